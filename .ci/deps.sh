@@ -1,0 +1,33 @@
+#!/bin/sh
+# Installs what the build needs with the system's package manager, as root or through sudo; where that is not possible it
+# prints the names of what is missing and ends with 1. Arguments: the pkg-config modules.
+missing=
+have() { command -v "$1" >/dev/null 2>&1; }
+have "${CC:-gcc}" || missing="$missing gcc"
+have "${CXX:-g++}" || missing="$missing g++"
+have pkg-config || missing="$missing pkg-config"
+for module in "$@"; do
+    if have pkg-config && pkg-config --exists "$module"; then continue; fi
+    case $module in
+    OpenImageIO) missing="$missing libopenimageio-dev" ;;
+    OpenEXR) missing="$missing libopenexr-dev" ;;
+    *) echo "deps: no package is known for $module" >&2; exit 1 ;;
+    esac
+done
+[ -z "$missing" ] && exit 0
+if ! have apt-get; then
+    echo "deps: missing (Debian's names):$missing; install them with your package manager and run make again" >&2
+    exit 1
+fi
+if [ "$(id -u)" -eq 0 ]; then run=
+elif have sudo && sudo -n true 2>/dev/null; then run=sudo
+elif have sudo && [ -t 0 ]; then run=sudo
+else
+    echo "deps: missing:$missing; as root: apt-get install$missing" >&2
+    exit 1
+fi
+echo "deps: installing$missing" >&2
+export DEBIAN_FRONTEND=noninteractive
+if $run apt-get update -qq >&2 && $run apt-get install -y -qq --no-install-recommends $missing >&2; then exit 0; fi
+echo "deps: could not install$missing (no network?); install them and run make again" >&2
+exit 1

@@ -1,0 +1,142 @@
+# lgd: make deps | make | make demo | make test | make bench | make install PREFIX= DESTDIR= | make asan
+CC ?= cc
+ifeq ($(origin CC),default)
+CC := gcc
+endif
+ifeq ($(origin CXX),default)
+CXX := g++
+endif
+PREFIX ?= /usr/local
+TESTDATA ?= ../shared/testdata
+FIXTURES ?= ../shared/fixtures
+BUILD ?= build
+OPT ?= -O3 -g
+SANITIZE ?=
+
+VERSION := 0.1.0
+PKG := OpenImageIO OpenEXR
+WARN := -Wall -Wextra -Wshadow
+CPPFLAGS_ALL = -I. -I$(BUILD)/gen -D_GNU_SOURCE -DLGD_VERSION='"$(VERSION)"' -DLGD_DATADIR='"$(PREFIX)/share/lgd"' $(CPPFLAGS)
+CFLAGS_ALL = -std=c11 $(OPT) $(WARN) -Wmissing-prototypes -fopenmp -fno-math-errno -fno-trapping-math -ffp-contract=off -fPIC $(SANITIZE) $(CFLAGS)
+CXXFLAGS_ALL = -std=c++17 $(OPT) $(WARN) -fPIC $(SANITIZE) $(CXXFLAGS)
+# Looked up only when something is compiled or linked with them, so that `make deps` and `make help` work without.
+PKG_CFLAGS = $(shell pkg-config --cflags $(PKG))
+PKG_LIBS = $(shell pkg-config --libs $(PKG))
+LDLIBS_ALL = $(PKG_LIBS) -fopenmp -lpthread -lm $(SANITIZE) $(LDLIBS)
+
+MACHINE := $(shell $(CC) -dumpmachine)
+ifneq (,$(filter x86_64%,$(MACHINE)))
+ISAS := base avx2 avx512
+else
+ISAS := base
+endif
+ISA_FLAGS_base :=
+ISA_FLAGS_avx2 := -mavx2 -mfma -mbmi2
+ISA_FLAGS_avx512 := -mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx2 -mfma -mbmi2 -mprefer-vector-width=512
+
+PROGRAMS := train infer eval data
+LIB_C := $(filter-out %main.c,$(wildcard tensor/*.c autograd/*.c render/*.c nn/*.c data/*.c train/*.c infer/*.c eval/*.c cli/*.c))
+KERNELS := $(wildcard tensor/kernels/*.c)
+OPS := $(sort $(wildcard autograd/op_*.c render/op_*.c))
+OBJ := $(BUILD)/obj
+LIB_OBJ := $(LIB_C:%.c=$(OBJ)/%.o) $(OBJ)/gen/op_list.o $(OBJ)/data/oiio.o \
+  $(foreach isa,$(ISAS),$(KERNELS:%.c=$(OBJ)/%.$(isa).o))
+LIB := $(BUILD)/liblgd.a
+BIN := $(PROGRAMS:%=$(BUILD)/bin/lgd-%)
+TEST_C := $(wildcard tests/*.c)
+BENCH_C := $(wildcard bench/*.c)
+TEST_BIN := $(BUILD)/bin/lgd-test
+BENCH_BIN := $(BUILD)/bin/lgd-bench
+
+all: $(BIN) $(LIB)
+
+$(BUILD)/bin/lgd-%: $(OBJ)/%/main.o $(LIB)
+	@mkdir -p $(@D)
+	$(CXX) -o $@ $< $(LIB) $(LDLIBS_ALL)
+
+$(TEST_BIN): $(TEST_C:%.c=$(OBJ)/%.o) $(LIB)
+	@mkdir -p $(@D)
+	$(CXX) -o $@ $^ $(LDLIBS_ALL)
+
+$(BENCH_BIN): $(BENCH_C:%.c=$(OBJ)/%.o) $(LIB)
+	@mkdir -p $(@D)
+	$(CXX) -o $@ $^ $(LDLIBS_ALL)
+
+$(LIB): $(LIB_OBJ)
+	@rm -f $@
+	$(AR) rcs $@ $^
+
+# Every object is rebuilt when the flags change.
+FLAGS_NOW := $(CC) $(CXX) $(OPT) $(SANITIZE) $(CFLAGS) $(CPPFLAGS) $(PREFIX) $(VERSION)
+$(shell mkdir -p $(BUILD)/gen; echo '$(FLAGS_NOW)' | cmp -s - $(BUILD)/gen/flags || echo '$(FLAGS_NOW)' > $(BUILD)/gen/flags)
+
+$(OBJ)/%.o: %.c $(BUILD)/gen/flags | $(BUILD)/gen/ops.h
+	@mkdir -p $(@D)
+	$(CC) $(CPPFLAGS_ALL) $(if $(filter data/%,$<),$(PKG_CFLAGS)) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
+
+$(OBJ)/gen/%.o: $(BUILD)/gen/%.c $(BUILD)/gen/flags
+	@mkdir -p $(@D)
+	$(CC) $(CPPFLAGS_ALL) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
+
+$(OBJ)/%.o: %.cpp $(BUILD)/gen/flags
+	@mkdir -p $(@D)
+	$(CXX) $(CPPFLAGS_ALL) $(PKG_CFLAGS) $(CXXFLAGS_ALL) -MMD -MP -c -o $@ $<
+
+# One kernel source, once per instruction set. Contraction to FMA is part of what a kernel is.
+define KERNEL_RULE
+$(OBJ)/tensor/kernels/%.$(1).o: tensor/kernels/%.c $(BUILD)/gen/flags
+	@mkdir -p $$(@D)
+	$$(CC) $$(CPPFLAGS_ALL) $$(CFLAGS_ALL) $$(ISA_FLAGS_$(1)) -ffp-contract=fast -DTS_ISA_SUFFIX=$(1) -MMD -MP -c -o $$@ $$<
+endef
+$(foreach isa,$(ISAS),$(eval $(call KERNEL_RULE,$(isa))))
+
+# The prototypes of all ops (the text between "#ifdef AG_API" and "#endif" in each autograd/op_*.c) and the list of their descriptors.
+$(BUILD)/gen/ops.h: $(filter autograd/%,$(OPS)) Makefile
+	@mkdir -p $(@D)
+	@{ echo '/* Made by make from autograd/op_*.c. */'; echo '#ifndef AG_OPS_H'; echo '#define AG_OPS_H'; \
+	  echo '#include "autograd/tape.h"'; \
+	  for f in $(sort $(filter autograd/%,$(OPS))); do sed -n '/^#ifdef AG_API$$/,/^#endif$$/{/^#/d;p}' $$f; done; echo '#endif'; } > $@.new
+	@cmp -s $@.new $@ && rm $@.new || mv $@.new $@
+$(BUILD)/gen/op_list.c: $(OPS) Makefile
+	@mkdir -p $(@D)
+	@{ echo '#include "autograd/op_list.h"'; for f in $(basename $(notdir $(OPS))); do echo "extern const ag_op $$f;"; done; \
+	  echo 'const ag_op *const ag_op_list[] = {'; for f in $(basename $(notdir $(OPS))); do echo "    &$$f,"; done; echo '    0};'; } > $@
+
+deps:
+	@sh .ci/deps.sh $(PKG)
+
+test: deps
+	@$(MAKE) --no-print-directory all $(TEST_BIN)
+	@BUILD=$(BUILD) TESTDATA=$(TESTDATA) FIXTURES=$(FIXTURES) sh tests/run.sh
+
+bench: all $(BENCH_BIN)
+	@TESTDATA=$(TESTDATA) $(BENCH_BIN)
+
+# The sanitizers' build lives beside the ordinary one.
+asan:
+	@$(MAKE) --no-print-directory BUILD=$(BUILD)/asan OPT='-O1 -g -fno-omit-frame-pointer' SANITIZE='-fsanitize=address,undefined -fno-sanitize-recover=all' test
+
+demo: deps
+	@$(MAKE) --no-print-directory all
+	@BUILD=$(BUILD) sh .ci/demo.sh
+
+install: all
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(PREFIX)/share/lgd
+	install -m 755 $(BIN) $(DESTDIR)$(PREFIX)/bin
+	install -m 644 $(LIB) $(DESTDIR)$(PREFIX)/lib
+	install -m 644 infer/lgd.h $(DESTDIR)$(PREFIX)/include
+	install -m 644 $(wildcard models/*.safetensors) $(DESTDIR)$(PREFIX)/share/lgd
+	@printf 'prefix=%s\nName: lgd\nDescription: material of a surface from one flash photograph\nVersion: %s\nCflags: -I$${prefix}/include\nLibs: -L$${prefix}/lib -llgd %s -fopenmp -lstdc++ -lm\n' \
+	  '$(PREFIX)' '$(VERSION)' '$(PKG_LIBS)' > $(DESTDIR)$(PREFIX)/lib/pkgconfig/lgd.pc
+
+uninstall:
+	rm -f $(PROGRAMS:%=$(DESTDIR)$(PREFIX)/bin/lgd-%) $(DESTDIR)$(PREFIX)/lib/liblgd.a $(DESTDIR)$(PREFIX)/lib/pkgconfig/lgd.pc \
+	  $(DESTDIR)$(PREFIX)/include/lgd.h $(patsubst models/%,$(DESTDIR)$(PREFIX)/share/lgd/%,$(wildcard models/*.safetensors))
+	-rmdir $(DESTDIR)$(PREFIX)/share/lgd
+
+clean:
+	rm -rf $(BUILD)
+
+.PHONY: all deps test bench asan demo install uninstall clean
+.SECONDARY:
+-include $(shell find $(OBJ) -name '*.d' 2>/dev/null)

@@ -1,0 +1,167 @@
+#include "cli/cli.h"
+#include "tensor/cpu.h"
+#include <ctype.h>
+#include <errno.h>
+#include <locale.h>
+#include <math.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+static const char *program_name = "lgd";
+
+int cl_init(const char *program)
+{
+    program_name = program;
+    setlocale(LC_ALL, "C");
+    signal(SIGPIPE, SIG_IGN);
+    ts_status st = {0};
+    if (ts_isa_init(&st) != TS_OK) return cl_usage("%s", st.message);
+    return CL_OK;
+}
+
+static void say(const char *format, va_list args)
+{
+    fflush(stdout);
+    fprintf(stderr, "%s: ", program_name);
+    vfprintf(stderr, format, args);
+    fputc('\n', stderr);
+}
+
+int cl_usage(const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    say(format, args);
+    va_end(args);
+    fprintf(stderr, "Try '%s --help'.\n", program_name);
+    return CL_USAGE;
+}
+
+int cl_failed(const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    say(format, args);
+    va_end(args);
+    return CL_FAILED;
+}
+
+void cl_note(const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    say(format, args);
+    va_end(args);
+}
+
+bool cl_parse_int(const char *text, int64_t lo, int64_t hi, int64_t *value)
+{
+    char *end;
+    errno = 0;
+    if (!*text || isspace((unsigned char)*text)) return false;
+    const long long v = strtoll(text, &end, 10);
+    if (errno || *end || v < lo || v > hi) return false;
+    *value = v;
+    return true;
+}
+
+bool cl_parse_real(const char *text, double lo, double hi, double *value)
+{
+    char *end;
+    errno = 0;
+    if (!*text || isspace((unsigned char)*text)) return false;
+    const double v = strtod(text, &end);
+    if ((errno && fabs(v) > 1) || *end || !(v >= lo && v <= hi)) return false; /* a denormal sets errno and is fine */
+    *value = v;
+    return true;
+}
+
+int cl_finish(int code)
+{
+    if (fflush(stdout) != 0 || ferror(stdout)) {
+        const int failed = cl_failed("cannot write to standard output: %s", strerror(errno));
+        return code ? code : failed;
+    }
+    return code;
+}
+
+void cl_print_version(void) { printf("%s (lgd) %s\n", program_name, LGD_VERSION); }
+
+double cl_seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+cl_progress cl_progress_start(const char *what, int64_t total)
+{
+    return (cl_progress){.what = what, .total = total, .start = cl_seconds(), .terminal = isatty(STDERR_FILENO)};
+}
+
+static void print_duration(char *out, size_t size, double s)
+{
+    const long t = (long)(s + 0.5);
+    if (t >= 3600) snprintf(out, size, "%ld:%02ld:%02ld", t / 3600, t / 60 % 60, t % 60);
+    else snprintf(out, size, "%ld:%02ld", t / 60, t % 60);
+}
+
+void cl_progress_show(cl_progress *p, int64_t done, const char *extra)
+{
+    const double now = cl_seconds();
+    if (!p->terminal || (now - p->last < 0.1 && done < p->total)) return;
+    p->last = now;
+    const double elapsed = now - p->start, rate = elapsed > 0 ? (double)done / elapsed : 0;
+    char eta[32] = "-";
+    if (rate > 0) print_duration(eta, sizeof eta, (double)(p->total - done) / rate);
+    fprintf(stderr, "\r\033[K%s %lld/%lld  %.2f/s  ETA %s  %s", p->what, (long long)done, (long long)p->total, rate, eta, extra ? extra : "");
+}
+
+void cl_progress_end(cl_progress *p)
+{
+    if (p->terminal && p->last > 0) fputs("\r\033[K", stderr);
+}
+
+static volatile sig_atomic_t interrupted;
+
+static void on_signal(int signal_number)
+{
+    if (interrupted) {
+        signal(signal_number, SIG_DFL);
+        raise(signal_number);
+    }
+    interrupted = 1;
+}
+
+void cl_catch_interrupt(void)
+{
+    struct sigaction action = {.sa_handler = on_signal};
+    sigemptyset(&action.sa_mask);
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+}
+
+bool cl_interrupted(void) { return interrupted != 0; }
+
+ts_code cl_make_folder(const char *path, ts_status *st)
+{
+    char part[4096];
+    const size_t length = strlen(path);
+    if (length == 0) return ts_fail(st, TS_INVALID, "an empty folder name");
+    if (length >= sizeof part) return ts_fail(st, TS_INVALID, "a folder name of %zu characters is too long", length);
+    for (size_t i = 1; i <= length; i++) {
+        if (path[i] != '/' && path[i] != 0) continue;
+        memcpy(part, path, i);
+        part[i] = 0;
+        if (mkdir(part, 0777) != 0 && errno != EEXIST) return ts_fail(st, TS_IO, "%s: cannot create the folder: %s", part, strerror(errno));
+    }
+    struct stat info;
+    if (stat(path, &info) != 0 || !S_ISDIR(info.st_mode)) return ts_fail(st, TS_IO, "%s: is not a folder", path);
+    return TS_OK;
+}

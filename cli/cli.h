@@ -1,0 +1,48 @@
+/* What the five programs share: exit codes, messages, progress, Ctrl-C. The only code besides the main.c files that prints. */
+#ifndef CL_CLI_H
+#define CL_CLI_H
+#include "tensor/status.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum { CL_OK = 0, CL_FAILED = 1, CL_USAGE = 2 };
+
+/* Locale "C" for numbers, SIGPIPE as an error of write, LGD_ISA checked. Returns CL_OK or prints one line and returns CL_USAGE. */
+int cl_init(const char *program);
+
+/* "program: message" on stderr. cl_usage adds "try 'program --help'" and returns CL_USAGE; cl_failed returns CL_FAILED. */
+int cl_usage(const char *format, ...) __attribute__((format(printf, 1, 2)));
+int cl_failed(const char *format, ...) __attribute__((format(printf, 1, 2)));
+void cl_note(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+/* Whole-string numbers in the C locale, within [lo, hi]; false otherwise. */
+bool cl_parse_int(const char *text, int64_t lo, int64_t hi, int64_t *value);
+bool cl_parse_real(const char *text, double lo, double hi, double *value);
+
+/* Flushes stdout; a failed write (closed pipe, full disk) prints one line and returns CL_FAILED, otherwise code. */
+int cl_finish(int code);
+
+/* --version's text on stdout. */
+void cl_print_version(void);
+
+/* A line on stderr with count, rate and ETA, only on a terminal, at most ten times a second. */
+typedef struct cl_progress {
+    const char *what;
+    int64_t total;
+    double start, last;
+    bool terminal;
+} cl_progress;
+cl_progress cl_progress_start(const char *what, int64_t total);
+void cl_progress_show(cl_progress *p, int64_t done, const char *extra /* or NULL */);
+void cl_progress_end(cl_progress *p);
+
+double cl_seconds(void); /* monotonic */
+
+/* Ctrl-C and SIGTERM set a flag; a second one ends the program at once. */
+void cl_catch_interrupt(void);
+bool cl_interrupted(void);
+
+/* Creates a folder and its parents; an existing folder is fine. */
+ts_code cl_make_folder(const char *path, ts_status *st);
+#endif

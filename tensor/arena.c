@@ -1,0 +1,120 @@
+#include "tensor/arena.h"
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { ALIGN = 64, MIN_CHUNK = 1 << 20, MAX_CHUNKS = 64 };
+
+struct ts_arena {
+    struct {
+        unsigned char *base;
+        size_t size;
+    } chunk[MAX_CHUNKS];
+    int chunks;
+    size_t at, used; /* the chunk in use and the bytes taken from it */
+    size_t total, peak;
+};
+
+ts_arena *ts_arena_create(size_t initial, ts_status *st)
+{
+    ts_arena *a = calloc(1, sizeof *a);
+    if (a && initial) {
+        initial = (initial + ALIGN - 1) / ALIGN * ALIGN;
+        a->chunk[0].base = aligned_alloc(ALIGN, initial);
+        if (a->chunk[0].base) {
+            a->chunk[0].size = initial;
+            a->chunks = 1;
+        } else {
+            free(a);
+            a = NULL;
+        }
+    }
+    if (!a) ts_fail(st, TS_NOMEM, "no memory for an arena of %zu bytes", initial);
+    return a;
+}
+
+static void free_chunks(ts_arena *a)
+{
+    for (int i = 0; i < a->chunks; i++) free(a->chunk[i].base);
+    a->chunks = 0;
+    a->at = a->used = 0;
+}
+
+void ts_arena_destroy(ts_arena **arena)
+{
+    if (!*arena) return;
+    free_chunks(*arena);
+    free(*arena);
+    *arena = NULL;
+}
+
+/* A chunk of at least bytes as chunk number a->chunks; sizes double so that MAX_CHUNKS never ends before memory does. */
+static int add_chunk(ts_arena *a, size_t bytes)
+{
+    if (a->chunks == MAX_CHUNKS) return 0;
+    size_t held = 0;
+    for (int i = 0; i < a->chunks; i++) held += a->chunk[i].size;
+    size_t size = held / 2 > bytes ? held / 2 : bytes;
+    if (size < MIN_CHUNK) size = MIN_CHUNK;
+    size = (size + ALIGN - 1) / ALIGN * ALIGN;
+    unsigned char *base = aligned_alloc(ALIGN, size);
+    if (!base && size > bytes) base = aligned_alloc(ALIGN, size = bytes);
+    if (!base) return 0;
+    a->chunk[a->chunks].base = base;
+    a->chunk[a->chunks].size = size;
+    a->chunks++;
+    return 1;
+}
+
+void *ts_arena_alloc(ts_arena *a, size_t bytes)
+{
+    if (bytes > SIZE_MAX / 4) return NULL;
+    bytes = bytes ? (bytes + ALIGN - 1) / ALIGN * ALIGN : ALIGN;
+    while (a->at >= (size_t)a->chunks || a->used + bytes > a->chunk[a->at].size) {
+        if (a->at + 1 < (size_t)a->chunks) {
+            a->at++;
+        } else {
+            if (!add_chunk(a, bytes)) return NULL;
+            a->at = (size_t)a->chunks - 1;
+        }
+        a->used = 0;
+    }
+    void *p = a->chunk[a->at].base + a->used;
+    a->used += bytes;
+    a->total += bytes;
+    if (a->total > a->peak) a->peak = a->total;
+    return p;
+}
+
+void *ts_arena_zalloc(ts_arena *a, size_t count, size_t size)
+{
+    if (size && count > SIZE_MAX / size) return NULL;
+    void *p = ts_arena_alloc(a, count * size);
+    if (p) memset(p, 0, count * size);
+    return p;
+}
+
+ts_mark ts_arena_mark(const ts_arena *a)
+{
+    return (ts_mark){a->at, a->used, a->total};
+}
+
+void ts_arena_release(ts_arena *a, ts_mark mark)
+{
+    a->at = mark.chunk;
+    a->used = mark.used;
+    a->total = mark.total;
+}
+
+void ts_arena_reset(ts_arena *a)
+{
+    if (a->chunks > 1) {
+        size_t size = a->peak + a->peak / 8; /* room for what fell between chunks */
+        free_chunks(a);
+        add_chunk(a, size); /* when this fails the next alloc reports it */
+    }
+    a->at = a->used = a->total = 0;
+}
+
+size_t ts_arena_used(const ts_arena *a) { return a->total; }
+size_t ts_arena_peak(const ts_arena *a) { return a->peak; }

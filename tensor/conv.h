@@ -1,0 +1,40 @@
+/* 2-D convolution on [N, H, W, C] images: stride 1, odd square kernels, dilation 1 or 2, same-size output, and its gradients.
+ * Threaded with OpenMP over fixed chunks: the same bytes for any number of threads. Weights are [OC, IC, K, K] in files and in
+ * parameter blocks and are packed for the kernels by ts_conv_pack. Every function trusts its shape (validated by ts_conv_check). */
+#ifndef TS_CONV_H
+#define TS_CONV_H
+#include "tensor/tensor.h"
+
+typedef enum ts_pad { TS_PAD_ZERO, TS_PAD_REPLICATE } ts_pad;
+
+typedef struct ts_conv {
+    int n, h, w;  /* images, rows, columns of input and output */
+    int ic, oc;   /* input and output channels */
+    int k;        /* kernel side: odd, 1 .. 15 */
+    int dilation; /* 1 or 2 */
+    ts_pad pad;   /* padding of dilation * (k - 1) / 2 on each side */
+} ts_conv;
+
+/* Which order the packed weights are in: for the output, or for the gradient of the input. */
+typedef enum ts_conv_use { TS_CONV_FORWARD, TS_CONV_DATA_GRADIENT } ts_conv_use;
+
+ts_code ts_conv_check(const ts_conv *c, ts_status *st);
+
+size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use); /* floats; does not depend on n, h, w */
+void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight /* [oc][ic][k][k] */, float *packed);
+
+/* y[n,i,j,o] = act(bias[o] + sum_{ky,kx,c} x[n, i + d(ky-k/2), j + d(kx-k/2), c] weight[o,c,ky,kx]),
+ * act(v) = v > 0 ? v : leak v (leak = 1: the identity, 0: ReLU). bias may be NULL. x and y contiguous, not overlapping. */
+void ts_conv_forward(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y);
+
+/* dx (+)= the gradient of the input given dy = the gradient before the activation. */
+void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
+
+/* dweight[oc][ic][k][k] += , dbias[oc] += (either may be NULL). */
+void ts_conv_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias);
+
+/* Naive twins: loop nests, sums in double; the same arguments with unpacked weights. */
+void ts_conv_forward_naive(const ts_conv *c, const float *x, const float *weight, const float *bias, float leak, float *y);
+void ts_conv_data_gradient_naive(const ts_conv *c, const float *dy, const float *weight, float *dx, bool accumulate);
+void ts_conv_weight_gradient_naive(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias);
+#endif

@@ -1,0 +1,22 @@
+/* Counter-based random numbers (Philox 4x32-10; Salmon et al., "Parallel Random Numbers: As Easy as 1, 2, 3", SC 2011):
+ * a stream is a function of (seed, stream, index), so that any thread can make any part of it. */
+#ifndef TS_RNG_H
+#define TS_RNG_H
+#include <stdint.h>
+
+typedef struct ts_rng {
+    uint32_t key[2], counter[4], block[4];
+    int left; /* values of block not yet given out */
+} ts_rng;
+
+/* Independent sequences for different (seed, stream, index); stream names the purpose (TS_STREAM_...). */
+ts_rng ts_rng_make(uint64_t seed, uint32_t stream, uint64_t index);
+
+enum { TS_STREAM_INIT = 1, TS_STREAM_MATERIAL = 2, TS_STREAM_SCENE = 3, TS_STREAM_CAMERA = 4, TS_STREAM_TEST = 5, TS_STREAM_EVAL = 6, TS_STREAM_TRAIN = 7 };
+
+uint32_t ts_rng_u32(ts_rng *r);
+float ts_rng_uniform(ts_rng *r);                    /* [0, 1), 24 bits */
+float ts_rng_range(ts_rng *r, float lo, float hi);  /* [lo, hi) */
+int ts_rng_int(ts_rng *r, int n);                   /* 0 .. n-1, n >= 1, unbiased to 2^-32 */
+float ts_rng_normal(ts_rng *r);                     /* mean 0, standard deviation 1 (Box-Muller in double) */
+#endif

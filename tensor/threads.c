@@ -1,0 +1,109 @@
+#include "tensor/threads.h"
+#include <omp.h>
+#include <pthread.h>
+#include <sched.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static atomic_int wanted;
+
+/* CPUs' worth of quota in a cgroup v2 or v1 hierarchy as a container sees it, or 0 for none. */
+static int quota_in(const char *max_path, const char *quota_path, const char *period_path)
+{
+    long long quota = -1, period = -1;
+    FILE *f = fopen(max_path, "re");
+    if (f) {
+        if (fscanf(f, "%lld %lld", &quota, &period) != 2) quota = -1; /* the word "max": no limit */
+        fclose(f);
+    } else {
+        FILE *q = fopen(quota_path, "re"), *p = fopen(period_path, "re");
+        if (!q || !p || fscanf(q, "%lld", &quota) != 1 || fscanf(p, "%lld", &period) != 1) quota = -1;
+        if (q) fclose(q);
+        if (p) fclose(p);
+    }
+    if (quota <= 0 || period <= 0) return 0;
+    return (int)((quota + period - 1) / period);
+}
+
+/* The process's own cgroup v2 path, where it is not a container's root. */
+static int quota_of_self(void)
+{
+    char line[512], path[600];
+    int least = 0;
+    FILE *f = fopen("/proc/self/cgroup", "re");
+    if (!f) return 0;
+    while (fgets(line, sizeof line, f)) {
+        if (strncmp(line, "0::", 3) != 0) continue;
+        line[strcspn(line, "\n")] = 0;
+        /* A limit may stand at any level above. */
+        for (char *end = line + strlen(line); end > line + 3; end = strrchr(line + 3, '/')) {
+            *end = 0;
+            snprintf(path, sizeof path, "/sys/fs/cgroup%s/cpu.max", line + 3);
+            const int q = quota_in(path, "", "");
+            if (q && (!least || q < least)) least = q;
+            if (!strchr(line + 3, '/')) break;
+        }
+    }
+    fclose(f);
+    return least;
+}
+
+int ts_threads_allowed(void)
+{
+    int n = 1;
+    cpu_set_t set;
+    if (sched_getaffinity(0, sizeof set, &set) == 0) n = CPU_COUNT(&set);
+    const int root = quota_in("/sys/fs/cgroup/cpu.max", "/sys/fs/cgroup/cpu/cpu.cfs_quota_us", "/sys/fs/cgroup/cpu/cpu.cfs_period_us");
+    const int self = quota_of_self();
+    if (root && root < n) n = root;
+    if (self && self < n) n = self;
+    return n < 1 ? 1 : n;
+}
+
+void ts_threads_set(int n) { atomic_store(&wanted, n >= 1 ? n : ts_threads_allowed()); }
+
+int ts_threads(void)
+{
+    if (atomic_load_explicit(&wanted, memory_order_relaxed) == 0) ts_threads_set(0);
+    return atomic_load_explicit(&wanted, memory_order_relaxed);
+}
+
+typedef struct scratch {
+    void *memory[TS_SCRATCH_SLOTS];
+    size_t size[TS_SCRATCH_SLOTS];
+} scratch;
+
+static pthread_key_t key;
+static pthread_once_t once = PTHREAD_ONCE_INIT;
+
+static void free_scratch(void *p)
+{
+    scratch *s = p;
+    for (int i = 0; i < TS_SCRATCH_SLOTS; i++) free(s->memory[i]);
+    free(s);
+}
+
+static void make_key(void)
+{
+    if (pthread_key_create(&key, free_scratch) != 0) abort();
+}
+
+void *ts_scratch(int slot, size_t bytes)
+{
+    pthread_once(&once, make_key);
+    scratch *s = pthread_getspecific(key);
+    if (!s) {
+        s = calloc(1, sizeof *s);
+        if (!s || pthread_setspecific(key, s) != 0) abort();
+    }
+    if (s->size[slot] < bytes) {
+        bytes = (bytes + 4095) / 4096 * 4096;
+        free(s->memory[slot]);
+        s->memory[slot] = aligned_alloc(64, bytes);
+        if (!s->memory[slot]) abort();
+        s->size[slot] = bytes;
+    }
+    return s->memory[slot];
+}

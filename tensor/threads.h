@@ -1,0 +1,16 @@
+/* How many threads the OpenMP loops use, and scratch memory for each of them. */
+#ifndef TS_THREADS_H
+#define TS_THREADS_H
+#include <stddef.h>
+
+/* n >= 1: use n threads; 0: as many as the process may use (affinity mask and cgroup CPU quota). */
+void ts_threads_set(int n);
+int ts_threads(void);
+int ts_threads_allowed(void); /* what 0 stands for */
+
+/* At least bytes of 64-byte aligned memory that belong to the calling thread and slot (0 .. TS_SCRATCH_SLOTS-1) until the
+ * next call with that slot on that thread. Grows only, never shrinks, so a repeated workload stops allocating. Never NULL:
+ * when memory is out it prints nothing and aborts, since no kernel can go on. */
+enum { TS_SCRATCH_SLOTS = 4 };
+void *ts_scratch(int slot, size_t bytes);
+#endif

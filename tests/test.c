@@ -1,0 +1,146 @@
+/* Runs every registered test in a process of its own, so that a crash is one failure and not the end, and prints
+ * "ok NAME", "FAIL NAME: why" or "skip NAME: why" for each. An argument selects the tests whose name contains it. */
+#include "tests/test.h"
+#include "tensor/cpu.h"
+#include <errno.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+enum { MAX_TESTS = 1024, LIMIT_SECONDS = 600 };
+
+static struct {
+    const char *name;
+    test_function f;
+} tests[MAX_TESTS];
+static int count;
+static int report = -1; /* the pipe to the runner */
+static char folder[64];
+
+void test_register(const char *name, test_function f)
+{
+    if (count == MAX_TESTS) abort();
+    tests[count].name = name;
+    tests[count++].f = f;
+}
+
+static void remove_folder(void)
+{
+    if (!folder[0]) return;
+    char command[128];
+    snprintf(command, sizeof command, "rm -rf '%s'", folder);
+    if (system(command) != 0) fprintf(stderr, "cannot remove %s\n", folder);
+}
+
+static _Noreturn void leave(char kind, const char *text)
+{
+    char line[1024];
+    const int n = snprintf(line, sizeof line, "%c%s", kind, text);
+    if (write(report, line, (size_t)(n < (int)sizeof line ? n : (int)sizeof line - 1)) < 0) perror("report");
+    remove_folder();
+    fflush(NULL);
+    _exit(kind == 'F');
+}
+
+void test_fail(const char *file, int line, const char *format, ...)
+{
+    char text[900];
+    const int n = snprintf(text, sizeof text, "%s:%d: ", file, line);
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text + n, sizeof text - (size_t)n, format, args);
+    va_end(args);
+    leave('F', text);
+}
+
+void test_skip(const char *format, ...)
+{
+    char text[900];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    leave('S', text);
+}
+
+static const char *existing(const char *variable, const char *fallback)
+{
+    const char *path = getenv(variable);
+    if (!path || !*path) path = fallback;
+    struct stat info;
+    if (stat(path, &info) != 0) test_skip("%s is absent (set %s)", path, variable);
+    return path;
+}
+
+const char *test_data(void) { return existing("TESTDATA", "../shared/testdata"); }
+const char *test_fixtures(void) { return existing("FIXTURES", "../shared/fixtures"); }
+
+const char *test_build(void)
+{
+    const char *b = getenv("BUILD");
+    return b && *b ? b : "build";
+}
+
+const char *test_folder(void)
+{
+    if (!folder[0]) {
+        strcpy(folder, "/tmp/lgd-test-XXXXXX");
+        if (!mkdtemp(folder)) test_fail(__FILE__, __LINE__, "mkdtemp: %s", strerror(errno));
+    }
+    return folder;
+}
+
+static int by_name(const void *a, const void *b)
+{
+    return strcmp(*(const char *const *)a, *(const char *const *)b);
+}
+
+/* 0 ok, 1 failed, 2 skipped */
+static int run(int i)
+{
+    int ends[2];
+    if (pipe(ends) != 0) abort();
+    fflush(NULL);
+    const pid_t child = fork();
+    if (child < 0) abort();
+    if (child == 0) {
+        close(ends[0]);
+        report = ends[1];
+        alarm(LIMIT_SECONDS);
+        tests[i].f();
+        leave('O', "");
+    }
+    close(ends[1]);
+    char text[1024];
+    size_t used = 0;
+    for (ssize_t n; (n = read(ends[0], text + used, sizeof text - 1 - used)) > 0;) used += (size_t)n;
+    text[used] = 0;
+    close(ends[0]);
+    int status;
+    waitpid(child, &status, 0);
+    const int failed_exit = !(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+    if (text[0] == 'F') printf("FAIL %s: %s\n", tests[i].name, text + 1);
+    else if (WIFSIGNALED(status)) printf("FAIL %s: killed by signal %d (%s)\n", tests[i].name, WTERMSIG(status), strsignal(WTERMSIG(status)));
+    else if (failed_exit || (text[0] != 'O' && text[0] != 'S')) printf("FAIL %s: ended with status %d without a report\n", tests[i].name, WIFEXITED(status) ? WEXITSTATUS(status) : -1);
+    else if (text[0] == 'S') printf("skip %s: %s\n", tests[i].name, text + 1);
+    else printf("ok %s\n", tests[i].name);
+    fflush(stdout);
+    return text[0] == 'F' || failed_exit ? 1 : text[0] == 'S' ? 2 : 0;
+}
+
+int main(int argc, char **argv)
+{
+    ts_status st = {0};
+    if (ts_isa_init(&st) != TS_OK) {
+        fprintf(stderr, "%s\n", st.message);
+        return 2;
+    }
+    qsort(tests, (size_t)count, sizeof tests[0], by_name);
+    int failed = 0;
+    for (int i = 0; i < count; i++)
+        if (argc < 2 || strstr(tests[i].name, argv[1])) failed += run(i) == 1;
+    return failed != 0;
+}
