@@ -1,0 +1,29 @@
+/* The bench's interface. A file bench/bench_NAME.c holds BENCH(name) { … } blocks, run in order of name by build/bin/lgd-bench. */
+#ifndef BENCH_H
+#define BENCH_H
+
+typedef void (*bench_function)(void);
+void bench_register(const char *name, bench_function f);
+#define BENCH(name)                                                                                    \
+    static void bench_##name(void);                                                                    \
+    __attribute__((constructor)) static void register_##name(void) { bench_register(#name, bench_##name); } \
+    static void bench_##name(void)
+
+/* Median seconds of one call of f(user), after a warm-up, for about a third of a second in all. The FMA peak is measured before
+ * and after, so that a row's fraction refers to the machine's speed at that moment. */
+typedef struct bench_time {
+    double seconds; /* median of one call */
+    double peak;    /* FLOP/s of the FMA peak with the threads in use, the mean of before and after */
+    int runs;
+} bench_time;
+bench_time bench_measure(void (*f)(void *user), void *user);
+
+/* FLOP/s of independent FMAs in registers on all threads in use, now (about 20 ms). */
+double bench_fma_peak(void);
+
+/* A row: label, milliseconds, GFLOP/s and the fraction of the peak (flop = 0: no such columns). */
+void bench_row(const char *label, bench_time t, double flop);
+/* A row with a figure in another unit, for example 150.2 "Mpixel/s". */
+void bench_row_unit(const char *label, bench_time t, double value, const char *unit);
+void bench_heading(const char *text);
+#endif

@@ -1,0 +1,39 @@
+/* Images in memory and in files. Floats, [height, width, channels], channels 1, 3 or 4, top row first. */
+#ifndef IO_IMAGE_H
+#define IO_IMAGE_H
+#include "tensor/status.h"
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct io_image {
+    int width, height, channels;
+    float *data; /* owned; freed by io_image_free */
+} io_image;
+
+ts_code io_image_create(io_image *image, int width, int height, int channels, ts_status *st); /* zeros */
+void io_image_free(io_image *image); /* and zeroes the struct */
+
+#define IO_MAX_PIXELS_DEFAULT (1 << 28)
+
+/* A photograph: any format that OpenImageIO reads, turned upright by its EXIF orientation, alpha dropped (composited on black),
+ * grey spread to three channels, CMYK and other colour models converted, colour space honoured (sRGB by default for integer formats, Display-P3 and Adobe RGB
+ * by their profile, linear for float formats), to LINEAR sRGB primaries. Negative and NaN become 0; values over 1 stay.
+ * The size is checked against max_pixels before memory is taken. */
+ts_code io_read_photo(const char *path, int64_t max_pixels, io_image *image, ts_status *st);
+
+/* A data image (a map): values as stored, integers / their maximum, no colour transform, orientation ignored. channels: 1 or 3 forced. */
+ts_code io_read_data(const char *path, int channels, int64_t max_pixels, io_image *image, ts_status *st);
+
+/* The largest centred square, resampled to size x size by an antialiased filter in linear light. */
+ts_code io_centre_square(const io_image *in, int size, io_image *out, ts_status *st);
+
+/* PNG, bits 8 or 16; srgb: encode linear values by the sRGB curve and tag the file so. Values are clamped to [0, 1]. Written to
+ * a temporary file and renamed. text: an optional comment ("Description"), or NULL. */
+ts_code io_write_png(const char *path, const io_image *image, int bits, bool srgb, ts_status *st);
+ts_code io_write_jpeg(const char *path, const io_image *image, int quality, ts_status *st); /* linear in, sRGB out */
+
+/* sRGB curve (IEC 61966-2-1), the only place that has it. */
+float io_srgb_to_linear(float v);
+float io_linear_to_srgb(float v);
+#endif

@@ -1,0 +1,40 @@
+/* Materials: maps [size, size, 9] in the encoding of tensor/maps.h, from files or procedures. */
+#ifndef IO_MATERIAL_H
+#define IO_MATERIAL_H
+#include "data/image.h"
+#include "tensor/maps.h"
+
+typedef struct io_material {
+    int size;
+    float *maps; /* owned, [size][size][MAP_CHANNELS] */
+    char name[128];
+} io_material;
+
+ts_code io_material_create(io_material *m, int size, ts_status *st);
+void io_material_free(io_material *m);
+
+/* A map folder: basecolor/albedo/diffuse, normal, roughness, metallic or specular; conventions from meta.txt (see the reader)
+ * or from the options; what is ambiguous is an error. Resampled to size (0: as stored, centre square). */
+typedef enum io_normal { IO_NORMAL_FROM_FILE, IO_NORMAL_GL, IO_NORMAL_DX } io_normal;
+ts_code io_read_map_folder(const char *path, io_normal convention, int size, io_material *m, ts_status *st);
+
+/* A strip: equal square panels side by side: input | normal | diffuse | roughness | specular, all linear, OpenGL y. input (may be
+ * NULL) gets the first panel, linear. */
+ts_code io_read_strip(const char *path, int size, io_material *m, io_image *input, ts_status *st);
+
+/* diffuse.png, specular.png (sRGB), roughness.png, normal.png (linear, 16 bit where it matters) and maps.exr (all channels linear
+ * float) into the folder; with masks from IO_MAPS_... and the normal's y flipped for DirectX. */
+enum { IO_MAPS_DIFFUSE = 1, IO_MAPS_SPECULAR = 2, IO_MAPS_ROUGHNESS = 4, IO_MAPS_NORMAL = 8, IO_MAPS_EXR = 16, IO_MAPS_ALL = 31 };
+ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st);
+/* A five-panel strip as io_read_strip reads it (16-bit PNG); input is linear, size x size. */
+ts_code io_write_strip(const char *path, const io_material *m, const io_image *input, ts_status *st);
+/* maps.exr back. */
+ts_code io_read_maps_exr(const char *path, io_material *m, ts_status *st);
+
+/* The reconstructed normal and physical values of one pixel, for writers and statistics. */
+typedef struct io_texel {
+    float diffuse[3], normal[3], roughness, specular[3];
+} io_texel;
+io_texel io_texel_get(const float *maps9);
+void io_texel_put(float *maps9, const io_texel *t); /* the normal is normalised; z < 0 is an error of the caller */
+#endif

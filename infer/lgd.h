@@ -1,0 +1,47 @@
+/* lgd: the material of a flat surface from one flash photograph. The public C API. */
+#ifndef LGD_H
+#define LGD_H
+#include <stddef.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct lgd_model lgd_model;
+
+/* One line of text about the last failure of that call; empty after success. */
+typedef struct lgd_error {
+    int code; /* 0: none */
+    char message[512];
+} lgd_error;
+
+/* Reads weights (safetensors). NULL and error on failure. The caller frees. One model may serve one call at a time. */
+lgd_model *lgd_load(const char *weights, lgd_error *error);
+void lgd_free(lgd_model **model);
+
+int lgd_trained_iterations(const lgd_model *model); /* the T that the model was trained for */
+
+typedef struct lgd_options {
+    int iterations; /* refinement steps; 0: R_0 alone, -1: as trained */
+    int threads;    /* 0: as many as the process may use */
+    /* Called after R_0 (step 0) and after every refinement with the reconstruction RMSE; return nonzero to stop there. May be NULL. */
+    int (*progress)(int step, double rmse, void *user);
+    void *user;
+} lgd_options;
+lgd_options lgd_options_default(void);
+
+/* image: side x side x 3 linear values (clamped to [0, 1] here), top row first. maps: side x side x 9, in [0, 1] where not said
+ * otherwise: diffuse rgb, normal x and y in [-1, 1] (OpenGL, z = sqrt(1 - x^2 - y^2)), roughness, specular F0 rgb.
+ * Returns 0, or nonzero with error set and maps unspecified. */
+int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps, lgd_error *error);
+
+/* Renders maps as returned by lgd_estimate under a point light and a camera (positions in patch widths, the sample is
+ * [-1/2, 1/2]^2 at z = 0, y up): image is side x side x 3, linear. */
+int lgd_render(const float *maps, int side, const float light[3], const float camera[3], float power, float *image, lgd_error *error);
+
+const char *lgd_version(void);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

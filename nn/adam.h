@@ -1,0 +1,24 @@
+/* Adam (Kingma and Ba, ICLR 2015) without weight decay, learning-rate schedule, gradient clipping and EMA, on whole blocks. */
+#ifndef NN_ADAM_H
+#define NN_ADAM_H
+#include "nn/model.h"
+
+typedef struct nn_adam {
+    float *m, *v, *ema; /* aligned blocks like the model's; ema NULL when ema_decay is 0 */
+    size_t count;
+    int64_t step;       /* updates made so far */
+    float beta1, beta2, epsilon, ema_decay;
+} nn_adam;
+
+ts_code nn_adam_create(nn_adam *adam, const nn_model *model, float ema_decay, ts_status *st);
+void nn_adam_free(nn_adam *adam);
+
+/* The norm of the gradient block's range [first, last), in double; NaN or infinity when any value is. */
+double nn_gradient_norm(const nn_model *model, size_t first, size_t last);
+
+/* One update of [first, last) with gradients multiplied by scale (for clipping), then the gradients are zeroed. step counts once a call. */
+void nn_adam_step(nn_adam *adam, nn_model *model, size_t first, size_t last, float rate, float scale);
+
+/* Linear warm-up over warmup steps, then a cosine from rate to rate * floor at total. step counts from 0. */
+float nn_learning_rate(float rate, float floor, int64_t step, int64_t warmup, int64_t total);
+#endif

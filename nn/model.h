@@ -1,0 +1,87 @@
+/* The network: its architecture as plain data, its parameters in one block, and the ONE definition of the unrolled loop. */
+#ifndef NN_MODEL_H
+#define NN_MODEL_H
+#include "autograd/tape.h"
+#include "render/scene.h"
+
+typedef enum nn_rmse {
+    NN_RMSE_START, /* per image, taken from R_0 once (ours) */
+    NN_RMSE_BATCH  /* over the whole batch, anew at every step (published) */
+} nn_rmse;
+
+/* Everything that a weights file must say about itself (its metadata, one key each). */
+typedef struct nn_arch {
+    int channels;       /* of the maps: 9, or 10 (published) */
+    int g_width;        /* of g's first convolution; level i has min(g_width * 2^i, g_width_max) */
+    int g_width_max;
+    int g_levels;       /* down blocks, 1 .. 8 */
+    int g_kernel_first; /* of the first down block: odd */
+    int g_kernel;       /* of all others */
+    int g_size;         /* side in pixels that g works at (a multiple of 2^g_levels); a photograph of another size is resampled for g */
+    int h_width;        /* of h's convolutions; 0: no refiner */
+    int h_gru;          /* of h's states */
+    int iterations;     /* T that it was trained for */
+    bool recurrent;     /* h carries its states from step to step */
+    bool gradient;      /* h reads the gradient (false: zeros, the ablation) */
+    bool mean_before_norm; /* the global track's mean: before (ours) or after (published) the normalisation */
+    nn_rmse rmse;
+} nn_arch;
+
+nn_arch nn_arch_default(void);
+ts_code nn_arch_check(const nn_arch *a, ts_status *st);
+
+typedef struct nn_param {
+    char name[96];
+    int rank, dim[4]; /* convolution [oc, ic, k, k], linear [out, in], bias [out] */
+    size_t offset, count; /* floats into the blocks */
+} nn_param;
+
+typedef struct nn_model {
+    nn_arch arch;
+    nn_param *param;
+    int params;
+    size_t count;  /* floats in a block (each parameter starts at a multiple of 16) */
+    float *value;  /* one aligned block */
+    float *grad;   /* the same, or NULL until nn_model_train */
+    void *layers;  /* nn's own */
+} nn_model;
+
+/* Parameters are allocated and zero. The caller frees. NULL and st on failure. */
+nn_model *nn_model_create(const nn_arch *arch, ts_status *st);
+void nn_model_free(nn_model **model);
+
+/* Allocates the gradient block (zero); idempotent. */
+ts_code nn_model_train(nn_model *model, ts_status *st);
+
+/* Kaiming for what a leaky ReLU or SELU follows, orthogonal for the recurrent weights, sigma 1e-3 for h's last layer, zero biases. */
+void nn_model_init(nn_model *model, uint64_t seed);
+
+const nn_param *nn_model_find(const nn_model *model, const char *name);
+/* The parameters of g alone and of h alone: [first, last) in floats of the block (g comes first). */
+void nn_model_range(const nn_model *model, bool refiner, size_t *first, size_t *last);
+
+/* One photograph batch. image: linear, clamped to [0, 1], [N, S, S, 3]. */
+typedef struct nn_input {
+    ts_tensor image;
+    rd_grid grid;  /* of every image in the batch */
+    rd_view view;  /* the flash */
+} nn_input;
+
+/* R_0 by g: [N, S, S, channels]. The log encoding, the resampling to g_size and back are in here. */
+ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in);
+
+/* What h keeps from step to step, and the loss's scale; zero-initialise it. */
+typedef struct nn_state {
+    ag_value *gru[2];
+    double *rmse0; /* per image, in the tape's arena */
+    int step;
+} nn_state;
+
+/* R_{t+1} = R_t + h(R_t, dL/dR_t). */
+ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
+
+/* The unrolled loop: maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate
+ * memory is released on a tape without gradients. after (may be NULL) sees every R_t and may stop the loop by returning false. */
+typedef bool (*nn_after)(int step, const ag_value *maps, void *user);
+ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps, nn_after after, void *user);
+#endif

@@ -1,0 +1,39 @@
+/* Weights and checkpoints as safetensors files; the metadata carries the architecture. The reader trusts nothing in a file. */
+#ifndef NN_WEIGHTS_H
+#define NN_WEIGHTS_H
+#include "nn/model.h"
+
+/* A writer of any named f32 blocks: used for weights (name "g.…", "h.…") and by the trainer for checkpoints. */
+typedef struct nn_block {
+    const char *name;
+    int rank;
+    int64_t dim[4];
+    const float *data;
+} nn_block;
+typedef struct nn_meta {
+    const char *key, *value;
+} nn_meta;
+
+/* Written to a temporary file beside path, fsynced, renamed; nothing is left on failure. */
+ts_code nn_safetensors_write(const char *path, const nn_block *blocks, int count, const nn_meta *meta, int metas, ts_status *st);
+
+/* A mapped, validated file. F32, F16 and BF16 tensors can be read. */
+typedef struct nn_file nn_file;
+nn_file *nn_safetensors_open(const char *path, ts_status *st);
+void nn_safetensors_close(nn_file **file);
+int nn_safetensors_count(const nn_file *file);
+const char *nn_safetensors_name(const nn_file *file, int i);
+const char *nn_safetensors_meta(const nn_file *file, const char *key); /* NULL when absent */
+/* Copies tensor name into out (count floats); TS_FORMAT when it is missing or has another shape. */
+ts_code nn_safetensors_read(const nn_file *file, const char *name, int rank, const int64_t *dim, float *out, ts_status *st);
+
+/* A model with its parameters from a file that says its own architecture. */
+nn_model *nn_model_load(const char *path, ts_status *st);
+/* values: the block to write, model->value or an EMA. Extra metadata may be given. TS_NUMERIC when a value is not finite. */
+ts_code nn_model_save(const nn_model *model, const float *values, const char *path, const nn_meta *extra, int extras, ts_status *st);
+/* Parameters that have the same name and shape are taken from the file; how many were, and were not, is returned through the pointers. */
+ts_code nn_model_init_from(nn_model *model, const char *path, int *taken, int *left, ts_status *st);
+/* The architecture to metadata and back. */
+int nn_arch_to_meta(const nn_arch *arch, nn_meta *meta, int capacity, char *text, size_t text_size);
+ts_code nn_arch_from_file(const nn_file *file, nn_arch *arch, ts_status *st);
+#endif

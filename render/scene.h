@@ -1,0 +1,45 @@
+/* Where the sample, the cameras and the lights are (DESIGN: the sample is the square [-1/2, 1/2]^2 at z = 0 in patch widths;
+ * x right, y up, z toward the camera). */
+#ifndef RD_SCENE_H
+#define RD_SCENE_H
+#include "tensor/rng.h"
+#include "tensor/status.h"
+
+/* The pixels that a map or an image holds: rows y0 .. y0+h-1 and columns x0 .. x0+w-1 of a sample that is side x side pixels.
+ * Pixel (column i, row j) has its centre at ((i + 1/2) / side - 1/2, 1/2 - (j + 1/2) / side). */
+typedef struct rd_grid {
+    int h, w, y0, x0, side;
+} rd_grid;
+
+rd_grid rd_grid_full(int side);
+
+typedef enum rd_kind {
+    RD_POINT,      /* positions; radiance = f max(n.l, 0) power / |light - x|^2, not clamped */
+    RD_DIRECTIONS, /* camera and light are unit directions, the same for every pixel; radiance = f pi max(n.l, 0) / max(l_z, 0.001) */
+    RD_NEAR        /* positions; radiance as RD_DIRECTIONS, without distance falloff */
+} rd_kind;
+
+typedef struct rd_view {
+    rd_kind kind;
+    float camera[3], light[3];
+    float power; /* RD_POINT only */
+} rd_view;
+
+/* The flash photograph: camera and light at (0, 0, RD_FLASH_DISTANCE), power RD_FLASH_POWER. */
+#define RD_FLASH_DISTANCE (250.0f / 256.0f)
+#define RD_FLASH_POWER (329288.0f / 65536.0f)
+rd_view rd_flash(void);
+
+/* The training loss's views: the first diffuse ones with directions r = sqrt(0.94 u + 0.01), phi uniform on the hemisphere for
+ * both; the rest specular: view so, light its mirror image about z, distances exp(N(0.5, 0.75)) from one point uniform on the
+ * patch (distances in half patch widths, lift 1e-4). Deschaintre et al., "Single-Image SVBRDF Capture with a Rendering-Aware
+ * Deep Network", 2018, section 4.2. */
+enum { RD_LOSS_DIFFUSE = 3, RD_LOSS_SPECULAR = 6, RD_LOSS_VIEWS = 9 };
+void rd_loss_views(ts_rng *rng, rd_view views[RD_LOSS_VIEWS]);
+
+/* Evaluation (DESIGN section 5): camera and light each uniform over the square [-1/2, 1/2]^2 at z = RD_FLASH_DISTANCE, power RD_FLASH_POWER. */
+void rd_eval_views(ts_rng *rng, int count, rd_view *views);
+
+/* The preview's light positions: index 0 .. count-1 around the sample, camera at the flash's place. */
+rd_view rd_preview_view(int index, int count);
+#endif
