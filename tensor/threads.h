@@ -13,4 +13,8 @@ int ts_threads_allowed(void); /* what 0 stands for */
  * when memory is out it prints nothing and aborts, since no kernel can go on. */
 enum { TS_SCRATCH_SLOTS = 4 };
 void *ts_scratch(int slot, size_t bytes);
+
+/* Between steps, while no scratch is in use: every thread grows its slots to the largest size that any thread has asked for.
+ * Under a dynamic schedule a thread may meet its largest task late; after this it finds the memory there. */
+void ts_scratch_level(void);
 #endif

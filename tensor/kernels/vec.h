@@ -26,8 +26,17 @@ static inline void v_store(float *p, vf x) { *(vf_u *)p = x; }
 static inline vf v_set(float x) { return x - (vf){0}; }
 static inline vi v_seti(int32_t x) { return x - (vi){0}; }
 static inline vf v_select(vi mask, vf a, vf b) { return (vf)((mask & (vi)a) | (~mask & (vi)b)); }
-static inline vf v_max(vf a, vf b) { return v_select(a > b, a, b); } /* b where either is NaN */
-static inline vf v_min(vf a, vf b) { return v_select(a < b, a, b); } /* b where either is NaN */
+/* a > b ? a : b and a < b ? a : b, so b where either is NaN. The instructions mean exactly that, but gcc does not find them. */
+#if defined(__AVX512F__)
+static inline vf v_max(vf a, vf b) { return (vf)_mm512_max_ps((__m512)a, (__m512)b); }
+static inline vf v_min(vf a, vf b) { return (vf)_mm512_min_ps((__m512)a, (__m512)b); }
+#elif defined(__AVX2__)
+static inline vf v_max(vf a, vf b) { return (vf)_mm256_max_ps((__m256)a, (__m256)b); }
+static inline vf v_min(vf a, vf b) { return (vf)_mm256_min_ps((__m256)a, (__m256)b); }
+#else
+static inline vf v_max(vf a, vf b) { return v_select(a > b, a, b); }
+static inline vf v_min(vf a, vf b) { return v_select(a < b, a, b); }
+#endif
 static inline vf v_abs(vf a) { return (vf)((vi)a & v_seti(0x7fffffff)); }
 
 static inline vf v_sqrt(vf x)
@@ -53,12 +62,37 @@ static inline float v_sum(vf x)
     return a[0];
 }
 
-/* n < VL values; the other lanes are 0. */
+/* The first n values, 0 <= n < VL; the other lanes are 0 and their memory is not touched. */
 static inline vf v_load_n(const float *p, int n)
 {
+#if defined(__AVX512F__)
+    return (vf)_mm512_maskz_loadu_ps((__mmask16)((1u << n) - 1), p);
+#elif defined(__AVX2__)
+    const vi lane = {0, 1, 2, 3, 4, 5, 6, 7};
+    return (vf)_mm256_maskload_ps(p, (__m256i)(lane < v_seti(n)));
+#else
     vf x = {0};
-    memcpy(&x, p, (size_t)n * sizeof(float));
+    for (int i = 0; i < n; i++) x[i] = p[i];
     return x;
+#endif
 }
-static inline void v_store_n(float *p, vf x, int n) { memcpy(p, &x, (size_t)n * sizeof(float)); }
+static inline void v_store_n(float *p, vf x, int n)
+{
+#if defined(__AVX512F__)
+    _mm512_mask_storeu_ps(p, (__mmask16)((1u << n) - 1), (__m512)x);
+#elif defined(__AVX2__)
+    const vi lane = {0, 1, 2, 3, 4, 5, 6, 7};
+    _mm256_maskstore_ps(p, (__m256i)(lane < v_seti(n)), (__m256)x);
+#else
+    for (int i = 0; i < n; i++) p[i] = x[i];
+#endif
+}
+
+/* left > 0 values or VL of them, whichever is less: for the last step of a loop. */
+static inline vf v_load_part(const float *p, int64_t left) { return left >= VL ? v_load(p) : v_load_n(p, (int)left); }
+static inline void v_store_part(float *p, vf x, int64_t left)
+{
+    if (left >= VL) v_store(p, x);
+    else v_store_n(p, x, (int)left);
+}
 #endif

@@ -1,0 +1,115 @@
+/* lgd-bench [NAME...]: runs the benchmarks whose name contains one of the words (all without a word), in order of name. */
+#include "bench/bench.h"
+#include "tensor/cpu.h"
+#include "tensor/kernels/peak.h"
+#include "tensor/threads.h"
+#include <omp.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MOST = 256, MOST_RUNS = 1000 };
+static struct entry {
+    const char *name;
+    bench_function f;
+} list[MOST];
+static int entries;
+
+void bench_register(const char *name, bench_function f)
+{
+    if (entries == MOST) {
+        fprintf(stderr, "lgd-bench: more than %d benchmarks: raise MOST in bench/bench.c\n", MOST);
+        exit(1);
+    }
+    list[entries++] = (struct entry){name, f};
+}
+
+double bench_fma_peak(void)
+{
+    double best = 0;
+    /* The best of a few short runs: a peak is what the machine can do, not what its neighbours leave at this moment. */
+    for (int i = 0; i < 4; i++) {
+        double flop = 0;
+        const double begin = omp_get_wtime();
+#pragma omp parallel num_threads(ts_threads()) reduction(+ : flop)
+        flop += ts_peak_k()->run(2000000);
+        const double speed = flop / (omp_get_wtime() - begin);
+        if (speed > best) best = speed;
+    }
+    return best;
+}
+
+static int by_value(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+bench_time bench_measure(void (*f)(void *user), void *user)
+{
+    static double times[MOST_RUNS];
+    bench_time t = {.peak = bench_fma_peak()};
+    f(user);
+    const double begin = omp_get_wtime();
+    do {
+        const double start = omp_get_wtime();
+        f(user);
+        times[t.runs++] = omp_get_wtime() - start;
+    } while (t.runs < MOST_RUNS && (t.runs < 3 || omp_get_wtime() - begin < 0.33));
+    t.peak = 0.5 * (t.peak + bench_fma_peak());
+    qsort(times, (size_t)t.runs, sizeof *times, by_value);
+    t.seconds = t.runs % 2 ? times[t.runs / 2] : 0.5 * (times[t.runs / 2 - 1] + times[t.runs / 2]);
+    return t;
+}
+
+void bench_heading(const char *text) { printf("\n%s\n", text); }
+
+void bench_row(const char *label, bench_time t, double flop)
+{
+    printf("  %-56s %11.4f ms", label, 1e3 * t.seconds);
+    if (flop > 0) printf(" %9.1f GFLOP/s %6.1f %% of the peak", 1e-9 * flop / t.seconds, 100 * flop / t.seconds / t.peak);
+    printf("\n");
+    fflush(stdout);
+}
+
+void bench_row_unit(const char *label, bench_time t, double value, const char *unit)
+{
+    printf("  %-56s %11.4f ms %9.4g %s\n", label, 1e3 * t.seconds, value, unit);
+    fflush(stdout);
+}
+
+static int by_name(const void *a, const void *b) { return strcmp(((const struct entry *)a)->name, ((const struct entry *)b)->name); }
+
+int main(int argc, char **argv)
+{
+    ts_status st = {0};
+    if (argc == 2 && strcmp(argv[1], "--help") == 0) {
+        printf("usage: lgd-bench [--list] [NAME...]\nRuns the benchmarks whose name contains one of the words; all of them without a word.\n");
+        return 0;
+    }
+    qsort(list, (size_t)entries, sizeof *list, by_name);
+    if (argc == 2 && strcmp(argv[1], "--list") == 0) {
+        for (int i = 0; i < entries; i++) printf("%s\n", list[i].name);
+        return 0;
+    }
+    if (ts_isa_init(&st) != TS_OK) {
+        fprintf(stderr, "lgd-bench: %s\n", st.message);
+        return 1;
+    }
+    printf("%s, %d threads, FMA peak %.1f GFLOP/s\n", ts_isa_name(ts_isa_now()), ts_threads(), 1e-9 * bench_fma_peak());
+    int ran = 0;
+    for (int i = 0; i < entries; i++) {
+        bool wanted = argc == 1;
+        for (int a = 1; a < argc; a++)
+            if (strstr(list[i].name, argv[a])) wanted = true;
+        if (!wanted) continue;
+        list[i].f();
+        ran++;
+    }
+    if (ran == 0) {
+        fprintf(stderr, "lgd-bench: no benchmark has such a name; --list names them\n");
+        return 2;
+    }
+    return 0;
+}

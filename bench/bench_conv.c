@@ -1,0 +1,121 @@
+/* Convolutions and their gradients: sizes of the published networks at 256 x 256, and of a small model in training. */
+#include "bench/bench.h"
+#include "tensor/conv.h"
+#include "tensor/rng.h"
+#include <stdio.h>
+#include <stdlib.h>
+
+typedef struct work {
+    ts_conv c;
+    float *x, *y, *weight, *bias, *packed, *packed_gradient;
+} work;
+
+static float *values(size_t count, float scale)
+{
+    ts_rng r = ts_rng_make(1, TS_STREAM_TEST, count);
+    float *p = aligned_alloc(64, (count * sizeof(float) + 63) / 64 * 64);
+    if (!p) abort();
+    for (size_t i = 0; i < count; i++) p[i] = ts_rng_range(&r, -scale, scale);
+    return p;
+}
+
+static work make(ts_conv c)
+{
+    const size_t pixels = (size_t)c.n * (size_t)c.h * (size_t)c.w, weights = (size_t)c.ic * (size_t)c.oc * (size_t)(c.k * c.k);
+    work w = {c, values(pixels * (size_t)c.ic, 1), values(pixels * (size_t)c.oc, 1), values(weights, 0.01f), values((size_t)c.oc, 1),
+              values(ts_conv_packed_count(&c, TS_CONV_FORWARD), 1), values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT), 1)};
+    ts_conv_pack(&c, TS_CONV_FORWARD, w.weight, w.packed);
+    ts_conv_pack(&c, TS_CONV_DATA_GRADIENT, w.weight, w.packed_gradient);
+    return w;
+}
+
+static void discard(work *w)
+{
+    free(w->x), free(w->y), free(w->weight), free(w->bias), free(w->packed), free(w->packed_gradient);
+}
+
+static void forward(void *user)
+{
+    work *w = user;
+    ts_conv_forward(&w->c, w->x, w->packed, w->bias, 0.2f, w->y);
+}
+
+static void data_gradient(void *user)
+{
+    work *w = user;
+    ts_conv_data_gradient(&w->c, w->y, w->packed_gradient, w->x, false);
+}
+
+static void weight_gradient(void *user)
+{
+    work *w = user;
+    ts_conv_weight_gradient(&w->c, w->x, w->y, w->weight, w->bias);
+}
+
+static void forward_naive(void *user)
+{
+    work *w = user;
+    ts_conv_forward_naive(&w->c, w->x, w->weight, w->bias, 0.2f, w->y);
+}
+
+static void row(const char *what, ts_conv c, void (*f)(void *user))
+{
+    char label[96];
+    snprintf(label, sizeof label, "%s n%d %dx%d %d->%d %dx%d%s%s", what, c.n, c.h, c.w, c.ic, c.oc, c.k, c.k, c.dilation > 1 ? " d2" : "",
+             c.pad == TS_PAD_REPLICATE ? " rep" : "");
+    work w = make(c);
+    bench_row(label, bench_measure(f, &w), 2.0 * c.n * c.h * c.w * c.ic * c.oc * c.k * c.k);
+    discard(&w);
+}
+
+static const ts_conv published[] = {
+    {1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO},        {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE}, {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE},
+    {1, 256, 256, 256, 192, 1, 1, TS_PAD_REPLICATE}, {1, 256, 256, 64, 192, 1, 1, TS_PAD_REPLICATE}, {1, 256, 256, 64, 10, 3, 1, TS_PAD_REPLICATE},
+    {1, 64, 64, 512, 512, 5, 1, TS_PAD_ZERO},        {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO},         {1, 4, 4, 512, 512, 5, 1, TS_PAD_ZERO},
+};
+
+static const ts_conv refiner[] = {
+    {8, 64, 64, 18, 64, 5, 1, TS_PAD_REPLICATE}, {8, 64, 64, 64, 96, 1, 1, TS_PAD_REPLICATE}, {8, 64, 64, 32, 96, 1, 1, TS_PAD_REPLICATE},
+    {8, 64, 64, 32, 64, 3, 2, TS_PAD_REPLICATE}, {8, 64, 64, 32, 9, 3, 1, TS_PAD_REPLICATE},
+};
+
+static const ts_conv unet[] = {
+    {8, 64, 64, 3, 16, 3, 1, TS_PAD_ZERO},   {8, 32, 32, 16, 32, 5, 1, TS_PAD_ZERO},  {8, 16, 16, 32, 64, 5, 1, TS_PAD_ZERO},
+    {8, 8, 8, 64, 128, 5, 1, TS_PAD_ZERO},   {8, 4, 4, 128, 256, 5, 1, TS_PAD_ZERO},  {8, 2, 2, 256, 256, 5, 1, TS_PAD_ZERO},
+    {8, 4, 4, 512, 256, 5, 1, TS_PAD_ZERO},  {8, 8, 8, 256, 128, 5, 1, TS_PAD_ZERO},  {8, 16, 16, 128, 64, 5, 1, TS_PAD_ZERO},
+    {8, 32, 32, 64, 32, 3, 1, TS_PAD_ZERO},  {8, 8, 8, 64, 128, 3, 1, TS_PAD_ZERO},   {8, 16, 16, 32, 64, 3, 1, TS_PAD_ZERO},
+    {8, 16, 16, 128, 64, 3, 1, TS_PAD_ZERO}, {8, 64, 64, 32, 16, 3, 1, TS_PAD_ZERO},
+};
+
+static void all(const ts_conv *shape, size_t count)
+{
+    for (size_t i = 0; i < count; i++) row("forward", shape[i], forward);
+    for (size_t i = 0; i < count; i++) row("data gradient", shape[i], data_gradient);
+    for (size_t i = 0; i < count; i++) row("weight gradient", shape[i], weight_gradient);
+}
+
+BENCH(conv_published)
+{
+    bench_heading("Convolutions of the published networks");
+    all(published, sizeof published / sizeof *published);
+}
+
+BENCH(conv_refiner)
+{
+    bench_heading("Convolutions of a small refiner in training");
+    all(refiner, sizeof refiner / sizeof *refiner);
+}
+
+BENCH(conv_unet)
+{
+    bench_heading("Convolutions of a small U-Net in training (small images: zero padding is skipped, so more than the peak is possible)");
+    all(unet, sizeof unet / sizeof *unet);
+}
+
+BENCH(conv_naive)
+{
+    const ts_conv c = {1, 64, 64, 64, 64, 3, 1, TS_PAD_ZERO};
+    bench_heading("A convolution and its naive twin");
+    row("forward", c, forward);
+    row("naive forward", c, forward_naive);
+}

@@ -1,0 +1,79 @@
+/* Internal to tensor/conv*.c: what forward and the data gradient have in common. */
+#ifndef TS_CONV_PLAN_H
+#define TS_CONV_PLAN_H
+#include "tensor/conv.h"
+#include "tensor/kernels/conv.h"
+
+/* y[n, i, j, o] (+)= act(bias[o] + sum x[n, i + first + d ky, j + first + d kx, c] w[ky, kx, c, o]).
+ * The gradient under replicate padding is computed on a domain that is larger by fold on each side, and what falls outside is
+ * added to the nearest border pixel: that is exactly the transpose of replicating it. */
+typedef struct conv_plan {
+    int n, h, w, ic; /* input */
+    int oc, k, dilation;
+    int first;      /* coordinate that tap 0 reads for output 0 */
+    bool replicate; /* else zeros */
+    int fold;       /* output domain [-fold, h + fold) x [-fold, w + fold), folded into [0, h) x [0, w) */
+    const float *x, *packed, *bias;
+    float *y;
+    float leak;
+    bool add;
+} conv_plan;
+
+enum {
+    CONV_BLOCK_BYTES = 640 << 10, /* weights that stay in the second cache while pixels pass by */
+    CONV_STAGE_SLACK = 64         /* the weight gradient reads whole vectors past the last pixel */
+};
+
+/* A window of input rows with their padding columns, of which a row is made when first needed. */
+typedef struct conv_stage {
+    float *memory;
+    ptrdiff_t pixel, row; /* strides in floats */
+    int rows, left, columns;
+    int next; /* first source row that is not there yet */
+} conv_stage;
+
+/* The layout of a window of rows and columns, the first column being input column left (may be negative). No memory yet:
+ * the caller puts conv_stage_size floats into memory. */
+conv_stage conv_stage_make(const conv_plan *p, int rows, int left, int columns);
+static inline size_t conv_stage_size(const conv_stage *s) { return (size_t)(s->row * s->rows) + CONV_STAGE_SLACK; }
+/* Makes source rows first to last of image n that are not there yet. */
+void conv_stage_fill(conv_stage *s, const conv_plan *p, int n, int first, int last);
+static inline const float *conv_stage_row(const conv_stage *s, int row) { return s->memory + row % s->rows * s->row; }
+
+/* For output coordinate i: the source coordinates and taps that meet there, in order of the tap. Returns how many;
+ * at most conv_pairs_max. */
+typedef struct conv_pair {
+    int source, tap;
+} conv_pair;
+int conv_pairs(const conv_plan *p, int i, int size, conv_pair *pair);
+static inline int conv_pairs_max(const conv_plan *p) { return p->k * (p->fold + 1) + p->k * p->fold; }
+
+/* Panels of 2 vectors of output channels; the last has one vector where that is enough. */
+static inline int conv_lanes(void) { return ts_conv_k()->lanes; }
+static inline int conv_panels(int oc) { return (oc + 2 * conv_lanes() - 1) / (2 * conv_lanes()); }
+static inline int conv_vectors(int oc, int panel) { return oc - panel * 2 * conv_lanes() > conv_lanes() ? 2 : 1; }
+
+/* Few pixels in an image and several images: tiles run over the images at one position, which needs no padding at all. */
+static inline bool conv_by_position(int n, int h, int w) { return n >= 4 && h * w <= 64; }
+
+/* Part i of n parts of total, as even as can be: [*begin, *end). */
+static inline void conv_part(int total, int parts, int i, int *begin, int *end)
+{
+    const int each = total / parts, larger = total % parts;
+    *begin = i * each + (i < larger ? i : larger);
+    *end = *begin + each + (i < larger);
+}
+
+/* A tile of the panel without its pixels; and one run on pixels from a to y. */
+ts_tile conv_panel_tile(const conv_plan *p, int panel);
+void conv_run_tile(ts_tile *t, int vectors, const float *a, float *y, int pixels);
+
+void conv_run_rows(const conv_plan *p);
+void conv_run_pointwise(const conv_plan *p);
+void conv_run_positions(const conv_plan *p);
+/* Whichever of them suits. */
+void conv_run(const conv_plan *p);
+
+/* dweight += for shapes with conv_by_position. */
+void conv_weight_positions(const ts_conv *c, const float *x, const float *dy, float *dweight);
+#endif

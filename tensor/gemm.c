@@ -1,0 +1,102 @@
+/* Matrix products with the tiles of the convolutions: rows of A are the pixels, B is packed as the weights. */
+#include "tensor/gemm.h"
+#include "tensor/conv_plan.h"
+#include "tensor/threads.h"
+
+enum {
+    ROWS = 8 * TS_TILE_PIXELS, /* of C in one unit of work */
+    DEPTH = 1024               /* k in one go: a panel of B of this depth stays in the second cache */
+};
+
+/* A value of op(M), M stored with the given row length. */
+static inline float value(const float *m, bool transposed, ptrdiff_t row_length, ptrdiff_t i, ptrdiff_t j)
+{
+    return transposed ? m[j * row_length + i] : m[i * row_length + j];
+}
+
+/* alpha op(B) as [panel][k][lane] */
+static void pack_b(bool tb, int n, int k, float alpha, const float *b, float *packed)
+{
+    const int lanes = conv_lanes(), panels = conv_panels(n), parts = k > 64 ? 16 : 1;
+#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
+    for (int panel = 0; panel < panels; panel++)
+        for (int part = 0; part < parts; part++) {
+            const int j0 = panel * 2 * lanes, width = conv_vectors(n, panel) * lanes, count = n - j0 < width ? n - j0 : width;
+            int begin, end;
+            conv_part(k, parts, part, &begin, &end);
+            for (int i = begin; i < end; i++) {
+                float *to = packed + (ptrdiff_t)j0 * k + (ptrdiff_t)i * width;
+                for (int j = 0; j < count; j++) to[j] = alpha * value(b, tb, tb ? k : n, i, j0 + j);
+                for (int j = count; j < width; j++) to[j] = 0;
+            }
+        }
+}
+
+typedef struct product {
+    bool ta, scale;
+    int m, n, k;
+    const float *a, *packed;
+    float beta, *c;
+} product;
+
+/* Rows [row, row + rows) of C, k in [k0, k1), panels [panel0, panel1). */
+static void run_block(const product *p, int row, int rows, int k0, int k1, int panel0, int panel1)
+{
+    const struct ts_conv_kernels *kernels = ts_conv_k();
+    const float *a = p->a + (ptrdiff_t)row * p->k + k0;
+    ptrdiff_t stride = p->k;
+    if (p->ta) {
+        stride = k1 - k0;
+        float *copy = ts_scratch(1, sizeof(float) * (size_t)rows * (size_t)stride);
+        for (int i = k0; i < k1; i++)
+            for (int r = 0; r < rows; r++) copy[r * stride + i - k0] = p->a[(ptrdiff_t)i * p->m + row + r];
+        a = copy;
+    }
+    for (int panel = panel0; panel < panel1; panel++) {
+        const int j0 = panel * 2 * kernels->lanes, vectors = conv_vectors(p->n, panel);
+        const ts_segment segment = {0, k0, k1 - k0};
+        ts_tile t = {.segment = &segment, .segments = 1, .a_stride = stride, .y_stride = p->n, .w = p->packed + (ptrdiff_t)j0 * p->k,
+                     .leak = 1, .channels = p->n - j0, .add = k0 > 0 || p->beta != 0};
+        if (k0 == 0 && p->scale)
+            for (int r = 0; r < rows; r++)
+                for (int j = j0; j < p->n && j < j0 + 2 * kernels->lanes; j++) p->c[(ptrdiff_t)(row + r) * p->n + j] *= p->beta;
+        for (int r = 0; r < rows; r += kernels->pixels) {
+            const int count = rows - r < kernels->pixels ? rows - r : kernels->pixels;
+            for (int g = 0; g < 3; g++) {
+                const ptrdiff_t at = r + (g * TS_TILE_GROUP < count ? g * TS_TILE_GROUP : 0);
+                t.a[g] = a + at * stride;
+                t.y[g] = p->c + (row + at) * p->n + j0;
+            }
+            kernels->tile[vectors - 1][count](&t);
+        }
+    }
+}
+
+void ts_gemm(bool ta, bool tb, int m, int n, int k, float alpha, const float *a, const float *b, float beta, float *c)
+{
+    const int lanes = conv_lanes(), panels = conv_panels(n), units = (m + ROWS - 1) / ROWS;
+    float *packed = ts_scratch(2, sizeof(float) * (size_t)k * (size_t)((n + lanes - 1) / lanes * lanes));
+    pack_b(tb, n, k, alpha, b, packed);
+    const product p = {.ta = ta, .scale = beta != 0 && beta != 1, .m = m, .n = n, .k = k, .a = a, .packed = packed, .beta = beta, .c = c};
+    int groups = units < 8 ? (8 + units - 1) / units : 1;
+    if (groups > panels) groups = panels;
+#pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads())
+    for (int i = 0; i < units; i++)
+        for (int g = 0; g < groups; g++) {
+            int panel0, panel1;
+            conv_part(panels, groups, g, &panel0, &panel1);
+            const int row = i * ROWS, rows = m - row < ROWS ? m - row : ROWS;
+            for (int k0 = 0; k0 < k; k0 += DEPTH) run_block(&p, row, rows, k0, k - k0 < DEPTH ? k : k0 + DEPTH, panel0, panel1);
+        }
+}
+
+void ts_gemm_naive(bool ta, bool tb, int m, int n, int k, float alpha, const float *a, const float *b, float beta, float *c)
+{
+    for (int i = 0; i < m; i++)
+        for (int j = 0; j < n; j++) {
+            double sum = 0;
+            for (int l = 0; l < k; l++) sum += (double)value(a, ta, ta ? m : k, i, l) * value(b, tb, tb ? k : n, l, j);
+            float *to = c + (ptrdiff_t)i * n + j;
+            *to = (float)(alpha * sum + (beta != 0 ? beta * *to : 0));
+        }
+}

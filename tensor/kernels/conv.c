@@ -1,0 +1,187 @@
+/* See conv.h. Each size is a function of its own, so that all accumulators live in registers: with 32 registers 14 x 2 of
+ * them leave room for two weights and one broadcast value. */
+#include "tensor/kernels/conv.h"
+#include "tensor/kernels/vec.h"
+
+#if VL == 16
+#define PIXELS 14
+#define ROWS 14
+#elif VL == 8
+#define PIXELS 6
+#define ROWS 6
+#else
+#define PIXELS 5
+#define ROWS 5
+#endif
+#define INLINE static inline __attribute__((always_inline))
+#define UNROLL _Pragma("GCC unroll 16")
+
+/* A panel's channels that exist, to and from memory. Vectors with a tail need a mask, or a detour where there are no masks. */
+#if VL == 16
+typedef __mmask16 lanes;
+INLINE lanes lanes_of(int n) { return (lanes)(n >= VL ? 0xffff : n > 0 ? (1 << n) - 1 : 0); }
+INLINE vf load_lanes(const float *p, lanes m) { return (vf)_mm512_maskz_loadu_ps(m, p); }
+INLINE void store_lanes(float *p, vf v, lanes m) { _mm512_mask_storeu_ps(p, m, (__m512)v); }
+#elif VL == 8
+typedef vi lanes;
+INLINE lanes lanes_of(int n) { return (vi){0, 1, 2, 3, 4, 5, 6, 7} < v_seti(n); }
+INLINE vf load_lanes(const float *p, lanes m) { return (vf)_mm256_maskload_ps(p, (__m256i)m); }
+INLINE void store_lanes(float *p, vf v, lanes m) { _mm256_maskstore_ps(p, (__m256i)m, (__m256)v); }
+#else
+typedef int lanes;
+INLINE lanes lanes_of(int n) { return n; }
+static __attribute__((noinline)) vf load_few(const float *p, int n)
+{
+    vf v = {0};
+    for (int i = 0; i < n && i < VL; i++) v[i] = p[i];
+    return v;
+}
+static __attribute__((noinline)) void store_few(float *p, vf v, int n)
+{
+    for (int i = 0; i < n && i < VL; i++) p[i] = v[i];
+}
+INLINE vf load_lanes(const float *p, lanes n) { return n >= VL ? v_load(p) : load_few(p, n); }
+INLINE void store_lanes(float *p, vf v, lanes n)
+{
+    if (n >= VL) v_store(p, v);
+    else store_few(p, v, n);
+}
+#endif
+
+/* One k: pixels x vectors multiplications. */
+#define STEP(u)                                                                                               \
+    {                                                                                                         \
+        vf b[2];                                                                                              \
+        UNROLL for (int v = 0; v < vectors; v++) b[v] = v_load(w + ((u) * vectors + v) * VL);                 \
+        UNROLL for (int p = 0; p < pixels; p++) {                                                             \
+            const char *at = a[p / TS_TILE_GROUP] + stride[p % TS_TILE_GROUP];                                \
+            vf x = v_set(((const float *)(const void *)at)[u]);                                               \
+            UNROLL for (int v = 0; v < vectors; v++) acc[p][v] += x * b[v];                                   \
+        }                                                                                                     \
+    }
+/* Base pointers and strides stay as they are, in registers: left alone, the compiler makes an address for each pixel and k,
+ * which do not fit. */
+#define KEEP_ADDRESSES                                                                                        \
+    __asm__("" : "+r"(a[0]), "+r"(a[1]), "+r"(a[2]));                                                         \
+    __asm__("" : "+r"(stride[1]), "+r"(stride[2]), "+r"(stride[3]), "+r"(stride[4]));
+
+INLINE void tile(const ts_tile *t, const int pixels, const int vectors)
+{
+    vf acc[PIXELS][2];
+    const ptrdiff_t ys = t->y_stride;
+    lanes mask[2];
+    UNROLL for (int v = 0; v < vectors; v++) mask[v] = lanes_of(t->channels - v * VL);
+    if (t->add) {
+        UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++)
+            acc[p][v] = load_lanes(t->y[p / TS_TILE_GROUP] + p % TS_TILE_GROUP * ys + v * VL, mask[v]);
+    } else {
+        UNROLL for (int v = 0; v < vectors; v++) {
+            vf b = t->bias ? load_lanes(t->bias + v * VL, mask[v]) : (vf){0};
+            UNROLL for (int p = 0; p < pixels; p++) acc[p][v] = b;
+        }
+    }
+    ptrdiff_t stride[TS_TILE_GROUP]; /* in bytes */
+    const char *fetch0 = (const char *)t->fetch[0], *fetch1 = (const char *)t->fetch[1];
+    UNROLL for (int i = 0; i < TS_TILE_GROUP; i++) stride[i] = i * t->a_stride * (ptrdiff_t)sizeof(float);
+    for (int g = 0; g < t->segments; g++) {
+        const char *a[3];
+        const float *w = t->w + t->segment[g].w * (vectors * VL);
+        UNROLL for (int i = 0; i < 3; i++) a[i] = (const char *)(t->a[i] + t->segment[g].a);
+        ptrdiff_t n = t->segment[g].count;
+        for (; n >= 4; n -= 4) {
+            STEP(0) __builtin_prefetch(fetch0);
+            STEP(1) __builtin_prefetch(fetch1);
+            STEP(2) __builtin_prefetch(fetch0 + 64);
+            STEP(3) __builtin_prefetch(fetch1 + 64);
+            fetch0 += t->fetch_step[0];
+            fetch1 += t->fetch_step[1];
+            w += 4 * vectors * VL;
+            UNROLL for (int i = 0; i < 3; i++) a[i] += 4 * sizeof(float);
+            KEEP_ADDRESSES
+        }
+        for (; n > 0; n--) {
+            STEP(0)
+            w += vectors * VL;
+            UNROLL for (int i = 0; i < 3; i++) a[i] += sizeof(float);
+            KEEP_ADDRESSES
+        }
+    }
+    if (t->leak != 1) {
+        vf leak = v_set(t->leak), zero = {0};
+        UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++)
+            acc[p][v] = v_select(acc[p][v] > zero, acc[p][v], leak * acc[p][v]);
+    }
+    UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++)
+        store_lanes(t->y[p / TS_TILE_GROUP] + p % TS_TILE_GROUP * ys + v * VL, acc[p][v], mask[v]);
+}
+
+/* One pixel: rows x vectors multiplications. */
+#define PIXEL                                                                                                 \
+    {                                                                                                         \
+        vf y[2];                                                                                              \
+        UNROLL for (int v = 0; v < vectors; v++) y[v] = v_load(b + v * VL);                                   \
+        UNROLL for (int m = 0; m < rows; m++) {                                                               \
+            vf x = v_set(a[m]);                                                                               \
+            UNROLL for (int v = 0; v < vectors; v++) acc[m][v] += x * y[v];                                   \
+        }                                                                                                     \
+        /* b's panel stays in the first cache from block to block; a comes from the second. */                \
+        __builtin_prefetch(a + ahead);                                                                        \
+        a += as;                                                                                              \
+        b += bs;                                                                                              \
+    }
+
+INLINE void sum(const ts_sum *t, const int rows, const int vectors)
+{
+    vf acc[ROWS][2];
+    UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++) acc[m][v] = v_load(t->c + m * t->c_stride + v * VL);
+    const ptrdiff_t as = t->a_stride, bs = t->b_stride, ahead = 8 * as + rows - 1, step = t->fetch_step;
+    const char *fetch = t->fetch;
+    for (int r = 0; r < t->rows; r++) {
+        const float *a = t->a + t->a_row[r], *b = t->b + t->b_row[r];
+        int p = t->count;
+        for (; p >= 2; p -= 2, fetch += step) {
+            PIXEL
+            __builtin_prefetch(fetch, 0, 2);
+            PIXEL
+        }
+        if (p) PIXEL
+    }
+    UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++) v_store(t->c + m * t->c_stride + v * VL, acc[m][v]);
+}
+
+static void columns(const float *x, int64_t pixels, int channels, float *restrict sum)
+{
+    const float *a = x, *b = x + channels, *c = b + channels, *d = c + channels;
+    for (; pixels >= 4; pixels -= 4, a += 4 * channels, b += 4 * channels, c += 4 * channels, d += 4 * channels)
+        for (int o = 0; o < channels; o++) sum[o] += (a[o] + b[o]) + (c[o] + d[o]);
+    for (; pixels > 0; pixels--, a += channels)
+        for (int o = 0; o < channels; o++) sum[o] += a[o];
+}
+
+#define FOR_5(DO) DO(1) DO(2) DO(3) DO(4) DO(5)
+#if PIXELS == 14
+#define FOR_ALL(DO) FOR_5(DO) DO(6) DO(7) DO(8) DO(9) DO(10) DO(11) DO(12) DO(13) DO(14)
+#elif PIXELS == 6
+#define FOR_ALL(DO) FOR_5(DO) DO(6)
+#else
+#define FOR_ALL(DO) FOR_5(DO)
+#endif
+#define FUNCTIONS(n)                                                       \
+    static void tile_##n##_1(const ts_tile *t) { tile(t, n, 1); }          \
+    static void tile_##n##_2(const ts_tile *t) { tile(t, n, 2); }          \
+    static void sum_##n##_1(const ts_sum *t) { sum(t, n, 1); }             \
+    static void sum_##n##_2(const ts_sum *t) { sum(t, n, 2); }
+FOR_ALL(FUNCTIONS)
+
+#define TILE_1(n) [n] = tile_##n##_1,
+#define TILE_2(n) [n] = tile_##n##_2,
+#define SUM_1(n) [n] = sum_##n##_1,
+#define SUM_2(n) [n] = sum_##n##_2,
+const struct ts_conv_kernels TS_TABLE(conv) = {
+    .lanes = VL,
+    .pixels = PIXELS,
+    .rows = ROWS,
+    .tile = {{FOR_ALL(TILE_1)}, {FOR_ALL(TILE_2)}},
+    .sum = {{FOR_ALL(SUM_1)}, {FOR_ALL(SUM_2)}},
+    .columns = columns,
+};

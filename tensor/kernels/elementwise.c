@@ -1,0 +1,179 @@
+#include "tensor/kernels/elementwise.h"
+#include "tensor/kernels/vmath.h"
+#include <stddef.h>
+
+static inline void put(float *p, vf x, int64_t left, bool accumulate)
+{
+    v_store_part(p, accumulate ? v_load_part(p, left) + x : x, left);
+}
+
+static inline vf leaky_of(vf x, vf leak) { return v_select(x > v_set(0.0f), x, x * leak); }
+static inline vf slope(vf y, vf dy, vf leak) { return v_select(y > v_set(0.0f), dy, dy * leak); }
+
+static void leaky(int64_t n, const float *x, float leak, float *y)
+{
+    const vf l = v_set(leak);
+    int64_t i = 0;
+    for (; i + VL <= n; i += VL) v_store(y + i, leaky_of(v_load(x + i), l));
+    if (i < n) v_store_part(y + i, leaky_of(v_load_part(x + i, n - i), l), n - i);
+}
+
+static void leaky_backward(int64_t n, const float *y, const float *dy, float leak, float *dx, bool accumulate)
+{
+    const vf l = v_set(leak);
+    for (int64_t i = 0; i < n; i += VL) put(dx + i, slope(v_load_part(y + i, n - i), v_load_part(dy + i, n - i), l), n - i, accumulate);
+}
+
+static void tanh_forward(int64_t n, const float *x, float *y)
+{
+    for (int64_t i = 0; i < n; i += VL) v_store_part(y + i, v_tanh(v_load_part(x + i, n - i)), n - i);
+}
+
+static void tanh_backward(int64_t n, const float *y, const float *dy, float *dx, bool accumulate)
+{
+    for (int64_t i = 0; i < n; i += VL) {
+        vf t = v_load_part(y + i, n - i);
+        put(dx + i, v_load_part(dy + i, n - i) * (1.0f - t * t), n - i, accumulate);
+    }
+}
+
+static void selu(int64_t n, const float *x, float *y)
+{
+    for (int64_t i = 0; i < n; i += VL) {
+        vf v = v_load_part(x + i, n - i);
+        vf below = (float)(TS_SELU_SCALE * TS_SELU_ALPHA) * v_expm1(v);
+        v_store_part(y + i, v_select(v > v_set(0.0f), v * (float)TS_SELU_SCALE, below), n - i);
+    }
+}
+
+static void selu_backward(int64_t n, const float *y, const float *dy, float *dx, bool accumulate)
+{
+    for (int64_t i = 0; i < n; i += VL) {
+        vf v = v_load_part(y + i, n - i);
+        vf d = v_select(v > v_set(0.0f), v_set((float)TS_SELU_SCALE), v + (float)(TS_SELU_SCALE * TS_SELU_ALPHA));
+        put(dx + i, v_load_part(dy + i, n - i) * d, n - i, accumulate);
+    }
+}
+
+static void add(int64_t n, const float *a, const float *b, float *y)
+{
+    int64_t i = 0;
+    for (; i + VL <= n; i += VL) v_store(y + i, v_load(a + i) + v_load(b + i));
+    if (i < n) v_store_part(y + i, v_load_part(a + i, n - i) + v_load_part(b + i, n - i), n - i);
+}
+
+static void scale(int64_t n, float s, const float *x, float *y, bool accumulate)
+{
+    for (int64_t i = 0; i < n; i += VL) put(y + i, v_load_part(x + i, n - i) * s, n - i, accumulate);
+}
+
+static void add_leaky(int64_t pixels, int c, const float *x, const float *g, float leak, float *y)
+{
+    const vf l = v_set(leak);
+    for (int64_t p = 0; p < pixels; p++, x += c, y += c)
+        for (int i = 0; i < c; i += VL) v_store_part(y + i, leaky_of(v_load_part(x + i, c - i) + v_load_part(g + i, c - i), l), c - i);
+}
+
+/* Pixels in one float partial sum: its error stays below 64 half ulps of the largest partial sum before it goes into a double. */
+enum { RUN = 64 };
+
+static void add_leaky_backward(int64_t pixels, int c, const float *y, const float *dy, float leak, float *dx, bool accumulate, double *sum)
+{
+    const vf l = v_set(leak);
+    for (int64_t p0 = 0; p0 < pixels; p0 += RUN) {
+        int64_t p1 = p0 + RUN < pixels ? p0 + RUN : pixels;
+        for (int i = 0; i < c; i += VL) {
+            vf total = {0};
+            for (int64_t p = p0; p < p1; p++) {
+                vf d = slope(v_load_part(y + p * c + i, c - i), v_load_part(dy + p * c + i, c - i), l);
+                total += d;
+                if (dx) put(dx + p * c + i, d, c - i, accumulate);
+            }
+            if (sum)
+                for (int j = 0; j < VL && i + j < c; j++) sum[i + j] += total[j];
+        }
+    }
+}
+
+static void broadcast(int64_t pixels, int c, const float *g, float *y, bool accumulate)
+{
+    for (int64_t p = 0; p < pixels; p++, y += c)
+        for (int i = 0; i < c; i += VL) put(y + i, v_load_part(g + i, c - i), c - i, accumulate);
+}
+
+static void copy(int64_t pixels, int c, const float *src, int64_t src_stride, float *dst, int64_t dst_stride, bool accumulate)
+{
+    for (int64_t p = 0; p < pixels; p++, src += src_stride, dst += dst_stride)
+        for (int i = 0; i < c; i += VL) put(dst + i, v_load_part(src + i, c - i), c - i, accumulate);
+}
+
+static void gru(int64_t pixels, int c, const float *ih, const float *hh, int64_t hh_stride, const float *old, float *y, float *zrn)
+{
+    for (int64_t p = 0; p < pixels; p++, ih += 3 * (int64_t)c, hh += hh_stride, y += c) {
+        for (int i = 0; i < c; i += VL) {
+            int left = c - i;
+            vf z = v_sigmoid(v_load_part(ih + i, left) + v_load_part(hh + i, left));
+            vf r = v_sigmoid(v_load_part(ih + c + i, left) + v_load_part(hh + c + i, left));
+            vf n = v_tanh(v_load_part(ih + 2 * c + i, left) + r * v_load_part(hh + 2 * c + i, left));
+            vf v = z * n;
+            if (old) {
+                vf o = v_load_part(old + p * c + i, left);
+                v = (o - z * o) + v;
+            }
+            v_store_part(y + i, v, left);
+            if (zrn) {
+                float *s = zrn + p * 3 * c + i;
+                v_store_part(s, z, left);
+                v_store_part(s + c, r, left);
+                v_store_part(s + 2 * c, n, left);
+            }
+        }
+    }
+}
+
+static void gru_backward(int64_t pixels, int c, const float *hh, int64_t hh_stride, const float *old, const float *zrn, const float *dy,
+                         float *dih, bool dih_accumulate, float *dhh, bool dhh_accumulate, float *dold, bool dold_accumulate, double *sum)
+{
+    for (int64_t p0 = 0; p0 < pixels; p0 += RUN) {
+        int64_t p1 = p0 + RUN < pixels ? p0 + RUN : pixels;
+        for (int i = 0; i < c; i += VL) {
+            const int left = c - i;
+            vf sz = {0}, sr = {0}, sn = {0};
+            for (int64_t p = p0; p < p1; p++) {
+                const int64_t at = p * 3 * c + i;
+                vf z = v_load_part(zrn + at, left), r = v_load_part(zrn + at + c, left), n = v_load_part(zrn + at + 2 * c, left), d = v_load_part(dy + p * c + i, left);
+                vf o = old ? v_load_part(old + p * c + i, left) : (vf){0};
+                vf az = d * (n - o) * z * (1.0f - z); /* gradients before the activations */
+                vf an = d * z * (1.0f - n * n);
+                vf ar = an * v_load_part(hh + p * hh_stride + 2 * c + i, left) * r * (1.0f - r);
+                vf hn = an * r;
+                if (dih) {
+                    put(dih + at, az, left, dih_accumulate);
+                    put(dih + at + c, ar, left, dih_accumulate);
+                    put(dih + at + 2 * c, an, left, dih_accumulate);
+                }
+                if (dhh) {
+                    put(dhh + at, az, left, dhh_accumulate);
+                    put(dhh + at + c, ar, left, dhh_accumulate);
+                    put(dhh + at + 2 * c, hn, left, dhh_accumulate);
+                }
+                if (dold) put(dold + p * c + i, d * (1.0f - z), left, dold_accumulate);
+                sz += az;
+                sr += ar;
+                sn += hn;
+            }
+            if (sum)
+                for (int j = 0; j < VL && j < left; j++) {
+                    sum[i + j] += sz[j];
+                    sum[c + i + j] += sr[j];
+                    sum[2 * c + i + j] += sn[j];
+                }
+        }
+    }
+}
+
+const struct ts_elementwise_kernels TS_TABLE(elementwise) = {
+    .leaky = leaky, .leaky_backward = leaky_backward, .tanh = tanh_forward, .tanh_backward = tanh_backward, .selu = selu,
+    .selu_backward = selu_backward, .add = add, .scale = scale, .add_leaky = add_leaky, .add_leaky_backward = add_leaky_backward,
+    .broadcast = broadcast, .copy = copy, .gru = gru, .gru_backward = gru_backward,
+};

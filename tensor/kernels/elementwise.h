@@ -1,0 +1,45 @@
+/* Kernels on single values and on pixels of c channels. Where accumulate is true the last pointer is added to, else overwritten.
+ * Inputs and outputs may be the same memory but not partly overlap. Activations are inverted from their OUTPUT y. */
+#ifndef TS_ELEMENTWISE_H
+#define TS_ELEMENTWISE_H
+#include "tensor/kernels/family.h"
+#include <stdbool.h>
+#include <stdint.h>
+
+/* Klambauer et al., "Self-Normalizing Neural Networks", NIPS 2017 */
+#define TS_SELU_SCALE 1.0507009873554805
+#define TS_SELU_ALPHA 1.6732632423543772
+
+struct ts_elementwise_kernels {
+    /* y = x > 0 ? x : leak x; dx = y > 0 ? dy : leak dy (0 <= leak: y has x's sign) */
+    void (*leaky)(int64_t n, const float *x, float leak, float *y);
+    void (*leaky_backward)(int64_t n, const float *y, const float *dy, float leak, float *dx, bool accumulate);
+    void (*tanh)(int64_t n, const float *x, float *y);
+    void (*tanh_backward)(int64_t n, const float *y, const float *dy, float *dx, bool accumulate); /* dy (1 - y^2) */
+    /* y = scale (x > 0 ? x : alpha (e^x - 1)); dx = dy (y > 0 ? scale : y + scale alpha) */
+    void (*selu)(int64_t n, const float *x, float *y);
+    void (*selu_backward)(int64_t n, const float *y, const float *dy, float *dx, bool accumulate);
+    void (*add)(int64_t n, const float *a, const float *b, float *y);
+    void (*scale)(int64_t n, float s, const float *x, float *y, bool accumulate); /* y (+)= s x */
+
+    /* Pixels of c channels: x, y, dy, dx are [pixels][c], g is [c]. */
+    void (*add_leaky)(int64_t pixels, int c, const float *x, const float *g, float leak, float *y); /* leaky(x + g) */
+    /* dx (+)= m dy, sum[c] += sum over pixels of m dy, m = y > 0 ? 1 : leak. dx or sum may be NULL. */
+    void (*add_leaky_backward)(int64_t pixels, int c, const float *y, const float *dy, float leak, float *dx, bool accumulate, double *sum);
+    void (*broadcast)(int64_t pixels, int c, const float *g, float *y, bool accumulate); /* y (+)= g at every pixel */
+    /* Part of every pixel: dst[p][0 .. c-1] (+)= src[p][0 .. c-1], the pixels dst_stride and src_stride floats apart. */
+    void (*copy)(int64_t pixels, int c, const float *src, int64_t src_stride, float *dst, int64_t dst_stride, bool accumulate);
+
+    /* z = sigmoid(ih_z + hh_z), r = sigmoid(ih_r + hh_r), n = tanh(ih_n + r hh_n), y = (1 - z) old + z n. ih: [pixels][3c] in
+     * chunks z, r, n; hh_stride 3c, or 0 for one hh for all pixels; old [pixels][c] or NULL = 0; zrn: [pixels][3c] or NULL. */
+    void (*gru)(int64_t pixels, int c, const float *ih, const float *hh, int64_t hh_stride, const float *old, float *y, float *zrn);
+    /* dih: [pixels][3c], dhh: [pixels][3c], dold: [pixels][c]; each may be NULL. sum[3c] += dhh over the pixels, or NULL.
+     * dih and dhh may be the same memory when dhh accumulates. */
+    void (*gru_backward)(int64_t pixels, int c, const float *hh, int64_t hh_stride, const float *old, const float *zrn, const float *dy,
+                         float *dih, bool dih_accumulate, float *dhh, bool dhh_accumulate, float *dold, bool dold_accumulate, double *sum);
+};
+TS_FAMILY(elementwise)
+
+/* The same in plain C, for tests. */
+extern const struct ts_elementwise_kernels ts_elementwise_naive;
+#endif

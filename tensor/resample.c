@@ -1,0 +1,95 @@
+#include "tensor/resample.h"
+#include "tensor/kernels/resample.h"
+#include "tensor/threads.h"
+#include <math.h>
+
+static ts_taps make_taps(ts_arena *arena, int in, int out, size_t weights)
+{
+    ts_taps t = {.in = in, .out = out};
+    t.first = ts_arena_alloc(arena, (size_t)out * sizeof(int));
+    t.offset = ts_arena_zalloc(arena, (size_t)out + 1, sizeof(int));
+    t.weight = t.first && t.offset ? ts_arena_zalloc(arena, weights, sizeof(float)) : NULL;
+    return t;
+}
+
+ts_taps ts_taps_aligned(ts_arena *arena, int in, int out)
+{
+    ts_taps t = make_taps(arena, in, out, 2 * (size_t)out);
+    if (!t.weight) return t;
+    for (int j = 0, at = 0; j < out; j++) {
+        /* in whole numbers, so that no rounding moves a position that falls on a source pixel */
+        int64_t numerator = (int64_t)j * (in - 1), denominator = out > 1 ? out - 1 : 1;
+        int i = (int)(numerator / denominator);
+        float f = (float)((double)(numerator % denominator) / (double)denominator);
+        t.first[j] = i;
+        t.weight[at++] = 1.0f - f;
+        if (f > 0) t.weight[at++] = f;
+        t.offset[j + 1] = at;
+    }
+    return t;
+}
+
+ts_taps ts_taps_triangle(ts_arena *arena, int in, int out)
+{
+    const double step = (double)in / out, radius = step > 1 ? step : 1;
+    const size_t most = 2 * (size_t)ceil(radius) + 1;
+    ts_taps t = make_taps(arena, in, out, most * (size_t)out);
+    if (!t.weight) return t;
+    for (int j = 0, at = 0; j < out; j++) {
+        const double centre = (j + 0.5) * step - 0.5;
+        const int lo = (int)floor(centre - radius) + 1, hi = (int)ceil(centre + radius) - 1; /* where the triangle is above 0 */
+        const int from = lo < 0 ? 0 : lo, to = hi > in - 1 ? in - 1 : hi;
+        double sum = 0;
+        for (int i = lo; i <= hi; i++) sum += 1 - fabs(i - centre) / radius;
+        for (int i = from; i <= to; i++) {
+            double w = 1 - fabs(i - centre) / radius;
+            if (i == 0)
+                for (int q = lo; q < 0; q++) w += 1 - fabs(q - centre) / radius;
+            if (i == in - 1)
+                for (int q = in; q <= hi; q++) w += 1 - fabs(q - centre) / radius;
+            t.weight[at + i - from] = (float)(w / sum);
+        }
+        t.first[j] = from;
+        at += to - from + 1;
+        t.offset[j + 1] = at;
+    }
+    return t;
+}
+
+ts_taps ts_taps_transpose(ts_arena *arena, const ts_taps *t)
+{
+    /* Both ends of a row's taps grow with the row, so the rows that touch a position follow each other. */
+    size_t weights = 0;
+    for (int i = 0, lo = 0, hi = 0; i < t->in; i++) {
+        while (lo < t->out && t->first[lo] + t->offset[lo + 1] - t->offset[lo] <= i) lo++;
+        while (hi < t->out && t->first[hi] <= i) hi++;
+        weights += hi > lo ? (size_t)(hi - lo) : 0;
+    }
+    ts_taps r = make_taps(arena, t->out, t->in, weights ? weights : 1);
+    if (!r.weight) return r;
+    for (int i = 0, lo = 0, hi = 0; i < t->in; i++) {
+        while (lo < t->out && t->first[lo] + t->offset[lo + 1] - t->offset[lo] <= i) lo++;
+        while (hi < t->out && t->first[hi] <= i) hi++;
+        r.first[i] = lo;
+        r.offset[i + 1] = r.offset[i] + (hi > lo ? hi - lo : 0);
+        for (int j = lo; j < hi; j++) r.weight[r.offset[i] + j - lo] = t->weight[t->offset[j] + i - t->first[j]];
+    }
+    return r;
+}
+
+void ts_resample(int n, int c, const ts_taps *rows, const ts_taps *columns, const float *x, float *y, bool accumulate)
+{
+    const struct ts_resample_kernels *k = ts_resample_k();
+    const int64_t row = (int64_t)columns->in * c, image = row * rows->in, lines = (int64_t)n * rows->out;
+    #pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int64_t line = 0; line < lines; line++) {
+        const int j = (int)(line % rows->out), at = rows->offset[j], count = rows->offset[j + 1] - at;
+        const float *from = x + line / rows->out * image + rows->first[j] * row;
+        if (count != 1 || rows->weight[at] != 1.0f) {
+            float *mixed = ts_scratch(0, (size_t)row * sizeof(float));
+            k->rows(row, count, rows->weight + at, from, row, mixed);
+            from = mixed;
+        }
+        k->pixels(columns->out, c, columns->first, columns->offset, columns->weight, from, y + line * columns->out * c, accumulate);
+    }
+}

@@ -1,0 +1,26 @@
+/* Separable linear filters on [N, H, W, C] images: upsampling, resizing, and their transposes (gradients) are all one of these. */
+#ifndef TS_RESAMPLE_H
+#define TS_RESAMPLE_H
+#include "tensor/tensor.h"
+
+/* A sparse matrix from in to out positions along one axis: out j = sum over k < offset[j + 1] - offset[j] of
+ * weight[offset[j] + k] * in (first[j] + k). Lives in an arena; weight is NULL where memory was out. */
+typedef struct ts_taps {
+    int in, out;
+    int *first;    /* [out] */
+    int *offset;   /* [out + 1] */
+    float *weight; /* [offset[out]] */
+} ts_taps;
+
+/* Linear interpolation with the first and the last positions of both falling on each other: source = j (in - 1) / (out - 1). */
+ts_taps ts_taps_aligned(ts_arena *arena, int in, int out);
+
+/* Triangle filter of half-width max(1, in / out) around (j + 1/2) in / out - 1/2, positions outside read the edge's value. */
+ts_taps ts_taps_triangle(ts_arena *arena, int in, int out);
+
+/* The transposed matrix. */
+ts_taps ts_taps_transpose(ts_arena *arena, const ts_taps *t);
+
+/* y (+)= x filtered. x: [n, rows->in, columns->in, c], y: [n, rows->out, columns->out, c]. Threaded over rows of y. */
+void ts_resample(int n, int c, const ts_taps *rows, const ts_taps *columns, const float *x, float *y, bool accumulate);
+#endif
