@@ -1,0 +1,80 @@
+/* y[n,h,w,:] = a[n,h,w,:] followed by b[n,h,w,:];   da, db = their channels of dy
+ * a: [N,H,W,A], b: [N,H,W,B], y: [N,H,W,A+B] */
+#include "autograd/gradcheck.h"
+#include "autograd/op.h"
+#include "ops.h"
+#include "tensor/kernels/elementwise.h"
+
+#ifdef AG_API
+/* a [N,H,W,A] and b [N,H,W,B] side by side: [N,H,W,A+B]. */
+ag_value *ag_concat(ag_tape *tape, ag_value *a, ag_value *b);
+#endif
+
+static void forward(ag_tape *tape, ag_node *node)
+{
+    (void)tape;
+    const struct ts_elementwise_kernels *k = ts_elementwise_k();
+    const int a = node->in[0]->t.shape.c, b = node->in[1]->t.shape.c, c = a + b;
+    const float *xa = node->in[0]->t.data, *xb = node->in[1]->t.data;
+    float *y = node->out->t.data;
+    const int64_t pixels = ts_pixels(node->out->t.shape), chunk = ag_pixel_chunk(c);
+    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels > chunk)
+    for (int64_t p = 0; p < pixels; p += chunk) {
+        k->copy(ag_part(pixels, p, chunk), a, xa + p * a, a, y + p * c, c, false);
+        k->copy(ag_part(pixels, p, chunk), b, xb + p * b, b, y + p * c + a, c, false);
+    }
+}
+
+static void backward(ag_tape *tape, ag_node *node)
+{
+    const struct ts_elementwise_kernels *k = ts_elementwise_k();
+    const int c = node->out->t.shape.c;
+    const float *dy = node->out->grad;
+    const int64_t pixels = ts_pixels(node->out->t.shape), chunk = ag_pixel_chunk(c);
+    for (int j = 0; j < 2; j++, dy += node->in[0]->t.shape.c) {
+        const int m = node->in[j]->t.shape.c;
+        bool accumulate;
+        float *dx = ag_grad_target(tape, node->in[j], &accumulate);
+        if (!dx) continue;
+        #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels > chunk)
+        for (int64_t p = 0; p < pixels; p += chunk) k->copy(ag_part(pixels, p, chunk), m, dy + p * c, c, dx + p * m, m, accumulate);
+    }
+}
+
+static void reference(const ag_node *node, const double *const *in, double *out)
+{
+    const int a = node->in[0]->t.shape.c, b = node->in[1]->t.shape.c;
+    for (int64_t p = 0; p < ts_pixels(node->out->t.shape); p++)
+        for (int i = 0; i < a + b; i++) *out++ = i < a ? in[0][p * a + i] : in[1][p * b + i - a];
+}
+
+static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
+{
+    (void)user;
+    return ag_concat(tape, in[0], in[1]);
+}
+
+static void cases(ag_gradcheck *check)
+{
+    ts_rng *r = ag_gradcheck_rng(check);
+    for (int i = 0; i < 6; i++) {
+        ag_case c = {.label = "random", .inputs = 2, .lo = -1, .hi = 1, .build = build};
+        c.shape[0] = c.shape[1] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9), 1 + ts_rng_int(r, 33)};
+        c.shape[1].c = 1 + ts_rng_int(r, 20);
+        ag_gradcheck_run(check, &c);
+    }
+}
+
+const ag_op op_concat = {"concat", forward, backward, reference, cases};
+
+ag_value *ag_concat(ag_tape *tape, ag_value *a, ag_value *b)
+{
+    ag_value *in[2] = {a, b};
+    char ta[AG_SHAPE_TEXT], tb[AG_SHAPE_TEXT];
+    if (!ag_ready(tape, "concat", 2, in)) return NULL;
+    ts_shape s = a->t.shape, q = b->t.shape;
+    if (s.n != q.n || s.h != q.h || s.w != q.w)
+        return ag_fail(tape, TS_INVALID, "concat: %s and %s differ in more than the channels", ag_shape_text(ta, s), ag_shape_text(tb, q));
+    s.c += q.c;
+    return ag_apply(tape, &op_concat, 2, in, s, NULL, 0);
+}

@@ -1,0 +1,280 @@
+#include "autograd/tape.h"
+#include "autograd/op.h"
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A value and where the arena stood before it was made: scopes ask which side of a mark it is on. */
+typedef struct ag_held {
+    ag_value v;
+    size_t born;
+} ag_held;
+
+typedef struct ag_pack {
+    const float *weight;
+    ts_conv_use use;
+    ts_conv conv; /* n, h, w play no part */
+    float *packed;
+} ag_pack;
+
+struct ag_tape {
+    ts_arena *arena, *packs_arena, *moving; /* moving: what a scope keeps, while the arena is released */
+    bool gradients, frozen;
+    ag_node **node; /* grown by doubling and never shrunk, as is pack */
+    size_t nodes, node_room;
+    ag_pack *pack;
+    size_t packs, pack_room;
+    ts_status status;
+};
+
+ag_tape *ag_tape_create(bool gradients, ts_status *st)
+{
+    ag_tape *tape = calloc(1, sizeof *tape);
+    if (!tape) {
+        ts_fail(st, TS_NOMEM, "no memory for a tape");
+        return NULL;
+    }
+    tape->gradients = gradients;
+    tape->arena = ts_arena_create(0, st);
+    tape->packs_arena = tape->arena ? ts_arena_create(0, st) : NULL;
+    tape->moving = tape->packs_arena ? ts_arena_create(0, st) : NULL;
+    if (!tape->moving) ag_tape_destroy(&tape);
+    return tape;
+}
+
+void ag_tape_destroy(ag_tape **tape)
+{
+    if (!*tape) return;
+    ts_arena_destroy(&(*tape)->arena);
+    ts_arena_destroy(&(*tape)->packs_arena);
+    ts_arena_destroy(&(*tape)->moving);
+    free((*tape)->node);
+    free((*tape)->pack);
+    free(*tape);
+    *tape = NULL;
+}
+
+void ag_reset(ag_tape *tape)
+{
+    ts_arena_reset(tape->arena);
+    ts_scratch_level();
+    tape->nodes = 0;
+    tape->status = (ts_status){0};
+    if (!tape->frozen) {
+        ts_arena_reset(tape->packs_arena);
+        tape->packs = 0;
+    }
+}
+
+const ts_status *ag_status(const ag_tape *tape) { return &tape->status; }
+ts_arena *ag_arena(ag_tape *tape) { return tape->arena; }
+bool ag_gradients(const ag_tape *tape) { return tape->gradients; }
+void ag_freeze(ag_tape *tape, bool frozen) { tape->frozen = frozen; }
+
+ag_value *ag_fail(ag_tape *tape, ts_code code, const char *format, ...)
+{
+    if (tape->status.code == TS_OK) {
+        va_list args;
+        va_start(args, format);
+        vsnprintf(tape->status.message, sizeof tape->status.message, format, args);
+        va_end(args);
+        tape->status.code = code;
+    }
+    return NULL;
+}
+
+static ag_value *no_memory(ag_tape *tape, const char *what)
+{
+    return ag_fail(tape, TS_NOMEM, "no memory for %s (the tape already holds %zu MiB); use smaller images or batches", what,
+                   ts_arena_used(tape->arena) >> 20);
+}
+
+bool ag_ready(ag_tape *tape, const char *op, int count, ag_value *const *in)
+{
+    if (tape->status.code != TS_OK) return false;
+    for (int i = 0; i < count; i++)
+        if (!in[i]) {
+            ag_fail(tape, TS_INVALID, "%s: input %d is missing", op, i);
+            return false;
+        }
+    return true;
+}
+
+const char *ag_shape_text(char text[AG_SHAPE_TEXT], ts_shape s)
+{
+    snprintf(text, AG_SHAPE_TEXT, "[%d,%d,%d,%d]", s.n, s.h, s.w, s.c);
+    return text;
+}
+
+static ag_value *new_value(ag_tape *tape, ts_tensor t, float *grad)
+{
+    if (tape->status.code != TS_OK) return NULL;
+    size_t born = ts_arena_used(tape->arena);
+    ag_held *held = ts_arena_alloc(tape->arena, sizeof *held);
+    if (!held) return no_memory(tape, "a value");
+    *held = (ag_held){{t, grad, grad != NULL, grad != NULL}, born};
+    return &held->v;
+}
+
+static ag_value *new_leaf(ag_tape *tape, ts_tensor t, float *grad)
+{
+    if (tape->status.code != TS_OK) return NULL;
+    if (!t.data || t.shape.n < 1 || t.shape.h < 1 || t.shape.w < 1 || t.shape.c < 1)
+        return ag_fail(tape, TS_INVALID, "leaf: no data or an empty shape [%d,%d,%d,%d]", t.shape.n, t.shape.h, t.shape.w, t.shape.c);
+    if (!ts_contiguous(&t)) return ag_fail(tape, TS_INVALID, "leaf: the tensor is a strided view; copy it with ts_copy first");
+    return new_value(tape, t, grad);
+}
+
+ag_value *ag_constant(ag_tape *tape, ts_tensor t) { return new_leaf(tape, t, NULL); }
+ag_value *ag_parameter(ag_tape *tape, ts_tensor t, float *grad) { return new_leaf(tape, t, tape->gradients ? grad : NULL); }
+
+ag_value *ag_empty(ag_tape *tape, ts_shape shape)
+{
+    ag_value *v = new_value(tape, (ts_tensor){0}, NULL); /* the header first: one order for values and their data */
+    if (!v) return NULL;
+    v->t = ts_new(tape->arena, shape);
+    if (!v->t.data) return no_memory(tape, "a value's data");
+    return v;
+}
+
+ag_value *ag_detach(ag_tape *tape, ag_value *v)
+{
+    if (!ag_ready(tape, "detach", 1, &v)) return NULL;
+    return new_value(tape, v->t, NULL);
+}
+
+/* One more slot in a list; false without memory. */
+static bool grow(void **list, size_t item, size_t count, size_t *room)
+{
+    if (count < *room) return true;
+    size_t more = *room ? 2 * *room : 256;
+    void *p = realloc(*list, more * item);
+    if (!p) return false;
+    *list = p;
+    *room = more;
+    return true;
+}
+
+ag_value *ag_apply(ag_tape *tape, const ag_op *op, int inputs, ag_value *const *in, ts_shape out, const void *attr, size_t attr_size)
+{
+    if (tape->status.code != TS_OK) return NULL;
+    ag_value *v = ag_empty(tape, out);
+    ag_node *node = ts_arena_zalloc(tape->arena, 1, sizeof *node);
+    void *copy = attr_size ? ts_arena_alloc(tape->arena, attr_size) : NULL;
+    if (!v || !node || (attr_size && !copy)) return no_memory(tape, op->name);
+    if (attr_size) memcpy(copy, attr, attr_size);
+    *node = (ag_node){.op = op, .inputs = inputs, .out = v, .attr = copy};
+    for (int i = 0; i < inputs; i++) {
+        node->in[i] = in[i];
+        if (in[i] && in[i]->needs_grad) v->needs_grad = true;
+    }
+    op->forward(tape, node);
+    if (tape->status.code != TS_OK) return NULL;
+    if (v->needs_grad) {
+        if (!grow((void **)&tape->node, sizeof *tape->node, tape->nodes, &tape->node_room)) return no_memory(tape, "the list of operations");
+        tape->node[tape->nodes++] = node;
+    }
+    return v;
+}
+
+float *ag_grad_target(ag_tape *tape, ag_value *v, bool *accumulate)
+{
+    if (!v || !v->needs_grad) return NULL;
+    if (!v->grad) {
+        v->grad = ts_arena_alloc(tape->arena, (size_t)ts_count(v->t.shape) * sizeof(float));
+        if (!v->grad) {
+            no_memory(tape, "a gradient");
+            return NULL;
+        }
+    }
+    *accumulate = v->grad_ready;
+    v->grad_ready = true;
+    return v->grad;
+}
+
+float *ag_grad_add(ag_tape *tape, ag_value *v)
+{
+    bool accumulate;
+    float *g = ag_grad_target(tape, v, &accumulate);
+    if (g && !accumulate) memset(g, 0, (size_t)ts_count(v->t.shape) * sizeof(float));
+    return g;
+}
+
+ts_code ag_backward(ag_tape *tape, ag_value *loss)
+{
+    if (!ag_ready(tape, "backward", 1, &loss)) return tape->status.code;
+    if (!tape->gradients) ag_fail(tape, TS_INVALID, "backward: the tape was created without gradients");
+    else if (ts_count(loss->t.shape) != 1) ag_fail(tape, TS_INVALID, "backward: the loss has %lld values, not one", (long long)ts_count(loss->t.shape));
+    else if (!loss->needs_grad) ag_fail(tape, TS_INVALID, "backward: the loss does not depend on any parameter");
+    float *seed = tape->status.code == TS_OK ? ag_grad_add(tape, loss) : NULL;
+    if (!seed) return tape->status.code;
+    seed[0] += 1.0f;
+    for (size_t i = tape->nodes; i-- > 0;) {
+        ag_node *node = tape->node[i];
+        if (!node->out->grad_ready) continue; /* the loss does not depend on it */
+        node->op->backward(tape, node);
+        if (tape->status.code != TS_OK) break;
+        node->out->grad_ready = false; /* passed on; a second backward starts it anew */
+    }
+    return tape->status.code;
+}
+
+const float *ag_packed(ag_tape *tape, const ts_conv *c, ts_conv_use use, const float *weight)
+{
+    for (size_t i = 0; i < tape->packs; i++) {
+        const ag_pack *p = &tape->pack[i];
+        if (p->weight == weight && p->use == use && p->conv.ic == c->ic && p->conv.oc == c->oc && p->conv.k == c->k &&
+            p->conv.dilation == c->dilation && p->conv.pad == c->pad)
+            return p->packed;
+    }
+    float *packed = ts_arena_alloc(tape->packs_arena, ts_conv_packed_count(c, use) * sizeof(float));
+    if (!packed || !grow((void **)&tape->pack, sizeof *tape->pack, tape->packs, &tape->pack_room)) {
+        no_memory(tape, "packed weights");
+        return NULL;
+    }
+    ts_conv_pack(c, use, weight, packed);
+    tape->pack[tape->packs++] = (ag_pack){weight, use, *c, packed};
+    return packed;
+}
+
+ts_mark ag_scope_begin(ag_tape *tape) { return ts_arena_mark(tape->arena); }
+
+void ag_scope_end(ag_tape *tape, ts_mark mark, ag_value **keep, int count)
+{
+    if (tape->gradients) return;
+    ts_mark moving = ts_arena_mark(tape->moving);
+    /* Out of the way first, back in afterwards: what is kept may be larger than the room before it. */
+    struct { ts_shape shape; float *data; } *kept = ts_arena_zalloc(tape->moving, (size_t)(count > 0 ? count : 1), sizeof *kept);
+    for (int i = 0; kept && i < count; i++) {
+        if (!keep[i] || ((const ag_held *)keep[i])->born < mark.total) continue;
+        size_t bytes = (size_t)ts_count(keep[i]->t.shape) * sizeof(float);
+        kept[i].shape = keep[i]->t.shape;
+        kept[i].data = ts_arena_alloc(tape->moving, bytes);
+        if (!kept[i].data) {
+            kept = NULL;
+            break;
+        }
+        memcpy(kept[i].data, keep[i]->t.data, bytes);
+    }
+    if (!kept) { /* nothing is lost: the memory stays taken */
+        no_memory(tape, "the values that a scope keeps");
+        ts_arena_release(tape->moving, moving);
+        return;
+    }
+    ts_arena_release(tape->arena, mark);
+    for (int i = 0; i < count; i++) {
+        if (!kept[i].data) continue;
+        keep[i] = ag_empty(tape, kept[i].shape);
+        if (keep[i]) memcpy(keep[i]->t.data, kept[i].data, (size_t)ts_count(kept[i].shape) * sizeof(float));
+    }
+    ts_arena_release(tape->moving, moving);
+    if (ts_arena_used(tape->moving) == 0) ts_arena_reset(tape->moving); /* several chunks become one */
+}
+
+const ag_node *ag_node_of(const ag_tape *tape, const ag_value *v)
+{
+    for (size_t i = tape->nodes; i-- > 0;)
+        if (tape->node[i]->out == v) return tape->node[i];
+    return NULL;
+}
