@@ -18,5 +18,6 @@ void rd_flash_rmse(rd_grid grid, const float *maps, int channels, const rd_view 
  * over the refinement; gradient is [h, w, channels], zero in channels beyond the ninth and where render is clamped.
  * *rmse (may be NULL) gets the RMSE of these maps. */
 #define RD_RMSE_FLOOR 1e-4 /* at a perfect fit the residual is zero too: the floor only keeps 0/0 away */
-void rd_flash_gradient(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image, double rmse0, float *gradient, double *rmse);
+void rd_flash_gradient(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image, double rmse0,
+                       float *gradient, double *rmse);
 #endif

@@ -1,0 +1,68 @@
+/* Shading: pixels times views a second. */
+#include "bench/bench.h"
+#include "render/losses.h"
+#include "render/render.h"
+#include "tensor/maps.h"
+#include <stdlib.h>
+
+enum { SIDE = 256, N = 8, S = 64 };
+
+typedef struct job {
+    float *maps, *target, *gradient, *image;
+    double rmse;
+    rd_view views[N * RD_LOSS_VIEWS];
+    ag_tape *tape;
+} job;
+
+static void render(void *user)
+{
+    job *j = user;
+    rd_view view = rd_flash();
+    rd_render(rd_grid_full(SIDE), j->maps, MAP_CHANNELS, &view, true, j->image);
+}
+
+static void gradient(void *user)
+{
+    job *j = user;
+    rd_view view = rd_flash();
+    rd_flash_gradient(rd_grid_full(SIDE), j->maps, MAP_CHANNELS, &view, j->image, 0.1, j->gradient, &j->rmse);
+}
+
+static void loss(void *user)
+{
+    job *j = user;
+    ts_shape shape = {N, S, S, MAP_CHANNELS};
+    ag_reset(j->tape);
+    ag_value *maps = ag_parameter(j->tape, ts_view(j->maps, shape), j->gradient), *target = ag_constant(j->tape, ts_view(j->target, shape));
+    ag_backward(j->tape, ag_render_loss(j->tape, maps, target, j->views, RD_LOSS_VIEWS));
+}
+
+BENCH(render)
+{
+    job j = {0};
+    ts_rng rng = ts_rng_make(1, TS_STREAM_TEST, 0);
+    size_t pixels = SIDE * SIDE;
+    j.maps = malloc(pixels * MAP_CHANNELS * sizeof(float));
+    j.target = malloc(pixels * MAP_CHANNELS * sizeof(float));
+    j.gradient = calloc(pixels * MAP_CHANNELS, sizeof(float));
+    j.image = malloc(pixels * 3 * sizeof(float));
+    j.tape = ag_tape_create(true, NULL);
+    if (!j.maps || !j.target || !j.gradient || !j.image || !j.tape) abort();
+    for (size_t i = 0; i < pixels * MAP_CHANNELS; i++) {
+        bool normal = i % MAP_CHANNELS == MAP_NORMAL || i % MAP_CHANNELS == MAP_NORMAL + 1;
+        j.maps[i] = ts_rng_range(&rng, -1, 1) * (normal ? 0.4f : 1);
+        j.target[i] = ts_rng_range(&rng, -1, 1) * (normal ? 0.4f : 1);
+    }
+    for (size_t i = 0; i < pixels * 3; i++) j.image[i] = ts_rng_uniform(&rng);
+    for (int i = 0; i < N; i++) rd_loss_views(&rng, j.views + i * RD_LOSS_VIEWS);
+    bench_heading("render (pixels x views)");
+    bench_time t = bench_measure(gradient, &j);
+    bench_row_unit("flash loss and gradient, 256^2", t, (double)pixels / t.seconds * 1e-6, "Mpixel/s");
+    t = bench_measure(render, &j);
+    bench_row_unit("value, 256^2", t, (double)pixels / t.seconds * 1e-6, "Mpixel/s");
+    t = bench_measure(loss, &j);
+    /* prediction and target are both rendered, and counted once */
+    bench_row_unit("render_loss with gradient, 8 x 64^2, 9 views", t, (double)N * S * S * RD_LOSS_VIEWS / t.seconds * 1e-6, "Mpixel/s");
+    ag_tape_destroy(&j.tape);
+    free(j.maps), free(j.target), free(j.gradient), free(j.image);
+}

@@ -1,0 +1,102 @@
+/* Errors between materials, in renderings and in maps. */
+#include "render/error.h"
+#include "render/render.h"
+#include "tensor/maps.h"
+#include "tensor/threads.h"
+#include <math.h>
+#include <stdlib.h>
+
+/* 1/2.2 and not the sRGB curve: the figures that others publish are in this space. NaN counts as black. */
+static float gamma_encode(float v)
+{
+    if (!(v > 0)) return 0;
+    return v >= 1 ? 1 : powf(v, 1 / 2.2f);
+}
+
+static float limit(float x)
+{
+    if (!(x > -1)) return -1;
+    return x > 1 ? 1 : x;
+}
+
+/* Sum of squared differences of gamma-encoded images; row sums in index order make it independent of the threads. */
+static double gamma_difference(int h, int w, const float *a, const float *b, double *rows)
+{
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int y = 0; y < h; y++) {
+        const size_t at = (size_t)y * (size_t)w * 3;
+        double sum = 0;
+        for (size_t i = at; i < at + (size_t)w * 3; i++) {
+            const double d = (double)gamma_encode(a[i]) - (double)gamma_encode(b[i]);
+            sum += d * d;
+        }
+        rows[y] = sum;
+    }
+    double sum = 0;
+    for (int y = 0; y < h; y++) sum += rows[y];
+    return sum;
+}
+
+double rd_render_rmse(rd_grid grid, const float *maps_a, int channels_a, const float *maps_b, int channels_b, const rd_view *views, int count)
+{
+    if (count < 1) return NAN;
+    const size_t values = (size_t)grid.h * (size_t)grid.w * 3;
+    float *image = malloc(2 * values * sizeof(float));
+    double *rows = malloc((size_t)grid.h * sizeof(double)), mean = NAN;
+    if (image && rows) {
+        double sum = 0;
+        for (int v = 0; v < count; v++) {
+            rd_render(grid, maps_a, channels_a, &views[v], true, image);
+            rd_render(grid, maps_b, channels_b, &views[v], true, image + values);
+            sum += sqrt(gamma_difference(grid.h, grid.w, image, image + values, rows) / (double)values);
+        }
+        mean = sum / count;
+    }
+    free(rows);
+    free(image);
+    return mean;
+}
+
+static void unit_normal(const float *maps, double n[3])
+{
+    n[0] = (double)limit(maps[MAP_NORMAL]);
+    n[1] = (double)limit(maps[MAP_NORMAL + 1]);
+    const double xy = n[0] * n[0] + n[1] * n[1];
+    if (xy > 1) { /* outside the disc the nearest direction is a grazing one */
+        n[0] /= sqrt(xy);
+        n[1] /= sqrt(xy);
+    }
+    n[2] = xy < 1 ? sqrt(1 - xy) : 0;
+}
+
+static double colour_difference(const float *a, const float *b)
+{
+    double sum = 0;
+    for (int c = 0; c < 3; c++) {
+        const double d = (double)gamma_encode((limit(a[c]) + 1) / 2) - (double)gamma_encode((limit(b[c]) + 1) / 2);
+        sum += d * d;
+    }
+    return sum;
+}
+
+rd_map_error rd_map_rmse(int64_t count, const float *maps_a, int channels_a, const float *maps_b, int channels_b)
+{
+    rd_map_error e = {0};
+    for (int64_t i = 0; i < count; i++) {
+        const float *a = maps_a + i * channels_a, *b = maps_b + i * channels_b;
+        double na[3], nb[3];
+        unit_normal(a, na);
+        unit_normal(b, nb);
+        for (int k = 0; k < 3; k++) e.normal += (na[k] - nb[k]) * (na[k] - nb[k]);
+        e.diffuse += colour_difference(a + MAP_DIFFUSE, b + MAP_DIFFUSE);
+        e.specular += colour_difference(a + MAP_SPECULAR, b + MAP_SPECULAR);
+        const double r = ((double)limit(a[MAP_ROUGHNESS]) - (double)limit(b[MAP_ROUGHNESS])) / 2;
+        e.roughness += r * r;
+    }
+    const double n = count > 0 ? (double)count : 1;
+    e.diffuse = sqrt(e.diffuse / (3 * n));
+    e.specular = sqrt(e.specular / (3 * n));
+    e.normal = sqrt(e.normal / (3 * n));
+    e.roughness = sqrt(e.roughness / n);
+    return e;
+}

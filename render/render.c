@@ -1,0 +1,71 @@
+#include "render/render.h"
+#include "render/brdf.h"
+#include "render/rows.h"
+#include "tensor/threads.h"
+#include <math.h>
+
+ts_shade_view rd_shade_view(const rd_view *view)
+{
+    ts_shade_view s = {.guards = &rd_guards, .falloff = view->kind == RD_POINT, .power = view->kind == RD_POINT ? view->power : 3.14159265f};
+    if (view->kind == RD_DIRECTIONS) {
+        s.kind = TS_SHADE_DIRECTIONS;
+        s.power = (float)rd_light(view, (double[2]){0}, s.light, s.camera);
+        s.fresnel = (float)rd_fresnel(rd_half(s.light, s.camera, s.half));
+        return s;
+    }
+    bool same = true;
+    for (int i = 0; i < 3; i++) {
+        s.light[i] = (double)view->light[i];
+        s.camera[i] = (double)view->camera[i];
+        same &= s.light[i] == s.camera[i];
+    }
+    s.kind = same ? TS_SHADE_COLLOCATED : TS_SHADE_POSITIONS;
+    s.fresnel = (float)rd_fresnel(1);
+    return s;
+}
+
+ts_shade_row rd_shade_row(rd_grid grid, int y, const float *maps, int channels)
+{
+    double centre[2];
+    rd_centre(grid, 0, y, centre);
+    return (ts_shade_row){.y = centre[1], .step = 1.0 / grid.side, .column = grid.x0, .count = grid.w, .channels = channels,
+                          .maps = maps + (int64_t)y * grid.w * channels};
+}
+
+void rd_render(rd_grid grid, const float *maps, int channels, const rd_view *view, bool clamp, float *image)
+{
+    ts_shade_view v = rd_shade_view(view);
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int y = 0; y < grid.h; y++) {
+        ts_shade_row row = rd_shade_row(grid, y, maps, channels);
+        ts_shade_k()->render(&v, &row, clamp ? 1.0f : INFINITY, image + (int64_t)y * grid.w * 3);
+    }
+}
+
+/* The RMSE, and the gradient scaled by scale unless it is NULL. A sum a row, added in order: the same for any number of threads. */
+static double flash(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image, double scale, float *gradient)
+{
+    ts_shade_view v = rd_shade_view(view);
+    double *sums = ts_scratch(0, (size_t)grid.h * sizeof(double)), sum = 0;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int y = 0; y < grid.h; y++) {
+        int64_t at = (int64_t)y * grid.w;
+        ts_shade_row row = rd_shade_row(grid, y, maps, channels);
+        sums[y] = ts_shade_k()->flash(&v, &row, image + at * 3, (float)scale, gradient ? gradient + at * channels : NULL);
+    }
+    for (int y = 0; y < grid.h; y++) sum += sums[y];
+    return sqrt(sum / (3.0 * grid.h * grid.w));
+}
+
+void rd_flash_rmse(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image, double *rmse)
+{
+    *rmse = flash(grid, maps, channels, view, image, 0, NULL);
+}
+
+void rd_flash_gradient(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image, double rmse0,
+                       float *gradient, double *rmse)
+{
+    double floored = rmse0 > RD_RMSE_FLOOR ? rmse0 : RD_RMSE_FLOOR;
+    double now = flash(grid, maps, channels, view, image, 1e5 / (3.0 * 256 * 256) / floored, gradient);
+    if (rmse) *rmse = now;
+}

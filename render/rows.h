@@ -1,0 +1,10 @@
+/* From the renderer's terms to the kernels': shared by render.c and the loss op. */
+#ifndef RD_ROWS_H
+#define RD_ROWS_H
+#include "render/scene.h"
+#include "tensor/kernels/shade.h"
+
+ts_shade_view rd_shade_view(const rd_view *view);
+/* Row y of a grid; maps [h, w, channels]. */
+ts_shade_row rd_shade_row(rd_grid grid, int y, const float *maps, int channels);
+#endif

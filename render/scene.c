@@ -1,0 +1,65 @@
+#include "render/scene.h"
+#include <math.h>
+
+#define TAU 6.28318530717958647692
+
+rd_grid rd_grid_full(int side)
+{
+    return (rd_grid){.h = side, .w = side, .side = side};
+}
+
+rd_view rd_flash(void)
+{
+    return (rd_view){RD_POINT, {0, 0, RD_FLASH_DISTANCE}, {0, 0, RD_FLASH_DISTANCE}, RD_FLASH_POWER};
+}
+
+static void hemisphere(ts_rng *rng, double d[3])
+{
+    double r = sqrt(0.94 * ts_rng_uniform(rng) + 0.01), phi = TAU * ts_rng_uniform(rng);
+    d[0] = r * cos(phi);
+    d[1] = r * sin(phi);
+    d[2] = sqrt(1 - r * r);
+}
+
+void rd_loss_views(ts_rng *rng, rd_view views[RD_LOSS_VIEWS])
+{
+    for (int i = 0; i < RD_LOSS_VIEWS; i++) {
+        double v[3], l[3];
+        hemisphere(rng, v);
+        if (i < RD_LOSS_DIFFUSE) {
+            hemisphere(rng, l);
+        } else {
+            double sx = ts_rng_range(rng, -1, 1), sy = ts_rng_range(rng, -1, 1), shift[3] = {sx, sy, 1e-4};
+            double dv = exp(0.5 + 0.75 * ts_rng_normal(rng)), dl = exp(0.5 + 0.75 * ts_rng_normal(rng));
+            for (int k = 0; k < 3; k++) {
+                l[k] = 0.5 * (dl * (k < 2 ? -v[k] : v[k]) + shift[k]); /* half: from half patch widths to patch widths */
+                v[k] = 0.5 * (dv * v[k] + shift[k]);
+            }
+        }
+        views[i].kind = i < RD_LOSS_DIFFUSE ? RD_DIRECTIONS : RD_NEAR;
+        views[i].power = 1;
+        for (int k = 0; k < 3; k++) {
+            views[i].camera[k] = (float)v[k];
+            views[i].light[k] = (float)l[k];
+        }
+    }
+}
+
+void rd_eval_views(ts_rng *rng, int count, rd_view *views)
+{
+    for (int i = 0; i < count; i++) {
+        views[i] = rd_flash();
+        for (int k = 0; k < 2; k++) views[i].camera[k] = ts_rng_range(rng, -0.5f, 0.5f);
+        for (int k = 0; k < 2; k++) views[i].light[k] = ts_rng_range(rng, -0.5f, 0.5f);
+    }
+}
+
+rd_view rd_preview_view(int index, int count)
+{
+    rd_view view = rd_flash();
+    double phi = TAU * (index + 0.5) / count;
+    /* beside the sample: the highlight leaves the middle and the relief shows, and every corner is still lit */
+    view.light[0] = (float)(0.6 * cos(phi));
+    view.light[1] = (float)(0.6 * sin(phi));
+    return view;
+}
