@@ -6,7 +6,7 @@
 typedef struct nn_adam {
     float *m, *v, *ema; /* aligned blocks like the model's; ema NULL when ema_decay is 0 */
     size_t count;
-    int64_t step;       /* updates made so far */
+    int64_t step;       /* updates made so far; back to 0 (with zero moments) when the set of trained parameters changes */
     float beta1, beta2, epsilon, ema_decay;
 } nn_adam;
 

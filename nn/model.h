@@ -46,9 +46,15 @@ typedef struct nn_model {
     void *layers;  /* nn's own */
 } nn_model;
 
+/* The parameter list alone: value is NULL. The caller frees. NULL and st on failure. */
+nn_model *nn_model_plan(const nn_arch *arch, ts_status *st);
+
 /* Parameters are allocated and zero. The caller frees. NULL and st on failure. */
 nn_model *nn_model_create(const nn_arch *arch, ts_status *st);
 void nn_model_free(nn_model **model);
+
+/* Trained numbers in g and in h, without the blocks' padding. */
+size_t nn_model_numbers(const nn_model *model, bool refiner);
 
 /* Allocates the gradient block (zero); idempotent. */
 ts_code nn_model_train(nn_model *model, ts_status *st);
@@ -81,7 +87,8 @@ typedef struct nn_state {
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
 /* The unrolled loop: maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate
- * memory is released on a tape without gradients. after (may be NULL) sees every R_t and may stop the loop by returning false. */
+ * memory is released on a tape without gradients. after (may be NULL) sees every R_t and may stop the loop by returning false;
+ * what is left of maps is then filled with the last R_t. */
 typedef bool (*nn_after)(int step, const ag_value *maps, void *user);
 ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps, nn_after after, void *user);
 #endif

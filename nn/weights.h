@@ -17,23 +17,31 @@ typedef struct nn_meta {
 /* Written to a temporary file beside path, fsynced, renamed; nothing is left on failure. */
 ts_code nn_safetensors_write(const char *path, const nn_block *blocks, int count, const nn_meta *meta, int metas, ts_status *st);
 
-/* A mapped, validated file. F32, F16 and BF16 tensors can be read. */
+/* A mapped, validated file: the header has at most 16 MiB, and the tensors fill the rest of the file without holes or overlap.
+ * F32, F16 and BF16 tensors can be read. */
 typedef struct nn_file nn_file;
 nn_file *nn_safetensors_open(const char *path, ts_status *st);
 void nn_safetensors_close(nn_file **file);
 int nn_safetensors_count(const nn_file *file);
 const char *nn_safetensors_name(const nn_file *file, int i);
+bool nn_safetensors_has(const nn_file *file, const char *name);
 const char *nn_safetensors_meta(const nn_file *file, const char *key); /* NULL when absent */
+const char *nn_safetensors_meta_key(const nn_file *file, int i);          /* in the file's order, NULL past the last */
+const char *nn_safetensors_path(const nn_file *file);                     /* for messages */
 /* Copies tensor name into out (count floats); TS_FORMAT when it is missing or has another shape. */
 ts_code nn_safetensors_read(const nn_file *file, const char *name, int rank, const int64_t *dim, float *out, ts_status *st);
 
-/* A model with its parameters from a file that says its own architecture. */
+/* A model with its parameters from a file that says its own architecture. Tensors whose names begin with neither "g." nor "h."
+ * (a checkpoint's) are left alone. */
 nn_model *nn_model_load(const char *path, ts_status *st);
 /* values: the block to write, model->value or an EMA. Extra metadata may be given. TS_NUMERIC when a value is not finite. */
 ts_code nn_model_save(const nn_model *model, const float *values, const char *path, const nn_meta *extra, int extras, ts_status *st);
 /* Parameters that have the same name and shape are taken from the file; how many were, and were not, is returned through the pointers. */
 ts_code nn_model_init_from(nn_model *model, const char *path, int *taken, int *left, ts_status *st);
-/* The architecture to metadata and back. */
+/* The architecture to metadata ("format" = "lgd" and one key "arch.FIELD" each: NN_ARCH_META entries, NN_ARCH_TEXT bytes of text are
+ * enough) and back. Returns the number of entries, -1 when capacity or text_size is too small. Keys that do not begin with "arch." are
+ * free for other use. */
+enum { NN_ARCH_META = 24, NN_ARCH_TEXT = 1024 };
 int nn_arch_to_meta(const nn_arch *arch, nn_meta *meta, int capacity, char *text, size_t text_size);
 ts_code nn_arch_from_file(const nn_file *file, nn_arch *arch, ts_status *st);
 #endif

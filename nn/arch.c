@@ -1,0 +1,152 @@
+/* The architecture's fields in one table: default, range, metadata key. */
+#include "nn/weights.h"
+#include "nn/layers.h"
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef enum field_kind { FIELD_INT, FIELD_BOOL, FIELD_RMSE } field_kind;
+
+typedef struct field {
+    const char *key;
+    field_kind kind;
+    size_t at;
+    int lo, hi, start;
+} field;
+
+/* The upper ends only keep products of sizes far from overflow. The defaults are the model that two cores can train. */
+#define AT(member) offsetof(nn_arch, member)
+static const field fields[] = {
+    {"channels", FIELD_INT, AT(channels), 9, 10, 9},
+    {"g_width", FIELD_INT, AT(g_width), 1, 4096, 16},
+    {"g_width_max", FIELD_INT, AT(g_width_max), 1, 4096, 128},
+    {"g_levels", FIELD_INT, AT(g_levels), 1, NN_MAX_LEVELS, 5},
+    {"g_kernel_first", FIELD_INT, AT(g_kernel_first), 1, 15, 3},
+    {"g_kernel", FIELD_INT, AT(g_kernel), 1, 15, 3},
+    {"g_size", FIELD_INT, AT(g_size), 2, 8192, 64},
+    {"h_width", FIELD_INT, AT(h_width), 0, 4096, 64},
+    {"h_gru", FIELD_INT, AT(h_gru), 1, 1024, 32},
+    {"iterations", FIELD_INT, AT(iterations), 0, 1000, 6},
+    {"recurrent", FIELD_BOOL, AT(recurrent), 0, 1, true},
+    {"gradient", FIELD_BOOL, AT(gradient), 0, 1, true},
+    {"mean_before_norm", FIELD_BOOL, AT(mean_before_norm), 0, 1, true},
+    {"rmse", FIELD_RMSE, AT(rmse), NN_RMSE_START, NN_RMSE_BATCH, NN_RMSE_START},
+};
+enum { FIELDS = sizeof fields / sizeof *fields };
+static const char *const rmse_name[] = {"start", "batch"};
+static const char prefix[] = "arch.";
+
+static int get(const nn_arch *a, const field *f)
+{
+    const void *p = (const char *)a + f->at;
+    if (f->kind == FIELD_BOOL) return *(const bool *)p;
+    if (f->kind == FIELD_RMSE) return (int)*(const nn_rmse *)p;
+    return *(const int *)p;
+}
+
+static void set(nn_arch *a, const field *f, int v)
+{
+    void *p = (char *)a + f->at;
+    if (f->kind == FIELD_BOOL) *(bool *)p = v != 0;
+    else if (f->kind == FIELD_RMSE) *(nn_rmse *)p = (nn_rmse)v;
+    else *(int *)p = v;
+}
+
+nn_arch nn_arch_default(void)
+{
+    nn_arch a;
+    memset(&a, 0, sizeof a);
+    for (int i = 0; i < FIELDS; i++) set(&a, &fields[i], fields[i].start);
+    return a;
+}
+
+ts_code nn_arch_check(const nn_arch *a, ts_status *st)
+{
+    for (int i = 0; i < FIELDS; i++) {
+        const field *f = &fields[i];
+        int v = get(a, f);
+        if (v < f->lo || v > f->hi) return ts_fail(st, TS_INVALID, "%s is %d: it must be %d to %d", f->key, v, f->lo, f->hi);
+    }
+    if (a->g_width_max < a->g_width)
+        return ts_fail(st, TS_INVALID, "g_width_max is %d: it must be at least g_width, %d", a->g_width_max, a->g_width);
+    if (a->g_kernel_first % 2 == 0) return ts_fail(st, TS_INVALID, "g_kernel_first is %d: it must be odd", a->g_kernel_first);
+    if (a->g_kernel % 2 == 0) return ts_fail(st, TS_INVALID, "g_kernel is %d: it must be odd", a->g_kernel);
+    if (a->g_size % (1 << a->g_levels) != 0)
+        return ts_fail(st, TS_INVALID, "g_size is %d: with %d g_levels it must be a multiple of %d", a->g_size, a->g_levels, 1 << a->g_levels);
+    if (a->h_width == 0 && a->iterations != 0)
+        return ts_fail(st, TS_INVALID, "iterations is %d: without a refiner (h_width 0) it must be 0", a->iterations);
+    return TS_OK;
+}
+
+static const char *value_text(const nn_arch *a, const field *f, char *text, size_t size)
+{
+    int v = get(a, f);
+    if (f->kind == FIELD_BOOL) snprintf(text, size, "%s", v ? "true" : "false");
+    else if (f->kind == FIELD_RMSE) snprintf(text, size, "%s", rmse_name[v]);
+    else snprintf(text, size, "%d", v);
+    return text;
+}
+
+int nn_arch_to_meta(const nn_arch *arch, nn_meta *meta, int capacity, char *text, size_t text_size)
+{
+    size_t used = 0;
+    if (capacity < FIELDS + 1) return -1;
+    meta[0] = (nn_meta){"format", "lgd"};
+    for (int i = 0; i < FIELDS; i++) {
+        char value[16], both[64];
+        value_text(arch, &fields[i], value, sizeof value);
+        int key = snprintf(both, sizeof both, "%s%s", prefix, fields[i].key) + 1;
+        int all = key + snprintf(both + key, sizeof both - (size_t)key, "%s", value) + 1;
+        if (used + (size_t)all > text_size) return -1;
+        memcpy(text + used, both, (size_t)all);
+        meta[i + 1] = (nn_meta){text + used, text + used + key};
+        used += (size_t)all;
+    }
+    return FIELDS + 1;
+}
+
+static bool parse(const field *f, const char *text, int *v)
+{
+    if (f->kind == FIELD_BOOL) {
+        *v = !strcmp(text, "true");
+        return *v || !strcmp(text, "false");
+    }
+    if (f->kind == FIELD_RMSE) {
+        for (*v = NN_RMSE_START; *v <= NN_RMSE_BATCH; ++*v)
+            if (!strcmp(text, rmse_name[*v])) return true;
+        return false;
+    }
+    size_t n = strlen(text);
+    if (n < 1 || n > 9 || strspn(text, "0123456789") != n) return false; /* nine digits fit an int */
+    *v = atoi(text);
+    return true;
+}
+
+ts_code nn_arch_from_file(const nn_file *file, nn_arch *arch, ts_status *st)
+{
+    const char *format = nn_safetensors_meta(file, "format"), *key;
+    memset(arch, 0, sizeof *arch);
+    if (!format || strcmp(format, "lgd") != 0)
+        return ts_fail(st, TS_FORMAT, "%s: metadata key \"format\" is %.40s, not \"lgd\": these are not weights of this program",
+                       nn_safetensors_path(file), format ? format : "missing");
+    for (int i = 0; (key = nn_safetensors_meta_key(file, i)) != NULL; i++) {
+        bool known = strncmp(key, prefix, sizeof prefix - 1) != 0;
+        for (int j = 0; j < FIELDS && !known; j++) known = !strcmp(key + sizeof prefix - 1, fields[j].key);
+        if (!known)
+            return ts_fail(st, TS_UNSUPPORTED, "%s: metadata key \"%.80s\" is not known: the file needs another version of this program",
+                           nn_safetensors_path(file), key);
+    }
+    for (int i = 0; i < FIELDS; i++) {
+        char name[64];
+        int v;
+        snprintf(name, sizeof name, "%s%s", prefix, fields[i].key);
+        const char *text = nn_safetensors_meta(file, name);
+        if (!text) return ts_fail(st, TS_FORMAT, "%s: metadata key \"%s\" is missing", nn_safetensors_path(file), name);
+        if (!parse(&fields[i], text, &v))
+            return ts_fail(st, TS_FORMAT, "%s: metadata key \"%s\" is \"%.40s\": not a value of it", nn_safetensors_path(file), name, text);
+        set(arch, &fields[i], v);
+    }
+    if (nn_arch_check(arch, st)) return ts_context(st, "%s: architecture", nn_safetensors_path(file));
+    return TS_OK;
+}

@@ -1,0 +1,49 @@
+/* Inside nn only: where each layer's parameters are in the model's list, and what they start from. */
+#ifndef NN_LAYERS_H
+#define NN_LAYERS_H
+#include "nn/model.h"
+
+enum { NN_MAX_LEVELS = 8 };
+
+/* Slopes of the leaky ReLUs, as published. */
+#define NN_LEAK_G 0.2f
+#define NN_LEAK_H 0.01f
+
+typedef struct nn_layer {
+    int weight, bias; /* indices into model->param; bias -1: none */
+} nn_layer;
+
+/* A down or up block of g: two convolutions, and the global track's way in and out. */
+typedef struct nn_unet_block {
+    nn_layer conv1, conv2;
+    nn_layer add;    /* global -> what is added to the features (Linear1 going down, Linear3 going up) */
+    nn_layer global; /* [mean of the features, global] -> new global (Linear2, Linear4) */
+} nn_unet_block;
+
+/* One convolution of h and the recurrent cell that reads it. */
+typedef struct nn_cell {
+    nn_layer conv, input, hidden;
+} nn_cell;
+
+typedef struct nn_layers {
+    nn_layer input_conv, input_global;
+    nn_unet_block down[NN_MAX_LEVELS], up[NN_MAX_LEVELS];
+    nn_layer output_conv1, output_conv2, output_add;
+    nn_cell cell[2];
+    nn_layer h_output;
+    int refiner;   /* index of h's first parameter */
+    double *start; /* per parameter: standard deviation of the first values, 0 for zeros, NN_ORTHOGONAL */
+} nn_layers;
+#define NN_ORTHOGONAL (-1.0)
+
+/* Parameter number index as a value on the tape, NULL for index -1. */
+ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index);
+ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad, float leak);
+ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x);
+
+/* g on its own input: x [N, g_size, g_size, 3] log-encoded -> [N, g_size, g_size, channels] in [-1, 1]. */
+ag_value *nn_unet(ag_tape *tape, const nn_model *model, ag_value *x);
+
+/* h: input [N, H, W, 2 channels] and the states (updated; NULL = zero) -> the change of the maps. */
+ag_value *nn_refiner(ag_tape *tape, const nn_model *model, ag_value *x, ag_value *gru[2]);
+#endif

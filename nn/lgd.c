@@ -1,0 +1,151 @@
+/* Learned gradient descent (Luo, Scandolo, Bousseau, Eisemann: "Single-Image SVBRDF Estimation with Learned Gradient Descent", CGF 43(2),
+ * 2024): R_0 = g(image), R_{t+1} = R_t + h(R_t, dL/dR_t). */
+#include "nn/layers.h"
+#include "ops.h"
+#include "render/render.h"
+#include "render/tone.h"
+#include "tensor/resize.h"
+#include "tensor/threads.h"
+#include <math.h>
+#include <string.h>
+
+static bool check(ag_tape *tape, const nn_model *model, const nn_input *in)
+{
+    ts_shape s = in->image.shape;
+    if (ag_status(tape)->code) return false;
+    if (!model->value) ag_fail(tape, TS_INVALID, "the model has no parameters");
+    else if (!in->image.data || s.c != 3) ag_fail(tape, TS_INVALID, "the photograph has %d channels: 3 are needed", s.c);
+    else if (!ts_contiguous(&in->image)) ag_fail(tape, TS_INVALID, "the photograph is not contiguous");
+    else if (s.h != in->grid.h || s.w != in->grid.w)
+        ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels, its grid %d x %d", s.w, s.h, in->grid.w, in->grid.h);
+    return !ag_status(tape)->code;
+}
+
+/* The photograph as g reads it: [N, g_size, g_size, 3], resampled while it is linear, then log-encoded. */
+static ag_value *encoded(ag_tape *tape, const nn_model *model, const ts_tensor *image)
+{
+    int size = model->arch.g_size;
+    ag_value *x = ag_empty(tape, (ts_shape){image->shape.n, size, size, 3});
+    if (!x) return NULL;
+    ts_status st = {0};
+    const float *from = x->t.data;
+    if (image->shape.h == size && image->shape.w == size) from = image->data;
+    else if (ts_resize(&x->t, image, ag_arena(tape), &st)) return ag_fail(tape, st.code, "%s", st.message);
+    rd_log_encode(ts_count(x->t.shape), from, x->t.data);
+    return x;
+}
+
+ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in)
+{
+    if (!check(tape, model, in)) return NULL;
+    ts_shape s = in->image.shape;
+    if (s.h != s.w) return ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels: g needs a square", s.w, s.h);
+    ts_mark mark = ag_scope_begin(tape);
+    ag_value *maps = nn_unet(tape, model, encoded(tape, model, &in->image));
+    if (s.h != model->arch.g_size) maps = ag_resize(tape, maps, s.h, s.w);
+    ag_scope_end(tape, mark, &maps, 1);
+    return maps;
+}
+
+/* dL/dR_t as h reads it: a constant of the tape, the shape of maps. */
+static ag_value *loss_gradient(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, nn_state *state)
+{
+    ts_shape s = maps->t.shape;
+    size_t image = (size_t)s.h * s.w * 3, one = (size_t)s.h * s.w * s.c;
+    ag_value *gradient = ag_empty(tape, s);
+    if (!gradient) return NULL;
+    if (!model->arch.gradient) {
+        memset(gradient->t.data, 0, (size_t)ts_count(s) * sizeof(float));
+        return gradient;
+    }
+    bool batch = model->arch.rmse == NN_RMSE_BATCH;
+    if (!state->rmse0) state->rmse0 = ts_arena_alloc(ag_arena(tape), (size_t)s.n * sizeof *state->rmse0);
+    if (!state->rmse0) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", s.n);
+    if (batch || state->step == 0)
+        for (int n = 0; n < s.n; n++)
+            rd_flash_rmse(in->grid, maps->t.data + n * one, s.c, &in->view, in->image.data + n * image, &state->rmse0[n]);
+    double common = 0;
+    for (int n = 0; n < s.n; n++) common += state->rmse0[n] * state->rmse0[n] / s.n;
+    for (int n = 0; n < s.n; n++) {
+        double rmse = batch ? sqrt(common) : state->rmse0[n];
+        rd_flash_gradient(in->grid, maps->t.data + n * one, s.c, &in->view, in->image.data + n * image, rmse, gradient->t.data + n * one, NULL);
+    }
+    if (batch) { /* d RMSE of the whole batch has 1 / (3 N H W) where rd_flash_gradient has 1 / (3 256^2) */
+        float scale = (float)(256.0 * 256.0 / ((double)s.n * s.h * s.w));
+        int64_t count = ts_count(s);
+        float *g = gradient->t.data;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+        for (int64_t i = 0; i < count; i++) g[i] *= scale;
+    }
+    return gradient;
+}
+
+ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state)
+{
+    if (!check(tape, model, in) || !maps) return NULL;
+    ts_shape s = maps->t.shape;
+    if (model->arch.h_width == 0) return ag_fail(tape, TS_INVALID, "the model has no refiner: 0 iterations are all that it can do");
+    if (!ts_same(s, (ts_shape){in->image.shape.n, in->grid.h, in->grid.w, model->arch.channels}))
+        return ag_fail(tape, TS_INVALID, "the maps are %d x %d x %d x %d, not the photograph's size and the model's %d channels", s.n, s.h, s.w, s.c,
+                       model->arch.channels);
+    ag_value *gradient = loss_gradient(tape, model, in, maps, state);
+    ag_value *next = ag_add(tape, maps, nn_refiner(tape, model, ag_concat(tape, maps, gradient), state->gru));
+    state->step++;
+    return next;
+}
+
+/* What the loop hands from step to step on a tape without gradients lives in buffers that were made before the first step, so that a
+ * step gives back all that it took. */
+typedef struct carried {
+    ag_value *maps, *gru[2];
+} carried;
+
+static void carry(ag_value *to, ag_value **value)
+{
+    if (!to || !*value) return;
+    memcpy(to->t.data, (*value)->t.data, (size_t)ts_count(to->t.shape) * sizeof(float));
+    *value = to;
+}
+
+static ag_value *step_and_release(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state, const carried *to)
+{
+    ts_mark mark = ag_scope_begin(tape);
+    ag_value *next = nn_refine(tape, model, in, maps, state);
+    if (!next) return NULL;
+    carry(to->maps, &next);
+    for (int i = 0; i < 2; i++) {
+        carry(to->gru[i], &state->gru[i]);
+        if (!to->gru[i]) state->gru[i] = NULL;
+    }
+    ag_scope_end(tape, mark, NULL, 0);
+    return next;
+}
+
+ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps, nn_after after, void *user)
+{
+    nn_state state = {0};
+    carried to = {0};
+    bool release = !ag_gradients(tape);
+    ag_value *now = nn_predict(tape, model, in);
+    int t = 0;
+    maps[0] = now;
+    if (now && release && steps > 0) {
+        ts_shape s = now->t.shape;
+        to.maps = now;
+        state.rmse0 = ts_arena_alloc(ag_arena(tape), (size_t)s.n * sizeof *state.rmse0);
+        if (!state.rmse0) ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", s.n);
+        for (int i = 0; i < 2 && model->arch.recurrent; i++) to.gru[i] = ag_empty(tape, (ts_shape){s.n, s.h, s.w, model->arch.h_gru});
+    }
+    bool on = now && (!after || after(0, now, user));
+    while (on && t < steps) {
+        if (release && keep_all) to.maps = ag_empty(tape, now->t.shape);
+        now = release ? step_and_release(tape, model, in, now, &state, &to) : nn_refine(tape, model, in, now, &state);
+        if (!now) break;
+        t++;
+        maps[keep_all ? t : 0] = now;
+        on = !after || after(t, now, user);
+    }
+    if (keep_all)
+        for (int i = t + 1; i <= steps; i++) maps[i] = now;
+    return ag_status(tape)->code;
+}

@@ -1,0 +1,212 @@
+/* The list of parameters and the blocks that hold them. */
+#include "nn/layers.h"
+#include "ops.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Parameters of the largest model: 8 levels, two blocks of 7 each, and what lies before and after them. */
+enum { MAX_PARAMS = 4 + 2 * 7 * NN_MAX_LEVELS + 6 + 13 };
+
+static nn_layers *layers_of(const nn_model *m) { return m->layers; }
+
+static int add(nn_model *m, const char *layer, const char *what, int rank, const int *dim, double start)
+{
+    nn_param *p = &m->param[m->params];
+    snprintf(p->name, sizeof p->name, "%s.%s", layer, what);
+    p->rank = rank;
+    p->count = 1;
+    for (int i = 0; i < 4; i++) {
+        p->dim[i] = i < rank ? dim[i] : 1;
+        p->count *= (size_t)p->dim[i];
+    }
+    p->offset = m->count;
+    m->count += (p->count + 15) / 16 * 16;
+    layers_of(m)->start[m->params] = start;
+    return m->params++;
+}
+
+/* gain: standard deviation of the output for an input of standard deviation 1. */
+static nn_layer conv(nn_model *m, const char *name, int oc, int ic, int k, bool bias, double gain)
+{
+    nn_layer l;
+    l.weight = add(m, name, "weight", 4, (int[]){oc, ic, k, k}, gain / sqrt((double)ic * k * k));
+    l.bias = bias ? add(m, name, "bias", 1, &oc, 0) : -1;
+    return l;
+}
+
+static nn_layer linear(nn_model *m, const char *name, int out, int in, double gain)
+{
+    nn_layer l;
+    l.weight = add(m, name, "weight", 2, (int[]){out, in}, gain / sqrt(in));
+    l.bias = add(m, name, "bias", 1, &out, 0);
+    return l;
+}
+
+/* Kaiming's factors (He et al., "Delving Deep into Rectifiers", ICCV 2015, eq. 15); SELU keeps a unit variance with gain 1 (Klambauer et al.,
+ * "Self-Normalizing Neural Networks", NIPS 2017). */
+static double leaky_gain(double leak) { return sqrt(2 / (1 + leak * leak)); }
+
+static nn_unet_block unet_block(nn_model *m, const char *way, int number, int in, int middle, int out, int global, int k)
+{
+    char name[64];
+    nn_unet_block b;
+    double gain = leaky_gain(NN_LEAK_G);
+    snprintf(name, sizeof name, "g.%s%d.conv1", way, number);
+    b.conv1 = conv(m, name, middle, in, k, true, 1); /* conv2 follows at once */
+    snprintf(name, sizeof name, "g.%s%d.conv2", way, number);
+    b.conv2 = conv(m, name, out, middle, k, false, gain);
+    snprintf(name, sizeof name, "g.%s%d.add", way, number);
+    b.add = linear(m, name, out, global, gain / sqrt(2)); /* one of two summands: the features themselves have unit variance */
+    snprintf(name, sizeof name, "g.%s%d.global", way, number);
+    b.global = linear(m, name, out, out + global, 1);
+    return b;
+}
+
+static int level_width(const nn_arch *a, int level)
+{
+    int64_t w = (int64_t)a->g_width << level;
+    return w < a->g_width_max ? (int)w : a->g_width_max;
+}
+
+static void plan_g(nn_model *m)
+{
+    const nn_arch *a = &m->arch;
+    nn_layers *l = m->layers;
+    int levels = a->g_levels, w0 = level_width(a, 0);
+    l->input_conv = conv(m, "g.input.conv", w0, 3, 3, true, leaky_gain(NN_LEAK_G));
+    l->input_global = linear(m, "g.input.global", w0, 3, 1);
+    for (int i = 1; i <= levels; i++) {
+        int in = level_width(a, i - 1), out = level_width(a, i);
+        l->down[i - 1] = unet_block(m, "down", i, in, out, out, in, i == 1 ? a->g_kernel_first : a->g_kernel);
+    }
+    for (int i = 1, deep = level_width(a, levels); i <= levels; i++) {
+        int skip = level_width(a, levels - i), out = i < levels ? level_width(a, levels - i - 1) : w0;
+        l->up[i - 1] = unet_block(m, "up", i, skip + deep, (skip + deep) / 2, out, deep, a->g_kernel);
+        deep = out;
+    }
+    /* R_0 starts near the middle of every map's range, where tanh still has a slope. */
+    l->output_conv1 = conv(m, "g.output.conv1", a->channels, w0, 3, true, 1);
+    l->output_conv2 = conv(m, "g.output.conv2", a->channels, a->channels, 3, true, 0.25);
+    l->output_add = linear(m, "g.output.add", a->channels, w0, 0.25);
+}
+
+static void plan_h(nn_model *m)
+{
+    const nn_arch *a = &m->arch;
+    nn_layers *l = m->layers;
+    double gain = leaky_gain(NN_LEAK_H);
+    for (int i = 0; i < 2; i++) {
+        nn_cell *c = &l->cell[i];
+        char name[64];
+        snprintf(name, sizeof name, "h.conv%d", i + 1);
+        c->conv = conv(m, name, a->h_width, i ? a->h_gru : 2 * a->channels, i ? 3 : 5, true, gain);
+        snprintf(name, sizeof name, "h.gru%d.ih", i + 1);
+        c->input = conv(m, name, 3 * a->h_gru, a->h_width, 1, true, 1);
+        snprintf(name, sizeof name, "h.gru%d.hh", i + 1);
+        c->hidden = conv(m, name, 3 * a->h_gru, a->h_gru, 1, true, 1);
+        l->start[c->hidden.weight] = NN_ORTHOGONAL;
+    }
+    l->h_output = conv(m, "h.output", a->channels, a->h_gru, 3, false, 1);
+    l->start[l->h_output.weight] = 1e-3; /* the loop starts as the identity, nearly */
+}
+
+nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
+{
+    if (nn_arch_check(arch, st)) return NULL;
+    nn_model *m = calloc(1, sizeof *m);
+    nn_layers *l = m ? m->layers = calloc(1, sizeof *l) : NULL;
+    if (l) {
+        m->param = calloc(MAX_PARAMS, sizeof *m->param);
+        l->start = calloc(MAX_PARAMS, sizeof *l->start);
+    }
+    if (!l || !m->param || !l->start) {
+        nn_model_free(&m);
+        ts_fail(st, TS_NOMEM, "no memory for the list of parameters");
+        return NULL;
+    }
+    m->arch = *arch;
+    plan_g(m);
+    l->refiner = m->params;
+    if (arch->h_width > 0) plan_h(m);
+    return m;
+}
+
+static float *block(size_t count, const char *what, ts_status *st)
+{
+    float *p = aligned_alloc(64, count * sizeof *p);
+    if (p) memset(p, 0, count * sizeof *p);
+    else ts_fail(st, TS_NOMEM, "no memory for the model's %s (%.0f MB)", what, (double)count * sizeof *p / 1e6);
+    return p;
+}
+
+nn_model *nn_model_create(const nn_arch *arch, ts_status *st)
+{
+    nn_model *m = nn_model_plan(arch, st);
+    if (m && !(m->value = block(m->count, "parameters", st))) nn_model_free(&m);
+    return m;
+}
+
+void nn_model_free(nn_model **model)
+{
+    nn_model *m = *model;
+    if (!m) return;
+    if (m->layers) free(layers_of(m)->start);
+    free(m->layers);
+    free(m->param);
+    free(m->value);
+    free(m->grad);
+    free(m);
+    *model = NULL;
+}
+
+ts_code nn_model_train(nn_model *model, ts_status *st)
+{
+    if (!model->grad) model->grad = block(model->count, "gradients", st);
+    return model->grad ? TS_OK : TS_NOMEM;
+}
+
+const nn_param *nn_model_find(const nn_model *model, const char *name)
+{
+    for (int i = 0; i < model->params; i++)
+        if (!strcmp(model->param[i].name, name)) return &model->param[i];
+    return NULL;
+}
+
+void nn_model_range(const nn_model *model, bool refiner, size_t *first, size_t *last)
+{
+    int at = layers_of(model)->refiner;
+    size_t border = at < model->params ? model->param[at].offset : model->count;
+    *first = refiner ? border : 0;
+    *last = refiner ? model->count : border;
+}
+
+size_t nn_model_numbers(const nn_model *model, bool refiner)
+{
+    size_t sum = 0;
+    for (int i = 0; i < model->params; i++)
+        if ((i >= layers_of(model)->refiner) == refiner) sum += model->param[i].count;
+    return sum;
+}
+
+ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index)
+{
+    if (index < 0) return NULL;
+    const nn_param *p = &model->param[index];
+    ts_shape s = {1, 1, 1, p->dim[0]};
+    if (p->rank == 2) s = (ts_shape){1, 1, p->dim[0], p->dim[1]};
+    if (p->rank == 4) s = (ts_shape){p->dim[0], p->dim[1], p->dim[2], p->dim[3]};
+    float *grad = model->grad && ag_gradients(tape) ? model->grad + p->offset : NULL;
+    return ag_parameter(tape, ts_view(model->value + p->offset, s), grad);
+}
+
+ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad, float leak)
+{
+    return ag_conv(tape, x, nn_parameter(tape, model, layer.weight), nn_parameter(tape, model, layer.bias), dilation, pad, leak);
+}
+
+ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x)
+{
+    return ag_linear(tape, x, nn_parameter(tape, model, layer.weight), nn_parameter(tape, model, layer.bias));
+}

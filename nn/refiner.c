@@ -1,0 +1,24 @@
+/* h: two convolutional gated recurrent units. */
+#include "nn/layers.h"
+#include "ops.h"
+
+static ag_value *cell(ag_tape *tape, const nn_model *model, const nn_cell *c, ag_value *x, int dilation, ag_value *old)
+{
+    x = nn_conv(tape, model, c->conv, x, dilation, TS_PAD_REPLICATE, NN_LEAK_H);
+    x = nn_conv(tape, model, c->input, x, 1, TS_PAD_ZERO, 1);
+    /* A zero state leaves of the hidden gates their bias. */
+    ag_value *hidden = old ? nn_conv(tape, model, c->hidden, old, 1, TS_PAD_ZERO, 1) : nn_parameter(tape, model, c->hidden.bias);
+    return ag_gru(tape, x, hidden, old);
+}
+
+ag_value *nn_refiner(ag_tape *tape, const nn_model *model, ag_value *x, ag_value *gru[2])
+{
+    const nn_layers *l = model->layers;
+    for (int i = 0; i < 2; i++) {
+        ts_mark mark = ag_scope_begin(tape);
+        gru[i] = cell(tape, model, &l->cell[i], x, i + 1, model->arch.recurrent ? gru[i] : NULL);
+        ag_scope_end(tape, mark, &gru[i], 1);
+        x = gru[i];
+    }
+    return ag_tanh(tape, nn_conv(tape, model, l->h_output, x, 1, TS_PAD_REPLICATE, 1));
+}

@@ -1,0 +1,46 @@
+/* g: a U-Net with a global track (Deschaintre et al. 2018, as changed by Luo et al. 2024). */
+#include "nn/layers.h"
+#include "ops.h"
+
+#define NORM_EPSILON 1e-5f /* as published; a constant channel becomes zero instead of 0/0 */
+
+/* x [N, H, W, in] -> [N, H, W, out], global [N, 1, 1, in'] -> [N, 1, 1, out]. */
+static void block(ag_tape *tape, const nn_model *model, const nn_unet_block *b, bool norm, ag_value **x, ag_value **global)
+{
+    ag_value *y = nn_conv(tape, model, b->conv1, *x, 1, TS_PAD_ZERO, 1);
+    y = nn_conv(tape, model, b->conv2, y, 1, TS_PAD_ZERO, 1);
+    ag_value *mean = model->arch.mean_before_norm ? ag_channel_mean(tape, y) : NULL;
+    if (norm) y = ag_instance_norm(tape, y, NORM_EPSILON);
+    if (!mean) mean = ag_channel_mean(tape, y);
+    *x = ag_add_leaky(tape, y, nn_linear(tape, model, b->add, *global), NN_LEAK_G);
+    *global = ag_selu(tape, nn_linear(tape, model, b->global, ag_concat(tape, mean, *global)));
+}
+
+ag_value *nn_unet(ag_tape *tape, const nn_model *model, ag_value *x)
+{
+    const nn_layers *l = model->layers;
+    int levels = model->arch.g_levels;
+    ag_value *skip[NN_MAX_LEVELS], *global = ag_selu(tape, nn_linear(tape, model, l->input_global, ag_channel_mean(tape, x)));
+    x = nn_conv(tape, model, l->input_conv, x, 1, TS_PAD_ZERO, NN_LEAK_G);
+    for (int i = 0; i < levels; i++) {
+        skip[i] = x;
+        ts_mark mark = ag_scope_begin(tape);
+        ag_value *keep[2] = {ag_max_pool(tape, x), global};
+        block(tape, model, &l->down[i], i < levels - 1, &keep[0], &keep[1]);
+        ag_scope_end(tape, mark, keep, 2);
+        x = keep[0];
+        global = keep[1];
+    }
+    for (int i = 0; i < levels; i++) {
+        ts_mark mark = ag_scope_begin(tape);
+        ag_value *keep[2] = {ag_concat(tape, skip[levels - 1 - i], ag_upsample(tape, x)), global};
+        block(tape, model, &l->up[i], true, &keep[0], &keep[1]);
+        ag_scope_end(tape, mark, keep, 2);
+        x = keep[0];
+        global = keep[1];
+    }
+    x = nn_conv(tape, model, l->output_conv1, x, 1, TS_PAD_ZERO, 1);
+    x = nn_conv(tape, model, l->output_conv2, x, 1, TS_PAD_ZERO, 1);
+    x = ag_add_leaky(tape, x, nn_linear(tape, model, l->output_add, global), 1);
+    return ag_tanh(tape, x);
+}

@@ -1,0 +1,429 @@
+/* Weights files: what is written comes back, and no file that is something else does any harm. */
+#include "nn/weights.h"
+#include "tests/test.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static nn_arch small(void)
+{
+    nn_arch a = nn_arch_default();
+    a.g_width = 3, a.g_width_max = 5, a.g_levels = 2, a.g_size = 8, a.h_width = 6, a.h_gru = 2;
+    return a;
+}
+
+static const char *path_of(const char *name)
+{
+    static char path[512];
+    snprintf(path, sizeof path, "%s/%s", test_folder(), name);
+    return path;
+}
+
+static char *slurp(const char *path, size_t *size)
+{
+    FILE *f = fopen(path, "rb");
+    CHECK(f, "%s cannot be read", path);
+    char *data = malloc(1 << 20);
+    *size = fread(data, 1, 1 << 20, f);
+    fclose(f);
+    return data;
+}
+
+static void spill(const char *path, const void *data, size_t size)
+{
+    FILE *f = fopen(path, "wb");
+    CHECK(f && fwrite(data, 1, size, f) == size && !fclose(f), "%s cannot be written", path);
+}
+
+/* A file of that header and of bytes of values. */
+static const char *craft(const char *header, size_t bytes)
+{
+    const char *path = path_of("bad.safetensors");
+    uint64_t size = strlen(header);
+    char *all = calloc(1, 8 + size + bytes + 1);
+    memcpy(all, &size, 8);
+    memcpy(all + 8, header, size);
+    spill(path, all, 8 + size + bytes);
+    free(all);
+    return path;
+}
+
+/* Refused, with one line that names the file and says what. */
+static void refused(const char *path, const char *what)
+{
+    ts_status st = {0};
+    nn_file *f = nn_safetensors_open(path, &st);
+    CHECK(!f, "a file that should say '%s' is taken", what);
+    CHECK(st.code == TS_FORMAT || st.code == TS_IO, "code %d for '%s'", st.code, what);
+    CHECK(strstr(st.message, path) == st.message, "'%s' does not begin with the file's name", st.message);
+    CHECK(strstr(st.message, what), "'%s' does not say '%s'", st.message, what);
+    CHECK(!strchr(st.message, '\n'), "more than a line: '%s'", st.message);
+}
+
+TEST(weights_round_trip_is_exact)
+{
+    ts_status st = {0};
+    nn_arch a = small();
+    nn_model *m = nn_model_create(&a, &st);
+    CHECK(m, "%s", st.message);
+    nn_model_init(m, 1);
+    m->value[3] = -0.0f;
+    m->value[4] = 1e-42f;
+    char path[512], again[512];
+    snprintf(path, sizeof path, "%s", path_of("a.safetensors"));
+    snprintf(again, sizeof again, "%s", path_of("b.safetensors"));
+    nn_meta extra[] = {{"run", "stone \"and\" brick \\ \t \xc3\xa9 \xf0\x9f\xaa\xa8"}, {"empty", ""}};
+    CHECK(!nn_model_save(m, m->value, path, extra, 2, &st), "%s", st.message);
+    nn_model *back = nn_model_load(path, &st);
+    CHECK(back, "%s", st.message);
+    CHECK(!memcmp(&back->arch, &m->arch, sizeof a), "another architecture");
+    CHECK(back->count == m->count && !memcmp(back->value, m->value, m->count * sizeof(float)), "other values");
+    CHECK(!nn_model_save(back, back->value, again, extra, 2, &st), "%s", st.message);
+    size_t n, k;
+    char *x = slurp(path, &n), *y = slurp(again, &k);
+    CHECK(n == k && !memcmp(x, y, n), "other bytes the second time");
+    uint64_t header;
+    memcpy(&header, x, 8);
+    CHECK((header + 8) % 64 == 0 && x[8] == '{', "the values begin at byte %llu", (unsigned long long)header + 8);
+    nn_file *f = nn_safetensors_open(path, &st);
+    CHECK(f && nn_safetensors_count(f) == m->params, "%s", st.message);
+    CHECK(!strcmp(nn_safetensors_meta(f, "run"), extra[0].value), "metadata '%s'", nn_safetensors_meta(f, "run"));
+    CHECK(!*nn_safetensors_meta(f, "empty") && !nn_safetensors_meta(f, "none"), "empty and missing metadata");
+    for (int i = 0; i < m->params; i++) CHECK(!strcmp(nn_safetensors_name(f, i), m->param[i].name), "tensor %d is %s", i, nn_safetensors_name(f, i));
+    nn_safetensors_close(&f);
+    CHECK(!f, "close leaves the pointer");
+    nn_model_free(&m);
+    nn_model_free(&back);
+}
+
+TEST(weights_architecture_round_trip)
+{
+    nn_arch a = small();
+    a.channels = 10, a.g_kernel_first = 5, a.g_kernel = 7, a.iterations = 11, a.recurrent = false, a.gradient = false, a.mean_before_norm = false;
+    a.rmse = NN_RMSE_BATCH;
+    ts_status st = {0};
+    char text[NN_ARCH_TEXT];
+    nn_meta meta[NN_ARCH_META];
+    int metas = nn_arch_to_meta(&a, meta, NN_ARCH_META, text, sizeof text);
+    CHECK(metas == 15, "%d entries, not format and 14 fields", metas);
+    CHECK(nn_arch_to_meta(&a, meta, metas - 1, text, sizeof text) < 0 && nn_arch_to_meta(&a, meta, metas, text, 20) < 0, "too little room is taken");
+    nn_arch_to_meta(&a, meta, NN_ARCH_META, text, sizeof text);
+    const char *path = path_of("arch.safetensors");
+    CHECK(!nn_safetensors_write(path, NULL, 0, meta, metas, &st), "%s", st.message);
+    nn_file *f = nn_safetensors_open(path, &st);
+    nn_arch b;
+    CHECK(f && !nn_arch_from_file(f, &b, &st), "%s", st.message);
+    CHECK(!memcmp(&a, &b, sizeof a), "another architecture");
+    nn_safetensors_close(&f);
+    for (int i = 0; i < metas; i++) { /* each key in turn missing, and then nonsense */
+        for (int nonsense = 0; nonsense < 2; nonsense++) {
+            nn_meta other[NN_ARCH_META];
+            int n = 0;
+            for (int j = 0; j < metas; j++)
+                if (j != i) other[n++] = meta[j];
+                else if (nonsense) other[n++] = (nn_meta){meta[j].key, "07x"};
+            st = (ts_status){0};
+            CHECK(!nn_safetensors_write(path, NULL, 0, other, n, &st), "%s", st.message);
+            f = nn_safetensors_open(path, &st);
+            CHECK(f && nn_arch_from_file(f, &b, &st) == TS_FORMAT && strstr(st.message, meta[i].key), "key %s: '%s'", meta[i].key, st.message);
+            nn_safetensors_close(&f);
+        }
+    }
+    nn_meta more[NN_ARCH_META];
+    memcpy(more, meta, sizeof more);
+    more[metas] = (nn_meta){"arch.attention", "true"};
+    st = (ts_status){0};
+    CHECK(!nn_safetensors_write(path, NULL, 0, more, metas + 1, &st), "%s", st.message);
+    f = nn_safetensors_open(path, &st);
+    CHECK(f && nn_arch_from_file(f, &b, &st) == TS_UNSUPPORTED && strstr(st.message, "arch.attention"), "'%s'", st.message);
+    nn_safetensors_close(&f);
+}
+
+TEST(weights_every_truncation_is_refused)
+{
+    ts_status st = {0};
+    nn_arch a = small();
+    nn_model *m = nn_model_create(&a, &st);
+    const char *path = path_of("t.safetensors");
+    CHECK(m && !nn_model_save(m, m->value, path, NULL, 0, &st), "%s", st.message);
+    size_t size;
+    char *all = slurp(path, &size);
+    for (size_t n = 0; n < size; n += n < 200 ? 1 : 97) {
+        spill(path, all, n);
+        st = (ts_status){0};
+        nn_model *bad = nn_model_load(path, &st);
+        CHECK(!bad && st.code == TS_FORMAT && strstr(st.message, "t.safetensors"), "%zu of %zu bytes: code %d '%s'", n, size, st.code, st.message);
+    }
+    char *longer = calloc(1, size + 4);
+    memcpy(longer, all, size);
+    spill(path, longer, size + 4);
+    refused(path, "4 bytes follow the last tensor");
+}
+
+/* Each byte of the header changed: an error or a model, never a crash. */
+TEST(weights_changed_headers_do_no_harm)
+{
+    ts_status st = {0};
+    nn_arch a = small();
+    nn_model *m = nn_model_create(&a, &st);
+    const char *path = path_of("c.safetensors");
+    CHECK(m && !nn_model_save(m, m->value, path, NULL, 0, &st), "%s", st.message);
+    size_t size, refusals = 0;
+    char *all = slurp(path, &size);
+    uint64_t header;
+    memcpy(&header, all, 8);
+    static const char to[] = {'"', '9', '}', '\0', (char)0xff};
+    for (size_t i = 0; i < 8 + header; i += 7)
+        for (size_t j = 0; j < sizeof to; j++) {
+            char old = all[i];
+            all[i] = to[j];
+            spill(path, all, size);
+            all[i] = old;
+            st = (ts_status){0};
+            nn_model *other = nn_model_load(path, &st);
+            CHECK(other || (st.code && strstr(st.message, path)), "byte %zu as %d: code %d, '%s'", i, to[j], st.code, st.message);
+            refusals += !other;
+            nn_model_free(&other);
+        }
+    CHECK(refusals > header / 3, "only %zu changes were noticed", refusals);
+}
+
+TEST(weights_malformed_files_are_refused)
+{
+#define T(shape, from, to) "{\"dtype\":\"F32\",\"shape\":" shape ",\"data_offsets\":[" from "," to "]}"
+    static const struct {
+        const char *header;
+        size_t bytes;
+        const char *what;
+    } bad[] = {
+        {"{\"a\":" T("[2]", "0", "8") "}", 4, "outside the file"},
+        {"{\"a\":" T("[2]", "8", "16") "}", 16, "hole"},
+        {"{\"a\":" T("[2]", "0", "8") ",\"b\":" T("[2]", "12", "20") "}", 20, "\"b\" comes after a hole"},
+        {"{\"a\":" T("[2]", "0", "8") ",\"b\":" T("[2]", "4", "12") "}", 12, "\"b\" overlaps"},
+        {"{\"a\":" T("[2]", "0", "8") ",\"b\":" T("[2]", "0", "8") "}", 8, "overlaps"},
+        {"{\"a\":" T("[2]", "0", "8") ",\"a\":" T("[2]", "8", "16") "}", 16, "\"a\" is there twice"},
+        {"{\"a\":" T("[2]", "0", "8") "}", 9, "1 bytes follow"},
+        {"{\"a\":" T("[3]", "0", "8") "}", 8, "\"a\" has 8 bytes, its shape needs 12"},
+        {"{\"a\":" T("[2]", "8", "0") "}", 8, "outside the file"},
+        {"{\"a\":" T("[4294967296,4294967296,16]", "0", "0") "}", 0, "\"a\" has an impossible shape"},
+        {"{\"a\":" T("[2305843009213693952,2]", "0", "0") "}", 0, "impossible shape"},
+        {"{\"a\":" T("[4611686018427387904]", "0", "0") "}", 0, "impossible shape"},
+        {"{\"a\":" T("[1]", "9223372036854775804", "9223372036854775807") "}", 0, "outside the file"},
+        {"{\"a\":" T("[1]", "0", "99999999999999999999") "}", 0, "too large"},
+        {"{\"a\":" T("[-1]", "0", "4") "}", 4, "not negative"},
+        {"{\"a\":" T("[1.0]", "0", "4") "}", 4, "not negative"},
+        {"{\"a\":" T("[01]", "0", "4") "}", 4, "begins with 0"},
+        {"{\"a\":" T("[1e0]", "0", "4") "}", 4, "not negative"},
+        {"{\"a\":" T("[1,1,1,1,1,1,1,1,1]", "0", "4") "}", 4, "more than 8 dimensions"},
+        {"{\"a\":" T("\"1\"", "0", "4") "}", 4, "expected '['"},
+        {"{\"a\":" T("[1]", "0,4", "4") "}", 4, "expected ']'"},
+        {"{\"a\":{\"dtype\":\"F33\",\"shape\":[1],\"data_offsets\":[0,4]}}", 4, "\"a\" has the unknown dtype \"F33\""},
+        {"{\"a\":{\"shape\":[1],\"data_offsets\":[0,4]}}", 4, "\"a\" lacks"},
+        {"{\"a\":{\"dtype\":\"F32\",\"shape\":[1],\"shape\":[1],\"data_offsets\":[0,4]}}", 4, "\"a\" has the unknown or repeated key \"shape\""},
+        {"{\"a\":{\"dtype\":\"F32\",\"shape\":[1],\"data_offsets\":[0,4],\"code\":\"x\"}}", 4, "unknown or repeated key \"code\""},
+        {"{\"a\":[[[[[[[[[[[[[[[[[[[[", 0, "expected '{'"},
+        {"{\"a\":{\"dtype\":{\"dtype\":{}}}}", 0, "expected a string"},
+        {"[]", 0, "expected '{'"},
+        {"null", 0, "expected '{'"},
+        {"", 0, "expected '{'"},
+        {"{", 0, "expected a string"},
+        {"{\"a\"}", 0, "expected ':'"},
+        {"{\"a\":" T("[1]", "0", "4") ",}", 4, "expected a string"},
+        {"{\"a\":" T("[1]", "0", "4") "} x", 4, "follows the end"},
+        {"{\"\xc3\x28\":" T("[1]", "0", "4") "}", 4, "UTF-8"},
+        {"{\"\xc0\x80\":" T("[1]", "0", "4") "}", 4, "UTF-8"},
+        {"{\"\xed\xa0\x80\":" T("[1]", "0", "4") "}", 4, "UTF-8"},
+        {"{\"\xf4\x90\x80\x80\":" T("[1]", "0", "4") "}", 4, "UTF-8"},
+        {"{\"a\n\":" T("[1]", "0", "4") "}", 4, "control character"},
+        {"{\"\\u0000\":" T("[1]", "0", "4") "}", 4, "character 0"},
+        {"{\"\\ud800x\":" T("[1]", "0", "4") "}", 4, "surrogate"},
+        {"{\"\\u12g4\":" T("[1]", "0", "4") "}", 4, "hexadecimal"},
+        {"{\"\\x\":" T("[1]", "0", "4") "}", 4, "escape"},
+        {"{\"a", 0, "does not end"},
+        {"{\"a\\", 0, "escape"},
+        {"{\"a\\u12", 0, "hexadecimal"},
+        {"{\"a\xe2\x82", 0, "UTF-8"},
+        {"{\"__metadata__\":{\"k\":1}}", 0, "expected a string"},
+        {"{\"__metadata__\":{\"k\":\"1\",\"k\":\"2\"}}", 0, "metadata key \"k\" is there twice"},
+        {"{\"__metadata__\":{},\"__metadata__\":{}}", 0, "second __metadata__"},
+        {"{\"__metadata__\":{\"k\":{\"l\":{}}}}", 0, "expected a string"},
+    };
+    for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) refused(craft(bad[i].header, bad[i].bytes), bad[i].what);
+    ts_status st = {0};
+    nn_file *f = nn_safetensors_open(craft("{ \"a\" : {\"shape\":[ 1 , 1 ],\n\"data_offsets\":[0,4],\"dtype\":\"F32\"} , \"b\":" T("[0]", "4", "4") "}   ", 4), &st);
+    CHECK(f && nn_safetensors_count(f) == 2, "a good file: %s", st.message);
+    nn_safetensors_close(&f);
+    f = nn_safetensors_open(craft("{}", 0), &st);
+    CHECK(f && nn_safetensors_count(f) == 0 && !nn_safetensors_has(f, "a"), "an empty list: %s", st.message);
+    nn_safetensors_close(&f);
+#undef T
+}
+
+TEST(weights_impossible_headers_are_refused)
+{
+    const char *path = path_of("h.safetensors");
+    char few[16] = {0};
+    spill(path, few, 0);
+    refused(path, "empty");
+    spill(path, few, 7);
+    refused(path, "no safetensors file");
+    spill(path, few, 8);
+    refused(path, "expected '{'");
+    static const uint64_t sizes[] = {9, 100u << 20, (16u << 20) + 1, UINT64_MAX, UINT64_MAX - 7, INT64_MAX};
+    for (int i = 0; i < 6; i++) {
+        memcpy(few, &sizes[i], 8);
+        spill(path, few, 16);
+        refused(path, i ? "at most 16 MiB" : "truncated");
+    }
+    size_t big = 100u << 20; /* really there */
+    char *header = malloc(big + 8);
+    uint64_t size = big;
+    memcpy(header, &size, 8);
+    memset(header + 8, ' ', big);
+    spill(path, header, big + 8);
+    refused(path, "at most 16 MiB");
+    size = 16 << 20; /* a deep nest of the largest size that is read */
+    memcpy(header, &size, 8);
+    memset(header + 8, '[', 16 << 20);
+    spill(path, header, (16 << 20) + 8);
+    refused(path, "expected '{'");
+    memcpy(header + 8, "{\"a\":", 5);
+    memset(header + 13, '{', (16 << 20) - 5);
+    spill(path, header, (16 << 20) + 8);
+    refused(path, "expected a string");
+    unlink(path);
+    free(header);
+    refused(test_folder(), "not a regular file");
+    refused(path_of("none"), "No such file");
+    mkfifo(path, 0600);
+    refused(path, "not a regular file");
+}
+
+TEST(weights_of_another_architecture_are_refused)
+{
+    ts_status st = {0};
+    nn_arch a = small(), b = small();
+    b.h_width = 8;
+    nn_model *m = nn_model_create(&a, &st), *n = nn_model_create(&b, &st);
+    nn_block block[64];
+    nn_meta meta[NN_ARCH_META];
+    char text[NN_ARCH_TEXT];
+    int metas = nn_arch_to_meta(&a, meta, NN_ARCH_META, text, sizeof text);
+    static const struct {
+        const char *what;
+        ts_code code;
+    } expected[] = {{"\"h.conv1.weight\" has the shape [8, 18, 5, 5], not [6, 18, 5, 5]", TS_FORMAT},
+                    {"\"h.output.weight\" is missing", TS_FORMAT},
+                    {"\"g.extra\" does not belong", TS_FORMAT},
+                    {"\"g.down1.conv2.weight\" holds a value that is not finite", TS_NUMERIC}};
+    const char *path = path_of("x.safetensors");
+    for (int c = 0; c < 4; c++) {
+        const nn_model *from = c ? m : n;
+        int count = 0;
+        for (int i = 0; i < from->params; i++) {
+            const nn_param *p = &from->param[i];
+            if (c == 1 && i == from->params - 1) continue;
+            block[count++] = (nn_block){p->name, p->rank, {p->dim[0], p->dim[1], p->dim[2], p->dim[3]}, from->value + p->offset};
+        }
+        if (c == 2) block[count++] = (nn_block){"g.extra", 1, {1}, m->value};
+        if (c == 3) m->value[nn_model_find(m, "g.down1.conv2.weight")->offset + 2] = NAN;
+        st = (ts_status){0};
+        CHECK(!nn_safetensors_write(path, block, count, meta, metas, &st), "%s", st.message);
+        nn_model *bad = nn_model_load(path, &st);
+        CHECK(!bad && st.code == expected[c].code && strstr(st.message, expected[c].what), "case %d: code %d, '%s'", c, st.code, st.message);
+    }
+    st = (ts_status){0};
+    char never[512];
+    snprintf(never, sizeof never, "%s", path_of("never"));
+    CHECK(nn_model_save(m, m->value, never, NULL, 0, &st) == TS_NUMERIC && strstr(st.message, "g.down1.conv2.weight"), "'%s'", st.message);
+    CHECK(access(never, F_OK) != 0, "a file is left");
+    st = (ts_status){0};
+    CHECK(!nn_safetensors_write(path, NULL, 0, NULL, 0, &st) && !nn_model_load(path, &st) && strstr(st.message, "\"format\""), "'%s'", st.message);
+}
+
+TEST(weights_init_from_takes_what_fits)
+{
+    ts_status st = {0};
+    nn_arch a = small(), b = small();
+    b.h_gru = 3; /* everything of h but one bias has another shape */
+    nn_model *m = nn_model_create(&a, &st), *n = nn_model_create(&b, &st);
+    nn_model_init(m, 1);
+    nn_model_init(n, 2);
+    const char *path = path_of("i.safetensors");
+    CHECK(!nn_model_save(m, m->value, path, NULL, 0, &st), "%s", st.message);
+    int taken, left;
+    float before = n->value[nn_model_find(n, "h.output.weight")->offset];
+    CHECK(!nn_model_init_from(n, path, &taken, &left, &st), "%s", st.message);
+    size_t first, last;
+    nn_model_range(n, false, &first, &last);
+    CHECK(!memcmp(m->value, n->value, last * sizeof(float)), "g was not taken");
+    CHECK(n->value[nn_model_find(n, "h.output.weight")->offset] == before, "h was touched");
+    CHECK(taken + left == n->params && left == 10, "%d taken, %d left of %d", taken, left, n->params);
+    st = (ts_status){0};
+    nn_safetensors_write(path, NULL, 0, NULL, 0, &st);
+    CHECK(nn_model_init_from(n, path, &taken, &left, &st) == TS_FORMAT && strstr(st.message, path), "'%s'", st.message);
+    st = (ts_status){0};
+    CHECK(nn_model_init_from(n, path_of("none"), &taken, &left, &st) == TS_IO, "'%s'", st.message);
+}
+
+TEST(weights_half_precision_is_exact)
+{
+    static const uint16_t half[] = {0x0000, 0x8000, 0x3c00, 0xc000, 0x0001, 0x8001, 0x03ff, 0x0400, 0x7bff, 0x7c00, 0xfc00, 0x3555};
+    static const float value[] = {0.0f, -0.0f, 1, -2, 0x1p-24f, -0x1p-24f, 0x1.ff8p-15f, 0x1p-14f, 65504, INFINITY, -INFINITY, 0x1.554p-2f};
+    static const uint16_t brain[] = {0x3f80, 0xc040, 0x0000, 0x7f7f};
+    static const float brain_value[] = {1, -3, 0, 0x1.fep+127f};
+    char bytes[600] = {0};
+    const char *header = "{\"h\":{\"dtype\":\"F16\",\"shape\":[12],\"data_offsets\":[0,24]},\"b\":{\"dtype\":\"BF16\",\"shape\":[4],\"data_offsets\":[24,32]},"
+                         "\"i\":{\"dtype\":\"I64\",\"shape\":[1],\"data_offsets\":[32,40]}}";
+    uint64_t n = strlen(header);
+    memcpy(bytes, &n, 8);
+    memcpy(bytes + 8, header, n);
+    memcpy(bytes + 8 + n, half, sizeof half);
+    memcpy(bytes + 8 + n + 24, brain, sizeof brain);
+    const char *path = path_of("half.safetensors");
+    spill(path, bytes, 8 + n + 40);
+    ts_status st = {0};
+    nn_file *f = nn_safetensors_open(path, &st);
+    CHECK(f, "%s", st.message);
+    float out[12];
+    CHECK(!nn_safetensors_read(f, "h", 1, (int64_t[]){12}, out, &st), "%s", st.message);
+    CHECK(!memcmp(out, value, sizeof value), "F16 is read wrongly");
+    CHECK(!nn_safetensors_read(f, "b", 1, (int64_t[]){4}, out, &st), "%s", st.message);
+    CHECK(!memcmp(out, brain_value, sizeof brain_value), "BF16 is read wrongly");
+    CHECK(nn_safetensors_read(f, "i", 1, (int64_t[]){1}, out, &st) == TS_FORMAT && strstr(st.message, "\"i\" has dtype I64"), "'%s'", st.message);
+    CHECK(nn_safetensors_read(f, "b", 2, (int64_t[]){2, 2}, out, &st) == TS_FORMAT && strstr(st.message, "[4], not [2, 2]"), "'%s'", st.message);
+    CHECK(nn_safetensors_read(f, "c", 1, (int64_t[]){4}, out, &st) == TS_FORMAT && strstr(st.message, "\"c\" is missing"), "'%s'", st.message);
+    nn_safetensors_close(&f);
+}
+
+TEST(weights_writing_leaves_the_old_file_or_the_new_one)
+{
+    ts_status st = {0};
+    char path[512], inside[600];
+    float two[] = {1, 2};
+    nn_block block = {"a", 1, {2}, two};
+    snprintf(path, sizeof path, "%s", path_of("w.safetensors"));
+    CHECK(!nn_safetensors_write(path, &block, 1, NULL, 0, &st), "%s", st.message);
+    nn_meta latin = {"note", "caf\xe9"};
+    CHECK(nn_safetensors_write(path, &block, 1, &latin, 1, &st) == TS_INVALID && strstr(st.message, "note"), "'%s'", st.message);
+    st = (ts_status){0};
+    block.name = "\xff";
+    CHECK(nn_safetensors_write(path, &block, 1, NULL, 0, &st) == TS_INVALID, "'%s'", st.message);
+    st = (ts_status){0};
+    nn_file *f = nn_safetensors_open(path, &st);
+    CHECK(f && nn_safetensors_has(f, "a"), "the old file is gone: %s", st.message);
+    nn_safetensors_close(&f);
+    block.name = "a";
+    snprintf(inside, sizeof inside, "%s/none/w.safetensors", test_folder());
+    CHECK(nn_safetensors_write(inside, &block, 1, NULL, 0, &st) == TS_IO && strstr(st.message, inside), "'%s'", st.message);
+    st = (ts_status){0};
+    char folder[512];
+    snprintf(folder, sizeof folder, "%s", path_of("folder"));
+    mkdir(folder, 0700);
+    CHECK(nn_safetensors_write(folder, &block, 1, NULL, 0, &st) == TS_IO && strstr(st.message, folder), "'%s'", st.message);
+    char command[700];
+    snprintf(command, sizeof command, "test \"$(ls '%s' | wc -l)\" = 2", test_folder());
+    CHECK(system(command) == 0, "a temporary file is left");
+}
