@@ -25,11 +25,13 @@ ts_code io_read_photo(const char *path, int64_t max_pixels, io_image *image, ts_
 /* A data image (a map): values as stored, integers / their maximum, no colour transform, orientation ignored. channels: 1 or 3 forced. */
 ts_code io_read_data(const char *path, int channels, int64_t max_pixels, io_image *image, ts_status *st);
 
-/* The largest centred square, resampled to size x size by an antialiased filter in linear light. */
+/* The largest centred square, resampled to size x size by an antialiased filter in linear light (ts_resize: no ringing). in may have any number
+ * of channels; out is created, also where size is the square's own. */
 ts_code io_centre_square(const io_image *in, int size, io_image *out, ts_status *st);
 
-/* PNG, bits 8 or 16; srgb: encode linear values by the sRGB curve and tag the file so. Values are clamped to [0, 1]. Written to
- * a temporary file and renamed. text: an optional comment ("Description"), or NULL. */
+/* PNG, bits 8 or 16; srgb: encode linear values by the sRGB curve and tag the file so. Values are clamped to [0, 1], NaN becomes 0; a fourth
+ * channel is straight alpha and never encoded. Written to a temporary file in the same folder, synced and renamed; an existing device or pipe
+ * is written to directly, a symbolic link is followed. */
 ts_code io_write_png(const char *path, const io_image *image, int bits, bool srgb, ts_status *st);
 ts_code io_write_jpeg(const char *path, const io_image *image, int quality, ts_status *st); /* linear in, sRGB out */
 

@@ -14,7 +14,8 @@ ts_code io_material_create(io_material *m, int size, ts_status *st);
 void io_material_free(io_material *m);
 
 /* A map folder: basecolor/albedo/diffuse, normal, roughness, metallic or specular; conventions from meta.txt (see the reader)
- * or from the options; what is ambiguous is an error. Resampled to size (0: as stored, centre square). */
+ * or from the options; what is ambiguous is an error. Resampled to size (0: the largest map's centre square).
+ * The option wins over a meta.txt, which io_write_maps writes and data/map_names.c describes. */
 typedef enum io_normal { IO_NORMAL_FROM_FILE, IO_NORMAL_GL, IO_NORMAL_DX } io_normal;
 ts_code io_read_map_folder(const char *path, io_normal convention, int size, io_material *m, ts_status *st);
 
@@ -23,12 +24,13 @@ ts_code io_read_map_folder(const char *path, io_normal convention, int size, io_
 ts_code io_read_strip(const char *path, int size, io_material *m, io_image *input, ts_status *st);
 
 /* diffuse.png, specular.png (sRGB), roughness.png, normal.png (linear, 16 bit where it matters) and maps.exr (all channels linear
- * float) into the folder; with masks from IO_MAPS_... and the normal's y flipped for DirectX. */
+ * float) into the folder; with masks from IO_MAPS_... and the normal's y flipped for DirectX, in maps.exr too. A meta.txt beside them says
+ * what they mean, so that io_read_map_folder reads the folder without being told. */
 enum { IO_MAPS_DIFFUSE = 1, IO_MAPS_SPECULAR = 2, IO_MAPS_ROUGHNESS = 4, IO_MAPS_NORMAL = 8, IO_MAPS_EXR = 16, IO_MAPS_ALL = 31 };
 ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st);
 /* A five-panel strip as io_read_strip reads it (16-bit PNG); input is linear, size x size. */
 ts_code io_write_strip(const char *path, const io_material *m, const io_image *input, ts_status *st);
-/* maps.exr back. */
+/* maps.exr back; whichever way its normals' y points, the maps' points up. */
 ts_code io_read_maps_exr(const char *path, io_material *m, ts_status *st);
 
 /* The reconstructed normal and physical values of one pixel, for writers and statistics. */

@@ -1,0 +1,53 @@
+#include "data/image.h"
+#include "tensor/resize.h"
+#include <stdlib.h>
+#include <string.h>
+
+ts_code io_image_create(io_image *image, int width, int height, int channels, ts_status *st)
+{
+    memset(image, 0, sizeof *image);
+    if (width < 1 || height < 1 || channels < 1) return ts_fail(st, TS_INVALID, "image of %d x %d pixels, %d channels", width, height, channels);
+    image->data = calloc((size_t)width * (size_t)height, (size_t)channels * sizeof(float));
+    if (!image->data) return ts_fail(st, TS_NOMEM, "no memory for an image of %d x %d pixels", width, height);
+    image->width = width;
+    image->height = height;
+    image->channels = channels;
+    return TS_OK;
+}
+
+void io_image_free(io_image *image)
+{
+    free(image->data);
+    memset(image, 0, sizeof *image);
+}
+
+static ts_code resample(const io_image *in, io_image *out, ts_status *st)
+{
+    ts_arena *arena = ts_arena_create(0, st);
+    if (!arena) return TS_NOMEM;
+    ts_tensor src = ts_view(in->data, (ts_shape){1, in->height, in->width, in->channels});
+    ts_tensor dst = ts_view(out->data, (ts_shape){1, out->height, out->width, out->channels});
+    ts_code code = ts_resize(&dst, &src, arena, st);
+    ts_arena_destroy(&arena);
+    return code;
+}
+
+ts_code io_centre_square(const io_image *in, int size, io_image *out, ts_status *st)
+{
+    int side = in->width < in->height ? in->width : in->height, x0 = (in->width - side) / 2, y0 = (in->height - side) / 2;
+    size_t row = (size_t)side * (size_t)in->channels;
+    if (size < 1) return ts_fail(st, TS_INVALID, "an image of %d x %d pixels", size, size);
+    io_image square;
+    if (io_image_create(&square, side, side, in->channels, st) != TS_OK) return TS_NOMEM;
+    for (int y = 0; y < side; y++)
+        memcpy(square.data + (size_t)y * row, in->data + ((size_t)(y + y0) * (size_t)in->width + (size_t)x0) * (size_t)in->channels, row * sizeof(float));
+    if (side == size) {
+        *out = square;
+        return TS_OK;
+    }
+    ts_code code = io_image_create(out, size, size, in->channels, st);
+    if (code == TS_OK) code = resample(&square, out, st);
+    if (code != TS_OK) io_image_free(out);
+    io_image_free(&square);
+    return code;
+}

@@ -1,0 +1,308 @@
+/* lgd-data: procedural materials as map folders, strips, photographs or a contact sheet, and how they compare with others' materials. */
+#include "cli/cli.h"
+#include "data/sheet.h"
+#include "data/statistics.h"
+#include "render/render.h"
+#include "tensor/threads.h"
+#include <errno.h>
+#include <getopt.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef enum format { FORMAT_NONE, FORMAT_FOLDERS, FORMAT_STRIPS } format;
+
+typedef struct options {
+    const char *output, *testdata;
+    io_procedural procedural;
+    int64_t first, count, size, threads, quality; /* count and size 0: not given */
+    io_camera camera;
+    format format;
+    bool sheet, photographs, statistics;
+} options;
+
+enum {
+    OPT_SEED = 256,
+    OPT_FIRST,
+    OPT_COUNT,
+    OPT_SIZE,
+    OPT_FAMILIES,
+    OPT_FORMAT,
+    OPT_SHEET,
+    OPT_PHOTOGRAPHS,
+    OPT_NOISE,
+    OPT_BLUR,
+    OPT_QUALITY,
+    OPT_STATISTICS,
+    OPT_TESTDATA,
+    OPT_THREADS,
+    OPT_HELP,
+    OPT_VERSION
+};
+
+static const struct option long_options[] = {{"output", required_argument, NULL, 'o'},
+                                             {"seed", required_argument, NULL, OPT_SEED},
+                                             {"first", required_argument, NULL, OPT_FIRST},
+                                             {"count", required_argument, NULL, OPT_COUNT},
+                                             {"size", required_argument, NULL, OPT_SIZE},
+                                             {"families", required_argument, NULL, OPT_FAMILIES},
+                                             {"format", required_argument, NULL, OPT_FORMAT},
+                                             {"contact-sheet", no_argument, NULL, OPT_SHEET},
+                                             {"photographs", no_argument, NULL, OPT_PHOTOGRAPHS},
+                                             {"noise", required_argument, NULL, OPT_NOISE},
+                                             {"blur", required_argument, NULL, OPT_BLUR},
+                                             {"quality", required_argument, NULL, OPT_QUALITY},
+                                             {"statistics", no_argument, NULL, OPT_STATISTICS},
+                                             {"testdata", required_argument, NULL, OPT_TESTDATA},
+                                             {"threads", required_argument, NULL, OPT_THREADS},
+                                             {"help", no_argument, NULL, OPT_HELP},
+                                             {"version", no_argument, NULL, OPT_VERSION},
+                                             {NULL, 0, NULL, 0}};
+
+static void print_help(void)
+{
+    printf("Usage: lgd-data [options] -o DIR\n"
+           "       lgd-data --statistics --testdata DIR [options]\n"
+           "Writes procedural materials: numbers FIRST .. FIRST+COUNT-1 of the endless sequence that SEED names.\n\n"
+           "What to write (the default is --format folders):\n"
+           "  -o, --output DIR      where to; made when absent\n"
+           "      --format FORMAT   folders: DIR/NAME/ with diffuse.png, specular.png, roughness.png, normal.png, maps.exr;\n"
+           "                        strips: DIR/NAME.png, five panels: photograph, normal, diffuse, roughness, specular\n"
+           "      --photographs     DIR/NAME.jpg, rendered under the flash, with sensor noise, blur and JPEG\n"
+           "      --contact-sheet   DIR/contact-sheet.png, a row for each family\n"
+           "      --statistics      compare maps with those of TESTDATA: a table on stdout\n\n"
+           "Which materials:\n"
+           "      --seed N          default 1\n"
+           "      --first N         default 0\n"
+           "      --count N         default 16; contact sheet 3 for each family; statistics 512\n"
+           "      --size N          8 .. 2048 pixels, default 256; contact sheet and statistics 128\n"
+           "      --families LIST   some of: ");
+    for (int i = 0; i < io_family_count(); i++)
+        printf("%s%s%s", i ? "," : "", i && i % 9 == 0 ? "\n                        " : "", io_family_name(i));
+    printf("\n\nHow:\n"
+           "      --noise X         of photographs, 0 none .. 1 a phone at night (default 0.5)\n"
+           "      --blur X          of photographs, largest sigma in pixels at 256 (default 0.6)\n"
+           "      --quality N       of photographs' JPEG, 1 .. 100 (default 90)\n"
+           "      --testdata DIR    a folder with maps/ (map folders) and strips/ to compare with\n"
+           "      --threads N       default: as many as the process may use\n"
+           "      --help, --version\n");
+}
+
+static int parse_families(char *list, uint64_t *families)
+{
+    *families = 0;
+    char *rest = NULL;
+    for (char *name = strtok_r(list, ",", &rest); name; name = strtok_r(NULL, ",", &rest)) {
+        int family = io_family_find(name);
+        if (family < 0) return cl_usage("--families: no family is called '%s' (--help lists them)", name);
+        *families |= UINT64_C(1) << family;
+    }
+    return *families ? CL_OK : cl_usage("--families: the list is empty");
+}
+
+static int parse_number(const char *option, const char *text, int64_t lo, int64_t hi, int64_t *value)
+{
+    return cl_parse_int(text, lo, hi, value)
+               ? CL_OK
+               : cl_usage("--%s: '%s' is not a whole number from %lld to %lld", option, text, (long long)lo, (long long)hi);
+}
+
+static int parse_share(const char *option, const char *text, double hi, float *value)
+{
+    double v;
+    if (!cl_parse_real(text, 0, hi, &v)) return cl_usage("--%s: '%s' is not a number from 0 to %g", option, text, hi);
+    *value = (float)v;
+    return CL_OK;
+}
+
+static int parse_options(int argc, char **argv, options *o)
+{
+    int code = CL_OK, c;
+    int64_t seed = 1;
+    opterr = 0;
+    while (code == CL_OK && (c = getopt_long(argc, argv, ":o:", long_options, NULL)) != -1) switch (c) {
+        case 'o': o->output = optarg; break;
+        case OPT_SEED: code = parse_number("seed", optarg, 0, INT64_MAX, &seed); break;
+        case OPT_FIRST: code = parse_number("first", optarg, 0, INT64_C(1) << 60, &o->first); break;
+        case OPT_COUNT: code = parse_number("count", optarg, 1, 10000000, &o->count); break;
+        case OPT_SIZE: code = parse_number("size", optarg, 8, 2048, &o->size); break;
+        case OPT_FAMILIES: code = parse_families(optarg, &o->procedural.families); break;
+        case OPT_FORMAT:
+            if (!strcmp(optarg, "folders")) o->format = FORMAT_FOLDERS;
+            else if (!strcmp(optarg, "strips")) o->format = FORMAT_STRIPS;
+            else code = cl_usage("--format: '%s' is neither 'folders' nor 'strips'", optarg);
+            break;
+        case OPT_SHEET: o->sheet = true; break;
+        case OPT_PHOTOGRAPHS: o->photographs = true; break;
+        case OPT_NOISE: code = parse_share("noise", optarg, 1, &o->camera.noise); break;
+        case OPT_BLUR: code = parse_share("blur", optarg, 4, &o->camera.blur); break;
+        case OPT_QUALITY: code = parse_number("quality", optarg, 1, 100, &o->quality); break;
+        case OPT_STATISTICS: o->statistics = true; break;
+        case OPT_TESTDATA: o->testdata = optarg; break;
+        case OPT_THREADS: code = parse_number("threads", optarg, 1, 1024, &o->threads); break;
+        case OPT_HELP: print_help(); exit(cl_finish(CL_OK));
+        case OPT_VERSION: cl_print_version(); exit(cl_finish(CL_OK));
+        case ':': code = cl_usage("%s needs a value", argv[optind - 1]); break;
+        default: code = cl_usage("no option is called '%s'", argv[optind - 1]);
+        }
+    if (code) return code;
+    if (optind < argc) return cl_usage("'%s' is not an option", argv[optind]);
+    bool writes = o->format || o->sheet || o->photographs;
+    if (!o->statistics && !writes) o->format = FORMAT_FOLDERS;
+    if (!o->output && (writes || !o->statistics)) return cl_usage("where to? Give -o DIR");
+    if (o->statistics && !o->testdata) return cl_usage("--statistics needs --testdata DIR");
+    if (o->testdata && !o->statistics) return cl_usage("--testdata is for --statistics");
+    o->procedural.seed = (uint64_t)seed;
+    return CL_OK;
+}
+
+static ts_code make_path(char path[4096], const options *o, const char *name, const char *suffix, ts_status *st)
+{
+    if (snprintf(path, 4096, "%s/%s%s", o->output, name, suffix) >= 4096) return ts_fail(st, TS_INVALID, "%s: the path is too long", o->output);
+    return TS_OK;
+}
+
+/* One material and its photograph, to the files that were asked for. */
+static ts_code write_material(const options *o, uint64_t index, io_material *m, io_image *photo, ts_status *st)
+{
+    char path[4096];
+    rd_view flash = rd_flash();
+    io_procedural_make(&o->procedural, index, m);
+    ts_code code = TS_OK;
+    if (o->format == FORMAT_FOLDERS) {
+        code = make_path(path, o, m->name, "", st);
+        if (!code) code = cl_make_folder(path, st);
+        if (!code) code = io_write_maps(path, m, IO_MAPS_ALL, false, st);
+    }
+    if (!code) rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &flash, true, photo->data);
+    if (!code && o->format == FORMAT_STRIPS) {
+        code = make_path(path, o, m->name, ".png", st);
+        if (!code) code = io_write_strip(path, m, photo, st);
+    }
+    if (!code && o->photographs) {
+        io_camera_apply(&o->camera, o->procedural.seed, index, m->size, photo->data);
+        code = make_path(path, o, m->name, ".jpg", st);
+        if (!code) code = io_write_jpeg(path, photo, (int)o->quality, st);
+    }
+    return code;
+}
+
+typedef ts_code task(const options *o, int64_t number, io_material *m, io_image *photo, io_sheet *sheet, ts_status *st);
+
+static ts_code write_task(const options *o, int64_t number, io_material *m, io_image *photo, io_sheet *sheet, ts_status *st)
+{
+    (void)sheet;
+    return write_material(o, (uint64_t)(o->first + number), m, photo, st);
+}
+
+static int row_family(const options *o, int row)
+{
+    for (int i = 0; i < io_family_count(); i++)
+        if ((!o->procedural.families || o->procedural.families >> i & 1) && row-- == 0) return i;
+    return 0;
+}
+
+static ts_code sheet_task(const options *o, int64_t number, io_material *m, io_image *photo, io_sheet *sheet, ts_status *st)
+{
+    (void)st;
+    int column = (int)(number % sheet->columns), row = (int)(number / sheet->columns);
+    io_procedural p = {o->procedural.seed, UINT64_C(1) << row_family(o, row)};
+    rd_view flash = rd_flash();
+    io_procedural_make(&p, (uint64_t)(o->first + number), m);
+    rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &flash, true, photo->data);
+    io_sheet_put(sheet, column, row, m->maps, photo->data);
+    return TS_OK;
+}
+
+/* Runs count tasks on all threads; the first failure (in the order of their numbers) is reported. */
+static ts_code run(const options *o, const char *what, task *f, int64_t count, int size, io_sheet *sheet, ts_status *st)
+{
+    int64_t done = 0, failed = count;
+    cl_progress progress = cl_progress_start(what, count);
+#pragma omp parallel num_threads(ts_threads())
+    {
+        ts_status mine = {0};
+        io_material m = {0};
+        io_image photo = {0};
+        ts_code ready = io_material_create(&m, size, &mine);
+        if (!ready) ready = io_image_create(&photo, size, size, 3, &mine);
+#pragma omp for schedule(dynamic, 1)
+        for (int64_t i = 0; i < count; i++) {
+            bool skip;
+#pragma omp critical(lgd_data)
+            skip = failed < i || cl_interrupted();
+            if (skip) continue;
+            ts_code code = ready ? ready : f(o, i, &m, &photo, sheet, &mine);
+#pragma omp critical(lgd_data)
+            {
+                if (code && i < failed) {
+                    failed = i;
+                    *st = mine;
+                }
+                cl_progress_show(&progress, ++done, NULL);
+            }
+        }
+        io_material_free(&m);
+        io_image_free(&photo);
+    }
+    cl_progress_end(&progress);
+    if (st->code == TS_OK && cl_interrupted())
+        ts_fail(st, TS_INTERRUPTED, "interrupted after %lld of %lld materials", (long long)done, (long long)count);
+    return st->code;
+}
+
+static ts_code make_sheet(const options *o, ts_status *st)
+{
+    int rows = 0;
+    for (int i = 0; i < io_family_count(); i++) rows += !o->procedural.families || o->procedural.families >> i & 1;
+    int64_t columns = o->count ? (o->count + rows - 1) / rows : 3;
+    io_sheet sheet = {0};
+    char path[4096];
+    ts_code code =
+        columns > 1000 ? ts_fail(st, TS_INVALID, "a contact sheet of %lld materials is too large: ask for fewer", (long long)o->count) : TS_OK;
+    if (!code) code = io_sheet_create(&sheet, (int)columns, rows, o->size ? (int)o->size : 128, st);
+    if (!code) code = run(o, "contact sheet", sheet_task, columns * rows, sheet.size, &sheet, st);
+    if (!code) code = make_path(path, o, "contact-sheet", ".png", st);
+    if (!code) code = io_write_png(path, &sheet.image, 8, true, st);
+    io_image_free(&sheet.image);
+    return code;
+}
+
+static ts_code compare(const options *o, ts_status *st)
+{
+    int count = o->count ? (int)o->count : 512, size = o->size ? (int)o->size : 128;
+    io_feature_set ours = {0}, theirs = {0};
+    ts_code code = io_features_folder(o->testdata, size, &theirs, st);
+    if (!code) code = io_features_procedural(&o->procedural, count, size, &ours, st);
+    if (!code) {
+        double each[IO_FEATURES], distance = io_feature_distance(&ours, &theirs, each), halves = io_feature_halves(&theirs, 200, 1);
+        printf("%-20s %15s %20s %10s\n", "", "testdata", "procedural", "distance");
+        for (int i = 0; i < IO_FEATURES; i++) {
+            double m, s, n, t;
+            io_feature_summary(&theirs, i, &m, &s);
+            io_feature_summary(&ours, i, &n, &t);
+            printf("%-20s %8.3f +- %5.3f %10.3f +- %5.3f %10.2f\n", io_feature_name(i), m, s, n, t, each[i]);
+        }
+        printf("distance of %d procedural materials from %d in %s: %.3f\n", ours.count, theirs.count, o->testdata, distance);
+        printf("distance between two halves of the latter, mean of 200 halvings: %.3f (ratio %.2f)\n", halves, distance / halves);
+    }
+    io_feature_set_free(&ours);
+    io_feature_set_free(&theirs);
+    return code;
+}
+
+int main(int argc, char **argv)
+{
+    options o = {.quality = 90, .camera = {0.5f, 0.6f, true}};
+    ts_status st = {0};
+    int code = cl_init("lgd-data");
+    if (!code) code = parse_options(argc, argv, &o);
+    if (code) return code;
+    ts_threads_set((int)o.threads);
+    cl_catch_interrupt();
+    if (o.output) cl_make_folder(o.output, &st);
+    if (!st.code && (o.format || o.photographs)) run(&o, "materials", write_task, o.count ? o.count : 16, o.size ? (int)o.size : 256, NULL, &st);
+    if (!st.code && o.sheet) make_sheet(&o, &st);
+    if (!st.code && o.statistics) compare(&o, &st);
+    return cl_finish(st.code ? cl_failed("%s", st.message) : CL_OK);
+}

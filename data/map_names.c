@@ -1,0 +1,208 @@
+/* What is in a map folder: files are recognised by their names, conventions by meta.txt.
+ *
+ * meta.txt holds lines "key: text" (or "key = text"); '#' begins a comment, unknown keys are left alone:
+ *   workflow: metallic | specular ...        needed only where both a metallic and a specular map exist
+ *   basecolor, diffuse, specular: sRGB | linear ...
+ *   normal: ... OpenGL ... | ... DirectX ...  (y up or y down)
+ *   file.MAP: NAME                           where names do not say it; MAP as in io_map_kind_name */
+#include "data/file.h"
+#include "data/map_folder.h"
+#include "data/oiio.h"
+#include <ctype.h>
+#include <dirent.h>
+#include <errno.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+const char *const io_map_kind_name[IO_MAP_KINDS] = {"basecolor", "diffuse", "normal", "roughness", "gloss", "metallic", "specular"};
+
+static const struct {
+    const char *word;
+    int kind;
+} words[] = {
+    {"basecolor", IO_BASECOLOR},     {"basecolour", IO_BASECOLOR},    {"albedo", IO_BASECOLOR},      {"color", IO_BASECOLOR},
+    {"colour", IO_BASECOLOR},        {"col", IO_BASECOLOR},           {"diffuse", IO_DIFFUSE_MAP},   {"diff", IO_DIFFUSE_MAP},
+    {"normal", IO_NORMAL_MAP},       {"normals", IO_NORMAL_MAP},      {"normalgl", IO_NORMAL_MAP},   {"normaldx", IO_NORMAL_MAP},
+    {"nor", IO_NORMAL_MAP},          {"nrm", IO_NORMAL_MAP},          {"roughness", IO_ROUGHNESS_MAP}, {"rough", IO_ROUGHNESS_MAP},
+    {"gloss", IO_GLOSS_MAP},         {"glossiness", IO_GLOSS_MAP},    {"metallic", IO_METALLIC_MAP}, {"metalness", IO_METALLIC_MAP},
+    {"metal", IO_METALLIC_MAP},      {"specular", IO_SPECULAR_MAP},   {"spec", IO_SPECULAR_MAP},
+};
+
+/* The words of a file name, cut at everything that is no letter or digit and where a capital follows a small letter. */
+enum { WORDS = 16, WORD = 32 };
+static int split_words(const char *stem, size_t length, char word[WORDS][WORD])
+{
+    int count = 0;
+    size_t n = 0;
+    for (size_t i = 0; i <= length && count < WORDS; i++) {
+        unsigned char c = i < length ? (unsigned char)stem[i] : 0, before = i ? (unsigned char)stem[i - 1] : 0;
+        bool end = !isalnum(c), camel = isupper(c) && islower(before);
+        if ((end || camel) && n) word[count++][n] = 0, n = 0;
+        if (!end && count < WORDS && n < WORD - 1) word[count][n++] = (char)tolower(c);
+    }
+    return count;
+}
+
+typedef enum side { UNKNOWN, GL, DX, BOTH } side;
+
+/* The map that a file name means, by its last telling word, or -1; *y: OpenGL or DirectX if it says so. */
+static int kind_of_name(const char *name, side *y)
+{
+    const char *dot = strrchr(name, '.');
+    char word[WORDS][WORD];
+    *y = UNKNOWN;
+    if (!dot || dot == name || !oi_knows_extension(dot + 1)) return -1;
+    int count = split_words(name, (size_t)(dot - name), word), kind = -1;
+    for (int i = count - 1; i >= 0 && kind < 0; i--)
+        for (size_t w = 0; w < sizeof words / sizeof words[0]; w++)
+            if (!strcmp(word[i], words[w].word)) kind = words[w].kind;
+    for (int i = 0; i < count && kind == IO_NORMAL_MAP; i++) {
+        if (!strcmp(word[i], "gl") || !strcmp(word[i], "opengl") || !strcmp(word[i], "ogl") || !strcmp(word[i], "normalgl")) *y = GL;
+        if (!strcmp(word[i], "dx") || !strcmp(word[i], "directx") || !strcmp(word[i], "normaldx")) *y = DX;
+    }
+    return kind;
+}
+
+/* Finds "key" at the beginning of a line, followed by ':' or '='; value is the rest, trimmed. */
+static bool find_key(const char *text, const char *key, char *value, size_t capacity)
+{
+    size_t length = strlen(key);
+    for (const char *line = text; line; line = strchr(line, '\n')) {
+        while (*line == '\n' || *line == '\r' || *line == ' ' || *line == '\t') line++;
+        if (!strncmp(line, "\xef\xbb\xbf", 3)) line += 3; /* a byte-order mark */
+        if (strncasecmp(line, key, length)) continue;
+        const char *p = line + length;
+        while (*p == ' ' || *p == '\t') p++;
+        if (*p != ':' && *p != '=') continue;
+        for (p++; *p == ' ' || *p == '\t';) p++;
+        size_t n = strcspn(p, "\r\n#");
+        while (n && (p[n - 1] == ' ' || p[n - 1] == '\t')) n--;
+        if (n >= capacity) n = capacity - 1;
+        memcpy(value, p, n);
+        value[n] = 0;
+        return true;
+    }
+    return false;
+}
+
+static bool says(const char *text, const char *word) { return strcasestr(text, word) != NULL; }
+
+static side normal_side(const char *text)
+{
+    bool gl = says(text, "opengl") || !strcasecmp(text, "gl"), dx = says(text, "directx") || !strcasecmp(text, "dx");
+    return gl && dx ? BOTH : gl ? GL : dx ? DX : UNKNOWN;
+}
+
+/* Two normal maps that say which is which are no ambiguity: the wanted one stays (OpenGL if either will do). */
+static bool choose_normal(io_map_set *set, side *have, const char *name, side y, side wanted)
+{
+    if (*have == UNKNOWN || y == UNKNOWN || *have == y) return false;
+    side better = wanted == DX ? DX : GL;
+    if (y == better) {
+        *have = y;
+        snprintf(set->file[IO_NORMAL_MAP], sizeof set->file[0], "%s", name);
+    }
+    return true;
+}
+
+static ts_code scan(const char *path, io_map_set *set, side wanted, side *file_side, ts_status *st)
+{
+    DIR *folder = opendir(path);
+    if (!folder) return ts_fail(st, TS_IO, "%s: %s", path, errno == ENOTDIR ? "not a folder of maps" : strerror(errno));
+    ts_code code = TS_OK;
+    for (struct dirent *entry; code == TS_OK && (entry = readdir(folder));) {
+        side y;
+        int kind = entry->d_name[0] == '.' ? -1 : kind_of_name(entry->d_name, &y);
+        if (kind < 0 || strlen(entry->d_name) >= sizeof set->file[0]) continue;
+        char *file = set->file[kind];
+        if (!file[0]) {
+            strcpy(file, entry->d_name);
+            if (kind == IO_NORMAL_MAP) *file_side = y;
+        } else if (kind != IO_NORMAL_MAP || !choose_normal(set, file_side, entry->d_name, y, wanted)) {
+            bool swap = strcmp(file, entry->d_name) > 0; /* the same message whatever order the system lists them in */
+            code = ts_fail(st, TS_INVALID, "%s: both %s and %s could be the %s map; remove one, or name it in meta.txt (file.%s: ...)", path,
+                           swap ? entry->d_name : file, swap ? file : entry->d_name, io_map_kind_name[kind], io_map_kind_name[kind]);
+        }
+    }
+    closedir(folder);
+    return code;
+}
+
+/* meta.txt's own words about files come first, so that they settle what names leave open. */
+static bool named_files(const char *meta, io_map_set *set)
+{
+    bool any = false;
+    for (int k = 0; k < IO_MAP_KINDS; k++) {
+        char key[32];
+        snprintf(key, sizeof key, "file.%s", io_map_kind_name[k]);
+        any = find_key(meta, key, set->file[k], sizeof set->file[k]) || any;
+    }
+    return any;
+}
+
+static ts_code settle_normal(const char *path, const char *meta, io_normal convention, side file_side, io_map_set *set, ts_status *st)
+{
+    char text[512] = "";
+    side y = file_side;
+    if (y == UNKNOWN && find_key(meta, "normal", text, sizeof text)) y = normal_side(text);
+    if (convention != IO_NORMAL_FROM_FILE) y = convention == IO_NORMAL_DX ? DX : GL;
+    if (y == GL || y == DX) {
+        set->directx = y == DX;
+        return TS_OK;
+    }
+    return ts_fail(st, TS_INVALID, "%s: %s; put \"normal: OpenGL y\" or \"normal: DirectX y\" into meta.txt, or say which with the option", path,
+                   y == BOTH ? "meta.txt names both conventions for the normal's y" : "nothing says whether the normal's y is OpenGL or DirectX");
+}
+
+static ts_code settle_workflow(const char *path, const char *meta, io_map_set *set, ts_status *st)
+{
+    char text[512] = "";
+    bool base = set->file[IO_BASECOLOR][0], diffuse = set->file[IO_DIFFUSE_MAP][0], metallic = set->file[IO_METALLIC_MAP][0];
+    bool specular = set->file[IO_SPECULAR_MAP][0], said_specular = false, said_metallic = false;
+    if (find_key(meta, "workflow", text, sizeof text)) {
+        said_specular = !strncasecmp(text, "specular", 8);
+        said_metallic = !strncasecmp(text, "metal", 5);
+    }
+    if (base && diffuse)
+        return ts_fail(st, TS_INVALID, "%s: both %s and %s could be the colour map; remove one, or name it in meta.txt (file.basecolor: ...)", path,
+                       set->file[IO_BASECOLOR], set->file[IO_DIFFUSE_MAP]);
+    if (metallic && specular && !said_specular && !said_metallic)
+        return ts_fail(st, TS_INVALID, "%s: has both %s and %s; put \"workflow: metallic\" or \"workflow: specular\" into meta.txt", path,
+                       set->file[IO_METALLIC_MAP], set->file[IO_SPECULAR_MAP]);
+    set->specular = said_specular || (specular && !said_metallic);
+    if (set->specular && !specular) return ts_fail(st, TS_INVALID, "%s: meta.txt says specular workflow, but there is no specular map", path);
+    if (set->file[IO_ROUGHNESS_MAP][0] && set->file[IO_GLOSS_MAP][0])
+        return ts_fail(st, TS_INVALID, "%s: has both %s and %s; remove one", path, set->file[IO_ROUGHNESS_MAP], set->file[IO_GLOSS_MAP]);
+    if (!base && !diffuse) return ts_fail(st, TS_INVALID, "%s: no colour map (basecolor, albedo, diffuse or color in its file name)", path);
+    if (!set->file[IO_NORMAL_MAP][0]) return ts_fail(st, TS_INVALID, "%s: no normal map (normal in its file name)", path);
+    if (!set->file[IO_ROUGHNESS_MAP][0] && !set->file[IO_GLOSS_MAP][0])
+        return ts_fail(st, TS_INVALID, "%s: no roughness map (roughness in its file name; a packed map must be taken apart)", path);
+    return TS_OK;
+}
+
+ts_code io_describe_map_folder(const char *path, io_normal convention, io_map_set *set, ts_status *st)
+{
+    memset(set, 0, sizeof *set);
+    char meta_path[PATH_MAX], *meta = NULL, text[512];
+    size_t size;
+    side file_side = UNKNOWN;
+    ts_code code = TS_OK;
+    if (snprintf(meta_path, sizeof meta_path, "%s/meta.txt", path) >= (int)sizeof meta_path) return ts_fail(st, TS_INVALID, "%s: name too long", path);
+    FILE *exists = fopen(meta_path, "re");
+    if (exists) {
+        fclose(exists);
+        code = io_read_bytes(meta_path, 1 << 20, &meta, &size, st);
+    }
+    const char *words_of = meta ? meta : "";
+    if (code == TS_OK && !named_files(words_of, set))
+        code = scan(path, set, convention == IO_NORMAL_DX ? DX : convention == IO_NORMAL_GL ? GL : UNKNOWN, &file_side, st);
+    if (code == TS_OK) code = settle_workflow(path, words_of, set, st);
+    if (code == TS_OK) code = settle_normal(path, words_of, convention, file_side, set, st);
+    for (int k = 0; k < IO_MAP_KINDS && code == TS_OK; k++)
+        set->linear[k] = find_key(words_of, io_map_kind_name[k], text, sizeof text) && says(text, "linear") && !says(text, "srgb");
+    free(meta);
+    return code;
+}

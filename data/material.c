@@ -1,0 +1,133 @@
+#include "data/material.h"
+#include "data/exr.h"
+#include "data/file.h"
+#include <limits.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { MAX_SIZE = 1 << 15 };
+
+ts_code io_material_create(io_material *m, int size, ts_status *st)
+{
+    memset(m, 0, sizeof *m);
+    if (size < 1 || size > MAX_SIZE) return ts_fail(st, TS_INVALID, "maps of %d x %d pixels: the size must be 1 .. %d", size, size, MAX_SIZE);
+    m->maps = calloc((size_t)size * (size_t)size, MAP_CHANNELS * sizeof(float));
+    if (!m->maps) return ts_fail(st, TS_NOMEM, "no memory for maps of %d x %d pixels", size, size);
+    m->size = size;
+    return TS_OK;
+}
+
+void io_material_free(io_material *m)
+{
+    free(m->maps);
+    memset(m, 0, sizeof *m);
+}
+
+static float unit(float x)
+{
+    float v = x * 0.5f + 0.5f;
+    return v > 0 ? v < 1 ? v : 1 : 0; /* NaN to 0 */
+}
+
+static float level(float v)
+{
+    return v > 0 ? v < 1 ? 2 * v - 1 : 1 : -1;
+}
+
+io_texel io_texel_get(const float *maps9)
+{
+    io_texel t = {.roughness = unit(maps9[MAP_ROUGHNESS])};
+    for (int c = 0; c < 3; c++) {
+        t.diffuse[c] = unit(maps9[MAP_DIFFUSE + c]);
+        t.specular[c] = unit(maps9[MAP_SPECULAR + c]);
+    }
+    float x = fminf(fmaxf(maps9[MAP_NORMAL], -1), 1), y = fminf(fmaxf(maps9[MAP_NORMAL + 1], -1), 1); /* NaN to -1: a value still */
+    float s = x * x + y * y;
+    /* Refined maps may leave the unit circle; the renderer's rule (n_x^2 + n_y^2 at most 1 - 1e-6, then unit length) keeps z above 0. */
+    if (s > 1 - 1e-6f) {
+        float length = sqrtf(s + 1e-6f);
+        t.normal[0] = x / length;
+        t.normal[1] = y / length;
+        t.normal[2] = 1e-3f / length;
+    } else {
+        t.normal[0] = x;
+        t.normal[1] = y;
+        t.normal[2] = sqrtf(1 - s);
+    }
+    return t;
+}
+
+void io_texel_put(float *maps9, const io_texel *t)
+{
+    for (int c = 0; c < 3; c++) {
+        maps9[MAP_DIFFUSE + c] = level(t->diffuse[c]);
+        maps9[MAP_SPECULAR + c] = level(t->specular[c]);
+    }
+    maps9[MAP_ROUGHNESS] = level(t->roughness);
+    float x = t->normal[0], y = t->normal[1], z = t->normal[2], s = x * x + y * y + z * z;
+    bool usable = isfinite(s) && s > 1e-12f;
+    /* A normal that is of unit length already keeps its exact x and y, so that reading back what was written changes nothing. */
+    float scale = !usable ? 0 : fabsf(s - 1) < 1e-6f ? 1 : 1 / sqrtf(s);
+    maps9[MAP_NORMAL] = usable ? x * scale : 0;
+    maps9[MAP_NORMAL + 1] = usable ? y * scale : 0;
+}
+
+/* One map as an image: diffuse, specular and roughness in [0, 1], normals as (n + 1) / 2. */
+static void fill_map(const io_material *m, unsigned which, bool directx, io_image *image)
+{
+    size_t pixels = (size_t)m->size * (size_t)m->size;
+    for (size_t i = 0; i < pixels; i++) {
+        io_texel t = io_texel_get(m->maps + i * MAP_CHANNELS);
+        float *out = image->data + i * (size_t)image->channels;
+        if (which == IO_MAPS_ROUGHNESS) *out = t.roughness;
+        for (int c = 0; c < 3 && which != IO_MAPS_ROUGHNESS; c++) {
+            float n = c == 1 && directx ? -t.normal[c] : t.normal[c];
+            out[c] = which == IO_MAPS_DIFFUSE ? t.diffuse[c] : which == IO_MAPS_SPECULAR ? t.specular[c] : n * 0.5f + 0.5f;
+        }
+    }
+}
+
+static ts_code write_map(const char *folder, const char *file, const io_material *m, unsigned which, bool directx, ts_status *st)
+{
+    char path[PATH_MAX];
+    if (snprintf(path, sizeof path, "%s/%s", folder, file) >= (int)sizeof path) return ts_fail(st, TS_INVALID, "%s: name too long", folder);
+    if (which == IO_MAPS_EXR) return io_write_maps_exr(path, m, directx, st);
+    bool colour = which == IO_MAPS_DIFFUSE || which == IO_MAPS_SPECULAR;
+    io_image image;
+    ts_code code = io_image_create(&image, m->size, m->size, which == IO_MAPS_ROUGHNESS ? 1 : 3, st);
+    if (code != TS_OK) return code;
+    fill_map(m, which, directx, &image);
+    /* Eight bits of the sRGB curve are enough for albedo; steps of a normal or of roughness are seen in highlights. */
+    code = io_write_png(path, &image, colour ? 8 : 16, colour, st);
+    io_image_free(&image);
+    return code;
+}
+
+/* What the files mean, for whoever reads them next (io_read_map_folder does). */
+static ts_code write_meta(const char *folder, bool directx, ts_status *st)
+{
+    char path[PATH_MAX], text[512];
+    if (snprintf(path, sizeof path, "%s/meta.txt", folder) >= (int)sizeof path) return ts_fail(st, TS_INVALID, "%s: name too long", folder);
+    int length = snprintf(text, sizeof text,
+                          "workflow: specular (F0)\ndiffuse: sRGB\nspecular: sRGB\nroughness: linear value, perceptual (alpha = roughness^2)\n"
+                          "normal: tangent space, %s y\nmaps.exr: all of them, linear\n",
+                          directx ? "DirectX" : "OpenGL");
+    return io_write_bytes(path, text, (size_t)length, st);
+}
+
+ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st)
+{
+    static const struct {
+        unsigned which;
+        const char *file;
+    } files[] = {{IO_MAPS_DIFFUSE, "diffuse.png"}, {IO_MAPS_SPECULAR, "specular.png"}, {IO_MAPS_ROUGHNESS, "roughness.png"},
+                 {IO_MAPS_NORMAL, "normal.png"}, {IO_MAPS_EXR, "maps.exr"}};
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+        if (!(which & files[i].which)) continue;
+        ts_code code = write_map(folder, files[i].file, m, files[i].which, directx, st);
+        if (code != TS_OK) return code;
+    }
+    return which ? write_meta(folder, directx, st) : TS_OK;
+}

@@ -1,0 +1,12 @@
+/* Small conventions that several readers share. */
+#ifndef IO_NAME_H
+#define IO_NAME_H
+#include <stdbool.h>
+#include <stddef.h>
+
+/* The last part of a path without its extension ("a/b.c.png" gives "b.c", "a/b/" gives "b"), cut to capacity - 1 bytes. */
+void io_name_from_path(const char *path, char *name, size_t capacity);
+
+/* A stored normal, (n + 1) / 2 per channel, to a unit vector with z > 0; directx: its y points down. */
+void io_normal_decode(const float stored[3], bool directx, float normal[3]);
+#endif
