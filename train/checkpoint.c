@@ -1,0 +1,144 @@
+/* The run's state on disk: checkpoint.safetensors holds the parameters, Adam's moments and the moving average as whole blocks (padding
+ * included, so that they come back bit by bit), and in its metadata the counters and the configuration. */
+#include "nn/weights.h"
+#include "train/ini.h"
+#include "train/parts.h"
+#include <errno.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char format_name[] = "lgd checkpoint";
+
+static bool all_finite(const float *x, size_t n)
+{
+    bool fine = true;
+    for (size_t i = 0; i < n; i++) fine &= isfinite(x[i]) != 0;
+    return fine;
+}
+
+/* The configuration without neutral keys, so that weights do not differ with the folder or the threads. Freed by the caller. */
+static char *config_text(const tr_config *c, ts_status *st)
+{
+    char *text = NULL;
+    size_t size = 0;
+    FILE *f = open_memstream(&text, &size);
+    if (f) tr_config_print(c, false, f);
+    if (!f || fclose(f) != 0 || !text) {
+        free(text);
+        ts_fail(st, TS_NOMEM, "no memory for the configuration's text");
+        return NULL;
+    }
+    return text;
+}
+
+ts_code tr_save_weights(tr_trainer *t, const char *name, ts_status *st)
+{
+    char path[TR_PATH], step[32];
+    char *text = config_text(&t->config, st);
+    if (!text) return st->code;
+    tr_path(t, name, path);
+    snprintf(step, sizeof step, "%" PRId64, t->step);
+    const nn_meta extra[] = {{"train.step", step}, {"train.config", text}};
+    const ts_code code = nn_model_save(t->model, tr_weights(t), path, extra, 2, st);
+    free(text);
+    return code;
+}
+
+/* The blocks of a checkpoint and how many there are: without a moving average three. */
+static int blocks(const tr_trainer *t, nn_block out[4])
+{
+    const char *const name[] = {"parameters", "adam.m", "adam.v", "average"};
+    const float *const data[] = {t->model->value, t->adam.m, t->adam.v, t->adam.ema};
+    int n = 0;
+    for (int i = 0; i < 4; i++)
+        if (data[i]) out[n++] = (nn_block){.name = name[i], .rank = 1, .dim = {(int64_t)t->model->count}, .data = data[i]};
+    return n;
+}
+
+ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
+{
+    char path[TR_PATH], number[6][32];
+    nn_block block[4];
+    const int n = blocks(t, block);
+    for (int i = 0; i < n; i++)
+        if (!all_finite(block[i].data, t->model->count))
+            return ts_fail(st, TS_NUMERIC, "%s are not finite after step %" PRId64 ", the checkpoint before is kept", block[i].name, t->step);
+    if (tr_log_flush(t, st) != TS_OK || tr_save_weights(t, "last.safetensors", st) != TS_OK) return st->code;
+    char *text = config_text(&t->config, st);
+    if (!text) return st->code;
+    tr_path(t, "checkpoint.safetensors", path);
+    snprintf(number[0], sizeof number[0], "%" PRId64, t->step);
+    snprintf(number[1], sizeof number[1], "%" PRId64, t->adam.step);
+    snprintf(number[2], sizeof number[2], "%" PRId64, t->skipped);
+    snprintf(number[3], sizeof number[3], "%d", t->in_a_row);
+    snprintf(number[4], sizeof number[4], "%.17g", t->best);
+    snprintf(number[5], sizeof number[5], "%" PRId64, t->best_step);
+    const nn_meta meta[] = {{"format", format_name},   {"step", number[0]}, {"adam_step", number[1]}, {"skipped", number[2]},
+                            {"skipped_in_a_row", number[3]}, {"best", number[4]}, {"best_step", number[5]}, {"config", text}};
+    const ts_code code = nn_safetensors_write(path, block, n, meta, (int)(sizeof meta / sizeof *meta), st);
+    free(text);
+    return code;
+}
+
+static ts_code read_count(const nn_file *file, const char *path, const char *key, int64_t *value, ts_status *st)
+{
+    const char *text = nn_safetensors_meta(file, key);
+    char *end = NULL;
+    errno = 0;
+    const long long v = text ? strtoll(text, &end, 10) : -1;
+    if (!text || end == text || *end || errno || v < 0) return ts_fail(st, TS_FORMAT, "%s: %s is missing or no count", path, key);
+    *value = v;
+    return TS_OK;
+}
+
+static ts_code check_config(const tr_trainer *t, const nn_file *file, const char *path, ts_status *st)
+{
+    const char *text = nn_safetensors_meta(file, "config");
+    tr_config then = tr_config_default();
+    tr_ini ini;
+    char where[TR_PATH + 32];
+    if (!text) return ts_fail(st, TS_FORMAT, "%s: its configuration is missing", path);
+    snprintf(where, sizeof where, "%s (config)", path);
+    ts_code code = tr_ini_parse(where, text, strlen(text), &ini, st);
+    for (int i = 0; code == TS_OK && i < ini.count; i++) code = tr_config_set(&then, where, ini.entry[i].section, ini.entry[i].key, ini.entry[i].value, st);
+    tr_ini_free(&ini);
+    return code == TS_OK ? tr_config_same(&then, &t->config, path, st) : code;
+}
+
+static ts_code restore(tr_trainer *t, const nn_file *file, const char *path, ts_status *st)
+{
+    const char *format = nn_safetensors_meta(file, "format"), *best = nn_safetensors_meta(file, "best");
+    const int64_t dim[1] = {(int64_t)t->model->count};
+    int64_t in_a_row = 0;
+    nn_block block[4];
+    if (!format || strcmp(format, format_name) != 0) return ts_fail(st, TS_FORMAT, "%s: is not a checkpoint of lgd-train", path);
+    if (check_config(t, file, path, st) != TS_OK) return st->code;
+    if (read_count(file, path, "step", &t->step, st) != TS_OK || read_count(file, path, "adam_step", &t->adam.step, st) != TS_OK ||
+        read_count(file, path, "skipped", &t->skipped, st) != TS_OK || read_count(file, path, "skipped_in_a_row", &in_a_row, st) != TS_OK ||
+        read_count(file, path, "best_step", &t->best_step, st) != TS_OK)
+        return st->code;
+    if (!best) return ts_fail(st, TS_FORMAT, "%s: best is missing", path);
+    if (t->step > tr_total(&t->config)) return ts_fail(st, TS_FORMAT, "%s: step %" PRId64 " is beyond the end of the run", path, t->step);
+    t->best = strtod(best, NULL);
+    t->in_a_row = (int)(in_a_row < 1000000 ? in_a_row : 1000000);
+    const int n = blocks(t, block);
+    for (int i = 0; i < n; i++) {
+        float *to = (float *)(uintptr_t)block[i].data;
+        if (nn_safetensors_read(file, block[i].name, 1, dim, to, st) != TS_OK) return ts_context(st, "%s", path);
+        if (!all_finite(to, t->model->count)) return ts_fail(st, TS_NUMERIC, "%s: %s holds values that are not finite", path, block[i].name);
+    }
+    return TS_OK;
+}
+
+ts_code tr_resume(tr_trainer *t, ts_status *st)
+{
+    char path[TR_PATH];
+    tr_path(t, "checkpoint.safetensors", path);
+    nn_file *file = nn_safetensors_open(path, st);
+    if (!file) return ts_context(st, "nothing to resume");
+    const ts_code code = restore(t, file, path, st);
+    nn_safetensors_close(&file);
+    return code;
+}

@@ -1,0 +1,230 @@
+/* Reading, checking and printing a configuration by the table of keys. */
+#include "train/config.h"
+#include "train/ini.h"
+#include <errno.h>
+#include <locale.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+
+/* Numbers are written with a point whatever the user's language. */
+static locale_t plain_locale(void)
+{
+    static locale_t plain;
+    if (!plain) plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    return plain;
+}
+
+static bool parse_real(const char *text, double *value)
+{
+    const locale_t plain = plain_locale();
+    const locale_t before = plain ? uselocale(plain) : (locale_t)0;
+    char *end;
+    *value = strtod(text, &end);
+    if (plain) uselocale(before);
+    return end != text && !*end && *text != ' ';
+}
+
+static bool parse_integer(const char *text, int64_t *value)
+{
+    char *end;
+    errno = 0;
+    *value = strtoll(text, &end, 10);
+    return end != text && !*end && !errno && *text != ' ';
+}
+
+static bool parse_bool(const char *text, bool *value)
+{
+    static const char *const words[2][4] = {{"no", "false", "off", "0"}, {"yes", "true", "on", "1"}};
+    for (int v = 0; v < 2; v++)
+        for (int i = 0; i < 4; i++)
+            if (!strcasecmp(text, words[v][i])) {
+                *value = v;
+                return true;
+            }
+    return false;
+}
+
+/* Edit distance, for suggestions only: long words are cut. */
+static int distance(const char *a, const char *b)
+{
+    enum { LONGEST = 32 };
+    int row[LONGEST + 1];
+    const int n = (int)strnlen(a, LONGEST), m = (int)strnlen(b, LONGEST);
+    for (int j = 0; j <= m; j++) row[j] = j;
+    for (int i = 1; i <= n; i++) {
+        int corner = row[0];
+        row[0] = i;
+        for (int j = 1; j <= m; j++) {
+            const int above = row[j], change = corner + (a[i - 1] != b[j - 1]);
+            const int step = (above < row[j - 1] ? above : row[j - 1]) + 1;
+            row[j] = change < step ? change : step;
+            corner = above;
+        }
+    }
+    return row[m];
+}
+
+/* Names or "all", removed by "-name", in any order after it. */
+static ts_code parse_families(const char *where, const char *text, uint64_t *mask, ts_status *st)
+{
+    const int count = io_family_count();
+    const uint64_t all = count < 64 ? (UINT64_C(1) << count) - 1 : ~UINT64_C(0);
+    uint64_t bits = 0;
+    for (const char *p = text; *p;) {
+        char word[64];
+        const size_t skip = strspn(p, " \t,"), n = strcspn(p + skip, " \t,");
+        p += skip;
+        if (!n) break;
+        if (n >= sizeof word) return ts_fail(st, TS_INVALID, "%s: data.families: \"%.60s\" is no family", where, p);
+        memcpy(word, p, n);
+        word[n] = 0;
+        p += n;
+        const bool remove = word[0] == '-';
+        const char *name = word + remove;
+        if (!remove && !strcmp(name, "all")) {
+            bits = all;
+            continue;
+        }
+        const int f = io_family_find(name);
+        if (f < 0) {
+            int best = 0;
+            for (int i = 1; i < count; i++)
+                if (distance(name, io_family_name(i)) < distance(name, io_family_name(best))) best = i;
+            return ts_fail(st, TS_INVALID, "%s: data.families: there is no family %s, did you mean %s?", where, name, io_family_name(best));
+        }
+        if (remove) bits &= ~(UINT64_C(1) << f);
+        else bits |= UINT64_C(1) << f;
+    }
+    if (!bits) return ts_fail(st, TS_INVALID, "%s: data.families names no family that may be drawn", where);
+    *mask = bits == all ? 0 : bits;
+    return TS_OK;
+}
+
+static ts_code bad_value(const char *where, const tr_key *k, const char *value, ts_status *st)
+{
+    switch (k->type) {
+    case TR_INT:
+    case TR_INT64:
+        return ts_fail(st, TS_INVALID, "%s: %s.%s must be an integer from %.0f to %.0f, not \"%.60s\"", where, k->section, k->key, k->lo, k->hi, value);
+    case TR_REAL: return ts_fail(st, TS_INVALID, "%s: %s.%s must be a number from %g to %g, not \"%.60s\"", where, k->section, k->key, k->lo, k->hi, value);
+    case TR_BOOL: return ts_fail(st, TS_INVALID, "%s: %s.%s must be yes or no, not \"%.60s\"", where, k->section, k->key, value);
+    default: break;
+    }
+    char names[256] = "";
+    for (int i = 0; k->choice && k->choice[i]; i++) {
+        const size_t n = strlen(names);
+        snprintf(names + n, sizeof names - n, "%s%s", i ? ", " : "", k->choice[i]);
+    }
+    return ts_fail(st, TS_INVALID, "%s: %s.%s must be one of %s, not \"%.60s\"", where, k->section, k->key, names, value);
+}
+
+static ts_code set_text(char *to, const char *where, const tr_key *k, const char *value, ts_status *st)
+{
+    if (strlen(value) >= (size_t)k->hi) return ts_fail(st, TS_INVALID, "%s: %s.%s is longer than %.0f bytes", where, k->section, k->key, k->hi - 1);
+    /* What an INI file could not say again must not get in by --set. */
+    if (strpbrk(value, "\r\n") || strstr(value, " #") || strstr(value, " ;") || value[0] == '#' || value[0] == ';')
+        return ts_fail(st, TS_INVALID, "%s: %s.%s must not contain a line break or the start of a comment", where, k->section, k->key);
+    strcpy(to, value);
+    return TS_OK;
+}
+
+static ts_code set_value(tr_config *c, const char *where, const tr_key *k, const char *value, ts_status *st)
+{
+    char *at = (char *)c + k->offset;
+    int64_t i;
+    double r;
+    switch (k->type) {
+    case TR_INT:
+    case TR_INT64:
+        if (!parse_integer(value, &i) || (double)i < k->lo || (double)i > k->hi) return bad_value(where, k, value, st);
+        if (k->type == TR_INT) *(int *)(void *)at = (int)i;
+        else *(int64_t *)(void *)at = i;
+        return TS_OK;
+    case TR_REAL:
+        if (!parse_real(value, &r) || !(r >= k->lo && r <= k->hi)) return bad_value(where, k, value, st);
+        *(double *)(void *)at = r;
+        return TS_OK;
+    case TR_BOOL: return parse_bool(value, (bool *)at) ? TS_OK : bad_value(where, k, value, st);
+    case TR_CHOICE:
+        for (int n = 0; k->choice[n]; n++)
+            if (!strcmp(value, k->choice[n])) {
+                memcpy(at, &n, sizeof n);
+                return TS_OK;
+            }
+        return bad_value(where, k, value, st);
+    case TR_FAMILIES: return parse_families(where, value, (uint64_t *)(void *)at, st);
+    case TR_TEXT: break;
+    }
+    return set_text(at, where, k, value, st);
+}
+
+tr_config tr_config_default(void)
+{
+    tr_config c;
+    memset(&c, 0, sizeof c);
+    c.arch = nn_arch_default();
+    for (int i = 0; i < tr_key_count; i++)
+        if (tr_keys[i].initial) set_value(&c, "default", &tr_keys[i], tr_keys[i].initial, NULL);
+    return c;
+}
+
+static ts_code unknown(const char *where, const char *section, const char *key, ts_status *st)
+{
+    const tr_key *near = NULL;
+    int least = 0;
+    bool known = false;
+    for (int i = 0; i < tr_key_count; i++) {
+        const tr_key *k = &tr_keys[i];
+        known |= !strcmp(k->section, section);
+        /* The right key in the wrong section comes before a similar key. */
+        const int d = 2 * distance(key, k->key) + (strcmp(k->section, section) ? 1 + (distance(section, k->section) > 2) : 0);
+        if (!near || d < least) near = k, least = d;
+    }
+    return ts_fail(st, TS_INVALID, "%s: there is no %s %.60s%s%.60s, did you mean %s.%s? (lgd-train --help-config lists all keys)", where,
+                   known ? "key" : "section", section, known ? "." : " with a key ", key, near->section, near->key);
+}
+
+ts_code tr_config_set(tr_config *c, const char *where, const char *section, const char *key, const char *value, ts_status *st)
+{
+    for (int i = 0; i < tr_key_count; i++)
+        if (!strcmp(tr_keys[i].section, section) && !strcmp(tr_keys[i].key, key)) return set_value(c, where, &tr_keys[i], value, st);
+    return unknown(where, section, key, st);
+}
+
+ts_code tr_config_set_assignment(tr_config *c, const char *assignment, ts_status *st)
+{
+    char section[64], key[64];
+    const char *dot = strchr(assignment, '.'), *equals = strchr(assignment, '=');
+    if (!dot || !equals || dot > equals || dot - assignment >= (ptrdiff_t)sizeof section || equals - dot - 1 >= (ptrdiff_t)sizeof key)
+        return ts_fail(st, TS_INVALID, "--set %.80s: expected section.key=value", assignment);
+    snprintf(section, sizeof section, "%.*s", (int)(dot - assignment), assignment);
+    snprintf(key, sizeof key, "%.*s", (int)(equals - dot - 1), dot + 1);
+    return tr_config_set(c, "--set", section, key, equals + 1, st);
+}
+
+ts_code tr_config_read(tr_config *c, const char *path, ts_status *st)
+{
+    tr_ini ini;
+    ts_code code = tr_ini_read(path, &ini, st);
+    for (int i = 0; code == TS_OK && i < ini.count; i++) {
+        char where[600];
+        snprintf(where, sizeof where, "%.580s:%d", path, ini.entry[i].line);
+        code = tr_config_set(c, where, ini.entry[i].section, ini.entry[i].key, ini.entry[i].value, st);
+    }
+    tr_ini_free(&ini);
+    return code;
+}
+
+ts_code tr_config_check(const tr_config *c, ts_status *st)
+{
+    const int t = c->arch.iterations;
+    const int lo = c->train.iterations_min ? c->train.iterations_min : t, hi = c->train.iterations_max ? c->train.iterations_max : t;
+    if (nn_arch_check(&c->arch, st) != TS_OK) return ts_context(st, "[model]");
+    if (c->train.steps + c->train.pretrain_steps < 1) return ts_fail(st, TS_INVALID, "train.steps and train.pretrain_steps are both 0, there is nothing to do");
+    if (lo > hi) return ts_fail(st, TS_INVALID, "train.iterations_min is %d, more than the %d of train.iterations_max", lo, hi);
+    if (c->validate.every && c->validate.seed == c->data.seed)
+        return ts_fail(st, TS_INVALID, "validate.seed equals data.seed: the validation materials would be those that are trained on");
+    return TS_OK;
+}

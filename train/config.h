@@ -1,0 +1,74 @@
+/* What a training run is, as plain data, and the one table of keys (train/keys.c) that parses, prints and documents it. */
+#ifndef TR_CONFIG_H
+#define TR_CONFIG_H
+#include "data/procedural.h"
+#include "nn/model.h"
+#include <stdio.h>
+
+typedef struct tr_config {
+    nn_arch arch; /* [model] */
+    struct {      /* [data] */
+        int64_t seed;
+        uint64_t families; /* bits as in io_procedural; 0: all */
+        double noise, blur;
+        bool quantise;
+        int patch, prefetch, threads;
+    } data;
+    struct { /* [train] */
+        int batch;
+        int64_t pretrain_steps, steps, warmup;
+        double pretrain_rate, pretrain_floor, rate, rate_floor;
+        double clip, ema, start_weight, map_weight;
+        int iterations_min, iterations_max; /* 0: arch.iterations */
+        int64_t seed, checkpoint_every, log_every;
+        int max_skipped;
+        char init[1024];
+    } train;
+    struct { /* [validate] */
+        int64_t every, seed;
+        int count, size;
+    } validate;
+    struct { /* [output] */
+        char folder[1024];
+    } output;
+} tr_config;
+
+typedef enum tr_type { TR_INT, TR_INT64, TR_REAL, TR_BOOL, TR_CHOICE, TR_TEXT, TR_FAMILIES } tr_type;
+
+typedef struct tr_key {
+    const char *section, *key;
+    tr_type type;
+    size_t offset;
+    double lo, hi;             /* numbers; TR_TEXT: hi is the size of the array */
+    const char *initial;       /* the default as text; NULL: nn_arch_default()'s */
+    const char *const *choice; /* TR_CHOICE: names in the order of the enum, NULL at the end */
+    bool neutral;              /* changes no byte of the weights: free to change on resume, not kept in checkpoints */
+    const char *help;
+} tr_key;
+
+extern const tr_key tr_keys[];
+extern const int tr_key_count;
+
+tr_config tr_config_default(void);
+
+/* Sets one key from text; where ("file.ini:12" or "--set") begins the message. An unknown section or key is answered with the nearest. */
+ts_code tr_config_set(tr_config *c, const char *where, const char *section, const char *key, const char *value, ts_status *st);
+/* The same from "section.key=value". */
+ts_code tr_config_set_assignment(tr_config *c, const char *assignment, ts_status *st);
+/* Every entry of the file; what it does not name stays as it is. */
+ts_code tr_config_read(tr_config *c, const char *path, ts_status *st);
+
+/* What no key can say alone: the architecture as a whole, ranges against each other. */
+ts_code tr_config_check(const tr_config *c, ts_status *st);
+
+/* The text of one value as an INI file has it. */
+void tr_config_format(const tr_config *c, const tr_key *key, char *text, size_t size);
+
+/* The whole configuration as an INI file that reads back to the same values. neutral: with the keys that change no weights. */
+void tr_config_print(const tr_config *c, bool neutral, FILE *f);
+/* Every key with type, range, default and meaning. */
+void tr_config_help(FILE *f);
+
+/* TS_INVALID naming the first key (not a neutral one) that differs; then: the older value's origin for the message. */
+ts_code tr_config_same(const tr_config *then, const tr_config *now, const char *origin, ts_status *st);
+#endif

@@ -1,0 +1,170 @@
+/* lgd-train: trains g and h as a configuration says. */
+#include "cli/cli.h"
+#include "tensor/threads.h"
+#include "train/trainer.h"
+#include <getopt.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static const char usage[] =
+    "Usage: lgd-train CONFIG.ini [options]\n"
+    "Trains a model on procedural materials as CONFIG.ini says. The run's folder (output.folder, by default runs/CONFIG)\n"
+    "gets the weights best.safetensors and last.safetensors, a checkpoint, log.csv and val.csv.\n"
+    "\n"
+    "  --set SECTION.KEY=VALUE  set a key after the file was read; may be given several times\n"
+    "  --resume                 go on from the folder's checkpoint, exactly as if the run had not stopped\n"
+    "  --init WEIGHTS           begin with the parameters of a weights file (the same as --set train.init=WEIGHTS)\n"
+    "  --threads N              threads to compute with (default: all that the process may use)\n"
+    "  --help-config            print every key with its range, default and meaning\n"
+    "  --print-config           print the configuration as it would run\n"
+    "  --help                   print this\n"
+    "  --version                print the version\n"
+    "\n"
+    "Ctrl-C finishes the step, saves a checkpoint and ends with exit status 1.\n";
+
+typedef struct shown {
+    cl_progress progress;
+    int64_t first, log_every;
+    double loss, seconds; /* sums since the last line */
+    int steps, samples;
+} shown;
+
+static void show_step(const tr_row *row, void *user)
+{
+    shown *s = user;
+    char extra[160];
+    if (!row->skipped) s->loss += row->loss;
+    s->steps += !row->skipped;
+    s->samples += row->batch;
+    s->seconds += row->seconds;
+    const int64_t done = row->step - s->first;
+    const bool line = row->step % s->log_every == 0 || row->step == row->total;
+    const double mean = s->steps ? s->loss / s->steps : NAN, speed = s->seconds > 0 ? s->samples / s->seconds : 0;
+    if (s->progress.terminal) {
+        snprintf(extra, sizeof extra, "%s  step %lld  loss %.4f  %.1f samples/s", row->pretraining ? "g alone" : "g and h", (long long)row->step, mean, speed);
+        cl_progress_show(&s->progress, done, extra);
+    } else if (line) {
+        const long left = lround((cl_seconds() - s->progress.start) / (double)done * (double)(row->total - row->step));
+        cl_note("step %lld/%lld  %s  loss %.4f  rate %.2e  %.1f samples/s  ETA %ld:%02ld:%02ld", (long long)row->step, (long long)row->total,
+                row->pretraining ? "g alone" : "g and h", mean, row->rate, speed, left / 3600, left / 60 % 60, left % 60);
+    }
+    if (line) s->loss = s->seconds = 0, s->steps = s->samples = 0;
+}
+
+/* The results of a run are its validations: they go to standard output. */
+static void show_validation(const tr_validation *v, void *user)
+{
+    shown *s = user;
+    cl_progress_end(&s->progress);
+    printf("validation at step %lld: render RMSE", (long long)v->step);
+    for (int k = 0; k <= v->iterations; k++) printf(" %.4f", v->render[k]);
+    printf("  diffuse %.4f specular %.4f roughness %.4f normal %.4f%s\n", v->diffuse, v->specular, v->roughness, v->normal, v->best ? "  (best)" : "");
+    fflush(stdout);
+}
+
+static void show_note(const char *line, void *user)
+{
+    shown *s = user;
+    cl_progress_end(&s->progress);
+    cl_note("%s", line);
+}
+
+static bool stop(void *user)
+{
+    (void)user;
+    return cl_interrupted();
+}
+
+static int train(const tr_config *config, const char *folder, bool resume)
+{
+    ts_status st = {0};
+    shown s = {.log_every = config->train.log_every};
+    const tr_listener listener = {.step = show_step, .validated = show_validation, .note = show_note, .stop = stop, .user = &s};
+    if (resume && access(folder, F_OK) != 0) return cl_failed("%s: there is no run to resume", folder);
+    if (!resume && cl_make_folder(folder, &st) != TS_OK) return cl_failed("%s", st.message);
+    cl_catch_interrupt();
+    tr_trainer *t = tr_create(config, folder, resume, &listener, &st);
+    if (!t) return cl_failed("%s", st.message);
+    const int64_t total = config->train.pretrain_steps + config->train.steps;
+    s.first = tr_step_now(t);
+    s.progress = cl_progress_start("train", total - s.first);
+    if (resume) cl_note("%s: %s step %lld of %lld", folder, s.first < total ? "going on from" : "complete at", (long long)s.first, (long long)total);
+    const ts_code code = tr_run(t, &st);
+    cl_progress_end(&s.progress);
+    tr_destroy(&t);
+    if (code != TS_OK) return cl_failed("%s", st.message);
+    cl_note("done: %s/best.safetensors and last.safetensors", folder);
+    return CL_OK;
+}
+
+enum { SET = 256, RESUME, INIT, THREADS, HELP_CONFIG, PRINT_CONFIG, HELP, VERSION };
+static const struct option options[] = {
+    {"set", required_argument, NULL, SET},       {"resume", no_argument, NULL, RESUME},           {"init", required_argument, NULL, INIT},
+    {"threads", required_argument, NULL, THREADS}, {"help-config", no_argument, NULL, HELP_CONFIG}, {"print-config", no_argument, NULL, PRINT_CONFIG},
+    {"help", no_argument, NULL, HELP},           {"version", no_argument, NULL, VERSION},         {0},
+};
+
+int main(int argc, char **argv)
+{
+    bool resume = false, print = false;
+    const char *init = NULL;
+    const char **set = malloc((size_t)argc * sizeof *set);
+    int sets = 0, option, code = cl_init("lgd-train");
+    ts_status st = {0};
+    char folder[1100];
+    if (!set || code != CL_OK) goto end;
+    while ((option = getopt_long(argc, argv, "", options, NULL)) != -1) {
+        int64_t threads;
+        switch (option) {
+        case SET: set[sets++] = optarg; break;
+        case RESUME: resume = true; break;
+        case INIT: init = optarg; break;
+        case PRINT_CONFIG: print = true; break;
+        case THREADS:
+            if (!cl_parse_int(optarg, 1, 1024, &threads)) {
+                code = cl_usage("--threads must be an integer from 1 to 1024, not \"%s\"", optarg);
+                goto end;
+            }
+            ts_threads_set((int)threads);
+            break;
+        case HELP_CONFIG: tr_config_help(stdout); code = cl_finish(CL_OK); goto end;
+        case HELP: fputs(usage, stdout); code = cl_finish(CL_OK); goto end;
+        case VERSION: cl_print_version(); code = cl_finish(CL_OK); goto end;
+        default: code = cl_usage("the option cannot be understood"); goto end;
+        }
+    }
+    const int files = argc - optind;
+    if (files > 1 || (files == 0 && !print)) {
+        code = cl_usage(files ? "one configuration file is expected, not %d" : "a configuration file is expected, for example configs/single.ini", files);
+        goto end;
+    }
+    if (init && resume) {
+        code = cl_usage("--init begins a run and --resume goes on with one: choose one of them");
+        goto end;
+    }
+    tr_config config = tr_config_default();
+    if (files && tr_config_read(&config, argv[optind], &st) != TS_OK) {
+        code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
+        goto end;
+    }
+    for (int i = 0; i < sets && st.code == TS_OK; i++) tr_config_set_assignment(&config, set[i], &st);
+    if (init && st.code == TS_OK) tr_config_set(&config, "--init", "train", "init", init, &st);
+    if (st.code == TS_OK) tr_config_check(&config, &st);
+    if (st.code != TS_OK) {
+        code = cl_usage("%s", st.message);
+        goto end;
+    }
+    if (print) {
+        tr_config_print(&config, true, stdout);
+        code = cl_finish(CL_OK);
+        goto end;
+    }
+    if (*config.output.folder) snprintf(folder, sizeof folder, "%s", config.output.folder);
+    else tr_default_folder(argv[optind], folder, sizeof folder);
+    code = cl_finish(train(&config, folder, resume));
+end:
+    free(set);
+    return code;
+}

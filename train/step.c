@@ -1,0 +1,125 @@
+/* One training step: photographs from maps, the loss, its gradient, Adam. */
+#include "ops.h"
+#include "render/losses.h"
+#include "render/render.h"
+#include "tensor/maps.h"
+#include "tensor/threads.h"
+#include "train/parts.h"
+#include <math.h>
+#include <string.h>
+
+void tr_photograph(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, float *images)
+{
+    const io_camera camera = {.noise = (float)c->data.noise, .blur = (float)c->data.blur, .quantise = c->data.quantise};
+    const size_t pixels = (size_t)size * (size_t)size;
+    const rd_view flash = rd_flash();
+    for (int i = 0; i < count; i++)
+        rd_render(rd_grid_full(size), maps + (size_t)i * pixels * MAP_CHANNELS, MAP_CHANNELS, &flash, true, images + (size_t)i * pixels * 3);
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int i = 0; i < count; i++) io_camera_apply(&camera, seed, index + (uint64_t)i, size, images + (size_t)i * pixels * 3);
+}
+
+/* Adds weight * (rendering loss + map_weight * map loss) of maps to sum (NULL: none yet). */
+static ag_value *add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value *target, double weight, double *render, double *map)
+{
+    ag_tape *tape = t->tape;
+    const double map_weight = t->config.train.map_weight;
+    ag_value *loss = ag_render_loss(tape, maps, target, t->views, RD_LOSS_VIEWS);
+    if (loss) *render = (double)loss->t.data[0];
+    if (map_weight > 0) {
+        ag_value *l1 = ag_map_loss(tape, maps, target);
+        if (l1) *map = (double)l1->t.data[0];
+        loss = ag_add(tape, loss, map_weight == 1 ? l1 : ag_scale(tape, l1, (float)map_weight));
+    }
+    if (weight != 1) loss = ag_scale(tape, loss, (float)weight);
+    return sum ? ag_add(tape, sum, loss) : loss;
+}
+
+/* The refinement steps of this step. */
+static int draw_iterations(const tr_config *c, int64_t step)
+{
+    const int lo = c->train.iterations_min ? c->train.iterations_min : c->arch.iterations;
+    const int hi = c->train.iterations_max ? c->train.iterations_max : c->arch.iterations;
+    if (c->arch.h_width == 0) return 0;
+    ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_TRAIN, (uint64_t)step);
+    return lo + ts_rng_int(&rng, hi - lo + 1);
+}
+
+static ag_value *forward(tr_trainer *t, const float *target, tr_row *row)
+{
+    const tr_config *c = &t->config;
+    const int batch = c->train.batch, size = c->data.patch;
+    ag_value *maps[TR_MOST_ITERATIONS + 1];
+    ag_value *goal = ag_constant(t->tape, ts_view((float *)(uintptr_t)target, (ts_shape){batch, size, size, MAP_CHANNELS}));
+    const nn_input in = {.image = ts_view(t->images, (ts_shape){batch, size, size, 3}), .grid = rd_grid_full(size), .view = rd_flash()};
+    if (row->pretraining) {
+        maps[0] = nn_predict(t->tape, t->model, &in);
+        return add_loss(t, NULL, maps[0], goal, 1, &row->render_start, &row->map_start);
+    }
+    row->iterations = draw_iterations(c, t->step);
+    if (nn_lgd(t->tape, t->model, &in, row->iterations, true, maps, NULL, NULL) != TS_OK) return NULL;
+    ag_value *loss = add_loss(t, NULL, maps[row->iterations], goal, 1, &row->render_end, &row->map_end);
+    if (row->iterations > 0 && c->train.start_weight > 0)
+        loss = add_loss(t, loss, maps[0], goal, c->train.start_weight, &row->render_start, &row->map_start);
+    return loss;
+}
+
+static double rate_now(const tr_config *c, int64_t step)
+{
+    const bool pre = tr_pretraining(c, step);
+    const int64_t length = pre ? c->train.pretrain_steps : c->train.steps, at = pre ? step : step - c->train.pretrain_steps;
+    const int64_t warmup = c->train.warmup < length / 2 ? c->train.warmup : length / 2;
+    return (double)nn_learning_rate((float)(pre ? c->train.pretrain_rate : c->train.rate), (float)(pre ? c->train.pretrain_floor : c->train.rate_floor), at,
+                                    warmup, length);
+}
+
+/* The second phase has another loss: Adam begins anew. */
+static void begin_phase(tr_trainer *t)
+{
+    if (t->step == 0 || t->step != t->config.train.pretrain_steps) return;
+    memset(t->adam.m, 0, t->adam.count * sizeof(float));
+    memset(t->adam.v, 0, t->adam.count * sizeof(float));
+    t->adam.step = 0;
+    t->best = INFINITY; /* R_0's error before, R_T's from now on */
+}
+
+ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
+{
+    const tr_config *c = &t->config;
+    const int batch = c->train.batch;
+    const double start = tr_seconds();
+    *row = (tr_row){.total = tr_total(c), .pretraining = tr_pretraining(c, t->step), .batch = batch, .loss = NAN, .norm = NAN,
+                    .render_start = NAN, .map_start = NAN, .render_end = NAN, .map_end = NAN};
+    begin_phase(t);
+    const float *target = io_loader_next(t->loader, st);
+    if (!target) return ts_context(st, "procedural materials");
+    tr_photograph(c, (uint64_t)c->data.seed, (uint64_t)t->step * (uint64_t)batch, batch, c->data.patch, target, t->images);
+    ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_SCENE, (uint64_t)t->step);
+    for (int i = 0; i < batch; i++) rd_loss_views(&rng, t->views + i * RD_LOSS_VIEWS);
+
+    size_t first = 0, last = t->model->count;
+    if (row->pretraining) nn_model_range(t->model, false, &first, &last);
+    ag_reset(t->tape);
+    ag_value *loss = forward(t, target, row);
+    if (loss) row->loss = (double)loss->t.data[0];
+    if (loss && isfinite(row->loss) && ag_backward(t->tape, loss) == TS_OK) row->norm = nn_gradient_norm(t->model, first, last);
+    if (ag_status(t->tape)->code) {
+        *st = *ag_status(t->tape);
+        return st->code;
+    }
+    row->rate = rate_now(c, t->step);
+    row->skipped = !isfinite(row->loss) || !isfinite(row->norm);
+    if (row->skipped) {
+        memset(t->model->grad, 0, t->model->count * sizeof(float));
+        t->skipped++;
+        t->in_a_row++;
+    } else {
+        const double clip = c->train.clip;
+        nn_adam_step(&t->adam, t->model, first, last, (float)row->rate, clip > 0 && row->norm > clip ? (float)(clip / row->norm) : 1.0f);
+        t->in_a_row = 0;
+    }
+    row->step = ++t->step;
+    row->skipped_total = t->skipped;
+    row->seconds = tr_seconds() - start;
+    return TS_OK;
+}

@@ -1,0 +1,194 @@
+/* The run: what it owns, its folder, the loop over steps. */
+#include "nn/weights.h"
+#include "tensor/maps.h"
+#include "train/parts.h"
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <time.h>
+#include <unistd.h>
+
+void tr_path(const tr_trainer *t, const char *name, char path[TR_PATH]) { snprintf(path, TR_PATH, "%s/%s", t->folder, name); }
+
+void tr_note(const tr_trainer *t, const char *format, ...)
+{
+    char line[1400];
+    va_list args;
+    if (!t->listener.note) return;
+    va_start(args, format);
+    vsnprintf(line, sizeof line, format, args);
+    va_end(args);
+    t->listener.note(line, t->listener.user);
+}
+
+int64_t tr_total(const tr_config *c) { return c->train.pretrain_steps + c->train.steps; }
+bool tr_pretraining(const tr_config *c, int64_t step) { return step < c->train.pretrain_steps; }
+const float *tr_weights(const tr_trainer *t) { return t->adam.ema ? t->adam.ema : t->model->value; }
+int64_t tr_step_now(const tr_trainer *t) { return t->step; }
+
+double tr_seconds(void)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+void tr_default_folder(const char *config_path, char *folder, size_t size)
+{
+    const char *slash = strrchr(config_path, '/'), *name = slash ? slash + 1 : config_path;
+    size_t n = strlen(name);
+    if (n >= 4 && !strcmp(name + n - 4, ".ini")) n -= 4;
+    /* A name that says nothing, or would lead out of runs/. */
+    if (n == 0 || (n == 1 && name[0] == '.') || (n == 2 && !strncmp(name, "..", 2))) name = "run", n = 3;
+    snprintf(folder, size, "runs/%.*s", (int)n, name);
+}
+
+static ts_code lock_folder(tr_trainer *t, ts_status *st)
+{
+    char path[TR_PATH];
+    tr_path(t, "lock", path);
+    t->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    if (t->lock < 0) return ts_fail(st, TS_IO, "%s: %s", path, strerror(errno));
+    if (flock(t->lock, LOCK_EX | LOCK_NB) == 0) return TS_OK;
+    if (errno == EWOULDBLOCK) return ts_fail(st, TS_INVALID, "%s: another lgd-train is at work in this folder (output.folder chooses another)", t->folder);
+    return ts_fail(st, TS_IO, "%s: %s", path, strerror(errno));
+}
+
+/* Weights are hours of work: they are never overwritten by a run that was not asked to go on. */
+static ts_code check_empty(const tr_trainer *t, ts_status *st)
+{
+    static const char *const names[] = {"checkpoint.safetensors", "last.safetensors", "best.safetensors"};
+    for (int i = 0; i < 3; i++) {
+        char path[TR_PATH];
+        tr_path(t, names[i], path);
+        if (access(path, F_OK) == 0)
+            return ts_fail(st, TS_INVALID, "%s: there is a run already (%s): --resume goes on with it, output.folder chooses another folder", t->folder, names[i]);
+    }
+    return TS_OK;
+}
+
+static ts_code write_config(const tr_trainer *t, ts_status *st)
+{
+    char path[TR_PATH];
+    tr_path(t, "config.ini", path);
+    FILE *f = fopen(path, "we");
+    if (f) tr_config_print(&t->config, true, f);
+    const bool bad = !f || ferror(f);
+    if ((f && fclose(f) != 0) || bad) return ts_fail(st, TS_IO, "%s: %s", path, strerror(errno));
+    return TS_OK;
+}
+
+static ts_code init_weights(tr_trainer *t, ts_status *st)
+{
+    const char *path = t->config.train.init;
+    int taken, left;
+    nn_model_init(t->model, (uint64_t)t->config.train.seed);
+    if (!*path) return TS_OK;
+    if (nn_model_init_from(t->model, path, &taken, &left, st) != TS_OK) return st->code;
+    if (taken == 0) return ts_fail(st, TS_INVALID, "%s: none of its parameters has a name and a shape of this model ([model] differs)", path);
+    tr_note(t, "%d parameters begin as in %s, %d as drawn", taken, path, left);
+    return TS_OK;
+}
+
+static ts_code build(tr_trainer *t, bool resume, ts_status *st)
+{
+    const tr_config *c = &t->config;
+    const size_t batch = (size_t)c->train.batch, pixels = (size_t)c->data.patch * (size_t)c->data.patch;
+    if (lock_folder(t, st) != TS_OK || (!resume && check_empty(t, st) != TS_OK)) return st->code;
+    t->images = malloc(batch * pixels * 3 * sizeof(float));
+    t->views = malloc(batch * RD_LOSS_VIEWS * sizeof *t->views);
+    if (!t->images || !t->views) return ts_fail(st, TS_NOMEM, "no memory for a batch of %d photographs", c->train.batch);
+    t->model = nn_model_create(&c->arch, st);
+    if (!t->model || nn_model_train(t->model, st) != TS_OK || (!resume && init_weights(t, st) != TS_OK)) return st->code;
+    if (nn_adam_create(&t->adam, t->model, (float)c->train.ema, st) != TS_OK || (resume && tr_resume(t, st) != TS_OK)) return st->code;
+    t->tape = ag_tape_create(true, st);
+    if (!t->tape || (c->validate.every && tr_validator_create(t, st) != TS_OK)) return st->code;
+    const io_procedural source = {.seed = (uint64_t)c->data.seed, .families = c->data.families};
+    t->loader = io_loader_create(&source, c->data.patch, c->train.batch, (uint64_t)t->step, c->data.prefetch, c->data.threads, st);
+    if (!t->loader || tr_log_open(t, st) != TS_OK) return st->code;
+    return write_config(t, st);
+}
+
+tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, const tr_listener *listener, ts_status *st)
+{
+    tr_trainer *t = calloc(1, sizeof *t);
+    if (!t) {
+        ts_fail(st, TS_NOMEM, "no memory for a trainer");
+        return NULL;
+    }
+    t->config = *config;
+    t->lock = -1;
+    t->best = INFINITY;
+    if (listener) t->listener = *listener;
+    ts_code code = TS_OK;
+    if (strlen(folder) >= sizeof t->folder) code = ts_fail(st, TS_INVALID, "the folder's name is longer than %zu bytes", sizeof t->folder - 1);
+    else strcpy(t->folder, folder);
+    if (code == TS_OK) code = tr_config_check(config, st);
+    if (code == TS_OK) code = build(t, resume, st);
+    if (code != TS_OK) tr_destroy(&t);
+    return t;
+}
+
+void tr_destroy(tr_trainer **trainer)
+{
+    tr_trainer *t = *trainer;
+    if (!t) return;
+    io_loader_destroy(&t->loader);
+    tr_log_close(t);
+    tr_validator_free(&t->validator);
+    ag_tape_destroy(&t->tape);
+    nn_adam_free(&t->adam);
+    nn_model_free(&t->model);
+    free(t->images);
+    free(t->views);
+    if (t->lock >= 0) close(t->lock);
+    free(t);
+    *trainer = NULL;
+}
+
+/* What follows a step: log, validation, checkpoint. *saved: whether the folder holds the state of now. */
+static ts_code after_step(tr_trainer *t, const tr_row *row, bool *saved, ts_status *st)
+{
+    const tr_config *c = &t->config;
+    const bool end = t->step == tr_total(c);
+    *saved = false;
+    if (tr_log_row(t, row, st) != TS_OK) return st->code;
+    if (t->listener.step) t->listener.step(row, t->listener.user);
+    if (row->skipped)
+        tr_note(t, "step %" PRId64 " is skipped: its %s is not finite (%d in a row)", t->step, isfinite(row->loss) ? "gradient" : "loss", t->in_a_row);
+    if (t->in_a_row > c->train.max_skipped) {
+        tr_log_flush(t, st);
+        return ts_fail(st, TS_NUMERIC,
+                       "%d steps in a row had no finite loss and gradient: stopped at step %" PRId64 ", the last checkpoint is kept (try a smaller train.rate)",
+                       t->in_a_row, t->step);
+    }
+    if (c->validate.every && (end || t->step % c->validate.every == 0)) {
+        tr_validation v;
+        if (tr_validate(t, &v, st) != TS_OK || tr_log_validation(t, &v, st) != TS_OK) return st->code;
+        if (t->listener.validated) t->listener.validated(&v, t->listener.user);
+    }
+    if (end || t->step % c->train.checkpoint_every == 0) {
+        if (tr_save_checkpoint(t, st) != TS_OK) return st->code;
+        *saved = true;
+    }
+    return TS_OK;
+}
+
+ts_code tr_run(tr_trainer *t, ts_status *st)
+{
+    bool saved = t->step > 0;
+    while (t->step < tr_total(&t->config)) {
+        tr_row row;
+        if (t->listener.stop && t->listener.stop(t->listener.user)) {
+            if (!saved && tr_save_checkpoint(t, st) != TS_OK) return st->code;
+            return ts_fail(st, TS_INTERRUPTED, "interrupted at step %" PRId64 ", go on with --resume", t->step);
+        }
+        if (tr_step(t, &row, st) != TS_OK || after_step(t, &row, &saved, st) != TS_OK) return st->code;
+    }
+    return TS_OK;
+}

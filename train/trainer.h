@@ -1,0 +1,61 @@
+/* A training run in a folder: steps, validation, checkpoints and the log. Everything random is a function of (seed, step), so that a
+ * resumed run makes the same bytes as one that was not interrupted, for any number of threads.
+ *
+ * Two phases. The first, pretrain_steps long, trains g alone on R_0's loss; the second trains g and h on R_T's and R_0's. Each has its
+ * own warm-up, cosine and Adam moments (g's moments from the first phase say nothing about the second loss).
+ *
+ * The folder's files: config.ini (as it runs), log.csv (a row a step), val.csv (a row a validation), best.safetensors (weights with the
+ * least validated error in the phase), last.safetensors (weights at the last checkpoint), checkpoint.safetensors (what --resume reads),
+ * lock. */
+#ifndef TR_TRAINER_H
+#define TR_TRAINER_H
+#include "train/config.h"
+
+/* One step as log.csv has it. NaN in a part: that loss has no weight or does not exist in this phase. */
+typedef struct tr_row {
+    int64_t step, total; /* steps made so far, this one included, and to make */
+    bool pretraining, skipped;
+    int iterations;      /* refinement steps that were drawn */
+    double loss, render_start, map_start, render_end, map_end; /* of R_0 and R_T */
+    double norm, rate;
+    double seconds;      /* that the step took */
+    int batch;
+    int64_t skipped_total;
+} tr_row;
+
+enum { TR_MOST_ITERATIONS = 64 };
+
+typedef struct tr_validation {
+    int64_t step;
+    int iterations;                        /* 0 while g is trained alone */
+    double render[TR_MOST_ITERATIONS + 1]; /* mean RMSE of 20 renderings of R_0 … R_iterations, see render/error.h */
+    double diffuse, specular, roughness, normal; /* mean RMSE of the last maps */
+    bool best;                             /* the least so far in this phase, and therefore saved */
+    double seconds;
+} tr_validation;
+
+/* What the caller is told, on the calling thread; any may be NULL. note: one line. stop: asked between steps. */
+typedef struct tr_listener {
+    void (*step)(const tr_row *row, void *user);
+    void (*validated)(const tr_validation *v, void *user);
+    void (*note)(const char *line, void *user);
+    bool (*stop)(void *user);
+    void *user;
+} tr_listener;
+
+typedef struct tr_trainer tr_trainer;
+
+/* Takes the folder (which exists) for this run; another trainer in it, a run in it without resume, and a checkpoint of another
+ * configuration with resume are errors. NULL and st set on failure. */
+tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, const tr_listener *listener, ts_status *st);
+
+/* The folder of a run without output.folder: runs/NAME for .../NAME.ini. */
+void tr_default_folder(const char *config_path, char *folder, size_t size);
+
+int64_t tr_step_now(const tr_trainer *t);
+
+/* To the end, or to the listener's stop (TS_INTERRUPTED, with a checkpoint saved), or to the first error. */
+ts_code tr_run(tr_trainer *t, ts_status *st);
+
+void tr_destroy(tr_trainer **t);
+#endif
