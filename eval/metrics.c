@@ -1,0 +1,63 @@
+#include "eval/metrics.h"
+#include "data/procedural.h"
+#include "render/error.h"
+#include "render/render.h"
+#include <math.h>
+#include <string.h>
+
+const char *const ev_metric_name[EV_METRICS] = {"diffuse", "specular", "roughness", "normal", "render"};
+
+void ev_photograph(const io_material *truth, float noise, uint64_t seed, uint64_t identity, float *image)
+{
+    const rd_view flash = rd_flash();
+    rd_render(rd_grid_full(truth->size), truth->maps, MAP_CHANNELS, &flash, true, image);
+    const io_camera camera = {.noise = noise, .quantise = true};
+    if (noise > 0) io_camera_apply(&camera, seed, identity, truth->size, image);
+}
+
+ev_row ev_score(const ev_case *c, const float *maps, int channels)
+{
+    const io_material *truth = c->truth;
+    const rd_map_error e = rd_map_rmse((int64_t)truth->size * truth->size, maps, channels, truth->maps, MAP_CHANNELS);
+    return (ev_row){{[EV_DIFFUSE] = e.diffuse, [EV_SPECULAR] = e.specular, [EV_ROUGHNESS] = e.roughness, [EV_NORMAL] = e.normal,
+        [EV_RENDER] = rd_render_rmse(rd_grid_full(truth->size), maps, channels, truth->maps, MAP_CHANNELS, c->views, RD_EVAL_VIEWS)}};
+}
+
+typedef struct watch {
+    const ev_case *c;
+    ev_row *row;
+    float *first, *last;
+    bool finite;
+} watch;
+
+static bool after_step(int step, const ag_value *maps, void *user)
+{
+    watch *w = user;
+    const int size = w->c->truth->size, channels = maps->t.shape.c;
+    const int64_t pixels = (int64_t)size * size;
+    w->row[step] = ev_score(w->c, maps->t.data, channels);
+    for (int i = 0; i < EV_METRICS; i++) w->finite = w->finite && isfinite(w->row[step].value[i]);
+    for (int64_t i = 0; i < pixels * channels; i++) w->finite = w->finite && isfinite(maps->t.data[i]); /* a clamp may hide it from the scores */
+    for (int copy = 0; copy < 2; copy++) {
+        float *to = copy ? w->last : step == 0 ? w->first : NULL;
+        for (int64_t i = 0; to && i < pixels; i++) memcpy(to + i * MAP_CHANNELS, maps->t.data + i * channels, MAP_CHANNELS * sizeof *to);
+    }
+    return w->finite;
+}
+
+ts_code ev_measure(ag_tape *tape, const nn_model *model, const ev_case *c, int steps, ev_row *row, float *first, float *last, ts_status *st)
+{
+    const int size = c->truth->size;
+    ag_reset(tape);
+    nn_input in = {.image = ts_new(ag_arena(tape), (ts_shape){1, size, size, 3}), .grid = rd_grid_full(size), .view = rd_flash()};
+    if (!in.image.data) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", size, size);
+    memcpy(in.image.data, c->image, (size_t)size * (size_t)size * 3 * sizeof *c->image);
+    watch w = {c, row, first, last, true};
+    ag_value *out = NULL;
+    if (nn_lgd(tape, model, &in, steps, false, &out, after_step, &w) != TS_OK) {
+        *st = *ag_status(tape);
+        return st->code;
+    }
+    if (!w.finite) return ts_fail(st, TS_NUMERIC, "the maps or their renderings have no finite error: damaged weights, or out of memory");
+    return TS_OK;
+}

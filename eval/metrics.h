@@ -1,0 +1,31 @@
+/* How good each step's maps are (DESIGN section 5). */
+#ifndef EV_METRICS_H
+#define EV_METRICS_H
+#include "data/material.h"
+#include "nn/model.h"
+
+enum { EV_DIFFUSE, EV_SPECULAR, EV_ROUGHNESS, EV_NORMAL, EV_RENDER, EV_METRICS };
+extern const char *const ev_metric_name[EV_METRICS];
+
+typedef struct ev_row {
+    double value[EV_METRICS]; /* RMSE */
+} ev_row;
+
+/* What one material is evaluated with. */
+typedef struct ev_case {
+    const io_material *truth;
+    const float *image;   /* the flash photograph, linear, in [0, 1] */
+    const rd_view *views; /* RD_EVAL_VIEWS of them */
+} ev_case;
+
+/* The input picture: the flash rendering; noise > 0 adds sensor noise of that strength and 8-bit quantisation, drawn with
+ * (seed, identity). image: size x size x 3. */
+void ev_photograph(const io_material *truth, float noise, uint64_t seed, uint64_t identity, float *image);
+
+/* Runs the loop: row[t] is what R_t scores, t = 0 .. steps. first and last (may be NULL) get the maps of R_0 and of R_steps,
+ * [size, size, 9]. The tape is one without gradients and is reset. */
+ts_code ev_measure(ag_tape *tape, const nn_model *model, const ev_case *c, int steps, ev_row *row, float *first, float *last, ts_status *st);
+
+/* What one estimate scores. */
+ev_row ev_score(const ev_case *c, const float *maps, int channels);
+#endif

@@ -1,0 +1,149 @@
+#include "eval/report.h"
+#include "render/error.h"
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { PATH_LENGTH = 4096 };
+
+ts_code ev_report_add(ev_report *r, int set, const char *material, const ev_row *row, ts_status *st)
+{
+    if (r->results == r->room) {
+        const int room = r->room ? 2 * r->room : 64;
+        ev_result *more = realloc(r->result, (size_t)room * sizeof *more);
+        if (!more) return ts_fail(st, TS_NOMEM, "out of memory for the results");
+        r->result = more;
+        r->room = room;
+    }
+    const size_t rows = (size_t)r->steps + 1;
+    ev_result *to = &r->result[r->results];
+    *to = (ev_result){.set = set, .row = malloc(rows * sizeof *row)};
+    if (!to->row) return ts_fail(st, TS_NOMEM, "out of memory for the results");
+    snprintf(to->material, sizeof to->material, "%s", material);
+    memcpy(to->row, row, rows * sizeof *row);
+    r->results++;
+    return TS_OK;
+}
+
+void ev_report_free(ev_report *r)
+{
+    for (int i = 0; i < r->results; i++) free(r->result[i].row);
+    free(r->result);
+    r->result = NULL;
+    r->results = r->room = 0;
+}
+
+int ev_report_summary(const ev_report *r, int set, int step, ev_row *mean, ev_row *deviation)
+{
+    int n = 0;
+    *mean = *deviation = (ev_row){{0}};
+    for (int i = 0; i < r->results; i++) n += set < 0 || r->result[i].set == set;
+    for (int pass = 0; pass < 2 && n > 0; pass++) /* the mean first: differences from it lose no digits */
+        for (int i = 0; i < r->results; i++)
+            for (int k = 0; k < EV_METRICS && (set < 0 || r->result[i].set == set); k++) {
+                const double v = r->result[i].row[step].value[k];
+                if (pass == 0) mean->value[k] += v / n;
+                else if (n > 1) deviation->value[k] += (v - mean->value[k]) * (v - mean->value[k]) / (n - 1);
+            }
+    for (int k = 0; k < EV_METRICS; k++) deviation->value[k] = sqrt(deviation->value[k]);
+    return n;
+}
+
+void ev_report_print(const ev_report *r, int size, FILE *out)
+{
+    for (int set = 0; set <= r->sets; set++) {
+        const bool all = set == r->sets;
+        ev_row mean, deviation;
+        const int n = ev_report_summary(r, all ? -1 : set, 0, &mean, &deviation);
+        if (n == 0 || (all && r->sets == 1)) continue;
+        const double start = mean.value[EV_RENDER];
+        fprintf(out, "%s%s: %d %s, %d x %d pixels, %d renderings each; RMSE, mean +- standard deviation\n     ", set > 0 ? "\n" : "",
+            all ? "all sets" : r->set_name[set], n, n == 1 ? "material" : "materials", size, size, RD_EVAL_VIEWS);
+        for (int k = 0; k < EV_METRICS; k++) fprintf(out, "  %-16s", ev_metric_name[k]);
+        fputs("  render change\n", out);
+        for (int t = 0; t <= r->steps; t++) {
+            ev_report_summary(r, all ? -1 : set, t, &mean, &deviation);
+            fprintf(out, "R_%-3d", t);
+            for (int k = 0; k < EV_METRICS; k++) fprintf(out, "  %.4f +- %.4f", mean.value[k], deviation.value[k]);
+            if (start > 0) fprintf(out, "  %+.1f%%", 100 * (mean.value[EV_RENDER] / start - 1));
+            fputc('\n', out);
+        }
+    }
+}
+
+/* RFC 4180: in quotes when it has to be, quotes doubled. */
+static void put_field(FILE *f, const char *text)
+{
+    if (!strpbrk(text, ",\"\r\n")) {
+        fputs(text, f);
+        return;
+    }
+    fputc('"', f);
+    for (; *text; text++) {
+        if (*text == '"') fputc('"', f);
+        fputc(*text, f);
+    }
+    fputc('"', f);
+}
+
+static void write_results(const ev_report *r, FILE *f)
+{
+    fputs("set,material,step", f);
+    for (int k = 0; k < EV_METRICS; k++) fprintf(f, ",%s", ev_metric_name[k]);
+    fputc('\n', f);
+    for (int i = 0; i < r->results; i++)
+        for (int t = 0; t <= r->steps; t++) {
+            put_field(f, r->set_name[r->result[i].set]);
+            fputc(',', f);
+            put_field(f, r->result[i].material);
+            fprintf(f, ",%d", t);
+            for (int k = 0; k < EV_METRICS; k++) fprintf(f, ",%.6f", r->result[i].row[t].value[k]);
+            fputc('\n', f);
+        }
+}
+
+static void write_summary(const ev_report *r, FILE *f)
+{
+    fputs("set,materials,step", f);
+    for (int k = 0; k < EV_METRICS; k++) fprintf(f, ",%s_mean,%s_deviation", ev_metric_name[k], ev_metric_name[k]);
+    fputc('\n', f);
+    for (int set = 0; set <= r->sets; set++) {
+        if (set == r->sets && r->sets == 1) continue; /* "all" would repeat it */
+        for (int t = 0; t <= r->steps; t++) {
+            ev_row mean, deviation;
+            const int n = ev_report_summary(r, set == r->sets ? -1 : set, t, &mean, &deviation);
+            if (n == 0) continue;
+            put_field(f, set == r->sets ? "all" : r->set_name[set]);
+            fprintf(f, ",%d,%d", n, t);
+            for (int k = 0; k < EV_METRICS; k++) fprintf(f, ",%.6f,%.6f", mean.value[k], deviation.value[k]);
+            fputc('\n', f);
+        }
+    }
+}
+
+static ts_code replace(const ev_report *r, const char *folder, const char *name, void (*write_to)(const ev_report *, FILE *), ts_status *st)
+{
+    char path[PATH_LENGTH], part[PATH_LENGTH];
+    if (snprintf(path, sizeof path, "%s/%s", folder, name) >= (int)sizeof path
+        || snprintf(part, sizeof part, "%s/.%s.%ld", folder, name, (long)getpid()) >= (int)sizeof part)
+        return ts_fail(st, TS_INVALID, "%s: the name is too long", folder);
+    FILE *f = fopen(part, "we");
+    if (!f) return ts_fail(st, TS_IO, "%s: cannot be written: %s", path, strerror(errno));
+    write_to(r, f);
+    const bool written = fflush(f) == 0 && !ferror(f) && fsync(fileno(f)) == 0;
+    int why = errno;
+    const bool closed = fclose(f) == 0;
+    if (written && !closed) why = errno;
+    if (written && closed && rename(part, path) == 0) return TS_OK;
+    if (written && closed) why = errno;
+    unlink(part);
+    return ts_fail(st, TS_IO, "%s: cannot be written: %s", path, strerror(why));
+}
+
+ts_code ev_report_write(const ev_report *r, const char *folder, ts_status *st)
+{
+    const ts_code code = replace(r, folder, "results.csv", write_results, st);
+    return code ? code : replace(r, folder, "summary.csv", write_summary, st);
+}

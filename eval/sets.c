@@ -1,0 +1,126 @@
+#include "eval/sets.h"
+#include "data/procedural.h"
+#include <dirent.h>
+#include <errno.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+enum { PATH_LENGTH = 4096, COUNT_MAX = 1000000 };
+
+static const char *const kind_name[EV_KINDS] = {"procedural", "strips", "maps"};
+
+static int by_name(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
+
+/* Whether the folder's entry is a material of that kind. Hidden files are not. */
+static bool belongs(const ev_set *set, const char *name)
+{
+    static const char *const images[] = {"png", "jpg", "jpeg", "tif", "tiff", "exr", "bmp", "webp", "tga", "ppm"};
+    char path[PATH_LENGTH];
+    struct stat info;
+    if (name[0] == '.' || snprintf(path, sizeof path, "%s/%s", set->where, name) >= (int)sizeof path || stat(path, &info) != 0) return false;
+    if (set->kind == EV_MAPS) return S_ISDIR(info.st_mode);
+    const char *dot = strrchr(name, '.');
+    for (size_t i = 0; dot && i < sizeof images / sizeof *images; i++)
+        if (strcasecmp(dot + 1, images[i]) == 0) return S_ISREG(info.st_mode);
+    return false;
+}
+
+static ts_code list_folder(ev_set *set, ts_status *st)
+{
+    DIR *d = opendir(set->where);
+    if (!d) return ts_fail(st, TS_IO, "%s: cannot be read: %s", set->where, strerror(errno));
+    ts_code code = TS_OK;
+    int room = 0;
+    for (struct dirent *e; !code && (e = readdir(d));) {
+        if (!belongs(set, e->d_name)) continue;
+        if (set->count == room) {
+            room = room ? 2 * room : 64;
+            char **more = realloc(set->entry, (size_t)room * sizeof *more);
+            if (!more) code = ts_fail(st, TS_NOMEM, "%s: out of memory", set->where);
+            else set->entry = more;
+        }
+        if (!code && !(set->entry[set->count] = strdup(e->d_name))) code = ts_fail(st, TS_NOMEM, "%s: out of memory", set->where);
+        if (!code) set->count++;
+    }
+    closedir(d);
+    if (!code && set->count == 0)
+        code = ts_fail(st, TS_IO, "%s: there is no %s in this folder", set->where, set->kind == EV_MAPS ? "map folder" : "strip image");
+    if (!code) qsort(set->entry, (size_t)set->count, sizeof *set->entry, by_name);
+    return code;
+}
+
+static ts_code parse_procedural(ev_set *set, ts_status *st)
+{
+    char *end;
+    errno = 0;
+    const bool digit = set->where[0] >= '0' && set->where[0] <= '9';
+    set->seed = strtoull(set->where, &end, 10);
+    const bool seed = digit && !errno && end[0] == ',' && end[1] >= '0' && end[1] <= '9';
+    const long count = seed ? strtol(end + 1, &end, 10) : 0;
+    if (!seed || errno || *end || count < 1 || count > COUNT_MAX)
+        return ts_fail(st, TS_INVALID, "--set %s: should be procedural:SEED,COUNT with COUNT in 1 .. %d", set->spec, COUNT_MAX);
+    set->count = (int)count;
+    return TS_OK;
+}
+
+ts_code ev_set_open(const char *spec, ev_set *set, ts_status *st)
+{
+    *set = (ev_set){.spec = strdup(spec), .kind = EV_KINDS};
+    if (!set->spec) return ts_fail(st, TS_NOMEM, "--set %s: out of memory", spec);
+    const char *colon = strchr(set->spec, ':');
+    for (int k = 0; colon && k < EV_KINDS; k++)
+        if (strlen(kind_name[k]) == (size_t)(colon - set->spec) && strncmp(kind_name[k], set->spec, (size_t)(colon - set->spec)) == 0) set->kind = (ev_kind)k;
+    ts_code code = TS_OK;
+    if (set->kind == EV_KINDS || !colon[1])
+        code = ts_fail(st, TS_INVALID, "--set %s: should be procedural:SEED,COUNT, strips:FOLDER or maps:FOLDER", spec);
+    else {
+        set->where = colon + 1;
+        code = set->kind == EV_PROCEDURAL ? parse_procedural(set, st) : list_folder(set, st);
+    }
+    if (code) ev_set_close(set);
+    return code;
+}
+
+void ev_set_close(ev_set *set)
+{
+    for (int i = 0; set->entry && i < set->count; i++) free(set->entry[i]);
+    free(set->entry);
+    free(set->spec);
+    *set = (ev_set){0};
+}
+
+uint64_t ev_set_identity(const ev_set *set, int i)
+{
+    char text[PATH_LENGTH];
+    if (set->kind == EV_PROCEDURAL) snprintf(text, sizeof text, "%s %" PRIu64 " %d", kind_name[set->kind], set->seed, i);
+    else snprintf(text, sizeof text, "%s %s", kind_name[set->kind], set->entry[i]);
+    uint64_t hash = UINT64_C(0xcbf29ce484222325); /* FNV-1a */
+    for (const char *c = text; *c; c++) hash = (hash ^ (unsigned char)*c) * UINT64_C(0x100000001b3);
+    return hash;
+}
+
+ts_code ev_set_load(const ev_set *set, int i, int size, io_material *m, ts_status *st)
+{
+    io_material_free(m);
+    if (set->kind == EV_PROCEDURAL) {
+        const io_procedural p = {.seed = set->seed};
+        const ts_code code = io_material_create(m, size, st);
+        if (code) return code;
+        io_procedural_make(&p, (uint64_t)i, m);
+        snprintf(m->name, sizeof m->name, "%06d", i);
+        return TS_OK;
+    }
+    char path[PATH_LENGTH];
+    if (snprintf(path, sizeof path, "%s/%s", set->where, set->entry[i]) >= (int)sizeof path)
+        return ts_fail(st, TS_INVALID, "%s: the name is too long", set->where);
+    const ts_code code = set->kind == EV_STRIPS ? io_read_strip(path, size, m, NULL, st) : io_read_map_folder(path, IO_NORMAL_FROM_FILE, size, m, st);
+    if (code) return code;
+    snprintf(m->name, sizeof m->name, "%s", set->entry[i]);
+    char *dot = set->kind == EV_STRIPS ? strrchr(m->name, '.') : NULL;
+    if (dot) *dot = 0;
+    return TS_OK;
+}

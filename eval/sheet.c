@@ -1,0 +1,25 @@
+#include "eval/sheet.h"
+#include "infer/panels.h"
+
+enum { ROWS = 3, RENDERINGS = 3, COLUMNS = 1 + LGD_MAP_PANELS + RENDERINGS };
+
+ts_code ev_sheet_write(const char *path, const ev_case *c, const float *first, const float *last, ts_status *st)
+{
+    const int size = c->truth->size;
+    io_image sheet = {0}, picture = {0};
+    ts_code code = io_image_create(&sheet, COLUMNS * size, ROWS * size, 3, st);
+    if (!code) code = io_image_create(&picture, size, size, 3, st);
+    for (int row = 0; row < ROWS && !code; row++) {
+        const float *const maps[ROWS] = {c->truth->maps, first, last};
+        const io_material m = {.size = size, .maps = (float *)maps[row]}; /* only read */
+        const rd_view flash = rd_flash();
+        if (row == 0) lgd_panel_put(&sheet, size, 0, 0, c->image);
+        else lgd_panel_render(&sheet, 0, row, &m, &flash, picture.data);
+        lgd_panel_maps(&sheet, 1, row, &m, picture.data);
+        for (int i = 0; i < RENDERINGS; i++) lgd_panel_render(&sheet, 1 + LGD_MAP_PANELS + i, row, &m, &c->views[i], picture.data);
+    }
+    if (!code) code = io_write_png(path, &sheet, 8, true, st);
+    io_image_free(&sheet);
+    io_image_free(&picture);
+    return code;
+}

@@ -1,0 +1,194 @@
+/* The public C API (infer/lgd.h): checks what a caller may get wrong, runs the unrolled loop, and turns the network's
+ * encoding into the values that the header promises. */
+#include "infer/lgd.h"
+#include "data/material.h"
+#include "infer/encode.h"
+#include "infer/memory.h"
+#include "nn/model.h"
+#include "nn/weights.h"
+#include "render/render.h"
+#include "tensor/threads.h"
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+    SIDE_MAX = 16384,     /* 9.7 GB of maps: a larger number is a mistake */
+    ITERATIONS_MAX = 1000, /* the same: nothing changes after some ten */
+    THREADS_MAX = 1024
+};
+
+struct lgd_model {
+    nn_model *net;
+    ag_tape *tape;
+};
+
+/* Copies st into error. Returns its code. */
+static int report(lgd_error *error, const ts_status *st)
+{
+    if (error) {
+        error->code = st->code;
+        memcpy(error->message, st->message, sizeof error->message);
+    }
+    return st->code;
+}
+
+_Static_assert(sizeof((lgd_error *)0)->message == sizeof((ts_status *)0)->message, "messages are copied whole");
+
+const char *lgd_version(void) { return LGD_VERSION; }
+
+lgd_options lgd_options_default(void) { return (lgd_options){.iterations = -1}; }
+
+int lgd_trained_iterations(const lgd_model *model) { return model->net->arch.iterations; }
+
+lgd_model *lgd_load(const char *weights, lgd_error *error)
+{
+    ts_status st = {0};
+    lgd_model *model = NULL;
+    if (!weights) ts_fail(&st, TS_INVALID, "lgd_load: no weights file is given");
+    else if (!(model = calloc(1, sizeof *model))) ts_fail(&st, TS_NOMEM, "%s: out of memory", weights);
+    else if ((model->net = nn_model_load(weights, &st)) && (model->tape = ag_tape_create(false, &st))) ag_freeze(model->tape, true);
+    if (st.code) lgd_free(&model);
+    report(error, &st);
+    return model;
+}
+
+void lgd_free(lgd_model **model)
+{
+    if (!model || !*model) return;
+    ag_tape_destroy(&(*model)->tape);
+    nn_model_free(&(*model)->net);
+    free(*model);
+    *model = NULL;
+}
+
+/* What the unrolled loop reports to: the caller's function. */
+typedef struct watch {
+    const nn_input *in;
+    const lgd_options *options;
+} watch;
+
+static bool after_step(int step, const ag_value *maps, void *user)
+{
+    const watch *w = user;
+    double rmse;
+    rd_flash_rmse(w->in->grid, maps->t.data, maps->t.shape.c, &w->in->view, w->in->image.data, &rmse);
+    return w->options->progress(step, rmse, w->options->user) == 0;
+}
+
+static ts_code check_arguments(const lgd_model *model, const float *image, int side, const lgd_options *o, const float *maps, ts_status *st)
+{
+    if (!model || !image || !maps) return ts_fail(st, TS_INVALID, "lgd_estimate: model, image and maps must be given");
+    if (side < 1 || side > SIDE_MAX) return ts_fail(st, TS_INVALID, "lgd_estimate: side is %d and must lie in 1 .. %d", side, SIDE_MAX);
+    if (o->iterations < -1 || o->iterations > ITERATIONS_MAX)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: iterations is %d and must lie in 0 .. %d, or be -1 for as trained", o->iterations, ITERATIONS_MAX);
+    if (o->threads < 0 || o->threads > THREADS_MAX)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: threads is %d and must lie in 1 .. %d, or be 0 for all", o->threads, THREADS_MAX);
+    if (o->iterations > 0 && model->net->arch.h_width == 0)
+        return ts_fail(st, TS_UNSUPPORTED, "lgd_estimate: these weights have no refiner: only 0 iterations are possible");
+    return TS_OK;
+}
+
+/* The network's encoding to the header's values. False when one is not finite. */
+static bool decode(const float *from, int channels, int64_t pixels, float *maps)
+{
+    for (int64_t i = 0; i < pixels; i++) {
+        const float *x = from + i * channels;
+        float *m = maps + i * MAP_CHANNELS;
+        for (int c = 0; c < MAP_CHANNELS; c++)
+            if (!isfinite(x[c])) return false;
+        const io_texel t = io_texel_get(x);
+        memcpy(m + MAP_DIFFUSE, t.diffuse, sizeof t.diffuse);
+        m[MAP_NORMAL] = t.normal[0];
+        m[MAP_NORMAL + 1] = t.normal[1];
+        m[MAP_ROUGHNESS] = t.roughness;
+        memcpy(m + MAP_SPECULAR, t.specular, sizeof t.specular);
+    }
+    return true;
+}
+
+void lgd_encode(const float *maps, int side, float *encoded)
+{
+    const int64_t pixels = (int64_t)side * side;
+    for (int64_t i = 0; i < pixels; i++) {
+        const float *m = maps + i * MAP_CHANNELS;
+        const float x = m[MAP_NORMAL], y = m[MAP_NORMAL + 1];
+        io_texel t = {.normal = {x, y, sqrtf(fmaxf(1 - x * x - y * y, 0))}, .roughness = m[MAP_ROUGHNESS]};
+        memcpy(t.diffuse, m + MAP_DIFFUSE, sizeof t.diffuse);
+        memcpy(t.specular, m + MAP_SPECULAR, sizeof t.specular);
+        io_texel_put(encoded + i * MAP_CHANNELS, &t);
+    }
+}
+
+/* What a step of h holds at once: maps, their gradient and change, the carried states, and for each of its two cells the convolution,
+ * both gates' inputs and the new state. g works at its own size and needs less. */
+static double step_bytes(const nn_arch *a, int side)
+{
+    const double cells = a->h_width > 0 ? 2.0 * (a->h_width + 8.0 * a->h_gru) : 0;
+    return (3 + 5.0 * a->channels + cells) * sizeof(float) * side * side;
+}
+
+static ts_code estimate(lgd_model *model, const float *image, int side, const lgd_options *o, float *maps, ts_status *st)
+{
+    ag_reset(model->tape);
+    const double more = step_bytes(&model->net->arch, side) - (double)ts_arena_peak(ag_arena(model->tape)); /* than earlier calls left */
+    if (more > 0 && lgd_memory_check(more, st) != TS_OK) return ts_context(st, "%d x %d pixels", side, side);
+    nn_input in = {.image = ts_new(ag_arena(model->tape), (ts_shape){1, side, side, 3}), .grid = rd_grid_full(side), .view = rd_flash()};
+    if (!in.image.data) return ts_fail(st, TS_NOMEM, "out of memory for an image of %d x %d pixels", side, side);
+    const int64_t values = (int64_t)side * side * 3;
+    for (int64_t i = 0; i < values; i++) in.image.data[i] = isfinite(image[i]) ? fminf(fmaxf(image[i], 0), 1) : 0;
+
+    const int trained = lgd_trained_iterations(model);
+    watch w = {&in, o};
+    ag_value *out = NULL;
+    if (nn_lgd(model->tape, model->net, &in, o->iterations < 0 ? trained : o->iterations, false, &out, o->progress ? after_step : NULL, &w) != TS_OK || !out) {
+        *st = *ag_status(model->tape);
+        return st->code ? st->code : ts_fail(st, TS_NUMERIC, "the network gave no result");
+    }
+    if (!decode(out->t.data, out->t.shape.c, (int64_t)side * side, maps))
+        return ts_fail(st, TS_NUMERIC, "the network's maps are not finite: the weights are damaged or did not train");
+    return TS_OK;
+}
+
+int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps, lgd_error *error)
+{
+    ts_status st = {0};
+    const lgd_options o = options ? *options : lgd_options_default();
+    if (check_arguments(model, image, side, &o, maps, &st) == TS_OK) {
+        ts_threads_set(o.threads);
+        estimate(model, image, side, &o, maps, &st);
+    }
+    return report(error, &st);
+}
+
+int lgd_render(const float *maps, int side, const float light[3], const float camera[3], float power, float *image, lgd_error *error)
+{
+    ts_status st = {0};
+    rd_view view = {.kind = RD_POINT, .power = power};
+    bool finite = isfinite(power);
+    if (!maps || !light || !camera || !image) {
+        ts_fail(&st, TS_INVALID, "lgd_render: maps, light, camera and image must be given");
+        return report(error, &st);
+    }
+    for (int i = 0; i < 3; i++) {
+        view.light[i] = light[i];
+        view.camera[i] = camera[i];
+        finite = finite && isfinite(light[i]) && isfinite(camera[i]);
+    }
+    if (!finite || power < 0) ts_fail(&st, TS_INVALID, "lgd_render: light, camera and power must be finite and power not negative");
+    else if (side < 1 || side > SIDE_MAX) ts_fail(&st, TS_INVALID, "lgd_render: side is %d and must lie in 1 .. %d", side, SIDE_MAX);
+    if (st.code) return report(error, &st);
+
+    const size_t pixels = (size_t)side * (size_t)side;
+    float *encoded = malloc(pixels * MAP_CHANNELS * sizeof *encoded);
+    if (!encoded) {
+        ts_fail(&st, TS_NOMEM, "lgd_render: out of memory for %d x %d pixels", side, side);
+        return report(error, &st);
+    }
+    lgd_encode(maps, side, encoded);
+    rd_render(rd_grid_full(side), encoded, MAP_CHANNELS, &view, false, image);
+    free(encoded);
+    return report(error, &st);
+}

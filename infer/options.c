@@ -1,0 +1,68 @@
+#include "infer/options.h"
+#include "cli/cli.h"
+#include "data/image.h"
+#include <string.h>
+
+enum { NORMAL = 256, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
+
+const lgd_argument lgd_infer_arguments[] = {
+    {'o', "output", "DIR", "write DIR/STEM/ for each photograph, STEM = its file name without extension (required)"},
+    {'s', "size", "N", "pixels of a side of the maps, 1 .. 8192 (default 256)"},
+    {'i', "iterations", "N", "refinement steps, 0 .. 1000; 0 = the first estimate alone (default: as trained)"},
+    {'m', "model", "FILE", "weights (default: $LGD_MODEL, or those installed or built with the program)"},
+    {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},
+    {NORMAL, "normal", "gl|dx", "normal.png with y up (OpenGL, default) or y down (DirectX)"},
+    {MAX_PIXELS, "max-pixels", "N", "refuse photographs with more pixels, before memory is taken (default 268435456)"},
+    {'q', "quiet", NULL, "no progress and no figures, only warnings and errors"},
+    {HELP, "help", NULL, "print this help"},
+    {VERSION, "version", NULL, "print the version"},
+    {0, NULL, NULL, NULL}};
+
+static ts_code whole(const char *name, const char *text, int64_t lo, int64_t hi, int64_t *value, ts_status *st)
+{
+    if (cl_parse_int(text, lo, hi, value)) return TS_OK;
+    return ts_fail(st, TS_INVALID, "--%s: '%s' is not a whole number in %lld .. %lld", name, text, (long long)lo, (long long)hi);
+}
+
+ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
+{
+    *c = (lgd_command){.size = 256, .iterations = -1, .max_pixels = IO_MAX_PIXELS_DEFAULT};
+    const char *value = NULL;
+    int key, operands = argc;
+    int64_t n = 0;
+    ts_code code = TS_OK;
+    while (!code && !c->help && !c->version && (key = lgd_argument_next(argc, argv, lgd_infer_arguments, &value, &operands, st)) != LGD_ARGUMENT_END) {
+        switch (key) {
+        case 'o': c->out = value; break;
+        case 'm': c->model = value; break;
+        case 'q': c->quiet = true; break;
+        case HELP: c->help = true; break;
+        case VERSION: c->version = true; break;
+        case MAX_PIXELS: code = whole("max-pixels", value, 1, INT64_C(1) << 40, &c->max_pixels, st); break;
+        case 's':
+            code = whole("size", value, 1, 8192, &n, st);
+            c->size = (int)n;
+            break;
+        case 'i':
+            code = whole("iterations", value, 0, 1000, &n, st);
+            c->iterations = (int)n;
+            break;
+        case 't':
+            code = whole("threads", value, 0, 1024, &n, st);
+            c->threads = (int)n;
+            break;
+        case NORMAL:
+            c->directx = strcmp(value, "dx") == 0;
+            if (!c->directx && strcmp(value, "gl") != 0) code = ts_fail(st, TS_INVALID, "--normal: '%s' is neither gl nor dx", value);
+            break;
+        default: code = st->code;
+        }
+    }
+    if (code || c->help || c->version) return code;
+    c->photo = argv + operands;
+    c->photos = argc - operands;
+    if (c->photos == 0) return ts_fail(st, TS_INVALID, "no photograph is given");
+    if (!c->out) return ts_fail(st, TS_INVALID, "no output folder is given: -o DIR");
+    if (!*c->out) return ts_fail(st, TS_INVALID, "-o: the name of the output folder is empty");
+    return TS_OK;
+}

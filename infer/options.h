@@ -1,0 +1,21 @@
+/* The command line of lgd-infer. */
+#ifndef LGD_OPTIONS_H
+#define LGD_OPTIONS_H
+#include "infer/arguments.h"
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct lgd_command {
+    const char *out, *model;
+    int size, iterations /* -1: as trained */, threads;
+    int64_t max_pixels;
+    bool directx, quiet, help, version;
+    char **photo; /* into argv */
+    int photos;
+} lgd_command;
+
+extern const lgd_argument lgd_infer_arguments[];
+
+/* TS_INVALID and st on wrong usage. With help or version set nothing else is checked. */
+ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st);
+#endif

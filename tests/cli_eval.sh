@@ -1,0 +1,143 @@
+# lgd-eval as people use it.
+. tests/lib.sh
+MODEL=${LGD_TEST_MODEL:-$ROOT/models/single.safetensors}
+export LGD_MODEL="$MODEL"
+
+model() { [ -f "$MODEL" ] || fail "$MODEL is absent: the weights that the project ships"; }
+evaluate() { "$BIN/lgd-eval" --size 32 --iterations 2 "$@"; }
+
+help_names_the_options() {
+    expect 0 "$BIN/lgd-eval" --help
+    for o in set iterations model threads seed noise images size output procedural strips maps; do says "$T/out" "$o"; done
+}
+
+wrong_usage() {
+    for o in --size=0 --iterations=-1 --threads=x --noise=2 --noise=0,5 --seed=-1 --nonsense --set=procedural:1 --set=pictures:x; do
+        expect 2 "$BIN/lgd-eval" --set procedural:1,1 "$o" -o "$T/o"
+        says "$T/err" "${o%%=*}"
+    done
+    expect 2 "$BIN/lgd-eval" -o "$T/o"
+    expect 2 "$BIN/lgd-eval" --set procedural:1,1
+    expect 2 "$BIN/lgd-eval" procedural:1,1 -o "$T/o"
+    says "$T/err" "--set"
+    expect 1 "$BIN/lgd-eval" --set "maps:$T/absent" -o "$T/o"
+    says "$T/err" "$T/absent"
+    expect 1 "$BIN/lgd-eval" --set "strips:$T" -o "$T/o"
+    says "$T/err" "$T"
+}
+
+procedural() {
+    model
+    expect 0 evaluate --set procedural:3,3 -o "$T/o"
+    lines "$T/out" 5
+    says "$T/out" "3 materials"
+    for t in 0 1 2; do grep -q "^R_$t  *0\.[0-9]* +- 0\." "$T/out" || fail "no line for R_$t"; done
+    lines "$T/o/results.csv" 10
+    lines "$T/o/summary.csv" 4
+    [ "$(ls -A "$T/o" | tr '\n' ' ')" = "results.csv summary.csv " ] || fail "other files: $(ls -A "$T/o")"
+    # the summary is the mean of the results
+    for t in 0 2; do
+        mean=$(awk -F, -v t=$t 'NR > 1 && $4 == t { s += $9; n++ } END { printf "%.4f", s / n }' "$T/o/results.csv")
+        told=$(awk -F, -v t=$t 'NR > 1 && $4 == t { printf "%.4f", $13 }' "$T/o/summary.csv")
+        [ "$mean" = "$told" ] || fail "step $t: mean $mean, summary $told"
+    done
+}
+
+same_numbers() {
+    model
+    expect 0 evaluate --set procedural:5,2 --threads 1 --noise 0.5 -o "$T/a"
+    for n in 2 3; do
+        expect 0 evaluate --set procedural:5,2 --threads $n --noise 0.5 -o "$T/b"
+        cmp -s "$T/a/results.csv" "$T/b/results.csv" || fail "$n threads give other numbers"
+    done
+    # a material's numbers do not depend on what else is evaluated
+    expect 0 evaluate --set procedural:8,1 --set procedural:5,2 --noise 0.5 -o "$T/b"
+    grep '5,2' "$T/a/results.csv" >"$T/one"
+    grep '5,2' "$T/b/results.csv" >"$T/two"
+    cmp -s "$T/one" "$T/two" || fail "another set changes the numbers"
+    says "$T/out" "all sets"
+    expect 0 evaluate --set procedural:5,2 --seed 2 --noise 0.5 -o "$T/c"
+    if cmp -s "$T/a/results.csv" "$T/c/results.csv"; then fail "another seed gives the same numbers"; fi
+}
+
+real_sets() {
+    [ -d "$TESTDATA/maps" ] && [ -d "$TESTDATA/strips" ] || skip "$TESTDATA/maps or strips is absent"
+    model
+    expect 0 evaluate --set "maps:$TESTDATA/maps" --set "strips:$TESTDATA/strips" -o "$T/o"
+    maps=$(ls "$TESTDATA/maps" | wc -l)
+    strips=$(ls "$TESTDATA/strips" | wc -l)
+    lines "$T/o/results.csv" $((1 + 3 * (maps + strips)))
+    says "$T/out" "$maps materials"
+    says "$T/out" "$((maps + strips)) materials"
+    awk -F, 'NR > 1 { for (i = NF - 4; i <= NF; i++) if (!($i >= 0 && $i < 2)) exit 1 }' "$T/o/results.csv" || fail "an error is out of range"
+}
+
+images() {
+    model
+    expect 0 evaluate --set procedural:3,2 --images -o "$T/o"
+    [ "$(ls "$T/o/images" | tr '\n' ' ')" = "1-000000.png 1-000001.png " ] || fail "images: $(ls "$T/o/images")"
+    for f in "$T"/o/images/*; do [ -s "$f" ] || fail "$f is empty"; done
+}
+
+bad_material() {
+    [ -d "$TESTDATA/strips" ] || skip "$TESTDATA/strips is absent"
+    model
+    mkdir "$T/s"
+    cp "$(ls "$TESTDATA"/strips/*.png | head -n 1)" "$T/s/good.png"
+    echo "no strip" >"$T/s/bad.png"
+    expect 1 evaluate --set "strips:$T/s" -o "$T/o"
+    says "$T/err" "bad.png"
+    lines "$T/o/results.csv" 4
+    rm "$T/s/good.png"
+    expect 1 evaluate --set "strips:$T/s" -o "$T/none"
+    [ ! -e "$T/none/results.csv" ] || fail "results of nothing"
+}
+
+unwritable() {
+    model
+    echo file >"$T/file"
+    expect 1 evaluate --set procedural:1,1 -o "$T/file"
+    says "$T/err" "$T/file"
+    mkdir "$T/o"
+    ( trap '' XFSZ
+      ulimit -f 0
+      "$BIN/lgd-eval" --size 8 -i 0 --set procedural:1,1 -o "$T/o" >/dev/null 2>/dev/null )
+    [ $? -eq 1 ] || fail "a full disk is no failure"
+    [ -z "$(ls -A "$T/o")" ] || fail "left over: $(ls -A "$T/o")"
+    { sleep 1; evaluate --set procedural:1,1 -o "$T/o" 2>"$T/err"; echo $? >"$T/code"; } | true
+    [ "$(cat "$T/code")" = 1 ] || fail "a closed pipe: exit status $(cat "$T/code")"
+    says "$T/err" "standard output"
+    lines "$T/o/results.csv" 4
+}
+
+interrupted() {
+    model
+    "$BIN/lgd-eval" --size 32 --set procedural:1,100000 -o "$T/o" --images >"$T/out" 2>"$T/err" &
+    pid=$!
+    n=0
+    while [ -z "$(ls "$T/o/images" 2>/dev/null)" ] && [ $n -lt 600 ]; do sleep 0.1; n=$((n + 1)); done
+    kill -INT $pid
+    wait $pid
+    [ $? -eq 1 ] || fail "exit status is not 1"
+    says "$T/err" "interrupted"
+    [ "$(ls -A "$T/o")" = images ] || fail "half a result: $(ls -A "$T/o")"
+}
+
+# What the project promises of its weights: refinement takes at least 15% off the error on materials that nobody trained on.
+refinement_helps() {
+    model
+    expect 0 "$BIN/lgd-eval" --size 128 --set procedural:20240607,16 -o "$T/o"
+    awk -F, 'NR == 2 { first = $13 } { last = $13 } END { exit !(last < 0.85 * first) }' "$T/o/summary.csv" ||
+        fail "$(awk -F, 'NR == 2 { first = $13 } { last = $13 } END { print "render RMSE", first, "->", last }' "$T/o/summary.csv")"
+}
+
+check eval_help_names_the_options help_names_the_options
+check eval_wrong_usage wrong_usage
+check eval_procedural procedural
+check eval_same_numbers_for_any_threads same_numbers
+check eval_real_sets real_sets
+check eval_images images
+check eval_bad_material_is_reported bad_material
+check eval_unwritable_output unwritable
+check eval_interrupted interrupted
+check eval_refinement_helps refinement_helps

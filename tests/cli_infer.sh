@@ -1,0 +1,376 @@
+# lgd-infer as people use it: the shipped weights, real photographs, and everything that goes wrong (DESIGN section 8).
+. tests/lib.sh
+MODEL=${LGD_TEST_MODEL:-$ROOT/models/single.safetensors}
+export LGD_MODEL="$MODEL"
+FILES="diffuse.png maps.exr meta.txt normal.png preview.png render.png roughness.png specular.png"
+
+model() { [ -f "$MODEL" ] || fail "$MODEL is absent: the weights that the project ships"; }
+
+# A photograph without test data: a binary PPM of $2 x $3 pixels with the grey levels of a smooth bump, or of the constant $4.
+photo() {
+    { printf 'P6\n%d %d\n255\n' "$2" "$3"
+      awk -v w="$2" -v h="$3" -v v="${4-}" 'BEGIN { for (y = 0; y < h; y++) for (x = 0; x < w; x++) {
+          g = v != "" ? v : int(200 - 120 * ((x / w - .5) ^ 2 + (y / h - .5) ^ 2) - 20 * ((x + y) % 2)); printf "\\%03o\\%03o\\%03o", g, g * .9, g * .7 } }' |
+      while IFS= read -r line || [ -n "$line" ]; do printf "$line"; done; } >"$1"
+}
+
+# Fails unless the folder has exactly the eight files, none empty.
+complete() {
+    [ "$(ls -A "$1" | tr '\n' ' ')" = "$FILES " ] || fail "$1 has: $(ls -A "$1" | tr '\n' ' ')"
+    for f in $FILES; do [ -s "$1/$f" ] || fail "$1/$f is empty"; done
+}
+
+infer() { "$BIN/lgd-infer" --size 32 --iterations 1 "$@"; }
+
+help_names_the_options() {
+    expect 0 "$BIN/lgd-infer" --help
+    for o in size iterations model threads normal max-pixels quiet output; do says "$T/out" "--$o"; done
+}
+
+wrong_usage() {
+    photo "$T/p.ppm" 8 8
+    for o in --size=0 --iterations=-1 --nonsense; do # tests/test_infer_files.c has the others
+        expect 2 "$BIN/lgd-infer" "$o" "$T/p.ppm" -o "$T/o"
+        says "$T/err" "${o%%=*}"
+        [ ! -e "$T/o" ] || fail "$o makes a folder"
+    done
+    expect 2 "$BIN/lgd-infer" "$T/p.ppm"
+    expect 2 "$BIN/lgd-infer" -o "$T/o"
+    says "$T/err" "--help"
+}
+
+whole_run() {
+    model
+    photo "$T/wall.ppm" 48 40
+    expect 0 "$BIN/lgd-infer" --size 32 "$T/wall.ppm" -o "$T/a/b"
+    complete "$T/a/b/wall"
+    [ "$(cat "$T/out")" = "$T/a/b/wall" ] || fail "standard output is: $(cat "$T/out")"
+    grep -Eq 'wall.ppm: reconstruction RMSE 0\.[0-9]+ \(R_0\) -> 0\.[0-9]+ \(R_[0-9]+\)' "$T/err" || fail "no RMSE: $(cat "$T/err")"
+    expect 0 "$BIN/lgd-infer" --size 32 --iterations 0 -q "$T/wall.ppm" -o "$T/c"
+    [ ! -s "$T/err" ] || fail "--quiet says: $(cat "$T/err")"
+    expect 0 "$BIN/lgd-infer" --size 32 --iterations 0 "$T/wall.ppm" -o "$T/c"
+    says "$T/err" "(R_0)"
+    if cmp -s "$T/a/b/wall/maps.exr" "$T/c/wall/maps.exr"; then fail "refinement changes nothing"; fi
+}
+
+threads_agree() {
+    model
+    photo "$T/p.ppm" 33 33
+    expect 0 infer --threads 1 "$T/p.ppm" -o "$T/1"
+    for n in 0 2 3; do
+        expect 0 infer --threads $n "$T/p.ppm" -o "$T/$n"
+        for f in $FILES; do cmp -s "$T/1/p/$f" "$T/$n/p/$f" || fail "$f differs with $n threads"; done
+    done
+}
+
+old_results() {
+    model
+    photo "$T/p.ppm" 32 32
+    expect 0 infer "$T/p.ppm" -o "$T/o"
+    cp "$T/o/p/maps.exr" "$T/first"
+    echo old >"$T/o/p/maps.exr"
+    echo mine >"$T/o/p/notes.txt"
+    expect 0 infer "$T/p.ppm" -o "$T/o"
+    cmp -s "$T/first" "$T/o/p/maps.exr" || fail "the old file is still there"
+    [ "$(cat "$T/o/p/notes.txt")" = mine ] || fail "somebody's file is gone"
+    rm "$T/o/p/notes.txt"
+    complete "$T/o/p"
+}
+
+bad_ones_do_not_stop() {
+    model
+    photo "$T/a.ppm" 16 16
+    photo "$T/d.ppm" 16 16
+    echo "no photograph" >"$T/b.jpg"
+    mkdir "$T/folder.png"
+    head -c 200 "$T/a.ppm" >"$T/e.ppm"
+    expect 1 infer "$T/a.ppm" "$T/b.jpg" "$T/c.png" "$T/folder.png" "$T/e.ppm" "$T/d.ppm" -o "$T/o"
+    complete "$T/o/a"
+    complete "$T/o/d"
+    lines "$T/out" 2
+    for f in b.jpg c.png folder.png e.ppm; do says "$T/err" "$T/$f"; done
+    says "$T/err" "4 of 6"
+    [ "$(ls -A "$T/o" | tr '\n' ' ')" = "a d " ] || fail "left over: $(ls -A "$T/o")"
+}
+
+same_stem() {
+    mkdir "$T/x" "$T/y"
+    photo "$T/x/wall.ppm" 8 8
+    photo "$T/y/wall.ppm" 8 8
+    expect 2 infer "$T/x/wall.ppm" "$T/y/wall.ppm" -o "$T/o"
+    says "$T/err" "$T/x/wall.ppm"
+    says "$T/err" "$T/y/wall.ppm"
+    [ ! -e "$T/o" ] || fail "work was begun"
+}
+
+odd_stems() {
+    model
+    mkdir "$T/in"
+    photo "$T/in/...ppm" 8 8
+    photo "$T/in/a b.c.ppm" 8 8
+    photo "$T/in/-o.ppm" 8 8
+    photo "$T/in/.ppm" 8 8
+    cd "$T/in" || exit 1
+    expect 0 infer -o ../o -- ...ppm "a b.c.ppm" -o.ppm .ppm
+    for f in ...ppm "a b.c" -o .ppm; do complete "$T/o/$f"; done
+    [ "$(ls -A "$T" | grep -cE '^(in|o|out|err)$')" = 4 ] && [ "$(ls -A "$T/in" | wc -l)" = 4 ] || fail "something was written beside the output folder"
+    expect 2 infer .. -o ../o
+    says "$T/err" ".."
+}
+
+output_beside_input() {
+    model
+    mkdir "$T/d" "$T/d/diffuse"
+    photo "$T/d/p.ppm" 16 16
+    cp "$T/d/p.ppm" "$T/before"
+    expect 0 infer "$T/d/p.ppm" -o "$T/d"
+    complete "$T/d/p"
+    cmp -s "$T/d/p.ppm" "$T/before" || fail "the photograph changed"
+    cp "$T/d/p/render.png" "$T/d/diffuse/diffuse.png"
+    expect 2 infer "$T/d/diffuse/diffuse.png" -o "$T/d"
+    says "$T/err" "diffuse/diffuse.png"
+    cp "$T/d/p.ppm" "$T/d/plain"
+    expect 2 infer "$T/d/plain" -o "$T/d"
+    cmp -s "$T/d/plain" "$T/before" || fail "the photograph without extension changed"
+}
+
+unwritable_output() {
+    model
+    photo "$T/p.ppm" 8 8
+    echo file >"$T/file"
+    for o in "$T/file" "$T/file/x" /proc/lgd-test; do
+        expect 1 infer "$T/p.ppm" -o "$o"
+        says "$T/err" "$o"
+        lines "$T/err" 1
+    done
+    mkdir "$T/o"
+    echo file >"$T/o/p"
+    expect 1 infer "$T/p.ppm" -o "$T/o"
+    says "$T/err" "$T/o/p"
+    [ "$(ls -A "$T/o")" = p ] && [ "$(cat "$T/o/p")" = file ] || fail "left over: $(ls -A "$T/o")"
+    if [ "$(id -u)" -ne 0 ]; then
+        mkdir "$T/ro"
+        chmod a-w "$T/ro"
+        expect 1 infer "$T/p.ppm" -o "$T/ro"
+        says "$T/err" "$T/ro"
+    fi
+}
+
+# A file may not grow beyond a few blocks, as on a disk that fills up in the middle.
+full_disk() {
+    model
+    photo "$T/p.ppm" 64 64
+    mkdir "$T/o"
+    ( trap '' XFSZ
+      ulimit -f 4
+      "$BIN/lgd-infer" --size 64 --iterations 0 "$T/p.ppm" -o "$T/o" >"$T/out" 2>"$T/err" )
+    [ $? -eq 1 ] || fail "it does not fail"
+    says "$T/err" "$T/p.ppm"
+    [ -z "$(ls -A "$T/o")" ] || fail "left over: $(ls -A "$T/o")"
+}
+
+full_file_system() {
+    model
+    mkdir "$T/disk"
+    mount -t tmpfs -o size=48k tmpfs "$T/disk" 2>/dev/null || skip "a small file system cannot be mounted here"
+    photo "$T/p.ppm" 64 64
+    "$BIN/lgd-infer" --size 64 --iterations 0 "$T/p.ppm" -o "$T/disk" >"$T/out" 2>"$T/err"
+    code=$?
+    rest=$(ls -A "$T/disk")
+    umount "$T/disk"
+    [ $code -eq 1 ] || fail "it does not fail"
+    says "$T/err" "$T/p.ppm"
+    [ -z "$rest" ] || fail "left over: $rest"
+}
+
+closed_pipe() {
+    model
+    photo "$T/p.ppm" 16 16
+    { sleep 1; infer "$T/p.ppm" -o "$T/o" 2>"$T/err"; echo $? >"$T/code"; } | true
+    [ "$(cat "$T/code")" = 1 ] || fail "exit status $(cat "$T/code")"
+    says "$T/err" "standard output"
+    complete "$T/o/p"
+    infer "$T/p.ppm" -o "$T/o2" >&- 2>"$T/err"
+    [ $? -eq 1 ] || fail "a closed standard output is no failure"
+    complete "$T/o2/p"
+}
+
+interrupted() {
+    model
+    mkdir "$T/in"
+    photo "$T/in/0.ppm" 32 32
+    i=1
+    while [ $i -lt 200 ]; do ln -s 0.ppm "$T/in/$i.ppm"; i=$((i + 1)); done
+    for s in INT TERM; do
+        "$BIN/lgd-infer" --size 96 "$T"/in/*.ppm -o "$T/$s" >"$T/out.$s" 2>"$T/err" &
+        pid=$!
+        n=0
+        while [ ! -s "$T/out.$s" ] && [ $n -lt 600 ]; do sleep 0.1; n=$((n + 1)); done
+        kill -$s $pid
+        wait $pid
+        [ $? -eq 1 ] || fail "$s: exit status is not 1"
+        says "$T/err" "interrupted"
+        done=$(wc -l <"$T/out.$s")
+        [ "$done" -ge 1 ] && [ "$done" -lt 200 ] || fail "$s: $done photographs are done"
+        [ "$(ls -A "$T/$s" | wc -l)" -eq "$done" ] || fail "$s: $done are reported and there are: $(ls -A "$T/$s" | tr '\n' ' ')"
+        while read -r folder; do complete "$folder"; done <"$T/out.$s"
+    done
+}
+
+weights() {
+    model
+    photo "$T/p.ppm" 8 8
+    expect 1 infer --model "$T/absent" "$T/p.ppm" -o "$T/o"
+    says "$T/err" "$T/absent"
+    head -c 5000 "$MODEL" >"$T/short"
+    expect 1 infer --model "$T/short" "$T/p.ppm" -o "$T/o"
+    says "$T/err" "$T/short"
+    lines "$T/err" 1
+    : >"$T/empty"
+    expect 1 infer --model "$T/empty" "$T/p.ppm" -o "$T/o"
+    says "$T/err" "$T/empty"
+    # valid safetensors of something else
+    header='{"w":{"dtype":"F32","shape":[1],"data_offsets":[0,4]}}'
+    { printf "\\$(printf %03o ${#header})\\000\\000\\000\\000\\000\\000\\000"; printf '%s1234' "$header"; } >"$T/other"
+    expect 1 infer --model "$T/other" "$T/p.ppm" -o "$T/o"
+    says "$T/err" "$T/other"
+    expect 1 env LGD_MODEL="$T/absent" "$BIN/lgd-infer" -s 8 "$T/p.ppm" -o "$T/o"
+    says "$T/err" "$T/absent"
+    expect 0 env LGD_MODEL="$T/absent" "$BIN/lgd-infer" -s 8 --model "$MODEL" "$T/p.ppm" -o "$T/o"
+}
+
+model_lookup() {
+    model
+    unset LGD_MODEL
+    photo "$T/p.ppm" 8 8
+    mkdir -p "$T/i/bin" "$T/i/share/lgd"
+    cp "$BIN/lgd-infer" "$T/i/bin"
+    "$T/i/bin/lgd-infer" -i 0 -s 8 "$T/p.ppm" -o "$T/o" >"$T/out" 2>"$T/err"
+    code=$?
+    if [ $code -ne 0 ]; then
+        says "$T/err" "--model"
+        says "$T/err" "LGD_MODEL"
+        lines "$T/err" 1
+    fi
+    cp "$MODEL" "$T/i/share/lgd/single.safetensors"
+    expect 0 "$T/i/bin/lgd-infer" -i 0 -s 8 "$T/p.ppm" -o "$T/o"
+    mkdir -p "$T/j/build/bin" "$T/j/models"
+    cp "$BIN/lgd-infer" "$T/j/build/bin"
+    cp "$MODEL" "$T/j/models/single.safetensors"
+    expect 0 "$T/j/build/bin/lgd-infer" -i 0 -s 8 "$T/p.ppm" -o "$T/o"
+}
+
+poor_photographs() {
+    model
+    photo "$T/black.ppm" 32 32 0
+    photo "$T/white.ppm" 32 32 255
+    expect 0 infer "$T/black.ppm" -o "$T/o"
+    complete "$T/o/black"
+    says "$T/err" "black.ppm: warning"
+    # the writer tints: a white that is white in all channels
+    { printf 'P6\n32 32\n255\n'; head -c 3072 /dev/zero | tr '\000' '\377'; } >"$T/white.ppm"
+    expect 0 infer "$T/white.ppm" -o "$T/o"
+    complete "$T/o/white"
+    says "$T/err" "overexposed"
+    # a little-endian float image, two thirds of it 4.0
+    { printf 'PF\n12 1\n-1.0\n'; for v in 1 2 3 4 5 6 7 8 9 10 11 12; do printf '\000\000\200\100\000\000\200\100\000\000\000\077'; done; } >"$T/bright.pfm"
+    expect 0 infer --size 1 "$T/bright.pfm" -o "$T/o"
+    says "$T/err" "66.7% of the values are above 1"
+}
+
+sizes() {
+    model
+    photo "$T/p.ppm" 20 31
+    for n in 1 2 3 17; do
+        expect 0 infer --size $n "$T/p.ppm" -o "$T/$n"
+        complete "$T/$n/p"
+    done
+    expect 0 "$BIN/lgd-infer" --size 255 -i 1 "$T/p.ppm" -o "$T/255"
+    complete "$T/255/p"
+    says "$T/err" "upsampled"
+    photo "$T/line.ppm" 1 40
+    photo "$T/dot.ppm" 1 1
+    expect 0 infer "$T/line.ppm" "$T/dot.ppm" -o "$T/o"
+    complete "$T/o/line"
+    complete "$T/o/dot"
+}
+
+too_many_pixels() {
+    model
+    printf 'P6\n1000000 1000000\n255\n' >"$T/huge.ppm"
+    expect 1 infer "$T/huge.ppm" -o "$T/o"
+    says "$T/err" "huge.ppm"
+    says "$T/err" "--max-pixels"
+    photo "$T/p.ppm" 10 10
+    expect 1 infer --max-pixels 99 "$T/p.ppm" -o "$T/o"
+    expect 0 infer --max-pixels 100 "$T/p.ppm" -o "$T/o"
+}
+
+comma_locale() {
+    model
+    if ! locale -a 2>/dev/null | grep -qi '^de_DE.utf-\?8$'; then
+        localedef -i de_DE -f UTF-8 "$T/de_DE.UTF-8" 2>/dev/null || skip "there is no comma-decimal locale and none can be made"
+        export LOCPATH="$T"
+    fi
+    photo "$T/p.ppm" 24 24
+    expect 0 infer "$T/p.ppm" -o "$T/c"
+    cp "$T/err" "$T/plain"
+    expect 0 env LC_ALL=de_DE.UTF-8 "$BIN/lgd-infer" --size 32 --iterations 1 "$T/p.ppm" -o "$T/de"
+    cmp -s "$T/err" "$T/plain" || fail "other words: $(cat "$T/err")"
+    for f in $FILES; do cmp -s "$T/c/p/$f" "$T/de/p/$f" || fail "$f differs"; done
+}
+
+directx_normals() {
+    model
+    photo "$T/p.ppm" 16 16
+    expect 0 infer "$T/p.ppm" -o "$T/gl"
+    expect 0 infer --normal dx "$T/p.ppm" -o "$T/dx"
+    if cmp -s "$T/gl/p/normal.png" "$T/dx/p/normal.png"; then fail "the normals are the same"; fi
+    for f in diffuse.png specular.png roughness.png render.png preview.png; do cmp -s "$T/gl/p/$f" "$T/dx/p/$f" || fail "$f differs"; done
+}
+
+instruction_sets() {
+    photo "$T/p.ppm" 8 8
+    expect 2 env LGD_ISA=mmx "$BIN/lgd-infer" "$T/p.ppm" -o "$T/o"
+    says "$T/err" "mmx"
+    model
+    expect 0 env LGD_ISA=base "$BIN/lgd-infer" -s 8 "$T/p.ppm" -o "$T/o"
+    complete "$T/o/p"
+}
+
+all_photographs() {
+    [ -d "$TESTDATA/photos" ] || skip "$TESTDATA/photos is absent"
+    model
+    n=$(ls "$TESTDATA/photos" | wc -l)
+    expect 0 "$BIN/lgd-infer" --size 64 "$TESTDATA"/photos/* -o "$T/o"
+    lines "$T/out" "$n"
+    [ "$(ls -A "$T/o" | wc -l)" -eq "$n" ] || fail "$n photographs, $(ls -A "$T/o" | wc -l) folders"
+    while read -r folder; do complete "$folder"; done <"$T/out"
+    [ "$(grep -c 'reconstruction RMSE' "$T/err")" -eq "$n" ] || fail "not every photograph has its figures"
+    awk '/reconstruction RMSE/ { for (i = 1; i <= NF; i++) if ($i == "RMSE") { a += $(i + 1); b += $(i + 4) } } END { exit !(b < a && a > 0) }' "$T/err" ||
+        fail "refinement does not bring the renderings nearer to the photographs"
+}
+
+check infer_help_names_the_options help_names_the_options
+check infer_wrong_usage wrong_usage
+check infer_whole_run whole_run
+check infer_threads_agree threads_agree
+check infer_old_results_are_replaced old_results
+check infer_bad_photographs_do_not_stop_the_rest bad_ones_do_not_stop
+check infer_same_stem same_stem
+check infer_odd_stems odd_stems
+check infer_output_beside_input output_beside_input
+check infer_unwritable_output unwritable_output
+check infer_full_disk full_disk
+check infer_full_file_system full_file_system
+check infer_closed_pipe closed_pipe
+check infer_interrupted interrupted
+check infer_weights_of_another_kind weights
+check infer_model_lookup model_lookup
+check infer_poor_photographs poor_photographs
+check infer_sizes sizes
+check infer_too_many_pixels too_many_pixels
+check infer_comma_locale comma_locale
+check infer_directx_normals directx_normals
+check infer_instruction_sets instruction_sets
+check infer_all_photographs all_photographs

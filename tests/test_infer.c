@@ -1,0 +1,282 @@
+/* The public C API. */
+#include "infer/lgd.h"
+#include "infer/memory.h"
+#include "nn/weights.h"
+#include "render/scene.h"
+#include "tensor/maps.h"
+#include "tests/test.h"
+#include <math.h>
+#include <string.h>
+
+enum { SIDE = 24, T = 3, VALUES = SIDE * SIDE * MAP_CHANNELS };
+
+static nn_arch tiny(void)
+{
+    nn_arch a = nn_arch_default();
+    a.g_width = 4;
+    a.g_width_max = 8;
+    a.g_levels = 2;
+    a.g_size = 16;
+    a.h_width = 8;
+    a.h_gru = 4;
+    a.iterations = T;
+    return a;
+}
+
+/* A model with random weights, through a file. The last layer of h is made large enough for a step to be seen. */
+static lgd_model *load(nn_arch a)
+{
+    char path[256];
+    ts_status st = {0};
+    snprintf(path, sizeof path, "%s/tiny.safetensors", test_folder());
+    nn_model *m = nn_model_create(&a, &st);
+    CHECK(m, "%s", st.message);
+    nn_model_init(m, 7);
+    size_t first, last;
+    nn_model_range(m, true, &first, &last);
+    ts_rng rng = ts_rng_make(3, TS_STREAM_TEST, 0);
+    for (size_t i = first; i < last; i++) m->value[i] += ts_rng_range(&rng, -0.05f, 0.05f);
+    CHECK(nn_model_save(m, m->value, path, NULL, 0, &st) == TS_OK, "%s", st.message);
+    nn_model_free(&m);
+    lgd_error e;
+    lgd_model *loaded = lgd_load(path, &e);
+    CHECK(loaded && e.code == 0 && !e.message[0], "%s", e.message);
+    return loaded;
+}
+
+static void make_image(float *image, int side)
+{
+    ts_rng rng = ts_rng_make(11, TS_STREAM_TEST, (uint64_t)side);
+    for (int i = 0; i < side * side * 3; i++) image[i] = 0.2f + 0.6f * ts_rng_uniform(&rng);
+}
+
+typedef struct trace {
+    int calls, stop_at, step[16];
+    double rmse[16];
+} trace;
+
+static int record(int step, double rmse, void *user)
+{
+    trace *t = user;
+    CHECK(t->calls < 16, "more calls than steps");
+    t->step[t->calls] = step;
+    t->rmse[t->calls++] = rmse;
+    return step == t->stop_at;
+}
+
+static void run(lgd_model *m, const float *image, int side, int iterations, int threads, trace *t, float *maps)
+{
+    lgd_error e = {.code = 77};
+    const lgd_options o = {.iterations = iterations, .threads = threads, .progress = t ? record : NULL, .user = t};
+    CHECK(lgd_estimate(m, image, side, &o, maps, &e) == 0 && e.code == 0 && !e.message[0], "%s", e.message);
+}
+
+TEST(infer_progress_sees_every_step)
+{
+    static float image[SIDE * SIDE * 3], maps[VALUES];
+    lgd_model *m = load(tiny());
+    make_image(image, SIDE);
+    CHECK(lgd_trained_iterations(m) == T, "trained for %d", lgd_trained_iterations(m));
+    for (int n = -1; n <= 5; n++) {
+        trace t = {.stop_at = -1};
+        run(m, image, SIDE, n, 1, &t, maps);
+        CHECK(t.calls == (n < 0 ? T : n) + 1, "%d calls for %d iterations", t.calls, n);
+        for (int i = 0; i < t.calls; i++) CHECK(t.step[i] == i && t.rmse[i] > 0 && t.rmse[i] < 1, "call %d: step %d, rmse %g", i, t.step[i], t.rmse[i]);
+    }
+    lgd_free(&m);
+    CHECK(!m, "lgd_free leaves the pointer");
+    lgd_free(&m);
+    lgd_free(NULL);
+}
+
+TEST(infer_stopping_at_a_step_is_asking_for_that_many)
+{
+    static float image[SIDE * SIDE * 3], stopped[VALUES], asked[VALUES], previous[VALUES];
+    lgd_model *m = load(tiny());
+    make_image(image, SIDE);
+    for (int n = 0; n < T; n++) {
+        trace t = {.stop_at = n};
+        run(m, image, SIDE, T, 1, &t, stopped);
+        CHECK(t.calls == n + 1, "%d calls after a stop at %d", t.calls, n);
+        run(m, image, SIDE, n, 1, NULL, asked);
+        CHECK(memcmp(stopped, asked, sizeof asked) == 0, "stopped at %d differs from %d iterations", n, n);
+        CHECK(n == 0 || memcmp(asked, previous, sizeof asked) != 0, "step %d changes nothing", n);
+        memcpy(previous, asked, sizeof asked);
+    }
+    lgd_free(&m);
+}
+
+TEST(infer_same_bytes_for_any_threads_and_again)
+{
+    static float image[SIDE * SIDE * 3], one[VALUES], other[VALUES], small[9 * 3], small_maps[9 * MAP_CHANNELS];
+    lgd_model *m = load(tiny());
+    make_image(image, SIDE);
+    make_image(small, 3);
+    run(m, image, SIDE, T, 1, NULL, one);
+    for (int threads = 0; threads <= 3; threads++) {
+        run(m, small, 3, 1, threads, NULL, small_maps); /* another size in between leaves nothing behind */
+        run(m, image, SIDE, T, threads, NULL, other);
+        CHECK(memcmp(one, other, sizeof one) == 0, "%d threads give other bytes", threads);
+    }
+    lgd_free(&m);
+}
+
+static bool in_range(const float *maps, int side)
+{
+    for (int i = 0; i < side * side; i++) {
+        const float *p = maps + i * MAP_CHANNELS;
+        for (int c = 0; c < MAP_CHANNELS; c++) {
+            const bool normal = c == MAP_NORMAL || c == MAP_NORMAL + 1;
+            if (!(p[c] >= (normal ? -1 : 0) && p[c] <= 1)) return false;
+        }
+        if (p[MAP_NORMAL] * p[MAP_NORMAL] + p[MAP_NORMAL + 1] * p[MAP_NORMAL + 1] > 1) return false;
+    }
+    return true;
+}
+
+TEST(infer_any_image_of_any_size_gives_maps)
+{
+    static float image[35 * 35 * 3], maps[35 * 35 * MAP_CHANNELS];
+    static const int sizes[] = {1, 2, 3, 5, 16, 17, 35};
+    static const float values[] = {0, 1, 0.5f, 1e-30f, 1e30f, -3, NAN, INFINITY, -INFINITY};
+    lgd_model *m = load(tiny());
+    for (size_t s = 0; s < sizeof sizes / sizeof *sizes; s++)
+        for (size_t v = 0; v < sizeof values / sizeof *values; v++) {
+            const int side = sizes[s];
+            trace t = {.stop_at = -1};
+            for (int i = 0; i < side * side * 3; i++) image[i] = values[v];
+            run(m, image, side, 2, 1, &t, maps);
+            CHECK(in_range(maps, side), "an image of %g with side %d gives maps out of range", (double)values[v], side);
+            for (int i = 0; i < t.calls; i++) CHECK(isfinite(t.rmse[i]), "rmse %g for an image of %g", t.rmse[i], (double)values[v]);
+        }
+    lgd_free(&m);
+}
+
+TEST(infer_bad_pixels_count_as_black_and_bright_ones_as_one)
+{
+    static float clean[SIDE * SIDE * 3], dirty[SIDE * SIDE * 3], a[VALUES], b[VALUES];
+    lgd_model *m = load(tiny());
+    make_image(clean, SIDE);
+    for (int i = 0; i < SIDE * SIDE * 3; i += 7) clean[i] = i % 2 ? 0 : 1;
+    memcpy(dirty, clean, sizeof dirty);
+    static const float black[] = {NAN, -5, INFINITY, -INFINITY, -0.0f};
+    for (int i = 0; i < SIDE * SIDE * 3; i += 7) dirty[i] = i % 2 ? black[i % 5] : 1 + (float)i;
+    run(m, clean, SIDE, T, 1, NULL, a);
+    run(m, dirty, SIDE, T, 1, NULL, b);
+    CHECK(memcmp(a, b, sizeof a) == 0, "the same photograph gives other maps");
+    lgd_free(&m);
+}
+
+/* The reported error is that of the rendering that lgd_render makes of the returned maps. */
+TEST(infer_reported_rmse_is_that_of_the_rendering)
+{
+    static float image[SIDE * SIDE * 3], maps[VALUES], again[SIDE * SIDE * 3];
+    const float flash[3] = {0, 0, RD_FLASH_DISTANCE};
+    lgd_model *m = load(tiny());
+    make_image(image, SIDE);
+    for (int n = 0; n <= T; n++) {
+        trace t = {.stop_at = -1};
+        lgd_error e;
+        run(m, image, SIDE, n, 1, &t, maps);
+        CHECK(lgd_render(maps, SIDE, flash, flash, RD_FLASH_POWER, again, &e) == 0, "%s", e.message);
+        double sum = 0;
+        for (int i = 0; i < SIDE * SIDE * 3; i++) sum += pow(fmin(again[i], 1) - image[i], 2);
+        const double rmse = sqrt(sum / (SIDE * SIDE * 3));
+        CHECK(fabs(rmse - t.rmse[n]) < 1e-4, "step %d: reported %g, rendered %g", n, t.rmse[n], rmse);
+    }
+    lgd_free(&m);
+}
+
+TEST(infer_render_is_linear_in_power_and_dark_below)
+{
+    static float image[SIDE * SIDE * 3], maps[VALUES], a[SIDE * SIDE * 3], b[SIDE * SIDE * 3];
+    const float light[3] = {0.2f, -0.3f, 0.8f}, below[3] = {0.2f, -0.3f, -0.8f}, camera[3] = {0, 0, 1};
+    lgd_model *m = load(tiny());
+    lgd_error e;
+    make_image(image, SIDE);
+    run(m, image, SIDE, 0, 1, NULL, maps);
+    for (int i = 0; i < SIDE * SIDE; i++) maps[i * MAP_CHANNELS + MAP_NORMAL] = maps[i * MAP_CHANNELS + MAP_NORMAL + 1] = 0;
+    CHECK(lgd_render(maps, SIDE, light, camera, 2, a, &e) == 0 && lgd_render(maps, SIDE, light, camera, 6, b, &e) == 0, "%s", e.message);
+    double total = 0;
+    for (int i = 0; i < SIDE * SIDE * 3; i++) {
+        CHECK(fabsf(b[i] - 3 * a[i]) <= 1e-5f * b[i], "%g is not 3 x %g", (double)b[i], (double)a[i]);
+        total += a[i];
+    }
+    CHECK(total > 0, "the light shows nothing");
+    CHECK(lgd_render(maps, SIDE, below, camera, 2, a, &e) == 0, "%s", e.message);
+    for (int i = 0; i < SIDE * SIDE * 3; i++) CHECK(a[i] == 0, "light from below shows %g", (double)a[i]);
+    lgd_free(&m);
+}
+
+TEST(infer_wrong_arguments_are_named)
+{
+    static float image[4 * 3], maps[4 * MAP_CHANNELS];
+    const float p[3] = {0, 0, 1}, bad[3] = {0, NAN, 1};
+    lgd_model *m = load(tiny());
+    static const struct {
+        int side, iterations, threads;
+        const char *word;
+    } wrong[] = {{0, 1, 1, "side"}, {-3, 1, 1, "side"}, {1 << 30, 1, 1, "side"}, {2, -2, 1, "iterations"}, {2, 1 << 20, 1, "iterations"}, {2, 1, -1, "threads"}, {2, 1, 1 << 20, "threads"}};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        lgd_error e = {0};
+        const lgd_options o = {.iterations = wrong[i].iterations, .threads = wrong[i].threads};
+        CHECK(lgd_estimate(m, image, wrong[i].side, &o, maps, &e) != 0 && strstr(e.message, wrong[i].word), "case %zu: '%s'", i, e.message);
+    }
+    lgd_error e = {0};
+    CHECK(lgd_estimate(NULL, image, 2, NULL, maps, &e) == TS_INVALID, "no model is taken");
+    CHECK(lgd_estimate(m, NULL, 2, NULL, maps, &e) == TS_INVALID, "no image is taken");
+    CHECK(lgd_estimate(m, image, 2, NULL, NULL, NULL) == TS_INVALID, "no maps are taken");
+    CHECK(lgd_estimate(m, image, 2, NULL, maps, &e) == 0 && !e.message[0], "the defaults: %s", e.message);
+    CHECK(lgd_render(maps, 2, p, p, 1, image, &e) == 0, "%s", e.message);
+    CHECK(lgd_render(NULL, 2, p, p, 1, image, &e) == TS_INVALID && lgd_render(maps, 0, p, p, 1, image, &e) == TS_INVALID, "render takes anything");
+    CHECK(lgd_render(maps, 2, bad, p, 1, image, &e) == TS_INVALID && lgd_render(maps, 2, p, p, -1, image, &e) == TS_INVALID, "render takes any light");
+    CHECK(!lgd_load(NULL, &e) && e.code == TS_INVALID, "no file is loaded");
+    lgd_free(&m);
+}
+
+TEST(infer_load_names_a_bad_file)
+{
+    char path[256];
+    lgd_error e = {0};
+    snprintf(path, sizeof path, "%s/absent.safetensors", test_folder());
+    CHECK(!lgd_load(path, &e) && e.code == TS_IO && strstr(e.message, path), "absent: '%s'", e.message);
+    FILE *f = fopen(path, "w");
+    CHECK(f && fputs("these are not weights at all, but they are long enough for a header", f) >= 0 && fclose(f) == 0, "cannot write %s", path);
+    CHECK(!lgd_load(path, &e) && e.code == TS_FORMAT && strstr(e.message, path), "text: '%s'", e.message);
+    CHECK(!strchr(e.message, '\n'), "more than a line: '%s'", e.message);
+}
+
+TEST(infer_without_a_refiner_only_the_first_estimate)
+{
+    static float image[SIDE * SIDE * 3], maps[VALUES];
+    nn_arch a = tiny();
+    a.h_width = a.iterations = 0;
+    lgd_model *m = load(a);
+    make_image(image, SIDE);
+    trace t = {.stop_at = -1};
+    run(m, image, SIDE, -1, 1, &t, maps);
+    CHECK(t.calls == 1 && in_range(maps, SIDE), "%d calls", t.calls);
+    lgd_error e;
+    const lgd_options o = {.iterations = 1};
+    CHECK(lgd_estimate(m, image, SIDE, &o, maps, &e) == TS_UNSUPPORTED && strstr(e.message, "refiner"), "'%s'", e.message);
+    lgd_free(&m);
+}
+
+TEST(infer_ten_channels_give_nine_maps)
+{
+    static float image[SIDE * SIDE * 3], maps[VALUES];
+    nn_arch a = tiny();
+    a.channels = 10;
+    lgd_model *m = load(a);
+    make_image(image, SIDE);
+    run(m, image, SIDE, 2, 1, NULL, maps);
+    CHECK(in_range(maps, SIDE), "maps out of range");
+    lgd_free(&m);
+}
+
+TEST(infer_more_memory_than_there_is_is_refused)
+{
+    ts_status st = {0};
+    CHECK(lgd_memory_check(1, &st) == TS_OK, "one byte: %s", st.message);
+    CHECK(lgd_memory_check(1e18, &st) == TS_NOMEM && strstr(st.message, "1000000000.0 GB"), "'%s'", st.message);
+}
