@@ -21,7 +21,7 @@ enum { AG_MAX_INPUTS = 8 };
 
 struct ag_value {
     ts_tensor t;      /* contiguous */
-    float *grad;      /* the same shape, or NULL while no gradient has reached it */
+    float *grad;      /* the same shape, or NULL while no gradient has reached it; only a parameter's is of use after ag_backward */
     bool needs_grad;  /* a parameter, or made from one */
     bool grad_ready;  /* grad holds values to be added to (false: the next writer overwrites) */
 };
@@ -80,7 +80,8 @@ float *ag_grad_target(ag_tape *tape, ag_value *v, bool *accumulate);
 /* The same, always to be added to (zeros were put there when it was fresh). */
 float *ag_grad_add(ag_tape *tape, ag_value *v);
 
-/* d loss / d parameter is added to every parameter's grad. loss: one value. Returns the tape's code. */
+/* d loss / d parameter is added to every parameter's grad. loss: one value. Returns the tape's code. May be called again, for
+ * another loss or the same one: the gradients of all calls add up. */
 ts_code ag_backward(ag_tape *tape, ag_value *loss);
 
 /* Packed weights of a convolution, made once per reset (or once for all after ag_freeze(tape, true)). Keyed by weight

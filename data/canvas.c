@@ -21,7 +21,8 @@ bool cv_chance(io_canvas *c, float p) { return ts_rng_uniform(&c->rng) < p; }
 
 nz_frame cv_frame(io_canvas *c, float scale, float stretch, float turns)
 {
-    nz_frame f = {c->count, cv_plane(c), cv_plane(c), scale * nz_max(1, 1 / stretch) * c->pixel};
+    float *u = cv_plane(c), *v = cv_plane(c);
+    nz_frame f = {c->count, u, v, scale * nz_max(1, 1 / stretch) * c->pixel};
     float cosine = cosf(turns * 6.2831853f) * scale, sine = sinf(turns * 6.2831853f) * scale, down = 1 / stretch;
     float u0 = cv_range(c, -50, 50), v0 = cv_range(c, -50, 50);
     const float *x = c->x, *y = c->y;

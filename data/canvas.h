@@ -32,6 +32,9 @@ enum { CANVAS_PAINTED = 8, CANVAS_ALL = 2 + CANVAS_PAINTED + CANVAS_PLANES };
 
 float *cv_plane(io_canvas *c);        /* the next scratch plane, contents undefined; cv_drop gives the last ones back */
 void cv_drop(io_canvas *c, int mark); /* mark = an earlier c->used */
+
+/* What draws from c->rng: these, and every function below and in palette.h and weathering.h that calls them. C leaves open in which order
+ * operands, arguments and initialisers are evaluated, so no two of them may draw: name the numbers first. (&&, || and ?: have an order.) */
 uint32_t cv_seed(io_canvas *c);
 float cv_range(io_canvas *c, float lo, float hi);
 float cv_log_range(io_canvas *c, float lo, float hi); /* uniform in the logarithm */

@@ -15,17 +15,25 @@ void io_family_brick(io_canvas *c)
     cv_fill(c, &brick);
 
     float rows = cv_log_range(c, 3, 12), turns = cv_chance(c, 0.6f) ? cv_range(c, -0.01f, 0.01f) : cv_range(c, 0, 1);
-    nz_frame straight = cv_frame(c, rows, 1, turns), f = cv_bend(c, straight, cv_range(c, 0.6f, 1.5f), 3, cv_log_range(c, 0.008f, 0.06f));
-    nz_brick_shape shape = {cv_range(c, 1.8f, 3.4f), cv_chance(c, 0.75f) ? 0.5f : cv_range(c, 0, 0.4f), cv_chance(c, 0.2f) ? 1 : 0.04f,
-                            cv_range(c, 0.02f, 0.2f)};
+    nz_frame straight = cv_frame(c, rows, 1, turns);
+    float bend = cv_log_range(c, 0.008f, 0.06f), bend_frequency = cv_range(c, 0.6f, 1.5f);
+    nz_frame f = cv_bend(c, straight, bend_frequency, 3, bend);
+    nz_brick_shape shape;
+    shape.width = cv_range(c, 1.8f, 3.4f);
+    shape.shift = cv_chance(c, 0.75f) ? 0.5f : cv_range(c, 0, 0.4f);
+    shape.loose = cv_chance(c, 0.2f) ? 1 : 0.04f;
+    shape.round = cv_range(c, 0.02f, 0.2f);
     nz_cells cells = cv_cells(c);
-    if (cv_chance(c, 0.1f)) nz_herringbone(f, 2 + ts_rng_int(&c->rng, 2), shape.round, cv_seed(c), cells);
-    else nz_brick(f, shape, cv_seed(c), cells);
+    bool herringbone = cv_chance(c, 0.1f);
+    uint32_t seed = cv_seed(c);
+    if (herringbone) nz_herringbone(f, 2 + ts_rng_int(&c->rng, 2), shape.round, seed, cells);
+    else nz_brick(f, shape, seed, cells);
 
     float unit = 1 / rows, joint = cv_range(c, 0.05f, 0.14f), bevel = cv_range(c, 0.03f, 0.14f) + 0.5f * straight.step,
           depth = cv_range(c, 0.03f, 0.2f);
     if (cv_chance(c, 0.15f)) depth *= -0.3f; /* mortar that bulges out */
-    float *grain = cv_noise(c, f, NZ_SMOOTH, cv_range(c, 1.5f, 4), 5, cv_range(c, 0.5f, 0.65f));
+    float grain_gain = cv_range(c, 0.5f, 0.65f), grain_frequency = cv_range(c, 1.5f, 4);
+    float *grain = cv_noise(c, f, NZ_SMOOTH, grain_frequency, 5, grain_gain);
     float *mask = cv_plane(c), ragged = cv_range(c, 0.005f, 0.03f);
     for (int i = 0; i < c->count; i++) mask[i] = cells.edge[i] + ragged * grain[i];
     float *body = cv_plane(c);
@@ -67,10 +75,12 @@ void io_family_brick(io_canvas *c)
         io_rgb p;
         pal_paint(c, p);
         io_substance paint = pal_dielectric(c, p, cv_range(c, 0.3f, 0.8f));
-        nz_fbm(f, NZ_SMOOTH, cv_range(c, 0.2f, 1), 5, 0.6f, cv_seed(c), pits);
+        seed = cv_seed(c);
+        nz_fbm(f, NZ_SMOOTH, cv_range(c, 0.2f, 1), 5, 0.6f, seed, pits);
         cv_threshold(c, pits, cv_level(cv_range(c, 0.6f, 1)), 0.12f);
         cv_cover(c, pits, 1, &paint);
     }
-    wear_dirt(c, cv_range(c, 0.1f, 0.3f) * unit, cv_range(c, 0, 0.6f));
+    float dirt = cv_range(c, 0, 0.6f), dirt_radius = cv_range(c, 0.1f, 0.3f) * unit;
+    wear_dirt(c, dirt_radius, dirt);
     wear_any(c, 0.7f);
 }

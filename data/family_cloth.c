@@ -66,11 +66,11 @@ void io_family_cloth(io_canvas *c)
     enum { KNITTED = 4, PILED = 5 };
     int weave = ts_rng_int(&c->rng, 6);
     float threads = cv_log_range(c, 8, 60), unit = 1 / threads, fade = nz_smooth(0.55f, 0.28f, threads * c->pixel);
-    nz_frame straight = cv_frame(c, threads,
-                                 weave >= KNITTED     ? cv_range(c, 0.7f, 1.3f)
-                                 : cv_chance(c, 0.7f) ? 1
-                                                      : cv_range(c, 0.6f, 1.6f),
-                                 cv_range(c, 0, 1));
+    float turns = cv_range(c, 0, 1);
+    float stretch = weave >= KNITTED     ? cv_range(c, 0.7f, 1.3f)
+                    : cv_chance(c, 0.7f) ? 1
+                                         : cv_range(c, 0.6f, 1.6f);
+    nz_frame straight = cv_frame(c, threads, stretch, turns);
     nz_frame f = cv_bend(c, straight, 0.05f, 3, cv_range(c, 0.05f, 0.4f));
     float *height = cv_plane(c), *over = cv_plane(c), *gap = cv_plane(c);
     if (weave == KNITTED) knitted(c, f, fade, height, over, gap);
@@ -104,16 +104,19 @@ void io_family_cloth(io_canvas *c)
     cv_roughen(c, gap, 0.15f);
     cv_roughen(c, over, silk ? cv_range(c, -0.15f, 0.15f) : cv_range(c, -0.05f, 0.05f));
     if (cv_chance(c, 0.4f)) { /* folds */
-        nz_frame wide = cv_bend(c, cv_frame(c, cv_range(c, 0.8f, 2.5f), cv_range(c, 1, 4), cv_range(c, 0, 1)), 1, 2, 0.06f);
+        float fold_turns = cv_range(c, 0, 1), fold_stretch = cv_range(c, 1, 4), folds = cv_range(c, 0.8f, 2.5f);
+        nz_frame wide = cv_bend(c, cv_frame(c, folds, fold_stretch, fold_turns), 1, 2, 0.06f);
         float *fold = cv_noise(c, wide, cv_chance(c, 0.5f) ? NZ_RIDGED : NZ_SMOOTH, 1, 3, 0.35f);
         cv_raise(c, fold, cv_log_range(c, 0.003f, 0.03f));
     }
     if (cv_chance(c, 0.15f)) { /* embroidery or print */
         io_rgb d;
         pal_paint(c, d);
-        nz_frame motif = cv_bend(c, cv_frame(c, cv_range(c, 2, 7), 1, cv_range(c, 0, 1)), 1, 2, 0.03f);
+        float motif_turns = cv_range(c, 0, 1), motifs = cv_range(c, 2, 7);
+        nz_frame motif = cv_bend(c, cv_frame(c, motifs, 1, motif_turns), 1, 2, 0.03f);
         nz_cells cells = cv_cells(c);
-        nz_cell(motif, 1, cv_chance(c, 0.5f) ? 0 : 0.5f, 0.5f, cv_seed(c), cells);
+        uint32_t seed = cv_seed(c);
+        nz_cell(motif, 1, cv_chance(c, 0.5f) ? 0 : 0.5f, 0.5f, seed, cells);
         float radius = cv_range(c, 0.15f, 0.4f), petals = cv_range(c, 0, 3);
         for (int i = 0; i < c->count; i++) {
             float x = cells.x[i], y = cells.y[i], d2 = x * x + y * y;

@@ -115,7 +115,8 @@ void io_family_embossed(io_canvas *c)
     cv_roughen(c, relief, cv_range(c, -0.25f, 0.15f));
     cv_shade(c, relief, cv_range(c, -0.1f, 0.5f));
     c->used = 0;
-    nz_frame soft = cv_bend(c, cv_frame(c, cv_range(c, 1, 5), cv_range(c, 1, 3), cv_range(c, 0, 1)), 1, 3, 0.04f);
+    float soft_turns = cv_range(c, 0, 1), soft_stretch = cv_range(c, 1, 3), soft_scale = cv_range(c, 1, 5);
+    nz_frame soft = cv_bend(c, cv_frame(c, soft_scale, soft_stretch, soft_turns), 1, 3, 0.04f);
     float *tone = cv_noise(c, soft, NZ_SMOOTH, 1, 6, 0.65f);
     cv_roughen(c, tone, cv_range(c, 0.01f, 0.1f));
     cv_shade(c, tone, cv_range(c, 0.02f, 0.2f));
@@ -147,7 +148,8 @@ void io_family_plastic(io_canvas *c)
         cv_shade(c, rib, fade * cv_range(c, 0, 0.4f));
         cv_roughen(c, rib, fade * cv_range(c, -0.15f, 0.05f));
     } else if (kind == 2) { /* paper or board: pressed fibres */
-        nz_frame f = cv_bend(c, cv_frame(c, cv_log_range(c, 12, 40), cv_range(c, 1, 5), cv_range(c, 0, 1)), 0.3f, 4, 0.25f);
+        float turns = cv_range(c, 0, 1), stretch = cv_range(c, 1, 5), scale = cv_log_range(c, 12, 40);
+        nz_frame f = cv_bend(c, cv_frame(c, scale, stretch, turns), 0.3f, 4, 0.25f);
         float *fibre = cv_noise(c, f, NZ_RIDGED, 0.6f, 4, 0.7f), *crumple = cv_noise(c, cv_frame(c, cv_range(c, 1, 4), 1, 0), NZ_RIDGED, 1, 4, 0.45f);
         cv_shade(c, fibre, cv_range(c, 0.02f, 0.12f));
         cv_raise(c, fibre, cv_log_range(c, 0.0001f, 0.0008f));
@@ -160,7 +162,8 @@ void io_family_plastic(io_canvas *c)
     } else { /* speckled or marbled in the mass */
         nz_frame f = cv_bend(c, cv_frame(c, cv_log_range(c, 3, 25), 1, 0), 0.8f, 3, 0.05f);
         float *spot = cv_noise(c, f, NZ_SMOOTH, 1, 4, 0.6f);
-        cv_threshold(c, spot, cv_level(cv_range(c, 0.1f, 0.6f)), cv_range(c, 0.1f, 0.6f));
+        float blur = cv_range(c, 0.1f, 0.6f), coverage = cv_range(c, 0.1f, 0.6f);
+        cv_threshold(c, spot, cv_level(coverage), blur);
         cv_tint(c, spot, 1, b);
         cv_roughen(c, spot, cv_range(c, -0.1f, 0.1f));
         cv_raise(c, spot, cv_range(c, 0, 0.001f));

@@ -17,7 +17,8 @@ static void stones(io_canvas *c, float scale, float share, float high)
     io_substance stone = pal_dielectric(c, a, cv_range(c, 0.35f, 0.9f));
     nz_frame f = cv_bend(c, cv_frame(c, scale, 1, cv_range(c, 0, 1)), 0.8f, 3, 0.04f);
     nz_cells cells = cv_cells(c);
-    nz_cell(f, 1, cv_range(c, 0.6f, 1), 0.5f, cv_seed(c), cells);
+    uint32_t seed = cv_seed(c);
+    nz_cell(f, 1, cv_range(c, 0.6f, 1), 0.5f, seed, cells);
     float gap = cv_range(c, 0.02f, 0.12f), wide = cv_range(c, 0.15f, 0.4f), fade = nz_smooth(0.8f, 0.35f, f.step);
     float *tone = cells.x, *shape = cells.near, *fine = cells.y;
     nz_fbm(f, NZ_SMOOTH, 1.5f, 4, 0.6f, cv_seed(c), fine);
@@ -70,13 +71,15 @@ void io_family_ground(io_canvas *c)
     pal_vary(c, a, 0.9f, b);
     io_substance soil = pal_dielectric(c, a, cv_range(c, 0.7f, 1));
     cv_fill(c, &soil);
-    nz_frame plain = cv_frame(c, cv_log_range(c, 1, 4), 1, cv_range(c, 0, 1)), f = cv_bend(c, plain, 1, 4, 0.03f);
-    float lumps = cv_log_range(c, 0.03f, 0.25f) / 6,
-          *relief = cv_noise(c, f, cv_chance(c, 0.3f) ? NZ_BILLOW : NZ_SMOOTH, 1.5f, 7, cv_range(c, 0.48f, 0.62f)), *mask = cv_plane(c);
+    float turns = cv_range(c, 0, 1), plain_scale = cv_log_range(c, 1, 4);
+    nz_frame plain = cv_frame(c, plain_scale, 1, turns), f = cv_bend(c, plain, 1, 4, 0.03f);
+    float lumps = cv_log_range(c, 0.03f, 0.25f) / 6, gain = cv_range(c, 0.48f, 0.62f);
+    float *relief = cv_noise(c, f, cv_chance(c, 0.3f) ? NZ_BILLOW : NZ_SMOOTH, 1.5f, 7, gain), *mask = cv_plane(c);
     int kind = ts_rng_int(&c->rng, 10);
     if (kind < 2) { /* rippled sand */
         float often = cv_range(c, 4, 14), wild = cv_range(c, 0.3f, 1.2f);
-        nz_frame ripple = cv_frame(c, 1, cv_range(c, 1, 3), cv_range(c, 0, 1));
+        float ripple_turns = cv_range(c, 0, 1), ripple_stretch = cv_range(c, 1, 3);
+        nz_frame ripple = cv_frame(c, 1, ripple_stretch, ripple_turns);
         nz_fbm(ripple, NZ_SMOOTH, 1.5f, 4, 0.5f, cv_seed(c), mask);
         for (int i = 0; i < c->count; i++) {
             float t = ripple.u[i] * often + wild * mask[i];
@@ -116,9 +119,11 @@ void io_family_ground(io_canvas *c)
         pal_pick(c, green, PAL_COUNT(green), 0.5f, g);
         pal_vary(c, g, 0.8f, h);
         io_substance moss = pal_dielectric(c, g, cv_range(c, 0.75f, 1));
-        nz_frame tuft = cv_frame(c, cv_log_range(c, 14, 40), cv_range(c, 1, 3), cv_range(c, 0, 1));
+        float tuft_turns = cv_range(c, 0, 1), tuft_stretch = cv_range(c, 1, 3), tufts = cv_log_range(c, 14, 40);
+        nz_frame tuft = cv_frame(c, tufts, tuft_stretch, tuft_turns);
         float *blade = cv_noise(c, tuft, NZ_RIDGED, 1, 3, 0.7f);
-        nz_fbm(f, NZ_SMOOTH, cv_range(c, 0.4f, 1.5f), 6, 0.6f, cv_seed(c), mask);
+        uint32_t seed = cv_seed(c);
+        nz_fbm(f, NZ_SMOOTH, cv_range(c, 0.4f, 1.5f), 6, 0.6f, seed, mask);
         for (int i = 0; i < c->count; i++) mask[i] += 0.25f * blade[i] - 20 * c->height[i];
         cv_threshold(c, mask, cv_level(cv_range(c, 0.1f, 0.8f)), 0.25f);
         cv_cover(c, mask, 1, &moss);

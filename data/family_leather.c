@@ -14,7 +14,8 @@ void io_family_leather(io_canvas *c)
     cv_fill(c, &s);
 
     float scale = cv_log_range(c, 10, 55), unit = 1 / scale, fade = nz_smooth(0.7f, 0.3f, scale * c->pixel);
-    nz_frame straight = cv_frame(c, scale, cv_range(c, 1, 1.7f), cv_range(c, 0, 1)), f = cv_bend(c, straight, 0.3f, 4, cv_range(c, 0.05f, 0.25f));
+    float turns = cv_range(c, 0, 1), stretch = cv_range(c, 1, 1.7f);
+    nz_frame straight = cv_frame(c, scale, stretch, turns), f = cv_bend(c, straight, 0.3f, 4, cv_range(c, 0.05f, 0.25f));
     nz_cells cells = cv_cells(c);
     nz_cell(f, 1, 1, 0, cv_seed(c), cells);
     float wide = cv_range(c, 0.12f, 0.4f), depth = cv_log_range(c, 0.03f, 0.3f) * unit * fade;
@@ -28,7 +29,8 @@ void io_family_leather(io_canvas *c)
     cv_shade(c, pebble, cv_range(c, 0.1f, 0.6f) * fade);
     cv_roughen(c, pebble, -cv_range(c, 0, 0.2f) * fade);
     if (cv_chance(c, 0.6f)) { /* creases over the grain */
-        nz_frame large = cv_bend(c, cv_frame(c, cv_range(c, 1.5f, 5), cv_range(c, 1, 2.5f), cv_range(c, 0, 1)), 1, 3, 0.06f);
+        float crease_turns = cv_range(c, 0, 1), crease_stretch = cv_range(c, 1, 2.5f), creases = cv_range(c, 1.5f, 5);
+        nz_frame large = cv_bend(c, cv_frame(c, creases, crease_stretch, crease_turns), 1, 3, 0.06f);
         float *crease = cv_noise(c, large, NZ_RIDGED, 1, 4, 0.5f);
         for (int i = 0; i < c->count; i++) crease[i] = nz_smooth(0.7f, 1.4f, crease[i]);
         cv_raise(c, crease, -cv_log_range(c, 0.001f, 0.008f));
@@ -41,9 +43,12 @@ void io_family_leather(io_canvas *c)
     cv_shade(c, cloud, cv_range(c, 0.03f, 0.25f));
     cv_roughen(c, cloud, cv_range(c, 0, 0.08f));
     if (cv_chance(c, 0.45f)) { /* quilted, or tiles sewn together */
-        float rows = cv_log_range(c, 1.5f, 6), size = 1 / rows, turns = cv_chance(c, 0.5f) ? 0.125f : cv_range(c, 0, 1);
-        nz_frame sewn = cv_bend(c, cv_frame(c, rows, cv_range(c, 0.8f, 1.3f), turns), 1, 2, 0.015f);
-        nz_brick_shape shape = {cv_chance(c, 0.6f) ? 1 : cv_range(c, 1, 2), cv_chance(c, 0.3f) ? 0.5f : 0, 0, cv_range(c, 0.01f, 0.15f)};
+        float rows = cv_log_range(c, 1.5f, 6), size = 1 / rows, sewn_turns = cv_chance(c, 0.5f) ? 0.125f : cv_range(c, 0, 1);
+        nz_frame sewn = cv_bend(c, cv_frame(c, rows, cv_range(c, 0.8f, 1.3f), sewn_turns), 1, 2, 0.015f);
+        nz_brick_shape shape = {.loose = 0};
+        shape.width = cv_chance(c, 0.6f) ? 1 : cv_range(c, 1, 2);
+        shape.shift = cv_chance(c, 0.3f) ? 0.5f : 0;
+        shape.round = cv_range(c, 0.01f, 0.15f);
         nz_cells piece = cv_cells(c);
         nz_brick(sewn, shape, cv_seed(c), piece);
         float pillow = cv_range(c, 0.1f, 0.5f), high = cv_range(c, 0.02f, 0.2f) * size, seam = cv_range(c, 0.01f, 0.03f),

@@ -7,14 +7,16 @@ static const uint32_t vein[] = {0x6f6b66, 0x8d8578, 0x3f3d3c, 0xa78a5c, 0xb5803f
 
 static void veins(io_canvas *c, const io_rgb second)
 {
-    nz_frame f = cv_bend(c, cv_frame(c, cv_log_range(c, 0.6f, 2.5f), cv_range(c, 1, 3), cv_range(c, 0, 1)), 0.7f, 4, cv_range(c, 0.05f, 0.22f));
+    float bend = cv_range(c, 0.05f, 0.22f), turns = cv_range(c, 0, 1), stretch = cv_range(c, 1, 3), scale = cv_log_range(c, 0.6f, 2.5f);
+    nz_frame f = cv_bend(c, cv_frame(c, scale, stretch, turns), 0.7f, 4, bend);
     float *cloud = cv_noise(c, f, NZ_SMOOTH, 1, 6, 0.6f), *line = cv_plane(c);
     float spread = cv_range(c, 0.1f, 0.5f);
     cv_shade(c, cloud, cv_range(c, 0.03f, 0.25f));
     for (int layer = 0; layer < 3; layer++) {
         io_rgb colour;
         pal_vary(c, second, 0.6f, colour);
-        nz_fbm(f, NZ_RIDGED, (float)(1 << layer) * cv_range(c, 0.4f, 0.8f), 3, 0.3f, cv_seed(c), line);
+        uint32_t seed = cv_seed(c);
+        nz_fbm(f, NZ_RIDGED, (float)(1 << layer) * cv_range(c, 0.4f, 0.8f), 3, 0.3f, seed, line);
         float sharp = cv_range(c, 0.06f, 0.3f) + (float)(1 << layer) * f.step, low = 1.25f - spread;
         for (int i = 0; i < c->count; i++) line[i] = nz_smooth(low, low + sharp * 3, line[i] + 0.25f * cloud[i]);
         cv_tint(c, line, cv_range(c, 0.25f, 0.9f), colour);
@@ -24,7 +26,8 @@ static void veins(io_canvas *c, const io_rgb second)
 
 static void bands(io_canvas *c, const io_rgb second)
 {
-    nz_frame f = cv_bend(c, cv_frame(c, cv_log_range(c, 0.8f, 2.5f), cv_range(c, 1.5f, 4), cv_range(c, 0, 1)), 0.7f, 4, cv_range(c, 0.06f, 0.2f));
+    float bend = cv_range(c, 0.06f, 0.2f), turns = cv_range(c, 0, 1), stretch = cv_range(c, 1.5f, 4), scale = cv_log_range(c, 0.8f, 2.5f);
+    nz_frame f = cv_bend(c, cv_frame(c, scale, stretch, turns), 0.7f, 4, bend);
     float *layer = cv_noise(c, f, NZ_SMOOTH, 0.6f, 3, 0.4f), *mask = cv_plane(c);
     float often = cv_range(c, 1, 4);
     io_rgb third;
@@ -103,7 +106,9 @@ void io_family_marble(io_canvas *c)
     if (cv_chance(c, 0.3f)) { /* slabs with a joint */
         float rows = cv_range(c, 1, 4);
         nz_frame slab = cv_frame(c, rows, 1, cv_chance(c, 0.7f) ? 0 : cv_range(c, 0, 1));
-        nz_brick_shape shape = {cv_range(c, 1, 2), cv_chance(c, 0.5f) ? 0.5f : 0, 0, 0.01f};
+        nz_brick_shape shape = {.loose = 0, .round = 0.01f};
+        shape.width = cv_range(c, 1, 2);
+        shape.shift = cv_chance(c, 0.5f) ? 0.5f : 0;
         nz_cells cells = cv_cells(c);
         nz_brick(slab, shape, cv_seed(c), cells);
         io_rgb joint = {0.05f, 0.045f, 0.04f};

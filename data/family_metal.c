@@ -39,7 +39,8 @@ void io_family_brushed(io_canvas *c)
         cv_roughen(c, bump, 0.04f);
         cv_shade(c, bump, cv_range(c, 0, 0.15f));
     } else if (finish == 3) { /* rolled sheet with dents */
-        nz_frame f = cv_frame(c, cv_range(c, 1, 4), cv_range(c, 1, 3), cv_range(c, 0, 1));
+        float turns = cv_range(c, 0, 1), stretch = cv_range(c, 1, 3), scale = cv_range(c, 1, 4);
+        nz_frame f = cv_frame(c, scale, stretch, turns);
         float *dent = cv_noise(c, f, NZ_SMOOTH, 1, 3, 0.4f);
         cv_raise(c, dent, cv_log_range(c, 0.001f, 0.01f));
         float *spot = cv_noise(c, f, NZ_SMOOTH, 3, 5, 0.7f);
@@ -53,7 +54,10 @@ void io_family_brushed(io_canvas *c)
         cv_shade(c, cloud, cv_range(c, -0.25f, 0.25f));
         cv_shade(c, spot, cv_range(c, 0, 0.12f));
     }
-    if (cv_chance(c, 0.5f)) wear_scratches(c, 5 + ts_rng_int(&c->rng, 60), cv_log_range(c, 0.1f, 1), NULL);
+    if (cv_chance(c, 0.5f)) {
+        float longest = cv_log_range(c, 0.1f, 1);
+        wear_scratches(c, 5 + ts_rng_int(&c->rng, 60), longest, NULL);
+    }
     if (cv_chance(c, 0.4f)) wear_smudges(c, 0.12f);
     wear_any(c, 0.3f);
 }
@@ -78,9 +82,8 @@ void io_family_rust(io_canvas *c)
     io_substance rust = pal_dielectric(c, a, cv_range(c, 0.65f, 1));
     cv_fill(c, &metal);
 
-    float scale = cv_log_range(c, 1.2f, 5);
-    nz_frame f = cv_frame(c, scale, cv_chance(c, 0.3f) ? cv_range(c, 0.3f, 3) : 1, cv_range(c, 0, 1)),
-             bent = cv_bend(c, f, 1, 4, cv_range(c, 0.01f, 0.06f));
+    float scale = cv_log_range(c, 1.2f, 5), turns = cv_range(c, 0, 1), stretch = cv_chance(c, 0.3f) ? cv_range(c, 0.3f, 3) : 1;
+    nz_frame f = cv_frame(c, scale, stretch, turns), bent = cv_bend(c, f, 1, 4, cv_range(c, 0.01f, 0.06f));
     float *cloud = cv_noise(c, bent, NZ_SMOOTH, 2, 5, 0.65f);
     cv_roughen(c, cloud, cv_range(c, 0.01f, 0.08f));
     cv_shade(c, cloud, cv_range(c, 0, 0.2f));
@@ -109,11 +112,15 @@ void io_family_rust(io_canvas *c)
     cv_raise(c, mix, relief * 0.4f);
     cv_raise(c, mask, cv_chance(c, 0.6f) ? relief : -relief);
     if (cv_chance(c, 0.3f)) { /* what the rain washed down */
-        nz_frame down = cv_frame(c, cv_range(c, 8, 20), cv_range(c, 6, 15), 0);
+        float narrow = cv_range(c, 6, 15), often = cv_range(c, 8, 20);
+        nz_frame down = cv_frame(c, often, narrow, 0);
         float *streak = cv_noise(c, down, NZ_SMOOTH, 1, 3, 0.6f);
         cv_threshold(c, streak, cv_range(c, 0.2f, 1.2f), 0.8f);
         cv_cover(c, streak, cv_range(c, 0.2f, 0.7f), &rust);
     }
-    if (cv_chance(c, 0.4f)) wear_scratches(c, 3 + ts_rng_int(&c->rng, 30), cv_log_range(c, 0.1f, 0.8f), &metal);
+    if (cv_chance(c, 0.4f)) {
+        float longest = cv_log_range(c, 0.1f, 0.8f);
+        wear_scratches(c, 3 + ts_rng_int(&c->rng, 30), longest, &metal);
+    }
     wear_any(c, 0.6f);
 }

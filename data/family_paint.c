@@ -44,7 +44,8 @@ static void base(io_canvas *c, io_substance *under, nz_frame f)
     }
     cv_fill(c, under);
     int mark = c->used;
-    nz_frame grain = cv_frame(c, cv_range(c, 8, 25), kind == 3 ? 12 : 1, cv_range(c, 0, 1));
+    float turns = cv_range(c, 0, 1), scale = cv_range(c, 8, 25);
+    nz_frame grain = cv_frame(c, scale, kind == 3 ? 12 : 1, turns);
     float *fine = cv_noise(c, grain, NZ_SMOOTH, 1, 4, 0.65f), *tone = cv_noise(c, f, NZ_SMOOTH, 1.5f, 5, 0.6f);
     cv_shade(c, fine, cv_range(c, 0.05f, 0.2f));
     cv_shade(c, tone, cv_range(c, 0.05f, 0.25f));
@@ -55,16 +56,18 @@ static void base(io_canvas *c, io_substance *under, nz_frame f)
 
 void io_family_paint(io_canvas *c)
 {
-    nz_frame plain = cv_frame(c, cv_log_range(c, 1, 4), cv_chance(c, 0.3f) ? cv_range(c, 1.5f, 4) : 1, cv_range(c, 0, 1)),
-             f = cv_bend(c, plain, 1.5f, 4, 0.025f);
+    float turns = cv_range(c, 0, 1), stretch = cv_chance(c, 0.3f) ? cv_range(c, 1.5f, 4) : 1, scale = cv_log_range(c, 1, 4);
+    nz_frame plain = cv_frame(c, scale, stretch, turns), f = cv_bend(c, plain, 1.5f, 4, 0.025f);
     io_substance under;
     base(c, &under, f);
-    float *wear = cv_noise(c, f, NZ_SMOOTH, cv_range(c, 0.6f, 1.5f), 7, cv_range(c, 0.5f, 0.75f)), *edge = cv_plane(c), *coat = cv_plane(c),
-          *mark = cv_plane(c);
+    float wear_gain = cv_range(c, 0.5f, 0.75f), wear_frequency = cv_range(c, 0.6f, 1.5f);
+    float *wear = cv_noise(c, f, NZ_SMOOTH, wear_frequency, 7, wear_gain), *edge = cv_plane(c), *coat = cv_plane(c), *mark = cv_plane(c);
     if (cv_chance(c, 0.4f)) { /* boards or sheets: paint goes first at their borders */
-        nz_frame sheet = cv_frame(c, cv_log_range(c, 1.2f, 6), 1, 0.25f * (float)ts_rng_int(&c->rng, 2));
+        float sheet_turns = 0.25f * (float)ts_rng_int(&c->rng, 2), sheets = cv_log_range(c, 1.2f, 6);
+        nz_frame sheet = cv_frame(c, sheets, 1, sheet_turns);
         nz_cells cells = cv_cells(c);
-        nz_brick(sheet, (nz_brick_shape){cv_chance(c, 0.5f) ? 1000 : cv_range(c, 1, 3), 0.5f, 0, 0.05f}, cv_seed(c), cells);
+        uint32_t seed = cv_seed(c);
+        nz_brick(sheet, (nz_brick_shape){cv_chance(c, 0.5f) ? 1000 : cv_range(c, 1, 3), 0.5f, 0, 0.05f}, seed, cells);
         float gap = cv_range(c, 0.005f, 0.03f), strong = cv_range(c, 0.5f, 2.5f), depth = cv_range(c, 0.005f, 0.03f);
         for (int i = 0; i < c->count; i++) {
             edge[i] = strong * nz_smooth(0.15f, 0, cells.edge[i]);
@@ -97,7 +100,8 @@ void io_family_paint(io_canvas *c)
         }
     }
     /* The last coat: brush marks or orange skin, faded in patches. */
-    nz_frame brush = cv_frame(c, cv_log_range(c, 10, 40), cv_chance(c, 0.5f) ? cv_range(c, 8, 30) : 1, cv_range(c, 0, 1));
+    float brush_turns = cv_range(c, 0, 1), brush_stretch = cv_chance(c, 0.5f) ? cv_range(c, 8, 30) : 1, brush_scale = cv_log_range(c, 10, 40);
+    nz_frame brush = cv_frame(c, brush_scale, brush_stretch, brush_turns);
     brush.step = nz_min(brush.step, 0.5f);
     float *stroke = cv_noise(c, brush, NZ_SMOOTH, 0.5f, 3, 0.5f);
     for (int i = 0; i < c->count; i++) stroke[i] *= coat[i];
@@ -108,6 +112,9 @@ void io_family_paint(io_canvas *c)
     cv_shade(c, mark, cv_range(c, 0, 0.15f));
     cv_roughen(c, mark, cv_range(c, 0, 0.1f));
     c->used = 0;
-    if (cv_chance(c, 0.5f)) wear_scratches(c, 4 + ts_rng_int(&c->rng, 50), cv_log_range(c, 0.1f, 0.9f), &under);
+    if (cv_chance(c, 0.5f)) {
+        float longest = cv_log_range(c, 0.1f, 0.9f);
+        wear_scratches(c, 4 + ts_rng_int(&c->rng, 50), longest, &under);
+    }
     wear_any(c, 0.6f);
 }

@@ -32,8 +32,11 @@ void io_family_panels(io_canvas *c)
 
     float rows = cv_log_range(c, 1, 5), unit = 1 / rows;
     nz_frame f = cv_frame(c, rows, 1, cv_chance(c, 0.75f) ? 0.25f * (float)ts_rng_int(&c->rng, 2) : cv_range(c, 0, 1));
-    nz_brick_shape shape = {cv_range(c, 0.6f, 2.5f), cv_chance(c, 0.5f) ? 0.5f : 0, cv_chance(c, 0.3f) ? 1 : 0,
-                            cv_chance(c, 0.5f) ? 0.02f : cv_range(c, 0.05f, 0.25f)};
+    nz_brick_shape shape;
+    shape.width = cv_range(c, 0.6f, 2.5f);
+    shape.shift = cv_chance(c, 0.5f) ? 0.5f : 0;
+    shape.loose = cv_chance(c, 0.3f) ? 1 : 0;
+    shape.round = cv_chance(c, 0.5f) ? 0.02f : cv_range(c, 0.05f, 0.25f);
     nz_cells cells = cv_cells(c);
     nz_brick(f, shape, cv_seed(c), cells);
     float e = f.step, gap = cv_range(c, 0.006f, 0.03f), bevel = cv_range(c, 0.01f, 0.05f) + 0.5f * e, depth = cv_range(c, 0.008f, 0.04f) * unit;
@@ -103,14 +106,16 @@ void io_family_panels(io_canvas *c)
     for (int i = 0; i < c->count; i++) a[i] = nz_smooth(gap + 0.6f * e, gap - 0.4f * e, cells.edge[i]);
     cv_cover(c, a, 1, &hole);
     c->used = 0;
-    nz_frame soft = cv_frame(c, cv_range(c, 2, 6), cv_range(c, 1, 3), 0.25f * (float)ts_rng_int(&c->rng, 2));
+    float soft_turns = 0.25f * (float)ts_rng_int(&c->rng, 2), soft_stretch = cv_range(c, 1, 3), soft_scale = cv_range(c, 2, 6);
+    nz_frame soft = cv_frame(c, soft_scale, soft_stretch, soft_turns);
     float *tone = cv_noise(c, soft, NZ_SMOOTH, 1, 6, 0.7f);
     cv_roughen(c, tone, cv_range(c, 0.01f, 0.08f));
     cv_shade(c, tone, cv_range(c, 0, 0.12f));
     c->used = 0;
     if (cv_chance(c, 0.5f)) {
         io_substance bare = pal_metal(c, cv_range(c, 0.2f, 0.5f));
-        wear_edges(c, cv_range(c, 0.008f, 0.02f), cv_range(c, 0, 0.6f), &bare);
+        float worn = cv_range(c, 0, 0.6f), edge_radius = cv_range(c, 0.008f, 0.02f);
+        wear_edges(c, edge_radius, worn, &bare);
     }
     if (cv_chance(c, 0.4f)) wear_dirt(c, 0.02f, cv_range(c, 0, 0.6f));
     wear_any(c, 0.4f);

@@ -16,17 +16,27 @@ void io_family_paving(io_canvas *c)
 
     float rows = cv_log_range(c, 2, 9), unit = 1 / rows;
     bool coursed = cv_chance(c, 0.5f);
-    nz_frame straight = cv_frame(c, rows, coursed ? 1 : cv_range(c, 0.8f, 1.8f), cv_range(c, 0, 1));
-    nz_frame f = cv_bend(c, straight, cv_range(c, 0.5f, 1.2f), 3, cv_range(c, 0.015f, 0.07f));
+    float turns = cv_range(c, 0, 1), stretch = coursed ? 1 : cv_range(c, 0.8f, 1.8f);
+    nz_frame straight = cv_frame(c, rows, stretch, turns);
+    float bend = cv_range(c, 0.015f, 0.07f), bend_frequency = cv_range(c, 0.5f, 1.2f);
+    nz_frame f = cv_bend(c, straight, bend_frequency, 3, bend);
     nz_cells cells = cv_cells(c);
     if (coursed) {
-        nz_brick_shape shape = {cv_range(c, 0.9f, 1.9f), 0.5f, cv_chance(c, 0.5f) ? 1 : 0.2f, cv_range(c, 0.1f, 0.45f)};
+        nz_brick_shape shape = {.shift = 0.5f};
+        shape.width = cv_range(c, 0.9f, 1.9f);
+        shape.loose = cv_chance(c, 0.5f) ? 1 : 0.2f;
+        shape.round = cv_range(c, 0.1f, 0.45f);
         if (cv_chance(c, 0.15f)) nz_herringbone(f, 2, shape.round, cv_seed(c), cells);
         else nz_brick(f, shape, cv_seed(c), cells);
-    } else nz_cell(f, 1, cv_range(c, 0.5f, 1), cv_chance(c, 0.5f) ? 0.5f : 0, cv_seed(c), cells);
+    } else {
+        uint32_t seed = cv_seed(c);
+        float stagger = cv_chance(c, 0.5f) ? 0.5f : 0, jitter = cv_range(c, 0.5f, 1);
+        nz_cell(f, 1, jitter, stagger, seed, cells);
+    }
 
     float gap = cv_range(c, 0.03f, 0.12f), bevel = cv_range(c, 0.06f, 0.35f), depth = cv_range(c, 0.05f, 0.28f), flat = cv_range(c, 0, 0.6f);
-    float *grain = cv_noise(c, f, NZ_SMOOTH, cv_range(c, 1, 3), 6, cv_range(c, 0.45f, 0.6f)), *top = cv_plane(c);
+    float grain_gain = cv_range(c, 0.45f, 0.6f), grain_frequency = cv_range(c, 1, 3);
+    float *grain = cv_noise(c, f, NZ_SMOOTH, grain_frequency, 6, grain_gain), *top = cv_plane(c);
     float lumpy = cv_log_range(c, 0.004f, 0.035f) * unit, tilt = cv_range(c, 0, 0.12f) * unit, uneven = cv_range(c, 0, 0.06f) * unit;
     for (int i = 0; i < c->count; i++) {
         float e = nz_clamp((cells.edge[i] - gap) / bevel + 0.1f * grain[i] * 0.3f, 0, 1), dome = e * (2 - e), id = cells.id[i];

@@ -38,9 +38,11 @@ void io_family_stone(io_canvas *c)
     for (int i = 0; i < c->count; i++) cut[i] = tone[i] + with_height * relief[i];
     cv_threshold(c, cut, bias, cv_range(c, 0.3f, 1.5f));
     cv_tint(c, cut, 1, b);
-    nz_fbm(bent, NZ_SMOOTH, cv_log_range(c, 1, 5), 5, 0.65f, cv_seed(c), tone);
+    uint32_t seed = cv_seed(c);
+    nz_fbm(bent, NZ_SMOOTH, cv_log_range(c, 1, 5), 5, 0.65f, seed, tone);
     for (int i = 0; i < c->count; i++) cut[i] = tone[i] - 0.3f * relief[i];
-    cv_threshold(c, cut, cv_range(c, 0, 1.2f), cv_range(c, 0.1f, 0.8f));
+    float blur = cv_range(c, 0.1f, 0.8f), edge = cv_range(c, 0, 1.2f);
+    cv_threshold(c, cut, edge, blur);
     cv_tint(c, cut, cv_range(c, 0.3f, 1), d);
     cv_roughen(c, cut, cv_range(c, -0.25f, 0.2f));
     cv_shade(c, fine, cv_range(c, 0.05f, 0.25f));
@@ -73,7 +75,8 @@ void io_family_stone(io_canvas *c)
     if (cv_chance(c, 0.3f)) {
         io_rgb l;
         pal_pick(c, lichen, PAL_COUNT(lichen), 0.5f, l);
-        nz_fbm(bent, NZ_SMOOTH, cv_log_range(c, 0.8f, 4), 6, 0.65f, cv_seed(c), tone);
+        seed = cv_seed(c);
+        nz_fbm(bent, NZ_SMOOTH, cv_log_range(c, 0.8f, 4), 6, 0.65f, seed, tone);
         for (int i = 0; i < c->count; i++) tone[i] += 0.4f * relief[i];
         cv_threshold(c, tone, cv_level(cv_range(c, 0.05f, 0.5f)), 0.25f);
         cv_tint(c, tone, cv_range(c, 0.5f, 1), l);

@@ -29,12 +29,18 @@ void io_family_tile(io_canvas *c)
     nz_frame straight = cv_frame(c, rows, hexagons ? 0.8660254f : 1, turns),
              f = cv_bend(c, straight, 0.5f, 2, cv_chance(c, 0.6f) ? 0.002f : cv_range(c, 0.005f, 0.025f));
     nz_cells cells = cv_cells(c);
-    if (hexagons) nz_cell(f, 1, cv_chance(c, 0.8f) ? 0 : 0.3f, 0.5f, cv_seed(c), cells);
-    else {
-        nz_brick_shape shape = {pattern < 2 ? 1 : cv_range(c, 1.4f, 4), pattern == 3 ? 0.5f : 0, pattern == 1 && cv_chance(c, 0.2f) ? 1 : 0,
-                                cv_chance(c, 0.6f) ? 0.02f : cv_range(c, 0.03f, 0.25f)};
-        if (pattern == 3 && cv_chance(c, 0.4f)) nz_herringbone(f, 2 + ts_rng_int(&c->rng, 3), shape.round, cv_seed(c), cells);
-        else nz_brick(f, shape, cv_seed(c), cells);
+    if (hexagons) {
+        uint32_t seed = cv_seed(c);
+        nz_cell(f, 1, cv_chance(c, 0.8f) ? 0 : 0.3f, 0.5f, seed, cells);
+    } else {
+        nz_brick_shape shape = {.shift = pattern == 3 ? 0.5f : 0};
+        shape.width = pattern < 2 ? 1 : cv_range(c, 1.4f, 4);
+        shape.loose = pattern == 1 && cv_chance(c, 0.2f) ? 1 : 0;
+        shape.round = cv_chance(c, 0.6f) ? 0.02f : cv_range(c, 0.03f, 0.25f);
+        bool herringbone = pattern == 3 && cv_chance(c, 0.4f);
+        uint32_t seed = cv_seed(c);
+        if (herringbone) nz_herringbone(f, 2 + ts_rng_int(&c->rng, 3), shape.round, seed, cells);
+        else nz_brick(f, shape, seed, cells);
     }
     float unit = 1 / rows, gap = cv_range(c, 0.012f, 0.06f), bevel = cv_range(c, 0.015f, 0.1f) + 0.5f * straight.step,
           depth = cv_range(c, 0.01f, 0.07f);

@@ -37,7 +37,8 @@ void io_family_plaster(io_canvas *c)
         for (int i = 0; i < c->count; i++) relief[i] = 0;
         for (int k = 0; k < 3; k++) {
             int mark = c->used;
-            nz_frame f = cv_bend(c, cv_frame(c, cv_log_range(c, 2, 6), cv_range(c, 1.5f, 4), cv_range(c, 0, 1)), 0.7f, 3, 0.05f);
+            float turns = cv_range(c, 0, 1), stretch = cv_range(c, 1.5f, 4), scale = cv_log_range(c, 2, 6);
+            nz_frame f = cv_bend(c, cv_frame(c, scale, stretch, turns), 0.7f, 3, 0.05f);
             float *stroke = cv_noise(c, f, NZ_SMOOTH, 1, 4, 0.5f), *over = cv_noise(c, f, NZ_SMOOTH, 0.6f, 4, 0.5f);
             for (int i = 0; i < c->count; i++) relief[i] = nz_mix(relief[i], 0.4f * stroke[i] + 0.5f, nz_smooth(-0.1f, 0.25f, over[i]));
             cv_drop(c, mark);
@@ -56,7 +57,8 @@ void io_family_plaster(io_canvas *c)
         relief = cv_noise(c, f, cv_chance(c, 0.5f) ? NZ_SMOOTH : NZ_BILLOW, 1, 3, 0.5f);
         cv_raise(c, relief, strong * 0.12f / scale);
     } else { /* scraped: grooves torn by coarse grains */
-        nz_frame f = cv_bend(c, cv_frame(c, cv_log_range(c, 6, 18), cv_range(c, 4, 10), cv_range(c, 0, 1)), 0.5f, 3, 0.1f);
+        float turns = cv_range(c, 0, 1), stretch = cv_range(c, 4, 10), scale = cv_log_range(c, 6, 18);
+        nz_frame f = cv_bend(c, cv_frame(c, scale, stretch, turns), 0.5f, 3, 0.1f);
         relief = cv_noise(c, f, NZ_SMOOTH, 1, 4, 0.6f);
         float low = cv_range(c, 0.3f, 1);
         for (int i = 0; i < c->count; i++) relief[i] = nz_smooth(low + 0.6f, low, relief[i]) + 0.04f * relief[i];
@@ -74,7 +76,8 @@ void io_family_plaster(io_canvas *c)
         io_rgb under;
         pal_pick(c, wash, PAL_COUNT(wash), 0.6f, under);
         io_substance old = pal_dielectric(c, under, cv_range(c, 0.6f, 1));
-        nz_fbm(f, NZ_SMOOTH, cv_range(c, 0.6f, 2), 6, 0.6f, cv_seed(c), wave);
+        uint32_t seed = cv_seed(c);
+        nz_fbm(f, NZ_SMOOTH, cv_range(c, 0.6f, 2), 6, 0.6f, seed, wave);
         for (int i = 0; i < c->count; i++) wave[i] += 0.2f * relief[i];
         cv_threshold(c, wave, cv_level(cv_range(c, 0.05f, 0.5f)), 0.04f);
         cv_cover(c, wave, 1, &old);
@@ -92,7 +95,8 @@ void io_family_concrete(io_canvas *c)
     bool polished = cv_chance(c, 0.2f);
     io_substance s = pal_dielectric(c, a, polished ? cv_range(c, 0.15f, 0.45f) : cv_range(c, 0.6f, 0.95f));
     cv_fill(c, &s);
-    nz_frame f = cv_bend(c, cv_frame(c, cv_log_range(c, 1, 4), 1, cv_range(c, 0, 1)), 1, 3, 0.04f);
+    float turns = cv_range(c, 0, 1), tone_scale = cv_log_range(c, 1, 4);
+    nz_frame f = cv_bend(c, cv_frame(c, tone_scale, 1, turns), 1, 3, 0.04f);
     float *tone = cv_noise(c, f, NZ_SMOOTH, 1, 7, cv_range(c, 0.55f, 0.75f)), *mask = cv_plane(c);
     cv_shade(c, tone, cv_range(c, 0.05f, 0.2f));
     cv_roughen(c, tone, cv_range(c, 0, 0.08f));
@@ -102,7 +106,8 @@ void io_family_concrete(io_canvas *c)
     if (cv_chance(c, 0.6f)) { /* air holes */
         nz_cells cells = cv_cells(c);
         float scale = cv_log_range(c, 6, 25), share = cv_range(c, 0.05f, 0.4f), step = scale * c->pixel;
-        nz_cell(cv_frame(c, scale, 1, 0), 1, 0.9f, 0, cv_seed(c), cells);
+        uint32_t seed = cv_seed(c);
+        nz_cell(cv_frame(c, scale, 1, 0), 1, 0.9f, 0, seed, cells);
         for (int i = 0; i < c->count; i++) {
             float radius = 0.05f + 0.25f * nz_again(cells.id[i], 2) * nz_again(cells.id[i], 2);
             mask[i] = nz_again(cells.id[i], 1) < share ? nz_smooth(radius + 0.5f * step, radius - 0.5f * step, cells.near[i]) : 0;
@@ -131,7 +136,8 @@ void io_family_concrete(io_canvas *c)
         float rows = cv_log_range(c, 1.5f, 8), unit = 1 / rows;
         nz_frame board = cv_frame(c, rows, 1, cv_chance(c, 0.7f) ? 0.25f * (float)ts_rng_int(&c->rng, 2) : cv_range(c, 0, 1));
         nz_cells cells = cv_cells(c);
-        nz_brick(board, (nz_brick_shape){cv_range(c, 2, 20), 0.4f, 1, 0.01f}, cv_seed(c), cells);
+        uint32_t seed = cv_seed(c);
+        nz_brick(board, (nz_brick_shape){cv_range(c, 2, 20), 0.4f, 1, 0.01f}, seed, cells);
         float step = cv_range(c, 0, 0.02f) * unit;
         for (int i = 0; i < c->count; i++) {
             float seam = nz_smooth(0.02f + board.step, 0, cells.edge[i]);
@@ -143,12 +149,14 @@ void io_family_concrete(io_canvas *c)
     }
     if (cv_chance(c, 0.35f)) cracks(c, 0.003f);
     if (cv_chance(c, 0.3f)) { /* water that ran down */
-        nz_frame down = cv_frame(c, cv_range(c, 5, 14), cv_range(c, 5, 12), 0);
+        float narrow = cv_range(c, 5, 12), often = cv_range(c, 5, 14);
+        nz_frame down = cv_frame(c, often, narrow, 0);
         float *streak = cv_noise(c, down, NZ_SMOOTH, 1, 4, 0.6f);
         cv_threshold(c, streak, cv_range(c, 0, 1), 0.8f);
         cv_shade(c, streak, cv_range(c, -0.5f, 0.2f));
     }
-    wear_grain(c, cv_range(c, 20, 50), cv_range(c, 0.03f, 0.12f), 0.03f);
+    float grain_colour = cv_range(c, 0.03f, 0.12f), grain_frequency = cv_range(c, 20, 50);
+    wear_grain(c, grain_frequency, grain_colour, 0.03f);
     if (cv_chance(c, 0.07f)) wear_wet(c, cv_range(c, 0.2f, 0.7f));
     wear_any(c, 0.7f);
 }

@@ -13,7 +13,8 @@ static void bark(io_canvas *c)
     io_substance s = pal_dielectric(c, a, cv_range(c, 0.65f, 0.95f));
     cv_fill(c, &s);
     float scale = cv_log_range(c, 4, 14);
-    nz_frame plain = cv_frame(c, scale, cv_range(c, 2, 6), cv_range(c, -0.08f, 0.08f) + 0.25f * (float)ts_rng_int(&c->rng, 2));
+    float lean = cv_range(c, -0.08f, 0.08f), turns = lean + 0.25f * (float)ts_rng_int(&c->rng, 2), stretch = cv_range(c, 2, 6);
+    nz_frame plain = cv_frame(c, scale, stretch, turns);
     nz_frame f = cv_bend(c, plain, 0.5f, 4, cv_range(c, 0.03f, 0.12f));
     nz_cells cells = cv_cells(c);
     nz_cell(f, 1, 1, 0, cv_seed(c), cells);
@@ -53,14 +54,19 @@ void io_family_wood(io_canvas *c)
           narrow = nz_min(1, rows / 4); /* a wide board has no wider joints */
     nz_frame f = cv_frame(c, rows, 1, cv_chance(c, 0.5f) ? 0.25f * (float)ts_rng_int(&c->rng, 2) : cv_range(c, 0, 1));
     nz_cells cells = cv_cells(c);
-    nz_brick_shape shape = {cv_range(c, 3, 12), cv_range(c, 0.2f, 0.6f), cv_chance(c, 0.5f) ? 1 : 0, 0.02f};
+    nz_brick_shape shape = {.round = 0.02f};
+    shape.width = cv_range(c, 3, 12);
+    shape.shift = cv_range(c, 0.2f, 0.6f);
+    shape.loose = cv_chance(c, 0.5f) ? 1 : 0;
     if (cv_chance(c, 0.12f)) shape = (nz_brick_shape){cv_range(c, 1, 2.5f), 0.5f, 0, 0.02f}; /* parquet blocks */
     bool herringbone = rows > 1 && cv_chance(c, 0.12f);
-    if (herringbone) nz_herringbone(f, 3 + ts_rng_int(&c->rng, 4), 0.02f, cv_seed(c), cells);
-    else nz_brick(f, shape, cv_seed(c), cells);
+    uint32_t seed = cv_seed(c);
+    if (herringbone) nz_herringbone(f, 3 + ts_rng_int(&c->rng, 4), 0.02f, seed, cells);
+    else nz_brick(f, shape, seed, cells);
 
     /* Each plank is cut from another place of the trunk: shift the grain by its number. */
-    float *u = cv_plane(c), *v = cv_plane(c), long_grain = cv_range(c, 6, 16), rings = nz_max(cv_range(c, 1.2f, 3.5f), cv_range(c, 4, 9) / rows);
+    float *u = cv_plane(c), *v = cv_plane(c), long_grain = cv_range(c, 6, 16);
+    float rings_in_patch = cv_range(c, 4, 9), rings = nz_max(cv_range(c, 1.2f, 3.5f), rings_in_patch / rows);
     for (int i = 0; i < c->count; i++) {
         u[i] = (herringbone ? cells.x[i] : f.u[i]) / long_grain + 40 * cells.id[i];
         v[i] = (herringbone ? cells.y[i] : f.v[i]) + 40 * nz_again(cells.id[i], 1);
@@ -73,7 +79,8 @@ void io_family_wood(io_canvas *c)
         nz_cells knot = cv_cells(c);
         nz_frame place = {c->count, cv_plane(c), v, f.step};
         for (int i = 0; i < c->count; i++) place.u[i] = f.u[i] * 0.6f + 40 * cells.id[i];
-        nz_cell(place, cv_range(c, 0.4f, 1), 0.8f, 0, cv_seed(c), knot);
+        seed = cv_seed(c);
+        nz_cell(place, cv_range(c, 0.4f, 1), 0.8f, 0, seed, knot);
         float share = cv_range(c, 0.1f, 0.5f), size = cv_range(c, 0.06f, 0.16f);
         for (int i = 0; i < c->count; i++) {
             float d = knot.near[i] / size, here = nz_again(knot.id[i], 1) < share;

@@ -7,7 +7,8 @@ ts_code io_image_create(io_image *image, int width, int height, int channels, ts
 {
     memset(image, 0, sizeof *image);
     if (width < 1 || height < 1 || channels < 1) return ts_fail(st, TS_INVALID, "image of %d x %d pixels, %d channels", width, height, channels);
-    image->data = calloc((size_t)width * (size_t)height, (size_t)channels * sizeof(float));
+    size_t pixels = (size_t)width * (size_t)height, most = (size_t)1 << 37; /* floats: half a terabyte, beyond which no allocator need be asked */
+    if (pixels <= most / (size_t)channels) image->data = calloc(pixels, (size_t)channels * sizeof(float));
     if (!image->data) return ts_fail(st, TS_NOMEM, "no memory for an image of %d x %d pixels", width, height);
     image->width = width;
     image->height = height;

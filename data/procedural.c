@@ -67,12 +67,15 @@ static void mix(io_canvas *c, const float *base)
     size_t n = (size_t)c->count;
     int dice = ts_rng_int(&c->rng, 10), how = dice < 4 ? 0 : dice < 7 ? 1 : dice < 9 ? 2 : 3;
     nz_frame f = cv_bend(c, cv_frame(c, 1, 1, 0), 3, 3, 0.015f);
-    nz_fbm(f, NZ_SMOOTH, cv_log_range(c, 0.5f, 3), 6, cv_range(c, 0.35f, 0.6f), cv_seed(c), mask);
+    uint32_t seed = cv_seed(c);
+    float gain = cv_range(c, 0.35f, 0.6f), frequency = cv_log_range(c, 0.5f, 3);
+    nz_fbm(f, NZ_SMOOTH, frequency, 6, gain, seed, mask);
     if (how == 1) { /* by height, as sand between stones */
         float *smooth = cv_cavity(c, 0.08f);
         for (int i = 0; i < c->count; i++) mask[i] = 0.4f * mask[i] - 1.6f * smooth[i];
     }
-    cv_threshold(c, mask, cv_level(cv_range(c, 0.25f, 0.75f)), cv_log_range(c, 0.03f, 0.5f));
+    float blur = cv_log_range(c, 0.03f, 0.5f), coverage = cv_range(c, 0.25f, 0.75f);
+    cv_threshold(c, mask, cv_level(coverage), blur);
     bool swap = how == 2, faint = how == 3;
     float share = faint ? cv_range(c, 0.3f, 0.7f) : 1;
     for (int i = 0; i < c->count; i++) {

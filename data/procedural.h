@@ -1,4 +1,6 @@
-/* Procedural SVBRDFs, streamed by (seed, index): the same bytes for any thread count and in any order. */
+/* Procedural SVBRDFs, streamed by (seed, index): the same bytes for any thread count, in any order, from gcc as from clang (plain IEEE arithmetic:
+ * -ffp-contract=off, no -ffast-math), as long as the C library's expf, logf, atan2f and so on are the same: another version of it, or another CPU,
+ * for which it may choose other code, may round them differently. */
 #ifndef IO_PROCEDURAL_H
 #define IO_PROCEDURAL_H
 #include "data/material.h"

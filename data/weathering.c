@@ -85,8 +85,9 @@ void wear_stains(io_canvas *c, float amount)
 {
     int mark = c->used;
     nz_frame f = cv_frame(c, 1, cv_range(c, 0.8f, 1.6f), 0), bent = cv_bend(c, f, 2, 2, 0.02f);
-    float *patch = cv_noise(c, bent, NZ_SMOOTH, cv_log_range(c, 0.8f, 4), 5, cv_range(c, 0.45f, 0.65f));
-    cv_threshold(c, patch, cv_range(c, -0.3f, 1), cv_range(c, 0.2f, 1.5f));
+    float gain = cv_range(c, 0.45f, 0.65f), frequency = cv_log_range(c, 0.8f, 4), *patch = cv_noise(c, bent, NZ_SMOOTH, frequency, 5, gain);
+    float blur = cv_range(c, 0.2f, 1.5f), edge = cv_range(c, -0.3f, 1);
+    cv_threshold(c, patch, edge, blur);
     cv_shade(c, patch, amount * cv_range(c, -0.8f, 0.35f));
     cv_roughen(c, patch, amount * cv_range(c, -0.35f, 0.3f));
     cv_drop(c, mark);
@@ -124,7 +125,8 @@ void wear_wet(io_canvas *c, float coverage)
 void wear_smudges(io_canvas *c, float amount)
 {
     int mark = c->used;
-    nz_frame f = cv_bend(c, cv_frame(c, cv_range(c, 2, 5), cv_range(c, 1, 4), cv_range(c, 0, 1)), 0.7f, 2, 0.08f);
+    float turns = cv_range(c, 0, 1), stretch = cv_range(c, 1, 4), scale = cv_range(c, 2, 5);
+    nz_frame f = cv_bend(c, cv_frame(c, scale, stretch, turns), 0.7f, 2, 0.08f);
     float *smear = cv_noise(c, f, NZ_SMOOTH, 1, 4, 0.6f);
     cv_roughen(c, smear, amount * cv_range(c, 0.3f, 1));
     cv_drop(c, mark);
@@ -134,10 +136,19 @@ void wear_any(io_canvas *c, float harsh)
 {
     cv_drop(c, 0);
     if (cv_chance(c, 0.3f + 0.3f * harsh)) wear_stains(c, cv_range(c, 0.3f, 1));
-    if (cv_chance(c, 0.15f + 0.35f * harsh)) wear_dirt(c, cv_log_range(c, 0.01f, 0.05f), cv_range(c, 0, 0.35f + 0.5f * harsh));
+    if (cv_chance(c, 0.15f + 0.35f * harsh)) {
+        float amount = cv_range(c, 0, 0.35f + 0.5f * harsh), radius = cv_log_range(c, 0.01f, 0.05f);
+        wear_dirt(c, radius, amount);
+    }
     if (cv_chance(c, 0.35f)) wear_smudges(c, 0.08f);
-    if (cv_chance(c, 0.25f)) wear_scratches(c, 2 + ts_rng_int(&c->rng, 25), cv_log_range(c, 0.1f, 0.8f), NULL);
-    if (cv_chance(c, 0.5f)) wear_grain(c, cv_log_range(c, 8, 40), cv_range(c, 0, 0.1f), cv_range(c, 0, 0.05f));
+    if (cv_chance(c, 0.25f)) {
+        float longest = cv_log_range(c, 0.1f, 0.8f);
+        wear_scratches(c, 2 + ts_rng_int(&c->rng, 25), longest, NULL);
+    }
+    if (cv_chance(c, 0.5f)) {
+        float roughness = cv_range(c, 0, 0.05f), colour = cv_range(c, 0, 0.1f), frequency = cv_log_range(c, 8, 40);
+        wear_grain(c, frequency, colour, roughness);
+    }
 }
 
 void wear_calm(io_canvas *c)

@@ -108,6 +108,7 @@ static int all(run *r, const lgd_plan *plan)
             failed++;
             continue;
         }
+        cl_progress_end(&r->bar);
         printf("%s\n", job->folder);
         fflush(stdout); /* a reader at the other end of a pipe gets each folder when it is there */
         if (!c->quiet && r->steps > 0) note(r, "reconstruction RMSE %.4f (R_0) -> %.4f (R_%d)", r->first, r->last, r->steps);

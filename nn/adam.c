@@ -57,11 +57,13 @@ float nn_learning_rate(float rate, float floor, int64_t step, int64_t warmup, in
     return (float)(rate * (floor + (1 - floor) * 0.5 * (1 + cos(3.14159265358979323846 * at))));
 }
 
-void nn_adam_step(nn_adam *adam, nn_model *model, size_t first, size_t last, float rate, float scale)
+void nn_adam_next(nn_adam *adam) { adam->step++; }
+
+void nn_adam_step(const nn_adam *adam, nn_model *model, size_t first, size_t last, float rate, float scale)
 {
     /* The moments start at zero, which the corrections make up for (Kingma and Ba, section 3). The average's memory is short at first, so
      * that the first weights are soon forgotten. */
-    double n = (double)++adam->step, root = sqrt(1 - pow(adam->beta2, n)), ramp = (1 + n) / (10 + n);
+    double n = (double)adam->step, root = sqrt(1 - pow(adam->beta2, n)), ramp = (1 + n) / (10 + n);
     float corrected = (float)(rate * root / (1 - pow(adam->beta1, n))), epsilon = (float)(adam->epsilon * root);
     float decay = ramp < adam->ema_decay ? (float)ramp : adam->ema_decay;
     int64_t chunks = (int64_t)((last - first + CHUNK - 1) / CHUNK);

@@ -16,8 +16,10 @@ void nn_adam_free(nn_adam *adam);
 /* The norm of the gradient block's range [first, last), in double; NaN or infinity when any value is. */
 double nn_gradient_norm(const nn_model *model, size_t first, size_t last);
 
-/* One update of [first, last) with gradients multiplied by scale (for clipping), then the gradients are zeroed. step counts once a call. */
-void nn_adam_step(nn_adam *adam, nn_model *model, size_t first, size_t last, float rate, float scale);
+/* One update of [first, last) with gradients multiplied by scale (for clipping), then the gradients are zeroed. nn_adam_next comes first, once
+ * for all the ranges of an update. */
+void nn_adam_step(const nn_adam *adam, nn_model *model, size_t first, size_t last, float rate, float scale);
+void nn_adam_next(nn_adam *adam);
 
 /* Linear warm-up over warmup steps, then a cosine from rate to rate * floor at total. step counts from 0. */
 float nn_learning_rate(float rate, float floor, int64_t step, int64_t warmup, int64_t total);

@@ -6,51 +6,55 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef enum field_kind { FIELD_INT, FIELD_BOOL, FIELD_RMSE } field_kind;
+typedef enum field_kind { FIELD_INT, FIELD_BOOL, FIELD_WORD } field_kind;
 
 typedef struct field {
     const char *key;
     field_kind kind;
     size_t at;
     int lo, hi, start;
+    const char *const *words; /* FIELD_WORD: its values' names, lo .. hi */
 } field;
+
+static const char *const rmse_words[] = {"start", "batch"}, *const encoding_words[] = {"raw", "asinh"};
+_Static_assert(sizeof(nn_rmse) == sizeof(int) && sizeof(nn_gradient) == sizeof(int), "a word's field is read and written as an int");
 
 /* The upper ends only keep products of sizes far from overflow. The defaults are the model that two cores can train. */
 #define AT(member) offsetof(nn_arch, member)
 static const field fields[] = {
-    {"channels", FIELD_INT, AT(channels), 9, 10, 9},
-    {"g_width", FIELD_INT, AT(g_width), 1, 4096, 16},
-    {"g_width_max", FIELD_INT, AT(g_width_max), 1, 4096, 128},
-    {"g_levels", FIELD_INT, AT(g_levels), 1, NN_MAX_LEVELS, 5},
-    {"g_kernel_first", FIELD_INT, AT(g_kernel_first), 1, 15, 3},
-    {"g_kernel", FIELD_INT, AT(g_kernel), 1, 15, 3},
-    {"g_size", FIELD_INT, AT(g_size), 2, 8192, 64},
-    {"h_width", FIELD_INT, AT(h_width), 0, 4096, 64},
-    {"h_gru", FIELD_INT, AT(h_gru), 1, 1024, 32},
-    {"iterations", FIELD_INT, AT(iterations), 0, 1000, 6},
-    {"recurrent", FIELD_BOOL, AT(recurrent), 0, 1, true},
-    {"gradient", FIELD_BOOL, AT(gradient), 0, 1, true},
-    {"mean_before_norm", FIELD_BOOL, AT(mean_before_norm), 0, 1, true},
-    {"rmse", FIELD_RMSE, AT(rmse), NN_RMSE_START, NN_RMSE_BATCH, NN_RMSE_START},
+    {"channels", FIELD_INT, AT(channels), 9, 10, 9, NULL},
+    {"g_width", FIELD_INT, AT(g_width), 1, 4096, 16, NULL},
+    {"g_width_max", FIELD_INT, AT(g_width_max), 1, 4096, 128, NULL},
+    {"g_levels", FIELD_INT, AT(g_levels), 1, NN_MAX_LEVELS, 5, NULL},
+    {"g_kernel_first", FIELD_INT, AT(g_kernel_first), 1, 15, 3, NULL},
+    {"g_kernel", FIELD_INT, AT(g_kernel), 1, 15, 3, NULL},
+    {"g_size", FIELD_INT, AT(g_size), 2, 8192, 64, NULL},
+    {"h_width", FIELD_INT, AT(h_width), 0, 4096, 64, NULL},
+    {"h_gru", FIELD_INT, AT(h_gru), 1, 1024, 32, NULL},
+    {"iterations", FIELD_INT, AT(iterations), 0, 1000, 6, NULL},
+    {"recurrent", FIELD_BOOL, AT(recurrent), 0, 1, true, NULL},
+    {"gradient", FIELD_BOOL, AT(gradient), 0, 1, true, NULL},
+    {"mean_before_norm", FIELD_BOOL, AT(mean_before_norm), 0, 1, true, NULL},
+    {"rmse", FIELD_WORD, AT(rmse), NN_RMSE_START, NN_RMSE_BATCH, NN_RMSE_START, rmse_words},
+    {"encoding", FIELD_WORD, AT(encoding), NN_GRADIENT_RAW, NN_GRADIENT_ASINH, NN_GRADIENT_ASINH, encoding_words},
 };
 enum { FIELDS = sizeof fields / sizeof *fields };
-static const char *const rmse_name[] = {"start", "batch"};
 static const char prefix[] = "arch.";
 
 static int get(const nn_arch *a, const field *f)
 {
     const void *p = (const char *)a + f->at;
     if (f->kind == FIELD_BOOL) return *(const bool *)p;
-    if (f->kind == FIELD_RMSE) return (int)*(const nn_rmse *)p;
-    return *(const int *)p;
+    int v;
+    memcpy(&v, p, sizeof v);
+    return v;
 }
 
 static void set(nn_arch *a, const field *f, int v)
 {
     void *p = (char *)a + f->at;
     if (f->kind == FIELD_BOOL) *(bool *)p = v != 0;
-    else if (f->kind == FIELD_RMSE) *(nn_rmse *)p = (nn_rmse)v;
-    else *(int *)p = v;
+    else memcpy(p, &v, sizeof v);
 }
 
 nn_arch nn_arch_default(void)
@@ -83,7 +87,7 @@ static const char *value_text(const nn_arch *a, const field *f, char *text, size
 {
     int v = get(a, f);
     if (f->kind == FIELD_BOOL) snprintf(text, size, "%s", v ? "true" : "false");
-    else if (f->kind == FIELD_RMSE) snprintf(text, size, "%s", rmse_name[v]);
+    else if (f->kind == FIELD_WORD) snprintf(text, size, "%s", f->words[v]);
     else snprintf(text, size, "%d", v);
     return text;
 }
@@ -112,9 +116,9 @@ static bool parse(const field *f, const char *text, int *v)
         *v = !strcmp(text, "true");
         return *v || !strcmp(text, "false");
     }
-    if (f->kind == FIELD_RMSE) {
-        for (*v = NN_RMSE_START; *v <= NN_RMSE_BATCH; ++*v)
-            if (!strcmp(text, rmse_name[*v])) return true;
+    if (f->kind == FIELD_WORD) {
+        for (*v = f->lo; *v <= f->hi; ++*v)
+            if (!strcmp(text, f->words[*v])) return true;
         return false;
     }
     size_t n = strlen(text);

@@ -4,6 +4,7 @@
 #include "ops.h"
 #include "render/render.h"
 #include "render/tone.h"
+#include "tensor/kernels/elementwise.h"
 #include "tensor/resize.h"
 #include "tensor/threads.h"
 #include <math.h>
@@ -76,6 +77,12 @@ static ag_value *loss_gradient(ag_tape *tape, const nn_model *model, const nn_in
         float *g = gradient->t.data;
 #pragma omp parallel for num_threads(ts_threads()) schedule(static)
         for (int64_t i = 0; i < count; i++) g[i] *= scale;
+    }
+    if (model->arch.encoding == NN_GRADIENT_ASINH) {
+        int64_t rows = (int64_t)s.n * s.h, row = (int64_t)s.w * s.c;
+        float *g = gradient->t.data;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+        for (int64_t y = 0; y < rows; y++) ts_elementwise_k()->asinh(row, NN_GRADIENT_SCALE, g + y * row, g + y * row);
     }
     return gradient;
 }

@@ -9,6 +9,13 @@ typedef enum nn_rmse {
     NN_RMSE_BATCH  /* over the whole batch, anew at every step (published) */
 } nn_rmse;
 
+typedef enum nn_gradient {
+    NN_GRADIENT_RAW,  /* as it is (published) */
+    NN_GRADIENT_ASINH /* asinh(NN_GRADIENT_SCALE x): near a sharp highlight the gradient is thousands of times that elsewhere, and a
+                       * network that reads both as they are learns from neither (docs/math.md) */
+} nn_gradient;
+#define NN_GRADIENT_SCALE 10.0f
+
 /* Everything that a weights file must say about itself (its metadata, one key each). */
 typedef struct nn_arch {
     int channels;       /* of the maps: 9, or 10 (published) */
@@ -25,6 +32,7 @@ typedef struct nn_arch {
     bool gradient;      /* h reads the gradient (false: zeros, the ablation) */
     bool mean_before_norm; /* the global track's mean: before (ours) or after (published) the normalisation */
     nn_rmse rmse;
+    nn_gradient encoding; /* of the gradient for h */
 } nn_arch;
 
 nn_arch nn_arch_default(void);

@@ -6,22 +6,30 @@
 ts_code ts_conv_check(const ts_conv *c, ts_status *st)
 {
     if (c->n < 1 || c->h < 1 || c->w < 1 || c->ic < 1 || c->oc < 1)
-        return ts_fail(st, TS_INVALID, "convolution of %d x %d x %d x %d to %d channels: every dimension must be at least 1", c->n, c->h, c->w, c->ic, c->oc);
+        return ts_fail(st, TS_INVALID, "convolution of %d x %d x %d x %d to %d channels: every dimension must be at least 1", c->n, c->h, c->w,
+                       c->ic, c->oc);
     if (c->k < 1 || c->k > 15 || c->k % 2 == 0) return ts_fail(st, TS_INVALID, "convolution kernel of side %d: use an odd side from 1 to 15", c->k);
     if (c->dilation != 1 && c->dilation != 2) return ts_fail(st, TS_INVALID, "convolution dilation %d: use 1 or 2", c->dilation);
-    if (c->pad != TS_PAD_ZERO && c->pad != TS_PAD_REPLICATE) return ts_fail(st, TS_INVALID, "convolution padding %d: use TS_PAD_ZERO or TS_PAD_REPLICATE", (int)c->pad);
+    if (c->pad != TS_PAD_ZERO && c->pad != TS_PAD_REPLICATE)
+        return ts_fail(st, TS_INVALID, "convolution padding %d: use TS_PAD_ZERO or TS_PAD_REPLICATE", (int)c->pad);
     const int64_t limit = INT64_C(1) << 40; /* floats: offsets stay far from overflow */
     const int64_t pixels = (int64_t)c->h * c->w, channels = c->ic > c->oc ? c->ic : c->oc;
     if (pixels > limit / c->n || pixels * c->n > limit / channels || (int64_t)c->ic * c->oc > (INT64_C(1) << 31) / (c->k * c->k))
-        return ts_fail(st, TS_INVALID, "convolution of %d x %d x %d x %d to %d channels with side %d is too large", c->n, c->h, c->w, c->ic, c->oc, c->k);
+        return ts_fail(st, TS_INVALID, "convolution of %d x %d x %d x %d to %d channels with side %d is too large", c->n, c->h, c->w, c->ic, c->oc,
+                       c->k);
     return TS_OK;
+}
+
+ptrdiff_t conv_panels_count(int ic, int oc, int k)
+{
+    const int lanes = conv_lanes();
+    return (ptrdiff_t)((oc + lanes - 1) / lanes * lanes) * ic * k * k;
 }
 
 size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
 {
     const int ic = use == TS_CONV_FORWARD ? c->ic : c->oc, oc = use == TS_CONV_FORWARD ? c->oc : c->ic;
-    const int lanes = conv_lanes();
-    return (size_t)((oc + lanes - 1) / lanes * lanes) * (size_t)ic * (size_t)(c->k * c->k);
+    return (size_t)conv_panels_count(ic, oc, c->k) + (conv_few_channels(oc, c->k) ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
 }
 
 /* packed: [panel][ky][kx][input][channel of the panel, zeros where there is none] */
@@ -33,6 +41,7 @@ void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float 
     /* weight[o][c][tap]: strides of the packed input and output channel */
     const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * taps : taps, i_step = forward ? taps : (ptrdiff_t)c->ic * taps;
     const int parts = ic > 16 ? 16 : ic;
+    if (conv_few_channels(oc, c->k)) conv_pack_few(ic, oc, c->k, !forward, weight, i_step, o_step, packed + conv_panels_count(ic, oc, c->k));
 #pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
     for (int panel = 0; panel < panels; panel++)
         for (int part = 0; part < parts; part++) {
@@ -71,6 +80,7 @@ void conv_run(const conv_plan *p)
 {
     if (p->k == 1) conv_run_pointwise(p);
     else if (conv_by_position(p->n, p->h, p->w)) conv_run_positions(p);
+    else if (conv_by_lanes(p)) conv_run_lanes(p);
     else conv_run_rows(p);
 }
 

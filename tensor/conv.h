@@ -20,7 +20,8 @@ typedef enum ts_conv_use { TS_CONV_FORWARD, TS_CONV_DATA_GRADIENT } ts_conv_use;
 
 ts_code ts_conv_check(const ts_conv *c, ts_status *st);
 
-size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use); /* floats; does not depend on n, h, w */
+/* floats; does not depend on n, h, w. Packed weights are for the ISA in use (tensor/cpu.h). */
+size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use);
 void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight /* [oc][ic][k][k] */, float *packed);
 
 /* y[n,i,j,o] = act(bias[o] + sum_{ky,kx,c} x[n, i + d(ky-k/2), j + d(kx-k/2), c] weight[o,c,ky,kx]),

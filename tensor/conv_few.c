@@ -36,7 +36,8 @@ void conv_run_pointwise(const conv_plan *p)
                         t.fetch[1] = y + step * p->oc + (panel - base) * y_part;
                         t.fetch_step[0] = x_part * (ptrdiff_t)sizeof(float) / calls;
                         t.fetch_step[1] = y_part * (ptrdiff_t)sizeof(float) / calls;
-                        conv_run_tile(&t, conv_vectors(p->oc, (int)panel), x, y + panel * 2 * conv_lanes(), (int)(count - j < step ? count - j : step));
+                        const int tile = (int)(count - j < step ? count - j : step);
+                        conv_run_tile(&t, conv_vectors(p->oc, (int)panel), x, y + panel * 2 * conv_lanes(), tile);
                     }
             }
         }

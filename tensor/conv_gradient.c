@@ -52,7 +52,9 @@ static job make_job(const ts_conv *c, const float *x, const float *dy)
     g.taps = c->dilation == 1 && g.pixel == c->ic ? 1 : c->k;
     g.lines = c->k * g.taps;
     g.length = g.taps == 1 ? c->k * c->ic : c->ic;
-    g.swapped = block_cost(c->oc, g.length) < block_cost(g.length, c->oc);
+    /* Read where it is, x has no room behind its last pixel for a whole vector. */
+    const bool whole = c->k > 1 || c->ic % conv_lanes() == 0;
+    g.swapped = whole && block_cost(c->oc, g.length) < block_cost(g.length, c->oc);
     g.m = g.swapped ? c->oc : g.length;
     g.n = g.swapped ? g.length : c->oc;
     const int lanes = conv_lanes();
@@ -126,7 +128,7 @@ static void run_pass(const job *g, pass *s, const conv_stage *stage, float *sums
         int rows = 0;
         for (int i = s->begin; i < s->end; i++) {
             int r = i + g->plan.first + ky * c->dilation;
-            if (g->plan.replicate) r = r < 0 ? 0 : r >= c->h ? c->h - 1 : r;
+            if (g->plan.replicate) r = conv_clamp(r, c->h);
             else if (r < 0 || r >= c->h) continue;
             const ptrdiff_t at = ((ptrdiff_t)s->image * c->h + i) * c->w + s->left;
             x_row[rows] = c->k == 1 ? at * c->ic : conv_stage_row(stage, r) - x + (s->left + kx * c->dilation) * stage->pixel;
@@ -176,7 +178,8 @@ static void run_chunk(const job *g, int chunk, int group, bool weights)
     for (int item = s.item; weights && item < s.item_end; item++) {
         const int panel = item / g->lines, line = item % g->lines;
         for (int m = 0; m < g->m; m++)
-            memset(sums + ((ptrdiff_t)line * g->m + m) * g->padded + panel * lanes2, 0, sizeof(float) * (size_t)(conv_vectors(g->n, panel) * conv_lanes()));
+            memset(sums + ((ptrdiff_t)line * g->m + m) * g->padded + panel * lanes2, 0,
+                   sizeof(float) * (size_t)(conv_vectors(g->n, panel) * conv_lanes()));
     }
     if (bias) memset(bias, 0, sizeof(float) * (size_t)c->oc);
     conv_stage stage = {0};
@@ -193,10 +196,8 @@ static void run_chunk(const job *g, int chunk, int group, bool weights)
         if (s.image != image_before) stage.next = 0;
         image_before = s.image;
         if (staged) {
-            int low = s.begin + g->plan.first, high = s.end - 1 + g->plan.first + reach;
-            low = low < 0 ? 0 : low >= c->h ? c->h - 1 : low;
-            high = high < 0 ? 0 : high >= c->h ? c->h - 1 : high;
-            conv_stage_fill(&stage, &g->plan, s.image, low, high);
+            const int low = s.begin + g->plan.first, high = s.end - 1 + g->plan.first + reach;
+            conv_stage_fill(&stage, &g->plan, s.image, conv_clamp(low, c->h), conv_clamp(high, c->h));
         }
         if (weights) plan_fetch(g, &s, row + s.end - s.begin, s.end - s.begin, blocks);
         for (int b = 0; weights && b < blocks; b++) {

@@ -42,8 +42,8 @@ static int join(const ts_conv *c, const staged *s, int tap, int width, ptrdiff_t
     for (int q = 0; q < c->h * c->w; q++) {
         int i = q / c->w + first + tap / c->k * c->dilation, j = q % c->w + first + tap % c->k * c->dilation;
         if (c->pad == TS_PAD_REPLICATE) {
-            i = i < 0 ? 0 : i >= c->h ? c->h - 1 : i;
-            j = j < 0 ? 0 : j >= c->w ? c->w - 1 : j;
+            i = conv_clamp(i, c->h);
+            j = conv_clamp(j, c->w);
         } else if (i < 0 || i >= c->h || j < 0 || j >= c->w) continue;
         x_row[rows] = ((ptrdiff_t)i * c->w + j) * c->n * s->pixel;
         dy_row[rows++] = (ptrdiff_t)q * c->n * width;

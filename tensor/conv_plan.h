@@ -56,6 +56,8 @@ static inline int conv_vectors(int oc, int panel) { return oc - panel * 2 * conv
 /* Few pixels in an image and several images: tiles run over the images at one position, which needs no padding at all. */
 static inline bool conv_by_position(int n, int h, int w) { return n >= 4 && h * w <= 64; }
 
+static inline int conv_clamp(int i, int size) { return i < 0 ? 0 : i >= size ? size - 1 : i; }
+
 /* Part i of n parts of total, as even as can be: [*begin, *end). */
 static inline void conv_part(int total, int parts, int i, int *begin, int *end)
 {
@@ -71,8 +73,16 @@ void conv_run_tile(ts_tile *t, int vectors, const float *a, float *y, int pixels
 void conv_run_rows(const conv_plan *p);
 void conv_run_pointwise(const conv_plan *p);
 void conv_run_positions(const conv_plan *p);
+void conv_run_lanes(const conv_plan *p);
 /* Whichever of them suits. */
 void conv_run(const conv_plan *p);
+
+/* Floats of the panels; weights to few channels are packed behind them once more for conv_run_lanes. */
+ptrdiff_t conv_panels_count(int ic, int oc, int k);
+bool conv_few_channels(int oc, int k);
+bool conv_by_lanes(const conv_plan *p);
+/* weight[i * i_step + o * o_step + tap] */
+void conv_pack_few(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step, float *packed);
 
 /* dweight += for shapes with conv_by_position. */
 void conv_weight_positions(const ts_conv *c, const float *x, const float *dy, float *dweight);

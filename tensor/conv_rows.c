@@ -37,7 +37,6 @@ typedef struct source {
 typedef struct runner {
     const conv_plan *p;
     const band *b;
-    blocking block;
     int out_w, tiles, tile_size, larger; /* the first so many tiles have a pixel more */
     int sources;
     source source[3];
@@ -101,7 +100,7 @@ static void make_segments(const runner *r, source *s, int e, int ky0, int ky1)
     s->segments = 0;
     for (int ky = ky0; ky < ky1; ky++) {
         int row = e + p->first + ky * p->dilation;
-        if (p->replicate) row = row < 0 ? 0 : row >= p->h ? p->h - 1 : row;
+        if (p->replicate) row = conv_clamp(row, p->h);
         else if (row < 0 || row >= p->h) continue;
         const ptrdiff_t at = s->stage.rows ? conv_stage_row(&s->stage, row) - s->stage.memory : (ptrdiff_t)row * p->w * p->ic;
         const ptrdiff_t w = (ptrdiff_t)ky * p->k * p->ic;
@@ -118,14 +117,10 @@ static void fold_row(const conv_plan *p, const float *extended, float *y, int ch
     if (first)
         for (int j = 0; j < p->w; j++) memset(y + (ptrdiff_t)j * p->oc, 0, sizeof(float) * (size_t)channels);
     for (int e = 0; e < p->w + 2 * p->fold; e++) {
-        int j = e - p->fold;
-        j = j < 0 ? 0 : j >= p->w ? p->w - 1 : j;
-        float *to = y + (ptrdiff_t)j * p->oc;
+        float *to = y + (ptrdiff_t)conv_clamp(e - p->fold, p->w) * p->oc;
         for (int o = 0; o < channels; o++) to[o] += extended[e * channels + o];
     }
 }
-
-static int clamp_row(const conv_plan *p, int row) { return row < 0 ? 0 : row >= p->h ? p->h - 1 : row; }
 
 /* One output row of panels [panel0, panel1). first: nothing has been put into y's row yet. */
 static void run_row(runner *r, int e, int ky0, int ky1, int panel0, int panel1, bool first)
@@ -135,11 +130,11 @@ static void run_row(runner *r, int e, int ky0, int ky1, int panel0, int panel1, 
     ptrdiff_t depth = 0;
     for (int i = 0; i < r->sources; i++) {
         source *s = &r->source[i];
-        if (s->stage.rows) conv_stage_fill(&s->stage, p, r->b->image, clamp_row(p, e + p->first), clamp_row(p, e + p->first + reach));
+        if (s->stage.rows) conv_stage_fill(&s->stage, p, r->b->image, conv_clamp(e + p->first, p->h), conv_clamp(e + p->first + reach, p->h));
         make_segments(r, s, e, ky0, ky1);
         depth = s->segments ? s->segments * s->segment[0].count : 0;
     }
-    float *y = p->y + ((ptrdiff_t)r->b->image * p->h + clamp_row(p, e - p->fold)) * p->w * p->oc;
+    float *y = p->y + ((ptrdiff_t)r->b->image * p->h + conv_clamp(e - p->fold, p->h)) * p->w * p->oc;
     const ptrdiff_t calls = depth / 4 > 0 ? depth / 4 : 1;
     for (int panel = panel0; panel < panel1; panel++) {
         ts_tile t = conv_panel_tile(p, panel);
@@ -168,7 +163,7 @@ static void run_row(runner *r, int e, int ky0, int ky1, int panel0, int panel1, 
 
 static void run_band(const conv_plan *p, blocking block, const band *b)
 {
-    runner r = {.p = p, .b = b, .block = block, .out_w = p->w + 2 * p->fold};
+    runner r = {.p = p, .b = b, .out_w = p->w + 2 * p->fold};
     const int reach = (p->k - 1) * p->dilation, step = ts_conv_k()->pixels;
     const int e0 = b->begin == 0 ? 0 : b->begin + p->fold, e1 = b->end == p->h ? p->h + 2 * p->fold : b->end + p->fold;
     r.tiles = (r.out_w + step - 1) / step;
@@ -183,7 +178,7 @@ static void run_band(const conv_plan *p, blocking block, const band *b)
         for (int ky = 0; ky < p->k; ky += block.ky) {
             const int ky_end = ky + block.ky < p->k ? ky + block.ky : p->k;
             for (int e = e0, before = -1; e < e1; e++) {
-                const int row = clamp_row(p, e - p->fold);
+                const int row = conv_clamp(e - p->fold, p->h);
                 run_row(&r, e, ky, ky_end, panel0, panel1, !p->add && ky == 0 && row != before);
                 before = row;
             }

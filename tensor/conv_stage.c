@@ -50,7 +50,7 @@ int conv_pairs(const conv_plan *p, int i, int size, conv_pair *pair)
     for (int t = 0; t < p->k; t++)
         for (int e = begin; e <= end; e++) {
             int s = e + p->fold + p->first + t * p->dilation;
-            if (p->replicate) s = s < 0 ? 0 : s >= size ? size - 1 : s;
+            if (p->replicate) s = conv_clamp(s, size);
             if (s >= 0 && s < size) pair[count++] = (conv_pair){s, t};
         }
     return count;

@@ -36,6 +36,11 @@ static void selu_backward(int64_t n, const float *y, const float *dy, float *dx,
     for (int64_t i = 0; i < n; i++) put(dx + i, dy[i] * (y[i] > 0 ? TS_SELU_SCALE : y[i] + TS_SELU_SCALE * TS_SELU_ALPHA), accumulate);
 }
 
+static void asinh_scaled(int64_t n, float s, const float *x, float *y)
+{
+    for (int64_t i = 0; i < n; i++) y[i] = (float)asinh((double)s * x[i]);
+}
+
 static void add(int64_t n, const float *a, const float *b, float *y)
 {
     for (int64_t i = 0; i < n; i++) y[i] = a[i] + b[i];
@@ -117,6 +122,6 @@ static void gru_backward(int64_t pixels, int c, const float *hh, int64_t hh_stri
 
 const struct ts_elementwise_kernels ts_elementwise_naive = {
     .leaky = leaky, .leaky_backward = leaky_backward, .tanh = tanh_forward, .tanh_backward = tanh_backward, .selu = selu,
-    .selu_backward = selu_backward, .add = add, .scale = scale, .add_leaky = add_leaky, .add_leaky_backward = add_leaky_backward,
+    .selu_backward = selu_backward, .asinh = asinh_scaled, .add = add, .scale = scale, .add_leaky = add_leaky, .add_leaky_backward = add_leaky_backward,
     .broadcast = broadcast, .copy = copy, .gru = gru, .gru_backward = gru_backward,
 };

@@ -56,7 +56,7 @@ static void run_block(const product *p, int row, int rows, int k0, int k1, int p
         const int j0 = panel * 2 * kernels->lanes, vectors = conv_vectors(p->n, panel);
         const ts_segment segment = {0, k0, k1 - k0};
         ts_tile t = {.segment = &segment, .segments = 1, .a_stride = stride, .y_stride = p->n, .w = p->packed + (ptrdiff_t)j0 * p->k,
-                     .leak = 1, .channels = p->n - j0, .add = k0 > 0 || p->beta != 0};
+                     .leak = 1, .channels = p->n - j0, .fetch = {p->packed, p->packed}, .add = k0 > 0 || p->beta != 0};
         if (k0 == 0 && p->scale)
             for (int r = 0; r < rows; r++)
                 for (int j = j0; j < p->n && j < j0 + 2 * kernels->lanes; j++) p->c[(ptrdiff_t)(row + r) * p->n + j] *= p->beta;

@@ -177,12 +177,13 @@ init_from_weights() {
 
 divergence_stops_with_a_reason() {
     config
-    expect 1 train --set train.rate=1e6 --set train.pretrain_rate=1e6 --set train.clip=0 --set train.warmup=0 --set train.steps=400 --set train.max_skipped=2
+    expect 1 train --set train.rate=1e6 --set train.pretrain_rate=1e6 --set train.clip=0 --set train.warmup=0 --set train.steps=400 \
+        --set train.max_skipped=2
     says "$T/err" "is skipped"
     says "$T/err" "3 steps in a row"
     # What is on disk can be read: it is finite.
-    [ ! -e "$T/run/last.safetensors" ] || expect 0 "$TRAIN" "$T/small.ini" --set output.folder="$T/next" --set train.steps=0 --set train.pretrain_steps=1 \
-        --init "$T/run/last.safetensors"
+    [ ! -e "$T/run/last.safetensors" ] || expect 0 "$TRAIN" "$T/small.ini" --set output.folder="$T/next" --set train.steps=0 \
+        --set train.pretrain_steps=1 --init "$T/run/last.safetensors"
 }
 
 unwritable_folder() {

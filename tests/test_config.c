@@ -39,14 +39,15 @@ TEST(ini_reads_sections_comments_and_blanks)
 {
     tr_ini ini;
     ts_status st;
-    CHECK(parse("# head\n\n[a]\nx = 1 # one\n  y=two words  ; and a comment\nz =\n[b]\nx = c#d\n[a]\nw = last", &ini, &st) == TS_OK, "%s", st.message);
+    CHECK(parse("# head\n\n[a]\nx = 1 # one\n  y=two words  ; and a comment\nz =\n[b]\nx = c#d\n[a]\nw = last", &ini, &st) == TS_OK, "%s",
+          st.message);
     CHECK(ini.count == 5, "%d entries", ini.count);
     const char *const want[5][3] = {{"a", "x", "1"}, {"a", "y", "two words"}, {"a", "z", ""}, {"b", "x", "c#d"}, {"a", "w", "last"}};
     const int line[5] = {4, 5, 6, 8, 10};
     for (int i = 0; i < 5; i++) {
         const tr_ini_entry *e = &ini.entry[i];
-        CHECK(!strcmp(e->section, want[i][0]) && !strcmp(e->key, want[i][1]) && !strcmp(e->value, want[i][2]), "entry %d is [%s] %s = \"%s\"", i, e->section,
-              e->key, e->value);
+        CHECK(!strcmp(e->section, want[i][0]) && !strcmp(e->key, want[i][1]) && !strcmp(e->value, want[i][2]), "entry %d is [%s] %s = \"%s\"", i,
+              e->section, e->key, e->value);
         CHECK(e->line == line[i], "entry %d is in line %d, not %d", i, e->line, line[i]);
     }
     tr_ini_free(&ini);
@@ -82,7 +83,8 @@ TEST(config_defaults_are_the_tables_and_the_architectures)
 {
     const tr_config c = tr_config_default();
     const nn_arch a = nn_arch_default();
-    CHECK(c.arch.g_width == a.g_width && c.arch.channels == a.channels && c.arch.iterations == a.iterations, "another architecture than nn's default");
+    CHECK(c.arch.g_width == a.g_width && c.arch.channels == a.channels && c.arch.iterations == a.iterations,
+          "another architecture than nn's default");
     ts_status st = {0};
     CHECK(tr_config_check(&c, &st) == TS_OK, "%s", st.message);
     for (int i = 0; i < tr_key_count; i++) {
@@ -91,7 +93,8 @@ TEST(config_defaults_are_the_tables_and_the_architectures)
         tr_config_format(&c, k, text, sizeof text);
         CHECK(!k->initial || !strcmp(text, k->initial), "%s.%s: default \"%s\" comes back as \"%s\"", k->section, k->key, k->initial, text);
         CHECK(k->help && *k->help, "%s.%s has no help", k->section, k->key);
-        for (int j = 0; j < i; j++) CHECK(strcmp(k->section, tr_keys[j].section) || strcmp(k->key, tr_keys[j].key), "%s.%s is there twice", k->section, k->key);
+        for (int j = 0; j < i; j++)
+            CHECK(strcmp(k->section, tr_keys[j].section) || strcmp(k->key, tr_keys[j].key), "%s.%s is there twice", k->section, k->key);
     }
 }
 
@@ -128,16 +131,30 @@ TEST(config_each_key_sets_its_own_value)
 
 TEST(config_rejects_bad_values)
 {
-    static const char *const bad[][3] = {
-        {"train", "batch", "0"},      {"train", "batch", "8.5"},  {"train", "batch", "8x"},   {"train", "batch", ""},
-        {"train", "batch", "99999999999999999999"}, {"train", "rate", "fast"}, {"train", "rate", "nan"},   {"train", "rate", "-1"},
-        {"train", "rate", "0,001"},   {"train", "ema", "1"},      {"train", "rate", "inf"},   {"data", "quantise", "maybe"},
-        {"model", "rmse", "mean"},    {"model", "g_levels", "9"}, {"data", "families", ""},   {"data", "families", "all, -all"},
-        {"data", "families", "granit"}, {"output", "folder", "a # b"}, {"train", "steps", "1e3"}};
+    static const char *const bad[][3] = {{"train", "batch", "0"},
+                                         {"train", "batch", "8.5"},
+                                         {"train", "batch", "8x"},
+                                         {"train", "batch", ""},
+                                         {"train", "batch", "99999999999999999999"},
+                                         {"train", "rate", "fast"},
+                                         {"train", "rate", "nan"},
+                                         {"train", "rate", "-1"},
+                                         {"train", "rate", "0,001"},
+                                         {"train", "ema", "1"},
+                                         {"train", "rate", "inf"},
+                                         {"data", "quantise", "maybe"},
+                                         {"model", "rmse", "mean"},
+                                         {"model", "g_levels", "9"},
+                                         {"data", "families", ""},
+                                         {"data", "families", "all, -all"},
+                                         {"data", "families", "granit"},
+                                         {"output", "folder", "a # b"},
+                                         {"train", "steps", "1e3"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         tr_config c = tr_config_default();
         ts_status st = {0};
-        CHECK(tr_config_set(&c, "c.ini:7", bad[i][0], bad[i][1], bad[i][2], &st) == TS_INVALID, "%s.%s = %s was accepted", bad[i][0], bad[i][1], bad[i][2]);
+        CHECK(tr_config_set(&c, "c.ini:7", bad[i][0], bad[i][1], bad[i][2], &st) == TS_INVALID, "%s.%s = %s was accepted", bad[i][0], bad[i][1],
+              bad[i][2]);
         CHECK(!strncmp(st.message, "c.ini:7: ", 9) && strstr(st.message, bad[i][1]), "the message names neither place nor key: %s", st.message);
         CHECK(tr_config_same(&c, &(tr_config){0}, "x", NULL) != TS_OK, "nothing is compared");
     }
@@ -145,8 +162,8 @@ TEST(config_rejects_bad_values)
 
 TEST(config_unknown_keys_are_answered_with_the_nearest)
 {
-    static const char *const asked[][3] = {{"train", "bach", "train.batch"},   {"train", "checkpoint_evry", "train.checkpoint_every"},
-                                           {"trian", "batch", "train.batch"},  {"data", "pretrain_steps", "train.pretrain_steps"},
+    static const char *const asked[][3] = {{"train", "bach", "train.batch"},      {"train", "checkpoint_evry", "train.checkpoint_every"},
+                                           {"trian", "batch", "train.batch"},     {"data", "pretrain_steps", "train.pretrain_steps"},
                                            {"model", "g_withd", "model.g_width"}, {"valid", "count", "validate.count"}};
     for (size_t i = 0; i < sizeof asked / sizeof *asked; i++) {
         tr_config c = tr_config_default();
@@ -237,8 +254,12 @@ TEST(config_numbers_do_not_depend_on_the_locale)
 
 TEST(config_checks_keys_against_each_other)
 {
-    static const char *const bad[][2] = {{"train.iterations_min=7", "iterations_min"}, {"train.steps=0", "nothing to do"}, {"validate.seed=1", "data.seed"},
-                                         {"model.g_size=50", "g_size"},                {"model.h_width=0", "iterations"},  {"model.g_kernel=4", "g_kernel"}};
+    static const char *const bad[][2] = {{"train.iterations_min=7", "iterations_min"},
+                                         {"train.steps=0", "nothing to do"},
+                                         {"validate.seed=1", "data.seed"},
+                                         {"model.g_size=50", "g_size"},
+                                         {"model.h_width=0", "iterations"},
+                                         {"model.g_kernel=4", "g_kernel"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         tr_config c = tr_config_default();
         ts_status st = {0};
@@ -249,9 +270,14 @@ TEST(config_checks_keys_against_each_other)
 
 TEST(config_default_folder_stays_in_runs)
 {
-    static const char *const cases[][2] = {{"configs/single.ini", "runs/single"}, {"tiny", "runs/tiny"},      {"a/b.c.ini", "runs/b.c"},
-                                           {"../...ini", "runs/run"},             {".ini", "runs/run"},       {"x/..", "runs/run"},
-                                           {"./..ini", "runs/run"},               {"/a/my run.ini", "runs/my run"}};
+    static const char *const cases[][2] = {{"configs/single.ini", "runs/single"},
+                                           {"tiny", "runs/tiny"},
+                                           {"a/b.c.ini", "runs/b.c"},
+                                           {"../...ini", "runs/run"},
+                                           {".ini", "runs/run"},
+                                           {"x/..", "runs/run"},
+                                           {"./..ini", "runs/run"},
+                                           {"/a/my run.ini", "runs/my run"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         char folder[256];
         tr_default_folder(cases[i][0], folder, sizeof folder);

@@ -10,34 +10,38 @@
 enum { GUARD = 64 };
 static const uint32_t canary = 0x7fc0beefu; /* a NaN: reading it into a result shows too */
 
-/* count floats between two guards; the last one ends right at the end of the memory that was asked for, for the sanitizer. */
+/* Results lie between two guards; inputs have none, so that the sanitizer sees a read past their end. */
 typedef struct buffer {
     float *memory, *data;
     size_t count;
+    int guard;
 } buffer;
 
-static buffer make(size_t count)
+static buffer make_guarded(size_t count, int guard)
 {
-    CHECK(count < (size_t)1 << 32, "count %zu", count);
-    buffer b = {malloc((count + 2 * GUARD) * sizeof(float)), NULL, count};
+    CHECK(count < (size_t)1 << 30, "a buffer of %zu floats", count);
+    const size_t all = count + 2 * (size_t)guard;
+    buffer b = {malloc(all * sizeof(float)), NULL, count, guard};
     CHECK(b.memory, "no memory");
-    b.data = b.memory + GUARD;
-    for (size_t i = 0; i < count + 2 * GUARD; i++) memcpy(b.memory + i, &canary, sizeof canary);
+    b.data = b.memory + guard;
+    for (size_t i = 0; i < all; i++) memcpy(b.memory + i, &canary, sizeof canary);
     return b;
 }
 
+static buffer make(size_t count) { return make_guarded(count, GUARD); }
+
 static buffer make_random(size_t count, ts_rng *r)
 {
-    buffer b = make(count);
+    buffer b = make_guarded(count, 0);
     for (size_t i = 0; i < count; i++) b.data[i] = ts_rng_range(r, -1, 1);
     return b;
 }
 
 static void finish(buffer *b, const char *name)
 {
-    for (size_t i = 0; i < GUARD; i++) {
-        CHECK(memcmp(b->memory + i, &canary, sizeof canary) == 0, "%s: written %zu floats before its begin", name, GUARD - i);
-        CHECK(memcmp(b->data + b->count + i, &canary, sizeof canary) == 0, "%s: written %zu floats after its end", name, i);
+    for (int i = 0; i < b->guard; i++) {
+        CHECK(memcmp(b->memory + i, &canary, sizeof canary) == 0, "%s: written %d floats before its begin", name, b->guard - i);
+        CHECK(memcmp(b->data + b->count + i, &canary, sizeof canary) == 0, "%s: written %d floats after its end", name, i);
     }
     free(b->memory);
 }
@@ -45,8 +49,9 @@ static void finish(buffer *b, const char *name)
 static const char *describe(const ts_conv *c)
 {
     static char text[160];
-    snprintf(text, sizeof text, "%s, %d threads, n %d, %d x %d, %d to %d channels, side %d, dilation %d, %s", ts_isa_name(ts_isa_now()), ts_threads(), c->n, c->h,
-             c->w, c->ic, c->oc, c->k, c->dilation, c->pad == TS_PAD_ZERO ? "zero" : "replicate");
+    snprintf(text, sizeof text, "%s, %d threads, n %d, %d x %d, %d to %d channels, side %d, dilation %d, %s",
+             ts_isa_name(ts_isa_now()), ts_threads(), c->n, c->h, c->w, c->ic, c->oc, c->k, c->dilation,
+             c->pad == TS_PAD_ZERO ? "zero" : "replicate");
     return text;
 }
 
@@ -55,14 +60,16 @@ static void same(const buffer *a, const buffer *b, double count, const char *wha
 {
     const double bound = 2e-7 * (4 + count);
     for (size_t i = 0; i < a->count; i++)
-        CHECK(fabs((double)a->data[i] - b->data[i]) <= bound, "%s differs at %zu: %.9g, naive %.9g (%s)", what, i, a->data[i], b->data[i], describe(c));
+        CHECK(fabs((double)a->data[i] - b->data[i]) <= bound, "%s differs at %zu: %.9g, naive %.9g (%s)", what, i, a->data[i], b->data[i],
+              describe(c));
 }
 
 static ts_conv draw(ts_rng *r)
 {
-    static const int channels[] = {1, 2, 3, 9, 16, 18, 20, 31, 32, 33, 48, 64}, sides[] = {1, 3, 3, 5, 5, 7}, sizes[] = {1, 2, 3, 4, 5, 7, 8, 13, 14, 15, 17, 29};
-    ts_conv c = {.n = 1, .ic = channels[ts_rng_int(r, 12)], .oc = channels[ts_rng_int(r, 12)], .k = sides[ts_rng_int(r, 6)], .dilation = 1 + ts_rng_int(r, 2),
-                 .pad = ts_rng_int(r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE};
+    static const int channels[] = {1, 2, 3, 9, 16, 18, 20, 31, 32, 33, 48, 64}, sides[] = {1, 3, 3, 5, 5, 7};
+    static const int sizes[] = {1, 2, 3, 4, 5, 7, 8, 13, 14, 15, 17, 29};
+    ts_conv c = {.n = 1, .ic = channels[ts_rng_int(r, 12)], .oc = channels[ts_rng_int(r, 12)], .k = sides[ts_rng_int(r, 6)],
+                 .dilation = 1 + ts_rng_int(r, 2), .pad = ts_rng_int(r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE};
     c.h = sizes[ts_rng_int(r, 12)];
     c.w = sizes[ts_rng_int(r, 12)];
     c.n = 1 + ts_rng_int(r, 6);
@@ -90,7 +97,8 @@ static size_t weight_count(const ts_conv *c) { return (size_t)c->ic * (size_t)c-
 static problem make_problem(ts_conv c, ts_rng *r)
 {
     static const float leaks[] = {1, 0.2f, 0};
-    return (problem){c, make_random(in_count(&c), r), make_random(weight_count(&c), r), make_random((size_t)c.oc, r), make_random(out_count(&c), r), leaks[ts_rng_int(r, 3)]};
+    return (problem){c, make_random(in_count(&c), r), make_random(weight_count(&c), r), make_random((size_t)c.oc, r), make_random(out_count(&c), r),
+                     leaks[ts_rng_int(r, 3)]};
 }
 
 static void finish_problem(problem *p)
@@ -197,10 +205,15 @@ TEST(conv_weight_gradient_naive) { against_naive(check_weight_gradient, 3); }
 TEST(conv_chosen_shapes)
 {
     static const ts_conv shapes[] = {
-        {1, 1, 1, 1, 1, 15, 2, TS_PAD_REPLICATE}, {2, 1, 1, 3, 2, 15, 2, TS_PAD_ZERO},   {1, 1, 300, 3, 9, 3, 1, TS_PAD_REPLICATE}, {1, 300, 1, 9, 3, 5, 2, TS_PAD_REPLICATE},
-        {1, 3, 211, 2, 33, 5, 1, TS_PAD_ZERO},    {4, 2, 2, 512, 40, 3, 1, TS_PAD_ZERO}, {1, 2, 3, 512, 33, 3, 1, TS_PAD_REPLICATE}, {1, 5, 4, 40, 512, 3, 2, TS_PAD_REPLICATE},
-        {1, 3, 3, 700, 5, 7, 1, TS_PAD_ZERO},     {1, 9, 7, 5, 700, 7, 1, TS_PAD_REPLICATE}, {9, 8, 8, 16, 16, 5, 2, TS_PAD_REPLICATE}, {5, 8, 8, 3, 20, 5, 1, TS_PAD_ZERO},
-        {1, 40, 40, 18, 33, 1, 1, TS_PAD_ZERO},   {17, 2, 2, 33, 65, 5, 1, TS_PAD_ZERO}, {1, 64, 64, 3, 16, 3, 1, TS_PAD_ZERO},    {2, 33, 64, 16, 9, 3, 2, TS_PAD_REPLICATE},
+        {1, 1, 1, 1, 1, 15, 2, TS_PAD_REPLICATE}, {2, 1, 1, 3, 2, 15, 2, TS_PAD_ZERO},
+        {1, 1, 300, 3, 9, 3, 1, TS_PAD_REPLICATE}, {1, 300, 1, 9, 3, 5, 2, TS_PAD_REPLICATE},
+        {1, 3, 211, 2, 33, 5, 1, TS_PAD_ZERO}, {4, 2, 2, 512, 40, 3, 1, TS_PAD_ZERO},
+        {1, 2, 3, 512, 33, 3, 1, TS_PAD_REPLICATE}, {1, 5, 4, 40, 512, 3, 2, TS_PAD_REPLICATE},
+        {1, 3, 3, 700, 5, 7, 1, TS_PAD_ZERO}, {1, 9, 7, 5, 700, 7, 1, TS_PAD_REPLICATE},
+        {9, 8, 8, 16, 16, 5, 2, TS_PAD_REPLICATE}, {5, 8, 8, 3, 20, 5, 1, TS_PAD_ZERO},
+        {1, 40, 40, 18, 33, 1, 1, TS_PAD_ZERO}, {17, 2, 2, 33, 65, 5, 1, TS_PAD_ZERO},
+        {1, 64, 64, 3, 16, 3, 1, TS_PAD_ZERO}, {2, 33, 64, 16, 9, 3, 2, TS_PAD_REPLICATE},
+        {2, 20, 70, 24, 10, 5, 2, TS_PAD_REPLICATE},
     };
     ts_rng r = ts_rng_make(4, TS_STREAM_TEST, 0);
     for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
@@ -270,7 +283,8 @@ TEST(conv_same_bytes_for_any_threads)
                     static const char *const names[] = {"forward", "data gradient", "weight gradient", "bias gradient"};
                     if (t == 0) first[b] = now[b];
                     else {
-                        CHECK(memcmp(first[b].data, now[b].data, now[b].count * sizeof(float)) == 0, "%s: other bytes than with one thread (%s)", names[b], describe(&p.c));
+                        CHECK(memcmp(first[b].data, now[b].data, now[b].count * sizeof(float)) == 0, "%s: other bytes than with one thread (%s)",
+                              names[b], describe(&p.c));
                         finish(&now[b], names[b]);
                     }
                 }

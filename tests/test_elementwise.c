@@ -84,6 +84,9 @@ TEST(elementwise_twins)
             TWICE("tanh_backward", tanh_backward(size, a0, b0, out1, add), tanh_backward(size, a0, b0, out2, add));
             TWICE("selu", selu(size, a0, out1), selu(size, a0, out2));
             TWICE("selu_backward", selu_backward(size, a0, b0, out1, add), selu_backward(size, a0, b0, out2, add));
+            TWICE("asinh", asinh(size, 10, a0, out1), asinh(size, 10, a0, out2));
+            TWICE("small asinh", asinh(size, 1e-2f, a0, out1), asinh(size, 1e-2f, a0, out2));
+            TWICE("large asinh", asinh(size, 1e25f, a0, out1), asinh(size, 1e25f, a0, out2));
             TWICE("add", add(size, a0, b0, out1), add(size, a0, b0, out2));
             TWICE("scale", scale(size, -1.7f, a0, out1, add), scale(size, -1.7f, a0, out2, add));
 #undef TWICE

@@ -115,20 +115,22 @@ TEST(render_tiles_and_threads_give_the_same_bytes)
     for (int i = 0; i < SIDE * SIDE * 3; i++) photo[i] = ts_rng_uniform(&rng);
     rd_grid full = rd_grid_full(SIDE);
     for (int isa = TS_BASE; isa <= (int)ts_isa_best(); isa++)
-        for (int k = 0; k < 11; k++) {
+        for (int k = 0; k < 4; k++) {
+            static const int kinds[4] = {0, RD_LOSS_DIFFUSE, RD_LOSS_VIEWS, RD_LOSS_VIEWS + 1};
             ts_isa_use((ts_isa)isa);
-            rd_view view = any_view(&rng, k);
+            rd_view view = any_view(&rng, kinds[k]);
             double rmse, again;
             ts_threads_set(1);
             rd_render(full, maps, CH, &view, true, image);
             rd_flash_gradient(full, maps, CH, &view, photo, 0.1, gradient, &rmse);
-            for (int threads = 2; threads <= 7; threads += 5) {
+            for (int threads = 2; threads <= 5; threads += 3) {
                 ts_threads_set(threads);
                 rd_render(full, maps, CH, &view, true, part);
                 rd_flash_gradient(full, maps, CH, &view, photo, 0.1, other, &again);
                 bool same = rmse == again && !memcmp(image, part, sizeof(float) * SIDE * SIDE * 3);
                 CHECK(same && !memcmp(gradient, other, sizeof(float) * SIDE * SIDE * CH), "%d threads give other bytes than one", threads);
             }
+            ts_threads_set(1);
             for (int t = 0; t < 6; t++) {
                 rd_grid g = {.h = 1 + ts_rng_int(&rng, SIDE), .w = 1 + ts_rng_int(&rng, SIDE), .side = SIDE};
                 g.y0 = ts_rng_int(&rng, SIDE - g.h + 1), g.x0 = ts_rng_int(&rng, SIDE - g.w + 1);

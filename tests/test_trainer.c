@@ -15,11 +15,11 @@ static tr_config small(void)
     ts_threads_set(1); /* such small work is slower on several, most of all on a busy machine */
     tr_config c = tr_config_default();
     ts_status st = {0};
-    static const char *const keys[] = {
-        "model.g_width=4",  "model.g_width_max=8",    "model.g_levels=2",       "model.g_size=16",         "model.h_width=8",           "model.h_gru=4",
-        "model.iterations=2", "data.patch=16",        "train.batch=2",          "train.pretrain_steps=4",  "train.steps=6",             "train.warmup=2",
-        "train.ema=0.9",    "train.checkpoint_every=3", "train.iterations_min=1", "train.iterations_max=3", "train.checkpoint_every=100", "validate.every=3",
-        "validate.count=3", "validate.size=16"};
+    static const char *const keys[] = {"model.g_width=4",  "model.g_width_max=8",    "model.g_levels=2",       "model.g_size=16",
+                                       "model.h_width=8",  "model.h_gru=4",          "model.iterations=2",     "data.patch=16",
+                                       "train.batch=2",    "train.pretrain_steps=4", "train.steps=6",          "train.warmup=2",
+                                       "train.ema=0.9",    "train.iterations_min=1", "train.iterations_max=3", "train.checkpoint_every=100",
+                                       "validate.every=3", "validate.count=3",       "validate.size=16"};
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) CHECK(tr_config_set_assignment(&c, keys[i], &st) == TS_OK, "%s", st.message);
     return c;
 }
@@ -200,7 +200,8 @@ TEST(trainer_makes_the_same_bytes_for_any_number_of_threads)
 
 TEST(trainer_seeds_matter)
 {
-    static const char *const change[] = {"data.seed=2", "train.seed=2", "train.map_weight=0.5", "train.start_weight=0.5", "data.noise=0", "train.clip=0.01"};
+    static const char *const change[] = {"data.seed=2",  "train.seed=2",   "train.map_weight=0.5", "train.start_weight=0.5",
+                                         "data.noise=0", "train.clip=0.01"};
     char path[700];
     tr_config c = small();
     run_whole(&c, folder("first"));
@@ -326,7 +327,8 @@ TEST(trainer_skips_steps_that_are_not_finite)
     CHECK(tr_run(t, &st) == TS_NUMERIC, "went on: %s", st.message);
     CHECK(strstr(st.message, "4 steps in a row") && w.notes == 4, "%d notes: %s", w.notes, st.message);
     CHECK(t->skipped == 4 && t->step == 5, "%d skipped at step %d", (int)t->skipped, (int)t->step);
-    CHECK(!memcmp(before, t->model->value, bytes) && !memcmp((char *)before + bytes, t->adam.m, bytes) && !memcmp((char *)before + 2 * bytes, t->adam.v, bytes),
+    CHECK(!memcmp(before, t->model->value, bytes) && !memcmp((char *)before + bytes, t->adam.m, bytes) &&
+              !memcmp((char *)before + 2 * bytes, t->adam.v, bytes),
           "a skipped step changed the state");
     t->adam.ema[0] = NAN;
     CHECK(tr_save_checkpoint(t, &st) == TS_NUMERIC, "a checkpoint that is not finite was written");

@@ -75,7 +75,7 @@ ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
     snprintf(number[3], sizeof number[3], "%d", t->in_a_row);
     snprintf(number[4], sizeof number[4], "%.17g", t->best);
     snprintf(number[5], sizeof number[5], "%" PRId64, t->best_step);
-    const nn_meta meta[] = {{"format", format_name},   {"step", number[0]}, {"adam_step", number[1]}, {"skipped", number[2]},
+    const nn_meta meta[] = {{"format", format_name},         {"step", number[0]}, {"adam_step", number[1]}, {"skipped", number[2]},
                             {"skipped_in_a_row", number[3]}, {"best", number[4]}, {"best_step", number[5]}, {"config", text}};
     const ts_code code = nn_safetensors_write(path, block, n, meta, (int)(sizeof meta / sizeof *meta), st);
     free(text);
@@ -102,7 +102,8 @@ static ts_code check_config(const tr_trainer *t, const nn_file *file, const char
     if (!text) return ts_fail(st, TS_FORMAT, "%s: its configuration is missing", path);
     snprintf(where, sizeof where, "%s (config)", path);
     ts_code code = tr_ini_parse(where, text, strlen(text), &ini, st);
-    for (int i = 0; code == TS_OK && i < ini.count; i++) code = tr_config_set(&then, where, ini.entry[i].section, ini.entry[i].key, ini.entry[i].value, st);
+    for (int i = 0; code == TS_OK && i < ini.count; i++)
+        code = tr_config_set(&then, where, ini.entry[i].section, ini.entry[i].key, ini.entry[i].value, st);
     tr_ini_free(&ini);
     return code == TS_OK ? tr_config_same(&then, &t->config, path, st) : code;
 }

@@ -94,8 +94,10 @@ static ts_code parse_families(const char *where, const char *text, uint64_t *mas
                 if (distance(name, io_family_name(i)) < distance(name, io_family_name(best))) best = i;
             return ts_fail(st, TS_INVALID, "%s: data.families: there is no family %s, did you mean %s?", where, name, io_family_name(best));
         }
-        if (remove) bits &= ~(UINT64_C(1) << f);
-        else bits |= UINT64_C(1) << f;
+        if (remove)
+            bits &= ~(UINT64_C(1) << f);
+        else
+            bits |= UINT64_C(1) << f;
     }
     if (!bits) return ts_fail(st, TS_INVALID, "%s: data.families names no family that may be drawn", where);
     *mask = bits == all ? 0 : bits;
@@ -107,8 +109,10 @@ static ts_code bad_value(const char *where, const tr_key *k, const char *value, 
     switch (k->type) {
     case TR_INT:
     case TR_INT64:
-        return ts_fail(st, TS_INVALID, "%s: %s.%s must be an integer from %.0f to %.0f, not \"%.60s\"", where, k->section, k->key, k->lo, k->hi, value);
-    case TR_REAL: return ts_fail(st, TS_INVALID, "%s: %s.%s must be a number from %g to %g, not \"%.60s\"", where, k->section, k->key, k->lo, k->hi, value);
+        return ts_fail(st, TS_INVALID, "%s: %s.%s must be an integer from %.0f to %.0f, not \"%.60s\"", where, k->section, k->key, k->lo, k->hi,
+                       value);
+    case TR_REAL:
+        return ts_fail(st, TS_INVALID, "%s: %s.%s must be a number from %g to %g, not \"%.60s\"", where, k->section, k->key, k->lo, k->hi, value);
     case TR_BOOL: return ts_fail(st, TS_INVALID, "%s: %s.%s must be yes or no, not \"%.60s\"", where, k->section, k->key, value);
     default: break;
     }
@@ -139,8 +143,10 @@ static ts_code set_value(tr_config *c, const char *where, const tr_key *k, const
     case TR_INT:
     case TR_INT64:
         if (!parse_integer(value, &i) || (double)i < k->lo || (double)i > k->hi) return bad_value(where, k, value, st);
-        if (k->type == TR_INT) *(int *)(void *)at = (int)i;
-        else *(int64_t *)(void *)at = i;
+        if (k->type == TR_INT)
+            *(int *)(void *)at = (int)i;
+        else
+            *(int64_t *)(void *)at = i;
         return TS_OK;
     case TR_REAL:
         if (!parse_real(value, &r) || !(r >= k->lo && r <= k->hi)) return bad_value(where, k, value, st);
@@ -222,7 +228,8 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
     const int t = c->arch.iterations;
     const int lo = c->train.iterations_min ? c->train.iterations_min : t, hi = c->train.iterations_max ? c->train.iterations_max : t;
     if (nn_arch_check(&c->arch, st) != TS_OK) return ts_context(st, "[model]");
-    if (c->train.steps + c->train.pretrain_steps < 1) return ts_fail(st, TS_INVALID, "train.steps and train.pretrain_steps are both 0, there is nothing to do");
+    if (c->train.steps + c->train.pretrain_steps < 1)
+        return ts_fail(st, TS_INVALID, "train.steps and train.pretrain_steps are both 0, there is nothing to do");
     if (lo > hi) return ts_fail(st, TS_INVALID, "train.iterations_min is %d, more than the %d of train.iterations_max", lo, hi);
     if (c->validate.every && c->validate.seed == c->data.seed)
         return ts_fail(st, TS_INVALID, "validate.seed equals data.seed: the validation materials would be those that are trained on");

@@ -17,7 +17,7 @@ typedef struct tr_config {
     struct { /* [train] */
         int batch;
         int64_t pretrain_steps, steps, warmup;
-        double pretrain_rate, pretrain_floor, rate, rate_floor;
+        double pretrain_rate, pretrain_floor, rate, g_rate, rate_floor;
         double clip, ema, start_weight, map_weight;
         int iterations_min, iterations_max; /* 0: arch.iterations */
         int64_t seed, checkpoint_every, log_every;

@@ -115,10 +115,14 @@ ts_code tr_ini_read(const char *path, tr_ini *ini, ts_status *st)
     const int error = ferror(f) ? errno : 0;
     fclose(f);
     ts_code code;
-    if (!text) code = ts_fail(st, TS_NOMEM, "%s: out of memory", path);
-    else if (error) code = ts_fail(st, TS_IO, "%s: %s", path, strerror(error));
-    else if (size > LARGEST) code = ts_fail(st, TS_INVALID, "%s: larger than 1 MB, this is no configuration", path);
-    else code = tr_ini_parse(path, text, size, ini, st);
+    if (!text)
+        code = ts_fail(st, TS_NOMEM, "%s: out of memory", path);
+    else if (error)
+        code = ts_fail(st, TS_IO, "%s: %s", path, strerror(error));
+    else if (size > LARGEST)
+        code = ts_fail(st, TS_INVALID, "%s: larger than 1 MB, this is no configuration", path);
+    else
+        code = tr_ini_parse(path, text, size, ini, st);
     free(text);
     return code;
 }

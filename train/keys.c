@@ -2,6 +2,7 @@
 #include "train/config.h"
 #include <stddef.h>
 
+static const char *const encoding_names[] = {"raw", "asinh", NULL}; /* as nn_gradient */
 static const char *const rmse_names[] = {"start", "batch", NULL}; /* as nn_rmse */
 
 #define AT(field) offsetof(tr_config, field)
@@ -16,13 +17,16 @@ const tr_key tr_keys[] = {
      "side in pixels that g works at, a multiple of 2^g_levels; other photographs are resampled for g"},
     {"model", "h_width", TR_INT, AT(arch.h_width), 0, 4096, NULL, NULL, false, "channels of the refiner's convolutions; 0: no refiner"},
     {"model", "h_gru", TR_INT, AT(arch.h_gru), 1, 4096, NULL, NULL, false, "channels of the refiner's recurrent states"},
-    {"model", "iterations", TR_INT, AT(arch.iterations), 0, 64, NULL, NULL, false, "refinement steps T that the model is trained for and validated with"},
+    {"model", "iterations", TR_INT, AT(arch.iterations), 0, 64, NULL, NULL, false,
+     "refinement steps T that the model is trained for and validated with"},
     {"model", "recurrent", TR_BOOL, AT(arch.recurrent), 0, 1, NULL, NULL, false, "the refiner carries its states from step to step"},
     {"model", "gradient", TR_BOOL, AT(arch.gradient), 0, 1, NULL, NULL, false, "the refiner reads the renderer's gradient (no: zeros, the ablation)"},
     {"model", "mean_before_norm", TR_BOOL, AT(arch.mean_before_norm), 0, 1, NULL, NULL, false,
      "g's global track takes its means before the normalisation (no: after it, as published)"},
     {"model", "rmse", TR_CHOICE, AT(arch.rmse), 0, 1, NULL, rmse_names, false,
      "what scales the gradient: the RMSE of each image's R_0, or of the whole batch anew at every step (published)"},
+    {"model", "encoding", TR_CHOICE, AT(arch.encoding), 0, 1, NULL, encoding_names, false,
+     "how the refiner reads the gradient: as it is (raw, published), or asinh of ten times it"},
 
     {"data", "seed", TR_INT64, AT(data.seed), 0, 1e15, "1", NULL, false, "seed of the materials and of the camera's noise"},
     {"data", "families", TR_FAMILIES, AT(data.families), 0, 0, "all", NULL, false,
@@ -40,6 +44,8 @@ const tr_key tr_keys[] = {
     {"train", "pretrain_rate", TR_REAL, AT(train.pretrain_rate), 0, 1e6, "0.001", NULL, false, "Adam's peak rate while g is trained alone"},
     {"train", "pretrain_floor", TR_REAL, AT(train.pretrain_floor), 0, 1, "0.1", NULL, false, "fraction of pretrain_rate that its cosine ends at"},
     {"train", "rate", TR_REAL, AT(train.rate), 0, 1e6, "0.001", NULL, false, "Adam's peak rate while g and h are trained together"},
+    {"train", "g_rate", TR_REAL, AT(train.g_rate), 0, 10, "1", NULL, false,
+     "factor of rate for g while g and h are trained together: a pretrained g needs less"},
     {"train", "rate_floor", TR_REAL, AT(train.rate_floor), 0, 1, "0", NULL, false, "fraction of rate that its cosine ends at"},
     {"train", "warmup", TR_INT64, AT(train.warmup), 0, 1e9, "100", NULL, false,
      "steps of linear warm-up at the start of either phase (at most half of it)"},

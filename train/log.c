@@ -67,8 +67,10 @@ ts_code tr_log_open(tr_trainer *t, ts_status *st)
 /* An absent value is an empty field. The sign of a NaN says nothing and differs between CPUs. */
 static void put(FILE *f, double v, bool absent_if_nan)
 {
-    if (isnan(v)) fputs(absent_if_nan ? "," : "nan,", f);
-    else fprintf(f, "%.9g,", v);
+    if (isnan(v))
+        fputs(absent_if_nan ? "," : "nan,", f);
+    else
+        fprintf(f, "%.9g,", v);
 }
 
 ts_code tr_log_row(tr_trainer *t, const tr_row *row, ts_status *st)

@@ -69,8 +69,8 @@ static double rate_now(const tr_config *c, int64_t step)
     const bool pre = tr_pretraining(c, step);
     const int64_t length = pre ? c->train.pretrain_steps : c->train.steps, at = pre ? step : step - c->train.pretrain_steps;
     const int64_t warmup = c->train.warmup < length / 2 ? c->train.warmup : length / 2;
-    return (double)nn_learning_rate((float)(pre ? c->train.pretrain_rate : c->train.rate), (float)(pre ? c->train.pretrain_floor : c->train.rate_floor), at,
-                                    warmup, length);
+    return (double)nn_learning_rate((float)(pre ? c->train.pretrain_rate : c->train.rate),
+                                    (float)(pre ? c->train.pretrain_floor : c->train.rate_floor), at, warmup, length);
 }
 
 /* The second phase has another loss: Adam begins anew. */
@@ -88,8 +88,15 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
     const tr_config *c = &t->config;
     const int batch = c->train.batch;
     const double start = tr_seconds();
-    *row = (tr_row){.total = tr_total(c), .pretraining = tr_pretraining(c, t->step), .batch = batch, .loss = NAN, .norm = NAN,
-                    .render_start = NAN, .map_start = NAN, .render_end = NAN, .map_end = NAN};
+    *row = (tr_row){.total = tr_total(c),
+                    .pretraining = tr_pretraining(c, t->step),
+                    .batch = batch,
+                    .loss = NAN,
+                    .norm = NAN,
+                    .render_start = NAN,
+                    .map_start = NAN,
+                    .render_end = NAN,
+                    .map_end = NAN};
     begin_phase(t);
     const float *target = io_loader_next(t->loader, st);
     if (!target) return ts_context(st, "procedural materials");
@@ -115,7 +122,13 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
         t->in_a_row++;
     } else {
         const double clip = c->train.clip;
-        nn_adam_step(&t->adam, t->model, first, last, (float)row->rate, clip > 0 && row->norm > clip ? (float)(clip / row->norm) : 1.0f);
+        const float scale = clip > 0 && row->norm > clip ? (float)(clip / row->norm) : 1.0f;
+        nn_adam_next(&t->adam);
+        for (int refiner = 0; refiner <= !row->pretraining; refiner++) {
+            nn_model_range(t->model, refiner, &first, &last);
+            const double factor = row->pretraining || refiner ? 1 : c->train.g_rate;
+            nn_adam_step(&t->adam, t->model, first, last, (float)(row->rate * factor), scale);
+        }
         t->in_a_row = 0;
     }
     row->step = ++t->step;

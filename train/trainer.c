@@ -55,7 +55,8 @@ static ts_code lock_folder(tr_trainer *t, ts_status *st)
     t->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
     if (t->lock < 0) return ts_fail(st, TS_IO, "%s: %s", path, strerror(errno));
     if (flock(t->lock, LOCK_EX | LOCK_NB) == 0) return TS_OK;
-    if (errno == EWOULDBLOCK) return ts_fail(st, TS_INVALID, "%s: another lgd-train is at work in this folder (output.folder chooses another)", t->folder);
+    if (errno == EWOULDBLOCK)
+        return ts_fail(st, TS_INVALID, "%s: another lgd-train is at work in this folder (output.folder chooses another)", t->folder);
     return ts_fail(st, TS_IO, "%s: %s", path, strerror(errno));
 }
 
@@ -67,7 +68,8 @@ static ts_code check_empty(const tr_trainer *t, ts_status *st)
         char path[TR_PATH];
         tr_path(t, names[i], path);
         if (access(path, F_OK) == 0)
-            return ts_fail(st, TS_INVALID, "%s: there is a run already (%s): --resume goes on with it, output.folder chooses another folder", t->folder, names[i]);
+            return ts_fail(st, TS_INVALID, "%s: there is a run already (%s): --resume goes on with it, output.folder chooses another folder",
+                           t->folder, names[i]);
     }
     return TS_OK;
 }
@@ -126,8 +128,10 @@ tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, 
     t->best = INFINITY;
     if (listener) t->listener = *listener;
     ts_code code = TS_OK;
-    if (strlen(folder) >= sizeof t->folder) code = ts_fail(st, TS_INVALID, "the folder's name is longer than %zu bytes", sizeof t->folder - 1);
-    else strcpy(t->folder, folder);
+    if (strlen(folder) >= sizeof t->folder)
+        code = ts_fail(st, TS_INVALID, "the folder's name is longer than %zu bytes", sizeof t->folder - 1);
+    else
+        strcpy(t->folder, folder);
     if (code == TS_OK) code = tr_config_check(config, st);
     if (code == TS_OK) code = build(t, resume, st);
     if (code != TS_OK) tr_destroy(&t);
@@ -160,11 +164,13 @@ static ts_code after_step(tr_trainer *t, const tr_row *row, bool *saved, ts_stat
     if (tr_log_row(t, row, st) != TS_OK) return st->code;
     if (t->listener.step) t->listener.step(row, t->listener.user);
     if (row->skipped)
-        tr_note(t, "step %" PRId64 " is skipped: its %s is not finite (%d in a row)", t->step, isfinite(row->loss) ? "gradient" : "loss", t->in_a_row);
+        tr_note(t, "step %" PRId64 " is skipped: its %s is not finite (%d in a row)", t->step, isfinite(row->loss) ? "gradient" : "loss",
+                t->in_a_row);
     if (t->in_a_row > c->train.max_skipped) {
         tr_log_flush(t, st);
         return ts_fail(st, TS_NUMERIC,
-                       "%d steps in a row had no finite loss and gradient: stopped at step %" PRId64 ", the last checkpoint is kept (try a smaller train.rate)",
+                       "%d steps in a row had no finite loss and gradient: stopped at step %" PRId64
+                       ", the last checkpoint is kept (try a smaller train.rate)",
                        t->in_a_row, t->step);
     }
     if (c->validate.every && (end || t->step % c->validate.every == 0)) {

@@ -78,8 +78,8 @@ static ts_code add_errors(tr_trainer *t, int first, int n, tr_validation *out, t
         const float *target = v->maps + (size_t)(first + i) * pixels * MAP_CHANNELS;
         const size_t at = (size_t)i * pixels * (size_t)channels;
         for (int k = 0; k <= out->iterations; k++)
-            out->render[k] += rd_render_rmse(grid, maps[k]->t.data + at, channels, target, MAP_CHANNELS, v->views + (size_t)(first + i) * RD_EVAL_VIEWS,
-                                             RD_EVAL_VIEWS);
+            out->render[k] += rd_render_rmse(grid, maps[k]->t.data + at, channels, target, MAP_CHANNELS,
+                                             v->views + (size_t)(first + i) * RD_EVAL_VIEWS, RD_EVAL_VIEWS);
         const rd_map_error e = rd_map_rmse((int64_t)pixels, maps[out->iterations]->t.data + at, channels, target, MAP_CHANNELS);
         out->diffuse += e.diffuse;
         out->specular += e.specular;

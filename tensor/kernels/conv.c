@@ -158,6 +158,46 @@ static void columns(const float *x, int64_t pixels, int channels, float *restric
         for (int o = 0; o < channels; o++) sum[o] += a[o];
 }
 
+/* Lane l of the two vectors that a stage of a transposition makes of a and b: squares of side h trade places. */
+#define LOW(l, h) ((l) & (h) ? VL + (l) - (h) : (l))
+#define HIGH(l, h) ((l) & (h) ? VL + (l) : (l) + (h))
+#define LANES_4(f, i, h) f(i, h), f(i + 1, h), f(i + 2, h), f(i + 3, h)
+#if VL == 16
+#define LANES(f, h) LANES_4(f, 0, h), LANES_4(f, 4, h), LANES_4(f, 8, h), LANES_4(f, 12, h)
+#elif VL == 8
+#define LANES(f, h) LANES_4(f, 0, h), LANES_4(f, 4, h)
+#else
+#define LANES(f, h) LANES_4(f, 0, h)
+#endif
+#define STAGE(h)                                                                      \
+    UNROLL for (int i = 0; i < VL; i++) if (!(i & (h)))                               \
+    {                                                                                 \
+        const vf a = r[i], b = r[i + (h)];                                            \
+        r[i] = __builtin_shufflevector(a, b, LANES(LOW, h));                          \
+        r[i + (h)] = __builtin_shufflevector(a, b, LANES(HIGH, h));                   \
+    }
+
+static void transpose(const float *x, int pixels, int channels, float *to, ptrdiff_t plane)
+{
+    const int whole_c = channels / VL * VL, whole_p = pixels / VL * VL;
+    for (int p = 0; p < whole_p; p += VL)
+        for (int c = 0; c < whole_c; c += VL) {
+            vf r[VL];
+            UNROLL for (int i = 0; i < VL; i++) r[i] = v_load(x + (ptrdiff_t)(p + i) * channels + c);
+#if VL == 16
+            STAGE(8)
+#endif
+#if VL >= 8
+            STAGE(4)
+#endif
+            STAGE(2)
+            STAGE(1)
+            UNROLL for (int i = 0; i < VL; i++) v_store(to + (c + i) * plane + p, r[i]);
+        }
+    for (int p = 0; p < pixels; p++)
+        for (int c = p < whole_p ? whole_c : 0; c < channels; c++) to[c * plane + p] = x[(ptrdiff_t)p * channels + c];
+}
+
 #define FOR_5(DO) DO(1) DO(2) DO(3) DO(4) DO(5)
 #if PIXELS == 14
 #define FOR_ALL(DO) FOR_5(DO) DO(6) DO(7) DO(8) DO(9) DO(10) DO(11) DO(12) DO(13) DO(14)
@@ -184,4 +224,5 @@ const struct ts_conv_kernels TS_TABLE(conv) = {
     .tile = {{FOR_ALL(TILE_1)}, {FOR_ALL(TILE_2)}},
     .sum = {{FOR_ALL(SUM_1)}, {FOR_ALL(SUM_2)}},
     .columns = columns,
+    .transpose = transpose,
 };

@@ -58,6 +58,7 @@ struct ts_conv_kernels {
     ts_tile_function *tile[2][TS_TILE_PIXELS + 1]; /* [vectors - 1][pixels] */
     ts_sum_function *sum[2][TS_SUM_ROWS + 1];      /* [vectors - 1][m] */
     void (*columns)(const float *x, int64_t pixels, int channels, float *sum); /* sum[o] += sum_p x[p][o] */
+    void (*transpose)(const float *x, int pixels, int channels, float *to, ptrdiff_t plane);   /* to[c plane + p] = x[p][c] */
 };
 TS_FAMILY(conv)
 #endif

@@ -19,6 +19,7 @@ struct ts_elementwise_kernels {
     /* y = scale (x > 0 ? x : alpha (e^x - 1)); dx = dy (y > 0 ? scale : y + scale alpha) */
     void (*selu)(int64_t n, const float *x, float *y);
     void (*selu_backward)(int64_t n, const float *y, const float *dy, float *dx, bool accumulate);
+    void (*asinh)(int64_t n, float s, const float *x, float *y); /* y = asinh(s x) */
     void (*add)(int64_t n, const float *a, const float *b, float *y);
     void (*scale)(int64_t n, float s, const float *x, float *y, bool accumulate); /* y (+)= s x */
 
