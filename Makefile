@@ -126,8 +126,8 @@ install: all
 	install -m 644 $(LIB) $(DESTDIR)$(PREFIX)/lib
 	install -m 644 infer/lgd.h $(DESTDIR)$(PREFIX)/include
 	install -m 644 $(wildcard models/*.safetensors) $(DESTDIR)$(PREFIX)/share/lgd
-	@printf 'prefix=%s\nName: lgd\nDescription: material of a surface from one flash photograph\nVersion: %s\nCflags: -I$${prefix}/include\nLibs: -L$${prefix}/lib -llgd -fopenmp -lpthread -lm\n' \
-	  '$(PREFIX)' '$(VERSION)' > $(DESTDIR)$(PREFIX)/lib/pkgconfig/lgd.pc
+	@printf 'prefix=%s\nName: lgd\nDescription: material of a surface from one flash photograph\nVersion: %s\nCflags: -I$${prefix}/include\nLibs: -L$${prefix}/lib -llgd %s -fopenmp -lstdc++ -lpthread -lm\n' \
+	  '$(PREFIX)' '$(VERSION)' '$(PKG_LIBS)' > $(DESTDIR)$(PREFIX)/lib/pkgconfig/lgd.pc
 
 uninstall:
 	rm -f $(PROGRAMS:%=$(DESTDIR)$(PREFIX)/bin/lgd-%) $(DESTDIR)$(PREFIX)/lib/liblgd.a $(DESTDIR)$(PREFIX)/lib/pkgconfig/lgd.pc \

@@ -233,6 +233,7 @@ TEST(nn_renderer_gradient_is_a_constant)
 {
     enum { STEPS = 3 };
     nn_arch a = tiny();
+    a.encoding = NN_GRADIENT_RAW; /* the numbers given are those of rd_flash_gradient */
     nn_model *m = create(&a, 6);
     enliven(m);
     nn_input in = photographs(1, SIDE, 3, NULL);

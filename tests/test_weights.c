@@ -77,12 +77,12 @@ TEST(weights_architecture_round_trip)
 {
     nn_arch a = small();
     a.channels = 10, a.g_kernel_first = 5, a.g_kernel = 7, a.iterations = 11, a.recurrent = false, a.gradient = false, a.mean_before_norm = false;
-    a.rmse = NN_RMSE_BATCH;
+    a.rmse = NN_RMSE_BATCH, a.encoding = NN_GRADIENT_RAW;
     ts_status st = {0};
     char text[NN_ARCH_TEXT];
     nn_meta meta[NN_ARCH_META];
     int metas = nn_arch_to_meta(&a, meta, NN_ARCH_META, text, sizeof text);
-    CHECK(metas == 15, "%d entries, not format and 14 fields", metas);
+    CHECK(metas == 16, "%d entries, not format and 15 fields", metas);
     CHECK(nn_arch_to_meta(&a, meta, metas - 1, text, sizeof text) < 0 && nn_arch_to_meta(&a, meta, metas, text, 20) < 0, "too little room is taken");
     nn_arch_to_meta(&a, meta, NN_ARCH_META, text, sizeof text);
     const char *path = path_of("arch.safetensors");
