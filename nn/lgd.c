@@ -19,6 +19,9 @@ static bool check(ag_tape *tape, const nn_model *model, const nn_input *in)
     else if (!ts_contiguous(&in->image)) ag_fail(tape, TS_INVALID, "the photograph is not contiguous");
     else if (s.h != in->grid.h || s.w != in->grid.w)
         ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels, its grid %d x %d", s.w, s.h, in->grid.w, in->grid.h);
+    else if (in->whole.data && !ts_same(in->whole.shape, (ts_shape){s.n, in->grid.side, in->grid.side, 3}))
+        ag_fail(tape, TS_INVALID, "the whole photograph is %d x %d pixels, the window's grid says %d", in->whole.shape.w, in->whole.shape.h,
+                in->grid.side);
     return !ag_status(tape)->code;
 }
 
@@ -39,13 +42,37 @@ static ag_value *encoded(ag_tape *tape, const nn_model *model, const ts_tensor *
 ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in)
 {
     if (!check(tape, model, in)) return NULL;
-    ts_shape s = in->image.shape;
-    if (s.h != s.w) return ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels: g needs a square", s.w, s.h);
+    const ts_tensor *photograph = in->whole.data ? &in->whole : &in->image;
+    const int side = photograph->shape.h;
+    if (side != photograph->shape.w)
+        return ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels: g needs a square", photograph->shape.w, side);
     ts_mark mark = ag_scope_begin(tape);
-    ag_value *maps = nn_unet(tape, model, encoded(tape, model, &in->image));
-    if (s.h != model->arch.g_size) maps = ag_resize(tape, maps, s.h, s.w);
+    ag_value *maps = nn_unet(tape, model, encoded(tape, model, photograph));
+    if (side != model->arch.g_size) maps = ag_resize(tape, maps, side, side);
     ag_scope_end(tape, mark, &maps, 1);
     return maps;
+}
+
+/* The part of maps of the whole that in->image shows. */
+static ag_value *window(ag_tape *tape, const nn_input *in, ag_value *maps)
+{
+    const rd_grid g = in->grid;
+    return in->whole.data ? ag_crop(tape, maps, g.y0, g.x0, g.h, g.w) : maps;
+}
+
+/* The RMSE of R_0, which scales all later gradients: of the whole photographs where they are given, maps then being theirs. */
+static bool measure_start(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, nn_state *state)
+{
+    if (!maps || !model->arch.gradient) return maps != NULL;
+    const ts_tensor *image = in->whole.data ? &in->whole : &in->image;
+    const rd_grid grid = in->whole.data ? rd_grid_full(in->grid.side) : in->grid;
+    const ts_shape s = maps->t.shape;
+    const int64_t one = (int64_t)s.h * s.w;
+    state->rmse0 = ts_arena_alloc(ag_arena(tape), (size_t)s.n * sizeof *state->rmse0);
+    if (!state->rmse0) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", s.n), false;
+    for (int n = 0; n < s.n; n++)
+        rd_flash_rmse(grid, maps->t.data + n * one * s.c, s.c, &in->view, image->data + n * one * 3, &state->rmse0[n]);
+    return true;
 }
 
 /* dL/dR_t as h reads it: a constant of the tape, the shape of maps. */
@@ -60,13 +87,12 @@ static ag_value *loss_gradient(ag_tape *tape, const nn_model *model, const nn_in
         return gradient;
     }
     bool batch = model->arch.rmse == NN_RMSE_BATCH;
-    if (!state->rmse0) state->rmse0 = ts_arena_alloc(ag_arena(tape), (size_t)s.n * sizeof *state->rmse0);
-    if (!state->rmse0) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", s.n);
-    if (batch || state->step == 0)
-        for (int n = 0; n < s.n; n++)
-            rd_flash_rmse(in->grid, maps->t.data + n * one, s.c, &in->view, in->image.data + n * image, &state->rmse0[n]);
     double common = 0;
-    for (int n = 0; n < s.n; n++) common += state->rmse0[n] * state->rmse0[n] / s.n;
+    for (int n = 0; batch && n < s.n; n++) {
+        double rmse;
+        rd_flash_rmse(in->grid, maps->t.data + n * one, s.c, &in->view, in->image.data + n * image, &rmse);
+        common += rmse * rmse / s.n;
+    }
     for (int n = 0; n < s.n; n++) {
         double rmse = batch ? sqrt(common) : state->rmse0[n];
         rd_flash_gradient(in->grid, maps->t.data + n * one, s.c, &in->view, in->image.data + n * image, rmse, gradient->t.data + n * one, NULL);
@@ -95,6 +121,7 @@ ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag
     if (!ts_same(s, (ts_shape){in->image.shape.n, in->grid.h, in->grid.w, model->arch.channels}))
         return ag_fail(tape, TS_INVALID, "the maps are %d x %d x %d x %d, not the photograph's size and the model's %d channels", s.n, s.h, s.w, s.c,
                        model->arch.channels);
+    if (model->arch.rmse == NN_RMSE_START && !state->rmse0 && !measure_start(tape, model, in, maps, state)) return NULL;
     ag_value *gradient = loss_gradient(tape, model, in, maps, state);
     ag_value *next = ag_add(tape, maps, nn_refiner(tape, model, ag_concat(tape, maps, gradient), state->gru));
     state->step++;
@@ -133,14 +160,14 @@ ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int ste
     nn_state state = {0};
     carried to = {0};
     bool release = !ag_gradients(tape);
-    ag_value *now = nn_predict(tape, model, in);
+    ag_value *predicted = nn_predict(tape, model, in), *now = NULL;
+    if (predicted && (steps == 0 || model->arch.rmse == NN_RMSE_BATCH || measure_start(tape, model, in, predicted, &state)))
+        now = window(tape, in, predicted);
     int t = 0;
     maps[0] = now;
     if (now && release && steps > 0) {
         ts_shape s = now->t.shape;
         to.maps = now;
-        state.rmse0 = ts_arena_alloc(ag_arena(tape), (size_t)s.n * sizeof *state.rmse0);
-        if (!state.rmse0) ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", s.n);
         for (int i = 0; i < 2 && model->arch.recurrent; i++) to.gru[i] = ag_empty(tape, (ts_shape){s.n, s.h, s.w, model->arch.h_gru});
     }
     bool on = now && (!after || after(0, now, user));

@@ -74,27 +74,28 @@ const nn_param *nn_model_find(const nn_model *model, const char *name);
 /* The parameters of g alone and of h alone: [first, last) in floats of the block (g comes first). */
 void nn_model_range(const nn_model *model, bool refiner, size_t *first, size_t *last);
 
-/* One photograph batch. image: linear, clamped to [0, 1], [N, S, S, 3]. */
+/* One photograph batch, linear, clamped to [0, 1]. g sees a whole photograph, h refines any window of it. */
 typedef struct nn_input {
-    ts_tensor image;
-    rd_grid grid;  /* of every image in the batch */
-    rd_view view;  /* the flash */
+    ts_tensor image; /* [N, h, w, 3]: what is refined, the grid's pixels */
+    rd_grid grid;    /* of every image in the batch */
+    rd_view view;    /* the flash */
+    ts_tensor whole; /* [N, side, side, 3]: the photographs of which image is the window; no data: image is the whole */
 } nn_input;
 
-/* R_0 by g: [N, S, S, channels]. The log encoding, the resampling to g_size and back are in here. */
+/* R_0 by g of the whole: [N, S, S, channels]. The log encoding, the resampling to g_size and back are in here. */
 ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in);
 
 /* What h keeps from step to step, and the loss's scale; zero-initialise it. */
 typedef struct nn_state {
     ag_value *gru[2];
-    double *rmse0; /* per image, in the tape's arena */
+    double *rmse0; /* of the whole images' R_0, in the tape's arena; NULL: nn_refine measures it on the maps that it is given */
     int step;
 } nn_state;
 
 /* R_{t+1} = R_t + h(R_t, dL/dR_t). */
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
-/* The unrolled loop: maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate
+/* The unrolled loop on the grid's window: maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate
  * memory is released on a tape without gradients. after (may be NULL) sees every R_t and may stop the loop by returning false;
  * what is left of maps is then filled with the last R_t. */
 typedef bool (*nn_after)(int step, const ag_value *maps, void *user);

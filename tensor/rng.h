@@ -12,7 +12,16 @@ typedef struct ts_rng {
 /* Independent sequences for different (seed, stream, index); stream names the purpose (TS_STREAM_...). */
 ts_rng ts_rng_make(uint64_t seed, uint32_t stream, uint64_t index);
 
-enum { TS_STREAM_INIT = 1, TS_STREAM_MATERIAL = 2, TS_STREAM_SCENE = 3, TS_STREAM_CAMERA = 4, TS_STREAM_TEST = 5, TS_STREAM_EVAL = 6, TS_STREAM_TRAIN = 7 };
+enum {
+    TS_STREAM_INIT = 1,
+    TS_STREAM_MATERIAL,
+    TS_STREAM_SCENE,
+    TS_STREAM_CAMERA,
+    TS_STREAM_TEST,
+    TS_STREAM_EVAL,
+    TS_STREAM_TRAIN,
+    TS_STREAM_WINDOW
+};
 
 uint32_t ts_rng_u32(ts_rng *r);
 float ts_rng_uniform(ts_rng *r);                    /* [0, 1), 24 bits */

@@ -60,7 +60,7 @@ static inline nn_input photographs(int n, int s, uint64_t seed, float **maps)
     for (int i = 0; i < n; i++) rd_render(rd_grid_full(s), m + (size_t)i * pixels * 9, 9, &flash, true, image + (size_t)i * pixels * 3);
     if (maps) *maps = m;
     else free(m);
-    return (nn_input){ts_view(image, (ts_shape){n, s, s, 3}), rd_grid_full(s), flash};
+    return (nn_input){.image = ts_view(image, (ts_shape){n, s, s, 3}), .grid = rd_grid_full(s), .view = flash};
 }
 
 static inline void check_tape(const ag_tape *t) { CHECK(!ag_status(t)->code, "tape: %s", ag_status(t)->message); }

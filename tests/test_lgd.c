@@ -107,6 +107,44 @@ TEST(nn_refiner_is_translation_equivariant)
     CHECK(size > 0.01, "the changes are too small to say anything: %g", size);
 }
 
+/* What is refined in a window is what the whole has there, but for the reach of T steps from the window's border. */
+TEST(nn_window_equals_the_whole)
+{
+    enum { WHOLE = 64, Y0 = 9, X0 = 17, H = 31, W = 40, STEPS = 2, REACH = STEPS * 5 };
+    nn_arch a = tiny();
+    a.g_size = 32;
+    nn_model *m = create(&a, 21);
+    enliven(m);
+    nn_input whole = photographs(2, WHOLE, 22, NULL), part = whole;
+    ts_status st = {0};
+    ts_arena *arena = ts_arena_create(1 << 16, &st);
+    CHECK(arena, "%s", st.message);
+    ts_tensor view = ts_window(&whole.image, Y0, X0, H, W);
+    part.whole = whole.image;
+    part.image = ts_new(arena, view.shape);
+    ts_copy(&part.image, &view);
+    part.grid = (rd_grid){.h = H, .w = W, .y0 = Y0, .x0 = X0, .side = WHOLE};
+    ag_tape *t[2] = {tape_create(false), tape_create(false)};
+    ag_value *maps[2][STEPS + 1];
+    nn_lgd(t[0], m, &whole, STEPS, true, maps[0], NULL, NULL);
+    nn_lgd(t[1], m, &part, STEPS, true, maps[1], NULL, NULL);
+    check_tape(t[0]);
+    check_tape(t[1]);
+    double moved = 0;
+    for (int k = 0; k <= STEPS; k += STEPS)
+        for (int n = 0; n < 2; n++)
+            for (int i = k ? REACH : 0; i < H - (k ? REACH : 0); i++)
+                for (int j = k ? REACH : 0; j < W - (k ? REACH : 0); j++)
+                    for (int c = 0; c < 9; c++) {
+                        const int64_t big = (((int64_t)n * WHOLE + i + Y0) * WHOLE + j + X0) * 9 + c, small = (((int64_t)n * H + i) * W + j) * 9 + c;
+                        const double p = maps[0][k]->t.data[big], q = maps[1][k]->t.data[small];
+                        CHECK(fabs(p - q) < 1e-5, "R_%d, image %d, row %d, column %d, channel %d: %g and %g", k, n, i, j, c, p, q);
+                        moved = fmax(moved, fabs(p - maps[0][0]->t.data[big]));
+                    }
+    CHECK(moved > 0.01, "the refinement is too small to say anything: %g", moved);
+    ts_arena_destroy(&arena);
+}
+
 static void scale(nn_model *m, const char *name, float factor)
 {
     const nn_param *p = nn_model_find(m, name);

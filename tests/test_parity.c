@@ -104,7 +104,7 @@ TEST(parity_g_is_the_published_one)
     float *image = stored(f, "input.image", 3), *expected = stored(f, "g.output", CHANNELS);
     ts_status st = {0};
     ag_tape *t = ag_tape_create(false, &st);
-    nn_input in = {ts_view(image, (ts_shape){1, SIDE, SIDE, 3}), rd_grid_full(SIDE), rd_flash()};
+    nn_input in = {.image = ts_view(image, (ts_shape){1, SIDE, SIDE, 3}), .grid = rd_grid_full(SIDE), .view = rd_flash()};
     ag_value *maps = nn_predict(t, m, &in);
     CHECK(maps, "%s", ag_status(t)->message);
     compare(maps->t.data, expected, 1e-4, 1e-5); /* PyTorch in float32: 1.7e-5 and 1.5e-6; the order of sums of 25600 products decides */

@@ -16,10 +16,10 @@ static tr_config small(void)
     tr_config c = tr_config_default();
     ts_status st = {0};
     static const char *const keys[] = {"model.g_width=4",  "model.g_width_max=8",    "model.g_levels=2",       "model.g_size=16",
-                                       "model.h_width=8",  "model.h_gru=4",          "model.iterations=2",     "data.patch=16",
+                                       "model.h_width=8",  "model.h_gru=4",          "model.iterations=2",     "data.patch=24",
                                        "train.batch=2",    "train.pretrain_steps=4", "train.steps=6",          "train.warmup=2",
                                        "train.ema=0.9",    "train.iterations_min=1", "train.iterations_max=3", "train.checkpoint_every=100",
-                                       "validate.every=3", "validate.count=3",       "validate.size=16"};
+                                       "validate.every=3", "validate.count=3",       "validate.size=16",      "train.window=16"};
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) CHECK(tr_config_set_assignment(&c, keys[i], &st) == TS_OK, "%s", st.message);
     return c;
 }

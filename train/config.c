@@ -230,6 +230,8 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
     if (nn_arch_check(&c->arch, st) != TS_OK) return ts_context(st, "[model]");
     if (c->train.steps + c->train.pretrain_steps < 1)
         return ts_fail(st, TS_INVALID, "train.steps and train.pretrain_steps are both 0, there is nothing to do");
+    if (c->train.window && (c->train.window < 8 || c->train.window > c->data.patch))
+        return ts_fail(st, TS_INVALID, "train.window is %d: use 8 to data.patch, which is %d, or 0", c->train.window, c->data.patch);
     if (lo > hi) return ts_fail(st, TS_INVALID, "train.iterations_min is %d, more than the %d of train.iterations_max", lo, hi);
     if (c->validate.every && c->validate.seed == c->data.seed)
         return ts_fail(st, TS_INVALID, "validate.seed equals data.seed: the validation materials would be those that are trained on");

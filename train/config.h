@@ -15,7 +15,7 @@ typedef struct tr_config {
         int patch, prefetch, threads;
     } data;
     struct { /* [train] */
-        int batch;
+        int batch, window; /* window 0: whole patches */
         int64_t pretrain_steps, steps, warmup;
         double pretrain_rate, pretrain_floor, rate, g_rate, rate_floor;
         double clip, ema, start_weight, map_weight;

@@ -39,6 +39,8 @@ const tr_key tr_keys[] = {
     {"data", "threads", TR_INT, AT(data.threads), 1, 64, "1", NULL, true, "background threads that make materials"},
 
     {"train", "batch", TR_INT, AT(train.batch), 1, 1024, "8", NULL, false, "materials in a step"},
+    {"train", "window", TR_INT, AT(train.window), 0, 1024, "0", NULL, false,
+     "side of the window of each patch that is refined and compared when g and h are trained together, g seeing the whole; 0: whole patches"},
     {"train", "pretrain_steps", TR_INT64, AT(train.pretrain_steps), 0, 1e9, "0", NULL, false, "steps that train g alone on R_0, before the others"},
     {"train", "steps", TR_INT64, AT(train.steps), 0, 1e9, "1000", NULL, false, "steps that train g and h together, after pretrain_steps"},
     {"train", "pretrain_rate", TR_REAL, AT(train.pretrain_rate), 0, 1e6, "0.001", NULL, false, "Adam's peak rate while g is trained alone"},

@@ -45,17 +45,44 @@ static int draw_iterations(const tr_config *c, int64_t step)
     return lo + ts_rng_int(&rng, hi - lo + 1);
 }
 
+/* The window of all photographs that h refines in this step. */
+static rd_grid draw_window(const tr_config *c, int64_t step)
+{
+    const int size = c->data.patch, side = c->train.window ? c->train.window : size;
+    ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_WINDOW, (uint64_t)step);
+    const int y0 = ts_rng_int(&rng, size - side + 1), x0 = ts_rng_int(&rng, size - side + 1);
+    return (rd_grid){.h = side, .w = side, .y0 = y0, .x0 = x0, .side = size};
+}
+
+/* The window's part of [N, S, S, C], contiguous, in the tape's arena. */
+static ts_tensor cut(tr_trainer *t, const ts_tensor *whole, rd_grid g)
+{
+    ts_tensor part = ts_window(whole, g.y0, g.x0, g.h, g.w), copy = ts_new(ag_arena(t->tape), part.shape);
+    if (copy.data) ts_copy(&copy, &part);
+    else ag_fail(t->tape, TS_NOMEM, "no memory for a window of %d x %d pixels", g.w, g.h);
+    return copy;
+}
+
 static ag_value *forward(tr_trainer *t, const float *target, tr_row *row)
 {
     const tr_config *c = &t->config;
     const int batch = c->train.batch, size = c->data.patch;
     ag_value *maps[TR_MOST_ITERATIONS + 1];
-    ag_value *goal = ag_constant(t->tape, ts_view((float *)(uintptr_t)target, (ts_shape){batch, size, size, MAP_CHANNELS}));
-    const nn_input in = {.image = ts_view(t->images, (ts_shape){batch, size, size, 3}), .grid = rd_grid_full(size), .view = rd_flash()};
+    ts_tensor goals = ts_view((float *)(uintptr_t)target, (ts_shape){batch, size, size, MAP_CHANNELS});
+    nn_input in = {.image = ts_view(t->images, (ts_shape){batch, size, size, 3}), .grid = rd_grid_full(size), .view = rd_flash()};
     if (row->pretraining) {
         maps[0] = nn_predict(t->tape, t->model, &in);
-        return add_loss(t, NULL, maps[0], goal, 1, &row->render_start, &row->map_start);
+        return add_loss(t, NULL, maps[0], ag_constant(t->tape, goals), 1, &row->render_start, &row->map_start);
     }
+    const rd_grid window = draw_window(c, t->step);
+    if (window.w < size) {
+        in.whole = in.image;
+        in.grid = window;
+        in.image = cut(t, &in.whole, window);
+        goals = cut(t, &goals, window);
+        if (!in.image.data || !goals.data) return NULL;
+    }
+    ag_value *goal = ag_constant(t->tape, goals);
     row->iterations = draw_iterations(c, t->step);
     if (nn_lgd(t->tape, t->model, &in, row->iterations, true, maps, NULL, NULL) != TS_OK) return NULL;
     ag_value *loss = add_loss(t, NULL, maps[row->iterations], goal, 1, &row->render_end, &row->map_end);
