@@ -1,38 +1,8 @@
-/* Training runs: exact resume, threads, skipped steps, the folder's rules. */
+/* Training runs: exact resume, threads, the folder's rules. */
 #include "nn/weights.h"
-#include "tensor/threads.h"
-#include "test.h"
-#include "train/parts.h"
+#include "tests/runs.h"
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
-
-/* As small as a run with every part in it can be: 4 steps of g alone, 6 of g and h with 1 to 3 iterations. */
-static tr_config small(void)
-{
-    ts_threads_set(1); /* such small work is slower on several, most of all on a busy machine */
-    tr_config c = tr_config_default();
-    ts_status st = {0};
-    static const char *const keys[] = {"model.g_width=4",  "model.g_width_max=8",    "model.g_levels=2",       "model.g_size=16",
-                                       "model.h_width=8",  "model.h_gru=4",          "model.iterations=2",     "data.patch=24",
-                                       "train.batch=2",    "train.pretrain_steps=4", "train.steps=6",          "train.warmup=2",
-                                       "train.ema=0.9",    "train.iterations_min=1", "train.iterations_max=3", "train.checkpoint_every=100",
-                                       "validate.every=3", "validate.count=3",       "validate.size=16",      "train.window=16"};
-    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) CHECK(tr_config_set_assignment(&c, keys[i], &st) == TS_OK, "%s", st.message);
-    return c;
-}
-
-static const char *folder(const char *name)
-{
-    static char path[24][600]; /* more than a test has */
-    static int next;
-    char *p = path[next++ % 24];
-    snprintf(p, 600, "%s/%s", test_folder(), name);
-    mkdir(p, 0777);
-    return p;
-}
 
 typedef struct watch {
     int64_t stop_at; /* 0: never */
@@ -41,20 +11,6 @@ typedef struct watch {
     const char *copy_from, *copy_to; /* copies a file after that step */
     int64_t copy_at;
 } watch;
-
-static size_t read_all(const char *path, char **data)
-{
-    FILE *f = fopen(path, "rb");
-    CHECK(f, "%s cannot be read", path);
-    fseek(f, 0, SEEK_END);
-    const size_t n = (size_t)ftell(f);
-    rewind(f);
-    *data = malloc(n + 1);
-    CHECK(fread(*data, 1, n, f) == n, "%s cannot be read", path);
-    (*data)[n] = 0;
-    fclose(f);
-    return n;
-}
 
 static void copy(const char *from, const char *to)
 {
@@ -302,47 +258,6 @@ TEST(trainer_locks_its_folder)
     t = tr_create(&c, where, false, NULL, &st);
     CHECK(t, "the lock outlived its trainer: %s", st.message);
     tr_destroy(&t);
-}
-
-/* Weights that overflow: every step is skipped and reported, nothing changes, the run stops, and no file holds a value that is not finite. */
-TEST(trainer_skips_steps_that_are_not_finite)
-{
-    tr_config c = small();
-    ts_status st = {0};
-    const char *where = folder("run");
-    tr_row row;
-    c.train.max_skipped = 3;
-    c.train.pretrain_steps = 0; /* no change of phase on the way, which begins Adam anew */
-    watch w = {0};
-    const tr_listener l = {.note = on_note, .user = &w};
-    tr_trainer *t = tr_create(&c, where, false, &l, &st);
-    CHECK(t, "%s", st.message);
-    CHECK(tr_step(t, &row, &st) == TS_OK && !row.skipped, "%s", st.message);
-    for (size_t i = 0; i < t->model->count; i++) t->model->value[i] *= 1e30f;
-    const size_t bytes = t->model->count * sizeof(float);
-    float *before = malloc(3 * bytes);
-    memcpy(before, t->model->value, bytes);
-    memcpy((char *)before + bytes, t->adam.m, bytes);
-    memcpy((char *)before + 2 * bytes, t->adam.v, bytes);
-    CHECK(tr_run(t, &st) == TS_NUMERIC, "went on: %s", st.message);
-    CHECK(strstr(st.message, "4 steps in a row") && w.notes == 4, "%d notes: %s", w.notes, st.message);
-    CHECK(t->skipped == 4 && t->step == 5, "%d skipped at step %d", (int)t->skipped, (int)t->step);
-    CHECK(!memcmp(before, t->model->value, bytes) && !memcmp((char *)before + bytes, t->adam.m, bytes) &&
-              !memcmp((char *)before + 2 * bytes, t->adam.v, bytes),
-          "a skipped step changed the state");
-    t->adam.ema[0] = NAN;
-    CHECK(tr_save_checkpoint(t, &st) == TS_NUMERIC, "a checkpoint that is not finite was written");
-    tr_destroy(&t);
-    char path[700], *log;
-    snprintf(path, sizeof path, "%s/checkpoint.safetensors", where);
-    CHECK(access(path, F_OK) != 0, "%s exists", path);
-    snprintf(path, sizeof path, "%s/last.safetensors", where);
-    CHECK(access(path, F_OK) != 0, "%s exists", path);
-    snprintf(path, sizeof path, "%s/log.csv", where);
-    read_all(path, &log);
-    CHECK(strstr(log, "nan,") && strstr(log, ",4\n"), "the log does not count the skipped steps: %s", log);
-    free(log);
-    free(before);
 }
 
 TEST(trainer_rejects_damaged_checkpoints)

@@ -18,7 +18,7 @@ typedef struct tr_config {
         int batch, window; /* window 0: whole patches */
         int64_t pretrain_steps, steps, warmup;
         double pretrain_rate, pretrain_floor, rate, g_rate, rate_floor;
-        double clip, ema, start_weight, map_weight;
+        double clip, spike, ema, start_weight, map_weight;
         int iterations_min, iterations_max; /* 0: arch.iterations */
         int64_t seed, checkpoint_every, log_every;
         int max_skipped;

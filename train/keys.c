@@ -52,6 +52,8 @@ const tr_key tr_keys[] = {
     {"train", "warmup", TR_INT64, AT(train.warmup), 0, 1e9, "100", NULL, false,
      "steps of linear warm-up at the start of either phase (at most half of it)"},
     {"train", "clip", TR_REAL, AT(train.clip), 0, 1e9, "1", NULL, false, "largest norm of the gradient, longer ones are scaled to it; 0: no limit"},
+    {"train", "spike", TR_REAL, AT(train.spike), 0, 1e9, "8", NULL, false,
+     "a step whose gradient is so many times longer than the recent mean is skipped; 0: none is"},
     {"train", "ema", TR_REAL, AT(train.ema), 0, 0.999999, "0.999", NULL, false,
      "decay of the moving average of the weights, which is what is validated and saved; 0: the weights themselves"},
     {"train", "start_weight", TR_REAL, AT(train.start_weight), 0, 1e3, "1", NULL, false, "weight of R_0's loss beside R_T's"},
@@ -63,7 +65,7 @@ const tr_key tr_keys[] = {
     {"train", "checkpoint_every", TR_INT64, AT(train.checkpoint_every), 1, 1e9, "500", NULL, true, "steps between checkpoints"},
     {"train", "log_every", TR_INT64, AT(train.log_every), 1, 1e9, "50", NULL, true, "steps between lines of progress when stderr is no terminal"},
     {"train", "max_skipped", TR_INT, AT(train.max_skipped), 0, 1000000, "20", NULL, true,
-     "steps in a row without a finite loss and gradient that are skipped; one more ends the run"},
+     "steps in a row that may be skipped (no finite loss and gradient, or a spike); one more ends the run"},
     {"train", "init", TR_TEXT, AT(train.init), 0, sizeof((tr_config *)0)->train.init, "", NULL, true,
      "weights file whose parameters of the same name and shape the run begins with"},
 

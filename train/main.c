@@ -34,8 +34,8 @@ static void show_step(const tr_row *row, void *user)
 {
     shown *s = user;
     char extra[160];
-    if (!row->skipped) s->loss += row->loss;
-    s->steps += !row->skipped;
+    if (!row->skip) s->loss += row->loss;
+    s->steps += !row->skip;
     s->samples += row->batch;
     s->seconds += row->seconds;
     const int64_t done = row->step - s->first;

@@ -110,6 +110,21 @@ static void begin_phase(tr_trainer *t)
     t->best = INFINITY; /* R_0's error before, R_T's from now on */
 }
 
+#define USUAL_DECAY 0.98
+
+/* A gradient of 0 is that of saturated outputs, from which there is no way back; one far beyond the usual norm would, after clipping, still
+ * move by a whole step each of the many weights whose second moment is small, and has ended runs so. */
+static const char *why_skip(const tr_trainer *t, const tr_row *row)
+{
+    enum { SETTLED = 100 }; /* steps before which norms change fast for good reasons */
+    const double spike = t->config.train.spike;
+    if (!isfinite(row->loss)) return "loss is not finite";
+    if (!isfinite(row->norm)) return "gradient is not finite";
+    if (row->norm == 0) return "gradient is zero";
+    if (spike > 0 && t->adam.step >= SETTLED && row->norm > spike * t->usual_norm) return "gradient is far longer than usual (train.spike)";
+    return NULL;
+}
+
 ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
 {
     const tr_config *c = &t->config;
@@ -142,8 +157,8 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
         return st->code;
     }
     row->rate = rate_now(c, t->step);
-    row->skipped = !isfinite(row->loss) || !isfinite(row->norm);
-    if (row->skipped) {
+    row->skip = why_skip(t, row);
+    if (row->skip) {
         memset(t->model->grad, 0, t->model->count * sizeof(float));
         t->skipped++;
         t->in_a_row++;
@@ -156,6 +171,7 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
             const double factor = row->pretraining || refiner ? 1 : c->train.g_rate;
             nn_adam_step(&t->adam, t->model, first, last, (float)(row->rate * factor), scale);
         }
+        t->usual_norm = t->adam.step == 1 ? row->norm : USUAL_DECAY * t->usual_norm + (1 - USUAL_DECAY) * row->norm;
         t->in_a_row = 0;
     }
     row->step = ++t->step;

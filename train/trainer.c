@@ -163,13 +163,12 @@ static ts_code after_step(tr_trainer *t, const tr_row *row, bool *saved, ts_stat
     *saved = false;
     if (tr_log_row(t, row, st) != TS_OK) return st->code;
     if (t->listener.step) t->listener.step(row, t->listener.user);
-    if (row->skipped)
-        tr_note(t, "step %" PRId64 " is skipped: its %s is not finite (%d in a row)", t->step, isfinite(row->loss) ? "gradient" : "loss",
-                t->in_a_row);
+    if (row->skip)
+        tr_note(t, "step %" PRId64 " is skipped: its %s (%d in a row)", t->step, row->skip, t->in_a_row);
     if (t->in_a_row > c->train.max_skipped) {
         tr_log_flush(t, st);
         return ts_fail(st, TS_NUMERIC,
-                       "%d steps in a row had no finite loss and gradient: stopped at step %" PRId64
+                       "%d steps in a row had no loss and gradient to learn from: stopped at step %" PRId64
                        ", the last checkpoint is kept (try a smaller train.rate)",
                        t->in_a_row, t->step);
     }
