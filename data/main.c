@@ -1,5 +1,6 @@
 /* lgd-data: procedural materials as map folders, strips, photographs or a contact sheet, and how they compare with others' materials. */
 #include "cli/cli.h"
+#include "data/camera.h"
 #include "data/sheet.h"
 #include "data/statistics.h"
 #include "render/render.h"
@@ -32,6 +33,11 @@ enum {
     OPT_PHOTOGRAPHS,
     OPT_NOISE,
     OPT_BLUR,
+    OPT_EXPOSURE,
+    OPT_VIGNETTE,
+    OPT_WHITE_BALANCE,
+    OPT_TILT,
+    OPT_OFF_CENTRE,
     OPT_QUALITY,
     OPT_STATISTICS,
     OPT_TESTDATA,
@@ -51,6 +57,11 @@ static const struct option long_options[] = {{"output", required_argument, NULL,
                                              {"photographs", no_argument, NULL, OPT_PHOTOGRAPHS},
                                              {"noise", required_argument, NULL, OPT_NOISE},
                                              {"blur", required_argument, NULL, OPT_BLUR},
+                                             {"exposure", required_argument, NULL, OPT_EXPOSURE},
+                                             {"vignette", required_argument, NULL, OPT_VIGNETTE},
+                                             {"white-balance", required_argument, NULL, OPT_WHITE_BALANCE},
+                                             {"tilt", required_argument, NULL, OPT_TILT},
+                                             {"off-centre", required_argument, NULL, OPT_OFF_CENTRE},
                                              {"quality", required_argument, NULL, OPT_QUALITY},
                                              {"statistics", no_argument, NULL, OPT_STATISTICS},
                                              {"testdata", required_argument, NULL, OPT_TESTDATA},
@@ -82,6 +93,11 @@ static void print_help(void)
     printf("\n\nHow:\n"
            "      --noise X         of photographs, 0 none .. 1 a phone at night (default 0.5)\n"
            "      --blur X          of photographs, largest sigma in pixels at 256 (default 0.6)\n"
+           "      --exposure X      of photographs, up to this many stops brighter or darker (default 0)\n"
+           "      --vignette X      of photographs, largest share of light lost in the corners, 0 .. 0.9 (default 0)\n"
+           "      --white-balance X of photographs, red and blue up to this share stronger or weaker, 0 .. 0.9 (default 0)\n"
+           "      --tilt X          of photographs, largest angle of the camera in degrees, 0 .. 30 (default 0)\n"
+           "      --off-centre X    of photographs, how far the camera may be off the centre in patch widths, 0 .. 0.4 (default 0)\n"
            "      --quality N       of photographs' JPEG, 1 .. 100 (default 90)\n"
            "      --testdata DIR    a folder with maps/ (map folders) and strips/ to compare with\n"
            "      --threads N       default: as many as the process may use\n"
@@ -136,6 +152,11 @@ static int parse_options(int argc, char **argv, options *o)
         case OPT_PHOTOGRAPHS: o->photographs = true; break;
         case OPT_NOISE: code = parse_share("noise", optarg, 1, &o->camera.noise); break;
         case OPT_BLUR: code = parse_share("blur", optarg, 4, &o->camera.blur); break;
+        case OPT_EXPOSURE: code = parse_share("exposure", optarg, 3, &o->camera.exposure); break;
+        case OPT_VIGNETTE: code = parse_share("vignette", optarg, 0.9, &o->camera.vignette); break;
+        case OPT_WHITE_BALANCE: code = parse_share("white-balance", optarg, 0.9, &o->camera.white_balance); break;
+        case OPT_TILT: code = parse_share("tilt", optarg, 30, &o->camera.tilt); break;
+        case OPT_OFF_CENTRE: code = parse_share("off-centre", optarg, 0.4, &o->camera.off_centre); break;
         case OPT_QUALITY: code = parse_number("quality", optarg, 1, 100, &o->quality); break;
         case OPT_STATISTICS: o->statistics = true; break;
         case OPT_TESTDATA: o->testdata = optarg; break;
@@ -174,12 +195,15 @@ static ts_code write_material(const options *o, uint64_t index, io_material *m, 
         if (!code) code = cl_make_folder(path, st);
         if (!code) code = io_write_maps(path, m, IO_MAPS_ALL, false, st);
     }
-    if (!code) rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &flash, true, photo->data);
     if (!code && o->format == FORMAT_STRIPS) {
+        rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &flash, true, photo->data);
         code = make_path(path, o, m->name, ".png", st);
         if (!code) code = io_write_strip(path, m, photo, st);
     }
     if (!code && o->photographs) {
+        io_camera_place(&o->camera, o->procedural.seed, index, RD_FLASH_DISTANCE, flash.camera);
+        memcpy(flash.light, flash.camera, sizeof flash.light);
+        rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &flash, false, photo->data);
         io_camera_apply(&o->camera, o->procedural.seed, index, m->size, photo->data);
         code = make_path(path, o, m->name, ".jpg", st);
         if (!code) code = io_write_jpeg(path, photo, (int)o->quality, st);
@@ -293,7 +317,7 @@ static ts_code compare(const options *o, ts_status *st)
 
 int main(int argc, char **argv)
 {
-    options o = {.quality = 90, .camera = {0.5f, 0.6f, true}};
+    options o = {.quality = 90, .camera = {.noise = 0.5f, .blur = 0.6f, .quantise = true}};
     ts_status st = {0};
     int code = cl_init("lgd-data");
     if (!code) code = parse_options(argc, argv, &o);

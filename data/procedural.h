@@ -17,13 +17,4 @@ typedef struct io_procedural {
 
 /* Material number index. m->size and m->maps are the caller's (io_material_create). Serial, thread safe. */
 void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m);
-
-/* What a camera does to the clean flash rendering (linear, clamped to [0,1], [size][size][3], in place): shot and read noise, slight blur,
- * 8-bit sRGB quantisation; a function of (seed, index). */
-typedef struct io_camera {
-    float noise; /* 0 = none .. 1 = a phone at night */
-    float blur;  /* largest sigma in pixels at 256^2 */
-    bool quantise;
-} io_camera;
-void io_camera_apply(const io_camera *c, uint64_t seed, uint64_t index, int size, float *image);
 #endif

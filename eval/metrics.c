@@ -1,5 +1,5 @@
 #include "eval/metrics.h"
-#include "data/procedural.h"
+#include "data/camera.h"
 #include "render/error.h"
 #include "render/render.h"
 #include <math.h>

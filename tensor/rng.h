@@ -20,7 +20,8 @@ enum {
     TS_STREAM_TEST,
     TS_STREAM_EVAL,
     TS_STREAM_TRAIN,
-    TS_STREAM_WINDOW
+    TS_STREAM_WINDOW,
+    TS_STREAM_PHOTOGRAPH
 };
 
 uint32_t ts_rng_u32(ts_rng *r);

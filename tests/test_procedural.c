@@ -1,4 +1,4 @@
-/* Procedural materials, their camera, their statistics. */
+/* Procedural materials and their statistics. */
 #include "data/noise.h"
 #include "data/procedural.h"
 #include "data/statistics.h"
@@ -271,31 +271,4 @@ TEST(noise_has_unit_spread_and_no_detail_below_a_pixel)
     nz_blur(SIDE, 5, x, out, y);
     for (int i = 0; i < SIDE * SIDE; i++) CHECK(fabsf(out[i] - 3) < 1e-4f, "a blurred constant is %g", out[i]);
     free(u), free(v), free(out), free(x), free(y);
-}
-
-TEST(camera_is_deterministic_and_within_range)
-{
-    enum { SIZE = 32, N = SIZE * SIZE * 3 };
-    static float clean[N], a[N], b[N];
-    for (int i = 0; i < N; i++) clean[i] = (float)(i % 97) / 96;
-    memcpy(a, clean, sizeof a);
-    io_camera none = {0, 0, false}, phone = {1, 1, true};
-    io_camera_apply(&none, 1, 2, SIZE, a);
-    CHECK(!memcmp(a, clean, sizeof a), "a camera without faults changes the image");
-    bool any = false;
-    for (uint64_t index = 0; index < 8; index++) {
-        memcpy(a, clean, sizeof a);
-        memcpy(b, clean, sizeof b);
-        io_camera_apply(&phone, 1, index, SIZE, a);
-        io_camera_apply(&phone, 1, index, SIZE, b);
-        CHECK(!memcmp(a, b, sizeof a), "photograph %d differs from itself", (int)index);
-        for (int i = 0; i < N; i++) {
-            float level = io_linear_to_srgb(a[i]) * 255;
-            CHECK(a[i] >= 0 && a[i] <= 1 && fabsf(level - roundf(level)) < 0.01f, "value %g is not one of 256 levels", a[i]);
-        }
-        memcpy(b, clean, sizeof b);
-        io_camera_apply(&phone, 1, index + 100, SIZE, b);
-        any |= memcmp(a, b, sizeof a) != 0;
-    }
-    CHECK(any, "all photographs have the same noise");
 }

@@ -10,9 +10,9 @@ typedef struct tr_config {
     struct {      /* [data] */
         int64_t seed;
         uint64_t families; /* bits as in io_procedural; 0: all */
-        double noise, blur;
+        double noise, noise_spread, blur, exposure, vignette, white_balance, tilt, off_centre; /* as in io_camera */
         bool quantise;
-        int patch, prefetch, threads;
+        int jpeg, patch, prefetch, threads;
     } data;
     struct { /* [train] */
         int batch, window; /* window 0: whole patches */

@@ -1,4 +1,5 @@
 /* One training step: photographs from maps, the loss, its gradient, Adam. */
+#include "data/camera.h"
 #include "ops.h"
 #include "render/losses.h"
 #include "render/render.h"
@@ -10,11 +11,23 @@
 
 void tr_photograph(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, float *images)
 {
-    const io_camera camera = {.noise = (float)c->data.noise, .blur = (float)c->data.blur, .quantise = c->data.quantise};
+    const io_camera camera = {.noise = (float)c->data.noise,
+                              .noise_spread = (float)c->data.noise_spread,
+                              .blur = (float)c->data.blur,
+                              .quantise = c->data.quantise,
+                              .exposure = (float)c->data.exposure,
+                              .vignette = (float)c->data.vignette,
+                              .white_balance = (float)c->data.white_balance,
+                              .jpeg = c->data.jpeg,
+                              .tilt = (float)c->data.tilt,
+                              .off_centre = (float)c->data.off_centre};
     const size_t pixels = (size_t)size * (size_t)size;
-    const rd_view flash = rd_flash();
-    for (int i = 0; i < count; i++)
-        rd_render(rd_grid_full(size), maps + (size_t)i * pixels * MAP_CHANNELS, MAP_CHANNELS, &flash, true, images + (size_t)i * pixels * 3);
+    for (int i = 0; i < count; i++) {
+        rd_view flash = rd_flash();
+        io_camera_place(&camera, seed, index + (uint64_t)i, RD_FLASH_DISTANCE, flash.camera);
+        memcpy(flash.light, flash.camera, sizeof flash.light);
+        rd_render(rd_grid_full(size), maps + (size_t)i * pixels * MAP_CHANNELS, MAP_CHANNELS, &flash, false, images + (size_t)i * pixels * 3);
+    }
 #pragma omp parallel for num_threads(ts_threads()) schedule(static)
     for (int i = 0; i < count; i++) io_camera_apply(&camera, seed, index + (uint64_t)i, size, images + (size_t)i * pixels * 3);
 }
