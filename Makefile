@@ -82,11 +82,12 @@ $(OBJ)/%.o: %.cpp $(BUILD)/gen/flags
 	@mkdir -p $(@D)
 	$(CXX) $(CPPFLAGS_ALL) $(PKG_CFLAGS) $(CXXFLAGS_ALL) -MMD -MP -c -o $@ $<
 
-# One kernel source, once per instruction set. Contraction to FMA is part of what a kernel is.
+# One kernel source, once per instruction set. Contraction to FMA is part of what a kernel is, but for those whose bytes must not depend on the machine.
+CONTRACT_noise := off
 define KERNEL_RULE
 $(OBJ)/tensor/kernels/%.$(1).o: tensor/kernels/%.c $(BUILD)/gen/flags
 	@mkdir -p $$(@D)
-	$$(CC) $$(CPPFLAGS_ALL) $$(CFLAGS_ALL) $$(ISA_FLAGS_$(1)) -ffp-contract=fast -DTS_ISA_SUFFIX=$(1) -MMD -MP -c -o $$@ $$<
+	$$(CC) $$(CPPFLAGS_ALL) $$(CFLAGS_ALL) $$(ISA_FLAGS_$(1)) -ffp-contract=$$(or $$(CONTRACT_$$*),fast) -DTS_ISA_SUFFIX=$(1) -MMD -MP -c -o $$@ $$<
 endef
 $(foreach isa,$(ISAS),$(eval $(call KERNEL_RULE,$(isa))))
 

@@ -116,14 +116,22 @@ void cv_tint(io_canvas *c, const float *mask, float amount, const io_rgb colour)
     }
 }
 
+/* Values that are worked on together: short plain loops over arrays of their own are what a compiler turns into vectors. */
+enum { BLOCK = 256 };
+
 void cv_shade(io_canvas *c, const float *plane, float amount)
 {
-    for (int i = 0; i < c->count; i++) {
-        float t = nz_clamp(1 + amount * plane[i], 0.1f, 2.5f);
-        float m = 1 + metal(c->specular[1][i]) * (0.5f * t - 0.5f); /* a metal's colour varies half as much as a pigment's */
+    float pigment[BLOCK], metallic[BLOCK];
+    for (int begin = 0; begin < c->count; begin += BLOCK) {
+        const int n = c->count - begin < BLOCK ? c->count - begin : BLOCK;
+        const float *in = plane + begin, *f0 = c->specular[1] + begin;
+        for (int i = 0; i < n; i++) pigment[i] = nz_clamp(1 + amount * in[i], 0.1f, 2.5f);
+        for (int i = 0; i < n; i++) metallic[i] = metal(f0[i]);
+        for (int i = 0; i < n; i++) metallic[i] = 1 + metallic[i] * (0.5f * pigment[i] - 0.5f); /* a metal's colour varies half as much as a pigment's */
         for (int k = 0; k < 3; k++) {
-            c->diffuse[k][i] *= t;
-            c->specular[k][i] *= m;
+            float *d = c->diffuse[k] + begin, *f = c->specular[k] + begin;
+            for (int i = 0; i < n; i++) d[i] *= pigment[i];
+            for (int i = 0; i < n; i++) f[i] *= metallic[i];
         }
     }
 }
@@ -152,29 +160,45 @@ float *cv_cavity(io_canvas *c, float radius)
     return out;
 }
 
+/* The slopes of n pixels from column x0 of row y, to the right and up, at most 2.5: a patch seen from the front hides steeper flanks. */
+static void slopes(const io_canvas *c, int y, int x0, int n, float *p, float *q)
+{
+    const int size = c->size, up = y > 0 ? y - 1 : y, down = y + 1 < size ? y + 1 : y;
+    const float *row = c->height + (size_t)y * (size_t)size, *above = c->height + (size_t)up * (size_t)size;
+    const float *below = c->height + (size_t)down * (size_t)size;
+    const float per_y = down > up ? (float)size / (float)(down - up) : 0, per_x = (float)size / 2;
+    const int first = x0 > 0 ? 0 : 1, last = x0 + n < size ? n : n - 1;
+    for (int i = first; i < last; i++) p[i] = (row[x0 + i + 1] - row[x0 + i - 1]) * per_x;
+    if (first && size > 1) p[0] = (row[1] - row[0]) * (float)size;
+    if (last < n && size > 1) p[n - 1] = (row[size - 1] - row[size - 2]) * (float)size;
+    if (size == 1) p[0] = 0;
+    for (int i = 0; i < n; i++) q[i] = (above[x0 + i] - below[x0 + i]) * per_y;
+    for (int i = 0; i < n; i++) {
+        const float limit = 1 / sqrtf(1 + 0.16f * (p[i] * p[i] + q[i] * q[i]));
+        p[i] *= limit;
+        q[i] *= limit;
+    }
+}
+
 void cv_write(const io_canvas *c, float *maps)
 {
-    int size = c->size;
-    for (int y = 0; y < size; y++) {
-        int up = y > 0 ? y - 1 : y, down = y + 1 < size ? y + 1 : y;
-        const float *row = c->height + (size_t)y * (size_t)size, *above = c->height + (size_t)up * (size_t)size;
-        const float *below = c->height + (size_t)down * (size_t)size;
-        float per_y = down > up ? (float)size / (float)(down - up) : 0;
-        for (int x = 0; x < size; x++) {
-            int left = x > 0 ? x - 1 : x, right = x + 1 < size ? x + 1 : x, i = y * size + x;
-            float per_x = right > left ? (float)size / (float)(right - left) : 0;
-            float p = (row[right] - row[left]) * per_x, q = (above[x] - below[x]) * per_y;
-            float limit = 1 / sqrtf(1 + 0.16f * (p * p + q * q)); /* no slope over 2.5: a patch seen from the front hides steeper flanks */
-            p *= limit;
-            q *= limit;
-            float z = 1 / sqrtf(1 + p * p + q * q), *m = maps + (size_t)i * MAP_CHANNELS;
+    const int size = c->size;
+    float p[BLOCK], q[BLOCK], z[BLOCK], plane[MAP_CHANNELS][BLOCK];
+    for (int y = 0; y < size; y++)
+        for (int x = 0; x < size; x += BLOCK) {
+            const int n = size - x < BLOCK ? size - x : BLOCK;
+            const size_t at = (size_t)y * (size_t)size + (size_t)x;
+            slopes(c, y, x, n, p, q);
+            for (int i = 0; i < n; i++) z[i] = 1 / sqrtf(1 + p[i] * p[i] + q[i] * q[i]);
+            for (int i = 0; i < n; i++) plane[MAP_NORMAL][i] = -p[i] * z[i];
+            for (int i = 0; i < n; i++) plane[MAP_NORMAL + 1][i] = -q[i] * z[i];
             for (int k = 0; k < 3; k++) {
-                m[MAP_DIFFUSE + k] = 2 * nz_clamp(c->diffuse[k][i], 0, 0.95f) - 1; /* nothing in nature is whiter */
-                m[MAP_SPECULAR + k] = 2 * nz_clamp(c->specular[k][i], 0.01f, 1) - 1;
+                const float *d = c->diffuse[k] + at, *f = c->specular[k] + at;
+                for (int i = 0; i < n; i++) plane[MAP_DIFFUSE + k][i] = 2 * nz_clamp(d[i], 0, 0.95f) - 1; /* nothing in nature is whiter */
+                for (int i = 0; i < n; i++) plane[MAP_SPECULAR + k][i] = 2 * nz_clamp(f[i], 0.01f, 1) - 1;
             }
-            m[MAP_NORMAL] = -p * z;
-            m[MAP_NORMAL + 1] = -q * z;
-            m[MAP_ROUGHNESS] = 2 * nz_clamp(c->roughness[i], 0.03f, 1) - 1;
+            for (int i = 0; i < n; i++) plane[MAP_ROUGHNESS][i] = 2 * nz_clamp(c->roughness[at + (size_t)i], 0.03f, 1) - 1;
+            for (int i = 0; i < n; i++)
+                for (int k = 0; k < MAP_CHANNELS; k++) maps[(at + (size_t)i) * MAP_CHANNELS + (size_t)k] = plane[k][i];
         }
-    }
 }

@@ -2,6 +2,7 @@
  * vectorise; nothing here calls libm, so that the bytes depend on the compiler's plain IEEE arithmetic alone. */
 #ifndef IO_NOISE_H
 #define IO_NOISE_H
+#include "tensor/kernels/noise.h"
 #include <stdint.h>
 
 /* Coordinates of every pixel, and how large a pixel is in their unit (the larger of the two directions): detail finer than that is left out. */
@@ -73,15 +74,7 @@ static inline float nz_sine(float t)
     float x = t - nz_floor(t) - 0.5f, y = (16 * nz_abs(x) - 8) * x;
     return y + 0.225f * (y * nz_abs(y) - y);
 }
-static inline uint32_t nz_hash(int32_t x, int32_t y, uint32_t seed)
-{
-    uint32_t h = (uint32_t)x * 0x8da6b343u + (uint32_t)y * 0xd8163841u + seed * 0xcb1ab31fu;
-    h ^= h >> 15;
-    h *= 0x2c1b3c6du;
-    h ^= h >> 12;
-    h *= 0x297a2d39u;
-    return h ^ h >> 15;
-}
+static inline uint32_t nz_hash(int32_t x, int32_t y, uint32_t seed) { return ts_noise_hash(x, y, seed); }
 static inline float nz_unit(uint32_t h) { return (float)(int32_t)(h >> 8) * (1.0f / 16777216.0f); }
 /* Another number in [0, 1) that belongs to the same cell. */
 static inline float nz_again(float id, uint32_t which) { return nz_unit(nz_hash((int32_t)(id * 16777216.0f), (int32_t)which, 77)); }
