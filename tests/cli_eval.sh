@@ -124,12 +124,13 @@ interrupted() {
     [ "$(ls -A "$T/o")" = images ] || fail "half a result: $(ls -A "$T/o")"
 }
 
-# What the project promises of its weights: refinement takes at least 15% off the error on materials that nobody trained on.
-# At 64 x 64 g sees everything and h has the least to add; at larger sizes it adds more (models/single.md has the figures).
+# What the project promises of its weights: on 64 materials that nobody trained on, at the size that people use, refinement takes at least
+# 15% off the renderings' error.
 refinement_helps() {
     model
-    expect 0 "$BIN/lgd-eval" --size 64 --threads 1 --set procedural:20240607,64 -o "$T/o"
-    awk -F, 'NR == 2 { first = $13 } { last = $13 } END { exit !(last < 0.92 * first) }' "$T/o/summary.csv" ||
+    case ${MAKEFLAGS:-} in *fsanitize*) skip "64 materials at 256 x 256 take too long with sanitizers" ;; esac
+    expect 0 "$BIN/lgd-eval" --set procedural:1000003,64 -o "$T/o"
+    awk -F, 'NR == 2 { first = $13 } { last = $13 } END { exit !(last < 0.85 * first) }' "$T/o/summary.csv" ||
         fail "$(awk -F, 'NR == 2 { first = $13 } { last = $13 } END { print "render RMSE", first, "->", last }' "$T/o/summary.csv")"
 }
 
