@@ -1,17 +1,12 @@
 /* Errors between materials, in renderings and in maps. */
 #include "render/error.h"
 #include "render/render.h"
+#include "render/tone.h"
+#include "tensor/kernels/vmath_arrays.h"
 #include "tensor/maps.h"
 #include "tensor/threads.h"
 #include <math.h>
 #include <stdlib.h>
-
-/* 1/2.2 and not the sRGB curve: the figures that others publish are in this space. NaN counts as black. */
-static float gamma_encode(float v)
-{
-    if (!(v > 0)) return 0;
-    return v >= 1 ? 1 : powf(v, 1 / 2.2f);
-}
 
 static float limit(float x)
 {
@@ -19,15 +14,17 @@ static float limit(float x)
     return x > 1 ? 1 : x;
 }
 
-/* Sum of squared differences of gamma-encoded images; row sums in index order make it independent of the threads. */
-static double gamma_difference(int h, int w, const float *a, const float *b, double *rows)
+/* Sum of squared differences of the images, which are gamma-encoded in place; row sums in index order make it independent of the threads. */
+static double gamma_difference(int h, int w, float *a, float *b, double *rows)
 {
 #pragma omp parallel for num_threads(ts_threads()) schedule(static)
     for (int y = 0; y < h; y++) {
         const size_t at = (size_t)y * (size_t)w * 3;
         double sum = 0;
+        ts_vmath_arrays_k()->gamma((int64_t)w * 3, a + at, a + at);
+        ts_vmath_arrays_k()->gamma((int64_t)w * 3, b + at, b + at);
         for (size_t i = at; i < at + (size_t)w * 3; i++) {
-            const double d = (double)gamma_encode(a[i]) - (double)gamma_encode(b[i]);
+            const double d = (double)a[i] - (double)b[i];
             sum += d * d;
         }
         rows[y] = sum;
@@ -73,7 +70,7 @@ static double colour_difference(const float *a, const float *b)
 {
     double sum = 0;
     for (int c = 0; c < 3; c++) {
-        const double d = (double)gamma_encode((limit(a[c]) + 1) / 2) - (double)gamma_encode((limit(b[c]) + 1) / 2);
+        const double d = (double)rd_gamma((limit(a[c]) + 1) / 2) - (double)rd_gamma((limit(b[c]) + 1) / 2);
         sum += d * d;
     }
     return sum;

@@ -258,6 +258,8 @@ TEST(adam_twins)
 
 static double sigmoid(double x) { return x < 0 ? exp(x) / (1 + exp(x)) : 1 / (1 + exp(-x)); }
 
+static double gamma_encode(double x) { return x > 0 ? x < 1 ? pow(x, 1 / 2.2) : 1 : 0; }
+
 /* |got - want| in units in the last place of want as a float. */
 static double ulps(float got, double want)
 {
@@ -279,11 +281,11 @@ TEST(vmath_errors)
         const struct ts_vmath_arrays_kernels *k = ts_vmath_arrays_k();
         const struct { const char *name; void (*f)(int64_t, const float *, float *); double (*want)(double); double bound; } f[] = {
             {"exp", k->exp, exp, 2}, {"exp2", k->exp2, exp2, 2}, {"expm1", k->expm1, expm1, 2},
-            {"log", k->log, log, 2}, {"tanh", k->tanh, tanh, 3}, {"sigmoid", k->sigmoid, sigmoid, 3},
+            {"log", k->log, log, 2}, {"tanh", k->tanh, tanh, 3}, {"sigmoid", k->sigmoid, sigmoid, 3}, {"gamma", k->gamma, gamma_encode, 80},
         };
         const float special[] = {0.0f, -0.0f, INFINITY, -INFINITY, NAN, 1.0f, -1.0f, 0x1p-149f, -0x1p-149f, 0x1p-126f, -0x1p-127f, 3.4028235e38f, -3.4028235e38f,
                                  88.72283f, 88.72284f, -87.33655f, -103.97f, -103.98f, 127.99999f, 128.0f, -126.0f, -149.0f, -150.1f, 0x1.fffffep-1f, 0x1.000002p0f};
-        for (int q = 0; q < 6; q++) {
+        for (int q = 0; q < 7; q++) {
             double worst = 0;
             float at = 0;
             /* every exponent and both signs: bits in steps of 16411, plus a dense sample of [-110, 135] */

@@ -1,5 +1,5 @@
-/* Vector exp, exp2, expm1, log, tanh, sigmoid. Largest error over all floats, in units in the last place of the double result
- * rounded to float: exp, exp2, expm1, log 2; tanh, sigmoid 3 (tests/test_elementwise.c measures them).
+/* Vector exp, exp2, expm1, log, tanh, sigmoid, gamma. Largest error over all floats, in units in the last place of the double result
+ * rounded to float: exp, exp2, expm1, log 2; tanh, sigmoid 3; gamma below (tests/test_elementwise.c measures them).
  * Everywhere: NaN gives NaN; results below FLT_MIN are rounded denormals, never flushed; results above FLT_MAX are infinity.
  * Polynomials are minimax fits (Remez) of the expression that each comment names; only files in this folder include this. */
 #ifndef TS_VMATH_H
@@ -123,5 +123,12 @@ static inline vf v_sigmoid(vf x)
     vf e = v_exp(-v_abs(x));
     vf r = 1.0f / (1.0f + e);
     return v_select(x < v_set(0.0f), e * r, r);
+}
+
+/* clamp(x, 0, 1)^(1/2.2), within 80 units in the last place; NaN gives 0, as everything that is not above 0 does */
+static inline vf v_gamma(vf x)
+{
+    vf y = v_exp(v_log(v_min(v_set(1.0f), x)) * (float)(1 / 2.2));
+    return v_select(x > v_set(0.0f), y, (vf){0});
 }
 #endif

@@ -12,7 +12,9 @@ ARRAY(expm1)
 ARRAY(log)
 ARRAY(tanh)
 ARRAY(sigmoid)
+ARRAY(gamma)
 
 const struct ts_vmath_arrays_kernels TS_TABLE(vmath_arrays) = {
     .exp = exp_array, .exp2 = exp2_array, .expm1 = expm1_array, .log = log_array, .tanh = tanh_array, .sigmoid = sigmoid_array,
+    .gamma = gamma_array,
 };

@@ -11,6 +11,7 @@ struct ts_vmath_arrays_kernels {
     void (*log)(int64_t n, const float *x, float *y);
     void (*tanh)(int64_t n, const float *x, float *y);
     void (*sigmoid)(int64_t n, const float *x, float *y);
+    void (*gamma)(int64_t n, const float *x, float *y);
 };
 TS_FAMILY(vmath_arrays)
 #endif
