@@ -58,8 +58,9 @@ rd_view rd_preview_view(int index, int count)
 {
     rd_view view = rd_flash();
     double phi = TAU * (index + 0.5) / count;
-    /* beside the sample: the highlight leaves the middle and the relief shows, and every corner is still lit */
-    view.light[0] = (float)(0.6 * cos(phi));
-    view.light[1] = (float)(0.6 * sin(phi));
+    /* low beside the sample: the highlight leaves the middle and relief throws its shading, which a light near the camera hides */
+    view.light[0] = (float)(0.75 * cos(phi));
+    view.light[1] = (float)(0.75 * sin(phi));
+    view.light[2] = 0.6f;
     return view;
 }
