@@ -64,3 +64,22 @@ rd_view rd_preview_view(int index, int count)
     view.light[2] = 0.6f;
     return view;
 }
+
+rd_view rd_capture_view(int index)
+{
+    static const signed char place[RD_CAPTURE_VIEWS][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
+    rd_view view = rd_flash();
+    for (int k = 0; k < 2; k++) view.light[k] = RD_CAPTURE_SPACING * (float)place[index][k];
+    return view;
+}
+
+void rd_capture_draw(ts_rng *rng, int count, int index[])
+{
+    int all[RD_CAPTURE_VIEWS];
+    for (int i = 0; i < RD_CAPTURE_VIEWS; i++) all[i] = i;
+    for (int i = 0; i < count; i++) { /* the first steps of Fisher and Yates's shuffle */
+        const int from = i + ts_rng_int(rng, RD_CAPTURE_VIEWS - i);
+        index[i] = all[from];
+        all[from] = all[i];
+    }
+}

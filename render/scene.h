@@ -42,4 +42,13 @@ void rd_eval_views(ts_rng *rng, int count, rd_view *views);
 
 /* The preview's light positions: index 0 .. count-1 around the sample, camera at the flash's place. */
 rd_view rd_preview_view(int index, int count);
+
+/* The predefined configurations of a capture in several photographs: the camera at the flash's place, the light at the same height over a 3 x 3
+ * grid, RD_CAPTURE_SPACING patch widths apart. 0 is the flash photograph; 1 .. 8 go round counter-clockwise from the right (1: +x, 3: +y). */
+enum { RD_CAPTURE_VIEWS = 9 };
+#define RD_CAPTURE_SPACING 0.6f
+rd_view rd_capture_view(int index);
+
+/* count different configurations of the nine in random order, every choice equally likely; 1 <= count <= RD_CAPTURE_VIEWS. */
+void rd_capture_draw(ts_rng *rng, int count, int index[]);
 #endif

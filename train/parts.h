@@ -43,9 +43,14 @@ bool tr_pretraining(const tr_config *c, int64_t step); /* whether the step after
 double tr_seconds(void);
 const float *tr_weights(const tr_trainer *t); /* what is validated and saved */
 
-/* step.c: the flash photographs [count][size][size][3] of materials; index: of the first, for the camera's noise. */
+/* photograph.c: the flash photographs [count][size][size][3] of materials [count][size][size][9] as [data] says; index: of the first, for the
+ * camera's faults. */
 void tr_photograph(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, float *images);
-/* One step; t->step counts it. Returns an error only where the run cannot go on (a skipped step is none). */
+/* number photographs of each material, images [count][number][size][size][3], under views [count][number] of kind RD_POINT whose camera looks straight
+ * down (NULL: the flash for all, which with number 1 is tr_photograph). Every photograph has faults of its own. */
+void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, const rd_view *views, int number,
+                    float *images);
+/* step.c. One step; t->step counts it. Returns an error only where the run cannot go on (a skipped step is none). */
 ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st);
 
 /* validate.c */

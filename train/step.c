@@ -1,5 +1,4 @@
 /* One training step: photographs from maps, the loss, its gradient, Adam. */
-#include "data/camera.h"
 #include "ops.h"
 #include "render/losses.h"
 #include "render/render.h"
@@ -8,29 +7,6 @@
 #include "train/parts.h"
 #include <math.h>
 #include <string.h>
-
-void tr_photograph(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, float *images)
-{
-    const io_camera camera = {.noise = (float)c->data.noise,
-                              .noise_spread = (float)c->data.noise_spread,
-                              .blur = (float)c->data.blur,
-                              .quantise = c->data.quantise,
-                              .exposure = (float)c->data.exposure,
-                              .vignette = (float)c->data.vignette,
-                              .white_balance = (float)c->data.white_balance,
-                              .jpeg = c->data.jpeg,
-                              .tilt = (float)c->data.tilt,
-                              .off_centre = (float)c->data.off_centre};
-    const size_t pixels = (size_t)size * (size_t)size;
-    for (int i = 0; i < count; i++) {
-        rd_view flash = rd_flash();
-        io_camera_place(&camera, seed, index + (uint64_t)i, RD_FLASH_DISTANCE, flash.camera);
-        memcpy(flash.light, flash.camera, sizeof flash.light);
-        rd_render(rd_grid_full(size), maps + (size_t)i * pixels * MAP_CHANNELS, MAP_CHANNELS, &flash, false, images + (size_t)i * pixels * 3);
-    }
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int i = 0; i < count; i++) io_camera_apply(&camera, seed, index + (uint64_t)i, size, images + (size_t)i * pixels * 3);
-}
 
 /* Adds weight * (rendering loss + map_weight * map loss) of maps to sum (NULL: none yet). */
 static ag_value *add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value *target, double weight, double *render, double *map)

@@ -1,0 +1,113 @@
+/* The photographs that training sees: one under the flash, or several under the configurations of a capture. */
+#include "data/camera.h"
+#include "render/render.h"
+#include "tensor/maps.h"
+#include "tensor/threads.h"
+#include "tests/test.h"
+#include "train/parts.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIZE = 24, COUNT = 3, NUMBER = 5, PIXELS = SIZE * SIZE };
+static float maps[COUNT][PIXELS * MAP_CHANNELS], one[COUNT][PIXELS * 3], many[COUNT][NUMBER][PIXELS * 3], again[COUNT][NUMBER][PIXELS * 3];
+
+static void make(void)
+{
+    io_procedural p = {.seed = 2};
+    for (int i = 0; i < COUNT; i++) {
+        io_material m = {.size = SIZE, .maps = maps[i]};
+        io_procedural_make(&p, (uint64_t)i, &m);
+    }
+}
+
+static tr_config without_faults(void)
+{
+    tr_config c = tr_config_default();
+    c.data.noise = c.data.noise_spread = c.data.blur = c.data.exposure = c.data.vignette = c.data.white_balance = c.data.tilt = c.data.off_centre = 0;
+    c.data.quantise = false;
+    c.data.jpeg = 0;
+    return c;
+}
+
+TEST(capture_has_nine_different_lights_and_begins_with_the_flash)
+{
+    const rd_view flash = rd_flash(), first = rd_capture_view(0);
+    CHECK(!memcmp(first.light, flash.light, sizeof flash.light) && first.power == flash.power, "configuration 0 is not the flash");
+    float sum[2] = {0};
+    for (int i = 0; i < RD_CAPTURE_VIEWS; i++) {
+        const rd_view a = rd_capture_view(i);
+        CHECK(a.kind == RD_POINT && a.light[2] == RD_FLASH_DISTANCE && !memcmp(a.camera, flash.camera, sizeof a.camera), "configuration %d", i);
+        for (int k = 0; k < 2; k++) sum[k] += a.light[k];
+        for (int j = 0; j < i; j++) {
+            const rd_view b = rd_capture_view(j);
+            CHECK(hypotf(a.light[0] - b.light[0], a.light[1] - b.light[1]) > 0.59f, "configurations %d and %d have one light", i, j);
+        }
+    }
+    CHECK(sum[0] == 0 && sum[1] == 0 && rd_capture_view(1).light[0] > 0 && rd_capture_view(3).light[1] > 0, "they are not around the centre");
+}
+
+TEST(capture_draws_every_subset_alike)
+{
+    ts_rng r = ts_rng_make(1, TS_STREAM_TEST, 0);
+    int seen[RD_CAPTURE_VIEWS] = {0}, leads[RD_CAPTURE_VIEWS] = {0};
+    for (int trial = 0; trial < 3600; trial++) {
+        int index[RD_CAPTURE_VIEWS], mask = 0;
+        const int count = 1 + trial % RD_CAPTURE_VIEWS;
+        rd_capture_draw(&r, count, index);
+        for (int i = 0; i < count; i++) {
+            CHECK(index[i] >= 0 && index[i] < RD_CAPTURE_VIEWS && !(mask >> index[i] & 1), "configuration %d comes twice", index[i]);
+            mask |= 1 << index[i];
+            seen[index[i]]++;
+        }
+        leads[index[0]]++;
+    }
+    for (int i = 0; i < RD_CAPTURE_VIEWS; i++)
+        CHECK(abs(seen[i] - 2000) < 150 && abs(leads[i] - 400) < 90, "configuration %d was drawn %d times, first %d times", i, seen[i], leads[i]);
+}
+
+TEST(photographs_are_the_clamped_renderings_without_faults)
+{
+    make();
+    const tr_config c = without_faults();
+    rd_view views[COUNT][NUMBER];
+    for (int i = 0; i < COUNT; i++)
+        for (int k = 0; k < NUMBER; k++) views[i][k] = rd_capture_view((3 * i + 2 * k) % RD_CAPTURE_VIEWS);
+    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, many[0][0]);
+    for (int i = 0; i < COUNT; i++)
+        for (int k = 0; k < NUMBER; k++) {
+            rd_render(rd_grid_full(SIZE), maps[i], MAP_CHANNELS, &views[i][k], true, one[0]);
+            CHECK(!memcmp(one[0], many[i][k], sizeof one[0]), "photograph %d of material %d is another", k, i);
+        }
+}
+
+TEST(photographs_under_the_flash_are_the_single_ones)
+{
+    make();
+    const tr_config c = tr_config_default();
+    rd_view flash[COUNT];
+    for (int i = 0; i < COUNT; i++) flash[i] = rd_flash();
+    tr_photograph(&c, 1, 7, COUNT, SIZE, maps[0], one[0]);
+    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], flash, 1, many[0][0]);
+    CHECK(!memcmp(one, many[0], sizeof one), "one flash photograph of each differs from tr_photograph");
+    tr_photograph(&c, 1, 9, 1, SIZE, maps[2], many[0][0]);
+    CHECK(!memcmp(one[2], many[0][0], sizeof one[2]), "a photograph depends on the batch that it comes in");
+}
+
+TEST(photographs_have_their_own_faults_for_any_number_of_threads)
+{
+    make();
+    const tr_config c = tr_config_default();
+    rd_view views[COUNT][NUMBER];
+    for (int i = 0; i < COUNT; i++)
+        for (int k = 0; k < NUMBER; k++) views[i][k] = rd_flash();
+    for (int threads = 1; threads <= 3; threads++) {
+        ts_threads_set(threads);
+        tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, threads == 1 ? many[0][0] : again[0][0]);
+        CHECK(threads == 1 || !memcmp(many, again, sizeof many), "%d threads make other bytes", threads);
+    }
+    ts_threads_set(0);
+    for (int i = 0; i < COUNT; i++)
+        for (int k = 1; k < NUMBER; k++)
+            CHECK(memcmp(many[i][0], many[i][k], sizeof many[i][0]), "photographs 0 and %d of material %d have the same faults", k, i);
+}

@@ -1,0 +1,46 @@
+/* What the camera sees of materials: the networks' input. */
+#include "data/camera.h"
+#include "render/render.h"
+#include "tensor/maps.h"
+#include "tensor/threads.h"
+#include "train/parts.h"
+
+static io_camera camera_of(const tr_config *c)
+{
+    return (io_camera){.noise = (float)c->data.noise,
+                       .noise_spread = (float)c->data.noise_spread,
+                       .blur = (float)c->data.blur,
+                       .quantise = c->data.quantise,
+                       .exposure = (float)c->data.exposure,
+                       .vignette = (float)c->data.vignette,
+                       .white_balance = (float)c->data.white_balance,
+                       .jpeg = c->data.jpeg,
+                       .tilt = (float)c->data.tilt,
+                       .off_centre = (float)c->data.off_centre};
+}
+
+void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, const rd_view *views, int number,
+                    float *images)
+{
+    const io_camera camera = camera_of(c);
+    const size_t pixels = (size_t)size * (size_t)size;
+    const uint64_t first = index * (uint64_t)number;
+    for (int i = 0; i < count * number; i++) {
+        rd_view view = views ? views[i] : rd_flash();
+        float moved[3]; /* the whole rig: a tilt or an offset that nobody measured moves camera and light alike */
+        io_camera_place(&camera, seed, first + (uint64_t)i, view.camera[2], moved);
+        for (int k = 0; k < 3; k++) {
+            const float by = moved[k] - (k == 2 ? view.camera[2] : 0);
+            view.camera[k] += by;
+            view.light[k] += by;
+        }
+        rd_render(rd_grid_full(size), maps + (size_t)(i / number) * pixels * MAP_CHANNELS, MAP_CHANNELS, &view, false, images + (size_t)i * pixels * 3);
+    }
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int i = 0; i < count * number; i++) io_camera_apply(&camera, seed, first + (uint64_t)i, size, images + (size_t)i * pixels * 3);
+}
+
+void tr_photograph(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, float *images)
+{
+    tr_photographs(c, seed, index, count, size, maps, NULL, 1, images);
+}
