@@ -159,8 +159,10 @@ V_INLINE void measure(const surface *s, const lighting *e, ts_shade_kind kind, a
         return;
     }
     a->nv = v_max(dot_lanes(s, e->v), v_set(0));
-    a->seen = (a->nl > v_set(0)) & (a->nv > v_set(0));
-    a->nh = v_select(a->seen, dot_lanes(s, e->h), v_set(1)); /* where unseen h may be 0, and D would be 0 / 0 */
+    /* Above the horizon of both n.h > 0, unless l and v are opposite and h is what rounding left, 0 at worst: D would be 0 / 0. */
+    vf nh = dot_lanes(s, e->h);
+    a->seen = (a->nl > v_set(0)) & (a->nv > v_set(0)) & (nh > v_set(0));
+    a->nh = v_select(a->seen, nh, v_set(1));
     cross_lanes(s, e->l, a->l);
     cross_lanes(s, e->v, a->v);
 }
