@@ -1,6 +1,7 @@
 #include "nn/adam.h"
 #include "tensor/kernels/adam.h"
 #include "tensor/threads.h"
+#include "tensor/block.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,7 +10,7 @@ enum { CHUNK = 1 << 14, PARTS = 256 }; /* fixed, so that sums do not depend on t
 
 static float *aligned(size_t count)
 {
-    float *p = aligned_alloc(64, count * sizeof *p); /* a block's count is a multiple of 16 */
+    float *p = ts_block(count * sizeof *p); /* a block's count is a multiple of 16 */
     if (p) memset(p, 0, count * sizeof *p);
     return p;
 }

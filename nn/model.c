@@ -1,6 +1,7 @@
 /* The list of parameters and the blocks that hold them. */
 #include "nn/layers.h"
 #include "ops.h"
+#include "tensor/block.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -135,7 +136,7 @@ nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
 
 static float *block(size_t count, const char *what, ts_status *st)
 {
-    float *p = aligned_alloc(64, count * sizeof *p);
+    float *p = ts_block(count * sizeof *p);
     if (p) memset(p, 0, count * sizeof *p);
     else ts_fail(st, TS_NOMEM, "no memory for the model's %s (%.0f MB)", what, (double)count * sizeof *p / 1e6);
     return p;

@@ -1,4 +1,5 @@
 #include "tensor/threads.h"
+#include "tensor/block.h"
 #include <omp.h>
 #include <pthread.h>
 #include <sched.h>
@@ -107,7 +108,7 @@ static void grow(scratch *s, int slot, size_t bytes)
 {
     if (s->size[slot] >= bytes) return;
     free(s->memory[slot]);
-    s->memory[slot] = aligned_alloc(64, bytes);
+    s->memory[slot] = ts_block(bytes);
     if (!s->memory[slot]) abort();
     s->size[slot] = bytes;
 }

@@ -1,5 +1,6 @@
 /* The foundation: status, arena, tensor views, random numbers, instruction sets, threads. */
 #include "tensor/arena.h"
+#include "tensor/block.h"
 #include "tensor/cpu.h"
 #include "tensor/rng.h"
 #include "tensor/tensor.h"
@@ -8,6 +9,19 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+TEST(blocks_are_aligned_whole_and_refused)
+{
+    static const size_t sizes[] = {1, 63, 64, 1000, (4u << 20) - 1, 4u << 20, (4u << 20) + 1, (9u << 20) + 17};
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
+        unsigned char *p = ts_block(sizes[i]);
+        CHECK(p && (uintptr_t)p % 64 == 0, "%zu bytes", sizes[i]);
+        memset(p, 0x5a, sizes[i]); /* the sanitizer sees a block that is too short */
+        CHECK(p[0] == 0x5a && p[sizes[i] - 1] == 0x5a, "%zu bytes do not hold what was written", sizes[i]);
+        free(p);
+    }
+    CHECK(!ts_block(SIZE_MAX) && !ts_block(SIZE_MAX - 100) && !ts_block(SIZE_MAX / 2), "more than there is was given");
+}
 
 TEST(status_keeps_one_line_and_puts_context_first)
 {
