@@ -11,7 +11,7 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
-enum { SETS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, PATH_LENGTH = 4096 };
+enum { SETS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, FAST, PATH_LENGTH = 4096 };
 
 static const lgd_argument arguments[] = {
     {'o', "output", "DIR", "write results.csv and summary.csv there (required)"},
@@ -23,6 +23,7 @@ static const lgd_argument arguments[] = {
     {SEED, "seed", "N", "draws the renderings' lights and cameras, and the noise (default 1)"},
     {NOISE, "noise", "X", "sensor noise of the input picture, 0 = none .. 1 = a phone at night (default 0)"},
     {IMAGES, "images", NULL, "also write DIR/images/SET-MATERIAL.png: truth, R_0 and the last R_t in three rows"},
+    {FAST, "fast", NULL, "no SSIM and FLIP, which take most of the time"},
     {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {'q', "quiet", NULL, "no progress"},
     {'h', "help", NULL, "print this help"},
@@ -34,7 +35,7 @@ typedef struct command {
     int sets, iterations, threads, size;
     int64_t seed;
     double noise;
-    bool images, quiet, help, version;
+    bool images, fast, quiet, help, version;
 } command;
 
 static ts_code whole(const char *name, const char *text, int64_t lo, int64_t hi, int64_t *value, ts_status *st)
@@ -58,6 +59,7 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
         case 'h': c->help = true; break;
         case 'V': c->version = true; break;
         case IMAGES: c->images = true; break;
+        case FAST: c->fast = true; break;
         case SEED: code = whole("seed", value, 0, INT64_MAX, &c->seed, st); break;
         case 'd':
             if (c->sets == SETS_MAX) code = ts_fail(st, TS_INVALID, "--set: more than %d sets", SETS_MAX);
@@ -92,8 +94,9 @@ static void print_help(void)
 {
     puts("Usage: lgd-eval [options] --set KIND:WHERE... -o DIR\n"
          "Renders each known material under a flash, estimates its maps from that picture, and prints the RMSE of the maps (diffuse and\n"
-         "specular in gamma space, roughness and normal as they are) and of renderings under other lights and cameras, for R_0 and\n"
-         "after every refinement step. The same seed gives the same numbers, for any number of threads.\n");
+         "specular in gamma space, roughness and normal as they are) and of renderings under other lights and cameras, the mean angle\n"
+         "between the normals in degrees, and SSIM and FLIP of the renderings, for R_0 and after every refinement step (SSIM and FLIP:\n"
+         "for R_0 and the last). The same seed gives the same numbers, for any number of threads.\n");
     lgd_argument_help(arguments, stdout);
     puts("\nExit status: 0 done, 1 a material failed (the others are in the results) or nothing could be written, 2 wrong usage.");
 }
@@ -123,7 +126,7 @@ static ts_code one(run *r, int set, int i, ts_status *st)
     if (ev_set_load(&r->set[set], i, c->size, &r->truth, st) != TS_OK) return st->code;
     rd_eval_views(&rng, RD_EVAL_VIEWS, views);
     ev_photograph(&r->truth, (float)c->noise, (uint64_t)c->seed, identity, r->image);
-    const ev_case k = {&r->truth, r->image, views};
+    const ev_case k = {&r->truth, r->image, views, !c->fast};
     ts_code code = ev_measure(r->tape, r->model, &k, r->report.steps, r->row, r->first, r->last, st);
     if (!code && c->images) {
         char path[PATH_LENGTH];

@@ -1,11 +1,15 @@
 #include "eval/metrics.h"
 #include "data/camera.h"
+#include "eval/flip.h"
+#include "eval/ssim.h"
 #include "render/error.h"
 #include "render/render.h"
+#include "render/tone.h"
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
-const char *const ev_metric_name[EV_METRICS] = {"diffuse", "specular", "roughness", "normal", "render"};
+const char *const ev_metric_name[EV_METRICS] = {"diffuse", "specular", "roughness", "normal", "render", "angle", "ssim", "flip"};
 
 void ev_photograph(const io_material *truth, float noise, uint64_t seed, uint64_t identity, float *image)
 {
@@ -15,16 +19,38 @@ void ev_photograph(const io_material *truth, float noise, uint64_t seed, uint64_
     if (noise > 0) io_camera_apply(&camera, seed, identity, truth->size, image);
 }
 
+/* SSIM as RMSE in gamma space; FLIP takes linear values. */
+static void perceive(const ev_case *c, const float *maps, int channels, ev_row *row)
+{
+    const int size = c->truth->size;
+    const size_t values = (size_t)size * (size_t)size * 3;
+    float *mine = malloc(2 * values * sizeof *mine), *truth = mine ? mine + values : NULL;
+    double ssim = mine ? 0 : NAN, flip = ssim;
+    for (int v = 0; v < RD_EVAL_VIEWS && mine; v++) {
+        rd_render(rd_grid_full(size), maps, channels, &c->views[v], true, mine);
+        rd_render(rd_grid_full(size), c->truth->maps, MAP_CHANNELS, &c->views[v], true, truth);
+        flip += ev_flip(size, size, mine, truth, NULL) / RD_EVAL_VIEWS;
+        for (size_t i = 0; i < 2 * values; i++) mine[i] = rd_gamma(mine[i]);
+        ssim += ev_ssim(size, size, mine, truth) / RD_EVAL_VIEWS;
+    }
+    row->value[EV_SSIM] = ssim;
+    row->value[EV_FLIP] = flip;
+    free(mine);
+}
+
 ev_row ev_score(const ev_case *c, const float *maps, int channels)
 {
     const io_material *truth = c->truth;
     const rd_map_error e = rd_map_rmse((int64_t)truth->size * truth->size, maps, channels, truth->maps, MAP_CHANNELS);
-    return (ev_row){{[EV_DIFFUSE] = e.diffuse, [EV_SPECULAR] = e.specular, [EV_ROUGHNESS] = e.roughness, [EV_NORMAL] = e.normal,
+    ev_row row = {{[EV_DIFFUSE] = e.diffuse, [EV_SPECULAR] = e.specular, [EV_ROUGHNESS] = e.roughness, [EV_NORMAL] = e.normal, [EV_ANGLE] = e.angle, [EV_SSIM] = NAN, [EV_FLIP] = NAN,
         [EV_RENDER] = rd_render_rmse(rd_grid_full(truth->size), maps, channels, truth->maps, MAP_CHANNELS, c->views, RD_EVAL_VIEWS)}};
+    if (c->perceptual) perceive(c, maps, channels, &row);
+    return row;
 }
 
 typedef struct watch {
     const ev_case *c;
+    int steps;
     ev_row *row;
     float *first, *last;
     bool finite;
@@ -35,8 +61,10 @@ static bool after_step(int step, const ag_value *maps, void *user)
     watch *w = user;
     const int size = w->c->truth->size, channels = maps->t.shape.c;
     const int64_t pixels = (int64_t)size * size;
-    w->row[step] = ev_score(w->c, maps->t.data, channels);
-    for (int i = 0; i < EV_METRICS; i++) w->finite = w->finite && isfinite(w->row[step].value[i]);
+    ev_case c = *w->c;
+    c.perceptual = c.perceptual && (step == 0 || step == w->steps);
+    w->row[step] = ev_score(&c, maps->t.data, channels);
+    for (int i = 0; i < EV_CHEAP; i++) w->finite = w->finite && isfinite(w->row[step].value[i]);
     for (int64_t i = 0; i < pixels * channels; i++) w->finite = w->finite && isfinite(maps->t.data[i]); /* a clamp may hide it from the scores */
     for (int copy = 0; copy < 2; copy++) {
         float *to = copy ? w->last : step == 0 ? w->first : NULL;
@@ -52,7 +80,7 @@ ts_code ev_measure(ag_tape *tape, const nn_model *model, const ev_case *c, int s
     nn_input in = {.image = ts_new(ag_arena(tape), (ts_shape){1, size, size, 3}), .grid = rd_grid_full(size), .view = rd_flash()};
     if (!in.image.data) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", size, size);
     memcpy(in.image.data, c->image, (size_t)size * (size_t)size * 3 * sizeof *c->image);
-    watch w = {c, row, first, last, true};
+    watch w = {c, steps, row, first, last, true};
     ag_value *out = NULL;
     if (nn_lgd(tape, model, &in, steps, false, &out, after_step, &w) != TS_OK) {
         *st = *ag_status(tape);

@@ -4,11 +4,11 @@
 #include "data/material.h"
 #include "nn/model.h"
 
-enum { EV_DIFFUSE, EV_SPECULAR, EV_ROUGHNESS, EV_NORMAL, EV_RENDER, EV_METRICS };
+enum { EV_DIFFUSE, EV_SPECULAR, EV_ROUGHNESS, EV_NORMAL, EV_RENDER, EV_ANGLE, EV_SSIM, EV_FLIP, EV_METRICS, EV_CHEAP = EV_SSIM };
 extern const char *const ev_metric_name[EV_METRICS];
 
 typedef struct ev_row {
-    double value[EV_METRICS]; /* RMSE */
+    double value[EV_METRICS]; /* RMSE; EV_ANGLE: degrees; EV_SSIM, EV_FLIP: the mean over the renderings. NaN: not measured */
 } ev_row;
 
 /* What one material is evaluated with. */
@@ -16,13 +16,14 @@ typedef struct ev_case {
     const io_material *truth;
     const float *image;   /* the flash photograph, linear, in [0, 1] */
     const rd_view *views; /* RD_EVAL_VIEWS of them */
+    bool perceptual;      /* SSIM and FLIP too, which take many times as long as the rest */
 } ev_case;
 
 /* The input picture: the flash rendering; noise > 0 adds sensor noise of that strength and 8-bit quantisation, drawn with
  * (seed, identity). image: size x size x 3. */
 void ev_photograph(const io_material *truth, float noise, uint64_t seed, uint64_t identity, float *image);
 
-/* Runs the loop: row[t] is what R_t scores, t = 0 .. steps. first and last (may be NULL) get the maps of R_0 and of R_steps,
+/* Runs the loop: row[t] is what R_t scores, t = 0 .. steps (SSIM and FLIP of the first and the last alone). first and last (may be NULL) get the maps of R_0 and of R_steps,
  * [size, size, 9]. The tape is one without gradients and is reset. */
 ts_code ev_measure(ag_tape *tape, const nn_model *model, const ev_case *c, int steps, ev_row *row, float *first, float *last, ts_status *st);
 

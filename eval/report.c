@@ -59,14 +59,17 @@ void ev_report_print(const ev_report *r, int size, FILE *out)
         const int n = ev_report_summary(r, all ? -1 : set, 0, &mean, &deviation);
         if (n == 0 || (all && r->sets == 1)) continue;
         const double start = mean.value[EV_RENDER];
-        fprintf(out, "%s%s: %d %s, %d x %d pixels, %d renderings each; RMSE, mean +- standard deviation\n     ", set > 0 ? "\n" : "",
+        fprintf(out, "%s%s: %d %s, %d x %d pixels, %d renderings each; RMSE (angle: degrees; ssim and flip: themselves), mean +- standard deviation\n     ", set > 0 ? "\n" : "",
             all ? "all sets" : r->set_name[set], n, n == 1 ? "material" : "materials", size, size, RD_EVAL_VIEWS);
         for (int k = 0; k < EV_METRICS; k++) fprintf(out, "  %-16s", ev_metric_name[k]);
         fputs("  render change\n", out);
         for (int t = 0; t <= r->steps; t++) {
             ev_report_summary(r, all ? -1 : set, t, &mean, &deviation);
             fprintf(out, "R_%-3d", t);
-            for (int k = 0; k < EV_METRICS; k++) fprintf(out, "  %.4f +- %.4f", mean.value[k], deviation.value[k]);
+            for (int k = 0; k < EV_METRICS; k++) {
+                if (isnan(mean.value[k])) fprintf(out, "  %-16s", "-");
+                else fprintf(out, k == EV_ANGLE ? "  %6.2f +- %6.2f" : "  %.4f +- %.4f", mean.value[k], deviation.value[k]);
+            }
             if (start > 0) fprintf(out, "  %+.1f%%", 100 * (mean.value[EV_RENDER] / start - 1));
             fputc('\n', out);
         }
@@ -88,6 +91,13 @@ static void put_field(FILE *f, const char *text)
     fputc('"', f);
 }
 
+/* What was not measured is empty. */
+static void put_number(FILE *f, double v)
+{
+    if (isnan(v)) fputc(',', f);
+    else fprintf(f, ",%.6f", v);
+}
+
 static void write_results(const ev_report *r, FILE *f)
 {
     fputs("set,material,step", f);
@@ -99,7 +109,7 @@ static void write_results(const ev_report *r, FILE *f)
             fputc(',', f);
             put_field(f, r->result[i].material);
             fprintf(f, ",%d", t);
-            for (int k = 0; k < EV_METRICS; k++) fprintf(f, ",%.6f", r->result[i].row[t].value[k]);
+            for (int k = 0; k < EV_METRICS; k++) put_number(f, r->result[i].row[t].value[k]);
             fputc('\n', f);
         }
 }
@@ -117,7 +127,7 @@ static void write_summary(const ev_report *r, FILE *f)
             if (n == 0) continue;
             put_field(f, set == r->sets ? "all" : r->set_name[set]);
             fprintf(f, ",%d,%d", n, t);
-            for (int k = 0; k < EV_METRICS; k++) fprintf(f, ",%.6f,%.6f", mean.value[k], deviation.value[k]);
+            for (int k = 0; k < EV_METRICS; k++) put_number(f, mean.value[k]), put_number(f, deviation.value[k]);
             fputc('\n', f);
         }
     }

@@ -84,7 +84,13 @@ rd_map_error rd_map_rmse(int64_t count, const float *maps_a, int channels_a, con
         double na[3], nb[3];
         unit_normal(a, na);
         unit_normal(b, nb);
-        for (int k = 0; k < 3; k++) e.normal += (na[k] - nb[k]) * (na[k] - nb[k]);
+        double chord = 0, sum = 0;
+        for (int k = 0; k < 3; k++) {
+            chord += (na[k] - nb[k]) * (na[k] - nb[k]);
+            sum += (na[k] + nb[k]) * (na[k] + nb[k]);
+        }
+        e.normal += chord;
+        e.angle += 2 * atan2(sqrt(chord), sqrt(sum)); /* Kahan: as accurate for equal vectors as for others, where acos is not */
         e.diffuse += colour_difference(a + MAP_DIFFUSE, b + MAP_DIFFUSE);
         e.specular += colour_difference(a + MAP_SPECULAR, b + MAP_SPECULAR);
         const double r = ((double)limit(a[MAP_ROUGHNESS]) - (double)limit(b[MAP_ROUGHNESS])) / 2;
@@ -95,5 +101,6 @@ rd_map_error rd_map_rmse(int64_t count, const float *maps_a, int channels_a, con
     e.specular = sqrt(e.specular / (3 * n));
     e.normal = sqrt(e.normal / (3 * n));
     e.roughness = sqrt(e.roughness / n);
+    e.angle *= 180 / 3.14159265358979323846 / n;
     return e;
 }

@@ -14,6 +14,7 @@ typedef struct rd_map_error {
     double diffuse, specular; /* of v^(1/2.2), v = (x + 1) / 2 in [0, 1] */
     double roughness;         /* of v */
     double normal;            /* of the unit vector's three components, each in [-1, 1] */
+    double angle;             /* not an RMSE: the mean angle between the normals, in degrees */
 } rd_map_error;
 
 /* RMSE of each map over count pixels and the map's components. Values are clamped to [-1, 1] first, as everything that shows them does. */

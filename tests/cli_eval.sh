@@ -9,7 +9,7 @@ evaluate() { "$BIN/lgd-eval" --size 32 --iterations 2 --threads 1 "$@"; }
 
 help_names_the_options() {
     expect 0 "$BIN/lgd-eval" --help
-    for o in set iterations model threads seed noise images size output procedural strips maps; do says "$T/out" "$o"; done
+    for o in fast set iterations model threads seed noise images size output procedural strips maps; do says "$T/out" "$o"; done
 }
 
 wrong_usage() {
@@ -70,7 +70,7 @@ real_sets() {
     lines "$T/o/results.csv" $((1 + 3 * (maps + strips)))
     says "$T/out" "$maps materials"
     says "$T/out" "$((maps + strips)) materials"
-    awk -F, 'NR > 1 { for (i = NF - 4; i <= NF; i++) if (!($i >= 0 && $i < 2)) exit 1 }' "$T/o/results.csv" || fail "an error is out of range"
+    awk -F, 'NR > 1 { for (i = NF - 7; i <= NF - 3; i++) if (!($i >= 0 && $i < 2)) exit 1; if (!($(NF - 2) > 0 && $(NF - 2) < 90) || $3 != 1 && !($NF > 0 && $NF < 1)) exit 1 }' "$T/o/results.csv" || fail "an error is out of range"
 }
 
 images() {

@@ -22,7 +22,7 @@ static void make_case(io_material *m, float *image, rd_view *views, ev_case *c)
     ts_rng rng = ts_rng_make(2, TS_STREAM_EVAL, 0);
     rd_eval_views(&rng, RD_EVAL_VIEWS, views);
     ev_photograph(m, 0, 1, 1, image);
-    *c = (ev_case){m, image, views};
+    *c = (ev_case){m, image, views, false};
 }
 
 TEST(eval_the_truth_scores_zero_and_an_offset_what_it_is)
@@ -33,7 +33,11 @@ TEST(eval_the_truth_scores_zero_and_an_offset_what_it_is)
     ev_case c;
     make_case(&m, image, views, &c);
     ev_row row = ev_score(&c, m.maps, MAP_CHANNELS);
-    for (int k = 0; k < EV_METRICS; k++) CHECK(row.value[k] == 0, "the truth has %s error %g", ev_metric_name[k], row.value[k]);
+    for (int k = 0; k < EV_CHEAP; k++) CHECK(row.value[k] == 0, "the truth has %s error %g", ev_metric_name[k], row.value[k]);
+    CHECK(isnan(row.value[EV_SSIM]) && isnan(row.value[EV_FLIP]), "what was not asked for has a value");
+    c.perceptual = true;
+    row = ev_score(&c, m.maps, MAP_CHANNELS);
+    CHECK(fabs(row.value[EV_SSIM] - 1) < 1e-12 && row.value[EV_FLIP] == 0, "the truth has SSIM %g and FLIP %g", row.value[EV_SSIM], row.value[EV_FLIP]);
     memcpy(maps, m.maps, sizeof maps);
     for (int i = 0; i < SIZE * SIZE; i++) {
         float *r = &m.maps[i * MAP_CHANNELS + MAP_ROUGHNESS];
@@ -42,7 +46,8 @@ TEST(eval_the_truth_scores_zero_and_an_offset_what_it_is)
     }
     row = ev_score(&c, maps, MAP_CHANNELS);
     CHECK(fabs(row.value[EV_ROUGHNESS] - 0.1) < 1e-5, "roughness error %g, not 0.1", row.value[EV_ROUGHNESS]);
-    CHECK(row.value[EV_DIFFUSE] == 0 && row.value[EV_SPECULAR] == 0 && row.value[EV_NORMAL] == 0 && row.value[EV_RENDER] > 0, "other maps are touched");
+    CHECK(row.value[EV_DIFFUSE] == 0 && row.value[EV_SPECULAR] == 0 && row.value[EV_NORMAL] == 0 && row.value[EV_ANGLE] == 0 && row.value[EV_RENDER] > 0, "other maps are touched");
+    CHECK(row.value[EV_SSIM] < 1 && row.value[EV_FLIP] > 0, "SSIM %g and FLIP %g see nothing", row.value[EV_SSIM], row.value[EV_FLIP]);
     io_material_free(&m);
 }
 
@@ -124,14 +129,14 @@ TEST(eval_csv_quotes_what_needs_it)
     const char *const names[] = {"maps:a,b \"c\""};
     ev_report r = {.steps = 0, .sets = 1, .set_name = names};
     ts_status st = {0};
-    ev_row row = {{0.5, 0.25, 0.125, 0, 1}};
+    ev_row row = {{0.5, 0.25, 0.125, 0, 1, 12, NAN, 0.75}};
     char path[256], line[256] = "";
     CHECK(ev_report_add(&r, 0, "plain", &row, &st) == TS_OK && ev_report_write(&r, test_folder(), &st) == TS_OK, "%s", st.message);
     snprintf(path, sizeof path, "%s/results.csv", test_folder());
     FILE *f = fopen(path, "r");
     CHECK(f && fgets(line, sizeof line, f), "%s is missing", path);
-    CHECK(strcmp(line, "set,material,step,diffuse,specular,roughness,normal,render\n") == 0, "header: %s", line);
-    CHECK(fgets(line, sizeof line, f) && strcmp(line, "\"maps:a,b \"\"c\"\"\",plain,0,0.500000,0.250000,0.125000,0.000000,1.000000\n") == 0, "row: %s", line);
+    CHECK(strcmp(line, "set,material,step,diffuse,specular,roughness,normal,render,angle,ssim,flip\n") == 0, "header: %s", line);
+    CHECK(fgets(line, sizeof line, f) && strcmp(line, "\"maps:a,b \"\"c\"\"\",plain,0,0.500000,0.250000,0.125000,0.000000,1.000000,12.000000,,0.750000\n") == 0, "row: %s", line);
     CHECK(!fgets(line, sizeof line, f), "more rows: %s", line);
     fclose(f);
     st = (ts_status){0};
