@@ -25,7 +25,7 @@ size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use);
 void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight /* [oc][ic][k][k] */, float *packed);
 
 /* y[n,i,j,o] = act(bias[o] + sum_{ky,kx,c} x[n, i + d(ky-k/2), j + d(kx-k/2), c] weight[o,c,ky,kx]),
- * act(v) = v > 0 ? v : leak v (leak = 1: the identity, 0: ReLU). bias may be NULL. x and y contiguous, not overlapping. */
+ * act(v) = v > 0 ? v : leak v (0 <= leak <= 1; 1: the identity, 0: ReLU). bias may be NULL. x and y contiguous, not overlapping. */
 void ts_conv_forward(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y);
 
 /* dx (+)= the gradient of the input given dy = the gradient before the activation. */

@@ -3,43 +3,55 @@
 #include "tensor/threads.h"
 #include <string.h>
 
+enum { PANELS_TOGETHER = 8 };
+
+/* Pixels [first, first + count) of panels [panel0, panel1), at most PANELS_TOGETHER of them. */
+static void run_pixels(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, int panel0, int panel1)
+{
+    const ptrdiff_t step = ts_conv_k()->pixels, panels = panel1 - panel0, calls = (p->ic + 3) / 4;
+    const ts_segment segment = {0, 0, p->ic};
+    ts_tile tile[PANELS_TOGETHER];
+    /* Each panel fetches its share of the next tile's input and output: few k leave no time to wait for memory. */
+    const ptrdiff_t x_part = step * p->ic / panels, y_part = step * p->oc / panels;
+    for (int i = 0; i < panels; i++) {
+        tile[i] = conv_panel_tile(p, panel0 + i);
+        tile[i].segment = &segment;
+        tile[i].segments = 1;
+        tile[i].a_stride = p->ic;
+        tile[i].fetch_step[0] = x_part * (ptrdiff_t)sizeof(float) / calls;
+        tile[i].fetch_step[1] = y_part * (ptrdiff_t)sizeof(float) / calls;
+    }
+    for (ptrdiff_t j = 0; j < count; j += step) {
+        const float *x = p->x + (first + j) * p->ic;
+        float *y = p->y + (first + j) * p->oc;
+        for (int i = 0; i < panels; i++) {
+            tile[i].fetch[0] = x + step * p->ic + i * x_part;
+            tile[i].fetch[1] = y + step * p->oc + i * y_part;
+            conv_run_tile(&tile[i], conv_vectors(p->oc, panel0 + i), x, y + (panel0 + i) * 2 * conv_lanes(),
+                          (int)(count - j < step ? count - j : step));
+        }
+    }
+}
+
 /* Side 1: all pixels of all images are one row, read where they are. */
 void conv_run_pointwise(const conv_plan *p)
 {
     const ptrdiff_t pixels = (ptrdiff_t)p->n * p->h * p->w;
-    const int panels = conv_panels(p->oc), step = ts_conv_k()->pixels, chunk = 16 * step;
+    const int panels = conv_panels(p->oc), chunk = 16 * ts_conv_k()->pixels;
     const int chunks = (int)((pixels + chunk - 1) / chunk);
     int groups = chunks < 8 ? (8 + chunks - 1) / chunks : 1;
     if (groups > panels) groups = panels;
-    const ts_segment segment = {0, 0, p->ic};
     ptrdiff_t together = CONV_BLOCK_BYTES / ((ptrdiff_t)p->ic * 2 * conv_lanes() * (ptrdiff_t)sizeof(float));
     if (together < 1) together = 1;
+    if (together > PANELS_TOGETHER) together = PANELS_TOGETHER;
 #pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads())
     for (int g = 0; g < groups; g++)
         for (int i = 0; i < chunks; i++) {
             int panel0, panel1;
             conv_part(panels, groups, g, &panel0, &panel1);
             const ptrdiff_t first = (ptrdiff_t)i * chunk, count = pixels - first < chunk ? pixels - first : chunk;
-            for (ptrdiff_t base = panel0; base < panel1; base += together) {
-                const ptrdiff_t end = base + together < panel1 ? base + together : panel1;
-                for (ptrdiff_t j = 0; j < count; j += step)
-                    for (ptrdiff_t panel = base; panel < end; panel++) {
-                        ts_tile t = conv_panel_tile(p, (int)panel);
-                        const float *x = p->x + (first + j) * p->ic;
-                        float *y = p->y + (first + j) * p->oc;
-                        t.segment = &segment;
-                        t.segments = 1;
-                        t.a_stride = p->ic;
-                        /* Each panel fetches its share of the next tile's input and output: few k leave no time to wait for memory. */
-                        const ptrdiff_t x_part = step * p->ic / (end - base), y_part = step * p->oc / (end - base), calls = (p->ic + 3) / 4;
-                        t.fetch[0] = x + step * p->ic + (panel - base) * x_part;
-                        t.fetch[1] = y + step * p->oc + (panel - base) * y_part;
-                        t.fetch_step[0] = x_part * (ptrdiff_t)sizeof(float) / calls;
-                        t.fetch_step[1] = y_part * (ptrdiff_t)sizeof(float) / calls;
-                        const int tile = (int)(count - j < step ? count - j : step);
-                        conv_run_tile(&t, conv_vectors(p->oc, (int)panel), x, y + panel * 2 * conv_lanes(), tile);
-                    }
-            }
+            for (int base = panel0; base < panel1; base += (int)together)
+                run_pixels(p, first, count, base, base + together < panel1 ? base + (int)together : panel1);
         }
 }
 

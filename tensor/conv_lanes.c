@@ -43,18 +43,30 @@ typedef struct rows {
 /* Makes the source rows first to last that are not there yet. */
 static void fill(rows *s, const conv_plan *p, int image, int first, int last)
 {
-    const int left = -p->first;
+    const int left = -p->first, right = (p->k - 1) * p->dilation + p->first;
     for (int r = s->next > first ? s->next : first; r <= last; r++) {
         float *to = s->memory + r % s->count * s->row;
         const float *from = p->x + ((ptrdiff_t)image * p->h + r) * p->w * p->ic, *end = from + (ptrdiff_t)(p->w - 1) * p->ic;
         ts_conv_k()->transpose(from, p->w, p->ic, to + left, s->plane);
-        for (int c = 0; c < p->ic; c++) {
-            float *plane = to + c * s->plane;
-            for (int j = 0; j < left; j++) plane[j] = p->replicate ? from[c] : 0;
-            for (ptrdiff_t j = left + p->w; j < s->plane; j++) plane[j] = p->replicate ? end[c] : 0;
+        for (int c = 0; p->replicate && c < p->ic; c++) {
+            float *begin = to + c * s->plane, *behind = begin + left + p->w;
+            for (int j = 0; j < left; j++) begin[j] = from[c];
+            for (int j = 0; j < right; j++) behind[j] = end[c];
         }
     }
     if (last >= s->next) s->next = last + 1;
+}
+
+/* Columns outside the image are zero and stay so, but for those that padding replicates. */
+static void clear_outside(const rows *s, const conv_plan *p)
+{
+    const int left = -p->first;
+    const ptrdiff_t behind = left + p->w;
+    for (ptrdiff_t i = 0; i < (ptrdiff_t)s->count * p->ic; i++) {
+        float *plane = s->memory + i * s->plane;
+        memset(plane, 0, sizeof(float) * (size_t)left);
+        memset(plane + behind, 0, sizeof(float) * (size_t)(s->plane - behind));
+    }
 }
 
 /* All outputs of extended row e as [channel][pixel]. */
@@ -90,19 +102,13 @@ static void sum_row(const conv_plan *p, const rows *s, int e, int pixels, float 
 /* y's row from [channel][pixel]. first: nothing has been put into it yet. */
 static void put_row(const conv_plan *p, const float *out, int pixels, float *y, bool first)
 {
-    if (!p->fold) {
-        for (int j = 0; j < p->w; j++)
-            for (int o = 0; o < p->oc; o++) {
-                float v = out[(ptrdiff_t)o * pixels + j] + (p->add ? y[(ptrdiff_t)j * p->oc + o] : 0);
-                y[(ptrdiff_t)j * p->oc + o] = v > 0 ? v : p->leak * v;
-            }
-        return;
-    }
-    if (first) memset(y, 0, sizeof(float) * (size_t)p->w * (size_t)p->oc);
-    for (int e = 0; e < p->w + 2 * p->fold; e++) {
-        float *to = y + (ptrdiff_t)conv_clamp(e - p->fold, p->w) * p->oc;
-        for (int o = 0; o < p->oc; o++) to[o] += out[(ptrdiff_t)o * pixels + e];
-    }
+    ts_conv_k()->collect(out + p->fold, pixels, p->w, p->oc, p->fold ? !first : p->add, p->leak, y);
+    float *end = y + (ptrdiff_t)(p->w - 1) * p->oc;
+    for (int o = 0; o < p->oc; o++)
+        for (int e = 0; e < p->fold; e++) {
+            y[o] += out[(ptrdiff_t)o * pixels + e];
+            end[o] += out[(ptrdiff_t)o * pixels + p->w + 2 * p->fold - 1 - e];
+        }
 }
 
 static void run_band(const conv_plan *p, int image, int begin, int end)
@@ -112,6 +118,7 @@ static void run_band(const conv_plan *p, int image, int begin, int end)
     rows s = {.plane = pixels + reach, .count = reach + 1 < p->h ? reach + 1 : p->h};
     s.row = s.plane * p->ic;
     s.memory = ts_scratch(0, sizeof(float) * (size_t)(s.row * s.count));
+    clear_outside(&s, p);
     float *out = ts_scratch(1, sizeof(float) * (size_t)p->oc * (size_t)pixels);
     for (int e = e0, before = -1; e < e1; e++) {
         const int row = conv_clamp(e - p->fold, p->h);

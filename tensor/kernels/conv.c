@@ -107,9 +107,8 @@ INLINE void tile(const ts_tile *t, const int pixels, const int vectors)
         }
     }
     if (t->leak != 1) {
-        vf leak = v_set(t->leak), zero = {0};
-        UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++)
-            acc[p][v] = v_select(acc[p][v] > zero, acc[p][v], leak * acc[p][v]);
+        const vf leak = v_set(t->leak);
+        UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) acc[p][v] = v_max(leak * acc[p][v], acc[p][v]);
     }
     UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++)
         store_lanes(t->y[p / TS_TILE_GROUP] + p % TS_TILE_GROUP * ys + v * VL, acc[p][v], mask[v]);
@@ -177,25 +176,53 @@ static void columns(const float *x, int64_t pixels, int channels, float *restric
         r[i + (h)] = __builtin_shufflevector(a, b, LANES(HIGH, h));                   \
     }
 
-static void transpose(const float *x, int pixels, int channels, float *to, ptrdiff_t plane)
+/* VL rows of VL values: columns become rows. */
+INLINE void turn(vf r[VL])
 {
-    const int whole_c = channels / VL * VL, whole_p = pixels / VL * VL;
-    for (int p = 0; p < whole_p; p += VL)
-        for (int c = 0; c < whole_c; c += VL) {
-            vf r[VL];
-            UNROLL for (int i = 0; i < VL; i++) r[i] = v_load(x + (ptrdiff_t)(p + i) * channels + c);
 #if VL == 16
-            STAGE(8)
+    STAGE(8)
 #endif
 #if VL >= 8
-            STAGE(4)
+    STAGE(4)
 #endif
-            STAGE(2)
-            STAGE(1)
-            UNROLL for (int i = 0; i < VL; i++) v_store(to + (c + i) * plane + p, r[i]);
+    STAGE(2)
+    STAGE(1)
+}
+
+static void transpose(const float *x, int pixels, int channels, float *to, ptrdiff_t plane)
+{
+    const int whole = pixels / VL * VL;
+    for (int p = 0; p < whole; p += VL)
+        for (int c = 0; c < channels; c += VL) {
+            vf r[VL];
+            UNROLL for (int i = 0; i < VL; i++) r[i] = v_load_part(x + (ptrdiff_t)(p + i) * channels + c, channels - c);
+            turn(r);
+            UNROLL for (int i = 0; i < VL; i++) if (i < channels - c) v_store(to + (c + i) * plane + p, r[i]);
         }
-    for (int p = 0; p < pixels; p++)
-        for (int c = p < whole_p ? whole_c : 0; c < channels; c++) to[c * plane + p] = x[(ptrdiff_t)p * channels + c];
+    for (int p = whole; p < pixels; p++)
+        for (int c = 0; c < channels; c++) to[c * plane + p] = x[(ptrdiff_t)p * channels + c];
+}
+
+static void collect(const float *x, ptrdiff_t plane, int pixels, int channels, bool add, float leak, float *y)
+{
+    const int whole = pixels / VL * VL;
+    for (int p = 0; p < whole; p += VL)
+        for (int c = 0; c < channels; c += VL) {
+            vf r[VL];
+            UNROLL for (int i = 0; i < VL; i++) r[i] = i < channels - c ? v_load(x + (c + i) * plane + p) : (vf){0};
+            turn(r);
+            for (int i = 0; i < VL; i++) {
+                float *to = y + (ptrdiff_t)(p + i) * channels + c;
+                const vf v = add ? r[i] + v_load_part(to, channels - c) : r[i];
+                v_store_part(to, v_max(v_set(leak) * v, v), channels - c);
+            }
+        }
+    for (int p = whole; p < pixels; p++)
+        for (int c = 0; c < channels; c++) {
+            float *to = y + (ptrdiff_t)p * channels + c;
+            const float v = x[c * plane + p] + (add ? *to : 0);
+            *to = v > 0 ? v : leak * v;
+        }
 }
 
 #define FOR_5(DO) DO(1) DO(2) DO(3) DO(4) DO(5)
@@ -225,4 +252,5 @@ const struct ts_conv_kernels TS_TABLE(conv) = {
     .sum = {{FOR_ALL(SUM_1)}, {FOR_ALL(SUM_2)}},
     .columns = columns,
     .transpose = transpose,
+    .collect = collect,
 };

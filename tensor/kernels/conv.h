@@ -29,7 +29,7 @@ typedef struct ts_tile {
     const float *w;               /* panel: [k][vectors * lanes] */
     const float *bias;            /* of the panel's first channel, or NULL: init = 0 */
     bool add;                     /* init = what y holds */
-    float leak;                   /* 1: no activation */
+    float leak;                   /* 0 .. 1; 1: no activation */
     int channels;                 /* of the panel that exist; no others are written */
     const float *a[3];            /* pixels 0, 5, 10 */
     float *y[3];
@@ -58,7 +58,9 @@ struct ts_conv_kernels {
     ts_tile_function *tile[2][TS_TILE_PIXELS + 1]; /* [vectors - 1][pixels] */
     ts_sum_function *sum[2][TS_SUM_ROWS + 1];      /* [vectors - 1][m] */
     void (*columns)(const float *x, int64_t pixels, int channels, float *sum); /* sum[o] += sum_p x[p][o] */
-    void (*transpose)(const float *x, int pixels, int channels, float *to, ptrdiff_t plane);   /* to[c plane + p] = x[p][c] */
+    void (*transpose)(const float *x, int pixels, int channels, float *to, ptrdiff_t plane); /* to[c plane + p] = x[p][c] */
+    /* y[p][c] = act(x[c plane + p] (+ y[p][c])) */
+    void (*collect)(const float *x, ptrdiff_t plane, int pixels, int channels, bool add, float leak, float *y);
 };
 TS_FAMILY(conv)
 #endif
