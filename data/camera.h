@@ -19,14 +19,14 @@ typedef struct io_camera {
 } io_camera;
 
 /* Where camera and light stand, in patch widths: (0, 0, distance) turned by the tilt about the point where the axis meets the patch. The
- * photograph is thought of as resampled to the frontal square, so that its maps stay registered: render with this position, nothing else changes. */
+ * photograph is thought of as resampled to the frontal square, so that its maps stay registered: render from there, nothing else changes. */
 void io_camera_place(const io_camera *c, uint64_t seed, uint64_t index, float distance, float position[3]);
 
 /* The factor of the light that the exposure stands for, which io_camera_apply multiplies in: for a loss that is to know it. */
 float io_camera_exposure(const io_camera *c, uint64_t seed, uint64_t index);
 
-/* image: a linear rendering that is NOT clamped, [size][size][3], in place. In this order: exposure, vignette and white balance; highlights clip at 1; blur;
- * noise; JPEG or rounding to 8 bits. The result lies in [0, 1]. Serial, thread safe. */
+/* image: a linear rendering that is NOT clamped, [size][size][3], in place. In this order: exposure, vignette and white balance; highlights clip at 1;
+ * blur; noise; JPEG or rounding to 8 bits. The result lies in [0, 1]. Serial, thread safe. */
 void io_camera_apply(const io_camera *c, uint64_t seed, uint64_t index, int size, float *image);
 
 /* What a baseline JPEG of this quality (1 .. 100, the tables of ITU-T T.81 annex K scaled as the Independent JPEG Group's library does) makes of

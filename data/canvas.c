@@ -127,7 +127,8 @@ void cv_shade(io_canvas *c, const float *plane, float amount)
         const float *in = plane + begin, *f0 = c->specular[1] + begin;
         for (int i = 0; i < n; i++) pigment[i] = nz_clamp(1 + amount * in[i], 0.1f, 2.5f);
         for (int i = 0; i < n; i++) metallic[i] = metal(f0[i]);
-        for (int i = 0; i < n; i++) metallic[i] = 1 + metallic[i] * (0.5f * pigment[i] - 0.5f); /* a metal's colour varies half as much as a pigment's */
+        /* a metal's colour varies half as much as a pigment's */
+        for (int i = 0; i < n; i++) metallic[i] = 1 + metallic[i] * (0.5f * pigment[i] - 0.5f);
         for (int k = 0; k < 3; k++) {
             float *d = c->diffuse[k] + begin, *f = c->specular[k] + begin;
             for (int i = 0; i < n; i++) d[i] *= pigment[i];

@@ -116,5 +116,6 @@ void io_family_paint(io_canvas *c)
         float longest = cv_log_range(c, 0.1f, 0.9f);
         wear_scratches(c, 4 + ts_rng_int(&c->rng, 50), longest, &under);
     }
+    if (cv_chance(c, 0.3f)) wear_decals(c);
     wear_any(c, 0.6f);
 }

@@ -112,6 +112,7 @@ void io_family_panels(io_canvas *c)
     cv_roughen(c, tone, cv_range(c, 0.01f, 0.08f));
     cv_shade(c, tone, cv_range(c, 0, 0.12f));
     c->used = 0;
+    if (cv_chance(c, 0.35f)) wear_decals(c);
     if (cv_chance(c, 0.5f)) {
         io_substance bare = pal_metal(c, cv_range(c, 0.2f, 0.5f));
         float worn = cv_range(c, 0, 0.6f), edge_radius = cv_range(c, 0.008f, 0.02f);

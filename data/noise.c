@@ -21,8 +21,8 @@ void nz_fbm(nz_frame f, nz_kind kind, float frequency, int octaves, float gain, 
             if (seen <= 0) break;
             uint32_t s = seed + 101u * (uint32_t)k;
             float shift_u = nz_unit(nz_hash(1, 0, s)) * 64, shift_v = nz_unit(nz_hash(2, 0, s)) * 64;
-            ts_noise_k()->octave(n, f.u + begin, f.v + begin, cycles, shift_u, shift_v, s, kind != NZ_SMOOTH, kind == NZ_BILLOW ? -a * seen : a * seen,
-                                 out + begin);
+            float scale = kind == NZ_BILLOW ? -a * seen : a * seen;
+            ts_noise_k()->octave(n, f.u + begin, f.v + begin, cycles, shift_u, shift_v, s, kind != NZ_SMOOTH, scale, out + begin);
         }
     }
 }

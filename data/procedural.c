@@ -58,35 +58,36 @@ static void painted_at(io_canvas *c, float *base)
     c->roughness = base + 7 * n;
 }
 
-/* Two materials of one patch: side by side with a ragged border, one showing through where it lies higher, the colours of one on the relief of the
- * other, or laid over each other faintly. base holds the first, c's painted planes the second; the result goes to c. */
+/* Two materials of one patch: side by side with a ragged border, one showing through where it lies higher, the colours or the gloss of one on the
+ * relief of the other, or laid over each other faintly. base holds the first, c's painted planes the second; the result goes to c. */
 static void mix(io_canvas *c, const float *base)
 {
+    enum { BESIDE, BY_HEIGHT, COLOURS, GLOSS, FAINT } how;
     int mark = c->used;
     float *mask = cv_plane(c);
     size_t n = (size_t)c->count;
-    int dice = ts_rng_int(&c->rng, 10), how = dice < 4 ? 0 : dice < 7 ? 1 : dice < 9 ? 2 : 3;
+    int dice = ts_rng_int(&c->rng, 12);
+    how = dice < 4 ? BESIDE : dice < 7 ? BY_HEIGHT : dice < 9 ? COLOURS : dice < 11 ? GLOSS : FAINT;
     nz_frame f = cv_bend(c, cv_frame(c, 1, 1, 0), 3, 3, 0.015f);
     uint32_t seed = cv_seed(c);
     float gain = cv_range(c, 0.35f, 0.6f), frequency = cv_log_range(c, 0.5f, 3);
     nz_fbm(f, NZ_SMOOTH, frequency, 6, gain, seed, mask);
-    if (how == 1) { /* by height, as sand between stones */
+    if (how == BY_HEIGHT) { /* by height, as sand between stones */
         float *smooth = cv_cavity(c, 0.08f);
         for (int i = 0; i < c->count; i++) mask[i] = 0.4f * mask[i] - 1.6f * smooth[i];
     }
     float blur = cv_log_range(c, 0.03f, 0.5f), coverage = cv_range(c, 0.25f, 0.75f);
     cv_threshold(c, mask, cv_level(coverage), blur);
-    bool swap = how == 2, faint = how == 3;
-    float share = faint ? cv_range(c, 0.3f, 0.7f) : 1;
+    float share = how == FAINT ? cv_range(c, 0.3f, 0.7f) : 1;
     for (int i = 0; i < c->count; i++) {
-        float t = faint ? share : mask[i], relief = swap || faint ? 0 : t;
+        float t = how == FAINT ? share : mask[i], relief = how <= BY_HEIGHT ? t : 0;
+        float colour = how == COLOURS ? 1 : how == GLOSS ? 0 : t, gloss = how == COLOURS || how == GLOSS ? 1 : t;
         c->height[i] = nz_mix(base[i], c->height[i], relief);
-        if (swap) t = 1;
         for (int k = 0; k < 3; k++) {
-            c->diffuse[k][i] = nz_mix(base[(size_t)(1 + k) * n + (size_t)i], c->diffuse[k][i], t);
-            c->specular[k][i] = nz_mix(base[(size_t)(4 + k) * n + (size_t)i], c->specular[k][i], t);
+            c->diffuse[k][i] = nz_mix(base[(size_t)(1 + k) * n + (size_t)i], c->diffuse[k][i], colour);
+            c->specular[k][i] = nz_mix(base[(size_t)(4 + k) * n + (size_t)i], c->specular[k][i], colour);
         }
-        c->roughness[i] = nz_mix(base[7 * n + (size_t)i], c->roughness[i], t);
+        c->roughness[i] = nz_mix(base[7 * n + (size_t)i], c->roughness[i], gloss);
     }
     cv_drop(c, mark);
 }
@@ -107,7 +108,7 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
     c.rng = ts_rng_make(p->seed, TS_STREAM_MATERIAL, index);
     uint64_t all = (UINT64_C(1) << io_family_count()) - 1, allowed = p->families & all ? p->families & all : all;
     int a = draw_family(&c.rng, allowed), b = draw_family(&c.rng, allowed);
-    bool mixed = cv_chance(&c, 0.22f);
+    bool mixed = cv_chance(&c, 0.27f);
     painted_at(&c, first);
     families[a].paint(&c);
     if (mixed) {

@@ -103,6 +103,36 @@ void wear_grain(io_canvas *c, float frequency, float colour, float roughness)
     cv_drop(c, mark);
 }
 
+void wear_texture(io_canvas *c, float frequency, float slope)
+{
+    int mark = c->used;
+    float stretch = cv_chance(c, 0.25f) ? cv_log_range(c, 1, 6) : 1, turns = cv_range(c, 0, 1);
+    nz_frame f = cv_frame(c, 1, stretch, turns);
+    nz_kind kind = cv_chance(c, 0.7f) ? NZ_SMOOTH : cv_chance(c, 0.5f) ? NZ_RIDGED : NZ_BILLOW;
+    float *fine = cv_noise(c, f, kind, frequency, 4, 0.6f);
+    cv_raise(c, fine, slope / (6.2831853f * frequency));
+    cv_roughen(c, fine, cv_range(c, -0.03f, 0.06f));
+    cv_drop(c, mark);
+}
+
+void wear_streaks(io_canvas *c, float amount)
+{
+    static const uint32_t run[] = {0x6b3a1e, 0x8a4a22, 0x3a2c22, 0xd8d4c8, 0x2a2826, 0x4a5240};
+    int mark = c->used;
+    io_rgb colour;
+    pal_pick(c, run, PAL_COUNT(run), 0.5f, colour);
+    io_substance dry = pal_dielectric(c, colour, cv_range(c, 0.5f, 0.95f));
+    float long_by = cv_range(c, 6, 20), often = cv_log_range(c, 4, 20);
+    nz_frame f = cv_bend(c, cv_frame(c, often, long_by, cv_chance(c, 0.85f) ? 0 : 0.25f), 0.6f, 2, 0.1f);
+    float *streak = cv_noise(c, f, NZ_SMOOTH, 1, 5, 0.6f), edge = cv_range(c, 0.3f, 1.2f), blur = cv_range(c, 0.2f, 1);
+    nz_frame wide = cv_frame(c, 1, 1, 0);
+    float *where = cv_noise(c, wide, NZ_SMOOTH, 1.5f, 3, 0.5f);
+    for (int i = 0; i < c->count; i++) streak[i] += 0.5f * where[i];
+    cv_threshold(c, streak, edge, blur);
+    cv_cover(c, streak, amount, &dry);
+    cv_drop(c, mark);
+}
+
 void wear_wet(io_canvas *c, float coverage)
 {
     int mark = c->used;
@@ -140,6 +170,8 @@ void wear_any(io_canvas *c, float harsh)
         float amount = cv_range(c, 0, 0.35f + 0.5f * harsh), radius = cv_log_range(c, 0.01f, 0.05f);
         wear_dirt(c, radius, amount);
     }
+    if (cv_chance(c, 0.16f * harsh)) wear_streaks(c, cv_range(c, 0.15f, 0.8f));
+    if (cv_chance(c, 0.05f)) wear_decals(c);
     if (cv_chance(c, 0.35f)) wear_smudges(c, 0.08f);
     if (cv_chance(c, 0.25f)) {
         float longest = cv_log_range(c, 0.1f, 0.8f);
@@ -149,15 +181,36 @@ void wear_any(io_canvas *c, float harsh)
         float roughness = cv_range(c, 0, 0.05f), colour = cv_range(c, 0, 0.1f), frequency = cv_log_range(c, 8, 40);
         wear_grain(c, frequency, colour, roughness);
     }
+    if (cv_chance(c, 0.35f)) {
+        float slope = cv_log_range(c, 0.01f, 0.05f + 0.2f * harsh), frequency = cv_log_range(c, 16, 100);
+        wear_texture(c, frequency, slope);
+    }
+}
+
+/* Neither feet nor polish reach the flanks of a relief. */
+static void roughen_flanks(io_canvas *c, float amount)
+{
+    int mark = c->used, size = c->size;
+    float *steep = cv_plane(c);
+    for (int y = 0; y < size; y++) {
+        const float *row = c->height + (size_t)y * (size_t)size, *below = y + 1 < size ? row + size : row;
+        float *out = steep + (size_t)y * (size_t)size;
+        for (int x = 0; x + 1 < size; x++) out[x] = (nz_abs(row[x + 1] - row[x]) + nz_abs(below[x] - row[x])) * (float)size;
+        out[size - 1] = size > 1 ? out[size - 2] : 0;
+        for (int x = 0; x < size; x++) out[x] = nz_min(1, 1.5f * out[x]);
+    }
+    cv_roughen(c, steep, amount);
+    cv_drop(c, mark);
 }
 
 void wear_calm(io_canvas *c)
 {
     float contrast = cv_range(c, 0.35f, 1), rough_contrast = cv_range(c, 0.3f, 1), depth = cv_log_range(c, 0.3f, 1.1f);
-    float gloss = cv_chance(c, 0.6f) ? cv_range(c, 0.55f, 1) : 1, dark = cv_chance(c, 0.4f) ? cv_log_range(c, 0.25f, 1) : 1;
-    float deep_rough = cv_range(c, 0, 0.2f), deep_dark = cv_range(c, 0, 0.3f);
+    float gloss = cv_chance(c, 0.75f) ? cv_range(c, 0.4f, 1) : 1, dark = cv_chance(c, 0.5f) ? cv_log_range(c, 0.25f, 1) : 1;
+    float deep_rough = cv_range(c, 0, 0.3f), deep_dark = cv_range(c, 0, 0.3f);
     float *cavity = cv_cavity(c, cv_log_range(c, 0.01f, 0.04f));
     cv_roughen(c, cavity, deep_rough);
+    if (cv_chance(c, 0.4f)) roughen_flanks(c, cv_range(c, 0, 0.2f));
     cv_shade(c, cavity, -deep_dark);
     float sum[3] = {0}, rough = 0, weight = 1e-3f; /* of what is not metal, which may be nothing */
     for (int i = 0; i < c->count; i++) {

@@ -13,6 +13,12 @@ void wear_scratches(io_canvas *c, int count, float longest, const io_substance *
 void wear_stains(io_canvas *c, float amount);
 /* Fine mottling of colour and roughness down to the pixel. */
 void wear_grain(io_canvas *c, float frequency, float colour, float roughness);
+/* Relief down to the pixel, of slopes up to about the given one: what a close photograph shows of any matt surface. */
+void wear_texture(io_canvas *c, float frequency, float slope);
+/* Prints, stickers and stencils (decal.c), partly rubbed off. */
+void wear_decals(io_canvas *c);
+/* Runs of rust, lime or dirt. */
+void wear_streaks(io_canvas *c, float amount);
 /* Water or oil in what lies below a level: smooth and dark. coverage 0 .. 1. */
 void wear_wet(io_canvas *c, float coverage);
 /* Smears and finger marks of roughness. */

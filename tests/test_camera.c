@@ -8,7 +8,8 @@
 #include <string.h>
 
 enum { SIZE = 37, N = SIZE * SIZE * 3 };
-static const io_camera every = {.noise = 1, .noise_spread = 1, .blur = 8, .quantise = true, .exposure = 1, .vignette = 0.5f, .white_balance = 0.2f, .jpeg = 40};
+static const io_camera every = {
+    .noise = 1, .noise_spread = 1, .blur = 8, .quantise = true, .exposure = 1, .vignette = 0.5f, .white_balance = 0.2f, .jpeg = 40};
 
 static void fill(float *image, float largest)
 {
@@ -115,8 +116,8 @@ TEST(camera_light_stays_within_its_ranges)
         CHECK(fabsf(a[middle] - 0.3f) < 1e-6f && a[0] <= a[3 * (SIZE / 2)] && a[0] >= 0.3f * 0.599f && a[0] == a[N - 3], "vignette: corner %g", a[0]);
         darkest = fminf(darkest, a[0]);
     }
-    CHECK(least < 0.4f && most > 2.5f && redder < 0.75f && bluer > 1.3f && darkest < 0.2f, "ranges are not used: %g %g, %g %g, %g", least, most, redder,
-          bluer, darkest);
+    CHECK(least < 0.4f && most > 2.5f && redder < 0.75f && bluer > 1.3f && darkest < 0.2f, "ranges are not used: %g %g, %g %g, %g", least, most,
+          redder, bluer, darkest);
 }
 
 TEST(camera_stands_at_its_distance_within_tilt_and_offset)
@@ -137,8 +138,8 @@ TEST(camera_stands_at_its_distance_within_tilt_and_offset)
         io_camera_place(&both, 1, index, 2, r);
         CHECK(fabsf(r[0] - p[0] - q[0]) < 1e-6f && fabsf(r[1] - p[1] - q[1]) < 1e-6f && r[2] == p[2], "tilt and offset do not add");
     }
-    CHECK(steepest > 4.8f && farthest > 0.098f && hypotf(mean[0], mean[1]) < 0.02f, "ranges are not used: %g %g, mean %g %g", steepest, farthest, mean[0],
-          mean[1]);
+    CHECK(steepest > 4.8f && farthest > 0.098f && hypotf(mean[0], mean[1]) < 0.02f, "ranges are not used: %g %g, mean %g %g", steepest, farthest,
+          mean[0], mean[1]);
 }
 
 static double psnr(const uint8_t *a, const uint8_t *b, int n)
@@ -192,7 +193,8 @@ TEST(jpeg_matches_the_library)
         image.data[i] = io_srgb_to_linear((float)picture[i] / 255);
     }
     for (int quality = 40; quality <= 95; quality += 11) {
-        CHECK(io_write_jpeg(path, &image, quality, &st) == TS_OK && io_read_photo(path, IO_MAX_PIXELS_DEFAULT, &back, &st) == TS_OK, "%s", st.message);
+        CHECK(io_write_jpeg(path, &image, quality, &st) == TS_OK, "%s", st.message);
+        CHECK(io_read_photo(path, IO_MAX_PIXELS_DEFAULT, &back, &st) == TS_OK, "%s", st.message);
         double loss = 0, apart = 0;
         for (int i = 0; i < VALUES; i++) theirs[i] = (uint8_t)(io_linear_to_srgb(back.data[i]) * 255 + 0.5f);
         double best = 0;

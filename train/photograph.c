@@ -34,7 +34,8 @@ void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count
             view.camera[k] += by;
             view.light[k] += by;
         }
-        rd_render(rd_grid_full(size), maps + (size_t)(i / number) * pixels * MAP_CHANNELS, MAP_CHANNELS, &view, false, images + (size_t)i * pixels * 3);
+        const float *material = maps + (size_t)(i / number) * pixels * MAP_CHANNELS;
+        rd_render(rd_grid_full(size), material, MAP_CHANNELS, &view, false, images + (size_t)i * pixels * 3);
     }
 #pragma omp parallel for num_threads(ts_threads()) schedule(static)
     for (int i = 0; i < count * number; i++) io_camera_apply(&camera, seed, first + (uint64_t)i, size, images + (size_t)i * pixels * 3);
