@@ -1,5 +1,6 @@
 /* lgd-data: procedural materials as map folders, strips, photographs or a contact sheet, and how they compare with others' materials. */
 #include "cli/cli.h"
+#include "data/capture.h"
 #include "data/camera.h"
 #include "data/sheet.h"
 #include "data/statistics.h"
@@ -7,11 +8,12 @@
 #include "tensor/threads.h"
 #include <errno.h>
 #include <getopt.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-typedef enum format { FORMAT_NONE, FORMAT_FOLDERS, FORMAT_STRIPS } format;
+typedef enum format { FORMAT_NONE, FORMAT_FOLDERS, FORMAT_STRIPS, FORMAT_CAPTURES } format;
 
 typedef struct options {
     const char *output, *testdata;
@@ -78,7 +80,8 @@ static void print_help(void)
            "What to write (the default is --format folders):\n"
            "  -o, --output DIR      where to; made when absent\n"
            "      --format FORMAT   folders: DIR/NAME/ with diffuse.png, specular.png, roughness.png, normal.png, maps.exr;\n"
-           "                        strips: DIR/NAME.png, five panels: photograph, normal, diffuse, roughness, specular\n"
+           "                        strips: DIR/NAME.png, five panels: photograph, normal, diffuse, roughness, specular;\n"
+           "                        captures: DIR/NAME/ with nine photographs 00.png .. 08.png and their lights and cameras\n"
            "      --photographs     DIR/NAME.jpg, rendered under the flash, with sensor noise, blur and JPEG\n"
            "      --contact-sheet   DIR/contact-sheet.png, a row for each family\n"
            "      --statistics      compare maps with those of TESTDATA: a table on stdout\n\n"
@@ -146,7 +149,8 @@ static int parse_options(int argc, char **argv, options *o)
         case OPT_FORMAT:
             if (!strcmp(optarg, "folders")) o->format = FORMAT_FOLDERS;
             else if (!strcmp(optarg, "strips")) o->format = FORMAT_STRIPS;
-            else code = cl_usage("--format: '%s' is neither 'folders' nor 'strips'", optarg);
+            else if (!strcmp(optarg, "captures")) o->format = FORMAT_CAPTURES;
+            else code = cl_usage("--format: '%s' is none of 'folders', 'strips' and 'captures'", optarg);
             break;
         case OPT_SHEET: o->sheet = true; break;
         case OPT_PHOTOGRAPHS: o->photographs = true; break;
@@ -183,6 +187,34 @@ static ts_code make_path(char path[4096], const options *o, const char *name, co
     return TS_OK;
 }
 
+/* A hand-held phone: the first picture is the flash photograph, the others are taken around it with the flash beside the lens. */
+static ts_code write_capture(const options *o, const io_material *m, ts_status *st)
+{
+    enum { PICTURES = 9 };
+    const size_t values = (size_t)m->size * (size_t)m->size * 3;
+    char path[4096];
+    io_capture c;
+    ts_code code = io_capture_create(&c, PICTURES, m->size, st);
+    c.side = 20;
+    for (int i = 0; i < PICTURES && !code; i++) {
+        rd_view view = rd_flash();
+        const double phi = 6.28318530717958647692 * (i - 1) / (PICTURES - 1);
+        if (i > 0) {
+            view.camera[0] = (float)(0.45 * cos(phi)), view.camera[1] = (float)(0.45 * sin(phi));
+            view.light[0] = view.camera[0] + 0.06f, view.light[1] = view.camera[1];
+        }
+        memcpy(c.camera[i], view.camera, sizeof view.camera);
+        memcpy(c.light[i], view.light, sizeof view.light);
+        rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &view, true, c.image + (size_t)i * values);
+    }
+    for (int k = 0; k < 3; k++) c.power[k] = RD_FLASH_POWER;
+    if (!code) code = make_path(path, o, m->name, "", st);
+    if (!code) code = cl_make_folder(path, st);
+    if (!code) code = io_write_capture(path, &c, st);
+    io_capture_free(&c);
+    return code;
+}
+
 /* One material and its photograph, to the files that were asked for. */
 static ts_code write_material(const options *o, uint64_t index, io_material *m, io_image *photo, ts_status *st)
 {
@@ -200,6 +232,7 @@ static ts_code write_material(const options *o, uint64_t index, io_material *m, 
         code = make_path(path, o, m->name, ".png", st);
         if (!code) code = io_write_strip(path, m, photo, st);
     }
+    if (!code && o->format == FORMAT_CAPTURES) code = write_capture(o, m, st);
     if (!code && o->photographs) {
         io_camera_place(&o->camera, o->procedural.seed, index, RD_FLASH_DISTANCE, flash.camera);
         memcpy(flash.light, flash.camera, sizeof flash.light);

@@ -13,6 +13,6 @@ typedef struct io_map_set {
     bool directx;                 /* the normal's y points down */
 } io_map_set;
 
-/* Looks into the folder and its meta.txt. */
-ts_code io_describe_map_folder(const char *path, io_normal convention, io_map_set *set, ts_status *st);
+/* Looks into the folder and its meta.txt; what is told (may be NULL) wins. */
+ts_code io_describe_map_folder(const char *path, const io_map_convention *told, io_map_set *set, ts_status *st);
 #endif

@@ -157,12 +157,15 @@ static ts_code settle_normal(const char *path, const char *meta, io_normal conve
                    y == BOTH ? "meta.txt names both conventions for the normal's y" : "nothing says whether the normal's y is OpenGL or DirectX");
 }
 
-static ts_code settle_workflow(const char *path, const char *meta, io_map_set *set, ts_status *st)
+static ts_code settle_workflow(const char *path, const char *meta, io_workflow told, io_map_set *set, ts_status *st)
 {
     char text[512] = "";
     bool base = set->file[IO_BASECOLOR][0], diffuse = set->file[IO_DIFFUSE_MAP][0], metallic = set->file[IO_METALLIC_MAP][0];
     bool specular = set->file[IO_SPECULAR_MAP][0], said_specular = false, said_metallic = false;
-    if (find_key(meta, "workflow", text, sizeof text)) {
+    if (told != IO_WORKFLOW_FROM_FILE) {
+        said_specular = told == IO_WORKFLOW_SPECULAR;
+        said_metallic = !said_specular;
+    } else if (find_key(meta, "workflow", text, sizeof text)) {
         said_specular = !strncasecmp(text, "specular", 8);
         said_metallic = !strncasecmp(text, "metal", 5);
     }
@@ -170,10 +173,10 @@ static ts_code settle_workflow(const char *path, const char *meta, io_map_set *s
         return ts_fail(st, TS_INVALID, "%s: both %s and %s could be the colour map; remove one, or name it in meta.txt (file.basecolor: ...)", path,
                        set->file[IO_BASECOLOR], set->file[IO_DIFFUSE_MAP]);
     if (metallic && specular && !said_specular && !said_metallic)
-        return ts_fail(st, TS_INVALID, "%s: has both %s and %s; put \"workflow: metallic\" or \"workflow: specular\" into meta.txt", path,
+        return ts_fail(st, TS_INVALID, "%s: has both %s and %s; put \"workflow: metallic\" or \"workflow: specular\" into meta.txt, or say which with the option", path,
                        set->file[IO_METALLIC_MAP], set->file[IO_SPECULAR_MAP]);
     set->specular = said_specular || (specular && !said_metallic);
-    if (set->specular && !specular) return ts_fail(st, TS_INVALID, "%s: meta.txt says specular workflow, but there is no specular map", path);
+    if (set->specular && !specular) return ts_fail(st, TS_INVALID, "%s: should be of the specular workflow, but there is no specular map", path);
     if (set->file[IO_ROUGHNESS_MAP][0] && set->file[IO_GLOSS_MAP][0])
         return ts_fail(st, TS_INVALID, "%s: has both %s and %s; remove one", path, set->file[IO_ROUGHNESS_MAP], set->file[IO_GLOSS_MAP]);
     if (!base && !diffuse) return ts_fail(st, TS_INVALID, "%s: no colour map (basecolor, albedo, diffuse or color in its file name)", path);
@@ -183,8 +186,9 @@ static ts_code settle_workflow(const char *path, const char *meta, io_map_set *s
     return TS_OK;
 }
 
-ts_code io_describe_map_folder(const char *path, io_normal convention, io_map_set *set, ts_status *st)
+ts_code io_describe_map_folder(const char *path, const io_map_convention *told, io_map_set *set, ts_status *st)
 {
+    const io_map_convention say = told ? *told : (io_map_convention){0};
     memset(set, 0, sizeof *set);
     char meta_path[PATH_MAX], *meta = NULL, text[512];
     size_t size;
@@ -198,11 +202,12 @@ ts_code io_describe_map_folder(const char *path, io_normal convention, io_map_se
     }
     const char *words_of = meta ? meta : "";
     if (code == TS_OK && !named_files(words_of, set))
-        code = scan(path, set, convention == IO_NORMAL_DX ? DX : convention == IO_NORMAL_GL ? GL : UNKNOWN, &file_side, st);
-    if (code == TS_OK) code = settle_workflow(path, words_of, set, st);
-    if (code == TS_OK) code = settle_normal(path, words_of, convention, file_side, set, st);
+        code = scan(path, set, say.normal == IO_NORMAL_DX ? DX : say.normal == IO_NORMAL_GL ? GL : UNKNOWN, &file_side, st);
+    if (code == TS_OK) code = settle_workflow(path, words_of, say.workflow, set, st);
+    if (code == TS_OK) code = settle_normal(path, words_of, say.normal, file_side, set, st);
     for (int k = 0; k < IO_MAP_KINDS && code == TS_OK; k++)
-        set->linear[k] = find_key(words_of, io_map_kind_name[k], text, sizeof text) && says(text, "linear") && !says(text, "srgb");
+        set->linear[k] = say.colour ? say.colour == IO_ENCODING_LINEAR
+                                    : find_key(words_of, io_map_kind_name[k], text, sizeof text) && says(text, "linear") && !says(text, "srgb");
     free(meta);
     return code;
 }

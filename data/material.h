@@ -17,7 +17,15 @@ void io_material_free(io_material *m);
  * or from the options; what is ambiguous is an error. Resampled to size (0: the largest map's centre square).
  * The option wins over a meta.txt, which io_write_maps writes and data/map_names.c describes. */
 typedef enum io_normal { IO_NORMAL_FROM_FILE, IO_NORMAL_GL, IO_NORMAL_DX } io_normal;
-ts_code io_read_map_folder(const char *path, io_normal convention, int size, io_material *m, ts_status *st);
+typedef enum io_workflow { IO_WORKFLOW_FROM_FILE, IO_WORKFLOW_METALLIC, IO_WORKFLOW_SPECULAR } io_workflow;
+typedef enum io_encoding { IO_ENCODING_FROM_FILE, IO_ENCODING_SRGB, IO_ENCODING_LINEAR } io_encoding; /* of colour maps */
+typedef struct io_map_convention {
+    io_normal normal;
+    io_workflow workflow;
+    io_encoding colour;
+} io_map_convention;
+/* told may be NULL: as the folder says. */
+ts_code io_read_map_folder(const char *path, const io_map_convention *told, int size, io_material *m, ts_status *st);
 
 /* A strip: equal square panels side by side: input | normal | diffuse | roughness | specular, all linear, OpenGL y. input (may be
  * NULL) gets the first panel, linear. */

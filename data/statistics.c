@@ -108,7 +108,7 @@ static ts_code add_folder(const char *folder, bool strips, int size, io_feature_
         io_material m = {0};
         if (!code && snprintf(path, sizeof path, "%s/%s", folder, list[i]->d_name) >= (int)sizeof path)
             code = ts_fail(st, TS_INVALID, "%s: the path is too long", folder);
-        if (!code) code = strips ? io_read_strip(path, size, &m, NULL, st) : io_read_map_folder(path, IO_NORMAL_FROM_FILE, size, &m, st);
+        if (!code) code = strips ? io_read_strip(path, size, &m, NULL, st) : io_read_map_folder(path, NULL, size, &m, st);
         if (!code) io_features(m.maps, m.size, set->values[set->count++]);
         io_material_free(&m);
         free(list[i]);

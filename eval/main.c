@@ -1,6 +1,8 @@
 /* lgd-eval: how far estimated maps are from known ones. */
 #include "cli/cli.h"
+#include "eval/multiview.h"
 #include "eval/report.h"
+#include "eval/set_ini.h"
 #include "eval/sets.h"
 #include "eval/sheet.h"
 #include "infer/arguments.h"
@@ -11,12 +13,15 @@
 #include <inttypes.h>
 #include <stdlib.h>
 
-enum { SETS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, FAST, PATH_LENGTH = 4096 };
+enum { SETS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, FAST, NORMAL, WORKFLOW, COLOUR, PATH_LENGTH = 4096 };
 
 static const lgd_argument arguments[] = {
     {'o', "output", "DIR", "write results.csv and summary.csv there (required)"},
     {'d', "set", "KIND:WHERE", "what to evaluate (required, may be repeated):\nprocedural:SEED,COUNT  generated materials\n"
-        "strips:FOLDER  images of five panels: input, normal, diffuse, roughness, specular\nmaps:FOLDER  a folder of map folders"},
+        "strips:FOLDER  images of five panels: input, normal, diffuse, roughness, specular\nmaps:FOLDER  a folder of map folders\nmultiview:FOLDER  a capture, or a folder of them: 00.png, 01.png ..., camera_pos.txt,\nlight_pos.txt, image_size.txt, light_power.txt; 00.png is the input"},
+    {NORMAL, "normal", "Y", "of map folders: opengl or directx (default: as set.ini, meta.txt or the file name says)"},
+    {WORKFLOW, "workflow", "W", "of map folders: metallic or specular (default: likewise, or as the files are)"},
+    {COLOUR, "colour", "C", "of map folders: srgb or linear (default: likewise, or sRGB)"},
     {'i', "iterations", "N", "refinement steps, 0 .. 1000 (default: as trained)"},
     {'m', "model", "FILE", "weights (default: $LGD_MODEL, or those installed or built with the program)"},
     {SIZE, "size", "N", "pixels of a side, 1 .. 4096 (default 256)"},
@@ -35,6 +40,7 @@ typedef struct command {
     int sets, iterations, threads, size;
     int64_t seed;
     double noise;
+    io_map_convention told;
     bool images, fast, quiet, help, version;
 } command;
 
@@ -77,6 +83,15 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
             code = whole("threads", value, 0, 1024, &n, st);
             c->threads = (int)n;
             break;
+        case NORMAL:
+            if (!ev_set_ini_key("normal", value, &c->told)) code = ts_fail(st, TS_INVALID, "--normal: '%s' is neither 'opengl' nor 'directx'", value);
+            break;
+        case WORKFLOW:
+            if (!ev_set_ini_key("workflow", value, &c->told)) code = ts_fail(st, TS_INVALID, "--workflow: '%s' is neither 'metallic' nor 'specular'", value);
+            break;
+        case COLOUR:
+            if (!ev_set_ini_key("colour", value, &c->told)) code = ts_fail(st, TS_INVALID, "--colour: '%s' is neither 'srgb' nor 'linear'", value);
+            break;
         case NOISE:
             if (!cl_parse_real(value, 0, 1, &c->noise)) code = ts_fail(st, TS_INVALID, "--noise: '%s' is not a number in 0 .. 1", value);
             break;
@@ -93,7 +108,7 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
 static void print_help(void)
 {
     puts("Usage: lgd-eval [options] --set KIND:WHERE... -o DIR\n"
-         "Renders each known material under a flash, estimates its maps from that picture, and prints the RMSE of the maps (diffuse and\n"
+         "Renders each known material under a flash (of a capture: takes its first picture), estimates its maps from that, and prints the RMSE of the maps (diffuse and\n"
          "specular in gamma space, roughness and normal as they are) and of renderings under other lights and cameras, the mean angle\n"
          "between the normals in degrees, and SSIM and FLIP of the renderings, for R_0 and after every refinement step (SSIM and FLIP:\n"
          "for R_0 and the last). The same seed gives the same numbers, for any number of threads.\n");
@@ -105,11 +120,13 @@ static void print_help(void)
 typedef struct run {
     const command *c;
     ev_set set[SETS_MAX];
-    const char *name[SETS_MAX];
+    const char *set_name[SETS_MAX];
     nn_model *model;
     ag_tape *tape;
     ev_report report;
     io_material truth;
+    io_capture capture;
+    char name[128]; /* of the material at work */
     ev_row *row;
     float *image, *first, *last;
     cl_progress bar;
@@ -123,19 +140,28 @@ static ts_code one(run *r, int set, int i, ts_status *st)
     const uint64_t identity = ev_set_identity(&r->set[set], i);
     rd_view views[RD_EVAL_VIEWS];
     ts_rng rng = ts_rng_make((uint64_t)c->seed, TS_STREAM_EVAL, identity);
-    if (ev_set_load(&r->set[set], i, c->size, &r->truth, st) != TS_OK) return st->code;
-    rd_eval_views(&rng, RD_EVAL_VIEWS, views);
-    ev_photograph(&r->truth, (float)c->noise, (uint64_t)c->seed, identity, r->image);
-    const ev_case k = {&r->truth, r->image, views, !c->fast};
+    const bool capture = r->set[set].kind == EV_MULTIVIEW;
+    if ((capture ? ev_set_load_capture(&r->set[set], i, c->size, &r->capture, st) : ev_set_load(&r->set[set], i, c->size, &r->truth, st)) != TS_OK)
+        return st->code;
+    snprintf(r->name, sizeof r->name, "%s", capture ? r->capture.name : r->truth.name);
+    ev_case k;
+    if (capture) {
+        ev_capture_input(&r->capture, r->image);
+        k = ev_case_of_capture(&r->capture, r->image, !c->fast);
+    } else {
+        rd_eval_views(&rng, RD_EVAL_VIEWS, views);
+        ev_photograph(&r->truth, (float)c->noise, (uint64_t)c->seed, identity, r->image);
+        k = ev_case_of_maps(&r->truth, r->image, views, !c->fast);
+    }
     ts_code code = ev_measure(r->tape, r->model, &k, r->report.steps, r->row, r->first, r->last, st);
     if (!code && c->images) {
         char path[PATH_LENGTH];
-        if (snprintf(path, sizeof path, "%s/images/%d-%s.png", c->out, set + 1, r->truth.name) >= (int)sizeof path)
+        if (snprintf(path, sizeof path, "%s/images/%d-%s.png", c->out, set + 1, r->name) >= (int)sizeof path)
             code = ts_fail(st, TS_INVALID, "%s: the name is too long", c->out);
         else code = ev_sheet_write(path, &k, r->first, r->last, st);
     }
-    if (code) return ts_context(st, "%s: %s", r->name[set], r->truth.name);
-    return ev_report_add(&r->report, set, r->truth.name, r->row, st);
+    if (code) return ts_context(st, "%s: %s", r->set[set].spec, r->name);
+    return ev_report_add(&r->report, set, r->name, r->row, st);
 }
 
 static int evaluate(run *r)
@@ -158,7 +184,7 @@ static int evaluate(run *r)
                 r->failed++;
             }
             r->done++;
-            if (!c->quiet) cl_progress_show(&r->bar, r->done, r->truth.name);
+            if (!c->quiet) cl_progress_show(&r->bar, r->done, r->name);
         }
     cl_progress_end(&r->bar);
     st = (ts_status){0};
@@ -181,7 +207,7 @@ static bool prepare(run *r, ts_status *st)
     ag_freeze(r->tape, true);
     const int steps = c->iterations < 0 ? r->model->arch.iterations : c->iterations;
     if (steps > 0 && r->model->arch.h_width == 0) return ts_fail(st, TS_UNSUPPORTED, "%s: has no refiner: only --iterations 0 is possible", path), false;
-    r->report = (ev_report){.steps = steps, .sets = c->sets, .set_name = r->name};
+    r->report = (ev_report){.steps = steps, .sets = c->sets, .set_name = r->set_name};
     const size_t pixels = (size_t)c->size * (size_t)c->size;
     r->row = calloc((size_t)steps + 1, sizeof *r->row);
     r->image = malloc(pixels * 3 * sizeof(float));
@@ -199,15 +225,16 @@ static int work(const command *c)
     int code = CL_OK;
     r->c = c;
     for (int s = 0; s < c->sets && code == CL_OK; s++) {
-        if (ev_set_open(c->spec[s], &r->set[s], &st) == TS_INVALID) code = cl_usage("%s", st.message);
+        if (ev_set_open(c->spec[s], &c->told, &r->set[s], &st) == TS_INVALID) code = cl_usage("%s", st.message);
         else if (st.code) code = cl_failed("%s", st.message);
-        r->name[s] = c->spec[s];
+        r->set_name[s] = c->spec[s];
     }
     ts_threads_set(c->threads);
     if (code == CL_OK) code = prepare(r, &st) ? evaluate(r) : cl_failed("%s", st.message);
     for (int s = 0; s < c->sets; s++) ev_set_close(&r->set[s]);
     ev_report_free(&r->report);
     io_material_free(&r->truth);
+    io_capture_free(&r->capture);
     free(r->row);
     free(r->image);
     free(r->first);

@@ -1,6 +1,7 @@
 #include "eval/metrics.h"
 #include "data/camera.h"
 #include "eval/flip.h"
+#include "eval/multiview.h"
 #include "eval/ssim.h"
 #include "render/error.h"
 #include "render/render.h"
@@ -9,7 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const ev_metric_name[EV_METRICS] = {"diffuse", "specular", "roughness", "normal", "render", "angle", "ssim", "flip"};
+const char *const ev_metric_name[EV_METRICS] = {"diffuse", "specular", "roughness", "normal", "render", "angle", "ssim", "flip", "exposure"};
 
 void ev_photograph(const io_material *truth, float noise, uint64_t seed, uint64_t identity, float *image)
 {
@@ -38,11 +39,22 @@ static void perceive(const ev_case *c, const float *maps, int channels, ev_row *
     free(mine);
 }
 
+ev_case ev_case_of_maps(const io_material *truth, const float *image, const rd_view *views, bool perceptual)
+{
+    return (ev_case){.size = truth->size, .view = rd_flash(), .image = image, .truth = truth, .views = views, .perceptual = perceptual};
+}
+
+ev_case ev_case_of_capture(const io_capture *capture, const float *image, bool perceptual)
+{
+    return (ev_case){.size = capture->size, .view = ev_capture_view(capture, 0), .image = image, .capture = capture, .perceptual = perceptual};
+}
+
 ev_row ev_score(const ev_case *c, const float *maps, int channels)
 {
+    if (c->capture) return ev_capture_score(c->capture, maps, channels, c->perceptual);
     const io_material *truth = c->truth;
     const rd_map_error e = rd_map_rmse((int64_t)truth->size * truth->size, maps, channels, truth->maps, MAP_CHANNELS);
-    ev_row row = {{[EV_DIFFUSE] = e.diffuse, [EV_SPECULAR] = e.specular, [EV_ROUGHNESS] = e.roughness, [EV_NORMAL] = e.normal, [EV_ANGLE] = e.angle, [EV_SSIM] = NAN, [EV_FLIP] = NAN,
+    ev_row row = {{[EV_DIFFUSE] = e.diffuse, [EV_SPECULAR] = e.specular, [EV_ROUGHNESS] = e.roughness, [EV_NORMAL] = e.normal, [EV_ANGLE] = e.angle, [EV_SSIM] = NAN, [EV_FLIP] = NAN, [EV_EXPOSURE] = NAN,
         [EV_RENDER] = rd_render_rmse(rd_grid_full(truth->size), maps, channels, truth->maps, MAP_CHANNELS, c->views, RD_EVAL_VIEWS)}};
     if (c->perceptual) perceive(c, maps, channels, &row);
     return row;
@@ -59,12 +71,12 @@ typedef struct watch {
 static bool after_step(int step, const ag_value *maps, void *user)
 {
     watch *w = user;
-    const int size = w->c->truth->size, channels = maps->t.shape.c;
+    const int size = w->c->size, channels = maps->t.shape.c;
     const int64_t pixels = (int64_t)size * size;
     ev_case c = *w->c;
     c.perceptual = c.perceptual && (step == 0 || step == w->steps);
     w->row[step] = ev_score(&c, maps->t.data, channels);
-    for (int i = 0; i < EV_CHEAP; i++) w->finite = w->finite && isfinite(w->row[step].value[i]);
+    w->finite = isfinite(w->row[step].value[EV_RENDER]);
     for (int64_t i = 0; i < pixels * channels; i++) w->finite = w->finite && isfinite(maps->t.data[i]); /* a clamp may hide it from the scores */
     for (int copy = 0; copy < 2; copy++) {
         float *to = copy ? w->last : step == 0 ? w->first : NULL;
@@ -75,9 +87,9 @@ static bool after_step(int step, const ag_value *maps, void *user)
 
 ts_code ev_measure(ag_tape *tape, const nn_model *model, const ev_case *c, int steps, ev_row *row, float *first, float *last, ts_status *st)
 {
-    const int size = c->truth->size;
+    const int size = c->size;
     ag_reset(tape);
-    nn_input in = {.image = ts_new(ag_arena(tape), (ts_shape){1, size, size, 3}), .grid = rd_grid_full(size), .view = rd_flash()};
+    nn_input in = {.image = ts_new(ag_arena(tape), (ts_shape){1, size, size, 3}), .grid = rd_grid_full(size), .view = c->view};
     if (!in.image.data) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", size, size);
     memcpy(in.image.data, c->image, (size_t)size * (size_t)size * 3 * sizeof *c->image);
     watch w = {c, steps, row, first, last, true};

@@ -38,16 +38,20 @@ void ev_report_free(ev_report *r)
 int ev_report_summary(const ev_report *r, int set, int step, ev_row *mean, ev_row *deviation)
 {
     int n = 0;
-    *mean = *deviation = (ev_row){{0}};
     for (int i = 0; i < r->results; i++) n += set < 0 || r->result[i].set == set;
-    for (int pass = 0; pass < 2 && n > 0; pass++) /* the mean first: differences from it lose no digits */
-        for (int i = 0; i < r->results; i++)
-            for (int k = 0; k < EV_METRICS && (set < 0 || r->result[i].set == set); k++) {
+    for (int k = 0; k < EV_METRICS; k++) {
+        int measured = 0;
+        double sum = 0, squares = 0;
+        for (int pass = 0; pass < 2; pass++) /* the mean first: differences from it lose no digits */
+            for (int i = 0; i < r->results; i++) {
                 const double v = r->result[i].row[step].value[k];
-                if (pass == 0) mean->value[k] += v / n;
-                else if (n > 1) deviation->value[k] += (v - mean->value[k]) * (v - mean->value[k]) / (n - 1);
+                if ((set >= 0 && r->result[i].set != set) || isnan(v)) continue;
+                if (pass == 0) sum += v, measured++;
+                else squares += (v - sum / measured) * (v - sum / measured);
             }
-    for (int k = 0; k < EV_METRICS; k++) deviation->value[k] = sqrt(deviation->value[k]);
+        mean->value[k] = measured ? sum / measured : NAN;
+        deviation->value[k] = measured > 1 ? sqrt(squares / (measured - 1)) : measured ? 0 : NAN;
+    }
     return n;
 }
 
@@ -58,17 +62,22 @@ void ev_report_print(const ev_report *r, int size, FILE *out)
         ev_row mean, deviation;
         const int n = ev_report_summary(r, all ? -1 : set, 0, &mean, &deviation);
         if (n == 0 || (all && r->sets == 1)) continue;
+        const ev_row any = mean; /* what R_0 has not, no step has */
         const double start = mean.value[EV_RENDER];
-        fprintf(out, "%s%s: %d %s, %d x %d pixels, %d renderings each; RMSE (angle: degrees; ssim and flip: themselves), mean +- standard deviation\n     ", set > 0 ? "\n" : "",
-            all ? "all sets" : r->set_name[set], n, n == 1 ? "material" : "materials", size, size, RD_EVAL_VIEWS);
-        for (int k = 0; k < EV_METRICS; k++) fprintf(out, "  %-16s", ev_metric_name[k]);
+        fprintf(out, "%s%s: %d %s, %d x %d pixels", set > 0 ? "\n" : "", all ? "all sets" : r->set_name[set], n, n == 1 ? "material" : "materials", size, size);
+        if (isnan(mean.value[EV_DIFFUSE])) fputs(", each picture but the first", out);
+        else if (isnan(mean.value[EV_EXPOSURE])) fprintf(out, ", %d renderings each", RD_EVAL_VIEWS);
+        fputs("; RMSE (angle: degrees; ssim, flip, exposure: themselves), mean +- standard deviation\n     ", out);
+        for (int k = 0; k < EV_METRICS; k++)
+            if (!isnan(mean.value[k])) fprintf(out, "  %-16s", ev_metric_name[k]);
         fputs("  render change\n", out);
         for (int t = 0; t <= r->steps; t++) {
             ev_report_summary(r, all ? -1 : set, t, &mean, &deviation);
             fprintf(out, "R_%-3d", t);
             for (int k = 0; k < EV_METRICS; k++) {
+                if (isnan(any.value[k])) continue;
                 if (isnan(mean.value[k])) fprintf(out, "  %-16s", "-");
-                else fprintf(out, k == EV_ANGLE ? "  %6.2f +- %6.2f" : "  %.4f +- %.4f", mean.value[k], deviation.value[k]);
+                else fprintf(out, k == EV_ANGLE || k == EV_EXPOSURE ? "  %6.2f +- %6.2f" : "  %.4f +- %.4f", mean.value[k], deviation.value[k]);
             }
             if (start > 0) fprintf(out, "  %+.1f%%", 100 * (mean.value[EV_RENDER] / start - 1));
             fputc('\n', out);

@@ -21,7 +21,8 @@ typedef struct ev_report {
 ts_code ev_report_add(ev_report *r, int set, const char *material, const ev_row *row, ts_status *st);
 void ev_report_free(ev_report *r);
 
-/* Mean and (with n - 1) standard deviation over the materials of a set, or of all sets with set = -1; how many there are. */
+/* Mean and (with n - 1) standard deviation over the materials of a set, or of all sets with set = -1, that have the number (NaN: none has);
+ * how many materials there are. */
 int ev_report_summary(const ev_report *r, int set, int step, ev_row *mean, ev_row *deviation);
 
 /* For each set, and for all together when there are several: a line a step, and how far the renderings' error is from R_0's. */

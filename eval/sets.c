@@ -1,5 +1,6 @@
 #include "eval/sets.h"
 #include "data/procedural.h"
+#include "eval/set_ini.h"
 #include <dirent.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -11,7 +12,7 @@
 
 enum { PATH_LENGTH = 4096, COUNT_MAX = 1000000 };
 
-static const char *const kind_name[EV_KINDS] = {"procedural", "strips", "maps"};
+static const char *const kind_name[EV_KINDS] = {"procedural", "strips", "maps", "multiview"};
 
 static int by_name(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
@@ -23,6 +24,7 @@ static bool belongs(const ev_set *set, const char *name)
     struct stat info;
     if (name[0] == '.' || snprintf(path, sizeof path, "%s/%s", set->where, name) >= (int)sizeof path || stat(path, &info) != 0) return false;
     if (set->kind == EV_MAPS) return S_ISDIR(info.st_mode);
+    if (set->kind == EV_MULTIVIEW) return S_ISDIR(info.st_mode) && io_is_capture(path);
     const char *dot = strrchr(name, '.');
     for (size_t i = 0; dot && i < sizeof images / sizeof *images; i++)
         if (strcasecmp(dot + 1, images[i]) == 0) return S_ISREG(info.st_mode);
@@ -48,7 +50,7 @@ static ts_code list_folder(ev_set *set, ts_status *st)
     }
     closedir(d);
     if (!code && set->count == 0)
-        code = ts_fail(st, TS_IO, "%s: there is no %s in this folder", set->where, set->kind == EV_MAPS ? "map folder" : "strip image");
+        code = ts_fail(st, TS_IO, "%s: there is no %s in this folder", set->where, set->kind == EV_MAPS ? "map folder" : set->kind == EV_STRIPS ? "strip image" : "capture (a folder with 00.png, camera_pos.txt ...)");
     if (!code) qsort(set->entry, (size_t)set->count, sizeof *set->entry, by_name);
     return code;
 }
@@ -67,7 +69,17 @@ static ts_code parse_procedural(ev_set *set, ts_status *st)
     return TS_OK;
 }
 
-ts_code ev_set_open(const char *spec, ev_set *set, ts_status *st)
+/* A folder that is a capture itself is a set of one, with an empty name inside it. */
+static ts_code list_captures(ev_set *set, ts_status *st)
+{
+    if (!io_is_capture(set->where)) return list_folder(set, st);
+    set->entry = calloc(1, sizeof *set->entry);
+    if (!set->entry || !(set->entry[0] = strdup(""))) return ts_fail(st, TS_NOMEM, "%s: out of memory", set->where);
+    set->count = 1;
+    return TS_OK;
+}
+
+ts_code ev_set_open(const char *spec, const io_map_convention *told, ev_set *set, ts_status *st)
 {
     *set = (ev_set){.spec = strdup(spec), .kind = EV_KINDS};
     if (!set->spec) return ts_fail(st, TS_NOMEM, "--set %s: out of memory", spec);
@@ -76,10 +88,11 @@ ts_code ev_set_open(const char *spec, ev_set *set, ts_status *st)
         if (strlen(kind_name[k]) == (size_t)(colon - set->spec) && strncmp(kind_name[k], set->spec, (size_t)(colon - set->spec)) == 0) set->kind = (ev_kind)k;
     ts_code code = TS_OK;
     if (set->kind == EV_KINDS || !colon[1])
-        code = ts_fail(st, TS_INVALID, "--set %s: should be procedural:SEED,COUNT, strips:FOLDER or maps:FOLDER", spec);
+        code = ts_fail(st, TS_INVALID, "--set %s: should be procedural:SEED,COUNT, strips:FOLDER, maps:FOLDER or multiview:FOLDER", spec);
     else {
         set->where = colon + 1;
-        code = set->kind == EV_PROCEDURAL ? parse_procedural(set, st) : list_folder(set, st);
+        code = set->kind == EV_PROCEDURAL ? parse_procedural(set, st) : set->kind == EV_MULTIVIEW ? list_captures(set, st) : list_folder(set, st);
+        if (!code && set->kind == EV_MAPS) code = ev_set_ini(set->where, told, &set->told, st);
     }
     if (code) ev_set_close(set);
     return code;
@@ -97,7 +110,7 @@ uint64_t ev_set_identity(const ev_set *set, int i)
 {
     char text[PATH_LENGTH];
     if (set->kind == EV_PROCEDURAL) snprintf(text, sizeof text, "%s %" PRIu64 " %d", kind_name[set->kind], set->seed, i);
-    else snprintf(text, sizeof text, "%s %s", kind_name[set->kind], set->entry[i]);
+    else snprintf(text, sizeof text, "%s %s", kind_name[set->kind], set->entry[i]); /* a lone capture has no views to draw */
     uint64_t hash = UINT64_C(0xcbf29ce484222325); /* FNV-1a */
     for (const char *c = text; *c; c++) hash = (hash ^ (unsigned char)*c) * UINT64_C(0x100000001b3);
     return hash;
@@ -117,10 +130,21 @@ ts_code ev_set_load(const ev_set *set, int i, int size, io_material *m, ts_statu
     char path[PATH_LENGTH];
     if (snprintf(path, sizeof path, "%s/%s", set->where, set->entry[i]) >= (int)sizeof path)
         return ts_fail(st, TS_INVALID, "%s: the name is too long", set->where);
-    const ts_code code = set->kind == EV_STRIPS ? io_read_strip(path, size, m, NULL, st) : io_read_map_folder(path, IO_NORMAL_FROM_FILE, size, m, st);
+    const ts_code code = set->kind == EV_STRIPS ? io_read_strip(path, size, m, NULL, st) : io_read_map_folder(path, &set->told, size, m, st);
     if (code) return code;
     snprintf(m->name, sizeof m->name, "%s", set->entry[i]);
     char *dot = set->kind == EV_STRIPS ? strrchr(m->name, '.') : NULL;
     if (dot) *dot = 0;
     return TS_OK;
+}
+
+ts_code ev_set_load_capture(const ev_set *set, int i, int size, io_capture *c, ts_status *st)
+{
+    char path[PATH_LENGTH];
+    io_capture_free(c);
+    if (snprintf(path, sizeof path, "%s%s%s", set->where, *set->entry[i] ? "/" : "", set->entry[i]) >= (int)sizeof path)
+        return ts_fail(st, TS_INVALID, "%s: the name is too long", set->where);
+    const ts_code code = io_read_capture(path, size, c, st);
+    if (!code && c->images < 2) return ts_fail(st, TS_FORMAT, "%s: has one picture: one is the input, the others are compared", path);
+    return code;
 }

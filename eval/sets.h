@@ -1,9 +1,10 @@
-/* What is evaluated: materials with known maps. */
+/* What is evaluated: materials with known maps, and captures. */
 #ifndef EV_SETS_H
 #define EV_SETS_H
+#include "data/capture.h"
 #include "data/material.h"
 
-typedef enum ev_kind { EV_PROCEDURAL, EV_STRIPS, EV_MAPS, EV_KINDS } ev_kind;
+typedef enum ev_kind { EV_PROCEDURAL, EV_STRIPS, EV_MAPS, EV_MULTIVIEW, EV_KINDS } ev_kind;
 
 typedef struct ev_set {
     char *spec;    /* as given: KIND:WHERE */
@@ -11,16 +12,21 @@ typedef struct ev_set {
     const char *where; /* into spec */
     uint64_t seed; /* EV_PROCEDURAL */
     int count;
+    io_map_convention told; /* EV_MAPS: what set.ini and the options say */
     char **entry;  /* the names in the folder, sorted; NULL for EV_PROCEDURAL */
 } ev_set;
 
-/* procedural:SEED,COUNT, strips:FOLDER (a folder of strip images) or maps:FOLDER (a folder of map folders). The caller closes it
- * after success. TS_INVALID for a wrong spec, TS_IO for a folder that cannot be read or has nothing of that kind. */
-ts_code ev_set_open(const char *spec, ev_set *set, ts_status *st);
+/* procedural:SEED,COUNT, strips:FOLDER (a folder of strip images), maps:FOLDER (a folder of map folders) or multiview:FOLDER (a capture, or a
+ * folder of them). A file set.ini in a folder of map folders says for all of them (eval/set_ini.h) what the options (told, may be NULL), which win,
+ * leave open. The caller closes it after success. TS_INVALID for a wrong spec, TS_IO for a folder that cannot be read or has nothing of that kind. */
+ts_code ev_set_open(const char *spec, const io_map_convention *told, ev_set *set, ts_status *st);
 void ev_set_close(ev_set *set);
 
-/* Material number i of 0 .. count-1, size x size pixels; m->name is its name within the set. m is zeroed or a material to be reused. */
+/* Material number i of 0 .. count-1, size x size pixels; m->name is its name within the set. m is zeroed or a material to be reused. Not of
+ * EV_MULTIVIEW. */
 ts_code ev_set_load(const ev_set *set, int i, int size, io_material *m, ts_status *st);
+/* The same of an EV_MULTIVIEW set. */
+ts_code ev_set_load_capture(const ev_set *set, int i, int size, io_capture *c, ts_status *st);
 
 /* A number that belongs to the material and not to its place among others: what its evaluation views are drawn with. */
 uint64_t ev_set_identity(const ev_set *set, int i);

@@ -4,6 +4,7 @@
 #include "eval/metrics.h"
 
 /* Three rows (truth, R_0, the last R_t), each: flash picture, diffuse, specular, roughness, normal, three of the evaluation's
- * renderings. The truth's flash picture is the input as the network saw it. Written as an 8-bit sRGB PNG. */
+ * renderings. The truth's flash picture is the input as the network saw it. Of a capture: its first
+ * eight photographs and their re-renderings. Written as an 8-bit sRGB PNG. */
 ts_code ev_sheet_write(const char *path, const ev_case *c, const float *first, const float *last, ts_status *st);
 #endif

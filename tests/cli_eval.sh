@@ -142,5 +142,42 @@ check eval_real_sets real_sets
 check eval_images images
 check eval_bad_material_is_reported bad_material
 check eval_unwritable_output unwritable
+captures() {
+    model
+    expect 0 "$BIN/lgd-data" --format captures --count 2 --size 32 -o "$T/c"
+    [ "$(ls "$T"/c/*/ | grep -c 'png$')" = 18 ] || fail "pictures: $(ls "$T"/c/*)"
+    expect 0 evaluate --set "multiview:$T/c" --images -o "$T/o"
+    says "$T/out" exposure
+    lines "$T/o/results.csv" 7
+    awk -F, 'NR > 1 && !($4 == "" && $8 > 0 && $8 < 0.5 && $12 > 0.3 && $12 < 3) { exit 1 }' "$T/o/results.csv" || fail "$(cat "$T/o/results.csv")"
+    [ "$(ls "$T/o/images" | wc -l)" = 2 ] || fail "images: $(ls "$T/o/images")"
+    one=$(ls -d "$T"/c/* | head -n 1)
+    expect 0 evaluate --set "multiview:$one" -o "$T/p"
+    rm "$one/light_pos.txt"
+    expect 1 evaluate --set "multiview:$T/c" -o "$T/q"
+    says "$T/err" light_pos.txt
+    lines "$T/q/results.csv" 4
+}
+
+told() {
+    for o in --normal=up --workflow=mixed --colour=p3; do
+        expect 2 "$BIN/lgd-eval" --set "maps:$T" $o -o "$T/o"
+        says "$T/err" "${o%%=*}"
+    done
+    model
+    expect 0 "$BIN/lgd-data" --count 1 --size 32 -o "$T/m"
+    expect 0 evaluate --set "maps:$T/m" -o "$T/gl"
+    echo 'normal = directx' >"$T/m/set.ini"
+    expect 0 evaluate --set "maps:$T/m" -o "$T/dx"
+    if cmp -s "$T/gl/results.csv" "$T/dx/results.csv"; then fail "set.ini is not read"; fi
+    expect 0 evaluate --set "maps:$T/m" --normal opengl -o "$T/again"
+    cmp -s "$T/gl/results.csv" "$T/again/results.csv" || fail "the option does not win"
+    echo 'normals = directx' >"$T/m/set.ini"
+    expect 1 evaluate --set "maps:$T/m" -o "$T/bad"
+    says "$T/err" set.ini:1
+}
+
+check eval_captures captures
+check eval_maps_options told
 check eval_interrupted interrupted
 check eval_refinement_helps refinement_helps

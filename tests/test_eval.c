@@ -22,7 +22,7 @@ static void make_case(io_material *m, float *image, rd_view *views, ev_case *c)
     ts_rng rng = ts_rng_make(2, TS_STREAM_EVAL, 0);
     rd_eval_views(&rng, RD_EVAL_VIEWS, views);
     ev_photograph(m, 0, 1, 1, image);
-    *c = (ev_case){m, image, views, false};
+    *c = ev_case_of_maps(m, image, views, false);
 }
 
 TEST(eval_the_truth_scores_zero_and_an_offset_what_it_is)
@@ -33,7 +33,7 @@ TEST(eval_the_truth_scores_zero_and_an_offset_what_it_is)
     ev_case c;
     make_case(&m, image, views, &c);
     ev_row row = ev_score(&c, m.maps, MAP_CHANNELS);
-    for (int k = 0; k < EV_CHEAP; k++) CHECK(row.value[k] == 0, "the truth has %s error %g", ev_metric_name[k], row.value[k]);
+    for (int k = 0; k <= EV_ANGLE; k++) CHECK(row.value[k] == 0, "the truth has %s error %g", ev_metric_name[k], row.value[k]);
     CHECK(isnan(row.value[EV_SSIM]) && isnan(row.value[EV_FLIP]), "what was not asked for has a value");
     c.perceptual = true;
     row = ev_score(&c, m.maps, MAP_CHANNELS);
@@ -129,14 +129,14 @@ TEST(eval_csv_quotes_what_needs_it)
     const char *const names[] = {"maps:a,b \"c\""};
     ev_report r = {.steps = 0, .sets = 1, .set_name = names};
     ts_status st = {0};
-    ev_row row = {{0.5, 0.25, 0.125, 0, 1, 12, NAN, 0.75}};
+    ev_row row = {{0.5, 0.25, 0.125, 0, 1, 12, NAN, 0.75, 2}};
     char path[256], line[256] = "";
     CHECK(ev_report_add(&r, 0, "plain", &row, &st) == TS_OK && ev_report_write(&r, test_folder(), &st) == TS_OK, "%s", st.message);
     snprintf(path, sizeof path, "%s/results.csv", test_folder());
     FILE *f = fopen(path, "r");
     CHECK(f && fgets(line, sizeof line, f), "%s is missing", path);
-    CHECK(strcmp(line, "set,material,step,diffuse,specular,roughness,normal,render,angle,ssim,flip\n") == 0, "header: %s", line);
-    CHECK(fgets(line, sizeof line, f) && strcmp(line, "\"maps:a,b \"\"c\"\"\",plain,0,0.500000,0.250000,0.125000,0.000000,1.000000,12.000000,,0.750000\n") == 0, "row: %s", line);
+    CHECK(strcmp(line, "set,material,step,diffuse,specular,roughness,normal,render,angle,ssim,flip,exposure\n") == 0, "header: %s", line);
+    CHECK(fgets(line, sizeof line, f) && strcmp(line, "\"maps:a,b \"\"c\"\"\",plain,0,0.500000,0.250000,0.125000,0.000000,1.000000,12.000000,,0.750000,2.000000\n") == 0, "row: %s", line);
     CHECK(!fgets(line, sizeof line, f), "more rows: %s", line);
     fclose(f);
     st = (ts_status){0};
@@ -151,15 +151,15 @@ TEST(eval_wrong_sets_are_named)
         "procedural:1,99999999999", "procedural:99999999999999999999999,3", "pictures:x", "strips:", "proc:1,2", "stripsx:."};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         ts_status st = {0};
-        CHECK(ev_set_open(wrong[i], &set, &st) == TS_INVALID && strstr(st.message, wrong[i]), "'%s': %s", wrong[i], st.message);
+        CHECK(ev_set_open(wrong[i], NULL, &set, &st) == TS_INVALID && strstr(st.message, wrong[i]), "'%s': %s", wrong[i], st.message);
     }
     char spec[300];
     ts_status st = {0};
     snprintf(spec, sizeof spec, "maps:%s", test_folder());
-    CHECK(ev_set_open(spec, &set, &st) == TS_IO && strstr(st.message, test_folder()), "an empty folder: %s", st.message);
+    CHECK(ev_set_open(spec, NULL, &set, &st) == TS_IO && strstr(st.message, test_folder()), "an empty folder: %s", st.message);
     st = (ts_status){0};
     snprintf(spec, sizeof spec, "strips:%s/absent", test_folder());
-    CHECK(ev_set_open(spec, &set, &st) == TS_IO && strstr(st.message, "absent"), "an absent folder: %s", st.message);
+    CHECK(ev_set_open(spec, NULL, &set, &st) == TS_IO && strstr(st.message, "absent"), "an absent folder: %s", st.message);
 }
 
 TEST(eval_procedural_set_is_the_generator)
@@ -167,8 +167,8 @@ TEST(eval_procedural_set_is_the_generator)
     ev_set set, other;
     ts_status st = {0};
     io_material a = {0}, b = {0};
-    CHECK(ev_set_open("procedural:21,5", &set, &st) == TS_OK && set.count == 5, "%s", st.message);
-    CHECK(ev_set_open("procedural:21,2", &other, &st) == TS_OK, "%s", st.message);
+    CHECK(ev_set_open("procedural:21,5", NULL, &set, &st) == TS_OK && set.count == 5, "%s", st.message);
+    CHECK(ev_set_open("procedural:21,2", NULL, &other, &st) == TS_OK, "%s", st.message);
     const io_procedural p = {.seed = 21};
     CHECK(io_material_create(&b, SIZE, &st) == TS_OK, "%s", st.message);
     for (int i = 0; i < 2; i++) {
@@ -207,14 +207,14 @@ TEST(eval_reads_strips_and_map_folders_in_order)
     CHECK(f && fclose(f) == 0, "cannot write %s", path);
     ev_set set;
     snprintf(spec, sizeof spec, "strips:%s", folder);
-    CHECK(ev_set_open(spec, &set, &st) == TS_OK && set.count == 2, "%s", st.message);
+    CHECK(ev_set_open(spec, NULL, &set, &st) == TS_OK && set.count == 2, "%s", st.message);
     CHECK(ev_set_load(&set, 0, SIZE, &back, &st) == TS_OK && strcmp(back.name, "a") == 0, "%s: %s", back.name, st.message);
     for (int i = 0; i < SIZE * SIZE; i++) /* 16-bit panels; the folded roughness is the coarsest */
         CHECK(fabsf(back.maps[i * MAP_CHANNELS] - m.maps[i * MAP_CHANNELS]) < 1e-3f, "diffuse of pixel %d: %g, not %g", i, (double)back.maps[i * MAP_CHANNELS], (double)m.maps[i * MAP_CHANNELS]);
     ev_set_close(&set);
 
     snprintf(spec, sizeof spec, "maps:%s/maps", test_data());
-    CHECK(ev_set_open(spec, &set, &st) == TS_OK && set.count > 1, "%s", st.message);
+    CHECK(ev_set_open(spec, NULL, &set, &st) == TS_OK && set.count > 1, "%s", st.message);
     for (int i = 1; i < set.count; i++) CHECK(strcmp(set.entry[i - 1], set.entry[i]) < 0, "not in order");
     CHECK(ev_set_load(&set, 1, SIZE, &back, &st) == TS_OK && back.size == SIZE && strcmp(back.name, set.entry[1]) == 0, "%s", st.message);
     ev_set_close(&set);

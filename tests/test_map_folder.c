@@ -50,7 +50,7 @@ static io_texel first(const char *folder, io_normal convention, int size)
 {
     ts_status st = {0};
     io_material m;
-    CHECK(io_read_map_folder(folder, convention, size, &m, &st) == TS_OK, "%s", st.message);
+    CHECK(io_read_map_folder(folder, &(io_map_convention){.normal = convention}, size, &m, &st) == TS_OK, "%s", st.message);
     io_texel t = io_texel_get(m.maps);
     io_material_free(&m);
     return t;
@@ -61,7 +61,7 @@ static void refused(const char *folder, io_normal convention, const char *word)
 {
     ts_status st = {0};
     io_material m;
-    CHECK(io_read_map_folder(folder, convention, 0, &m, &st) != TS_OK && !m.maps, "%s was read", folder);
+    CHECK(io_read_map_folder(folder, &(io_map_convention){.normal = convention}, 0, &m, &st) != TS_OK && !m.maps, "%s was read", folder);
     CHECK(strstr(st.message, folder) && strstr(st.message, word) && !strchr(st.message, '\n'), "no \"%s\" in: %s", word, st.message);
 }
 
@@ -180,7 +180,7 @@ TEST(map_folder_sizes)
     ts_status st = {0};
     io_material m;
     for (int size = 0; size <= 12; size += 4) {
-        CHECK(io_read_map_folder(folder, IO_NORMAL_GL, size, &m, &st) == TS_OK, "%s", st.message);
+        CHECK(io_read_map_folder(folder, &(io_map_convention){.normal = IO_NORMAL_GL}, size, &m, &st) == TS_OK, "%s", st.message);
         CHECK(m.size == (size ? size : 3), "size %d became %d", size, m.size);
         CHECK(!strcmp(m.name, "sizes"), "named %s", m.name);
         for (int i = 0; i < m.size * m.size; i++) {
@@ -220,10 +220,10 @@ TEST(artists_conventions)
         ts_status st = {0};
         io_map_set set;
         snprintf(path, sizeof path, "%s/maps/%s", data, sets[k]);
-        CHECK(io_describe_map_folder(path, IO_NORMAL_FROM_FILE, &set, &st) == TS_OK, "%s", st.message);
+        CHECK(io_describe_map_folder(path, NULL, &set, &st) == TS_OK, "%s", st.message);
         CHECK(set.directx == (strstr(directx_sets, sets[k]) != NULL), "%s: read as %s", sets[k], set.directx ? "DirectX" : "OpenGL");
         CHECK(!set.specular && !set.linear[IO_BASECOLOR] && set.file[IO_BASECOLOR][0] && set.file[IO_ROUGHNESS_MAP][0], "%s", sets[k]);
-        CHECK(io_describe_map_folder(path, IO_NORMAL_DX, &set, &st) == TS_OK && set.directx, "%s: the option does not win", sets[k]);
+        CHECK(io_describe_map_folder(path, &(io_map_convention){.normal = IO_NORMAL_DX}, &set, &st) == TS_OK && set.directx, "%s: the option does not win", sets[k]);
     }
 }
 
@@ -235,7 +235,7 @@ TEST(artists_map_sets)
         ts_status st = {0};
         io_material m;
         snprintf(path, sizeof path, "%s/maps/%s", data, sets[k]);
-        CHECK(io_read_map_folder(path, IO_NORMAL_FROM_FILE, 64, &m, &st) == TS_OK, "%s", st.message);
+        CHECK(io_read_map_folder(path, NULL, 64, &m, &st) == TS_OK, "%s", st.message);
         CHECK(m.size == 64 && !strcmp(m.name, sets[k]), "%s: %d", m.name, m.size);
         double y = 0, albedo = 0, z = 0, f0 = 1;
         for (int i = 0; i < 64 * 64; i++) {
