@@ -14,15 +14,18 @@ OPT ?= -O3 -g
 SANITIZE ?=
 
 VERSION := 0.1.0
-PKG := OpenImageIO OpenEXR
+# What the programs read and write themselves, and what only the shared object needs that reads all other image formats.
+PKG := OpenEXR libpng libjpeg
+PKG_IMAGE := OpenImageIO
 WARN := -Wall -Wextra -Wshadow
-CPPFLAGS_ALL = -I. -I$(BUILD)/gen -D_GNU_SOURCE -DLGD_VERSION='"$(VERSION)"' -DLGD_DATADIR='"$(PREFIX)/share/lgd"' $(CPPFLAGS)
+CPPFLAGS_ALL = -I. -I$(BUILD)/gen -D_GNU_SOURCE -DLGD_VERSION='"$(VERSION)"' -DLGD_DATADIR='"$(PREFIX)/share/lgd"' -DLGD_LIBDIR='"$(PREFIX)/lib"' $(CPPFLAGS)
 CFLAGS_ALL = -std=c11 $(OPT) $(WARN) -Wmissing-prototypes -fopenmp -fno-math-errno -fno-trapping-math -ffp-contract=off -fPIC $(SANITIZE) $(CFLAGS)
 CXXFLAGS_ALL = -std=c++17 $(OPT) $(WARN) -fPIC $(SANITIZE) $(CXXFLAGS)
 # Looked up only when something is compiled or linked with them, so that `make deps` and `make help` work without.
 PKG_CFLAGS = $(shell pkg-config --cflags $(PKG))
-PKG_LIBS = $(shell pkg-config --libs $(PKG))
-LDLIBS_ALL = $(PKG_LIBS) -fopenmp -lpthread -lm $(SANITIZE) $(LDLIBS)
+# OpenEXR's C core alone: the rest of it is C++.
+PKG_LIBS = $(filter-out -lOpenEXR-% -lOpenEXRUtil% -lIex% -lIlmThread% -lImath% -lOpenEXR -lIex -lImath -lIlmThread,$(shell pkg-config --libs $(PKG)))
+LDLIBS_ALL = $(PKG_LIBS) -fopenmp -lpthread -ldl -lm $(SANITIZE) $(LDLIBS)
 
 MACHINE := $(shell $(CC) -dumpmachine)
 ifneq (,$(filter x86_64%,$(MACHINE)))
@@ -39,32 +42,38 @@ LIB_C := $(filter-out %main.c,$(wildcard tensor/*.c autograd/*.c render/*.c nn/*
 KERNELS := $(wildcard tensor/kernels/*.c)
 OPS := $(sort $(wildcard autograd/op_*.c render/op_*.c))
 OBJ := $(BUILD)/obj
-LIB_OBJ := $(LIB_C:%.c=$(OBJ)/%.o) $(OBJ)/gen/op_list.o $(OBJ)/data/oiio.o \
+LIB_OBJ := $(LIB_C:%.c=$(OBJ)/%.o) $(OBJ)/gen/op_list.o \
   $(foreach isa,$(ISAS),$(KERNELS:%.c=$(OBJ)/%.$(isa).o))
 LIB := $(BUILD)/liblgd.a
+IMAGE_LIB := $(BUILD)/lib/lgd/liblgd_image.so
 BIN := $(PROGRAMS:%=$(BUILD)/bin/lgd-%)
 TEST_C := $(wildcard tests/*.c)
 BENCH_C := $(wildcard bench/*.c)
 TEST_BIN := $(BUILD)/bin/lgd-test
 BENCH_BIN := $(BUILD)/bin/lgd-bench
 
-all: $(BIN) $(LIB)
+all: $(BIN) $(LIB) $(IMAGE_LIB)
 
 $(BUILD)/bin/lgd-%: $(OBJ)/%/main.o $(LIB)
 	@mkdir -p $(@D)
-	$(CXX) -o $@ $< $(LIB) $(LDLIBS_ALL)
+	$(CC) -o $@ $< $(LIB) $(LDLIBS_ALL)
 
-$(TEST_BIN): $(TEST_C:%.c=$(OBJ)/%.o) $(LIB)
+$(TEST_BIN): $(TEST_C:%.c=$(OBJ)/%.o) $(LIB) | $(IMAGE_LIB)
 	@mkdir -p $(@D)
-	$(CXX) -o $@ $^ $(LDLIBS_ALL)
+	$(CC) -o $@ $(filter %.o %.a,$^) $(LDLIBS_ALL)
 
 $(BENCH_BIN): $(BENCH_C:%.c=$(OBJ)/%.o) $(LIB)
 	@mkdir -p $(@D)
-	$(CXX) -o $@ $^ $(LDLIBS_ALL)
+	$(CC) -o $@ $(filter %.o %.a,$^) $(LDLIBS_ALL)
 
 $(LIB): $(LIB_OBJ)
 	@rm -f $@
 	$(AR) rcs $@ $^
+
+# OpenImageIO, behind the table in data/oiio.h. Loaded when an image needs it, never linked.
+$(IMAGE_LIB): $(OBJ)/data/oiio.o $(OBJ)/tensor/status.o
+	@mkdir -p $(@D)
+	$(CXX) -shared -Wl,-Bsymbolic -o $@ $^ $(shell pkg-config --libs $(PKG_IMAGE)) $(SANITIZE) $(LDLIBS)
 
 # Every object is rebuilt when the flags change.
 FLAGS_NOW := $(CC) $(CXX) $(OPT) $(SANITIZE) $(CFLAGS) $(CPPFLAGS) $(PREFIX) $(VERSION)
@@ -80,7 +89,7 @@ $(OBJ)/gen/%.o: $(BUILD)/gen/%.c $(BUILD)/gen/flags
 
 $(OBJ)/%.o: %.cpp $(BUILD)/gen/flags
 	@mkdir -p $(@D)
-	$(CXX) $(CPPFLAGS_ALL) $(PKG_CFLAGS) $(CXXFLAGS_ALL) -MMD -MP -c -o $@ $<
+	$(CXX) $(CPPFLAGS_ALL) $(shell pkg-config --cflags $(PKG_IMAGE)) $(CXXFLAGS_ALL) -MMD -MP -c -o $@ $<
 
 # One kernel source, once per instruction set. Contraction to FMA is part of what a kernel is, but for those whose bytes must not depend on the machine.
 CONTRACT_noise := off
@@ -104,7 +113,7 @@ $(BUILD)/gen/op_list.c: $(OPS) Makefile
 	  echo 'const ag_op *const ag_op_list[] = {'; for f in $(basename $(notdir $(OPS))); do echo "    &$$f,"; done; echo '    0};'; } > $@
 
 deps:
-	@sh .ci/deps.sh $(PKG)
+	@sh .ci/deps.sh $(PKG) $(PKG_IMAGE)
 
 test: deps
 	@$(MAKE) --no-print-directory all $(TEST_BIN)
@@ -125,15 +134,17 @@ install: all
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(PREFIX)/share/lgd
 	install -m 755 $(BIN) $(DESTDIR)$(PREFIX)/bin
 	install -m 644 $(LIB) $(DESTDIR)$(PREFIX)/lib
+	install -d $(DESTDIR)$(PREFIX)/lib/lgd
+	install -m 755 $(IMAGE_LIB) $(DESTDIR)$(PREFIX)/lib/lgd
 	install -m 644 infer/lgd.h $(DESTDIR)$(PREFIX)/include
 	install -m 644 $(wildcard models/*.safetensors) $(DESTDIR)$(PREFIX)/share/lgd
-	@printf 'prefix=%s\nName: lgd\nDescription: material of a surface from one flash photograph\nVersion: %s\nCflags: -I$${prefix}/include\nLibs: -L$${prefix}/lib -llgd %s -fopenmp -lstdc++ -lpthread -lm\n' \
+	@printf 'prefix=%s\nName: lgd\nDescription: material of a surface from one flash photograph\nVersion: %s\nCflags: -I$${prefix}/include\nLibs: -L$${prefix}/lib -llgd %s -fopenmp -lpthread -ldl -lm\n' \
 	  '$(PREFIX)' '$(VERSION)' '$(PKG_LIBS)' > $(DESTDIR)$(PREFIX)/lib/pkgconfig/lgd.pc
 
 uninstall:
-	rm -f $(PROGRAMS:%=$(DESTDIR)$(PREFIX)/bin/lgd-%) $(DESTDIR)$(PREFIX)/lib/liblgd.a $(DESTDIR)$(PREFIX)/lib/pkgconfig/lgd.pc \
+	rm -f $(PROGRAMS:%=$(DESTDIR)$(PREFIX)/bin/lgd-%) $(DESTDIR)$(PREFIX)/lib/liblgd.a $(DESTDIR)$(PREFIX)/lib/lgd/liblgd_image.so $(DESTDIR)$(PREFIX)/lib/pkgconfig/lgd.pc \
 	  $(DESTDIR)$(PREFIX)/include/lgd.h $(patsubst models/%,$(DESTDIR)$(PREFIX)/share/lgd/%,$(wildcard models/*.safetensors))
-	-rmdir $(DESTDIR)$(PREFIX)/share/lgd
+	-rmdir $(DESTDIR)$(PREFIX)/share/lgd $(DESTDIR)$(PREFIX)/lib/lgd
 
 clean:
 	rm -rf $(BUILD)

@@ -11,6 +11,8 @@ for module in "$@"; do
     case $module in
     OpenImageIO) missing="$missing libopenimageio-dev" ;;
     OpenEXR) missing="$missing libopenexr-dev" ;;
+    libpng) missing="$missing libpng-dev" ;;
+    libjpeg) missing="$missing libjpeg-dev" ;;
     *) echo "deps: no package is known for $module" >&2; exit 1 ;;
     esac
 done

@@ -33,6 +33,14 @@ ts_code io_centre_square(const io_image *in, int size, io_image *out, ts_status 
  * channel is straight alpha and never encoded. Written to a temporary file in the same folder, synced and renamed; an existing device or pipe
  * is written to directly, a symbolic link is followed. */
 ts_code io_write_png(const char *path, const io_image *image, int bits, bool srgb, ts_status *st);
+/* The same for a picture whose rows are made when they are written: make fills [count][width][channels] values of the rows from y on, in
+ * order, and ends the writing by returning something else than TS_OK (with st). channels: 1 grey, 2 with alpha, 3 RGB, 4 with alpha. */
+typedef struct io_rows {
+    int width, height, channels;
+    ts_code (*make)(int y, int count, float *values, void *user, ts_status *st);
+    void *user;
+} io_rows;
+ts_code io_write_png_rows(const char *path, const io_rows *rows, int bits, bool srgb, ts_status *st);
 ts_code io_write_jpeg(const char *path, const io_image *image, int quality, ts_status *st); /* linear in, sRGB out */
 
 /* sRGB curve (IEC 61966-2-1), the only place that has it. */

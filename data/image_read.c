@@ -1,4 +1,5 @@
 #include "data/colour.h"
+#include "data/common_read.h"
 #include "data/file.h"
 #include "data/image.h"
 #include "data/image_read.h"
@@ -17,28 +18,27 @@ static io_space space_of(const char *path, const oi_image *image)
     return image->adobe ? io_space_adobe_rgb() : io_space_srgb();
 }
 
-/* Integers have at most 65536 different values: the curve is evaluated once for each. */
-enum { LEVELS = 65536 };
-static bool build_tables(const io_space *space, float **tables)
+/* Integers have few different values: the curve is evaluated once for each. */
+static bool build_tables(const io_space *space, int levels, float **tables)
 {
-    *tables = malloc(3 * LEVELS * sizeof(float));
+    *tables = malloc(3 * (size_t)levels * sizeof(float));
     if (!*tables) return false;
     for (int c = 0; c < 3; c++)
-        for (int i = 0; i < LEVELS; i++) (*tables)[c * LEVELS + i] = io_curve_value(&space->curve[c], (float)i / (LEVELS - 1));
+        for (int i = 0; i < levels; i++) (*tables)[c * levels + i] = io_curve_value(&space->curve[c], (float)i / (float)(levels - 1));
     return true;
 }
 
-static float lookup(const float *table, float v)
+static float lookup(const float *table, int levels, float v)
 {
-    int i = v > 0 ? (int)(v * (LEVELS - 1) + 0.5f) : 0;
-    return table[i < LEVELS ? i : LEVELS - 1];
+    int i = v > 0 ? (int)(v * (float)(levels - 1) + 0.5f) : 0;
+    return table[i < levels ? i : levels - 1];
 }
 
 static void convert_pixel(const oi_image *raw, const io_space *space, const float *tables, const float *in, float *out)
 {
     for (int c = 0; c < 3; c++) {
         float v = in[raw->colour[c]];
-        out[c] = tables ? lookup(tables + c * LEVELS, v) : io_curve_value(&space->curve[c], v);
+        out[c] = tables ? lookup(tables + c * raw->levels, raw->levels, v) : io_curve_value(&space->curve[c], v);
     }
     if (raw->alpha >= 0 && !raw->associated)
         for (int c = 0; c < 3; c++) out[c] *= in[raw->alpha]; /* over black, in linear light */
@@ -68,7 +68,7 @@ static ts_code convert(const char *path, const oi_image *raw, bool upright, io_i
     int orientation = upright ? raw->orientation : 1;
     bool swap = orientation >= 5;
     float *tables = NULL;
-    if (!raw->floating && !build_tables(&space, &tables)) return ts_fail(st, TS_NOMEM, "%s: out of memory", path);
+    if (!raw->floating && !build_tables(&space, raw->levels, &tables)) return ts_fail(st, TS_NOMEM, "%s: out of memory", path);
     ts_code code = io_image_create(image, swap ? raw->height : raw->width, swap ? raw->width : raw->height, 3, st);
     float *out = image->data;
     for (int y = 0; code == TS_OK && y < image->height; y++)
@@ -82,7 +82,8 @@ static ts_code read_raw(const char *path, int64_t max_pixels, oi_image *raw, ts_
 {
     ts_code code = io_check_file(path, st);
     if (code == TS_OK) code = io_check_png(path, st);
-    return code == TS_OK ? oi_read(path, max_pixels, raw, st) : code;
+    if (code != TS_OK || io_read_png_file(path, max_pixels, raw) || io_read_jpeg_file(path, max_pixels, raw)) return code;
+    return oi_read(path, max_pixels, raw, st);
 }
 
 static ts_code read_colour(const char *path, int64_t max_pixels, bool upright, io_image *image, ts_status *st)

@@ -1,13 +1,9 @@
-/* See data/oiio.h. Each function catches everything: its callers are C. */
-extern "C" {
-#include "tensor/threads.h"
-}
+/* See data/oiio.h. The shared object's only source besides tensor/status.c. Each function catches everything: its callers are C. */
 #include "data/oiio.h"
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <cstdlib>
 #include <cstring>
-#include <mutex>
 #include <new>
 
 using namespace OIIO;
@@ -24,11 +20,6 @@ static std::string one_line(std::string text)
 template <class F> static ts_code guarded(const char *name, ts_status *st, F f)
 {
     try {
-        static std::once_flag once;
-        std::call_once(once, [] {
-            OIIO::attribute("threads", ts_threads());
-            OIIO::attribute("limits:imagesize_MB", 0); /* ours counts pixels and says how to raise it */
-        });
         return f();
     } catch (const std::bad_alloc &) {
         return ts_fail(st, TS_NOMEM, "%s: out of memory", name);
@@ -69,6 +60,7 @@ static void describe(const ImageSpec &spec, oi_image *image)
 {
     TypeDesc type = spec.format;
     image->floating = type.is_floating_point();
+    image->levels = type.size() == 1 ? 256 : 65536;
     image->associated = spec.get_int_attribute("oiio:UnassociatedAlpha", 0) == 0;
     image->orientation = spec.get_int_attribute("Orientation", 1);
     if (image->orientation < 1 || image->orientation > 8) image->orientation = 1;
@@ -126,34 +118,22 @@ static ts_code read_file(const char *path, int64_t max_pixels, oi_image *image, 
     return TS_OK;
 }
 
-extern "C" ts_code oi_read(const char *path, int64_t max_pixels, oi_image *image, ts_status *st)
+static ts_code read(const char *path, int64_t max_pixels, oi_image *image, ts_status *st)
 {
-    memset(image, 0, sizeof *image);
-    ts_code code = guarded(path, st, [&] { return read_file(path, max_pixels, image, st); });
-    if (code != TS_OK) oi_free(image);
-    return code;
+    return guarded(path, st, [&] { return read_file(path, max_pixels, image, st); });
 }
 
-extern "C" void oi_free(oi_image *image)
+static ts_code encode(const char *name, const oi_encoding *e, const uint8_t *pixels, unsigned char **bytes, size_t *size, ts_status *st)
 {
-    free(image->data);
-    free(image->icc);
-    memset(image, 0, sizeof *image);
-}
-
-static ts_code encode(const char *name, const oi_encoding *e, const void *pixels, unsigned char **bytes, size_t *size, ts_status *st)
-{
-    auto out = ImageOutput::create(e->format);
-    if (!out) return ts_fail(st, TS_UNSUPPORTED, "%s: this OpenImageIO cannot write %s", name, e->format);
-    TypeDesc type = e->bits == 16 ? TypeDesc::UINT16 : TypeDesc::UINT8;
-    ImageSpec spec(e->width, e->height, e->channels, type);
-    spec.attribute("oiio:UnassociatedAlpha", 1);
-    if (e->srgb) spec.attribute("oiio:ColorSpace", "sRGB");
-    if (e->quality) spec.attribute("Compression", "jpeg:" + std::to_string(e->quality));
+    auto out = ImageOutput::create("jpeg");
+    if (!out) return ts_fail(st, TS_UNSUPPORTED, "%s: this OpenImageIO cannot write JPEG", name);
+    ImageSpec spec(e->width, e->height, e->channels, TypeDesc::UINT8);
+    spec.attribute("oiio:ColorSpace", "sRGB");
+    spec.attribute("Compression", "jpeg:" + std::to_string(e->quality));
     Filesystem::IOVecOutput memory;
     if (!out->supports("ioproxy") || !out->set_ioproxy(&memory))
-        return ts_fail(st, TS_UNSUPPORTED, "%s: this OpenImageIO cannot write %s to memory", name, e->format);
-    if (!out->open(std::string("image.") + e->format, spec) || !out->write_image(type, pixels) || !out->close())
+        return ts_fail(st, TS_UNSUPPORTED, "%s: this OpenImageIO cannot write JPEG to memory", name);
+    if (!out->open("image.jpg", spec) || !out->write_image(TypeDesc::UINT8, pixels) || !out->close())
         return ts_fail(st, TS_IO, "%s: %s", name, one_line(out->geterror()).c_str());
     std::vector<unsigned char> &buffer = memory.buffer();
     *bytes = (unsigned char *)malloc(buffer.size() + 1);
@@ -163,12 +143,12 @@ static ts_code encode(const char *name, const oi_encoding *e, const void *pixels
     return TS_OK;
 }
 
-extern "C" ts_code oi_encode(const char *name, const oi_encoding *e, const void *pixels, unsigned char **bytes, size_t *size, ts_status *st)
+static ts_code encode_jpeg(const char *name, const oi_encoding *e, const uint8_t *pixels, unsigned char **bytes, size_t *size, ts_status *st)
 {
     return guarded(name, st, [&] { return encode(name, e, pixels, bytes, size, st); });
 }
 
-extern "C" bool oi_knows_extension(const char *extension)
+static bool knows_extension(const char *extension)
 {
     bool known = false;
     guarded("extension", nullptr, [&] {
@@ -182,4 +162,18 @@ extern "C" bool oi_knows_extension(const char *extension)
         return TS_OK;
     });
     return known;
+}
+
+static void start(int threads)
+{
+    guarded("start", nullptr, [&] {
+        OIIO::attribute("threads", threads);
+        OIIO::attribute("limits:imagesize_MB", 0); /* ours counts pixels and says how to raise it */
+        return TS_OK;
+    });
+}
+
+extern "C" {
+__attribute__((visibility("default"))) extern const oi_library lgd_image_library;
+const oi_library lgd_image_library = {OI_BUILD, start, read, encode_jpeg, knows_extension};
 }

@@ -1,4 +1,5 @@
-/* The only door to OpenImageIO: plain C types outside, no C++ exception leaves. */
+/* The only door to OpenImageIO: plain C types, no C++ exception leaves. The library itself stands behind a shared object that is loaded at
+ * the first call that needs it (data/image_library.c): Debian's build brings some 260 others, a quarter of a second before the first pixel. */
 #ifndef IO_OIIO_H
 #define IO_OIIO_H
 #include <stdbool.h>
@@ -16,6 +17,7 @@ typedef struct oi_image {
     float *data;                 /* [height][width][channels] */
     int colour[3], alpha;        /* channel numbers of red, green, blue (all the same when grey), of alpha or -1 */
     bool grey, floating;         /* floating: stored as half, float or double */
+    int levels;                  /* how many values an integer file tells apart: 256 or 65536 (more are rounded to that) */
     bool associated;             /* the colours are multiplied by alpha already */
     int orientation;             /* EXIF, 1 to 8 */
     bool linear, adobe;          /* the file says: linear values; Adobe RGB (EXIF's interoperability index) */
@@ -29,17 +31,25 @@ typedef struct oi_image {
 ts_code oi_read(const char *path, int64_t max_pixels, oi_image *image, ts_status *st);
 void oi_free(oi_image *image);
 
-/* Encodes in memory. format "png" (bits 8 or 16) or "jpeg" (8); pixels are uint8_t or uint16_t [height][width][channels]. srgb: the file is
- * tagged so. bytes is malloced and the caller's. name is for messages. */
+/* Encodes a JPEG in memory; pixels are uint8_t [height][width][channels]. bytes is malloced and the caller's. name is for messages. */
 typedef struct oi_encoding {
-    const char *format;
-    int width, height, channels, bits, quality;
-    bool srgb;
+    int width, height, channels, quality;
 } oi_encoding;
-ts_code oi_encode(const char *name, const oi_encoding *e, const void *pixels, unsigned char **bytes, size_t *size, ts_status *st);
+ts_code oi_encode_jpeg(const char *name, const oi_encoding *e, const uint8_t *pixels, unsigned char **bytes, size_t *size, ts_status *st);
 
-/* Whether some reader claims this file name extension (without the dot). */
+/* Whether some reader claims this file name extension (without the dot). False also where the library cannot be loaded. */
 bool oi_knows_extension(const char *extension);
+
+/* What the shared object exports under the name OI_LIBRARY: build says whether it belongs to this program. */
+typedef struct oi_library {
+    const char *build;
+    void (*start)(int threads);
+    ts_code (*read)(const char *path, int64_t max_pixels, oi_image *image, ts_status *st);
+    ts_code (*encode_jpeg)(const char *name, const oi_encoding *e, const uint8_t *pixels, unsigned char **bytes, size_t *size, ts_status *st);
+    bool (*knows_extension)(const char *extension);
+} oi_library;
+#define OI_LIBRARY "lgd_image_library"
+#define OI_BUILD "lgd " LGD_VERSION " image library 1"
 
 #ifdef __cplusplus
 }

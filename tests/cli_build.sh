@@ -48,9 +48,11 @@ check help_to_a_full_disk_fails help_to_a_full_disk_fails
 deps_name_what_is_missing() {
     mkdir "$T/bin"
     for tool in sh command id; do ln -s "$(command -v $tool)" "$T/bin/" 2>/dev/null; done
-    PATH="$T/bin" expect 1 "$T/bin/sh" .ci/deps.sh OpenImageIO OpenEXR
+    PATH="$T/bin" expect 1 "$T/bin/sh" .ci/deps.sh OpenImageIO OpenEXR libpng libjpeg
     says "$T/err" "libopenimageio-dev"
     says "$T/err" "libopenexr-dev"
+    says "$T/err" "libpng-dev"
+    says "$T/err" "libjpeg-dev"
     says "$T/err" "g++"
 }
 check deps_name_what_is_missing deps_name_what_is_missing
@@ -60,7 +62,7 @@ install_link_uninstall() {
     command -v pkg-config >/dev/null || skip "no pkg-config"
     expect 0 make --no-print-directory install BUILD="$BUILD" DESTDIR="$T/root" PREFIX=/usr/local
     find "$T/root" -type f | sed "s|$T/root||" | sort >"$T/files"
-    for f in bin/lgd-infer bin/lgd-train bin/lgd-eval bin/lgd-data lib/liblgd.a include/lgd.h share/lgd/single.safetensors lib/pkgconfig/lgd.pc; do
+    for f in bin/lgd-infer bin/lgd-train bin/lgd-eval bin/lgd-data lib/liblgd.a lib/lgd/liblgd_image.so include/lgd.h share/lgd/single.safetensors lib/pkgconfig/lgd.pc; do
         grep -qx "/usr/local/$f" "$T/files" || fail "$f is not installed"
     done
     cat >"$T/user.c" <<'C'

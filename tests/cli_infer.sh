@@ -246,6 +246,7 @@ model_lookup() {
     photo "$T/p.ppm" 8 8
     mkdir -p "$T/i/bin" "$T/i/share/lgd"
     cp "$BIN/lgd-infer" "$T/i/bin"
+    cp -R "$BUILD/lib" "$T/i"
     "$T/i/bin/lgd-infer" -i 0 -s 8 "$T/p.ppm" -o "$T/o" >"$T/out" 2>"$T/err"
     code=$?
     if [ $code -ne 0 ]; then
@@ -257,8 +258,26 @@ model_lookup() {
     expect 0 "$T/i/bin/lgd-infer" -i 0 -s 8 "$T/p.ppm" -o "$T/o"
     mkdir -p "$T/j/build/bin" "$T/j/models"
     cp "$BIN/lgd-infer" "$T/j/build/bin"
+    cp -R "$BUILD/lib" "$T/j/build"
     cp "$MODEL" "$T/j/models/single.safetensors"
     expect 0 "$T/j/build/bin/lgd-infer" -i 0 -s 8 "$T/p.ppm" -o "$T/o"
+}
+
+without_the_image_library() {
+    model
+    photo "$T/p.ppm" 8 8
+    mkdir -p "$T/i/bin" "$T/d"
+    cp "$BIN/lgd-infer" "$T/i/bin"
+    expect 0 infer "$T/p.ppm" -o "$T/d"
+    cp "$T/d/p/diffuse.png" "$T/q.png"
+    expect 0 "$T/i/bin/lgd-infer" -i 0 -s 8 "$T/q.png" -o "$T/o" # a PNG needs none
+    "$T/i/bin/lgd-infer" -i 0 -s 8 "$T/p.ppm" -o "$T/o" >"$T/out" 2>"$T/err" && skip "the image library is installed"
+    lines "$T/err" 1
+    says "$T/err" "p.ppm: this image needs liblgd_image.so"
+    mkdir -p "$T/i/lib/lgd"
+    echo "no library" >"$T/i/lib/lgd/liblgd_image.so"
+    expect 1 "$T/i/bin/lgd-infer" -i 0 -s 8 "$T/p.ppm" -o "$T/o"
+    says "$T/err" "liblgd_image.so"
 }
 
 poor_photographs() {
@@ -368,6 +387,7 @@ check infer_closed_pipe closed_pipe
 check infer_interrupted interrupted
 check infer_weights_of_another_kind weights
 check infer_model_lookup model_lookup
+check infer_without_the_image_library without_the_image_library
 check infer_poor_photographs poor_photographs
 check infer_sizes sizes
 check infer_too_many_pixels too_many_pixels
