@@ -5,8 +5,8 @@
 #include <string.h>
 
 enum {
-    PASS_PIXELS = 128,   /* a pass of one panel of dy stays in the first cache for all blocks of inputs */
-    PASS_COLUMNS = 192,
+    PASS_PIXELS = 256,   /* a pass of one panel of dy stays in the first cache for all blocks of inputs */
+    PASS_COLUMNS = 256,
     CHUNK_PIXELS = 1024, /* so many that clearing and adding the sums of a chunk is little beside making them */
     CHUNKS = 16,
     UNITS = 16           /* of work, at least, where the shape allows */
@@ -269,7 +269,7 @@ static void run_rows(job *g, float *dweight, float *dbias)
 
 void ts_conv_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
 {
-    if (dweight && c->k > 1 && conv_by_position(c->n, c->h, c->w)) {
+    if (dweight && c->k > 1 && c->h * c->w <= CONV_POSITIONS) {
         conv_weight_positions(c, x, dy, dweight);
         dweight = NULL;
     }

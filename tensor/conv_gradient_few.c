@@ -5,7 +5,6 @@
 #include <string.h>
 
 enum {
-    POSITIONS = 64,
     PASS_PIXELS = 128 /* a pass of one panel of dy stays in the first cache */
 };
 
@@ -34,33 +33,35 @@ static staged stage(const ts_conv *c, const float *x, const float *dy)
     return (staged){to_x, to_dy, pixel};
 }
 
-/* The pairs of positions that a tap joins, as rows of a sum. */
-static int join(const ts_conv *c, const staged *s, int tap, int width, ptrdiff_t *x_row, ptrdiff_t *dy_row)
+/* The pairs of positions that a tap joins, as rows of *count pixels of a sum: neighbours stay neighbours unless they are replicated. */
+static int join(const ts_conv *c, const staged *s, int tap, int width, ptrdiff_t *x_row, ptrdiff_t *dy_row, int *count)
 {
-    const int first = -c->dilation * (c->k / 2);
+    const int reach = c->dilation * (c->k / 2), di = tap / c->k * c->dilation - reach, dj = tap % c->k * c->dilation - reach;
+    const bool replicate = c->pad == TS_PAD_REPLICATE;
+    const int left = replicate || dj > 0 ? 0 : -dj, right = replicate || dj < 0 ? c->w : c->w - dj, run = replicate ? 1 : right - left;
     int rows = 0;
-    for (int q = 0; q < c->h * c->w; q++) {
-        int i = q / c->w + first + tap / c->k * c->dilation, j = q % c->w + first + tap % c->k * c->dilation;
-        if (c->pad == TS_PAD_REPLICATE) {
-            i = conv_clamp(i, c->h);
-            j = conv_clamp(j, c->w);
-        } else if (i < 0 || i >= c->h || j < 0 || j >= c->w) continue;
-        x_row[rows] = ((ptrdiff_t)i * c->w + j) * c->n * s->pixel;
-        dy_row[rows++] = (ptrdiff_t)q * c->n * width;
+    for (int i = 0; i < c->h && run > 0; i++) {
+        const int from = replicate ? conv_clamp(i + di, c->h) : i + di;
+        if (from < 0 || from >= c->h) continue;
+        for (int j = left; j < right; j += run) {
+            x_row[rows] = ((ptrdiff_t)from * c->w + (replicate ? conv_clamp(j + dj, c->w) : j + dj)) * c->n * s->pixel;
+            dy_row[rows++] = ((ptrdiff_t)i * c->w + j) * c->n * width;
+        }
     }
+    *count = run * c->n;
     return rows;
 }
 
 void conv_weight_positions(const ts_conv *c, const float *x, const float *dy, float *dweight)
 {
     const struct ts_conv_kernels *kernels = ts_conv_k();
-    const int lanes2 = 2 * kernels->lanes, panels = conv_panels(c->oc), taps = c->k * c->k, rows_pass = c->n < PASS_PIXELS ? PASS_PIXELS / c->n : 1;
+    const int lanes2 = 2 * kernels->lanes, panels = conv_panels(c->oc), taps = c->k * c->k;
     const int blocks = (c->ic + kernels->rows - 1) / kernels->rows;
     const ptrdiff_t pixels = (ptrdiff_t)c->h * c->w * c->n;
 #pragma omp parallel num_threads(ts_threads())
     {
         const staged s = stage(c, x, dy);
-        float *sums = ts_scratch(2, sizeof(float) * (size_t)(taps * kernels->rows * lanes2)); /* [tap][input][lane] */
+        float *sums = ts_scratch(2, sizeof(float) * (size_t)(taps * kernels->rows * lanes2)); /* [input][tap][lane] */
 #pragma omp for collapse(2) schedule(dynamic)
         for (int panel = 0; panel < panels; panel++)
             for (int block = 0; block < blocks; block++) {
@@ -70,20 +71,18 @@ void conv_weight_positions(const ts_conv *c, const float *x, const float *dy, fl
                 conv_part(c->ic, blocks, block, &begin, &end);
                 memset(sums, 0, sizeof(float) * (size_t)(taps * (end - begin) * lanes2));
                 for (int tap = 0; tap < taps; tap++) {
-                    ptrdiff_t x_row[POSITIONS], dy_row[POSITIONS];
-                    const int rows = join(c, &s, tap, width, x_row, dy_row);
+                    ptrdiff_t x_row[CONV_POSITIONS], dy_row[CONV_POSITIONS];
+                    int run;
+                    const int rows = join(c, &s, tap, width, x_row, dy_row, &run), rows_pass = run < PASS_PIXELS ? PASS_PIXELS / (run > 0 ? run : 1) : 1;
                     for (int r = 0; r < rows; r += rows_pass) {
                         const ts_sum t = {.a = s.x + begin, .b = s.dy + pixels * o0, .a_row = x_row + r, .b_row = dy_row + r,
-                                          .rows = rows - r < rows_pass ? rows - r : rows_pass, .count = c->n, .a_stride = s.pixel, .b_stride = width,
-                                          .c = sums + (ptrdiff_t)tap * (end - begin) * lanes2, .c_stride = lanes2, .fetch = (const char *)sums};
+                                          .rows = rows - r < rows_pass ? rows - r : rows_pass, .count = run, .a_stride = s.pixel, .b_stride = width,
+                                          .c = sums + tap * lanes2, .c_stride = (ptrdiff_t)taps * lanes2, .fetch = (const char *)sums};
                         kernels->sum[vectors - 1][end - begin](&t);
                     }
                 }
-                for (int o = 0; o < count; o++) {
-                    float *to = dweight + ((ptrdiff_t)(o0 + o) * c->ic + begin) * taps;
-                    for (int i = 0; i < end - begin; i++)
-                        for (int tap = 0; tap < taps; tap++) to[i * taps + tap] += sums[((ptrdiff_t)tap * (end - begin) + i) * lanes2 + o];
-                }
+                kernels->collect(sums, lanes2, count, (end - begin) * taps, true, 1, dweight + ((ptrdiff_t)o0 * c->ic + begin) * taps,
+                                 (ptrdiff_t)c->ic * taps);
             }
     }
 }

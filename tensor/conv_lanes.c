@@ -8,7 +8,7 @@
 static int64_t panel_cost(int oc, int pixels)
 {
     const int vectors = (oc + conv_lanes() - 1) / conv_lanes();
-    return (int64_t)vectors * conv_lanes() * pixels * (vectors == 1 ? 16 : 12);
+    return (int64_t)vectors * conv_lanes() * pixels * (vectors == 1 ? 13 : 12);
 }
 
 static int padded_pixels(int pixels) { return (pixels + conv_lanes() - 1) / conv_lanes() * conv_lanes(); }
@@ -102,7 +102,7 @@ static void sum_row(const conv_plan *p, const rows *s, int e, int pixels, float 
 /* y's row from [channel][pixel]. first: nothing has been put into it yet. */
 static void put_row(const conv_plan *p, const float *out, int pixels, float *y, bool first)
 {
-    ts_conv_k()->collect(out + p->fold, pixels, p->w, p->oc, p->fold ? !first : p->add, p->leak, y);
+    ts_conv_k()->collect(out + p->fold, pixels, p->w, p->oc, p->fold ? !first : p->add, p->leak, y, p->oc);
     float *end = y + (ptrdiff_t)(p->w - 1) * p->oc;
     for (int o = 0; o < p->oc; o++)
         for (int e = 0; e < p->fold; e++) {

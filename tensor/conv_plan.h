@@ -54,7 +54,8 @@ static inline int conv_panels(int oc) { return (oc + 2 * conv_lanes() - 1) / (2 
 static inline int conv_vectors(int oc, int panel) { return oc - panel * 2 * conv_lanes() > conv_lanes() ? 2 : 1; }
 
 /* Few pixels in an image and several images: tiles run over the images at one position, which needs no padding at all. */
-static inline bool conv_by_position(int n, int h, int w) { return n >= 4 && h * w <= 64; }
+enum { CONV_POSITIONS = 64 };
+static inline bool conv_by_position(int n, int h, int w) { return n >= 4 && h * w <= CONV_POSITIONS; }
 
 static inline int conv_clamp(int i, int size) { return i < 0 ? 0 : i >= size ? size - 1 : i; }
 
@@ -84,6 +85,6 @@ bool conv_by_lanes(const conv_plan *p);
 /* weight[i * i_step + o * o_step + tap] */
 void conv_pack_few(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step, float *packed);
 
-/* dweight += for shapes with conv_by_position. */
+/* dweight += for at most CONV_POSITIONS pixels an image. */
 void conv_weight_positions(const ts_conv *c, const float *x, const float *dy, float *dweight);
 #endif

@@ -123,8 +123,8 @@ INLINE void tile(const ts_tile *t, const int pixels, const int vectors)
             vf x = v_set(a[m]);                                                                               \
             UNROLL for (int v = 0; v < vectors; v++) acc[m][v] += x * y[v];                                   \
         }                                                                                                     \
-        /* b's panel stays in the first cache from block to block; a comes from the second. */                \
-        __builtin_prefetch(a + ahead);                                                                        \
+        __builtin_prefetch(b + ahead);                                                                        \
+        __builtin_prefetch(b + ahead + VL);                                                                   \
         a += as;                                                                                              \
         b += bs;                                                                                              \
     }
@@ -133,7 +133,7 @@ INLINE void sum(const ts_sum *t, const int rows, const int vectors)
 {
     vf acc[ROWS][2];
     UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++) acc[m][v] = v_load(t->c + m * t->c_stride + v * VL);
-    const ptrdiff_t as = t->a_stride, bs = t->b_stride, ahead = 8 * as + rows - 1, step = t->fetch_step;
+    const ptrdiff_t as = t->a_stride, bs = t->b_stride, ahead = 8 * bs, step = t->fetch_step;
     const char *fetch = t->fetch;
     for (int r = 0; r < t->rows; r++) {
         const float *a = t->a + t->a_row[r], *b = t->b + t->b_row[r];
@@ -141,6 +141,7 @@ INLINE void sum(const ts_sum *t, const int rows, const int vectors)
         for (; p >= 2; p -= 2, fetch += step) {
             PIXEL
             __builtin_prefetch(fetch, 0, 2);
+            __builtin_prefetch(fetch + 64, 0, 2);
             PIXEL
         }
         if (p) PIXEL
@@ -203,7 +204,7 @@ static void transpose(const float *x, int pixels, int channels, float *to, ptrdi
         for (int c = 0; c < channels; c++) to[c * plane + p] = x[(ptrdiff_t)p * channels + c];
 }
 
-static void collect(const float *x, ptrdiff_t plane, int pixels, int channels, bool add, float leak, float *y)
+static void collect(const float *x, ptrdiff_t plane, int pixels, int channels, bool add, float leak, float *y, ptrdiff_t stride)
 {
     const int whole = pixels / VL * VL;
     for (int p = 0; p < whole; p += VL)
@@ -212,14 +213,14 @@ static void collect(const float *x, ptrdiff_t plane, int pixels, int channels, b
             UNROLL for (int i = 0; i < VL; i++) r[i] = i < channels - c ? v_load(x + (c + i) * plane + p) : (vf){0};
             turn(r);
             for (int i = 0; i < VL; i++) {
-                float *to = y + (ptrdiff_t)(p + i) * channels + c;
+                float *to = y + (p + i) * stride + c;
                 const vf v = add ? r[i] + v_load_part(to, channels - c) : r[i];
                 v_store_part(to, v_max(v_set(leak) * v, v), channels - c);
             }
         }
     for (int p = whole; p < pixels; p++)
         for (int c = 0; c < channels; c++) {
-            float *to = y + (ptrdiff_t)p * channels + c;
+            float *to = y + p * stride + c;
             const float v = x[c * plane + p] + (add ? *to : 0);
             *to = v > 0 ? v : leak * v;
         }

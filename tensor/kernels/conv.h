@@ -44,7 +44,7 @@ typedef struct ts_sum {
     ptrdiff_t a_stride, b_stride; /* from pixel to pixel */
     float *c;
     ptrdiff_t c_stride;
-    const char *fetch;    /* prefetched into the second cache, a line for every other pixel; never read, but should be mapped */
+    const char *fetch;    /* prefetched into the second cache, two lines for every other pixel; never read, but should be mapped */
     ptrdiff_t fetch_step; /* bytes forward for two pixels */
 } ts_sum;
 
@@ -59,8 +59,8 @@ struct ts_conv_kernels {
     ts_sum_function *sum[2][TS_SUM_ROWS + 1];      /* [vectors - 1][m] */
     void (*columns)(const float *x, int64_t pixels, int channels, float *sum); /* sum[o] += sum_p x[p][o] */
     void (*transpose)(const float *x, int pixels, int channels, float *to, ptrdiff_t plane); /* to[c plane + p] = x[p][c] */
-    /* y[p][c] = act(x[c plane + p] (+ y[p][c])) */
-    void (*collect)(const float *x, ptrdiff_t plane, int pixels, int channels, bool add, float leak, float *y);
+    /* y[p stride + c] = act(x[c plane + p] (+ y[p stride + c])) */
+    void (*collect)(const float *x, ptrdiff_t plane, int pixels, int channels, bool add, float leak, float *y, ptrdiff_t stride);
 };
 TS_FAMILY(conv)
 #endif
