@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 #include "data/capture.h"
 #include "data/camera.h"
+#include "data/histogram.h"
 #include "data/sheet.h"
 #include "data/statistics.h"
 #include "render/render.h"
@@ -21,7 +22,7 @@ typedef struct options {
     int64_t first, count, size, threads, quality; /* count and size 0: not given */
     io_camera camera;
     format format;
-    bool sheet, photographs, statistics;
+    bool sheet, photographs, statistics, histograms;
 } options;
 
 enum {
@@ -42,6 +43,7 @@ enum {
     OPT_OFF_CENTRE,
     OPT_QUALITY,
     OPT_STATISTICS,
+    OPT_HISTOGRAMS,
     OPT_TESTDATA,
     OPT_THREADS,
     OPT_HELP,
@@ -66,6 +68,7 @@ static const struct option long_options[] = {{"output", required_argument, NULL,
                                              {"off-centre", required_argument, NULL, OPT_OFF_CENTRE},
                                              {"quality", required_argument, NULL, OPT_QUALITY},
                                              {"statistics", no_argument, NULL, OPT_STATISTICS},
+                                             {"histograms", no_argument, NULL, OPT_HISTOGRAMS},
                                              {"testdata", required_argument, NULL, OPT_TESTDATA},
                                              {"threads", required_argument, NULL, OPT_THREADS},
                                              {"help", no_argument, NULL, OPT_HELP},
@@ -84,12 +87,13 @@ static void print_help(void)
            "                        captures: DIR/NAME/ with nine photographs 00.png .. 08.png and their lights and cameras\n"
            "      --photographs     DIR/NAME.jpg, rendered under the flash, with sensor noise, blur and JPEG\n"
            "      --contact-sheet   DIR/contact-sheet.png, a row for each family\n"
-           "      --statistics      compare maps with those of TESTDATA: a table on stdout\n\n"
+           "      --statistics      compare maps with those of TESTDATA: a table on stdout\n"
+           "      --histograms      of each map beside those of TESTDATA: DIR/histograms.svg and DIR/histograms.csv\n\n"
            "Which materials:\n"
            "      --seed N          default 1\n"
            "      --first N         default 0\n"
-           "      --count N         default 16; contact sheet 3 for each family; statistics 512\n"
-           "      --size N          8 .. 2048 pixels, default 256; contact sheet and statistics 128\n"
+           "      --count N         default 16; contact sheet 3 for each family; statistics and histograms 512\n"
+           "      --size N          8 .. 2048 pixels, default 256; contact sheet, statistics and histograms 128\n"
            "      --families LIST   some of: ");
     for (int i = 0; i < io_family_count(); i++)
         printf("%s%s%s", i ? "," : "", i && i % 9 == 0 ? "\n                        " : "", io_family_name(i));
@@ -163,6 +167,7 @@ static int parse_options(int argc, char **argv, options *o)
         case OPT_OFF_CENTRE: code = parse_share("off-centre", optarg, 0.4, &o->camera.off_centre); break;
         case OPT_QUALITY: code = parse_number("quality", optarg, 1, 100, &o->quality); break;
         case OPT_STATISTICS: o->statistics = true; break;
+        case OPT_HISTOGRAMS: o->histograms = true; break;
         case OPT_TESTDATA: o->testdata = optarg; break;
         case OPT_THREADS: code = parse_number("threads", optarg, 1, 1024, &o->threads); break;
         case OPT_HELP: print_help(); exit(cl_finish(CL_OK));
@@ -172,11 +177,12 @@ static int parse_options(int argc, char **argv, options *o)
         }
     if (code) return code;
     if (optind < argc) return cl_usage("'%s' is not an option", argv[optind]);
-    bool writes = o->format || o->sheet || o->photographs;
+    bool writes = o->format || o->sheet || o->photographs || o->histograms;
     if (!o->statistics && !writes) o->format = FORMAT_FOLDERS;
     if (!o->output && (writes || !o->statistics)) return cl_usage("where to? Give -o DIR");
-    if (o->statistics && !o->testdata) return cl_usage("--statistics needs --testdata DIR");
-    if (o->testdata && !o->statistics) return cl_usage("--testdata is for --statistics");
+    const bool compares = o->statistics || o->histograms;
+    if (compares && !o->testdata) return cl_usage("%s needs --testdata DIR", o->statistics ? "--statistics" : "--histograms");
+    if (o->testdata && !compares) return cl_usage("--testdata is for --statistics and --histograms");
     o->procedural.seed = (uint64_t)seed;
     return CL_OK;
 }
@@ -348,6 +354,37 @@ static ts_code compare(const options *o, ts_status *st)
     return code;
 }
 
+static ts_code add_to_histogram(void *context, const io_material *m, ts_status *st)
+{
+    (void)st;
+    io_histogram_add(context, m->maps, m->size);
+    return TS_OK;
+}
+
+static ts_code make_histograms(const options *o, ts_status *st)
+{
+    static io_histogram ours, theirs;
+    int count = o->count ? (int)o->count : 512, size = o->size ? (int)o->size : 128;
+    char path[4096];
+    io_material m = {0};
+    ts_code code = io_visit_materials(o->testdata, size, add_to_histogram, &theirs, st);
+    if (!code && !theirs.count) code = ts_fail(st, TS_IO, "%s: has no materials in maps/ or strips/", o->testdata);
+    if (!code) code = io_material_create(&m, size, st);
+    for (int i = 0; !code && i < count; i++) {
+        if (cl_interrupted()) code = ts_fail(st, TS_INTERRUPTED, "interrupted after %d of %d materials", i, count);
+        io_procedural_make(&o->procedural, (uint64_t)(o->first + i), &m);
+        io_histogram_add(&ours, m.maps, size);
+    }
+    io_material_free(&m);
+    if (!code) code = make_path(path, o, "histograms", ".csv", st);
+    if (!code) code = io_histogram_csv(path, &theirs, &ours, "testdata", "procedural", st);
+    if (!code) code = make_path(path, o, "histograms", ".svg", st);
+    if (!code) code = io_histogram_svg(path, &theirs, &ours, "testdata", "procedural", st);
+    for (int k = 0; !code && k < IO_HISTOGRAMS; k++)
+        printf("%-10s %5.1f%% in common\n", io_histogram_name(k), 100 * io_histogram_overlap(&theirs, &ours, k));
+    return code;
+}
+
 int main(int argc, char **argv)
 {
     options o = {.quality = 90, .camera = {.noise = 0.5f, .blur = 0.6f, .quantise = true}};
@@ -361,5 +398,6 @@ int main(int argc, char **argv)
     if (!st.code && (o.format || o.photographs)) run(&o, "materials", write_task, o.count ? o.count : 16, o.size ? (int)o.size : 256, NULL, &st);
     if (!st.code && o.sheet) make_sheet(&o, &st);
     if (!st.code && o.statistics) compare(&o, &st);
+    if (!st.code && o.histograms) make_histograms(&o, &st);
     return cl_finish(st.code ? cl_failed("%s", st.message) : CL_OK);
 }

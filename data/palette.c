@@ -61,7 +61,7 @@ io_substance pal_metal(io_canvas *c, float roughness)
     /* Grime and oxide darken: a third of the metals is clean, the rest has down to a sixth of the reflectance, and reddens as it goes. */
     float age = cv_chance(c, 0.4f) ? cv_range(c, 0.88f, 1) : cv_log_range(c, 0.13f, 0.95f), warm = (1 - age) * cv_range(c, 0, 0.45f);
     io_substance s = {{0, 0, 0}, {f0[0] * age, f0[1] * age * (1 - 0.4f * warm), f0[2] * age * (1 - warm)}, roughness};
-    float grey = cv_chance(c, 0.6f) ? 0.002f : cv_log_range(c, 0.003f, 0.03f); /* the dust that lies on it */
+    float grey = cv_chance(c, 0.55f) ? 0 : cv_log_range(c, 0.001f, 0.03f); /* the dust that lies on it */
     for (int k = 0; k < 3; k++) s.diffuse[k] = grey;
     return s;
 }

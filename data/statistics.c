@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { DIFFUSE, ROUGHNESS, SPECULAR, SLOPE, PLANES };
+enum { DIFFUSE, ROUGHNESS, SPECULAR, SLOPE, PLANES, SATURATION = PLANES };
 
 static const char *const names[IO_FEATURES] = {"mean diffuse",       "mean roughness",  "mean specular",     "mean slope",       "spread diffuse",
                                                "spread roughness",   "spread specular", "spread slope",      "gradient diffuse", "gradient roughness",
@@ -15,8 +15,7 @@ static const char *const names[IO_FEATURES] = {"mean diffuse",       "mean rough
 
 const char *io_feature_name(int feature) { return feature >= 0 && feature < IO_FEATURES ? names[feature] : "none"; }
 
-/* The four numbers of a pixel that everything is computed from. */
-static void planes_of(const float *m, double out[PLANES])
+void io_values(const float *m, double out[IO_VALUES])
 {
     io_texel t = io_texel_get(m);
     const float *d = t.diffuse, *s = t.specular;
@@ -24,6 +23,9 @@ static void planes_of(const float *m, double out[PLANES])
     out[SPECULAR] = pow(fmax(0, 0.2126 * s[0] + 0.7152 * s[1] + 0.0722 * s[2]), 1 / 2.2);
     out[ROUGHNESS] = t.roughness;
     out[SLOPE] = sqrt((double)t.normal[0] * t.normal[0] + (double)t.normal[1] * t.normal[1]);
+    double hi = fmax(m[MAP_DIFFUSE], fmax(m[MAP_DIFFUSE + 1], m[MAP_DIFFUSE + 2])) + 1,
+           lo = fmin(m[MAP_DIFFUSE], fmin(m[MAP_DIFFUSE + 1], m[MAP_DIFFUSE + 2])) + 1;
+    out[SATURATION] = (hi - lo) / (hi + 0.02); /* black has no hue, only noise: 0.01 of albedo keeps it out */
 }
 
 void io_features(const float *maps, int size, double out[IO_FEATURES])
@@ -37,17 +39,15 @@ void io_features(const float *maps, int size, double out[IO_FEATURES])
         double left[PLANES] = {0};
         for (int x = 0; x < size; x++) {
             const float *m = maps + ((size_t)y * (size_t)size + (size_t)x) * MAP_CHANNELS;
-            double v[PLANES], *up = above + (size_t)x * PLANES;
-            planes_of(m, v);
+            double v[IO_VALUES], *up = above + (size_t)x * PLANES;
+            io_values(m, v);
             for (int k = 0; k < PLANES; k++) {
                 if (x && y) gradient[k] += sqrt((v[k] - left[k]) * (v[k] - left[k]) + (v[k] - up[k]) * (v[k] - up[k]));
                 sum[k] += v[k];
                 for (int j = 0; j <= k; j++) product[j][k] += v[j] * v[k];
                 left[k] = up[k] = v[k];
             }
-            double hi = fmax(m[MAP_DIFFUSE], fmax(m[MAP_DIFFUSE + 1], m[MAP_DIFFUSE + 2])) + 1,
-                   lo = fmin(m[MAP_DIFFUSE], fmin(m[MAP_DIFFUSE + 1], m[MAP_DIFFUSE + 2])) + 1;
-            colour += (hi - lo) / (hi + 0.02); /* black has no hue, only noise: 0.01 of albedo keeps it out */
+            colour += v[SATURATION];
             metal += v[SPECULAR] > 0.4223;     /* 0.15^(1/2.2) */
         }
     }
@@ -93,23 +93,20 @@ ts_code io_features_procedural(const io_procedural *p, int count, int size, io_f
 
 static int not_hidden(const struct dirent *e) { return e->d_name[0] != '.'; }
 
-/* Adds the features of everything in one folder; an absent folder adds nothing. */
-static ts_code add_folder(const char *folder, bool strips, int size, io_feature_set *set, ts_status *st)
+/* Shows visit everything in one folder; an absent folder has nothing. */
+static ts_code visit_folder(const char *folder, bool strips, int size, io_visit *visit, void *context, ts_status *st)
 {
     struct dirent **list = NULL;
     int n = scandir(folder, &list, not_hidden, alphasort);
     ts_code code = TS_OK;
     if (n < 0) return TS_OK;
-    double(*grown)[IO_FEATURES] = realloc(set->values, (size_t)(set->count + n + 1) * sizeof *grown);
-    if (grown) set->values = grown;
-    else code = ts_fail(st, TS_NOMEM, "statistics: no memory for %d materials", n);
     for (int i = 0; i < n; i++) {
         char path[4096];
         io_material m = {0};
         if (!code && snprintf(path, sizeof path, "%s/%s", folder, list[i]->d_name) >= (int)sizeof path)
             code = ts_fail(st, TS_INVALID, "%s: the path is too long", folder);
         if (!code) code = strips ? io_read_strip(path, size, &m, NULL, st) : io_read_map_folder(path, NULL, size, &m, st);
-        if (!code) io_features(m.maps, m.size, set->values[set->count++]);
+        if (!code) code = visit(context, &m, st);
         io_material_free(&m);
         free(list[i]);
     }
@@ -117,15 +114,30 @@ static ts_code add_folder(const char *folder, bool strips, int size, io_feature_
     return code;
 }
 
-ts_code io_features_folder(const char *folder, int size, io_feature_set *set, ts_status *st)
+ts_code io_visit_materials(const char *folder, int size, io_visit *visit, void *context, ts_status *st)
 {
     char maps[4096], strips[4096];
-    *set = (io_feature_set){0};
     if (snprintf(maps, sizeof maps, "%s/maps", folder) >= (int)sizeof maps ||
         snprintf(strips, sizeof strips, "%s/strips", folder) >= (int)sizeof strips)
         return ts_fail(st, TS_INVALID, "%s: the path is too long", folder);
-    ts_code code = add_folder(maps, false, size, set, st);
-    if (!code) code = add_folder(strips, true, size, set, st);
+    ts_code code = visit_folder(maps, false, size, visit, context, st);
+    return code ? code : visit_folder(strips, true, size, visit, context, st);
+}
+
+static ts_code add_features(void *context, const io_material *m, ts_status *st)
+{
+    io_feature_set *set = context;
+    double(*grown)[IO_FEATURES] = realloc(set->values, (size_t)(set->count + 1) * sizeof *grown);
+    if (!grown) return ts_fail(st, TS_NOMEM, "statistics: no memory for %d materials", set->count + 1);
+    set->values = grown;
+    io_features(m->maps, m->size, set->values[set->count++]);
+    return TS_OK;
+}
+
+ts_code io_features_folder(const char *folder, int size, io_feature_set *set, ts_status *st)
+{
+    *set = (io_feature_set){0};
+    ts_code code = io_visit_materials(folder, size, add_features, set, st);
     if (!code && set->count < 2) code = ts_fail(st, TS_IO, "%s: needs at least two materials in maps/ and strips/, has %d", folder, set->count);
     if (code) io_feature_set_free(set);
     return code;

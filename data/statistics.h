@@ -4,9 +4,17 @@
 #include "data/material.h"
 #include "data/procedural.h"
 
-/* For one material, of diffuse luminance and specular luminance (both gamma 1/2.2, as eyes and errors see them), roughness and slope |n_xy|: mean,
- * standard deviation, mean size of the difference to the neighbours right and below per 1/64 patch width, correlations of all pairs (0 where
- * one of the two does not vary); and the diffuse colour's saturation and the share of metal (F0 over 0.15). */
+/* Of one pixel: diffuse luminance, roughness, specular luminance (luminances gamma 1/2.2, as eyes and errors see them), slope |n_xy|, saturation of
+ * the diffuse colour. */
+enum { IO_VALUES = 5 };
+void io_values(const float *maps9, double out[IO_VALUES]);
+
+/* Shows visit every map folder in folder/maps and every strip in folder/strips, in the order of their names, until it returns an error. */
+typedef ts_code io_visit(void *context, const io_material *m, ts_status *st);
+ts_code io_visit_materials(const char *folder, int size, io_visit *visit, void *context, ts_status *st);
+
+/* For one material, of the first four of these: mean, standard deviation, mean size of the difference to the neighbours right and below per 1/64
+ * patch width, correlations of all pairs (0 where one of the two does not vary); and the mean saturation and the share of metal (F0 over 0.15). */
 enum { IO_FEATURES = 20 };
 const char *io_feature_name(int feature);
 void io_features(const float *maps, int size, double out[IO_FEATURES]);

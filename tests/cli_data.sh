@@ -102,6 +102,22 @@ data_statistics() {
 }
 check data_statistics data_statistics
 
+data_histograms() {
+    expect 2 "$DATA" --histograms --testdata "$T/own"
+    expect 2 "$DATA" --histograms -o "$T/h"
+    mkdir -p "$T/own" "$T/empty"
+    expect 1 "$DATA" --histograms --testdata "$T/empty" -o "$T/h"
+    says "$T/err" "$T/empty"
+    expect 0 "$DATA" -o "$T/own/maps" --count 8 --size 32
+    expect 0 "$DATA" --histograms --testdata "$T/own" --count 8 --size 32 -o "$T/h"
+    # The same materials through files: nearly all is in common; every column adds up to one for each map.
+    awk '/in common/ { n++; if ($2 + 0 < 93) exit 1 } END { exit n != 5 }' "$T/out" || fail "$(cat "$T/out")"
+    awk -F, 'NR > 1 { a[$1] += $4; b[$1] += $5; n++ } END { for (k in a) if ((a[k] - 1)^2 + (b[k] - 1)^2 > 1e-6) exit 1; exit n != 160 }' \
+        "$T/h/histograms.csv" || fail "$(head -40 "$T/h/histograms.csv")"
+    grep -q '</svg>' "$T/h/histograms.svg" || fail "the picture is cut short"
+}
+check data_histograms data_histograms
+
 data_resembles_artists_maps() {
     [ -d "$TESTDATA/maps" ] || skip "no $TESTDATA"
     expect 0 "$DATA" --statistics --testdata "$TESTDATA" --count 200 --size 64
