@@ -1,0 +1,77 @@
+#include "data/height.h"
+#include "tensor/block.h"
+#include "tensor/gemm.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define LEAST_Z 0.05f /* sine of 3 degrees */
+#define PI 3.14159265358979323846
+
+/* dz/dx and dz/dy (y down, as rows go) times the pixel's width. */
+static void slopes(const io_material *m, float *p, float *q)
+{
+    const size_t pixels = (size_t)m->size * (size_t)m->size;
+    for (size_t i = 0; i < pixels; i++) {
+        const io_texel t = io_texel_get(m->maps + i * MAP_CHANNELS);
+        const float z = fmaxf(t.normal[2], LEAST_Z) * (float)m->size;
+        p[i] = -t.normal[0] / z;
+        q[i] = t.normal[1] / z;
+    }
+}
+
+/* What the differences of neighbours, each the mean of its two slopes, flow out of every pixel: D^T of them. */
+static void divergence(int n, const float *p, const float *q, float *out)
+{
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) {
+            const size_t at = (size_t)i * (size_t)n + (size_t)j;
+            float sum = 0;
+            if (j > 0) sum += 0.5f * (p[at - 1] + p[at]);
+            if (j < n - 1) sum -= 0.5f * (p[at] + p[at + 1]);
+            if (i > 0) sum += 0.5f * (q[at - (size_t)n] + q[at]);
+            if (i < n - 1) sum -= 0.5f * (q[at] + q[at + (size_t)n]);
+            out[at] = sum;
+        }
+}
+
+/* Row k: the orthonormal cosine sqrt(2/n) cos(pi k (j + 1/2) / n), an eigenvector of D^T D with the eigenvalue 2 - 2 cos(pi k / n). */
+static void cosines(int n, float *c)
+{
+    for (int k = 0; k < n; k++)
+        for (int j = 0; j < n; j++) {
+            const int phase = (int)((int64_t)k * (2 * j + 1) % (4 * (int64_t)n)); /* exact, where the angle itself would lose digits */
+            c[(size_t)k * (size_t)n + (size_t)j] = (float)((k ? sqrt(2.0 / n) : sqrt(1.0 / n)) * cos(PI * phase / (2.0 * n)));
+        }
+}
+
+/* 4 sin^2(x/2) and not 2 - 2 cos x: the smallest are what heights are made of. */
+static double eigenvalue(int k, int n)
+{
+    const double s = sin(PI * k / (2.0 * n));
+    return 4 * s * s;
+}
+
+ts_code io_height(const io_material *m, float *height, ts_status *st)
+{
+    const int n = m->size;
+    const size_t pixels = (size_t)n * (size_t)n;
+    float *memory = ts_block(3 * pixels * sizeof *memory);
+    if (!memory) return ts_fail(st, TS_NOMEM, "no memory for heights of %d x %d pixels", n, n);
+    float *a = memory, *b = a + pixels, *c = b + pixels;
+    slopes(m, a, b);
+    divergence(n, a, b, height);
+    cosines(n, c);
+    ts_gemm(false, false, n, n, n, 1, c, height, 0, a);
+    ts_gemm(false, true, n, n, n, 1, a, c, 0, b);
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++) {
+            const double e = eigenvalue(i, n) + eigenvalue(j, n);
+            float *v = b + (size_t)i * (size_t)n + (size_t)j;
+            *v = i || j ? (float)((double)*v / e) : 0;
+        }
+    ts_gemm(true, false, n, n, n, 1, c, b, 0, a);
+    ts_gemm(false, false, n, n, n, 1, a, c, 0, height);
+    free(memory);
+    return TS_OK;
+}

@@ -1,0 +1,14 @@
+/* Diffuse and specular maps as base colour and metalness. */
+#ifndef IO_METALLIC_H
+#define IO_METALLIC_H
+#include "data/material.h"
+
+/* RMS over all pixels and channels, linear: what the conversion cannot express. */
+typedef struct io_metallic_error {
+    double diffuse, specular;
+} io_metallic_error;
+
+/* basecolor [size][size][3] linear, metallic [size][size], both in [0, 1], so that base (1 - metallic) and
+ * 0.04 (1 - metallic) + base metallic come nearest to diffuse and F0 in the sum of squares, pixel by pixel. */
+io_metallic_error io_to_metallic(const io_material *m, float *basecolor, float *metallic);
+#endif
