@@ -34,6 +34,7 @@ static const field fields[] = {
     {"iterations", FIELD_INT, AT(iterations), 0, 1000, 6, NULL},
     {"recurrent", FIELD_BOOL, AT(recurrent), 0, 1, true, NULL},
     {"gradient", FIELD_BOOL, AT(gradient), 0, 1, true, NULL},
+    {"descent", FIELD_BOOL, AT(descent), 0, 1, true, NULL},
     {"mean_before_norm", FIELD_BOOL, AT(mean_before_norm), 0, 1, true, NULL},
     {"rmse", FIELD_WORD, AT(rmse), NN_RMSE_START, NN_RMSE_BATCH, NN_RMSE_START, rmse_words},
     {"encoding", FIELD_WORD, AT(encoding), NN_GRADIENT_RAW, NN_GRADIENT_ASINH, NN_GRADIENT_ASINH, encoding_words},

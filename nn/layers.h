@@ -30,11 +30,12 @@ typedef struct nn_layers {
     nn_unet_block down[NN_MAX_LEVELS], up[NN_MAX_LEVELS];
     nn_layer output_conv1, output_conv2, output_add;
     nn_cell cell[2];
-    nn_layer h_output;
+    nn_layer h_output, h_descent; /* h_descent: weight -1 where there is none */
     int refiner;   /* index of h's first parameter */
-    double *start; /* per parameter: standard deviation of the first values, 0 for zeros, NN_ORTHOGONAL */
+    double *start; /* per parameter: standard deviation of the first values, 0 for zeros, or one of these: */
 } nn_layers;
 #define NN_ORTHOGONAL (-1.0)
+#define NN_DESCENT (-2.0) /* -0.003 times the identity: six such steps lower the loss of a trained g's R_0 without overshooting anywhere */
 
 /* Parameter number index as a value on the tape, NULL for index -1. */
 ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index);
@@ -46,4 +47,7 @@ ag_value *nn_unet(ag_tape *tape, const nn_model *model, ag_value *x);
 
 /* h: input [N, H, W, 2 channels] and the states (updated; NULL = zero) -> the change of the maps. */
 ag_value *nn_refiner(ag_tape *tape, const nn_model *model, ag_value *x, ag_value *gru[2]);
+
+/* R_{t+1} from R_t and its encoded gradient, both [N, H, W, channels]. */
+ag_value *nn_step(ag_tape *tape, const nn_model *model, ag_value *maps, ag_value *gradient, ag_value *gru[2]);
 #endif

@@ -123,7 +123,7 @@ ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag
                        model->arch.channels);
     if (model->arch.rmse == NN_RMSE_START && !state->rmse0 && !measure_start(tape, model, in, maps, state)) return NULL;
     ag_value *gradient = loss_gradient(tape, model, in, maps, state);
-    ag_value *next = ag_add(tape, maps, nn_refiner(tape, model, ag_concat(tape, maps, gradient), state->gru));
+    ag_value *next = nn_step(tape, model, maps, gradient, state->gru);
     state->step++;
     return next;
 }

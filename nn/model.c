@@ -8,7 +8,7 @@
 #include <string.h>
 
 /* Parameters of the largest model: 8 levels, two blocks of 7 each, and what lies before and after them. */
-enum { MAX_PARAMS = 4 + 2 * 7 * NN_MAX_LEVELS + 6 + 13 };
+enum { MAX_PARAMS = 4 + 2 * 7 * NN_MAX_LEVELS + 6 + 14 };
 
 static nn_layers *layers_of(const nn_model *m) { return m->layers; }
 
@@ -110,7 +110,11 @@ static void plan_h(nn_model *m)
         l->start[c->hidden.weight] = NN_ORTHOGONAL;
     }
     l->h_output = conv(m, "h.output", a->channels, a->h_gru, 3, false, 1);
-    l->start[l->h_output.weight] = 1e-3; /* the loop starts as the identity, nearly */
+    l->start[l->h_output.weight] = 1e-3; /* h starts as nothing, nearly */
+    l->h_descent = (nn_layer){-1, -1};
+    if (!a->descent || !a->gradient) return;
+    l->h_descent = conv(m, "h.descent", a->channels, a->channels, 1, false, 1);
+    l->start[l->h_descent.weight] = NN_DESCENT;
 }
 
 nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)

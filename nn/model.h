@@ -30,6 +30,7 @@ typedef struct nn_arch {
     int iterations;     /* T that it was trained for */
     bool recurrent;     /* h carries its states from step to step */
     bool gradient;      /* h reads the gradient (false: zeros, the ablation) */
+    bool descent;       /* the gradient also reaches the maps past h, by a learned 9 x 9 matrix (false: published) */
     bool mean_before_norm; /* the global track's mean: before (ours) or after (published) the normalisation */
     nn_rmse rmse;
     nn_gradient encoding; /* of the gradient for h */
@@ -92,7 +93,8 @@ typedef struct nn_state {
     int step;
 } nn_state;
 
-/* R_{t+1} = R_t + h(R_t, dL/dR_t). */
+/* R_{t+1} = R_t + h(R_t, e) + D e, e being dL/dR_t as arch.encoding has it; D is a matrix over the channels that begins as -0.003 times the
+ * identity, so that an untrained loop is plain descent (arch.descent; without it, as published, D is 0). */
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
 /* The unrolled loop on the grid's window: maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate

@@ -22,3 +22,10 @@ ag_value *nn_refiner(ag_tape *tape, const nn_model *model, ag_value *x, ag_value
     }
     return ag_tanh(tape, nn_conv(tape, model, l->h_output, x, 1, TS_PAD_REPLICATE, 1));
 }
+
+ag_value *nn_step(ag_tape *tape, const nn_model *model, ag_value *maps, ag_value *gradient, ag_value *gru[2])
+{
+    const nn_layers *l = model->layers;
+    ag_value *next = ag_add(tape, maps, nn_refiner(tape, model, ag_concat(tape, maps, gradient), gru));
+    return l->h_descent.weight < 0 ? next : ag_add(tape, next, nn_conv(tape, model, l->h_descent, gradient, 1, TS_PAD_ZERO, 1));
+}

@@ -9,7 +9,7 @@ static inline nn_arch published_arch(void)
 {
     nn_arch a = nn_arch_default();
     a.channels = 10, a.g_width = 64, a.g_width_max = 512, a.g_levels = 7, a.g_kernel = 5, a.g_size = 256, a.h_width = 256, a.h_gru = 64;
-    a.recurrent = a.mean_before_norm = false, a.rmse = NN_RMSE_BATCH, a.encoding = NN_GRADIENT_RAW;
+    a.recurrent = a.mean_before_norm = a.descent = false, a.rmse = NN_RMSE_BATCH, a.encoding = NN_GRADIENT_RAW;
     return a;
 }
 

@@ -76,13 +76,13 @@ TEST(weights_round_trip_is_exact)
 TEST(weights_architecture_round_trip)
 {
     nn_arch a = small();
-    a.channels = 10, a.g_kernel_first = 5, a.g_kernel = 7, a.iterations = 11, a.recurrent = false, a.gradient = false, a.mean_before_norm = false;
+    a.channels = 10, a.g_kernel_first = 5, a.g_kernel = 7, a.iterations = 11, a.recurrent = false, a.gradient = false, a.mean_before_norm = a.descent = false;
     a.rmse = NN_RMSE_BATCH, a.encoding = NN_GRADIENT_RAW;
     ts_status st = {0};
     char text[NN_ARCH_TEXT];
     nn_meta meta[NN_ARCH_META];
     int metas = nn_arch_to_meta(&a, meta, NN_ARCH_META, text, sizeof text);
-    CHECK(metas == 16, "%d entries, not format and 15 fields", metas);
+    CHECK(metas == 17, "%d entries, not format and 16 fields", metas);
     CHECK(nn_arch_to_meta(&a, meta, metas - 1, text, sizeof text) < 0 && nn_arch_to_meta(&a, meta, metas, text, 20) < 0, "too little room is taken");
     nn_arch_to_meta(&a, meta, NN_ARCH_META, text, sizeof text);
     const char *path = path_of("arch.safetensors");
@@ -180,7 +180,7 @@ TEST(weights_of_another_architecture_are_refused)
         const char *what;
         ts_code code;
     } expected[] = {{"\"h.conv1.weight\" has the shape [8, 18, 5, 5], not [6, 18, 5, 5]", TS_FORMAT},
-                    {"\"h.output.weight\" is missing", TS_FORMAT},
+                    {"\"h.descent.weight\" is missing", TS_FORMAT},
                     {"\"g.extra\" does not belong", TS_FORMAT},
                     {"\"g.down1.conv2.weight\" holds a value that is not finite", TS_NUMERIC}};
     const char *path = path_of("x.safetensors");

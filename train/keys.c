@@ -21,6 +21,8 @@ const tr_key tr_keys[] = {
      "refinement steps T that the model is trained for and validated with"},
     {"model", "recurrent", TR_BOOL, AT(arch.recurrent), 0, 1, NULL, NULL, false, "the refiner carries its states from step to step"},
     {"model", "gradient", TR_BOOL, AT(arch.gradient), 0, 1, NULL, NULL, false, "the refiner reads the renderer's gradient (no: zeros, the ablation)"},
+    {"model", "descent", TR_BOOL, AT(arch.descent), 0, 1, NULL, NULL, false,
+     "the gradient also reaches the maps past the refiner, by a learned matrix over the channels that begins as plain descent (no: published)"},
     {"model", "mean_before_norm", TR_BOOL, AT(arch.mean_before_norm), 0, 1, NULL, NULL, false,
      "g's global track takes its means before the normalisation (no: after it, as published)"},
     {"model", "rmse", TR_CHOICE, AT(arch.rmse), 0, 1, NULL, rmse_names, false,
