@@ -106,14 +106,14 @@ static ts_code write_map(const char *folder, const char *file, const io_material
 }
 
 /* What the files mean, for whoever reads them next (io_read_map_folder does). */
-static ts_code write_meta(const char *folder, bool directx, ts_status *st)
+static ts_code write_meta(const char *folder, unsigned which, bool directx, ts_status *st)
 {
     char path[PATH_MAX], text[512];
     if (snprintf(path, sizeof path, "%s/meta.txt", folder) >= (int)sizeof path) return ts_fail(st, TS_INVALID, "%s: name too long", folder);
-    int length = snprintf(text, sizeof text,
-                          "workflow: specular (F0)\ndiffuse: sRGB\nspecular: sRGB\nroughness: linear value, perceptual (alpha = roughness^2)\n"
-                          "normal: tangent space, %s y\nmaps.exr: all of them, linear\n",
-                          directx ? "DirectX" : "OpenGL");
+    /* Beside a base colour and a metallic map the reader is not to look for F0. */
+    int length = snprintf(text, sizeof text, "%sroughness: linear value, perceptual (alpha = roughness^2)\nnormal: tangent space, %s y\n%s",
+                          which & (IO_MAPS_DIFFUSE | IO_MAPS_SPECULAR) ? "workflow: specular (F0)\ndiffuse: sRGB\nspecular: sRGB\n" : "",
+                          directx ? "DirectX" : "OpenGL", which & IO_MAPS_EXR ? "maps.exr: diffuse, specular (F0), roughness and normal, linear\n" : "");
     return io_write_bytes(path, text, (size_t)length, st);
 }
 
@@ -129,5 +129,5 @@ ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, 
         ts_code code = write_map(folder, files[i].file, m, files[i].which, directx, st);
         if (code != TS_OK) return code;
     }
-    return which ? write_meta(folder, directx, st) : TS_OK;
+    return which ? write_meta(folder, which, directx, st) : TS_OK;
 }

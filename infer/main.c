@@ -82,7 +82,10 @@ static ts_code one(run *r, const lgd_job *job, ts_status *st)
         if (!code) look_at(r, &photo, &square);
         if (!code) code = io_material_create(&m, c->size, st);
         if (!code) code = estimate(r, &square, &m, st);
-        if (!code) code = lgd_output_write(c->out, job->stem, &m, &square, c->directx, st);
+        io_metallic_error lost = {0};
+        if (!code) code = lgd_output_write(c->out, job->stem, &m, &square, c->outputs, c->directx, &lost, st);
+        if (!code && c->outputs & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC) && !c->quiet)
+            note(r, "base colour and metalness miss diffuse by %.4f and F0 by %.4f (RMS, linear)", lost.diffuse, lost.specular);
         if (code) ts_context(st, "%s", job->photo);
     }
     io_image_free(&photo);

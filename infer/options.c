@@ -1,9 +1,10 @@
 #include "infer/options.h"
 #include "cli/cli.h"
 #include "data/image.h"
+#include "infer/output.h"
 #include <string.h>
 
-enum { NORMAL = 256, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
+enum { NORMAL = 256, MAPS, WORKFLOW, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
 
 const lgd_argument lgd_infer_arguments[] = {
     {'o', "output", "DIR", "write DIR/STEM/ for each photograph, STEM = its file name without extension (required)"},
@@ -12,6 +13,10 @@ const lgd_argument lgd_infer_arguments[] = {
     {'m', "model", "FILE", "weights (default: $LGD_MODEL, or those installed or built with the program)"},
     {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {NORMAL, "normal", "gl|dx", "normal.png with y up (OpenGL, default) or y down (DirectX)"},
+    {MAPS, "maps", "LIST", "write only these, of diffuse, specular, roughness, normal, exr, render, preview (the default: all\n"
+                            "so far), basecolor, metallic, height, gltf, materialx; what is not asked for is not computed"},
+    {WORKFLOW, "workflow", "W", "specular (default), or metallic: base colour and metalness in place of diffuse and specular,\n"
+                                "with the error that this makes"},
     {MAX_PIXELS, "max-pixels", "N", "refuse photographs with more pixels, before memory is taken (default 268435456)"},
     {'q', "quiet", NULL, "no progress and no figures, only warnings and errors"},
     {HELP, "help", NULL, "print this help"},
@@ -51,6 +56,14 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
             code = whole("threads", value, 0, 1024, &n, st);
             c->threads = (int)n;
             break;
+        case MAPS:
+            code = lgd_output_parse(value, &c->outputs, st);
+            if (code) ts_context(st, "--maps");
+            break;
+        case WORKFLOW:
+            c->metallic = strcmp(value, "metallic") == 0;
+            if (!c->metallic && strcmp(value, "specular") != 0) code = ts_fail(st, TS_INVALID, "--workflow: '%s' is neither specular nor metallic", value);
+            break;
         case NORMAL:
             c->directx = strcmp(value, "dx") == 0;
             if (!c->directx && strcmp(value, "gl") != 0) code = ts_fail(st, TS_INVALID, "--normal: '%s' is neither gl nor dx", value);
@@ -59,6 +72,14 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
         }
     }
     if (code || c->help || c->version) return code;
+    const unsigned documents = LGD_OUT_GLTF | LGD_OUT_MATERIALX;
+    if (c->outputs & documents && c->directx) return ts_fail(st, TS_INVALID, "--normal dx: glTF and MaterialX need OpenGL normals");
+    if (c->outputs & documents && c->metallic) return ts_fail(st, TS_INVALID, "--workflow metallic: the glTF and MaterialX documents refer to F0");
+    if (!c->outputs) c->outputs = LGD_OUT_DEFAULT;
+    if (c->metallic) { /* what was asked of the one workflow is given in the other */
+        const unsigned f0 = c->outputs & (LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR);
+        c->outputs = (c->outputs & ~f0) | (f0 & LGD_OUT_DIFFUSE ? LGD_OUT_BASECOLOR : 0) | (f0 & LGD_OUT_SPECULAR ? LGD_OUT_METALLIC : 0);
+    }
     c->photo = argv + operands;
     c->photos = argc - operands;
     if (c->photos == 0) return ts_fail(st, TS_INVALID, "no photograph is given");

@@ -9,7 +9,8 @@ typedef struct lgd_command {
     const char *out, *model;
     int size, iterations /* -1: as trained */, threads;
     int64_t max_pixels;
-    bool directx, quiet, help, version;
+    unsigned outputs; /* LGD_OUT_... */
+    bool directx, metallic, quiet, help, version;
     char **photo; /* into argv */
     int photos;
 } lgd_command;

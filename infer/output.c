@@ -1,4 +1,6 @@
 #include "infer/output.h"
+#include "data/height.h"
+#include "infer/export.h"
 #include "infer/panels.h"
 #include "render/scene.h"
 #include <errno.h>
@@ -10,7 +12,26 @@
 
 enum { PATH_LENGTH = 4096 };
 
-const char *const lgd_files[LGD_FILES] = {"diffuse.png", "specular.png", "roughness.png", "normal.png", "maps.exr", "meta.txt", "render.png", "preview.png"};
+const char *const lgd_output_names[LGD_OUTPUTS] = {"diffuse",   "specular", "roughness", "normal", "exr",  "render",
+                                                   "preview",   "basecolor", "metallic", "height", "gltf", "materialx"};
+const char *const lgd_files[LGD_FILES] = {"diffuse.png", "specular.png",  "roughness.png", "normal.png", "maps.exr",      "render.png",   "preview.png",
+                                          "basecolor.png", "metallic.png", "height.png",   "material.gltf", "material.mtlx", "meta.txt"};
+
+ts_code lgd_output_parse(const char *list, unsigned *which, ts_status *st)
+{
+    *which = 0;
+    for (const char *at = list;; at++) {
+        const size_t n = strcspn(at, ",");
+        int k = 0;
+        while (k < LGD_OUTPUTS && (strlen(lgd_output_names[k]) != n || strncmp(at, lgd_output_names[k], n) != 0)) k++;
+        if (k == LGD_OUTPUTS) return ts_fail(st, TS_INVALID, "'%.*s' is nothing that can be written", (int)(n < 40 ? n : 40), at);
+        *which |= 1u << k;
+        at += n;
+        if (!*at) break;
+    }
+    if (*which & (LGD_OUT_GLTF | LGD_OUT_MATERIALX)) *which |= LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR | LGD_OUT_ROUGHNESS | LGD_OUT_NORMAL;
+    return TS_OK;
+}
 
 /* folder/name; TS_INVALID when it is too long. */
 static ts_code join(char path[PATH_LENGTH], const char *folder, const char *name, ts_status *st)
@@ -48,30 +69,99 @@ ts_code lgd_output_check(const char *folder, ts_status *st)
     return code;
 }
 
-static ts_code write_pictures(const char *folder, const io_material *m, const io_image *photo, ts_status *st)
+/* folder/lgd_files[of the bit which]. */
+static ts_code write_png(const char *folder, unsigned which, const io_image *image, int bits, bool srgb, ts_status *st)
+{
+    char path[PATH_LENGTH];
+    int k = 0;
+    while (which >> k != 1) k++;
+    if (join(path, folder, lgd_files[k], st) != TS_OK) return st->code;
+    return io_write_png(path, image, bits, srgb, st);
+}
+
+static ts_code write_render(const char *folder, const io_material *m, const io_image *photo, ts_status *st)
 {
     const int size = m->size;
-    char path[PATH_LENGTH];
-    io_image pair = {0}, strip = {0}, picture = {0};
+    const rd_view flash = rd_flash();
+    io_image pair = {0}, picture = {0};
     ts_code code = io_image_create(&pair, 2 * size, size, 3, st);
-    if (!code) code = io_image_create(&strip, LGD_PREVIEW_LIGHTS * size, size, 3, st);
     if (!code) code = io_image_create(&picture, size, size, 3, st);
     if (!code) {
-        const rd_view flash = rd_flash();
         lgd_panel_put(&pair, size, 0, 0, photo->data);
         lgd_panel_render(&pair, 1, 0, m, &flash, picture.data);
-        for (int i = 0; i < LGD_PREVIEW_LIGHTS; i++) {
-            const rd_view view = rd_preview_view(i, LGD_PREVIEW_LIGHTS);
-            lgd_panel_render(&strip, i, 0, m, &view, picture.data);
-        }
-        code = join(path, folder, "render.png", st);
-        if (!code) code = io_write_png(path, &pair, 8, true, st);
-        if (!code) code = join(path, folder, "preview.png", st);
-        if (!code) code = io_write_png(path, &strip, 8, true, st);
+        code = write_png(folder, LGD_OUT_RENDER, &pair, 8, true, st);
     }
     io_image_free(&pair);
+    io_image_free(&picture);
+    return code;
+}
+
+static ts_code write_preview(const char *folder, const io_material *m, ts_status *st)
+{
+    const int size = m->size;
+    io_image strip = {0}, picture = {0};
+    ts_code code = io_image_create(&strip, LGD_PREVIEW_LIGHTS * size, size, 3, st);
+    if (!code) code = io_image_create(&picture, size, size, 3, st);
+    for (int i = 0; i < LGD_PREVIEW_LIGHTS && !code; i++) {
+        const rd_view view = rd_preview_view(i, LGD_PREVIEW_LIGHTS);
+        lgd_panel_render(&strip, i, 0, m, &view, picture.data);
+    }
+    if (!code) code = write_png(folder, LGD_OUT_PREVIEW, &strip, 8, true, st);
     io_image_free(&strip);
     io_image_free(&picture);
+    return code;
+}
+
+static ts_code write_metallic(const char *folder, const io_material *m, unsigned which, io_metallic_error *lost, ts_status *st)
+{
+    io_image base = {0}, metal = {0};
+    ts_code code = io_image_create(&base, m->size, m->size, 3, st);
+    if (!code) code = io_image_create(&metal, m->size, m->size, 1, st);
+    if (!code) {
+        const io_metallic_error e = io_to_metallic(m, base.data, metal.data);
+        if (lost) *lost = e;
+    }
+    if (!code && which & LGD_OUT_BASECOLOR) code = write_png(folder, LGD_OUT_BASECOLOR, &base, 8, true, st);
+    if (!code && which & LGD_OUT_METALLIC) code = write_png(folder, LGD_OUT_METALLIC, &metal, 16, false, st);
+    io_image_free(&base);
+    io_image_free(&metal);
+    return code;
+}
+
+static ts_code write_height(const char *folder, const io_material *m, ts_status *st)
+{
+    io_image height = {0};
+    ts_code code = io_image_create(&height, m->size, m->size, 1, st);
+    if (!code) code = io_height(m, height.data, st);
+    for (int64_t i = 0; i < (int64_t)m->size * m->size && !code; i++) height.data[i] += 0.5f;
+    if (!code) code = write_png(folder, LGD_OUT_HEIGHT, &height, 16, false, st);
+    io_image_free(&height);
+    return code;
+}
+
+static ts_code write_document(const char *folder, const char *name, ts_code (*write)(const char *path, ts_status *st), ts_status *st)
+{
+    char path[PATH_LENGTH];
+    return join(path, folder, name, st) ? st->code : write(path, st);
+}
+
+static ts_code write_all(const char *folder, const io_material *m, const io_image *photo, unsigned which, bool directx, io_metallic_error *lost,
+                         ts_status *st)
+{
+    static const struct {
+        unsigned output, maps;
+    } same[] = {{LGD_OUT_DIFFUSE, IO_MAPS_DIFFUSE}, {LGD_OUT_SPECULAR, IO_MAPS_SPECULAR}, {LGD_OUT_ROUGHNESS, IO_MAPS_ROUGHNESS},
+                {LGD_OUT_NORMAL, IO_MAPS_NORMAL}, {LGD_OUT_EXR, IO_MAPS_EXR}};
+    unsigned maps = 0;
+    for (size_t i = 0; i < sizeof same / sizeof *same; i++)
+        if (which & same[i].output) maps |= same[i].maps;
+    ts_code code = io_write_maps(folder, m, maps, directx, st);
+    if (!code && which & LGD_OUT_RENDER) code = write_render(folder, m, photo, st);
+    if (!code && which & LGD_OUT_PREVIEW) code = write_preview(folder, m, st);
+    if (!code && which & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC)) code = write_metallic(folder, m, which, lost, st);
+    if (!code && which & LGD_OUT_HEIGHT) code = write_height(folder, m, st);
+    if (!code && which & LGD_OUT_GLTF) code = write_document(folder, "material.gltf", lgd_write_gltf, st);
+    if (!code && which & LGD_OUT_MATERIALX) code = write_document(folder, "material.mtlx", lgd_write_materialx, st);
     return code;
 }
 
@@ -81,12 +171,14 @@ static ts_code move_files(const char *hidden, const char *folder, ts_status *st)
     char from[PATH_LENGTH], to[PATH_LENGTH];
     for (int i = 0; i < LGD_FILES; i++) {
         if (join(from, hidden, lgd_files[i], st) != TS_OK || join(to, folder, lgd_files[i], st) != TS_OK) return st->code;
+        if (access(from, F_OK) != 0) continue; /* not asked for */
         if (rename(from, to) != 0) return ts_fail(st, TS_IO, "%s: cannot be replaced: %s", to, strerror(errno));
     }
     return TS_OK;
 }
 
-ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const io_image *photo, bool directx, ts_status *st)
+ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const io_image *photo, unsigned which, bool directx,
+                         io_metallic_error *lost, ts_status *st)
 {
     char folder[PATH_LENGTH], hidden[PATH_LENGTH];
     struct stat info;
@@ -95,8 +187,7 @@ ts_code lgd_output_write(const char *parent, const char *stem, const io_material
     if (there && !S_ISDIR(info.st_mode)) return ts_fail(st, TS_IO, "%s: is in the way: it is not a folder", folder);
     /* inside the folder when it exists: it may lie on another file system than its parent */
     if (make_hidden(there ? folder : parent, hidden, st) != TS_OK) return st->code;
-    ts_code code = io_write_maps(hidden, m, IO_MAPS_ALL, directx, st);
-    if (!code) code = write_pictures(hidden, m, photo, st);
+    ts_code code = write_all(hidden, m, photo, which, directx, lost, st);
     if (!code && there) code = move_files(hidden, folder, st);
     else if (!code && rename(hidden, folder) != 0) code = ts_fail(st, TS_IO, "%s: cannot be made: %s", folder, strerror(errno));
     if (code || there) remove_hidden(hidden);

@@ -1,17 +1,38 @@
 /* The files of one photograph, all or none. */
 #ifndef LGD_OUTPUT_H
 #define LGD_OUTPUT_H
-#include "data/material.h"
+#include "data/metallic.h"
 #include <stdbool.h>
 
-enum { LGD_FILES = 8, LGD_PREVIEW_LIGHTS = 4 };
-extern const char *const lgd_files[LGD_FILES];
+/* What can be written for a photograph, a bit each in the order of lgd_output_names. */
+enum {
+    LGD_OUT_DIFFUSE = 1 << 0,   /* diffuse.png, sRGB */
+    LGD_OUT_SPECULAR = 1 << 1,  /* specular.png: F0, sRGB */
+    LGD_OUT_ROUGHNESS = 1 << 2, /* roughness.png, linear, 16 bit */
+    LGD_OUT_NORMAL = 1 << 3,    /* normal.png, linear, 16 bit */
+    LGD_OUT_EXR = 1 << 4,       /* maps.exr */
+    LGD_OUT_RENDER = 1 << 5,    /* render.png: the photograph beside the re-rendered flash picture */
+    LGD_OUT_PREVIEW = 1 << 6,   /* preview.png: LGD_PREVIEW_LIGHTS light positions */
+    LGD_OUT_BASECOLOR = 1 << 7, /* basecolor.png, sRGB (data/metallic.h) */
+    LGD_OUT_METALLIC = 1 << 8,  /* metallic.png, linear, 16 bit */
+    LGD_OUT_HEIGHT = 1 << 9,    /* height.png, 16 bit: 0.5 is the mean, the full range one patch width (data/height.h) */
+    LGD_OUT_GLTF = 1 << 10,     /* material.gltf (infer/export.h) */
+    LGD_OUT_MATERIALX = 1 << 11 /* material.mtlx */
+};
+enum { LGD_OUTPUTS = 12, LGD_FILES = LGD_OUTPUTS + 1, LGD_PREVIEW_LIGHTS = 4 };
+#define LGD_OUT_DEFAULT 0x7fu
+extern const char *const lgd_output_names[LGD_OUTPUTS];
+extern const char *const lgd_files[LGD_FILES]; /* the file of each, then meta.txt */
+
+/* A list such as "normal,height" as bits. The documents bring the four maps that they refer to. TS_INVALID names the word. */
+ts_code lgd_output_parse(const char *list, unsigned *which, ts_status *st);
 
 /* Fails with one clear line when nothing can be made inside the folder, before any work is done for it. */
 ts_code lgd_output_check(const char *folder, ts_status *st);
 
-/* Writes diffuse.png, specular.png, roughness.png, normal.png, maps.exr, meta.txt (what these mean), render.png (photo beside the re-rendered flash picture) and
- * preview.png (a strip of LGD_PREVIEW_LIGHTS light positions) to parent/stem. They are written to a hidden folder first and renamed
- * when all are complete: a failure leaves what was there before, and nothing else. photo: linear, of the material's size. */
-ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const io_image *photo, bool directx, ts_status *st);
+/* Writes which (bits) and, beside maps, meta.txt (what they mean) to parent/stem; nothing else is computed. They are written to a hidden
+ * folder first and renamed when all are complete: a failure leaves what was there before, and nothing else. photo: linear, of the
+ * material's size. lost: what base colour and metalness cannot express, where they are written; may be NULL. */
+ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const io_image *photo, unsigned which, bool directx,
+                         io_metallic_error *lost, ts_status *st);
 #endif
