@@ -41,6 +41,8 @@ typedef struct io_rows {
     void *user;
 } io_rows;
 ts_code io_write_png_rows(const char *path, const io_rows *rows, int bits, bool srgb, ts_status *st);
+/* The bytes of the file, malloced and the caller's, instead. */
+ts_code io_png_bytes(const io_image *image, int bits, bool srgb, unsigned char **bytes, size_t *size, ts_status *st);
 ts_code io_write_jpeg(const char *path, const io_image *image, int quality, ts_status *st); /* linear in, sRGB out */
 
 /* sRGB curve (IEC 61966-2-1), the only place that has it. */

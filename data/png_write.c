@@ -129,11 +129,14 @@ static bool work(writing *w, const io_rows *rows, int bits, bool srgb, ts_status
     return true;
 }
 
-ts_code io_write_png_rows(const char *path, const io_rows *rows, int bits, bool srgb, ts_status *st)
+/* The file in memory; name is for messages. bytes is malloced and the caller's. */
+static ts_code encode(const char *name, const io_rows *rows, int bits, bool srgb, unsigned char **bytes, size_t *size, ts_status *st)
 {
-    if (bits != 8 && bits != 16) return ts_fail(st, TS_INVALID, "%s: PNG with %d bits", path, bits);
+    *bytes = NULL;
+    *size = 0;
+    if (bits != 8 && bits != 16) return ts_fail(st, TS_INVALID, "%s: PNG with %d bits", name, bits);
     if (rows->width < 1 || rows->height < 1 || rows->channels < 1 || rows->channels > 4)
-        return ts_fail(st, TS_INVALID, "%s: PNG of %d x %d pixels with %d channels", path, rows->width, rows->height, rows->channels);
+        return ts_fail(st, TS_INVALID, "%s: PNG of %d x %d pixels with %d channels", name, rows->width, rows->height, rows->channels);
     const size_t values = (size_t)rows->width * (size_t)rows->channels;
     writing w = {.values = malloc(values * ROWS * sizeof(float)), .row = malloc(values * (size_t)(bits / 8))};
     bool done = false;
@@ -144,11 +147,21 @@ ts_code io_write_png_rows(const char *path, const io_rows *rows, int bits, bool 
         png_destroy_write_struct(&w.png, &w.info);
     }
     ts_code code = done ? TS_OK : w.code;
-    if (done) code = io_write_bytes(path, w.bytes, w.size, st);
-    else if (!code) code = w.message[0] ? ts_fail(st, TS_IO, "%s: %s", path, w.message) : ts_fail(st, TS_NOMEM, "%s: out of memory", path);
-    free(w.bytes);
+    if (!done && !code) code = w.message[0] ? ts_fail(st, TS_IO, "%s: %s", name, w.message) : ts_fail(st, TS_NOMEM, "%s: out of memory", name);
     free(w.values);
     free(w.row);
+    if (code) free(w.bytes);
+    else *bytes = w.bytes, *size = w.size;
+    return code;
+}
+
+ts_code io_write_png_rows(const char *path, const io_rows *rows, int bits, bool srgb, ts_status *st)
+{
+    unsigned char *bytes;
+    size_t size;
+    ts_code code = encode(path, rows, bits, srgb, &bytes, &size, st);
+    if (!code) code = io_write_bytes(path, bytes, size, st);
+    free(bytes);
     return code;
 }
 
@@ -166,4 +179,11 @@ ts_code io_write_png(const char *path, const io_image *image, int bits, bool srg
     io_image copy = *image; /* the row maker's pointer is not const */
     const io_rows rows = {image->width, image->height, image->channels, copy_rows, &copy};
     return io_write_png_rows(path, &rows, bits, srgb, st);
+}
+
+ts_code io_png_bytes(const io_image *image, int bits, bool srgb, unsigned char **bytes, size_t *size, ts_status *st)
+{
+    io_image copy = *image;
+    const io_rows rows = {image->width, image->height, image->channels, copy_rows, &copy};
+    return encode("a PNG in memory", &rows, bits, srgb, bytes, size, st);
 }

@@ -9,14 +9,16 @@
 #include "infer/model_path.h"
 #include "nn/weights.h"
 #include "render/error.h"
+#include "tensor/cpu.h"
 #include "tensor/threads.h"
 #include <inttypes.h>
 #include <stdlib.h>
+#include <string.h>
 
-enum { SETS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, FAST, NORMAL, WORKFLOW, COLOUR, PATH_LENGTH = 4096 };
+enum { SETS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, FAST, NORMAL, WORKFLOW, COLOUR, PATH_LENGTH = 4096, PICTURES = 128 /* in the report: some 40 MB */ };
 
 static const lgd_argument arguments[] = {
-    {'o', "output", "DIR", "write results.csv and summary.csv there (required)"},
+    {'o', "output", "DIR", "write results.csv, summary.csv, results.json and report.html there (required)"},
     {'d', "set", "KIND:WHERE", "what to evaluate (required, may be repeated):\nprocedural:SEED,COUNT  generated materials\n"
         "strips:FOLDER  images of five panels: input, normal, diffuse, roughness, specular\nmaps:FOLDER  a folder of map folders\nmultiview:FOLDER  a capture, or a folder of them: 00.png, 01.png ..., camera_pos.txt,\nlight_pos.txt, image_size.txt, light_power.txt; 00.png is the input"},
     {NORMAL, "normal", "Y", "of map folders: opengl or directx (default: as set.ini, meta.txt or the file name says)"},
@@ -123,11 +125,13 @@ typedef struct run {
     const char *set_name[SETS_MAX];
     nn_model *model;
     ag_tape *tape;
+    char model_name[PATH_LENGTH];
     ev_report report;
     io_material truth;
     io_capture capture;
     char name[128]; /* of the material at work */
     ev_row *row;
+    double *seconds;
     float *image, *first, *last;
     cl_progress bar;
     int64_t done;
@@ -153,7 +157,7 @@ static ts_code one(run *r, int set, int i, ts_status *st)
         ev_photograph(&r->truth, (float)c->noise, (uint64_t)c->seed, identity, r->image);
         k = ev_case_of_maps(&r->truth, r->image, views, !c->fast);
     }
-    ts_code code = ev_measure(r->tape, r->model, &k, r->report.steps, r->row, r->first, r->last, st);
+    ts_code code = ev_measure(r->tape, r->model, &k, r->report.steps, r->row, r->seconds, r->first, r->last, st);
     if (!code && c->images) {
         char path[PATH_LENGTH];
         if (snprintf(path, sizeof path, "%s/images/%d-%s.png", c->out, set + 1, r->name) >= (int)sizeof path)
@@ -161,7 +165,10 @@ static ts_code one(run *r, int set, int i, ts_status *st)
         else code = ev_sheet_write(path, &k, r->first, r->last, st);
     }
     if (code) return ts_context(st, "%s: %s", r->set[set].spec, r->name);
-    return ev_report_add(&r->report, set, r->name, r->row, st);
+    unsigned char *png = NULL;
+    size_t png_size = 0;
+    if (r->report.results < PICTURES) code = ev_sheet_png(&k, r->last, &png, &png_size, st);
+    return code ? code : ev_report_add(&r->report, set, r->name, r->row, r->seconds, png, png_size, st);
 }
 
 static int evaluate(run *r)
@@ -190,7 +197,7 @@ static int evaluate(run *r)
     st = (ts_status){0};
     if (r->report.results == 0) return cl_failed("no material could be evaluated");
     if (ev_report_write(&r->report, c->out, &st) != TS_OK) return cl_failed("%s", st.message);
-    ev_report_print(&r->report, c->size, stdout);
+    ev_report_print(&r->report, stdout);
     if (r->failed > 0) return cl_failed("%d of %" PRId64 " materials failed: they are not in the means", r->failed, total);
     return CL_OK;
 }
@@ -207,13 +214,17 @@ static bool prepare(run *r, ts_status *st)
     ag_freeze(r->tape, true);
     const int steps = c->iterations < 0 ? r->model->arch.iterations : c->iterations;
     if (steps > 0 && r->model->arch.h_width == 0) return ts_fail(st, TS_UNSUPPORTED, "%s: has no refiner: only --iterations 0 is possible", path), false;
-    r->report = (ev_report){.steps = steps, .sets = c->sets, .set_name = r->set_name};
+    r->report = (ev_report){.steps = steps, .sets = c->sets, .set_name = r->set_name, .size = c->size, .threads = ts_threads(), .isa = ts_isa_name(ts_isa_now())};
+    const char *slash = strrchr(path, '/'); /* where it lay says nothing to whom the report is sent */
+    snprintf(r->model_name, sizeof r->model_name, "%s", slash ? slash + 1 : path);
+    r->report.model = r->model_name;
     const size_t pixels = (size_t)c->size * (size_t)c->size;
     r->row = calloc((size_t)steps + 1, sizeof *r->row);
+    r->seconds = calloc((size_t)steps + 1, sizeof *r->seconds);
     r->image = malloc(pixels * 3 * sizeof(float));
     r->first = malloc(pixels * MAP_CHANNELS * sizeof(float));
     r->last = malloc(pixels * MAP_CHANNELS * sizeof(float));
-    if (!r->row || !r->image || !r->first || !r->last) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", c->size, c->size), false;
+    if (!r->row || !r->seconds || !r->image || !r->first || !r->last) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", c->size, c->size), false;
     return true;
 }
 
@@ -236,6 +247,7 @@ static int work(const command *c)
     io_material_free(&r->truth);
     io_capture_free(&r->capture);
     free(r->row);
+    free(r->seconds);
     free(r->image);
     free(r->first);
     free(r->last);

@@ -1,4 +1,5 @@
 #include "eval/metrics.h"
+#include "cli/cli.h"
 #include "data/camera.h"
 #include "eval/flip.h"
 #include "eval/multiview.h"
@@ -64,6 +65,7 @@ typedef struct watch {
     const ev_case *c;
     int steps;
     ev_row *row;
+    double *seconds, start, scoring; /* scoring: spent on scores so far */
     float *first, *last;
     bool finite;
 } watch;
@@ -71,6 +73,8 @@ typedef struct watch {
 static bool after_step(int step, const ag_value *maps, void *user)
 {
     watch *w = user;
+    const double now = cl_seconds();
+    if (w->seconds) w->seconds[step] = now - w->start - w->scoring;
     const int size = w->c->size, channels = maps->t.shape.c;
     const int64_t pixels = (int64_t)size * size;
     ev_case c = *w->c;
@@ -82,17 +86,18 @@ static bool after_step(int step, const ag_value *maps, void *user)
         float *to = copy ? w->last : step == 0 ? w->first : NULL;
         for (int64_t i = 0; to && i < pixels; i++) memcpy(to + i * MAP_CHANNELS, maps->t.data + i * channels, MAP_CHANNELS * sizeof *to);
     }
+    w->scoring += cl_seconds() - now;
     return w->finite;
 }
 
-ts_code ev_measure(ag_tape *tape, const nn_model *model, const ev_case *c, int steps, ev_row *row, float *first, float *last, ts_status *st)
+ts_code ev_measure(ag_tape *tape, const nn_model *model, const ev_case *c, int steps, ev_row *row, double *seconds, float *first, float *last, ts_status *st)
 {
     const int size = c->size;
     ag_reset(tape);
     nn_input in = {.image = ts_new(ag_arena(tape), (ts_shape){1, size, size, 3}), .grid = rd_grid_full(size), .view = c->view};
     if (!in.image.data) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", size, size);
     memcpy(in.image.data, c->image, (size_t)size * (size_t)size * 3 * sizeof *c->image);
-    watch w = {c, steps, row, first, last, true};
+    watch w = {c, steps, row, seconds, cl_seconds(), 0, first, last, true};
     ag_value *out = NULL;
     if (nn_lgd(tape, model, &in, steps, false, &out, after_step, &w) != TS_OK) {
         *st = *ag_status(tape);

@@ -31,9 +31,10 @@ ev_case ev_case_of_capture(const io_capture *capture, const float *image, bool p
  * (seed, identity). image: size x size x 3. */
 void ev_photograph(const io_material *truth, float noise, uint64_t seed, uint64_t identity, float *image);
 
-/* Runs the loop: row[t] is what R_t scores, t = 0 .. steps (SSIM and FLIP of the first and the last alone). first and last (may be NULL) get the maps of R_0 and of R_steps,
+/* Runs the loop: row[t] is what R_t scores, t = 0 .. steps (SSIM and FLIP of the first and the last alone). seconds[t] (may be NULL) is the time
+ * from the photograph to R_t, without that of the scores. first and last (may be NULL) get the maps of R_0 and of R_steps,
  * [size, size, 9]. The tape is one without gradients and is reset. */
-ts_code ev_measure(ag_tape *tape, const nn_model *model, const ev_case *c, int steps, ev_row *row, float *first, float *last, ts_status *st);
+ts_code ev_measure(ag_tape *tape, const nn_model *model, const ev_case *c, int steps, ev_row *row, double *seconds, float *first, float *last, ts_status *st);
 
 /* What one estimate scores. */
 ev_row ev_score(const ev_case *c, const float *maps, int channels);

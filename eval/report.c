@@ -1,4 +1,5 @@
 #include "eval/report.h"
+#include "eval/html.h"
 #include "render/error.h"
 #include <errno.h>
 #include <math.h>
@@ -8,31 +9,64 @@
 
 enum { PATH_LENGTH = 4096 };
 
-ts_code ev_report_add(ev_report *r, int set, const char *material, const ev_row *row, ts_status *st)
+ts_code ev_report_add(ev_report *r, int set, const char *material, const ev_row *row, const double *seconds, unsigned char *png, size_t png_size, ts_status *st)
 {
     if (r->results == r->room) {
         const int room = r->room ? 2 * r->room : 64;
         ev_result *more = realloc(r->result, (size_t)room * sizeof *more);
-        if (!more) return ts_fail(st, TS_NOMEM, "out of memory for the results");
+        if (!more) {
+            free(png);
+            return ts_fail(st, TS_NOMEM, "out of memory for the results");
+        }
         r->result = more;
         r->room = room;
     }
     const size_t rows = (size_t)r->steps + 1;
-    ev_result *to = &r->result[r->results];
-    *to = (ev_result){.set = set, .row = malloc(rows * sizeof *row)};
-    if (!to->row) return ts_fail(st, TS_NOMEM, "out of memory for the results");
+    ev_result *to = &r->result[r->results++];
+    *to = (ev_result){.set = set, .row = malloc(rows * sizeof *row), .seconds = malloc(rows * sizeof *seconds), .png = png, .png_size = png_size};
+    if (!to->row || !to->seconds) {
+        r->results--;
+        free(to->row);
+        free(to->seconds);
+        free(png);
+        return ts_fail(st, TS_NOMEM, "out of memory for the results");
+    }
     snprintf(to->material, sizeof to->material, "%s", material);
     memcpy(to->row, row, rows * sizeof *row);
-    r->results++;
+    memcpy(to->seconds, seconds, rows * sizeof *seconds);
     return TS_OK;
 }
 
 void ev_report_free(ev_report *r)
 {
-    for (int i = 0; i < r->results; i++) free(r->result[i].row);
+    for (int i = 0; i < r->results; i++) {
+        free(r->result[i].row);
+        free(r->result[i].seconds);
+        free(r->result[i].png);
+    }
     free(r->result);
     r->result = NULL;
     r->results = r->room = 0;
+}
+
+static int by_size(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+double ev_report_seconds(const ev_report *r, int set, int step)
+{
+    double *all = malloc(((size_t)r->results + 1) * sizeof *all), median = NAN;
+    int n = 0;
+    for (int i = 0; i < r->results && all; i++)
+        if (set < 0 || r->result[i].set == set) all[n++] = r->result[i].seconds[step];
+    if (n) {
+        qsort(all, (size_t)n, sizeof *all, by_size);
+        median = (all[n / 2] + all[(n - 1) / 2]) / 2;
+    }
+    free(all);
+    return median;
 }
 
 int ev_report_summary(const ev_report *r, int set, int step, ev_row *mean, ev_row *deviation)
@@ -55,7 +89,7 @@ int ev_report_summary(const ev_report *r, int set, int step, ev_row *mean, ev_ro
     return n;
 }
 
-void ev_report_print(const ev_report *r, int size, FILE *out)
+void ev_report_print(const ev_report *r, FILE *out)
 {
     for (int set = 0; set <= r->sets; set++) {
         const bool all = set == r->sets;
@@ -64,13 +98,13 @@ void ev_report_print(const ev_report *r, int size, FILE *out)
         if (n == 0 || (all && r->sets == 1)) continue;
         const ev_row any = mean; /* what R_0 has not, no step has */
         const double start = mean.value[EV_RENDER];
-        fprintf(out, "%s%s: %d %s, %d x %d pixels", set > 0 ? "\n" : "", all ? "all sets" : r->set_name[set], n, n == 1 ? "material" : "materials", size, size);
+        fprintf(out, "%s%s: %d %s, %d x %d pixels", set > 0 ? "\n" : "", all ? "all sets" : r->set_name[set], n, n == 1 ? "material" : "materials", r->size, r->size);
         if (isnan(mean.value[EV_DIFFUSE])) fputs(", each picture but the first", out);
         else if (isnan(mean.value[EV_EXPOSURE])) fprintf(out, ", %d renderings each", RD_EVAL_VIEWS);
         fputs("; RMSE (angle: degrees; ssim, flip, exposure: themselves), mean +- standard deviation\n     ", out);
         for (int k = 0; k < EV_METRICS; k++)
             if (!isnan(mean.value[k])) fprintf(out, "  %-16s", ev_metric_name[k]);
-        fputs("  render change\n", out);
+        fputs("  render change  seconds\n", out);
         for (int t = 0; t <= r->steps; t++) {
             ev_report_summary(r, all ? -1 : set, t, &mean, &deviation);
             fprintf(out, "R_%-3d", t);
@@ -79,8 +113,7 @@ void ev_report_print(const ev_report *r, int size, FILE *out)
                 if (isnan(mean.value[k])) fprintf(out, "  %-16s", "-");
                 else fprintf(out, k == EV_ANGLE || k == EV_EXPOSURE ? "  %6.2f +- %6.2f" : "  %.4f +- %.4f", mean.value[k], deviation.value[k]);
             }
-            if (start > 0) fprintf(out, "  %+.1f%%", 100 * (mean.value[EV_RENDER] / start - 1));
-            fputc('\n', out);
+            fprintf(out, "  %+12.1f%%  %7.3f\n", start > 0 ? 100 * (mean.value[EV_RENDER] / start - 1) : 0, ev_report_seconds(r, all ? -1 : set, t));
         }
     }
 }
@@ -163,6 +196,11 @@ static ts_code replace(const ev_report *r, const char *folder, const char *name,
 
 ts_code ev_report_write(const ev_report *r, const char *folder, ts_status *st)
 {
-    const ts_code code = replace(r, folder, "results.csv", write_results, st);
-    return code ? code : replace(r, folder, "summary.csv", write_summary, st);
+    ts_code code = replace(r, folder, "results.csv", write_results, st);
+    static const struct {
+        const char *name;
+        void (*write_to)(const ev_report *, FILE *);
+    } others[] = {{"summary.csv", write_summary}, {"results.json", ev_json_write}, {"report.html", ev_html_write}};
+    for (size_t i = 0; i < sizeof others / sizeof *others && !code; i++) code = replace(r, folder, others[i].name, others[i].write_to, st);
+    return code;
 }

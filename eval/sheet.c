@@ -1,50 +1,90 @@
 #include "eval/sheet.h"
 #include "eval/multiview.h"
 #include "infer/panels.h"
+#include "tensor/resize.h"
+#include <math.h>
 
 enum { ROWS = 3, RENDERINGS = 3, COLUMNS = 1 + LGD_MAP_PANELS + RENDERINGS };
 
-/* Rows: the photographs, and their re-renderings by R_0 and the last R_t, each with its own exposure. */
-static ts_code capture_sheet(const char *path, const ev_case *c, const float *first, const float *last, ts_status *st)
+static int columns_of(const ev_case *c) { return c->capture && c->capture->images < COLUMNS ? c->capture->images : COLUMNS; }
+
+/* maps NULL: the photographs. Each estimate has its own exposure. */
+static void capture_row(io_image *sheet, const ev_case *c, int row, const float *maps, float *picture)
 {
-    const io_capture *capture = c->capture;
-    const int size = c->size, columns = capture->images < COLUMNS ? capture->images : COLUMNS;
-    const size_t values = (size_t)size * (size_t)size * 3;
-    io_image sheet = {0}, picture = {0};
-    ts_code code = io_image_create(&sheet, columns * size, ROWS * size, 3, st);
-    if (!code) code = io_image_create(&picture, size, size, 3, st);
-    for (int row = 0; row < ROWS && !code; row++) {
-        const float *maps = row == 1 ? first : last;
-        const double exposure = row ? ev_capture_score(capture, maps, MAP_CHANNELS, false).value[EV_EXPOSURE] : 1;
-        for (int i = 0; i < columns; i++) {
-            if (row) ev_capture_render(capture, i, maps, MAP_CHANNELS, exposure, picture.data);
-            lgd_panel_put(&sheet, size, i, row, row ? picture.data : capture->image + (size_t)i * values);
-        }
+    const size_t values = (size_t)c->size * (size_t)c->size * 3;
+    const double exposure = maps ? ev_capture_score(c->capture, maps, MAP_CHANNELS, false).value[EV_EXPOSURE] : 1;
+    for (int i = 0; i < columns_of(c); i++) {
+        if (maps) ev_capture_render(c->capture, i, maps, MAP_CHANNELS, exposure, picture);
+        lgd_panel_put(sheet, c->size, i, row, maps ? picture : c->capture->image + (size_t)i * values);
     }
-    if (!code) code = io_write_png(path, &sheet, 8, true, st);
-    io_image_free(&sheet);
+}
+
+/* maps NULL: the truth. */
+static void maps_row(io_image *sheet, const ev_case *c, int row, const float *maps, float *picture)
+{
+    const io_material m = {.size = c->size, .maps = maps ? (float *)maps : c->truth->maps}; /* only read */
+    if (maps) lgd_panel_render(sheet, 0, row, &m, &c->view, picture);
+    else lgd_panel_put(sheet, c->size, 0, row, c->image);
+    lgd_panel_maps(sheet, 1, row, &m, picture);
+    for (int i = 0; i < RENDERINGS; i++) lgd_panel_render(sheet, 1 + LGD_MAP_PANELS + i, row, &m, &c->views[i], picture);
+}
+
+/* Row i shows maps[i]; the sheet has rows of them and is linear. */
+static ts_code make(const ev_case *c, const float *const *maps, int rows, int sheet_rows, io_image *sheet, ts_status *st)
+{
+    io_image picture = {0};
+    ts_code code = io_image_create(sheet, columns_of(c) * c->size, sheet_rows * c->size, 3, st);
+    if (!code) code = io_image_create(&picture, c->size, c->size, 3, st);
+    for (int row = 0; row < rows && !code; row++) (c->capture ? capture_row : maps_row)(sheet, c, row, maps[row], picture.data);
     io_image_free(&picture);
     return code;
 }
 
 ts_code ev_sheet_write(const char *path, const ev_case *c, const float *first, const float *last, ts_status *st)
 {
-    if (c->capture) return capture_sheet(path, c, first, last, st);
-    const int size = c->size;
-    io_image sheet = {0}, picture = {0};
-    ts_code code = io_image_create(&sheet, COLUMNS * size, ROWS * size, 3, st);
-    if (!code) code = io_image_create(&picture, size, size, 3, st);
-    for (int row = 0; row < ROWS && !code; row++) {
-        const float *const maps[ROWS] = {c->truth->maps, first, last};
-        const io_material m = {.size = size, .maps = (float *)maps[row]}; /* only read */
-        const rd_view flash = rd_flash();
-        if (row == 0) lgd_panel_put(&sheet, size, 0, 0, c->image);
-        else lgd_panel_render(&sheet, 0, row, &m, &flash, picture.data);
-        lgd_panel_maps(&sheet, 1, row, &m, picture.data);
-        for (int i = 0; i < RENDERINGS; i++) lgd_panel_render(&sheet, 1 + LGD_MAP_PANELS + i, row, &m, &c->views[i], picture.data);
-    }
+    const float *const maps[ROWS] = {NULL, first, last};
+    io_image sheet = {0};
+    ts_code code = make(c, maps, ROWS, ROWS, &sheet, st);
     if (!code) code = io_write_png(path, &sheet, 8, true, st);
     io_image_free(&sheet);
-    io_image_free(&picture);
+    return code;
+}
+
+/* The third row from the first two, as they are shown. */
+static void difference_row(io_image *sheet)
+{
+    const size_t values = (size_t)sheet->width * (size_t)sheet->height; /* a third of the height times three channels */
+    for (size_t i = 0; i < values; i++) {
+        const float d = fabsf(io_linear_to_srgb(sheet->data[i]) - io_linear_to_srgb(sheet->data[values + i]));
+        sheet->data[2 * values + i] = io_srgb_to_linear(fminf(4 * d, 1));
+    }
+}
+
+static ts_code shrink(io_image *sheet, int width, int height, ts_status *st)
+{
+    io_image small = {0};
+    ts_arena *arena = ts_arena_create(0, st);
+    ts_code code = arena ? io_image_create(&small, width, height, 3, st) : st->code;
+    if (!code) {
+        const ts_tensor from = ts_view(sheet->data, (ts_shape){1, sheet->height, sheet->width, 3});
+        ts_tensor to = ts_view(small.data, (ts_shape){1, height, width, 3});
+        code = ts_resize(&to, &from, arena, st);
+    }
+    ts_arena_destroy(&arena);
+    io_image_free(code ? &small : sheet);
+    if (!code) *sheet = small;
+    return code;
+}
+
+ts_code ev_sheet_png(const ev_case *c, const float *estimate, unsigned char **bytes, size_t *size, ts_status *st)
+{
+    const float *const maps[2] = {NULL, estimate};
+    io_image sheet = {0};
+    *bytes = NULL;
+    ts_code code = make(c, maps, 2, ROWS, &sheet, st);
+    if (!code) difference_row(&sheet);
+    if (!code && c->size > EV_SHEET_PANEL) code = shrink(&sheet, columns_of(c) * EV_SHEET_PANEL, ROWS * EV_SHEET_PANEL, st);
+    if (!code) code = io_png_bytes(&sheet, 8, true, bytes, size, st);
+    io_image_free(&sheet);
     return code;
 }

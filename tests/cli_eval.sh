@@ -35,7 +35,7 @@ procedural() {
     for t in 0 1 2; do grep -q "^R_$t  *0\.[0-9]* +- 0\." "$T/out" || fail "no line for R_$t"; done
     lines "$T/o/results.csv" 10
     lines "$T/o/summary.csv" 4
-    [ "$(ls -A "$T/o" | tr '\n' ' ')" = "results.csv summary.csv " ] || fail "other files: $(ls -A "$T/o")"
+    [ "$(ls -A "$T/o" | tr '\n' ' ')" = "report.html results.csv results.json summary.csv " ] || fail "other files: $(ls -A "$T/o")"
     # the summary is the mean of the results
     for t in 0 2; do
         mean=$(awk -F, -v t=$t 'NR > 1 && $4 == t { s += $9; n++ } END { printf "%.4f", s / n }' "$T/o/results.csv")

@@ -72,13 +72,14 @@ TEST(eval_measures_every_step_as_its_maps_score)
         CHECK(model && tape, "%s", st.message);
         nn_model_init(model, 1);
         ev_row row[3], again[3];
-        CHECK(ev_measure(tape, model, &c, 2, row, first, last, &st) == TS_OK, "%s", st.message);
+        double seconds[3];
+        CHECK(ev_measure(tape, model, &c, 2, row, NULL, first, last, &st) == TS_OK, "%s", st.message);
         const ev_row start = ev_score(&c, first, MAP_CHANNELS), end = ev_score(&c, last, MAP_CHANNELS);
         CHECK(memcmp(&start, &row[0], sizeof start) == 0 && memcmp(&end, &row[2], sizeof end) == 0, "rows differ from their maps' scores");
         CHECK(memcmp(first, last, sizeof first) != 0, "refinement does nothing");
-        CHECK(ev_measure(tape, model, &c, 2, again, NULL, NULL, &st) == TS_OK && memcmp(row, again, sizeof row) == 0, "again gives other numbers");
+        CHECK(ev_measure(tape, model, &c, 2, again, seconds, NULL, NULL, &st) == TS_OK && memcmp(row, again, sizeof row) == 0, "again gives other numbers");
         for (size_t i = 0; i < model->count; i++) model->value[i] = NAN;
-        CHECK(ev_measure(tape, model, &c, 2, again, NULL, NULL, &st) == TS_NUMERIC, "damaged weights have a score: %s", st.message);
+        CHECK(ev_measure(tape, model, &c, 2, again, seconds, NULL, NULL, &st) == TS_NUMERIC, "damaged weights have a score: %s", st.message);
         st = (ts_status){0};
         ag_tape_destroy(&tape);
         nn_model_free(&model);
@@ -109,11 +110,12 @@ TEST(eval_summary_is_mean_and_deviation)
     static const double value[] = {1, 2, 6, 5};
     for (int i = 0; i < 4; i++) {
         ev_row row[2];
+        const double seconds[2] = {0, value[i]};
         for (int k = 0; k < EV_METRICS; k++) {
             row[0].value[k] = value[i] + k;
             row[1].value[k] = 10 * value[i];
         }
-        CHECK(ev_report_add(&r, i / 3, "m", row, &st) == TS_OK, "%s", st.message);
+        CHECK(ev_report_add(&r, i / 3, "m", row, seconds, NULL, 0, &st) == TS_OK, "%s", st.message);
     }
     ev_row mean, deviation;
     CHECK(ev_report_summary(&r, 0, 0, &mean, &deviation) == 3, "three materials");
@@ -121,17 +123,19 @@ TEST(eval_summary_is_mean_and_deviation)
         CHECK(fabs(mean.value[k] - 3 - k) < 1e-12 && fabs(deviation.value[k] - sqrt(7)) < 1e-12, "mean %g, deviation %g", mean.value[k], deviation.value[k]);
     CHECK(ev_report_summary(&r, 1, 1, &mean, &deviation) == 1 && mean.value[0] == 50 && deviation.value[0] == 0, "one material has no spread");
     CHECK(ev_report_summary(&r, -1, 1, &mean, &deviation) == 4 && fabs(mean.value[2] - 35) < 1e-12, "all sets: %g", mean.value[2]);
+    CHECK(ev_report_seconds(&r, 0, 1) == 2 && ev_report_seconds(&r, -1, 1) == 3.5, "medians %g and %g", ev_report_seconds(&r, 0, 1), ev_report_seconds(&r, -1, 1));
     ev_report_free(&r);
 }
 
 TEST(eval_csv_quotes_what_needs_it)
 {
     const char *const names[] = {"maps:a,b \"c\""};
-    ev_report r = {.steps = 0, .sets = 1, .set_name = names};
+    ev_report r = {.steps = 0, .sets = 1, .set_name = names, .model = "m", .isa = "base"};
     ts_status st = {0};
+    const double second = 1;
     ev_row row = {{0.5, 0.25, 0.125, 0, 1, 12, NAN, 0.75, 2}};
     char path[256], line[256] = "";
-    CHECK(ev_report_add(&r, 0, "plain", &row, &st) == TS_OK && ev_report_write(&r, test_folder(), &st) == TS_OK, "%s", st.message);
+    CHECK(ev_report_add(&r, 0, "plain", &row, &second, NULL, 0, &st) == TS_OK && ev_report_write(&r, test_folder(), &st) == TS_OK, "%s", st.message);
     snprintf(path, sizeof path, "%s/results.csv", test_folder());
     FILE *f = fopen(path, "r");
     CHECK(f && fgets(line, sizeof line, f), "%s is missing", path);

@@ -1,0 +1,109 @@
+#include "eval/plot.h"
+#include <math.h>
+#include <stdbool.h>
+
+enum { WIDTH = 760, HEIGHT = 420, LEFT = 70, RIGHT = 210, TOP = 20, BOTTOM = 50, TICKS = 6 };
+
+/* Colours that people with any colour vision tell apart (Okabe and Ito, "Color Universal Design", 2008). */
+static const char *const colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"};
+#define COLOUR(s) colours[(size_t)(s) % (sizeof colours / sizeof *colours)]
+
+void ev_put_text(FILE *f, const char *text)
+{
+    for (; *text; text++) switch (*text) {
+        case '&': fputs("&amp;", f); break;
+        case '<': fputs("&lt;", f); break;
+        case '>': fputs("&gt;", f); break;
+        case '"': fputs("&quot;", f); break;
+        default: fputc(*text, f);
+        }
+}
+
+typedef struct frame {
+    double x0, x1, y0, y1; /* log10 of x; y */
+} frame;
+
+static bool shown(const ev_point *p) { return isfinite(p->x) && p->x > 0 && isfinite(p->y); }
+static double across(const frame *r, double x) { return LEFT + (log10(x) - r->x0) / (r->x1 - r->x0) * (WIDTH - LEFT - RIGHT); }
+static double down(const frame *r, double y) { return TOP + (r->y1 - y) / (r->y1 - r->y0) * (HEIGHT - TOP - BOTTOM); }
+
+/* 1, 2 or 5 times a power of ten: the smallest that is at least v. */
+static double round_step(double v)
+{
+    const double ten = pow(10, floor(log10(v)));
+    return v <= ten ? ten : v <= 2 * ten ? 2 * ten : v <= 5 * ten ? 5 * ten : 10 * ten;
+}
+
+static bool make_frame(const ev_series *series, int count, frame *r)
+{
+    *r = (frame){INFINITY, -INFINITY, INFINITY, -INFINITY};
+    for (int s = 0; s < count; s++)
+        for (int i = 0; i < series[s].points; i++) {
+            const ev_point *p = &series[s].point[i];
+            if (!shown(p)) continue;
+            r->x0 = fmin(r->x0, log10(p->x)), r->x1 = fmax(r->x1, log10(p->x));
+            r->y0 = fmin(r->y0, p->y), r->y1 = fmax(r->y1, p->y);
+        }
+    if (r->x0 > r->x1) return false;
+    const double mx = fmax(0.05, 0.06 * (r->x1 - r->x0)), my = fmax(1e-4, 0.08 * (r->y1 - r->y0)); /* a single point has a frame too */
+    r->x0 -= mx, r->x1 += mx, r->y0 -= my, r->y1 += my;
+    return true;
+}
+
+static void axes(FILE *f, const frame *r, const char *x_title, const char *y_title)
+{
+    fprintf(f, "<rect x=\"%d\" y=\"%d\" width=\"%d\" height=\"%d\" fill=\"none\" stroke=\"#888\"/>\n", LEFT, TOP, WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM);
+    const double step = round_step((r->y1 - r->y0) / TICKS);
+    for (double y = ceil(r->y0 / step) * step; y <= r->y1; y += step)
+        fprintf(f, "<line x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\" stroke=\"#ddd\"/><text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%.3g</text>\n", LEFT, WIDTH - RIGHT,
+            down(r, y), down(r, y), LEFT - 6, down(r, y) + 4, y);
+    const bool wide = r->x1 - r->x0 > 3; /* decades only */
+    for (int e = (int)floor(r->x0); e <= (int)ceil(r->x1); e++)
+        for (int m = 1; m < 10; m += wide ? 9 : 1) {
+            const double x = m * pow(10, e);
+            if (log10(x) < r->x0 || log10(x) > r->x1) continue;
+            fprintf(f, "<line x1=\"%.1f\" x2=\"%.1f\" y1=\"%d\" y2=\"%d\" stroke=\"#ddd\"/>", across(r, x), across(r, x), TOP, HEIGHT - BOTTOM);
+            if (m == 1 || m == 2 || m == 5) fprintf(f, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%.4g</text>\n", across(r, x), HEIGHT - BOTTOM + 16, x);
+        }
+    fprintf(f, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">", (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 10);
+    ev_put_text(f, x_title);
+    fprintf(f, "</text>\n<text transform=\"translate(16 %d) rotate(-90)\" text-anchor=\"middle\">", (TOP + HEIGHT - BOTTOM) / 2);
+    ev_put_text(f, y_title);
+    fputs("</text>\n", f);
+}
+
+static void draw(FILE *f, const frame *r, const ev_series *series, int s)
+{
+    const int legend = TOP + 12 + 18 * s;
+    fprintf(f, "<g stroke=\"%s\" fill=\"none\"><polyline points=\"", COLOUR(s));
+    for (int i = 0; i < series->points; i++)
+        if (shown(&series->point[i])) fprintf(f, "%.1f,%.1f ", across(r, series->point[i].x), down(r, series->point[i].y));
+    fputs("\"/></g>\n", f);
+    for (int i = 0; i < series->points; i++) {
+        const ev_point *p = &series->point[i];
+        if (!shown(p)) continue;
+        fprintf(f, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3.5\" fill=\"%s\"><title>", across(r, p->x), down(r, p->y), COLOUR(s));
+        ev_put_text(f, series->name);
+        fprintf(f, " %s: %.4g s, %.4f &#177; %.4f</title></circle>", p->label, p->x, p->y, p->deviation);
+        if (p->label[0]) {
+            fprintf(f, "<text x=\"%.1f\" y=\"%.1f\" font-size=\"10\">", across(r, p->x) + 4, down(r, p->y) - 5);
+            ev_put_text(f, p->label);
+            fputs("</text>\n", f);
+        }
+    }
+    fprintf(f, "<circle cx=\"%d\" cy=\"%d\" r=\"3.5\" fill=\"%s\"/><text x=\"%d\" y=\"%d\">", WIDTH - RIGHT + 14, legend, COLOUR(s), WIDTH - RIGHT + 24, legend + 4);
+    ev_put_text(f, series->name);
+    fputs("</text>\n", f);
+}
+
+void ev_plot_write(FILE *f, const char *x_title, const char *y_title, const ev_series *series, int count)
+{
+    frame r;
+    fprintf(f, "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" font-family=\"sans-serif\" font-size=\"12\">\n", WIDTH, HEIGHT, WIDTH, HEIGHT);
+    fprintf(f, "<rect width=\"%d\" height=\"%d\" fill=\"#fff\"/>\n", WIDTH, HEIGHT);
+    if (make_frame(series, count, &r)) {
+        axes(f, &r, x_title, y_title);
+        for (int s = 0; s < count; s++) draw(f, &r, &series[s], s);
+    } else fprintf(f, "<text x=\"%d\" y=\"%d\">nothing was measured</text>\n", LEFT, HEIGHT / 2);
+    fputs("</svg>\n", f);
+}

@@ -1,0 +1,23 @@
+/* A plot as SVG: series of points, the horizontal axis logarithmic. */
+#ifndef EV_PLOT_H
+#define EV_PLOT_H
+#include <stdio.h>
+
+typedef struct ev_point {
+    double x, y;       /* x > 0 */
+    double deviation;  /* of y: shown when one points at it */
+    char label[32];    /* beside the point; may be empty */
+} ev_point;
+
+typedef struct ev_series {
+    const char *name;
+    const ev_point *point;
+    int points; /* joined by a line in this order */
+} ev_series;
+
+/* Text for HTML and SVG: & < > " as entities. */
+void ev_put_text(FILE *f, const char *text);
+
+/* A whole <svg> element. Points that are not finite, or whose x is not above 0, are left out; without any a line says so. */
+void ev_plot_write(FILE *f, const char *x_title, const char *y_title, const ev_series *series, int count);
+#endif

@@ -1,0 +1,132 @@
+/* The report's files: what they say and that they are what they claim to be. */
+#include "eval/html.h"
+#include "eval/plot.h"
+#include "tests/test.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static char *written(void (*write_to)(const ev_report *, FILE *), const ev_report *r)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    CHECK(f, "open_memstream");
+    write_to(r, f);
+    CHECK(fclose(f) == 0 && strlen(text) == size, "a zero byte in the text");
+    return text;
+}
+
+static int count(const char *text, const char *what)
+{
+    int n = 0;
+    for (const char *p = text; (p = strstr(p, what)); p += strlen(what)) n++;
+    return n;
+}
+
+/* Two sets, three materials, hostile names, and numbers that were not measured. */
+static void make(ev_report *r)
+{
+    static const char *const sets[] = {"maps:<a> & \"b\"", "procedural:1,1"}, *const materials[] = {"</article><script>x</script>", "back\\slash\"quote", "tab\there"};
+    static const char png[] = "any bytes"; /* the page does not look into them */
+    ts_status st = {0};
+    *r = (ev_report){.steps = 1, .sets = 2, .size = 8, .threads = 1, .set_name = sets, .model = "m<1>.safetensors", .isa = "base"};
+    for (int i = 0; i < 3; i++) {
+        ev_row row[2];
+        const double seconds[2] = {0.5, 1.5};
+        for (int k = 0; k < EV_METRICS; k++) {
+            row[0].value[k] = k == EV_EXPOSURE || (k == EV_SSIM && i == 0) ? NAN : 0.25 * (i + 1);
+            row[1].value[k] = row[0].value[k] / 2;
+        }
+        unsigned char *copy = i == 1 ? (unsigned char *)strdup(png) : NULL;
+        CHECK(ev_report_add(r, i / 2, materials[i], row, seconds, copy, i == 1 ? strlen(png) : 0, &st) == TS_OK, "%s", st.message);
+    }
+}
+
+TEST(report_html)
+{
+    ev_report r;
+    make(&r);
+    char *text = written(ev_html_write, &r);
+    CHECK(count(text, "<article ") == 3 && count(text, "</article>") == 3, "%d materials", count(text, "<article "));
+    CHECK(count(text, "<script>") == 1 && strstr(text, "&lt;script&gt;x"), "a name is markup");
+    CHECK(strstr(text, "maps:&lt;a&gt; &amp; &quot;b&quot;") && strstr(text, "m&lt;1&gt;"), "names are not escaped");
+    CHECK(strstr(text, "data:image/png;base64,YW55IGJ5dGVz\""), "the picture is not there");
+    CHECK(count(text, "http://") == 1 && count(text, "https://") == 0, "something is loaded"); /* SVG's namespace */
+    CHECK(!strstr(text, "nan") && !strstr(text, "inf"), "a number is none");
+    CHECK(count(text, "data-ssim=\"\"") == 1 && count(text, "data-exposure=\"\"") == 3 && strstr(text, "data-render=\"0.250000\""), "the sort keys");
+    CHECK(count(text, "<circle") == 2 * 2 + 2, "%d points in the plot", count(text, "<circle"));
+    free(text);
+    ev_report_free(&r);
+}
+
+/* A reader of JSON that knows no more than the grammar (RFC 8259). */
+static const char *value(const char *p);
+static const char *blank(const char *p) { return p + strspn(p, " \n\t\r"); }
+static const char *string(const char *p)
+{
+    CHECK(*p == '"', "no string: %.20s", p);
+    for (p++; *p != '"'; p++) {
+        CHECK((unsigned char)*p >= 0x20, "a control character in a string");
+        if (*p == '\\') p++;
+    }
+    return p + 1;
+}
+static const char *list(const char *p, char end)
+{
+    for (p = blank(p + 1); *p != end; p = blank(p)) {
+        if (end == '}') {
+            p = blank(string(p));
+            CHECK(*p == ':', "no colon: %.20s", p);
+            p++;
+        }
+        p = blank(value(blank(p)));
+        CHECK(*p == ',' || *p == end, "neither a comma nor an end: %.20s", p);
+        if (*p == ',') {
+            p = blank(p + 1);
+            CHECK(*p != end, "a comma before the end");
+        }
+    }
+    return p + 1;
+}
+static const char *value(const char *p)
+{
+    char *end;
+    if (*p == '{') return list(p, '}');
+    if (*p == '[') return list(p, ']');
+    if (*p == '"') return string(p);
+    if (!strncmp(p, "null", 4)) return p + 4;
+    CHECK(*p == '-' || (*p >= '0' && *p <= '9'), "no value: %.20s", p);
+    strtod(p, &end);
+    return end;
+}
+
+TEST(report_json)
+{
+    ev_report r;
+    make(&r);
+    char *text = written(ev_json_write, &r);
+    CHECK(*blank(value(blank(text))) == 0, "something after the end");
+    CHECK(count(text, "\"name\"") == 5 && count(text, "\"seconds\": 1.5") == 5, "%d names", count(text, "\"name\""));
+    CHECK(count(text, "\"ssim\": null") == 2 && strstr(text, "\"ssim\": 0.25"), "what was not measured");
+    CHECK(strstr(text, "back\\\\slash\\\"quote") && strstr(text, "tab\\u0009here"), "names are not escaped");
+    free(text);
+    ev_report_free(&r);
+}
+
+TEST(report_plot)
+{
+    const ev_point some[] = {{0.1, 0.2, 0, "a"}, {1, 0.1, 0, ""}, {0, 0.1, 0, "zero"}, {1, NAN, 0, "none"}, {INFINITY, 1, 0, ""}};
+    const ev_series series[] = {{"s", some, 5}, {"one", some, 1}, {"none", some + 3, 1}};
+    for (int n = 0; n <= 3; n++) {
+        char *text = NULL;
+        size_t size;
+        FILE *f = open_memstream(&text, &size);
+        CHECK(f, "open_memstream");
+        ev_plot_write(f, "x <", "y", n == 3 ? series + 1 : series, n == 3 ? 1 : n);
+        fclose(f);
+        CHECK(!strstr(text, "nan") && !strstr(text, "inf") && !strstr(text, "zero"), "%s", text);
+        CHECK(strstr(text, "nothing was measured") ? n == 0 : count(text, "<circle") == (n == 3 ? 2 : n == 2 ? 5 : 3), "%d series: %d circles", n, count(text, "<circle"));
+        free(text);
+    }
+}
