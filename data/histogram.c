@@ -24,6 +24,20 @@ void io_histogram_add(io_histogram *h, const float *maps, int size)
     h->count++;
 }
 
+static ts_code add(void *context, const io_material *m, ts_status *st)
+{
+    (void)st;
+    io_histogram_add(context, m->maps, m->size);
+    return TS_OK;
+}
+
+ts_code io_histogram_folder(const char *folder, int size, io_histogram *h, ts_status *st)
+{
+    const int before = h->count;
+    ts_code code = io_visit_materials(folder, size, add, h, st);
+    return code || h->count > before ? code : ts_fail(st, TS_IO, "%s: has no materials in maps/ or strips/", folder);
+}
+
 double io_histogram_overlap(const io_histogram *a, const io_histogram *b, int histogram)
 {
     double sum = 0;

@@ -14,6 +14,8 @@ typedef struct io_histogram {
 } io_histogram;
 
 void io_histogram_add(io_histogram *h, const float *maps, int size);
+/* Adds what io_visit_materials finds in the folder; TS_IO when that is nothing. */
+ts_code io_histogram_folder(const char *folder, int size, io_histogram *h, ts_status *st);
 /* What the two sets have in common of one map: the sum over the bins of the smaller share, 1 when they are the same. */
 double io_histogram_overlap(const io_histogram *a, const io_histogram *b, int histogram);
 

@@ -354,21 +354,13 @@ static ts_code compare(const options *o, ts_status *st)
     return code;
 }
 
-static ts_code add_to_histogram(void *context, const io_material *m, ts_status *st)
-{
-    (void)st;
-    io_histogram_add(context, m->maps, m->size);
-    return TS_OK;
-}
-
 static ts_code make_histograms(const options *o, ts_status *st)
 {
     static io_histogram ours, theirs;
     int count = o->count ? (int)o->count : 512, size = o->size ? (int)o->size : 128;
     char path[4096];
     io_material m = {0};
-    ts_code code = io_visit_materials(o->testdata, size, add_to_histogram, &theirs, st);
-    if (!code && !theirs.count) code = ts_fail(st, TS_IO, "%s: has no materials in maps/ or strips/", o->testdata);
+    ts_code code = io_histogram_folder(o->testdata, size, &theirs, st);
     if (!code) code = io_material_create(&m, size, st);
     for (int i = 0; !code && i < count; i++) {
         if (cl_interrupted()) code = ts_fail(st, TS_INTERRUPTED, "interrupted after %d of %d materials", i, count);
