@@ -106,7 +106,7 @@ static ts_code write_map(const char *folder, const char *file, const io_material
 }
 
 /* What the files mean, for whoever reads them next (io_read_map_folder does). */
-static ts_code write_meta(const char *folder, unsigned which, bool directx, ts_status *st)
+ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_status *st)
 {
     char path[PATH_MAX], text[512];
     if (snprintf(path, sizeof path, "%s/meta.txt", folder) >= (int)sizeof path) return ts_fail(st, TS_INVALID, "%s: name too long", folder);
@@ -117,7 +117,7 @@ static ts_code write_meta(const char *folder, unsigned which, bool directx, ts_s
     return io_write_bytes(path, text, (size_t)length, st);
 }
 
-ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st)
+ts_code io_write_map_files(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st)
 {
     static const struct {
         unsigned which;
@@ -129,5 +129,12 @@ ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, 
         ts_code code = write_map(folder, files[i].file, m, files[i].which, directx, st);
         if (code != TS_OK) return code;
     }
-    return which ? write_meta(folder, which, directx, st) : TS_OK;
+    return TS_OK;
+}
+
+ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st)
+{
+    const ts_code code = io_write_map_files(folder, m, which, directx, st);
+    if (code != TS_OK) return code;
+    return which ? io_write_maps_meta(folder, which, directx, st) : TS_OK;
 }

@@ -36,6 +36,9 @@ ts_code io_read_strip(const char *path, int size, io_material *m, io_image *inpu
  * what they mean, so that io_read_map_folder reads the folder without being told. */
 enum { IO_MAPS_DIFFUSE = 1, IO_MAPS_SPECULAR = 2, IO_MAPS_ROUGHNESS = 4, IO_MAPS_NORMAL = 8, IO_MAPS_EXR = 16, IO_MAPS_ALL = 31 };
 ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st);
+/* The two halves of it: the files alone (from several threads at once too, for different files), the meta.txt alone. */
+ts_code io_write_map_files(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st);
+ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_status *st);
 /* A five-panel strip as io_read_strip reads it (16-bit PNG); input is linear, size x size. */
 ts_code io_write_strip(const char *path, const io_material *m, const io_image *input, ts_status *st);
 /* maps.exr back; whichever way its normals' y points, the maps' points up. */

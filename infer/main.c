@@ -6,7 +6,9 @@
 #include "infer/model_path.h"
 #include "infer/options.h"
 #include "infer/output.h"
-#include "infer/plan.h"
+#include "infer/output.h"
+#include "infer/pipeline.h"
+#include "tensor/threads.h"
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -14,113 +16,84 @@ typedef struct run {
     const lgd_command *command;
     lgd_model *model;
     cl_progress bar;
-    int done, steps;     /* photographs finished; refinement steps of each */
-    const char *photo;   /* the one in work */
-    double first, last;  /* reconstruction RMSE of R_0 and of the last R_t */
+    lgd_item *item;         /* the one that is computed */
+    int jobs, done, failed; /* photographs: all, with complete files, without */
+    int steps;              /* refinement steps of each */
 } run;
 
 static int after_step(int step, double rmse, void *user)
 {
     run *r = user;
-    if (step == 0) r->first = rmse;
-    r->last = rmse;
-    if (!r->command->quiet) cl_progress_show(&r->bar, (int64_t)r->done * (r->steps + 1) + step + 1, r->photo);
+    if (step == 0) r->item->first = rmse;
+    r->item->last = rmse;
+    r->item->steps = step;
+    if (!r->command->quiet) cl_progress_show(&r->bar, (int64_t)r->item->index * (r->steps + 1) + step + 1, r->item->job->photo);
     return cl_interrupted();
 }
 
-static void note(run *r, const char *format, ...) __attribute__((format(printf, 2, 3)));
-static void note(run *r, const char *format, ...)
-{
-    char text[512];
-    va_list args;
-    va_start(args, format);
-    vsnprintf(text, sizeof text, format, args);
-    va_end(args);
-    cl_progress_end(&r->bar);
-    cl_note("%s: %s", r->photo, text);
-}
-
 /* Says what makes a photograph a poor one: the maps will be guesses. */
-static void look_at(run *r, const io_image *photo, const io_image *square)
+static void look_at(const lgd_item *item)
 {
-    const int size = square->width, side = photo->width < photo->height ? photo->width : photo->height;
+    const char *name = item->job->photo;
+    const int size = item->square.width;
     const int64_t values = (int64_t)size * size * 3;
     int64_t dark = 0, full = 0, over = 0;
     for (int64_t i = 0; i < values; i++) {
-        dark += square->data[i] < 1e-3f; /* three of 255 sRGB levels */
-        full += square->data[i] > 0.999f;
-        over += square->data[i] > 1.001f; /* more than resampling rounds to */
+        const float v = item->square.data[i];
+        dark += v < 1e-3f; /* three of 255 sRGB levels */
+        full += v > 0.999f;
+        over += v > 1.001f; /* more than resampling rounds to */
     }
-    if (size > side) note(r, "note: upsampled: its square has %d pixels a side and --size is %d", side, size);
-    if (dark == values) note(r, "warning: the photograph is black: its maps mean nothing");
-    else if (full * 10 > values * 9) note(r, "warning: the photograph is overexposed (%.0f%% of the values): its maps mean little", 100.0 * (double)full / (double)values);
-    else if (over > 0) note(r, "note: %.1f%% of the values are above 1 and count as 1", 100.0 * (double)over / (double)values);
+    if (size > item->photo_side) cl_note("%s: note: upsampled: its square has %d pixels a side and --size is %d", name, item->photo_side, size);
+    if (dark == values) cl_note("%s: warning: the photograph is black: its maps mean nothing", name);
+    else if (full * 10 > values * 9)
+        cl_note("%s: warning: the photograph is overexposed (%.0f%% of the values): its maps mean little", name, 100.0 * (double)full / (double)values);
+    else if (over > 0) cl_note("%s: note: %.1f%% of the values are above 1 and count as 1", name, 100.0 * (double)over / (double)values);
 }
 
-static ts_code estimate(run *r, const io_image *square, io_material *m, ts_status *st)
+static void compute(lgd_item *item, void *user)
 {
+    run *r = user;
+    const int size = item->square.width;
     const lgd_options options = {.iterations = r->command->iterations, .threads = r->command->threads, .progress = after_step, .user = r};
     lgd_error error;
-    float *maps = malloc((size_t)square->width * (size_t)square->width * MAP_CHANNELS * sizeof *maps);
-    ts_code code = TS_OK;
-    if (!maps) code = ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", square->width, square->width);
-    else if (lgd_estimate(r->model, square->data, square->width, &options, maps, &error)) code = ts_fail(st, (ts_code)error.code, "%s", error.message);
-    else if (cl_interrupted()) code = ts_fail(st, TS_INTERRUPTED, "interrupted");
-    else lgd_encode(maps, square->width, m->maps);
-    free(maps);
-    return code;
+    r->item = item;
+    if (io_material_create(&item->m, size, &item->st) != TS_OK) ts_context(&item->st, "%s", item->job->photo);
+    else if (lgd_estimate(r->model, item->square.data, size, &options, item->m.maps, &error))
+        ts_fail(&item->st, (ts_code)error.code, "%s: %s", item->job->photo, error.message);
+    else if (cl_interrupted()) ts_fail(&item->st, TS_INTERRUPTED, "interrupted");
+    else lgd_encode(item->m.maps, size, item->m.maps);
 }
 
-static ts_code one(run *r, const lgd_job *job, ts_status *st)
+static void finished(const lgd_item *item, void *user)
 {
-    const lgd_command *c = r->command;
-    io_image photo = {0}, square = {0};
-    io_material m = {0};
-    ts_code code = io_read_photo(job->photo, c->max_pixels, &photo, st);
-    if (!code) {
-        code = io_centre_square(&photo, c->size, &square, st);
-        if (!code) look_at(r, &photo, &square);
-        if (!code) code = io_material_create(&m, c->size, st);
-        if (!code) code = estimate(r, &square, &m, st);
-        io_metallic_error lost = {0};
-        if (!code) code = lgd_output_write(c->out, job->stem, &m, &square, c->outputs, c->directx, &lost, st);
-        if (!code && c->outputs & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC) && !c->quiet)
-            note(r, "base colour and metalness miss diffuse by %.4f and F0 by %.4f (RMS, linear)", lost.diffuse, lost.specular);
-        if (code) ts_context(st, "%s", job->photo);
-    }
-    io_image_free(&photo);
-    io_image_free(&square);
-    io_material_free(&m);
-    return code;
-}
-
-static int all(run *r, const lgd_plan *plan)
-{
-    const lgd_command *c = r->command;
-    int failed = 0;
-    r->bar = cl_progress_start("step", (int64_t)plan->jobs * (r->steps + 1));
-    for (; r->done < plan->jobs && !cl_interrupted(); r->done++) {
-        const lgd_job *job = &plan->job[r->done];
-        ts_status st = {0};
-        r->photo = job->photo;
-        const ts_code code = one(r, job, &st);
-        if (code == TS_INTERRUPTED) break;
-        if (code) {
-            cl_progress_end(&r->bar);
-            cl_failed("%s", st.message);
-            failed++;
-            continue;
-        }
-        cl_progress_end(&r->bar);
-        printf("%s\n", job->folder);
-        fflush(stdout); /* a reader at the other end of a pipe gets each folder when it is there */
-        if (!c->quiet && r->steps > 0) note(r, "reconstruction RMSE %.4f (R_0) -> %.4f (R_%d)", r->first, r->last, r->steps);
-        else if (!c->quiet) note(r, "reconstruction RMSE %.4f (R_0)", r->first);
-    }
+    run *r = user;
+    if (item->st.code == TS_INTERRUPTED) return;
     cl_progress_end(&r->bar);
-    if (cl_interrupted()) return cl_failed("interrupted: %d of %d photographs are done", r->done - failed, plan->jobs);
-    if (failed > 0 && plan->jobs > 1) return cl_failed("%d of %d photographs failed", failed, plan->jobs);
-    return failed > 0 ? CL_FAILED : CL_OK;
+    if (item->square.data) look_at(item);
+    if (item->st.code) {
+        cl_failed("%s", item->st.message);
+        r->failed++;
+        return;
+    }
+    r->done++;
+    if (r->command->outputs & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC) && !r->command->quiet)
+        cl_note("%s: base colour and metalness miss diffuse by %.4f and F0 by %.4f (RMS, linear)", item->job->photo, item->lost.diffuse, item->lost.specular);
+    printf("%s\n", item->job->folder);
+    fflush(stdout); /* a reader at the other end of a pipe gets each folder when it is there */
+    if (r->command->quiet) return;
+    if (item->steps > 0) cl_note("%s: reconstruction RMSE %.4f (R_0) -> %.4f (R_%d)", item->job->photo, item->first, item->last, item->steps);
+    else cl_note("%s: reconstruction RMSE %.4f (R_0)", item->job->photo, item->first);
+}
+
+static int all(run *r, lgd_pipeline *pipeline)
+{
+    r->bar = cl_progress_start("step", (int64_t)r->jobs * (r->steps + 1));
+    lgd_pipeline_run(pipeline, compute, finished, cl_interrupted, r);
+    cl_progress_end(&r->bar);
+    if (cl_interrupted() && r->done + r->failed < r->jobs) return cl_failed("interrupted: %d of %d photographs are done", r->done, r->jobs);
+    if (r->failed > 0 && r->jobs > 1) return cl_failed("%d of %d photographs failed", r->failed, r->jobs);
+    return r->failed > 0 ? CL_FAILED : CL_OK;
 }
 
 static void print_help(void)
@@ -145,15 +118,19 @@ static int work(const lgd_command *c)
     lgd_plan plan;
     char weights[LGD_PATH_MAX];
     if (lgd_plan_make(c->photo, c->photos, c->out, &plan, &st) != TS_OK) return cl_usage("%s", st.message);
-    run r = {.command = c};
+    ts_threads_set(c->threads);
+    run r = {.command = c, .jobs = plan.jobs};
     int code = CL_FAILED;
+    lgd_pipeline *pipeline = NULL;
     if (lgd_model_path(c->model, weights, &st) != TS_OK) cl_failed("%s", st.message);
+    else if (!(pipeline = lgd_pipeline_start(&plan, c, &st))) cl_failed("%s", st.message); /* decodes while the weights are read */
     else if (!(r.model = lgd_load(weights, &error))) cl_failed("%s", error.message);
     else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK) cl_failed("%s", st.message);
     else {
         r.steps = c->iterations < 0 ? lgd_trained_iterations(r.model) : c->iterations;
-        code = all(&r, &plan);
+        code = all(&r, pipeline);
     }
+    lgd_pipeline_end(&pipeline);
     lgd_free(&r.model);
     lgd_plan_free(&plan);
     return code;

@@ -1,7 +1,7 @@
 #include "infer/output.h"
 #include "data/height.h"
 #include "infer/export.h"
-#include "infer/panels.h"
+#include "render/render.h"
 #include "render/scene.h"
 #include <errno.h>
 #include <stdio.h>
@@ -79,37 +79,51 @@ static ts_code write_png(const char *folder, unsigned which, const io_image *ima
     return io_write_png(path, image, bits, srgb, st);
 }
 
+/* A picture of square panels whose rows are rendered while they are written. photo: the first panel, or NULL. */
+typedef struct strip {
+    const io_material *m;
+    const io_image *photo;
+    rd_view view[LGD_PREVIEW_LIGHTS];
+    int panels;
+} strip;
+
+static ts_code make_rows(int y, int count, float *values, void *user, ts_status *st)
+{
+    const strip *s = user;
+    const int size = s->m->size;
+    const size_t panel = (size_t)size * 3, row = panel * (size_t)s->panels, first = (size_t)y * (size_t)size;
+    float *picture = malloc((size_t)count * panel * sizeof *picture);
+    if (!picture) return ts_fail(st, TS_NOMEM, "out of memory");
+    for (int k = 0; k < s->panels; k++) {
+        const float *from = k == 0 && s->photo ? s->photo->data + first * 3 : picture;
+        if (from == picture)
+            rd_render((rd_grid){.h = count, .w = size, .y0 = y, .side = size}, s->m->maps + first * MAP_CHANNELS, MAP_CHANNELS, &s->view[k], true, picture);
+        for (int i = 0; i < count; i++) memcpy(values + (size_t)i * row + (size_t)k * panel, from + (size_t)i * panel, panel * sizeof *values);
+    }
+    free(picture);
+    return TS_OK;
+}
+
+static ts_code write_strip(const char *folder, const char *name, strip *s, ts_status *st)
+{
+    char path[PATH_LENGTH];
+    const io_rows rows = {s->panels * s->m->size, s->m->size, 3, make_rows, s};
+    const ts_code code = join(path, folder, name, st);
+    return code ? code : io_write_png_rows(path, &rows, 8, true, st);
+}
+
 static ts_code write_render(const char *folder, const io_material *m, const io_image *photo, ts_status *st)
 {
-    const int size = m->size;
-    const rd_view flash = rd_flash();
-    io_image pair = {0}, picture = {0};
-    ts_code code = io_image_create(&pair, 2 * size, size, 3, st);
-    if (!code) code = io_image_create(&picture, size, size, 3, st);
-    if (!code) {
-        lgd_panel_put(&pair, size, 0, 0, photo->data);
-        lgd_panel_render(&pair, 1, 0, m, &flash, picture.data);
-        code = write_png(folder, LGD_OUT_RENDER, &pair, 8, true, st);
-    }
-    io_image_free(&pair);
-    io_image_free(&picture);
-    return code;
+    strip s = {.m = m, .photo = photo, .panels = 2};
+    s.view[1] = rd_flash();
+    return write_strip(folder, "render.png", &s, st);
 }
 
 static ts_code write_preview(const char *folder, const io_material *m, ts_status *st)
 {
-    const int size = m->size;
-    io_image strip = {0}, picture = {0};
-    ts_code code = io_image_create(&strip, LGD_PREVIEW_LIGHTS * size, size, 3, st);
-    if (!code) code = io_image_create(&picture, size, size, 3, st);
-    for (int i = 0; i < LGD_PREVIEW_LIGHTS && !code; i++) {
-        const rd_view view = rd_preview_view(i, LGD_PREVIEW_LIGHTS);
-        lgd_panel_render(&strip, i, 0, m, &view, picture.data);
-    }
-    if (!code) code = write_png(folder, LGD_OUT_PREVIEW, &strip, 8, true, st);
-    io_image_free(&strip);
-    io_image_free(&picture);
-    return code;
+    strip s = {.m = m, .panels = LGD_PREVIEW_LIGHTS};
+    for (int i = 0; i < s.panels; i++) s.view[i] = rd_preview_view(i, s.panels);
+    return write_strip(folder, "preview.png", &s, st);
 }
 
 static ts_code write_metallic(const char *folder, const io_material *m, unsigned which, io_metallic_error *lost, ts_status *st)
@@ -145,8 +159,13 @@ static ts_code write_document(const char *folder, const char *name, ts_code (*wr
     return join(path, folder, name, st) ? st->code : write(path, st);
 }
 
-static ts_code write_all(const char *folder, const io_material *m, const io_image *photo, unsigned which, bool directx, io_metallic_error *lost,
-                         ts_status *st)
+/* What is made in one go; bits of which. Slow ones first, so that two threads end together. */
+static const unsigned portions[] = {LGD_OUT_EXR, LGD_OUT_HEIGHT, LGD_OUT_PREVIEW, LGD_OUT_NORMAL, LGD_OUT_BASECOLOR | LGD_OUT_METALLIC, LGD_OUT_RENDER,
+                                    LGD_OUT_ROUGHNESS, LGD_OUT_DIFFUSE, LGD_OUT_SPECULAR, LGD_OUT_GLTF, LGD_OUT_MATERIALX};
+enum { PORTIONS = sizeof portions / sizeof *portions };
+
+/* The bits of data/material.h. */
+static unsigned map_bits(unsigned which)
 {
     static const struct {
         unsigned output, maps;
@@ -155,14 +174,36 @@ static ts_code write_all(const char *folder, const io_material *m, const io_imag
     unsigned maps = 0;
     for (size_t i = 0; i < sizeof same / sizeof *same; i++)
         if (which & same[i].output) maps |= same[i].maps;
-    ts_code code = io_write_maps(folder, m, maps, directx, st);
-    if (!code && which & LGD_OUT_RENDER) code = write_render(folder, m, photo, st);
-    if (!code && which & LGD_OUT_PREVIEW) code = write_preview(folder, m, st);
-    if (!code && which & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC)) code = write_metallic(folder, m, which, lost, st);
-    if (!code && which & LGD_OUT_HEIGHT) code = write_height(folder, m, st);
-    if (!code && which & LGD_OUT_GLTF) code = write_document(folder, "material.gltf", lgd_write_gltf, st);
-    if (!code && which & LGD_OUT_MATERIALX) code = write_document(folder, "material.mtlx", lgd_write_materialx, st);
-    return code;
+    return maps;
+}
+
+static ts_code write_portion(const char *folder, const io_material *m, const io_image *photo, unsigned which, bool directx, io_metallic_error *lost,
+                             ts_status *st)
+{
+    switch (which) {
+    case 0: return TS_OK;
+    case LGD_OUT_RENDER: return write_render(folder, m, photo, st);
+    case LGD_OUT_PREVIEW: return write_preview(folder, m, st);
+    case LGD_OUT_HEIGHT: return write_height(folder, m, st);
+    case LGD_OUT_GLTF: return write_document(folder, "material.gltf", lgd_write_gltf, st);
+    case LGD_OUT_MATERIALX: return write_document(folder, "material.mtlx", lgd_write_materialx, st);
+    default:
+        return which & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC) ? write_metallic(folder, m, which, lost, st)
+                                                              : io_write_map_files(folder, m, map_bits(which), directx, st);
+    }
+}
+
+/* Of several failures the first portion's is told. */
+static ts_code write_all(const char *folder, const io_material *m, const io_image *photo, unsigned which, bool directx, int threads,
+                         io_metallic_error *lost, ts_status *st)
+{
+    ts_status failure[PORTIONS] = {{0}};
+#pragma omp parallel for num_threads(threads) schedule(dynamic)
+    for (int i = 0; i < PORTIONS; i++) write_portion(folder, m, photo, which & portions[i], directx, lost, &failure[i]);
+    for (int i = 0; i < PORTIONS; i++)
+        if (failure[i].code) return ts_fail(st, failure[i].code, "%s", failure[i].message);
+    const unsigned maps = map_bits(which);
+    return maps ? io_write_maps_meta(folder, maps, directx, st) : TS_OK;
 }
 
 /* Every complete file from the hidden folder over the one in folder. */
@@ -178,7 +219,7 @@ static ts_code move_files(const char *hidden, const char *folder, ts_status *st)
 }
 
 ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const io_image *photo, unsigned which, bool directx,
-                         io_metallic_error *lost, ts_status *st)
+                         int threads, io_metallic_error *lost, ts_status *st)
 {
     char folder[PATH_LENGTH], hidden[PATH_LENGTH];
     struct stat info;
@@ -187,7 +228,7 @@ ts_code lgd_output_write(const char *parent, const char *stem, const io_material
     if (there && !S_ISDIR(info.st_mode)) return ts_fail(st, TS_IO, "%s: is in the way: it is not a folder", folder);
     /* inside the folder when it exists: it may lie on another file system than its parent */
     if (make_hidden(there ? folder : parent, hidden, st) != TS_OK) return st->code;
-    ts_code code = write_all(hidden, m, photo, which, directx, lost, st);
+    ts_code code = write_all(hidden, m, photo, which, directx, threads, lost, st);
     if (!code && there) code = move_files(hidden, folder, st);
     else if (!code && rename(hidden, folder) != 0) code = ts_fail(st, TS_IO, "%s: cannot be made: %s", folder, strerror(errno));
     if (code || there) remove_hidden(hidden);

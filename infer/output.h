@@ -32,7 +32,7 @@ ts_code lgd_output_check(const char *folder, ts_status *st);
 
 /* Writes which (bits) and, beside maps, meta.txt (what they mean) to parent/stem; nothing else is computed. They are written to a hidden
  * folder first and renamed when all are complete: a failure leaves what was there before, and nothing else. photo: linear, of the
- * material's size. lost: what base colour and metalness cannot express, where they are written; may be NULL. */
+ * material's size. lost: what base colour and metalness cannot express, where they are written; may be NULL. Files are made on as many threads as given. */
 ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const io_image *photo, unsigned which, bool directx,
-                         io_metallic_error *lost, ts_status *st);
+                         int threads, io_metallic_error *lost, ts_status *st);
 #endif

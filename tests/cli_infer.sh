@@ -25,7 +25,7 @@ infer() { "$BIN/lgd-infer" --size 32 --iterations 1 --threads 1 "$@"; }
 
 help_names_the_options() {
     expect 0 "$BIN/lgd-infer" --help
-    for o in size iterations model threads normal max-pixels quiet output; do says "$T/out" "--$o"; done
+    for o in size iterations model threads maps normal max-pixels quiet output; do says "$T/out" "--$o"; done
 }
 
 wrong_usage() {
@@ -62,6 +62,43 @@ threads_agree() {
         expect 0 infer --threads $n "$T/p.ppm" -o "$T/$n"
         for f in $FILES; do cmp -s "$T/1/p/$f" "$T/$n/p/$f" || fail "$f differs with $n threads"; done
     done
+}
+
+only_what_is_asked_for() {
+    model
+    photo "$T/p.ppm" 32 32
+    expect 0 infer "$T/p.ppm" -o "$T/all"
+    for list in diffuse specular roughness normal exr render preview; do
+        expect 0 infer --maps $list "$T/p.ppm" -o "$T/$list"
+        for f in "$T/$list/p"/*; do cmp -s "$f" "$T/all/p/${f##*/}" || fail "--maps $list: ${f##*/} differs"; done
+        case $list in render|preview) want="$list.png " ;; exr) want="maps.exr meta.txt " ;; *) want=$(printf '%s\n' "$list.png" meta.txt | sort | tr '\n' ' ') ;; esac
+        [ "$(ls -A "$T/$list/p" | tr '\n' ' ')" = "$want" ] || fail "--maps $list writes $(ls -A "$T/$list/p" | tr '\n' ' ')"
+    done
+    expect 0 infer --maps render,normal "$T/p.ppm" -o "$T/all"
+    complete "$T/all/p"
+}
+
+# Photographs in the same order, with the same words and the same bytes, whether they overlap or come one at a time.
+overlap_changes_nothing() {
+    model
+    list=
+    for i in 1 2 3 4 5 6 7; do
+        photo "$T/$i.ppm" $((20 + i)) 33
+        list="$list $T/$i.ppm"
+    done
+    echo bad >"$T/4.ppm"
+    # shellcheck disable=SC2086
+    expect 1 infer $list -o "$T/o"
+    cp "$T/out" "$T/names"
+    cp "$T/err" "$T/words"
+    : >"$T/one_names"
+    : >"$T/one_words"
+    for p in $list; do
+        infer "$p" -o "$T/one" >>"$T/one_names" 2>>"$T/one_words"
+    done
+    sed "s|$T/one/|$T/o/|" "$T/one_names" | cmp -s - "$T/names" || fail "other folders, or in another order"
+    grep -v "1 of 7 photographs failed" "$T/words" | cmp -s - "$T/one_words" || fail "other words: $(diff "$T/words" "$T/one_words" | head -n 3)"
+    diff -r "$T/o" "$T/one" >/dev/null || fail "other files"
 }
 
 old_results() {
@@ -375,6 +412,8 @@ check infer_help_names_the_options help_names_the_options
 check infer_wrong_usage wrong_usage
 check infer_whole_run whole_run
 check infer_threads_agree threads_agree
+check infer_writes_only_what_is_asked_for only_what_is_asked_for
+check infer_overlap_changes_nothing overlap_changes_nothing
 check infer_old_results_are_replaced old_results
 check infer_bad_photographs_do_not_stop_the_rest bad_ones_do_not_stop
 check infer_same_stem same_stem

@@ -1,0 +1,39 @@
+/* Many photographs: while one is computed the next is decoded and the last one's files are written. */
+#ifndef LGD_PIPELINE_H
+#define LGD_PIPELINE_H
+#include "data/material.h"
+#include "data/metallic.h"
+#include "infer/options.h"
+#include "infer/plan.h"
+
+/* A photograph on its way. */
+typedef struct lgd_item {
+    const lgd_job *job;
+    int index;          /* into the plan */
+    ts_status st;       /* the first failure on the way; later stages leave the item alone */
+    io_image square;    /* linear, command->size a side */
+    int photo_side;     /* the shorter side of the photograph in pixels */
+    io_material m;
+    double first, last; /* reconstruction RMSE of R_0 and of the last R_t */
+    int steps;          /* t of that */
+    io_metallic_error lost; /* infer/output.h */
+    bool decoded;       /* what follows in the inbox: decoded or finished */
+} lgd_item;
+
+typedef struct lgd_pipeline lgd_pipeline;
+
+/* Starts decoding at once, in the plan's order; plan and command outlive the pipeline. NULL with st on failure. */
+lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *command, ts_status *st);
+
+/* Computes the maps of an item, or sets its st. */
+typedef void (*lgd_compute)(lgd_item *item, void *user);
+/* Told of every photograph in the plan's order, when its files are complete or its st says why not. */
+typedef void (*lgd_finished)(const lgd_item *item, void *user);
+
+/* Both functions are called by the thread that calls this. stop is asked before each photograph: true ends the work after what is being
+ * written; the photographs that were begun and not computed end with TS_INTERRUPTED. */
+void lgd_pipeline_run(lgd_pipeline *p, lgd_compute compute, lgd_finished finished, bool (*stop)(void), void *user);
+
+/* Waits for what is under way. Nulls the pointer. */
+void lgd_pipeline_end(lgd_pipeline **p);
+#endif
