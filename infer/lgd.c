@@ -4,6 +4,7 @@
 #include "data/material.h"
 #include "infer/encode.h"
 #include "infer/memory.h"
+#include "infer/tiles.h"
 #include "nn/model.h"
 #include "nn/weights.h"
 #include "render/render.h"
@@ -17,7 +18,10 @@
 enum {
     SIDE_MAX = 16384,     /* 9.7 GB of maps: a larger number is a mistake */
     ITERATIONS_MAX = 1000, /* the same: nothing changes after some ten */
-    THREADS_MAX = 1024
+    THREADS_MAX = 1024,
+    UNTILED = 512,         /* pixels a side up to which a step of h is one piece: at most 0.8 GB with the default architecture */
+    TILE = 320,            /* the surroundings add a fifth to its work */
+    TILE_SELECTIVE = 128   /* where tiles are skipped or end early: small enough to fit what they follow */
 };
 
 struct lgd_model {
@@ -86,6 +90,9 @@ static ts_code check_arguments(const lgd_model *model, const float *image, int s
         return ts_fail(st, TS_INVALID, "lgd_estimate: iterations is %d and must lie in 0 .. %d, or be -1 for as trained", o->iterations, ITERATIONS_MAX);
     if (o->threads < 0 || o->threads > THREADS_MAX)
         return ts_fail(st, TS_INVALID, "lgd_estimate: threads is %d and must lie in 1 .. %d, or be 0 for all", o->threads, THREADS_MAX);
+    if (!(o->tolerance >= 0 && o->tolerance <= 1)) return ts_fail(st, TS_INVALID, "lgd_estimate: tolerance is %g and must lie in 0 .. 1", o->tolerance);
+    if ((o->tolerance > 0 || o->mask) && !lgd_tiles_exact(&model->net->arch))
+        return ts_fail(st, TS_UNSUPPORTED, "lgd_estimate: these weights' loss is taken anew over the whole photograph at every step: no mask and no tolerance");
     if (o->iterations > 0 && model->net->arch.h_width == 0)
         return ts_fail(st, TS_UNSUPPORTED, "lgd_estimate: these weights have no refiner: only 0 iterations are possible");
     return TS_OK;
@@ -130,7 +137,12 @@ static double step_bytes(const nn_arch *a, int side)
     return (3 + 5.0 * a->channels + cells) * sizeof(float) * side * side;
 }
 
-static ts_code estimate(lgd_model *model, const float *image, int side, const lgd_options *o, float *maps, ts_status *st)
+static ts_code not_finite(ts_status *st)
+{
+    return ts_fail(st, TS_NUMERIC, "the network's maps are not finite: the weights are damaged or did not train");
+}
+
+static ts_code estimate_whole(lgd_model *model, const float *image, int side, int steps, const lgd_options *o, float *maps, ts_status *st)
 {
     ag_reset(model->tape);
     const double more = step_bytes(&model->net->arch, side) - (double)ts_arena_peak(ag_arena(model->tape)); /* than earlier calls left */
@@ -140,16 +152,59 @@ static ts_code estimate(lgd_model *model, const float *image, int side, const lg
     const int64_t values = (int64_t)side * side * 3;
     for (int64_t i = 0; i < values; i++) in.image.data[i] = isfinite(image[i]) ? fminf(fmaxf(image[i], 0), 1) : 0;
 
-    const int trained = lgd_trained_iterations(model);
     watch w = {&in, o};
     ag_value *out = NULL;
-    if (nn_lgd(model->tape, model->net, &in, o->iterations < 0 ? trained : o->iterations, false, &out, o->progress ? after_step : NULL, &w) != TS_OK || !out) {
+    if (nn_lgd(model->tape, model->net, &in, steps, false, &out, o->progress ? after_step : NULL, &w) != TS_OK || !out) {
         *st = *ag_status(model->tape);
         return st->code ? st->code : ts_fail(st, TS_NUMERIC, "the network gave no result");
     }
-    if (!decode(out->t.data, out->t.shape.c, (int64_t)side * side, maps))
-        return ts_fail(st, TS_NUMERIC, "the network's maps are not finite: the weights are damaged or did not train");
-    return TS_OK;
+    return decode(out->t.data, out->t.shape.c, (int64_t)side * side, maps) ? TS_OK : not_finite(st);
+}
+
+/* The caller's function, as tiles call it. */
+typedef struct tile_watch {
+    const lgd_options *options;
+    double tiles, begun;
+} tile_watch;
+
+static int before_tile(void *user)
+{
+    tile_watch *w = user;
+    return w->options->tile ? w->options->tile(w->begun++ / w->tiles, w->options->user) : 0;
+}
+
+static ts_code estimate_tiles(lgd_model *model, const float *image, int side, int steps, const lgd_options *o, float *maps, ts_status *st)
+{
+    const nn_arch *arch = &model->net->arch;
+    const int64_t pixels = (int64_t)side * side;
+    const int tile = o->mask || o->tolerance > 0 ? TILE_SELECTIVE : TILE, across = (side + tile - 1) / tile;
+    tile_watch w = {o, (double)across * across, 0};
+    /* the network's channels are the caller's, but for published models */
+    float *raw = arch->channels == MAP_CHANNELS ? maps : malloc((size_t)pixels * (size_t)arch->channels * sizeof *raw);
+    double *rmse = calloc((size_t)steps + 1, sizeof *rmse);
+    ts_code code = raw && rmse ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
+    lgd_tiles t = {.image = image, .mask = o->mask, .side = side, .tile = tile, .steps = steps, .tolerance = o->tolerance, .rmse = o->progress ? rmse : NULL,
+                   .alive = before_tile, .user = &w};
+    if (!code) code = lgd_tiles_run(model->tape, model->net, &t, raw, st);
+    int stop = steps;
+    for (int i = 0; !code && o->progress && i < stop; i++)
+        if (o->progress(i, rmse[i], o->user)) stop = i;
+    if (!code && stop == steps && o->progress) o->progress(steps, rmse[steps], o->user);
+    if (!code && stop < steps) {
+        t.steps = stop;
+        code = lgd_tiles_run(model->tape, model->net, &t, raw, st);
+    }
+    if (!code && !decode(raw, arch->channels, pixels, maps)) code = not_finite(st);
+    if (raw != maps) free(raw);
+    free(rmse);
+    return code;
+}
+
+static ts_code estimate(lgd_model *model, const float *image, int side, const lgd_options *o, float *maps, ts_status *st)
+{
+    const int steps = o->iterations < 0 ? lgd_trained_iterations(model) : o->iterations;
+    const bool tiles = lgd_tiles_exact(&model->net->arch) && (side > UNTILED || o->mask || o->tolerance > 0);
+    return (tiles ? estimate_tiles : estimate_whole)(model, image, side, steps, o, maps, st);
 }
 
 int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps, lgd_error *error)

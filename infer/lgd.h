@@ -27,6 +27,16 @@ typedef struct lgd_options {
     /* Called after R_0 (step 0) and after every refinement with the reconstruction RMSE; return nonzero to stop there. May be NULL. */
     int (*progress)(int step, double rmse, void *user);
     void *user;
+    /* side x side, or NULL: only where it is not zero are the maps sure to be refined, exactly as they would be without it; elsewhere they may
+     * be the first estimate. */
+    const unsigned char *mask;
+    /* A tile of 128 x 128 pixels is refined no further once the RMS of a step's change of its maps (in their encoding, [-1, 1]), over it and all
+     * that it reads, is below this: its maps are then exactly those of that step. 0: never. */
+    double tolerance;
+    /* Photographs over 512 pixels a side, and those with mask or tolerance, are refined tile by tile, all steps of a tile at a time: progress is
+     * then called for every step at the end (stopping at a step does the work again to there), and this before each tile with the fraction that
+     * is done; nonzero ends the work with an error. May be NULL. */
+    int (*tile)(double done, void *user);
 } lgd_options;
 lgd_options lgd_options_default(void);
 

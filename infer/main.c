@@ -31,6 +31,14 @@ static int after_step(int step, double rmse, void *user)
     return cl_interrupted();
 }
 
+/* Of a photograph that is refined in tiles. */
+static int before_tile(double done, void *user)
+{
+    run *r = user;
+    if (!r->command->quiet) cl_progress_show(&r->bar, (int64_t)((r->item->index + done) * (r->steps + 1)), r->item->job->photo);
+    return cl_interrupted();
+}
+
 /* Says what makes a photograph a poor one: the maps will be guesses. */
 static void look_at(const lgd_item *item)
 {
@@ -55,11 +63,12 @@ static void compute(lgd_item *item, void *user)
 {
     run *r = user;
     const int size = item->square.width;
-    const lgd_options options = {.iterations = r->command->iterations, .threads = r->command->threads, .progress = after_step, .user = r};
+    const lgd_options options = {.iterations = r->command->iterations, .threads = r->command->threads, .progress = after_step, .user = r,
+                                 .mask = item->mask, .tolerance = r->command->tolerance, .tile = before_tile};
     lgd_error error;
     r->item = item;
     if (io_material_create(&item->m, size, &item->st) != TS_OK) ts_context(&item->st, "%s", item->job->photo);
-    else if (lgd_estimate(r->model, item->square.data, size, &options, item->m.maps, &error))
+    else if (lgd_estimate(r->model, item->square.data, size, &options, item->m.maps, &error) && !cl_interrupted())
         ts_fail(&item->st, (ts_code)error.code, "%s: %s", item->job->photo, error.message);
     else if (cl_interrupted()) ts_fail(&item->st, TS_INTERRUPTED, "interrupted");
     else lgd_encode(item->m.maps, size, item->m.maps);

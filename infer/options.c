@@ -4,12 +4,16 @@
 #include "infer/output.h"
 #include <string.h>
 
-enum { NORMAL = 256, MAPS, WORKFLOW, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
+enum { NORMAL = 256, MAPS, WORKFLOW, MASK, TOLERANCE, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
 
 const lgd_argument lgd_infer_arguments[] = {
     {'o', "output", "DIR", "write DIR/STEM/ for each photograph, STEM = its file name without extension (required)"},
     {'s', "size", "N", "pixels of a side of the maps, 1 .. 8192 (default 256)"},
     {'i', "iterations", "N", "refinement steps, 0 .. 1000; 0 = the first estimate alone (default: as trained)"},
+    {MASK, "mask", "FILE", "an image of the photographs' shape: only where it is brighter than black are the maps sure to be refined,\n"
+                           "as they would be without it; elsewhere they may be the first estimate"},
+    {TOLERANCE, "tolerance", "X", "0 .. 1: a tile of 128 pixels is refined no further once a step changes its maps by less than X (RMS,\n"
+                                  "of values in -1 .. 1); 0, the default, is exact"},
     {'m', "model", "FILE", "weights (default: $LGD_MODEL, or those installed or built with the program)"},
     {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {NORMAL, "normal", "gl|dx", "normal.png with y up (OpenGL, default) or y down (DirectX)"},
@@ -55,6 +59,10 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
         case 't':
             code = whole("threads", value, 0, 1024, &n, st);
             c->threads = (int)n;
+            break;
+        case MASK: c->mask = value; break;
+        case TOLERANCE:
+            if (!cl_parse_real(value, 0, 1, &c->tolerance)) code = ts_fail(st, TS_INVALID, "--tolerance: '%s' is not a number in 0 .. 1", value);
             break;
         case MAPS:
             code = lgd_output_parse(value, &c->outputs, st);

@@ -6,9 +6,10 @@
 #include <stdint.h>
 
 typedef struct lgd_command {
-    const char *out, *model;
+    const char *out, *model, *mask;
     int size, iterations /* -1: as trained */, threads;
     int64_t max_pixels;
+    double tolerance;
     unsigned outputs; /* LGD_OUT_... */
     bool directx, metallic, quiet, help, version;
     char **photo; /* into argv */

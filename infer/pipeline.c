@@ -2,6 +2,7 @@
 #include "infer/output.h"
 #include "infer/queue.h"
 #include "tensor/threads.h"
+#include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 
@@ -18,13 +19,33 @@ struct lgd_pipeline {
     atomic_bool stopped;
 };
 
+/* The mask is cut and resampled as the photograph is; what is not black in a pixel makes it wanted. */
+static ts_code read_mask(const lgd_command *c, const io_image *photo, unsigned char **mask, ts_status *st)
+{
+    io_image whole = {0}, square = {0};
+    const size_t pixels = (size_t)c->size * (size_t)c->size;
+    ts_code code = io_read_data(c->mask, 1, c->max_pixels, &whole, st);
+    if (code) return code;
+    const double difference = (double)whole.width * photo->height - (double)whole.height * photo->width; /* a pixel of rounding is none */
+    if (fabs(difference) > fmax(whole.width, whole.height) + fmax(photo->width, photo->height))
+        code = ts_fail(st, TS_INVALID, "the mask %s is %d x %d pixels and the photograph %d x %d: not the same shape", c->mask, whole.width, whole.height, photo->width,
+                       photo->height);
+    if (!code) code = io_centre_square(&whole, c->size, &square, st);
+    if (!code && !(*mask = malloc(pixels))) code = ts_fail(st, TS_NOMEM, "out of memory for the mask");
+    for (size_t i = 0; i < pixels && !code; i++) (*mask)[i] = square.data[i] > 0;
+    io_image_free(&whole);
+    io_image_free(&square);
+    return code;
+}
+
 static void decode(const lgd_command *c, lgd_item *item)
 {
     io_image photo = {0};
     ts_code code = io_read_photo(item->job->photo, c->max_pixels, &photo, &item->st);
     if (!code) {
         item->photo_side = photo.width < photo.height ? photo.width : photo.height;
-        if (io_centre_square(&photo, c->size, &item->square, &item->st)) ts_context(&item->st, "%s", item->job->photo);
+        if (io_centre_square(&photo, c->size, &item->square, &item->st) || (c->mask && read_mask(c, &photo, &item->mask, &item->st)))
+            ts_context(&item->st, "%s", item->job->photo);
     }
     io_image_free(&photo);
 }
@@ -79,6 +100,8 @@ static void release(lgd_pipeline *p, lgd_item *item)
 {
     io_image_free(&item->square);
     io_material_free(&item->m);
+    free(item->mask);
+    item->mask = NULL;
     lgd_queue_push(&p->idle, item);
 }
 
@@ -118,6 +141,7 @@ void lgd_pipeline_end(lgd_pipeline **pp)
     for (int i = 0; i < ITEMS; i++) {
         io_image_free(&p->item[i].square);
         io_material_free(&p->item[i].m);
+        free(p->item[i].mask);
     }
     free(p);
     *pp = NULL;

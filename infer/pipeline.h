@@ -12,6 +12,7 @@ typedef struct lgd_item {
     int index;          /* into the plan */
     ts_status st;       /* the first failure on the way; later stages leave the item alone */
     io_image square;    /* linear, command->size a side */
+    unsigned char *mask; /* [size][size] from command->mask, or NULL */
     int photo_side;     /* the shorter side of the photograph in pixels */
     io_material m;
     double first, last; /* reconstruction RMSE of R_0 and of the last R_t */

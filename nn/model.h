@@ -86,6 +86,9 @@ typedef struct nn_input {
 /* R_0 by g of the whole: [N, S, S, channels]. The log encoding, the resampling to g_size and back are in here. */
 ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in);
 
+/* How many pixels away from an output pixel h reads, in one step. */
+int nn_refiner_reach(const nn_model *model);
+
 /* What h keeps from step to step, and the loss's scale; zero-initialise it. */
 typedef struct nn_state {
     ag_value *gru[2];

@@ -29,3 +29,12 @@ ag_value *nn_step(ag_tape *tape, const nn_model *model, ag_value *maps, ag_value
     ag_value *next = ag_add(tape, maps, nn_refiner(tape, model, ag_concat(tape, maps, gradient), gru));
     return l->h_descent.weight < 0 ? next : ag_add(tape, next, nn_conv(tape, model, l->h_descent, gradient, 1, TS_PAD_ZERO, 1));
 }
+
+int nn_refiner_reach(const nn_model *model)
+{
+    const nn_layers *l = model->layers;
+    if (model->arch.h_width == 0) return 0;
+    int reach = model->param[l->h_output.weight].dim[2] / 2;
+    for (int i = 0; i < 2; i++) reach += (i + 1) * (model->param[l->cell[i].conv.weight].dim[2] / 2); /* the second is dilated by 2 */
+    return reach;
+}

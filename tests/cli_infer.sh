@@ -352,6 +352,33 @@ sizes() {
     complete "$T/o/dot"
 }
 
+mask_and_tolerance() {
+    model
+    photo "$T/p.ppm" 40 40
+    photo "$T/black.ppm" 40 40 0
+    photo "$T/white.ppm" 20 20 255
+    photo "$T/long.ppm" 40 20 255
+    expect 0 infer "$T/p.ppm" -o "$T/plain"
+    expect 0 infer --iterations 0 "$T/p.ppm" -o "$T/first"
+    expect 0 infer --mask "$T/white.ppm" "$T/p.ppm" -o "$T/all"
+    expect 0 infer --mask "$T/black.ppm" "$T/p.ppm" -o "$T/none"
+    cmp -s "$T/all/p/normal.png" "$T/plain/p/normal.png" || fail "a mask that wants everything changes the maps"
+    cmp -s "$T/none/p/normal.png" "$T/first/p/normal.png" || fail "a mask that wants nothing does not give the first estimate"
+    expect 1 infer --mask "$T/long.ppm" "$T/p.ppm" -o "$T/o"
+    says "$T/err" "long.ppm is 40 x 20"
+    expect 1 infer --mask "$T/absent.png" "$T/p.ppm" -o "$T/o"
+    says "$T/err" "absent.png"
+    for x in -1 2 x 0,5; do
+        expect 2 infer --tolerance $x "$T/p.ppm" -o "$T/o"
+        says "$T/err" "--tolerance"
+    done
+    expect 0 "$BIN/lgd-infer" --size 32 --threads 1 --tolerance 1 "$T/p.ppm" -o "$T/one"
+    cmp -s "$T/one/p/normal.png" "$T/plain/p/normal.png" || fail "with a tolerance above every change it is not the first step that counts"
+    expect 0 infer --size 520 "$T/p.ppm" -o "$T/large" # in tiles
+    complete "$T/large/p"
+    says "$T/err" "(R_1)"
+}
+
 too_many_pixels() {
     model
     printf 'P6\n1000000 1000000\n255\n' >"$T/huge.ppm"
@@ -429,6 +456,7 @@ check infer_model_lookup model_lookup
 check infer_without_the_image_library without_the_image_library
 check infer_poor_photographs poor_photographs
 check infer_sizes sizes
+check infer_mask_and_tolerance mask_and_tolerance
 check infer_too_many_pixels too_many_pixels
 check infer_comma_locale comma_locale
 check infer_directx_normals directx_normals

@@ -1,0 +1,230 @@
+#include "infer/tiles.h"
+#include "render/render.h"
+#include "tensor/resample.h"
+#include "tensor/resize.h"
+#include <math.h>
+#include <string.h>
+
+bool lgd_tiles_exact(const nn_arch *arch) { return arch->rmse == NN_RMSE_START || !arch->gradient; }
+
+/* A rectangle of the photograph: rows y0 .. y1 - 1, columns x0 .. x1 - 1. */
+typedef struct area {
+    int y0, x0, y1, x1;
+} area;
+
+static int rows(area a) { return a.y1 - a.y0; }
+static int columns(area a) { return a.x1 - a.x0; }
+
+static area grown(area a, int by, int side)
+{
+    return (area){a.y0 > by ? a.y0 - by : 0, a.x0 > by ? a.x0 - by : 0, a.y1 + by < side ? a.y1 + by : side, a.x1 + by < side ? a.x1 + by : side};
+}
+
+typedef struct work {
+    ag_tape *tape;
+    const nn_model *model;
+    lgd_tiles *t;
+    int channels;
+    const ag_value *predicted; /* R_0 as g gives it, at its own size */
+    ts_taps taps;              /* from there to side, along rows and columns alike */
+    double rmse0;
+    double *squares;           /* [steps + 1]: sums over the pixels of squared differences, by t */
+} work;
+
+/* The taps of out positions first .. first + count - 1 alone: views of t. offset counts from the first of all, so the weights stay where they are. */
+static ts_taps part(const ts_taps *t, int first, int count)
+{
+    return (ts_taps){t->in, count, t->first + first, t->offset + first, t->weight};
+}
+
+/* R_0 in an area. */
+static void start(const work *w, area a, float *maps)
+{
+    const ts_taps down = part(&w->taps, a.y0, rows(a)), across = part(&w->taps, a.x0, columns(a));
+    ts_resample(1, w->channels, &down, &across, w->predicted->t.data, maps, false);
+}
+
+static void photograph(const work *w, area a, float *to)
+{
+    for (int y = a.y0; y < a.y1; y++) {
+        const float *from = w->t->image + ((size_t)y * (size_t)w->t->side + (size_t)a.x0) * 3;
+        for (int i = 0; i < 3 * columns(a); i++) *to++ = isfinite(from[i]) ? fminf(fmaxf(from[i], 0), 1) : 0;
+    }
+}
+
+/* to (area b) = the part of from (area a) that it shows; b lies in a. */
+static void crop(area a, area b, int channels, const float *from, float *to)
+{
+    const size_t row = (size_t)columns(b) * (size_t)channels;
+    for (int y = b.y0; y < b.y1; y++, to += row)
+        memmove(to, from + ((size_t)(y - a.y0) * (size_t)columns(a) + (size_t)(b.x0 - a.x0)) * (size_t)channels, row * sizeof *to);
+}
+
+static rd_grid grid_of(area a, int side) { return (rd_grid){rows(a), columns(a), a.y0, a.x0, side}; }
+
+/* Sum of squared differences between photograph and rendering of the maps (of area a) in core. */
+static double square_sum(const work *w, area a, area core, const float *maps)
+{
+    const rd_view view = rd_flash();
+    const ts_mark mark = ts_arena_mark(ag_arena(w->tape));
+    const size_t pixels = (size_t)rows(core) * (size_t)columns(core);
+    float *part_of = ts_arena_alloc(ag_arena(w->tape), pixels * (size_t)w->channels * sizeof *part_of);
+    float *image = ts_arena_alloc(ag_arena(w->tape), pixels * 3 * sizeof *image);
+    double rmse = 0;
+    if (part_of && image) {
+        crop(a, core, w->channels, maps, part_of);
+        photograph(w, core, image);
+        rd_flash_rmse(grid_of(core, w->t->side), part_of, w->channels, &view, image, &rmse);
+    } else ag_fail(w->tape, TS_NOMEM, "out of memory");
+    ts_arena_release(ag_arena(w->tape), mark);
+    return rmse * rmse * (double)pixels;
+}
+
+static double change(const float *a, const float *b, size_t values)
+{
+    double sum = 0;
+    for (size_t i = 0; i < values; i++) sum += (double)(a[i] - b[i]) * (double)(a[i] - b[i]);
+    return sqrt(sum / (double)values);
+}
+
+/* The steps of a tile: what is refined shrinks towards the tile by h's reach at every step. Leaves R_T of the tile in to. */
+static void refine(work *w, area core, float *to)
+{
+    lgd_tiles *t = w->t;
+    const int reach = nn_refiner_reach(w->model), gru = w->model->arch.h_gru;
+    ag_tape *tape = w->tape;
+    area now = grown(core, reach * t->steps, t->side);
+    const int carried = w->model->arch.recurrent ? 2 : 0;
+    const ts_shape s = {1, rows(now), columns(now), w->channels};
+    ag_value *maps = ag_empty(tape, s), *image = ag_empty(tape, (ts_shape){1, s.h, s.w, 3});
+    ag_value *states[2] = {0};
+    for (int i = 0; i < carried; i++) states[i] = ag_empty(tape, (ts_shape){1, s.h, s.w, gru});
+    if (ag_status(tape)->code) return;
+    float *const buffer = maps->t.data, *const photo = image->t.data;
+    start(w, now, buffer);
+    double rmse0[1] = {w->rmse0};
+    nn_state state = {.rmse0 = rmse0};
+    double last = t->rmse ? square_sum(w, now, core, buffer) : 0;
+    if (t->rmse) w->squares[0] += last;
+    int step = 0;
+    for (bool on = true; step < t->steps && on;) {
+        const area next = grown(core, reach * (t->steps - step - 1), t->side);
+        const ts_mark mark = ag_scope_begin(tape);
+        photograph(w, now, photo);
+        const ts_shape shape = {1, rows(now), columns(now), w->channels};
+        const nn_input in = {.image = ts_view(photo, (ts_shape){1, shape.h, shape.w, 3}), .grid = grid_of(now, t->side), .view = rd_flash()};
+        for (int i = 0; i < carried && step > 0; i++) state.gru[i] = ag_constant(tape, ts_view(states[i]->t.data, (ts_shape){1, shape.h, shape.w, gru}));
+        ag_value *out = nn_refine(tape, w->model, &in, ag_constant(tape, ts_view(buffer, shape)), &state);
+        if (!out) return;
+        on = !(t->tolerance > 0) || change(buffer, out->t.data, (size_t)ts_count(shape)) >= t->tolerance;
+        crop(now, next, w->channels, out->t.data, buffer);
+        for (int i = 0; i < 2; i++) {
+            if (i < carried && state.gru[i]) crop(now, next, gru, state.gru[i]->t.data, states[i]->t.data);
+            state.gru[i] = NULL;
+        }
+        ag_scope_end(tape, mark, NULL, 0);
+        now = next;
+        step++;
+        if (t->rmse) w->squares[step] += last = square_sum(w, now, core, buffer);
+    }
+    t->refined += (int64_t)rows(core) * columns(core) * step;
+    for (int i = step + 1; i <= t->steps && t->rmse; i++) w->squares[i] += last;
+    crop(now, core, w->channels, buffer, to);
+}
+
+/* The smallest area of a that holds its wanted pixels; empty (y1 = y0) when there are none. */
+static area wanted(const lgd_tiles *t, area a)
+{
+    if (!t->mask) return a;
+    area b = {a.y1, a.x1, a.y0, a.x0};
+    for (int y = a.y0; y < a.y1; y++)
+        for (int x = a.x0; x < a.x1; x++) {
+            if (!t->mask[(size_t)y * (size_t)t->side + (size_t)x]) continue;
+            if (y < b.y0) b.y0 = y;
+            if (y >= b.y1) b.y1 = y + 1;
+            if (x < b.x0) b.x0 = x;
+            if (x >= b.x1) b.x1 = x + 1;
+        }
+    return b.y1 > b.y0 ? b : (area){a.y0, a.x0, a.y0, a.x0};
+}
+
+static void put(const work *w, area b, const float *from, float *maps)
+{
+    const size_t channels = (size_t)w->channels, row = (size_t)columns(b) * channels;
+    for (int y = b.y0; y < b.y1; y++, from += row)
+        memcpy(maps + ((size_t)y * (size_t)w->t->side + (size_t)b.x0) * channels, from, row * sizeof *from);
+}
+
+/* The first estimate everywhere, and what is refined over it. */
+static void tile(work *w, area a, float *maps)
+{
+    const ts_mark mark = ag_scope_begin(w->tape);
+    float *own = ts_arena_alloc(ag_arena(w->tape), (size_t)rows(a) * (size_t)columns(a) * (size_t)w->channels * sizeof *own);
+    const area todo = wanted(w->t, a);
+    if (!own) ag_fail(w->tape, TS_NOMEM, "out of memory for a tile of %d x %d pixels", columns(a), rows(a));
+    else if (rows(todo) < rows(a) || columns(todo) < columns(a)) {
+        start(w, a, own);
+        put(w, a, own, maps);
+    }
+    if (own && rows(todo) > 0) {
+        refine(w, todo, own);
+        put(w, todo, own, maps);
+    }
+    ag_scope_end(w->tape, mark, NULL, 0);
+}
+
+/* g works on the whole photograph at its own size; the loss's scale is that of the whole R_0, measured in bands. */
+static ts_code prepare(work *w)
+{
+    ts_arena *arena = ag_arena(w->tape);
+    const int side = w->t->side, size = w->model->arch.g_size;
+    const area all = {0, 0, side, side};
+    ag_value *small = ag_empty(w->tape, (ts_shape){1, size, size, 3});
+    if (!small) return ag_status(w->tape)->code;
+    const ts_mark mark = ag_scope_begin(w->tape);
+    ag_value *whole = ag_empty(w->tape, (ts_shape){1, side, side, 3});
+    ts_status st = {0};
+    if (!whole) return ag_status(w->tape)->code;
+    photograph(w, all, whole->t.data);
+    if (side == size) memcpy(small->t.data, whole->t.data, (size_t)size * (size_t)size * 3 * sizeof(float));
+    else if (ts_resize(&small->t, &whole->t, arena, &st)) ag_fail(w->tape, st.code, "%s", st.message);
+    ag_scope_end(w->tape, mark, NULL, 0);
+    const nn_input in = {.image = small->t, .grid = rd_grid_full(size), .view = rd_flash()};
+    w->predicted = nn_predict(w->tape, w->model, &in);
+    w->taps = ts_taps_triangle(arena, size, side);
+    w->squares = ts_arena_zalloc(arena, (size_t)w->t->steps + 1, sizeof *w->squares);
+    if (!w->taps.weight || !w->squares) ag_fail(w->tape, TS_NOMEM, "out of memory");
+    double sum = 0;
+    for (int y = 0; y < side && !ag_status(w->tape)->code; y += w->t->tile) {
+        const area band = {y, 0, y + w->t->tile < side ? y + w->t->tile : side, side};
+        const ts_mark before = ag_scope_begin(w->tape);
+        const ag_value *maps = ag_empty(w->tape, (ts_shape){1, rows(band), side, w->channels});
+        if (maps) {
+            start(w, band, maps->t.data);
+            sum += square_sum(w, band, band, maps->t.data);
+        }
+        ag_scope_end(w->tape, before, NULL, 0);
+    }
+    w->rmse0 = sqrt(sum / ((double)side * side));
+    return ag_status(w->tape)->code;
+}
+
+ts_code lgd_tiles_run(ag_tape *tape, const nn_model *model, lgd_tiles *t, float *maps, ts_status *st)
+{
+    work w = {.tape = tape, .model = model, .t = t, .channels = model->arch.channels};
+    ag_reset(tape);
+    t->refined = 0;
+    ts_code code = prepare(&w);
+    int64_t pixels = 0;
+    for (int y = 0; y < t->side && !code; y += t->tile)
+        for (int x = 0; x < t->side && !code; x += t->tile) {
+            const area a = {y, x, y + t->tile < t->side ? y + t->tile : t->side, x + t->tile < t->side ? x + t->tile : t->side}, b = wanted(t, a);
+            if (t->alive && t->alive(t->user)) return ts_fail(st, TS_INTERRUPTED, "interrupted");
+            tile(&w, a, maps);
+            pixels += (int64_t)rows(b) * columns(b);
+            code = ag_status(tape)->code;
+        }
+    if (code) return ts_fail(st, code, "%s", ag_status(tape)->message);
+    for (int i = 0; i <= t->steps && t->rmse; i++) t->rmse[i] = pixels > 0 ? sqrt(w.squares[i] / (double)pixels) : 0;
+    return TS_OK;
+}
