@@ -21,8 +21,11 @@ typedef struct conv_attr {
 static void forward(ag_tape *tape, ag_node *node)
 {
     const conv_attr *a = node->attr;
-    const float *packed = ag_packed(tape, &a->conv, TS_CONV_FORWARD, node->in[1]->t.data);
-    if (packed) ts_conv_forward(&a->conv, node->in[0]->t.data, packed, node->in[2] ? node->in[2]->t.data : NULL, a->leak, node->out->t.data);
+    const bool direct = ts_conv_exact() || !ts_conv_winograd(&a->conv);
+    const float *packed = ag_packed(tape, &a->conv, direct ? TS_CONV_FORWARD : TS_CONV_WINOGRAD, node->in[1]->t.data);
+    if (!packed) return;
+    const float *bias = node->in[2] ? node->in[2]->t.data : NULL;
+    (direct ? ts_conv_forward : ts_conv_forward_winograd)(&a->conv, node->in[0]->t.data, packed, bias, a->leak, node->out->t.data);
 }
 
 static void backward(ag_tape *tape, ag_node *node)

@@ -7,7 +7,7 @@
 
 typedef struct work {
     ts_conv c;
-    float *x, *y, *weight, *bias, *packed, *packed_gradient;
+    float *x, *y, *weight, *bias, *packed, *packed_gradient, *packed_winograd;
 } work;
 
 static float *values(size_t count, float scale)
@@ -23,21 +23,29 @@ static work make(ts_conv c)
 {
     const size_t pixels = (size_t)c.n * (size_t)c.h * (size_t)c.w, weights = (size_t)c.ic * (size_t)c.oc * (size_t)(c.k * c.k);
     work w = {c, values(pixels * (size_t)c.ic, 1), values(pixels * (size_t)c.oc, 1), values(weights, 0.01f), values((size_t)c.oc, 1),
-              values(ts_conv_packed_count(&c, TS_CONV_FORWARD), 1), values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT), 1)};
+              values(ts_conv_packed_count(&c, TS_CONV_FORWARD), 1), values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT), 1),
+              c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_WINOGRAD), 1) : NULL};
     ts_conv_pack(&c, TS_CONV_FORWARD, w.weight, w.packed);
     ts_conv_pack(&c, TS_CONV_DATA_GRADIENT, w.weight, w.packed_gradient);
+    if (c.k == 3) ts_conv_pack(&c, TS_CONV_WINOGRAD, w.weight, w.packed_winograd);
     return w;
 }
 
 static void discard(work *w)
 {
-    free(w->x), free(w->y), free(w->weight), free(w->bias), free(w->packed), free(w->packed_gradient);
+    free(w->x), free(w->y), free(w->weight), free(w->bias), free(w->packed), free(w->packed_gradient), free(w->packed_winograd);
 }
 
 static void forward(void *user)
 {
     work *w = user;
     ts_conv_forward(&w->c, w->x, w->packed, w->bias, 0.2f, w->y);
+}
+
+static void winograd(void *user)
+{
+    work *w = user;
+    ts_conv_forward_winograd(&w->c, w->x, w->packed_winograd, w->bias, 0.2f, w->y);
 }
 
 static void data_gradient(void *user)
@@ -110,6 +118,17 @@ BENCH(conv_unet)
 {
     bench_heading("Convolutions of a small U-Net in training (small images: zero padding is skipped, so more than the peak is possible)");
     all(unet, sizeof unet / sizeof *unet);
+}
+
+BENCH(conv_winograd)
+{
+    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO}, {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE},
+                                    {1, 256, 256, 32, 64, 3, 2, TS_PAD_REPLICATE}, {1, 28, 28, 64, 64, 3, 1, TS_PAD_ZERO}};
+    bench_heading("Winograd's F(4 x 4, 3 x 3), counting the direct way's multiplications, each below the direct way");
+    for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
+        row("forward", shape[i], forward);
+        row("Winograd forward", shape[i], winograd);
+    }
 }
 
 BENCH(conv_naive)

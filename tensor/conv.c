@@ -28,6 +28,7 @@ ptrdiff_t conv_panels_count(int ic, int oc, int k)
 
 size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
 {
+    if (use == TS_CONV_WINOGRAD) return conv_winograd_count(c);
     const int ic = use == TS_CONV_FORWARD ? c->ic : c->oc, oc = use == TS_CONV_FORWARD ? c->oc : c->ic;
     return (size_t)conv_panels_count(ic, oc, c->k) + (conv_few_channels(oc, c->k) ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
 }
@@ -35,6 +36,10 @@ size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
 /* packed: [panel][ky][kx][input][channel of the panel, zeros where there is none] */
 void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float *packed)
 {
+    if (use == TS_CONV_WINOGRAD) {
+        conv_winograd_pack(c, weight, packed);
+        return;
+    }
     const bool forward = use == TS_CONV_FORWARD;
     const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : c->ic, taps = c->k * c->k;
     const int panel_width = 2 * conv_lanes(), panels = conv_panels(oc);
