@@ -1,4 +1,4 @@
-# lgd: make deps | make | make demo | make test | make bench | make install PREFIX= DESTDIR= | make asan
+# lgd: make deps | make | make demo | make test | make bench | make stress | make install PREFIX= DESTDIR= | make asan
 CC ?= cc
 ifeq ($(origin CC),default)
 CC := gcc
@@ -47,10 +47,14 @@ LIB_OBJ := $(LIB_C:%.c=$(OBJ)/%.o) $(OBJ)/gen/op_list.o \
 LIB := $(BUILD)/liblgd.a
 IMAGE_LIB := $(BUILD)/lib/lgd/liblgd_image.so
 BIN := $(PROGRAMS:%=$(BUILD)/bin/lgd-%)
-TEST_C := $(wildcard tests/*.c)
+STRESS_C := $(filter-out %main.c,$(wildcard tests/stress/*.c))
+TEST_C := $(wildcard tests/*.c) $(STRESS_C)
 BENCH_C := $(wildcard bench/*.c)
 TEST_BIN := $(BUILD)/bin/lgd-test
 BENCH_BIN := $(BUILD)/bin/lgd-bench
+STRESS_BIN := $(BUILD)/bin/lgd-stress
+# tests/stress/training.c stands between the trainer and its data.
+WRAP := -Wl,--wrap=io_loader_next -Wl,--wrap=tr_photograph
 
 all: $(BIN) $(LIB) $(IMAGE_LIB)
 
@@ -60,7 +64,11 @@ $(BUILD)/bin/lgd-%: $(OBJ)/%/main.o $(LIB)
 
 $(TEST_BIN): $(TEST_C:%.c=$(OBJ)/%.o) $(LIB) | $(IMAGE_LIB)
 	@mkdir -p $(@D)
-	$(CC) -o $@ $(filter %.o %.a,$^) $(LDLIBS_ALL)
+	$(CC) -o $@ $(filter %.o %.a,$^) $(WRAP) $(LDLIBS_ALL)
+
+$(STRESS_BIN): $(OBJ)/tests/stress/main.o $(STRESS_C:%.c=$(OBJ)/%.o) $(LIB)
+	@mkdir -p $(@D)
+	$(CC) -o $@ $(filter %.o %.a,$^) $(WRAP) $(LDLIBS_ALL)
 
 $(BENCH_BIN): $(BENCH_C:%.c=$(OBJ)/%.o) $(LIB)
 	@mkdir -p $(@D)
@@ -122,6 +130,9 @@ test: deps
 bench: all $(BENCH_BIN)
 	@TESTDATA=$(TESTDATA) $(BENCH_BIN)
 
+stress: $(STRESS_BIN)
+	@$(STRESS_BIN)
+
 # The sanitizers' build lives beside the ordinary one.
 asan:
 	@$(MAKE) --no-print-directory BUILD=$(BUILD)/asan OPT='-O1 -g -fno-omit-frame-pointer' SANITIZE='-fsanitize=address,undefined -fno-sanitize-recover=all' test
@@ -149,6 +160,6 @@ uninstall:
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all deps test bench asan demo install uninstall clean
+.PHONY: all deps test bench stress asan demo install uninstall clean
 .SECONDARY:
 -include $(shell find $(OBJ) -name '*.d' 2>/dev/null)
