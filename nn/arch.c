@@ -130,28 +130,28 @@ static bool parse(const field *f, const char *text, int *v)
 
 ts_code nn_arch_from_file(const nn_file *file, nn_arch *arch, ts_status *st)
 {
-    const char *format = nn_safetensors_meta(file, "format"), *key;
+    const char *format = nn_file_meta(file, "format"), *key;
     memset(arch, 0, sizeof *arch);
     if (!format || strcmp(format, "lgd") != 0)
         return ts_fail(st, TS_FORMAT, "%s: metadata key \"format\" is %.40s, not \"lgd\": these are not weights of this program",
-                       nn_safetensors_path(file), format ? format : "missing");
-    for (int i = 0; (key = nn_safetensors_meta_key(file, i)) != NULL; i++) {
+                       nn_file_path(file), format ? format : "missing");
+    for (int i = 0; (key = nn_file_meta_key(file, i)) != NULL; i++) {
         bool known = strncmp(key, prefix, sizeof prefix - 1) != 0;
         for (int j = 0; j < FIELDS && !known; j++) known = !strcmp(key + sizeof prefix - 1, fields[j].key);
         if (!known)
             return ts_fail(st, TS_UNSUPPORTED, "%s: metadata key \"%.80s\" is not known: the file needs another version of this program",
-                           nn_safetensors_path(file), key);
+                           nn_file_path(file), key);
     }
     for (int i = 0; i < FIELDS; i++) {
         char name[64];
         int v;
         snprintf(name, sizeof name, "%s%s", prefix, fields[i].key);
-        const char *text = nn_safetensors_meta(file, name);
-        if (!text) return ts_fail(st, TS_FORMAT, "%s: metadata key \"%s\" is missing", nn_safetensors_path(file), name);
+        const char *text = nn_file_meta(file, name);
+        if (!text) return ts_fail(st, TS_FORMAT, "%s: metadata key \"%s\" is missing", nn_file_path(file), name);
         if (!parse(&fields[i], text, &v))
-            return ts_fail(st, TS_FORMAT, "%s: metadata key \"%s\" is \"%.40s\": not a value of it", nn_safetensors_path(file), name, text);
+            return ts_fail(st, TS_FORMAT, "%s: metadata key \"%s\" is \"%.40s\": not a value of it", nn_file_path(file), name, text);
         set(arch, &fields[i], v);
     }
-    if (nn_arch_check(arch, st)) return ts_context(st, "%s: architecture", nn_safetensors_path(file));
+    if (nn_arch_check(arch, st)) return ts_context(st, "%s: architecture", nn_file_path(file));
     return TS_OK;
 }

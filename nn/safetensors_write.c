@@ -1,16 +1,10 @@
 /* The safetensors container (github.com/huggingface/safetensors, README, "Format"): u64 header size, JSON header, values, little endian. */
+#include "nn/file_parts.h"
 #include "nn/json.h"
 #include "nn/weights.h"
-#include <errno.h>
-#include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
-
-#if __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
-#error "weights files are little endian and are copied to and from memory as they are"
-#endif
 
 typedef struct text {
     char *data;
@@ -53,18 +47,14 @@ static bool put_string(text *t, const char *s)
     return true;
 }
 
-static int64_t block_count(const nn_block *b)
-{
-    int64_t count = 1;
-    for (int i = 0; i < b->rank; i++) count *= b->dim[i];
-    return count;
-}
-
-static ts_code make_header(text *t, const char *path, const nn_block *blocks, int count, const nn_meta *meta, int metas, ts_status *st)
+/* order: the tensors as their values follow each other in the file. */
+static ts_code make_header(text *t, const char *path, const nn_entry *entry, const int *order, int entries, nn_dtype real, const nn_meta *meta,
+                           int metas, ts_status *st)
 {
     int64_t at = 0;
     char number[64];
-    memset(room(t, 8), 0, 8);
+    char *size_field = room(t, 8);
+    if (size_field) memset(size_field, 0, 8);
     put(t, "{");
     if (metas > 0) put(t, "\"__metadata__\":{");
     for (int i = 0; i < metas; i++) {
@@ -73,17 +63,20 @@ static ts_code make_header(text *t, const char *path, const nn_block *blocks, in
         put(t, ":");
         if (!good || !put_string(t, meta[i].value)) return ts_fail(st, TS_INVALID, "%s: metadata \"%.80s\" is not UTF-8", path, meta[i].key);
     }
-    if (metas > 0) put(t, count ? "}," : "}");
-    for (int i = 0; i < count; i++) {
-        const nn_block *b = &blocks[i];
+    if (metas > 0) put(t, entries ? "}," : "}");
+    for (int i = 0; i < entries; i++) {
+        const nn_entry *e = &entry[order[i]];
+        const nn_dtype to = nn_dtype_out(e->dtype, real);
         if (i) put(t, ",");
-        if (!put_string(t, b->name)) return ts_fail(st, TS_INVALID, "%s: the tensor name \"%.80s\" is not UTF-8", path, b->name);
-        put(t, ":{\"dtype\":\"F32\",\"shape\":[");
-        for (int j = 0; j < b->rank; j++) {
-            snprintf(number, sizeof number, "%s%lld", j ? "," : "", (long long)b->dim[j]);
+        if (!put_string(t, e->name)) return ts_fail(st, TS_INVALID, "%s: the tensor name \"%.80s\" is not UTF-8", path, e->name);
+        put(t, ":{\"dtype\":\"");
+        put(t, nn_dtype_name(to));
+        put(t, "\",\"shape\":[");
+        for (int j = 0; j < e->rank; j++) {
+            snprintf(number, sizeof number, "%s%lld", j ? "," : "", (long long)e->dim[j]);
             put(t, number);
         }
-        int64_t end = at + 4 * block_count(b);
+        int64_t end = at + nn_dtype_size(to) * e->count;
         snprintf(number, sizeof number, "],\"data_offsets\":[%lld,%lld]}", (long long)at, (long long)end);
         put(t, number);
         at = end;
@@ -96,64 +89,42 @@ static ts_code make_header(text *t, const char *path, const nn_block *blocks, in
     return TS_OK;
 }
 
-static bool write_all(int fd, const void *data, size_t size)
+ts_code nn_safetensors_put(nn_out *o, const nn_entry *entry, int entries, nn_dtype real, const nn_meta *meta, int metas, ts_status *st)
 {
-    const char *p = data;
-    while (size > 0) {
-        ssize_t n = write(fd, p, size < 1u << 30 ? size : 1u << 30);
-        if (n < 0 && errno == EINTR) continue;
-        if (n <= 0) return false;
-        p += n;
-        size -= (size_t)n;
+    text t = {malloc(4096), 0, 4096, false};
+    int *order = malloc(((size_t)entries + 1) * sizeof *order), n = 0;
+    void *work = NULL;
+    size_t work_size = 0;
+    ts_code code = TS_OK;
+    if (!t.data || !order) code = ts_fail(st, TS_NOMEM, "%s: no memory to write it", o->path);
+    for (int size = 8; !code && size; size /= 2) /* the widest first, so that every number is aligned to its size */
+        for (int i = 0; i < entries; i++)
+            if (nn_dtype_size(nn_dtype_out(entry[i].dtype, real)) == size) order[n++] = i;
+    if (!code) code = make_header(&t, o->path, entry, order, entries, real, meta, metas, st);
+    if (!code) nn_out_put(o, t.data, t.used);
+    for (int i = 0; i < entries && !code && !o->error; i++) {
+        const nn_entry *e = &entry[order[i]];
+        const nn_dtype to = nn_dtype_out(e->dtype, real);
+        const void *bytes = nn_entry_bytes(e, to, o->path, &work, &work_size, st);
+        if (!bytes) code = st ? st->code : TS_FORMAT;
+        else nn_out_put(o, bytes, (size_t)e->count * (size_t)nn_dtype_size(to));
     }
-    return true;
-}
-
-/* Makes the rename itself survive a power failure. A file system that cannot sync a folder says EINVAL: nothing to be done. */
-static bool sync_folder(const char *path, char *folder)
-{
-    strcpy(folder, path);
-    char *slash = strrchr(folder, '/');
-    if (slash) slash[slash == folder] = 0;
-    int fd = open(slash ? folder : ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    if (fd < 0) return errno == EACCES; /* a folder that can be written but not read */
-    bool good = fsync(fd) == 0 || errno == EINVAL;
-    close(fd);
-    return good;
+    free(work);
+    free(order);
+    free(t.data);
+    return code;
 }
 
 ts_code nn_safetensors_write(const char *path, const nn_block *blocks, int count, const nn_meta *meta, int metas, ts_status *st)
 {
-    text t = {malloc(4096), 0, 4096, false};
-    char *temporary = malloc(strlen(path) + 32);
-    int fd = -1;
-    ts_code code = TS_OK;
-    if (!t.data || !temporary) code = ts_fail(st, TS_NOMEM, "%s: no memory to write it", path);
-    if (!code) code = make_header(&t, path, blocks, count, meta, metas, st);
-    if (!code) {
-        sprintf(temporary, "%s.%ld", path, (long)getpid()); /* two processes that write the same file do not meet */
-        fd = open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0666);
-        if (fd < 0) code = ts_fail(st, TS_IO, "%s: cannot write here: %s", path, strerror(errno));
+    nn_entry *entry = malloc(((size_t)count + 1) * sizeof *entry);
+    if (!entry) return ts_fail(st, TS_NOMEM, "%s: no memory to write it", path);
+    for (int i = 0; i < count; i++) {
+        entry[i] = (nn_entry){.name = blocks[i].name, .rank = blocks[i].rank, .data = (const unsigned char *)blocks[i].data};
+        for (int j = 0; j < blocks[i].rank; j++) entry[i].dim[j] = blocks[i].dim[j];
+        nn_entry_shape(&entry[i]);
     }
-    if (fd >= 0) {
-        bool good = write_all(fd, t.data, t.used);
-        for (int i = 0; i < count && good; i++) good = write_all(fd, blocks[i].data, (size_t)block_count(&blocks[i]) * sizeof(float));
-        good = good && fsync(fd) == 0;
-        int error = errno;
-        if (close(fd) != 0 && good) {
-            good = false;
-            error = errno;
-        }
-        if (good && rename(temporary, path) != 0) {
-            good = false;
-            error = errno;
-        }
-        if (!good) {
-            unlink(temporary);
-            code = ts_fail(st, TS_IO, "%s: cannot write it: %s", path, strerror(error));
-        } else if (!sync_folder(path, temporary)) code = ts_fail(st, TS_IO, "%s: cannot sync its folder: %s", path, strerror(errno));
-    }
-    free(t.data);
-    free(temporary);
+    ts_code code = nn_file_write(path, NN_FORM_SAFETENSORS, entry, count, NN_DTYPES, meta, metas, st);
+    free(entry);
     return code;
 }

@@ -22,18 +22,18 @@ nn_model *nn_model_load(const char *path, ts_status *st)
 {
     nn_arch arch;
     nn_model *m = NULL;
-    nn_file *f = nn_safetensors_open(path, st);
+    nn_file *f = nn_file_open(path, st);
     if (f && !nn_arch_from_file(f, &arch, st)) {
         m = nn_model_plan(&arch, st); /* before memory is taken: is the file what its metadata says? */
-        for (int i = 0; m && i < nn_safetensors_count(f); i++) {
-            const char *name = nn_safetensors_name(f, i);
+        for (int i = 0; m && i < nn_file_count(f); i++) {
+            const char *name = nn_file_name(f, i);
             if (of_network(name) && !nn_model_find(m, name)) {
                 ts_fail(st, TS_FORMAT, "%s: tensor \"%.200s\" does not belong to the architecture that the file states", path, name);
                 nn_model_free(&m);
             }
         }
         for (int i = 0; m && i < m->params; i++)
-            if (!nn_safetensors_has(f, m->param[i].name)) {
+            if (!nn_file_has(f, m->param[i].name)) {
                 ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" is missing", path, m->param[i].name);
                 nn_model_free(&m);
             }
@@ -45,13 +45,13 @@ nn_model *nn_model_load(const char *path, ts_status *st)
             const nn_param *p = &m->param[i];
             int64_t dim[4];
             dims_of(p, dim);
-            ts_code code = nn_safetensors_read(f, p->name, p->rank, dim, m->value + p->offset, st);
+            ts_code code = nn_file_read(f, p->name, p->rank, dim, m->value + p->offset, st);
             if (!code && !finite_all(m->value + p->offset, p->count))
                 code = ts_fail(st, TS_NUMERIC, "%s: tensor \"%s\" holds a value that is not finite", path, p->name);
             if (code) nn_model_free(&m);
         }
     }
-    nn_safetensors_close(&f);
+    nn_file_close(&f);
     return m;
 }
 
@@ -81,7 +81,7 @@ ts_code nn_model_save(const nn_model *model, const float *values, const char *pa
 
 ts_code nn_model_init_from(nn_model *model, const char *path, int *taken, int *left, ts_status *st)
 {
-    nn_file *f = nn_safetensors_open(path, st);
+    nn_file *f = nn_file_open(path, st);
     if (!f) return st ? st->code : TS_IO;
     *taken = *left = 0;
     ts_code code = TS_OK;
@@ -89,12 +89,12 @@ ts_code nn_model_init_from(nn_model *model, const char *path, int *taken, int *l
         const nn_param *p = &model->param[i];
         int64_t dim[4];
         dims_of(p, dim);
-        if (nn_safetensors_read(f, p->name, p->rank, dim, model->value + p->offset, NULL)) ++*left;
+        if (nn_file_read(f, p->name, p->rank, dim, model->value + p->offset, NULL)) ++*left;
         else if (!finite_all(model->value + p->offset, p->count))
             code = ts_fail(st, TS_NUMERIC, "%s: tensor \"%s\" holds a value that is not finite", path, p->name);
         else ++*taken;
     }
     if (!code && *taken == 0) code = ts_fail(st, TS_FORMAT, "%s: no tensor has the name and shape of one of the model's", path);
-    nn_safetensors_close(&f);
+    nn_file_close(&f);
     return code;
 }

@@ -1,6 +1,7 @@
-/* Weights and checkpoints as safetensors files; the metadata carries the architecture. The reader trusts nothing in a file. */
+/* Weights and checkpoints as files; the metadata of safetensors carries the architecture. */
 #ifndef NN_WEIGHTS_H
 #define NN_WEIGHTS_H
+#include "nn/file.h"
 #include "nn/model.h"
 
 /* A writer of any named f32 blocks: used for weights (name "g.…", "h.…") and by the trainer for checkpoints. */
@@ -10,26 +11,9 @@ typedef struct nn_block {
     int64_t dim[4];
     const float *data;
 } nn_block;
-typedef struct nn_meta {
-    const char *key, *value;
-} nn_meta;
 
 /* Written to a temporary file beside path, fsynced, renamed; nothing is left on failure. */
 ts_code nn_safetensors_write(const char *path, const nn_block *blocks, int count, const nn_meta *meta, int metas, ts_status *st);
-
-/* A mapped, validated file: the header has at most 16 MiB, and the tensors fill the rest of the file without holes or overlap.
- * F32, F16 and BF16 tensors can be read. */
-typedef struct nn_file nn_file;
-nn_file *nn_safetensors_open(const char *path, ts_status *st);
-void nn_safetensors_close(nn_file **file);
-int nn_safetensors_count(const nn_file *file);
-const char *nn_safetensors_name(const nn_file *file, int i);
-bool nn_safetensors_has(const nn_file *file, const char *name);
-const char *nn_safetensors_meta(const nn_file *file, const char *key); /* NULL when absent */
-const char *nn_safetensors_meta_key(const nn_file *file, int i);          /* in the file's order, NULL past the last */
-const char *nn_safetensors_path(const nn_file *file);                     /* for messages */
-/* Copies tensor name into out (count floats); TS_FORMAT when it is missing or has another shape. */
-ts_code nn_safetensors_read(const nn_file *file, const char *name, int rank, const int64_t *dim, float *out, ts_status *st);
 
 /* A model with its parameters from a file that says its own architecture. Tensors whose names begin with neither "g." nor "h."
  * (a checkpoint's) are left alone. */

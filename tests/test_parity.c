@@ -63,7 +63,7 @@ static float *stored(const nn_file *f, const char *name, int channels)
     ts_status st = {0};
     size_t pixels = (size_t)SIDE * SIDE;
     float *planes = malloc(pixels * (size_t)channels * sizeof *planes), *out = malloc(pixels * (size_t)channels * sizeof *out);
-    CHECK(!nn_safetensors_read(f, name, 3, (int64_t[]){channels, SIDE, SIDE}, planes, &st), "%s", st.message);
+    CHECK(!nn_file_read(f, name, 3, (int64_t[]){channels, SIDE, SIDE}, planes, &st), "%s", st.message);
     for (size_t i = 0; i < pixels; i++)
         for (int c = 0; c < channels; c++) out[i * (size_t)channels + (size_t)c] = planes[(size_t)c * pixels + i];
     free(planes);

@@ -63,11 +63,11 @@ TEST(weights_round_trip_is_exact)
     memcpy(&header, x, 8);
     CHECK((header + 8) % 64 == 0 && x[8] == '{', "the values begin at byte %llu", (unsigned long long)header + 8);
     nn_file *f = nn_safetensors_open(path, &st);
-    CHECK(f && nn_safetensors_count(f) == m->params, "%s", st.message);
-    CHECK(!strcmp(nn_safetensors_meta(f, "run"), extra[0].value), "metadata '%s'", nn_safetensors_meta(f, "run"));
-    CHECK(!*nn_safetensors_meta(f, "empty") && !nn_safetensors_meta(f, "none"), "empty and missing metadata");
-    for (int i = 0; i < m->params; i++) CHECK(!strcmp(nn_safetensors_name(f, i), m->param[i].name), "tensor %d is %s", i, nn_safetensors_name(f, i));
-    nn_safetensors_close(&f);
+    CHECK(f && nn_file_count(f) == m->params, "%s", st.message);
+    CHECK(!strcmp(nn_file_meta(f, "run"), extra[0].value), "metadata '%s'", nn_file_meta(f, "run"));
+    CHECK(!*nn_file_meta(f, "empty") && !nn_file_meta(f, "none"), "empty and missing metadata");
+    for (int i = 0; i < m->params; i++) CHECK(!strcmp(nn_file_name(f, i), m->param[i].name), "tensor %d is %s", i, nn_file_name(f, i));
+    nn_file_close(&f);
     CHECK(!f, "close leaves the pointer");
     nn_model_free(&m);
     nn_model_free(&back);
@@ -91,7 +91,7 @@ TEST(weights_architecture_round_trip)
     nn_arch b;
     CHECK(f && !nn_arch_from_file(f, &b, &st), "%s", st.message);
     CHECK(!memcmp(&a, &b, sizeof a), "another architecture");
-    nn_safetensors_close(&f);
+    nn_file_close(&f);
     for (int i = 0; i < metas; i++) { /* each key in turn missing, and then nonsense */
         for (int nonsense = 0; nonsense < 2; nonsense++) {
             nn_meta other[NN_ARCH_META];
@@ -103,7 +103,7 @@ TEST(weights_architecture_round_trip)
             CHECK(!nn_safetensors_write(path, NULL, 0, other, n, &st), "%s", st.message);
             f = nn_safetensors_open(path, &st);
             CHECK(f && nn_arch_from_file(f, &b, &st) == TS_FORMAT && strstr(st.message, meta[i].key), "key %s: '%s'", meta[i].key, st.message);
-            nn_safetensors_close(&f);
+            nn_file_close(&f);
         }
     }
     nn_meta more[NN_ARCH_META];
@@ -113,7 +113,7 @@ TEST(weights_architecture_round_trip)
     CHECK(!nn_safetensors_write(path, NULL, 0, more, metas + 1, &st), "%s", st.message);
     f = nn_safetensors_open(path, &st);
     CHECK(f && nn_arch_from_file(f, &b, &st) == TS_UNSUPPORTED && strstr(st.message, "arch.attention"), "'%s'", st.message);
-    nn_safetensors_close(&f);
+    nn_file_close(&f);
 }
 
 TEST(weights_every_truncation_is_refused)
@@ -248,8 +248,8 @@ TEST(weights_writing_leaves_the_old_file_or_the_new_one)
     CHECK(nn_safetensors_write(path, &block, 1, NULL, 0, &st) == TS_INVALID, "'%s'", st.message);
     st = (ts_status){0};
     nn_file *f = nn_safetensors_open(path, &st);
-    CHECK(f && nn_safetensors_has(f, "a"), "the old file is gone: %s", st.message);
-    nn_safetensors_close(&f);
+    CHECK(f && nn_file_has(f, "a"), "the old file is gone: %s", st.message);
+    nn_file_close(&f);
     block.name = "a";
     snprintf(inside, sizeof inside, "%s/none/w.safetensors", test_folder());
     CHECK(nn_safetensors_write(inside, &block, 1, NULL, 0, &st) == TS_IO && strstr(st.message, inside), "'%s'", st.message);

@@ -85,7 +85,7 @@ ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
 
 static ts_code read_count(const nn_file *file, const char *path, const char *key, int64_t *value, ts_status *st)
 {
-    const char *text = nn_safetensors_meta(file, key);
+    const char *text = nn_file_meta(file, key);
     char *end = NULL;
     errno = 0;
     const long long v = text ? strtoll(text, &end, 10) : -1;
@@ -96,7 +96,7 @@ static ts_code read_count(const nn_file *file, const char *path, const char *key
 
 static ts_code check_config(const tr_trainer *t, const nn_file *file, const char *path, ts_status *st)
 {
-    const char *text = nn_safetensors_meta(file, "config");
+    const char *text = nn_file_meta(file, "config");
     tr_config then = tr_config_default();
     tr_ini ini;
     char where[TR_PATH + 32];
@@ -111,8 +111,8 @@ static ts_code check_config(const tr_trainer *t, const nn_file *file, const char
 
 static ts_code restore(tr_trainer *t, const nn_file *file, const char *path, ts_status *st)
 {
-    const char *format = nn_safetensors_meta(file, "format"), *best = nn_safetensors_meta(file, "best"),
-               *usual = nn_safetensors_meta(file, "usual_norm");
+    const char *format = nn_file_meta(file, "format"), *best = nn_file_meta(file, "best"),
+               *usual = nn_file_meta(file, "usual_norm");
     const int64_t dim[1] = {(int64_t)t->model->count};
     int64_t in_a_row = 0;
     nn_block block[4];
@@ -130,7 +130,7 @@ static ts_code restore(tr_trainer *t, const nn_file *file, const char *path, ts_
     const int n = blocks(t, block);
     for (int i = 0; i < n; i++) {
         float *to = (float *)(uintptr_t)block[i].data;
-        if (nn_safetensors_read(file, block[i].name, 1, dim, to, st) != TS_OK) return ts_context(st, "%s", path);
+        if (nn_file_read(file, block[i].name, 1, dim, to, st) != TS_OK) return ts_context(st, "%s", path);
         if (!all_finite(to, t->model->count)) return ts_fail(st, TS_NUMERIC, "%s: %s holds values that are not finite", path, block[i].name);
     }
     return TS_OK;
@@ -143,6 +143,6 @@ ts_code tr_resume(tr_trainer *t, ts_status *st)
     nn_file *file = nn_safetensors_open(path, st);
     if (!file) return ts_context(st, "nothing to resume");
     const ts_code code = restore(t, file, path, st);
-    nn_safetensors_close(&file);
+    nn_file_close(&file);
     return code;
 }
