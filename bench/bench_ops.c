@@ -124,8 +124,9 @@ BENCH(ops)
     rows(tape, ag_max_pool(tape, x), n);
     rows(tape, ag_upsample(tape, x), 0);
     rows(tape, ag_resize(tape, x, 2 * SIDE, 2 * SIDE), 0);
-    ag_value *ih = random_value(tape, &r, (ts_shape){N, SIDE, SIDE, 96}), *hh = random_value(tape, &r, (ts_shape){N, SIDE, SIDE, 96});
-    rows(tape, ag_gru(tape, ih, hh, random_value(tape, &r, (ts_shape){N, SIDE, SIDE, 32})), 5 * n / 2);
+    ag_value *one = random_value(tape, &r, (ts_shape){1, 1, 1, 96});
+    rows(tape, ag_gru(tape, x, random_value(tape, &r, (ts_shape){N, SIDE, SIDE, 32}), random_value(tape, &r, (ts_shape){96, C, 1, 1}), one,
+                      random_value(tape, &r, (ts_shape){96, 32, 1, 1}), one), 7 * n / 2);
     ag_value *weight = random_value(tape, &r, (ts_shape){1, 1, 256, 512}), *bias = random_value(tape, &r, (ts_shape){1, 1, 1, 256});
     rows(tape, ag_linear(tape, random_value(tape, &r, (ts_shape){N, 1, 1, 512}), weight, bias), 256 * 512);
     t = bench_measure(adam, &b);

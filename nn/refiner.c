@@ -5,10 +5,8 @@
 static ag_value *cell(ag_tape *tape, const nn_model *model, const nn_cell *c, ag_value *x, int dilation, ag_value *old)
 {
     x = nn_conv(tape, model, c->conv, x, dilation, TS_PAD_REPLICATE, NN_LEAK_H);
-    x = nn_conv(tape, model, c->input, x, 1, TS_PAD_ZERO, 1);
-    /* A zero state leaves of the hidden gates their bias. */
-    ag_value *hidden = old ? nn_conv(tape, model, c->hidden, old, 1, TS_PAD_ZERO, 1) : nn_parameter(tape, model, c->hidden.bias);
-    return ag_gru(tape, x, hidden, old);
+    return ag_gru(tape, x, old, nn_parameter(tape, model, c->input.weight), nn_parameter(tape, model, c->input.bias),
+                  nn_parameter(tape, model, c->hidden.weight), nn_parameter(tape, model, c->hidden.bias));
 }
 
 ag_value *nn_refiner(ag_tape *tape, const nn_model *model, ag_value *x, ag_value *gru[2])

@@ -5,8 +5,8 @@
 
 enum { PANELS_TOGETHER = 8 };
 
-/* Pixels [first, first + count) of panels [panel0, panel1), at most PANELS_TOGETHER of them. */
-static void run_pixels(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, int panel0, int panel1)
+/* Panels [panel0, panel1), at most PANELS_TOGETHER of them. */
+static void run_together(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, int panel0, int panel1)
 {
     const ptrdiff_t step = ts_conv_k()->pixels, panels = panel1 - panel0, calls = (p->ic + 3) / 4;
     const ts_segment segment = {0, 0, p->ic};
@@ -33,6 +33,15 @@ static void run_pixels(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, int
     }
 }
 
+void conv_run_pixels(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, int panel0, int panel1)
+{
+    ptrdiff_t together = CONV_BLOCK_BYTES / ((ptrdiff_t)p->ic * 2 * conv_lanes() * (ptrdiff_t)sizeof(float));
+    if (together < 1) together = 1;
+    if (together > PANELS_TOGETHER) together = PANELS_TOGETHER;
+    for (int base = panel0; base < panel1; base += (int)together)
+        run_together(p, first, count, base, base + together < panel1 ? base + (int)together : panel1);
+}
+
 /* Side 1: all pixels of all images are one row, read where they are. */
 void conv_run_pointwise(const conv_plan *p)
 {
@@ -41,17 +50,13 @@ void conv_run_pointwise(const conv_plan *p)
     const int chunks = (int)((pixels + chunk - 1) / chunk);
     int groups = chunks < 8 ? (8 + chunks - 1) / chunks : 1;
     if (groups > panels) groups = panels;
-    ptrdiff_t together = CONV_BLOCK_BYTES / ((ptrdiff_t)p->ic * 2 * conv_lanes() * (ptrdiff_t)sizeof(float));
-    if (together < 1) together = 1;
-    if (together > PANELS_TOGETHER) together = PANELS_TOGETHER;
 #pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads())
     for (int g = 0; g < groups; g++)
         for (int i = 0; i < chunks; i++) {
             int panel0, panel1;
             conv_part(panels, groups, g, &panel0, &panel1);
             const ptrdiff_t first = (ptrdiff_t)i * chunk, count = pixels - first < chunk ? pixels - first : chunk;
-            for (int base = panel0; base < panel1; base += (int)together)
-                run_pixels(p, first, count, base, base + together < panel1 ? base + (int)together : panel1);
+            conv_run_pixels(p, first, count, panel0, panel1);
         }
 }
 

@@ -71,6 +71,9 @@ static inline void conv_part(int total, int parts, int i, int *begin, int *end)
 ts_tile conv_panel_tile(const conv_plan *p, int panel);
 void conv_run_tile(ts_tile *t, int vectors, const float *a, float *y, int pixels);
 
+/* Side 1, serial: pixels [first, first + count) of panels [panel0, panel1). */
+void conv_run_pixels(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, int panel0, int panel1);
+
 void conv_run_rows(const conv_plan *p);
 void conv_run_pointwise(const conv_plan *p);
 void conv_run_positions(const conv_plan *p);

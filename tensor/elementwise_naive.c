@@ -79,43 +79,35 @@ static void copy(int64_t pixels, int c, const float *src, int64_t src_stride, fl
         for (int i = 0; i < c; i++) put(dst + p * dst_stride + i, src[p * src_stride + i], accumulate);
 }
 
-static void gru(int64_t pixels, int c, const float *ih, const float *hh, int64_t hh_stride, const float *old, float *y, float *zrn)
+static void gru(int64_t pixels, int c, const float *ih, const float *hh, int64_t hh_stride, const float *old, float *y, float *saved)
 {
     for (int64_t p = 0; p < pixels; p++) {
         const float *a = ih + p * 3 * c, *b = hh + p * hh_stride;
         for (int i = 0; i < c; i++) {
             double z = sigmoid((double)a[i] + b[i]), r = sigmoid((double)a[c + i] + b[c + i]);
             double n = tanh(a[2 * c + i] + r * b[2 * c + i]);
-            if (zrn) {
-                zrn[p * 3 * c + i] = (float)z;
-                zrn[p * 3 * c + c + i] = (float)r;
-                zrn[p * 3 * c + 2 * c + i] = (float)n;
+            if (saved) {
+                const double all[4] = {z, r, n, b[2 * c + i]};
+                for (int k = 0; k < 4; k++) saved[(p * 4 + k) * c + i] = (float)all[k];
             }
             y[p * c + i] = (float)((old ? (1 - z) * old[p * c + i] : 0) + z * n);
         }
     }
 }
 
-static void gru_backward(int64_t pixels, int c, const float *hh, int64_t hh_stride, const float *old, const float *zrn, const float *dy,
-                         float *dih, bool dih_accumulate, float *dhh, bool dhh_accumulate, float *dold, bool dold_accumulate, double *sum)
+static void gru_backward(int64_t pixels, int c, const float *saved, const float *old, const float *dy, float *d, float *dold, bool accumulate,
+                         double *sum)
 {
     for (int64_t p = 0; p < pixels; p++) {
         for (int i = 0; i < c; i++) {
-            const int64_t at = p * 3 * c + i;
-            double z = zrn[at], r = zrn[at + c], n = zrn[at + 2 * c], d = dy[p * c + i];
-            double before[3] = {0}, hidden[3];
-            before[0] = d * (n - (old ? old[p * c + i] : 0)) * z * (1 - z);
-            before[2] = d * z * (1 - n * n);
-            before[1] = before[2] * hh[p * hh_stride + 2 * c + i] * r * (1 - r);
-            hidden[0] = before[0];
-            hidden[1] = before[1];
-            hidden[2] = before[2] * r;
-            for (int k = 0; k < 3; k++) {
-                if (dih) put(dih + at + k * c, before[k], dih_accumulate);
-                if (dhh) put(dhh + at + k * c, hidden[k], dhh_accumulate);
-                if (sum) sum[k * c + i] += hidden[k];
+            const float *s = saved + p * 4 * c + i;
+            const double z = s[0], r = s[c], n = s[2 * c], v = dy[p * c + i], m = v * z * (1 - n * n);
+            const double all[4] = {m, v * (n - (old ? old[p * c + i] : 0)) * z * (1 - z), m * s[3 * c] * r * (1 - r), m * r};
+            for (int k = 0; k < 4; k++) {
+                d[(p * 4 + k) * c + i] = (float)all[k];
+                if (sum) sum[k * c + i] += all[k];
             }
-            if (dold) put(dold + p * c + i, d * (1 - z), dold_accumulate);
+            if (dold) put(dold + p * c + i, v * (1 - z), accumulate);
         }
     }
 }

@@ -100,9 +100,9 @@ static ag_value *network(ag_tape *tape)
     ag_value *low = ag_conv(tape, ag_max_pool(tape, skip), param(tape, WIDE, WIDE, 5, 5), NULL, 1, TS_PAD_REPLICATE, 1.0f);
     low = ag_add_leaky(tape, ag_instance_norm(tape, low, 1e-5f), global, 0.2f);
     ag_value *both = ag_concat(tape, skip, ag_resize(tape, ag_upsample(tape, low), SIDE, SIDE));
-    ag_value *ih = ag_conv(tape, both, param(tape, 27, 2 * WIDE, 1, 1), param(tape, 1, 1, 1, 27), 1, TS_PAD_ZERO, 1.0f);
-    ag_value *state = ag_gru(tape, ih, param(tape, 1, 1, 1, 27), NULL);
-    state = ag_gru(tape, ih, ih, state);
+    ag_value *ih = param(tape, 27, 2 * WIDE, 1, 1), *ih_bias = param(tape, 1, 1, 1, 27), *hh = param(tape, 27, 9, 1, 1), *hh_bias = param(tape, 1, 1, 1, 27);
+    ag_value *state = ag_gru(tape, both, NULL, ih, ih_bias, hh, hh_bias);
+    state = ag_gru(tape, both, state, ih, ih_bias, hh, hh_bias);
     ag_value *maps = ag_tanh(tape, ag_add(tape, ag_leaky(tape, ag_scale(tape, state, 3), 0.1f), state));
     return maps;
 }
@@ -190,7 +190,7 @@ TEST(tape_error_is_sticky)
     CHECK(ag_status(tape)->code == TS_INVALID && strcmp(ag_status(tape)->message, "conv: input has 18 channels, weight wants 20") == 0, "message: %s",
           ag_status(tape)->message);
     /* Everything afterwards gives NULL, accepts NULL, and leaves the first message. */
-    CHECK(!ag_add(tape, NULL, x) && !ag_tanh(tape, NULL) && !ag_gru(tape, NULL, NULL, NULL) && !network(tape), "an op went on after the error");
+    CHECK(!ag_add(tape, NULL, x) && !ag_tanh(tape, NULL) && !ag_gru(tape, NULL, NULL, NULL, NULL, NULL, NULL) && !network(tape), "an op went on after the error");
     CHECK(!ag_constant(tape, ts_view(w, (ts_shape){1, 1, 1, 1})) && !ag_empty(tape, (ts_shape){1, 1, 1, 1}) && !ag_detach(tape, x), "a leaf was made after the error");
     CHECK(ag_backward(tape, NULL) == TS_INVALID && strstr(ag_status(tape)->message, "weight wants 20"), "the first message was lost: %s", ag_status(tape)->message);
     ag_reset(tape);
@@ -207,7 +207,9 @@ TEST(tape_shape_messages)
         ag_value *x = ag_constant(tape, ts_view(photo, (ts_shape){2, 3, 4, 6}));                                                 \
         ag_value *v = ag_constant(tape, ts_view(photo, (ts_shape){2, 1, 1, 5}));                                                 \
         ag_value *w = ag_constant(tape, ts_view(photo, (ts_shape){1, 1, 7, 6}));                                                 \
-        (void)x, (void)v, (void)w;                                                                                               \
+        ag_value *gates = ag_constant(tape, ts_view(photo, (ts_shape){3, 6, 1, 1})), *hidden = ag_constant(tape, ts_view(photo, (ts_shape){3, 1, 1, 1})); \
+        ag_value *three = ag_constant(tape, ts_view(photo, (ts_shape){1, 1, 1, 3}));                                             \
+        (void)x, (void)v, (void)w, (void)gates, (void)hidden, (void)three;                                                                                               \
         CHECK(!(call) && ag_status(tape)->code == TS_INVALID && strstr(ag_status(tape)->message, text), "%s: %s", #call, ag_status(tape)->message); \
     } while (0)
     REFUSED(ag_add(tape, x, v), "[2,3,4,6] and [2,1,1,5]");
@@ -217,8 +219,10 @@ TEST(tape_shape_messages)
     REFUSED(ag_linear(tape, v, w, NULL), "5 channels, weight wants 6");
     REFUSED(ag_max_pool(tape, x), "must be even");
     REFUSED(ag_add_leaky(tape, x, v, 0.1f), "every pixel");
-    REFUSED(ag_gru(tape, v, v, NULL), "three times");
-    REFUSED(ag_gru(tape, x, v, NULL), "hh is");
+    REFUSED(ag_gru(tape, x, NULL, w, v, w, v), "not {3c,ic,1,1}");
+    REFUSED(ag_gru(tape, x, v, gates, three, hidden, three), "the state is");
+    REFUSED(ag_gru(tape, x, NULL, gates, v, hidden, three), "biases");
+    REFUSED(ag_gru(tape, x, NULL, gates, three, gates, three), "not {3c,c,1,1}");
     REFUSED(ag_resize(tape, x, 0, 4), "0 x 4");
     REFUSED(ag_leaky(tape, x, NAN), "leak");
     REFUSED(ag_instance_norm(tape, x, 0), "epsilon");

@@ -122,7 +122,7 @@ static void copy(int64_t pixels, int c, const float *src, int64_t src_stride, fl
         for (int i = 0; i < c; i += VL) put(dst + i, v_load_part(src + i, c - i), c - i, accumulate);
 }
 
-static void gru(int64_t pixels, int c, const float *ih, const float *hh, int64_t hh_stride, const float *old, float *y, float *zrn)
+static void gru(int64_t pixels, int c, const float *ih, const float *hh, int64_t hh_stride, const float *old, float *y, float *saved)
 {
     for (int64_t p = 0; p < pixels; p++, ih += 3 * (int64_t)c, hh += hh_stride, y += c) {
         for (int i = 0; i < c; i += VL) {
@@ -136,53 +136,44 @@ static void gru(int64_t pixels, int c, const float *ih, const float *hh, int64_t
                 v = (o - z * o) + v;
             }
             v_store_part(y + i, v, left);
-            if (zrn) {
-                float *s = zrn + p * 3 * c + i;
+            if (saved) {
+                float *s = saved + p * 4 * c + i;
                 v_store_part(s, z, left);
                 v_store_part(s + c, r, left);
                 v_store_part(s + 2 * c, n, left);
+                v_store_part(s + 3 * c, v_load_part(hh + 2 * c + i, left), left);
             }
         }
     }
 }
 
-static void gru_backward(int64_t pixels, int c, const float *hh, int64_t hh_stride, const float *old, const float *zrn, const float *dy,
-                         float *dih, bool dih_accumulate, float *dhh, bool dhh_accumulate, float *dold, bool dold_accumulate, double *sum)
+static void gru_backward(int64_t pixels, int c, const float *saved, const float *old, const float *dy, float *d, float *dold, bool accumulate,
+                         double *sum)
 {
     for (int64_t p0 = 0; p0 < pixels; p0 += RUN) {
         int64_t p1 = p0 + RUN < pixels ? p0 + RUN : pixels;
         for (int i = 0; i < c; i += VL) {
             const int left = c - i;
-            vf sz = {0}, sr = {0}, sn = {0};
+            vf total[4] = {{0}, {0}, {0}, {0}};
             for (int64_t p = p0; p < p1; p++) {
-                const int64_t at = p * 3 * c + i;
-                vf z = v_load_part(zrn + at, left), r = v_load_part(zrn + at + c, left), n = v_load_part(zrn + at + 2 * c, left), d = v_load_part(dy + p * c + i, left);
-                vf o = old ? v_load_part(old + p * c + i, left) : (vf){0};
-                vf az = d * (n - o) * z * (1.0f - z); /* gradients before the activations */
-                vf an = d * z * (1.0f - n * n);
-                vf ar = an * v_load_part(hh + p * hh_stride + 2 * c + i, left) * r * (1.0f - r);
-                vf hn = an * r;
-                if (dih) {
-                    put(dih + at, az, left, dih_accumulate);
-                    put(dih + at + c, ar, left, dih_accumulate);
-                    put(dih + at + 2 * c, an, left, dih_accumulate);
-                }
-                if (dhh) {
-                    put(dhh + at, az, left, dhh_accumulate);
-                    put(dhh + at + c, ar, left, dhh_accumulate);
-                    put(dhh + at + 2 * c, hn, left, dhh_accumulate);
-                }
-                if (dold) put(dold + p * c + i, d * (1.0f - z), left, dold_accumulate);
-                sz += az;
-                sr += ar;
-                sn += hn;
+                const float *s = saved + p * 4 * c + i;
+                float *to = d + p * 4 * c + i;
+                const vf z = v_load_part(s, left), r = v_load_part(s + c, left), n = v_load_part(s + 2 * c, left), dv = v_load_part(dy + p * c + i, left);
+                const vf o = old ? v_load_part(old + p * c + i, left) : (vf){0};
+                const vf m = dv * z * (1.0f - n * n), az = dv * (n - o) * z * (1.0f - z);
+                const vf ar = m * v_load_part(s + 3 * c, left) * r * (1.0f - r), hn = m * r;
+                v_store_part(to, m, left);
+                v_store_part(to + c, az, left);
+                v_store_part(to + 2 * c, ar, left);
+                v_store_part(to + 3 * c, hn, left);
+                if (dold) put(dold + p * c + i, dv * (1.0f - z), left, accumulate);
+                total[0] += m;
+                total[1] += az;
+                total[2] += ar;
+                total[3] += hn;
             }
-            if (sum)
-                for (int j = 0; j < VL && j < left; j++) {
-                    sum[i + j] += sz[j];
-                    sum[c + i + j] += sr[j];
-                    sum[2 * c + i + j] += sn[j];
-                }
+            for (int k = 0; sum && k < 4; k++)
+                for (int j = 0; j < VL && j < left; j++) sum[k * c + i + j] += total[k][j];
         }
     }
 }

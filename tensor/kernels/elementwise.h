@@ -31,13 +31,13 @@ struct ts_elementwise_kernels {
     /* Part of every pixel: dst[p][0 .. c-1] (+)= src[p][0 .. c-1], the pixels dst_stride and src_stride floats apart. */
     void (*copy)(int64_t pixels, int c, const float *src, int64_t src_stride, float *dst, int64_t dst_stride, bool accumulate);
 
-    /* z = sigmoid(ih_z + hh_z), r = sigmoid(ih_r + hh_r), n = tanh(ih_n + r hh_n), y = (1 - z) old + z n. ih: [pixels][3c] in
-     * chunks z, r, n; hh_stride 3c, or 0 for one hh for all pixels; old [pixels][c] or NULL = 0; zrn: [pixels][3c] or NULL. */
-    void (*gru)(int64_t pixels, int c, const float *ih, const float *hh, int64_t hh_stride, const float *old, float *y, float *zrn);
-    /* dih: [pixels][3c], dhh: [pixels][3c], dold: [pixels][c]; each may be NULL. sum[3c] += dhh over the pixels, or NULL.
-     * dih and dhh may be the same memory when dhh accumulates. */
-    void (*gru_backward)(int64_t pixels, int c, const float *hh, int64_t hh_stride, const float *old, const float *zrn, const float *dy,
-                         float *dih, bool dih_accumulate, float *dhh, bool dhh_accumulate, float *dold, bool dold_accumulate, double *sum);
+    /* The gates and the new state of tensor/gru.h. ih: [pixels][3c] in chunks z, r, n; hh_stride 3c, or 0 for one hh for all pixels;
+     * old [pixels][c] or NULL = 0; saved: [pixels][4c] = z, r, n, hh_n, or NULL. */
+    void (*gru)(int64_t pixels, int c, const float *ih, const float *hh, int64_t hh_stride, const float *old, float *y, float *saved);
+    /* With dm = dy z (1 - n^2): d[pixels][4c] = dm, dy (n - old) z (1 - z), dm hh_n r (1 - r), dm r: the gradients of ih_n, of z's and r's
+     * sums, and of hh_n; sum[4c] += d over the pixels; dold[pixels][c] (+)= dy (1 - z). dold and sum may be NULL. */
+    void (*gru_backward)(int64_t pixels, int c, const float *saved, const float *old, const float *dy, float *d, float *dold, bool accumulate,
+                         double *sum);
 };
 TS_FAMILY(elementwise)
 

@@ -1,0 +1,156 @@
+#include "tensor/gru.h"
+#include "tensor/conv_plan.h"
+#include "tensor/kernels/elementwise.h"
+#include "tensor/threads.h"
+#include <string.h>
+
+enum {
+    BAND = 8 * TS_TILE_PIXELS, /* pixels: with 64 and 32 channels, or 256 and 64, all that a band touches stays in the second cache */
+    PART_PIXELS = 1024,        /* weight gradients: private sums for so many pixels at least, */
+    PARTS = 16                 /* and no more of them, by shape alone */
+};
+
+ts_conv ts_gru_input(const ts_gru *g) { return (ts_conv){1, 1, 1, g->ic, 3 * g->c, 1, 1, TS_PAD_ZERO}; }
+ts_conv ts_gru_hidden(const ts_gru *g) { return (ts_conv){1, 1, 1, g->c, 3 * g->c, 1, 1, TS_PAD_ZERO}; }
+
+void ts_gru_forward(const ts_gru *g, const float *x, const float *old, const float *ih_packed, const float *ih_bias, const float *hh_packed,
+                    const float *hh_bias, float *y, float *saved)
+{
+    const struct ts_elementwise_kernels *k = ts_elementwise_k();
+    const int gates = 3 * g->c;
+    const conv_plan input = {.ic = g->ic, .oc = gates, .k = 1, .packed = ih_packed, .bias = ih_bias, .leak = 1};
+    const conv_plan hidden = {.ic = g->c, .oc = gates, .k = 1, .packed = hh_packed, .bias = hh_bias, .leak = 1};
+#pragma omp parallel for schedule(dynamic, 4) num_threads(ts_threads())
+    for (int64_t p = 0; p < g->pixels; p += BAND) {
+        const int count = (int)(g->pixels - p < BAND ? g->pixels - p : BAND);
+        float *ih = ts_scratch(0, sizeof(float) * (size_t)(BAND * gates)), *hh = ts_scratch(1, sizeof(float) * (size_t)(BAND * gates));
+        conv_plan now = input;
+        now.x = x + p * g->ic;
+        now.y = ih;
+        conv_run_pixels(&now, 0, count, 0, conv_panels(gates));
+        if (old) {
+            now = hidden;
+            now.x = old + p * g->c;
+            now.y = hh;
+            conv_run_pixels(&now, 0, count, 0, conv_panels(gates));
+        }
+        /* A zero state leaves of the hidden gates their bias. */
+        k->gru(count, g->c, ih, old ? hh : hh_bias, old ? gates : 0, old ? old + p * g->c : NULL, y + p * g->c, saved ? saved + p * 4 * g->c : NULL);
+    }
+}
+
+/* y[p] (+)= the sum over runs of channels of a[p]: a band's data gradient. */
+static void product(const float *a, ptrdiff_t a_stride, const ts_segment *segment, int segments, int depth, const float *packed, int oc, float *y,
+                    bool add, int count)
+{
+    const struct ts_conv_kernels *k = ts_conv_k();
+    const conv_plan plan = {.ic = depth, .oc = oc, .k = 1, .packed = packed, .leak = 1, .add = add};
+    for (int panel = 0; panel < conv_panels(oc); panel++) {
+        ts_tile t = conv_panel_tile(&plan, panel);
+        t.segment = segment;
+        t.segments = segments;
+        t.a_stride = a_stride;
+        for (int p = 0; p < count; p += k->pixels)
+            conv_run_tile(&t, conv_vectors(oc, panel), a + p * a_stride, y + (ptrdiff_t)p * oc + panel * 2 * k->lanes, count - p < k->pixels ? count - p : k->pixels);
+    }
+}
+
+static int padded(int channels) { return (channels + conv_lanes() - 1) / conv_lanes() * conv_lanes(); }
+
+/* Private sums of a part: [3c][padded ic], [3c][padded c], and in double [4c]. The 4c gradients of a pixel before the activations come as
+ * n, z, r, n' (n' that of hh_n), so that both ih's and hh's three are neighbours. */
+typedef struct sums {
+    float *input, *hidden;
+    double *bias;
+} sums;
+
+/* c[m][i] += sum_p d[p][m] b[p][i] for 3c values of m */
+static void add_products(const float *d, int c, const float *b, int channels, int count, float *sum)
+{
+    const struct ts_conv_kernels *k = ts_conv_k();
+    const int width = padded(channels), tiles = (3 * c + k->rows - 1) / k->rows;
+    const ptrdiff_t zero = 0;
+    ptrdiff_t b_stride = channels;
+    if (width != channels) { /* whole vectors are read */
+        float *staged = ts_scratch(1, sizeof(float) * (size_t)(BAND * width));
+        for (int p = 0; p < count; p++) {
+            memcpy(staged + (ptrdiff_t)p * width, b + (ptrdiff_t)p * channels, sizeof(float) * (size_t)channels);
+            memset(staged + (ptrdiff_t)p * width + channels, 0, sizeof(float) * (size_t)(width - channels));
+        }
+        b = staged;
+        b_stride = width;
+    }
+    for (int panel = 0; panel < conv_panels(channels); panel++)
+        for (int i = 0; i < tiles; i++) {
+            int begin, end;
+            conv_part(3 * c, tiles, i, &begin, &end);
+            const ts_sum t = {.a = d + begin, .b = b + panel * 2 * k->lanes, .a_row = &zero, .b_row = &zero, .rows = 1, .count = count, .a_stride = 4 * c,
+                              .b_stride = b_stride, .c = sum + (ptrdiff_t)begin * width + panel * 2 * k->lanes, .c_stride = width, .fetch = (const char *)d};
+            k->sum[conv_vectors(channels, panel) - 1][end - begin](&t);
+        }
+}
+
+static void run_band(const ts_gru *g, int64_t p, int count, const float *x, const float *old, const float *ih_packed, const float *hh_packed,
+                     const float *saved, const float *dy, const ts_gru_gradients *to, sums s)
+{
+    const int c = g->c;
+    const ts_segment input[2] = {{c, 0, 2 * c}, {0, 2 * c, c}}, hidden = {c, 0, 3 * c};
+    float *d = ts_scratch(0, sizeof(float) * (size_t)(BAND * 4 * c)), *dold = to->dold ? to->dold + p * c : NULL;
+    ts_elementwise_k()->gru_backward(count, c, saved + p * 4 * c, old ? old + p * c : NULL, dy + p * c, d, dold, to->dold_add, s.bias);
+    if (dold) product(d, 4 * c, &hidden, 1, 3 * c, hh_packed, c, dold, true, count);
+    if (to->dx) product(d, 4 * c, input, 2, 3 * c, ih_packed, g->ic, to->dx + p * g->ic, to->dx_add, count);
+    if (to->ih_weight) add_products(d, c, x + p * g->ic, g->ic, count, s.input);
+    if (to->hh_weight && old) add_products(d + c, c, old + p * c, c, count, s.hidden);
+}
+
+/* The parts' sums of one row, in order of the parts, added to its place. */
+static void reduce_row(const float *first, ptrdiff_t part, int parts, int channels, float *to)
+{
+    for (int i = 0; i < channels; i++) {
+        float sum = first[i];
+        for (int j = 1; j < parts; j++) sum += first[j * part + i];
+        to[i] += sum;
+    }
+}
+
+static void reduce_bias(const double *first, ptrdiff_t part, int parts, int c, const ts_gru_gradients *to)
+{
+    for (int i = 0; i < 4 * c; i++) {
+        double sum = 0;
+        for (int j = 0; j < parts; j++) sum += first[j * part + i];
+        const int chunk = i / c, at = i % c;
+        if (to->ih_bias && chunk < 3) to->ih_bias[(chunk + 2) % 3 * c + at] += (float)sum;
+        if (to->hh_bias && chunk > 0) to->hh_bias[(chunk - 1) * c + at] += (float)sum;
+    }
+}
+
+void ts_gru_backward(const ts_gru *g, const float *x, const float *old, const float *ih_packed, const float *hh_packed, const float *saved,
+                     const float *dy, const ts_gru_gradients *to)
+{
+    const int c = g->c, gates = 3 * c;
+    const int64_t most = g->pixels / PART_PIXELS;
+    const int parts = most < 1 ? 1 : most > PARTS ? PARTS : (int)most;
+    const ptrdiff_t input = (ptrdiff_t)gates * padded(g->ic), hidden = (ptrdiff_t)gates * padded(c);
+    const ptrdiff_t doubles = 4 * c, size = doubles + (input + hidden + 1) / 2; /* of a part, in doubles */
+    double *memory = ts_scratch(2, sizeof(double) * (size_t)(size * parts));
+#pragma omp parallel num_threads(ts_threads())
+    {
+#pragma omp for schedule(dynamic)
+        for (int part = 0; part < parts; part++) {
+            double *own = memory + part * size;
+            float *weights = (float *)(void *)(own + doubles);
+            memset(own, 0, sizeof(double) * (size_t)size);
+            const sums s = {weights, weights + input, to->ih_bias || to->hh_bias ? own : NULL};
+            const int64_t begin = g->pixels * part / parts, end = g->pixels * (part + 1) / parts;
+            for (int64_t p = begin; p < end; p += BAND)
+                run_band(g, p, (int)(end - p < BAND ? end - p : BAND), x, old, ih_packed, hh_packed, saved, dy, to, s);
+        }
+#pragma omp for schedule(static)
+        for (int m = 0; m < gates; m++) {
+            const float *first = (const float *)(const void *)(memory + doubles);
+            if (to->ih_weight) reduce_row(first + (ptrdiff_t)m * padded(g->ic), 2 * size, parts, g->ic, to->ih_weight + (ptrdiff_t)((m + 2 * c) % gates) * g->ic);
+            if (to->hh_weight && old) reduce_row(first + input + (ptrdiff_t)m * padded(c), 2 * size, parts, c, to->hh_weight + (ptrdiff_t)m * c);
+        }
+    }
+    if (to->ih_bias || to->hh_bias) reduce_bias(memory, size, parts, c, to);
+}
