@@ -14,6 +14,7 @@ typedef struct field {
     size_t at;
     int lo, hi, start;
     const char *const *words; /* FIELD_WORD: its values' names, lo .. hi */
+    bool late; /* files older than the field do not have it */
 } field;
 
 static const char *const rmse_words[] = {"start", "batch"}, *const encoding_words[] = {"raw", "asinh"};
@@ -22,22 +23,23 @@ _Static_assert(sizeof(nn_rmse) == sizeof(int) && sizeof(nn_gradient) == sizeof(i
 /* The upper ends only keep products of sizes far from overflow. The defaults are the model that two cores can train. */
 #define AT(member) offsetof(nn_arch, member)
 static const field fields[] = {
-    {"channels", FIELD_INT, AT(channels), 9, 10, 9, NULL},
-    {"g_width", FIELD_INT, AT(g_width), 1, 4096, 16, NULL},
-    {"g_width_max", FIELD_INT, AT(g_width_max), 1, 4096, 128, NULL},
-    {"g_levels", FIELD_INT, AT(g_levels), 1, NN_MAX_LEVELS, 5, NULL},
-    {"g_kernel_first", FIELD_INT, AT(g_kernel_first), 1, 15, 3, NULL},
-    {"g_kernel", FIELD_INT, AT(g_kernel), 1, 15, 3, NULL},
-    {"g_size", FIELD_INT, AT(g_size), 2, 8192, 64, NULL},
-    {"h_width", FIELD_INT, AT(h_width), 0, 4096, 64, NULL},
-    {"h_gru", FIELD_INT, AT(h_gru), 1, 1024, 32, NULL},
-    {"iterations", FIELD_INT, AT(iterations), 0, 1000, 6, NULL},
-    {"recurrent", FIELD_BOOL, AT(recurrent), 0, 1, true, NULL},
-    {"gradient", FIELD_BOOL, AT(gradient), 0, 1, true, NULL},
-    {"descent", FIELD_BOOL, AT(descent), 0, 1, true, NULL},
-    {"mean_before_norm", FIELD_BOOL, AT(mean_before_norm), 0, 1, true, NULL},
-    {"rmse", FIELD_WORD, AT(rmse), NN_RMSE_START, NN_RMSE_BATCH, NN_RMSE_START, rmse_words},
-    {"encoding", FIELD_WORD, AT(encoding), NN_GRADIENT_RAW, NN_GRADIENT_ASINH, NN_GRADIENT_ASINH, encoding_words},
+    {"channels", FIELD_INT, AT(channels), 9, 10, 9, NULL, false},
+    {"g_width", FIELD_INT, AT(g_width), 1, 4096, 16, NULL, false},
+    {"g_width_max", FIELD_INT, AT(g_width_max), 1, 4096, 128, NULL, false},
+    {"g_levels", FIELD_INT, AT(g_levels), 1, NN_MAX_LEVELS, 5, NULL, false},
+    {"g_kernel_first", FIELD_INT, AT(g_kernel_first), 1, 15, 3, NULL, false},
+    {"g_kernel", FIELD_INT, AT(g_kernel), 1, 15, 3, NULL, false},
+    {"g_size", FIELD_INT, AT(g_size), 2, 8192, 64, NULL, false},
+    {"h_width", FIELD_INT, AT(h_width), 0, 4096, 64, NULL, false},
+    {"h_gru", FIELD_INT, AT(h_gru), 1, 1024, 32, NULL, false},
+    {"iterations", FIELD_INT, AT(iterations), 0, 1000, 6, NULL, false},
+    {"recurrent", FIELD_BOOL, AT(recurrent), 0, 1, true, NULL, false},
+    {"gradient", FIELD_BOOL, AT(gradient), 0, 1, true, NULL, false},
+    {"descent", FIELD_BOOL, AT(descent), 0, 1, true, NULL, false},
+    {"mean_before_norm", FIELD_BOOL, AT(mean_before_norm), 0, 1, true, NULL, false},
+    {"rmse", FIELD_WORD, AT(rmse), NN_RMSE_START, NN_RMSE_BATCH, NN_RMSE_START, rmse_words, false},
+    {"encoding", FIELD_WORD, AT(encoding), NN_GRADIENT_RAW, NN_GRADIENT_ASINH, NN_GRADIENT_ASINH, encoding_words, false},
+    {.key = "latent", .kind = FIELD_INT, .at = AT(latent), .hi = 1024, .late = true},
 };
 enum { FIELDS = sizeof fields / sizeof *fields };
 static const char prefix[] = "arch.";
@@ -79,6 +81,7 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
     if (a->g_kernel % 2 == 0) return ts_fail(st, TS_INVALID, "g_kernel is %d: it must be odd", a->g_kernel);
     if (a->g_size % (1 << a->g_levels) != 0)
         return ts_fail(st, TS_INVALID, "g_size is %d: with %d g_levels it must be a multiple of %d", a->g_size, a->g_levels, 1 << a->g_levels);
+    if (a->latent > 0 && a->h_width > 0) return ts_fail(st, TS_INVALID, "latent is %d: an auto-encoder has no refiner, so h_width must be 0", a->latent);
     if (a->h_width == 0 && a->iterations != 0)
         return ts_fail(st, TS_INVALID, "iterations is %d: without a refiner (h_width 0) it must be 0", a->iterations);
     return TS_OK;
@@ -96,19 +99,21 @@ static const char *value_text(const nn_arch *a, const field *f, char *text, size
 int nn_arch_to_meta(const nn_arch *arch, nn_meta *meta, int capacity, char *text, size_t text_size)
 {
     size_t used = 0;
-    if (capacity < FIELDS + 1) return -1;
-    meta[0] = (nn_meta){"format", "lgd"};
+    int n = 0;
+    if (capacity < 1) return -1;
+    meta[n++] = (nn_meta){"format", "lgd"};
     for (int i = 0; i < FIELDS; i++) {
+        if (fields[i].late && get(arch, &fields[i]) == fields[i].start) continue;
         char value[16], both[64];
         value_text(arch, &fields[i], value, sizeof value);
         int key = snprintf(both, sizeof both, "%s%s", prefix, fields[i].key) + 1;
         int all = key + snprintf(both + key, sizeof both - (size_t)key, "%s", value) + 1;
-        if (used + (size_t)all > text_size) return -1;
+        if (n == capacity || used + (size_t)all > text_size) return -1;
         memcpy(text + used, both, (size_t)all);
-        meta[i + 1] = (nn_meta){text + used, text + used + key};
+        meta[n++] = (nn_meta){text + used, text + used + key};
         used += (size_t)all;
     }
-    return FIELDS + 1;
+    return n;
 }
 
 static bool parse(const field *f, const char *text, int *v)
@@ -147,6 +152,10 @@ ts_code nn_arch_from_file(const nn_file *file, nn_arch *arch, ts_status *st)
         int v;
         snprintf(name, sizeof name, "%s%s", prefix, fields[i].key);
         const char *text = nn_file_meta(file, name);
+        if (!text && fields[i].late) {
+            set(arch, &fields[i], fields[i].start);
+            continue;
+        }
         if (!text) return ts_fail(st, TS_FORMAT, "%s: metadata key \"%s\" is missing", nn_file_path(file), name);
         if (!parse(&fields[i], text, &v))
             return ts_fail(st, TS_FORMAT, "%s: metadata key \"%s\" is \"%.40s\": not a value of it", nn_file_path(file), name, text);

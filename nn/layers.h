@@ -30,6 +30,7 @@ typedef struct nn_layers {
     nn_unet_block down[NN_MAX_LEVELS], up[NN_MAX_LEVELS];
     nn_layer output_conv1, output_conv2, output_add;
     nn_cell cell[2];
+    nn_layer encoder[NN_MAX_LEVELS + 1], code, decoder[NN_MAX_LEVELS + 1][2], decoded; /* the deepest decoder level has one convolution */
     nn_layer h_output, h_descent; /* h_descent: weight -1 where there is none */
     int refiner;   /* index of h's first parameter */
     double *start; /* per parameter: standard deviation of the first values, 0 for zeros, or one of these: */

@@ -117,6 +117,27 @@ static void plan_h(nn_model *m)
     l->start[l->h_descent.weight] = NN_DESCENT;
 }
 
+/* The encoder pools between its convolutions; the decoder has two a level, since it alone has to make the detail. */
+static void plan_latent(nn_model *m)
+{
+    const nn_arch *a = &m->arch;
+    nn_layers *l = m->layers;
+    const int levels = a->g_levels;
+    const double gain = leaky_gain(NN_LEAK_G);
+    char name[64];
+    for (int i = 0; i <= levels; i++) {
+        snprintf(name, sizeof name, "a.encoder%d", i);
+        l->encoder[i] = conv(m, name, level_width(a, i), i ? level_width(a, i - 1) : a->channels, 3, true, gain);
+    }
+    l->code = conv(m, "a.code", a->latent, level_width(a, levels), 3, true, 1);
+    for (int i = levels; i >= 0; i--)
+        for (int j = 0; j < (i < levels ? 2 : 1); j++) {
+            snprintf(name, sizeof name, "a.decoder%d.conv%d", i, j + 1);
+            l->decoder[i][j] = conv(m, name, level_width(a, i), j ? level_width(a, i) : i == levels ? a->latent : level_width(a, i + 1), 3, true, gain);
+        }
+    l->decoded = conv(m, "a.output", a->channels, level_width(a, 0), 3, true, 0.25);
+}
+
 nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
 {
     if (nn_arch_check(arch, st)) return NULL;
@@ -132,7 +153,8 @@ nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
         return NULL;
     }
     m->arch = *arch;
-    plan_g(m);
+    if (arch->latent > 0) plan_latent(m);
+    else plan_g(m);
     l->refiner = m->params;
     if (arch->h_width > 0) plan_h(m);
     return m;
@@ -202,7 +224,8 @@ ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index)
     ts_shape s = {1, 1, 1, p->dim[0]};
     if (p->rank == 2) s = (ts_shape){1, 1, p->dim[0], p->dim[1]};
     if (p->rank == 4) s = (ts_shape){p->dim[0], p->dim[1], p->dim[2], p->dim[3]};
-    float *grad = model->grad && ag_gradients(tape) ? model->grad + p->offset : NULL;
+    const bool fixed = model->g_fixed && index < layers_of(model)->refiner;
+    float *grad = model->grad && ag_gradients(tape) && !fixed ? model->grad + p->offset : NULL;
     return ag_parameter(tape, ts_view(model->value + p->offset, s), grad);
 }
 

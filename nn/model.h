@@ -34,6 +34,8 @@ typedef struct nn_arch {
     bool mean_before_norm; /* the global track's mean: before (ours) or after (published) the normalisation */
     nn_rmse rmse;
     nn_gradient encoding; /* of the gradient for h */
+    int latent;         /* channels of an auto-encoder's code: the model then is one of maps (nn_encode), shaped by g_width, g_width_max and g_levels, and
+                         * has neither g nor h; 0: g and h */
 } nn_arch;
 
 nn_arch nn_arch_default(void);
@@ -52,6 +54,7 @@ typedef struct nn_model {
     size_t count;  /* floats in a block (each parameter starts at a multiple of 16) */
     float *value;  /* one aligned block */
     float *grad;   /* the same, or NULL until nn_model_train */
+    bool g_fixed;  /* g's parameters are constants: no gradient is computed for them, nor through g */
     void *layers;  /* nn's own */
 } nn_model;
 
@@ -85,6 +88,11 @@ typedef struct nn_input {
 
 /* R_0 by g of the whole: [N, S, S, channels]. The log encoding, the resampling to g_size and back are in here. */
 ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in);
+
+/* An auto-encoder of maps (arch.latent): [N, S, S, channels] to its code [N, S / 2^g_levels, S / 2^g_levels, latent], and back to maps in
+ * [-1, 1]. Convolutional: any S that is a multiple of 2^g_levels. */
+ag_value *nn_encode(ag_tape *tape, const nn_model *model, ag_value *maps);
+ag_value *nn_decode(ag_tape *tape, const nn_model *model, ag_value *code);
 
 /* How many pixels away from an output pixel h reads, in one step. */
 int nn_refiner_reach(const nn_model *model);

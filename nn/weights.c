@@ -9,7 +9,7 @@ static void dims_of(const nn_param *p, int64_t dim[4])
     for (int i = 0; i < 4; i++) dim[i] = p->dim[i];
 }
 
-static bool of_network(const char *name) { return !strncmp(name, "g.", 2) || !strncmp(name, "h.", 2); }
+static bool of_network(const char *name) { return !strncmp(name, "g.", 2) || !strncmp(name, "h.", 2) || !strncmp(name, "a.", 2); }
 
 static bool finite_all(const float *v, size_t count)
 {

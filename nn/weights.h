@@ -15,7 +15,7 @@ typedef struct nn_block {
 /* Written to a temporary file beside path, fsynced, renamed; nothing is left on failure. */
 ts_code nn_safetensors_write(const char *path, const nn_block *blocks, int count, const nn_meta *meta, int metas, ts_status *st);
 
-/* A model with its parameters from a file that says its own architecture. Tensors whose names begin with neither "g." nor "h."
+/* A model with its parameters from a file that says its own architecture. Tensors whose names begin with none of "g.", "h." and "a."
  * (a checkpoint's) are left alone. */
 nn_model *nn_model_load(const char *path, ts_status *st);
 /* values: the block to write, model->value or an EMA. Extra metadata may be given. TS_NUMERIC when a value is not finite. */
@@ -23,7 +23,7 @@ ts_code nn_model_save(const nn_model *model, const float *values, const char *pa
 /* Parameters that have the same name and shape are taken from the file; how many were, and were not, is returned through the pointers. */
 ts_code nn_model_init_from(nn_model *model, const char *path, int *taken, int *left, ts_status *st);
 /* The architecture to metadata ("format" = "lgd" and one key "arch.FIELD" each: NN_ARCH_META entries, NN_ARCH_TEXT bytes of text are
- * enough) and back. Returns the number of entries, -1 when capacity or text_size is too small. Keys that do not begin with "arch." are
+ * enough) and back. A field that came later is written only where it is not its default, and may be missing. Returns the number of entries, -1 when capacity or text_size is too small. Keys that do not begin with "arch." are
  * free for other use. */
 enum { NN_ARCH_META = 24, NN_ARCH_TEXT = 1024 };
 int nn_arch_to_meta(const nn_arch *arch, nn_meta *meta, int capacity, char *text, size_t text_size);

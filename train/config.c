@@ -230,6 +230,14 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
     if (nn_arch_check(&c->arch, st) != TS_OK) return ts_context(st, "[model]");
     if (c->train.steps + c->train.pretrain_steps < 1)
         return ts_fail(st, TS_INVALID, "train.steps and train.pretrain_steps are both 0, there is nothing to do");
+    if (c->arch.latent > 0) {
+        const int unit = 1 << c->arch.g_levels;
+        if (c->data.patch % unit || (c->validate.every && c->validate.size % unit))
+            return ts_fail(st, TS_INVALID, "data.patch is %d and validate.size %d: with %d model.g_levels an auto-encoder needs multiples of %d", c->data.patch, c->validate.size,
+                           c->arch.g_levels, unit);
+        if (c->train.pretrain_steps || c->train.window) return ts_fail(st, TS_INVALID, "an auto-encoder (model.latent) has one phase and whole patches: train.pretrain_steps and train.window must be 0");
+    }
+    if (c->train.steps && c->train.g_rate == 0 && c->arch.h_width == 0) return ts_fail(st, TS_INVALID, "train.g_rate is 0 and there is no refiner (model.h_width): nothing would be trained");
     if (c->train.window && (c->train.window < 8 || c->train.window > c->data.patch))
         return ts_fail(st, TS_INVALID, "train.window is %d: use 8 to data.patch, which is %d, or 0", c->train.window, c->data.patch);
     if (lo > hi) return ts_fail(st, TS_INVALID, "train.iterations_min is %d, more than the %d of train.iterations_max", lo, hi);

@@ -29,6 +29,8 @@ const tr_key tr_keys[] = {
      "what scales the gradient: the RMSE of each image's R_0, or of the whole batch anew at every step (published)"},
     {"model", "encoding", TR_CHOICE, AT(arch.encoding), 0, 1, NULL, encoding_names, false,
      "how the refiner reads the gradient: as it is (raw, published), or asinh of ten times it"},
+    {"model", "latent", TR_INT, AT(arch.latent), 0, 1024, NULL, NULL, false,
+     "channels of the code of an auto-encoder of maps, which is then what is trained (train.steps; shaped by g_width, g_width_max and g_levels; h_width and iterations are 0); 0: g and h"},
 
     {"data", "seed", TR_INT64, AT(data.seed), 0, 1e15, "1", NULL, false, "seed of the materials and of the camera's noise"},
     {"data", "families", TR_FAMILIES, AT(data.families), 0, 0, "all", NULL, false,
@@ -61,7 +63,7 @@ const tr_key tr_keys[] = {
     {"train", "pretrain_floor", TR_REAL, AT(train.pretrain_floor), 0, 1, "0.1", NULL, false, "fraction of pretrain_rate that its cosine ends at"},
     {"train", "rate", TR_REAL, AT(train.rate), 0, 1e6, "0.001", NULL, false, "Adam's peak rate while g and h are trained together"},
     {"train", "g_rate", TR_REAL, AT(train.g_rate), 0, 10, "1", NULL, false,
-     "factor of rate for g while g and h are trained together: a pretrained g needs less"},
+     "factor of rate for g while g and h are trained together: a pretrained g needs less; 0: g is fixed, and no gradient is computed for it"},
     {"train", "rate_floor", TR_REAL, AT(train.rate_floor), 0, 1, "0", NULL, false, "fraction of rate that its cosine ends at"},
     {"train", "warmup", TR_INT64, AT(train.warmup), 0, 1e9, "100", NULL, false,
      "steps of linear warm-up at the start of either phase (at most half of it)"},

@@ -63,6 +63,10 @@ static ag_value *forward(tr_trainer *t, const float *target, tr_row *row)
         maps[0] = nn_predict(t->tape, t->model, &in);
         return add_loss(t, NULL, maps[0], ag_constant(t->tape, goals), 1, &row->render_start, &row->map_start);
     }
+    if (c->arch.latent > 0) {
+        ag_value *goal = ag_constant(t->tape, goals);
+        return add_loss(t, NULL, nn_decode(t->tape, t->model, nn_encode(t->tape, t->model, goal)), goal, 1, &row->render_end, &row->map_end);
+    }
     const rd_grid window = draw_window(c, t->step);
     if (window.w < size) {
         in.whole = in.image;
@@ -135,8 +139,9 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
     ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_SCENE, (uint64_t)t->step);
     for (int i = 0; i < batch; i++) rd_loss_views(&rng, t->views + i * RD_LOSS_VIEWS);
 
+    t->model->g_fixed = !row->pretraining && c->train.g_rate == 0;
     size_t first = 0, last = t->model->count;
-    if (row->pretraining) nn_model_range(t->model, false, &first, &last);
+    if (row->pretraining || t->model->g_fixed) nn_model_range(t->model, t->model->g_fixed, &first, &last);
     ag_reset(t->tape);
     ag_value *loss = forward(t, target, row);
     if (loss) row->loss = (double)loss->t.data[0];
@@ -155,7 +160,7 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
         const double clip = c->train.clip;
         const float scale = clip > 0 && row->norm > clip ? (float)(clip / row->norm) : 1.0f;
         nn_adam_next(&t->adam);
-        for (int refiner = 0; refiner <= !row->pretraining; refiner++) {
+        for (int refiner = t->model->g_fixed; refiner <= !row->pretraining; refiner++) {
             nn_model_range(t->model, refiner, &first, &last);
             const double factor = row->pretraining || refiner ? 1 : c->train.g_rate;
             nn_adam_step(&t->adam, t->model, first, last, (float)(row->rate * factor), scale);
