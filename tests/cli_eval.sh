@@ -70,7 +70,9 @@ real_sets() {
     lines "$T/o/results.csv" $((1 + 3 * (maps + strips)))
     says "$T/out" "$maps materials"
     says "$T/out" "$((maps + strips)) materials"
-    awk -F, 'NR > 1 { for (i = NF - 7; i <= NF - 3; i++) if (!($i >= 0 && $i < 2)) exit 1; if (!($(NF - 2) > 0 && $(NF - 2) < 90) || $3 != 1 && !($NF > 0 && $NF < 1)) exit 1 }' "$T/o/results.csv" || fail "an error is out of range"
+    # set,material,step, five errors, angle, then ssim and flip of the first and the last step
+    awk -F, 'NR > 1 { for (i = 4; i <= 8; i++) if (!($i >= 0 && $i < 2)) exit 1
+        if (!($9 > 0 && $9 < 90) || $3 != 1 && !($10 < 1 && $10 > -1 && $11 > 0 && $11 < 1)) exit 1 }' "$T/o/results.csv" || fail "an error is out of range"
 }
 
 images() {
