@@ -54,7 +54,7 @@ TEST_BIN := $(BUILD)/bin/lgd-test
 BENCH_BIN := $(BUILD)/bin/lgd-bench
 STRESS_BIN := $(BUILD)/bin/lgd-stress
 # tests/stress/training.c stands between the trainer and its data.
-WRAP := -Wl,--wrap=io_loader_next -Wl,--wrap=tr_photograph
+WRAP := -Wl,--wrap=io_loader_next -Wl,--wrap=tr_photographs
 
 all: $(BIN) $(LIB) $(IMAGE_LIB)
 

@@ -39,6 +39,7 @@ static const field fields[] = {
     {"mean_before_norm", FIELD_BOOL, AT(mean_before_norm), 0, 1, true, NULL, false},
     {"rmse", FIELD_WORD, AT(rmse), NN_RMSE_START, NN_RMSE_BATCH, NN_RMSE_START, rmse_words, false},
     {"encoding", FIELD_WORD, AT(encoding), NN_GRADIENT_RAW, NN_GRADIENT_ASINH, NN_GRADIENT_ASINH, encoding_words, false},
+    {.key = "images", .kind = FIELD_INT, .at = AT(images), .lo = 1, .hi = NN_MAX_IMAGES, .start = 1, .late = true},
     {.key = "latent", .kind = FIELD_INT, .at = AT(latent), .hi = 1024, .late = true},
 };
 enum { FIELDS = sizeof fields / sizeof *fields };
@@ -82,6 +83,8 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
     if (a->g_size % (1 << a->g_levels) != 0)
         return ts_fail(st, TS_INVALID, "g_size is %d: with %d g_levels it must be a multiple of %d", a->g_size, a->g_levels, 1 << a->g_levels);
     if (a->latent > 0 && a->h_width > 0) return ts_fail(st, TS_INVALID, "latent is %d: an auto-encoder has no refiner, so h_width must be 0", a->latent);
+    if (a->images > 1 && a->rmse == NN_RMSE_BATCH)
+        return ts_fail(st, TS_INVALID, "images is %d: with rmse = batch it must be 1", a->images);
     if (a->h_width == 0 && a->iterations != 0)
         return ts_fail(st, TS_INVALID, "iterations is %d: without a refiner (h_width 0) it must be 0", a->iterations);
     return TS_OK;

@@ -50,7 +50,8 @@ void nn_model_init(nn_model *model, uint64_t seed)
             int n = p->dim[1]; /* one n x n matrix for each gate */
             for (int gate = 0; gate < p->dim[0] / n; gate++) orthogonal(&rng, n, v + (size_t)gate * n * n);
         } else if (l->start[i] == NN_DESCENT) {
-            for (int j = 0; j < p->dim[0]; j++) v[(size_t)j * (size_t)p->dim[1] + (size_t)j] = -0.003f;
+            const int channels = p->dim[0], images = p->dim[1] / channels;
+            for (int j = 0; j < p->dim[1]; j++) v[(size_t)(j % channels) * (size_t)p->dim[1] + (size_t)j] = -0.003f / (float)images;
         } else if (l->start[i] > 0) {
             for (size_t j = 0; j < p->count; j++) v[j] = (float)(l->start[i] * ts_rng_normal(&rng));
         }

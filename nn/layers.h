@@ -36,19 +36,19 @@ typedef struct nn_layers {
     double *start; /* per parameter: standard deviation of the first values, 0 for zeros, or one of these: */
 } nn_layers;
 #define NN_ORTHOGONAL (-1.0)
-#define NN_DESCENT (-2.0) /* -0.003 times the identity: six such steps lower the loss of a trained g's R_0 without overshooting anywhere */
+#define NN_DESCENT (-2.0) /* -0.003 times the identity, shared by the photographs: six such steps lower the loss of a trained g's R_0 without overshooting anywhere */
 
 /* Parameter number index as a value on the tape, NULL for index -1. */
 ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index);
 ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad, float leak);
 ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x);
 
-/* g on its own input: x [N, g_size, g_size, 3] log-encoded -> [N, g_size, g_size, channels] in [-1, 1]. */
+/* g on its own input: x [N, g_size, g_size, 3 images] log-encoded -> [N, g_size, g_size, channels] in [-1, 1]. */
 ag_value *nn_unet(ag_tape *tape, const nn_model *model, ag_value *x);
 
-/* h: input [N, H, W, 2 channels] and the states (updated; NULL = zero) -> the change of the maps. */
+/* h: input [N, H, W, (1 + images) channels] and the states (updated; NULL = zero) -> the change of the maps. */
 ag_value *nn_refiner(ag_tape *tape, const nn_model *model, ag_value *x, ag_value *gru[2]);
 
-/* R_{t+1} from R_t and its encoded gradient, both [N, H, W, channels]. */
+/* R_{t+1} from R_t, [N, H, W, channels], and its encoded gradients, [N, H, W, images channels]. */
 ag_value *nn_step(ag_tape *tape, const nn_model *model, ag_value *maps, ag_value *gradient, ag_value *gru[2]);
 #endif

@@ -10,6 +10,10 @@
 #include <math.h>
 #include <string.h>
 
+static int given(const nn_input *in) { return in->given > 0 ? in->given : 1; }
+static int materials(const nn_input *in) { return in->image.shape.n / given(in); }
+static const rd_view *view_of(const nn_input *in, int photograph) { return in->views ? &in->views[photograph] : &in->view; }
+
 static bool check(ag_tape *tape, const nn_model *model, const nn_input *in)
 {
     ts_shape s = in->image.shape;
@@ -17,6 +21,9 @@ static bool check(ag_tape *tape, const nn_model *model, const nn_input *in)
     if (!model->value) ag_fail(tape, TS_INVALID, "the model has no parameters");
     else if (model->arch.latent > 0) ag_fail(tape, TS_INVALID, "the model is an auto-encoder of maps: it cannot read a photograph");
     else if (!in->image.data || s.c != 3) ag_fail(tape, TS_INVALID, "the photograph has %d channels: 3 are needed", s.c);
+    else if (given(in) > model->arch.images)
+        ag_fail(tape, TS_INVALID, "%d photographs are given: the model reads %d", given(in), model->arch.images);
+    else if (s.n % given(in) != 0) ag_fail(tape, TS_INVALID, "%d photographs are not a multiple of %d", s.n, given(in));
     else if (!ts_contiguous(&in->image)) ag_fail(tape, TS_INVALID, "the photograph is not contiguous");
     else if (s.h != in->grid.h || s.w != in->grid.w)
         ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels, its grid %d x %d", s.w, s.h, in->grid.w, in->grid.h);
@@ -26,17 +33,34 @@ static bool check(ag_tape *tape, const nn_model *model, const nn_input *in)
     return !ag_status(tape)->code;
 }
 
-/* The photograph as g reads it: [N, g_size, g_size, 3], resampled while it is linear, then log-encoded. */
-static ag_value *encoded(ag_tape *tape, const nn_model *model, const ts_tensor *image)
+/* [N * given, S, S, 3] to [N, S, S, 3 images]. */
+static void side_by_side(const ts_tensor *from, int count, int images, float *to)
 {
-    int size = model->arch.g_size;
-    ag_value *x = ag_empty(tape, (ts_shape){image->shape.n, size, size, 3});
+    const int64_t pixels = (int64_t)from->shape.h * from->shape.w, rows = from->shape.n / count * pixels;
+    for (int64_t i = 0; i < rows; i++) {
+        const int64_t n = i / pixels, at = i % pixels;
+        for (int k = 0; k < images; k++)
+            for (int c = 0; c < 3; c++)
+                to[(i * images + k) * 3 + c] = k < count ? from->data[((n * count + k) * pixels + at) * 3 + c] : -1.0f; /* -1: black, encoded */
+    }
+}
+
+/* The photographs as g reads them: [N, g_size, g_size, 3 images], resampled while they are linear, then log-encoded. */
+static ag_value *encoded(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *image)
+{
+    const int size = model->arch.g_size, images = model->arch.images, count = given(in);
+    ag_value *x = ag_empty(tape, (ts_shape){image->shape.n / count, size, size, 3 * images});
     if (!x) return NULL;
+    const ts_mark mark = ag_scope_begin(tape);
+    ag_value *each = images == 1 ? x : ag_empty(tape, (ts_shape){image->shape.n, size, size, 3});
+    if (!each) return NULL;
     ts_status st = {0};
-    const float *from = x->t.data;
+    const float *from = each->t.data;
     if (image->shape.h == size && image->shape.w == size) from = image->data;
-    else if (ts_resize(&x->t, image, ag_arena(tape), &st)) return ag_fail(tape, st.code, "%s", st.message);
-    rd_log_encode(ts_count(x->t.shape), from, x->t.data);
+    else if (ts_resize(&each->t, image, ag_arena(tape), &st)) return ag_fail(tape, st.code, "%s", st.message);
+    rd_log_encode(ts_count(each->t.shape), from, each->t.data);
+    if (images > 1) side_by_side(&each->t, count, images, x->t.data);
+    ag_scope_end(tape, mark, NULL, 0);
     return x;
 }
 
@@ -48,7 +72,7 @@ ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in)
     if (side != photograph->shape.w)
         return ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels: g needs a square", photograph->shape.w, side);
     ts_mark mark = ag_scope_begin(tape);
-    ag_value *maps = nn_unet(tape, model, encoded(tape, model, photograph));
+    ag_value *maps = nn_unet(tape, model, encoded(tape, model, in, photograph));
     if (side != model->arch.g_size) maps = ag_resize(tape, maps, side, side);
     ag_scope_end(tape, mark, &maps, 1);
     return maps;
@@ -69,45 +93,69 @@ static bool measure_start(ag_tape *tape, const nn_model *model, const nn_input *
     const rd_grid grid = in->whole.data ? rd_grid_full(in->grid.side) : in->grid;
     const ts_shape s = maps->t.shape;
     const int64_t one = (int64_t)s.h * s.w;
-    state->rmse0 = ts_arena_alloc(ag_arena(tape), (size_t)s.n * sizeof *state->rmse0);
-    if (!state->rmse0) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", s.n), false;
-    for (int n = 0; n < s.n; n++)
-        rd_flash_rmse(grid, maps->t.data + n * one * s.c, s.c, &in->view, image->data + n * one * 3, &state->rmse0[n]);
+    const int photographs = image->shape.n;
+    state->rmse0 = ts_arena_alloc(ag_arena(tape), (size_t)photographs * sizeof *state->rmse0);
+    if (!state->rmse0) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", photographs), false;
+    for (int i = 0; i < photographs; i++)
+        rd_flash_rmse(grid, maps->t.data + i / given(in) * one * s.c, s.c, view_of(in, i), image->data + i * one * 3, &state->rmse0[i]);
     return true;
 }
 
-/* dL/dR_t as h reads it: a constant of the tape, the shape of maps. */
-static ag_value *loss_gradient(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, nn_state *state)
+/* to [pixels, images channels] = from [pixels, channels] at photograph k's place. */
+static void place(int64_t pixels, int channels, int images, int k, const float *from, float *to)
 {
-    ts_shape s = maps->t.shape;
-    size_t image = (size_t)s.h * s.w * 3, one = (size_t)s.h * s.w * s.c;
-    ag_value *gradient = ag_empty(tape, s);
-    if (!gradient) return NULL;
-    if (!model->arch.gradient) {
-        memset(gradient->t.data, 0, (size_t)ts_count(s) * sizeof(float));
-        return gradient;
-    }
-    bool batch = model->arch.rmse == NN_RMSE_BATCH;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int64_t i = 0; i < pixels; i++) memcpy(to + (i * images + k) * channels, from + i * channels, (size_t)channels * sizeof *to);
+}
+
+/* dL/dR_t of every photograph, as the renderer gives it: to is [N, H, W, images channels]. False without memory. */
+static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, const nn_state *state, float *to)
+{
+    const ts_shape s = maps->t.shape;
+    const int64_t pixels = (int64_t)s.h * s.w;
+    const int count = given(in), images = model->arch.images;
+    const bool batch = model->arch.rmse == NN_RMSE_BATCH;
+    const ts_mark mark = ts_arena_mark(ag_arena(tape));
+    float *apart = images > 1 ? ts_arena_alloc(ag_arena(tape), (size_t)(pixels * s.c) * sizeof *apart) : NULL;
+    if (images > 1 && !apart) return ag_fail(tape, TS_NOMEM, "no memory for the gradient of %d x %d pixels", s.w, s.h), false;
+    if (count < images) memset(to, 0, (size_t)(s.n * pixels * images * s.c) * sizeof *to);
     double common = 0;
-    for (int n = 0; batch && n < s.n; n++) {
+    for (int i = 0; batch && i < s.n; i++) {
         double rmse;
-        rd_flash_rmse(in->grid, maps->t.data + n * one, s.c, &in->view, in->image.data + n * image, &rmse);
+        rd_flash_rmse(in->grid, maps->t.data + i * pixels * s.c, s.c, view_of(in, i), in->image.data + i * pixels * 3, &rmse);
         common += rmse * rmse / s.n;
     }
-    for (int n = 0; n < s.n; n++) {
-        double rmse = batch ? sqrt(common) : state->rmse0[n];
-        rd_flash_gradient(in->grid, maps->t.data + n * one, s.c, &in->view, in->image.data + n * image, rmse, gradient->t.data + n * one, NULL);
+    for (int i = 0; i < s.n * count; i++) {
+        const int n = i / count, k = i % count;
+        const double rmse = batch ? sqrt(common) : state->rmse0[i];
+        float *own = to + n * pixels * images * s.c;
+        rd_flash_gradient(in->grid, maps->t.data + n * pixels * s.c, s.c, view_of(in, i), in->image.data + i * pixels * 3, rmse, apart ? apart : own,
+                          NULL);
+        if (apart) place(pixels, s.c, images, k, apart, own);
     }
-    if (batch) { /* d RMSE of the whole batch has 1 / (3 N H W) where rd_flash_gradient has 1 / (3 256^2) */
+    ts_arena_release(ag_arena(tape), mark);
+    return true;
+}
+
+/* The gradients as h reads them: a constant of the tape, [N, H, W, images channels]. */
+static ag_value *loss_gradient(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, const nn_state *state)
+{
+    ts_shape s = maps->t.shape;
+    ag_value *gradient = ag_empty(tape, (ts_shape){s.n, s.h, s.w, s.c * model->arch.images});
+    if (!gradient) return NULL;
+    float *g = gradient->t.data;
+    const int64_t rows = (int64_t)s.n * s.h, row = (int64_t)s.w * gradient->t.shape.c;
+    if (!model->arch.gradient) {
+        memset(g, 0, (size_t)(rows * row) * sizeof *g);
+        return gradient;
+    }
+    if (!gradients(tape, model, in, maps, state, g)) return NULL;
+    if (model->arch.rmse == NN_RMSE_BATCH) { /* d RMSE of the whole batch has 1 / (3 N H W) where rd_flash_gradient has 1 / (3 256^2) */
         float scale = (float)(256.0 * 256.0 / ((double)s.n * s.h * s.w));
-        int64_t count = ts_count(s);
-        float *g = gradient->t.data;
 #pragma omp parallel for num_threads(ts_threads()) schedule(static)
-        for (int64_t i = 0; i < count; i++) g[i] *= scale;
+        for (int64_t i = 0; i < rows * row; i++) g[i] *= scale;
     }
     if (model->arch.encoding == NN_GRADIENT_ASINH) {
-        int64_t rows = (int64_t)s.n * s.h, row = (int64_t)s.w * s.c;
-        float *g = gradient->t.data;
 #pragma omp parallel for num_threads(ts_threads()) schedule(static)
         for (int64_t y = 0; y < rows; y++) ts_elementwise_k()->asinh(row, NN_GRADIENT_SCALE, g + y * row, g + y * row);
     }
@@ -119,7 +167,7 @@ ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag
     if (!check(tape, model, in) || !maps) return NULL;
     ts_shape s = maps->t.shape;
     if (model->arch.h_width == 0) return ag_fail(tape, TS_INVALID, "the model has no refiner: 0 iterations are all that it can do");
-    if (!ts_same(s, (ts_shape){in->image.shape.n, in->grid.h, in->grid.w, model->arch.channels}))
+    if (!ts_same(s, (ts_shape){materials(in), in->grid.h, in->grid.w, model->arch.channels}))
         return ag_fail(tape, TS_INVALID, "the maps are %d x %d x %d x %d, not the photograph's size and the model's %d channels", s.n, s.h, s.w, s.c,
                        model->arch.channels);
     if (model->arch.rmse == NN_RMSE_START && !state->rmse0 && !measure_start(tape, model, in, maps, state)) return NULL;

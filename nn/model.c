@@ -76,8 +76,8 @@ static void plan_g(nn_model *m)
     const nn_arch *a = &m->arch;
     nn_layers *l = m->layers;
     int levels = a->g_levels, w0 = level_width(a, 0);
-    l->input_conv = conv(m, "g.input.conv", w0, 3, 3, true, leaky_gain(NN_LEAK_G));
-    l->input_global = linear(m, "g.input.global", w0, 3, 1);
+    l->input_conv = conv(m, "g.input.conv", w0, 3 * a->images, 3, true, leaky_gain(NN_LEAK_G));
+    l->input_global = linear(m, "g.input.global", w0, 3 * a->images, 1);
     for (int i = 1; i <= levels; i++) {
         int in = level_width(a, i - 1), out = level_width(a, i);
         l->down[i - 1] = unet_block(m, "down", i, in, out, out, in, i == 1 ? a->g_kernel_first : a->g_kernel);
@@ -102,7 +102,7 @@ static void plan_h(nn_model *m)
         nn_cell *c = &l->cell[i];
         char name[64];
         snprintf(name, sizeof name, "h.conv%d", i + 1);
-        c->conv = conv(m, name, a->h_width, i ? a->h_gru : 2 * a->channels, i ? 3 : 5, true, gain);
+        c->conv = conv(m, name, a->h_width, i ? a->h_gru : (1 + a->images) * a->channels, i ? 3 : 5, true, gain);
         snprintf(name, sizeof name, "h.gru%d.ih", i + 1);
         c->input = conv(m, name, 3 * a->h_gru, a->h_width, 1, true, 1);
         snprintf(name, sizeof name, "h.gru%d.hh", i + 1);
@@ -113,7 +113,7 @@ static void plan_h(nn_model *m)
     l->start[l->h_output.weight] = 1e-3; /* h starts as nothing, nearly */
     l->h_descent = (nn_layer){-1, -1};
     if (!a->descent || !a->gradient) return;
-    l->h_descent = conv(m, "h.descent", a->channels, a->channels, 1, false, 1);
+    l->h_descent = conv(m, "h.descent", a->channels, a->images * a->channels, 1, false, 1);
     l->start[l->h_descent.weight] = NN_DESCENT;
 }
 

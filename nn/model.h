@@ -17,7 +17,9 @@ typedef enum nn_gradient {
 #define NN_GRADIENT_SCALE 10.0f
 
 /* Everything that a weights file must say about itself (its metadata, one key each). */
+enum { NN_MAX_IMAGES = 9 };
 typedef struct nn_arch {
+    int images;         /* most photographs of a material that are read at once, each under a light and view of its own (fewer may be given) */
     int channels;       /* of the maps: 9, or 10 (published) */
     int g_width;        /* of g's first convolution; level i has min(g_width * 2^i, g_width_max) */
     int g_width_max;
@@ -78,15 +80,18 @@ const nn_param *nn_model_find(const nn_model *model, const char *name);
 /* The parameters of g alone and of h alone: [first, last) in floats of the block (g comes first). */
 void nn_model_range(const nn_model *model, bool refiner, size_t *first, size_t *last);
 
-/* One photograph batch, linear, clamped to [0, 1]. g sees a whole photograph, h refines any window of it. */
+/* A batch of N materials, each in `given` photographs, one material's after the other's; linear, clamped to [0, 1]. g sees whole photographs, h
+ * refines any window of them. */
 typedef struct nn_input {
-    ts_tensor image; /* [N, h, w, 3]: what is refined, the grid's pixels */
-    rd_grid grid;    /* of every image in the batch */
-    rd_view view;    /* the flash */
-    ts_tensor whole; /* [N, side, side, 3]: the photographs of which image is the window; no data: image is the whole */
+    ts_tensor image; /* [N * given, h, w, 3]: what is refined, the grid's pixels */
+    rd_grid grid;    /* of every photograph */
+    rd_view view;    /* of every photograph where views is NULL: the flash */
+    ts_tensor whole; /* [N * given, side, side, 3]: the photographs of which image is the window; no data: image is the whole */
+    const rd_view *views; /* [N * given], or NULL */
+    int given;            /* 1 .. arch.images; 0 stands for 1 */
 } nn_input;
 
-/* R_0 by g of the whole: [N, S, S, channels]. The log encoding, the resampling to g_size and back are in here. */
+/* R_0 by g of the whole: [N, S, S, channels]. Photographs that are not given are black. The log encoding, the resampling to g_size and back are in here. */
 ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in);
 
 /* An auto-encoder of maps (arch.latent): [N, S, S, channels] to its code [N, S / 2^g_levels, S / 2^g_levels, latent], and back to maps in
@@ -100,11 +105,11 @@ int nn_refiner_reach(const nn_model *model);
 /* What h keeps from step to step, and the loss's scale; zero-initialise it. */
 typedef struct nn_state {
     ag_value *gru[2];
-    double *rmse0; /* of the whole images' R_0, in the tape's arena; NULL: nn_refine measures it on the maps that it is given */
+    double *rmse0; /* of each of the whole photographs by R_0, in the tape's arena; NULL: nn_refine measures it on the maps that it is given */
     int step;
 } nn_state;
 
-/* R_{t+1} = R_t + h(R_t, e) + D e, e being dL/dR_t as arch.encoding has it; D is a matrix over the channels that begins as -0.003 times the
+/* R_{t+1} = R_t + h(R_t, e) + D e, e being dL/dR_t as arch.encoding has it, one for each photograph (zero where none is given); D is a matrix over the channels that begins as -0.003 times the
  * identity, so that an untrained loop is plain descent (arch.descent; without it, as published, D is 0). */
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 

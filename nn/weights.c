@@ -1,5 +1,6 @@
 /* A model to a file and back. */
 #include "nn/weights.h"
+#include "nn/layers.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -79,6 +80,33 @@ ts_code nn_model_save(const nn_model *model, const float *values, const char *pa
     return code;
 }
 
+/* A layer that reads every photograph begins as a model of one photograph has it, each photograph with its share: photographs that are all alike
+ * then give what one of them gives. False where the file has no such tensor. */
+static bool spread(const nn_model *model, int index, nn_file *f)
+{
+    const nn_layers *l = model->layers;
+    const nn_param *p = &model->param[index];
+    const int images = model->arch.images, in = p->dim[1];
+    const bool refiner = model->arch.h_width > 0 && index == l->cell[0].conv.weight;
+    const int first = refiner ? model->arch.channels : 0, each = (in - first) / images; /* h reads the maps, then the gradients */
+    if (images == 1 || !(refiner || index == l->input_conv.weight || index == l->input_global.weight ||
+                         (model->arch.h_width > 0 && index == l->h_descent.weight)))
+        return false;
+    const size_t kernel = (size_t)p->dim[2] * (size_t)p->dim[3], single = (size_t)(first + each) * kernel;
+    float *one = malloc((size_t)p->dim[0] * single * sizeof *one);
+    const int64_t dim[4] = {p->dim[0], first + each, p->dim[2], p->dim[3]};
+    const bool fine = one && !nn_file_read(f, p->name, p->rank, dim, one, NULL);
+    float *v = model->value + p->offset;
+    for (int o = 0; fine && o < p->dim[0]; o++)
+        for (int c = 0; c < in; c++)
+            for (size_t k = 0; k < kernel; k++) {
+                const int from = c < first ? c : first + (c - first) % each;
+                v[((size_t)o * (size_t)in + (size_t)c) * kernel + k] = one[(size_t)o * single + (size_t)from * kernel + k] / (float)(c < first ? 1 : images);
+            }
+    free(one);
+    return fine;
+}
+
 ts_code nn_model_init_from(nn_model *model, const char *path, int *taken, int *left, ts_status *st)
 {
     nn_file *f = nn_file_open(path, st);
@@ -89,7 +117,7 @@ ts_code nn_model_init_from(nn_model *model, const char *path, int *taken, int *l
         const nn_param *p = &model->param[i];
         int64_t dim[4];
         dims_of(p, dim);
-        if (nn_file_read(f, p->name, p->rank, dim, model->value + p->offset, NULL)) ++*left;
+        if (nn_file_read(f, p->name, p->rank, dim, model->value + p->offset, NULL) && !spread(model, i, f)) ++*left;
         else if (!finite_all(model->value + p->offset, p->count))
             code = ts_fail(st, TS_NUMERIC, "%s: tensor \"%s\" holds a value that is not finite", path, p->name);
         else ++*taken;

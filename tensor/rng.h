@@ -21,7 +21,8 @@ enum {
     TS_STREAM_EVAL,
     TS_STREAM_TRAIN,
     TS_STREAM_WINDOW,
-    TS_STREAM_PHOTOGRAPH
+    TS_STREAM_PHOTOGRAPH,
+    TS_STREAM_CAPTURE
 };
 
 uint32_t ts_rng_u32(ts_rng *r);

@@ -81,7 +81,7 @@ C
     PKG_CONFIG_PATH=$T/root/usr/local/lib/pkgconfig
     export PKG_CONFIG_PATH
     # shellcheck disable=SC2046
-    expect 0 "${CC:-gcc}" -o "$T/user" "$T/user.c" $(pkg-config --define-prefix --cflags --libs lgd)
+    expect 0 ${CC:-gcc} -o "$T/user" "$T/user.c" $(pkg-config --define-prefix --cflags --libs lgd)
     expect 0 "$T/user" "$T/root/usr/local/share/lgd/single.safetensors"
     expect 1 "$T/user" "$T/absent.safetensors"
     says "$T/out" "absent.safetensors"

@@ -87,11 +87,29 @@ TEST(photographs_under_the_flash_are_the_single_ones)
     const tr_config c = tr_config_default();
     rd_view flash[COUNT];
     for (int i = 0; i < COUNT; i++) flash[i] = rd_flash();
-    tr_photograph(&c, 1, 7, COUNT, SIZE, maps[0], one[0]);
+    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], NULL, 1, one[0]);
     tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], flash, 1, many[0][0]);
-    CHECK(!memcmp(one, many[0], sizeof one), "one flash photograph of each differs from tr_photograph");
-    tr_photograph(&c, 1, 9, 1, SIZE, maps[2], many[0][0]);
+    CHECK(!memcmp(one, many[0], sizeof one), "one flash photograph of each differs from the flash's own");
+    tr_photographs(&c, 1, 9, 1, SIZE, maps[2], NULL, 1, many[0][0]);
     CHECK(!memcmp(one[2], many[0][0], sizeof one[2]), "a photograph depends on the batch that it comes in");
+}
+
+TEST(capture_views_are_the_flash_or_different_configurations)
+{
+    tr_config c = tr_config_default();
+    rd_view flash = rd_flash(), views[COUNT][NUMBER], alone[NUMBER];
+    tr_capture_views(&c, 1, 7, COUNT, 1, views[0]);
+    CHECK(!memcmp(views[0][0].light, flash.light, sizeof flash.light) && !memcmp(views[0][2].light, flash.light, sizeof flash.light), "one photograph is not the flash's");
+    c.arch.images = NUMBER;
+    tr_capture_views(&c, 1, 7, COUNT, NUMBER, views[0]);
+    tr_capture_views(&c, 1, 9, 1, NUMBER, alone);
+    bool differ = false;
+    for (int k = 0; k < NUMBER; k++) {
+        CHECK(!memcmp(alone[k].light, views[2][k].light, sizeof alone[k].light), "a material's configurations depend on its batch");
+        differ = differ || memcmp(views[0][k].light, views[1][k].light, sizeof alone[k].light);
+        for (int j = 0; j < k; j++) CHECK(memcmp(views[0][j].light, views[0][k].light, sizeof alone[k].light), "configurations %d and %d are one", j, k);
+    }
+    CHECK(differ, "two materials have the same configurations");
 }
 
 TEST(photographs_have_their_own_faults_for_any_number_of_threads)

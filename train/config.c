@@ -240,6 +240,8 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
     if (c->train.steps && c->train.g_rate == 0 && c->arch.h_width == 0) return ts_fail(st, TS_INVALID, "train.g_rate is 0 and there is no refiner (model.h_width): nothing would be trained");
     if (c->train.window && (c->train.window < 8 || c->train.window > c->data.patch))
         return ts_fail(st, TS_INVALID, "train.window is %d: use 8 to data.patch, which is %d, or 0", c->train.window, c->data.patch);
+    if (c->train.given_min > c->arch.images)
+        return ts_fail(st, TS_INVALID, "train.given_min is %d, more than the %d of model.images", c->train.given_min, c->arch.images);
     if (lo > hi) return ts_fail(st, TS_INVALID, "train.iterations_min is %d, more than the %d of train.iterations_max", lo, hi);
     if (c->validate.every && c->validate.seed == c->data.seed)
         return ts_fail(st, TS_INVALID, "validate.seed equals data.seed: the validation materials would be those that are trained on");

@@ -20,6 +20,7 @@ typedef struct tr_config {
         double pretrain_rate, pretrain_floor, rate, g_rate, rate_floor;
         double clip, spike, ema, start_weight, map_weight;
         int iterations_min, iterations_max; /* 0: arch.iterations */
+        int given_min;                      /* 0: arch.images */
         int64_t seed, checkpoint_every, log_every;
         int max_skipped;
         char init[1024];

@@ -8,6 +8,8 @@ static const char *const rmse_names[] = {"start", "batch", NULL}; /* as nn_rmse 
 #define AT(field) offsetof(tr_config, field)
 
 const tr_key tr_keys[] = {
+    {"model", "images", TR_INT, AT(arch.images), 1, NN_MAX_IMAGES, NULL, NULL, false,
+     "most photographs of a material that are read at once; above 1 they are taken under some of nine known lights (docs/math.md)"},
     {"model", "g_width", TR_INT, AT(arch.g_width), 1, 1024, NULL, NULL, false, "channels of g's first convolution; level i has g_width * 2^i"},
     {"model", "g_width_max", TR_INT, AT(arch.g_width_max), 1, 4096, NULL, NULL, false, "most channels that a level of g has"},
     {"model", "g_levels", TR_INT, AT(arch.g_levels), 1, 8, NULL, NULL, false, "down blocks of g"},
@@ -77,6 +79,8 @@ const tr_key tr_keys[] = {
     {"train", "iterations_min", TR_INT, AT(train.iterations_min), 0, 64, "0", NULL, false,
      "fewest refinement steps in a training step, drawn uniformly; 0: model.iterations"},
     {"train", "iterations_max", TR_INT, AT(train.iterations_max), 0, 64, "0", NULL, false, "most refinement steps; 0: model.iterations"},
+    {"train", "given_min", TR_INT, AT(train.given_min), 0, NN_MAX_IMAGES, "0", NULL, false,
+     "fewest photographs of a training step, drawn uniformly up to model.images; 0: always so many"},
     {"train", "seed", TR_INT64, AT(train.seed), 0, 1e15, "1", NULL, false, "seed of the initial weights, the loss's views and the drawn iterations"},
     {"train", "checkpoint_every", TR_INT64, AT(train.checkpoint_every), 1, 1e9, "500", NULL, true, "steps between checkpoints"},
     {"train", "log_every", TR_INT64, AT(train.log_every), 1, 1e9, "50", NULL, true, "steps between lines of progress when stderr is no terminal"},

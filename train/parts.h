@@ -9,7 +9,9 @@ enum { TR_PATH = 1200 }; /* a folder and one of our names */
 
 /* The fixed materials of validation. */
 typedef struct tr_validator {
-    float *maps, *images; /* [count][size][size][9] and [3], owned */
+    float *maps;          /* [count][size][size][9], owned */
+    float *images;        /* [count][arch.images][size][size][3], owned */
+    rd_view *captures;    /* [count][arch.images], owned */
     rd_view *views;       /* [count][RD_EVAL_VIEWS], owned */
     nn_model *model;      /* holds what is validated: the moving average, or a copy of the weights */
     ag_tape *tape;        /* without gradients */
@@ -24,7 +26,8 @@ struct tr_trainer {
     nn_adam adam;
     ag_tape *tape;
     io_loader *loader;
-    float *images;      /* [batch][patch][patch][3] */
+    float *images;      /* [batch][given][patch][patch][3], given <= arch.images */
+    rd_view *captures;  /* [batch][given] */
     rd_view *views;     /* [batch][RD_LOSS_VIEWS] */
     tr_validator validator;
     FILE *log, *validation_log;
@@ -43,13 +46,15 @@ bool tr_pretraining(const tr_config *c, int64_t step); /* whether the step after
 double tr_seconds(void);
 const float *tr_weights(const tr_trainer *t); /* what is validated and saved */
 
-/* photograph.c: the flash photographs [count][size][size][3] of materials [count][size][size][9] as [data] says; index: of the first, for the
- * camera's faults. */
-void tr_photograph(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, float *images);
-/* number photographs of each material, images [count][number][size][size][3], under views [count][number] of kind RD_POINT whose camera looks straight
- * down (NULL: the flash for all, which with number 1 is tr_photograph). Every photograph has faults of its own. */
+/* photograph.c: number photographs of each material [count][size][size][9] as [data] says, images [count][number][size][size][3], under views
+ * [count][number] of kind RD_POINT whose camera looks straight down (NULL: the flash for all); index: of the first material, for the camera's faults,
+ * of which every photograph has its own. */
 void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, const rd_view *views, int number,
                     float *images);
+/* The views of number photographs of each of count materials, [count][number]: the flash for a model of one photograph, else some of the
+ * predefined configurations of a capture, drawn for each material. */
+void tr_capture_views(const tr_config *c, uint64_t seed, uint64_t index, int count, int number, rd_view *views);
+
 /* step.c. One step; t->step counts it. Returns an error only where the run cannot go on (a skipped step is none). */
 ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st);
 

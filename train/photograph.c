@@ -41,7 +41,12 @@ void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count
     for (int i = 0; i < count * number; i++) io_camera_apply(&camera, seed, first + (uint64_t)i, size, images + (size_t)i * pixels * 3);
 }
 
-void tr_photograph(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, float *images)
+void tr_capture_views(const tr_config *c, uint64_t seed, uint64_t index, int count, int number, rd_view *views)
 {
-    tr_photographs(c, seed, index, count, size, maps, NULL, 1, images);
+    for (int i = 0; i < count; i++) {
+        int place[RD_CAPTURE_VIEWS] = {0};
+        ts_rng rng = ts_rng_make(seed, TS_STREAM_CAPTURE, index + (uint64_t)i);
+        if (c->arch.images > 1) rd_capture_draw(&rng, number, place);
+        for (int k = 0; k < number; k++) views[i * number + k] = rd_capture_view(place[k]);
+    }
 }

@@ -34,6 +34,14 @@ static int draw_iterations(const tr_config *c, int64_t step)
     return lo + ts_rng_int(&rng, hi - lo + 1);
 }
 
+/* The photographs of each material in this step. */
+static int draw_given(const tr_config *c, int64_t step)
+{
+    const int hi = c->arch.images, lo = c->train.given_min ? c->train.given_min : hi;
+    ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_CAPTURE, (uint64_t)step);
+    return lo + ts_rng_int(&rng, hi - lo + 1);
+}
+
 /* The window of all photographs that h refines in this step. */
 static rd_grid draw_window(const tr_config *c, int64_t step)
 {
@@ -52,13 +60,13 @@ static ts_tensor cut(tr_trainer *t, const ts_tensor *whole, rd_grid g)
     return copy;
 }
 
-static ag_value *forward(tr_trainer *t, const float *target, tr_row *row)
+static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *row)
 {
     const tr_config *c = &t->config;
     const int batch = c->train.batch, size = c->data.patch;
     ag_value *maps[TR_MOST_ITERATIONS + 1];
     ts_tensor goals = ts_view((float *)(uintptr_t)target, (ts_shape){batch, size, size, MAP_CHANNELS});
-    nn_input in = {.image = ts_view(t->images, (ts_shape){batch, size, size, 3}), .grid = rd_grid_full(size), .view = rd_flash()};
+    nn_input in = {.image = ts_view(t->images, (ts_shape){batch * given, size, size, 3}), .grid = rd_grid_full(size), .views = t->captures, .given = given};
     if (row->pretraining) {
         maps[0] = nn_predict(t->tape, t->model, &in);
         return add_loss(t, NULL, maps[0], ag_constant(t->tape, goals), 1, &row->render_start, &row->map_start);
@@ -135,7 +143,10 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
     begin_phase(t);
     const float *target = io_loader_next(t->loader, st);
     if (!target) return ts_context(st, "procedural materials");
-    tr_photograph(c, (uint64_t)c->data.seed, (uint64_t)t->step * (uint64_t)batch, batch, c->data.patch, target, t->images);
+    const int given = draw_given(c, t->step);
+    const uint64_t index = (uint64_t)t->step * (uint64_t)batch;
+    tr_capture_views(c, (uint64_t)c->data.seed, index, batch, given, t->captures);
+    tr_photographs(c, (uint64_t)c->data.seed, index, batch, c->data.patch, target, t->captures, given, t->images);
     ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_SCENE, (uint64_t)t->step);
     for (int i = 0; i < batch; i++) rd_loss_views(&rng, t->views + i * RD_LOSS_VIEWS);
 
@@ -143,7 +154,7 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
     size_t first = 0, last = t->model->count;
     if (row->pretraining || t->model->g_fixed) nn_model_range(t->model, t->model->g_fixed, &first, &last);
     ag_reset(t->tape);
-    ag_value *loss = forward(t, target, row);
+    ag_value *loss = forward(t, target, given, row);
     if (loss) row->loss = (double)loss->t.data[0];
     if (loss && isfinite(row->loss) && ag_backward(t->tape, loss) == TS_OK) row->norm = nn_gradient_norm(t->model, first, last);
     if (ag_status(t->tape)->code) {

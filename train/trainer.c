@@ -102,9 +102,11 @@ static ts_code build(tr_trainer *t, bool resume, ts_status *st)
     const tr_config *c = &t->config;
     const size_t batch = (size_t)c->train.batch, pixels = (size_t)c->data.patch * (size_t)c->data.patch;
     if (lock_folder(t, st) != TS_OK || (!resume && check_empty(t, st) != TS_OK)) return st->code;
-    t->images = malloc(batch * pixels * 3 * sizeof(float));
+    const size_t photographs = batch * (size_t)c->arch.images;
+    t->images = malloc(photographs * pixels * 3 * sizeof(float));
+    t->captures = malloc(photographs * sizeof *t->captures);
     t->views = malloc(batch * RD_LOSS_VIEWS * sizeof *t->views);
-    if (!t->images || !t->views) return ts_fail(st, TS_NOMEM, "no memory for a batch of %d photographs", c->train.batch);
+    if (!t->images || !t->captures || !t->views) return ts_fail(st, TS_NOMEM, "no memory for %zu photographs", photographs);
     t->model = nn_model_create(&c->arch, st);
     if (!t->model || nn_model_train(t->model, st) != TS_OK || (!resume && init_weights(t, st) != TS_OK)) return st->code;
     if (nn_adam_create(&t->adam, t->model, (float)c->train.ema, st) != TS_OK || (resume && tr_resume(t, st) != TS_OK)) return st->code;
@@ -149,6 +151,7 @@ void tr_destroy(tr_trainer **trainer)
     nn_adam_free(&t->adam);
     nn_model_free(&t->model);
     free(t->images);
+    free(t->captures);
     free(t->views);
     if (t->lock >= 0) close(t->lock);
     free(t);

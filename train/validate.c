@@ -36,13 +36,16 @@ ts_code tr_validator_create(tr_trainer *t, ts_status *st)
     tr_validator *v = &t->validator;
     const size_t count = (size_t)c->validate.count, pixels = (size_t)c->validate.size * (size_t)c->validate.size;
     v->maps = malloc(count * pixels * MAP_CHANNELS * sizeof(float));
-    v->images = malloc(count * pixels * 3 * sizeof(float));
+    const size_t given = (size_t)c->arch.images;
+    v->images = malloc(count * given * pixels * 3 * sizeof(float));
+    v->captures = malloc(count * given * sizeof *v->captures);
     v->views = malloc(count * RD_EVAL_VIEWS * sizeof *v->views);
-    if (!v->maps || !v->images || !v->views || !make_materials(c, v->maps)) return ts_fail(st, TS_NOMEM, "no memory for the validation materials");
+    if (!v->maps || !v->images || !v->captures || !v->views || !make_materials(c, v->maps)) return ts_fail(st, TS_NOMEM, "no memory for the validation materials");
     v->model = nn_model_create(&c->arch, st);
     v->tape = v->model ? ag_tape_create(false, st) : NULL;
     if (!v->tape) return st->code;
-    tr_photograph(c, (uint64_t)c->validate.seed, 0, c->validate.count, c->validate.size, v->maps, v->images);
+    tr_capture_views(c, (uint64_t)c->validate.seed, 0, c->validate.count, c->arch.images, v->captures);
+    tr_photographs(c, (uint64_t)c->validate.seed, 0, c->validate.count, c->validate.size, v->maps, v->captures, c->arch.images, v->images);
     for (int i = 0; i < c->validate.count; i++) {
         ts_rng rng = ts_rng_make((uint64_t)c->validate.seed, TS_STREAM_EVAL, (uint64_t)i);
         rd_eval_views(&rng, RD_EVAL_VIEWS, v->views + (size_t)i * RD_EVAL_VIEWS);
@@ -54,6 +57,7 @@ void tr_validator_free(tr_validator *v)
 {
     free(v->maps);
     free(v->images);
+    free(v->captures);
     free(v->views);
     nn_model_free(&v->model);
     ag_tape_destroy(&v->tape);
@@ -67,7 +71,11 @@ static ts_code add_errors(tr_trainer *t, int first, int n, tr_validation *out, t
     const int size = t->config.validate.size, channels = t->config.arch.channels;
     const size_t pixels = (size_t)size * (size_t)size;
     const rd_grid grid = rd_grid_full(size);
-    const nn_input in = {.image = ts_view(v->images + (size_t)first * pixels * 3, (ts_shape){n, size, size, 3}), .grid = grid, .view = rd_flash()};
+    const size_t given = (size_t)t->config.arch.images, photograph = (size_t)first * given;
+    const nn_input in = {.image = ts_view(v->images + photograph * pixels * 3, (ts_shape){n * (int)given, size, size, 3}),
+                         .grid = grid,
+                         .views = v->captures + photograph,
+                         .given = (int)given};
     ag_value *maps[TR_MOST_ITERATIONS + 1];
     ag_reset(v->tape);
     if (v->model->arch.latent > 0) { /* how well the maps themselves come back */

@@ -17,8 +17,8 @@ static struct {
 
 const float *__real_io_loader_next(io_loader *loader, ts_status *st);
 const float *__wrap_io_loader_next(io_loader *loader, ts_status *st);
-void __real_tr_photograph(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, float *images);
-void __wrap_tr_photograph(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, float *images);
+void __real_tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, const rd_view *views, int number, float *images);
+void __wrap_tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, const rd_view *views, int number, float *images);
 
 /* One in two hundred: with maps and photographs, one in a hundred inputs. */
 static void spoil(float *values, int count, size_t each)
@@ -43,9 +43,9 @@ const float *__wrap_io_loader_next(io_loader *loader, ts_status *st)
     return poison.maps;
 }
 
-void __wrap_tr_photograph(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, float *images)
+void __wrap_tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, const rd_view *views, int number, float *images)
 {
-    __real_tr_photograph(c, seed, index, count, size, maps, images);
+    __real_tr_photographs(c, seed, index, count, size, maps, views, number, images);
     if (poison.on && count == poison.batch && size == poison.size) spoil(images, count, (size_t)size * (size_t)size * 3);
 }
 
