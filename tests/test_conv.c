@@ -295,6 +295,30 @@ TEST(conv_same_bytes_for_any_threads)
     }
 }
 
+/* Sums of 12,800 products: parts of bounded length keep the error near a ten-millionth, one running sum would make 2e-6 of it. */
+TEST(conv_long_sums_stay_accurate)
+{
+    const ts_conv c = {.n = 1, .h = 6, .w = 5, .ic = 512, .oc = 33, .k = 5, .dilation = 1, .pad = TS_PAD_REPLICATE};
+    ts_rng r = ts_rng_make(9, TS_STREAM_TEST, 0);
+    const size_t count = (size_t)c.h * (size_t)c.w * (size_t)c.oc;
+    buffer x = make_random((size_t)(c.h * c.w * c.ic), &r), w = make_random((size_t)(c.oc * c.ic * c.k * c.k), &r), y = make(count), y2 = make(count);
+    ts_conv_forward_naive(&c, x.data, w.data, NULL, 1, y2.data);
+    for (int isa = TS_BASE; isa <= (int)ts_isa_best(); isa++) {
+        ts_isa_use((ts_isa)isa);
+        buffer packed = make(ts_conv_packed_count(&c, TS_CONV_FORWARD));
+        ts_conv_pack(&c, TS_CONV_FORWARD, w.data, packed.data);
+        ts_conv_forward(&c, x.data, packed.data, NULL, 1, y.data);
+        double error = 0, size = 0;
+        for (size_t i = 0; i < count; i++) {
+            error += ((double)y.data[i] - y2.data[i]) * ((double)y.data[i] - y2.data[i]);
+            size += (double)y2.data[i] * y2.data[i];
+        }
+        printf("  %s: %.2g\n", ts_isa_name((ts_isa)isa), sqrt(error / size));
+        CHECK(error < 4e-7 * 4e-7 * size, "%s: relative error %g", ts_isa_name((ts_isa)isa), sqrt(error / size));
+        finish(&packed, "packed");
+    }
+}
+
 TEST(conv_check_refuses)
 {
     const ts_conv good = {1, 4, 4, 3, 5, 3, 1, TS_PAD_ZERO};

@@ -107,7 +107,7 @@ TEST(parity_g_is_the_published_one)
     nn_input in = {.image = ts_view(image, (ts_shape){1, SIDE, SIDE, 3}), .grid = rd_grid_full(SIDE), .view = rd_flash()};
     ag_value *maps = nn_predict(t, m, &in);
     CHECK(maps, "%s", ag_status(t)->message);
-    compare(maps->t.data, expected, 1e-4, 1e-5); /* PyTorch in float32: 1.7e-5 and 1.5e-6; the order of sums of 25600 products decides */
+    compare(maps->t.data, expected, 2e-5, 2e-6); /* PyTorch in float32: 1.7e-5 and 1.5e-6 */
 }
 
 TEST(parity_h_is_the_published_one)

@@ -48,6 +48,10 @@ INLINE void store_lanes(float *p, vf v, lanes n)
 }
 #endif
 
+/* Sums over more k than this are made of parts: the rounding of a float sum grows with its length, a published convolution has 25,600
+ * terms, and a part costs a hundredth of its time to put away. */
+enum { PART = 128 };
+
 /* One k: pixels x vectors multiplications. */
 #define STEP(u)                                                                                               \
     {                                                                                                         \
@@ -67,13 +71,17 @@ INLINE void store_lanes(float *p, vf v, lanes n)
 
 INLINE void tile(const ts_tile *t, const int pixels, const int vectors)
 {
-    vf acc[PIXELS][2];
+    vf acc[PIXELS][2], whole[PIXELS][2];
     const ptrdiff_t ys = t->y_stride;
     lanes mask[2];
+    bool parts = t->add; /* whole holds the sum of the parts before acc's */
+    __asm__("" : "=m"(whole)); /* says that it is set: the compiler cannot see that parts guards it, and clearing it takes as long as 1 k */
     UNROLL for (int v = 0; v < vectors; v++) mask[v] = lanes_of(t->channels - v * VL);
     if (t->add) {
-        UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++)
-            acc[p][v] = load_lanes(t->y[p / TS_TILE_GROUP] + p % TS_TILE_GROUP * ys + v * VL, mask[v]);
+        UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) {
+            whole[p][v] = load_lanes(t->y[p / TS_TILE_GROUP] + p % TS_TILE_GROUP * ys + v * VL, mask[v]);
+            acc[p][v] = (vf){0};
+        }
     } else {
         UNROLL for (int v = 0; v < vectors; v++) {
             vf b = t->bias ? load_lanes(t->bias + v * VL, mask[v]) : (vf){0};
@@ -83,11 +91,25 @@ INLINE void tile(const ts_tile *t, const int pixels, const int vectors)
     ptrdiff_t stride[TS_TILE_GROUP]; /* in bytes */
     const char *fetch0 = (const char *)t->fetch[0], *fetch1 = (const char *)t->fetch[1];
     UNROLL for (int i = 0; i < TS_TILE_GROUP; i++) stride[i] = i * t->a_stride * (ptrdiff_t)sizeof(float);
-    for (int g = 0; g < t->segments; g++) {
-        const char *a[3];
-        const float *w = t->w + t->segment[g].w * (vectors * VL);
-        UNROLL for (int i = 0; i < 3; i++) a[i] = (const char *)(t->a[i] + t->segment[g].a);
-        ptrdiff_t n = t->segment[g].count;
+    ptrdiff_t left = 0, room = PART; /* of this segment, of this part */
+    const char *a[3];
+    const float *w = t->w;
+    for (int g = 0; g < t->segments || left > 0;) {
+        if (left == 0) {
+            w = t->w + t->segment[g].w * (vectors * VL);
+            UNROLL for (int i = 0; i < 3; i++) a[i] = (const char *)(t->a[i] + t->segment[g].a);
+            left = t->segment[g++].count;
+        }
+        if (room == 0) {
+            if (!parts) UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) whole[p][v] = acc[p][v];
+            else UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) whole[p][v] += acc[p][v];
+            UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) acc[p][v] = (vf){0};
+            parts = true;
+            room = PART;
+        }
+        ptrdiff_t n = left < room ? left : room;
+        left -= n;
+        room -= n;
         for (; n >= 4; n -= 4) {
             STEP(0) __builtin_prefetch(fetch0);
             STEP(1) __builtin_prefetch(fetch1);
@@ -106,6 +128,7 @@ INLINE void tile(const ts_tile *t, const int pixels, const int vectors)
             KEEP_ADDRESSES
         }
     }
+    if (parts) UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) acc[p][v] += whole[p][v];
     if (t->leak != 1) {
         const vf leak = v_set(t->leak);
         UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) acc[p][v] = v_max(leak * acc[p][v], acc[p][v]);
