@@ -15,7 +15,7 @@ SANITIZE ?=
 
 VERSION := 0.1.0
 # What the programs read and write themselves, and what only the shared object needs that reads all other image formats.
-PKG := OpenEXR libpng libjpeg
+PKG := OpenEXR libpng libjpeg zlib
 PKG_IMAGE := OpenImageIO
 WARN := -Wall -Wextra -Wshadow
 CPPFLAGS_ALL = -I. -I$(BUILD)/gen -D_GNU_SOURCE -DLGD_VERSION='"$(VERSION)"' -DLGD_DATADIR='"$(PREFIX)/share/lgd"' -DLGD_LIBDIR='"$(PREFIX)/lib"' $(CPPFLAGS)
@@ -37,7 +37,7 @@ ISA_FLAGS_base :=
 ISA_FLAGS_avx2 := -mavx2 -mfma -mbmi2
 ISA_FLAGS_avx512 := -mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx2 -mfma -mbmi2 -mprefer-vector-width=512
 
-PROGRAMS := train infer eval data
+PROGRAMS := train infer eval data convert
 LIB_C := $(filter-out %main.c,$(wildcard tensor/*.c autograd/*.c render/*.c nn/*.c data/*.c train/*.c infer/*.c eval/*.c cli/*.c))
 KERNELS := $(wildcard tensor/kernels/*.c)
 OPS := $(sort $(wildcard autograd/op_*.c render/op_*.c))
@@ -59,6 +59,10 @@ WRAP := -Wl,--wrap=io_loader_next -Wl,--wrap=tr_photographs
 all: $(BIN) $(LIB) $(IMAGE_LIB)
 
 $(BUILD)/bin/lgd-%: $(OBJ)/%/main.o $(LIB)
+	@mkdir -p $(@D)
+	$(CC) -o $@ $< $(LIB) $(LDLIBS_ALL)
+
+$(BUILD)/bin/lgd-convert: $(OBJ)/infer/convert_main.o $(LIB)
 	@mkdir -p $(@D)
 	$(CC) -o $@ $< $(LIB) $(LDLIBS_ALL)
 
@@ -89,7 +93,7 @@ $(shell mkdir -p $(BUILD)/gen; echo '$(FLAGS_NOW)' | cmp -s - $(BUILD)/gen/flags
 
 $(OBJ)/%.o: %.c $(BUILD)/gen/flags | $(BUILD)/gen/ops.h
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS_ALL) $(if $(filter data/%,$<),$(PKG_CFLAGS)) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
+	$(CC) $(CPPFLAGS_ALL) $(if $(filter data/% nn/%,$<),$(PKG_CFLAGS)) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
 
 $(OBJ)/gen/%.o: $(BUILD)/gen/%.c $(BUILD)/gen/flags
 	@mkdir -p $(@D)

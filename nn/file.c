@@ -96,7 +96,13 @@ static nn_file *open_with(const char *path, ts_code (*parse)(nn_file *f, ts_stat
 }
 
 nn_file *nn_safetensors_open(const char *path, ts_status *st) { return open_with(path, nn_safetensors_parse, st); }
-nn_file *nn_file_open(const char *path, ts_status *st) { return open_with(path, nn_safetensors_parse, st); }
+
+static ts_code parse_any(nn_file *f, ts_status *st)
+{
+    return nn_torch_is_zip(f) || nn_torch_is_old(f) ? nn_torch_parse(f, st) : nn_safetensors_parse(f, st);
+}
+
+nn_file *nn_file_open(const char *path, ts_status *st) { return open_with(path, parse_any, st); }
 
 void nn_file_close(nn_file **file)
 {

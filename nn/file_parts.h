@@ -26,6 +26,9 @@ bool nn_entry_shape(nn_entry *e);
 
 /* The forms' readers: f is mapped, entries and metadata are to be filled in. */
 ts_code nn_safetensors_parse(nn_file *f, ts_status *st);
+ts_code nn_torch_parse(nn_file *f, ts_status *st);
+bool nn_torch_is_zip(const nn_file *f);
+bool nn_torch_is_old(const nn_file *f); /* not a ZIP archive: PyTorch before 1.6 */
 
 /* A file on its way: put as often as needed (errors stay), then end, which puts it in path's place, or removes it after an error or where code says
  * that the caller has one. path must live until then. */
@@ -46,4 +49,5 @@ const void *nn_entry_bytes(const nn_entry *e, nn_dtype to, const char *path, voi
 
 /* The forms' writers. */
 ts_code nn_safetensors_put(nn_out *o, const nn_entry *entry, int entries, nn_dtype real, const nn_meta *meta, int metas, ts_status *st);
+ts_code nn_torch_put(nn_out *o, const nn_entry *entry, int entries, nn_dtype real, const nn_meta *meta, int metas, ts_status *st);
 #endif

@@ -66,8 +66,8 @@ ts_code nn_out_end(nn_out *o, ts_code code, ts_status *st)
 ts_code nn_file_write(const char *path, nn_form form, const nn_entry *entry, int entries, nn_dtype real, const nn_meta *meta, int metas, ts_status *st)
 {
     nn_out o;
-    if (form != NN_FORM_SAFETENSORS) return ts_fail(st, TS_INVALID, "%s: that form is not written", path);
+    if (form == NN_FORM_TORCH_OLD) return ts_fail(st, TS_INVALID, "%s: PyTorch's old form is not written", path);
     ts_code code = nn_out_begin(&o, path, st);
-    if (!code) code = nn_safetensors_put(&o, entry, entries, real, meta, metas, st);
+    if (!code) code = (form == NN_FORM_TORCH_ZIP ? nn_torch_put : nn_safetensors_put)(&o, entry, entries, real, meta, metas, st);
     return nn_out_end(&o, code, st);
 }

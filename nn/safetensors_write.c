@@ -1,88 +1,59 @@
 /* The safetensors container (github.com/huggingface/safetensors, README, "Format"): u64 header size, JSON header, values, little endian. */
 #include "nn/file_parts.h"
 #include "nn/json.h"
+#include "nn/text.h"
 #include "nn/weights.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct text {
-    char *data;
-    size_t used, size;
-    bool failed;
-} text;
-
-static char *room(text *t, size_t n)
-{
-    if (t->failed) return NULL;
-    if (t->size - t->used < n) {
-        size_t size = (t->size + n) * 2;
-        char *data = realloc(t->data, size);
-        if (!data) {
-            t->failed = true;
-            return NULL;
-        }
-        t->data = data;
-        t->size = size;
-    }
-    t->used += n;
-    return t->data + t->used - n;
-}
-
-static void put(text *t, const char *s)
-{
-    char *to = room(t, strlen(s));
-    if (to) memcpy(to, s, strlen(s));
-}
-
 /* false: s is not UTF-8. */
-static bool put_string(text *t, const char *s)
+static bool put_string(nn_text *t, const char *s)
 {
     int64_t n = json_escape(s, NULL);
     if (n < 0) return false;
-    put(t, "\"");
-    char *to = room(t, (size_t)n);
+    nn_text_put(t, "\"");
+    char *to = nn_text_room(t, (size_t)n);
     if (to) json_escape(s, to);
-    put(t, "\"");
+    nn_text_put(t, "\"");
     return true;
 }
 
 /* order: the tensors as their values follow each other in the file. */
-static ts_code make_header(text *t, const char *path, const nn_entry *entry, const int *order, int entries, nn_dtype real, const nn_meta *meta,
+static ts_code make_header(nn_text *t, const char *path, const nn_entry *entry, const int *order, int entries, nn_dtype real, const nn_meta *meta,
                            int metas, ts_status *st)
 {
     int64_t at = 0;
     char number[64];
-    char *size_field = room(t, 8);
-    if (size_field) memset(size_field, 0, 8);
-    put(t, "{");
-    if (metas > 0) put(t, "\"__metadata__\":{");
+    nn_text_number(t, 0, 8); /* the header's size, at the end */
+    nn_text_put(t, "{");
+    if (metas > 0) nn_text_put(t, "\"__metadata__\":{");
     for (int i = 0; i < metas; i++) {
-        if (i) put(t, ",");
+        if (i) nn_text_put(t, ",");
         bool good = put_string(t, meta[i].key);
-        put(t, ":");
+        nn_text_put(t, ":");
         if (!good || !put_string(t, meta[i].value)) return ts_fail(st, TS_INVALID, "%s: metadata \"%.80s\" is not UTF-8", path, meta[i].key);
     }
-    if (metas > 0) put(t, entries ? "}," : "}");
+    if (metas > 0) nn_text_put(t, entries ? "}," : "}");
     for (int i = 0; i < entries; i++) {
         const nn_entry *e = &entry[order[i]];
         const nn_dtype to = nn_dtype_out(e->dtype, real);
-        if (i) put(t, ",");
+        if (i) nn_text_put(t, ",");
         if (!put_string(t, e->name)) return ts_fail(st, TS_INVALID, "%s: the tensor name \"%.80s\" is not UTF-8", path, e->name);
-        put(t, ":{\"dtype\":\"");
-        put(t, nn_dtype_name(to));
-        put(t, "\",\"shape\":[");
+        nn_text_put(t, ":{\"dtype\":\"");
+        nn_text_put(t, nn_dtype_name(to));
+        nn_text_put(t, "\",\"shape\":[");
         for (int j = 0; j < e->rank; j++) {
             snprintf(number, sizeof number, "%s%lld", j ? "," : "", (long long)e->dim[j]);
-            put(t, number);
+            nn_text_put(t, number);
         }
         int64_t end = at + nn_dtype_size(to) * e->count;
         snprintf(number, sizeof number, "],\"data_offsets\":[%lld,%lld]}", (long long)at, (long long)end);
-        put(t, number);
+        nn_text_put(t, number);
         at = end;
     }
-    put(t, "}");
-    while (!t->failed && t->used % 64) put(t, " "); /* the values begin at a cache line of the mapped file */
+    nn_text_put(t, "}");
+    while (!t->failed && t->used % 64) nn_text_put(t, " "); /* the values begin at a cache line of the mapped file */
     if (t->failed) return ts_fail(st, TS_NOMEM, "%s: no memory for the header", path);
     uint64_t size = t->used - 8;
     memcpy(t->data, &size, 8);
@@ -91,12 +62,12 @@ static ts_code make_header(text *t, const char *path, const nn_entry *entry, con
 
 ts_code nn_safetensors_put(nn_out *o, const nn_entry *entry, int entries, nn_dtype real, const nn_meta *meta, int metas, ts_status *st)
 {
-    text t = {malloc(4096), 0, 4096, false};
+    nn_text t = {0};
     int *order = malloc(((size_t)entries + 1) * sizeof *order), n = 0;
     void *work = NULL;
     size_t work_size = 0;
     ts_code code = TS_OK;
-    if (!t.data || !order) code = ts_fail(st, TS_NOMEM, "%s: no memory to write it", o->path);
+    if (!order) code = ts_fail(st, TS_NOMEM, "%s: no memory to write it", o->path);
     for (int size = 8; !code && size; size /= 2) /* the widest first, so that every number is aligned to its size */
         for (int i = 0; i < entries; i++)
             if (nn_dtype_size(nn_dtype_out(entry[i].dtype, real)) == size) order[n++] = i;
