@@ -21,6 +21,7 @@ typedef struct ag_pack {
 struct ag_tape {
     ts_arena *arena, *packs_arena, *moving; /* moving: what a scope keeps, while the arena is released */
     bool gradients, frozen;
+    ag_value *into; /* of the next operation */
     ag_node **node; /* grown by doubling and never shrunk, as is pack */
     size_t nodes, node_room;
     ag_pack *pack;
@@ -60,6 +61,7 @@ void ag_reset(ag_tape *tape)
     ts_arena_reset(tape->arena);
     ts_scratch_level();
     tape->nodes = 0;
+    tape->into = NULL;
     tape->status = (ts_status){0};
     if (!tape->frozen) {
         ts_arena_reset(tape->packs_arena);
@@ -156,10 +158,26 @@ static bool grow(void **list, size_t item, size_t count, size_t *room)
     return true;
 }
 
+void ag_into(ag_tape *tape, ag_value *to)
+{
+    if (to && tape->gradients) ag_fail(tape, TS_INVALID, "into: a tape with gradients keeps every value");
+    tape->into = to;
+}
+
+/* Where the operation's result goes. */
+static ag_value *result(ag_tape *tape, const ag_op *op, ts_shape out)
+{
+    ag_value *v = tape->into;
+    tape->into = NULL;
+    if (!v) return ag_empty(tape, out);
+    char a[AG_SHAPE_TEXT], b[AG_SHAPE_TEXT];
+    return ts_same(v->t.shape, out) ? v : ag_fail(tape, TS_INVALID, "%s: the result is %s, the place for it %s", op->name, ag_shape_text(a, out), ag_shape_text(b, v->t.shape));
+}
+
 ag_value *ag_apply(ag_tape *tape, const ag_op *op, int inputs, ag_value *const *in, ts_shape out, const void *attr, size_t attr_size)
 {
     if (tape->status.code != TS_OK) return NULL;
-    ag_value *v = ag_empty(tape, out);
+    ag_value *v = result(tape, op, out);
     ag_node *node = ts_arena_zalloc(tape->arena, 1, sizeof *node);
     void *copy = attr_size ? ts_arena_alloc(tape->arena, attr_size) : NULL;
     if (!v || !node || (attr_size && !copy)) return no_memory(tape, op->name);

@@ -67,6 +67,9 @@ ag_value *ag_constant(ag_tape *tape, ts_tensor t);
 ag_value *ag_parameter(ag_tape *tape, ts_tensor t, float *grad);
 /* Uninitialised constant of that shape in the arena. */
 ag_value *ag_empty(ag_tape *tape, ts_shape shape);
+/* The next operation on a tape without gradients writes its result into the memory of to (NULL: of a new value) and returns to, whose shape
+ * must fit. Operations that go value by value or pixel by pixel (ag_add, ag_tanh, ag_gru's state) may overwrite an input so. */
+void ag_into(ag_tape *tape, ag_value *to);
 /* The same data without its history: no gradient flows through. */
 ag_value *ag_detach(ag_tape *tape, ag_value *v);
 

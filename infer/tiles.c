@@ -113,15 +113,16 @@ static void refine(work *w, area core, float *to)
         photograph(w, now, photo);
         const ts_shape shape = {1, rows(now), columns(now), w->channels};
         const nn_input in = {.image = ts_view(photo, (ts_shape){1, shape.h, shape.w, 3}), .grid = grid_of(now, t->side), .view = rd_flash()};
-        for (int i = 0; i < carried && step > 0; i++) state.gru[i] = ag_constant(tape, ts_view(states[i]->t.data, (ts_shape){1, shape.h, shape.w, gru}));
+        for (int i = 0; i < carried; i++) {
+            state.to[i] = ag_constant(tape, ts_view(states[i]->t.data, (ts_shape){1, shape.h, shape.w, gru}));
+            state.gru[i] = step > 0 ? state.to[i] : NULL;
+        }
         ag_value *out = nn_refine(tape, w->model, &in, ag_constant(tape, ts_view(buffer, shape)), &state);
         if (!out) return;
         on = !(t->tolerance > 0) || change(buffer, out->t.data, (size_t)ts_count(shape)) >= t->tolerance;
         crop(now, next, w->channels, out->t.data, buffer);
-        for (int i = 0; i < 2; i++) {
-            if (i < carried && state.gru[i]) crop(now, next, gru, state.gru[i]->t.data, states[i]->t.data);
-            state.gru[i] = NULL;
-        }
+        for (int i = 0; i < carried; i++) crop(now, next, gru, states[i]->t.data, states[i]->t.data);
+        state.gru[0] = state.gru[1] = NULL;
         ag_scope_end(tape, mark, NULL, 0);
         now = next;
         step++;

@@ -46,9 +46,10 @@ ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_val
 /* g on its own input: x [N, g_size, g_size, 3 images] log-encoded -> [N, g_size, g_size, channels] in [-1, 1]. */
 ag_value *nn_unet(ag_tape *tape, const nn_model *model, ag_value *x);
 
-/* h: input [N, H, W, (1 + images) channels] and the states (updated; NULL = zero) -> the change of the maps. */
-ag_value *nn_refiner(ag_tape *tape, const nn_model *model, ag_value *x, ag_value *gru[2]);
+/* h: input [N, H, W, (1 + images) channels] and the states (updated; NULL = zero) -> the change of the maps. to: NULL, or for each new state
+ * the value to write it into, which may be the old one (a tape without gradients). */
+ag_value *nn_refiner(ag_tape *tape, const nn_model *model, ag_value *x, ag_value *gru[2], ag_value *const to[2]);
 
-/* R_{t+1} from R_t, [N, H, W, channels], and its encoded gradients, [N, H, W, images channels]. */
-ag_value *nn_step(ag_tape *tape, const nn_model *model, ag_value *maps, ag_value *gradient, ag_value *gru[2]);
+/* R_{t+1} from both = [R_t, its encoded gradients], [N, H, W, (1 + images) channels]; maps and gradient are its parts. */
+ag_value *nn_step(ag_tape *tape, const nn_model *model, ag_value *maps, ag_value *gradient, ag_value *both, ag_value *gru[2], ag_value *const to[2]);
 #endif

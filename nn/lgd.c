@@ -137,7 +137,7 @@ static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, 
     return true;
 }
 
-/* The gradients as h reads them: a constant of the tape, [N, H, W, images channels]. */
+/* The gradients: a constant of the tape, [N, H, W, images channels]. */
 static ag_value *loss_gradient(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, const nn_state *state)
 {
     ts_shape s = maps->t.shape;
@@ -155,11 +155,26 @@ static ag_value *loss_gradient(ag_tape *tape, const nn_model *model, const nn_in
 #pragma omp parallel for num_threads(ts_threads()) schedule(static)
         for (int64_t i = 0; i < rows * row; i++) g[i] *= scale;
     }
-    if (model->arch.encoding == NN_GRADIENT_ASINH) {
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-        for (int64_t y = 0; y < rows; y++) ts_elementwise_k()->asinh(row, NN_GRADIENT_SCALE, g + y * row, g + y * row);
-    }
     return gradient;
+}
+
+/* Encodes the gradients where they are. both (NULL: not asked for): [N, H, W, (1 + images) channels], the maps and the encoded gradients. */
+static void encode(const nn_model *model, const ag_value *maps, ag_value *gradient, ag_value *both)
+{
+    const struct ts_elementwise_kernels *k = ts_elementwise_k();
+    const ts_shape s = maps->t.shape;
+    const int own = gradient->t.shape.c, all = s.c + own;
+    const int64_t rows = (int64_t)s.n * s.h, w = s.w;
+    const bool asinh_too = model->arch.encoding == NN_GRADIENT_ASINH && model->arch.gradient;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int64_t y = 0; y < rows; y++) {
+        float *g = gradient->t.data + y * w * own;
+        if (asinh_too) k->asinh(w * own, NN_GRADIENT_SCALE, g, g);
+        if (!both) continue;
+        float *to = both->t.data + y * w * all;
+        k->copy(w, s.c, maps->t.data + y * w * s.c, s.c, to, all, false);
+        k->copy(w, own, g, own, to + s.c, all, false);
+    }
 }
 
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state)
@@ -171,43 +186,32 @@ ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag
         return ag_fail(tape, TS_INVALID, "the maps are %d x %d x %d x %d, not the photograph's size and the model's %d channels", s.n, s.h, s.w, s.c,
                        model->arch.channels);
     if (model->arch.rmse == NN_RMSE_START && !state->rmse0 && !measure_start(tape, model, in, maps, state)) return NULL;
-    ag_value *gradient = loss_gradient(tape, model, in, maps, state);
-    ag_value *next = nn_step(tape, model, maps, gradient, state->gru);
+    ag_value *gradient = loss_gradient(tape, model, in, maps, state), *both = NULL;
+    const bool joined = !ag_gradients(tape); /* else the gradient of R_t needs an operation that joins them */
+    if (joined) both = ag_empty(tape, (ts_shape){s.n, s.h, s.w, (1 + model->arch.images) * s.c});
+    if (!gradient || (joined && !both)) return NULL;
+    encode(model, maps, gradient, both);
+    ag_value *next = nn_step(tape, model, maps, gradient, joined ? both : ag_concat(tape, maps, gradient), state->gru, state->to);
     state->step++;
     return next;
 }
 
-/* What the loop hands from step to step on a tape without gradients lives in buffers that were made before the first step, so that a
- * step gives back all that it took. */
-typedef struct carried {
-    ag_value *maps, *gru[2];
-} carried;
-
-static void carry(ag_value *to, ag_value **value)
-{
-    if (!to || !*value) return;
-    memcpy(to->t.data, (*value)->t.data, (size_t)ts_count(to->t.shape) * sizeof(float));
-    *value = to;
-}
-
-static ag_value *step_and_release(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state, const carried *to)
+/* On a tape without gradients a step gives back all that it took: R_t lives in a buffer that was made before, as the states do. */
+static ag_value *step_and_release(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state, ag_value *to)
 {
     ts_mark mark = ag_scope_begin(tape);
     ag_value *next = nn_refine(tape, model, in, maps, state);
     if (!next) return NULL;
-    carry(to->maps, &next);
-    for (int i = 0; i < 2; i++) {
-        carry(to->gru[i], &state->gru[i]);
-        if (!to->gru[i]) state->gru[i] = NULL;
-    }
+    memcpy(to->t.data, next->t.data, (size_t)ts_count(to->t.shape) * sizeof(float));
     ag_scope_end(tape, mark, NULL, 0);
-    return next;
+    for (int i = 0; i < 2; i++) state->gru[i] = state->to[i];
+    return to;
 }
 
 ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps, nn_after after, void *user)
 {
     nn_state state = {0};
-    carried to = {0};
+    ag_value *buffer = NULL; /* of R_t */
     bool release = !ag_gradients(tape);
     ag_value *predicted = nn_predict(tape, model, in), *now = NULL;
     if (predicted && (steps == 0 || model->arch.rmse == NN_RMSE_BATCH || measure_start(tape, model, in, predicted, &state)))
@@ -216,13 +220,14 @@ ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int ste
     maps[0] = now;
     if (now && release && steps > 0) {
         ts_shape s = now->t.shape;
-        to.maps = now;
-        for (int i = 0; i < 2 && model->arch.recurrent; i++) to.gru[i] = ag_empty(tape, (ts_shape){s.n, s.h, s.w, model->arch.h_gru});
+        buffer = now;
+        for (int i = 0; i < 2 && model->arch.recurrent; i++) state.to[i] = ag_empty(tape, (ts_shape){s.n, s.h, s.w, model->arch.h_gru});
     }
     bool on = now && (!after || after(0, now, user));
     while (on && t < steps) {
-        if (release && keep_all) to.maps = ag_empty(tape, now->t.shape);
-        now = release ? step_and_release(tape, model, in, now, &state, &to) : nn_refine(tape, model, in, now, &state);
+        if (release && keep_all) buffer = ag_empty(tape, now->t.shape);
+        if (release && !buffer) break;
+        now = release ? step_and_release(tape, model, in, now, &state, buffer) : nn_refine(tape, model, in, now, &state);
         if (!now) break;
         t++;
         maps[keep_all ? t : 0] = now;

@@ -330,3 +330,23 @@ TEST(tape_frozen_weights_are_packed_once)
     }
     ag_tape_destroy(&tape);
 }
+
+TEST(into_writes_where_it_is_told)
+{
+    ts_status st = {0};
+    float a[6] = {1, 2, 3, 4, 5, 6}, b[6] = {6, 5, 4, 3, 2, 1}, more[4] = {0};
+    ag_tape *tape = ag_tape_create(false, &st);
+    CHECK(tape, "%s", st.message);
+    ag_value *x = ag_constant(tape, ts_view(a, (ts_shape){1, 1, 2, 3})), *y = ag_constant(tape, ts_view(b, (ts_shape){1, 1, 2, 3}));
+    ag_into(tape, x);
+    CHECK(ag_add(tape, x, y) == x && a[0] == 7 && a[5] == 7, "the sum is not where it was to go");
+    CHECK(ag_add(tape, x, y) != x && a[0] == 7, "the next operation went there too");
+    ag_into(tape, ag_constant(tape, ts_view(more, (ts_shape){1, 1, 2, 2})));
+    CHECK(!ag_add(tape, x, y) && strstr(ag_status(tape)->message, "the place for it"), "%s", ag_status(tape)->message);
+    ag_tape_destroy(&tape);
+    tape = ag_tape_create(true, &st);
+    x = ag_constant(tape, ts_view(a, (ts_shape){1, 1, 2, 3}));
+    ag_into(tape, x);
+    CHECK(!ag_add(tape, x, x) && strstr(ag_status(tape)->message, "keeps every value"), "%s", ag_status(tape)->message);
+    ag_tape_destroy(&tape);
+}

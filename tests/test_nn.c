@@ -158,7 +158,10 @@ static ag_value *loop(ag_tape *t, const nn_model *m, const nn_input *in, int ste
         return maps[steps];
     }
     ag_value *now = nn_predict(t, m, in), *gru[2] = {NULL, NULL};
-    for (int i = 0; i < steps; i++) now = nn_step(t, m, now, ag_constant(t, ts_view(frozen[i], now->t.shape)), gru);
+    for (int i = 0; i < steps; i++) {
+        ag_value *gradient = ag_constant(t, ts_view(frozen[i], now->t.shape));
+        now = nn_step(t, m, now, gradient, ag_concat(t, now, gradient), gru, NULL);
+    }
     check_tape(t);
     return now;
 }

@@ -119,7 +119,7 @@ TEST(parity_h_is_the_published_one)
     ag_tape *t = ag_tape_create(false, &st);
     ts_shape s = {1, SIDE, SIDE, CHANNELS};
     ag_value *gru[2] = {NULL, NULL};
-    ag_value *delta = nn_refiner(t, m, ag_concat(t, ag_constant(t, ts_view(maps, s)), ag_constant(t, ts_view(gradient, s))), gru);
+    ag_value *delta = nn_refiner(t, m, ag_concat(t, ag_constant(t, ts_view(maps, s)), ag_constant(t, ts_view(gradient, s))), gru, NULL);
     CHECK(delta, "%s", ag_status(t)->message);
     compare(delta->t.data, expected, 1e-4, 4e-6);
 }
