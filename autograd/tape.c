@@ -1,33 +1,10 @@
 #include "autograd/tape.h"
 #include "autograd/op.h"
+#include "autograd/tape_inside.h"
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* A value and where the arena stood before it was made: scopes ask which side of a mark it is on. */
-typedef struct ag_held {
-    ag_value v;
-    size_t born;
-} ag_held;
-
-typedef struct ag_pack {
-    const float *weight;
-    ts_conv_use use;
-    ts_conv conv; /* n, h, w play no part */
-    float *packed;
-} ag_pack;
-
-struct ag_tape {
-    ts_arena *arena, *packs_arena, *moving; /* moving: what a scope keeps, while the arena is released */
-    bool gradients, frozen;
-    ag_value *into; /* of the next operation */
-    ag_node **node; /* grown by doubling and never shrunk, as is pack */
-    size_t nodes, node_room;
-    ag_pack *pack;
-    size_t packs, pack_room;
-    ts_status status;
-};
 
 ag_tape *ag_tape_create(bool gradients, ts_status *st)
 {
@@ -109,7 +86,7 @@ const char *ag_shape_text(char text[AG_SHAPE_TEXT], ts_shape s)
     return text;
 }
 
-static ag_value *new_value(ag_tape *tape, ts_tensor t, float *grad)
+ag_value *ag_new_value(ag_tape *tape, ts_tensor t, float *grad)
 {
     if (tape->status.code != TS_OK) return NULL;
     size_t born = ts_arena_used(tape->arena);
@@ -125,7 +102,7 @@ static ag_value *new_leaf(ag_tape *tape, ts_tensor t, float *grad)
     if (!t.data || t.shape.n < 1 || t.shape.h < 1 || t.shape.w < 1 || t.shape.c < 1)
         return ag_fail(tape, TS_INVALID, "leaf: no data or an empty shape [%d,%d,%d,%d]", t.shape.n, t.shape.h, t.shape.w, t.shape.c);
     if (!ts_contiguous(&t)) return ag_fail(tape, TS_INVALID, "leaf: the tensor is a strided view; copy it with ts_copy first");
-    return new_value(tape, t, grad);
+    return ag_new_value(tape, t, grad);
 }
 
 ag_value *ag_constant(ag_tape *tape, ts_tensor t) { return new_leaf(tape, t, NULL); }
@@ -133,7 +110,7 @@ ag_value *ag_parameter(ag_tape *tape, ts_tensor t, float *grad) { return new_lea
 
 ag_value *ag_empty(ag_tape *tape, ts_shape shape)
 {
-    ag_value *v = new_value(tape, (ts_tensor){0}, NULL); /* the header first: one order for values and their data */
+    ag_value *v = ag_new_value(tape, (ts_tensor){0}, NULL); /* the header first: one order for values and their data */
     if (!v) return NULL;
     v->t = ts_new(tape->arena, shape);
     if (!v->t.data) return no_memory(tape, "a value's data");
@@ -143,7 +120,7 @@ ag_value *ag_empty(ag_tape *tape, ts_shape shape)
 ag_value *ag_detach(ag_tape *tape, ag_value *v)
 {
     if (!ag_ready(tape, "detach", 1, &v)) return NULL;
-    return new_value(tape, v->t, NULL);
+    return ag_new_value(tape, v->t, NULL);
 }
 
 /* One more slot in a list; false without memory. */
@@ -155,6 +132,13 @@ static bool grow(void **list, size_t item, size_t count, size_t *room)
     if (!p) return false;
     *list = p;
     *room = more;
+    return true;
+}
+
+bool ag_record(ag_tape *tape, ag_node *node)
+{
+    if (!grow((void **)&tape->node, sizeof *tape->node, tape->nodes, &tape->node_room)) return no_memory(tape, "the list of operations");
+    tape->node[tape->nodes++] = node;
     return true;
 }
 
@@ -189,11 +173,7 @@ ag_value *ag_apply(ag_tape *tape, const ag_op *op, int inputs, ag_value *const *
     }
     op->forward(tape, node);
     if (tape->status.code != TS_OK) return NULL;
-    if (v->needs_grad) {
-        if (!grow((void **)&tape->node, sizeof *tape->node, tape->nodes, &tape->node_room)) return no_memory(tape, "the list of operations");
-        tape->node[tape->nodes++] = node;
-    }
-    return v;
+    return v->needs_grad && !ag_record(tape, node) ? NULL : v;
 }
 
 float *ag_grad_target(ag_tape *tape, ag_value *v, bool *accumulate)
@@ -219,6 +199,17 @@ float *ag_grad_add(ag_tape *tape, ag_value *v)
     return g;
 }
 
+void ag_walk(ag_tape *tape, size_t first)
+{
+    for (size_t i = tape->nodes; i-- > first;) {
+        ag_node *node = tape->node[i];
+        if (!node->out->grad_ready) continue; /* the loss does not depend on it */
+        node->op->backward(tape, node);
+        if (tape->status.code != TS_OK) break;
+        node->out->grad_ready = false; /* passed on; a second backward starts it anew */
+    }
+}
+
 ts_code ag_backward(ag_tape *tape, ag_value *loss)
 {
     if (!ag_ready(tape, "backward", 1, &loss)) return tape->status.code;
@@ -228,13 +219,7 @@ ts_code ag_backward(ag_tape *tape, ag_value *loss)
     float *seed = tape->status.code == TS_OK ? ag_grad_add(tape, loss) : NULL;
     if (!seed) return tape->status.code;
     seed[0] += 1.0f;
-    for (size_t i = tape->nodes; i-- > 0;) {
-        ag_node *node = tape->node[i];
-        if (!node->out->grad_ready) continue; /* the loss does not depend on it */
-        node->op->backward(tape, node);
-        if (tape->status.code != TS_OK) break;
-        node->out->grad_ready = false; /* passed on; a second backward starts it anew */
-    }
+    ag_walk(tape, 0);
     return tape->status.code;
 }
 

@@ -196,6 +196,41 @@ ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag
     return next;
 }
 
+typedef struct step_of {
+    const nn_model *model;
+    nn_input in;
+    double *rmse0;
+} step_of;
+
+/* in: R_t and the states; out: R_{t+1} and, where they are carried, the new states. */
+static void step_again(ag_tape *tape, ag_value *const *in, ag_value **out, const void *user)
+{
+    const step_of *s = user;
+    nn_state state = {.gru = {in[1], in[2]}, .rmse0 = s->rmse0};
+    out[0] = nn_refine(tape, s->model, &s->in, in[0], &state);
+    for (int i = 0; i < 2 && s->model->arch.recurrent; i++) out[i + 1] = state.gru[i];
+}
+
+/* Room for the gradients of R_t and the states: a step's and the next one's take turns. */
+static float *gradient_room(ag_tape *tape, const ag_value *maps, int channels)
+{
+    float *room = ts_arena_alloc(ag_arena(tape), (size_t)ts_pixels(maps->t.shape) * (size_t)channels * sizeof *room);
+    if (!room) ag_fail(tape, TS_NOMEM, "no memory for a step's gradients");
+    return room;
+}
+
+static ag_value *step_and_forget(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state, float *const room[3])
+{
+    const step_of of = {model, *in, state->rmse0};
+    ag_value *const from[3] = {maps, state->gru[0], state->gru[1]};
+    ag_value *to[3] = {0};
+    if (!ag_checkpoint(tape, step_again, &of, sizeof of, 3, from, room, model->arch.recurrent ? 3 : 1, to)) return NULL;
+    state->gru[0] = to[1];
+    state->gru[1] = to[2];
+    state->step++;
+    return to[0];
+}
+
 /* On a tape without gradients a step gives back all that it took: R_t lives in a buffer that was made before, as the states do. */
 static ag_value *step_and_release(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state, ag_value *to)
 {
@@ -223,11 +258,14 @@ ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int ste
         buffer = now;
         for (int i = 0; i < 2 && model->arch.recurrent; i++) state.to[i] = ag_empty(tape, (ts_shape){s.n, s.h, s.w, model->arch.h_gru});
     }
+    float *room[2][3] = {{0}};
+    for (int i = 0; now && !release && in->recompute && i < 6; i++) room[i / 3][i % 3] = gradient_room(tape, now, i % 3 ? model->arch.h_gru : now->t.shape.c);
     bool on = now && (!after || after(0, now, user));
     while (on && t < steps) {
         if (release && keep_all) buffer = ag_empty(tape, now->t.shape);
         if (release && !buffer) break;
-        now = release ? step_and_release(tape, model, in, now, &state, buffer) : nn_refine(tape, model, in, now, &state);
+        if (release) now = step_and_release(tape, model, in, now, &state, buffer);
+        else now = in->recompute ? step_and_forget(tape, model, in, now, &state, room[t % 2]) : nn_refine(tape, model, in, now, &state);
         if (!now) break;
         t++;
         maps[keep_all ? t : 0] = now;

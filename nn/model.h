@@ -89,6 +89,7 @@ typedef struct nn_input {
     ts_tensor whole; /* [N * given, side, side, 3]: the photographs of which image is the window; no data: image is the whole */
     const rd_view *views; /* [N * given], or NULL */
     int given;            /* 1 .. arch.images; 0 stands for 1 */
+    bool recompute;       /* on a tape with gradients: of each step only R_t and h's states are kept, the rest is computed again for the gradient */
 } nn_input;
 
 /* R_0 by g of the whole: [N, S, S, channels]. Photographs that are not given are black. The log encoding, the resampling to g_size and back are in here. */

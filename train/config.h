@@ -21,6 +21,7 @@ typedef struct tr_config {
         double clip, spike, ema, start_weight, map_weight;
         int iterations_min, iterations_max; /* 0: arch.iterations */
         int given_min;                      /* 0: arch.images */
+        bool checkpoint_steps;
         int64_t seed, checkpoint_every, log_every;
         int max_skipped;
         char init[1024];

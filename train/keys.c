@@ -81,6 +81,8 @@ const tr_key tr_keys[] = {
     {"train", "iterations_max", TR_INT, AT(train.iterations_max), 0, 64, "0", NULL, false, "most refinement steps; 0: model.iterations"},
     {"train", "given_min", TR_INT, AT(train.given_min), 0, NN_MAX_IMAGES, "0", NULL, false,
      "fewest photographs of a training step, drawn uniformly up to model.images; 0: always so many"},
+    {"train", "checkpoint_steps", TR_BOOL, AT(train.checkpoint_steps), 0, 1, "no", NULL, true,
+     "keep of each refinement only the maps and h's states, and compute the rest again for the gradient: less memory, a third more time, the same numbers"},
     {"train", "seed", TR_INT64, AT(train.seed), 0, 1e15, "1", NULL, false, "seed of the initial weights, the loss's views and the drawn iterations"},
     {"train", "checkpoint_every", TR_INT64, AT(train.checkpoint_every), 1, 1e9, "500", NULL, true, "steps between checkpoints"},
     {"train", "log_every", TR_INT64, AT(train.log_every), 1, 1e9, "50", NULL, true, "steps between lines of progress when stderr is no terminal"},

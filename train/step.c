@@ -66,7 +66,8 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
     const int batch = c->train.batch, size = c->data.patch;
     ag_value *maps[TR_MOST_ITERATIONS + 1];
     ts_tensor goals = ts_view((float *)(uintptr_t)target, (ts_shape){batch, size, size, MAP_CHANNELS});
-    nn_input in = {.image = ts_view(t->images, (ts_shape){batch * given, size, size, 3}), .grid = rd_grid_full(size), .views = t->captures, .given = given};
+    nn_input in = {.image = ts_view(t->images, (ts_shape){batch * given, size, size, 3}), .grid = rd_grid_full(size), .views = t->captures, .given = given,
+                   .recompute = c->train.checkpoint_steps};
     if (row->pretraining) {
         maps[0] = nn_predict(t->tape, t->model, &in);
         return add_loss(t, NULL, maps[0], ag_constant(t->tape, goals), 1, &row->render_start, &row->map_start);

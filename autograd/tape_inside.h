@@ -1,0 +1,36 @@
+/* What the tape is made of: for autograd/tape.c and autograd/checkpoint.c alone. */
+#ifndef AG_TAPE_INSIDE_H
+#define AG_TAPE_INSIDE_H
+#include "autograd/tape.h"
+
+/* A value and where the arena stood before it was made: scopes ask which side of a mark it is on. */
+typedef struct ag_held {
+    ag_value v;
+    size_t born;
+} ag_held;
+
+typedef struct ag_pack {
+    const float *weight;
+    ts_conv_use use;
+    ts_conv conv; /* n, h, w play no part */
+    float *packed;
+} ag_pack;
+
+struct ag_tape {
+    ts_arena *arena, *packs_arena, *moving; /* moving: what a scope keeps, while the arena is released */
+    bool gradients, frozen;
+    ag_value *into; /* of the next operation */
+    ag_node **node; /* grown by doubling and never shrunk, as is pack */
+    size_t nodes, node_room;
+    ag_pack *pack;
+    size_t packs, pack_room;
+    ts_status status;
+};
+
+/* A leaf; grad (NULL: none is wanted) is where its gradient goes. */
+ag_value *ag_new_value(ag_tape *tape, ts_tensor t, float *grad);
+/* Puts the node at the end of the tape. */
+bool ag_record(ag_tape *tape, ag_node *node);
+/* Backward of the nodes from number first on, last first. */
+void ag_walk(ag_tape *tape, size_t first);
+#endif
