@@ -47,6 +47,17 @@ lgd_options lgd_options_default(void) { return (lgd_options){.iterations = -1}; 
 
 int lgd_trained_iterations(const lgd_model *model) { return model->net->arch.iterations; }
 
+int lgd_most_photos(const lgd_model *model) { return model->net->arch.images; }
+
+lgd_photo lgd_flash_photo(const float *image)
+{
+    const rd_view flash = rd_flash();
+    lgd_photo p = {.image = image, .power = flash.power};
+    memcpy(p.light, flash.light, sizeof p.light);
+    memcpy(p.camera, flash.camera, sizeof p.camera);
+    return p;
+}
+
 lgd_model *lgd_load(const char *weights, lgd_error *error)
 {
     ts_status st = {0};
@@ -77,14 +88,32 @@ typedef struct watch {
 static bool after_step(int step, const ag_value *maps, void *user)
 {
     const watch *w = user;
-    double rmse;
-    rd_flash_rmse(w->in->grid, maps->t.data, maps->t.shape.c, &w->in->view, w->in->image.data, &rmse);
-    return w->options->progress(step, rmse, w->options->user) == 0;
+    const rd_grid g = w->in->grid;
+    double squares = 0;
+    for (int k = 0; k < w->in->given; k++) {
+        double rmse;
+        rd_flash_rmse(g, maps->t.data, maps->t.shape.c, &w->in->views[k], w->in->image.data + (size_t)k * (size_t)g.h * (size_t)g.w * 3, &rmse);
+        squares += rmse * rmse / w->in->given;
+    }
+    return w->options->progress(step, sqrt(squares), w->options->user) == 0;
 }
 
-static ts_code check_arguments(const lgd_model *model, const float *image, int side, const lgd_options *o, const float *maps, ts_status *st)
+static ts_code check_photo(const lgd_photo *p, int number, ts_status *st)
 {
-    if (!model || !image || !maps) return ts_fail(st, TS_INVALID, "lgd_estimate: model, image and maps must be given");
+    if (!p->image) return ts_fail(st, TS_INVALID, "lgd_estimate: photograph %d has no image", number);
+    bool fine = isfinite(p->power) && p->power > 0 && p->light[2] > 0 && p->camera[2] > 0;
+    for (int i = 0; i < 3; i++) fine = fine && isfinite(p->light[i]) && isfinite(p->camera[i]);
+    if (!fine) return ts_fail(st, TS_INVALID, "lgd_estimate: light and camera of photograph %d must be above the sample, its power above 0", number);
+    return TS_OK;
+}
+
+static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *o, const float *maps, ts_status *st)
+{
+    if (!model || !photo || !maps) return ts_fail(st, TS_INVALID, "lgd_estimate: model, image and maps must be given");
+    if (photos < 1 || photos > model->net->arch.images)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: %d photographs: these weights read 1 .. %d", photos, model->net->arch.images);
+    for (int k = 0; k < photos; k++)
+        if (check_photo(&photo[k], k + 1, st) != TS_OK) return st->code;
     if (side < 1 || side > SIDE_MAX) return ts_fail(st, TS_INVALID, "lgd_estimate: side is %d and must lie in 1 .. %d", side, SIDE_MAX);
     if (o->iterations < -1 || o->iterations > ITERATIONS_MAX)
         return ts_fail(st, TS_INVALID, "lgd_estimate: iterations is %d and must lie in 0 .. %d, or be -1 for as trained", o->iterations, ITERATIONS_MAX);
@@ -134,7 +163,7 @@ void lgd_encode(const float *maps, int side, float *encoded)
 static double step_bytes(const nn_arch *a, int side)
 {
     const double cells = a->h_width > 0 ? 2.0 * (a->h_width + 8.0 * a->h_gru) : 0;
-    return (3 + 5.0 * a->channels + cells) * sizeof(float) * side * side;
+    return (3.0 * a->images + (3.0 + 2.0 * a->images) * a->channels + cells) * sizeof(float) * side * side;
 }
 
 static ts_code not_finite(ts_status *st)
@@ -142,15 +171,16 @@ static ts_code not_finite(ts_status *st)
     return ts_fail(st, TS_NUMERIC, "the network's maps are not finite: the weights are damaged or did not train");
 }
 
-static ts_code estimate_whole(lgd_model *model, const float *image, int side, int steps, const lgd_options *o, float *maps, ts_status *st)
+static ts_code estimate_whole(lgd_model *model, const float *const *image, const rd_view *views, int given, int side, int steps, const lgd_options *o, float *maps, ts_status *st)
 {
     ag_reset(model->tape);
     const double more = step_bytes(&model->net->arch, side) - (double)ts_arena_peak(ag_arena(model->tape)); /* than earlier calls left */
     if (more > 0 && lgd_memory_check(more, st) != TS_OK) return ts_context(st, "%d x %d pixels", side, side);
-    nn_input in = {.image = ts_new(ag_arena(model->tape), (ts_shape){1, side, side, 3}), .grid = rd_grid_full(side), .view = rd_flash()};
+    nn_input in = {.image = ts_new(ag_arena(model->tape), (ts_shape){given, side, side, 3}), .grid = rd_grid_full(side), .views = views, .given = given};
     if (!in.image.data) return ts_fail(st, TS_NOMEM, "out of memory for an image of %d x %d pixels", side, side);
     const int64_t values = (int64_t)side * side * 3;
-    for (int64_t i = 0; i < values; i++) in.image.data[i] = isfinite(image[i]) ? fminf(fmaxf(image[i], 0), 1) : 0;
+    for (int k = 0; k < given; k++)
+        for (int64_t i = 0; i < values; i++) in.image.data[k * values + i] = isfinite(image[k][i]) ? fminf(fmaxf(image[k][i], 0), 1) : 0;
 
     watch w = {&in, o};
     ag_value *out = NULL;
@@ -173,7 +203,7 @@ static int before_tile(void *user)
     return w->options->tile ? w->options->tile(w->begun++ / w->tiles, w->options->user) : 0;
 }
 
-static ts_code estimate_tiles(lgd_model *model, const float *image, int side, int steps, const lgd_options *o, float *maps, ts_status *st)
+static ts_code estimate_tiles(lgd_model *model, const float *const *image, const rd_view *views, int given, int side, int steps, const lgd_options *o, float *maps, ts_status *st)
 {
     const nn_arch *arch = &model->net->arch;
     const int64_t pixels = (int64_t)side * side;
@@ -183,7 +213,7 @@ static ts_code estimate_tiles(lgd_model *model, const float *image, int side, in
     float *raw = arch->channels == MAP_CHANNELS ? maps : malloc((size_t)pixels * (size_t)arch->channels * sizeof *raw);
     double *rmse = calloc((size_t)steps + 1, sizeof *rmse);
     ts_code code = raw && rmse ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
-    lgd_tiles t = {.image = image, .mask = o->mask, .side = side, .tile = tile, .steps = steps, .tolerance = o->tolerance, .rmse = o->progress ? rmse : NULL,
+    lgd_tiles t = {.image = image, .views = views, .given = given, .mask = o->mask, .side = side, .tile = tile, .steps = steps, .tolerance = o->tolerance, .rmse = o->progress ? rmse : NULL,
                    .alive = before_tile, .user = &w};
     if (!code) code = lgd_tiles_run(model->tape, model->net, &t, raw, st);
     int stop = steps;
@@ -200,22 +230,36 @@ static ts_code estimate_tiles(lgd_model *model, const float *image, int side, in
     return code;
 }
 
-static ts_code estimate(lgd_model *model, const float *image, int side, const lgd_options *o, float *maps, ts_status *st)
+static ts_code estimate(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *o, float *maps, ts_status *st)
 {
+    const float *image[NN_MAX_IMAGES];
+    rd_view views[NN_MAX_IMAGES];
+    for (int k = 0; k < photos; k++) {
+        image[k] = photo[k].image;
+        views[k] = (rd_view){.kind = RD_POINT, .power = photo[k].power};
+        memcpy(views[k].light, photo[k].light, sizeof views[k].light);
+        memcpy(views[k].camera, photo[k].camera, sizeof views[k].camera);
+    }
     const int steps = o->iterations < 0 ? lgd_trained_iterations(model) : o->iterations;
     const bool tiles = lgd_tiles_exact(&model->net->arch) && (side > UNTILED || o->mask || o->tolerance > 0);
-    return (tiles ? estimate_tiles : estimate_whole)(model, image, side, steps, o, maps, st);
+    return (tiles ? estimate_tiles : estimate_whole)(model, image, views, photos, side, steps, o, maps, st);
+}
+
+int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options, float *maps, lgd_error *error)
+{
+    ts_status st = {0};
+    const lgd_options o = options ? *options : lgd_options_default();
+    if (check_arguments(model, photo, photos, side, &o, maps, &st) == TS_OK) {
+        ts_threads_set(o.threads);
+        estimate(model, photo, photos, side, &o, maps, &st);
+    }
+    return report(error, &st);
 }
 
 int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps, lgd_error *error)
 {
-    ts_status st = {0};
-    const lgd_options o = options ? *options : lgd_options_default();
-    if (check_arguments(model, image, side, &o, maps, &st) == TS_OK) {
-        ts_threads_set(o.threads);
-        estimate(model, image, side, &o, maps, &st);
-    }
-    return report(error, &st);
+    const lgd_photo photo = lgd_flash_photo(image);
+    return lgd_estimate_photos(model, &photo, 1, side, options, maps, error);
 }
 
 int lgd_render(const float *maps, int side, const float light[3], const float camera[3], float power, float *image, lgd_error *error)

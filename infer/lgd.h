@@ -20,6 +20,7 @@ lgd_model *lgd_load(const char *weights, lgd_error *error);
 void lgd_free(lgd_model **model);
 
 int lgd_trained_iterations(const lgd_model *model); /* the T that the model was trained for */
+int lgd_most_photos(const lgd_model *model);        /* photographs that it reads at once: 1, or those of a multi-image model */
 
 typedef struct lgd_options {
     int iterations; /* refinement steps; 0: R_0 alone, -1: as trained */
@@ -44,6 +45,19 @@ lgd_options lgd_options_default(void);
  * otherwise: diffuse rgb, normal x and y in [-1, 1] (OpenGL, z = sqrt(1 - x^2 - y^2)), roughness, specular F0 rgb.
  * Returns 0, or nonzero with error set and maps unspecified. */
 int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps, lgd_error *error);
+
+/* A photograph of the sample, rectified to it. Positions in patch widths (the sample is [-1/2, 1/2]^2 at z = 0, x right, y up), both above the
+ * sample; radiance = BRDF max(n.l, 0) power / distance^2. */
+typedef struct lgd_photo {
+    const float *image; /* side x side x 3 linear values (clamped to [0, 1] here), top row first */
+    float light[3], camera[3], power;
+} lgd_photo;
+
+/* The photograph that lgd_estimate assumes: light and camera at one place above the centre, of the usual power. */
+lgd_photo lgd_flash_photo(const float *image);
+
+/* lgd_estimate from 1 .. lgd_most_photos photographs under known lights. */
+int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options, float *maps, lgd_error *error);
 
 /* Renders maps as returned by lgd_estimate under a point light and a camera (positions in patch widths, the sample is
  * [-1/2, 1/2]^2 at z = 0, y up): image is side x side x 3, linear. */

@@ -27,7 +27,7 @@ typedef struct work {
     int channels;
     const ag_value *predicted; /* R_0 as g gives it, at its own size */
     ts_taps taps;              /* from there to side, along rows and columns alike */
-    double rmse0;
+    double *rmse0;             /* [given] */
     double *squares;           /* [steps + 1]: sums over the pixels of squared differences, by t */
 } work;
 
@@ -44,12 +44,14 @@ static void start(const work *w, area a, float *maps)
     ts_resample(1, w->channels, &down, &across, w->predicted->t.data, maps, false);
 }
 
-static void photograph(const work *w, area a, float *to)
+/* The given photographs in an area, one after the other. */
+static void photographs(const work *w, area a, float *to)
 {
-    for (int y = a.y0; y < a.y1; y++) {
-        const float *from = w->t->image + ((size_t)y * (size_t)w->t->side + (size_t)a.x0) * 3;
-        for (int i = 0; i < 3 * columns(a); i++) *to++ = isfinite(from[i]) ? fminf(fmaxf(from[i], 0), 1) : 0;
-    }
+    for (int k = 0; k < w->t->given; k++)
+        for (int y = a.y0; y < a.y1; y++) {
+            const float *from = w->t->image[k] + ((size_t)y * (size_t)w->t->side + (size_t)a.x0) * 3;
+            for (int i = 0; i < 3 * columns(a); i++) *to++ = isfinite(from[i]) ? fminf(fmaxf(from[i], 0), 1) : 0;
+        }
 }
 
 /* to (area b) = the part of from (area a) that it shows; b lies in a. */
@@ -62,22 +64,33 @@ static void crop(area a, area b, int channels, const float *from, float *to)
 
 static rd_grid grid_of(area a, int side) { return (rd_grid){rows(a), columns(a), a.y0, a.x0, side}; }
 
-/* Sum of squared differences between photograph and rendering of the maps (of area a) in core. */
-static double square_sum(const work *w, area a, area core, const float *maps)
+/* Sum of squared differences between each photograph and the rendering of the maps (of area a) in core, added to sum [given]. */
+static void add_squares(const work *w, area a, area core, const float *maps, double *sum)
 {
-    const rd_view view = rd_flash();
     const ts_mark mark = ts_arena_mark(ag_arena(w->tape));
+    const int given = w->t->given;
     const size_t pixels = (size_t)rows(core) * (size_t)columns(core);
     float *part_of = ts_arena_alloc(ag_arena(w->tape), pixels * (size_t)w->channels * sizeof *part_of);
-    float *image = ts_arena_alloc(ag_arena(w->tape), pixels * 3 * sizeof *image);
-    double rmse = 0;
+    float *image = ts_arena_alloc(ag_arena(w->tape), pixels * (size_t)given * 3 * sizeof *image);
     if (part_of && image) {
         crop(a, core, w->channels, maps, part_of);
-        photograph(w, core, image);
-        rd_flash_rmse(grid_of(core, w->t->side), part_of, w->channels, &view, image, &rmse);
+        photographs(w, core, image);
+        for (int k = 0; k < given; k++) {
+            double rmse;
+            rd_flash_rmse(grid_of(core, w->t->side), part_of, w->channels, &w->t->views[k], image + (size_t)k * pixels * 3, &rmse);
+            sum[k] += rmse * rmse * (double)pixels;
+        }
     } else ag_fail(w->tape, TS_NOMEM, "out of memory");
     ts_arena_release(ag_arena(w->tape), mark);
-    return rmse * rmse * (double)pixels;
+}
+
+/* Of all photographs together. */
+static double square_sum(const work *w, area a, area core, const float *maps)
+{
+    double each[NN_MAX_IMAGES] = {0}, sum = 0;
+    add_squares(w, a, core, maps, each);
+    for (int k = 0; k < w->t->given; k++) sum += each[k] / w->t->given;
+    return sum;
 }
 
 static double change(const float *a, const float *b, size_t values)
@@ -96,23 +109,22 @@ static void refine(work *w, area core, float *to)
     area now = grown(core, reach * t->steps, t->side);
     const int carried = w->model->arch.recurrent ? 2 : 0;
     const ts_shape s = {1, rows(now), columns(now), w->channels};
-    ag_value *maps = ag_empty(tape, s), *image = ag_empty(tape, (ts_shape){1, s.h, s.w, 3});
+    ag_value *maps = ag_empty(tape, s), *image = ag_empty(tape, (ts_shape){t->given, s.h, s.w, 3});
     ag_value *states[2] = {0};
     for (int i = 0; i < carried; i++) states[i] = ag_empty(tape, (ts_shape){1, s.h, s.w, gru});
     if (ag_status(tape)->code) return;
     float *const buffer = maps->t.data, *const photo = image->t.data;
     start(w, now, buffer);
-    double rmse0[1] = {w->rmse0};
-    nn_state state = {.rmse0 = rmse0};
+    nn_state state = {.rmse0 = w->rmse0};
     double last = t->rmse ? square_sum(w, now, core, buffer) : 0;
     if (t->rmse) w->squares[0] += last;
     int step = 0;
     for (bool on = true; step < t->steps && on;) {
         const area next = grown(core, reach * (t->steps - step - 1), t->side);
         const ts_mark mark = ag_scope_begin(tape);
-        photograph(w, now, photo);
+        photographs(w, now, photo);
         const ts_shape shape = {1, rows(now), columns(now), w->channels};
-        const nn_input in = {.image = ts_view(photo, (ts_shape){1, shape.h, shape.w, 3}), .grid = grid_of(now, t->side), .view = rd_flash()};
+        const nn_input in = {.image = ts_view(photo, (ts_shape){t->given, shape.h, shape.w, 3}), .grid = grid_of(now, t->side), .views = t->views, .given = t->given};
         for (int i = 0; i < carried; i++) {
             state.to[i] = ag_constant(tape, ts_view(states[i]->t.data, (ts_shape){1, shape.h, shape.w, gru}));
             state.gru[i] = step > 0 ? state.to[i] : NULL;
@@ -178,35 +190,35 @@ static void tile(work *w, area a, float *maps)
 static ts_code prepare(work *w)
 {
     ts_arena *arena = ag_arena(w->tape);
-    const int side = w->t->side, size = w->model->arch.g_size;
+    const int side = w->t->side, size = w->model->arch.g_size, given = w->t->given;
     const area all = {0, 0, side, side};
-    ag_value *small = ag_empty(w->tape, (ts_shape){1, size, size, 3});
+    ag_value *small = ag_empty(w->tape, (ts_shape){given, size, size, 3});
     if (!small) return ag_status(w->tape)->code;
     const ts_mark mark = ag_scope_begin(w->tape);
-    ag_value *whole = ag_empty(w->tape, (ts_shape){1, side, side, 3});
+    ag_value *whole = ag_empty(w->tape, (ts_shape){given, side, side, 3});
     ts_status st = {0};
     if (!whole) return ag_status(w->tape)->code;
-    photograph(w, all, whole->t.data);
-    if (side == size) memcpy(small->t.data, whole->t.data, (size_t)size * (size_t)size * 3 * sizeof(float));
+    photographs(w, all, whole->t.data);
+    if (side == size) memcpy(small->t.data, whole->t.data, (size_t)ts_count(small->t.shape) * sizeof(float));
     else if (ts_resize(&small->t, &whole->t, arena, &st)) ag_fail(w->tape, st.code, "%s", st.message);
     ag_scope_end(w->tape, mark, NULL, 0);
-    const nn_input in = {.image = small->t, .grid = rd_grid_full(size), .view = rd_flash()};
+    const nn_input in = {.image = small->t, .grid = rd_grid_full(size), .views = w->t->views, .given = given};
     w->predicted = nn_predict(w->tape, w->model, &in);
     w->taps = ts_taps_triangle(arena, size, side);
     w->squares = ts_arena_zalloc(arena, (size_t)w->t->steps + 1, sizeof *w->squares);
-    if (!w->taps.weight || !w->squares) ag_fail(w->tape, TS_NOMEM, "out of memory");
-    double sum = 0;
+    w->rmse0 = ts_arena_zalloc(arena, (size_t)given, sizeof *w->rmse0);
+    if (!w->taps.weight || !w->squares || !w->rmse0) ag_fail(w->tape, TS_NOMEM, "out of memory");
     for (int y = 0; y < side && !ag_status(w->tape)->code; y += w->t->tile) {
         const area band = {y, 0, y + w->t->tile < side ? y + w->t->tile : side, side};
         const ts_mark before = ag_scope_begin(w->tape);
         const ag_value *maps = ag_empty(w->tape, (ts_shape){1, rows(band), side, w->channels});
         if (maps) {
             start(w, band, maps->t.data);
-            sum += square_sum(w, band, band, maps->t.data);
+            add_squares(w, band, band, maps->t.data, w->rmse0);
         }
         ag_scope_end(w->tape, before, NULL, 0);
     }
-    w->rmse0 = sqrt(sum / ((double)side * side));
+    for (int k = 0; k < given && !ag_status(w->tape)->code; k++) w->rmse0[k] = sqrt(w->rmse0[k] / ((double)side * side));
     return ag_status(w->tape)->code;
 }
 

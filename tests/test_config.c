@@ -1,22 +1,22 @@
 /* The INI reader and the table of configuration keys. */
 #include "test.h"
 #include "train/config.h"
-#include "train/ini.h"
+#include "data/ini.h"
 #include "train/trainer.h"
 #include <locale.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-static ts_code parse(const char *text, tr_ini *ini, ts_status *st)
+static ts_code parse(const char *text, io_ini *ini, ts_status *st)
 {
     memset(st, 0, sizeof *st);
-    return tr_ini_parse("x.ini", text, strlen(text), ini, st);
+    return io_ini_parse("x.ini", text, strlen(text), ini, st);
 }
 
 static void expect_error(const char *text, const char *part)
 {
-    tr_ini ini;
+    io_ini ini;
     ts_status st;
     CHECK(parse(text, &ini, &st) == TS_INVALID, "accepted: %s", text);
     CHECK(strstr(st.message, part), "\"%s\" is not in: %s", part, st.message);
@@ -37,7 +37,7 @@ static const char *write_file(const char *name, const char *text)
 
 TEST(ini_reads_sections_comments_and_blanks)
 {
-    tr_ini ini;
+    io_ini ini;
     ts_status st;
     CHECK(parse("# head\n\n[a]\nx = 1 # one\n  y=two words  ; and a comment\nz =\n[b]\nx = c#d\n[a]\nw = last", &ini, &st) == TS_OK, "%s",
           st.message);
@@ -45,22 +45,22 @@ TEST(ini_reads_sections_comments_and_blanks)
     const char *const want[5][3] = {{"a", "x", "1"}, {"a", "y", "two words"}, {"a", "z", ""}, {"b", "x", "c#d"}, {"a", "w", "last"}};
     const int line[5] = {4, 5, 6, 8, 10};
     for (int i = 0; i < 5; i++) {
-        const tr_ini_entry *e = &ini.entry[i];
+        const io_ini_entry *e = &ini.entry[i];
         CHECK(!strcmp(e->section, want[i][0]) && !strcmp(e->key, want[i][1]) && !strcmp(e->value, want[i][2]), "entry %d is [%s] %s = \"%s\"", i,
               e->section, e->key, e->value);
         CHECK(e->line == line[i], "entry %d is in line %d, not %d", i, e->line, line[i]);
     }
-    tr_ini_free(&ini);
+    io_ini_free(&ini);
 }
 
 TEST(ini_accepts_crlf_and_byte_order_mark)
 {
-    tr_ini ini;
+    io_ini ini;
     ts_status st;
     CHECK(parse("\xef\xbb\xbf[a]\r\nx = 1\r\n\r\n; c\r\ny = 2\r\n", &ini, &st) == TS_OK, "%s", st.message);
     CHECK(ini.count == 2 && !strcmp(ini.entry[0].value, "1") && !strcmp(ini.entry[1].value, "2"), "wrong entries");
     CHECK(ini.entry[1].line == 5, "line %d", ini.entry[1].line);
-    tr_ini_free(&ini);
+    io_ini_free(&ini);
 }
 
 TEST(ini_errors_name_file_and_line)
@@ -73,10 +73,10 @@ TEST(ini_errors_name_file_and_line)
     expect_error("[a] x\n", "x.ini:1: a section");
     expect_error("[a]\n= 3\n", "x.ini:2:");
     expect_error("[]\n", "x.ini:1:");
-    tr_ini ini;
+    io_ini ini;
     ts_status st = {0};
-    CHECK(tr_ini_parse("x.ini", "[a]\0\n", 5, &ini, &st) == TS_INVALID && strstr(st.message, "zero byte"), "%s", st.message);
-    CHECK(tr_ini_read("/nonexistent/x.ini", &ini, &st) == TS_IO && strstr(st.message, "/nonexistent/x.ini"), "%s", st.message);
+    CHECK(io_ini_parse("x.ini", "[a]\0\n", 5, &ini, &st) == TS_INVALID && strstr(st.message, "zero byte"), "%s", st.message);
+    CHECK(io_ini_read("/nonexistent/x.ini", &ini, &st) == TS_IO && strstr(st.message, "/nonexistent/x.ini"), "%s", st.message);
 }
 
 TEST(config_defaults_are_the_tables_and_the_architectures)

@@ -227,6 +227,13 @@ TEST(infer_wrong_arguments_are_named)
     CHECK(lgd_estimate(m, NULL, 2, NULL, maps, &e) == TS_INVALID, "no image is taken");
     CHECK(lgd_estimate(m, image, 2, NULL, NULL, NULL) == TS_INVALID, "no maps are taken");
     CHECK(lgd_estimate(m, image, 2, NULL, maps, &e) == 0 && !e.message[0], "the defaults: %s", e.message);
+    lgd_photo two[2] = {lgd_flash_photo(image), lgd_flash_photo(image)};
+    CHECK(lgd_most_photos(m) == 1 && lgd_estimate_photos(m, two, 2, 2, NULL, maps, &e) == TS_INVALID && strstr(e.message, "2 photographs"), "'%s'", e.message);
+    two[0].power = 0;
+    CHECK(lgd_estimate_photos(m, two, 1, 2, NULL, maps, &e) == TS_INVALID && strstr(e.message, "power"), "'%s'", e.message);
+    two[0] = lgd_flash_photo(image);
+    two[0].light[2] = -1;
+    CHECK(lgd_estimate_photos(m, two, 1, 2, NULL, maps, &e) == TS_INVALID && strstr(e.message, "above"), "'%s'", e.message);
     CHECK(lgd_render(maps, 2, p, p, 1, image, &e) == 0, "%s", e.message);
     CHECK(lgd_render(NULL, 2, p, p, 1, image, &e) == TS_INVALID && lgd_render(maps, 0, p, p, 1, image, &e) == TS_INVALID, "render takes anything");
     CHECK(lgd_render(maps, 2, bad, p, 1, image, &e) == TS_INVALID && lgd_render(maps, 2, p, p, -1, image, &e) == TS_INVALID, "render takes any light");

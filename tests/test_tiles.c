@@ -15,9 +15,10 @@ static void make_image(float *image, int side)
     for (int i = 0; i < side * side * 3; i++) image[i] = 0.2f + 0.6f * ts_rng_uniform(&rng);
 }
 
-static nn_model *random_model(bool recurrent)
+static nn_model *random_model_of(bool recurrent, int images)
 {
     nn_arch a = nn_arch_default();
+    a.images = images;
     a.g_width = 4;
     a.g_width_max = 8;
     a.g_levels = 2;
@@ -34,6 +35,16 @@ static nn_model *random_model(bool recurrent)
     ts_rng rng = ts_rng_make(3, TS_STREAM_TEST, 0);
     for (size_t i = first; i < last; i++) m->value[i] += ts_rng_range(&rng, -0.05f, 0.05f);
     return m;
+}
+
+static nn_model *random_model(bool recurrent) { return random_model_of(recurrent, 1); }
+
+/* One flash photograph in tiles. */
+static lgd_tiles flash_tiles(const float *const *image, int side, int tile, int steps)
+{
+    static rd_view flash;
+    flash = rd_flash();
+    return (lgd_tiles){.image = image, .views = &flash, .given = 1, .side = side, .tile = tile, .steps = steps};
 }
 
 static ag_tape *frozen_tape(void)
@@ -63,6 +74,7 @@ static double farthest(const float *a, const float *b, size_t values)
 }
 
 static float whole_maps[TILES_T + 1][LARGE * LARGE * MAP_CHANNELS], tiled_maps[LARGE * LARGE * MAP_CHANNELS], large[LARGE * LARGE * 3];
+static const float *const only[] = {large};
 
 /* Every step of every tile size on odd sizes: the untiled result to rounding, so there are no seams. */
 TEST(infer_tiles_give_the_untiled_result)
@@ -83,7 +95,8 @@ TEST(infer_tiles_give_the_untiled_result)
             for (size_t k = 0; k < sizeof tiles / sizeof *tiles; k++) {
                 double rmse[TILES_T + 1];
                 ts_status st = {0};
-                lgd_tiles t = {.image = large, .side = side, .tile = tiles[k], .steps = TILES_T, .rmse = rmse};
+                lgd_tiles t = flash_tiles(only, side, tiles[k], TILES_T);
+                t.rmse = rmse;
                 CHECK(lgd_tiles_run(tape, m, &t, tiled_maps, &st) == TS_OK, "%s", st.message);
                 const double far = farthest(tiled_maps, maps[TILES_T], values);
                 CHECK(far < 2e-5, "side %d, tiles of %d: %g away", side, tiles[k], far);
@@ -101,6 +114,32 @@ TEST(infer_tiles_give_the_untiled_result)
     ag_tape_destroy(&tape);
 }
 
+/* The same of several photographs, fewer than the model could read. */
+TEST(infer_tiles_of_several_photographs)
+{
+    enum { GIVEN = 2 };
+    static float images[GIVEN][LARGE * LARGE * 3];
+    ag_tape *tape = frozen_tape();
+    nn_model *m = random_model_of(true, 3);
+    rd_view views[GIVEN];
+    make_image(images[0], LARGE);
+    make_image(images[1], LARGE - 1);
+    for (int k = 0; k < GIVEN; k++) views[k] = rd_capture_view(2 + k);
+    const nn_input in = {.image = ts_view(images[0], (ts_shape){GIVEN, LARGE, LARGE, 3}), .grid = rd_grid_full(LARGE), .views = views, .given = GIVEN};
+    ag_value *out;
+    ag_reset(tape);
+    CHECK(nn_lgd(tape, m, &in, TILES_T, false, &out, NULL, NULL) == TS_OK, "%s", ag_status(tape)->message);
+    const size_t values = LARGE * LARGE * MAP_CHANNELS;
+    memcpy(whole_maps[0], out->t.data, values * sizeof(float));
+    ts_status st = {0};
+    lgd_tiles t = {.image = (const float *const[]){images[0], images[1]}, .views = views, .given = GIVEN, .side = LARGE, .tile = 30, .steps = TILES_T};
+    CHECK(lgd_tiles_run(tape, m, &t, tiled_maps, &st) == TS_OK, "%s", st.message);
+    const double far = farthest(tiled_maps, whole_maps[0], values);
+    CHECK(far < 2e-5, "%g away", far);
+    nn_model_free(&m);
+    ag_tape_destroy(&tape);
+}
+
 /* Where the mask wants them the maps are those without it, and most of the work is not done. */
 TEST(infer_mask_changes_nothing_where_it_is_set)
 {
@@ -115,7 +154,8 @@ TEST(infer_mask_changes_nothing_where_it_is_set)
         for (int x = 50; x < LARGE; x++) mask[y * LARGE + x] = (x + y) % 3 == 0;
     mask[LARGE * LARGE - 1] = 255;
     ts_status st = {0};
-    lgd_tiles t = {.image = large, .mask = mask, .side = LARGE, .tile = 16, .steps = TILES_T};
+    lgd_tiles t = flash_tiles(only, LARGE, 16, TILES_T);
+    t.mask = mask;
     CHECK(lgd_tiles_run(tape, m, &t, tiled_maps, &st) == TS_OK, "%s", st.message);
     for (int i = 0; i < LARGE * LARGE; i++) {
         const size_t at = (size_t)i * MAP_CHANNELS;
@@ -144,7 +184,8 @@ TEST(infer_tolerance_ends_a_tile_at_one_of_its_steps)
     const double change = farthest(maps[1], maps[0], sizeof tiled_maps / sizeof(float));
     for (double tolerance = 1e-6; tolerance < 2 * change; tolerance *= 4) {
         ts_status st = {0};
-        lgd_tiles t = {.image = large, .side = LARGE, .tile = TILE, .steps = TILES_T, .tolerance = tolerance};
+        lgd_tiles t = flash_tiles(only, LARGE, TILE, TILES_T);
+        t.tolerance = tolerance;
         CHECK(lgd_tiles_run(tape, m, &t, tiled_maps, &st) == TS_OK, "%s", st.message);
         CHECK(t.refined <= before, "more work with a larger tolerance");
         before = t.refined;
@@ -179,7 +220,7 @@ TEST(infer_tiles_need_no_memory_for_the_whole)
         for (size_t i = 0; i < pixels * 3; i++) image[i] = 0.5f;
         ag_tape *tape = frozen_tape();
         ts_status st = {0};
-        lgd_tiles t = {.image = image, .side = side, .tile = 64, .steps = 1};
+        lgd_tiles t = flash_tiles((const float *const[]){image}, side, 64, 1);
         CHECK(lgd_tiles_run(tape, m, &t, maps, &st) == TS_OK, "%s", st.message);
         peak[k] = ts_arena_peak(ag_arena(tape));
         ag_tape_destroy(&tape);

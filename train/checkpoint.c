@@ -1,7 +1,7 @@
 /* The run's state on disk: checkpoint.safetensors holds the parameters, Adam's moments and the moving average as whole blocks (padding
  * included, so that they come back bit by bit), and in its metadata the counters and the configuration. */
 #include "nn/weights.h"
-#include "train/ini.h"
+#include "data/ini.h"
 #include "train/parts.h"
 #include <errno.h>
 #include <inttypes.h>
@@ -98,14 +98,14 @@ static ts_code check_config(const tr_trainer *t, const nn_file *file, const char
 {
     const char *text = nn_file_meta(file, "config");
     tr_config then = tr_config_default();
-    tr_ini ini;
+    io_ini ini;
     char where[TR_PATH + 32];
     if (!text) return ts_fail(st, TS_FORMAT, "%s: its configuration is missing", path);
     snprintf(where, sizeof where, "%s (config)", path);
-    ts_code code = tr_ini_parse(where, text, strlen(text), &ini, st);
+    ts_code code = io_ini_parse(where, text, strlen(text), &ini, st);
     for (int i = 0; code == TS_OK && i < ini.count; i++)
         code = tr_config_set(&then, where, ini.entry[i].section, ini.entry[i].key, ini.entry[i].value, st);
-    tr_ini_free(&ini);
+    io_ini_free(&ini);
     return code == TS_OK ? tr_config_same(&then, &t->config, path, st) : code;
 }
 

@@ -1,6 +1,6 @@
 /* Reading, checking and printing a configuration by the table of keys. */
 #include "train/config.h"
-#include "train/ini.h"
+#include "data/ini.h"
 #include <errno.h>
 #include <locale.h>
 #include <math.h>
@@ -212,14 +212,14 @@ ts_code tr_config_set_assignment(tr_config *c, const char *assignment, ts_status
 
 ts_code tr_config_read(tr_config *c, const char *path, ts_status *st)
 {
-    tr_ini ini;
-    ts_code code = tr_ini_read(path, &ini, st);
+    io_ini ini;
+    ts_code code = io_ini_read(path, &ini, st);
     for (int i = 0; code == TS_OK && i < ini.count; i++) {
         char where[600];
         snprintf(where, sizeof where, "%.580s:%d", path, ini.entry[i].line);
         code = tr_config_set(c, where, ini.entry[i].section, ini.entry[i].key, ini.entry[i].value, st);
     }
-    tr_ini_free(&ini);
+    io_ini_free(&ini);
     return code;
 }
 

@@ -1,23 +1,23 @@
 /* INI files: [section], key = value, comments from # or ; (at the start of a line or after a blank), CRLF or LF, an optional
  * UTF-8 byte-order mark. Strict: what is none of these, a key outside a section and a key given twice are errors with FILE:LINE. */
-#ifndef TR_INI_H
-#define TR_INI_H
+#ifndef IO_INI_H
+#define IO_INI_H
 #include "tensor/status.h"
 #include <stddef.h>
 
-typedef struct tr_ini_entry {
+typedef struct io_ini_entry {
     const char *section, *key, *value; /* trimmed; value may be empty */
     int line;                          /* from 1 */
-} tr_ini_entry;
+} io_ini_entry;
 
-typedef struct tr_ini {
+typedef struct io_ini {
     char *name, *text;   /* owned: the file's name for messages, and what the entries point into */
-    tr_ini_entry *entry; /* owned */
+    io_ini_entry *entry; /* owned */
     int count;
-} tr_ini;
+} io_ini;
 
 /* TS_IO when the file cannot be read, TS_INVALID for its content. On failure ini is empty; the caller frees it after success. */
-ts_code tr_ini_read(const char *path, tr_ini *ini, ts_status *st);
-ts_code tr_ini_parse(const char *name, const char *text, size_t size, tr_ini *ini, ts_status *st);
-void tr_ini_free(tr_ini *ini); /* and zeroes the struct */
+ts_code io_ini_read(const char *path, io_ini *ini, ts_status *st);
+ts_code io_ini_parse(const char *name, const char *text, size_t size, io_ini *ini, ts_status *st);
+void io_ini_free(io_ini *ini); /* and zeroes the struct */
 #endif

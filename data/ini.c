@@ -1,5 +1,5 @@
 /* The INI reader. */
-#include "train/ini.h"
+#include "data/ini.h"
 #include <errno.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -36,14 +36,14 @@ static bool is_name(const char *s)
     return true;
 }
 
-static ts_code add(tr_ini *ini, int *capacity, tr_ini_entry e, ts_status *st)
+static ts_code add(io_ini *ini, int *capacity, io_ini_entry e, ts_status *st)
 {
     for (int i = 0; i < ini->count; i++)
         if (!strcmp(ini->entry[i].section, e.section) && !strcmp(ini->entry[i].key, e.key))
             return ts_fail(st, TS_INVALID, "%s:%d: %s.%s is given twice (first in line %d)", ini->name, e.line, e.section, e.key, ini->entry[i].line);
     if (ini->count == *capacity) {
         const int more = *capacity ? 2 * *capacity : 64;
-        tr_ini_entry *grown = realloc(ini->entry, (size_t)more * sizeof *grown);
+        io_ini_entry *grown = realloc(ini->entry, (size_t)more * sizeof *grown);
         if (!grown) return ts_fail(st, TS_NOMEM, "%s: out of memory", ini->name);
         ini->entry = grown;
         *capacity = more;
@@ -52,7 +52,7 @@ static ts_code add(tr_ini *ini, int *capacity, tr_ini_entry e, ts_status *st)
     return TS_OK;
 }
 
-static ts_code parse_line(tr_ini *ini, int *capacity, char *line, int number, const char **section, ts_status *st)
+static ts_code parse_line(io_ini *ini, int *capacity, char *line, int number, const char **section, ts_status *st)
 {
     cut_comment(line);
     char *s = trim(line);
@@ -68,13 +68,13 @@ static ts_code parse_line(tr_ini *ini, int *capacity, char *line, int number, co
     char *equals = strchr(s, '=');
     if (!equals) return ts_fail(st, TS_INVALID, "%s:%d: expected key = value, not \"%.60s\"", ini->name, number, s);
     *equals = 0;
-    tr_ini_entry e = {.section = *section, .key = trim(s), .value = trim(equals + 1), .line = number};
+    io_ini_entry e = {.section = *section, .key = trim(s), .value = trim(equals + 1), .line = number};
     if (!is_name(e.key)) return ts_fail(st, TS_INVALID, "%s:%d: \"%.60s\" is no key name", ini->name, number, e.key);
     if (!e.section) return ts_fail(st, TS_INVALID, "%s:%d: %s stands before the first [section]", ini->name, number, e.key);
     return add(ini, capacity, e, st);
 }
 
-static ts_code parse_text(tr_ini *ini, size_t size, ts_status *st)
+static ts_code parse_text(io_ini *ini, size_t size, ts_status *st)
 {
     char *p = ini->text;
     const char *section = NULL;
@@ -91,23 +91,23 @@ static ts_code parse_text(tr_ini *ini, size_t size, ts_status *st)
     return TS_OK;
 }
 
-ts_code tr_ini_parse(const char *name, const char *text, size_t size, tr_ini *ini, ts_status *st)
+ts_code io_ini_parse(const char *name, const char *text, size_t size, io_ini *ini, ts_status *st)
 {
-    *ini = (tr_ini){.name = strdup(name), .text = malloc(size + 1)};
+    *ini = (io_ini){.name = strdup(name), .text = malloc(size + 1)};
     if (!ini->name || !ini->text) {
-        tr_ini_free(ini);
+        io_ini_free(ini);
         return ts_fail(st, TS_NOMEM, "%s: out of memory", name);
     }
     memcpy(ini->text, text, size);
     ini->text[size] = 0;
     const ts_code code = parse_text(ini, size, st);
-    if (code != TS_OK) tr_ini_free(ini);
+    if (code != TS_OK) io_ini_free(ini);
     return code;
 }
 
-ts_code tr_ini_read(const char *path, tr_ini *ini, ts_status *st)
+ts_code io_ini_read(const char *path, io_ini *ini, ts_status *st)
 {
-    *ini = (tr_ini){0};
+    *ini = (io_ini){0};
     FILE *f = fopen(path, "rb");
     if (!f) return ts_fail(st, TS_IO, "%s: %s", path, strerror(errno));
     char *text = malloc(LARGEST + 1);
@@ -122,15 +122,15 @@ ts_code tr_ini_read(const char *path, tr_ini *ini, ts_status *st)
     else if (size > LARGEST)
         code = ts_fail(st, TS_INVALID, "%s: larger than 1 MB, this is no configuration", path);
     else
-        code = tr_ini_parse(path, text, size, ini, st);
+        code = io_ini_parse(path, text, size, ini, st);
     free(text);
     return code;
 }
 
-void tr_ini_free(tr_ini *ini)
+void io_ini_free(io_ini *ini)
 {
     free(ini->name);
     free(ini->text);
     free(ini->entry);
-    *ini = (tr_ini){0};
+    *ini = (io_ini){0};
 }
