@@ -210,7 +210,7 @@ static bool prepare(run *r, ts_status *st)
     if (cl_make_folder(c->out, st) != TS_OK) return false;
     if (snprintf(path, sizeof path, "%s/images", c->out) >= (int)sizeof path) return ts_fail(st, TS_INVALID, "%s: the name is too long", c->out), false;
     if (c->images && cl_make_folder(path, st) != TS_OK) return false;
-    if (lgd_model_path(c->model, path, st) != TS_OK || !(r->model = nn_model_load(path, st)) || !(r->tape = ag_tape_create(false, st))) return false;
+    if (lgd_model_path(c->model, "single", path, st) != TS_OK || !(r->model = nn_model_load(path, st)) || !(r->tape = ag_tape_create(false, st))) return false;
     ag_freeze(r->tape, true);
     const int steps = c->iterations < 0 ? r->model->arch.iterations : c->iterations;
     if (steps > 0 && r->model->arch.h_width == 0) return ts_fail(st, TS_UNSUPPORTED, "%s: has no refiner: only --iterations 0 is possible", path), false;

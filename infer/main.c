@@ -1,11 +1,11 @@
 /* lgd-infer: maps from flash photographs. */
 #include "cli/cli.h"
 #include "data/material.h"
+#include "infer/capture.h"
 #include "infer/encode.h"
 #include "infer/lgd.h"
 #include "infer/model_path.h"
 #include "infer/options.h"
-#include "infer/output.h"
 #include "infer/output.h"
 #include "infer/pipeline.h"
 #include "tensor/threads.h"
@@ -66,9 +66,15 @@ static void compute(lgd_item *item, void *user)
     const lgd_options options = {.iterations = r->command->iterations, .threads = r->command->threads, .progress = after_step, .user = r,
                                  .mask = item->mask, .tolerance = r->command->tolerance, .tile = before_tile};
     lgd_error error;
+    lgd_photo photo[IO_CAPTURE_IMAGES] = {lgd_flash_photo(item->square.data)};
+    int photos = 1;
+    if (item->capture.images) {
+        photos = lgd_capture_photos(&item->capture, lgd_most_photos(r->model), photo);
+        if (photos < item->capture.images) cl_note("%s: note: the first %d of its %d photographs are used: these weights read no more", item->job->photo, photos, item->capture.images);
+    }
     r->item = item;
     if (io_material_create(&item->m, size, &item->st) != TS_OK) ts_context(&item->st, "%s", item->job->photo);
-    else if (lgd_estimate(r->model, item->square.data, size, &options, item->m.maps, &error) && !cl_interrupted())
+    else if (lgd_estimate_photos(r->model, photo, photos, size, &options, item->m.maps, &error) && !cl_interrupted())
         ts_fail(&item->st, (ts_code)error.code, "%s: %s", item->job->photo, error.message);
     else if (cl_interrupted()) ts_fail(&item->st, TS_INTERRUPTED, "interrupted");
     else lgd_encode(item->m.maps, size, item->m.maps);
@@ -108,6 +114,7 @@ static int all(run *r, lgd_pipeline *pipeline)
 static void print_help(void)
 {
     puts("Usage: lgd-infer [options] PHOTO... -o DIR\n"
+         "       lgd-infer [options] --capture WHERE -o DIR\n"
          "Estimates the material of a flat surface from a photograph taken straight on with a flash beside the lens.\n"
          "The largest centred square is used.\n");
     lgd_argument_help(lgd_infer_arguments, stdout);
@@ -131,7 +138,7 @@ static int work(const lgd_command *c)
     run r = {.command = c, .jobs = plan.jobs};
     int code = CL_FAILED;
     lgd_pipeline *pipeline = NULL;
-    if (lgd_model_path(c->model, weights, &st) != TS_OK) cl_failed("%s", st.message);
+    if (lgd_model_path(c->model, *c->capture ? "multi" : "single", weights, &st) != TS_OK) cl_failed("%s", st.message);
     else if (!(pipeline = lgd_pipeline_start(&plan, c, &st))) cl_failed("%s", st.message); /* decodes while the weights are read */
     else if (!(r.model = lgd_load(weights, &error))) cl_failed("%s", error.message);
     else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK) cl_failed("%s", st.message);

@@ -10,7 +10,7 @@ static ts_code take(const char *from, char path[LGD_PATH_MAX], ts_status *st)
     return TS_OK;
 }
 
-ts_code lgd_model_path(const char *option, char path[LGD_PATH_MAX], ts_status *st)
+ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_MAX], ts_status *st)
 {
     if (option) return take(option, path, st);
     const char *variable = getenv("LGD_MODEL");
@@ -22,12 +22,13 @@ ts_code lgd_model_path(const char *option, char path[LGD_PATH_MAX], ts_status *s
         folder[length] = 0;
         char *slash = strrchr(folder, '/');
         if (slash) *slash = 0;
-        static const char *const beside[] = {"../share/lgd/single.safetensors", "../../models/single.safetensors"};
+        static const char *const beside[] = {"../share/lgd", "../../models"};
         for (int i = 0; i < 2; i++) {
-            snprintf(path, LGD_PATH_MAX, "%s/%s", folder, beside[i]);
+            snprintf(path, LGD_PATH_MAX, "%s/%s/%s.safetensors", folder, beside[i], name);
             if (access(path, F_OK) == 0) return TS_OK;
         }
     }
-    if (access(LGD_DATADIR "/single.safetensors", F_OK) == 0) return take(LGD_DATADIR "/single.safetensors", path, st);
-    return ts_fail(st, TS_IO, "no weights found in ../share/lgd or ../../models beside the program or in %s: name a file with --model or LGD_MODEL", LGD_DATADIR);
+    snprintf(path, LGD_PATH_MAX, "%s/%s.safetensors", LGD_DATADIR, name);
+    if (access(path, F_OK) == 0) return TS_OK;
+    return ts_fail(st, TS_IO, "no %s.safetensors found in ../share/lgd or ../../models beside the program or in %s: name a file with --model or LGD_MODEL", name, LGD_DATADIR);
 }

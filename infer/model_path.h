@@ -5,7 +5,7 @@
 
 enum { LGD_PATH_MAX = 4096 };
 
-/* The first of: option (--model), $LGD_MODEL, ../share/lgd/single.safetensors and ../../models/single.safetensors beside the
+/* The first of: option (--model), $LGD_MODEL, ../share/lgd/NAME.safetensors and ../../models/NAME.safetensors beside the
  * program's own folder, and the installation's data folder. The first two are taken as they are; TS_IO when nothing is found. */
-ts_code lgd_model_path(const char *option, char path[LGD_PATH_MAX], ts_status *st);
+ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_MAX], ts_status *st);
 #endif

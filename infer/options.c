@@ -4,12 +4,14 @@
 #include "infer/output.h"
 #include <string.h>
 
-enum { NORMAL = 256, MAPS, WORKFLOW, MASK, TOLERANCE, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
+enum { NORMAL = 256, CAPTURE, MAPS, WORKFLOW, MASK, TOLERANCE, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
 
 const lgd_argument lgd_infer_arguments[] = {
     {'o', "output", "DIR", "write DIR/STEM/ for each photograph, STEM = its file name without extension (required)"},
     {'s', "size", "N", "pixels of a side of the maps, 1 .. 8192 (default 256)"},
     {'i', "iterations", "N", "refinement steps, 0 .. 1000; 0 = the first estimate alone (default: as trained)"},
+    {CAPTURE, "capture", "WHERE", "in place of PHOTO: several photographs of one sample under known lights, listed in an INI file\n"
+                                  "or a folder in MaterialGAN's layout; by default with the weights named multi"},
     {MASK, "mask", "FILE", "an image of the photographs' shape: only where it is brighter than black are the maps sure to be refined,\n"
                            "as they would be without it; elsewhere they may be the first estimate"},
     {TOLERANCE, "tolerance", "X", "0 .. 1: a tile of 128 pixels is refined no further once a step changes its maps by less than X (RMS,\n"
@@ -31,6 +33,16 @@ static ts_code whole(const char *name, const char *text, int64_t lo, int64_t hi,
 {
     if (cl_parse_int(text, lo, hi, value)) return TS_OK;
     return ts_fail(st, TS_INVALID, "--%s: '%s' is not a whole number in %lld .. %lld", name, text, (long long)lo, (long long)hi);
+}
+
+static ts_code take_capture(const char *value, lgd_command *c, ts_status *st)
+{
+    size_t n = strlen(value);
+    while (n > 1 && value[n - 1] == '/') n--;
+    if (n == 0 || n >= sizeof c->capture) return ts_fail(st, TS_INVALID, "--capture: the name is %s", n ? "too long" : "empty");
+    memcpy(c->capture, value, n);
+    c->capture[n] = 0;
+    return TS_OK;
 }
 
 ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
@@ -61,6 +73,7 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
             c->threads = (int)n;
             break;
         case MASK: c->mask = value; break;
+        case CAPTURE: code = take_capture(value, c, st); break;
         case TOLERANCE:
             if (!cl_parse_real(value, 0, 1, &c->tolerance)) code = ts_fail(st, TS_INVALID, "--tolerance: '%s' is not a number in 0 .. 1", value);
             break;
@@ -90,6 +103,13 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
     }
     c->photo = argv + operands;
     c->photos = argc - operands;
+    if (*c->capture && c->photos > 0) return ts_fail(st, TS_INVALID, "--capture lists its photographs: '%s' is one more", c->photo[0]);
+    if (*c->capture && c->mask) return ts_fail(st, TS_INVALID, "--mask needs the shape of a photograph: not with --capture");
+    if (*c->capture) {
+        c->only[0] = c->capture;
+        c->photo = c->only;
+        c->photos = 1;
+    }
     if (c->photos == 0) return ts_fail(st, TS_INVALID, "no photograph is given");
     if (!c->out) return ts_fail(st, TS_INVALID, "no output folder is given: -o DIR");
     if (!*c->out) return ts_fail(st, TS_INVALID, "-o: the name of the output folder is empty");

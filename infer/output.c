@@ -82,7 +82,7 @@ static ts_code write_png(const char *folder, unsigned which, const io_image *ima
 /* A picture of square panels whose rows are rendered while they are written. photo: the first panel, or NULL. */
 typedef struct strip {
     const io_material *m;
-    const io_image *photo;
+    const lgd_photo *photo;
     rd_view view[LGD_PREVIEW_LIGHTS];
     int panels;
 } strip;
@@ -95,7 +95,7 @@ static ts_code make_rows(int y, int count, float *values, void *user, ts_status 
     float *picture = malloc((size_t)count * panel * sizeof *picture);
     if (!picture) return ts_fail(st, TS_NOMEM, "out of memory");
     for (int k = 0; k < s->panels; k++) {
-        const float *from = k == 0 && s->photo ? s->photo->data + first * 3 : picture;
+        const float *from = k == 0 && s->photo ? s->photo->image + first * 3 : picture;
         if (from == picture)
             rd_render((rd_grid){.h = count, .w = size, .y0 = y, .side = size}, s->m->maps + first * MAP_CHANNELS, MAP_CHANNELS, &s->view[k], true, picture);
         for (int i = 0; i < count; i++) memcpy(values + (size_t)i * row + (size_t)k * panel, from + (size_t)i * panel, panel * sizeof *values);
@@ -112,10 +112,12 @@ static ts_code write_strip(const char *folder, const char *name, strip *s, ts_st
     return code ? code : io_write_png_rows(path, &rows, 8, true, st);
 }
 
-static ts_code write_render(const char *folder, const io_material *m, const io_image *photo, ts_status *st)
+static ts_code write_render(const char *folder, const io_material *m, const lgd_photo *photo, ts_status *st)
 {
     strip s = {.m = m, .photo = photo, .panels = 2};
-    s.view[1] = rd_flash();
+    s.view[1] = (rd_view){.kind = RD_POINT, .power = photo->power};
+    memcpy(s.view[1].light, photo->light, sizeof photo->light);
+    memcpy(s.view[1].camera, photo->camera, sizeof photo->camera);
     return write_strip(folder, "render.png", &s, st);
 }
 
@@ -177,7 +179,7 @@ static unsigned map_bits(unsigned which)
     return maps;
 }
 
-static ts_code write_portion(const char *folder, const io_material *m, const io_image *photo, unsigned which, bool directx, io_metallic_error *lost,
+static ts_code write_portion(const char *folder, const io_material *m, const lgd_photo *photo, unsigned which, bool directx, io_metallic_error *lost,
                              ts_status *st)
 {
     switch (which) {
@@ -194,7 +196,7 @@ static ts_code write_portion(const char *folder, const io_material *m, const io_
 }
 
 /* Of several failures the first portion's is told. */
-static ts_code write_all(const char *folder, const io_material *m, const io_image *photo, unsigned which, bool directx, int threads,
+static ts_code write_all(const char *folder, const io_material *m, const lgd_photo *photo, unsigned which, bool directx, int threads,
                          io_metallic_error *lost, ts_status *st)
 {
     ts_status failure[PORTIONS] = {{0}};
@@ -218,7 +220,7 @@ static ts_code move_files(const char *hidden, const char *folder, ts_status *st)
     return TS_OK;
 }
 
-ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const io_image *photo, unsigned which, bool directx,
+ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const lgd_photo *photo, unsigned which, bool directx,
                          int threads, io_metallic_error *lost, ts_status *st)
 {
     char folder[PATH_LENGTH], hidden[PATH_LENGTH];

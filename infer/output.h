@@ -2,6 +2,7 @@
 #ifndef LGD_OUTPUT_H
 #define LGD_OUTPUT_H
 #include "data/metallic.h"
+#include "infer/lgd.h"
 #include <stdbool.h>
 
 /* What can be written for a photograph, a bit each in the order of lgd_output_names. */
@@ -31,8 +32,8 @@ ts_code lgd_output_parse(const char *list, unsigned *which, ts_status *st);
 ts_code lgd_output_check(const char *folder, ts_status *st);
 
 /* Writes which (bits) and, beside maps, meta.txt (what they mean) to parent/stem; nothing else is computed. They are written to a hidden
- * folder first and renamed when all are complete: a failure leaves what was there before, and nothing else. photo: linear, of the
+ * folder first and renamed when all are complete: a failure leaves what was there before, and nothing else. photo: of the
  * material's size. lost: what base colour and metalness cannot express, where they are written; may be NULL. Files are made on as many threads as given. */
-ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const io_image *photo, unsigned which, bool directx,
+ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const lgd_photo *photo, unsigned which, bool directx,
                          int threads, io_metallic_error *lost, ts_status *st);
 #endif

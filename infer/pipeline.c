@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* One item each in decoding, computing and writing. Where maps are large there is one in all: the memory counts more than the time. */
 enum { ITEMS = 3, LARGE = 1024 };
@@ -38,8 +39,20 @@ static ts_code read_mask(const lgd_command *c, const io_image *photo, unsigned c
     return code;
 }
 
+static void decode_capture(const lgd_command *c, lgd_item *item)
+{
+    if (lgd_read_capture(c->capture, c->size, c->max_pixels, &item->capture, &item->st) != TS_OK) return;
+    item->photo_side = c->size;
+    if (io_image_create(&item->square, c->size, c->size, 3, &item->st) != TS_OK) ts_context(&item->st, "%s", c->capture);
+    else memcpy(item->square.data, item->capture.image, (size_t)c->size * (size_t)c->size * 3 * sizeof(float));
+}
+
 static void decode(const lgd_command *c, lgd_item *item)
 {
+    if (*c->capture) {
+        decode_capture(c, item);
+        return;
+    }
     io_image photo = {0};
     ts_code code = io_read_photo(item->job->photo, c->max_pixels, &photo, &item->st);
     if (!code) {
@@ -73,7 +86,9 @@ static void *write_all(void *user)
         lgd_item *item = next;
         /* The last one has all threads to itself: nothing is computed any more. */
         const int threads = item->index + 1 < p->plan->jobs && c->size <= LARGE ? 1 : ts_threads();
-        if (!item->st.code && lgd_output_write(c->out, item->job->stem, &item->m, &item->square, c->outputs, c->directx, threads, &item->lost, &item->st))
+        lgd_photo first = lgd_flash_photo(item->square.data);
+        if (item->capture.images) lgd_capture_photos(&item->capture, 1, &first);
+        if (!item->st.code && lgd_output_write(c->out, item->job->stem, &item->m, &first, c->outputs, c->directx, threads, &item->lost, &item->st))
             ts_context(&item->st, "%s", item->job->photo);
         item->decoded = false;
         lgd_queue_push(&p->inbox, item);
@@ -99,6 +114,7 @@ lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *comman
 static void release(lgd_pipeline *p, lgd_item *item)
 {
     io_image_free(&item->square);
+    io_capture_free(&item->capture);
     io_material_free(&item->m);
     free(item->mask);
     item->mask = NULL;
@@ -140,6 +156,7 @@ void lgd_pipeline_end(lgd_pipeline **pp)
     if (p->writing) pthread_join(p->writer, NULL);
     for (int i = 0; i < ITEMS; i++) {
         io_image_free(&p->item[i].square);
+        io_capture_free(&p->item[i].capture);
         io_material_free(&p->item[i].m);
         free(p->item[i].mask);
     }

@@ -3,6 +3,7 @@
 #define LGD_PIPELINE_H
 #include "data/material.h"
 #include "data/metallic.h"
+#include "infer/capture.h"
 #include "infer/options.h"
 #include "infer/plan.h"
 
@@ -11,7 +12,8 @@ typedef struct lgd_item {
     const lgd_job *job;
     int index;          /* into the plan */
     ts_status st;       /* the first failure on the way; later stages leave the item alone */
-    io_image square;    /* linear, command->size a side */
+    io_image square;    /* linear, command->size a side; of a capture the first picture */
+    io_capture capture; /* images 0: there is none */
     unsigned char *mask; /* [size][size] from command->mask, or NULL */
     int photo_side;     /* the shorter side of the photograph in pixels */
     io_material m;

@@ -115,7 +115,8 @@ TEST(infer_output_is_complete_and_replaces)
     char path[300];
     make_material(&m, &photo, SIZE);
     for (int round = 0; round < 2; round++) {
-        CHECK(lgd_output_write(test_folder(), "x", &m, &photo, (1u << LGD_OUTPUTS) - 1, false, 2, NULL, &st) == TS_OK, "round %d: %s", round, st.message);
+    const lgd_photo flash = lgd_flash_photo(photo.data);
+        CHECK(lgd_output_write(test_folder(), "x", &m, &flash, (1u << LGD_OUTPUTS) - 1, false, 2, NULL, &st) == TS_OK, "round %d: %s", round, st.message);
         snprintf(path, sizeof path, "%s/x", test_folder());
         CHECK(count_entries(path) == LGD_FILES && count_entries(test_folder()) == 1, "round %d: %d files", round, count_entries(path));
         m.maps[MAP_ROUGHNESS] = -0.25f; /* in the second round */
@@ -144,7 +145,8 @@ TEST(infer_output_failure_leaves_nothing)
     make_material(&m, &photo, 4);
     snprintf(path, sizeof path, "%s/x", test_folder());
     put_file(path);
-    CHECK(lgd_output_write(test_folder(), "x", &m, &photo, (1u << LGD_OUTPUTS) - 1, false, 2, NULL, &st) == TS_IO && strstr(st.message, "/x"), "a file in the way: %s", st.message);
+    const lgd_photo flash = lgd_flash_photo(photo.data);
+    CHECK(lgd_output_write(test_folder(), "x", &m, &flash, (1u << LGD_OUTPUTS) - 1, false, 2, NULL, &st) == TS_IO && strstr(st.message, "/x"), "a file in the way: %s", st.message);
     CHECK(count_entries(test_folder()) == 1, "something is left");
     st = (ts_status){0};
     CHECK(lgd_output_check(path, &st) == TS_IO && strstr(st.message, path), "a file is taken as a folder: %s", st.message);
@@ -189,6 +191,6 @@ TEST(infer_model_path_order)
     char path[LGD_PATH_MAX];
     ts_status st = {0};
     CHECK(setenv("LGD_MODEL", "/from/variable", 1) == 0, "setenv");
-    CHECK(lgd_model_path("given", path, &st) == TS_OK && strcmp(path, "given") == 0, "%s", path);
-    CHECK(lgd_model_path(NULL, path, &st) == TS_OK && strcmp(path, "/from/variable") == 0, "%s", path);
+    CHECK(lgd_model_path("given", "single", path, &st) == TS_OK && strcmp(path, "given") == 0, "%s", path);
+    CHECK(lgd_model_path(NULL, "single", path, &st) == TS_OK && strcmp(path, "/from/variable") == 0, "%s", path);
 }
