@@ -1,4 +1,4 @@
-# lgd: make deps | make | make demo | make test | make bench | make stress | make install PREFIX= DESTDIR= | make asan
+# lgd: make deps | make | make demo | make test | make bench | make stress | make fuzz | make install PREFIX= DESTDIR= | make asan
 CC ?= cc
 ifeq ($(origin CC),default)
 CC := gcc
@@ -48,7 +48,8 @@ LIB := $(BUILD)/liblgd.a
 IMAGE_LIB := $(BUILD)/lib/lgd/liblgd_image.so
 BIN := $(PROGRAMS:%=$(BUILD)/bin/lgd-%)
 STRESS_C := $(filter-out %main.c,$(wildcard tests/stress/*.c))
-TEST_C := $(wildcard tests/*.c) $(STRESS_C)
+FUZZ_C := $(filter-out %main.c,$(wildcard tests/fuzz/*.c))
+TEST_C := $(wildcard tests/*.c) $(STRESS_C) $(FUZZ_C)
 BENCH_C := $(wildcard bench/*.c)
 TEST_BIN := $(BUILD)/bin/lgd-test
 BENCH_BIN := $(BUILD)/bin/lgd-bench
@@ -137,6 +138,35 @@ bench: all $(BENCH_BIN)
 stress: $(STRESS_BIN)
 	@$(STRESS_BIN)
 
+# clang's libFuzzer with the address and undefined sanitizers, FUZZ_SECONDS for each target. The readers are compiled for it; what else they need comes
+# from the library as it is. New inputs go to $(BUILD)/fuzz/NAME, one that breaks something to $(BUILD)/fuzz/NAME.crash-….
+FUZZ ?= safetensors torch photo image config folder
+FUZZ_SECONDS ?= 600
+FUZZ_CC ?= clang
+# OpenImageIO's PNG reader leaks where libpng jumps out of it, and its libraries take seconds to load.
+FUZZ_OPTIONS_image := -detect_leaks=0 -timeout=60
+FUZZED := $(filter-out nn/weights.c,$(wildcard $(addprefix nn/,file.c entry.c json.c safetensors_read.c zip.c pickle.c torch_objects.c torch_read.c) \
+  $(addprefix data/,png_file.c png_read.c jpeg_read.c exif.c colour.c image.c image_read.c image_library.c capture.c file.c name.c map_folder.c map_names.c material.c) \
+  train/ini.c train/config.c train/config_text.c train/keys.c eval/set_ini.c)) $(FUZZ_C)
+FUZZ_FLAGS := -O1 -g -fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=all
+FUZZ_OBJ := $(FUZZED:%.c=$(BUILD)/fuzz/obj/%.o)
+
+$(BUILD)/fuzz/obj/%.o: %.c $(BUILD)/gen/flags | $(BUILD)/gen/ops.h
+	@mkdir -p $(@D)
+	$(FUZZ_CC) $(CPPFLAGS_ALL) $(PKG_CFLAGS) -std=c11 $(WARN) $(FUZZ_FLAGS) -MMD -MP -c -o $@ $<
+
+$(BUILD)/fuzz/bin/%: tests/fuzz/main.c $(FUZZ_OBJ) $(LIB)
+	@mkdir -p $(@D)
+	$(FUZZ_CC) $(CPPFLAGS_ALL) -std=c11 $(WARN) $(FUZZ_FLAGS) -fsanitize=fuzzer -DFUZZ_TARGET=fuzz_$* -o $@ $(filter %.c %.o %.a,$^) -rdynamic $(PKG_LIBS) -lgomp -lpthread -ldl -lm
+
+fuzz: $(FUZZ:%=$(BUILD)/fuzz/bin/%) $(IMAGE_LIB)
+	@mkdir -p $(BUILD)/fuzz/lib/lgd && cp $(IMAGE_LIB) $(BUILD)/fuzz/lib/lgd
+	@for t in $(FUZZ); do mkdir -p $(BUILD)/fuzz/$$t && echo "fuzz: $$t, $(FUZZ_SECONDS) s" && \
+	  if [ $$t = image ]; then more='$(FUZZ_OPTIONS_image)'; else more=-timeout=10; fi && \
+	  $(BUILD)/fuzz/bin/$$t -max_total_time=$(FUZZ_SECONDS) $$more -rss_limit_mb=2048 -max_len=16384 -print_final_stats=1 \
+	  -artifact_prefix=$(BUILD)/fuzz/$$t. $(BUILD)/fuzz/$$t tests/corpus/$$t >$(BUILD)/fuzz/$$t.log 2>&1 || { tail -n 40 $(BUILD)/fuzz/$$t.log; exit 1; }; \
+	  sed -n 's/^stat::number_of_executed_units: */fuzz: clean, inputs: /p' $(BUILD)/fuzz/$$t.log; done
+
 # The sanitizers' build lives beside the ordinary one.
 asan:
 	@$(MAKE) --no-print-directory BUILD=$(BUILD)/asan OPT='-O1 -g -fno-omit-frame-pointer' SANITIZE='-fsanitize=address,undefined -fno-sanitize-recover=all' test
@@ -164,6 +194,6 @@ uninstall:
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all deps test bench stress asan demo install uninstall clean
+.PHONY: all deps test bench stress fuzz asan demo install uninstall clean
 .SECONDARY:
--include $(shell find $(OBJ) -name '*.d' 2>/dev/null)
+-include $(shell find $(OBJ) $(BUILD)/fuzz/obj -name '*.d' 2>/dev/null)

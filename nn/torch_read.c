@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_DEPTH = 32, MOST_VISITS = 1 << 22, MOST_NAMES = 16 << 20, MOST_NAME = 1024, MOST_EXPANDED = 1 << 24 };
+enum { MOST_DEPTH = 32, MOST_NAMES = 16 << 20, MOST_NAME = 1024, MOST_EXPANDED = 1 << 24 };
 
 /* A storage of an old file. */
 typedef struct old_storage {
@@ -25,7 +25,7 @@ typedef struct reader {
     old_storage *old; /* by key */
     int olds;
     char name[MOST_NAME]; /* of what is being visited */
-    int visits;
+    size_t visits, most_visits; /* of items: in a tree there are fewer than bytes in its pickle */
     size_t names;
 } reader;
 
@@ -129,7 +129,7 @@ static ts_code visit(reader *r, const pk_value *v, int depth)
     const uint32_t each = v->kind == PK_DICT ? 2 : 1;
     for (uint32_t i = 0; i < v->length; i += each) {
         const pk_value place = {.kind = PK_INT, .number = i}, *key = each == 2 ? v->item[i] : &place;
-        if (++r->visits > MOST_VISITS) return ts_fail(r->st, TS_FORMAT, "%s: dictionaries with more than 4 million items", r->f->path);
+        if (++r->visits > r->most_visits) return ts_fail(r->st, TS_FORMAT, "%s: dictionaries within dictionaries that are all the same ones", r->f->path);
         if (key->kind != PK_TEXT && key->kind != PK_INT && key->kind != PK_BOOL)
             return ts_fail(r->st, TS_FORMAT, "%s: a key that is neither text nor a whole number", r->f->path);
         if (!(at == 0 && is_wrapper(key) && v->item[i + each - 1]->kind == PK_DICT) && !name_key(r, key))
@@ -207,6 +207,7 @@ static ts_code read_zip(reader *r)
     if (!data) return r->st ? r->st->code : TS_FORMAT;
     pickle p = {.data = data, .size = main_entry->size, .path = f->path, .part = "data.pkl", .hooks = &torch_hooks, .arena = f->arena, .st = r->st};
     const pk_value *root = pk_read(&p);
+    r->most_visits = 2 * p.size + 1000;
     return root ? take_tensors(r, root) : r->st ? r->st->code : TS_FORMAT;
 }
 
@@ -234,7 +235,7 @@ static bool collect(reader *r, sizes *s, const pk_value *v, int depth)
     }
     if (depth == MOST_DEPTH || (v->kind != PK_DICT && v->kind != PK_LIST && v->kind != PK_TUPLE)) return true;
     for (uint32_t i = 0; i < v->length; i++)
-        if (++r->visits > MOST_VISITS || !collect(r, s, v->item[i], depth + 1)) return false;
+        if (++r->visits > r->most_visits || !collect(r, s, v->item[i], depth + 1)) return false;
     return true;
 }
 
@@ -281,6 +282,7 @@ static ts_code read_old(reader *r)
         p.part = part[i];
         if (!(v[i] = pk_read(&p))) return r->st ? r->st->code : TS_FORMAT;
     }
+    r->most_visits = 2 * p.at + 1000;
     if (v[1]->kind != PK_INT || v[1]->number != 1001) return ts_fail(r->st, TS_UNSUPPORTED, "%s: the protocol version is not 1001", f->path);
     if (v[4]->kind != PK_LIST) return ts_fail(r->st, TS_FORMAT, "%s: the storage keys are no list", f->path);
     sizes s = {0};

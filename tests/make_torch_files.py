@@ -173,7 +173,7 @@ zipped('deep.pth', b'}' + text('a') + b'](' * 40 + b'e' * 40 + b's', 'nested')
 zipped('cycle.pth', b'}q\0' + text('a') + b'h\0s', 'nested')
 laughs = b']q\0'
 for i in range(12): laughs += b'](h' + bytes([i]) + (b'h' + bytes([i])) * 15 + b'eq' + bytes([i + 1])
-zipped('laughs.pth', b'](' + laughs + b'e', 'million items')
+zipped('laughs.pth', b'](' + laughs + b'e', 'all the same ones')
 zipped('persistent_text.pth', text('0') + b'Q', 'persistent object')
 zipped('persistent_module.pth', w(tensor(storage('0', tag='module'), (1,))), 'persistent object')
 zipped('no_storage.pth', w(tensor(text('0'), (1,))), 'without storage')
