@@ -96,6 +96,13 @@ static void base64(FILE *f, const unsigned char *bytes, size_t size)
     }
 }
 
+static bool measured(const ev_report *r, int metric)
+{
+    for (int i = 0; i < r->results; i++)
+        if (!isnan(r->result[i].row[r->steps].value[metric])) return true;
+    return false;
+}
+
 static void material(const ev_report *r, const ev_result *m, FILE *f)
 {
     const ev_row *first = &m->row[0], *last = &m->row[r->steps];
@@ -134,12 +141,13 @@ void ev_html_write(const ev_report *r, FILE *f)
     fputs(head, f);
     fprintf(f, "</head><body>\n<h1>lgd-eval</h1>\n<p>%d &#215; %d pixels, %d thread%s, %s; model ", r->size, r->size, r->threads, r->threads == 1 ? "" : "s", r->isa);
     ev_put_text(f, r->model);
-    fputs(". Mean and standard deviation over the materials; seconds: median. diffuse to render: RMSE; angle: degrees; ssim, flip, exposure: themselves.</p>\n", f);
+    fputs(". Mean and standard deviation over the materials; seconds: median. diffuse to render: RMSE; angle: degrees; ssim, flip, exposure, lpips: themselves.</p>\n", f);
     for (int s = 0; s < r->sets; s++) table(r, s, f);
     if (r->sets > 1) table(r, -1, f);
     plot(r, f);
     fputs("<h2>Materials</h2>\n<p>Sort by:", f);
-    for (int k = 0; k < EV_METRICS; k++) fprintf(f, " <button data-key=\"%s\">%s</button>", ev_metric_name[k], ev_metric_name[k]);
+    for (int k = 0; k < EV_METRICS; k++)
+        if (measured(r, k)) fprintf(f, " <button data-key=\"%s\">%s</button>", ev_metric_name[k], ev_metric_name[k]);
     fprintf(f,
         "</p>\n<p>Rows: the truth; R<sub>%d</sub>; four times their difference. Columns: input and its re-rendering, diffuse, specular, roughness, normal, renderings"
         " under other lights and cameras (of a capture: its photographs and their re-renderings).</p>\n<div id=\"materials\">\n",

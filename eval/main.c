@@ -15,7 +15,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SETS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, FAST, NORMAL, WORKFLOW, COLOUR, PATH_LENGTH = 4096, PICTURES = 128 /* in the report: some 40 MB */ };
+enum { SETS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, FAST, NORMAL, WORKFLOW, COLOUR, LPIPS, PATH_LENGTH = 4096, PICTURES = 128 /* in the report: some 40 MB */ };
 
 static const lgd_argument arguments[] = {
     {'o', "output", "DIR", "write results.csv, summary.csv, results.json and report.html there (required)"},
@@ -30,6 +30,7 @@ static const lgd_argument arguments[] = {
     {SEED, "seed", "N", "draws the renderings' lights and cameras, and the noise (default 1)"},
     {NOISE, "noise", "X", "sensor noise of the input picture, 0 = none .. 1 = a phone at night (default 0)"},
     {IMAGES, "images", NULL, "also write DIR/images/SET-MATERIAL.png: truth, R_0 and the last R_t in three rows"},
+    {LPIPS, "lpips-weights", "TRUNK LINEAR", "measure LPIPS 0.1 too: torchvision's AlexNet and the lpips package's linear heads, two files (.pth or safetensors)"},
     {FAST, "fast", NULL, "no SSIM and FLIP, which take most of the time"},
     {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {'q', "quiet", NULL, "no progress"},
@@ -38,7 +39,7 @@ static const lgd_argument arguments[] = {
     {0, NULL, NULL, NULL}};
 
 typedef struct command {
-    const char *out, *model, *spec[SETS_MAX];
+    const char *out, *model, *lpips[2], *spec[SETS_MAX];
     int sets, iterations, threads, size;
     int64_t seed;
     double noise;
@@ -68,6 +69,10 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
         case 'V': c->version = true; break;
         case IMAGES: c->images = true; break;
         case FAST: c->fast = true; break;
+        case LPIPS:
+            c->lpips[0] = value;
+            if (!(c->lpips[1] = lgd_argument_second(argc, argv))) code = ts_fail(st, TS_INVALID, "--lpips-weights needs two files: TRUNK LINEAR");
+            break;
         case SEED: code = whole("seed", value, 0, INT64_MAX, &c->seed, st); break;
         case 'd':
             if (c->sets == SETS_MAX) code = ts_fail(st, TS_INVALID, "--set: more than %d sets", SETS_MAX);
@@ -112,8 +117,8 @@ static void print_help(void)
     puts("Usage: lgd-eval [options] --set KIND:WHERE... -o DIR\n"
          "Renders each known material under a flash (of a capture: takes its first picture), estimates its maps from that, and prints the RMSE of the maps (diffuse and\n"
          "specular in gamma space, roughness and normal as they are) and of renderings under other lights and cameras, the mean angle\n"
-         "between the normals in degrees, and SSIM and FLIP of the renderings, for R_0 and after every refinement step (SSIM and FLIP:\n"
-         "for R_0 and the last). The same seed gives the same numbers, for any number of threads.\n");
+         "between the normals in degrees, and SSIM and FLIP (and LPIPS) of the renderings, for R_0 and after every refinement step (these\n"
+         "three: for R_0 and the last). The same seed gives the same numbers, for any number of threads.\n");
     lgd_argument_help(arguments, stdout);
     puts("\nExit status: 0 done, 1 a material failed (the others are in the results) or nothing could be written, 2 wrong usage.");
 }
@@ -124,6 +129,7 @@ typedef struct run {
     ev_set set[SETS_MAX];
     const char *set_name[SETS_MAX];
     nn_model *model;
+    ev_lpips *lpips;
     ag_tape *tape;
     char model_name[PATH_LENGTH];
     ev_report report;
@@ -157,6 +163,7 @@ static ts_code one(run *r, int set, int i, ts_status *st)
         ev_photograph(&r->truth, (float)c->noise, (uint64_t)c->seed, identity, r->image);
         k = ev_case_of_maps(&r->truth, r->image, views, !c->fast);
     }
+    k.lpips = r->lpips;
     ts_code code = ev_measure(r->tape, r->model, &k, r->report.steps, r->row, r->seconds, r->first, r->last, st);
     if (!code && c->images) {
         char path[PATH_LENGTH];
@@ -212,6 +219,8 @@ static bool prepare(run *r, ts_status *st)
     if (c->images && cl_make_folder(path, st) != TS_OK) return false;
     if (lgd_model_path(c->model, "single", path, st) != TS_OK || !(r->model = nn_model_load(path, st)) || !(r->tape = ag_tape_create(false, st))) return false;
     ag_freeze(r->tape, true);
+    if (c->lpips[0] && c->size < EV_LPIPS_SIDE) return ts_fail(st, TS_UNSUPPORTED, "LPIPS needs pictures of at least %d x %d pixels: --size", EV_LPIPS_SIDE, EV_LPIPS_SIDE), false;
+    if (c->lpips[0] && !(r->lpips = ev_lpips_load(c->lpips[0], c->lpips[1], st))) return false;
     const int steps = c->iterations < 0 ? r->model->arch.iterations : c->iterations;
     if (steps > 0 && r->model->arch.h_width == 0) return ts_fail(st, TS_UNSUPPORTED, "%s: has no refiner: only --iterations 0 is possible", path), false;
     r->report = (ev_report){.steps = steps, .sets = c->sets, .set_name = r->set_name, .size = c->size, .threads = ts_threads(), .isa = ts_isa_name(ts_isa_now())};
@@ -253,6 +262,7 @@ static int work(const command *c)
     free(r->last);
     ag_tape_destroy(&r->tape);
     nn_model_free(&r->model);
+    ev_lpips_free(&r->lpips);
     free(r);
     return code;
 }

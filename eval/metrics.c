@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-const char *const ev_metric_name[EV_METRICS] = {"diffuse", "specular", "roughness", "normal", "render", "angle", "ssim", "flip", "exposure"};
+const char *const ev_metric_name[EV_METRICS] = {"diffuse", "specular", "roughness", "normal", "render", "angle", "ssim", "flip", "exposure", "lpips"};
 
 void ev_photograph(const io_material *truth, float noise, uint64_t seed, uint64_t identity, float *image)
 {
@@ -21,22 +21,24 @@ void ev_photograph(const io_material *truth, float noise, uint64_t seed, uint64_
     if (noise > 0) io_camera_apply(&camera, seed, identity, truth->size, image);
 }
 
-/* SSIM as RMSE in gamma space; FLIP takes linear values. */
+/* SSIM and LPIPS as RMSE in gamma space; FLIP takes linear values. */
 static void perceive(const ev_case *c, const float *maps, int channels, ev_row *row)
 {
     const int size = c->truth->size;
     const size_t values = (size_t)size * (size_t)size * 3;
     float *mine = malloc(2 * values * sizeof *mine), *truth = mine ? mine + values : NULL;
-    double ssim = mine ? 0 : NAN, flip = ssim;
+    double ssim = mine && c->perceptual ? 0 : NAN, flip = ssim, lpips = mine && c->lpips ? 0 : NAN;
     for (int v = 0; v < RD_EVAL_VIEWS && mine; v++) {
         rd_render(rd_grid_full(size), maps, channels, &c->views[v], true, mine);
         rd_render(rd_grid_full(size), c->truth->maps, MAP_CHANNELS, &c->views[v], true, truth);
-        flip += ev_flip(size, size, mine, truth, NULL) / RD_EVAL_VIEWS;
+        if (c->perceptual) flip += ev_flip(size, size, mine, truth, NULL) / RD_EVAL_VIEWS;
         for (size_t i = 0; i < 2 * values; i++) mine[i] = rd_gamma(mine[i]);
-        ssim += ev_ssim(size, size, mine, truth) / RD_EVAL_VIEWS;
+        if (c->perceptual) ssim += ev_ssim(size, size, mine, truth) / RD_EVAL_VIEWS;
+        if (c->lpips) lpips += ev_lpips_distance(c->lpips, size, size, mine, truth, NULL) / RD_EVAL_VIEWS;
     }
     row->value[EV_SSIM] = ssim;
     row->value[EV_FLIP] = flip;
+    row->value[EV_LPIPS] = lpips;
     free(mine);
 }
 
@@ -52,12 +54,12 @@ ev_case ev_case_of_capture(const io_capture *capture, const float *image, bool p
 
 ev_row ev_score(const ev_case *c, const float *maps, int channels)
 {
-    if (c->capture) return ev_capture_score(c->capture, maps, channels, c->perceptual);
+    if (c->capture) return ev_capture_score(c->capture, maps, channels, c->perceptual, c->lpips);
     const io_material *truth = c->truth;
     const rd_map_error e = rd_map_rmse((int64_t)truth->size * truth->size, maps, channels, truth->maps, MAP_CHANNELS);
-    ev_row row = {{[EV_DIFFUSE] = e.diffuse, [EV_SPECULAR] = e.specular, [EV_ROUGHNESS] = e.roughness, [EV_NORMAL] = e.normal, [EV_ANGLE] = e.angle, [EV_SSIM] = NAN, [EV_FLIP] = NAN, [EV_EXPOSURE] = NAN,
+    ev_row row = {{[EV_DIFFUSE] = e.diffuse, [EV_SPECULAR] = e.specular, [EV_ROUGHNESS] = e.roughness, [EV_NORMAL] = e.normal, [EV_ANGLE] = e.angle, [EV_SSIM] = NAN, [EV_FLIP] = NAN, [EV_EXPOSURE] = NAN, [EV_LPIPS] = NAN,
         [EV_RENDER] = rd_render_rmse(rd_grid_full(truth->size), maps, channels, truth->maps, MAP_CHANNELS, c->views, RD_EVAL_VIEWS)}};
-    if (c->perceptual) perceive(c, maps, channels, &row);
+    if (c->perceptual || c->lpips) perceive(c, maps, channels, &row);
     return row;
 }
 
@@ -79,6 +81,7 @@ static bool after_step(int step, const ag_value *maps, void *user)
     const int64_t pixels = (int64_t)size * size;
     ev_case c = *w->c;
     c.perceptual = c.perceptual && (step == 0 || step == w->steps);
+    if (step != 0 && step != w->steps) c.lpips = NULL;
     w->row[step] = ev_score(&c, maps->t.data, channels);
     w->finite = isfinite(w->row[step].value[EV_RENDER]);
     for (int64_t i = 0; i < pixels * channels; i++) w->finite = w->finite && isfinite(maps->t.data[i]); /* a clamp may hide it from the scores */

@@ -3,13 +3,14 @@
 #define EV_METRICS_H
 #include "data/capture.h"
 #include "data/material.h"
+#include "eval/lpips.h"
 #include "nn/model.h"
 
-enum { EV_DIFFUSE, EV_SPECULAR, EV_ROUGHNESS, EV_NORMAL, EV_RENDER, EV_ANGLE, EV_SSIM, EV_FLIP, EV_EXPOSURE, EV_METRICS };
+enum { EV_DIFFUSE, EV_SPECULAR, EV_ROUGHNESS, EV_NORMAL, EV_RENDER, EV_ANGLE, EV_SSIM, EV_FLIP, EV_EXPOSURE, EV_LPIPS, EV_METRICS };
 extern const char *const ev_metric_name[EV_METRICS];
 
 typedef struct ev_row {
-    double value[EV_METRICS]; /* RMSE; EV_ANGLE: degrees; EV_SSIM, EV_FLIP: the mean over the renderings;
+    double value[EV_METRICS]; /* RMSE; EV_ANGLE: degrees; EV_SSIM, EV_FLIP, EV_LPIPS: the mean over the renderings;
                                 * EV_EXPOSURE: of captures. NaN: not measured */
 } ev_row;
 
@@ -22,6 +23,7 @@ typedef struct ev_case {
     const rd_view *views; /* RD_EVAL_VIEWS of them; not of a capture */
     const io_capture *capture; /* where it is not NULL, truth is: eval/multiview.h compares */
     bool perceptual;      /* SSIM and FLIP too, which take many times as long as the rest */
+    ev_lpips *lpips;      /* LPIPS too, where it is not NULL */
 } ev_case;
 
 ev_case ev_case_of_maps(const io_material *truth, const float *image, const rd_view *views, bool perceptual);
@@ -31,7 +33,7 @@ ev_case ev_case_of_capture(const io_capture *capture, const float *image, bool p
  * (seed, identity). image: size x size x 3. */
 void ev_photograph(const io_material *truth, float noise, uint64_t seed, uint64_t identity, float *image);
 
-/* Runs the loop: row[t] is what R_t scores, t = 0 .. steps (SSIM and FLIP of the first and the last alone). seconds[t] (may be NULL) is the time
+/* Runs the loop: row[t] is what R_t scores, t = 0 .. steps (SSIM, FLIP and LPIPS of the first and the last alone). seconds[t] (may be NULL) is the time
  * from the photograph to R_t, without that of the scores. first and last (may be NULL) get the maps of R_0 and of R_steps,
  * [size, size, 9]. The tape is one without gradients and is reset. */
 ts_code ev_measure(ag_tape *tape, const nn_model *model, const ev_case *c, int steps, ev_row *row, double *seconds, float *first, float *last, ts_status *st);

@@ -87,7 +87,7 @@ static double fit(size_t values, const float *photo, const float *scene)
     return exp2((lo + hi) / 2);
 }
 
-ev_row ev_capture_score(const io_capture *c, const float *maps, int channels, bool perceptual)
+ev_row ev_capture_score(const io_capture *c, const float *maps, int channels, bool perceptual, ev_lpips *lpips)
 {
     ev_row row;
     for (int k = 0; k < EV_METRICS; k++) row.value[k] = NAN;
@@ -100,21 +100,23 @@ ev_row ev_capture_score(const io_capture *c, const float *maps, int channels, bo
     for (size_t i = 0; i < values; i++) photo[i] = rd_gamma(c->image[i]);
     render(c, 0, maps, channels, scene);
     const double exposure = fit(values, photo, scene);
-    double rmse = 0, ssim = 0, flip = 0;
+    double rmse = 0, ssim = 0, flip = 0, distance = 0;
     for (int p = 1; p < c->images; p++) {
         const float *linear = c->image + (size_t)p * values;
         for (size_t i = 0; i < values; i++) photo[i] = rd_gamma(linear[i]);
         render(c, p, maps, channels, scene);
         rmse += difference(values, photo, scene, exposure);
-        if (!perceptual) continue;
+        if (!perceptual && !lpips) continue;
         expose(values, exposure, scene, shown);
-        flip += ev_flip(c->size, c->size, shown, linear, NULL);
+        if (perceptual) flip += ev_flip(c->size, c->size, shown, linear, NULL);
         for (size_t i = 0; i < values; i++) shown[i] = rd_gamma(shown[i]);
-        ssim += ev_ssim(c->size, c->size, shown, photo);
+        if (perceptual) ssim += ev_ssim(c->size, c->size, shown, photo);
+        if (lpips) distance += ev_lpips_distance(lpips, c->size, c->size, shown, photo, NULL);
     }
     row.value[EV_EXPOSURE] = exposure;
     row.value[EV_RENDER] = rmse / (c->images - 1);
     if (perceptual) row.value[EV_SSIM] = ssim / (c->images - 1), row.value[EV_FLIP] = flip / (c->images - 1);
+    if (lpips) row.value[EV_LPIPS] = distance / (c->images - 1);
     free(memory);
     return row;
 }

@@ -12,10 +12,10 @@ rd_view ev_capture_view(const io_capture *c, int picture);
 void ev_capture_input(const io_capture *c, float *image);
 
 /* Re-renderings of maps [size, size, channels] under each picture's own light and camera, in the capture's own brightness. EV_RENDER (and EV_SSIM and
- * EV_FLIP if perceptual) are means over pictures 1 .. images-1; EV_EXPOSURE is the factor on the light, the same for all pictures, that makes
+ * EV_FLIP if perceptual, EV_LPIPS if lpips is not NULL) are means over pictures 1 .. images-1; EV_EXPOSURE is the factor on the light, the same for all pictures, that makes
  * the re-rendering of picture 0 most like it (least RMSE in gamma space): maps fix brightness only up to what one picture says. The rest
  * is NaN: nobody knows the maps. NaN throughout when memory cannot be had. */
-ev_row ev_capture_score(const io_capture *c, const float *maps, int channels, bool perceptual);
+ev_row ev_capture_score(const io_capture *c, const float *maps, int channels, bool perceptual, ev_lpips *lpips);
 
 /* image = the re-rendering of one picture with that exposure, linear, clamped. */
 void ev_capture_render(const io_capture *c, int picture, const float *maps, int channels, double exposure, float *image);

@@ -101,7 +101,7 @@ void ev_report_print(const ev_report *r, FILE *out)
         fprintf(out, "%s%s: %d %s, %d x %d pixels", set > 0 ? "\n" : "", all ? "all sets" : r->set_name[set], n, n == 1 ? "material" : "materials", r->size, r->size);
         if (isnan(mean.value[EV_DIFFUSE])) fputs(", each picture but the first", out);
         else if (isnan(mean.value[EV_EXPOSURE])) fprintf(out, ", %d renderings each", RD_EVAL_VIEWS);
-        fputs("; RMSE (angle: degrees; ssim, flip, exposure: themselves), mean +- standard deviation\n     ", out);
+        fputs("; RMSE (angle: degrees; ssim, flip, exposure, lpips: themselves), mean +- standard deviation\n     ", out);
         for (int k = 0; k < EV_METRICS; k++)
             if (!isnan(mean.value[k])) fprintf(out, "  %-16s", ev_metric_name[k]);
         fputs("  render change  seconds\n", out);

@@ -35,6 +35,8 @@ int lgd_argument_next(int argc, char **argv, const lgd_argument *table, const ch
     return key;
 }
 
+const char *lgd_argument_second(int argc, char **argv) { return optind < argc && argv[optind][0] != '-' ? argv[optind++] : NULL; }
+
 void lgd_argument_help(const lgd_argument *table, FILE *out)
 {
     for (int i = 0; table[i].key; i++) {

@@ -17,6 +17,9 @@ enum { LGD_ARGUMENT_END = -1, LGD_ARGUMENT_BAD = -2 };
  * (GNU order: options may stand behind operands, "--" ends them). LGD_ARGUMENT_BAD with st for what the table does not have. */
 int lgd_argument_next(int argc, char **argv, const lgd_argument *table, const char **value, int *operands, ts_status *st);
 
+/* The word behind that value, for an option that has two; NULL when there is none. */
+const char *lgd_argument_second(int argc, char **argv);
+
 /* A line (or more) for each option. */
 void lgd_argument_help(const lgd_argument *table, FILE *out);
 #endif

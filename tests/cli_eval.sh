@@ -53,8 +53,8 @@ same_numbers() {
     done
     # a material's numbers do not depend on what else is evaluated
     expect 0 evaluate --set procedural:8,1 --set procedural:5,2 --noise 0.5 -o "$T/b"
-    grep '5,2' "$T/a/results.csv" >"$T/one"
-    grep '5,2' "$T/b/results.csv" >"$T/two"
+    grep '^"procedural:5,2"' "$T/a/results.csv" >"$T/one"
+    grep '^"procedural:5,2"' "$T/b/results.csv" >"$T/two"
     cmp -s "$T/one" "$T/two" || fail "another set changes the numbers"
     says "$T/out" "all sets"
     expect 0 evaluate --set procedural:5,2 --seed 2 --noise 0.5 -o "$T/c"
@@ -179,7 +179,26 @@ told() {
     says "$T/err" set.ini:1
 }
 
+# LPIPS with weights that are not trained, but have the names and shapes: a program to make them is the test of the library.
+lpips() {
+    model
+    expect 2 "$BIN/lgd-eval" --set procedural:1,1 -o "$T/o" --lpips-weights a.pth
+    says "$T/err" "lpips-weights"
+    expect 1 evaluate --set procedural:1,1 -o "$T/o" --lpips-weights "$T/none.pth" "$T/none.safetensors"
+    says "$T/err" "none.pth"
+    LPIPS_OUT=$T "$BIN/lgd-test" eval_lpips_is >/dev/null || fail "the weights cannot be made"
+    expect 0 "$BIN/lgd-eval" -i 1 --fast --size 48 --set procedural:1,3 -o "$T/p" --lpips-weights "$T/alexnet.pth" "$T/alex.safetensors"
+    says "$T/out" "lpips"
+    awk -F, 'NR == 1 && $13 != "lpips" || NR > 1 && !($14 > 0 && $14 < 5) { exit 1 }' "$T/p/results.csv" || fail "$(cat "$T/p/results.csv")"
+    says "$T/p/summary.csv" "lpips_mean,lpips_deviation"
+    says "$T/p/results.json" '"lpips": 0.'
+    says "$T/p/report.html" 'data-key="lpips"'
+    expect 0 "$BIN/lgd-eval" -i 0 --fast --size 48 --set procedural:1,1 -o "$T/q"
+    if grep -q 'data-key="lpips"' "$T/q/report.html"; then fail "LPIPS without weights"; fi
+}
+
 check eval_captures captures
+check eval_lpips lpips
 check eval_maps_options told
 check eval_interrupted interrupted
 check eval_refinement_helps refinement_helps

@@ -133,14 +133,14 @@ TEST(eval_csv_quotes_what_needs_it)
     ev_report r = {.steps = 0, .sets = 1, .set_name = names, .model = "m", .isa = "base"};
     ts_status st = {0};
     const double second = 1;
-    ev_row row = {{0.5, 0.25, 0.125, 0, 1, 12, NAN, 0.75, 2}};
+    ev_row row = {{0.5, 0.25, 0.125, 0, 1, 12, NAN, 0.75, 2, NAN}};
     char path[256], line[256] = "";
     CHECK(ev_report_add(&r, 0, "plain", &row, &second, NULL, 0, &st) == TS_OK && ev_report_write(&r, test_folder(), &st) == TS_OK, "%s", st.message);
     snprintf(path, sizeof path, "%s/results.csv", test_folder());
     FILE *f = fopen(path, "r");
     CHECK(f && fgets(line, sizeof line, f), "%s is missing", path);
-    CHECK(strcmp(line, "set,material,step,diffuse,specular,roughness,normal,render,angle,ssim,flip,exposure\n") == 0, "header: %s", line);
-    CHECK(fgets(line, sizeof line, f) && strcmp(line, "\"maps:a,b \"\"c\"\"\",plain,0,0.500000,0.250000,0.125000,0.000000,1.000000,12.000000,,0.750000,2.000000\n") == 0, "row: %s", line);
+    CHECK(strcmp(line, "set,material,step,diffuse,specular,roughness,normal,render,angle,ssim,flip,exposure,lpips\n") == 0, "header: %s", line);
+    CHECK(fgets(line, sizeof line, f) && strcmp(line, "\"maps:a,b \"\"c\"\"\",plain,0,0.500000,0.250000,0.125000,0.000000,1.000000,12.000000,,0.750000,2.000000,\n") == 0, "row: %s", line);
     CHECK(!fgets(line, sizeof line, f), "more rows: %s", line);
     fclose(f);
     st = (ts_status){0};
