@@ -1,7 +1,7 @@
 /* lgd-bench [NAME...]: runs the benchmarks whose name contains one of the words (all without a word), in order of name. */
 #include "bench/bench.h"
 #include "tensor/cpu.h"
-#include "tensor/kernels/peak.h"
+#include "tensor/peak.h"
 #include "tensor/threads.h"
 #include <omp.h>
 #include <stdbool.h>
@@ -25,21 +25,6 @@ void bench_register(const char *name, bench_function f)
     list[entries++] = (struct entry){name, f};
 }
 
-double bench_fma_peak(void)
-{
-    double best = 0;
-    /* The best of a few short runs: a peak is what the machine can do, not what its neighbours leave at this moment. */
-    for (int i = 0; i < 4; i++) {
-        double flop = 0;
-        const double begin = omp_get_wtime();
-#pragma omp parallel num_threads(ts_threads()) reduction(+ : flop)
-        flop += ts_peak_k()->run(2000000);
-        const double speed = flop / (omp_get_wtime() - begin);
-        if (speed > best) best = speed;
-    }
-    return best;
-}
-
 static int by_value(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
@@ -49,7 +34,7 @@ static int by_value(const void *a, const void *b)
 bench_time bench_measure(void (*f)(void *user), void *user)
 {
     static double times[MOST_RUNS];
-    bench_time t = {.peak = bench_fma_peak()};
+    bench_time t = {.peak = ts_fma_peak()};
     f(user);
     const double begin = omp_get_wtime();
     do {
@@ -57,7 +42,7 @@ bench_time bench_measure(void (*f)(void *user), void *user)
         f(user);
         times[t.runs++] = omp_get_wtime() - start;
     } while (t.runs < MOST_RUNS && (t.runs < 3 || omp_get_wtime() - begin < 0.33));
-    t.peak = 0.5 * (t.peak + bench_fma_peak());
+    t.peak = 0.5 * (t.peak + ts_fma_peak());
     qsort(times, (size_t)t.runs, sizeof *times, by_value);
     t.seconds = t.runs % 2 ? times[t.runs / 2] : 0.5 * (times[t.runs / 2 - 1] + times[t.runs / 2]);
     return t;
@@ -97,7 +82,7 @@ int main(int argc, char **argv)
         fprintf(stderr, "lgd-bench: %s\n", st.message);
         return 1;
     }
-    printf("%s, %d threads, FMA peak %.1f GFLOP/s\n", ts_isa_name(ts_isa_now()), ts_threads(), 1e-9 * bench_fma_peak());
+    printf("%s, %d threads, FMA peak %.1f GFLOP/s\n", ts_isa_name(ts_isa_now()), ts_threads(), 1e-9 * ts_fma_peak());
     int ran = 0;
     for (int i = 0; i < entries; i++) {
         bool wanted = argc == 1;

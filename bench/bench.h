@@ -18,9 +18,6 @@ typedef struct bench_time {
 } bench_time;
 bench_time bench_measure(void (*f)(void *user), void *user);
 
-/* FLOP/s of independent FMAs in registers on all threads in use, now (about 20 ms). */
-double bench_fma_peak(void);
-
 /* A row: label, milliseconds, GFLOP/s and the fraction of the peak (flop = 0: no such columns). */
 void bench_row(const char *label, bench_time t, double flop);
 /* A row with a figure in another unit, for example 150.2 "Mpixel/s". */

@@ -29,20 +29,40 @@ static void put_row(FILE *f, const ev_row *row)
     fputc('}', f);
 }
 
+/* The object's beginning. */
+static void put_column(const ev_report *r, int column, FILE *f)
+{
+    fputs("{\"method\": ", f);
+    put_string(f, r->method[ev_report_method(r, column)].label);
+    fprintf(f, ", \"step\": %d, ", r->step[column]);
+}
+
 void ev_json_write(const ev_report *r, FILE *f)
 {
     fprintf(f, "{\n\"version\": \"%s\",\n\"model\": ", LGD_VERSION);
     put_string(f, r->model);
-    fprintf(f, ",\n\"size\": %d,\n\"threads\": %d,\n\"isa\": \"%s\",\n\"sets\": [", r->size, r->threads, r->isa);
+    fprintf(f, ",\n\"size\": %d,\n\"threads\": %d,\n\"pinned\": %s,\n\"repeat\": %d,\n\"isa\": \"%s\",\n\"methods\": [", r->size, r->threads, r->pinned ? "true" : "false", r->repeat, r->isa);
+    for (int m = 0; m < r->methods; m++) {
+        fputs(m ? ",\n{\"label\": " : "\n{\"label\": ", f);
+        put_string(f, r->method[m].label);
+        fprintf(f, ", \"bytes\": %zu, \"peak_flops\": ", r->method[m].bytes);
+        put_number(f, ev_report_peak(r, -1, m));
+        fputc('}', f);
+    }
+    fputs("],\n\"sets\": [", f);
     for (int s = 0; s < r->sets; s++) {
         fputs(s ? ",\n{\"name\": " : "\n{\"name\": ", f);
         put_string(f, r->set_name[s]);
         fputs(", \"steps\": [", f);
-        for (int t = 0; t <= r->steps; t++) {
+        for (int c = 0; c < r->columns; c++) {
             ev_row mean, deviation;
-            const int n = ev_report_summary(r, s, t, &mean, &deviation);
-            fprintf(f, "%s\n  {\"step\": %d, \"materials\": %d, \"seconds\": ", t ? "," : "", t, n);
-            put_number(f, ev_report_seconds(r, s, t));
+            const int n = ev_report_summary(r, s, c, &mean, &deviation);
+            fputs(c ? ",\n  " : "\n  ", f);
+            put_column(r, c, f);
+            fprintf(f, "\"materials\": %d, \"seconds\": ", n);
+            put_number(f, ev_report_seconds(r, s, c));
+            fputs(", \"peak_flops\": ", f);
+            put_number(f, ev_report_peak(r, s, ev_report_method(r, c)));
             fputs(", \"mean\": ", f);
             put_row(f, &mean);
             fputs(", \"deviation\": ", f);
@@ -57,11 +77,13 @@ void ev_json_write(const ev_report *r, FILE *f)
         fprintf(f, "%s\n{\"set\": %d, \"name\": ", i ? "," : "", m->set);
         put_string(f, m->material);
         fputs(", \"steps\": [", f);
-        for (int t = 0; t <= r->steps; t++) {
-            fprintf(f, "%s\n  {\"step\": %d, \"seconds\": ", t ? "," : "", t);
-            put_number(f, m->seconds[t]);
+        for (int c = 0; c < r->columns; c++) {
+            fputs(c ? ",\n  " : "\n  ", f);
+            put_column(r, c, f);
+            fputs("\"seconds\": ", f);
+            put_number(f, m->seconds[c]);
             fputs(", \"error\": ", f);
-            put_row(f, &m->row[t]);
+            put_row(f, &m->row[c]);
             fputc('}', f);
         }
         fputs("]}", f);

@@ -1,10 +1,10 @@
-/* How good each step's maps are (DESIGN section 5). */
+/* How good maps are (DESIGN section 5). */
 #ifndef EV_METRICS_H
 #define EV_METRICS_H
 #include "data/capture.h"
 #include "data/material.h"
 #include "eval/lpips.h"
-#include "nn/model.h"
+#include "render/scene.h"
 
 enum { EV_DIFFUSE, EV_SPECULAR, EV_ROUGHNESS, EV_NORMAL, EV_RENDER, EV_ANGLE, EV_SSIM, EV_FLIP, EV_EXPOSURE, EV_LPIPS, EV_METRICS };
 extern const char *const ev_metric_name[EV_METRICS];
@@ -32,11 +32,6 @@ ev_case ev_case_of_capture(const io_capture *capture, const float *image, bool p
 /* The input picture: the flash rendering; noise > 0 adds sensor noise of that strength and 8-bit quantisation, drawn with
  * (seed, identity). image: size x size x 3. */
 void ev_photograph(const io_material *truth, float noise, uint64_t seed, uint64_t identity, float *image);
-
-/* Runs the loop: row[t] is what R_t scores, t = 0 .. steps (SSIM, FLIP and LPIPS of the first and the last alone). seconds[t] (may be NULL) is the time
- * from the photograph to R_t, without that of the scores. first and last (may be NULL) get the maps of R_0 and of R_steps,
- * [size, size, 9]. The tape is one without gradients and is reset. */
-ts_code ev_measure(ag_tape *tape, const nn_model *model, const ev_case *c, int steps, ev_row *row, double *seconds, float *first, float *last, ts_status *st);
 
 /* What one estimate scores. */
 ev_row ev_score(const ev_case *c, const float *maps, int channels);

@@ -1,11 +1,10 @@
 #include "eval/plot.h"
 #include <math.h>
-#include <stdbool.h>
 
 enum { WIDTH = 760, HEIGHT = 420, LEFT = 70, RIGHT = 210, TOP = 20, BOTTOM = 50, TICKS = 6 };
 
-/* Colours that people with any colour vision tell apart (Okabe and Ito, "Color Universal Design", 2008). */
-static const char *const colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000"};
+/* Seven that people with any colour vision tell apart (Okabe and Ito, "Color Universal Design", 2008), and three more. */
+static const char *const colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#8c564b", "#7f7f7f", "#9467bd"};
 #define COLOUR(s) colours[(size_t)(s) % (sizeof colours / sizeof *colours)]
 
 void ev_put_text(FILE *f, const char *text)
@@ -20,11 +19,13 @@ void ev_put_text(FILE *f, const char *text)
 }
 
 typedef struct frame {
-    double x0, x1, y0, y1; /* log10 of x; y */
+    double x0, x1, y0, y1; /* of x its place */
+    bool log_x;
 } frame;
 
-static bool shown(const ev_point *p) { return isfinite(p->x) && p->x > 0 && isfinite(p->y); }
-static double across(const frame *r, double x) { return LEFT + (log10(x) - r->x0) / (r->x1 - r->x0) * (WIDTH - LEFT - RIGHT); }
+static bool shown(const frame *r, const ev_point *p) { return isfinite(p->x) && (p->x > 0 || !r->log_x) && isfinite(p->y); }
+static double place(const frame *r, double x) { return r->log_x ? log10(x) : x; }
+static double across(const frame *r, double x) { return LEFT + (place(r, x) - r->x0) / (r->x1 - r->x0) * (WIDTH - LEFT - RIGHT); }
 static double down(const frame *r, double y) { return TOP + (r->y1 - y) / (r->y1 - r->y0) * (HEIGHT - TOP - BOTTOM); }
 
 /* 1, 2 or 5 times a power of ten: the smallest that is at least v. */
@@ -34,14 +35,14 @@ static double round_step(double v)
     return v <= ten ? ten : v <= 2 * ten ? 2 * ten : v <= 5 * ten ? 5 * ten : 10 * ten;
 }
 
-static bool make_frame(const ev_series *series, int count, frame *r)
+static bool make_frame(const ev_series *series, int count, bool log_x, frame *r)
 {
-    *r = (frame){INFINITY, -INFINITY, INFINITY, -INFINITY};
+    *r = (frame){INFINITY, -INFINITY, INFINITY, -INFINITY, log_x};
     for (int s = 0; s < count; s++)
         for (int i = 0; i < series[s].points; i++) {
             const ev_point *p = &series[s].point[i];
-            if (!shown(p)) continue;
-            r->x0 = fmin(r->x0, log10(p->x)), r->x1 = fmax(r->x1, log10(p->x));
+            if (!shown(r, p)) continue;
+            r->x0 = fmin(r->x0, place(r, p->x)), r->x1 = fmax(r->x1, place(r, p->x));
             r->y0 = fmin(r->y0, p->y), r->y1 = fmax(r->y1, p->y);
         }
     if (r->x0 > r->x1) return false;
@@ -50,21 +51,34 @@ static bool make_frame(const ev_series *series, int count, frame *r)
     return true;
 }
 
-static void axes(FILE *f, const frame *r, const char *x_title, const char *y_title)
+static void tick(FILE *f, const frame *r, double x, bool number)
+{
+    fprintf(f, "<line x1=\"%.1f\" x2=\"%.1f\" y1=\"%d\" y2=\"%d\" stroke=\"#ddd\"/>", across(r, x), across(r, x), TOP, HEIGHT - BOTTOM);
+    if (number) fprintf(f, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%.4g</text>\n", across(r, x), HEIGHT - BOTTOM + 16, x);
+}
+
+static void log_axis(FILE *f, const frame *r)
+{
+    const double decades = r->x1 - r->x0;
+    for (int e = (int)floor(r->x0); e <= (int)ceil(r->x1); e++)
+        for (int m = 1; m < 10; m += decades > 3 ? 9 : 1) {
+            const double x = m * pow(10, e);
+            if (log10(x) >= r->x0 && log10(x) <= r->x1) tick(f, r, x, m == 1 || (decades < 2 && (m == 2 || m == 5)));
+        }
+}
+
+static void draw_axes(FILE *f, const frame *r, const char *x_title, const char *y_title)
 {
     fprintf(f, "<rect x=\"%d\" y=\"%d\" width=\"%d\" height=\"%d\" fill=\"none\" stroke=\"#888\"/>\n", LEFT, TOP, WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM);
     const double step = round_step((r->y1 - r->y0) / TICKS);
     for (double y = ceil(r->y0 / step) * step; y <= r->y1; y += step)
         fprintf(f, "<line x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\" stroke=\"#ddd\"/><text x=\"%d\" y=\"%.1f\" text-anchor=\"end\">%.3g</text>\n", LEFT, WIDTH - RIGHT,
             down(r, y), down(r, y), LEFT - 6, down(r, y) + 4, y);
-    const bool wide = r->x1 - r->x0 > 3; /* decades only */
-    for (int e = (int)floor(r->x0); e <= (int)ceil(r->x1); e++)
-        for (int m = 1; m < 10; m += wide ? 9 : 1) {
-            const double x = m * pow(10, e);
-            if (log10(x) < r->x0 || log10(x) > r->x1) continue;
-            fprintf(f, "<line x1=\"%.1f\" x2=\"%.1f\" y1=\"%d\" y2=\"%d\" stroke=\"#ddd\"/>", across(r, x), across(r, x), TOP, HEIGHT - BOTTOM);
-            if (m == 1 || m == 2 || m == 5) fprintf(f, "<text x=\"%.1f\" y=\"%d\" text-anchor=\"middle\">%.4g</text>\n", across(r, x), HEIGHT - BOTTOM + 16, x);
-        }
+    if (r->log_x) log_axis(f, r);
+    else {
+        const double unit = round_step((r->x1 - r->x0) / TICKS);
+        for (double x = ceil(r->x0 / unit) * unit; x <= r->x1; x += unit) tick(f, r, x, true);
+    }
     fprintf(f, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">", (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 10);
     ev_put_text(f, x_title);
     fprintf(f, "</text>\n<text transform=\"translate(16 %d) rotate(-90)\" text-anchor=\"middle\">", (TOP + HEIGHT - BOTTOM) / 2);
@@ -77,14 +91,14 @@ static void draw(FILE *f, const frame *r, const ev_series *series, int s)
     const int legend = TOP + 12 + 18 * s;
     fprintf(f, "<g stroke=\"%s\" fill=\"none\"><polyline points=\"", COLOUR(s));
     for (int i = 0; i < series->points; i++)
-        if (shown(&series->point[i])) fprintf(f, "%.1f,%.1f ", across(r, series->point[i].x), down(r, series->point[i].y));
+        if (shown(r, &series->point[i])) fprintf(f, "%.1f,%.1f ", across(r, series->point[i].x), down(r, series->point[i].y));
     fputs("\"/></g>\n", f);
     for (int i = 0; i < series->points; i++) {
         const ev_point *p = &series->point[i];
-        if (!shown(p)) continue;
+        if (!shown(r, p)) continue;
         fprintf(f, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3.5\" fill=\"%s\"><title>", across(r, p->x), down(r, p->y), COLOUR(s));
         ev_put_text(f, series->name);
-        fprintf(f, " %s: %.4g s, %.4f &#177; %.4f</title></circle>", p->label, p->x, p->y, p->deviation);
+        fprintf(f, " %s: %.4g, %.4f &#177; %.4f</title></circle>", p->label, p->x, p->y, p->deviation);
         if (p->label[0]) {
             fprintf(f, "<text x=\"%.1f\" y=\"%.1f\" font-size=\"10\">", across(r, p->x) + 4, down(r, p->y) - 5);
             ev_put_text(f, p->label);
@@ -96,13 +110,13 @@ static void draw(FILE *f, const frame *r, const ev_series *series, int s)
     fputs("</text>\n", f);
 }
 
-void ev_plot_write(FILE *f, const char *x_title, const char *y_title, const ev_series *series, int count)
+void ev_plot_write(FILE *f, const ev_axes *axes, const ev_series *series, int count)
 {
     frame r;
     fprintf(f, "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" font-family=\"sans-serif\" font-size=\"12\">\n", WIDTH, HEIGHT, WIDTH, HEIGHT);
     fprintf(f, "<rect width=\"%d\" height=\"%d\" fill=\"#fff\"/>\n", WIDTH, HEIGHT);
-    if (make_frame(series, count, &r)) {
-        axes(f, &r, x_title, y_title);
+    if (make_frame(series, count, axes->log_x, &r)) {
+        draw_axes(f, &r, axes->x_title, axes->y_title);
         for (int s = 0; s < count; s++) draw(f, &r, &series[s], s);
     } else fprintf(f, "<text x=\"%d\" y=\"%d\">nothing was measured</text>\n", LEFT, HEIGHT / 2);
     fputs("</svg>\n", f);

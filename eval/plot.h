@@ -1,10 +1,11 @@
-/* A plot as SVG: series of points, the horizontal axis logarithmic. */
+/* A plot as SVG: series of points. */
 #ifndef EV_PLOT_H
 #define EV_PLOT_H
+#include <stdbool.h>
 #include <stdio.h>
 
 typedef struct ev_point {
-    double x, y;       /* x > 0 */
+    double x, y;       /* x > 0 on a logarithmic axis */
     double deviation;  /* of y: shown when one points at it */
     char label[32];    /* beside the point; may be empty */
 } ev_point;
@@ -18,6 +19,11 @@ typedef struct ev_series {
 /* Text for HTML and SVG: & < > " as entities. */
 void ev_put_text(FILE *f, const char *text);
 
-/* A whole <svg> element. Points that are not finite, or whose x is not above 0, are left out; without any a line says so. */
-void ev_plot_write(FILE *f, const char *x_title, const char *y_title, const ev_series *series, int count);
+typedef struct ev_axes {
+    const char *x_title, *y_title;
+    bool log_x;
+} ev_axes;
+
+/* A whole <svg> element. Points that are not finite, or whose x is not above 0 on a logarithmic axis, are left out; without any a line says so. */
+void ev_plot_write(FILE *f, const ev_axes *axes, const ev_series *series, int count);
 #endif

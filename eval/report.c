@@ -1,48 +1,42 @@
 #include "eval/report.h"
-#include "eval/html.h"
 #include "render/error.h"
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
-enum { PATH_LENGTH = 4096 };
-
-ts_code ev_report_add(ev_report *r, int set, const char *material, const ev_row *row, const double *seconds, unsigned char *png, size_t png_size, ts_status *st)
+int ev_report_add(ev_report *r, int set, const char *material, ts_status *st)
 {
     if (r->results == r->room) {
         const int room = r->room ? 2 * r->room : 64;
         ev_result *more = realloc(r->result, (size_t)room * sizeof *more);
-        if (!more) {
-            free(png);
-            return ts_fail(st, TS_NOMEM, "out of memory for the results");
-        }
+        if (!more) return ts_fail(st, TS_NOMEM, "out of memory for the results"), -1;
         r->result = more;
         r->room = room;
     }
-    const size_t rows = (size_t)r->steps + 1;
+    const size_t columns = (size_t)r->columns, methods = (size_t)r->methods;
     ev_result *to = &r->result[r->results++];
-    *to = (ev_result){.set = set, .row = malloc(rows * sizeof *row), .seconds = malloc(rows * sizeof *seconds), .png = png, .png_size = png_size};
-    if (!to->row || !to->seconds) {
-        r->results--;
-        free(to->row);
-        free(to->seconds);
-        free(png);
-        return ts_fail(st, TS_NOMEM, "out of memory for the results");
-    }
+    *to = (ev_result){.set = set, .row = malloc(columns * sizeof *to->row), .seconds = malloc(columns * sizeof *to->seconds), .peak = malloc(methods * sizeof *to->peak),
+                      .png = calloc(methods, sizeof *to->png), .png_size = calloc(methods, sizeof *to->png_size)};
     snprintf(to->material, sizeof to->material, "%s", material);
-    memcpy(to->row, row, rows * sizeof *row);
-    memcpy(to->seconds, seconds, rows * sizeof *seconds);
-    return TS_OK;
+    if (!to->row || !to->seconds || !to->peak || !to->png || !to->png_size) return ts_fail(st, TS_NOMEM, "out of memory for the results"), -1;
+    for (int i = 0; i < r->columns; i++) {
+        to->seconds[i] = NAN;
+        for (int k = 0; k < EV_METRICS; k++) to->row[i].value[k] = NAN;
+    }
+    for (int m = 0; m < r->methods; m++) to->peak[m] = NAN;
+    return r->results - 1;
 }
 
 void ev_report_free(ev_report *r)
 {
     for (int i = 0; i < r->results; i++) {
-        free(r->result[i].row);
-        free(r->result[i].seconds);
-        free(r->result[i].png);
+        ev_result *m = &r->result[i];
+        for (int k = 0; k < r->methods && m->png; k++) free(m->png[k]);
+        free(m->row);
+        free(m->seconds);
+        free(m->peak);
+        free(m->png);
+        free(m->png_size);
     }
     free(r->result);
     r->result = NULL;
@@ -55,21 +49,29 @@ static int by_size(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-double ev_report_seconds(const ev_report *r, int set, int step)
+static double median(const ev_report *r, int set, const double *(*of)(const ev_result *m), int index)
 {
-    double *all = malloc(((size_t)r->results + 1) * sizeof *all), median = NAN;
+    double *all = malloc(((size_t)r->results + 1) * sizeof *all), middle = NAN;
     int n = 0;
-    for (int i = 0; i < r->results && all; i++)
-        if (set < 0 || r->result[i].set == set) all[n++] = r->result[i].seconds[step];
+    for (int i = 0; i < r->results && all; i++) {
+        const double v = of(&r->result[i])[index];
+        if ((set < 0 || r->result[i].set == set) && !isnan(v)) all[n++] = v;
+    }
     if (n) {
         qsort(all, (size_t)n, sizeof *all, by_size);
-        median = (all[n / 2] + all[(n - 1) / 2]) / 2;
+        middle = (all[n / 2] + all[(n - 1) / 2]) / 2;
     }
     free(all);
-    return median;
+    return middle;
 }
 
-int ev_report_summary(const ev_report *r, int set, int step, ev_row *mean, ev_row *deviation)
+static const double *seconds_of(const ev_result *m) { return m->seconds; }
+static const double *peak_of(const ev_result *m) { return m->peak; }
+
+double ev_report_seconds(const ev_report *r, int set, int column) { return median(r, set, seconds_of, column); }
+double ev_report_peak(const ev_report *r, int set, int method) { return median(r, set, peak_of, method); }
+
+int ev_report_summary(const ev_report *r, int set, int column, ev_row *mean, ev_row *deviation)
 {
     int n = 0;
     for (int i = 0; i < r->results; i++) n += set < 0 || r->result[i].set == set;
@@ -78,7 +80,7 @@ int ev_report_summary(const ev_report *r, int set, int step, ev_row *mean, ev_ro
         double sum = 0, squares = 0;
         for (int pass = 0; pass < 2; pass++) /* the mean first: differences from it lose no digits */
             for (int i = 0; i < r->results; i++) {
-                const double v = r->result[i].row[step].value[k];
+                const double v = r->result[i].row[column].value[k];
                 if ((set >= 0 && r->result[i].set != set) || isnan(v)) continue;
                 if (pass == 0) sum += v, measured++;
                 else squares += (v - sum / measured) * (v - sum / measured);
@@ -89,118 +91,73 @@ int ev_report_summary(const ev_report *r, int set, int step, ev_row *mean, ev_ro
     return n;
 }
 
+int ev_report_method(const ev_report *r, int column)
+{
+    int m = 0;
+    while (m + 1 < r->methods && r->method[m + 1].first <= column) m++;
+    return m;
+}
+
+int ev_report_shown(const ev_report *r, int *column)
+{
+    int n = 0;
+    for (int c = 0; c < r->columns; c++) {
+        const ev_subject *m = &r->method[ev_report_method(r, c)];
+        if (r->methods == 1 || c == m->first + m->points - 1) column[n++] = c;
+    }
+    return n;
+}
+
+const char *ev_report_name(const ev_report *r, int column, char name[EV_NAME])
+{
+    if (r->methods == 1) snprintf(name, EV_NAME, "R_%d", r->step[column]);
+    else snprintf(name, EV_NAME, "%s", r->method[ev_report_method(r, column)].label);
+    return name;
+}
+
+/* One set's table, or that of all with set = -1. */
+static void print_table(const ev_report *r, int set, const int *column, int columns, FILE *out)
+{
+    ev_row mean, deviation, any = {{0}};
+    char name[EV_NAME];
+    int n = 0, width = 5;
+    for (int i = 0; i < columns; i++) { /* what no column has is no column of the table */
+        const int length = (int)strlen(ev_report_name(r, column[i], name));
+        n = ev_report_summary(r, set, column[i], &mean, &deviation);
+        if (length > width) width = length;
+        for (int k = 0; k < EV_METRICS; k++)
+            if (i == 0 || isnan(any.value[k])) any.value[k] = mean.value[k];
+    }
+    if (n == 0) return;
+    ev_report_summary(r, set, column[0], &mean, &deviation);
+    const double start = mean.value[EV_RENDER];
+    fprintf(out, "%s%s: %d %s, %d x %d pixels", set != 0 ? "\n" : "", set < 0 ? "all sets" : r->set_name[set], n, n == 1 ? "material" : "materials", r->size, r->size);
+    if (isnan(any.value[EV_DIFFUSE])) fputs(", each picture but the first", out);
+    else if (isnan(any.value[EV_EXPOSURE])) fprintf(out, ", %d renderings each", RD_EVAL_VIEWS);
+    fprintf(out, "; RMSE (angle: degrees; ssim, flip, exposure, lpips: themselves), mean +- standard deviation; %d thread%s%s, seconds: median\n%*s", r->threads,
+        r->threads == 1 ? "" : "s", r->pinned ? ", pinned" : "", width, "");
+    for (int k = 0; k < EV_METRICS; k++)
+        if (!isnan(any.value[k])) fprintf(out, "  %-16s", ev_metric_name[k]);
+    fputs("  render change  seconds  GFLOP/s peak      MB\n", out);
+    for (int i = 0; i < columns; i++) {
+        const int m = ev_report_method(r, column[i]);
+        ev_report_summary(r, set, column[i], &mean, &deviation);
+        fprintf(out, "%-*s", width, ev_report_name(r, column[i], name));
+        for (int k = 0; k < EV_METRICS; k++) {
+            if (isnan(any.value[k])) continue;
+            if (isnan(mean.value[k])) fprintf(out, "  %-16s", "-");
+            else fprintf(out, k == EV_ANGLE || k == EV_EXPOSURE ? "  %6.2f +- %6.2f" : "  %.4f +- %.4f", mean.value[k], deviation.value[k]);
+        }
+        fprintf(out, "  %+12.1f%%  %7.3f  %12.0f  %6.0f\n", start > 0 ? 100 * (mean.value[EV_RENDER] / start - 1) : 0, ev_report_seconds(r, set, column[i]),
+            1e-9 * ev_report_peak(r, set, m), 1e-6 * (double)r->method[m].bytes);
+    }
+}
+
 void ev_report_print(const ev_report *r, FILE *out)
 {
-    for (int set = 0; set <= r->sets; set++) {
-        const bool all = set == r->sets;
-        ev_row mean, deviation;
-        const int n = ev_report_summary(r, all ? -1 : set, 0, &mean, &deviation);
-        if (n == 0 || (all && r->sets == 1)) continue;
-        const ev_row any = mean; /* what R_0 has not, no step has */
-        const double start = mean.value[EV_RENDER];
-        fprintf(out, "%s%s: %d %s, %d x %d pixels", set > 0 ? "\n" : "", all ? "all sets" : r->set_name[set], n, n == 1 ? "material" : "materials", r->size, r->size);
-        if (isnan(mean.value[EV_DIFFUSE])) fputs(", each picture but the first", out);
-        else if (isnan(mean.value[EV_EXPOSURE])) fprintf(out, ", %d renderings each", RD_EVAL_VIEWS);
-        fputs("; RMSE (angle: degrees; ssim, flip, exposure, lpips: themselves), mean +- standard deviation\n     ", out);
-        for (int k = 0; k < EV_METRICS; k++)
-            if (!isnan(mean.value[k])) fprintf(out, "  %-16s", ev_metric_name[k]);
-        fputs("  render change  seconds\n", out);
-        for (int t = 0; t <= r->steps; t++) {
-            ev_report_summary(r, all ? -1 : set, t, &mean, &deviation);
-            fprintf(out, "R_%-3d", t);
-            for (int k = 0; k < EV_METRICS; k++) {
-                if (isnan(any.value[k])) continue;
-                if (isnan(mean.value[k])) fprintf(out, "  %-16s", "-");
-                else fprintf(out, k == EV_ANGLE || k == EV_EXPOSURE ? "  %6.2f +- %6.2f" : "  %.4f +- %.4f", mean.value[k], deviation.value[k]);
-            }
-            fprintf(out, "  %+12.1f%%  %7.3f\n", start > 0 ? 100 * (mean.value[EV_RENDER] / start - 1) : 0, ev_report_seconds(r, all ? -1 : set, t));
-        }
-    }
-}
-
-/* RFC 4180: in quotes when it has to be, quotes doubled. */
-static void put_field(FILE *f, const char *text)
-{
-    if (!strpbrk(text, ",\"\r\n")) {
-        fputs(text, f);
-        return;
-    }
-    fputc('"', f);
-    for (; *text; text++) {
-        if (*text == '"') fputc('"', f);
-        fputc(*text, f);
-    }
-    fputc('"', f);
-}
-
-/* What was not measured is empty. */
-static void put_number(FILE *f, double v)
-{
-    if (isnan(v)) fputc(',', f);
-    else fprintf(f, ",%.6f", v);
-}
-
-static void write_results(const ev_report *r, FILE *f)
-{
-    fputs("set,material,step", f);
-    for (int k = 0; k < EV_METRICS; k++) fprintf(f, ",%s", ev_metric_name[k]);
-    fputc('\n', f);
-    for (int i = 0; i < r->results; i++)
-        for (int t = 0; t <= r->steps; t++) {
-            put_field(f, r->set_name[r->result[i].set]);
-            fputc(',', f);
-            put_field(f, r->result[i].material);
-            fprintf(f, ",%d", t);
-            for (int k = 0; k < EV_METRICS; k++) put_number(f, r->result[i].row[t].value[k]);
-            fputc('\n', f);
-        }
-}
-
-static void write_summary(const ev_report *r, FILE *f)
-{
-    fputs("set,materials,step", f);
-    for (int k = 0; k < EV_METRICS; k++) fprintf(f, ",%s_mean,%s_deviation", ev_metric_name[k], ev_metric_name[k]);
-    fputc('\n', f);
-    for (int set = 0; set <= r->sets; set++) {
-        if (set == r->sets && r->sets == 1) continue; /* "all" would repeat it */
-        for (int t = 0; t <= r->steps; t++) {
-            ev_row mean, deviation;
-            const int n = ev_report_summary(r, set == r->sets ? -1 : set, t, &mean, &deviation);
-            if (n == 0) continue;
-            put_field(f, set == r->sets ? "all" : r->set_name[set]);
-            fprintf(f, ",%d,%d", n, t);
-            for (int k = 0; k < EV_METRICS; k++) put_number(f, mean.value[k]), put_number(f, deviation.value[k]);
-            fputc('\n', f);
-        }
-    }
-}
-
-static ts_code replace(const ev_report *r, const char *folder, const char *name, void (*write_to)(const ev_report *, FILE *), ts_status *st)
-{
-    char path[PATH_LENGTH], part[PATH_LENGTH];
-    if (snprintf(path, sizeof path, "%s/%s", folder, name) >= (int)sizeof path
-        || snprintf(part, sizeof part, "%s/.%s.%ld", folder, name, (long)getpid()) >= (int)sizeof part)
-        return ts_fail(st, TS_INVALID, "%s: the name is too long", folder);
-    FILE *f = fopen(part, "we");
-    if (!f) return ts_fail(st, TS_IO, "%s: cannot be written: %s", path, strerror(errno));
-    write_to(r, f);
-    const bool written = fflush(f) == 0 && !ferror(f) && fsync(fileno(f)) == 0;
-    int why = errno;
-    const bool closed = fclose(f) == 0;
-    if (written && !closed) why = errno;
-    if (written && closed && rename(part, path) == 0) return TS_OK;
-    if (written && closed) why = errno;
-    unlink(part);
-    return ts_fail(st, TS_IO, "%s: cannot be written: %s", path, strerror(why));
-}
-
-ts_code ev_report_write(const ev_report *r, const char *folder, ts_status *st)
-{
-    ts_code code = replace(r, folder, "results.csv", write_results, st);
-    static const struct {
-        const char *name;
-        void (*write_to)(const ev_report *, FILE *);
-    } others[] = {{"summary.csv", write_summary}, {"results.json", ev_json_write}, {"report.html", ev_html_write}};
-    for (size_t i = 0; i < sizeof others / sizeof *others && !code; i++) code = replace(r, folder, others[i].name, others[i].write_to, st);
-    return code;
+    int *column = malloc((size_t)r->columns * sizeof *column);
+    const int columns = column ? ev_report_shown(r, column) : 0;
+    for (int set = 0; set < r->sets && columns; set++) print_table(r, set, column, columns, out);
+    if (r->sets > 1 && columns) print_table(r, -1, column, columns, out);
+    free(column);
 }

@@ -10,6 +10,24 @@
 
 static atomic_int wanted;
 
+bool ts_threads_pin(void)
+{
+    cpu_set_t all;
+    const int threads = ts_threads();
+    if (sched_getaffinity(0, sizeof all, &all) != 0 || CPU_COUNT(&all) < threads) return false;
+    int bound = 0;
+#pragma omp parallel num_threads(threads) reduction(+ : bound)
+    {
+        int left = omp_get_thread_num(), cpu = 0;
+        while (!CPU_ISSET(cpu, &all) || left-- > 0) cpu++;
+        cpu_set_t one;
+        CPU_ZERO(&one);
+        CPU_SET(cpu, &one);
+        bound += sched_setaffinity(0, sizeof one, &one) == 0; /* of the calling thread alone */
+    }
+    return bound == threads;
+}
+
 /* CPUs' worth of quota in a cgroup v2 or v1 hierarchy as a container sees it, or 0 for none. */
 static int quota_in(const char *max_path, const char *quota_path, const char *period_path)
 {

@@ -1,12 +1,17 @@
 /* How many threads the OpenMP loops use, and scratch memory for each of them. */
 #ifndef TS_THREADS_H
 #define TS_THREADS_H
+#include <stdbool.h>
 #include <stddef.h>
 
 /* n >= 1: use n threads; 0: as many as the process may use (affinity mask and cgroup CPU quota). */
 void ts_threads_set(int n);
 int ts_threads(void);
 int ts_threads_allowed(void); /* what 0 stands for */
+
+/* Binds each of the threads in use to a CPU of its own, in the order of the process's affinity mask, so that times do not depend on where the system
+ * moves them. False, with nothing changed, when there are fewer CPUs than threads. Call after ts_threads_set. */
+bool ts_threads_pin(void);
 
 /* At least bytes of 64-byte aligned memory that belong to the calling thread and slot (0 .. TS_SCRATCH_SLOTS-1) until the
  * next call with that slot on that thread. Grows only, never shrinks, so a repeated workload stops allocating. Never NULL:

@@ -9,11 +9,11 @@ evaluate() { "$BIN/lgd-eval" --size 32 --iterations 2 --threads 1 "$@"; }
 
 help_names_the_options() {
     expect 0 "$BIN/lgd-eval" --help
-    for o in fast set iterations model threads seed noise images size output procedural strips maps; do says "$T/out" "$o"; done
+    for o in method repeat pin descent finetune fast set iterations model threads seed noise images size output procedural strips maps; do says "$T/out" "$o"; done
 }
 
 wrong_usage() {
-    for o in --size=0 --iterations=-1 --threads=x --noise=2 --noise=0,5 --seed=-1 --nonsense --set=procedural:1 --set=pictures:x; do
+    for o in --size=0 --iterations=-1 --threads=x --noise=2 --noise=0,5 --seed=-1 --repeat=0 --nonsense --set=procedural:1 --set=pictures:x; do
         expect 2 "$BIN/lgd-eval" --set procedural:1,1 "$o" -o "$T/o"
         says "$T/err" "${o%%=*}"
     done
@@ -35,11 +35,11 @@ procedural() {
     for t in 0 1 2; do grep -q "^R_$t  *0\.[0-9]* +- 0\." "$T/out" || fail "no line for R_$t"; done
     lines "$T/o/results.csv" 10
     lines "$T/o/summary.csv" 4
-    [ "$(ls -A "$T/o" | tr '\n' ' ')" = "report.html results.csv results.json summary.csv " ] || fail "other files: $(ls -A "$T/o")"
+    [ "$(ls -A "$T/o" | tr '\n' ' ')" = "report.html results.csv results.json summary.csv times.csv " ] || fail "other files: $(ls -A "$T/o")"
     # the summary is the mean of the results
     for t in 0 2; do
-        mean=$(awk -F, -v t=$t 'NR > 1 && $4 == t { s += $9; n++ } END { printf "%.4f", s / n }' "$T/o/results.csv")
-        told=$(awk -F, -v t=$t 'NR > 1 && $4 == t { printf "%.4f", $13 }' "$T/o/summary.csv")
+        mean=$(awk -F, -v t=$t 'NR > 1 && $5 == t { s += $10; n++ } END { printf "%.4f", s / n }' "$T/o/results.csv")
+        told=$(awk -F, -v t=$t 'NR > 1 && $5 == t { printf "%.4f", $14 }' "$T/o/summary.csv")
         [ "$mean" = "$told" ] || fail "step $t: mean $mean, summary $told"
     done
 }
@@ -70,9 +70,9 @@ real_sets() {
     lines "$T/o/results.csv" $((1 + 3 * (maps + strips)))
     says "$T/out" "$maps materials"
     says "$T/out" "$((maps + strips)) materials"
-    # set,material,step, five errors, angle, then ssim and flip of the first and the last step
-    awk -F, 'NR > 1 { for (i = 4; i <= 8; i++) if (!($i >= 0 && $i < 2)) exit 1
-        if (!($9 > 0 && $9 < 90) || $3 != 1 && !($10 < 1 && $10 > -1 && $11 > 0 && $11 < 1)) exit 1 }' "$T/o/results.csv" || fail "an error is out of range"
+    # set,material,method,step, five errors, angle, then ssim and flip of the first and the last step
+    awk -F, 'NR > 1 { for (i = 5; i <= 9; i++) if (!($i >= 0 && $i < 2)) exit 1
+        if (!($10 > 0 && $10 < 90) || $4 != 1 && !($11 < 1 && $11 > -1 && $12 > 0 && $12 < 1)) exit 1 }' "$T/o/results.csv" || fail "an error is out of range"
 }
 
 images() {
@@ -132,8 +132,8 @@ refinement_helps() {
     model
     case ${MAKEFLAGS:-} in *fsanitize*) skip "64 materials at 256 x 256 take too long with sanitizers" ;; esac
     expect 0 "$BIN/lgd-eval" --fast --set procedural:1000003,64 -o "$T/o"
-    awk -F, 'NR == 2 { first = $13 } { last = $13 } END { exit !(last < 0.85 * first) }' "$T/o/summary.csv" ||
-        fail "$(awk -F, 'NR == 2 { first = $13 } { last = $13 } END { print "render RMSE", first, "->", last }' "$T/o/summary.csv")"
+    awk -F, 'NR == 2 { first = $14 } { last = $14 } END { exit !(last < 0.85 * first) }' "$T/o/summary.csv" ||
+        fail "$(awk -F, 'NR == 2 { first = $14 } { last = $14 } END { print "render RMSE", first, "->", last }' "$T/o/summary.csv")"
 }
 
 check eval_help_names_the_options help_names_the_options
@@ -151,7 +151,7 @@ captures() {
     expect 0 evaluate --set "multiview:$T/c" --images -o "$T/o"
     says "$T/out" exposure
     lines "$T/o/results.csv" 7
-    awk -F, 'NR > 1 && !($4 == "" && $8 > 0 && $8 < 0.5 && $12 > 0.3 && $12 < 3) { exit 1 }' "$T/o/results.csv" || fail "$(cat "$T/o/results.csv")"
+    awk -F, 'NR > 1 && !($5 == "" && $9 > 0 && $9 < 0.5 && $13 > 0.3 && $13 < 3) { exit 1 }' "$T/o/results.csv" || fail "$(cat "$T/o/results.csv")"
     [ "$(ls "$T/o/images" | wc -l)" = 2 ] || fail "images: $(ls "$T/o/images")"
     one=$(ls -d "$T"/c/* | head -n 1)
     expect 0 evaluate --set "multiview:$one" -o "$T/p"
@@ -189,7 +189,7 @@ lpips() {
     LPIPS_OUT=$T "$BIN/lgd-test" eval_lpips_is >/dev/null || fail "the weights cannot be made"
     expect 0 "$BIN/lgd-eval" -i 1 --fast --size 48 --set procedural:1,3 -o "$T/p" --lpips-weights "$T/alexnet.pth" "$T/alex.safetensors"
     says "$T/out" "lpips"
-    awk -F, 'NR == 1 && $13 != "lpips" || NR > 1 && !($14 > 0 && $14 < 5) { exit 1 }' "$T/p/results.csv" || fail "$(cat "$T/p/results.csv")"
+    awk -F, 'NR == 1 && $14 != "lpips" || NR > 1 && !($15 > 0 && $14 < 5) { exit 1 }' "$T/p/results.csv" || fail "$(cat "$T/p/results.csv")"
     says "$T/p/summary.csv" "lpips_mean,lpips_deviation"
     says "$T/p/results.json" '"lpips": 0.'
     says "$T/p/report.html" 'data-key="lpips"'
@@ -197,8 +197,39 @@ lpips() {
     if grep -q 'data-key="lpips"' "$T/q/report.html"; then fail "LPIPS without weights"; fi
 }
 
+methods() {
+    model
+    for m in nothing lgd:steps=3 lgd:iterations=x descent:start=here descent:rate descent:rate= descent:rate=1,rate=2 unet latent lgd-nograd mean:label=; do
+        expect 2 "$BIN/lgd-eval" --set procedural:1,1 --method "$m" -o "$T/o"
+        says "$T/err" "--method $m"
+    done
+    expect 2 "$BIN/lgd-eval" --set procedural:1,1 --method mean --method mean -o "$T/o"
+    says "$T/err" label=
+    for m in "unet:model=$T/none" "latent:model=$MODEL" "lgd-nograd:model=$MODEL"; do
+        expect 1 "$BIN/lgd-eval" --set procedural:1,1 --method "$m" -o "$T/o"
+        says "$T/err" "${m#*=}"
+        lines "$T/err" 1
+    done
+    expect 0 evaluate --set procedural:3,2 --method lgd --method mean --method descent:steps=3 --method "unet:label=g alone,model=$MODEL" --images -o "$T/o"
+    lines "$T/out" 6
+    grep -q '^descent:steps=3  *0\.' "$T/out" || fail "no line for descent: $(cat "$T/out")"
+    lines "$T/o/summary.csv" 10 # three of lgd, one of mean, four of descent (0, 1, 2, 3), one of unet
+    lines "$T/o/times.csv" 10
+    says "$T/o/results.csv" ',g alone,0,'
+    [ "$(ls "$T/o/images" | wc -l)" = 8 ] || fail "images: $(ls "$T/o/images")"
+    # the default is lgd
+    expect 0 evaluate --set procedural:3,2 -o "$T/p"
+    expect 0 evaluate --set procedural:3,2 --method lgd -o "$T/q"
+    cmp -s "$T/p/results.csv" "$T/q/results.csv" || fail "the default is not lgd"
+    # a method's numbers depend neither on the others nor on the threads
+    expect 0 "$BIN/lgd-eval" --size 32 --threads 2 --repeat 2 --set procedural:3,2 --method descent:steps=3 -o "$T/r"
+    grep descent "$T/o/results.csv" >"$T/one"
+    grep descent "$T/r/results.csv" | cmp -s - "$T/one" || fail "descent gives other numbers"
+}
+
 check eval_captures captures
 check eval_lpips lpips
 check eval_maps_options told
+check eval_methods methods
 check eval_interrupted interrupted
 check eval_refinement_helps refinement_helps

@@ -25,6 +25,16 @@ opens_and_sorts() {
         keys $key >"$T/keys"
         sed 's/^$/-1/' "$T/keys" | sort -g -r -c || fail "not sorted by $key: $(tr '\n' ' ' <"$T/keys")"
     done
+    # a column a method, and sorting by the chosen one's errors
+    expect 0 "$BIN/lgd-eval" --fast --size 32 -i 1 --threads 1 --set procedural:3,3 --method lgd --method mean -o "$T/m"
+    browse "$T/m/report.html#render"
+    says "$T/dom" 'data-failed="0"'
+    says "$T/dom" '<th>lgd</th><th>mean</th>'
+    [ "$(grep -o '<figcaption>' "$T/dom" | wc -l)" = 6 ] || fail "pictures"
+    sed 's|<option value="1">|<option value="1" selected>|' "$T/m/report.html" >"$T/m/mean.html"
+    browse "$T/m/mean.html#render"
+    keys render-1 >"$T/keys"
+    sort -g -r -c "$T/keys" || fail "not sorted by mean's error: $(tr '\n' ' ' <"$T/keys")"
     # and the page would tell if something failed
     sed 's|src="data:image/png;base64,....|src="http://127.0.0.1:9/x.png?|' "$T/o/report.html" >"$T/o/bad.html"
     browse "$T/o/bad.html"

@@ -1,9 +1,10 @@
 /* What lgd-eval measures and how it sums up. */
 #include "data/procedural.h"
-#include "eval/metrics.h"
+#include "eval/estimate.h"
 #include "eval/report.h"
 #include "eval/sets.h"
 #include "eval/sheet.h"
+#include "nn/weights.h"
 #include "render/error.h"
 #include "tests/test.h"
 #include <math.h>
@@ -58,7 +59,9 @@ TEST(eval_measures_every_step_as_its_maps_score)
     rd_view views[RD_EVAL_VIEWS];
     ev_case c;
     ts_status st = {0};
+    char path[300];
     make_case(&m, image, views, &c);
+    snprintf(path, sizeof path, "%s/w.safetensors", test_folder());
     for (int channels = MAP_CHANNELS; channels <= MAP_CHANNELS + 1; channels++) {
         nn_arch a = nn_arch_default();
         a.channels = channels;
@@ -68,20 +71,27 @@ TEST(eval_measures_every_step_as_its_maps_score)
         a.h_width = 4;
         a.h_gru = 4;
         nn_model *model = nn_model_create(&a, &st);
-        ag_tape *tape = ag_tape_create(false, &st);
-        CHECK(model && tape, "%s", st.message);
+        CHECK(model, "%s", st.message);
         nn_model_init(model, 1);
+        CHECK(nn_model_save(model, model->value, path, NULL, 0, &st) == TS_OK, "%s", st.message);
+        ev_estimator e;
+        CHECK(ev_method_parse("lgd", path, 2, &e, &st) == TS_OK && ev_open(&e, &st) == TS_OK, "%s", st.message);
         ev_row row[3], again[3];
         double seconds[3];
-        CHECK(ev_measure(tape, model, &c, 2, row, NULL, first, last, &st) == TS_OK, "%s", st.message);
+        int step[EV_POINTS];
+        const int points = ev_points(&e, step);
+        CHECK(points == 3 && step[0] == 0 && step[2] == 2, "%d points", points);
+        CHECK(ev_estimate(&e, &c, step, points, 1, row, seconds, first, last, &st) == TS_OK, "%s", st.message);
         const ev_row start = ev_score(&c, first, MAP_CHANNELS), end = ev_score(&c, last, MAP_CHANNELS);
         CHECK(memcmp(&start, &row[0], sizeof start) == 0 && memcmp(&end, &row[2], sizeof end) == 0, "rows differ from their maps' scores");
         CHECK(memcmp(first, last, sizeof first) != 0, "refinement does nothing");
-        CHECK(ev_measure(tape, model, &c, 2, again, seconds, NULL, NULL, &st) == TS_OK && memcmp(row, again, sizeof row) == 0, "again gives other numbers");
-        for (size_t i = 0; i < model->count; i++) model->value[i] = NAN;
-        CHECK(ev_measure(tape, model, &c, 2, again, seconds, NULL, NULL, &st) == TS_NUMERIC, "damaged weights have a score: %s", st.message);
+        CHECK(ev_estimate(&e, &c, step, points, 3, again, seconds, NULL, last, &st) == TS_OK && memcmp(row, again, sizeof row) == 0, "again gives other numbers");
+        CHECK(seconds[0] <= seconds[1] && seconds[1] <= seconds[2], "times run backward");
+        for (size_t i = 0; i < e.net->count; i++) e.net->value[i] = NAN;
+        ag_freeze(e.tape, false);
+        CHECK(ev_estimate(&e, &c, step, points, 1, again, seconds, NULL, last, &st) == TS_NUMERIC, "damaged weights have a score: %s", st.message);
         st = (ts_status){0};
-        ag_tape_destroy(&tape);
+        ev_close(&e);
         nn_model_free(&model);
     }
     io_material_free(&m);
@@ -105,17 +115,20 @@ TEST(eval_noise_is_seeded_and_none_is_exact)
 TEST(eval_summary_is_mean_and_deviation)
 {
     const char *const names[] = {"one", "two"};
-    ev_report r = {.steps = 1, .sets = 2, .set_name = names};
+    ev_subject method = {.label = "m", .points = 2};
+    int step[] = {0, 1};
+    ev_report r = {.sets = 2, .set_name = names, .method = &method, .methods = 1, .step = step, .columns = 2};
     ts_status st = {0};
     static const double value[] = {1, 2, 6, 5};
     for (int i = 0; i < 4; i++) {
-        ev_row row[2];
-        const double seconds[2] = {0, value[i]};
+        CHECK(ev_report_add(&r, i / 3, "m", &st) == i, "%s", st.message);
+        CHECK(isnan(r.result[i].seconds[0]) && isnan(r.result[i].row[1].value[0]), "what was not measured is a number");
+        r.result[i].seconds[0] = 0;
+        r.result[i].seconds[1] = value[i];
         for (int k = 0; k < EV_METRICS; k++) {
-            row[0].value[k] = value[i] + k;
-            row[1].value[k] = 10 * value[i];
+            r.result[i].row[0].value[k] = value[i] + k;
+            r.result[i].row[1].value[k] = 10 * value[i];
         }
-        CHECK(ev_report_add(&r, i / 3, "m", row, seconds, NULL, 0, &st) == TS_OK, "%s", st.message);
     }
     ev_row mean, deviation;
     CHECK(ev_report_summary(&r, 0, 0, &mean, &deviation) == 3, "three materials");
@@ -130,18 +143,27 @@ TEST(eval_summary_is_mean_and_deviation)
 TEST(eval_csv_quotes_what_needs_it)
 {
     const char *const names[] = {"maps:a,b \"c\""};
-    ev_report r = {.steps = 0, .sets = 1, .set_name = names, .model = "m", .isa = "base"};
+    ev_subject method = {.label = "d:x=1,y=2", .points = 1, .bytes = 7};
+    int step[] = {20};
+    ev_report r = {.sets = 1, .set_name = names, .model = "m", .isa = "base", .method = &method, .methods = 1, .step = step, .columns = 1, .threads = 1};
     ts_status st = {0};
-    const double second = 1;
-    ev_row row = {{0.5, 0.25, 0.125, 0, 1, 12, NAN, 0.75, 2, NAN}};
     char path[256], line[256] = "";
-    CHECK(ev_report_add(&r, 0, "plain", &row, &second, NULL, 0, &st) == TS_OK && ev_report_write(&r, test_folder(), &st) == TS_OK, "%s", st.message);
+    CHECK(ev_report_add(&r, 0, "plain", &st) == 0, "%s", st.message);
+    r.result[0].row[0] = (ev_row){{0.5, 0.25, 0.125, 0, 1, 12, NAN, 0.75, 2, NAN}};
+    r.result[0].seconds[0] = 1.5;
+    r.result[0].peak[0] = 2e9;
+    CHECK(ev_report_write(&r, test_folder(), &st) == TS_OK, "%s", st.message);
     snprintf(path, sizeof path, "%s/results.csv", test_folder());
     FILE *f = fopen(path, "r");
     CHECK(f && fgets(line, sizeof line, f), "%s is missing", path);
-    CHECK(strcmp(line, "set,material,step,diffuse,specular,roughness,normal,render,angle,ssim,flip,exposure,lpips\n") == 0, "header: %s", line);
-    CHECK(fgets(line, sizeof line, f) && strcmp(line, "\"maps:a,b \"\"c\"\"\",plain,0,0.500000,0.250000,0.125000,0.000000,1.000000,12.000000,,0.750000,2.000000,\n") == 0, "row: %s", line);
+    CHECK(strcmp(line, "set,material,method,step,diffuse,specular,roughness,normal,render,angle,ssim,flip,exposure,lpips\n") == 0, "header: %s", line);
+    CHECK(fgets(line, sizeof line, f) && strcmp(line, "\"maps:a,b \"\"c\"\"\",plain,\"d:x=1,y=2\",20,0.500000,0.250000,0.125000,0.000000,1.000000,12.000000,,0.750000,2.000000,\n") == 0, "row: %s", line);
     CHECK(!fgets(line, sizeof line, f), "more rows: %s", line);
+    fclose(f);
+    snprintf(path, sizeof path, "%s/times.csv", test_folder());
+    f = fopen(path, "r");
+    CHECK(f && fgets(line, sizeof line, f) && fgets(line, sizeof line, f), "%s is missing", path);
+    CHECK(strcmp(line, "\"maps:a,b \"\"c\"\"\",1,\"d:x=1,y=2\",20,1.500000,2.000000,7,1\n") == 0, "row: %s", line);
     fclose(f);
     st = (ts_status){0};
     CHECK(ev_report_write(&r, "/proc/nowhere", &st) == TS_IO && strstr(st.message, "results.csv"), "%s", st.message);

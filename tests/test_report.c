@@ -24,29 +24,38 @@ static int count(const char *text, const char *what)
     return n;
 }
 
-/* Two sets, three materials, hostile names, and numbers that were not measured. */
-static void make(ev_report *r)
+/* Two sets, three materials, hostile names, and numbers that were not measured. One method with two steps, or two methods with one each. */
+static void make(ev_report *r, int methods)
 {
     static const char *const sets[] = {"maps:<a> & \"b\"", "procedural:1,1"}, *const materials[] = {"</article><script>x</script>", "back\\slash\"quote", "tab\there"};
     static const char png[] = "any bytes"; /* the page does not look into them */
+    static ev_subject method[2];
+    static int step[2];
     ts_status st = {0};
-    *r = (ev_report){.steps = 1, .sets = 2, .size = 8, .threads = 1, .set_name = sets, .model = "m<1>.safetensors", .isa = "base"};
+    step[0] = 0, step[1] = methods == 1;
+    method[0] = (ev_subject){.label = "lgd<1>", .points = 3 - methods, .bytes = 2000000};
+    method[1] = (ev_subject){.label = "descent:steps=2", .first = 1, .points = 1};
+    *r = (ev_report){.sets = 2, .size = 8, .threads = 1, .repeat = 1, .set_name = sets, .model = "m<1>.safetensors", .isa = "base", .method = method, .methods = methods, .step = step, .columns = 2};
     for (int i = 0; i < 3; i++) {
-        ev_row row[2];
-        const double seconds[2] = {0.5, 1.5};
+        CHECK(ev_report_add(r, i / 2, materials[i], &st) == i, "%s", st.message);
+        ev_result *to = &r->result[i];
         for (int k = 0; k < EV_METRICS; k++) {
-            row[0].value[k] = k == EV_EXPOSURE || (k == EV_SSIM && i == 0) ? NAN : 0.25 * (i + 1);
-            row[1].value[k] = row[0].value[k] / 2;
+            to->row[0].value[k] = k == EV_EXPOSURE || (k == EV_SSIM && i == 0) ? NAN : 0.25 * (i + 1);
+            to->row[1].value[k] = to->row[0].value[k] / 2;
         }
-        unsigned char *copy = i == 1 ? (unsigned char *)strdup(png) : NULL;
-        CHECK(ev_report_add(r, i / 2, materials[i], row, seconds, copy, i == 1 ? strlen(png) : 0, &st) == TS_OK, "%s", st.message);
+        to->seconds[0] = 0.5;
+        to->seconds[1] = 1.5;
+        to->peak[0] = 5e11;
+        if (i != 1) continue;
+        to->png[0] = (unsigned char *)strdup(png);
+        to->png_size[0] = strlen(png);
     }
 }
 
 TEST(report_html)
 {
     ev_report r;
-    make(&r);
+    make(&r, 1);
     char *text = written(ev_html_write, &r);
     CHECK(count(text, "<article ") == 3 && count(text, "</article>") == 3, "%d materials", count(text, "<article "));
     CHECK(count(text, "<script>") == 1 && strstr(text, "&lt;script&gt;x"), "a name is markup");
@@ -95,7 +104,8 @@ static const char *value(const char *p)
     if (*p == '{') return list(p, '}');
     if (*p == '[') return list(p, ']');
     if (*p == '"') return string(p);
-    if (!strncmp(p, "null", 4)) return p + 4;
+    if (!strncmp(p, "null", 4) || !strncmp(p, "true", 4)) return p + 4;
+    if (!strncmp(p, "false", 5)) return p + 5;
     CHECK(*p == '-' || (*p >= '0' && *p <= '9'), "no value: %.20s", p);
     strtod(p, &end);
     return end;
@@ -104,13 +114,36 @@ static const char *value(const char *p)
 TEST(report_json)
 {
     ev_report r;
-    make(&r);
+    make(&r, 1);
     char *text = written(ev_json_write, &r);
     CHECK(*blank(value(blank(text))) == 0, "something after the end");
     CHECK(count(text, "\"name\"") == 5 && count(text, "\"seconds\": 1.5") == 5, "%d names", count(text, "\"name\""));
+    CHECK(strstr(text, "{\"label\": \"lgd<1>\", \"bytes\": 2000000, \"peak_flops\": 5e+11}"), "the method");
     CHECK(count(text, "\"ssim\": null") == 2 && strstr(text, "\"ssim\": 0.25"), "what was not measured");
     CHECK(strstr(text, "back\\\\slash\\\"quote") && strstr(text, "tab\\u0009here"), "names are not escaped");
     free(text);
+    ev_report_free(&r);
+}
+
+TEST(report_of_several_methods)
+{
+    ev_report r;
+    make(&r, 2);
+    char *text = written(ev_html_write, &r), *json = written(ev_json_write, &r);
+    CHECK(count(text, "<th>lgd&lt;1&gt;</th><th>descent:steps=2</th>") == 3, "a column for each method");
+    CHECK(count(text, "<option ") == 2 && count(text, "data-render-1=\"0.125000\"") == 1 && count(text, "data-render=\"0.250000\"") == 1, "the sort keys");
+    CHECK(count(text, "<circle") == 2 + 2, "%d points in the plot", count(text, "<circle"));
+    CHECK(!strstr(text, "nan") && !strstr(text, "inf") && *blank(value(blank(json))) == 0, "a number is none");
+    char *table = NULL;
+    size_t size;
+    FILE *f = open_memstream(&table, &size);
+    CHECK(f, "open_memstream");
+    ev_report_print(&r, f);
+    fclose(f);
+    CHECK(count(table, "\nlgd<1>  ") == 3 && count(table, "\ndescent:steps=2  ") == 3 && count(table, "-50.0%") == 3, "%s", table);
+    free(text);
+    free(json);
+    free(table);
     ev_report_free(&r);
 }
 
@@ -123,10 +156,24 @@ TEST(report_plot)
         size_t size;
         FILE *f = open_memstream(&text, &size);
         CHECK(f, "open_memstream");
-        ev_plot_write(f, "x <", "y", n == 3 ? series + 1 : series, n == 3 ? 1 : n);
+        ev_plot_write(f, &(ev_axes){"x <", "y", true}, n == 3 ? series + 1 : series, n == 3 ? 1 : n);
         fclose(f);
         CHECK(!strstr(text, "nan") && !strstr(text, "inf") && !strstr(text, "zero"), "%s", text);
         CHECK(strstr(text, "nothing was measured") ? n == 0 : count(text, "<circle") == (n == 3 ? 2 : n == 2 ? 5 : 3), "%d series: %d circles", n, count(text, "<circle"));
         free(text);
     }
+}
+
+TEST(report_plot_has_a_linear_axis_too)
+{
+    const ev_point some[] = {{-1, 0.2, 0, ""}, {0, 0.1, 0, "zero"}, {24, 0.3, 0, ""}};
+    const ev_series series = {"s", some, 3};
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    CHECK(f, "open_memstream");
+    ev_plot_write(f, &(ev_axes){"T", "y", false}, &series, 1);
+    fclose(f);
+    CHECK(count(text, "<circle") == 4 && strstr(text, "zero") && strstr(text, ">10</text>") && strstr(text, ">20</text>"), "%s", text);
+    free(text);
 }

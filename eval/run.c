@@ -1,0 +1,198 @@
+#include "eval/run.h"
+#include "eval/multiview.h"
+#include "eval/sheet.h"
+#include "render/error.h"
+#include "tensor/cpu.h"
+#include "tensor/peak.h"
+#include "tensor/threads.h"
+#include <stdlib.h>
+#include <string.h>
+
+enum { PATH_LENGTH = 4096, PICTURES = 256 /* in a report: some 80 MB */ };
+
+/* What one material needs. */
+typedef struct bench {
+    io_material truth;
+    io_capture capture;
+    rd_view views[RD_EVAL_VIEWS];
+    float *image, *first, *last;
+    ev_row *row;
+    double *seconds;
+    const char *name;
+    int pictures;
+    int *at;   /* of each material: its result, or -1: none yet */
+    bool *bad; /* it cannot be read */
+} bench;
+
+static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, ts_status *st)
+{
+    const uint64_t identity = ev_set_identity(set, i);
+    const bool capture = set->kind == EV_MULTIVIEW;
+    b->name = "";
+    if ((capture ? ev_set_load_capture(set, i, r->size, &b->capture, st) : ev_set_load(set, i, r->size, &b->truth, st)) != TS_OK) return st->code;
+    if (capture) {
+        b->name = b->capture.name;
+        ev_capture_input(&b->capture, b->image);
+        *c = ev_case_of_capture(&b->capture, b->image, r->perceptual);
+        c->lpips = r->lpips;
+        return TS_OK;
+    }
+    b->name = b->truth.name;
+    ts_rng rng = ts_rng_make(r->seed, TS_STREAM_EVAL, identity);
+    rd_eval_views(&rng, RD_EVAL_VIEWS, b->views);
+    ev_photograph(&b->truth, (float)r->noise, r->seed, identity, b->image);
+    *c = ev_case_of_maps(&b->truth, b->image, b->views, r->perceptual);
+    c->lpips = r->lpips;
+    return TS_OK;
+}
+
+static bool begin(int step, const float *maps, int channels, void *user)
+{
+    (void)maps, (void)channels, (void)user;
+    return step < 2;
+}
+
+static ts_code sheet(const ev_run *r, const bench *b, const ev_case *c, int set, int method, ts_status *st)
+{
+    char path[PATH_LENGTH];
+    const char *label = r->methods > 1 ? r->method[method].label : "";
+    if (snprintf(path, sizeof path, "%s/%d-%s%s%s.png", r->images, set + 1, b->name, *label ? "-" : "", label) >= (int)sizeof path)
+        return ts_fail(st, TS_INVALID, "%s: the name is too long", r->images);
+    return ev_sheet_write(path, c, b->first, b->last, st);
+}
+
+/* A material by an open method; into the report only when all went well. */
+static ts_code one(ev_run *r, bench *b, int set, int m, int64_t number, const ev_case *c, ts_status *st)
+{
+    ev_estimator *e = &r->method[m];
+    const ev_subject *s = &r->subject[m];
+    unsigned char *png = NULL;
+    size_t png_size = 0;
+    ts_code code = ev_estimate(e, c, r->step + s->first, s->points, r->repeat, b->row, b->seconds, b->first, b->last, st);
+    if (!code && r->images) code = sheet(r, b, c, set, m, st);
+    if (!code && r->pictures && b->pictures < PICTURES) {
+        code = ev_sheet_png(c, b->last, &png, &png_size, st);
+        b->pictures++;
+    }
+    if (!code && b->at[number] < 0) {
+        b->at[number] = ev_report_add(&r->report, set, b->name, st);
+        if (b->at[number] < 0) code = st->code;
+    }
+    if (code) {
+        free(png);
+        return code;
+    }
+    ev_result *to = &r->report.result[b->at[number]];
+    memcpy(to->row + s->first, b->row, (size_t)s->points * sizeof *to->row);
+    memcpy(to->seconds + s->first, b->seconds, (size_t)s->points * sizeof *to->seconds);
+    to->peak[m] = ts_fma_peak();
+    to->png[m] = png;
+    to->png_size[m] = png_size;
+    return TS_OK;
+}
+
+static ts_code all_materials(ev_run *r, bench *b, int m, int64_t total, ts_status *st)
+{
+    int64_t number = 0;
+    bool warm = false;
+    for (int s = 0; s < r->sets; s++)
+        for (int i = 0; i < r->set[s].count; i++, number++) {
+            ev_case c;
+            if (b->bad[number]) continue;
+            *st = (ts_status){0};
+            b->bad[number] = load(r, b, &r->set[s], i, &c, st) != TS_OK;
+            if (!st->code && !warm) {
+                r->method[m].method->run(&r->method[m], &c, begin, NULL, st);
+                warm = true;
+            }
+            if (!st->code && one(r, b, s, m, number, &c, st) == TS_INTERRUPTED) return st->code;
+            if (st->code) {
+                if (!b->bad[number]) ts_context(st, "%s: %s%s%s", r->set[s].spec, b->name, r->methods > 1 ? ", " : "", r->methods > 1 ? r->method[m].label : "");
+                if (r->failed) r->failed(st->message, r->user);
+                r->failures++;
+            }
+            if (r->done) r->done(total * m + number + 1, total * r->methods, b->name, r->user);
+        }
+    *st = (ts_status){0};
+    return TS_OK;
+}
+
+/* The columns, and that every method can be opened. */
+static ts_code plan(ev_run *r, ts_status *st)
+{
+    int *step = malloc(EV_POINTS * sizeof *step);
+    ts_code code = step ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory");
+    r->subject = calloc((size_t)r->methods, sizeof *r->subject);
+    if (!r->subject) code = ts_fail(st, TS_NOMEM, "out of memory");
+    for (int m = 0, columns = 0; m < r->methods && !code; m++) {
+        code = ev_open(&r->method[m], st);
+        if (code) break;
+        const int points = ev_points(&r->method[m], step);
+        int *more = realloc(r->step, (size_t)(columns + points) * sizeof *more);
+        if (!more) code = ts_fail(st, TS_NOMEM, "out of memory");
+        else memcpy((r->step = more) + columns, step, (size_t)points * sizeof *step);
+        r->subject[m] = (ev_subject){.label = r->method[m].label, .first = columns, .points = points};
+        columns += points;
+        r->report.columns = columns;
+        ev_close(&r->method[m]);
+    }
+    free(step);
+    return code;
+}
+
+static bool make(ev_run *r, bench *b, int64_t total)
+{
+    const size_t pixels = (size_t)r->size * (size_t)r->size;
+    b->image = malloc(pixels * 3 * sizeof *b->image);
+    b->first = malloc(pixels * MAP_CHANNELS * sizeof *b->first);
+    b->last = malloc(pixels * MAP_CHANNELS * sizeof *b->last);
+    b->row = malloc((size_t)r->report.columns * sizeof *b->row);
+    b->seconds = malloc((size_t)r->report.columns * sizeof *b->seconds);
+    b->at = malloc((size_t)total * sizeof *b->at);
+    b->bad = calloc((size_t)total, sizeof *b->bad);
+    for (int64_t i = 0; i < total && b->at; i++) b->at[i] = -1;
+    return b->image && b->first && b->last && b->row && b->seconds && b->at && b->bad;
+}
+
+static void clear(bench *b)
+{
+    io_material_free(&b->truth);
+    io_capture_free(&b->capture);
+    free(b->image);
+    free(b->first);
+    free(b->last);
+    free(b->row);
+    free(b->seconds);
+    free(b->at);
+    free(b->bad);
+}
+
+ts_code ev_run_all(ev_run *r, ts_status *st)
+{
+    bench b = {0};
+    int64_t total = 0;
+    for (int s = 0; s < r->sets; s++) total += r->set[s].count;
+    r->report = (ev_report){.sets = r->sets, .size = r->size, .threads = ts_threads(), .repeat = r->repeat, .pinned = r->pinned, .set_name = r->set_name, .model = r->model,
+                            .isa = ts_isa_name(ts_isa_now()), .methods = r->methods};
+    ts_code code = plan(r, st);
+    r->report.method = r->subject;
+    r->report.step = r->step;
+    if (!code && !make(r, &b, total)) code = ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", r->size, r->size);
+    for (int m = 0; m < r->methods && !code; m++) {
+        code = ev_open(&r->method[m], st);
+        if (!code) code = all_materials(r, &b, m, total, st);
+        r->subject[m].bytes = ev_bytes(&r->method[m]);
+        ev_close(&r->method[m]);
+    }
+    clear(&b);
+    return code;
+}
+
+void ev_run_free(ev_run *r)
+{
+    ev_report_free(&r->report);
+    free(r->subject);
+    free(r->step);
+    r->subject = NULL;
+    r->step = NULL;
+}
