@@ -1,4 +1,5 @@
 #include "data/image.h"
+#include "data/scikit.h"
 #include "tensor/resize.h"
 #include <stdlib.h>
 #include <string.h>
@@ -33,7 +34,20 @@ static ts_code resample(const io_image *in, io_image *out, ts_status *st)
     return code;
 }
 
-ts_code io_centre_square(const io_image *in, int size, io_image *out, ts_status *st)
+static ts_code resample_scikit(const io_image *in, io_image *out, ts_status *st)
+{
+    ts_arena *arena = ts_arena_create(0, st);
+    if (!arena) return TS_NOMEM;
+    const ts_taps rows = io_taps_scikit(arena, in->height, out->height), columns = io_taps_scikit(arena, in->width, out->width);
+    const bool fine = rows.weight && columns.weight;
+    if (fine) ts_resample(1, in->channels, &rows, &columns, in->data, out->data, false);
+    ts_arena_destroy(&arena);
+    return fine ? TS_OK : ts_fail(st, TS_NOMEM, "no memory to resample an image of %d x %d pixels", in->width, in->height);
+}
+
+typedef ts_code resampler(const io_image *in, io_image *out, ts_status *st);
+
+static ts_code centre_square(const io_image *in, int size, resampler *by, io_image *out, ts_status *st)
 {
     int side = in->width < in->height ? in->width : in->height, x0 = (in->width - side) / 2, y0 = (in->height - side) / 2;
     size_t row = (size_t)side * (size_t)in->channels;
@@ -47,8 +61,15 @@ ts_code io_centre_square(const io_image *in, int size, io_image *out, ts_status 
         return TS_OK;
     }
     ts_code code = io_image_create(out, size, size, in->channels, st);
-    if (code == TS_OK) code = resample(&square, out, st);
+    if (code == TS_OK) code = by(&square, out, st);
     if (code != TS_OK) io_image_free(out);
     io_image_free(&square);
     return code;
+}
+
+ts_code io_centre_square(const io_image *in, int size, io_image *out, ts_status *st) { return centre_square(in, size, resample, out, st); }
+
+ts_code io_centre_square_scikit(const io_image *in, int size, io_image *out, ts_status *st)
+{
+    return centre_square(in, size, resample_scikit, out, st);
 }

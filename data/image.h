@@ -22,12 +22,21 @@ void io_image_free(io_image *image); /* and zeroes the struct */
  * The size is checked against max_pixels before memory is taken. */
 ts_code io_read_photo(const char *path, int64_t max_pixels, io_image *image, ts_status *st);
 
+/* A photograph with its values as stored, integers / their maximum: upright, three channels, alpha ignored, no colour transform. Float formats,
+ * which are linear, are raised to 1 / gamma, so that all come in one encoding. */
+ts_code io_read_stored(const char *path, int64_t max_pixels, double gamma, io_image *image, ts_status *st);
+
 /* A data image (a map): values as stored, integers / their maximum, no colour transform, orientation ignored. channels: 1 or 3 forced. */
 ts_code io_read_data(const char *path, int channels, int64_t max_pixels, io_image *image, ts_status *st);
 
 /* The largest centred square, resampled to size x size by an antialiased filter in linear light (ts_resize: no ringing). in may have any number
  * of channels; out is created, also where size is the square's own. */
 ts_code io_centre_square(const io_image *in, int size, io_image *out, ts_status *st);
+
+/* The same by the filter of scikit-image's transform.resize from 0.19 on, with its defaults (order 1, mode "reflect", anti-aliasing where it shrinks): a
+ * Gaussian of sigma (in / size - 1) / 2 cut off at 4 sigma, then linear interpolation at (j + 1/2) in / size - 1/2, both axes mirrored about the
+ * outermost pixels' centres. */
+ts_code io_centre_square_scikit(const io_image *in, int size, io_image *out, ts_status *st);
 
 /* PNG, bits 8 or 16; srgb: encode linear values by the sRGB curve and tag the file so. Values are clamped to [0, 1], NaN becomes 0; a fourth
  * channel is straight alpha and never encoded. Written to a temporary file in the same folder, synced and renamed; an existing device or pipe

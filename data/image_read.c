@@ -104,6 +104,27 @@ ts_code io_read_colour_map(const char *path, int64_t max_pixels, io_image *image
     return read_colour(path, max_pixels, false, image, st);
 }
 
+ts_code io_read_stored(const char *path, int64_t max_pixels, double gamma, io_image *image, ts_status *st)
+{
+    oi_image raw;
+    *image = (io_image){0};
+    ts_code code = read_raw(path, max_pixels, &raw, st);
+    if (code != TS_OK) return code;
+    const bool swap = raw.orientation >= 5;
+    code = io_image_create(image, swap ? raw.height : raw.width, swap ? raw.width : raw.height, 3, st);
+    float *out = image->data;
+    for (int y = 0; code == TS_OK && y < image->height; y++)
+        for (int x = 0; x < image->width; x++, out += 3) {
+            const float *in = raw.data + stored_at(raw.orientation, x, y, raw.width, raw.height) * (size_t)raw.channels;
+            for (int c = 0; c < 3; c++) {
+                const float v = in[raw.colour[c]];
+                out[c] = !(v > 0) ? 0 : raw.floating ? powf(v, (float)(1 / gamma)) : v;
+            }
+        }
+    oi_free(&raw);
+    return code == TS_OK ? code : ts_context(st, "%s", path);
+}
+
 ts_code io_read_data(const char *path, int channels, int64_t max_pixels, io_image *image, ts_status *st)
 {
     oi_image raw;

@@ -7,6 +7,7 @@
 #include "infer/model_path.h"
 #include "infer/options.h"
 #include "infer/output.h"
+#include "infer/photograph.h"
 #include "infer/pipeline.h"
 #include "tensor/threads.h"
 #include <stdio.h>
@@ -137,9 +138,11 @@ static int work(const lgd_command *c)
     ts_threads_set(c->threads);
     run r = {.command = c, .jobs = plan.jobs};
     int code = CL_FAILED;
+    bool published = false;
     lgd_pipeline *pipeline = NULL;
     if (lgd_model_path(c->model, *c->capture ? "multi" : "single", weights, &st) != TS_OK) cl_failed("%s", st.message);
-    else if (!(pipeline = lgd_pipeline_start(&plan, c, &st))) cl_failed("%s", st.message); /* decodes while the weights are read */
+    else if (lgd_weights_published(weights, &published, &st) != TS_OK) cl_failed("%s", st.message);
+    else if (!(pipeline = lgd_pipeline_start(&plan, c, published, &st))) cl_failed("%s", st.message); /* decodes while the weights are read */
     else if (!(r.model = lgd_load(weights, &error))) cl_failed("%s", error.message);
     else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK) cl_failed("%s", st.message);
     else {

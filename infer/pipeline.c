@@ -1,5 +1,6 @@
 #include "infer/pipeline.h"
 #include "infer/output.h"
+#include "infer/photograph.h"
 #include "infer/queue.h"
 #include "tensor/threads.h"
 #include <math.h>
@@ -16,7 +17,7 @@ struct lgd_pipeline {
     lgd_item item[ITEMS];
     lgd_queue idle, inbox, computed; /* inbox: for the computing thread; NULL there: no more is decoded */
     pthread_t decoder, writer;
-    bool decoding, writing;
+    bool published, decoding, writing;
     atomic_bool stopped;
 };
 
@@ -47,17 +48,17 @@ static void decode_capture(const lgd_command *c, lgd_item *item)
     else memcpy(item->square.data, item->capture.image, (size_t)c->size * (size_t)c->size * 3 * sizeof(float));
 }
 
-static void decode(const lgd_command *c, lgd_item *item)
+static void decode(const lgd_command *c, bool published, lgd_item *item)
 {
     if (*c->capture) {
         decode_capture(c, item);
         return;
     }
     io_image photo = {0};
-    ts_code code = io_read_photo(item->job->photo, c->max_pixels, &photo, &item->st);
+    ts_code code = lgd_photograph_read(item->job->photo, published, c->max_pixels, &photo, &item->st);
     if (!code) {
         item->photo_side = photo.width < photo.height ? photo.width : photo.height;
-        if (io_centre_square(&photo, c->size, &item->square, &item->st) || (c->mask && read_mask(c, &photo, &item->mask, &item->st)))
+        if (lgd_photograph_square(&photo, published, c->size, &item->square, &item->st) || (c->mask && read_mask(c, &photo, &item->mask, &item->st)))
             ts_context(&item->st, "%s", item->job->photo);
     }
     io_image_free(&photo);
@@ -70,7 +71,7 @@ static void *decode_all(void *user)
     for (int i = 0; i < p->plan->jobs && lgd_queue_pop(&p->idle, &next) && !p->stopped; i++) {
         lgd_item *item = next;
         *item = (lgd_item){.job = &p->plan->job[i], .index = i, .decoded = true};
-        decode(p->command, item);
+        decode(p->command, p->published, item);
         lgd_queue_push(&p->inbox, item);
     }
     lgd_queue_push(&p->inbox, NULL);
@@ -96,11 +97,11 @@ static void *write_all(void *user)
     return NULL;
 }
 
-lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *command, ts_status *st)
+lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *command, bool published, ts_status *st)
 {
     lgd_pipeline *p = calloc(1, sizeof *p);
     if (!p) return ts_fail(st, TS_NOMEM, "out of memory"), NULL;
-    *p = (lgd_pipeline){.plan = plan, .command = command, .idle = LGD_QUEUE_INITIALIZER, .inbox = LGD_QUEUE_INITIALIZER, .computed = LGD_QUEUE_INITIALIZER};
+    *p = (lgd_pipeline){.plan = plan, .command = command, .published = published, .idle = LGD_QUEUE_INITIALIZER, .inbox = LGD_QUEUE_INITIALIZER, .computed = LGD_QUEUE_INITIALIZER};
     for (int i = 0; i < (command->size > LARGE ? 1 : ITEMS); i++) lgd_queue_push(&p->idle, &p->item[i]);
     p->decoding = pthread_create(&p->decoder, NULL, decode_all, p) == 0;
     p->writing = p->decoding && pthread_create(&p->writer, NULL, write_all, p) == 0;

@@ -25,8 +25,8 @@ typedef struct lgd_item {
 
 typedef struct lgd_pipeline lgd_pipeline;
 
-/* Starts decoding at once, in the plan's order; plan and command outlive the pipeline. NULL with st on failure. */
-lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *command, ts_status *st);
+/* Starts decoding at once, in the plan's order, published: as infer/photograph.h says; plan and command outlive the pipeline. NULL with st on failure. */
+lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *command, bool published, ts_status *st);
 
 /* Computes the maps of an item, or sets its st. */
 typedef void (*lgd_compute)(lgd_item *item, void *user);

@@ -1,6 +1,7 @@
 /* The architecture's fields in one table: default, range, metadata key. */
 #include "nn/weights.h"
 #include "nn/layers.h"
+#include "nn/published.h"
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,8 +18,8 @@ typedef struct field {
     bool late; /* files older than the field do not have it */
 } field;
 
-static const char *const rmse_words[] = {"start", "batch"}, *const encoding_words[] = {"raw", "asinh"};
-_Static_assert(sizeof(nn_rmse) == sizeof(int) && sizeof(nn_gradient) == sizeof(int), "a word's field is read and written as an int");
+static const char *const rmse_words[] = {"start", "batch"}, *const encoding_words[] = {"raw", "asinh"}, *const compat_words[] = {"none", "published"};
+_Static_assert(sizeof(nn_rmse) == sizeof(int) && sizeof(nn_compat) == sizeof(int) && sizeof(nn_gradient) == sizeof(int), "a word's field is read and written as an int");
 
 /* The upper ends only keep products of sizes far from overflow. The defaults are the model that two cores can train. */
 #define AT(member) offsetof(nn_arch, member)
@@ -40,6 +41,7 @@ static const field fields[] = {
     {"rmse", FIELD_WORD, AT(rmse), NN_RMSE_START, NN_RMSE_BATCH, NN_RMSE_START, rmse_words, false},
     {"encoding", FIELD_WORD, AT(encoding), NN_GRADIENT_RAW, NN_GRADIENT_ASINH, NN_GRADIENT_ASINH, encoding_words, false},
     {.key = "images", .kind = FIELD_INT, .at = AT(images), .lo = 1, .hi = NN_MAX_IMAGES, .start = 1, .late = true},
+    {.key = "compat", .kind = FIELD_WORD, .at = AT(compat), .hi = NN_COMPAT_PUBLISHED, .words = compat_words, .late = true},
     {.key = "latent", .kind = FIELD_INT, .at = AT(latent), .hi = 1024, .late = true},
 };
 enum { FIELDS = sizeof fields / sizeof *fields };
@@ -85,6 +87,8 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
     if (a->latent > 0 && a->h_width > 0) return ts_fail(st, TS_INVALID, "latent is %d: an auto-encoder has no refiner, so h_width must be 0", a->latent);
     if (a->images > 1 && a->rmse == NN_RMSE_BATCH)
         return ts_fail(st, TS_INVALID, "images is %d: with rmse = batch it must be 1", a->images);
+    if (a->compat == NN_COMPAT_PUBLISHED && (a->descent || a->images > 1 || a->latent > 0 || a->rmse != NN_RMSE_BATCH))
+        return ts_fail(st, TS_INVALID, "compat is published: that needs descent = false, rmse = batch, images 1 and latent 0");
     if (a->h_width == 0 && a->iterations != 0)
         return ts_fail(st, TS_INVALID, "iterations is %d: without a refiner (h_width 0) it must be 0", a->iterations);
     return TS_OK;
@@ -140,9 +144,12 @@ ts_code nn_arch_from_file(const nn_file *file, nn_arch *arch, ts_status *st)
 {
     const char *format = nn_file_meta(file, "format"), *key;
     memset(arch, 0, sizeof *arch);
-    if (!format || strcmp(format, "lgd") != 0)
-        return ts_fail(st, TS_FORMAT, "%s: metadata key \"format\" is %.40s, not \"lgd\": these are not weights of this program",
+    if (!format || strcmp(format, "lgd") != 0) {
+        if (nn_published_file(file)) return nn_published_arch(file, arch, st);
+        return ts_fail(st, TS_FORMAT,
+                       "%s: metadata key \"format\" is %.40s, not \"lgd\", and the tensors are not the published network's: these are not weights of this program",
                        nn_file_path(file), format ? format : "missing");
+    }
     for (int i = 0; (key = nn_file_meta_key(file, i)) != NULL; i++) {
         bool known = strncmp(key, prefix, sizeof prefix - 1) != 0;
         for (int j = 0; j < FIELDS && !known; j++) known = !strcmp(key + sizeof prefix - 1, fields[j].key);

@@ -2,6 +2,7 @@
  * 2024): R_0 = g(image), R_{t+1} = R_t + h(R_t, dL/dR_t). */
 #include "nn/layers.h"
 #include "ops.h"
+#include "render/published.h"
 #include "render/render.h"
 #include "render/tone.h"
 #include "tensor/kernels/elementwise.h"
@@ -12,7 +13,14 @@
 
 static int given(const nn_input *in) { return in->given > 0 ? in->given : 1; }
 static int materials(const nn_input *in) { return in->image.shape.n / given(in); }
-static const rd_view *view_of(const nn_input *in, int photograph) { return in->views ? &in->views[photograph] : &in->view; }
+
+/* Under which a photograph was taken, as the model's renderer has it. */
+static rd_view view_of(const nn_model *model, const nn_input *in, int photograph)
+{
+    rd_view view = in->views ? in->views[photograph] : in->view;
+    if (model->arch.compat == NN_COMPAT_PUBLISHED && view.kind == RD_POINT) view.kind = RD_PUBLISHED;
+    return view;
+}
 
 static bool check(ag_tape *tape, const nn_model *model, const nn_input *in)
 {
@@ -96,8 +104,10 @@ static bool measure_start(ag_tape *tape, const nn_model *model, const nn_input *
     const int photographs = image->shape.n;
     state->rmse0 = ts_arena_alloc(ag_arena(tape), (size_t)photographs * sizeof *state->rmse0);
     if (!state->rmse0) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", photographs), false;
-    for (int i = 0; i < photographs; i++)
-        rd_flash_rmse(grid, maps->t.data + i / given(in) * one * s.c, s.c, view_of(in, i), image->data + i * one * 3, &state->rmse0[i]);
+    for (int i = 0; i < photographs; i++) {
+        const rd_view view = view_of(model, in, i);
+        rd_flash_rmse(grid, maps->t.data + i / given(in) * one * s.c, s.c, &view, image->data + i * one * 3, &state->rmse0[i]);
+    }
     return true;
 }
 
@@ -122,14 +132,16 @@ static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, 
     double common = 0;
     for (int i = 0; batch && i < s.n; i++) {
         double rmse;
-        rd_flash_rmse(in->grid, maps->t.data + i * pixels * s.c, s.c, view_of(in, i), in->image.data + i * pixels * 3, &rmse);
+        const rd_view view = view_of(model, in, i);
+        rd_flash_rmse(in->grid, maps->t.data + i * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, &rmse);
         common += rmse * rmse / s.n;
     }
     for (int i = 0; i < s.n * count; i++) {
         const int n = i / count, k = i % count;
         const double rmse = batch ? sqrt(common) : state->rmse0[i];
+        const rd_view view = view_of(model, in, i);
         float *own = to + n * pixels * images * s.c;
-        rd_flash_gradient(in->grid, maps->t.data + n * pixels * s.c, s.c, view_of(in, i), in->image.data + i * pixels * 3, rmse, apart ? apart : own,
+        rd_flash_gradient(in->grid, maps->t.data + n * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, rmse, apart ? apart : own,
                           NULL);
         if (apart) place(pixels, s.c, images, k, apart, own);
     }

@@ -1,5 +1,6 @@
 /* The list of parameters and the blocks that hold them. */
 #include "nn/layers.h"
+#include "nn/published.h"
 #include "ops.h"
 #include "tensor/block.h"
 #include <math.h>
@@ -7,14 +8,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Parameters of the largest model: 8 levels, two blocks of 7 each, and what lies before and after them. */
-enum { MAX_PARAMS = 4 + 2 * 7 * NN_MAX_LEVELS + 6 + 14 };
+/* Parameters of the largest model: 8 levels, two blocks of 11 each, and what lies before and after them. */
+enum { MAX_PARAMS = 4 + 2 * 11 * NN_MAX_LEVELS + 6 + 14 };
 
 static nn_layers *layers_of(const nn_model *m) { return m->layers; }
 
 static int add(nn_model *m, const char *layer, const char *what, int rank, const int *dim, double start)
 {
     nn_param *p = &m->param[m->params];
+    char theirs[64];
+    if (m->arch.compat == NN_COMPAT_PUBLISHED && nn_published_name(layer, theirs, sizeof theirs)) layer = theirs;
     snprintf(p->name, sizeof p->name, "%s.%s", layer, what);
     p->rank = rank;
     p->count = 1;
@@ -49,19 +52,34 @@ static nn_layer linear(nn_model *m, const char *name, int out, int in, double ga
  * "Self-Normalizing Neural Networks", NIPS 2017). */
 static double leaky_gain(double leak) { return sqrt(2 / (1 + leak * leak)); }
 
+/* A linear layer of a block, called way and number. */
+static nn_layer block_linear(nn_model *m, const char *way, int number, const char *what, int out, int in, double gain)
+{
+    char name[64];
+    snprintf(name, sizeof name, "g.%s%d.%s", way, number, what);
+    return linear(m, name, out, in, gain);
+}
+
 static nn_unet_block unet_block(nn_model *m, const char *way, int number, int in, int middle, int out, int global, int k)
 {
     char name[64];
     nn_unet_block b;
+    const bool published = m->arch.compat == NN_COMPAT_PUBLISHED, up = way[0] == 'u';
     double gain = leaky_gain(NN_LEAK_G);
-    snprintf(name, sizeof name, "g.%s%d.conv1", way, number);
-    b.conv1 = conv(m, name, middle, in, k, true, 1); /* conv2 follows at once */
-    snprintf(name, sizeof name, "g.%s%d.conv2", way, number);
-    b.conv2 = conv(m, name, out, middle, k, false, gain);
-    snprintf(name, sizeof name, "g.%s%d.add", way, number);
-    b.add = linear(m, name, out, global, gain / sqrt(2)); /* one of two summands: the features themselves have unit variance */
-    snprintf(name, sizeof name, "g.%s%d.global", way, number);
-    b.global = linear(m, name, out, out + global, 1);
+    for (int pass = 0; pass < 3; pass++) /* the published order is: linears of the way down, those of the way up, convolutions */
+        if (pass == (published ? 2 : 0)) {
+            snprintf(name, sizeof name, "g.%s%d.conv1", way, number);
+            b.conv1 = conv(m, name, middle, in, k, true, 1); /* conv2 follows at once */
+            snprintf(name, sizeof name, "g.%s%d.conv2", way, number);
+            b.conv2 = conv(m, name, out, middle, k, false, gain);
+        } else if (pass == (published ? up : 1)) {
+            b.add = block_linear(m, way, number, "add", out, global, gain / sqrt(2)); /* one of two summands: the features themselves have unit variance */
+            b.global = block_linear(m, way, number, "global", out, out + global, 1);
+        } else if (published) { /* made, kept in files, never read */
+            const int other = up ? in : in / 2;
+            block_linear(m, way, number, "unused1", out, other, 0);
+            block_linear(m, way, number, "unused2", out, out + other, 0);
+        }
     return b;
 }
 
@@ -101,13 +119,18 @@ static void plan_h(nn_model *m)
     for (int i = 0; i < 2; i++) {
         nn_cell *c = &l->cell[i];
         char name[64];
-        snprintf(name, sizeof name, "h.conv%d", i + 1);
-        c->conv = conv(m, name, a->h_width, i ? a->h_gru : (1 + a->images) * a->channels, i ? 3 : 5, true, gain);
-        snprintf(name, sizeof name, "h.gru%d.ih", i + 1);
-        c->input = conv(m, name, 3 * a->h_gru, a->h_width, 1, true, 1);
-        snprintf(name, sizeof name, "h.gru%d.hh", i + 1);
-        c->hidden = conv(m, name, 3 * a->h_gru, a->h_gru, 1, true, 1);
-        l->start[c->hidden.weight] = NN_ORTHOGONAL;
+        const bool last = a->compat == NN_COMPAT_PUBLISHED; /* in the published order the convolution comes last */
+        for (int pass = 0; pass < 2; pass++)
+            if (pass == last) {
+                snprintf(name, sizeof name, "h.conv%d", i + 1);
+                c->conv = conv(m, name, a->h_width, i ? a->h_gru : (1 + a->images) * a->channels, i ? 3 : 5, true, gain);
+            } else {
+                snprintf(name, sizeof name, "h.gru%d.ih", i + 1);
+                c->input = conv(m, name, 3 * a->h_gru, a->h_width, 1, true, 1);
+                snprintf(name, sizeof name, "h.gru%d.hh", i + 1);
+                c->hidden = conv(m, name, 3 * a->h_gru, a->h_gru, 1, true, 1);
+                l->start[c->hidden.weight] = NN_ORTHOGONAL;
+            }
     }
     l->h_output = conv(m, "h.output", a->channels, a->h_gru, 3, false, 1);
     l->start[l->h_output.weight] = 1e-3; /* h starts as nothing, nearly */

@@ -16,6 +16,12 @@ typedef enum nn_gradient {
 } nn_gradient;
 #define NN_GRADIENT_SCALE 10.0f
 
+typedef enum nn_compat {
+    NN_COMPAT_NONE,
+    NN_COMPAT_PUBLISHED /* Luo et al.'s code: its names of tensors, the linears that it has and never uses, its flash renderer (render/published.h), its
+                         * photographs (infer/photograph.h) */
+} nn_compat;
+
 /* Everything that a weights file must say about itself (its metadata, one key each). */
 enum { NN_MAX_IMAGES = 9 };
 typedef struct nn_arch {
@@ -36,6 +42,7 @@ typedef struct nn_arch {
     bool mean_before_norm; /* the global track's mean: before (ours) or after (published) the normalisation */
     nn_rmse rmse;
     nn_gradient encoding; /* of the gradient for h */
+    nn_compat compat;
     int latent;         /* channels of an auto-encoder's code: the model then is one of maps (nn_encode), shaped by g_width, g_width_max and g_levels, and
                          * has neither g nor h; 0: g and h */
 } nn_arch;

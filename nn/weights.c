@@ -1,6 +1,7 @@
 /* A model to a file and back. */
 #include "nn/weights.h"
 #include "nn/layers.h"
+#include "nn/published.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,7 +11,10 @@ static void dims_of(const nn_param *p, int64_t dim[4])
     for (int i = 0; i < 4; i++) dim[i] = p->dim[i];
 }
 
-static bool of_network(const char *name) { return !strncmp(name, "g.", 2) || !strncmp(name, "h.", 2) || !strncmp(name, "a.", 2); }
+static bool of_network(const char *name)
+{
+    return !strncmp(name, "g.", 2) || !strncmp(name, "h.", 2) || !strncmp(name, "a.", 2) || nn_published_tensor(name);
+}
 
 static bool finite_all(const float *v, size_t count)
 {

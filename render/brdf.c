@@ -1,4 +1,5 @@
 #include "render/brdf.h"
+#include "render/published.h"
 #include <math.h>
 
 const ts_shade_guards rd_guards = {
@@ -40,7 +41,9 @@ static double normalize3(double a[3])
     return length;
 }
 
-void rd_decode_double(const double maps[MAP_CHANNELS], rd_surface *s)
+static const ts_shade_guards *guards_of(const rd_view *view) { return view->kind == RD_PUBLISHED ? &rd_published.guards : &rd_guards; }
+
+static void decode(const ts_shade_guards *guards, const double maps[MAP_CHANNELS], rd_surface *s)
 {
     double x[MAP_CHANNELS];
     for (int i = 0; i < MAP_CHANNELS; i++) {
@@ -53,14 +56,14 @@ void rd_decode_double(const double maps[MAP_CHANNELS], rd_surface *s)
         s->specular[c] = (x[MAP_SPECULAR + c] + 1) / 2;
     }
     s->roughness = (x[MAP_ROUGHNESS] + 1) / 2;
-    if (s->roughness < rd_guards.roughness) {
-        s->roughness = rd_guards.roughness;
+    if (s->roughness < guards->roughness) {
+        s->roughness = guards->roughness;
         s->slope[MAP_ROUGHNESS] = 0;
     }
 
     double nx = x[MAP_NORMAL], ny = x[MAP_NORMAL + 1], z2 = 1 - nx * nx - ny * ny;
-    bool guard = z2 < rd_guards.nz2;
-    double nz = sqrt(guard ? rd_guards.nz2 : z2), length = sqrt(nx * nx + ny * ny + nz * nz);
+    bool guard = z2 < guards->nz2;
+    double nz = sqrt(guard ? guards->nz2 : z2), length = sqrt(nx * nx + ny * ny + nz * nz);
     double n[3] = {nx / length, ny / length, nz / length};
     for (int j = 0; j < 2; j++) {
         /* before the division by the length: (1, 0, -nx/nz) or (0, 1, -ny/nz); in the guard n_z is constant */
@@ -69,6 +72,8 @@ void rd_decode_double(const double maps[MAP_CHANNELS], rd_surface *s)
     }
     for (int i = 0; i < 3; i++) s->n[i] = n[i];
 }
+
+void rd_decode_double(const double maps[MAP_CHANNELS], rd_surface *s) { decode(&rd_guards, maps, s); }
 
 void rd_decode(const float maps[MAP_CHANNELS], rd_surface *s)
 {
@@ -90,32 +95,34 @@ double rd_half(const double l[3], const double v[3], double h[3])
 
 /* f and what its derivatives are made of. */
 typedef struct lobe {
-    double nl, nv, h[3], fresnel, specular; /* fresnel: F = s + (1 - s) fresnel; specular: D G / 4 */
+    double nl, nv, h[3], fresnel, specular; /* fresnel: F = s + (1 - s) fresnel; specular: D G / 4 as in brdf.h */
     double by_alpha, by_nl, by_nv, by_nh;   /* d specular / d each */
     bool seen;
 } lobe;
 
-static lobe evaluate(const rd_surface *s, const double l[3], const double v[3])
+static lobe evaluate(const ts_shade_guards *guards, const rd_surface *s, const double l[3], const double v[3])
 {
     lobe b = {.nl = dot3(s->n, l), .nv = dot3(s->n, v)};
     double vh = rd_half(l, v, b.h);
     b.seen = b.nl > 0 && b.nv > 0 && vh > 0; /* opposite l and v have no half vector; there n.l = -n.v */
     if (!b.seen) return b;
-    double nh = dot3(s->n, b.h), alpha = rd_alpha(s->roughness), k = alpha / 2, a2 = alpha * alpha;
-    double s2 = cross2(s->n, b.h), denominator = a2 * nh * nh + s2;
+    double nh = dot3(s->n, b.h), alpha = rd_alpha(s->roughness), k = alpha / 2 + guards->k, a2 = alpha * alpha;
+    double s2 = cross2(s->n, b.h), inner = a2 * nh * nh + s2, below = PI * inner * inner + guards->distribution;
     double gl = b.nl * (1 - k) + k, gv = b.nv * (1 - k) + k;
-    b.specular = a2 / (PI * denominator * denominator) / (gl * gv) / 4;
+    /* Without a guard this is 1 / 4, and its logarithm has no derivative. */
+    double cosines = b.nl * b.nv / (4 * b.nl * b.nv + guards->cosines), by_cosine = guards->cosines / (4 * b.nl * b.nv + guards->cosines);
+    b.specular = a2 / below / (gl * gv) * cosines;
     b.fresnel = rd_fresnel(vh);
-    b.by_alpha = b.specular * (2 * (s2 - a2 * nh * nh) / (alpha * denominator) - ((1 - b.nl) / gl + (1 - b.nv) / gv) / 2);
-    b.by_nl = -b.specular * (1 - k) / gl;
-    b.by_nv = -b.specular * (1 - k) / gv;
-    b.by_nh = b.specular * 4 * (1 - alpha) * (1 + alpha) * nh / denominator; /* n moves on the sphere, so |n x h|^2 = 1 - (n.h)^2 */
+    b.by_alpha = b.specular * (2 * (PI * inner * (s2 - a2 * nh * nh) + guards->distribution) / (alpha * below) - ((1 - b.nl) / gl + (1 - b.nv) / gv) / 2);
+    b.by_nl = b.specular * (by_cosine / b.nl - (1 - k) / gl);
+    b.by_nv = b.specular * (by_cosine / b.nv - (1 - k) / gv);
+    b.by_nh = b.specular * 4 * PI * inner * (1 - alpha) * (1 + alpha) * nh / below; /* n moves on the sphere, so |n x h|^2 = 1 - (n.h)^2 */
     return b;
 }
 
 void rd_brdf(const rd_surface *s, const double l[3], const double v[3], double f[3], double specular[3])
 {
-    lobe b = evaluate(s, l, v);
+    lobe b = evaluate(&rd_guards, s, l, v);
     for (int c = 0; c < 3; c++) {
         double mirror = b.seen ? b.specular * (s->specular[c] + (1 - s->specular[c]) * b.fresnel) : 0;
         f[c] = b.seen ? (1 - s->specular[c]) * s->diffuse[c] / PI + mirror : 0;
@@ -139,7 +146,7 @@ double rd_light(const rd_view *view, const double point[2], double l[3], double 
     double distance2 = dot3(l, l);
     normalize3(l);
     normalize3(v);
-    if (view->kind == RD_POINT) return view->power / fmax(distance2, rd_guards.distance2);
+    if (view->kind == RD_POINT || view->kind == RD_PUBLISHED) return view->power / fmax(distance2, guards_of(view)->distance2);
     return PI / fmax(l[2], rd_guards.lz);
 }
 
@@ -147,8 +154,8 @@ void rd_radiance(const double maps[MAP_CHANNELS], const double point[2], const r
 {
     rd_surface s;
     double l[3], v[3], strength = rd_light(view, point, l, v);
-    rd_decode_double(maps, &s);
-    lobe b = evaluate(&s, l, v);
+    decode(guards_of(view), maps, &s);
+    lobe b = evaluate(guards_of(view), &s, l, v);
     for (int c = 0; c < 3; c++) {
         radiance[c] = 0;
         for (int i = 0; gradient && i < MAP_CHANNELS; i++) gradient[c][i] = 0;

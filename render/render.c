@@ -1,12 +1,14 @@
 #include "render/render.h"
 #include "render/brdf.h"
+#include "render/published.h"
 #include "render/rows.h"
 #include "tensor/threads.h"
 #include <math.h>
 
 ts_shade_view rd_shade_view(const rd_view *view)
 {
-    ts_shade_view s = {.guards = &rd_guards, .falloff = view->kind == RD_POINT, .power = view->kind == RD_POINT ? view->power : 3.14159265f};
+    const bool published = view->kind == RD_PUBLISHED, falloff = published || view->kind == RD_POINT;
+    ts_shade_view s = {.guards = published ? &rd_published.guards : &rd_guards, .falloff = falloff, .power = falloff ? view->power : 3.14159265f};
     if (view->kind == RD_DIRECTIONS) {
         s.kind = TS_SHADE_DIRECTIONS;
         s.power = (float)rd_light(view, (double[2]){0}, s.light, s.camera);
@@ -19,7 +21,7 @@ ts_shade_view rd_shade_view(const rd_view *view)
         s.camera[i] = (double)view->camera[i];
         same &= s.light[i] == s.camera[i];
     }
-    s.kind = same ? TS_SHADE_COLLOCATED : TS_SHADE_POSITIONS;
+    s.kind = published ? TS_SHADE_PUBLISHED : same ? TS_SHADE_COLLOCATED : TS_SHADE_POSITIONS;
     s.fresnel = (float)rd_fresnel(1);
     return s;
 }
@@ -65,7 +67,9 @@ void rd_flash_rmse(rd_grid grid, const float *maps, int channels, const rd_view 
 void rd_flash_gradient(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image, double rmse0,
                        float *gradient, double *rmse)
 {
-    double floored = rmse0 > RD_RMSE_FLOOR ? rmse0 : RD_RMSE_FLOOR;
-    double now = flash(grid, maps, channels, view, image, 1e5 / (3.0 * 256 * 256) / floored, gradient);
+    const bool published = view->kind == RD_PUBLISHED;
+    const double least = published ? rd_published.rmse : RD_RMSE_FLOOR, factor = published ? rd_published.gradient : 1e5;
+    double floored = rmse0 > least ? rmse0 : least;
+    double now = flash(grid, maps, channels, view, image, factor / (3.0 * 256 * 256) / floored, gradient);
     if (rmse) *rmse = now;
 }

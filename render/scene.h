@@ -16,13 +16,14 @@ rd_grid rd_grid_full(int side);
 typedef enum rd_kind {
     RD_POINT,      /* positions; radiance = f max(n.l, 0) power / |light - x|^2, not clamped */
     RD_DIRECTIONS, /* camera and light are unit directions, the same for every pixel; radiance = f pi max(n.l, 0) / max(l_z, 0.001) */
-    RD_NEAR        /* positions; radiance as RD_DIRECTIONS, without distance falloff */
+    RD_NEAR,       /* positions; radiance as RD_DIRECTIONS, without distance falloff */
+    RD_PUBLISHED   /* as RD_POINT with light and camera at one position, shaded as the published code does (render/published.h) */
 } rd_kind;
 
 typedef struct rd_view {
     rd_kind kind;
     float camera[3], light[3];
-    float power; /* RD_POINT only */
+    float power; /* RD_POINT and RD_PUBLISHED only */
 } rd_view;
 
 /* The flash photograph: camera and light at (0, 0, RD_FLASH_DISTANCE), power RD_FLASH_POWER. */

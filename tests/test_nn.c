@@ -2,7 +2,6 @@
 #include "nn/adam.h"
 #include "tensor/threads.h"
 #include "tests/networks.h"
-#include "tests/published.h"
 #include <stddef.h>
 
 TEST(nn_trial_model_has_the_size_of_the_design)
@@ -25,46 +24,6 @@ TEST(nn_trial_model_has_the_size_of_the_design)
         CHECK(nn_model_find(m, m->param[i].name) == &m->param[i], "%s is there twice", m->param[i].name);
     }
     CHECK(!nn_model_find(m, "g.down6.conv1.weight"), "five levels have no sixth block");
-    nn_model_free(&m);
-}
-
-TEST(nn_published_architecture_has_the_published_tensors)
-{
-    char path[1024], line[256], name[160], shape[64], ours[160];
-    snprintf(path, sizeof path, "%s/paper_tensors.tsv", test_fixtures());
-    FILE *f = fopen(path, "r");
-    if (!f) test_skip("%s is absent", path);
-    nn_arch a = published_arch();
-    ts_status st = {0};
-    nn_model *m = nn_model_plan(&a, &st);
-    CHECK(m, "%s", st.message);
-    size_t total = 0, unused = 0;
-    int used = 0;
-    while (fgets(line, sizeof line, f)) {
-        CHECK(sscanf(line, "%159s %63s", name, shape) == 2, "line %s", line);
-        char has[64] = "";
-        size_t count = 1;
-        for (char *p = shape; *p; p++) {
-            count *= strtoul(p, &p, 10);
-            if (!*p) break;
-        }
-        total += count;
-        if (!published_name(name, ours, sizeof ours)) {
-            unused += count;
-            continue;
-        }
-        const nn_param *p = nn_model_find(m, ours);
-        CHECK(p, "%s: there is no %s", name, ours);
-        for (int i = 0; i < p->rank; i++) snprintf(has + strlen(has), sizeof has - strlen(has), "%s%d", i ? "x" : "", p->dim[i]);
-        CHECK(!strcmp(has, shape), "%s is %s, %s is %s", name, shape, ours, has);
-        used++;
-    }
-    fclose(f);
-    CHECK(total == 160147298, "the list has %zu numbers", total);
-    CHECK(used == m->params, "%d tensors are used, the model has %d", used, m->params);
-    CHECK(nn_model_numbers(m, false) + nn_model_numbers(m, true) == total - unused, "numbers: %zu and %zu, not %zu", nn_model_numbers(m, false),
-          nn_model_numbers(m, true), total - unused);
-    CHECK(nn_model_numbers(m, true) == 405376, "h has %zu numbers", nn_model_numbers(m, true));
     nn_model_free(&m);
 }
 

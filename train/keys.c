@@ -3,6 +3,7 @@
 #include <stddef.h>
 
 static const char *const encoding_names[] = {"raw", "asinh", NULL}; /* as nn_gradient */
+static const char *const compat_names[] = {"none", "published", NULL}; /* as nn_compat */
 static const char *const rmse_names[] = {"start", "batch", NULL}; /* as nn_rmse */
 
 #define AT(field) offsetof(tr_config, field)
@@ -10,6 +11,7 @@ static const char *const rmse_names[] = {"start", "batch", NULL}; /* as nn_rmse 
 const tr_key tr_keys[] = {
     {"model", "images", TR_INT, AT(arch.images), 1, NN_MAX_IMAGES, NULL, NULL, false,
      "most photographs of a material that are read at once; above 1 they are taken under some of nine known lights (docs/math.md)"},
+    {"model", "channels", TR_INT, AT(arch.channels), 9, 10, NULL, NULL, false, "of the maps; 10: with the light's intensity, which nothing reads (published)"},
     {"model", "g_width", TR_INT, AT(arch.g_width), 1, 1024, NULL, NULL, false, "channels of g's first convolution; level i has g_width * 2^i"},
     {"model", "g_width_max", TR_INT, AT(arch.g_width_max), 1, 4096, NULL, NULL, false, "most channels that a level of g has"},
     {"model", "g_levels", TR_INT, AT(arch.g_levels), 1, 8, NULL, NULL, false, "down blocks of g"},
@@ -29,6 +31,8 @@ const tr_key tr_keys[] = {
      "g's global track takes its means before the normalisation (no: after it, as published)"},
     {"model", "rmse", TR_CHOICE, AT(arch.rmse), 0, 1, NULL, rmse_names, false,
      "what scales the gradient: the RMSE of each image's R_0, or of the whole batch anew at every step (published)"},
+    {"model", "compat", TR_CHOICE, AT(arch.compat), 0, 1, NULL, compat_names, false,
+     "published: the published code's names of tensors and unused layers, flash renderer and preparation of photographs"},
     {"model", "encoding", TR_CHOICE, AT(arch.encoding), 0, 1, NULL, encoding_names, false,
      "how the refiner reads the gradient: as it is (raw, published), or asinh of ten times it"},
     {"model", "latent", TR_INT, AT(arch.latent), 0, 1024, NULL, NULL, false,

@@ -50,7 +50,7 @@ INLINE void store_lanes(float *p, vf v, lanes n)
 
 /* Sums over more k than this are made of parts: the rounding of a float sum grows with its length, a published convolution has 25,600
  * terms, and a part costs a hundredth of its time to put away. */
-enum { PART = 128 };
+enum { PART = 96 };
 
 /* One k: pixels x vectors multiplications. */
 #define STEP(u)                                                                                               \

@@ -84,6 +84,8 @@ typedef struct lighting {
     vf strength, fresnel; /* F = s + (1 - s) fresnel */
 } lighting;
 
+V_INLINE bool one_place(ts_shade_kind kind) { return kind == TS_SHADE_COLLOCATED || kind == TS_SHADE_PUBLISHED; }
+
 V_INLINE void light(const ts_shade_view *view, ts_shade_kind kind, const ts_shade_row *row, int first, lighting *e)
 {
     vd inverse[2], lz[2], vdoth[2];
@@ -99,7 +101,7 @@ V_INLINE void light(const ts_shade_view *view, ts_shade_kind kind, const ts_shad
         vd x = d_count(row->column + first + h * VL / 2 + 0.5) * row->step - 0.5, y = d_set(row->y), i;
         e->l[h] = l = unit((direction){l.x - x, l.y - y, l.z}, &inverse[h]);
         lz[h] = l.z;
-        if (kind == TS_SHADE_COLLOCATED) {
+        if (one_place(kind)) {
             e->v[h] = e->h[h] = l;
             continue;
         }
@@ -152,7 +154,7 @@ V_INLINE void measure(const surface *s, const lighting *e, ts_shade_kind kind, a
     a->nl = a->nv = v_max(dot_lanes(s, e->l), v_set(0));
     cross_lanes(s, e->h, a->h);
     a->sine2 = a->h[0] * a->h[0] + a->h[1] * a->h[1] + a->h[2] * a->h[2];
-    if (kind == TS_SHADE_COLLOCATED) {
+    if (one_place(kind)) {
         a->seen = a->nl > v_set(0);
         a->nh = v_select(a->seen, a->nl, v_set(1));
         for (int i = 0; i < 3; i++) a->l[i] = a->v[i] = a->h[i];
@@ -170,17 +172,29 @@ V_INLINE void measure(const surface *s, const lighting *e, ts_shade_kind kind, a
 /* Radiance, and what its derivatives are made of. */
 typedef struct radiance {
     vf value[3], f[3], fresnel[3], scale; /* value = f scale */
-    vf lobe, a, i, il, iv;                /* lobe = D G / 4; alpha; 1 / (alpha^2 (n.h)^2 + |n x h|^2); 1 / G's factors */
+    vf lobe, a, k, i, il, iv;             /* lobe = D G / 4; alpha; G's k; 1 / (alpha^2 (n.h)^2 + |n x h|^2); 1 / G's factors */
+    vf guarded, cosine;                   /* what TS_SHADE_PUBLISHED adds to the derivatives of log lobe by log alpha / 2 and by each cosine */
 } radiance;
 
-V_INLINE void shade(const surface *s, const lighting *e, const angles *g, radiance *r)
+V_INLINE void shade(const ts_shade_view *view, ts_shade_kind kind, const surface *s, const lighting *e, const angles *g, radiance *r)
 {
+    const bool published = kind == TS_SHADE_PUBLISHED;
     r->a = TS_ALPHA(s->roughness);
-    vf a2 = r->a * r->a, k = r->a * 0.5f;
-    r->i = 1.0f / (a2 * (g->nh * g->nh) + g->sine2);
+    vf a2 = r->a * r->a, k = r->k = published ? r->a * 0.5f + (float)view->guards->k : r->a * 0.5f;
+    vf inner = a2 * (g->nh * g->nh) + g->sine2;
     r->il = 1.0f / (g->nl * (1.0f - k) + k);
     r->iv = 1.0f / (g->nv * (1.0f - k) + k);
-    r->lobe = (a2 * r->i) * r->i * (r->il * r->iv) * (0.25f * INV_PI);
+    if (published) { /* the oracle in render/brdf.c has the same terms by the same names */
+        const float guard = (float)view->guards->distribution, least = (float)view->guards->cosines;
+        vf below = 1.0f / (inner * inner * (1 / INV_PI) + guard), cosines = 1.0f / (4.0f * (g->nl * g->nv) + least);
+        r->i = inner * below * (1 / INV_PI);
+        r->lobe = a2 * below * (r->il * r->iv) * (g->nl * g->nv * cosines);
+        r->guarded = guard * below;
+        r->cosine = least * cosines / v_max(g->nl, v_set(1e-20f)); /* unseen where n.l = 0 */
+    } else {
+        r->i = 1.0f / inner;
+        r->lobe = (a2 * r->i) * r->i * (r->il * r->iv) * (0.25f * INV_PI);
+    }
     r->scale = v_select(g->seen, e->strength * g->nl, v_set(0));
     for (int c = 0; c < 3; c++) {
         r->fresnel[c] = s->specular[c] + (1.0f - s->specular[c]) * e->fresnel;
@@ -195,7 +209,7 @@ typedef struct slopes {
 } slopes;
 
 /* Adds the derivatives of sum over c of u[c] value[c]. */
-V_INLINE void derive(const surface *s, const lighting *e, const angles *g, const radiance *r, const vf u[3], slopes *d)
+V_INLINE void derive(ts_shade_kind kind, const surface *s, const lighting *e, const angles *g, const radiance *r, const vf u[3], slopes *d)
 {
     vf uf = {0}, us = {0};
     for (int c = 0; c < 3; c++) {
@@ -206,11 +220,13 @@ V_INLINE void derive(const surface *s, const lighting *e, const angles *g, const
         us += t * r->fresnel[c];
     }
     us = us * r->lobe; /* times d log lobe from here on */
-    vf k = r->a * 0.5f, an = r->a * g->nh;
-    vf log_alpha = 2.0f * (g->sine2 - an * an) * r->i / r->a - 0.5f * ((1.0f - g->nl) * r->il + (1.0f - g->nv) * r->iv);
+    const bool published = kind == TS_SHADE_PUBLISHED;
+    vf k = r->k, an = r->a * g->nh, log_d = (g->sine2 - an * an) * r->i;
+    vf log_alpha = 2.0f * (published ? log_d + r->guarded : log_d) / r->a - 0.5f * ((1.0f - g->nl) * r->il + (1.0f - g->nv) * r->iv);
     d->roughness += us * log_alpha * (2.0f * s->roughness);
     vf by_l = v_select(g->seen, uf * e->strength, v_set(0)) - us * (1.0f - k) * r->il;
     vf by_v = -us * (1.0f - k) * r->iv;
+    if (published) by_l += us * r->cosine, by_v += us * r->cosine;
     vf by_h = us * (4.0f * (1.0f - r->a) * (1.0f + r->a)) * g->nh * r->i;
     for (int i = 0; i < 3; i++) d->n[i] += by_l * g->l[i] + by_v * g->v[i] + by_h * g->h[i];
 }
@@ -251,7 +267,7 @@ V_INLINE void render_kind(const ts_shade_view *view, ts_shade_kind kind, const t
         decode(view->guards, row->maps + (int64_t)i * row->channels, row->channels, n, &s);
         light(view, kind, row, i, &e);
         measure(&s, &e, kind, &g);
-        shade(&s, &e, &g, &r);
+        shade(view, kind, &s, &e, &g, &r);
         for (int c = 0; c < 3; c++) r.value[c] = v_min(r.value[c], v_set(limit));
         v_store_pixels(image + (int64_t)i * 3, 3, n, 3, r.value);
     }
@@ -271,7 +287,7 @@ V_INLINE double flash_kind(const ts_shade_view *view, ts_shade_kind kind, const 
         decode(view->guards, row->maps + (int64_t)i * row->channels, row->channels, n, &s);
         light(view, kind, row, i, &e);
         measure(&s, &e, kind, &g);
-        shade(&s, &e, &g, &r);
+        shade(view, kind, &s, &e, &g, &r);
         v_load_pixels(image + (int64_t)i * 3, 3, n, 3, target);
         for (int c = 0; c < 3; c++) {
             vf error = v_min(r.value[c], v_set(1)) - target[c];
@@ -281,7 +297,7 @@ V_INLINE double flash_kind(const ts_shade_view *view, ts_shade_kind kind, const 
         sum += (double)v_sum(v_select(live, squares, v_set(0)));
         if (!gradient) continue;
         slopes d = {0};
-        derive(&s, &e, &g, &r, u, &d);
+        derive(kind, &s, &e, &g, &r, u, &d);
         encode(&s, &d, out);
         v_store_pixels(gradient + (int64_t)i * row->channels, row->channels, n, MAP_CHANNELS, out);
     }
@@ -292,6 +308,7 @@ V_INLINE double flash_kind(const ts_shade_view *view, ts_shade_kind kind, const 
 static void render(const ts_shade_view *view, const ts_shade_row *row, float limit, float *image)
 {
     switch (view->kind) {
+    case TS_SHADE_PUBLISHED: render_kind(view, TS_SHADE_PUBLISHED, row, limit, image); return;
     case TS_SHADE_COLLOCATED: render_kind(view, TS_SHADE_COLLOCATED, row, limit, image); return;
     case TS_SHADE_DIRECTIONS: render_kind(view, TS_SHADE_DIRECTIONS, row, limit, image); return;
     default: render_kind(view, TS_SHADE_POSITIONS, row, limit, image); return;
@@ -301,6 +318,7 @@ static void render(const ts_shade_view *view, const ts_shade_row *row, float lim
 static double flash(const ts_shade_view *view, const ts_shade_row *row, const float *image, float scale, float *gradient)
 {
     switch (view->kind) {
+    case TS_SHADE_PUBLISHED: return flash_kind(view, TS_SHADE_PUBLISHED, row, image, scale, gradient);
     case TS_SHADE_COLLOCATED: return flash_kind(view, TS_SHADE_COLLOCATED, row, image, scale, gradient);
     case TS_SHADE_DIRECTIONS: return flash_kind(view, TS_SHADE_DIRECTIONS, row, image, scale, gradient);
     default: return flash_kind(view, TS_SHADE_POSITIONS, row, image, scale, gradient);
@@ -318,14 +336,14 @@ V_INLINE vf log_view(const ts_shade_view *view, ts_shade_kind kind, const ts_sha
     measure(s, &e, kind, &g);
     measure(target, &e, kind, &gt);
     if (!v_any(g.seen | gt.seen)) return total; /* both black */
-    shade(s, &e, &g, &r);
-    shade(target, &e, &gt, &rt);
+    shade(view, kind, s, &e, &g, &r);
+    shade(view, kind, target, &e, &gt, &rt);
     for (int c = 0; c < 3; c++) {
         vf a = r.value[c] + 0.01f, b = rt.value[c] + 0.01f, inverse = 1.0f / a;
         total += v_abs(v_log(v_select(a == b, v_set(1), b * inverse))); /* equal ones give 0 and not a rounding */
         u[c] = v_select(a > b, v_set(scale), v_select(a < b, v_set(-scale), v_set(0))) * inverse;
     }
-    if (wanted) derive(s, &e, &g, &r, u, d);
+    if (wanted) derive(kind, s, &e, &g, &r, u, d);
     return total;
 }
 

@@ -14,12 +14,14 @@ typedef struct ts_shade_guards {
     double nz2;       /* smallest n_z^2 before normalisation */
     double distance2; /* smallest squared distance that the falloff sees */
     double lz;        /* smallest l_z that irradiance is divided by */
+    double distribution, k, cosines; /* TS_SHADE_PUBLISHED: added to pi (…)^2 below D, to G's k, and to 4 n.l n.v; elsewhere 0 and not looked at */
 } ts_shade_guards;
 
 typedef enum ts_shade_kind {
     TS_SHADE_POSITIONS,
     TS_SHADE_COLLOCATED, /* the light's position is the camera's: l = v = h */
-    TS_SHADE_DIRECTIONS  /* unit l, v and h are the same for every pixel */
+    TS_SHADE_DIRECTIONS, /* unit l, v and h are the same for every pixel */
+    TS_SHADE_PUBLISHED   /* collocated, with the published renderer's guards (render/published.h) */
 } ts_shade_kind;
 
 typedef struct ts_shade_view {

@@ -1,0 +1,71 @@
+/* The centre square as scikit-image's resize makes it, against values that it made (tests/make_scikit.py), and photographs with their stored values. */
+#include "data/image.h"
+#include "tests/scikit_values.h"
+#include "tests/test.h"
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+static io_image picture(int side)
+{
+    ts_status st = {0};
+    io_image image;
+    CHECK(!io_image_create(&image, side, side, 3, &st), "%s", st.message);
+    for (int i = 0; i < side * side * 3; i++) image.data[i] = (float)((uint32_t)i * 2654435761u >> 24) / 255.0f;
+    return image;
+}
+
+/* Largest difference of every step-th value. */
+static double difference(int from, int to, const float *expected, int step)
+{
+    ts_status st = {0};
+    io_image in = picture(from), out;
+    CHECK(!io_centre_square_scikit(&in, to, &out, &st), "%s", st.message);
+    double worst = 0;
+    for (int i = 0; i < to * to * 3; i += step) worst = fmax(worst, fabs((double)out.data[i] - (double)expected[i / step]));
+    io_image_free(&in);
+    io_image_free(&out);
+    return worst;
+}
+
+TEST(scikit_resize_is_matched)
+{
+    const float *expected = scikit_values;
+    for (size_t i = 0; i < sizeof scikit_cases / sizeof *scikit_cases; i++) {
+        const int from = scikit_cases[i].from, to = scikit_cases[i].to;
+        const double d = difference(from, to, expected, 1);
+        CHECK(d < 5e-7, "%d to %d pixels: differs by %g", from, to, d);
+        expected += to * to * 3;
+    }
+    CHECK(expected == scikit_values + sizeof scikit_values / sizeof *scikit_values, "the table has other sizes");
+    const double d = difference(SCIKIT_LARGE, SCIKIT_LARGE_TO, scikit_large, SCIKIT_STEP);
+    CHECK(d < 5e-7, "%d to %d pixels: differs by %g", SCIKIT_LARGE, SCIKIT_LARGE_TO, d);
+}
+
+TEST(scikit_square_is_the_centre)
+{
+    ts_status st = {0};
+    io_image wide, out;
+    CHECK(!io_image_create(&wide, 30, 10, 1, &st), "%s", st.message);
+    for (int i = 0; i < 300; i++) wide.data[i] = (float)(i % 30);
+    CHECK(!io_centre_square_scikit(&wide, 10, &out, &st) && out.data[0] == 10 && out.data[9] == 19, "the middle third is not taken as it is");
+    io_image_free(&out);
+    CHECK(io_centre_square_scikit(&wide, 0, &out, &st) == TS_INVALID, "size 0");
+    io_image_free(&wide);
+}
+
+TEST(scikit_stored_values_of_photographs)
+{
+    ts_status st = {0};
+    char path[512];
+    io_image image, back;
+    CHECK(!io_image_create(&image, 4, 2, 3, &st), "%s", st.message);
+    for (int i = 0; i < 24; i++) image.data[i] = (float)i / 23;
+    snprintf(path, sizeof path, "%s/a.png", test_folder());
+    CHECK(!io_write_png(path, &image, 8, false, &st), "%s", st.message);
+    CHECK(!io_read_stored(path, 1000, 2.2, &back, &st), "%s", st.message);
+    for (int i = 0; i < 24; i++) CHECK(fabsf(back.data[i] * 255 - rintf(image.data[i] * 255)) < 1e-4f, "value %d is %g", i, (double)back.data[i]);
+    CHECK(io_read_stored(path, 7, 2.2, &back, &st) != TS_OK, "more pixels than allowed");
+    CHECK(io_read_stored("/nonexistent", 7, 2.2, &back, &st) == TS_IO && !back.data, "a missing file");
+}
