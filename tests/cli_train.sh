@@ -47,6 +47,26 @@ run_makes_its_files() {
     says "$T/err" "there is a run already"
 }
 
+# A small network of the published kind: its weights before training are a file, and it trains, its tenth channel included.
+published_kind() {
+    config
+    set -- --set model.channels=10 --set model.compat=published --set model.descent=no --set model.rmse=batch --set model.recurrent=no \
+        --set train.pretrain_steps=0 --set train.steps=2
+    expect 0 train "$@" --initial "$T/a.safetensors"
+    [ ! -e "$T/run" ] || fail "a run was begun"
+    expect 0 train "$@"
+    expect 0 "$BIN/lgd-convert" --list "$T/a.safetensors"
+    says "$T/out" "preprocess_net.down1.conv.fullyconnect4.weight"
+    expect 0 "$BIN/lgd-convert" --list "$T/run/last.safetensors"
+    says "$T/out" "main_net.rnn.layers.0.rnn_cell.hh.bias"
+    cmp -s "$T/a.safetensors" "$T/run/last.safetensors" && fail "nothing was learned"
+    expect 2 train --resume --initial "$T/b.safetensors"
+    expect 2 train "$@" --set model.rmse=start
+    says "$T/err" "compat"
+    expect 1 train "$@" --initial "$T/none/a.safetensors"
+    says "$T/err" "none/a.safetensors"
+}
+
 default_folder_has_the_files_name() {
     config
     cd "$T" || exit 1
@@ -221,6 +241,7 @@ shipped_configurations_are_valid() {
 }
 
 check train_run_makes_its_files run_makes_its_files
+check train_published_kind published_kind
 check train_default_folder_has_the_files_name default_folder_has_the_files_name
 check train_options_and_usage options_and_usage
 check train_errors_name_file_and_line errors_name_file_and_line

@@ -15,6 +15,7 @@ static const char usage[] = "Usage: lgd-train CONFIG.ini [options]\n"
                             "  --set SECTION.KEY=VALUE  set a key after the file was read; may be given several times\n"
                             "  --resume                 go on from the folder's checkpoint, exactly as if the run had not stopped\n"
                             "  --init WEIGHTS           begin with the parameters of a weights file (the same as --set train.init=WEIGHTS)\n"
+                            "  --initial FILE           write the weights that the run would begin with, and end\n"
                             "  --threads N              threads to compute with (default: all that the process may use)\n"
                             "  --help-config            print every key with its range, default and meaning\n"
                             "  --print-config           print the configuration as it would run\n"
@@ -110,11 +111,12 @@ static void spin_briefly(char **argv)
     if (setenv("GOMP_SPINCOUNT", "2000", 1) == 0) execv("/proc/self/exe", argv); /* where that fails the run is only slower */
 }
 
-enum { SET = 256, RESUME, INIT, THREADS, HELP_CONFIG, PRINT_CONFIG, HELP, VERSION };
+enum { SET = 256, RESUME, INIT, INITIAL, THREADS, HELP_CONFIG, PRINT_CONFIG, HELP, VERSION };
 static const struct option options[] = {
     {"set", required_argument, NULL, SET},
     {"resume", no_argument, NULL, RESUME},
     {"init", required_argument, NULL, INIT},
+    {"initial", required_argument, NULL, INITIAL},
     {"threads", required_argument, NULL, THREADS},
     {"help-config", no_argument, NULL, HELP_CONFIG},
     {"print-config", no_argument, NULL, PRINT_CONFIG},
@@ -126,7 +128,7 @@ static const struct option options[] = {
 int main(int argc, char **argv)
 {
     bool resume = false, print = false;
-    const char *init = NULL;
+    const char *init = NULL, *initial = NULL;
     const char **set = malloc((size_t)argc * sizeof *set);
     int sets = 0, option, code = cl_init("lgd-train");
     ts_status st = {0};
@@ -138,6 +140,7 @@ int main(int argc, char **argv)
         case SET: set[sets++] = optarg; break;
         case RESUME: resume = true; break;
         case INIT: init = optarg; break;
+        case INITIAL: initial = optarg; break;
         case PRINT_CONFIG: print = true; break;
         case THREADS:
             if (!cl_parse_int(optarg, 1, 1024, &threads)) {
@@ -171,6 +174,10 @@ int main(int argc, char **argv)
         code = cl_usage("--init begins a run and --resume goes on with one: choose one of them");
         goto end;
     }
+    if (initial && resume) {
+        code = cl_usage("--initial writes what a run begins with and --resume goes on with one: choose one of them");
+        goto end;
+    }
     tr_config config = tr_config_default();
     if (files && tr_config_read(&config, argv[optind], &st) != TS_OK) {
         code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
@@ -186,6 +193,10 @@ int main(int argc, char **argv)
     if (print) {
         tr_config_print(&config, true, stdout);
         code = cl_finish(CL_OK);
+        goto end;
+    }
+    if (initial) {
+        code = cl_finish(tr_initial(&config, initial, &st) == TS_OK ? CL_OK : cl_failed("%s", st.message));
         goto end;
     }
     spin_briefly(argv);

@@ -13,6 +13,7 @@ static ag_value *add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value
 {
     ag_tape *tape = t->tape;
     const double map_weight = t->config.train.map_weight;
+    if (maps && maps->t.shape.c > MAP_CHANNELS) maps = ag_channels(tape, maps, MAP_CHANNELS); /* a material has no light intensity */
     ag_value *loss = ag_render_loss(tape, maps, target, t->views, RD_LOSS_VIEWS);
     if (loss) *render = (double)loss->t.data[0];
     if (map_weight > 0) {

@@ -97,6 +97,18 @@ static ts_code init_weights(tr_trainer *t, ts_status *st)
     return TS_OK;
 }
 
+ts_code tr_initial(const tr_config *config, const char *path, ts_status *st)
+{
+    int taken, left;
+    nn_model *m = nn_model_create(&config->arch, st);
+    if (!m) return st->code;
+    nn_model_init(m, (uint64_t)config->train.seed);
+    ts_code code = *config->train.init ? nn_model_init_from(m, config->train.init, &taken, &left, st) : TS_OK;
+    if (!code) code = nn_model_save(m, m->value, path, NULL, 0, st);
+    nn_model_free(&m);
+    return code;
+}
+
 static ts_code build(tr_trainer *t, bool resume, ts_status *st)
 {
     const tr_config *c = &t->config;

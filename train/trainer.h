@@ -50,6 +50,9 @@ typedef struct tr_trainer tr_trainer;
  * configuration with resume are errors. NULL and st set on failure. */
 tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, const tr_listener *listener, ts_status *st);
 
+/* The weights that a run of this configuration begins with, as a file. */
+ts_code tr_initial(const tr_config *config, const char *path, ts_status *st);
+
 /* The folder of a run without output.folder: runs/NAME for .../NAME.ini. */
 void tr_default_folder(const char *config_path, char *folder, size_t size);
 
