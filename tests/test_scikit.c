@@ -1,5 +1,8 @@
 /* The centre square as scikit-image's resize makes it, against values that it made (tests/make_scikit.py), and photographs with their stored values. */
 #include "data/image.h"
+#include "infer/photograph.h"
+#include "nn/weights.h"
+#include "render/published.h"
 #include "tests/scikit_values.h"
 #include "tests/test.h"
 #include <math.h>
@@ -68,4 +71,35 @@ TEST(scikit_stored_values_of_photographs)
     for (int i = 0; i < 24; i++) CHECK(fabsf(back.data[i] * 255 - rintf(image.data[i] * 255)) < 1e-4f, "value %d is %g", i, (double)back.data[i]);
     CHECK(io_read_stored(path, 7, 2.2, &back, &st) != TS_OK, "more pixels than allowed");
     CHECK(io_read_stored("/nonexistent", 7, 2.2, &back, &st) == TS_IO && !back.data, "a missing file");
+}
+
+/* Which weights want which photograph, and that the power comes after the resampling: of 0 and 255 side by side the published loader makes a dark grey. */
+TEST(scikit_photographs_for_published_weights)
+{
+    ts_status st = {0};
+    char path[512], weights[512];
+    snprintf(path, sizeof path, "%s/p.png", test_folder());
+    snprintf(weights, sizeof weights, "%s/w.safetensors", test_folder());
+    for (int published = 0; published < 2; published++) {
+        nn_arch a = nn_arch_default();
+        a.g_width = 2, a.g_width_max = 2, a.g_levels = 1, a.h_width = 0, a.iterations = 0;
+        if (published) a.compat = NN_COMPAT_PUBLISHED, a.descent = false, a.rmse = NN_RMSE_BATCH;
+        nn_model *m = nn_model_create(&a, &st);
+        bool is = !published;
+        CHECK(m && !nn_model_save(m, m->value, weights, NULL, 0, &st), "%s", st.message);
+        CHECK(!lgd_weights_published(weights, &is, &st) && is == (published == 1), "published: %d, not %d: %s", is, published, st.message);
+        nn_model_free(&m);
+    }
+    bool is;
+    CHECK(lgd_weights_published("/nonexistent", &is, &st) == TS_IO && !is, "a missing file");
+    io_image image, photo, square;
+    CHECK(!io_image_create(&image, 8, 8, 3, &st), "%s", st.message);
+    for (int i = 0; i < 8 * 8 * 3; i++) image.data[i] = (float)(i / 3 % 2);
+    CHECK(!io_write_png(path, &image, 8, false, &st) && !lgd_photograph_read(path, true, 1000, &photo, &st), "%s", st.message);
+    CHECK(!lgd_photograph_square(&photo, true, 2, &square, &st), "%s", st.message);
+    for (int i = 0; i < 12; i++) CHECK(fabs((double)square.data[i] - pow(0.5, rd_published.gamma)) < 0.02, "a fine pattern becomes %g", (double)square.data[i]);
+    io_image_free(&square);
+    io_image_free(&photo);
+    CHECK(!lgd_photograph_read(path, false, 1000, &photo, &st) && !lgd_photograph_square(&photo, false, 2, &square, &st), "%s", st.message);
+    for (int i = 0; i < 12; i++) CHECK(fabs((double)square.data[i] - 0.5) < 0.1, "without compat a fine pattern becomes %g", (double)square.data[i]);
 }
