@@ -1,4 +1,5 @@
 #include "eval/html.h"
+#include "tensor/conv.h"
 #include "eval/plot.h"
 #include <math.h>
 #include <stdlib.h>
@@ -209,7 +210,8 @@ void ev_html_write(const ev_report *r, FILE *f)
     shown s = {.column = malloc((size_t)r->columns * sizeof *s.column)};
     s.columns = s.column ? ev_report_shown(r, s.column) : 0;
     fputs(head, f);
-    fprintf(f, "</head><body>\n<h1>lgd-eval</h1>\n<p>%d &#215; %d pixels, %d thread%s%s, %s; model ", r->size, r->size, r->threads, r->threads == 1 ? "" : "s", r->pinned ? ", pinned" : "", r->isa);
+    fprintf(f, "</head><body>\n<h1>lgd-eval</h1>\n<p>%d &#215; %d pixels, %d thread%s%s, %s, %s convolutions; model ", r->size, r->size, r->threads, r->threads == 1 ? "" : "s",
+            r->pinned ? ", pinned" : "", r->isa, ts_conv_exact() ? "direct" : "Winograd");
     ev_put_text(f, r->model);
     fprintf(f, ". Mean and standard deviation over the materials; seconds: median over them, of %d run%s each; peak: multiply-adds in registers, measured beside the method; MB: its weights, moments"
                " and activations. diffuse to render: RMSE; angle: degrees; ssim, flip, exposure, lpips: themselves.</p>\n", r->repeat, r->repeat == 1 ? "" : "s");

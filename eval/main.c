@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SETS_MAX = 64, METHODS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, FAST, NORMAL, WORKFLOW, COLOUR, METHOD, REPEAT, PIN, LPIPS, PATH_LENGTH = 4096 };
+enum { SETS_MAX = 64, METHODS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, FAST, NORMAL, WORKFLOW, COLOUR, METHOD, REPEAT, PIN, LPIPS, EXACT, PATH_LENGTH = 4096 };
 
 static const lgd_argument arguments[] = {
     {'o', "output", "DIR", "write results.csv, summary.csv, times.csv, results.json and report.html there (required)"},
@@ -29,6 +29,7 @@ static const lgd_argument arguments[] = {
     {FAST, "fast", NULL, "no SSIM and FLIP, which take most of the time"},
     {REPEAT, "repeat", "N", "estimate each photograph N times, 1 .. 1000, and take the median time (default 1)"},
     {PIN, "pin", NULL, "bind every thread to a CPU of its own"},
+    {EXACT, "exact", NULL, "compute all convolutions directly, not by Winograd's way where it is faster, as lgd-infer does"},
     {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {'q', "quiet", NULL, "no progress"},
     {'h', "help", NULL, "print this help"},
@@ -41,7 +42,7 @@ typedef struct command {
     int64_t seed;
     double noise;
     io_map_convention told;
-    bool images, fast, pin, quiet, help, version;
+    bool images, fast, exact, pin, quiet, help, version;
 } command;
 
 static ts_code whole(const char *name, const char *text, int64_t lo, int64_t hi, int64_t *value, ts_status *st)
@@ -65,6 +66,7 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
         case 'h': c->help = true; break;
         case 'V': c->version = true; break;
         case PIN: c->pin = true; break;
+        case EXACT: c->exact = true; break;
         case METHOD:
             if (c->methods == METHODS_MAX) code = ts_fail(st, TS_INVALID, "--method: more than %d methods", METHODS_MAX);
             else c->method[c->methods++] = value;
@@ -208,6 +210,7 @@ static int evaluate(work *w, ts_status *st)
     r->seed = (uint64_t)c->seed;
     r->noise = c->noise;
     r->perceptual = !c->fast;
+    ts_conv_exact_set(c->exact);
     r->pictures = true;
     r->pinned = c->pin;
     r->model = slash ? slash + 1 : w->model;

@@ -8,6 +8,7 @@
 #include "nn/model.h"
 #include "nn/weights.h"
 #include "render/render.h"
+#include "tensor/resize.h"
 #include "tensor/threads.h"
 #include <math.h>
 #include <stdint.h>
@@ -79,23 +80,35 @@ void lgd_free(lgd_model **model)
     *model = NULL;
 }
 
-/* What the unrolled loop reports to: the caller's function. */
+/* What the unrolled loop reports to: the caller's function, and what finds the end of the automatic number of steps. */
 typedef struct watch {
     const nn_input *in;
     const lgd_options *options;
+    float *best; /* NULL, or R_t of the last step that paid */
+    double best_rmse;
+    int steps;   /* t of best */
 } watch;
+
+#define AUTO_LEAST 1e-3 /* of the RMSE: a step that lowers it by less is not worth its time */
 
 static bool after_step(int step, const ag_value *maps, void *user)
 {
-    const watch *w = user;
+    watch *w = user;
     const rd_grid g = w->in->grid;
     double squares = 0;
     for (int k = 0; k < w->in->given; k++) {
-        double rmse;
-        rd_flash_rmse(g, maps->t.data, maps->t.shape.c, &w->in->views[k], w->in->image.data + (size_t)k * (size_t)g.h * (size_t)g.w * 3, &rmse);
-        squares += rmse * rmse / w->in->given;
+        double one;
+        rd_flash_rmse(g, maps->t.data, maps->t.shape.c, &w->in->views[k], w->in->image.data + (size_t)k * (size_t)g.h * (size_t)g.w * 3, &one);
+        squares += one * one / w->in->given;
     }
-    return w->options->progress(step, sqrt(squares), w->options->user) == 0;
+    const double rmse = sqrt(squares);
+    if (w->best) {
+        if (step > 0 && !(rmse < w->best_rmse * (1 - AUTO_LEAST))) return false;
+        memcpy(w->best, maps->t.data, (size_t)ts_count(maps->t.shape) * sizeof *w->best);
+        w->best_rmse = rmse;
+        w->steps = step;
+    }
+    return !w->options->progress || w->options->progress(step, rmse, w->options->user) == 0;
 }
 
 static ts_code check_photo(const lgd_photo *p, int number, ts_status *st)
@@ -115,8 +128,9 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
     for (int k = 0; k < photos; k++)
         if (check_photo(&photo[k], k + 1, st) != TS_OK) return st->code;
     if (side < 1 || side > SIDE_MAX) return ts_fail(st, TS_INVALID, "lgd_estimate: side is %d and must lie in 1 .. %d", side, SIDE_MAX);
-    if (o->iterations < -1 || o->iterations > ITERATIONS_MAX)
-        return ts_fail(st, TS_INVALID, "lgd_estimate: iterations is %d and must lie in 0 .. %d, or be -1 for as trained", o->iterations, ITERATIONS_MAX);
+    if (o->iterations < LGD_AUTO || o->iterations > ITERATIONS_MAX)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: iterations is %d and must lie in 0 .. %d, or be -1 for as trained or %d for automatic", o->iterations,
+                       ITERATIONS_MAX, LGD_AUTO);
     if (o->threads < 0 || o->threads > THREADS_MAX)
         return ts_fail(st, TS_INVALID, "lgd_estimate: threads is %d and must lie in 1 .. %d, or be 0 for all", o->threads, THREADS_MAX);
     if (!(o->tolerance >= 0 && o->tolerance <= 1)) return ts_fail(st, TS_INVALID, "lgd_estimate: tolerance is %g and must lie in 0 .. 1", o->tolerance);
@@ -171,7 +185,9 @@ static ts_code not_finite(ts_status *st)
     return ts_fail(st, TS_NUMERIC, "the network's maps are not finite: the weights are damaged or did not train");
 }
 
-static ts_code estimate_whole(lgd_model *model, const float *const *image, const rd_view *views, int given, int side, int steps, const lgd_options *o, float *maps, ts_status *st)
+/* taken: NULL, or gets the number of steps that were made. */
+static ts_code run_whole(lgd_model *model, const float *const *image, const rd_view *views, int given, int side, int steps, const lgd_options *o, float *maps,
+                         int *taken, ts_status *st)
 {
     ag_reset(model->tape);
     const double more = step_bytes(&model->net->arch, side) - (double)ts_arena_peak(ag_arena(model->tape)); /* than earlier calls left */
@@ -182,13 +198,48 @@ static ts_code estimate_whole(lgd_model *model, const float *const *image, const
     for (int k = 0; k < given; k++)
         for (int64_t i = 0; i < values; i++) in.image.data[k * values + i] = isfinite(image[k][i]) ? fminf(fmaxf(image[k][i], 0), 1) : 0;
 
-    watch w = {&in, o};
+    watch w = {.in = &in, .options = o, .steps = steps};
     ag_value *out = NULL;
-    if (nn_lgd(model->tape, model->net, &in, steps, false, &out, o->progress ? after_step : NULL, &w) != TS_OK || !out) {
+    if (o->iterations == LGD_AUTO) {
+        w.best = ts_arena_alloc(ag_arena(model->tape), (size_t)side * (size_t)side * (size_t)model->net->arch.channels * sizeof *w.best);
+        if (!w.best) return ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
+    }
+    if (nn_lgd(model->tape, model->net, &in, steps, false, &out, o->progress || w.best ? after_step : NULL, &w) != TS_OK || !out) {
         *st = *ag_status(model->tape);
         return st->code ? st->code : ts_fail(st, TS_NUMERIC, "the network gave no result");
     }
-    return decode(out->t.data, out->t.shape.c, (int64_t)side * side, maps) ? TS_OK : not_finite(st);
+    if (taken) *taken = w.steps;
+    return decode(w.best ? w.best : out->t.data, out->t.shape.c, (int64_t)side * side, maps) ? TS_OK : not_finite(st);
+}
+
+static ts_code estimate_whole(lgd_model *model, const float *const *image, const rd_view *views, int given, int side, int steps, const lgd_options *o, float *maps, ts_status *st)
+{
+    return run_whole(model, image, views, given, side, steps, o, maps, NULL, st);
+}
+
+/* The number of steps that the photographs take at AUTO_SIDE pixels. */
+static ts_code count_steps(lgd_model *model, const float *const *image, const rd_view *views, int given, int side, int most, int *steps, ts_status *st)
+{
+    enum { AUTO_SIDE = 256 };
+    const int small = side < AUTO_SIDE ? side : AUTO_SIDE;
+    const size_t pixels = (size_t)small * (size_t)small;
+    const lgd_options o = {.iterations = LGD_AUTO};
+    float *photo = malloc((size_t)given * pixels * 3 * sizeof *photo), *maps = malloc(pixels * MAP_CHANNELS * sizeof *maps);
+    const float *each[NN_MAX_IMAGES];
+    ts_arena *arena = ts_arena_create(0, st);
+    ts_code code = photo && maps && arena ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory");
+    for (int k = 0; k < given && !code; k++) {
+        ts_tensor to = ts_view(photo + (size_t)k * pixels * 3, (ts_shape){1, small, small, 3});
+        const ts_tensor from = ts_view((float *)(uintptr_t)image[k], (ts_shape){1, side, side, 3});
+        if (small == side) memcpy(to.data, image[k], pixels * 3 * sizeof *photo);
+        else code = ts_resize(&to, &from, arena, st);
+        each[k] = to.data;
+    }
+    if (!code) code = run_whole(model, each, views, given, small, most, &o, maps, steps, st);
+    ts_arena_destroy(&arena);
+    free(photo);
+    free(maps);
+    return code;
 }
 
 /* The caller's function, as tiles call it. */
@@ -240,8 +291,12 @@ static ts_code estimate(lgd_model *model, const lgd_photo *photo, int photos, in
         memcpy(views[k].light, photo[k].light, sizeof views[k].light);
         memcpy(views[k].camera, photo[k].camera, sizeof views[k].camera);
     }
-    const int steps = o->iterations < 0 ? lgd_trained_iterations(model) : o->iterations;
     const bool tiles = lgd_tiles_exact(&model->net->arch) && (side > UNTILED || o->mask || o->tolerance > 0);
+    int steps = o->iterations == -1 ? lgd_trained_iterations(model) : o->iterations;
+    if (o->iterations == LGD_AUTO) {
+        steps = model->net->arch.h_width > 0 ? LGD_AUTO_MOST : 0;
+        if (tiles && count_steps(model, image, views, photos, side, steps, &steps, st)) return st->code;
+    }
     return (tiles ? estimate_tiles : estimate_whole)(model, image, views, photos, side, steps, o, maps, st);
 }
 
@@ -250,8 +305,11 @@ int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, in
     ts_status st = {0};
     const lgd_options o = options ? *options : lgd_options_default();
     if (check_arguments(model, photo, photos, side, &o, maps, &st) == TS_OK) {
+        const bool was = ts_conv_exact();
         ts_threads_set(o.threads);
+        ts_conv_exact_set(o.exact);
         estimate(model, photo, photos, side, &o, maps, &st);
+        ts_conv_exact_set(was);
     }
     return report(error, &st);
 }

@@ -22,8 +22,13 @@ void lgd_free(lgd_model **model);
 int lgd_trained_iterations(const lgd_model *model); /* the T that the model was trained for */
 int lgd_most_photos(const lgd_model *model);        /* photographs that it reads at once: 1, or those of a multi-image model */
 
+/* As many steps as the reconstruction RMSE falls by, at least a thousandth each, LGD_AUTO_MOST at most; R_t is that of the last such step. Of
+ * photographs that are refined tile by tile the steps are counted on the photograph at 256 x 256 pixels. */
+enum { LGD_AUTO = -2, LGD_AUTO_MOST = 24 };
+
 typedef struct lgd_options {
-    int iterations; /* refinement steps; 0: R_0 alone, -1: as trained */
+    int iterations; /* refinement steps; 0: R_0 alone, -1: as trained, LGD_AUTO */
+    int exact;      /* 0: 3 x 3 convolutions by Winograd's way where that is faster, with maps that differ by less than 1e-4; else directly */
     int threads;    /* 0: as many as the process may use */
     /* Called after R_0 (step 0) and after every refinement with the reconstruction RMSE; return nonzero to stop there. May be NULL. */
     int (*progress)(int step, double rmse, void *user);

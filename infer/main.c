@@ -65,7 +65,7 @@ static void compute(lgd_item *item, void *user)
     run *r = user;
     const int size = item->square.width;
     const lgd_options options = {.iterations = r->command->iterations, .threads = r->command->threads, .progress = after_step, .user = r,
-                                 .mask = item->mask, .tolerance = r->command->tolerance, .tile = before_tile};
+                                 .exact = r->command->exact, .mask = item->mask, .tolerance = r->command->tolerance, .tile = before_tile};
     lgd_error error;
     lgd_photo photo[IO_CAPTURE_IMAGES] = {lgd_flash_photo(item->square.data)};
     int photos = 1;
@@ -146,7 +146,7 @@ static int work(const lgd_command *c)
     else if (!(r.model = lgd_load(weights, &error))) cl_failed("%s", error.message);
     else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK) cl_failed("%s", st.message);
     else {
-        r.steps = c->iterations < 0 ? lgd_trained_iterations(r.model) : c->iterations;
+        r.steps = c->iterations == LGD_AUTO ? LGD_AUTO_MOST : c->iterations < 0 ? lgd_trained_iterations(r.model) : c->iterations;
         code = all(&r, pipeline);
     }
     lgd_pipeline_end(&pipeline);

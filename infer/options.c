@@ -1,15 +1,18 @@
 #include "infer/options.h"
 #include "cli/cli.h"
 #include "data/image.h"
+#include "infer/lgd.h"
 #include "infer/output.h"
 #include <string.h>
 
-enum { NORMAL = 256, CAPTURE, MAPS, WORKFLOW, MASK, TOLERANCE, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
+enum { NORMAL = 256, CAPTURE, MAPS, WORKFLOW, MASK, TOLERANCE, EXACT, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
 
 const lgd_argument lgd_infer_arguments[] = {
     {'o', "output", "DIR", "write DIR/STEM/ for each photograph, STEM = its file name without extension (required)"},
     {'s', "size", "N", "pixels of a side of the maps, 1 .. 8192 (default 256)"},
-    {'i', "iterations", "N", "refinement steps, 0 .. 1000; 0 = the first estimate alone (default: as trained)"},
+    {'i', "iterations", "N|auto", "refinement steps, 0 .. 1000; 0 = the first estimate alone; auto = as long as the reconstruction improves,\n"
+                                  "24 at most (default: as trained)"},
+    {EXACT, "exact", NULL, "compute all convolutions directly; the default, Winograd's way where it is faster, differs by less than 1e-4"},
     {CAPTURE, "capture", "WHERE", "in place of PHOTO: several photographs of one sample under known lights, listed in an INI file\n"
                                   "or a folder in MaterialGAN's layout; by default with the weights named multi"},
     {MASK, "mask", "FILE", "an image of the photographs' shape: only where it is brighter than black are the maps sure to be refined,\n"
@@ -65,13 +68,15 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
             c->size = (int)n;
             break;
         case 'i':
-            code = whole("iterations", value, 0, 1000, &n, st);
+            if (strcmp(value, "auto") == 0) n = LGD_AUTO;
+            else code = whole("iterations", value, 0, 1000, &n, st);
             c->iterations = (int)n;
             break;
         case 't':
             code = whole("threads", value, 0, 1024, &n, st);
             c->threads = (int)n;
             break;
+        case EXACT: c->exact = true; break;
         case MASK: c->mask = value; break;
         case CAPTURE: code = take_capture(value, c, st); break;
         case TOLERANCE:

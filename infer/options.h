@@ -8,11 +8,11 @@
 typedef struct lgd_command {
     const char *out, *model, *mask;
     char capture[4096]; /* what is read in place of a photograph, without slashes at its end; or empty */
-    int size, iterations /* -1: as trained */, threads;
+    int size, iterations /* -1: as trained; LGD_AUTO */, threads;
     int64_t max_pixels;
     double tolerance;
     unsigned outputs; /* LGD_OUT_... */
-    bool directx, metallic, quiet, help, version;
+    bool directx, metallic, exact, quiet, help, version;
     char **photo; /* into argv; with a capture, that alone */
     char *only[1];
     int photos;

@@ -6,6 +6,7 @@
 #include "tensor/maps.h"
 #include "tests/test.h"
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { SIDE = 24, T = 3, VALUES = SIDE * SIDE * MAP_CHANNELS };
@@ -69,6 +70,51 @@ static void run(lgd_model *m, const float *image, int side, int iterations, int 
     lgd_error e = {.code = 77};
     const lgd_options o = {.iterations = iterations, .threads = threads, .progress = t ? record : NULL, .user = t};
     CHECK(lgd_estimate(m, image, side, &o, maps, &e) == 0 && e.code == 0 && !e.message[0], "%s", e.message);
+}
+
+/* Winograd's way, where the network is wide enough for it. */
+TEST(infer_exact_and_fast_maps_are_near)
+{
+    nn_arch a = tiny();
+    a.h_width = 32;
+    a.h_gru = 24;
+    lgd_model *m = load(a);
+    static float image[SIDE * SIDE * 3], exact[VALUES], fast[VALUES], again[VALUES];
+    lgd_error e;
+    make_image(image, SIDE);
+    const lgd_options direct = {.iterations = T, .exact = 1}, quick = {.iterations = T, .threads = 1}, three = {.iterations = T, .threads = 3};
+    CHECK(!lgd_estimate(m, image, SIDE, &direct, exact, &e) && !lgd_estimate(m, image, SIDE, &quick, fast, &e) && !lgd_estimate(m, image, SIDE, &three, again, &e),
+          "%s", e.message);
+    double most = 0;
+    for (int i = 0; i < VALUES; i++) most = fmax(most, fabs((double)exact[i] - fast[i]));
+    CHECK(most > 0 && most <= 1e-4, "the maps differ by %g", most);
+    CHECK(!memcmp(fast, again, sizeof fast), "other maps with three threads");
+    lgd_free(&m);
+}
+
+/* The automatic number of steps ends at the first that does not pay, and gives the maps of the one before. */
+TEST(infer_auto_stops_where_the_loss_no_longer_falls)
+{
+    lgd_model *m = load(tiny());
+    static float image[SIDE * SIDE * 3], chosen[VALUES], fixed[VALUES];
+    lgd_error e;
+    make_image(image, SIDE);
+    trace t = {.stop_at = -1}, all = {.stop_at = -1};
+    run(m, image, SIDE, LGD_AUTO, 1, &t, chosen);
+    CHECK(t.calls >= 1 && t.calls < 16, "%d steps", t.calls);
+    run(m, image, SIDE, t.calls, 1, &all, fixed); /* one more than was chosen */
+    for (int i = 0; i < t.calls; i++) CHECK(t.step[i] == i && t.rmse[i] == all.rmse[i], "step %d: %g and %g", i, t.rmse[i], all.rmse[i]);
+    for (int i = 1; i < t.calls; i++) CHECK(t.rmse[i] < t.rmse[i - 1] * 0.999, "step %d does not pay", i);
+    CHECK(all.rmse[t.calls] >= t.rmse[t.calls - 1] * 0.999, "step %d would have paid: %g after %g", t.calls, all.rmse[t.calls], t.rmse[t.calls - 1]);
+    run(m, image, SIDE, t.calls - 1, 1, NULL, fixed);
+    CHECK(!memcmp(chosen, fixed, sizeof chosen), "the maps are not those of step %d", t.calls - 1);
+    unsigned char *mask = malloc(SIDE * SIDE); /* the same number where tiles are refined */
+    memset(mask, 1, SIDE * SIDE);
+    const lgd_options o = {.iterations = LGD_AUTO, .mask = mask};
+    CHECK(!lgd_estimate(m, image, SIDE, &o, chosen, &e), "%s", e.message);
+    for (int i = 0; i < VALUES; i++) CHECK(fabs((double)chosen[i] - fixed[i]) < 1e-4, "value %d: %g and %g", i, chosen[i], fixed[i]);
+    free(mask);
+    lgd_free(&m);
 }
 
 TEST(infer_progress_sees_every_step)
@@ -216,7 +262,7 @@ TEST(infer_wrong_arguments_are_named)
     static const struct {
         int side, iterations, threads;
         const char *word;
-    } wrong[] = {{0, 1, 1, "side"}, {-3, 1, 1, "side"}, {1 << 30, 1, 1, "side"}, {2, -2, 1, "iterations"}, {2, 1 << 20, 1, "iterations"}, {2, 1, -1, "threads"}, {2, 1, 1 << 20, "threads"}};
+    } wrong[] = {{0, 1, 1, "side"}, {-3, 1, 1, "side"}, {1 << 30, 1, 1, "side"}, {2, -3, 1, "iterations"}, {2, 1 << 20, 1, "iterations"}, {2, 1, -1, "threads"}, {2, 1, 1 << 20, "threads"}};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         lgd_error e = {0};
         const lgd_options o = {.iterations = wrong[i].iterations, .threads = wrong[i].threads};
