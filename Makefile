@@ -132,8 +132,13 @@ test: deps
 	@$(MAKE) --no-print-directory all $(TEST_BIN)
 	@BUILD=$(BUILD) TESTDATA=$(TESTDATA) FIXTURES=$(FIXTURES) sh tests/run.sh
 
+# BENCH="conv_ infer" runs the benchmarks whose names contain these words.
 bench: all $(BENCH_BIN)
-	@TESTDATA=$(TESTDATA) $(BENCH_BIN)
+	@TESTDATA=$(TESTDATA) $(BENCH_BIN) $(BENCH)
+
+# PyTorch for the peer's column: bench/peer_torch.py
+bench-deps:
+	@BUILD=$(BUILD) sh .ci/bench-deps.sh
 
 stress: $(STRESS_BIN)
 	@$(STRESS_BIN)
@@ -194,6 +199,6 @@ uninstall:
 clean:
 	rm -rf $(BUILD)
 
-.PHONY: all deps test bench stress fuzz asan demo install uninstall clean
+.PHONY: all deps test bench bench-deps stress fuzz asan demo install uninstall clean
 .SECONDARY:
 -include $(shell find $(OBJ) $(BUILD)/fuzz/obj -name '*.d' 2>/dev/null)

@@ -23,4 +23,10 @@ void bench_row(const char *label, bench_time t, double flop);
 /* A row with a figure in another unit, for example 150.2 "Mpixel/s". */
 void bench_row_unit(const char *label, bench_time t, double value, const char *unit);
 void bench_heading(const char *text);
+
+/* Median seconds that the peer (bench/peer_torch.py, whose head lists the jobs) takes for a job; NaN where there is no peer or it fails, which is said
+ * once. bench_row_peer: below a row, its floor (flop at the peak) and the peer's time. */
+double bench_peer(const char *job);
+const char *bench_peer_name(void);
+void bench_row_peer(bench_time t, double flop, double peer);
 #endif

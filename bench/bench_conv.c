@@ -2,6 +2,7 @@
 #include "bench/bench.h"
 #include "tensor/conv.h"
 #include "tensor/rng.h"
+#include "tensor/threads.h"
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -76,6 +77,25 @@ static void row(const char *what, ts_conv c, void (*f)(void *user))
     discard(&w);
 }
 
+static void peer_row(const char *what, const char *job, ts_conv c, void (*f)(void *user), double times)
+{
+    char label[96], text[128];
+    snprintf(label, sizeof label, "%s n%d %dx%d %d->%d %dx%d%s", what, c.n, c.h, c.w, c.ic, c.oc, c.k, c.k, c.dilation > 1 ? " d2" : "");
+    snprintf(text, sizeof text, "%s %d %d %d %d %d %d %d %s", job, c.n, c.h, c.w, c.ic, c.oc, c.k, c.dilation, c.pad == TS_PAD_ZERO ? "zero" : "replicate");
+    work w = make(c);
+    const double flop = times * 2.0 * c.n * c.h * c.w * c.ic * c.oc * c.k * c.k;
+    const bench_time t = bench_measure(f, &w);
+    bench_row(label, t, flop);
+    bench_row_peer(t, flop, bench_peer(text));
+    discard(&w);
+}
+
+static void both_gradients(void *user)
+{
+    data_gradient(user);
+    weight_gradient(user);
+}
+
 static const ts_conv published[] = {
     {1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO},        {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE}, {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE},
     {1, 256, 256, 256, 192, 1, 1, TS_PAD_REPLICATE}, {1, 256, 256, 64, 192, 1, 1, TS_PAD_REPLICATE}, {1, 256, 256, 64, 10, 3, 1, TS_PAD_REPLICATE},
@@ -129,6 +149,43 @@ BENCH(conv_winograd)
         row("forward", shape[i], forward);
         row("Winograd forward", shape[i], winograd);
     }
+}
+
+BENCH(peer_conv)
+{
+    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO}, {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE},
+                                    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE}, {1, 256, 256, 256, 192, 1, 1, TS_PAD_ZERO},
+                                    {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO}, {4, 80, 80, 18, 64, 5, 1, TS_PAD_REPLICATE}};
+    bench_heading("single convolutions beside their floor (the peak) and the peer");
+    for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
+        peer_row("forward", "conv", shape[i], forward, 1);
+        if (ts_conv_winograd(&shape[i])) peer_row("Winograd forward", "conv", shape[i], winograd, 1);
+        peer_row("both gradients", "gradient", shape[i], both_gradients, 2);
+    }
+}
+
+BENCH(two_threads)
+{
+    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO}, {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE},
+                                    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE}};
+    static void (*const f[])(void *user) = {forward, data_gradient, weight_gradient, winograd};
+    static const char *const what[] = {"forward", "data gradient", "weight gradient", "Winograd forward"};
+    const int all = ts_threads();
+    bench_heading("all threads beside one, and what the peak gains");
+    for (size_t i = 0; i < sizeof shape / sizeof *shape; i++)
+        for (int k = 0; k < 4; k++) {
+            if (k == 3 && !ts_conv_winograd(&shape[i])) continue;
+            work w = make(shape[i]);
+            ts_threads_set(1);
+            const bench_time one = bench_measure(f[k], &w);
+            ts_threads_set(all);
+            const bench_time t = bench_measure(f[k], &w);
+            char label[96];
+            snprintf(label, sizeof label, "%s %d->%d %dx%d: %.2f x (peak %.2f x)", what[k], shape[i].ic, shape[i].oc, shape[i].k, shape[i].k, one.seconds / t.seconds,
+                     t.peak / one.peak);
+            bench_row_unit(label, t, all, "threads");
+            discard(&w);
+        }
 }
 
 BENCH(conv_naive)

@@ -1,6 +1,7 @@
 /* The whole inference of one photograph at 256 x 256 with the default architecture. FLOP are those of the convolutions: the
  * rest (norms, resampling, the renderer's gradient) is what keeps the fraction of the peak below a convolution's. */
 #include "bench/bench.h"
+#include "bench/shape.h"
 #include "nn/model.h"
 #include "render/render.h"
 #include <stdio.h>
@@ -16,22 +17,6 @@ typedef struct subject {
     ag_value *maps; /* for a single step: R_t and what h carried so far */
     nn_state state;
 } subject;
-
-/* Multiplications and additions of the convolutions whose name starts with prefix. */
-static double conv_flop(const nn_model *m, const char *prefix)
-{
-    double flop = 0;
-    for (int i = 0; i < m->params; i++) {
-        const nn_param *p = &m->param[i];
-        if (p->rank != 4 || strncmp(p->name, prefix, strlen(prefix)) != 0) continue;
-        int side = m->arch.g_size, level;
-        if (sscanf(p->name, "g.down%d", &level) == 1) side >>= level;
-        else if (sscanf(p->name, "g.up%d", &level) == 1) side >>= m->arch.g_levels - level;
-        else if (p->name[0] == 'h') side = SIDE;
-        flop += 2.0 * (double)p->count * side * side;
-    }
-    return flop;
-}
 
 static void whole(void *user)
 {
@@ -60,37 +45,59 @@ static void gradient(void *user)
     ag_scope_end(s->tape, mark, NULL, 0);
 }
 
-BENCH(infer)
+static void measure(nn_arch arch, const char *heading)
 {
     ts_status st = {0};
-    const nn_arch arch = nn_arch_default();
-    char label[96];
+    char label[128], job[256];
     subject s = {.model = nn_model_create(&arch, &st), .tape = ag_tape_create(false, &st)};
+    bench_heading(heading);
     if (!s.model || !s.tape) {
-        printf("infer: %s\n", st.message);
+        printf("  %s\n", st.message);
         nn_model_free(&s.model);
         ag_tape_destroy(&s.tape);
         return;
     }
     nn_model_init(s.model, 1);
     ag_freeze(s.tape, true);
-    s.in = (nn_input){.image = ts_new(ag_arena(s.tape), (ts_shape){1, SIDE, SIDE, 3}), .grid = rd_grid_full(SIDE), .view = rd_flash()};
-    ts_rng rng = ts_rng_make(1, TS_STREAM_TEST, 0);
-    for (int i = 0; i < SIDE * SIDE * 3; i++) s.in.image.data[i] = ts_rng_range(&rng, 0.1f, 0.9f);
+    static float image[SIDE * SIDE * 3];
+    for (int i = 0; i < SIDE * SIDE * 3; i++) image[i] = (float)(i % 97) / 97;
+    s.in = (nn_input){.image = ts_view(image, (ts_shape){1, SIDE, SIDE, 3}), .grid = rd_grid_full(SIDE), .view = rd_flash()};
     s.maps = nn_predict(s.tape, s.model, &s.in);
     s.maps = nn_refine(s.tape, s.model, &s.in, s.maps, &s.state);
 
-    bench_heading("inference, 256 x 256, default architecture");
-    const double g = conv_flop(s.model, "g."), h = conv_flop(s.model, "h."), unused = conv_flop(s.model, "h.gru1.hh") + conv_flop(s.model, "h.gru2.hh");
+    const double g = bench_network_flop(s.model, "g.", SIDE), h = bench_network_flop(s.model, "h.", SIDE);
+    const double unused = bench_network_flop(s.model, "h.gru1.hh", SIDE) + bench_network_flop(s.model, "h.gru2.hh", SIDE); /* without states */
+    const double step_flop = arch.recurrent ? h : h - unused;
     snprintf(label, sizeof label, "g at %d x %d and its maps resampled", arch.g_size, arch.g_size);
     bench_row(label, bench_measure(whole, &s), g);
-    bench_row("one step of h with its gradient", bench_measure(step, &s), h);
+    bench_row("one step of h with its gradient", bench_measure(step, &s), step_flop);
     bench_time t = bench_measure(gradient, &s);
     bench_row_unit("  of which the renderer's gradient", t, SIDE * SIDE / t.seconds * 1e-6, "Mpixel/s");
     s.steps = arch.iterations;
-    snprintf(label, sizeof label, "g and %d steps", s.steps);
-    bench_row(label, bench_measure(whole, &s), g + s.steps * h - unused); /* the first step has no states to multiply */
-    if (ag_status(s.tape)->code) printf("infer: %s\n", ag_status(s.tape)->message);
+    const double flop = g + s.steps * h - (arch.recurrent ? 1 : s.steps) * unused;
+    bench_peer_network("infer", &arch, s.steps, job, sizeof job);
+    snprintf(job + strlen(job), sizeof job - strlen(job), " %d", SIDE);
+    for (int exact = 1; exact >= 0; exact--) {
+        ts_conv_exact_set(exact);
+        snprintf(label, sizeof label, "g and %d steps, %s", s.steps, exact ? "direct" : "Winograd where it wins");
+        t = bench_measure(whole, &s);
+        bench_row(label, t, flop);
+        if (!exact) bench_row_peer(t, flop, bench_peer(job));
+    }
+    ts_conv_exact_set(true);
+    if (ag_status(s.tape)->code) printf("  %s\n", ag_status(s.tape)->message);
     ag_tape_destroy(&s.tape);
     nn_model_free(&s.model);
+}
+
+BENCH(infer) { measure(nn_arch_default(), "inference, 256 x 256, default architecture"); }
+
+/* The published networks with random weights. */
+BENCH(infer_paper)
+{
+    nn_arch a = nn_arch_default();
+    a.channels = 10, a.g_width = 64, a.g_width_max = 512, a.g_levels = 7, a.g_kernel_first = 3, a.g_kernel = 5, a.g_size = SIDE;
+    a.h_width = 256, a.h_gru = 64, a.iterations = 6, a.recurrent = false, a.descent = false, a.mean_before_norm = false;
+    a.rmse = NN_RMSE_BATCH, a.encoding = NN_GRADIENT_RAW;
+    measure(a, "inference, 256 x 256, the published networks");
 }

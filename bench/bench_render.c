@@ -4,6 +4,7 @@
 #include "render/render.h"
 #include "tensor/maps.h"
 #include <stdlib.h>
+#include <string.h>
 
 enum { SIDE = 256, N = 8, S = 64 };
 
@@ -12,6 +13,7 @@ typedef struct job {
     double rmse;
     rd_view views[N * RD_LOSS_VIEWS];
     ag_tape *tape;
+    const rd_view *below;
 } job;
 
 static void render(void *user)
@@ -19,6 +21,12 @@ static void render(void *user)
     job *j = user;
     rd_view view = rd_flash();
     rd_render(rd_grid_full(SIDE), j->maps, MAP_CHANNELS, &view, true, j->image);
+}
+
+static void under(void *user)
+{
+    job *j = user;
+    rd_render(rd_grid_full(SIDE), j->maps, MAP_CHANNELS, j->below, true, j->image);
 }
 
 static void gradient(void *user)
@@ -58,6 +66,25 @@ BENCH(render)
     bench_heading("render (pixels x views)");
     bench_time t = bench_measure(gradient, &j);
     bench_row_unit("flash loss and gradient, 256^2", t, (double)pixels / t.seconds * 1e-6, "Mpixel/s");
+    /* What has no gradient or no light is skipped, vector by vector: the same call on such scenes. */
+    float *kept = malloc(pixels * MAP_CHANNELS * sizeof(float));
+    if (!kept) abort();
+    memcpy(kept, j.maps, pixels * MAP_CHANNELS * sizeof(float));
+    for (int scene = 0; scene < 2; scene++) {
+        for (size_t i = 0; i < pixels * MAP_CHANNELS; i++) {
+            const size_t c = i % MAP_CHANNELS;
+            if (scene == 0) j.maps[i] = c < 3 ? 1 : c == MAP_ROUGHNESS ? -0.95f : c >= MAP_SPECULAR ? 1 : 0; /* white, smooth: saturated in the middle */
+            else j.maps[i] = c >= MAP_SPECULAR ? -1 : kept[i];
+        }
+        t = bench_measure(gradient, &j);
+        bench_row_unit(scene ? "  black specular" : "  white and shiny: saturated pixels", t, (double)pixels / t.seconds * 1e-6, "Mpixel/s");
+    }
+    memcpy(j.maps, kept, pixels * MAP_CHANNELS * sizeof(float));
+    const rd_view below = {.kind = RD_POINT, .camera = {0, 0, 1}, .light = {0, 0, -1}, .power = 5};
+    j.below = &below;
+    t = bench_measure(under, &j);
+    bench_row_unit("  value, the light below the horizon", t, (double)pixels / t.seconds * 1e-6, "Mpixel/s");
+    free(kept);
     t = bench_measure(render, &j);
     bench_row_unit("value, 256^2", t, (double)pixels / t.seconds * 1e-6, "Mpixel/s");
     t = bench_measure(loss, &j);

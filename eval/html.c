@@ -1,6 +1,6 @@
 #include "eval/html.h"
-#include "tensor/conv.h"
 #include "eval/plot.h"
+#include "tensor/conv.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -4,6 +4,7 @@
 #include "eval/set_ini.h"
 #include "infer/arguments.h"
 #include "infer/model_path.h"
+#include "tensor/conv.h"
 #include "tensor/threads.h"
 #include <inttypes.h>
 #include <stdlib.h>

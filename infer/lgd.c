@@ -22,7 +22,8 @@ enum {
     THREADS_MAX = 1024,
     UNTILED = 512,         /* pixels a side up to which a step of h is one piece: at most 0.8 GB with the default architecture */
     TILE = 320,            /* the surroundings add a fifth to its work */
-    TILE_SELECTIVE = 128   /* where tiles are skipped or end early: small enough to fit what they follow */
+    TILE_MASK = 128,       /* small enough to fit what they follow */
+    TILE_EARLY = 256       /* tiles that end early: the surroundings of smaller ones cost more than ending saves */
 };
 
 struct lgd_model {
@@ -258,7 +259,7 @@ static ts_code estimate_tiles(lgd_model *model, const float *const *image, const
 {
     const nn_arch *arch = &model->net->arch;
     const int64_t pixels = (int64_t)side * side;
-    const int tile = o->mask || o->tolerance > 0 ? TILE_SELECTIVE : TILE, across = (side + tile - 1) / tile;
+    const int early = side > UNTILED ? TILE_EARLY : side, tile = o->mask ? TILE_MASK : o->tolerance > 0 ? early : TILE, across = (side + tile - 1) / tile;
     tile_watch w = {o, (double)across * across, 0};
     /* the network's channels are the caller's, but for published models */
     float *raw = arch->channels == MAP_CHANNELS ? maps : malloc((size_t)pixels * (size_t)arch->channels * sizeof *raw);

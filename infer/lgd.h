@@ -36,7 +36,7 @@ typedef struct lgd_options {
     /* side x side, or NULL: only where it is not zero are the maps sure to be refined, exactly as they would be without it; elsewhere they may
      * be the first estimate. */
     const unsigned char *mask;
-    /* A tile of 128 x 128 pixels is refined no further once the RMS of a step's change of its maps (in their encoding, [-1, 1]), over it and all
+    /* The photograph (over 512 pixels a side: each of its tiles of 256 x 256, with a mask of 128 x 128) is refined no further once the RMS of a step's change of its maps (in their encoding, [-1, 1]), over it and all
      * that it reads, is below this: its maps are then exactly those of that step. 0: never. */
     double tolerance;
     /* Photographs over 512 pixels a side, and those with mask or tolerance, are refined tile by tile, all steps of a tile at a time: progress is

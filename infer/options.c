@@ -17,7 +17,7 @@ const lgd_argument lgd_infer_arguments[] = {
                                   "or a folder in MaterialGAN's layout; by default with the weights named multi"},
     {MASK, "mask", "FILE", "an image of the photographs' shape: only where it is brighter than black are the maps sure to be refined,\n"
                            "as they would be without it; elsewhere they may be the first estimate"},
-    {TOLERANCE, "tolerance", "X", "0 .. 1: a tile of 128 pixels is refined no further once a step changes its maps by less than X (RMS,\n"
+    {TOLERANCE, "tolerance", "X", "0 .. 1: the photograph (over 512 pixels: a tile of it) is refined no further once a step changes its maps by less than X (RMS,\n"
                                   "of values in -1 .. 1); 0, the default, is exact"},
     {'m', "model", "FILE", "weights (default: $LGD_MODEL, or those installed or built with the program)"},
     {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},

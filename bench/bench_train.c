@@ -1,0 +1,145 @@
+/* A training step of configs/single.ini's shape, what its data and its renderings cost beside it, and its memory with and without
+ * train.checkpoint_steps. */
+#include "bench/bench.h"
+#include "bench/shape.h"
+#include "data/procedural.h"
+#include "nn/adam.h"
+#include "ops.h"
+#include "nn/model.h"
+#include "render/losses.h"
+#include "render/render.h"
+#include "train/config.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct subject {
+    tr_config c;
+    nn_model *model;
+    nn_adam adam;
+    ag_tape *tape;
+    nn_input in;
+    float *maps, *images, *goal, *window;
+    rd_view *views;
+    int steps;
+    uint64_t next;
+} subject;
+
+static ag_value *loss_of(subject *s, ag_value *maps)
+{
+    ag_value *goal = ag_constant(s->tape, ts_view(s->goal, maps->t.shape));
+    return ag_add(s->tape, ag_render_loss(s->tape, maps, goal, s->views, RD_LOSS_VIEWS), ag_map_loss(s->tape, maps, goal));
+}
+
+static void step(void *user)
+{
+    subject *s = user;
+    ag_value *maps[65];
+    ag_reset(s->tape);
+    nn_lgd(s->tape, s->model, &s->in, s->steps, true, maps, NULL, NULL);
+    if (ag_status(s->tape)->code) return;
+    ag_backward(s->tape, ag_add(s->tape, loss_of(s, maps[s->steps]), loss_of(s, maps[0])));
+    nn_gradient_norm(s->model, 0, s->model->count);
+    nn_adam_next(&s->adam);
+    nn_adam_step(&s->adam, s->model, 0, s->model->count, 1e-4f, 1);
+}
+
+static void losses(void *user)
+{
+    subject *s = user;
+    ag_reset(s->tape);
+    const ts_shape shape = {s->c.train.batch, s->in.grid.h, s->in.grid.w, MAP_CHANNELS};
+    float *gradient = ts_arena_zalloc(ag_arena(s->tape), (size_t)ts_count(shape), sizeof *gradient);
+    for (int i = 0; i < 2; i++) ag_backward(s->tape, loss_of(s, ag_parameter(s->tape, ts_view(s->window, shape), gradient)));
+}
+
+static void material(void *user)
+{
+    subject *s = user;
+    io_material m = {.size = s->c.data.patch, .maps = s->maps};
+    const io_procedural p = {.seed = 1};
+    io_procedural_make(&p, s->next++, &m);
+}
+
+/* The same network and steps for the peer. */
+static double peer(const subject *s)
+{
+    char job[256];
+    bench_peer_network("train", &s->model->arch, s->steps, job, sizeof job);
+    const size_t n = strlen(job);
+    snprintf(job + n, sizeof job - n, " %d %d %d", s->c.train.batch, s->c.data.patch, s->in.grid.w);
+    return bench_peer(job);
+}
+
+static double megabytes(subject *s, int steps, bool recompute)
+{
+    ts_status st = {0};
+    ag_tape *kept = s->tape;
+    s->tape = ag_tape_create(true, &st);
+    if (!s->tape) abort();
+    s->steps = steps;
+    s->in.recompute = recompute;
+    step(s);
+    step(s);
+    const double most = (double)ts_arena_peak(ag_arena(s->tape)) / (1 << 20);
+    ag_tape_destroy(&s->tape);
+    s->tape = kept;
+    return most;
+}
+
+static void measure(subject *s)
+{
+    const int batch = s->c.train.batch, side = s->in.grid.w;
+    char label[96];
+    const double g = bench_network_flop(s->model, "g.", side), h = bench_network_flop(s->model, "h.", side), flop = 3 * batch * (g + s->steps * h);
+    snprintf(label, sizeof label, "%d patches of %d^2, window %d, T = %d", batch, s->c.data.patch, side, s->steps);
+    const bench_time t = bench_measure(step, s);
+    bench_row(label, t, flop);
+    bench_row_peer(t, flop, peer(s));
+    bench_time part = bench_measure(losses, s);
+    bench_row_unit("  of which both losses, 9 renderings each", part, 100 * part.seconds / t.seconds, "% of the step");
+    part = bench_measure(material, s);
+    part.seconds *= batch;
+    bench_row_unit("  its materials, one thread beside it", part, 100 * part.seconds / t.seconds, "% of the step");
+    const int trained = s->steps;
+    const double states = (double)batch * side * side * (s->model->arch.channels + 2 * s->model->arch.h_gru) * sizeof(float) / (1 << 20);
+    const double plain = megabytes(s, trained, false), few = megabytes(s, trained, true), many = megabytes(s, 24, true);
+    printf("  memory: %.0f MiB; with train.checkpoint_steps %.0f MiB, and %.0f MiB at T = 24: %.2f MiB a step more, R_t and the states are %.2f MiB\n", plain, few, many,
+           (many - few) / (24 - trained), states);
+}
+
+BENCH(train)
+{
+    ts_status st = {0};
+    subject s = {.c = tr_config_default(), .tape = ag_tape_create(true, &st)};
+    bench_heading("a training step of configs/single.ini: g, h, losses, all gradients, Adam");
+    if (!s.tape || tr_config_read(&s.c, "configs/single.ini", &st) || !(s.model = nn_model_create(&s.c.arch, &st)) || nn_model_train(s.model, &st) ||
+        nn_adam_create(&s.adam, s.model, 0, &st)) {
+        printf("  %s\n", st.message);
+        return;
+    }
+    nn_model_init(s.model, 1);
+    const int patch = s.c.data.patch, side = s.c.train.window ? s.c.train.window : patch;
+    const size_t batch = (size_t)s.c.train.batch, pixels = (size_t)patch * (size_t)patch, part = (size_t)side * (size_t)side;
+    ts_rng rng = ts_rng_make(1, TS_STREAM_TEST, 0);
+    s.maps = malloc(pixels * MAP_CHANNELS * sizeof(float));
+    s.images = malloc(batch * pixels * 3 * sizeof(float));
+    s.window = malloc(batch * part * MAP_CHANNELS * sizeof(float));
+    s.goal = malloc(batch * part * MAP_CHANNELS * sizeof(float));
+    s.views = malloc(batch * RD_LOSS_VIEWS * sizeof *s.views);
+    float *shown = malloc(batch * part * 3 * sizeof(float));
+    if (!s.maps || !s.images || !s.window || !s.goal || !s.views || !shown) abort();
+    for (size_t i = 0; i < batch * pixels * 3; i++) s.images[i] = ts_rng_uniform(&rng);
+    for (size_t i = 0; i < batch * part * 3; i++) shown[i] = ts_rng_uniform(&rng);
+    for (size_t i = 0; i < batch * part * MAP_CHANNELS; i++) s.window[i] = ts_rng_range(&rng, -0.5f, 0.5f), s.goal[i] = ts_rng_range(&rng, -0.5f, 0.5f);
+    for (size_t i = 0; i < batch; i++) rd_loss_views(&rng, s.views + i * RD_LOSS_VIEWS);
+    s.steps = s.c.arch.iterations;
+    s.in = (nn_input){.image = ts_view(shown, (ts_shape){(int)batch, side, side, 3}), .grid = {.h = side, .w = side, .side = patch}, .view = rd_flash()};
+    if (side < patch) s.in.whole = ts_view(s.images, (ts_shape){(int)batch, patch, patch, 3});
+    measure(&s);
+    if (ag_status(s.tape)->code) printf("  %s\n", ag_status(s.tape)->message);
+    ag_tape_destroy(&s.tape);
+    nn_model_free(&s.model);
+    nn_adam_free(&s.adam);
+    free(s.maps), free(s.images), free(s.window), free(s.goal), free(s.views), free(shown);
+}

@@ -1,0 +1,270 @@
+#!/usr/bin/env python3
+"""The peer of lgd-bench: our networks and single convolutions in PyTorch, on the CPU.
+
+Reads jobs from standard input, one a line, and answers each with its median time in seconds (or "-" and a reason):
+    version                                  the version, and nothing to do with time
+    threads N
+    conv N H W IC OC K DILATION PAD          forward, the better of both memory formats; PAD: zero or replicate
+    gradient N H W IC OC K DILATION PAD      gradients of input and weights together
+    infer G_WIDTH G_MAX G_LEVELS G_FIRST G_KERNEL G_SIZE H_WIDTH H_GRU CHANNELS RECURRENT T SIDE
+    train (the same up to T) BATCH PATCH WINDOW
+Weights are random: time does not depend on them. Renderer's gradients are included, by autograd.
+"""
+import math
+import sys
+import time
+
+try:
+    import torch
+    import torch.nn.functional as F
+    from torch import nn
+except ImportError:
+    print("- there is no PyTorch here", flush=True)
+    sys.exit(0)
+
+
+def median_time(f, least=0.7, most=10.0):
+    """Warmed up, at least three runs."""
+    f()
+    times, begin = [], time.perf_counter()
+    while len(times) < 3 or time.perf_counter() - begin < least:
+        start = time.perf_counter()
+        f()
+        times.append(time.perf_counter() - start)
+        if time.perf_counter() - begin > most and len(times) >= 2:
+            break
+    return sorted(times)[len(times) // 2]
+
+
+def padded(x, k, dilation, pad):
+    reach = dilation * (k // 2)
+    return F.pad(x, (reach,) * 4, mode="replicate") if pad == "replicate" else x
+
+
+def convolution(n, h, w, ic, oc, k, dilation, pad, gradient):
+    best = math.inf
+    for layout in (torch.channels_last, torch.contiguous_format):
+        x = torch.randn(n, ic, h, w).contiguous(memory_format=layout)
+        weight = torch.randn(oc, ic, k, k).contiguous(memory_format=layout)
+        bias = torch.randn(oc)
+        zero = 0 if pad == "replicate" else dilation * (k // 2)
+        run = lambda: F.conv2d(padded(x, k, dilation, pad), weight, bias, padding=zero, dilation=dilation)
+        if gradient:
+            x.requires_grad_()
+            weight.requires_grad_()
+            y = run()
+            dy = torch.randn_like(y)
+            best = min(best, median_time(lambda: torch.autograd.grad(y, (x, weight), dy, retain_graph=True)))
+        else:
+            with torch.no_grad():
+                best = min(best, median_time(run))
+    return best
+
+
+class Block(nn.Module):
+    def __init__(self, ins, middle, out, glob, k, norm):
+        super().__init__()
+        self.conv1 = nn.Conv2d(ins, middle, k, padding=k // 2)
+        self.conv2 = nn.Conv2d(middle, out, k, padding=k // 2, bias=False)
+        self.add, self.glob, self.norm = nn.Linear(glob, out), nn.Linear(out + glob, out), norm
+
+    def forward(self, x, g):
+        y = self.conv2(self.conv1(x))
+        mean = y.mean((2, 3))
+        if self.norm:
+            y = F.instance_norm(y, eps=1e-5)
+        x = F.leaky_relu(y + self.add(g)[:, :, None, None], 0.2)
+        return x, F.selu(self.glob(torch.cat([mean, g], 1)))
+
+
+class UNet(nn.Module):
+    def __init__(self, width, width_max, levels, first, kernel, channels):
+        super().__init__()
+        wide = [min(width << i, width_max) for i in range(levels + 1)]
+        self.conv, self.glob = nn.Conv2d(3, wide[0], 3, padding=1), nn.Linear(3, wide[0])
+        self.down = nn.ModuleList(Block(wide[i], wide[i + 1], wide[i + 1], wide[i], kernel if i else first, i < levels - 1) for i in range(levels))
+        up, deep = [], wide[levels]
+        for i in range(1, levels + 1):
+            skip, out = wide[levels - i], wide[levels - i - 1] if i < levels else wide[0]
+            up.append(Block(skip + deep, (skip + deep) // 2, out, deep, kernel, True))
+            deep = out
+        self.up = nn.ModuleList(up)
+        self.out1, self.out2 = nn.Conv2d(wide[0], channels, 3, padding=1), nn.Conv2d(channels, channels, 3, padding=1)
+        self.add = nn.Linear(wide[0], channels)
+
+    def forward(self, x):
+        g = F.selu(self.glob(x.mean((2, 3))))
+        x, skips = F.leaky_relu(self.conv(x), 0.2), []
+        for block in self.down:
+            skips.append(x)
+            x, g = block(F.max_pool2d(x, 2), g)
+        for block in self.up:
+            x, g = block(torch.cat([skips.pop(), F.interpolate(x, scale_factor=2, mode="bilinear", align_corners=True)], 1), g)
+        return torch.tanh(self.out2(self.out1(x)) + self.add(g)[:, :, None, None])
+
+
+class Cell(nn.Module):
+    def __init__(self, ins, c):
+        super().__init__()
+        self.ih, self.hh, self.c = nn.Conv2d(ins, 3 * c, 1), nn.Conv2d(c, 3 * c, 1), c
+
+    def forward(self, x, old):
+        iz, ir, im = self.ih(x).chunk(3, 1)
+        hz, hr, hm = (self.hh(old) if old is not None else self.hh.bias[None, :, None, None]).chunk(3, 1)
+        z, r = torch.sigmoid(iz + hz), torch.sigmoid(ir + hr)
+        m = torch.tanh(im + r * hm)
+        return z * m if old is None else (1 - z) * old + z * m
+
+
+class Refiner(nn.Module):
+    def __init__(self, width, gru, channels, recurrent):
+        super().__init__()
+        self.conv1, self.cell1 = nn.Conv2d(2 * channels, width, 5), Cell(width, gru)
+        self.conv2, self.cell2 = nn.Conv2d(gru, width, 3, dilation=2), Cell(width, gru)
+        self.out, self.recurrent = nn.Conv2d(gru, channels, 3, bias=False), recurrent
+
+    def forward(self, x, state):
+        a = self.cell1(F.leaky_relu(self.conv1(padded(x, 5, 1, "replicate")), 0.01), state[0] if self.recurrent else None)
+        b = self.cell2(F.leaky_relu(self.conv2(padded(a, 3, 2, "replicate")), 0.01), state[1] if self.recurrent else None)
+        return torch.tanh(self.out(padded(b, 3, 1, "replicate"))), (a, b)
+
+
+def shade(maps, n_l, n_v, v_h, n_h):
+    """f of each pixel; maps [N, 9.., H, W] in [-1, 1]."""
+    diffuse, specular, rough = (maps[:, 0:3] + 1) / 2, (maps[:, 6:9] + 1) / 2, (maps[:, 5:6] + 1) / 2
+    alpha2 = rough.clamp_min(1e-3) ** 4
+    k = rough ** 2 / 2
+    d = alpha2 / (math.pi * (n_h * n_h * (alpha2 - 1) + 1) ** 2)
+    g = 1 / ((n_l * (1 - k) + k) * (n_v * (1 - k) + k))
+    f = specular + (1 - specular) * torch.exp2((-5.55473 * v_h - 6.98316) * v_h)
+    return (1 - specular) * diffuse / math.pi + d * f * g / 4
+
+
+def normals(maps):
+    xy = maps[:, 3:5].clamp(-0.999, 0.999)
+    return torch.cat([xy, (1 - (xy * xy).sum(1, keepdim=True)).clamp_min(1e-6).sqrt()], 1)
+
+
+def dot(a, b):
+    return (a * b).sum(1, keepdim=True).clamp_min(1e-3)
+
+
+def positions(h, w, side):
+    y, x = torch.meshgrid(torch.arange(h), torch.arange(w), indexing="ij")
+    return torch.stack([(x + 0.5) / side - 0.5, 0.5 - (y + 0.5) / side, torch.zeros(h, w)])[None]
+
+
+def flash(maps, place):
+    """The flash photograph."""
+    to = torch.tensor([0, 0, 250 / 256])[None, :, None, None] - place
+    square = (to * to).sum(1, keepdim=True)
+    l = to / square.sqrt()
+    n_l = dot(normals(maps), l)
+    return (shade(maps, n_l, n_l, torch.ones_like(n_l), n_l) * n_l * (329288 / 65536) / square).clamp(0, 1)
+
+
+def rendered(maps, place, light, camera, near):
+    l, v = (light - place, camera - place) if near else (light + 0 * place, camera + 0 * place)
+    l, v = F.normalize(l, dim=1), F.normalize(v, dim=1)
+    half, n = F.normalize(l + v, dim=1), normals(maps)
+    n_l = dot(n, l)
+    return shade(maps, n_l, dot(n, v), dot(v, half), dot(n, half)) * math.pi * n_l / l[:, 2:3].clamp_min(1e-3)
+
+
+def gradient_of_loss(maps, image, place, rmse):
+    r = maps.detach().requires_grad_()
+    with torch.enable_grad():
+        loss = (flash(r, place) - image).square().sum() / 2
+        return torch.autograd.grad(loss, r)[0] * (1e5 / (3 * 65536) / rmse)
+
+
+class LGD(nn.Module):
+    def __init__(self, a):
+        super().__init__()
+        self.a = a
+        self.g = UNet(a["g_width"], a["g_max"], a["g_levels"], a["g_first"], a["g_kernel"], a["channels"])
+        self.h = Refiner(a["h_width"], a["h_gru"], a["channels"], a["recurrent"])
+
+    def forward(self, whole, image, y0, x0):
+        side, size, (h, w) = whole.shape[2], self.a["g_size"], image.shape[2:]
+        x = whole if side == size else F.interpolate(whole, size=(size, size), mode="area")
+        maps = self.g(2 * torch.log((x + 0.01) / 0.01) / math.log(101) - 1)
+        if side != size:
+            maps = F.interpolate(maps, size=(side, side), mode="bilinear")
+        first = maps = maps[:, :, y0:y0 + h, x0:x0 + w]
+        place = positions(side, side, side)[:, :, y0:y0 + h, x0:x0 + w]
+        state = [torch.zeros(image.shape[0], self.a["h_gru"], h, w)] * 2
+        for _ in range(self.a["steps"]):
+            gradient = torch.asinh(10 * gradient_of_loss(maps, image, place, 0.1))
+            delta, state = self.h(torch.cat([maps, gradient], 1), state)
+            maps = maps + delta
+        return first, maps
+
+
+NAMES = ["g_width", "g_max", "g_levels", "g_first", "g_kernel", "g_size", "h_width", "h_gru", "channels", "recurrent", "steps"]
+
+
+def network(words):
+    torch.manual_seed(1)
+    return LGD(dict(zip(NAMES, map(int, words)))), [int(w) for w in words[len(NAMES):]]
+
+
+def infer(words):
+    best = math.inf
+    for layout in (torch.channels_last, torch.contiguous_format):
+        net, (side,) = network(words)
+        net = net.to(memory_format=layout).eval()
+        image = torch.rand(1, 3, side, side).contiguous(memory_format=layout)
+        with torch.no_grad():
+            best = min(best, median_time(lambda: net(image, image, 0, 0)))
+    return best
+
+
+def train(words):
+    best = math.inf
+    for layout in (torch.channels_last, torch.contiguous_format):
+        net, (batch, patch, window) = network(words)
+        net = net.to(memory_format=layout)
+        adam = torch.optim.Adam(net.parameters(), 1e-4)
+        whole = torch.rand(batch, 3, patch, patch).contiguous(memory_format=layout)
+        image, place = whole[:, :, :window, :window], positions(window, window, window)
+        target = torch.rand(batch, net.a["channels"], window, window) - 0.5
+        light, camera = torch.randn(9, batch, 3, 1, 1), torch.randn(9, batch, 3, 1, 1)
+        light[:, :, 2], camera[:, :, 2] = light[:, :, 2].abs() + 0.3, camera[:, :, 2].abs() + 0.3
+
+        def loss_of(maps):
+            total = (maps - target).abs().mean()
+            for i in range(9):
+                a, b = rendered(maps, place, light[i], camera[i], i >= 3), rendered(target, place, light[i], camera[i], i >= 3)
+                total = total + (torch.log(a + 0.01) - torch.log(b + 0.01)).abs().mean() / 9
+            return total
+
+        def step():
+            adam.zero_grad(set_to_none=True)
+            first, last = net(whole, image, 0, 0)
+            (loss_of(first) + loss_of(last)).backward()
+            torch.nn.utils.clip_grad_norm_(net.parameters(), 1.0)
+            adam.step()
+
+        best = min(best, median_time(step))
+    return best
+
+
+def answer(words):
+    if words[0] == "version":
+        return f"PyTorch {torch.__version__}"
+    if words[0] == "threads":
+        torch.set_num_threads(int(words[1]))
+        return "0"
+    if words[0] in ("conv", "gradient"):
+        return f"{convolution(*map(int, words[1:8]), words[8], words[0] == 'gradient'):.6g}"
+    return f"{(infer if words[0] == 'infer' else train)(words[1:]):.6g}"
+
+
+for line in sys.stdin:
+    if not line.split():
+        continue
+    try:
+        print(answer(line.split()), flush=True)
+    except (RuntimeError, ValueError, KeyError, MemoryError) as e:
+        print("- " + str(e).splitlines()[0], flush=True)

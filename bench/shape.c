@@ -1,0 +1,24 @@
+#include "bench/shape.h"
+#include <stdio.h>
+#include <string.h>
+
+double bench_network_flop(const nn_model *m, const char *prefix, int side)
+{
+    double flop = 0;
+    for (int i = 0; i < m->params; i++) {
+        const nn_param *p = &m->param[i];
+        if (p->rank != 4 || strncmp(p->name, prefix, strlen(prefix)) != 0) continue;
+        int at = m->arch.g_size, level;
+        if (sscanf(p->name, "g.down%d", &level) == 1) at >>= level;
+        else if (sscanf(p->name, "g.up%d", &level) == 1) at >>= m->arch.g_levels - level;
+        else if (p->name[0] == 'h') at = side;
+        flop += 2.0 * (double)p->count * at * at;
+    }
+    return flop;
+}
+
+void bench_peer_network(const char *work, const nn_arch *a, int steps, char *job, size_t size)
+{
+    snprintf(job, size, "%s %d %d %d %d %d %d %d %d %d %d %d", work, a->g_width, a->g_width_max, a->g_levels, a->g_kernel_first, a->g_kernel, a->g_size,
+             a->h_width, a->h_gru, a->channels, a->recurrent, steps);
+}

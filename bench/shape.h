@@ -1,0 +1,11 @@
+/* What networks cost, and how to ask the peer for them. */
+#ifndef BENCH_SHAPE_H
+#define BENCH_SHAPE_H
+#include "nn/model.h"
+
+/* Multiplications and additions of the convolutions whose name starts with prefix: g at its own size, h at side x side. */
+double bench_network_flop(const nn_model *m, const char *prefix, int side);
+
+/* "WORK g_width ... T" for bench/peer_torch.py. */
+void bench_peer_network(const char *work, const nn_arch *a, int steps, char *job, size_t size);
+#endif
