@@ -1,7 +1,8 @@
 /* lgd-eval: how far estimated maps are from known ones. */
 #include "cli/cli.h"
-#include "eval/run.h"
+#include "eval/figure.h"
 #include "eval/set_ini.h"
+#include "eval/tune.h"
 #include "infer/arguments.h"
 #include "infer/model_path.h"
 #include "tensor/conv.h"
@@ -10,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SETS_MAX = 64, METHODS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, FAST, NORMAL, WORKFLOW, COLOUR, METHOD, REPEAT, PIN, LPIPS, EXACT, PATH_LENGTH = 4096 };
+enum { SETS_MAX = 64, METHODS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, FAST, NORMAL, WORKFLOW, COLOUR, METHOD, REPEAT, PIN, LPIPS, EXACT, TUNE, FIGURE, PARETO, PATH_LENGTH = 4096 };
 
 static const lgd_argument arguments[] = {
     {'o', "output", "DIR", "write results.csv, summary.csv, times.csv, results.json and report.html there (required)"},
@@ -31,6 +32,9 @@ static const lgd_argument arguments[] = {
     {REPEAT, "repeat", "N", "estimate each photograph N times, 1 .. 1000, and take the median time (default 1)"},
     {PIN, "pin", NULL, "bind every thread to a CPU of its own"},
     {EXACT, "exact", NULL, "compute all convolutions directly, not by Winograd's way where it is faster, as lgd-infer does"},
+    {FIGURE, "figure", "NAME", "also write DIR/NAME.svg and .csv: iterations (error over T, 0 .. 24 unless told) or methods (error over time)"},
+    {PARETO, "pareto", NULL, "instead: DIR/pareto.svg and .csv, lgd's time against error at 128, 256, 512 pixels, T = 0 .. 24, and tolerances"},
+    {TUNE, "tune", NULL, "instead: search the grids of the methods' settings (default: of those that need no weights), DIR/tune.csv"},
     {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {'q', "quiet", NULL, "no progress"},
     {'h', "help", NULL, "print this help"},
@@ -43,7 +47,7 @@ typedef struct command {
     int64_t seed;
     double noise;
     io_map_convention told;
-    bool images, fast, exact, pin, quiet, help, version;
+    bool images, fast, exact, pin, tune, pareto, iterations_figure, methods_figure, quiet, help, version;
 } command;
 
 static ts_code whole(const char *name, const char *text, int64_t lo, int64_t hi, int64_t *value, ts_status *st)
@@ -68,6 +72,13 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
         case 'V': c->version = true; break;
         case PIN: c->pin = true; break;
         case EXACT: c->exact = true; break;
+        case TUNE: c->tune = true; break;
+        case PARETO: c->pareto = true; break;
+        case FIGURE:
+            if (!strcmp(value, "iterations")) c->iterations_figure = true;
+            else if (!strcmp(value, "methods")) c->methods_figure = true;
+            else code = ts_fail(st, TS_INVALID, "--figure: '%s' is neither 'iterations' nor 'methods'", value);
+            break;
         case METHOD:
             if (c->methods == METHODS_MAX) code = ts_fail(st, TS_INVALID, "--method: more than %d methods", METHODS_MAX);
             else c->method[c->methods++] = value;
@@ -117,6 +128,10 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
     if (code || c->help || c->version) return code;
     if (operands < argc) return ts_fail(st, TS_INVALID, "'%s' is not an option; sets are given as --set KIND:WHERE", argv[operands]);
     if (c->sets == 0) return ts_fail(st, TS_INVALID, "no set is given: --set KIND:WHERE");
+    if (c->tune + c->pareto + (c->iterations_figure || c->methods_figure) > 1) return ts_fail(st, TS_INVALID, "--tune, --pareto and --figure are different tasks: choose one");
+    if (c->pareto && (c->methods || c->iterations >= 0)) return ts_fail(st, TS_INVALID, "--pareto has its own methods and iterations: --method and --iterations do not go with it");
+    if ((c->tune || c->pareto) && c->images) return ts_fail(st, TS_INVALID, "--images does not go with --tune or --pareto");
+    if (c->iterations_figure && c->iterations < 0) c->iterations = 24;
     if (!c->out || !*c->out) return ts_fail(st, TS_INVALID, "no output folder is given: -o DIR");
     return TS_OK;
 }
@@ -139,6 +154,7 @@ typedef struct work {
     const command *c;
     ev_set set[SETS_MAX];
     ev_estimator *method;
+    ev_tuning tuning;
     ev_lpips *lpips;
     char model[PATH_LENGTH], images[PATH_LENGTH];
     ev_run run;
@@ -179,12 +195,30 @@ static ts_code parse_methods(work *w, ts_status *st)
     return TS_OK;
 }
 
+/* All combinations of the grids; without methods of those that need no weights of their own. */
+static ts_code parse_tuning(work *w, ts_status *st)
+{
+    static const char *const some[] = {"mean", "lgd", "descent", "finetune"};
+    const command *c = w->c;
+    const int count = c->methods ? c->methods : (int)(sizeof some / sizeof *some);
+    for (int i = 0; i < count; i++)
+        if (ev_tune_add(&w->tuning, c->methods ? c->method[i] : some[i], i, w->model, st) != TS_OK) return st->code;
+    w->run.method = w->tuning.method;
+    w->run.methods = w->tuning.methods;
+    return TS_OK;
+}
+
 static int finish(work *w, ts_status *st)
 {
     ev_run *r = &w->run;
     if (r->report.results == 0) return cl_failed("no material could be evaluated");
-    if (ev_report_write(&r->report, w->c->out, st) != TS_OK) return cl_failed("%s", st->message);
-    ev_report_print(&r->report, stdout);
+    const char *out = w->c->out;
+    ts_code code = w->c->tune ? ev_tune_write(&r->report, out, st) : ev_report_write(&r->report, out, st);
+    if (!code && w->c->iterations_figure) code = ev_figure_iterations(&r->report, out, st);
+    if (!code && w->c->methods_figure) code = ev_figure_methods(&r->report, out, st);
+    if (code) return cl_failed("%s", st->message);
+    if (w->c->tune) ev_tune_print(&w->tuning, &r->report, stdout);
+    else ev_report_print(&r->report, stdout);
     if (r->failures > 0) return cl_failed("%d of %" PRId64 " %s failed: they are not in the means", r->failures, w->total, r->methods > 1 ? "estimates" : "materials");
     return CL_OK;
 }
@@ -210,20 +244,22 @@ static int evaluate(work *w, ts_status *st)
     r->repeat = c->repeat;
     r->seed = (uint64_t)c->seed;
     r->noise = c->noise;
-    r->perceptual = !c->fast;
+    r->perceptual = !c->fast && !c->tune;
     ts_conv_exact_set(c->exact);
-    r->pictures = true;
+    r->pictures = !c->tune;
     r->pinned = c->pin;
     r->model = slash ? slash + 1 : w->model;
     r->images = c->images ? w->images : NULL;
     r->failed = show_failure;
     r->done = show_progress;
     r->user = w;
-    w->bar = cl_progress_start(r->methods > 1 ? "estimate" : "material", 0);
-    const ts_code code = ev_run_all(r, st);
+    w->bar = cl_progress_start(r->methods != 1 ? "estimate" : "material", 0);
+    static const int sizes[] = {128, 256, 512};
+    const ts_code code = c->pareto ? ev_pareto(r, sizes, 3, w->model, c->out, st) : ev_run_all(r, st);
     cl_progress_end(&w->bar);
-    if (code == TS_INTERRUPTED) return cl_failed("interrupted after %" PRId64 " of %" PRId64 " %s: no results are written", w->done, w->total, r->methods > 1 ? "estimates" : "materials");
-    return code ? cl_failed("%s", st->message) : finish(w, st);
+    if (code == TS_INTERRUPTED) return cl_failed("interrupted after %" PRId64 " of %" PRId64 " %s: no results are written", w->done, w->total, r->methods != 1 ? "estimates" : "materials");
+    if (code) return cl_failed("%s", st->message);
+    return c->pareto ? CL_OK : finish(w, st);
 }
 
 static int start(const command *c)
@@ -237,11 +273,12 @@ static int start(const command *c)
         if (ev_set_open(c->spec[s], &c->told, &w->set[s], &st) != TS_OK) code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
     ts_threads_set(c->threads);
     if (code == CL_OK && lgd_model_path(c->model, "single", w->model, &st) != TS_OK) code = cl_failed("%s", st.message);
-    if (code == CL_OK && parse_methods(w, &st) != TS_OK) code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
+    if (code == CL_OK && (c->tune ? parse_tuning(w, &st) : c->pareto ? TS_OK : parse_methods(w, &st)) != TS_OK) code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
     if (code == CL_OK) code = evaluate(w, &st);
     for (int s = 0; s < c->sets; s++) ev_set_close(&w->set[s]);
     ev_run_free(&w->run);
     ev_lpips_free(&w->lpips);
+    ev_tune_free(&w->tuning);
     free(w->method);
     free(w);
     return code;

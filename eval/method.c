@@ -165,6 +165,13 @@ int ev_points(const ev_estimator *e, int step[EV_POINTS])
     const int steps = e->method->steps ? e->method->steps(e) : 0;
     int n = 0;
     if (e->last_alone) step[n++] = steps;
+    else if (e->tried)
+        for (const char *p = e->tried; *p && n < EV_POINTS; p += strspn(p, " ")) {
+            char *end;
+            const int t = (int)strtol(p, &end, 10);
+            if (t <= steps) step[n++] = t;
+            p = end;
+        }
     else if (!e->method->few)
         for (int i = 0; i <= steps && n < EV_POINTS; i++) step[n++] = i;
     else {

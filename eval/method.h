@@ -45,6 +45,7 @@ struct ev_estimator {
     char text[EV_METHOD_TEXT]; /* value points into it */
     const char *value[EV_SETTINGS]; /* by the table's index; NULL: neither given nor a default */
     const char *weights;   /* the program's model, for weights that are not given */
+    const char *tried;     /* the steps to score, separated by blanks; NULL: the method's own */
     bool last_alone;       /* only the last step can be seen */
     nn_model *net, *coder; /* g (and h); an auto-encoder */
     ag_tape *tape, *train; /* without and with gradients */

@@ -3,7 +3,7 @@
 #include "infer/tiles.h"
 #include <string.h>
 
-enum { TILE = 128 }; /* as lgd-infer's where tiles end early */
+enum { UNTILED = 512, TILE = 128 }; /* as lgd-infer's where a tolerance ends tiles early: up to the first the whole is one */
 
 static int steps(const ev_estimator *e)
 {
@@ -52,7 +52,7 @@ static ts_code run_tiles(ev_estimator *e, const ev_case *c, ev_seen seen, void *
 {
     const int channels = e->net->arch.channels;
     if (ev_block(e, (size_t)c->size * (size_t)c->size * (size_t)channels, st) != TS_OK) return st->code;
-    lgd_tiles t = {.image = &c->image, .views = &c->view, .given = 1, .side = c->size, .tile = TILE, .steps = steps(e), .tolerance = ev_number(e, "tolerance")};
+    lgd_tiles t = {.image = &c->image, .views = &c->view, .given = 1, .side = c->size, .tile = c->size > UNTILED ? TILE : c->size, .steps = steps(e), .tolerance = ev_number(e, "tolerance")};
     if (lgd_tiles_run(e->tape, e->net, &t, e->x, st) != TS_OK) return st->code;
     seen(t.steps, e->x, channels, user);
     return TS_OK;

@@ -77,7 +77,7 @@ static void draw_axes(FILE *f, const frame *r, const char *x_title, const char *
     if (r->log_x) log_axis(f, r);
     else {
         const double unit = round_step((r->x1 - r->x0) / TICKS);
-        for (double x = ceil(r->x0 / unit) * unit; x <= r->x1; x += unit) tick(f, r, x, true);
+        for (double x = ceil(r->x0 / unit) * unit + 0.0; x <= r->x1; x += unit) tick(f, r, x, true); /* + 0: no -0 */
     }
     fprintf(f, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">", (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 10);
     ev_put_text(f, x_title);

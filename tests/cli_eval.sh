@@ -9,7 +9,7 @@ evaluate() { "$BIN/lgd-eval" --size 32 --iterations 2 --threads 1 "$@"; }
 
 help_names_the_options() {
     expect 0 "$BIN/lgd-eval" --help
-    for o in method repeat pin descent finetune fast set iterations model threads seed noise images size output procedural strips maps; do says "$T/out" "$o"; done
+    for o in method repeat pin tune figure pareto descent finetune fast set iterations model threads seed noise images size output procedural strips maps; do says "$T/out" "$o"; done
 }
 
 wrong_usage() {
@@ -227,9 +227,35 @@ methods() {
     grep descent "$T/r/results.csv" | cmp -s - "$T/one" || fail "descent gives other numbers"
 }
 
+searches_and_figures() {
+    model
+    for o in "--tune --pareto" "--tune --figure methods" "--pareto --method mean" "--figure pie" "--tune --images"; do
+        expect 2 "$BIN/lgd-eval" --set procedural:1,1 $o -o "$T/o"
+        lines "$T/err" 2
+    done
+    expect 0 "$BIN/lgd-eval" --size 16 --threads 1 --set procedural:1000001,2 --tune --method mean --method descent:rate=0.01,start=r0 -o "$T/t"
+    lines "$T/out" 3
+    says "$T/out" "mean            2 tried"
+    says "$T/out" "descent        10 tried"
+    lines "$T/t/tune.csv" 13
+    [ "$(ls -A "$T/t")" = tune.csv ] || fail "$(ls -A "$T/t")"
+    # the best is the least of its method's
+    best=$(awk '/^descent/ { print $(NF - 3) }' "$T/out")
+    least=$(grep descent "$T/t/tune.csv" | awk -F, '{ v = $(NF - 2); if (!n++ || v < m) m = v } END { printf "%.4f", m }')
+    [ "$best" = "$least" ] || fail "the best is $best, the least $least"
+    expect 0 "$BIN/lgd-eval" --fast --size 16 --threads 1 --set procedural:1,2 --figure iterations --figure methods --method lgd --method mean -o "$T/f"
+    lines "$T/f/iterations.csv" 27 # T = 0 .. 24 and mean
+    lines "$T/f/methods.csv" 27
+    for f in iterations methods; do
+        says "$T/f/$f.svg" "</svg>"
+        says "$T/f/$f.svg" ">mean</text>"
+    done
+}
+
 check eval_captures captures
 check eval_lpips lpips
 check eval_maps_options told
 check eval_methods methods
+check eval_searches_and_figures searches_and_figures
 check eval_interrupted interrupted
 check eval_refinement_helps refinement_helps

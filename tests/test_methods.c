@@ -1,6 +1,7 @@
 /* The compared methods: the laws that each obeys. */
 #include "data/procedural.h"
-#include "eval/estimate.h"
+#include "eval/figure.h"
+#include "eval/tune.h"
 #include "nn/weights.h"
 #include "render/error.h"
 #include "render/render.h"
@@ -218,4 +219,49 @@ TEST(methods_tolerance_that_ends_nothing_changes_nothing)
     const int step = 3;
     CHECK(ev_estimate(&b, &s->c, &step, 1, 1, &row, &seconds, NULL, last, &st) == TS_OK, "%s", st.message);
     for (int i = 0; i < VALUES; i++) CHECK(fabsf(last[i] - whole.maps[3][i]) < 1e-5f, "value %d: %g, not %g", i, (double)last[i], (double)whole.maps[3][i]);
+}
+
+TEST(methods_grids_are_at_least_as_large_as_lgd_s)
+{
+    ev_tuning t = {0};
+    ts_status st = {0};
+    char spec[400];
+    int tried[3] = {0};
+    snprintf(spec, sizeof spec, "latent:model=%s", weights(true, true));
+    const char *const specs_of[] = {"descent", "finetune", spec};
+    for (int i = 0; i < 3; i++) CHECK(ev_tune_add(&t, specs_of[i], i, weights(false, true), &st) == TS_OK, "%s", st.message);
+    for (int m = 0; m < t.methods; m++) {
+        int step[EV_POINTS];
+        CHECK(!strcmp(t.method[m].method->name, t.of[m] == 0 ? "descent" : t.of[m] == 1 ? "finetune" : "latent"), "the wrong method");
+        for (int k = 0; k < m; k++) CHECK(strcmp(t.method[m].label, t.method[k].label) != 0, "%s twice", t.method[m].label);
+        CHECK(ev_open(&t.method[m], &st) == TS_OK, "%s: %s", t.method[m].label, st.message);
+        tried[t.of[m]] += ev_points(&t.method[m], step);
+        ev_close(&t.method[m]);
+    }
+    CHECK(tried[0] >= 25 && tried[1] >= 25 && tried[2] >= 25, "%d, %d, %d settings, lgd has 25", tried[0], tried[1], tried[2]);
+    ev_tune_free(&t);
+}
+
+TEST(methods_pareto_has_every_size)
+{
+    ev_set set;
+    ts_status st = {0};
+    const char *const name = "procedural:5,1";
+    char path[400], line[200];
+    CHECK(ev_set_open(name, NULL, &set, &st) == TS_OK, "%s", st.message);
+    const ev_run r = {.set = &set, .set_name = &name, .sets = 1, .repeat = 1, .seed = 1};
+    const int sizes[] = {16, 32};
+    CHECK(ev_pareto(&r, sizes, 2, weights(false, true), test_folder(), &st) == TS_OK, "%s", st.message);
+    snprintf(path, sizeof path, "%s/pareto.csv", test_folder());
+    FILE *f = fopen(path, "r");
+    int lines = 0, finite = 0;
+    while (f && fgets(line, sizeof line, f)) {
+        double seconds, error;
+        const char *at = strrchr(line, ','), *name_end = line[0] == '"' ? strchr(line + 1, '"') : NULL;
+        lines++;
+        finite += at && name_end && sscanf(name_end, "\",%*[^,],%lf,%lf", &seconds, &error) == 2;
+    }
+    CHECK(f && lines == 1 + 2 * (25 + 5), "%d lines", lines);
+    CHECK(finite >= 2 * (5 + 5), "%d labelled lines with numbers", finite);
+    ev_set_close(&set);
 }
