@@ -33,7 +33,7 @@ ts_code io_read_data(const char *path, int channels, int64_t max_pixels, io_imag
  * of channels; out is created, also where size is the square's own. */
 ts_code io_centre_square(const io_image *in, int size, io_image *out, ts_status *st);
 
-/* The same by the filter of scikit-image's transform.resize from 0.19 on, with its defaults (order 1, mode "reflect", anti-aliasing where it shrinks): a
+/* The same by the filter of scikit-image's transform.resize (0.20 to 0.26) with its defaults (order 1, mode "reflect", anti-aliasing where it shrinks): a
  * Gaussian of sigma (in / size - 1) / 2 cut off at 4 sigma, then linear interpolation at (j + 1/2) in / size - 1/2, both axes mirrored about the
  * outermost pixels' centres. */
 ts_code io_centre_square_scikit(const io_image *in, int size, io_image *out, ts_status *st);

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes tests/scikit_values.h: what scikit-image's transform.resize makes of small pictures, for tests/test_scikit.c.
 
-    python3 tests/make_scikit.py > tests/scikit_values.h        needs scikit-image 0.19 or later (pip install scikit-image)
+    python3 tests/make_scikit.py > tests/scikit_values.h        needs scikit-image (pip install scikit-image); 0.20 and 0.26 give the same
 
 The pictures are a formula's, byte i of the picture being bits 24 to 31 of i * 2654435761 mod 2^32, so that the test can make them too."""
 import numpy

@@ -233,3 +233,39 @@ TEST(published_kernels_match_the_reference)
         CHECK(worst < 2e-5 && worst_gradient < 2e-4, "%s: value off by %g, gradient by %g", ts_isa_name((ts_isa)isa), worst, worst_gradient);
     }
 }
+
+/* A small network of this kind: every instruction set gives what the base one gives, to rounding, which a random h magnifies some fourfold at each
+ * step. The parity at the paper's size runs on the best one alone (test_parity.c). */
+TEST(published_network_on_every_instruction_set)
+{
+    enum { SIDE = 32, C = 10, VALUES = SIDE * SIDE * C, STEPS = 2 };
+    ts_status st = {0};
+    nn_arch a = small();
+    a.g_width = 8, a.g_width_max = 32, a.g_levels = 3, a.g_size = SIDE, a.h_width = 24, a.h_gru = 12;
+    nn_model *m = nn_model_create(&a, &st);
+    CHECK(m, "%s", st.message);
+    nn_model_init(m, 11);
+    const nn_param *last = nn_model_find(m, "main_net.rnn.layers.2.input_fun.conv_layer.weight");
+    for (size_t i = 0; i < last->count; i++) m->value[last->offset + i] *= 10; /* h begins as nothing, nearly */
+    float *image = malloc(SIDE * SIDE * 3 * sizeof *image), *base = malloc((STEPS + 1) * VALUES * sizeof *base);
+    ts_rng rng = ts_rng_make(12, TS_STREAM_TEST, 0);
+    for (int i = 0; i < SIDE * SIDE * 3; i++) image[i] = ts_rng_range(&rng, 0.1f, 0.7f);
+    const nn_input in = {.image = ts_view(image, (ts_shape){1, SIDE, SIDE, 3}), .grid = rd_grid_full(SIDE), .view = rd_flash()};
+    for (int isa = TS_BASE; isa <= (int)ts_isa_best(); isa++) {
+        ts_isa_use((ts_isa)isa);
+        ag_tape *t = ag_tape_create(false, &st);
+        ag_value *maps[STEPS + 1];
+        CHECK(t && !nn_lgd(t, m, &in, STEPS, true, maps, NULL, NULL), "%s", t ? ag_status(t)->message : st.message);
+        for (int k = 0; k <= STEPS; k++) {
+            double sum = 0;
+            for (int i = 0; i < VALUES; i++) {
+                if (isa == TS_BASE) base[k * VALUES + i] = maps[k]->t.data[i];
+                sum += fabs((double)maps[k]->t.data[i] - (double)base[k * VALUES + i]) / VALUES;
+            }
+            printf("  %s: R_%d differs by %.2g\n", ts_isa_name((ts_isa)isa), k, sum);
+            CHECK(sum < 1e-6 * pow(5, k), "%s: R_%d differs by %g on average", ts_isa_name((ts_isa)isa), k, sum);
+        }
+        CHECK(isa > TS_BASE || fabs((double)base[STEPS * VALUES] - (double)base[0]) > 1e-4, "h changes nothing");
+        ag_tape_destroy(&t);
+    }
+}
