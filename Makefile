@@ -144,15 +144,15 @@ stress: $(STRESS_BIN)
 	@$(STRESS_BIN)
 
 # clang's libFuzzer with the address and undefined sanitizers, FUZZ_SECONDS for each target. The readers are compiled for it; what else they need comes
-# from the library as it is. New inputs go to $(BUILD)/fuzz/NAME, one that breaks something to $(BUILD)/fuzz/NAME.crash-….
+# from the library as it is. OpenImageIO's libraries take seconds to load, and its PNG reader leaks a name where libpng jumps out of it.
+# New inputs go to $(BUILD)/fuzz/NAME, one that breaks something to $(BUILD)/fuzz/NAME.crash-….
 FUZZ ?= safetensors torch photo image config folder
 FUZZ_SECONDS ?= 600
 FUZZ_CC ?= clang
-# OpenImageIO's PNG reader leaks where libpng jumps out of it, and its libraries take seconds to load.
-FUZZ_OPTIONS_image := -detect_leaks=0 -timeout=60
-FUZZED := $(filter-out nn/weights.c,$(wildcard $(addprefix nn/,file.c entry.c json.c safetensors_read.c zip.c pickle.c torch_objects.c torch_read.c) \
-  $(addprefix data/,png_file.c png_read.c jpeg_read.c exif.c colour.c image.c image_read.c image_library.c capture.c file.c name.c map_folder.c map_names.c material.c) \
-  train/ini.c train/config.c train/config_text.c train/keys.c eval/set_ini.c)) $(FUZZ_C)
+FUZZED := $(wildcard $(addprefix nn/,file.c entry.c json.c safetensors_read.c zip.c pickle.c torch_objects.c torch_read.c) \
+  $(addprefix data/,png_file.c png_read.c jpeg_read.c exif.c colour.c image.c image_read.c image_library.c capture.c capture_ini.c ini.c file.c name.c map_folder.c \
+  map_names.c material.c) \
+  train/config.c train/config_text.c train/keys.c eval/set_ini.c) $(FUZZ_C)
 FUZZ_FLAGS := -O1 -g -fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=all
 FUZZ_OBJ := $(FUZZED:%.c=$(BUILD)/fuzz/obj/%.o)
 
@@ -167,8 +167,8 @@ $(BUILD)/fuzz/bin/%: tests/fuzz/main.c $(FUZZ_OBJ) $(LIB)
 fuzz: $(FUZZ:%=$(BUILD)/fuzz/bin/%) $(IMAGE_LIB)
 	@mkdir -p $(BUILD)/fuzz/lib/lgd && cp $(IMAGE_LIB) $(BUILD)/fuzz/lib/lgd
 	@for t in $(FUZZ); do mkdir -p $(BUILD)/fuzz/$$t && echo "fuzz: $$t, $(FUZZ_SECONDS) s" && \
-	  if [ $$t = image ]; then more='$(FUZZ_OPTIONS_image)'; else more=-timeout=10; fi && \
-	  $(BUILD)/fuzz/bin/$$t -max_total_time=$(FUZZ_SECONDS) $$more -rss_limit_mb=2048 -max_len=16384 -print_final_stats=1 \
+	  leaks=1 && limit=10 && if [ $$t = image ]; then leaks=0 && limit=300; fi && ASAN_OPTIONS=detect_leaks=$$leaks \
+	  $(BUILD)/fuzz/bin/$$t -max_total_time=$(FUZZ_SECONDS) -timeout=$$limit -rss_limit_mb=2048 -max_len=16384 -print_final_stats=1 \
 	  -artifact_prefix=$(BUILD)/fuzz/$$t. $(BUILD)/fuzz/$$t tests/corpus/$$t >$(BUILD)/fuzz/$$t.log 2>&1 || { tail -n 40 $(BUILD)/fuzz/$$t.log; exit 1; }; \
 	  sed -n 's/^stat::number_of_executed_units: */fuzz: clean, inputs: /p' $(BUILD)/fuzz/$$t.log; done
 

@@ -145,7 +145,10 @@ static void pool(pair *x)
                 const float *from = x->data + (((size_t)n * (size_t)x->h + 2 * (size_t)oy) * (size_t)x->w + 2 * (size_t)ox) * channels;
                 for (size_t c = 0; c < channels; c++) {
                     float most = from[c];
-                    for (int i = 1; i < 9; i++) most = fmaxf(most, from[((size_t)(i / 3) * (size_t)x->w + (size_t)(i % 3)) * channels + c]);
+                    for (size_t i = 1; i < 9; i++) {
+                        const float v = from[(i / 3 * (size_t)x->w + i % 3) * channels + c];
+                        if (v > most) most = v;
+                    }
                     to[c] = most;
                 }
             }

@@ -10,7 +10,7 @@ void fuzz_torch(const uint8_t *data, size_t size);       /* a weights file of an
 void fuzz_photo(const uint8_t *data, size_t size);       /* PNG and JPEG by the quick readers, and their colours; a PNG's checksums are put right first */
 void fuzz_image(const uint8_t *data, size_t size);       /* by OpenImageIO: the first byte chooses the file name's extension, the rest is the file */
 void fuzz_config(const uint8_t *data, size_t size);      /* a training configuration */
-void fuzz_folder(const uint8_t *data, size_t size);      /* the first byte chooses set.ini, meta.txt or one of a capture's text files */
+void fuzz_folder(const uint8_t *data, size_t size);      /* the first byte chooses set.ini, meta.txt or one of a capture's files */
 
 /* An existing folder for files that need a name; set it before the last two. */
 extern const char *fuzz_where;

@@ -1,4 +1,5 @@
 #include "data/capture.h"
+#include "data/capture_ini.h"
 #include "data/map_folder.h"
 #include "eval/set_ini.h"
 #include "tests/fuzz/fuzz.h"
@@ -33,13 +34,13 @@ void fuzz_config(const uint8_t *data, size_t size)
 
 void fuzz_folder(const uint8_t *data, size_t size)
 {
-    static const char *const name[] = {"set.ini", "meta.txt", "image_size.txt", "light_power.txt", "camera_pos.txt", "light_pos.txt"};
+    static const char *const name[] = {"set.ini", "meta.txt", "image_size.txt", "light_power.txt", "camera_pos.txt", "light_pos.txt", "capture.ini"};
     static const char *const sound[] = {"10\n", "1,1,1\n", "0,0,10\n", "0,0,10\n"};
     if (size < 1) return;
-    const int kind = data[0] % 6;
+    const int kind = data[0] % 7;
     ts_status st = {0};
     for (int i = 2; i < 6; i++)
-        if (kind >= 2 && i != kind) fuzz_named(name[i], (const uint8_t *)sound[i - 2], strlen(sound[i - 2]));
+        if (kind >= 2 && kind < 6 && i != kind) fuzz_named(name[i], (const uint8_t *)sound[i - 2], strlen(sound[i - 2]));
     const char *path = fuzz_named(name[kind], data + 1, size - 1);
     ts_code code = TS_OK;
     if (kind == 0) {
@@ -50,8 +51,8 @@ void fuzz_folder(const uint8_t *data, size_t size)
         code = io_describe_map_folder(fuzz_where, NULL, &set, &st);
     } else {
         io_capture c;
-        code = io_read_capture(fuzz_where, 8, &c, &st);
-        if (!code) abort(); /* there are no pictures */
+        code = kind == 6 ? io_read_capture_ini(path, 8, 1, 1 << 16, &c, &st) : io_read_capture(fuzz_where, 8, &c, &st);
+        if (!code) io_capture_free(&c);
     }
     if (code && (!*st.message || strchr(st.message, '\n'))) abort();
     remove(path);

@@ -9,8 +9,8 @@ static void use(nn_file *f)
     enum { MOST = 1 << 16 };
     static double as_is[MOST];
     static float real[MOST];
-    volatile size_t length = 0;
-    for (int i = 0; nn_file_meta_key(f, i); i++) length += strlen(nn_file_meta(f, nn_file_meta_key(f, i)));
+    for (int i = 0; nn_file_meta_key(f, i); i++)
+        if (strlen(nn_file_meta(f, nn_file_meta_key(f, i))) > 1 << 30) abort(); /* reads all of it */
     for (int i = 0; i < nn_file_count(f); i++) {
         const nn_entry *e = nn_file_entry(f, i);
         if (nn_file_find(f, e->name) != e) abort();
