@@ -308,7 +308,7 @@ int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, in
     if (check_arguments(model, photo, photos, side, &o, maps, &st) == TS_OK) {
         const bool was = ts_conv_exact();
         ts_threads_set(o.threads);
-        ts_conv_exact_set(o.exact);
+        ts_conv_exact_set(o.exact || model->net->arch.compat == NN_COMPAT_PUBLISHED); /* whoever runs that wants its numbers */
         estimate(model, photo, photos, side, &o, maps, &st);
         ts_conv_exact_set(was);
     }

@@ -28,7 +28,8 @@ enum { LGD_AUTO = -2, LGD_AUTO_MOST = 24 };
 
 typedef struct lgd_options {
     int iterations; /* refinement steps; 0: R_0 alone, -1: as trained, LGD_AUTO */
-    int exact;      /* 0: 3 x 3 convolutions by Winograd's way where that is faster, with maps that differ by less than 1e-4; else directly */
+    int exact;      /* 0: 3 x 3 convolutions by Winograd's way where that is faster, with maps that differ by less than 1e-4; else directly, as weights
+                     * of the published network always are */
     int threads;    /* 0: as many as the process may use */
     /* Called after R_0 (step 0) and after every refinement with the reconstruction RMSE; return nonzero to stop there. May be NULL. */
     int (*progress)(int step, double rmse, void *user);

@@ -1,4 +1,5 @@
 /* The published network as a configuration: its tensors, its files without metadata of ours, its flash renderer. */
+#include "infer/lgd.h"
 #include "nn/published.h"
 #include "nn/weights.h"
 #include "render/brdf.h"
@@ -267,5 +268,38 @@ TEST(published_network_on_every_instruction_set)
         }
         CHECK(isa > TS_BASE || fabs((double)base[STEPS * VALUES] - (double)base[0]) > 1e-4, "h changes nothing");
         ag_tape_destroy(&t);
+    }
+}
+
+/* Winograd's convolutions are for others: with weights of this kind exact makes no difference, with the same network under our names it does. */
+TEST(published_weights_are_run_directly)
+{
+    enum { SIDE = 64 };
+    ts_status st = {0};
+    lgd_error error;
+    char path[512];
+    float *image = malloc(SIDE * SIDE * 3 * sizeof *image), *maps[2];
+    for (int i = 0; i < 2; i++) maps[i] = malloc(SIDE * SIDE * 9 * sizeof *maps[i]);
+    ts_rng rng = ts_rng_make(13, TS_STREAM_TEST, 0);
+    for (int i = 0; i < SIDE * SIDE * 3; i++) image[i] = ts_rng_range(&rng, 0.1f, 0.7f);
+    for (int published = 0; published < 2; published++) {
+        nn_arch a = small();
+        a.g_width = a.g_width_max = 32, a.g_levels = 1, a.g_kernel = 3, a.g_size = SIDE, a.h_width = 0, a.iterations = 0;
+        if (!published) a.compat = NN_COMPAT_NONE;
+        nn_model *m = nn_model_create(&a, &st);
+        CHECK(m, "%s", st.message);
+        nn_model_init(m, 11);
+        snprintf(path, sizeof path, "%s/%d.safetensors", test_folder(), published);
+        CHECK(!nn_model_save(m, m->value, path, NULL, 0, &st), "%s", st.message);
+        nn_model_free(&m);
+        lgd_model *model = lgd_load(path, &error);
+        CHECK(model, "%s", error.message);
+        for (int exact = 0; exact < 2; exact++) {
+            lgd_options o = lgd_options_default();
+            o.exact = exact;
+            CHECK(!lgd_estimate(model, image, SIDE, &o, maps[exact], &error), "%s", error.message);
+        }
+        lgd_free(&model);
+        CHECK(!memcmp(maps[0], maps[1], SIDE * SIDE * 9 * sizeof(float)) == (published == 1), "published %d: --exact is not heeded as it should be", published);
     }
 }
