@@ -4,6 +4,7 @@
 #include "data/material.h"
 #include "infer/encode.h"
 #include "infer/memory.h"
+#include "infer/power.h"
 #include "infer/tiles.h"
 #include "nn/model.h"
 #include "nn/weights.h"
@@ -293,6 +294,11 @@ static ts_code estimate(lgd_model *model, const lgd_photo *photo, int photos, in
         memcpy(views[k].camera, photo[k].camera, sizeof views[k].camera);
     }
     const bool tiles = lgd_tiles_exact(&model->net->arch) && (side > UNTILED || o->mask || o->tolerance > 0);
+    if (o->power) *o->power = 1;
+    if (o->power && model->net->arch.compat == NN_COMPAT_NONE) {
+        if (lgd_fit_power(model->tape, model->net, image, views, photos, side, o->power, st) != TS_OK) return st->code;
+        for (int k = 0; k < photos; k++) views[k].power *= (float)*o->power;
+    }
     int steps = o->iterations == -1 ? lgd_trained_iterations(model) : o->iterations;
     if (o->iterations == LGD_AUTO) {
         steps = model->net->arch.h_width > 0 ? LGD_AUTO_MOST : 0;

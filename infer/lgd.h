@@ -44,6 +44,10 @@ typedef struct lgd_options {
      * then called for every step at the end (stopping at a step does the work again to there), and this before each tile with the fraction that
      * is done; nonzero ends the work with an error. May be NULL. */
     int (*tile)(double done, void *user);
+    /* NULL: the photographs' lights are as strong as they say. Else what all of them have to be multiplied by is estimated from the photographs alone
+     * (it can be told apart from the albedo only where that would have to be above 1 or outside of what the model knows), taken, and written here; 1
+     * for the published weights, whose light is fixed. */
+    double *power;
 } lgd_options;
 lgd_options lgd_options_default(void);
 

@@ -10,6 +10,7 @@
 #include "infer/photograph.h"
 #include "infer/pipeline.h"
 #include "tensor/threads.h"
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -65,7 +66,7 @@ static void compute(lgd_item *item, void *user)
     run *r = user;
     const int size = item->square.width;
     const lgd_options options = {.iterations = r->command->iterations, .threads = r->command->threads, .progress = after_step, .user = r,
-                                 .exact = r->command->exact, .mask = item->mask, .tolerance = r->command->tolerance, .tile = before_tile};
+                                 .power = r->command->power > 0 ? NULL : &item->power, .exact = r->command->exact, .mask = item->mask, .tolerance = r->command->tolerance, .tile = before_tile};
     lgd_error error;
     lgd_photo photo[IO_CAPTURE_IMAGES] = {lgd_flash_photo(item->square.data)};
     int photos = 1;
@@ -73,6 +74,8 @@ static void compute(lgd_item *item, void *user)
         photos = lgd_capture_photos(&item->capture, lgd_most_photos(r->model), photo);
         if (photos < item->capture.images) cl_note("%s: note: the first %d of its %d photographs are used: these weights read no more", item->job->photo, photos, item->capture.images);
     }
+    item->power = r->command->power > 0 ? r->command->power : 1;
+    for (int k = 0; k < photos; k++) photo[k].power *= (float)item->power;
     r->item = item;
     if (io_material_create(&item->m, size, &item->st) != TS_OK) ts_context(&item->st, "%s", item->job->photo);
     else if (lgd_estimate_photos(r->model, photo, photos, size, &options, item->m.maps, &error) && !cl_interrupted())
@@ -98,6 +101,7 @@ static void finished(const lgd_item *item, void *user)
     printf("%s\n", item->job->folder);
     fflush(stdout); /* a reader at the other end of a pipe gets each folder when it is there */
     if (r->command->quiet) return;
+    if (fabs(item->power - 1) >= 0.005) cl_note("%s: light power %.2f of the %s", item->job->photo, item->power, item->capture.images ? "capture's" : "usual");
     if (item->steps > 0) cl_note("%s: reconstruction RMSE %.4f (R_0) -> %.4f (R_%d)", item->job->photo, item->first, item->last, item->steps);
     else cl_note("%s: reconstruction RMSE %.4f (R_0)", item->job->photo, item->first);
 }

@@ -5,7 +5,7 @@
 #include "infer/output.h"
 #include <string.h>
 
-enum { NORMAL = 256, CAPTURE, MAPS, WORKFLOW, MASK, TOLERANCE, EXACT, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
+enum { NORMAL = 256, CAPTURE, POWER, MAPS, WORKFLOW, MASK, TOLERANCE, EXACT, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
 
 const lgd_argument lgd_infer_arguments[] = {
     {'o', "output", "DIR", "write DIR/STEM/ for each photograph, STEM = its file name without extension (required)"},
@@ -15,6 +15,8 @@ const lgd_argument lgd_infer_arguments[] = {
     {EXACT, "exact", NULL, "compute all convolutions directly; the default, Winograd's way where it is faster, differs by less than 1e-4"},
     {CAPTURE, "capture", "WHERE", "in place of PHOTO: several photographs of one sample under known lights, listed in an INI file\n"
                                   "or a folder in MaterialGAN's layout; by default with the weights named multi"},
+    {POWER, "light-power", "P", "how strong the light is, in usual ones (of a capture: in those that it names): a number in 0.01 .. 100, or\n"
+                                "auto, estimated from the photograph and reported (the default; of a capture 1)"},
     {MASK, "mask", "FILE", "an image of the photographs' shape: only where it is brighter than black are the maps sure to be refined,\n"
                            "as they would be without it; elsewhere they may be the first estimate"},
     {TOLERANCE, "tolerance", "X", "0 .. 1: the photograph (over 512 pixels: a tile of it) is refined no further once a step changes its maps by less than X (RMS,\n"
@@ -55,6 +57,7 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
     int key, operands = argc;
     int64_t n = 0;
     ts_code code = TS_OK;
+    bool power_given = false;
     while (!code && !c->help && !c->version && (key = lgd_argument_next(argc, argv, lgd_infer_arguments, &value, &operands, st)) != LGD_ARGUMENT_END) {
         switch (key) {
         case 'o': c->out = value; break;
@@ -77,6 +80,12 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
             c->threads = (int)n;
             break;
         case EXACT: c->exact = true; break;
+        case POWER:
+            power_given = true;
+            c->power = 0;
+            if (strcmp(value, "auto") != 0 && !cl_parse_real(value, 0.01, 100, &c->power))
+                code = ts_fail(st, TS_INVALID, "--light-power: '%s' is neither auto nor a number in 0.01 .. 100", value);
+            break;
         case MASK: c->mask = value; break;
         case CAPTURE: code = take_capture(value, c, st); break;
         case TOLERANCE:
@@ -111,6 +120,7 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
     if (*c->capture && c->photos > 0) return ts_fail(st, TS_INVALID, "--capture lists its photographs: '%s' is one more", c->photo[0]);
     if (*c->capture && c->mask) return ts_fail(st, TS_INVALID, "--mask needs the shape of a photograph: not with --capture");
     if (*c->capture) {
+        if (!power_given) c->power = 1;
         c->only[0] = c->capture;
         c->photo = c->only;
         c->photos = 1;

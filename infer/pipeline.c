@@ -89,6 +89,7 @@ static void *write_all(void *user)
         const int threads = item->index + 1 < p->plan->jobs && c->size <= LARGE ? 1 : ts_threads();
         lgd_photo first = lgd_flash_photo(item->square.data);
         if (item->capture.images) lgd_capture_photos(&item->capture, 1, &first);
+        first.power *= (float)item->power;
         if (!item->st.code && lgd_output_write(c->out, item->job->stem, &item->m, &first, c->outputs, c->directx, threads, &item->lost, &item->st))
             ts_context(&item->st, "%s", item->job->photo);
         item->decoded = false;

@@ -19,6 +19,7 @@ typedef struct lgd_item {
     io_material m;
     double first, last; /* reconstruction RMSE of R_0 and of the last R_t */
     int steps;          /* t of that */
+    double power;       /* of the light that was taken, in those that the photographs name */
     io_metallic_error lost; /* infer/output.h */
     bool decoded;       /* what follows in the inbox: decoded or finished */
 } lgd_item;
