@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SETS_MAX = 64, METHODS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, FAST, NORMAL, WORKFLOW, COLOUR, METHOD, REPEAT, PIN, LPIPS, EXACT, TUNE, FIGURE, PARETO, PATH_LENGTH = 4096 };
+enum { SETS_MAX = 64, METHODS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, FAST, NORMAL, WORKFLOW, COLOUR, METHOD, REPEAT, PIN, LPIPS, EXACT, TUNE, FIGURE, PARETO, EXPOSURE, LIGHT, PATH_LENGTH = 4096 };
 
 static const lgd_argument arguments[] = {
     {'o', "output", "DIR", "write results.csv, summary.csv, times.csv, results.json and report.html there (required)"},
@@ -26,6 +26,9 @@ static const lgd_argument arguments[] = {
     {SIZE, "size", "N", "pixels of a side, 1 .. 4096 (default 256)"},
     {SEED, "seed", "N", "draws the renderings' lights and cameras, and the noise (default 1)"},
     {NOISE, "noise", "X", "sensor noise of the input picture, 0 = none .. 1 = a phone at night (default 0)"},
+    {EXPOSURE, "exposure", "S", "photographs under a light S times as strong as the methods are told, 0.01 .. 100; renderings are then compared after one\n"
+        "factor on the estimate's is fitted (default 1, and no fit)"},
+    {LIGHT, "light", "X,Y", "place the flash X, Y patch widths from the centre, -4 .. 4 each; the methods are told (default 0,0)"},
     {IMAGES, "images", NULL, "also write DIR/images/SET-MATERIAL.png: truth, first and last estimate in three rows;\nof several methods a file each"},
     {LPIPS, "lpips-weights", "TRUNK LINEAR", "measure LPIPS 0.1 too: torchvision's AlexNet and the lpips package's linear heads, two files (.pth or safetensors)"},
     {FAST, "fast", NULL, "no SSIM and FLIP, which take most of the time"},
@@ -45,7 +48,7 @@ typedef struct command {
     const char *out, *model, *lpips[2], *spec[SETS_MAX], *method[METHODS_MAX];
     int sets, methods, iterations, threads, size, repeat;
     int64_t seed;
-    double noise;
+    double noise, exposure, light[2]; /* exposure 0: not given */
     io_map_convention told;
     bool images, fast, exact, pin, tune, pareto, iterations_figure, methods_figure, quiet, help, version;
 } command;
@@ -54,6 +57,19 @@ static ts_code whole(const char *name, const char *text, int64_t lo, int64_t hi,
 {
     if (cl_parse_int(text, lo, hi, value)) return TS_OK;
     return ts_fail(st, TS_INVALID, "--%s: '%s' is not a whole number in %lld .. %lld", name, text, (long long)lo, (long long)hi);
+}
+
+static ts_code parse_light(const char *text, double light[2], ts_status *st)
+{
+    char x[32];
+    const char *comma = strchr(text, ',');
+    const size_t n = comma ? (size_t)(comma - text) : 0;
+    if (n > 0 && n < sizeof x) {
+        memcpy(x, text, n);
+        x[n] = 0;
+        if (cl_parse_real(x, -4, 4, &light[0]) && cl_parse_real(comma + 1, -4, 4, &light[1])) return TS_OK;
+    }
+    return ts_fail(st, TS_INVALID, "--light: '%s' is not X,Y with numbers in -4 .. 4", text);
 }
 
 static ts_code parse(int argc, char **argv, command *c, ts_status *st)
@@ -87,6 +103,10 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
             code = whole("repeat", value, 1, 1000, &n, st);
             c->repeat = (int)n;
             break;
+        case EXPOSURE:
+            if (!cl_parse_real(value, 0.01, 100, &c->exposure)) code = ts_fail(st, TS_INVALID, "--exposure: '%s' is not a number in 0.01 .. 100", value);
+            break;
+        case LIGHT: code = parse_light(value, c->light, st); break;
         case IMAGES: c->images = true; break;
         case FAST: c->fast = true; break;
         case LPIPS:
@@ -244,6 +264,10 @@ static int evaluate(work *w, ts_status *st)
     r->repeat = c->repeat;
     r->seed = (uint64_t)c->seed;
     r->noise = c->noise;
+    r->exposure = c->exposure > 0 ? c->exposure : 1;
+    r->fit = c->exposure > 0;
+    r->flash = rd_flash();
+    for (int k = 0; k < 2; k++) r->flash.light[k] = (float)c->light[k];
     r->perceptual = !c->fast && !c->tune;
     ts_conv_exact_set(c->exact);
     r->pictures = !c->tune;

@@ -30,6 +30,7 @@ typedef struct ev_method {
     const ev_setting *settings;
     bool few;                 /* of many steps some are scored: 1, 2, 5, 10 ... (false: all) */
     int (*steps)(const ev_estimator *e); /* after open; NULL: 0 */
+    int (*photos)(const ev_estimator *e); /* photographs that it reads, after open; NULL: 1 */
     ts_code (*open)(ev_estimator *e, ts_status *st); /* weights and tapes; on failure ev_close cleans up */
     /* Estimates the maps of c->image, a flash photograph of view c->view; step 0 is what it begins with. The same numbers for any number of
      * threads, whatever was estimated before. */

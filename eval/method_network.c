@@ -1,5 +1,6 @@
 /* unet, unet-joint, lgd, lgd-nograd, frozen: networks that only run. They differ in the weights that they ask for. */
 #include "eval/method.h"
+#include "infer/power.h"
 #include "infer/tiles.h"
 #include <string.h>
 
@@ -11,6 +12,12 @@ static int steps(const ev_estimator *e)
     return told < 0 ? e->net->arch.iterations : (int)told;
 }
 
+static int photos(const ev_estimator *e)
+{
+    const double told = ev_given(e, "photos") ? ev_number(e, "photos") : e->net->arch.images;
+    return (int)told;
+}
+
 static ts_code open_g(ev_estimator *e, ts_status *st) { return ev_open_net(e, "model", st); }
 
 static ts_code open_lgd(ev_estimator *e, ts_status *st)
@@ -18,6 +25,7 @@ static ts_code open_lgd(ev_estimator *e, ts_status *st)
     if (ev_open_net(e, "model", st) != TS_OK) return st->code;
     const nn_arch *a = &e->net->arch;
     e->last_alone = ev_number(e, "tolerance") > 0;
+    if (photos(e) > a->images) return ts_fail(st, TS_UNSUPPORTED, "%s: reads at most %d photographs", ev_text(e, "model"), a->images);
     if (steps(e) > 0 && a->h_width == 0) return ts_fail(st, TS_UNSUPPORTED, "%s: has no refiner: only iterations 0 are possible", ev_text(e, "model"));
     if (e->last_alone && !lgd_tiles_exact(a)) return ts_fail(st, TS_UNSUPPORTED, "%s: its steps couple all pixels, so that no tolerance can end a part of them", ev_text(e, "model"));
     return TS_OK;
@@ -48,11 +56,27 @@ static bool after(int step, const ag_value *maps, void *user)
     return t->seen(step, maps->t.data, maps->t.shape.c, t->user);
 }
 
-static ts_code run_tiles(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
+enum { POWER_TOLD, POWER_AUTO, POWER_KNOWN };
+
+/* The inputs' pictures and views, with the lights' power as the key says. Returns how many. */
+static ts_code inputs(ev_estimator *e, const ev_case *c, const float *image[NN_MAX_IMAGES], rd_view view[NN_MAX_IMAGES], ts_status *st)
+{
+    double factor = (int)ev_number(e, "power") == POWER_KNOWN ? c->exposure : 1;
+    const int count = photos(e);
+    for (int k = 0; k < count; k++) {
+        image[k] = c->image + (size_t)k * (size_t)c->size * (size_t)c->size * 3;
+        view[k] = c->input[k];
+    }
+    if ((int)ev_number(e, "power") == POWER_AUTO && lgd_fit_power(e->tape, e->net, image, view, count, c->size, &factor, st) != TS_OK) return st->code;
+    for (int k = 0; k < count; k++) view[k].power *= (float)factor;
+    return TS_OK;
+}
+
+static ts_code run_tiles(ev_estimator *e, const ev_case *c, const float *const *image, const rd_view *view, ev_seen seen, void *user, ts_status *st)
 {
     const int channels = e->net->arch.channels;
     if (ev_block(e, (size_t)c->size * (size_t)c->size * (size_t)channels, st) != TS_OK) return st->code;
-    lgd_tiles t = {.image = &c->image, .views = &c->view, .given = 1, .side = c->size, .tile = c->size > UNTILED ? TILE : c->size, .steps = steps(e), .tolerance = ev_number(e, "tolerance")};
+    lgd_tiles t = {.image = image, .views = view, .given = photos(e), .side = c->size, .tile = c->size > UNTILED ? TILE : c->size, .steps = steps(e), .tolerance = ev_number(e, "tolerance")};
     if (lgd_tiles_run(e->tape, e->net, &t, e->x, st) != TS_OK) return st->code;
     seen(t.steps, e->x, channels, user);
     return TS_OK;
@@ -60,11 +84,15 @@ static ts_code run_tiles(ev_estimator *e, const ev_case *c, ev_seen seen, void *
 
 static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
 {
-    if (e->last_alone) return run_tiles(e, c, seen, user, st);
+    const float *image[NN_MAX_IMAGES];
+    rd_view view[NN_MAX_IMAGES];
+    if (inputs(e, c, image, view, st) != TS_OK) return st->code;
+    if (e->last_alone) return run_tiles(e, c, image, view, seen, user, st);
     told t = {seen, user};
     ag_value *out = NULL;
     ag_reset(e->tape);
-    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){1, c->size, c->size, 3}), .grid = rd_grid_full(c->size), .view = c->view};
+    const int given = photos(e);
+    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){given, c->size, c->size, 3}), .grid = rd_grid_full(c->size), .views = view, .given = given};
     if (nn_lgd(e->tape, e->net, &in, steps(e), false, &out, after, &t) == TS_OK) return TS_OK;
     *st = *ag_status(e->tape);
     return st->code;
@@ -79,12 +107,18 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
 
 static const ev_setting unet[] = {MODEL_GIVEN("weights of a g that was trained alone"), {0}};
 static const ev_setting joint[] = {MODEL("weights of g and h, by default the program's"), {0}};
-static const ev_setting lgd[] = {MODEL("weights of g and h, by default the program's"), ITERATIONS, TOLERANCE, {0}};
-static const ev_setting nograd[] = {MODEL_GIVEN("weights trained with model.gradient = no"), ITERATIONS, TOLERANCE, {0}};
-static const ev_setting frozen[] = {MODEL_GIVEN("weights trained with train.g_rate = 0"), ITERATIONS, TOLERANCE, {0}};
+#define PHOTOS {.key = "photos", .type = EV_WHOLE, .lo = 1, .hi = NN_MAX_IMAGES, .help = "photographs that are given (default: as many as the weights read)"}
+#define POWER                                                                                                                             \
+    {.key = "power", .type = EV_WORD, .words = "told auto known", .initial = "told",                                                      \
+     .help = "of the light: the usual one, estimated as lgd-infer --light-power auto, or what --exposure made of it"}
+#define REFINER ITERATIONS, TOLERANCE, PHOTOS, POWER, {0}
+
+static const ev_setting lgd[] = {MODEL("weights of g and h, by default the program's"), REFINER};
+static const ev_setting nograd[] = {MODEL_GIVEN("weights trained with model.gradient = no"), REFINER};
+static const ev_setting frozen[] = {MODEL_GIVEN("weights trained with train.g_rate = 0"), REFINER};
 
 const ev_method ev_method_unet = {.name = "unet", .help = "g alone, feed-forward", .settings = unet, .open = open_g, .run = run_g};
 const ev_method ev_method_unet_joint = {.name = "unet-joint", .help = "R_0 of g and h that were trained together", .settings = joint, .open = open_g, .run = run_g};
-const ev_method ev_method_lgd = {.name = "lgd", .help = "g and h, which reads the gradient", .settings = lgd, .steps = steps, .open = open_lgd, .run = run_lgd};
-const ev_method ev_method_lgd_nograd = {.name = "lgd-nograd", .help = "g and h that was trained without the gradient", .settings = nograd, .steps = steps, .open = open_nograd, .run = run_lgd};
-const ev_method ev_method_frozen = {.name = "frozen", .help = "h that was trained on a fixed g", .settings = frozen, .steps = steps, .open = open_lgd, .run = run_lgd};
+const ev_method ev_method_lgd = {.name = "lgd", .help = "g and h, which reads the gradient", .settings = lgd, .steps = steps, .photos = photos, .open = open_lgd, .run = run_lgd};
+const ev_method ev_method_lgd_nograd = {.name = "lgd-nograd", .help = "g and h that was trained without the gradient", .settings = nograd, .steps = steps, .photos = photos, .open = open_nograd, .run = run_lgd};
+const ev_method ev_method_frozen = {.name = "frozen", .help = "h that was trained on a fixed g", .settings = frozen, .steps = steps, .photos = photos, .open = open_lgd, .run = run_lgd};

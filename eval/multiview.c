@@ -27,11 +27,11 @@ rd_view ev_capture_view(const io_capture *c, int picture)
     return view;
 }
 
-void ev_capture_input(const io_capture *c, float *image)
+void ev_capture_input(const io_capture *c, int inputs, float *image)
 {
     float gain[3];
     input_gain(c, gain);
-    for (size_t i = 0; i < (size_t)c->size * (size_t)c->size * 3; i++) image[i] = fminf(c->image[i] * gain[i % 3], 1);
+    for (size_t i = 0; i < (size_t)inputs * (size_t)c->size * (size_t)c->size * 3; i++) image[i] = fminf(c->image[i] * gain[i % 3], 1);
 }
 
 /* Linear radiance in the capture's own brightness. */
@@ -87,13 +87,13 @@ static double fit(size_t values, const float *photo, const float *scene)
     return exp2((lo + hi) / 2);
 }
 
-ev_row ev_capture_score(const io_capture *c, const float *maps, int channels, bool perceptual, ev_lpips *lpips)
+ev_row ev_capture_score(const io_capture *c, int inputs, const float *maps, int channels, bool perceptual, ev_lpips *lpips)
 {
     ev_row row;
     for (int k = 0; k < EV_METRICS; k++) row.value[k] = NAN;
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
     float *memory = malloc(3 * values * sizeof *memory), *photo = memory, *scene = memory + values, *shown = memory + 2 * values;
-    if (!memory || c->images < 2) {
+    if (!memory || c->images <= inputs) {
         free(memory);
         return row;
     }
@@ -101,7 +101,7 @@ ev_row ev_capture_score(const io_capture *c, const float *maps, int channels, bo
     render(c, 0, maps, channels, scene);
     const double exposure = fit(values, photo, scene);
     double rmse = 0, ssim = 0, flip = 0, distance = 0;
-    for (int p = 1; p < c->images; p++) {
+    for (int p = inputs; p < c->images; p++) {
         const float *linear = c->image + (size_t)p * values;
         for (size_t i = 0; i < values; i++) photo[i] = rd_gamma(linear[i]);
         render(c, p, maps, channels, scene);
@@ -114,9 +114,9 @@ ev_row ev_capture_score(const io_capture *c, const float *maps, int channels, bo
         if (lpips) distance += ev_lpips_distance(lpips, c->size, c->size, shown, photo, NULL);
     }
     row.value[EV_EXPOSURE] = exposure;
-    row.value[EV_RENDER] = rmse / (c->images - 1);
-    if (perceptual) row.value[EV_SSIM] = ssim / (c->images - 1), row.value[EV_FLIP] = flip / (c->images - 1);
-    if (lpips) row.value[EV_LPIPS] = distance / (c->images - 1);
+    row.value[EV_RENDER] = rmse / (c->images - inputs);
+    if (perceptual) row.value[EV_SSIM] = ssim / (c->images - inputs), row.value[EV_FLIP] = flip / (c->images - inputs);
+    if (lpips) row.value[EV_LPIPS] = distance / (c->images - inputs);
     free(memory);
     return row;
 }

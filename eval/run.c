@@ -32,16 +32,26 @@ static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, t
     if ((capture ? ev_set_load_capture(set, i, r->size, &b->capture, st) : ev_set_load(set, i, r->size, &b->truth, st)) != TS_OK) return st->code;
     if (capture) {
         b->name = b->capture.name;
-        ev_capture_input(&b->capture, b->image);
-        *c = ev_case_of_capture(&b->capture, b->image, r->perceptual);
+        if (b->capture.images <= r->inputs)
+            return ts_fail(st, TS_FORMAT, "%s: has %d pictures: %d are the input, and one more at least is compared", b->name, b->capture.images, r->inputs);
+        ev_capture_input(&b->capture, r->inputs, b->image);
+        *c = ev_case_of_capture(&b->capture, b->image, r->inputs, r->perceptual);
         c->lpips = r->lpips;
         return TS_OK;
     }
     b->name = b->truth.name;
     ts_rng rng = ts_rng_make(r->seed, TS_STREAM_EVAL, identity);
     rd_eval_views(&rng, RD_EVAL_VIEWS, b->views);
-    ev_photograph(&b->truth, (float)r->noise, r->seed, identity, b->image);
     *c = ev_case_of_maps(&b->truth, b->image, b->views, r->perceptual);
+    c->view = r->flash;
+    c->inputs = r->inputs;
+    c->exposure = r->exposure;
+    c->fit = r->fit;
+    ev_input_views(&c->view, c->inputs, r->seed, identity, c->input);
+    for (int k = 0; k < c->inputs; k++) {
+        const ev_photo photo = {c->input[k], c->exposure, (float)r->noise, r->seed, identity * NN_MAX_IMAGES + (uint64_t)k};
+        ev_photograph(&b->truth, &photo, b->image + (size_t)k * (size_t)r->size * (size_t)r->size * 3);
+    }
     c->lpips = r->lpips;
     return TS_OK;
 }
@@ -122,12 +132,14 @@ static ts_code plan(ev_run *r, ts_status *st)
 {
     int *step = malloc(EV_POINTS * sizeof *step);
     ts_code code = step ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory");
+    r->inputs = 1;
     r->subject = calloc((size_t)r->methods, sizeof *r->subject);
     if (!r->subject) code = ts_fail(st, TS_NOMEM, "out of memory");
     for (int m = 0, columns = 0; m < r->methods && !code; m++) {
         code = ev_open(&r->method[m], st);
         if (code) break;
-        const int points = ev_points(&r->method[m], step);
+        const int points = ev_points(&r->method[m], step), photos = r->method[m].method->photos ? r->method[m].method->photos(&r->method[m]) : 1;
+        if (photos > r->inputs) r->inputs = photos;
         int *more = realloc(r->step, (size_t)(columns + points) * sizeof *more);
         if (!more) code = ts_fail(st, TS_NOMEM, "out of memory");
         else memcpy((r->step = more) + columns, step, (size_t)points * sizeof *step);
@@ -143,7 +155,7 @@ static ts_code plan(ev_run *r, ts_status *st)
 static bool make(ev_run *r, bench *b, int64_t total)
 {
     const size_t pixels = (size_t)r->size * (size_t)r->size;
-    b->image = malloc(pixels * 3 * sizeof *b->image);
+    b->image = malloc((size_t)r->inputs * pixels * 3 * sizeof *b->image);
     b->first = malloc(pixels * MAP_CHANNELS * sizeof *b->first);
     b->last = malloc(pixels * MAP_CHANNELS * sizeof *b->last);
     b->row = malloc((size_t)r->report.columns * sizeof *b->row);

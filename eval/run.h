@@ -13,7 +13,9 @@ typedef struct ev_run {
     int methods;
     int size, repeat;
     uint64_t seed;        /* of the renderings' views and the noise */
-    double noise;
+    double noise, exposure; /* exposure: the inputs' lights, in those that the methods are told; not 1: renderings are compared after one factor is fitted */
+    rd_view flash;        /* of the first input, as the methods are told; not of captures */
+    bool fit;             /* compare renderings after one factor is fitted */
     bool perceptual, pictures, pinned; /* SSIM and FLIP; pictures for the report; whether the threads are pinned */
     ev_lpips *lpips;      /* LPIPS too, where it is not NULL */
     const char *model;    /* its name for the report */
@@ -27,6 +29,7 @@ typedef struct ev_run {
     int failures;
     ev_subject *subject;
     int *step;
+    int inputs;           /* pictures of each material: the most that a method reads */
 } ev_run;
 
 /* Opens each method to learn of its weights' errors before any work, then one after the other, so that its memory and caches are its own; the first

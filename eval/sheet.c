@@ -12,7 +12,7 @@ static int columns_of(const ev_case *c) { return c->capture && c->capture->image
 static void capture_row(io_image *sheet, const ev_case *c, int row, const float *maps, float *picture)
 {
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
-    const double exposure = maps ? ev_capture_score(c->capture, maps, MAP_CHANNELS, false, NULL).value[EV_EXPOSURE] : 1;
+    const double exposure = maps ? ev_capture_score(c->capture, c->inputs, maps, MAP_CHANNELS, false, NULL).value[EV_EXPOSURE] : 1;
     for (int i = 0; i < columns_of(c); i++) {
         if (maps) ev_capture_render(c->capture, i, maps, MAP_CHANNELS, exposure, picture);
         lgd_panel_put(sheet, c->size, i, row, maps ? picture : c->capture->image + (size_t)i * values);

@@ -200,6 +200,24 @@ all_photographs() {
         fail "refinement does not bring the renderings nearer to the photographs"
 }
 
+# The power of the light is reported when it is not the usual one, and changes the maps; the wrong ones are refused.
+light_power() {
+    model
+    photo "$T/p.ppm" 16 16
+    expect 0 infer --light-power 1 "$T/p.ppm" -o "$T/one"
+    if grep -q 'light power' "$T/err"; then fail "the usual power is reported"; fi
+    expect 0 infer --light-power 2.5 "$T/p.ppm" -o "$T/more"
+    says "$T/err" "light power 2.50"
+    if cmp -s "$T/one/p/maps.exr" "$T/more/p/maps.exr"; then fail "the power changes nothing"; fi
+    expect 0 infer "$T/p.ppm" -o "$T/default"
+    expect 0 infer --light-power auto "$T/p.ppm" -o "$T/auto"
+    cmp -s "$T/default/p/maps.exr" "$T/auto/p/maps.exr" || fail "auto is not the default"
+    for power in 0 -1 1e9 bright; do
+        expect 2 infer --light-power=$power "$T/p.ppm" -o "$T/bad"
+        says "$T/err" --light-power
+    done
+}
+
 check infer_help_names_the_options help_names_the_options
 check infer_wrong_usage wrong_usage
 check infer_whole_run whole_run
@@ -208,6 +226,7 @@ check infer_writes_only_what_is_asked_for only_what_is_asked_for
 check infer_overlap_changes_nothing overlap_changes_nothing
 check infer_old_results_are_replaced old_results
 check infer_poor_photographs poor_photographs
+check infer_light_power light_power
 check infer_sizes sizes
 check infer_mask_and_tolerance mask_and_tolerance
 check infer_comma_locale comma_locale

@@ -22,7 +22,7 @@ static void make_case(io_material *m, float *image, rd_view *views, ev_case *c)
     io_procedural_make(&p, 4, m);
     ts_rng rng = ts_rng_make(2, TS_STREAM_EVAL, 0);
     rd_eval_views(&rng, RD_EVAL_VIEWS, views);
-    ev_photograph(m, 0, 1, 1, image);
+    ev_photograph(m, &(ev_photo){rd_flash(), 1, 0, 1, 1}, image);
     *c = ev_case_of_maps(m, image, views, false);
 }
 
@@ -104,10 +104,10 @@ TEST(eval_noise_is_seeded_and_none_is_exact)
     rd_view views[RD_EVAL_VIEWS];
     ev_case c;
     make_case(&m, clean, views, &c);
-    ev_photograph(&m, 0.5f, 1, 7, a);
-    ev_photograph(&m, 0.5f, 1, 7, b);
+    ev_photograph(&m, &(ev_photo){rd_flash(), 1, 0.5f, 1, 7}, a);
+    ev_photograph(&m, &(ev_photo){rd_flash(), 1, 0.5f, 1, 7}, b);
     CHECK(memcmp(a, b, sizeof a) == 0 && memcmp(a, clean, sizeof a) != 0, "noise is not a function of its seed");
-    ev_photograph(&m, 0.5f, 1, 8, b);
+    ev_photograph(&m, &(ev_photo){rd_flash(), 1, 0.5f, 1, 8}, b);
     CHECK(memcmp(a, b, sizeof a) != 0, "two materials have the same noise");
     io_material_free(&m);
 }

@@ -30,7 +30,7 @@ static scene *make(uint64_t index)
     io_procedural_make(&p, index, &s->truth);
     ts_rng rng = ts_rng_make(2, TS_STREAM_EVAL, index);
     rd_eval_views(&rng, RD_EVAL_VIEWS, s->views);
-    ev_photograph(&s->truth, 0, 1, 1, s->image);
+    ev_photograph(&s->truth, &(ev_photo){rd_flash(), 1, 0, 1, 1}, s->image);
     s->c = ev_case_of_maps(&s->truth, s->image, s->views, false);
     return s;
 }

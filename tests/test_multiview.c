@@ -39,14 +39,14 @@ TEST(eval_capture_of_the_truth_scores_nothing)
         io_material m = {0};
         io_capture c;
         make(&m, &c, brightness);
-        const ev_row row = ev_capture_score(&c, m.maps, MAP_CHANNELS, true, NULL);
+        const ev_row row = ev_capture_score(&c, 1, m.maps, MAP_CHANNELS, true, NULL);
         CHECK(fabs(row.value[EV_EXPOSURE] / (double)brightness - 1) < 1e-3, "exposure %g, not %g", row.value[EV_EXPOSURE], (double)brightness);
         CHECK(row.value[EV_RENDER] < 1e-4 && row.value[EV_SSIM] > 0.9999 && row.value[EV_FLIP] < 1e-2, "RMSE %g, SSIM %g, FLIP %g", row.value[EV_RENDER],
               row.value[EV_SSIM], row.value[EV_FLIP]);
         CHECK(isnan(row.value[EV_DIFFUSE]) && isnan(row.value[EV_ANGLE]), "the maps of a capture are known");
         for (int i = 0; i < SIZE * SIZE; i++) m.maps[i * MAP_CHANNELS + MAP_NORMAL] *= -1;
-        CHECK(ev_capture_score(&c, m.maps, MAP_CHANNELS, false, NULL).value[EV_RENDER] > 0.005, "mirrored normals score %g",
-              ev_capture_score(&c, m.maps, MAP_CHANNELS, false, NULL).value[EV_RENDER]);
+        CHECK(ev_capture_score(&c, 1, m.maps, MAP_CHANNELS, false, NULL).value[EV_RENDER] > 0.005, "mirrored normals score %g",
+              ev_capture_score(&c, 1, m.maps, MAP_CHANNELS, false, NULL).value[EV_RENDER]);
         io_material_free(&m);
         io_capture_free(&c);
     }
@@ -59,7 +59,7 @@ TEST(eval_capture_input_is_a_flash_photograph)
     io_capture c;
     static float input[SIZE * SIZE * 3], expected[SIZE * SIZE * 3];
     make(&m, &c, 1);
-    ev_capture_input(&c, input);
+    ev_capture_input(&c, 1, input);
     const rd_view view = ev_capture_view(&c, 0);
     rd_render(rd_grid_full(SIZE), m.maps, MAP_CHANNELS, &view, true, expected);
     int compared = 0;
@@ -96,7 +96,7 @@ TEST(eval_multiview_sets)
     CHECK(ev_set_open(spec, NULL, &set, &st) == TS_OK && set.count == 1, "%s", st.message);
     CHECK(ev_set_load_capture(&set, 0, 0, &back, &st) == TS_OK && back.images == IMAGES && strcmp(back.name, "b") == 0, "%s: %s", back.name, st.message);
     /* 8 bits of gamma are all that is lost */
-    CHECK(ev_capture_score(&back, m.maps, MAP_CHANNELS, false, NULL).value[EV_RENDER] < 0.003, "RMSE %g", ev_capture_score(&back, m.maps, MAP_CHANNELS, false, NULL).value[EV_RENDER]);
+    CHECK(ev_capture_score(&back, 1, m.maps, MAP_CHANNELS, false, NULL).value[EV_RENDER] < 0.003, "RMSE %g", ev_capture_score(&back, 1, m.maps, MAP_CHANNELS, false, NULL).value[EV_RENDER]);
     ev_set_close(&set);
     io_capture_free(&c);
     CHECK(io_capture_create(&c, 1, 8, &st) == TS_OK, "%s", st.message);
@@ -159,11 +159,11 @@ TEST(eval_multiview_of_others)
         t.normal[2] = fmaxf(t.normal[2], 1e-3f);
         io_texel_put(m.maps + (size_t)i * MAP_CHANNELS, &t);
     }
-    const ev_row row = ev_capture_score(&c, m.maps, MAP_CHANNELS, false, NULL);
+    const ev_row row = ev_capture_score(&c, 1, m.maps, MAP_CHANNELS, false, NULL);
     printf("RMSE %.4f, exposure %.3f\n", row.value[EV_RENDER], row.value[EV_EXPOSURE]);
     CHECK(row.value[EV_RENDER] < 0.05 && fabs(row.value[EV_EXPOSURE] - 1) < 0.1, "RMSE %g, exposure %g", row.value[EV_RENDER], row.value[EV_EXPOSURE]);
     for (int i = 0; i < PICTURES; i++) c.light[i][1] *= -1, c.camera[i][1] *= -1;
-    CHECK(ev_capture_score(&c, m.maps, MAP_CHANNELS, false, NULL).value[EV_RENDER] > 2 * row.value[EV_RENDER], "y may as well point down");
+    CHECK(ev_capture_score(&c, 1, m.maps, MAP_CHANNELS, false, NULL).value[EV_RENDER] > 2 * row.value[EV_RENDER], "y may as well point down");
     io_image_free(&strip);
     io_material_free(&m);
     io_capture_free(&c);

@@ -1,0 +1,64 @@
+/* The light's strength from the photograph. */
+#include "infer/power.h"
+#include "tests/networks.h"
+
+enum { LARGE = 40 };
+
+/* A network whose R_0 is one material, whatever it sees. */
+static nn_model *constant_material(int images)
+{
+    nn_arch a = tiny();
+    a.images = images;
+    nn_model *m = create(&a, 51);
+    memset(m->value, 0, m->count * sizeof *m->value);
+    const nn_param *p = nn_model_find(m, "g.output.add.bias");
+    static const float encoded[9] = {-0.2f, 0.1f, -0.6f, 0, 0, 0.1f, -0.9f, -0.9f, -0.9f};
+    memcpy(m->value + p->offset, encoded, sizeof encoded);
+    return m;
+}
+
+static double fit(const nn_model *m, const float *const *image, const rd_view *views, int given, int side)
+{
+    ts_status st = {0};
+    ag_tape *t = tape_create(false);
+    double factor = -1;
+    CHECK(!lgd_fit_power(t, m, image, views, given, side, &factor, &st), "%s", st.message);
+    ag_tape_destroy(&t);
+    return factor;
+}
+
+TEST(infer_power_of_what_is_rendered_is_found)
+{
+    nn_model *m = constant_material(3);
+    static float maps[LARGE * LARGE * 9], photo[2][LARGE * LARGE * 3];
+    for (int i = 0; i < LARGE * LARGE * 9; i++) {
+        const nn_param *p = nn_model_find(m, "g.output.add.bias");
+        maps[i] = tanhf(m->value[p->offset + (size_t)(i % 9)]);
+    }
+    for (int given = 1; given <= 2; given++)
+        for (double factor = 0.25; factor < 5; factor *= 2) {
+            rd_view views[2] = {rd_capture_view(0), rd_capture_view(3)};
+            for (int k = 0; k < given; k++) {
+                rd_view strong = views[k];
+                strong.power *= (float)factor;
+                rd_render(rd_grid_full(LARGE), maps, 9, &strong, true, photo[k]); /* clipped, where the light is strong */
+            }
+            const double found = fit(m, (const float *const[]){photo[0], photo[1]}, views, given, LARGE);
+            CHECK(fabs(found / factor - 1) < 0.02, "%d photographs: %g, not %g", given, found, factor); /* resampling moves the highlight a little */
+        }
+    nn_model_free(&m);
+}
+
+TEST(infer_power_stays_in_its_range)
+{
+    nn_model *m = constant_material(1);
+    static float photo[LARGE * LARGE * 3];
+    const rd_view flash = rd_flash();
+    const float *const image[] = {photo};
+    CHECK(fit(m, image, &flash, 1, LARGE) == 1, "a black photograph has a light of %g", fit(m, image, &flash, 1, LARGE));
+    for (int i = 0; i < LARGE * LARGE * 3; i++) photo[i] = 1;
+    CHECK(fit(m, image, &flash, 1, LARGE) == 1, "a white photograph has a light of %g", fit(m, image, &flash, 1, LARGE));
+    for (int i = 0; i < LARGE * LARGE * 3; i++) photo[i] = i % 2 ? NAN : 1e-4f;
+    CHECK(fit(m, image, &flash, 1, LARGE) == 0.125, "a dark one has %g", fit(m, image, &flash, 1, LARGE));
+    nn_model_free(&m);
+}
