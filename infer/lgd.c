@@ -287,11 +287,17 @@ static ts_code estimate(lgd_model *model, const lgd_photo *photo, int photos, in
 {
     const float *image[NN_MAX_IMAGES];
     rd_view views[NN_MAX_IMAGES];
+    rd_view given[NN_MAX_IMAGES];
+    int order[NN_MAX_IMAGES];
     for (int k = 0; k < photos; k++) {
-        image[k] = photo[k].image;
-        views[k] = (rd_view){.kind = RD_POINT, .power = photo[k].power};
-        memcpy(views[k].light, photo[k].light, sizeof views[k].light);
-        memcpy(views[k].camera, photo[k].camera, sizeof views[k].camera);
+        given[k] = (rd_view){.kind = RD_POINT, .power = photo[k].power};
+        memcpy(given[k].light, photo[k].light, sizeof given[k].light);
+        memcpy(given[k].camera, photo[k].camera, sizeof given[k].camera);
+    }
+    rd_capture_order(given, photos, order);
+    for (int k = 0; k < photos; k++) {
+        image[k] = photo[order[k]].image;
+        views[k] = given[order[k]];
     }
     const bool tiles = lgd_tiles_exact(&model->net->arch) && (side > UNTILED || o->mask || o->tolerance > 0);
     if (o->power) *o->power = 1;

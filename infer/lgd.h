@@ -66,7 +66,7 @@ typedef struct lgd_photo {
 /* The photograph that lgd_estimate assumes: light and camera at one place above the centre, of the usual power. */
 lgd_photo lgd_flash_photo(const float *image);
 
-/* lgd_estimate from 1 .. lgd_most_photos photographs under known lights. */
+/* lgd_estimate from 1 .. lgd_most_photos photographs under known lights, in any order. */
 int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options, float *maps, lgd_error *error);
 
 /* Renders maps as returned by lgd_estimate under a point light and a camera (positions in patch widths, the sample is

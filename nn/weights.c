@@ -84,9 +84,9 @@ ts_code nn_model_save(const nn_model *model, const float *values, const char *pa
     return code;
 }
 
-/* A layer that reads every photograph begins as a model of one photograph has it, each photograph with its share: photographs that are all alike
- * then give what one of them gives. False where the file has no such tensor. */
-static bool spread(const nn_model *model, int index, nn_file *f)
+/* A layer that reads every photograph begins as a model of one photograph has it, for the first of them, and blind to the others. False where the
+ * file has no such tensor. */
+static bool widened(const nn_model *model, int index, nn_file *f)
 {
     const nn_layers *l = model->layers;
     const nn_param *p = &model->param[index];
@@ -104,8 +104,8 @@ static bool spread(const nn_model *model, int index, nn_file *f)
     for (int o = 0; fine && o < p->dim[0]; o++)
         for (int c = 0; c < in; c++)
             for (size_t k = 0; k < kernel; k++) {
-                const int from = c < first ? c : first + (c - first) % each;
-                v[((size_t)o * (size_t)in + (size_t)c) * kernel + k] = one[(size_t)o * single + (size_t)from * kernel + k] / (float)(c < first ? 1 : images);
+                const bool blind = c >= first + each;
+                v[((size_t)o * (size_t)in + (size_t)c) * kernel + k] = blind ? 0 : one[(size_t)o * single + (size_t)c * kernel + k];
             }
     free(one);
     return fine;
@@ -121,7 +121,7 @@ ts_code nn_model_init_from(nn_model *model, const char *path, int *taken, int *l
         const nn_param *p = &model->param[i];
         int64_t dim[4];
         dims_of(p, dim);
-        if (nn_file_read(f, p->name, p->rank, dim, model->value + p->offset, NULL) && !spread(model, i, f)) ++*left;
+        if (nn_file_read(f, p->name, p->rank, dim, model->value + p->offset, NULL) && !widened(model, i, f)) ++*left;
         else if (!finite_all(model->value + p->offset, p->count))
             code = ts_fail(st, TS_NUMERIC, "%s: tensor \"%s\" holds a value that is not finite", path, p->name);
         else ++*taken;

@@ -1,5 +1,6 @@
 #include "render/scene.h"
 #include <math.h>
+#include <stdbool.h>
 
 #define TAU 6.28318530717958647692
 
@@ -81,5 +82,29 @@ void rd_capture_draw(ts_rng *rng, int count, int index[])
         const int from = i + ts_rng_int(rng, RD_CAPTURE_VIEWS - i);
         index[i] = all[from];
         all[from] = all[i];
+    }
+}
+
+/* Whether a comes before b. Differences below a hundred-thousandth of the patch are rounding of positions. */
+static bool before(const rd_view *a, const rd_view *b)
+{
+    double distance[2], angle[2];
+    const rd_view *v[2] = {a, b};
+    for (int i = 0; i < 2; i++) {
+        const double x = (double)v[i]->light[0] - (double)v[i]->camera[0], y = (double)v[i]->light[1] - (double)v[i]->camera[1];
+        const double z = (double)v[i]->light[2] - (double)v[i]->camera[2];
+        distance[i] = sqrt(x * x + y * y + z * z);
+        angle[i] = distance[i] < 1e-5 ? 0 : atan2(y, x);
+        if (angle[i] < -1e-5) angle[i] += 2 * M_PI;
+    }
+    return fabs(distance[0] - distance[1]) > 1e-5 ? distance[0] < distance[1] : angle[0] < angle[1];
+}
+
+void rd_capture_order(const rd_view *views, int count, int order[])
+{
+    for (int i = 0; i < count; i++) {
+        int at = i;
+        for (; at > 0 && before(&views[i], &views[order[at - 1]]); at--) order[at] = order[at - 1];
+        order[at] = i;
     }
 }

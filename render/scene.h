@@ -52,4 +52,8 @@ rd_view rd_capture_view(int index);
 
 /* count different configurations of the nine in random order, every choice equally likely; 1 <= count <= RD_CAPTURE_VIEWS. */
 void rd_capture_draw(ts_rng *rng, int count, int index[]);
+
+/* The order in which models read the photographs of a capture: by the light's distance from the camera, the flash first; of equal ones by the light's
+ * direction from the camera, from x over y. order[0 .. count-1]: indices into views. Any order of the same views gives the same photographs in turn. */
+void rd_capture_order(const rd_view *views, int count, int order[]);
 #endif

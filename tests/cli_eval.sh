@@ -259,3 +259,26 @@ check eval_methods methods
 check eval_searches_and_figures searches_and_figures
 check eval_interrupted interrupted
 check eval_refinement_helps refinement_helps
+
+# Photographs under a stronger light: what is told of it is not known to the method, and the comparison fits one factor.
+light() {
+    model
+    for o in --exposure=0 --exposure=x --light=1 --light=a,b --light=9,0; do
+        expect 2 "$BIN/lgd-eval" --set procedural:1,1 "$o" -o "$T/o"
+        says "$T/err" "${o%%=*}"
+    done
+    expect 0 evaluate --set procedural:3,2 --exposure 1 -o "$T/one"
+    expect 0 evaluate --set procedural:3,2 --exposure 2 -o "$T/two"
+    expect 0 evaluate --set procedural:3,2 --exposure 2 --method lgd:power=known -o "$T/known"
+    expect 0 evaluate --set procedural:3,2 --exposure 2 --method lgd:power=auto -o "$T/auto"
+    for a in one two known auto; do
+        sed 's/"[^"]*"/set/' "$T/$a/results.csv" | awk -F, 'NR == 1 { while ($++k != "exposure" && k < NF); } NR > 1 && !($k > 0.1 && $k < 10) { exit 1 }' || fail "$a: no factor is fitted"
+        for b in one two known auto; do
+            [ "$a" = "$b" ] || ! cmp -s "$T/$a/results.csv" "$T/$b/results.csv" || fail "$a and $b give the same numbers"
+        done
+    done
+    expect 0 evaluate --set procedural:3,2 --light 0.5,0 -o "$T/side"
+    expect 0 evaluate --set procedural:3,2 -o "$T/middle"
+    if cmp -s "$T/side/results.csv" "$T/middle/results.csv"; then fail "--light changes nothing"; fi
+}
+check eval_light light

@@ -94,6 +94,26 @@ TEST(photographs_under_the_flash_are_the_single_ones)
     CHECK(!memcmp(one[2], many[0][0], sizeof one[2]), "a photograph depends on the batch that it comes in");
 }
 
+TEST(capture_order_is_that_of_the_views)
+{
+    rd_view views[RD_CAPTURE_VIEWS], turned[RD_CAPTURE_VIEWS];
+    int order[RD_CAPTURE_VIEWS], place[RD_CAPTURE_VIEWS];
+    ts_rng r = ts_rng_make(4, TS_STREAM_TEST, 0);
+    for (int trial = 0; trial < 50; trial++) {
+        const int count = 1 + trial % RD_CAPTURE_VIEWS;
+        rd_capture_draw(&r, RD_CAPTURE_VIEWS, place);
+        for (int i = 0; i < count; i++) views[i] = rd_capture_view(place[i]), turned[count - 1 - i] = views[i];
+        rd_capture_order(views, count, order);
+        rd_view first[RD_CAPTURE_VIEWS];
+        for (int i = 0; i < count; i++) first[i] = views[order[i]];
+        rd_capture_order(turned, count, order);
+        for (int i = 0; i < count; i++) {
+            CHECK(!memcmp(first[i].light, turned[order[i]].light, sizeof first[i].light), "view %d of %d depends on the order that is given", i, count);
+            if (place[i] == 0) CHECK(first[0].light[0] == 0 && first[0].light[1] == 0, "the flash is not the first");
+        }
+    }
+}
+
 TEST(capture_views_are_the_flash_or_different_configurations)
 {
     tr_config c = tr_config_default();

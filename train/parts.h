@@ -52,7 +52,8 @@ const float *tr_weights(const tr_trainer *t); /* what is validated and saved */
 void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, const rd_view *views, int number,
                     float *images);
 /* The views of number photographs of each of count materials, [count][number]: the flash for a model of one photograph, else some of the
- * predefined configurations of a capture, drawn for each material. */
+ * predefined configurations of a capture, drawn for each material, in the order of
+ * rd_capture_order. */
 void tr_capture_views(const tr_config *c, uint64_t seed, uint64_t index, int count, int number, rd_view *views);
 
 /* step.c. One step; t->step counts it. Returns an error only where the run cannot go on (a skipped step is none). */
