@@ -39,7 +39,7 @@ static int load(const char *spec, int step, sample *s, int room)
         s[n].truth = malloc(PIXELS * MAP_CHANNELS * sizeof(float));
         if (!s[n].image || !s[n].truth) abort();
         rd_eval_views(&rng, RD_EVAL_VIEWS, s[n].views);
-        ev_photograph(&m, 0, 1, 1, s[n].image);
+        ev_photograph(&m, &(ev_photo){rd_flash(), 1, 0, 1, 1}, s[n].image);
         memcpy(s[n].truth, m.maps, PIXELS * MAP_CHANNELS * sizeof(float));
         n++;
     }
