@@ -4,7 +4,7 @@
 #include "infer/tiles.h"
 #include <string.h>
 
-enum { UNTILED = 512, TILE = 128 }; /* as lgd-infer's where a tolerance ends tiles early: up to the first the whole is one */
+enum { UNTILED = 512, TILE = 256 }; /* as lgd-infer's where a tolerance ends tiles early: up to the first the whole is one */
 
 static int steps(const ev_estimator *e)
 {

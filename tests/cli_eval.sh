@@ -219,7 +219,10 @@ methods() {
     [ "$(ls "$T/o/images" | wc -l)" = 8 ] || fail "images: $(ls "$T/o/images")"
     # the default is lgd
     expect 0 evaluate --set procedural:3,2 -o "$T/p"
-    expect 0 evaluate --set procedural:3,2 --method lgd -o "$T/q"
+    expect 0 evaluate --set procedural:3,2 --method lgd --pin -o "$T/q"
+    says "$T/out" "1 thread, pinned"
+    expect 1 "$BIN/lgd-eval" --set procedural:3,2 --pin --threads 1024 -o "$T/x"
+    says "$T/err" "--pin"
     cmp -s "$T/p/results.csv" "$T/q/results.csv" || fail "the default is not lgd"
     # a method's numbers depend neither on the others nor on the threads
     expect 0 "$BIN/lgd-eval" --size 32 --threads 2 --repeat 2 --set procedural:3,2 --method descent:steps=3 -o "$T/r"

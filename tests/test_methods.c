@@ -9,6 +9,8 @@
 #include "tensor/threads.h"
 #include "tests/test.h"
 #include <math.h>
+#include <omp.h>
+#include <sched.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -185,6 +187,22 @@ TEST(methods_mean_is_as_bright_as_the_photograph)
         CHECK(fabs(mine / photo - 1) < 1e-3, "red is %g times the photograph's", mine / photo);
         ev_close(&mean);
     }
+}
+
+TEST(methods_threads_are_pinned_to_a_cpu_each)
+{
+    cpu_set_t all, now;
+    CHECK(sched_getaffinity(0, sizeof all, &all) == 0, "sched_getaffinity");
+    ts_threads_set(CPU_COUNT(&all) + 1);
+    CHECK(!ts_threads_pin() && sched_getaffinity(0, sizeof now, &now) == 0 && CPU_EQUAL(&all, &now), "more threads than CPUs are pinned");
+    const int threads = CPU_COUNT(&all) > 1 ? 2 : 1;
+    ts_threads_set(threads);
+    CHECK(ts_threads_pin(), "%d threads are not pinned", threads);
+    cpu_set_t of[2];
+#pragma omp parallel num_threads(threads)
+    sched_getaffinity(0, sizeof of[0], &of[omp_get_thread_num()]);
+    for (int i = 0; i < threads; i++) CHECK(CPU_COUNT(&of[i]) == 1, "thread %d has %d CPUs", i, CPU_COUNT(&of[i]));
+    CHECK(threads == 1 || !CPU_EQUAL(&of[0], &of[1]), "two threads share a CPU");
 }
 
 TEST(methods_points_and_settings)
