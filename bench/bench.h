@@ -1,6 +1,7 @@
 /* The bench's interface. A file bench/bench_NAME.c holds BENCH(name) { … } blocks, run in order of name by build/bin/lgd-bench. */
 #ifndef BENCH_H
 #define BENCH_H
+#include <stdbool.h>
 
 typedef void (*bench_function)(void);
 void bench_register(const char *name, bench_function f);
@@ -17,6 +18,9 @@ typedef struct bench_time {
     int runs;
 } bench_time;
 bench_time bench_measure(void (*f)(void *user), void *user);
+
+/* Times are processor time (lgd-bench --cpu). */
+bool bench_cpu(void);
 
 /* A row: label, milliseconds, GFLOP/s and the fraction of the peak (flop = 0: no such columns). */
 void bench_row(const char *label, bench_time t, double flop);

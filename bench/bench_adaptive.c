@@ -101,9 +101,9 @@ BENCH(adaptive)
     }
     for (int i = 0; i < PIXELS; i++) mask[i] = i % SIDE < SIDE / 4 && i / SIDE < SIDE / 2;
     setting k[] = {{"fixed", {.iterations = -1}}, {"fixed, --exact", {.iterations = -1, .exact = 1}}, {"--tolerance 0.0001", {.iterations = -1, .tolerance = 1e-4}},
-                   {"--tolerance 0.0003", {.iterations = -1, .tolerance = 3e-4}}, {"--tolerance 0.001", {.iterations = -1, .tolerance = 1e-3}},
-                   {"--tolerance 0.003", {.iterations = -1, .tolerance = 3e-3}}, 
-                   {"--tolerance 0.01", {.iterations = -1, .tolerance = 1e-2}}, {"--tolerance 0.02", {.iterations = -1, .tolerance = 2e-2}},
+                   {"--tolerance 0.001", {.iterations = -1, .tolerance = 1e-3}}, {"--tolerance 0.0015", {.iterations = -1, .tolerance = 1.5e-3}},
+                   {"--tolerance 0.002", {.iterations = -1, .tolerance = 2e-3}}, {"--tolerance 0.0025", {.iterations = -1, .tolerance = 2.5e-3}},
+                   {"--tolerance 0.003", {.iterations = -1, .tolerance = 3e-3}}, {"--tolerance 0.01", {.iterations = -1, .tolerance = 1e-2}},
                    {"--iterations auto", {.iterations = LGD_AUTO}}, {"--mask, an eighth wanted", {.iterations = -1, .mask = mask}}};
     const int settings = sizeof k / sizeof *k;
     const int procedural = load("procedural:1000003,8", 1, s, MOST);

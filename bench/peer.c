@@ -48,7 +48,7 @@ static bool start_with(const char *interpreter)
     if (child == 0) {
         dup2(there[0], 0), dup2(back[1], 1);
         close(there[0]), close(there[1]), close(back[0]), close(back[1]);
-        execl(interpreter, "python3", "bench/peer_torch.py", (char *)NULL);
+        execl(interpreter, interpreter /* by which Python finds its environment */, "bench/peer_torch.py", (char *)NULL);
         _exit(127);
     }
     close(there[0]), close(back[1]);
@@ -60,6 +60,7 @@ static bool start_with(const char *interpreter)
     char threads[32];
     snprintf(threads, sizeof threads, "threads %d", ts_threads());
     ask(threads);
+    if (bench_cpu()) ask("clock cpu");
     return true;
 }
 
