@@ -22,16 +22,9 @@ void ev_photograph(const io_material *truth, const ev_photo *photo, float *image
 
 void ev_input_views(const rd_view *told, int count, uint64_t seed, uint64_t identity, rd_view *input)
 {
-    int place[RD_CAPTURE_VIEWS], used = 1;
     ts_rng rng = ts_rng_make(seed, TS_STREAM_CAPTURE, identity);
-    rd_capture_draw(&rng, RD_CAPTURE_VIEWS, place);
-    rd_view drawn[RD_CAPTURE_VIEWS + 1] = {*told};
-    int order[RD_CAPTURE_VIEWS + 1];
-    for (int i = 0; i < RD_CAPTURE_VIEWS && used < count; i++)
-        if (place[i] != 0) drawn[used++] = rd_capture_view(place[i]); /* number 0 is the flash */
-    rd_capture_order(drawn + 1, count - 1, order);
-    input[0] = *told;
-    for (int i = 1; i < count; i++) input[i] = drawn[1 + order[i - 1]];
+    rd_capture_draw(&rng, count, input);
+    input[0] = *told; /* in place of the flash */
 }
 
 /* SSIM and LPIPS as RMSE in gamma space; FLIP takes linear values. */

@@ -74,17 +74,6 @@ rd_view rd_capture_view(int index)
     return view;
 }
 
-void rd_capture_draw(ts_rng *rng, int count, int index[])
-{
-    int all[RD_CAPTURE_VIEWS];
-    for (int i = 0; i < RD_CAPTURE_VIEWS; i++) all[i] = i;
-    for (int i = 0; i < count; i++) { /* the first steps of Fisher and Yates's shuffle */
-        const int from = i + ts_rng_int(rng, RD_CAPTURE_VIEWS - i);
-        index[i] = all[from];
-        all[from] = all[i];
-    }
-}
-
 /* Whether a comes before b. Differences below a hundred-thousandth of the patch are rounding of positions. */
 static bool before(const rd_view *a, const rd_view *b)
 {
@@ -107,4 +96,19 @@ void rd_capture_order(const rd_view *views, int count, int order[])
         for (; at > 0 && before(&views[i], &views[order[at - 1]]); at--) order[at] = order[at - 1];
         order[at] = i;
     }
+}
+
+void rd_capture_draw(ts_rng *rng, int count, rd_view views[])
+{
+    int place[RD_CAPTURE_VIEWS], order[RD_CAPTURE_VIEWS];
+    rd_view drawn[RD_CAPTURE_VIEWS] = {{0}};
+    for (int i = 0; i < RD_CAPTURE_VIEWS; i++) place[i] = i;
+    for (int i = 1; i < count; i++) { /* the first steps of Fisher and Yates's shuffle of all but the flash */
+        const int from = i + ts_rng_int(rng, RD_CAPTURE_VIEWS - i), kept = place[i];
+        place[i] = place[from];
+        place[from] = kept;
+    }
+    for (int i = 0; i < count; i++) drawn[i] = rd_capture_view(place[i]);
+    rd_capture_order(drawn, count, order);
+    for (int i = 0; i < count; i++) views[i] = drawn[order[i]];
 }

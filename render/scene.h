@@ -50,8 +50,9 @@ enum { RD_CAPTURE_VIEWS = 9 };
 #define RD_CAPTURE_SPACING 0.6f
 rd_view rd_capture_view(int index);
 
-/* count different configurations of the nine in random order, every choice equally likely; 1 <= count <= RD_CAPTURE_VIEWS. */
-void rd_capture_draw(ts_rng *rng, int count, int index[]);
+/* The views of a capture of count <= RD_CAPTURE_VIEWS photographs: the flash, and others of the configurations, every subset of them alike often, in
+ * the order of rd_capture_order. */
+void rd_capture_draw(ts_rng *rng, int count, rd_view views[]);
 
 /* The order in which models read the photographs of a capture: by the light's distance from the camera, the flash first; of equal ones by the light's
  * direction from the camera, from x over y. order[0 .. count-1]: indices into views. Any order of the same views gives the same photographs in turn. */

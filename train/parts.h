@@ -51,10 +51,8 @@ const float *tr_weights(const tr_trainer *t); /* what is validated and saved */
  * of which every photograph has its own. */
 void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, const rd_view *views, int number,
                     float *images);
-/* The views of number photographs of each of count materials, [count][number]: the flash for a model of one photograph, else some of the
- * predefined configurations of a capture, drawn for each material, in the order of
- * rd_capture_order. */
-void tr_capture_views(const tr_config *c, uint64_t seed, uint64_t index, int count, int number, rd_view *views);
+/* The views of number photographs of each of count materials, [count][number], drawn for each material (rd_capture_draw): one is the flash. */
+void tr_capture_views(uint64_t seed, uint64_t index, int count, int number, rd_view *views);
 
 /* step.c. One step; t->step counts it. Returns an error only where the run cannot go on (a skipped step is none). */
 ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st);

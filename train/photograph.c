@@ -41,16 +41,10 @@ void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count
     for (int i = 0; i < count * number; i++) io_camera_apply(&camera, seed, first + (uint64_t)i, size, images + (size_t)i * pixels * 3);
 }
 
-void tr_capture_views(const tr_config *c, uint64_t seed, uint64_t index, int count, int number, rd_view *views)
+void tr_capture_views(uint64_t seed, uint64_t index, int count, int number, rd_view *views)
 {
     for (int i = 0; i < count; i++) {
-        int place[RD_CAPTURE_VIEWS] = {0};
         ts_rng rng = ts_rng_make(seed, TS_STREAM_CAPTURE, index + (uint64_t)i);
-        if (c->arch.images > 1) rd_capture_draw(&rng, number, place);
-        rd_view drawn[RD_CAPTURE_VIEWS];
-        int order[RD_CAPTURE_VIEWS];
-        for (int k = 0; k < number; k++) drawn[k] = rd_capture_view(place[k]);
-        rd_capture_order(drawn, number, order);
-        for (int k = 0; k < number; k++) views[i * number + k] = drawn[order[k]];
+        rd_capture_draw(&rng, number, views + i * number);
     }
 }
