@@ -4,6 +4,8 @@
 #include <math.h>
 #include <string.h>
 
+/* Stops by which R_0's brightness errs where nothing is amiss: the estimate is that much nearer to 1, so that usual photographs keep the usual light. */
+#define USUAL_STOPS 0.2
 #define CLIPPED 0.98f /* sensor values at and above say only that there is more light */
 
 static void add_products(size_t values, const float *photo, const float *rendered, double *photo_rendered, double *rendered_rendered)
@@ -42,6 +44,9 @@ ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *
         rd_render(grid, maps->t.data, maps->t.shape.c, &views[k], false, rendered->t.data);
         add_products(values, small->t.data + (size_t)k * values, rendered->t.data, &products, &squares);
     }
-    if (products > 0 && squares > 0) *factor = fmin(fmax(products / squares, 0.125), 8);
+    if (products > 0 && squares > 0) {
+        const double stops = log2(products / squares), beyond = fmin(fmax(fabs(stops) - USUAL_STOPS, 0), 3);
+        *factor = exp2(stops < 0 ? -beyond : beyond);
+    }
     return TS_OK;
 }
