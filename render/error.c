@@ -76,7 +76,8 @@ static double colour_difference(const float *a, const float *b)
     return sum;
 }
 
-rd_map_error rd_map_rmse(int64_t count, const float *maps_a, int channels_a, const float *maps_b, int channels_b)
+/* Sums of squares and of angles in radians. */
+static rd_map_error map_sums(int64_t count, const float *maps_a, int channels_a, const float *maps_b, int channels_b)
 {
     rd_map_error e = {0};
     for (int64_t i = 0; i < count; i++) {
@@ -95,6 +96,21 @@ rd_map_error rd_map_rmse(int64_t count, const float *maps_a, int channels_a, con
         e.specular += colour_difference(a + MAP_SPECULAR, b + MAP_SPECULAR);
         const double r = ((double)limit(a[MAP_ROUGHNESS]) - (double)limit(b[MAP_ROUGHNESS])) / 2;
         e.roughness += r * r;
+    }
+    return e;
+}
+
+rd_map_error rd_map_rmse(int64_t count, const float *maps_a, int channels_a, const float *maps_b, int channels_b)
+{
+    enum { BLOCK = 4096 }; /* sums of sums: the rounding of one sum grows with its length, to 1e-12 at 4096^2 pixels */
+    rd_map_error e = {0};
+    for (int64_t i = 0; i < count; i += BLOCK) {
+        const rd_map_error s = map_sums(count - i < BLOCK ? count - i : BLOCK, maps_a + i * channels_a, channels_a, maps_b + i * channels_b, channels_b);
+        e.diffuse += s.diffuse;
+        e.specular += s.specular;
+        e.normal += s.normal;
+        e.roughness += s.roughness;
+        e.angle += s.angle;
     }
     const double n = count > 0 ? (double)count : 1;
     e.diffuse = sqrt(e.diffuse / (3 * n));

@@ -171,7 +171,7 @@ V_INLINE void measure(const surface *s, const lighting *e, ts_shade_kind kind, a
 
 /* Radiance, and what its derivatives are made of. */
 typedef struct radiance {
-    vf value[3], f[3], fresnel[3], scale; /* value = f scale */
+    vf value[3], fresnel[3], scale;       /* value = f scale */
     vf lobe, a, k, i, il, iv;             /* lobe = D G / 4; alpha; G's k; 1 / (alpha^2 (n.h)^2 + |n x h|^2); 1 / G's factors */
     vf guarded, cosine;                   /* what TS_SHADE_PUBLISHED adds to the derivatives of log lobe by log alpha / 2 and by each cosine */
 } radiance;
@@ -198,8 +198,7 @@ V_INLINE void shade(const ts_shade_view *view, ts_shade_kind kind, const surface
     r->scale = v_select(g->seen, e->strength * g->nl, v_set(0));
     for (int c = 0; c < 3; c++) {
         r->fresnel[c] = s->specular[c] + (1.0f - s->specular[c]) * e->fresnel;
-        r->f[c] = (1.0f - s->specular[c]) * s->diffuse[c] * INV_PI + r->lobe * r->fresnel[c];
-        r->value[c] = r->f[c] * r->scale;
+        r->value[c] = ((1.0f - s->specular[c]) * s->diffuse[c] * INV_PI + r->lobe * r->fresnel[c]) * r->scale;
     }
 }
 
@@ -211,20 +210,22 @@ typedef struct slopes {
 /* Adds the derivatives of sum over c of u[c] value[c]. */
 V_INLINE void derive(ts_shade_kind kind, const surface *s, const lighting *e, const angles *g, const radiance *r, const vf u[3], slopes *d)
 {
-    vf uf = {0}, us = {0};
+    vf ud = {0}, um = {0}; /* times the diffuse and the mirror part, without lobe and scale */
     for (int c = 0; c < 3; c++) {
-        vf t = u[c] * r->scale;
-        d->diffuse[c] += t * (1.0f - s->specular[c]) * INV_PI;
+        vf t = u[c] * r->scale, rest = (1.0f - s->specular[c]) * INV_PI;
+        d->diffuse[c] += t * rest;
         d->specular[c] += t * (r->lobe * (1.0f - e->fresnel) - s->diffuse[c] * INV_PI);
-        uf += u[c] * r->f[c];
-        us += t * r->fresnel[c];
+        ud += u[c] * (rest * s->diffuse[c]);
+        um += u[c] * r->fresnel[c];
     }
-    us = us * r->lobe; /* times d log lobe from here on */
+    um = um * r->lobe;
+    vf us = um * r->scale; /* times d log lobe from here on */
     const bool published = kind == TS_SHADE_PUBLISHED;
     vf k = r->k, an = r->a * g->nh, log_d = (g->sine2 - an * an) * r->i;
     vf log_alpha = 2.0f * (published ? log_d + r->guarded : log_d) / r->a - 0.5f * ((1.0f - g->nl) * r->il + (1.0f - g->nv) * r->iv);
     d->roughness += us * log_alpha * (2.0f * s->roughness);
-    vf by_l = v_select(g->seen, uf * e->strength, v_set(0)) - us * (1.0f - k) * r->il;
+    /* n.l / (n.l (1 - k) + k) by n.l, and not the difference of the product's two terms, which nearly cancel at a grazing light. */
+    vf by_l = v_select(g->seen, (ud + um * k * r->il) * e->strength, v_set(0));
     vf by_v = -us * (1.0f - k) * r->iv;
     if (published) by_l += us * r->cosine, by_v += us * r->cosine;
     vf by_h = us * (4.0f * (1.0f - r->a) * (1.0f + r->a)) * g->nh * r->i;

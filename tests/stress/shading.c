@@ -56,12 +56,12 @@ static void pixel(const float *maps, const rd_view *view, rd_grid grid, worst *w
     rd_render(grid, maps, C, view, false, image);
     /* A weak light, so that nothing is clamped, and a photograph that is darker by one in green: the gradient is then radiance's own. */
     rd_view weak = *view;
-    weak.power *= 1e-9f;
+    weak.power *= 1e-12f; /* radiance reaches 1e9 */
     rd_render(grid, maps, C, &weak, false, base);
     base[1] -= 1;
     const ts_shade_view sv = rd_shade_view(&weak);
     const ts_shade_row row = rd_shade_row(grid, 0, maps, C);
-    ts_shade_k()->flash(&sv, &row, base, 1e9f, gradient);
+    ts_shade_k()->flash(&sv, &row, base, 1e12f, gradient);
     bool finite = true;
     for (int c = 0; c < 3; c++) finite = finite && isfinite(image[c]);
     for (int i = 0; i < C; i++) finite = finite && isfinite(gradient[i]);
@@ -76,7 +76,7 @@ static void pixel(const float *maps, const rd_view *view, rd_grid grid, worst *w
 
 static void grid_of(bool full, worst *w)
 {
-    static const double roughness[] = {1e-4, 1e-3, 0.01, 0.0201, 0.03, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1};
+    static const double roughness[] = {1e-4, 1e-3, 0.0101, 0.0201, 0.03, 0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9, 1};
     static const double angle[] = {0, 1e-3, 0.1, 1, 10, 30, 45, 60, 75, 85, 88.9, 89.5, 89.9};
     static const double albedo[] = {0, 1e-3, 0.04, 0.5, 1};
     static const double tilt[] = {0, 1e-6, 1e-3, 0.1, 0.5, 0.9, 0.99, 0.9989, 0.9999, 1};
