@@ -141,7 +141,7 @@ bench-deps:
 	@BUILD=$(BUILD) sh .ci/bench-deps.sh
 
 stress: $(STRESS_BIN)
-	@$(STRESS_BIN)
+	@OMP_WAIT_POLICY=passive $(STRESS_BIN) $(STRESS)
 
 # clang's libFuzzer with the address and undefined sanitizers, FUZZ_SECONDS for each target. The readers are compiled for it; what else they need comes
 # from the library as it is. OpenImageIO's libraries take seconds to load, and its PNG reader leaks a name where libpng jumps out of it.

@@ -182,8 +182,8 @@ V_INLINE void shade(const ts_shade_view *view, ts_shade_kind kind, const surface
     r->a = TS_ALPHA(s->roughness);
     vf a2 = r->a * r->a, k = r->k = published ? r->a * 0.5f + (float)view->guards->k : r->a * 0.5f;
     vf inner = a2 * (g->nh * g->nh) + g->sine2;
-    r->il = 1.0f / (g->nl * (1.0f - k) + k);
-    r->iv = 1.0f / (g->nv * (1.0f - k) + k);
+    r->il = 1.0f / v_fma(g->nl, 1.0f - k, k); /* v_fma: the same bytes in every loop, so that a perfect fit has an error of 0 */
+    r->iv = 1.0f / v_fma(g->nv, 1.0f - k, k);
     if (published) { /* the oracle in render/brdf.c has the same terms by the same names */
         const float guard = (float)view->guards->distribution, least = (float)view->guards->cosines;
         vf below = 1.0f / (inner * inner * (1 / INV_PI) + guard), cosines = 1.0f / (4.0f * (g->nl * g->nv) + least);
@@ -198,7 +198,7 @@ V_INLINE void shade(const ts_shade_view *view, ts_shade_kind kind, const surface
     r->scale = v_select(g->seen, e->strength * g->nl, v_set(0));
     for (int c = 0; c < 3; c++) {
         r->fresnel[c] = s->specular[c] + (1.0f - s->specular[c]) * e->fresnel;
-        r->value[c] = ((1.0f - s->specular[c]) * s->diffuse[c] * INV_PI + r->lobe * r->fresnel[c]) * r->scale;
+        r->value[c] = v_fma(r->lobe, r->fresnel[c], (1.0f - s->specular[c]) * s->diffuse[c] * INV_PI) * r->scale;
     }
 }
 
@@ -212,10 +212,10 @@ V_INLINE void derive(ts_shade_kind kind, const surface *s, const lighting *e, co
 {
     vf ud = {0}, um = {0}; /* times the diffuse and the mirror part, without lobe and scale */
     for (int c = 0; c < 3; c++) {
-        vf t = u[c] * r->scale, rest = (1.0f - s->specular[c]) * INV_PI;
-        d->diffuse[c] += t * rest;
+        vf t = u[c] * r->scale;
+        d->diffuse[c] += t * (1.0f - s->specular[c]) * INV_PI;
         d->specular[c] += t * (r->lobe * (1.0f - e->fresnel) - s->diffuse[c] * INV_PI);
-        ud += u[c] * (rest * s->diffuse[c]);
+        ud += u[c] * (1.0f - s->specular[c]) * s->diffuse[c] * INV_PI;
         um += u[c] * r->fresnel[c];
     }
     um = um * r->lobe;

@@ -39,6 +39,18 @@ static inline vf v_min(vf a, vf b) { return v_select(a < b, a, b); }
 #endif
 static inline vf v_abs(vf a) { return (vf)((vi)a & v_seti(0x7fffffff)); }
 
+/* a b + c. Where c is a product too, the compiler would fuse either of them, in one function this and in the next the other. */
+static inline vf v_fma(vf a, vf b, vf c)
+{
+#if defined(__AVX512F__)
+    return (vf)_mm512_fmadd_ps((__m512)a, (__m512)b, (__m512)c);
+#elif defined(__AVX2__)
+    return (vf)_mm256_fmadd_ps((__m256)a, (__m256)b, (__m256)c);
+#else
+    return a * b + c;
+#endif
+}
+
 static inline vf v_sqrt(vf x)
 {
 #if defined(__AVX512F__)
