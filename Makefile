@@ -174,7 +174,7 @@ fuzz: $(FUZZ:%=$(BUILD)/fuzz/bin/%) $(IMAGE_LIB)
 
 # The sanitizers' build lives beside the ordinary one.
 asan:
-	@$(MAKE) --no-print-directory BUILD=$(BUILD)/asan OPT='-O1 -g -fno-omit-frame-pointer' SANITIZE='-fsanitize=address,undefined -fno-sanitize-recover=all' test
+	@ASAN_OPTIONS=allocator_may_return_null=1 $(MAKE) --no-print-directory BUILD=$(BUILD)/asan OPT='-O1 -g -fno-omit-frame-pointer' SANITIZE='-fsanitize=address,undefined -fno-sanitize-recover=all' test
 
 demo: deps
 	@$(MAKE) --no-print-directory all

@@ -66,7 +66,8 @@ bool io_exif(const unsigned char *segment, size_t size, int *orientation, bool *
     const size_t interoperability = exif && !t.odd ? follow(&t, entry(&t, exif, INTEROPERABILITY_DIRECTORY)) : 0;
     const size_t index = interoperability && !t.odd ? entry(&t, interoperability, INTEROPERABILITY_INDEX) : 0;
     if (index) {
-        if (get16(&t, index + 2) != ASCII || get32(&t, index + 4) != 4) t.odd = true; /* "R98" and a zero: in the entry itself */
+        /* "R98" and a zero: in the entry itself, which may be cut off */
+        if (get16(&t, index + 2) != ASCII || get32(&t, index + 4) != 4 || index + 12 > t.size) t.odd = true;
         *adobe = !t.odd && memcmp(t.bytes + index + 8, "R03", 3) == 0;
     }
     return !t.odd;
