@@ -97,7 +97,7 @@ BENCH(infer_paper)
 {
     nn_arch a = nn_arch_default();
     a.channels = 10, a.g_width = 64, a.g_width_max = 512, a.g_levels = 7, a.g_kernel_first = 3, a.g_kernel = 5, a.g_size = SIDE;
-    a.h_width = 256, a.h_gru = 64, a.iterations = 6, a.recurrent = false, a.descent = false, a.mean_before_norm = false;
+    a.h_width = 256, a.h_gru = 64, a.iterations = 6, a.recurrent = false, a.descent = NN_DESCENT_NONE, a.mean_before_norm = false;
     a.rmse = NN_RMSE_BATCH, a.encoding = NN_GRADIENT_RAW;
     measure(a, "inference, 256 x 256, the published networks");
 }

@@ -14,6 +14,7 @@ typedef struct job {
     rd_view views[N * RD_LOSS_VIEWS];
     ag_tape *tape;
     const rd_view *below;
+    int photographs;
 } job;
 
 static void render(void *user)
@@ -34,6 +35,17 @@ static void gradient(void *user)
     job *j = user;
     rd_view view = rd_flash();
     rd_flash_gradient(rd_grid_full(SIDE), j->maps, MAP_CHANNELS, &view, j->image, 0.1, j->gradient, &j->rmse);
+}
+
+static void newton(void *user)
+{
+    job *j = user;
+    rd_view views[RD_CAPTURE_VIEWS];
+    const float *image[RD_CAPTURE_VIEWS];
+    float damping[MAP_CHANNELS];
+    for (int k = 0; k < j->photographs; k++) views[k] = rd_capture_view(k), image[k] = j->image;
+    for (int i = 0; i < MAP_CHANNELS; i++) damping[i] = 0.1f;
+    rd_newton_step(rd_grid_full(SIDE), j->maps, MAP_CHANNELS, views, image, j->photographs, damping, j->gradient);
 }
 
 static void loss(void *user)
@@ -87,6 +99,11 @@ BENCH(render)
     free(kept);
     t = bench_measure(render, &j);
     bench_row_unit("value, 256^2", t, (double)pixels / t.seconds * 1e-6, "Mpixel/s");
+    for (j.photographs = 1; j.photographs <= 5; j.photographs += 4) {
+        t = bench_measure(newton, &j);
+        bench_row_unit(j.photographs == 1 ? "Newton step, 1 photograph, 256^2" : "Newton step, 5 photographs, 256^2", t,
+                       (double)pixels * j.photographs / t.seconds * 1e-6, "Mpixel/s");
+    }
     t = bench_measure(loss, &j);
     /* prediction and target are both rendered, and counted once */
     bench_row_unit("render_loss with gradient, 8 x 64^2, 9 views", t, (double)N * S * S * RD_LOSS_VIEWS / t.seconds * 1e-6, "Mpixel/s");

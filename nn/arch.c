@@ -19,7 +19,8 @@ typedef struct field {
 } field;
 
 static const char *const rmse_words[] = {"start", "batch"}, *const encoding_words[] = {"raw", "asinh"}, *const compat_words[] = {"none", "published"};
-_Static_assert(sizeof(nn_rmse) == sizeof(int) && sizeof(nn_compat) == sizeof(int) && sizeof(nn_gradient) == sizeof(int), "a word's field is read and written as an int");
+static const char *const descent_words[] = {"none", "gradient", "newton"};
+_Static_assert(sizeof(nn_rmse) == sizeof(int) && sizeof(nn_compat) == sizeof(int) && sizeof(nn_gradient) == sizeof(int) && sizeof(nn_descent) == sizeof(int), "a word's field is read and written as an int");
 
 /* The upper ends only keep products of sizes far from overflow. The defaults are the model that two cores can train. */
 #define AT(member) offsetof(nn_arch, member)
@@ -36,7 +37,7 @@ static const field fields[] = {
     {"iterations", FIELD_INT, AT(iterations), 0, 1000, 6, NULL, false},
     {"recurrent", FIELD_BOOL, AT(recurrent), 0, 1, true, NULL, false},
     {"gradient", FIELD_BOOL, AT(gradient), 0, 1, true, NULL, false},
-    {"descent", FIELD_BOOL, AT(descent), 0, 1, true, NULL, false},
+    {"descent", FIELD_WORD, AT(descent), NN_DESCENT_NONE, NN_DESCENT_NEWTON, NN_DESCENT_NEWTON, descent_words, false},
     {"mean_before_norm", FIELD_BOOL, AT(mean_before_norm), 0, 1, true, NULL, false},
     {"rmse", FIELD_WORD, AT(rmse), NN_RMSE_START, NN_RMSE_BATCH, NN_RMSE_START, rmse_words, false},
     {"encoding", FIELD_WORD, AT(encoding), NN_GRADIENT_RAW, NN_GRADIENT_ASINH, NN_GRADIENT_ASINH, encoding_words, false},
@@ -87,8 +88,8 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
     if (a->latent > 0 && a->h_width > 0) return ts_fail(st, TS_INVALID, "latent is %d: an auto-encoder has no refiner, so h_width must be 0", a->latent);
     if (a->images > 1 && a->rmse == NN_RMSE_BATCH)
         return ts_fail(st, TS_INVALID, "images is %d: with rmse = batch it must be 1", a->images);
-    if (a->compat == NN_COMPAT_PUBLISHED && (a->descent || a->images > 1 || a->latent > 0 || a->rmse != NN_RMSE_BATCH))
-        return ts_fail(st, TS_INVALID, "compat is published: that needs descent = false, rmse = batch, images 1 and latent 0");
+    if (a->compat == NN_COMPAT_PUBLISHED && (a->descent != NN_DESCENT_NONE || a->images > 1 || a->latent > 0 || a->rmse != NN_RMSE_BATCH))
+        return ts_fail(st, TS_INVALID, "compat is published: that needs descent = none, rmse = batch, images 1 and latent 0");
     if (a->h_width == 0 && a->iterations != 0)
         return ts_fail(st, TS_INVALID, "iterations is %d: without a refiner (h_width 0) it must be 0", a->iterations);
     return TS_OK;

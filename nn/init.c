@@ -49,9 +49,11 @@ void nn_model_init(nn_model *model, uint64_t seed)
         if (l->start[i] == NN_ORTHOGONAL) {
             int n = p->dim[1]; /* one n x n matrix for each gate */
             for (int gate = 0; gate < p->dim[0] / n; gate++) orthogonal(&rng, n, v + (size_t)gate * n * n);
-        } else if (l->start[i] == NN_DESCENT) {
+        } else if (l->start[i] == NN_DESCENT_START) {
             const int channels = p->dim[0], images = p->dim[1] / channels;
             for (int j = 0; j < p->dim[1]; j++) v[(size_t)(j % channels) * (size_t)p->dim[1] + (size_t)j] = -0.003f / (float)images;
+        } else if (l->start[i] == NN_NEWTON_START) {
+            for (int j = 0; j < p->dim[0]; j++) v[j * p->dim[1] + j] = 0.5f;
         } else if (l->start[i] > 0) {
             for (size_t j = 0; j < p->count; j++) v[j] = (float)(l->start[i] * ts_rng_normal(&rng));
         }

@@ -31,12 +31,14 @@ typedef struct nn_layers {
     nn_layer output_conv1, output_conv2, output_add;
     nn_cell cell[2];
     nn_layer encoder[NN_MAX_LEVELS + 1], code, decoder[NN_MAX_LEVELS + 1][2], decoded; /* the deepest decoder level has one convolution */
-    nn_layer h_output, h_descent; /* h_descent: weight -1 where there is none */
+    nn_layer h_output, h_path; /* h_path: of arch.descent, weight -1 where there is none */
     int refiner;   /* index of h's first parameter */
     double *start; /* per parameter: standard deviation of the first values, 0 for zeros, or one of these: */
 } nn_layers;
 #define NN_ORTHOGONAL (-1.0)
-#define NN_DESCENT (-2.0) /* -0.003 times the identity, shared by the photographs: six such steps lower the loss of a trained g's R_0 without overshooting anywhere */
+#define NN_NEWTON_DAMPING 0.1f /* of every channel: 0.03 to 0.3 are within some percent of each other, from one photograph and from five */
+#define NN_NEWTON_START (-3.0) /* half the identity: the equations are linear only near the maps */
+#define NN_DESCENT_START (-2.0) /* -0.003 times the identity, shared by the photographs: six such steps lower the loss of a trained g's R_0 without overshooting anywhere */
 
 /* Parameter number index as a value on the tape, NULL for index -1. */
 ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index);
@@ -50,6 +52,6 @@ ag_value *nn_unet(ag_tape *tape, const nn_model *model, ag_value *x);
  * the value to write it into, which may be the old one (a tape without gradients). */
 ag_value *nn_refiner(ag_tape *tape, const nn_model *model, ag_value *x, ag_value *gru[2], ag_value *const to[2]);
 
-/* R_{t+1} from both = [R_t, its encoded gradients], [N, H, W, (1 + images) channels]; maps and gradient are its parts. */
-ag_value *nn_step(ag_tape *tape, const nn_model *model, ag_value *maps, ag_value *gradient, ag_value *both, ag_value *gru[2], ag_value *const to[2]);
+/* R_{t+1} from both = [R_t, its encoded gradients], [N, H, W, (1 + images) channels]; maps is a part of it. path: what arch.descent lets past h, or NULL. */
+ag_value *nn_step(ag_tape *tape, const nn_model *model, ag_value *maps, ag_value *path, ag_value *both, ag_value *gru[2], ag_value *const to[2]);
 #endif

@@ -6,6 +6,7 @@
 #include "render/render.h"
 #include "render/tone.h"
 #include "tensor/kernels/elementwise.h"
+#include "tensor/maps.h"
 #include "tensor/resize.h"
 #include "tensor/threads.h"
 #include <math.h>
@@ -189,6 +190,29 @@ static void encode(const nn_model *model, const ag_value *maps, ag_value *gradie
     }
 }
 
+/* Where Gauss and Newton's method would go: a constant of the tape, [N, H, W, channels]. */
+static ag_value *newton_step(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps)
+{
+    float damping[MAP_CHANNELS];
+    for (int i = 0; i < MAP_CHANNELS; i++) damping[i] = NN_NEWTON_DAMPING;
+    const ts_shape s = maps->t.shape;
+    const int64_t pixels = (int64_t)s.h * s.w;
+    const int count = given(in);
+    ag_value *to = ag_empty(tape, s);
+    if (!to) return NULL;
+    if (s.c > MAP_CHANNELS) memset(to->t.data, 0, (size_t)ts_count(s) * sizeof *to->t.data);
+    for (int n = 0; n < s.n; n++) {
+        rd_view view[NN_MAX_IMAGES];
+        const float *image[NN_MAX_IMAGES];
+        for (int k = 0; k < count; k++) {
+            view[k] = view_of(model, in, n * count + k);
+            image[k] = in->image.data + (n * count + k) * pixels * 3;
+        }
+        rd_newton_step(in->grid, maps->t.data + n * pixels * s.c, s.c, view, image, count, damping, to->t.data + n * pixels * s.c);
+    }
+    return to;
+}
+
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state)
 {
     if (!check(tape, model, in) || !maps) return NULL;
@@ -198,12 +222,14 @@ ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag
         return ag_fail(tape, TS_INVALID, "the maps are %d x %d x %d x %d, not the photograph's size and the model's %d channels", s.n, s.h, s.w, s.c,
                        model->arch.channels);
     if (model->arch.rmse == NN_RMSE_START && !state->rmse0 && !measure_start(tape, model, in, maps, state)) return NULL;
-    ag_value *gradient = loss_gradient(tape, model, in, maps, state), *both = NULL;
+    ag_value *gradient = loss_gradient(tape, model, in, maps, state), *both = NULL, *path = NULL;
+    if (model->arch.gradient && model->arch.descent == NN_DESCENT_GRADIENT) path = gradient;
+    if (model->arch.gradient && model->arch.descent == NN_DESCENT_NEWTON && !(path = newton_step(tape, model, in, maps))) return NULL;
     const bool joined = !ag_gradients(tape); /* else the gradient of R_t needs an operation that joins them */
     if (joined) both = ag_empty(tape, (ts_shape){s.n, s.h, s.w, (1 + model->arch.images) * s.c});
     if (!gradient || (joined && !both)) return NULL;
     encode(model, maps, gradient, both);
-    ag_value *next = nn_step(tape, model, maps, gradient, joined ? both : ag_concat(tape, maps, gradient), state->gru, state->to);
+    ag_value *next = nn_step(tape, model, maps, path, joined ? both : ag_concat(tape, maps, gradient), state->gru, state->to);
     state->step++;
     return next;
 }

@@ -134,10 +134,11 @@ static void plan_h(nn_model *m)
     }
     l->h_output = conv(m, "h.output", a->channels, a->h_gru, 3, false, 1);
     l->start[l->h_output.weight] = 1e-3; /* h starts as nothing, nearly */
-    l->h_descent = (nn_layer){-1, -1};
-    if (!a->descent || !a->gradient) return;
-    l->h_descent = conv(m, "h.descent", a->channels, a->images * a->channels, 1, false, 1);
-    l->start[l->h_descent.weight] = NN_DESCENT;
+    l->h_path = (nn_layer){-1, -1};
+    if (a->descent == NN_DESCENT_NONE || !a->gradient) return;
+    const bool newton = a->descent == NN_DESCENT_NEWTON;
+    l->h_path = conv(m, newton ? "h.newton" : "h.descent", a->channels, newton ? a->channels : a->images * a->channels, 1, false, 1);
+    l->start[l->h_path.weight] = newton ? NN_NEWTON_START : NN_DESCENT_START;
 }
 
 /* The encoder pools between its convolutions; the decoder has two a level, since it alone has to make the detail. */

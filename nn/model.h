@@ -22,6 +22,13 @@ typedef enum nn_compat {
                          * photographs (infer/photograph.h) */
 } nn_compat;
 
+/* What reaches the maps past h. */
+typedef enum nn_descent {
+    NN_DESCENT_NONE,     /* nothing (published) */
+    NN_DESCENT_GRADIENT, /* the encoded gradients, by a learned matrix over their channels */
+    NN_DESCENT_NEWTON    /* the step of Gauss and Newton's method that fits each pixel to its photographs (rd_newton_step), by a learned 9 x 9 matrix */
+} nn_descent;
+
 /* Everything that a weights file must say about itself (its metadata, one key each). */
 enum { NN_MAX_IMAGES = 9 };
 typedef struct nn_arch {
@@ -38,10 +45,10 @@ typedef struct nn_arch {
     int iterations;     /* T that it was trained for */
     bool recurrent;     /* h carries its states from step to step */
     bool gradient;      /* h reads the gradient (false: zeros, the ablation) */
-    bool descent;       /* the gradient also reaches the maps past h, by a learned 9 x 9 matrix (false: published) */
     bool mean_before_norm; /* the global track's mean: before (ours) or after (published) the normalisation */
     nn_rmse rmse;
     nn_gradient encoding; /* of the gradient for h */
+    nn_descent descent;
     nn_compat compat;
     int latent;         /* channels of an auto-encoder's code: the model then is one of maps (nn_encode), shaped by g_width, g_width_max and g_levels, and
                          * has neither g nor h; 0: g and h */
@@ -117,8 +124,9 @@ typedef struct nn_state {
     int step;
 } nn_state;
 
-/* R_{t+1} = R_t + h(R_t, e) + D e, e being dL/dR_t as arch.encoding has it, one for each photograph (zero where none is given); D is a matrix over the channels that begins as -0.003 times the
- * identity, so that an untrained loop is plain descent (arch.descent; without it, as published, D is 0). */
+/* R_{t+1} = R_t + h(R_t, e) + D p, e being dL/dR_t as arch.encoding has it, one for each photograph (zero where none is given). D is a learned matrix over
+ * the channels, and arch.descent says of what: p = e and D begins as -0.003 times the identity, so that an untrained loop is plain descent; or p is the
+ * step of Gauss and Newton's method, damped by 0.1 beside the photographs' variance, and D begins as half the identity; or, as published, D is 0. */
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
 /* The unrolled loop on the grid's window: maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate

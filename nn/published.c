@@ -80,7 +80,8 @@ ts_code nn_published_arch(const nn_file *file, nn_arch *arch, ts_status *st)
 {
     nn_arch a = nn_arch_default();
     a.compat = NN_COMPAT_PUBLISHED;
-    a.recurrent = a.mean_before_norm = a.descent = false;
+    a.recurrent = a.mean_before_norm = false;
+    a.descent = NN_DESCENT_NONE;
     a.rmse = NN_RMSE_BATCH;
     a.encoding = NN_GRADIENT_RAW;
     a.g_size = 256;

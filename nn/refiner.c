@@ -22,11 +22,11 @@ ag_value *nn_refiner(ag_tape *tape, const nn_model *model, ag_value *x, ag_value
     return ag_tanh(tape, nn_conv(tape, model, l->h_output, x, 1, TS_PAD_REPLICATE, 1));
 }
 
-ag_value *nn_step(ag_tape *tape, const nn_model *model, ag_value *maps, ag_value *gradient, ag_value *both, ag_value *gru[2], ag_value *const to[2])
+ag_value *nn_step(ag_tape *tape, const nn_model *model, ag_value *maps, ag_value *path, ag_value *both, ag_value *gru[2], ag_value *const to[2])
 {
     const nn_layers *l = model->layers;
     ag_value *next = ag_add(tape, maps, nn_refiner(tape, model, both, gru, to));
-    return l->h_descent.weight < 0 ? next : ag_add(tape, next, nn_conv(tape, model, l->h_descent, gradient, 1, TS_PAD_ZERO, 1));
+    return path ? ag_add(tape, next, nn_conv(tape, model, l->h_path, path, 1, TS_PAD_ZERO, 1)) : next;
 }
 
 int nn_refiner_reach(const nn_model *model)

@@ -2,6 +2,7 @@
 #include "render/brdf.h"
 #include "render/published.h"
 #include "render/rows.h"
+#include "tensor/kernels/newton.h"
 #include "tensor/threads.h"
 #include <math.h>
 
@@ -72,4 +73,18 @@ void rd_flash_gradient(rd_grid grid, const float *maps, int channels, const rd_v
     double floored = rmse0 > least ? rmse0 : least;
     double now = flash(grid, maps, channels, view, image, factor / (3.0 * 256 * 256) / floored, gradient);
     if (rmse) *rmse = now;
+}
+
+void rd_newton_step(rd_grid grid, const float *maps, int channels, const rd_view *views, const float *const *image, int count, const float *damping, float *step)
+{
+    ts_shade_view v[RD_CAPTURE_VIEWS];
+    for (int k = 0; k < count; k++) v[k] = rd_shade_view(&views[k]);
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int y = 0; y < grid.h; y++) {
+        const int64_t at = (int64_t)y * grid.w;
+        const ts_shade_row row = rd_shade_row(grid, y, maps, channels);
+        const float *part[RD_CAPTURE_VIEWS];
+        for (int k = 0; k < count; k++) part[k] = image[k] + at * 3;
+        ts_newton_k()->step(v, part, count, &row, damping, step + at * channels);
+    }
 }

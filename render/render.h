@@ -20,4 +20,9 @@ void rd_flash_rmse(rd_grid grid, const float *maps, int channels, const rd_view 
 #define RD_RMSE_FLOOR 1e-4 /* at a perfect fit the residual is zero too: the floor only keeps 0/0 away */
 void rd_flash_gradient(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image, double rmse0,
                        float *gradient, double *rmse);
+
+/* Where Gauss and Newton's method would go from the maps: for each pixel by itself the step that fits it to count photographs (RD_POINT views, image[k]
+ * [h, w, 3] belongs to views[k]), damped by damping[MAP_CHANNELS] > 0 as of Levenberg and Marquardt (tensor/kernels/newton.h has the equation). step:
+ * [h, w, channels]; channels beyond the ninth are not written. Finite for finite maps. */
+void rd_newton_step(rd_grid grid, const float *maps, int channels, const rd_view *views, const float *const *image, int count, const float *damping, float *step);
 #endif

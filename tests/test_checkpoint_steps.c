@@ -60,8 +60,7 @@ TEST(checkpoint_steps_same_gradients)
     a.rmse = NN_RMSE_BATCH;
     a.gradient = true;
     compare(a, 3);
-    a.descent = !a.descent;
-    compare(a, 2);
+    for (a.descent = NN_DESCENT_NONE; a.descent <= NN_DESCENT_NEWTON; a.descent++) compare(a, 2);
 }
 
 TEST(checkpoint_steps_memory_grows_by_states)

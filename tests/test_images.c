@@ -9,6 +9,7 @@ static nn_arch several(void)
 {
     nn_arch a = tiny();
     a.images = IMAGES;
+    a.descent = NN_DESCENT_GRADIENT;
     return a;
 }
 
@@ -31,7 +32,8 @@ static nn_input captures(int n, int given, float **maps)
 /* Begun from a model of one photograph: what that gives from the first. */
 TEST(nn_images_begin_with_the_first)
 {
-    const nn_arch one = tiny(), many = several();
+    nn_arch one = tiny(), many = several();
+    one.descent = NN_DESCENT_GRADIENT;
     nn_model *m = create(&one, 41), *more = create(&many, 42);
     enliven(m);
     char path[] = "/tmp/lgd_imagesXXXXXX";
@@ -87,6 +89,34 @@ TEST(nn_images_have_a_gradient_each)
         }
         ag_tape_destroy(&t);
     }
+}
+
+/* With h silent a step is half of the one that fits all photographs. */
+TEST(nn_images_meet_in_a_newton_step)
+{
+    nn_arch arch = several();
+    arch.descent = NN_DESCENT_NEWTON;
+    nn_model *m = create(&arch, 46);
+    const nn_param *p = nn_model_find(m, "h.output.weight");
+    memset(m->value + p->offset, 0, p->count * sizeof *m->value);
+    for (int given = 1; given <= IMAGES; given++) {
+        float *truth, step[PIXELS * 9], damping[9];
+        for (int i = 0; i < 9; i++) damping[i] = 0.1f;
+        nn_input in = captures(2, given, &truth);
+        ag_tape *t = tape_create(false);
+        ag_value *maps[2];
+        CHECK(!nn_lgd(t, m, &in, 1, true, maps, NULL, NULL), "%s", ag_status(t)->message);
+        for (int n = 0; n < 2; n++) {
+            const float *start = maps[0]->t.data + (size_t)n * PIXELS * 9, *end = maps[1]->t.data + (size_t)n * PIXELS * 9, *image[IMAGES];
+            for (int k = 0; k < given; k++) image[k] = in.image.data + (size_t)(n * given + k) * PIXELS * 3;
+            rd_newton_step(in.grid, start, 9, in.views + n * given, image, given, damping, step);
+            for (int j = 0; j < PIXELS * 9; j++)
+                CHECK(fabsf(end[j] - (start[j] + 0.5f * step[j])) < 1e-5f, "%d given, material %d, value %d: %g, not %g", given, n, j, (double)end[j],
+                      (double)(start[j] + 0.5f * step[j]));
+        }
+        ag_tape_destroy(&t);
+    }
+    nn_model_free(&m);
 }
 
 TEST(nn_images_that_are_not_given_are_black_to_g)

@@ -203,7 +203,7 @@ TEST(nn_global_mean_before_or_after_the_norm)
 TEST(nn_batch_rmse_couples_the_batch)
 {
     nn_arch a = tiny();
-    a.rmse = NN_RMSE_BATCH, a.encoding = NN_GRADIENT_RAW;
+    a.rmse = NN_RMSE_BATCH, a.encoding = NN_GRADIENT_RAW, a.descent = NN_DESCENT_GRADIENT;
     nn_model *m = create(&a, 15);
     enliven(m);
     nn_input in = photographs(2, SIDE, 10, NULL);

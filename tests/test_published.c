@@ -117,7 +117,7 @@ TEST(published_needs_its_other_keys)
 {
     ts_status st = {0};
     nn_arch a = small();
-    a.descent = true;
+    a.descent = NN_DESCENT_NEWTON;
     CHECK(nn_arch_check(&a, &st) == TS_INVALID && strstr(st.message, "descent"), "'%s'", st.message);
 }
 

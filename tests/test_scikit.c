@@ -83,7 +83,7 @@ TEST(scikit_photographs_for_published_weights)
     for (int published = 0; published < 2; published++) {
         nn_arch a = nn_arch_default();
         a.g_width = 2, a.g_width_max = 2, a.g_levels = 1, a.h_width = 0, a.iterations = 0;
-        if (published) a.compat = NN_COMPAT_PUBLISHED, a.descent = false, a.rmse = NN_RMSE_BATCH;
+        if (published) a.compat = NN_COMPAT_PUBLISHED, a.descent = NN_DESCENT_NONE, a.rmse = NN_RMSE_BATCH;
         nn_model *m = nn_model_create(&a, &st);
         bool is = !published;
         CHECK(m && !nn_model_save(m, m->value, weights, NULL, 0, &st), "%s", st.message);

@@ -76,7 +76,7 @@ TEST(weights_round_trip_is_exact)
 TEST(weights_architecture_round_trip)
 {
     nn_arch a = small();
-    a.channels = 10, a.g_kernel_first = 5, a.g_kernel = 7, a.iterations = 11, a.recurrent = false, a.gradient = false, a.mean_before_norm = a.descent = false;
+    a.channels = 10, a.g_kernel_first = 5, a.g_kernel = 7, a.iterations = 11, a.recurrent = false, a.gradient = false, a.mean_before_norm = false, a.descent = NN_DESCENT_GRADIENT;
     a.rmse = NN_RMSE_BATCH, a.encoding = NN_GRADIENT_RAW;
     ts_status st = {0};
     char text[NN_ARCH_TEXT];
@@ -180,7 +180,7 @@ TEST(weights_of_another_architecture_are_refused)
         const char *what;
         ts_code code;
     } expected[] = {{"\"h.conv1.weight\" has the shape [8, 18, 5, 5], not [6, 18, 5, 5]", TS_FORMAT},
-                    {"\"h.descent.weight\" is missing", TS_FORMAT},
+                    {"\"h.newton.weight\" is missing", TS_FORMAT},
                     {"\"g.extra\" does not belong", TS_FORMAT},
                     {"\"g.down1.conv2.weight\" holds a value that is not finite", TS_NUMERIC}};
     const char *path = path_of("x.safetensors");

@@ -4,6 +4,7 @@
 
 static const char *const encoding_names[] = {"raw", "asinh", NULL}; /* as nn_gradient */
 static const char *const compat_names[] = {"none", "published", NULL}; /* as nn_compat */
+static const char *const descent_names[] = {"none", "gradient", "newton", NULL}; /* as nn_descent */
 static const char *const rmse_names[] = {"start", "batch", NULL}; /* as nn_rmse */
 
 #define AT(field) offsetof(tr_config, field)
@@ -25,8 +26,8 @@ const tr_key tr_keys[] = {
      "refinement steps T that the model is trained for and validated with"},
     {"model", "recurrent", TR_BOOL, AT(arch.recurrent), 0, 1, NULL, NULL, false, "the refiner carries its states from step to step"},
     {"model", "gradient", TR_BOOL, AT(arch.gradient), 0, 1, NULL, NULL, false, "the refiner reads the renderer's gradient (no: zeros, the ablation)"},
-    {"model", "descent", TR_BOOL, AT(arch.descent), 0, 1, NULL, NULL, false,
-     "the gradient also reaches the maps past the refiner, by a learned matrix over the channels that begins as plain descent (no: published)"},
+    {"model", "descent", TR_CHOICE, AT(arch.descent), 0, NN_DESCENT_NEWTON, NULL, descent_names, false,
+     "what reaches the maps past the refiner, by a learned matrix over the channels: nothing (none, published), the gradient, or the step of Gauss and Newton's method that fits each pixel to its photographs (newton)"},
     {"model", "mean_before_norm", TR_BOOL, AT(arch.mean_before_norm), 0, 1, NULL, NULL, false,
      "g's global track takes its means before the normalisation (no: after it, as published)"},
     {"model", "rmse", TR_CHOICE, AT(arch.rmse), 0, 1, NULL, rmse_names, false,

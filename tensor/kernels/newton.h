@@ -1,0 +1,16 @@
+/* Steps of Gauss and Newton's method for rows of pixels: what the maps of a pixel would have to be for its renderings to meet the photographs. */
+#ifndef TS_NEWTON_H
+#define TS_NEWTON_H
+#include "tensor/kernels/shade.h"
+#include "tensor/maps.h"
+
+struct ts_newton_kernels {
+    /* Of each pixel by itself: step[count, channels] = -(J' W J + diag(damping))^-1 J' W e, e = min(radiance, 1) - image over the views and rgb,
+     * J = d min(radiance, 1) / d maps, W = 1 / (image + TS_NEWTON_NOISE); where maps + step would leave [-1, 1] it ends there. images[v][count, 3]
+     * belongs to views[v]; damping[MAP_CHANNELS] > 0. Channels beyond the maps' are not written. */
+    void (*step)(const ts_shade_view *views, const float *const *images, int count, const ts_shade_row *row, const float *damping, float *step);
+};
+/* The variance of a photograph's value grows with it: shot noise, and 8 bits after the gamma curve. */
+#define TS_NEWTON_NOISE 0.02f
+TS_FAMILY(newton)
+#endif
