@@ -213,6 +213,21 @@ static ag_value *newton_step(ag_tape *tape, const nn_model *model, const nn_inpu
     return to;
 }
 
+/* Nothing taught h that its steps must come to rest: beyond those it was trained for, what is left of them adds up to a drift. So step t > T goes
+ * (T / t)^2 of its way, and all those together less than T whole steps. The published loop has no such rule. */
+static ag_value *shortened(ag_tape *tape, const nn_arch *a, int t, ag_value *maps, ag_value *next)
+{
+    if (!next || t <= a->iterations || a->compat == NN_COMPAT_PUBLISHED) return next;
+    const float left = (float)(a->iterations > 0 ? a->iterations : 1) / (float)t, weight = left * left, rest = 1 - weight;
+    if (ag_gradients(tape)) return ag_add(tape, ag_scale(tape, maps, rest), ag_scale(tape, next, weight));
+    const int64_t count = ts_count(next->t.shape); /* the same bytes, without memory of their own */
+    const float *from = maps->t.data;
+    float *to = next->t.data;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int64_t i = 0; i < count; i++) to[i] = rest * from[i] + weight * to[i];
+    return next;
+}
+
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state)
 {
     if (!check(tape, model, in) || !maps) return NULL;
@@ -231,20 +246,21 @@ ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag
     encode(model, maps, gradient, both);
     ag_value *next = nn_step(tape, model, maps, path, joined ? both : ag_concat(tape, maps, gradient), state->gru, state->to);
     state->step++;
-    return next;
+    return shortened(tape, &model->arch, state->step, maps, next);
 }
 
 typedef struct step_of {
     const nn_model *model;
     nn_input in;
     double *rmse0;
+    int step;
 } step_of;
 
 /* in: R_t and the states; out: R_{t+1} and, where they are carried, the new states. */
 static void step_again(ag_tape *tape, ag_value *const *in, ag_value **out, const void *user)
 {
     const step_of *s = user;
-    nn_state state = {.gru = {in[1], in[2]}, .rmse0 = s->rmse0};
+    nn_state state = {.gru = {in[1], in[2]}, .rmse0 = s->rmse0, .step = s->step};
     out[0] = nn_refine(tape, s->model, &s->in, in[0], &state);
     for (int i = 0; i < 2 && s->model->arch.recurrent; i++) out[i + 1] = state.gru[i];
 }
@@ -259,7 +275,7 @@ static float *gradient_room(ag_tape *tape, const ag_value *maps, int channels)
 
 static ag_value *step_and_forget(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state, float *const room[3])
 {
-    const step_of of = {model, *in, state->rmse0};
+    const step_of of = {model, *in, state->rmse0, state->step};
     ag_value *const from[3] = {maps, state->gru[0], state->gru[1]};
     ag_value *to[3] = {0};
     if (!ag_checkpoint(tape, step_again, &of, sizeof of, 3, from, room, model->arch.recurrent ? 3 : 1, to)) return NULL;

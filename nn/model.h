@@ -121,7 +121,7 @@ int nn_refiner_reach(const nn_model *model);
 typedef struct nn_state {
     ag_value *gru[2], *to[2]; /* to: NULL, or where the new states are written (a tape without gradients); to[i] may be gru[i] */
     double *rmse0; /* of each of the whole photographs by R_0, in the tape's arena; NULL: nn_refine measures it on the maps that it is given */
-    int step;
+    int step; /* how many were done: those beyond arch.iterations are shortened, the t-th to (T / t)^2 of its length (not where compat is published) */
 } nn_state;
 
 /* R_{t+1} = R_t + h(R_t, e) + D p, e being dL/dR_t as arch.encoding has it, one for each photograph (zero where none is given). D is a learned matrix over

@@ -26,6 +26,35 @@ TEST(nn_loop_is_the_same_however_it_is_run)
     }
 }
 
+TEST(nn_steps_beyond_the_trained_ones_are_shortened)
+{
+    nn_arch a = tiny();
+    a.recurrent = true;
+    nn_model *m = create(&a, 7);
+    enliven(m);
+    nn_input in = photographs(1, 24, 4, NULL);
+    for (int variant = 0; variant < 4; variant++) { /* with gradients, without, recomputed, published */
+        ag_tape *short_of = tape_create(variant != 1), *whole = tape_create(variant != 1);
+        ag_value *x[4], *y[4];
+        in.recompute = variant == 2;
+        m->arch.compat = variant == 3 ? NN_COMPAT_PUBLISHED : NN_COMPAT_NONE;
+        m->arch.iterations = 2;
+        CHECK(!nn_lgd(short_of, m, &in, 3, true, x, NULL, NULL), "%s", ag_status(short_of)->message);
+        m->arch.iterations = 3;
+        CHECK(!nn_lgd(whole, m, &in, 3, true, y, NULL, NULL), "%s", ag_status(whole)->message);
+        CHECK(same(x[2], y[2]), "a trained step is shortened (variant %d)", variant);
+        double worst = 0;
+        for (int64_t i = 0; i < ts_count(x[3]->t.shape); i++) {
+            const double from = x[2]->t.data[i], step = y[3]->t.data[i] - from, weight = variant == 3 ? 1 : 4.0 / 9;
+            worst = fmax(worst, fabs(x[3]->t.data[i] - (from + weight * step)));
+        }
+        CHECK(worst < 1e-6 && !same(x[2], x[3]), "the third step of two is off by %g (variant %d)", worst, variant);
+        ag_tape_destroy(&short_of);
+        ag_tape_destroy(&whole);
+    }
+    nn_model_free(&m);
+}
+
 TEST(nn_memory_of_inference_does_not_grow_with_steps)
 {
     nn_arch a = tiny();
