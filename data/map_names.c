@@ -153,7 +153,7 @@ static ts_code settle_normal(const char *path, const char *meta, io_normal conve
         set->directx = y == DX;
         return TS_OK;
     }
-    return ts_fail(st, TS_INVALID, "%s: %s; put \"normal: OpenGL y\" or \"normal: DirectX y\" into meta.txt, or say which with the option", path,
+    return ts_fail(st, TS_INVALID, "%s: %s; put \"normal: OpenGL y\" or \"normal: DirectX y\" into meta.txt, or say which by lgd-eval's --normal or a set.ini", path,
                    y == BOTH ? "meta.txt names both conventions for the normal's y" : "nothing says whether the normal's y is OpenGL or DirectX");
 }
 
@@ -173,7 +173,7 @@ static ts_code settle_workflow(const char *path, const char *meta, io_workflow t
         return ts_fail(st, TS_INVALID, "%s: both %s and %s could be the colour map; remove one, or name it in meta.txt (file.basecolor: ...)", path,
                        set->file[IO_BASECOLOR], set->file[IO_DIFFUSE_MAP]);
     if (metallic && specular && !said_specular && !said_metallic)
-        return ts_fail(st, TS_INVALID, "%s: has both %s and %s; put \"workflow: metallic\" or \"workflow: specular\" into meta.txt, or say which with the option", path,
+        return ts_fail(st, TS_INVALID, "%s: has both %s and %s; put \"workflow: metallic\" or \"workflow: specular\" into meta.txt, or say which by lgd-eval's --workflow or a set.ini", path,
                        set->file[IO_METALLIC_MAP], set->file[IO_SPECULAR_MAP]);
     set->specular = said_specular || (specular && !said_metallic);
     if (set->specular && !specular) return ts_fail(st, TS_INVALID, "%s: should be of the specular workflow, but there is no specular map", path);

@@ -1,4 +1,4 @@
-/* set.ini: what holds for every map folder of a set. Lines "key = value", '#' or ';' begins a comment:
+/* set.ini: what holds for a map folder, or, in the folder of them all, for every one. Lines "key = value", '#' or ';' begins a comment:
  *   workflow = metallic | specular
  *   normal = opengl | directx       which way the normal's y points
  *   colour = srgb | linear          how colour maps are stored

@@ -93,6 +93,7 @@ ts_code ev_set_open(const char *spec, const io_map_convention *told, ev_set *set
         set->where = colon + 1;
         code = set->kind == EV_PROCEDURAL ? parse_procedural(set, st) : set->kind == EV_MULTIVIEW ? list_captures(set, st) : list_folder(set, st);
         if (!code && set->kind == EV_MAPS) code = ev_set_ini(set->where, told, &set->told, st);
+        if (told) set->option = *told;
     }
     if (code) ev_set_close(set);
     return code;
@@ -116,6 +117,17 @@ uint64_t ev_set_identity(const ev_set *set, int i)
     return hash;
 }
 
+static ts_code load_maps(const ev_set *set, const char *path, int size, io_material *m, ts_status *st)
+{
+    io_map_convention own;
+    const ts_code code = ev_set_ini(path, &set->option, &own, st);
+    if (code) return code;
+    if (!own.normal) own.normal = set->told.normal;
+    if (!own.workflow) own.workflow = set->told.workflow;
+    if (!own.colour) own.colour = set->told.colour;
+    return io_read_map_folder(path, &own, size, m, st);
+}
+
 ts_code ev_set_load(const ev_set *set, int i, int size, io_material *m, ts_status *st)
 {
     io_material_free(m);
@@ -130,7 +142,7 @@ ts_code ev_set_load(const ev_set *set, int i, int size, io_material *m, ts_statu
     char path[PATH_LENGTH];
     if (snprintf(path, sizeof path, "%s/%s", set->where, set->entry[i]) >= (int)sizeof path)
         return ts_fail(st, TS_INVALID, "%s: the name is too long", set->where);
-    const ts_code code = set->kind == EV_STRIPS ? io_read_strip(path, size, m, NULL, st) : io_read_map_folder(path, &set->told, size, m, st);
+    const ts_code code = set->kind == EV_STRIPS ? io_read_strip(path, size, m, NULL, st) : load_maps(set, path, size, m, st);
     if (code) return code;
     snprintf(m->name, sizeof m->name, "%s", set->entry[i]);
     char *dot = set->kind == EV_STRIPS ? strrchr(m->name, '.') : NULL;

@@ -12,13 +12,13 @@ typedef struct ev_set {
     const char *where; /* into spec */
     uint64_t seed; /* EV_PROCEDURAL */
     int count;
-    io_map_convention told; /* EV_MAPS: what set.ini and the options say */
+    io_map_convention option, told; /* EV_MAPS: what the options say, and with set.ini */
     char **entry;  /* the names in the folder, sorted; NULL for EV_PROCEDURAL */
 } ev_set;
 
 /* procedural:SEED,COUNT, strips:FOLDER (a folder of strip images), maps:FOLDER (a folder of map folders) or multiview:FOLDER (a capture, or a
- * folder of them). A file set.ini in a folder of map folders says for all of them (eval/set_ini.h) what the options (told, may be NULL), which win,
- * leave open. The caller closes it after success. TS_INVALID for a wrong spec, TS_IO for a folder that cannot be read or has nothing of that kind. */
+ * folder of them). A file set.ini in a map folder says (eval/set_ini.h) what the options (told, may be NULL), which win, leave open, and one in the
+ * folder of all of them what is still open then. The caller closes it after success. TS_INVALID for a wrong spec, TS_IO for a folder that cannot be read or has nothing of that kind. */
 ts_code ev_set_open(const char *spec, const io_map_convention *told, ev_set *set, ts_status *st);
 void ev_set_close(ev_set *set);
 

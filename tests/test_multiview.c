@@ -214,6 +214,25 @@ TEST(eval_maps_as_told)
     ev_set set;
     io_material m = {0};
     io_map_convention say = {0};
+    /* a map folder's own set.ini wins over that of the set, the option over both */
+    const struct {
+        const char *name, *text;
+    } ini[] = {{"set.ini", "workflow = metallic\nnormal = opengl\n"}, {"m/set.ini", "normal = directx\n"}};
+    for (int i = 0; i < 2; i++) {
+        snprintf(path, sizeof path, "%s/%s", test_folder(), ini[i].name);
+        CHECK(io_write_bytes(path, ini[i].text, strlen(ini[i].text), &st) == TS_OK, "%s", st.message);
+    }
+    for (int i = 0; i < 2; i++) {
+        say.normal = i ? IO_NORMAL_GL : IO_NORMAL_FROM_FILE;
+        CHECK(ev_set_open(spec, &say, &set, &st) == TS_OK && set.count == 1 && ev_set_load(&set, 0, 4, &m, &st) == TS_OK, "%s", st.message);
+        CHECK((io_texel_get(m.maps).normal[1] < 0) == (i == 0), "set.ini of the map folder, option %d", i);
+        ev_set_close(&set);
+    }
+    for (int i = 0; i < 2; i++) {
+        snprintf(path, sizeof path, "%s/%s", test_folder(), ini[i].name);
+        CHECK(remove(path) == 0, "%s", path);
+    }
+    say = (io_map_convention){0};
     CHECK(ev_set_open(spec, &say, &set, &st) == TS_OK && ev_set_load(&set, 0, 4, &m, &st) == TS_INVALID && strstr(st.message, "workflow"), "two workflows: %s", st.message);
     ev_set_close(&set);
     say.workflow = IO_WORKFLOW_SPECULAR;
