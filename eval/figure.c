@@ -98,6 +98,7 @@ static ts_code of_report(const ev_report *r, bool time, const char *folder, ts_s
             if (time && r->method[m].points > 1 && (i == 0 || i == r->method[m].points - 1 || step % 6 == 0)) snprintf(label, sizeof label, "%d", step);
             put_point(&g, r, c, time ? ev_report_seconds(r, -1, c) : step, label);
         }
+        g.series[m].level = !time && r->method[m].points == 1;
     }
     if (!code) code = finish(&g, folder, time ? "methods" : "iterations", st);
     clear(&g);

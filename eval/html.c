@@ -105,7 +105,7 @@ static void plot(const ev_report *r, FILE *f)
         const ev_subject *m = &r->method[r->methods > 1 ? s : 0];
         const int set = r->methods > 1 ? -1 : s;
         ev_point *p = point + (size_t)s * (size_t)r->columns;
-        series[s] = (ev_series){r->methods > 1 ? m->label : r->set_name[s], p, m->points};
+        series[s] = (ev_series){r->methods > 1 ? m->label : r->set_name[s], p, m->points, false};
         for (int t = 0; t < m->points; t++) {
             ev_row mean, deviation;
             const int step = r->step[m->first + t];

@@ -88,15 +88,17 @@ static void draw_axes(FILE *f, const frame *r, const char *x_title, const char *
 
 static void draw(FILE *f, const frame *r, const ev_series *series, int s)
 {
+    const char *radius = series->points > 50 ? "1.5" : "3.5";
     const int legend = TOP + 12 + 18 * s;
     fprintf(f, "<g stroke=\"%s\" fill=\"none\"><polyline points=\"", COLOUR(s));
     for (int i = 0; i < series->points; i++)
         if (shown(r, &series->point[i])) fprintf(f, "%.1f,%.1f ", across(r, series->point[i].x), down(r, series->point[i].y));
+    if (series->level && shown(r, series->point)) fprintf(f, "%d,%.1f %d,%.1f", LEFT, down(r, series->point->y), WIDTH - RIGHT, down(r, series->point->y));
     fputs("\"/></g>\n", f);
     for (int i = 0; i < series->points; i++) {
         const ev_point *p = &series->point[i];
         if (!shown(r, p)) continue;
-        fprintf(f, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"3.5\" fill=\"%s\"><title>", across(r, p->x), down(r, p->y), COLOUR(s));
+        fprintf(f, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%s\" fill=\"%s\"><title>", across(r, p->x), down(r, p->y), radius, COLOUR(s));
         ev_put_text(f, series->name);
         fprintf(f, " %s: %.4g, %.4f &#177; %.4f</title></circle>", p->label, p->x, p->y, p->deviation);
         if (p->label[0]) {

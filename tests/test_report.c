@@ -150,7 +150,7 @@ TEST(report_of_several_methods)
 TEST(report_plot)
 {
     const ev_point some[] = {{0.1, 0.2, 0, "a"}, {1, 0.1, 0, ""}, {0, 0.1, 0, "zero"}, {1, NAN, 0, "none"}, {INFINITY, 1, 0, ""}};
-    const ev_series series[] = {{"s", some, 5}, {"one", some, 1}, {"none", some + 3, 1}};
+    const ev_series series[] = {{"s", some, 5, false}, {"one", some, 1, false}, {"none", some + 3, 1, false}};
     for (int n = 0; n <= 3; n++) {
         char *text = NULL;
         size_t size;
@@ -167,13 +167,14 @@ TEST(report_plot)
 TEST(report_plot_has_a_linear_axis_too)
 {
     const ev_point some[] = {{-1, 0.2, 0, ""}, {0, 0.1, 0, "zero"}, {24, 0.3, 0, ""}};
-    const ev_series series = {"s", some, 3};
+    const ev_series series[] = {{"s", some, 3, false}, {"level", some, 1, true}};
     char *text = NULL;
     size_t size;
     FILE *f = open_memstream(&text, &size);
     CHECK(f, "open_memstream");
-    ev_plot_write(f, &(ev_axes){"T", "y", false}, &series, 1);
+    ev_plot_write(f, &(ev_axes){"T", "y", false}, series, 2);
     fclose(f);
-    CHECK(count(text, "<circle") == 4 && strstr(text, "zero") && strstr(text, ">10</text>") && strstr(text, ">20</text>"), "%s", text);
+    CHECK(strstr(text, " 70,195.0 550,195.0"), "a level goes from side to side: %s", text);
+    CHECK(count(text, "<circle") == 6 && strstr(text, "zero") && strstr(text, ">10</text>") && strstr(text, ">20</text>"), "%s", text);
     free(text);
 }
