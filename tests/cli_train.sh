@@ -237,7 +237,7 @@ full_disk() {
 }
 
 shipped_configurations_are_valid() {
-    for f in configs/*.ini; do expect 0 "$TRAIN" "$f" --print-config; done
+    for f in configs/*.ini configs/ablation/*.ini; do expect 0 "$TRAIN" "$f" --print-config; done
 }
 
 check train_run_makes_its_files run_makes_its_files
