@@ -50,7 +50,7 @@ run_makes_its_files() {
 # A small network of the published kind: its weights before training are a file, and it trains, its tenth channel included.
 published_kind() {
     config
-    set -- --set model.channels=10 --set model.compat=published --set model.descent=no --set model.rmse=batch --set model.recurrent=no \
+    set -- --set model.channels=10 --set model.compat=published --set model.descent=none --set model.rmse=batch --set model.recurrent=no \
         --set train.pretrain_steps=0 --set train.steps=2
     expect 0 train "$@" --initial "$T/a.safetensors"
     [ ! -e "$T/run" ] || fail "a run was begun"
