@@ -36,7 +36,8 @@ typedef struct nn_layers {
     double *start; /* per parameter: standard deviation of the first values, 0 for zeros, or one of these: */
 } nn_layers;
 #define NN_ORTHOGONAL (-1.0)
-#define NN_NEWTON_DAMPING 0.1f /* of every channel: 0.03 to 0.3 are within some percent of each other, from one photograph and from five */
+#define NN_NEWTON_DAMPING 0.1f /* 0.03 to 0.3 are within some percent of each other, from one photograph and from five */
+#define NN_NEWTON_DAMPING_SPECULAR 1.0f /* one photograph cannot tell F0 from albedo: without this the detail of both goes into F0 */
 #define NN_NEWTON_START (-3.0) /* half the identity: the equations are linear only near the maps */
 #define NN_DESCENT_START (-2.0) /* -0.003 times the identity, shared by the photographs: six such steps lower the loss of a trained g's R_0 without overshooting anywhere */
 

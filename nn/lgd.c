@@ -194,7 +194,7 @@ static void encode(const nn_model *model, const ag_value *maps, ag_value *gradie
 static ag_value *newton_step(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps)
 {
     float damping[MAP_CHANNELS];
-    for (int i = 0; i < MAP_CHANNELS; i++) damping[i] = NN_NEWTON_DAMPING;
+    for (int i = 0; i < MAP_CHANNELS; i++) damping[i] = i >= MAP_SPECULAR ? NN_NEWTON_DAMPING_SPECULAR : NN_NEWTON_DAMPING;
     const ts_shape s = maps->t.shape;
     const int64_t pixels = (int64_t)s.h * s.w;
     const int count = given(in);

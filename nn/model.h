@@ -126,7 +126,7 @@ typedef struct nn_state {
 
 /* R_{t+1} = R_t + h(R_t, e) + D p, e being dL/dR_t as arch.encoding has it, one for each photograph (zero where none is given). D is a learned matrix over
  * the channels, and arch.descent says of what: p = e and D begins as -0.003 times the identity, so that an untrained loop is plain descent; or p is the
- * step of Gauss and Newton's method, damped by 0.1 beside the photographs' variance, and D begins as half the identity; or, as published, D is 0. */
+ * step of Gauss and Newton's method, damped by 0.1 beside the photographs' variance and by 1 in F0, and D begins as half the identity; or, as published, D is 0. */
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
 /* The unrolled loop on the grid's window: maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate
