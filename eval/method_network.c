@@ -26,7 +26,7 @@ static ts_code open_lgd(ev_estimator *e, ts_status *st)
     const nn_arch *a = &e->net->arch;
     e->last_alone = ev_number(e, "tolerance") > 0;
     if (photos(e) > a->images) return ts_fail(st, TS_UNSUPPORTED, "%s: reads at most %d photographs", ev_text(e, "model"), a->images);
-    if (steps(e) > 0 && a->h_width == 0) return ts_fail(st, TS_UNSUPPORTED, "%s: has no refiner: only iterations 0 are possible", ev_text(e, "model"));
+    if (steps(e) > 0 && !nn_arch_refines(a)) return ts_fail(st, TS_UNSUPPORTED, "%s: has no refiner: only iterations 0 are possible", ev_text(e, "model"));
     if (e->last_alone && !lgd_tiles_exact(a)) return ts_fail(st, TS_UNSUPPORTED, "%s: its steps couple all pixels, so that no tolerance can end a part of them", ev_text(e, "model"));
     return TS_OK;
 }

@@ -46,7 +46,7 @@ _Static_assert(sizeof((lgd_error *)0)->message == sizeof((ts_status *)0)->messag
 
 const char *lgd_version(void) { return LGD_VERSION; }
 
-lgd_options lgd_options_default(void) { return (lgd_options){.iterations = -1}; }
+lgd_options lgd_options_default(void) { return (lgd_options){.iterations = -1, .tolerance = LGD_TOLERANCE_USUAL}; }
 
 int lgd_trained_iterations(const lgd_model *model) { return model->net->arch.iterations; }
 
@@ -135,10 +135,11 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
                        ITERATIONS_MAX, LGD_AUTO);
     if (o->threads < 0 || o->threads > THREADS_MAX)
         return ts_fail(st, TS_INVALID, "lgd_estimate: threads is %d and must lie in 1 .. %d, or be 0 for all", o->threads, THREADS_MAX);
-    if (!(o->tolerance >= 0 && o->tolerance <= 1)) return ts_fail(st, TS_INVALID, "lgd_estimate: tolerance is %g and must lie in 0 .. 1", o->tolerance);
+    if (!(o->tolerance >= 0 && o->tolerance <= 1) && o->tolerance != LGD_TOLERANCE_USUAL)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: tolerance is %g and must lie in 0 .. 1, or be %g for the usual one", o->tolerance, LGD_TOLERANCE_USUAL);
     if ((o->tolerance > 0 || o->mask) && !lgd_tiles_exact(&model->net->arch))
         return ts_fail(st, TS_UNSUPPORTED, "lgd_estimate: these weights' loss is taken anew over the whole photograph at every step: no mask and no tolerance");
-    if (o->iterations > 0 && model->net->arch.h_width == 0)
+    if (o->iterations > 0 && !nn_arch_refines(&model->net->arch))
         return ts_fail(st, TS_UNSUPPORTED, "lgd_estimate: these weights have no refiner: only 0 iterations are possible");
     return TS_OK;
 }
@@ -307,7 +308,7 @@ static ts_code estimate(lgd_model *model, const lgd_photo *photo, int photos, in
     }
     int steps = o->iterations == -1 ? lgd_trained_iterations(model) : o->iterations;
     if (o->iterations == LGD_AUTO) {
-        steps = model->net->arch.h_width > 0 ? LGD_AUTO_MOST : 0;
+        steps = nn_arch_refines(&model->net->arch) ? LGD_AUTO_MOST : 0;
         if (tiles && count_steps(model, image, views, photos, side, steps, &steps, st)) return st->code;
     }
     return (tiles ? estimate_tiles : estimate_whole)(model, image, views, photos, side, steps, o, maps, st);
@@ -316,8 +317,10 @@ static ts_code estimate(lgd_model *model, const lgd_photo *photo, int photos, in
 int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options, float *maps, lgd_error *error)
 {
     ts_status st = {0};
-    const lgd_options o = options ? *options : lgd_options_default();
+    lgd_options o = options ? *options : lgd_options_default();
     if (check_arguments(model, photo, photos, side, &o, maps, &st) == TS_OK) {
+        if (o.tolerance == LGD_TOLERANCE_USUAL)
+            o.tolerance = o.iterations == -1 && !o.exact && lgd_tiles_exact(&model->net->arch) ? LGD_TOLERANCE : 0;
         const bool was = ts_conv_exact();
         ts_threads_set(o.threads);
         ts_conv_exact_set(o.exact || model->net->arch.compat == NN_COMPAT_PUBLISHED); /* whoever runs that wants its numbers */

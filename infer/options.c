@@ -20,7 +20,7 @@ const lgd_argument lgd_infer_arguments[] = {
     {MASK, "mask", "FILE", "an image of the photographs' shape: only where it is brighter than black are the maps sure to be refined,\n"
                            "as they would be without it; elsewhere they may be the first estimate"},
     {TOLERANCE, "tolerance", "X", "0 .. 1: the photograph (over 512 pixels: a tile of it) is refined no further once a step changes its maps by less than X (RMS,\n"
-                                  "of values in -1 .. 1); 0, the default, is exact"},
+                                  "of values in -1 .. 1); 0: never (default: 0.004; 0 with --iterations, with --exact and with published weights)"},
     {'m', "model", "FILE", "weights (default: $LGD_MODEL, or those installed or built with the program)"},
     {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {NORMAL, "normal", "gl|dx", "normal.png with y up (OpenGL, default) or y down (DirectX)"},
@@ -52,7 +52,7 @@ static ts_code take_capture(const char *value, lgd_command *c, ts_status *st)
 
 ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
 {
-    *c = (lgd_command){.size = 256, .iterations = -1, .max_pixels = IO_MAX_PIXELS_DEFAULT};
+    *c = (lgd_command){.size = 256, .iterations = -1, .tolerance = LGD_TOLERANCE_USUAL, .max_pixels = IO_MAX_PIXELS_DEFAULT};
     const char *value = NULL;
     int key, operands = argc;
     int64_t n = 0;

@@ -107,7 +107,7 @@ static void refine(work *w, area core, float *to)
     const int reach = nn_refiner_reach(w->model), gru = w->model->arch.h_gru;
     ag_tape *tape = w->tape;
     area now = grown(core, reach * t->steps, t->side);
-    const int carried = w->model->arch.recurrent ? 2 : 0;
+    const int carried = nn_arch_carries(&w->model->arch) ? 2 : 0;
     const ts_shape s = {1, rows(now), columns(now), w->channels};
     ag_value *maps = ag_empty(tape, s), *image = ag_empty(tape, (ts_shape){t->given, s.h, s.w, 3});
     ag_value *states[2] = {0};

@@ -72,6 +72,13 @@ nn_arch nn_arch_default(void)
     return a;
 }
 
+bool nn_arch_refines(const nn_arch *a)
+{
+    return a->h_width > 0 || (a->iterations > 0 && a->latent == 0 && a->gradient && a->descent != NN_DESCENT_NONE);
+}
+
+bool nn_arch_carries(const nn_arch *a) { return a->recurrent && a->h_width > 0; }
+
 ts_code nn_arch_check(const nn_arch *a, ts_status *st)
 {
     for (int i = 0; i < FIELDS; i++) {
@@ -90,8 +97,8 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
         return ts_fail(st, TS_INVALID, "images is %d: with rmse = batch it must be 1", a->images);
     if (a->compat == NN_COMPAT_PUBLISHED && (a->descent != NN_DESCENT_NONE || a->images > 1 || a->latent > 0 || a->rmse != NN_RMSE_BATCH))
         return ts_fail(st, TS_INVALID, "compat is published: that needs descent = none, rmse = batch, images 1 and latent 0");
-    if (a->h_width == 0 && a->iterations != 0)
-        return ts_fail(st, TS_INVALID, "iterations is %d: without a refiner (h_width 0) it must be 0", a->iterations);
+    if (a->iterations != 0 && !nn_arch_refines(a))
+        return ts_fail(st, TS_INVALID, "iterations is %d: with h_width 0 and no descent (or no gradient) it must be 0", a->iterations);
     return TS_OK;
 }
 

@@ -232,19 +232,21 @@ ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag
 {
     if (!check(tape, model, in) || !maps) return NULL;
     ts_shape s = maps->t.shape;
-    if (model->arch.h_width == 0) return ag_fail(tape, TS_INVALID, "the model has no refiner: 0 iterations are all that it can do");
+    if (!nn_arch_refines(&model->arch)) return ag_fail(tape, TS_INVALID, "the model has no refiner: 0 iterations are all that it can do");
     if (!ts_same(s, (ts_shape){materials(in), in->grid.h, in->grid.w, model->arch.channels}))
         return ag_fail(tape, TS_INVALID, "the maps are %d x %d x %d x %d, not the photograph's size and the model's %d channels", s.n, s.h, s.w, s.c,
                        model->arch.channels);
     if (model->arch.rmse == NN_RMSE_START && !state->rmse0 && !measure_start(tape, model, in, maps, state)) return NULL;
-    ag_value *gradient = loss_gradient(tape, model, in, maps, state), *both = NULL, *path = NULL;
+    const bool newton = model->arch.gradient && model->arch.descent == NN_DESCENT_NEWTON, read = model->arch.h_width > 0;
+    ag_value *gradient = read || !newton ? loss_gradient(tape, model, in, maps, state) : NULL, *both = NULL, *path = NULL;
     if (model->arch.gradient && model->arch.descent == NN_DESCENT_GRADIENT) path = gradient;
-    if (model->arch.gradient && model->arch.descent == NN_DESCENT_NEWTON && !(path = newton_step(tape, model, in, maps))) return NULL;
-    const bool joined = !ag_gradients(tape); /* else the gradient of R_t needs an operation that joins them */
+    if (newton && !(path = newton_step(tape, model, in, maps))) return NULL;
+    const bool joined = read && !ag_gradients(tape); /* else the gradient of R_t needs an operation that joins them */
     if (joined) both = ag_empty(tape, (ts_shape){s.n, s.h, s.w, (1 + model->arch.images) * s.c});
-    if (!gradient || (joined && !both)) return NULL;
-    encode(model, maps, gradient, both);
-    ag_value *next = nn_step(tape, model, maps, path, joined ? both : ag_concat(tape, maps, gradient), state->gru, state->to);
+    if (ag_status(tape)->code) return NULL;
+    if (gradient) encode(model, maps, gradient, both);
+    if (read && !joined) both = ag_concat(tape, maps, gradient);
+    ag_value *next = nn_step(tape, model, maps, path, both, state->gru, state->to);
     state->step++;
     return shortened(tape, &model->arch, state->step, maps, next);
 }
@@ -262,7 +264,7 @@ static void step_again(ag_tape *tape, ag_value *const *in, ag_value **out, const
     const step_of *s = user;
     nn_state state = {.gru = {in[1], in[2]}, .rmse0 = s->rmse0, .step = s->step};
     out[0] = nn_refine(tape, s->model, &s->in, in[0], &state);
-    for (int i = 0; i < 2 && s->model->arch.recurrent; i++) out[i + 1] = state.gru[i];
+    for (int i = 0; i < 2 && nn_arch_carries(&s->model->arch); i++) out[i + 1] = state.gru[i];
 }
 
 /* Room for the gradients of R_t and the states: a step's and the next one's take turns. */
@@ -278,7 +280,7 @@ static ag_value *step_and_forget(ag_tape *tape, const nn_model *model, const nn_
     const step_of of = {model, *in, state->rmse0, state->step};
     ag_value *const from[3] = {maps, state->gru[0], state->gru[1]};
     ag_value *to[3] = {0};
-    if (!ag_checkpoint(tape, step_again, &of, sizeof of, 3, from, room, model->arch.recurrent ? 3 : 1, to)) return NULL;
+    if (!ag_checkpoint(tape, step_again, &of, sizeof of, 3, from, room, nn_arch_carries(&model->arch) ? 3 : 1, to)) return NULL;
     state->gru[0] = to[1];
     state->gru[1] = to[2];
     state->step++;
@@ -310,7 +312,7 @@ ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int ste
     if (now && release && steps > 0) {
         ts_shape s = now->t.shape;
         buffer = now;
-        for (int i = 0; i < 2 && model->arch.recurrent; i++) state.to[i] = ag_empty(tape, (ts_shape){s.n, s.h, s.w, model->arch.h_gru});
+        for (int i = 0; i < 2 && nn_arch_carries(&model->arch); i++) state.to[i] = ag_empty(tape, (ts_shape){s.n, s.h, s.w, model->arch.h_gru});
     }
     float *room[2][3] = {{0}};
     for (int i = 0; now && !release && in->recompute && i < 6; i++) room[i / 3][i % 3] = gradient_room(tape, now, i % 3 ? model->arch.h_gru : now->t.shape.c);

@@ -116,7 +116,7 @@ static void plan_h(nn_model *m)
     const nn_arch *a = &m->arch;
     nn_layers *l = m->layers;
     double gain = leaky_gain(NN_LEAK_H);
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < 2 && a->h_width > 0; i++) {
         nn_cell *c = &l->cell[i];
         char name[64];
         const bool last = a->compat == NN_COMPAT_PUBLISHED; /* in the published order the convolution comes last */
@@ -132,8 +132,10 @@ static void plan_h(nn_model *m)
                 l->start[c->hidden.weight] = NN_ORTHOGONAL;
             }
     }
-    l->h_output = conv(m, "h.output", a->channels, a->h_gru, 3, false, 1);
-    l->start[l->h_output.weight] = 1e-3; /* h starts as nothing, nearly */
+    if (a->h_width > 0) {
+        l->h_output = conv(m, "h.output", a->channels, a->h_gru, 3, false, 1);
+        l->start[l->h_output.weight] = 1e-3; /* h starts as nothing, nearly */
+    }
     l->h_path = (nn_layer){-1, -1};
     if (a->descent == NN_DESCENT_NONE || !a->gradient) return;
     const bool newton = a->descent == NN_DESCENT_NEWTON;
@@ -180,7 +182,7 @@ nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
     if (arch->latent > 0) plan_latent(m);
     else plan_g(m);
     l->refiner = m->params;
-    if (arch->h_width > 0) plan_h(m);
+    if (nn_arch_refines(arch)) plan_h(m);
     return m;
 }
 

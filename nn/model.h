@@ -40,7 +40,7 @@ typedef struct nn_arch {
     int g_kernel_first; /* of the first down block: odd */
     int g_kernel;       /* of all others */
     int g_size;         /* side in pixels that g works at (a multiple of 2^g_levels); a photograph of another size is resampled for g */
-    int h_width;        /* of h's convolutions; 0: no refiner */
+    int h_width;        /* of h's convolutions; 0: h is what descent lets past it, or, where iterations is 0 or descent none, nothing */
     int h_gru;          /* of h's states */
     int iterations;     /* T that it was trained for */
     bool recurrent;     /* h carries its states from step to step */
@@ -56,6 +56,8 @@ typedef struct nn_arch {
 
 nn_arch nn_arch_default(void);
 ts_code nn_arch_check(const nn_arch *a, ts_status *st);
+bool nn_arch_refines(const nn_arch *a); /* there is something to do steps with */
+bool nn_arch_carries(const nn_arch *a); /* the steps have states */
 
 typedef struct nn_param {
     char name[96];

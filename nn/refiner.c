@@ -25,7 +25,7 @@ ag_value *nn_refiner(ag_tape *tape, const nn_model *model, ag_value *x, ag_value
 ag_value *nn_step(ag_tape *tape, const nn_model *model, ag_value *maps, ag_value *path, ag_value *both, ag_value *gru[2], ag_value *const to[2])
 {
     const nn_layers *l = model->layers;
-    ag_value *next = ag_add(tape, maps, nn_refiner(tape, model, both, gru, to));
+    ag_value *next = model->arch.h_width > 0 ? ag_add(tape, maps, nn_refiner(tape, model, both, gru, to)) : maps;
     return path ? ag_add(tape, next, nn_conv(tape, model, l->h_path, path, 1, TS_PAD_ZERO, 1)) : next;
 }
 

@@ -94,7 +94,7 @@ static bool widened(const nn_model *model, int index, nn_file *f)
     const bool refiner = model->arch.h_width > 0 && index == l->cell[0].conv.weight;
     const int first = refiner ? model->arch.channels : 0, each = (in - first) / images; /* h reads the maps, then the gradients */
     if (images == 1 || !(refiner || index == l->input_conv.weight || index == l->input_global.weight ||
-                         (model->arch.h_width > 0 && model->arch.descent == NN_DESCENT_GRADIENT && index == l->h_path.weight)))
+                         (model->arch.descent == NN_DESCENT_GRADIENT && nn_arch_refines(&model->arch) && index == l->h_path.weight)))
         return false;
     const size_t kernel = (size_t)p->dim[2] * (size_t)p->dim[3], single = (size_t)(first + each) * kernel;
     float *one = malloc((size_t)p->dim[0] * single * sizeof *one);

@@ -155,6 +155,21 @@ mask_and_tolerance() {
     says "$T/err" "(R_1)"
 }
 
+usual_tolerance() {
+    photo "$T/p.ppm" 64 64
+    run="$BIN/lgd-infer --size 64 --threads 1 --maps normal,exr $T/p.ppm"
+    expect 0 $run -o "$T/usual"
+    expect 0 $run --tolerance 0.004 -o "$T/same"
+    expect 0 $run --tolerance 0 -o "$T/all"
+    expect 0 $run --iterations 6 -o "$T/six"
+    expect 0 $run --exact -o "$T/exact"
+    expect 0 $run --exact --tolerance 0 -o "$T/exact_all"
+    cmp -s "$T/usual/p/maps.exr" "$T/same/p/maps.exr" || fail "the usual tolerance is not 0.004"
+    cmp -s "$T/usual/p/maps.exr" "$T/all/p/maps.exr" && fail "it ends nothing early"
+    cmp -s "$T/six/p/maps.exr" "$T/all/p/maps.exr" || fail "there is a tolerance where the number of steps is given"
+    cmp -s "$T/exact/p/maps.exr" "$T/exact_all/p/maps.exr" || fail "there is a tolerance with --exact"
+}
+
 comma_locale() {
     model
     if ! locale -a 2>/dev/null | grep -qi '^de_DE.utf-\?8$'; then
@@ -229,6 +244,7 @@ check infer_poor_photographs poor_photographs
 check infer_light_power light_power
 check infer_sizes sizes
 check infer_mask_and_tolerance mask_and_tolerance
+check infer_usual_tolerance usual_tolerance
 check infer_comma_locale comma_locale
 check infer_directx_normals directx_normals
 check infer_instruction_sets instruction_sets

@@ -32,7 +32,7 @@ static inline nn_model *create(const nn_arch *a, uint64_t seed)
 static inline void enliven(nn_model *m)
 {
     const nn_param *p = nn_model_find(m, "h.output.weight");
-    for (size_t i = 0; i < p->count; i++) m->value[p->offset + i] *= 200;
+    for (size_t i = 0; p && i < p->count; i++) m->value[p->offset + i] *= 200;
 }
 
 static inline ag_tape *tape_create(bool gradients)

@@ -63,6 +63,9 @@ TEST(checkpoint_steps_same_gradients)
     a.gradient = true;
     compare(a, 3);
     for (a.descent = NN_DESCENT_NONE; a.descent <= NN_DESCENT_NEWTON; a.descent++) compare(a, 2);
+    a = tiny();
+    a.h_width = 0;
+    compare(a, 2);
 }
 
 TEST(checkpoint_steps_memory_grows_by_states)

@@ -258,7 +258,6 @@ TEST(config_checks_keys_against_each_other)
                                          {"train.steps=0", "nothing to do"},
                                          {"validate.seed=1", "data.seed"},
                                          {"model.g_size=50", "g_size"},
-                                         {"model.h_width=0", "iterations"},
                                          {"model.g_kernel=4", "g_kernel"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         tr_config c = tr_config_default();

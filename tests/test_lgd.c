@@ -4,9 +4,10 @@
 TEST(nn_loop_is_the_same_however_it_is_run)
 {
     enum { STEPS = 4 };
-    for (int variant = 0; variant < 4; variant++) {
+    for (int variant = 0; variant < 6; variant++) {
         nn_arch a = tiny();
         a.recurrent = variant & 1, a.rmse = variant & 2 ? NN_RMSE_BATCH : NN_RMSE_START;
+        if (variant > 3) a.h_width = 0, a.descent = variant & 1 ? NN_DESCENT_GRADIENT : NN_DESCENT_NEWTON;
         nn_model *m = create(&a, 7);
         enliven(m);
         nn_input in = photographs(2, 24, 4, NULL);

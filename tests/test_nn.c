@@ -36,7 +36,7 @@ TEST(nn_arch_check_names_the_key)
     } bad[] = {{"channels", offsetof(nn_arch, channels), 8},        {"g_width", offsetof(nn_arch, g_width), 0},     {"g_width_max", offsetof(nn_arch, g_width_max), 8},
                {"g_levels", offsetof(nn_arch, g_levels), 9},        {"g_kernel", offsetof(nn_arch, g_kernel), 4},   {"g_kernel_first", offsetof(nn_arch, g_kernel_first), 2},
                {"g_size", offsetof(nn_arch, g_size), 48},           {"h_width", offsetof(nn_arch, h_width), -1},    {"h_gru", offsetof(nn_arch, h_gru), 0},
-               {"iterations", offsetof(nn_arch, iterations), -1},   {"iterations", offsetof(nn_arch, h_width), 0}};
+               {"iterations", offsetof(nn_arch, iterations), -1}};
     nn_arch a = nn_arch_default();
     ts_status st = {0};
     CHECK(!nn_arch_check(&a, &st), "%s", st.message);
@@ -46,6 +46,15 @@ TEST(nn_arch_check_names_the_key)
         st = (ts_status){0};
         CHECK(nn_arch_check(&a, &st) == TS_INVALID && strstr(st.message, bad[i].key), "%s = %d gives '%s'", bad[i].key, bad[i].value, st.message);
         CHECK(!nn_model_create(&a, &st), "a model of a bad architecture");
+    }
+    for (int without = 0; without < 3; without++) { /* convolutions; them and the descent; them and the gradient */
+        a = nn_arch_default();
+        a.h_width = 0;
+        if (without == 1) a.descent = NN_DESCENT_NONE;
+        if (without == 2) a.gradient = false;
+        st = (ts_status){0};
+        const bool fine = !nn_arch_check(&a, &st);
+        CHECK(without ? !fine && strstr(st.message, "iterations") : fine, "without %d: '%s'", without, st.message);
     }
 }
 

@@ -15,7 +15,7 @@ static void make_image(float *image, int side)
     for (int i = 0; i < side * side * 3; i++) image[i] = 0.2f + 0.6f * ts_rng_uniform(&rng);
 }
 
-static nn_model *random_model_of(bool recurrent, int images)
+static nn_model *random_model_of(int h_width, bool recurrent, int images)
 {
     nn_arch a = nn_arch_default();
     a.images = images;
@@ -23,7 +23,7 @@ static nn_model *random_model_of(bool recurrent, int images)
     a.g_width_max = 8;
     a.g_levels = 2;
     a.g_size = 16;
-    a.h_width = 8;
+    a.h_width = h_width;
     a.h_gru = 4;
     ts_status st = {0};
     a.recurrent = recurrent;
@@ -37,7 +37,7 @@ static nn_model *random_model_of(bool recurrent, int images)
     return m;
 }
 
-static nn_model *random_model(bool recurrent) { return random_model_of(recurrent, 1); }
+static nn_model *random_model(bool recurrent) { return random_model_of(8, recurrent, 1); }
 
 /* One flash photograph in tiles. */
 static lgd_tiles flash_tiles(const float *const *image, int side, int tile, int steps)
@@ -80,9 +80,9 @@ static const float *const only[] = {large};
 TEST(infer_tiles_give_the_untiled_result)
 {
     ag_tape *tape = frozen_tape();
-    for (int recurrent = 0; recurrent < 2; recurrent++) {
-        nn_model *m = random_model(recurrent);
-        CHECK(nn_refiner_reach(m) == 5, "h reaches %d pixels", nn_refiner_reach(m));
+    for (int variant = 0; variant < 3; variant++) { /* h without states, with them, none but the Newton step */
+        nn_model *m = random_model_of(variant < 2 ? 8 : 0, variant == 1, 1);
+        CHECK(nn_refiner_reach(m) == (variant < 2 ? 5 : 0), "h reaches %d pixels", nn_refiner_reach(m));
         static const int sides[] = {LARGE, 33, 7, 1}, tiles[] = {1000, 32, 17, 9};
         for (size_t s = 0; s < sizeof sides / sizeof *sides; s++) {
             const int side = sides[s];
@@ -91,7 +91,8 @@ TEST(infer_tiles_give_the_untiled_result)
             for (int t = 0; t <= TILES_T; t++) maps[t] = whole_maps[t];
             make_image(large, side);
             untiled(tape, m, large, side, maps);
-            CHECK(farthest(maps[TILES_T], maps[TILES_T - 1], values) > 1e-3, "a step changes nothing");
+            const bool saturated = variant == 2 && side == 1; /* its one pixel has no gradient */
+            CHECK(saturated || farthest(maps[TILES_T], maps[TILES_T - 1], values) > (variant < 2 ? 1e-3 : 0), "a step changes nothing"); /* Newton's come to rest */
             for (size_t k = 0; k < sizeof tiles / sizeof *tiles; k++) {
                 double rmse[TILES_T + 1];
                 ts_status st = {0};
@@ -120,7 +121,7 @@ TEST(infer_tiles_of_several_photographs)
     enum { GIVEN = 2 };
     static float images[GIVEN][LARGE * LARGE * 3];
     ag_tape *tape = frozen_tape();
-    nn_model *m = random_model_of(true, 3);
+    nn_model *m = random_model_of(8, true, 3);
     rd_view views[GIVEN];
     make_image(images[0], LARGE);
     make_image(images[1], LARGE - 1);

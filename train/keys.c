@@ -20,7 +20,7 @@ const tr_key tr_keys[] = {
     {"model", "g_kernel", TR_INT, AT(arch.g_kernel), 1, 15, NULL, NULL, false, "kernel side of g's other blocks, odd"},
     {"model", "g_size", TR_INT, AT(arch.g_size), 2, 4096, NULL, NULL, false,
      "side in pixels that g works at, a multiple of 2^g_levels; other photographs are resampled for g"},
-    {"model", "h_width", TR_INT, AT(arch.h_width), 0, 4096, NULL, NULL, false, "channels of the refiner's convolutions; 0: no refiner"},
+    {"model", "h_width", TR_INT, AT(arch.h_width), 0, 4096, NULL, NULL, false, "channels of the refiner's convolutions; 0: none, a refinement step is then what model.descent gives"},
     {"model", "h_gru", TR_INT, AT(arch.h_gru), 1, 4096, NULL, NULL, false, "channels of the refiner's recurrent states"},
     {"model", "iterations", TR_INT, AT(arch.iterations), 0, 64, NULL, NULL, false,
      "refinement steps T that the model is trained for and validated with"},

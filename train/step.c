@@ -30,7 +30,7 @@ static int draw_iterations(const tr_config *c, int64_t step)
 {
     const int lo = c->train.iterations_min ? c->train.iterations_min : c->arch.iterations;
     const int hi = c->train.iterations_max ? c->train.iterations_max : c->arch.iterations;
-    if (c->arch.h_width == 0) return 0;
+    if (!nn_arch_refines(&c->arch)) return 0;
     ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_TRAIN, (uint64_t)step);
     return lo + ts_rng_int(&rng, hi - lo + 1);
 }
