@@ -42,6 +42,7 @@ static const ev_setting settings[] = {
     {.key = "rate", .type = EV_REAL, .lo = 0, .hi = 10, .initial = "0.01", .grid = "0.001 0.003 0.01 0.03 0.1", .help = "Adam's rate"},
     {.key = "steps", .type = EV_WHOLE, .lo = 0, .hi = 100000, .initial = "100", .grid = "0 1 2 5 10 20 50 100 200 500", .steps = true, .help = "of Adam"},
     {.key = "photos", .type = EV_WHOLE, .lo = 1, .hi = RD_CAPTURE_VIEWS, .initial = "1", .help = "photographs that are given"},
+    EV_ORIENTATIONS,
     {.key = "model", .type = EV_WEIGHTS, .initial = "", .help = "whose R_0, by default the program's"},
     {0}};
 const ev_method ev_method_descent = {

@@ -76,7 +76,7 @@ static ts_code run_tiles(ev_estimator *e, const ev_case *c, const float *const *
 {
     const int channels = e->net->arch.channels;
     if (ev_block(e, (size_t)c->size * (size_t)c->size * (size_t)channels, st) != TS_OK) return st->code;
-    lgd_tiles t = {.image = image, .views = view, .given = photos(e), .side = c->size, .tile = c->size > UNTILED ? TILE : c->size, .steps = steps(e), .tolerance = ev_number(e, "tolerance")};
+    lgd_tiles t = {.image = image, .views = view, .given = photos(e), .side = c->size, .tile = c->size > UNTILED ? TILE : c->size, .steps = steps(e), .oriented = ev_oriented(e), .tolerance = ev_number(e, "tolerance")};
     if (lgd_tiles_run(e->tape, e->net, &t, e->x, st) != TS_OK) return st->code;
     seen(t.steps, e->x, channels, user);
     return TS_OK;
@@ -92,7 +92,7 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
     ag_value *out = NULL;
     ag_reset(e->tape);
     const int given = photos(e);
-    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){given, c->size, c->size, 3}), .grid = rd_grid_full(c->size), .views = view, .given = given};
+    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){given, c->size, c->size, 3}), .grid = rd_grid_full(c->size), .views = view, .given = given, .oriented = ev_oriented(e)};
     if (nn_lgd(e->tape, e->net, &in, steps(e), false, &out, after, &t) == TS_OK) return TS_OK;
     *st = *ag_status(e->tape);
     return st->code;
@@ -106,12 +106,12 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
 #define TOLERANCE {.key = "tolerance", .type = EV_REAL, .lo = 0, .hi = 1, .initial = "0", .help = "tiles end when a step changes them less, as lgd-infer --tolerance"}
 
 static const ev_setting unet[] = {MODEL_GIVEN("weights of a g that was trained alone"), {0}};
-static const ev_setting joint[] = {MODEL("weights of g and h, by default the program's"), {0}};
+static const ev_setting joint[] = {MODEL("weights of g and h, by default the program's"), EV_ORIENTATIONS, {0}};
 #define PHOTOS {.key = "photos", .type = EV_WHOLE, .lo = 1, .hi = NN_MAX_IMAGES, .help = "photographs that are given (default: as many as the weights read)"}
 #define POWER                                                                                                                             \
     {.key = "power", .type = EV_WORD, .words = "told auto known", .initial = "told",                                                      \
      .help = "of the light: the usual one, estimated as lgd-infer --light-power auto, or what --exposure made of it"}
-#define REFINER ITERATIONS, TOLERANCE, PHOTOS, POWER, {0}
+#define REFINER ITERATIONS, TOLERANCE, EV_ORIENTATIONS, PHOTOS, POWER, {0}
 
 static const ev_setting lgd[] = {MODEL("weights of g and h, by default the program's"), REFINER};
 static const ev_setting nograd[] = {MODEL_GIVEN("weights trained with model.gradient = no"), REFINER};

@@ -31,6 +31,7 @@ static const ev_setting settings[] = {
     {.key = "rate", .type = EV_REAL, .lo = 0, .hi = 1, .initial = "0.5", .grid = "0.1 0.2 0.5 1", .help = "the part of each step that is taken"},
     {.key = "steps", .type = EV_WHOLE, .lo = 0, .hi = 100000, .initial = "6", .grid = "0 1 2 5 10 20 50 100", .steps = true, .help = "of the method"},
     {.key = "photos", .type = EV_WHOLE, .lo = 1, .hi = RD_CAPTURE_VIEWS, .initial = "1", .help = "photographs that are given"},
+    EV_ORIENTATIONS,
     {.key = "model", .type = EV_WEIGHTS, .initial = "", .help = "whose R_0, by default the program's"},
     {0}};
 const ev_method ev_method_newton = {

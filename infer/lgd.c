@@ -46,7 +46,7 @@ _Static_assert(sizeof((lgd_error *)0)->message == sizeof((ts_status *)0)->messag
 
 const char *lgd_version(void) { return LGD_VERSION; }
 
-lgd_options lgd_options_default(void) { return (lgd_options){.iterations = -1, .tolerance = LGD_TOLERANCE_USUAL}; }
+lgd_options lgd_options_default(void) { return (lgd_options){.iterations = -1, .orientations = 8, .tolerance = LGD_TOLERANCE_USUAL}; }
 
 int lgd_trained_iterations(const lgd_model *model) { return model->net->arch.iterations; }
 
@@ -137,6 +137,8 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
         return ts_fail(st, TS_INVALID, "lgd_estimate: threads is %d and must lie in 1 .. %d, or be 0 for all", o->threads, THREADS_MAX);
     if (!(o->tolerance >= 0 && o->tolerance <= 1) && o->tolerance != LGD_TOLERANCE_USUAL)
         return ts_fail(st, TS_INVALID, "lgd_estimate: tolerance is %g and must lie in 0 .. 1, or be %g for the usual one", o->tolerance, LGD_TOLERANCE_USUAL);
+    if (o->orientations != 0 && o->orientations != 1 && o->orientations != 8)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: orientations is %d and must be 1 or 8", o->orientations);
     if ((o->tolerance > 0 || o->mask) && !lgd_tiles_exact(&model->net->arch))
         return ts_fail(st, TS_UNSUPPORTED, "lgd_estimate: these weights' loss is taken anew over the whole photograph at every step: no mask and no tolerance");
     if (o->iterations > 0 && !nn_arch_refines(&model->net->arch))
@@ -195,7 +197,7 @@ static ts_code run_whole(lgd_model *model, const float *const *image, const rd_v
     ag_reset(model->tape);
     const double more = step_bytes(&model->net->arch, side) - (double)ts_arena_peak(ag_arena(model->tape)); /* than earlier calls left */
     if (more > 0 && lgd_memory_check(more, st) != TS_OK) return ts_context(st, "%d x %d pixels", side, side);
-    nn_input in = {.image = ts_new(ag_arena(model->tape), (ts_shape){given, side, side, 3}), .grid = rd_grid_full(side), .views = views, .given = given};
+    nn_input in = {.image = ts_new(ag_arena(model->tape), (ts_shape){given, side, side, 3}), .grid = rd_grid_full(side), .views = views, .given = given, .oriented = o->orientations == 8};
     if (!in.image.data) return ts_fail(st, TS_NOMEM, "out of memory for an image of %d x %d pixels", side, side);
     const int64_t values = (int64_t)side * side * 3;
     for (int k = 0; k < given; k++)
@@ -221,12 +223,12 @@ static ts_code estimate_whole(lgd_model *model, const float *const *image, const
 }
 
 /* The number of steps that the photographs take at AUTO_SIDE pixels. */
-static ts_code count_steps(lgd_model *model, const float *const *image, const rd_view *views, int given, int side, int most, int *steps, ts_status *st)
+static ts_code count_steps(lgd_model *model, const float *const *image, const rd_view *views, int given, int side, int most, int orientations, int *steps, ts_status *st)
 {
     enum { AUTO_SIDE = 256 };
     const int small = side < AUTO_SIDE ? side : AUTO_SIDE;
     const size_t pixels = (size_t)small * (size_t)small;
-    const lgd_options o = {.iterations = LGD_AUTO};
+    const lgd_options o = {.iterations = LGD_AUTO, .orientations = orientations};
     float *photo = malloc((size_t)given * pixels * 3 * sizeof *photo), *maps = malloc(pixels * MAP_CHANNELS * sizeof *maps);
     const float *each[NN_MAX_IMAGES];
     ts_arena *arena = ts_arena_create(0, st);
@@ -267,7 +269,7 @@ static ts_code estimate_tiles(lgd_model *model, const float *const *image, const
     float *raw = arch->channels == MAP_CHANNELS ? maps : malloc((size_t)pixels * (size_t)arch->channels * sizeof *raw);
     double *rmse = calloc((size_t)steps + 1, sizeof *rmse);
     ts_code code = raw && rmse ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
-    lgd_tiles t = {.image = image, .views = views, .given = given, .mask = o->mask, .side = side, .tile = tile, .steps = steps, .tolerance = o->tolerance, .rmse = o->progress ? rmse : NULL,
+    lgd_tiles t = {.image = image, .views = views, .given = given, .mask = o->mask, .side = side, .tile = tile, .steps = steps, .oriented = o->orientations == 8, .tolerance = o->tolerance, .rmse = o->progress ? rmse : NULL,
                    .alive = before_tile, .user = &w};
     if (!code) code = lgd_tiles_run(model->tape, model->net, &t, raw, st);
     int stop = steps;
@@ -309,7 +311,7 @@ static ts_code estimate(lgd_model *model, const lgd_photo *photo, int photos, in
     int steps = o->iterations == -1 ? lgd_trained_iterations(model) : o->iterations;
     if (o->iterations == LGD_AUTO) {
         steps = nn_arch_refines(&model->net->arch) ? LGD_AUTO_MOST : 0;
-        if (tiles && count_steps(model, image, views, photos, side, steps, &steps, st)) return st->code;
+        if (tiles && count_steps(model, image, views, photos, side, steps, o->orientations, &steps, st)) return st->code;
     }
     return (tiles ? estimate_tiles : estimate_whole)(model, image, views, photos, side, steps, o, maps, st);
 }

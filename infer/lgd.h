@@ -34,6 +34,8 @@ typedef struct lgd_options {
     int iterations; /* refinement steps; 0: R_0 alone, -1: as trained, LGD_AUTO */
     int exact;      /* 0: 3 x 3 convolutions by Winograd's way where that is faster, with maps that differ by less than 1e-4; else directly, as weights
                      * of the published network always are */
+    int orientations; /* 8: the first estimate is the mean of those of the photograph's eight orientations (quarter turns and their mirror images), where
+                       * it is the only one and light and camera are above its centre (not with the published weights); 1 or 0: of the photograph as it is */
     int threads;    /* 0: as many as the process may use */
     /* Called after R_0 (step 0) and after every refinement with the reconstruction RMSE; return nonzero to stop there. May be NULL. */
     int (*progress)(int step, double rmse, void *user);

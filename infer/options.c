@@ -5,13 +5,14 @@
 #include "infer/output.h"
 #include <string.h>
 
-enum { NORMAL = 256, CAPTURE, POWER, MAPS, WORKFLOW, MASK, TOLERANCE, EXACT, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
+enum { NORMAL = 256, CAPTURE, POWER, MAPS, WORKFLOW, MASK, TOLERANCE, ORIENTATIONS, EXACT, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
 
 const lgd_argument lgd_infer_arguments[] = {
     {'o', "output", "DIR", "write DIR/STEM/ for each photograph, STEM = its file name without extension (required)"},
     {'s', "size", "N", "pixels of a side of the maps, 1 .. 8192 (default 256)"},
     {'i', "iterations", "N|auto", "refinement steps, 0 .. 1000; 0 = the first estimate alone; auto = as long as the reconstruction improves,\n"
                                   "24 at most (default: as trained)"},
+    {ORIENTATIONS, "orientations", "N", "8 (default): the first estimate is the mean over the photograph's quarter turns and mirror images; 1: that of the photograph as it is"},
     {EXACT, "exact", NULL, "compute all convolutions directly; the default, Winograd's way where it is faster, differs by less than 1e-4"},
     {CAPTURE, "capture", "WHERE", "in place of PHOTO: several photographs of one sample under known lights, listed in an INI file\n"
                                   "or a folder in MaterialGAN's layout; by default with the weights named multi"},
@@ -52,7 +53,7 @@ static ts_code take_capture(const char *value, lgd_command *c, ts_status *st)
 
 ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
 {
-    *c = (lgd_command){.size = 256, .iterations = -1, .tolerance = LGD_TOLERANCE_USUAL, .max_pixels = IO_MAX_PIXELS_DEFAULT};
+    *c = (lgd_command){.size = 256, .iterations = -1, .orientations = 8, .tolerance = LGD_TOLERANCE_USUAL, .max_pixels = IO_MAX_PIXELS_DEFAULT};
     const char *value = NULL;
     int key, operands = argc;
     int64_t n = 0;
@@ -78,6 +79,10 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
         case 't':
             code = whole("threads", value, 0, 1024, &n, st);
             c->threads = (int)n;
+            break;
+        case ORIENTATIONS:
+            c->orientations = strcmp(value, "8") == 0 ? 8 : 1;
+            if (c->orientations == 1 && strcmp(value, "1") != 0) code = ts_fail(st, TS_INVALID, "--orientations: '%s' is neither 1 nor 8", value);
             break;
         case EXACT: c->exact = true; break;
         case POWER:

@@ -202,7 +202,7 @@ static ts_code prepare(work *w)
     if (side == size) memcpy(small->t.data, whole->t.data, (size_t)ts_count(small->t.shape) * sizeof(float));
     else if (ts_resize(&small->t, &whole->t, arena, &st)) ag_fail(w->tape, st.code, "%s", st.message);
     ag_scope_end(w->tape, mark, NULL, 0);
-    const nn_input in = {.image = small->t, .grid = rd_grid_full(size), .views = w->t->views, .given = given};
+    const nn_input in = {.image = small->t, .grid = rd_grid_full(size), .views = w->t->views, .given = given, .oriented = w->t->oriented};
     w->predicted = nn_predict(w->tape, w->model, &in);
     w->taps = ts_taps_triangle(arena, size, side);
     w->squares = ts_arena_zalloc(arena, (size_t)w->t->steps + 1, sizeof *w->squares);

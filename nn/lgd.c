@@ -73,6 +73,14 @@ static ag_value *encoded(ag_tape *tape, const nn_model *model, const nn_input *i
     return x;
 }
 
+static bool central(const float p[3]) { return p[0] == 0 && p[1] == 0; }
+
+bool nn_orients(const nn_model *model, const nn_input *in)
+{
+    const rd_view view = view_of(model, in, 0);
+    return in->image.shape.n == 1 && model->arch.compat == NN_COMPAT_NONE && central(view.camera) && central(view.light);
+}
+
 ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in)
 {
     if (!check(tape, model, in)) return NULL;
@@ -81,7 +89,8 @@ ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in)
     if (side != photograph->shape.w)
         return ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels: g needs a square", photograph->shape.w, side);
     ts_mark mark = ag_scope_begin(tape);
-    ag_value *maps = nn_unet(tape, model, encoded(tape, model, in, photograph));
+    ag_value *x = encoded(tape, model, in, photograph);
+    ag_value *maps = in->oriented && !ag_gradients(tape) && nn_orients(model, in) ? nn_unet_oriented(tape, model, x) : nn_unet(tape, model, x);
     if (side != model->arch.g_size) maps = ag_resize(tape, maps, side, side);
     ag_scope_end(tape, mark, &maps, 1);
     return maps;

@@ -105,11 +105,16 @@ typedef struct nn_input {
     ts_tensor whole; /* [N * given, side, side, 3]: the photographs of which image is the window; no data: image is the whole */
     const rd_view *views; /* [N * given], or NULL */
     int given;            /* 1 .. arch.images; 0 stands for 1 */
+    bool oriented;        /* R_0 is the mean of g's maps of the photograph in its eight orientations (quarter turns and their mirror images), where
+                           * nn_orients says that they are alike; on a tape without gradients */
     bool recompute;       /* on a tape with gradients: of each step only R_t and h's states are kept, the rest is computed again for the gradient */
 } nn_input;
 
 /* R_0 by g of the whole: [N, S, S, channels]. Photographs that are not given are black. The log encoding, the resampling to g_size and back are in here. */
 ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in);
+
+/* One photograph is given, its light and camera are above the centre, and the weights are not published ones. */
+bool nn_orients(const nn_model *model, const nn_input *in);
 
 /* An auto-encoder of maps (arch.latent): [N, S, S, channels] to its code [N, S / 2^g_levels, S / 2^g_levels, latent], and back to maps in
  * [-1, 1]. Convolutional: any S that is a multiple of 2^g_levels. */
