@@ -1,4 +1,5 @@
 /* lgd-bench [--cpu] [NAME...]: runs the benchmarks whose name contains one of the words (all without a word), in order of name. */
+#include "bench/batches.h"
 #include "bench/bench.h"
 #include "tensor/cpu.h"
 #include "tensor/kernels/peak.h"
@@ -100,8 +101,8 @@ int main(int argc, char **argv)
 {
     ts_status st = {0};
     if (argc == 2 && strcmp(argv[1], "--help") == 0) {
-        printf("usage: lgd-bench [--list | --cpu] [NAME...]\nRuns the benchmarks whose name contains one of the words; all of them without a word. --cpu: processor\n"
-               "time over the number of threads in place of wall time, for a machine that others use too (set OMP_WAIT_POLICY=passive).\n");
+        printf("usage: lgd-bench [--list | --cpu | --batches CONFIG.ini] [NAME...]\nRuns the benchmarks whose name contains one of the words; all of them without a word. --cpu: processor\n"
+               "time over the number of threads in place of wall time, for a machine that others use too (set OMP_WAIT_POLICY=passive).\n--batches writes what lgd-train would train with to standard output (bench/batches.h).\n");
         return 0;
     }
     qsort(list, (size_t)entries, sizeof *list, by_name);
@@ -109,6 +110,10 @@ int main(int argc, char **argv)
         processor_time = true;
         argc--;
         argv++;
+    }
+    if (argc == 3 && strcmp(argv[1], "--batches") == 0) {
+        if (ts_isa_init(&st) != TS_OK || bench_batches(argv[2], &st) != TS_OK) fprintf(stderr, "lgd-bench: %s\n", st.message);
+        return st.code ? 1 : 0;
     }
     if (argc == 2 && strcmp(argv[1], "--list") == 0) {
         for (int i = 0; i < entries; i++) printf("%s\n", list[i].name);

@@ -133,24 +133,25 @@ class Refiner(nn.Module):
         return torch.tanh(self.out(padded(b, 3, 1, "replicate"))), (a, b)
 
 
-def shade(maps, n_l, n_v, v_h, n_h):
-    """f of each pixel; maps [N, 9.., H, W] in [-1, 1]."""
-    diffuse, specular, rough = (maps[:, 0:3] + 1) / 2, (maps[:, 6:9] + 1) / 2, (maps[:, 5:6] + 1) / 2
-    alpha2 = rough.clamp_min(1e-3) ** 4
-    k = rough ** 2 / 2
-    d = alpha2 / (math.pi * (n_h * n_h * (alpha2 - 1) + 1) ** 2)
-    g = 1 / ((n_l * (1 - k) + k) * (n_v * (1 - k) + k))
-    f = specular + (1 - specular) * torch.exp2((-5.55473 * v_h - 6.98316) * v_h)
-    return (1 - specular) * diffuse / math.pi + d * f * g / 4
-
-
-def normals(maps):
-    xy = maps[:, 3:5].clamp(-0.999, 0.999)
-    return torch.cat([xy, (1 - (xy * xy).sum(1, keepdim=True)).clamp_min(1e-6).sqrt()], 1)
-
-
 def dot(a, b):
-    return (a * b).sum(1, keepdim=True).clamp_min(1e-3)
+    return (a * b).sum(1, keepdim=True)
+
+
+def radiance(maps, l, v, strength):
+    """f n.l strength of each pixel (render/brdf.h); maps [N, 9.., H, W] in [-1, 1], l and v of length 1."""
+    maps = maps.clamp(-1, 1)
+    xy = maps[:, 3:5]
+    n = F.normalize(torch.cat([xy, (1 - (xy * xy).sum(1, keepdim=True)).clamp_min(1e-6).sqrt()], 1), dim=1)
+    half = F.normalize(l + v, dim=1)
+    n_l, n_v, n_h, v_h = dot(n, l), dot(n, v), dot(n, half), dot(v, half)
+    seen = (n_l > 0) & (n_v > 0)
+    across = torch.cross(n, half.expand_as(n), dim=1)
+    diffuse, specular, rough = (maps[:, 0:3] + 1) / 2, (maps[:, 6:9] + 1) / 2, ((maps[:, 5:6] + 1) / 2).clamp_min(0.01)
+    alpha2, k = rough ** 4, rough ** 2 / 2
+    d = alpha2 / (math.pi * (alpha2 * n_h * n_h + dot(across, across)) ** 2)
+    g = 1 / ((n_l.clamp_min(0) * (1 - k) + k) * (n_v.clamp_min(0) * (1 - k) + k))
+    f = specular + (1 - specular) * torch.exp2((-5.55473 * v_h - 6.98316) * v_h)
+    return torch.where(seen, ((1 - specular) * diffuse / math.pi + d * f * g / 4) * n_l * strength, torch.zeros(()))
 
 
 def positions(h, w, side):
@@ -163,16 +164,13 @@ def flash(maps, place):
     to = torch.tensor([0, 0, 250 / 256])[None, :, None, None] - place
     square = (to * to).sum(1, keepdim=True)
     l = to / square.sqrt()
-    n_l = dot(normals(maps), l)
-    return (shade(maps, n_l, n_l, torch.ones_like(n_l), n_l) * n_l * (329288 / 65536) / square).clamp(0, 1)
+    return radiance(maps, l, l, (329288 / 65536) / square).clamp(0, 1)
 
 
 def rendered(maps, place, light, camera, near):
     l, v = (light - place, camera - place) if near else (light + 0 * place, camera + 0 * place)
     l, v = F.normalize(l, dim=1), F.normalize(v, dim=1)
-    half, n = F.normalize(l + v, dim=1), normals(maps)
-    n_l = dot(n, l)
-    return shade(maps, n_l, dot(n, v), dot(v, half), dot(n, half)) * math.pi * n_l / l[:, 2:3].clamp_min(1e-3)
+    return radiance(maps, l, v, math.pi / l[:, 2:3].clamp_min(1e-3))
 
 
 def gradient_of_loss(maps, image, place, rmse):
@@ -197,9 +195,11 @@ class LGD(nn.Module):
             maps = F.interpolate(maps, size=(side, side), mode="bilinear")
         first = maps = maps[:, :, y0:y0 + h, x0:x0 + w]
         place = positions(side, side, side)[:, :, y0:y0 + h, x0:x0 + w]
+        with torch.no_grad():
+            rmse = (flash(first, place) - image).square().mean((1, 2, 3), keepdim=True).sqrt()
         state = [torch.zeros(image.shape[0], self.a["h_gru"], h, w)] * 2
         for _ in range(self.a["steps"]):
-            gradient = torch.asinh(10 * gradient_of_loss(maps, image, place, 0.1))
+            gradient = torch.asinh(10 * gradient_of_loss(maps, image, place, rmse))
             delta, state = self.h(torch.cat([maps, gradient], 1), state)
             maps = maps + delta
         return first, maps
@@ -224,6 +224,15 @@ def infer(words):
     return best
 
 
+def training_loss(maps, target, place, light, camera):
+    """L1 of the maps and of the logarithms of nine renderings; light and camera [9, N, 3, 1, 1], the first three directions."""
+    total = (maps - target).abs().mean()
+    for i in range(9):
+        a, b = rendered(maps, place, light[i], camera[i], i >= 3), rendered(target, place, light[i], camera[i], i >= 3)
+        total = total + (torch.log(a + 0.01) - torch.log(b + 0.01)).abs().mean() / 9
+    return total
+
+
 def train(words):
     best = math.inf
     for layout in (torch.channels_last, torch.contiguous_format):
@@ -236,17 +245,10 @@ def train(words):
         light, camera = torch.randn(9, batch, 3, 1, 1), torch.randn(9, batch, 3, 1, 1)
         light[:, :, 2], camera[:, :, 2] = light[:, :, 2].abs() + 0.3, camera[:, :, 2].abs() + 0.3
 
-        def loss_of(maps):
-            total = (maps - target).abs().mean()
-            for i in range(9):
-                a, b = rendered(maps, place, light[i], camera[i], i >= 3), rendered(target, place, light[i], camera[i], i >= 3)
-                total = total + (torch.log(a + 0.01) - torch.log(b + 0.01)).abs().mean() / 9
-            return total
-
         def step():
             adam.zero_grad(set_to_none=True)
             first, last = net(whole, image, 0, 0)
-            (loss_of(first) + loss_of(last)).backward()
+            (training_loss(first, target, place, light, camera) + training_loss(last, target, place, light, camera)).backward()
             torch.nn.utils.clip_grad_norm_(net.parameters(), 1.0)
             adam.step()
 
@@ -270,10 +272,15 @@ def answer(words):
     return f"{(infer if words[0] == 'infer' else train)(words[1:]):.6g}"
 
 
-for line in sys.stdin:
-    if not line.split():
-        continue
-    try:
-        print(answer(line.split()), flush=True)
-    except (RuntimeError, ValueError, KeyError, MemoryError) as e:
-        print("- " + str(e).splitlines()[0], flush=True)
+def main():
+    for line in sys.stdin:
+        if not line.split():
+            continue
+        try:
+            print(answer(line.split()), flush=True)
+        except (RuntimeError, ValueError, KeyError, MemoryError) as e:
+            print("- " + str(e).splitlines()[0], flush=True)
+
+
+if __name__ == "__main__":
+    main()
