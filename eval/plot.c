@@ -1,5 +1,6 @@
 #include "eval/plot.h"
 #include <math.h>
+#include <string.h>
 
 enum { WIDTH = 760, HEIGHT = 420, LEFT = 70, RIGHT = 210, TOP = 20, BOTTOM = 50, TICKS = 6 };
 
@@ -86,7 +87,33 @@ static void draw_axes(FILE *f, const frame *r, const char *x_title, const char *
     fputs("</text>\n", f);
 }
 
-static void draw(FILE *f, const frame *r, const ev_series *series, int s)
+/* The places of the labels so far. */
+typedef struct labels {
+    struct { double x, y, width; } box[256];
+    int count;
+} labels;
+
+enum { LABEL_HEIGHT = 11, LABEL_ADVANCE = 6 }; /* of 10 pixel letters */
+
+/* Beside the point, above or below, right or left of it, where no other label is; nowhere if there is no such place: the point still tells when one points at it. */
+static void put_label(FILE *f, labels *all, double x, double y, const char *text)
+{
+    const double width = LABEL_ADVANCE * (double)strlen(text);
+    for (int place = 0; place < 4; place++) {
+        const double at_x = place & 2 ? x - 4 - width : x + 4, at_y = place & 1 ? y + 13 : y - 5;
+        bool free = at_y < HEIGHT - BOTTOM && at_x > LEFT;
+        for (int i = 0; i < all->count && free; i++)
+            free = fabs(all->box[i].y - at_y) >= LABEL_HEIGHT || at_x >= all->box[i].x + all->box[i].width || all->box[i].x >= at_x + width;
+        if (!free || all->count == (int)(sizeof all->box / sizeof *all->box)) continue;
+        all->box[all->count].x = at_x, all->box[all->count].y = at_y, all->box[all->count++].width = width;
+        fprintf(f, "<text x=\"%.1f\" y=\"%.1f\" font-size=\"10\">", at_x, at_y);
+        ev_put_text(f, text);
+        fputs("</text>", f);
+        return;
+    }
+}
+
+static void draw(FILE *f, const frame *r, const ev_series *series, int s, labels *all)
 {
     const char *radius = series->points > 50 ? "1.5" : "3.5";
     const int legend = TOP + 12 + 18 * s;
@@ -101,11 +128,8 @@ static void draw(FILE *f, const frame *r, const ev_series *series, int s)
         fprintf(f, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%s\" fill=\"%s\"><title>", across(r, p->x), down(r, p->y), radius, COLOUR(s));
         ev_put_text(f, series->name);
         fprintf(f, " %s: %.4g, %.4f &#177; %.4f</title></circle>", p->label, p->x, p->y, p->deviation);
-        if (p->label[0]) {
-            fprintf(f, "<text x=\"%.1f\" y=\"%.1f\" font-size=\"10\">", across(r, p->x) + 4, down(r, p->y) - 5);
-            ev_put_text(f, p->label);
-            fputs("</text>\n", f);
-        }
+        if (p->label[0]) put_label(f, all, across(r, p->x), down(r, p->y), p->label);
+        fputs("\n", f);
     }
     fprintf(f, "<circle cx=\"%d\" cy=\"%d\" r=\"3.5\" fill=\"%s\"/><text x=\"%d\" y=\"%d\">", WIDTH - RIGHT + 14, legend, COLOUR(s), WIDTH - RIGHT + 24, legend + 4);
     ev_put_text(f, series->name);
@@ -115,11 +139,12 @@ static void draw(FILE *f, const frame *r, const ev_series *series, int s)
 void ev_plot_write(FILE *f, const ev_axes *axes, const ev_series *series, int count)
 {
     frame r;
+    labels all = {.count = 0};
     fprintf(f, "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\" font-family=\"sans-serif\" font-size=\"12\">\n", WIDTH, HEIGHT, WIDTH, HEIGHT);
     fprintf(f, "<rect width=\"%d\" height=\"%d\" fill=\"#fff\"/>\n", WIDTH, HEIGHT);
     if (make_frame(series, count, axes->log_x, &r)) {
         draw_axes(f, &r, axes->x_title, axes->y_title);
-        for (int s = 0; s < count; s++) draw(f, &r, &series[s], s);
+        for (int s = 0; s < count; s++) draw(f, &r, &series[s], s, &all);
     } else fprintf(f, "<text x=\"%d\" y=\"%d\">nothing was measured</text>\n", LEFT, HEIGHT / 2);
     fputs("</svg>\n", f);
 }

@@ -178,3 +178,26 @@ TEST(report_plot_has_a_linear_axis_too)
     CHECK(count(text, "<circle") == 6 && strstr(text, "zero") && strstr(text, ">10</text>") && strstr(text, ">20</text>"), "%s", text);
     free(text);
 }
+
+TEST(report_plot_labels_keep_apart)
+{
+    const ev_point near[] = {{0.2, 0.2, 0, "label 0"}, {0.2, 0.2, 0, "label 1"}, {0.2, 0.2, 0, "label 2"}, {0.21, 0.2, 0, "label 3"}, {0.2, 0.2, 0, "label 4"}, {0.9, 0.9, 0, ""}, {-0.9, 0, 0, ""}};
+    const ev_series series[] = {{"s", near, 7, false}};
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    CHECK(f, "open_memstream");
+    ev_plot_write(f, &(ev_axes){"x", "y", false}, series, 1);
+    fclose(f);
+    double x[6], y[6];
+    int labels = 0;
+    for (const char *p = text; (p = strstr(p, "font-size=\"10\">label")); p++) {
+        const char *begin = p;
+        while (strncmp(begin, "<text", 5)) begin--;
+        CHECK(sscanf(begin, "<text x=\"%lf\" y=\"%lf\"", &x[labels], &y[labels]) == 2, "%.60s", begin);
+        for (int i = 0; i < labels; i++) CHECK(fabs(x[i] - x[labels]) >= 42 || fabs(y[i] - y[labels]) >= 11, "labels %d and %d are on one another", i, labels);
+        labels++;
+    }
+    CHECK(labels == 4, "%d of 5 labels, for which there are four places", labels);
+    free(text);
+}
