@@ -1,8 +1,11 @@
 #include "infer/model_path.h"
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+
+enum { LGD_NAME_MAX = 64 }; /* of a shipped model's name */
 
 static ts_code take(const char *from, char path[LGD_PATH_MAX], ts_status *st)
 {
@@ -10,13 +13,10 @@ static ts_code take(const char *from, char path[LGD_PATH_MAX], ts_status *st)
     return TS_OK;
 }
 
-ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_MAX], ts_status *st)
+/* The file of a model that ships with the program. */
+static bool shipped(const char *name, char path[LGD_PATH_MAX])
 {
-    if (option) return take(option, path, st);
-    const char *variable = getenv("LGD_MODEL");
-    if (variable && *variable) return take(variable, path, st);
-
-    char folder[LGD_PATH_MAX - 64]; /* room for what is appended */
+    char folder[LGD_PATH_MAX - 64 - LGD_NAME_MAX]; /* room for what is appended */
     const ssize_t length = readlink("/proc/self/exe", folder, sizeof folder - 1);
     if (length > 0) {
         folder[length] = 0;
@@ -25,10 +25,21 @@ ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_
         static const char *const beside[] = {"../share/lgd", "../../models"};
         for (int i = 0; i < 2; i++) {
             snprintf(path, LGD_PATH_MAX, "%s/%s/%s.safetensors", folder, beside[i], name);
-            if (access(path, F_OK) == 0) return TS_OK;
+            if (access(path, F_OK) == 0) return true;
         }
     }
     snprintf(path, LGD_PATH_MAX, "%s/%s.safetensors", LGD_DATADIR, name);
-    if (access(path, F_OK) == 0) return TS_OK;
+    return access(path, F_OK) == 0;
+}
+
+static bool is_name(const char *option) { return *option && strlen(option) < LGD_NAME_MAX && !strpbrk(option, "/.") && access(option, F_OK) != 0; }
+
+ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_MAX], ts_status *st)
+{
+    const char *variable = getenv("LGD_MODEL");
+    if (!option && variable && *variable) option = variable;
+    if (option && !is_name(option)) return take(option, path, st);
+    if (option) name = option;
+    if (shipped(name, path)) return TS_OK;
     return ts_fail(st, TS_IO, "no %s.safetensors found in ../share/lgd or ../../models beside the program or in %s: name a file with --model or LGD_MODEL", name, LGD_DATADIR);
 }

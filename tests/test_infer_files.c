@@ -191,6 +191,10 @@ TEST(infer_model_path_order)
     char path[LGD_PATH_MAX];
     ts_status st = {0};
     CHECK(setenv("LGD_MODEL", "/from/variable", 1) == 0, "setenv");
-    CHECK(lgd_model_path("given", "single", path, &st) == TS_OK && strcmp(path, "given") == 0, "%s", path);
+    CHECK(lgd_model_path("given.safetensors", "single", path, &st) == TS_OK && strcmp(path, "given.safetensors") == 0, "%s", path);
+    CHECK(lgd_model_path("./given", "single", path, &st) == TS_OK && strcmp(path, "./given") == 0, "%s", path);
+    CHECK(lgd_model_path("given", "single", path, &st) == TS_IO && strstr(st.message, "no given.safetensors"), "a name that no model has: %s", st.message);
+    st = (ts_status){0};
+    CHECK(lgd_model_path("multi", "single", path, &st) == TS_OK && strstr(path, "/multi.safetensors"), "%s: %s", path, st.message);
     CHECK(lgd_model_path(NULL, "single", path, &st) == TS_OK && strcmp(path, "/from/variable") == 0, "%s", path);
 }
