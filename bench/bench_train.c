@@ -1,4 +1,4 @@
-/* A training step of configs/single.ini's shape, what its data and its renderings cost beside it, and its memory with and without
+/* Training steps of the shipped configurations' shapes, what its data and its renderings cost beside it, and its memory with and without
  * train.checkpoint_steps. */
 #include "bench/bench.h"
 #include "bench/shape.h"
@@ -38,10 +38,13 @@ static void step(void *user)
     ag_reset(s->tape);
     nn_lgd(s->tape, s->model, &s->in, s->steps, true, maps, NULL, NULL);
     if (ag_status(s->tape)->code) return;
-    ag_backward(s->tape, ag_add(s->tape, loss_of(s, maps[s->steps]), loss_of(s, maps[0])));
-    nn_gradient_norm(s->model, 0, s->model->count);
+    ag_value *loss = loss_of(s, maps[0]);
+    ag_backward(s->tape, s->steps > 0 ? ag_add(s->tape, loss_of(s, maps[s->steps]), loss) : loss);
+    size_t first = 0, last = s->model->count;
+    if (s->model->g_fixed) nn_model_range(s->model, true, &first, &last);
+    nn_gradient_norm(s->model, first, last);
     nn_adam_next(&s->adam);
-    nn_adam_step(&s->adam, s->model, 0, s->model->count, 1e-4f, 1);
+    nn_adam_step(&s->adam, s->model, first, last, 1e-4f, 1);
 }
 
 static void losses(void *user)
@@ -50,7 +53,7 @@ static void losses(void *user)
     ag_reset(s->tape);
     const ts_shape shape = {s->c.train.batch, s->in.grid.h, s->in.grid.w, MAP_CHANNELS};
     float *gradient = ts_arena_zalloc(ag_arena(s->tape), (size_t)ts_count(shape), sizeof *gradient);
-    for (int i = 0; i < 2; i++) ag_backward(s->tape, loss_of(s, ag_parameter(s->tape, ts_view(s->window, shape), gradient)));
+    for (int i = 0; i < (s->steps > 0 ? 2 : 1); i++) ag_backward(s->tape, loss_of(s, ag_parameter(s->tape, ts_view(s->window, shape), gradient)));
 }
 
 static void material(void *user)
@@ -67,7 +70,7 @@ static double peer(const subject *s)
     char job[256];
     bench_peer_network("train", &s->model->arch, s->steps, job, sizeof job);
     const size_t n = strlen(job);
-    snprintf(job + n, sizeof job - n, " %d %d %d", s->c.train.batch, s->c.data.patch, s->in.grid.w);
+    snprintf(job + n, sizeof job - n, " %d %d %d %d", s->c.train.batch, s->c.data.patch, s->in.grid.w, s->model->g_fixed);
     return bench_peer(job);
 }
 
@@ -91,29 +94,30 @@ static void measure(subject *s)
 {
     const int batch = s->c.train.batch, side = s->in.grid.w;
     char label[96];
-    const double g = bench_network_flop(s->model, "g.", side), h = bench_network_flop(s->model, "h.", side), flop = 3 * batch * (g + s->steps * h);
-    snprintf(label, sizeof label, "%d patches of %d^2, window %d, T = %d", batch, s->c.data.patch, side, s->steps);
+    const double g = bench_network_flop(s->model, "g.", side), h = bench_network_flop(s->model, "h.", side), flop = batch * ((s->model->g_fixed ? 1 : 3) * g + 3 * s->steps * h);
+    snprintf(label, sizeof label, "%d patches of %d^2, window %d, T = %d%s", batch, s->c.data.patch, side, s->steps, s->model->g_fixed ? ", g fixed" : "");
     const bench_time t = bench_measure(step, s);
     bench_row(label, t, flop);
     bench_row_peer(t, flop, peer(s));
     bench_time part = bench_measure(losses, s);
-    bench_row_unit("  of which both losses, 9 renderings each", part, 100 * part.seconds / t.seconds, "% of the step");
+    bench_row_unit(s->steps > 0 ? "  of which both losses, 9 renderings each" : "  of which the loss, 9 renderings", part, 100 * part.seconds / t.seconds, "% of the step");
     part = bench_measure(material, s);
     part.seconds *= batch;
     bench_row_unit("  its materials, one thread beside it", part, 100 * part.seconds / t.seconds, "% of the step");
     const int trained = s->steps;
+    if (trained == 0) return;
     const double states = (double)batch * side * side * (s->model->arch.channels + 2 * s->model->arch.h_gru) * sizeof(float) / (1 << 20);
     const double plain = megabytes(s, trained, false), few = megabytes(s, trained, true), many = megabytes(s, 24, true);
     printf("  memory: %.0f MiB; with train.checkpoint_steps %.0f MiB, and %.0f MiB at T = 24: %.2f MiB a step more, R_t and the states are %.2f MiB\n", plain, few, many,
            (many - few) / (24 - trained), states);
 }
 
-BENCH(train)
+static void train(const char *config, const char *heading)
 {
     ts_status st = {0};
     subject s = {.c = tr_config_default(), .tape = ag_tape_create(true, &st)};
-    bench_heading("a training step of configs/single.ini: g, h, losses, all gradients, Adam");
-    if (!s.tape || tr_config_read(&s.c, "configs/single.ini", &st) || !(s.model = nn_model_create(&s.c.arch, &st)) || nn_model_train(s.model, &st) ||
+    bench_heading(heading);
+    if (!s.tape || tr_config_read(&s.c, config, &st) || !(s.model = nn_model_create(&s.c.arch, &st)) || nn_model_train(s.model, &st) ||
         nn_adam_create(&s.adam, s.model, 0, &st)) {
         printf("  %s\n", st.message);
         return;
@@ -133,7 +137,8 @@ BENCH(train)
     for (size_t i = 0; i < batch * part * 3; i++) shown[i] = ts_rng_uniform(&rng);
     for (size_t i = 0; i < batch * part * MAP_CHANNELS; i++) s.window[i] = ts_rng_range(&rng, -0.5f, 0.5f), s.goal[i] = ts_rng_range(&rng, -0.5f, 0.5f);
     for (size_t i = 0; i < batch; i++) rd_loss_views(&rng, s.views + i * RD_LOSS_VIEWS);
-    s.steps = s.c.arch.iterations;
+    s.model->g_fixed = s.c.train.steps && s.c.train.g_rate == 0;
+    s.steps = s.c.train.steps ? s.c.arch.iterations : 0;
     s.in = (nn_input){.image = ts_view(shown, (ts_shape){(int)batch, side, side, 3}), .grid = {.h = side, .w = side, .side = patch}, .view = rd_flash()};
     if (side < patch) s.in.whole = ts_view(s.images, (ts_shape){(int)batch, patch, patch, 3});
     measure(&s);
@@ -143,3 +148,7 @@ BENCH(train)
     nn_adam_free(&s.adam);
     free(s.maps), free(s.images), free(s.window), free(s.goal), free(s.views), free(shown);
 }
+
+BENCH(train) { train("configs/single.ini", "a training step of configs/single.ini: g, h with its Newton steps (which the peer does not have), losses, all gradients that are asked for, Adam"); }
+BENCH(train_g) { train("configs/single-g.ini", "a training step of configs/single-g.ini: g alone"); }
+BENCH(train_both) { train("configs/ablation/t6.ini", "a training step of configs/ablation/t6.ini: g and h together"); }

@@ -8,7 +8,7 @@ Reads jobs from standard input, one a line, and answers each with its median tim
     conv N H W IC OC K DILATION PAD          forward, the better of both memory formats; PAD: zero or replicate
     gradient N H W IC OC K DILATION PAD      gradients of input and weights together
     infer G_WIDTH G_MAX G_LEVELS G_FIRST G_KERNEL G_SIZE H_WIDTH H_GRU CHANNELS RECURRENT T SIDE
-    train (the same up to T) BATCH PATCH WINDOW
+    train (the same up to T) BATCH PATCH WINDOW FIXED   T 0: g alone; FIXED 1: h alone
 Weights are random: time does not depend on them. Renderer's gradients are included, by autograd.
 """
 import math
@@ -236,9 +236,10 @@ def training_loss(maps, target, place, light, camera):
 def train(words):
     best = math.inf
     for layout in (torch.channels_last, torch.contiguous_format):
-        net, (batch, patch, window) = network(words)
+        net, (batch, patch, window, fixed) = network(words)
         net = net.to(memory_format=layout)
-        adam = torch.optim.Adam(net.parameters(), 1e-4)
+        net.g.requires_grad_(not fixed)
+        adam = torch.optim.Adam((p for p in net.parameters() if p.requires_grad), 1e-4)
         whole = torch.rand(batch, 3, patch, patch).contiguous(memory_format=layout)
         image, place = whole[:, :, :window, :window], positions(window, window, window)
         target = torch.rand(batch, net.a["channels"], window, window) - 0.5
@@ -248,7 +249,10 @@ def train(words):
         def step():
             adam.zero_grad(set_to_none=True)
             first, last = net(whole, image, 0, 0)
-            (training_loss(first, target, place, light, camera) + training_loss(last, target, place, light, camera)).backward()
+            loss = training_loss(last, target, place, light, camera)
+            if net.a["steps"] and not fixed:
+                loss = loss + training_loss(first, target, place, light, camera)
+            loss.backward()
             torch.nn.utils.clip_grad_norm_(net.parameters(), 1.0)
             adam.step()
 
