@@ -79,6 +79,26 @@ bench_time bench_measure(void (*f)(void *user), void *user)
     return t;
 }
 
+void bench_row_threads(void (*f)(void *user), void *user)
+{
+    enum { ROUNDS = 5 };
+    const int all = ts_threads();
+    double gain[ROUNDS], of_peak[ROUNDS];
+    if (all == 1 || processor_time) return;
+    for (int i = 0; i < ROUNDS; i++) {
+        ts_threads_set(1);
+        const bench_time one = bench_measure(f, user);
+        ts_threads_set(all);
+        const bench_time many = bench_measure(f, user);
+        gain[i] = one.seconds / many.seconds;
+        of_peak[i] = many.peak / one.peak;
+    }
+    qsort(gain, ROUNDS, sizeof *gain, by_value);
+    qsort(of_peak, ROUNDS, sizeof *of_peak, by_value);
+    printf("    %d threads: %.2f times as fast as one, the peak %.2f times\n", all, gain[ROUNDS / 2], of_peak[ROUNDS / 2]);
+    fflush(stdout);
+}
+
 void bench_heading(const char *text) { printf("\n%s\n", text); }
 
 void bench_row(const char *label, bench_time t, double flop)

@@ -27,6 +27,8 @@ void bench_row(const char *label, bench_time t, double flop);
 /* A row with a figure in another unit, for example 150.2 "Mpixel/s". */
 void bench_row_unit(const char *label, bench_time t, double value, const char *unit);
 void bench_heading(const char *text);
+/* A row: how many times as fast as one thread all of them are, median of five measured in turn, and the same of the FMA peak. Wall time only. */
+void bench_row_threads(void (*f)(void *user), void *user);
 
 /* Median seconds that the peer (bench/peer_torch.py, whose head lists the jobs) takes for a job; NaN where there is no peer or it fails, which is said
  * once. bench_row_peer: below a row, its floor (flop at the peak) and the peer's time. */

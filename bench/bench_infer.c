@@ -83,6 +83,7 @@ static void measure(nn_arch arch, const char *heading)
         t = bench_measure(whole, &s);
         bench_row(label, t, flop);
         if (!exact) bench_row_peer(t, flop, bench_peer(job));
+        if (exact) bench_row_threads(whole, &s);
     }
     ts_conv_exact_set(true);
     if (ag_status(s.tape)->code) printf("  %s\n", ag_status(s.tape)->message);
@@ -91,6 +92,14 @@ static void measure(nn_arch arch, const char *heading)
 }
 
 BENCH(infer) { measure(nn_arch_default(), "inference, 256 x 256, default architecture"); }
+
+/* The shipped model's, whose Newton steps the peer does not have. */
+BENCH(infer_shipped)
+{
+    nn_arch a = nn_arch_default();
+    a.h_width = 32, a.h_gru = 16;
+    measure(a, "inference, 256 x 256, the shipped model's architecture");
+}
 
 /* The published networks with random weights. */
 BENCH(infer_paper)

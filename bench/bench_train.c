@@ -99,6 +99,7 @@ static void measure(subject *s)
     const bench_time t = bench_measure(step, s);
     bench_row(label, t, flop);
     bench_row_peer(t, flop, peer(s));
+    bench_row_threads(step, s);
     bench_time part = bench_measure(losses, s);
     bench_row_unit(s->steps > 0 ? "  of which both losses, 9 renderings each" : "  of which the loss, 9 renderings", part, 100 * part.seconds / t.seconds, "% of the step");
     part = bench_measure(material, s);
