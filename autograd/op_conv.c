@@ -21,11 +21,12 @@ typedef struct conv_attr {
 static void forward(ag_tape *tape, ag_node *node)
 {
     const conv_attr *a = node->attr;
-    const bool direct = ts_conv_exact() || !ts_conv_winograd(&a->conv);
-    const float *packed = ag_packed(tape, &a->conv, direct ? TS_CONV_FORWARD : TS_CONV_WINOGRAD, node->in[1]->t.data);
+    const ts_conv_use use = ts_conv_precision() == TS_BF16 ? TS_CONV_FORWARD_BF16
+                            : ts_conv_exact() || !ts_conv_winograd(&a->conv) ? TS_CONV_FORWARD : TS_CONV_WINOGRAD;
+    const float *packed = ag_packed(tape, &a->conv, use, node->in[1]->t.data);
     if (!packed) return;
     const float *bias = node->in[2] ? node->in[2]->t.data : NULL;
-    (direct ? ts_conv_forward : ts_conv_forward_winograd)(&a->conv, node->in[0]->t.data, packed, bias, a->leak, node->out->t.data);
+    (use == TS_CONV_FORWARD_BF16 ? ts_conv_forward_bf16 : use == TS_CONV_FORWARD ? ts_conv_forward : ts_conv_forward_winograd)(&a->conv, node->in[0]->t.data, packed, bias, a->leak, node->out->t.data);
 }
 
 static void backward(ag_tape *tape, ag_node *node)
@@ -43,8 +44,9 @@ static void backward(ag_tape *tape, ag_node *node)
     if (dweight || dbias) ts_conv_weight_gradient(&a->conv, node->in[0]->t.data, dy, dweight, dbias);
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
-    const float *packed = dx ? ag_packed(tape, &a->conv, TS_CONV_DATA_GRADIENT, node->in[1]->t.data) : NULL;
-    if (packed) ts_conv_data_gradient(&a->conv, dy, packed, dx, accumulate);
+    const bool bf16 = ts_conv_precision() == TS_BF16;
+    const float *packed = dx ? ag_packed(tape, &a->conv, bf16 ? TS_CONV_DATA_GRADIENT_BF16 : TS_CONV_DATA_GRADIENT, node->in[1]->t.data) : NULL;
+    if (packed) (bf16 ? ts_conv_data_gradient_bf16 : ts_conv_data_gradient)(&a->conv, dy, packed, dx, accumulate);
 }
 
 /* Where a tap falls; -1: on a zero. */

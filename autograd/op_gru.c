@@ -17,7 +17,7 @@ enum { X, IH, IH_BIAS, HH, HH_BIAS, OLD, INPUTS };
 
 static ts_gru shape(const ag_node *node)
 {
-    return (ts_gru){ts_pixels(node->out->t.shape), node->in[X]->t.shape.c, node->out->t.shape.c};
+    return (ts_gru){ts_pixels(node->out->t.shape), node->in[X]->t.shape.c, node->out->t.shape.c, ts_conv_precision() == TS_BF16};
 }
 
 static const float *packed(ag_tape *tape, ts_conv c, ts_conv_use use, const ag_value *weight) { return ag_packed(tape, &c, use, weight->t.data); }
@@ -25,8 +25,9 @@ static const float *packed(ag_tape *tape, ts_conv c, ts_conv_use use, const ag_v
 static void forward(ag_tape *tape, ag_node *node)
 {
     const ts_gru g = shape(node);
-    const float *ih = packed(tape, ts_gru_input(&g), TS_CONV_FORWARD, node->in[IH]), *old = node->in[OLD] ? node->in[OLD]->t.data : NULL;
-    const float *hh = ih && old ? packed(tape, ts_gru_hidden(&g), TS_CONV_FORWARD, node->in[HH]) : NULL;
+    const ts_conv_use use = g.bf16 ? TS_CONV_FORWARD_BF16 : TS_CONV_FORWARD;
+    const float *ih = packed(tape, ts_gru_input(&g), use, node->in[IH]), *old = node->in[OLD] ? node->in[OLD]->t.data : NULL;
+    const float *hh = ih && old ? packed(tape, ts_gru_hidden(&g), use, node->in[HH]) : NULL;
     if (!ih || (old && !hh)) return;
     if (node->out->needs_grad) {
         node->saved = ts_arena_alloc(ag_arena(tape), (size_t)g.pixels * 4 * (size_t)g.c * sizeof(float));

@@ -29,6 +29,8 @@ ptrdiff_t conv_panels_count(int ic, int oc, int k)
 size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
 {
     if (use == TS_CONV_WINOGRAD) return conv_winograd_count(c);
+    if (use == TS_CONV_FORWARD_BF16) return (size_t)conv_panels_count(conv_bf16_depth(c->ic), c->oc, c->k);
+    if (use == TS_CONV_DATA_GRADIENT_BF16) return (size_t)conv_panels_count(conv_bf16_depth(c->oc), c->ic, c->k);
     const int ic = use == TS_CONV_FORWARD ? c->ic : c->oc, oc = use == TS_CONV_FORWARD ? c->oc : c->ic;
     return (size_t)conv_panels_count(ic, oc, c->k) + (conv_few_channels(oc, c->k) ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
 }
@@ -38,6 +40,10 @@ void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float 
 {
     if (use == TS_CONV_WINOGRAD) {
         conv_winograd_pack(c, weight, packed);
+        return;
+    }
+    if (use == TS_CONV_FORWARD_BF16 || use == TS_CONV_DATA_GRADIENT_BF16) {
+        conv_pack_bf16(c, use == TS_CONV_FORWARD_BF16, weight, packed);
         return;
     }
     const bool forward = use == TS_CONV_FORWARD;
@@ -71,14 +77,14 @@ ts_tile conv_panel_tile(const conv_plan *p, int panel)
                      .add = p->add, .leak = p->leak, .y_stride = p->oc, .fetch = {p->packed, p->packed}};
 }
 
-void conv_run_tile(ts_tile *t, int vectors, const float *a, float *y, int pixels)
+void conv_run_tile(ts_tile *t, int vectors, const float *a, float *y, int pixels, bool bf16)
 {
     for (int g = 0; g < 3; g++) {
         const int at = g * TS_TILE_GROUP < pixels ? g * TS_TILE_GROUP : 0;
         t->a[g] = a + at * t->a_stride;
         t->y[g] = y + at * t->y_stride;
     }
-    ts_conv_k()->tile[vectors - 1][pixels](t);
+    (bf16 ? ts_conv_k()->tile_bf16 : ts_conv_k()->tile)[vectors - 1][pixels](t);
 }
 
 void conv_run(const conv_plan *p)
@@ -91,7 +97,7 @@ void conv_run(const conv_plan *p)
 
 void ts_conv_forward(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y)
 {
-    const conv_plan p = {.n = c->n, .h = c->h, .w = c->w, .ic = c->ic, .oc = c->oc, .k = c->k, .dilation = c->dilation,
+    const conv_plan p = {.n = c->n, .h = c->h, .w = c->w, .ic = c->ic, .channels = c->ic, .oc = c->oc, .k = c->k, .dilation = c->dilation,
                          .first = -c->dilation * (c->k / 2), .replicate = c->pad == TS_PAD_REPLICATE,
                          .x = x, .packed = packed, .bias = bias, .y = y, .leak = leak};
     conv_run(&p);

@@ -15,8 +15,9 @@ typedef struct ts_conv {
     ts_pad pad;   /* padding of dilation * (k - 1) / 2 on each side */
 } ts_conv;
 
-/* Which order the packed weights are in: for the output, for the gradient of the input, or for the output by Winograd's way. */
-typedef enum ts_conv_use { TS_CONV_FORWARD, TS_CONV_DATA_GRADIENT, TS_CONV_WINOGRAD } ts_conv_use;
+/* Which order the packed weights are in: for the output, for the gradient of the input, for the output by Winograd's way; and the first two
+ * as pairs of bf16 values. */
+typedef enum ts_conv_use { TS_CONV_FORWARD, TS_CONV_DATA_GRADIENT, TS_CONV_WINOGRAD, TS_CONV_FORWARD_BF16, TS_CONV_DATA_GRADIENT_BF16 } ts_conv_use;
 
 ts_code ts_conv_check(const ts_conv *c, ts_status *st);
 
@@ -43,10 +44,23 @@ bool ts_conv_exact(void);
 /* dx (+)= the gradient of the input given dy = the gradient before the activation. */
 void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
 
+/* Both with x, dy and the weights rounded to bf16 (the nearest, ties to even), products and sums in f32, weights packed for the use of that
+ * name: vdpbf16ps where the CPU has it, the same sum from floats elsewhere. Bias, activation and results are f32. */
+void ts_conv_forward_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y);
+void ts_conv_data_gradient_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
+
+/* Process-wide, f32 unless said otherwise: how ag_conv and ag_gru multiply in forward and ag_conv for the gradient of its input. Gradients of
+ * weights, and whatever else is summed, stay f32. Set between tapes, or at least between a tape's forward and the next. */
+typedef enum ts_precision { TS_F32, TS_BF16, TS_PRECISION_COUNT } ts_precision;
+void ts_conv_precision_set(ts_precision p);
+ts_precision ts_conv_precision(void);
+const char *ts_precision_name(ts_precision p); /* f32, bf16 */
+
 /* dweight[oc][ic][k][k] += , dbias[oc] += (either may be NULL). */
 void ts_conv_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias);
 
-/* Naive twins: loop nests, sums in double; the same arguments with unpacked weights. */
+/* Naive twins: loop nests, sums in double; the same arguments with unpacked weights. Those of bf16 are the same on rounded arguments. */
+float ts_bf16_naive(float x); /* the bf16 value nearest to x */
 void ts_conv_forward_naive(const ts_conv *c, const float *x, const float *weight, const float *bias, float leak, float *y);
 void ts_conv_data_gradient_naive(const ts_conv *c, const float *dy, const float *weight, float *dx, bool accumulate);
 void ts_conv_weight_gradient_naive(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias);

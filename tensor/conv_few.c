@@ -1,7 +1,6 @@
 /* Convolutions whose tiles need no padded rows: kernels of side 1, and small images. */
 #include "tensor/conv_plan.h"
 #include "tensor/threads.h"
-#include <string.h>
 
 enum { PANELS_TOGETHER = 8 };
 
@@ -28,7 +27,7 @@ static void run_together(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, i
             tile[i].fetch[0] = x + step * p->ic + i * x_part;
             tile[i].fetch[1] = y + step * p->oc + i * y_part;
             conv_run_tile(&tile[i], conv_vectors(p->oc, panel0 + i), x, y + (panel0 + i) * 2 * conv_lanes(),
-                          (int)(count - j < step ? count - j : step));
+                          (int)(count - j < step ? count - j : step), p->bf16);
         }
     }
 }
@@ -42,7 +41,7 @@ void conv_run_pixels(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, int p
         run_together(p, first, count, base, base + together < panel1 ? base + (int)together : panel1);
 }
 
-/* Side 1: all pixels of all images are one row, read where they are. */
+/* Side 1: all pixels of all images are one row, read where they are, or from a chunk as bf16. */
 void conv_run_pointwise(const conv_plan *p)
 {
     const ptrdiff_t pixels = (ptrdiff_t)p->n * p->h * p->w;
@@ -56,7 +55,16 @@ void conv_run_pointwise(const conv_plan *p)
             int panel0, panel1;
             conv_part(panels, groups, g, &panel0, &panel1);
             const ptrdiff_t first = (ptrdiff_t)i * chunk, count = pixels - first < chunk ? pixels - first : chunk;
-            conv_run_pixels(p, first, count, panel0, panel1);
+            if (!p->bf16) {
+                conv_run_pixels(p, first, count, panel0, panel1);
+                continue;
+            }
+            conv_plan now = *p;
+            float *x = ts_scratch(0, sizeof(float) * (size_t)chunk * (size_t)p->ic);
+            conv_put_pixels(p, p->x + first * p->channels, count, x, p->ic);
+            now.x = x;
+            now.y = p->y + first * p->oc;
+            conv_run_pixels(&now, 0, count, panel0, panel1);
         }
 }
 
@@ -65,7 +73,7 @@ void conv_run_positions(const conv_plan *p)
 {
     const int panels = conv_panels(p->oc), most = conv_pairs_max(p), positions = p->h * p->w;
     const ptrdiff_t pixel = p->ic % 512 ? p->ic : p->ic + 16;
-    const ptrdiff_t image = (ptrdiff_t)positions * p->ic;
+    const ptrdiff_t image = (ptrdiff_t)positions * p->channels;
     const int tiles = (p->n + ts_conv_k()->pixels - 1) / ts_conv_k()->pixels;
 #pragma omp parallel num_threads(ts_threads())
     {
@@ -73,7 +81,7 @@ void conv_run_positions(const conv_plan *p)
         float *staged = ts_scratch(0, sizeof(float) * (size_t)(positions * pixel) * (size_t)p->n);
         for (int q = 0; q < positions; q++)
             for (int n = 0; n < p->n; n++)
-                memcpy(staged + ((ptrdiff_t)q * p->n + n) * pixel, p->x + n * image + (ptrdiff_t)q * p->ic, sizeof(float) * (size_t)p->ic);
+                conv_put_pixels(p, p->x + n * image + (ptrdiff_t)q * p->channels, 1, staged + ((ptrdiff_t)q * p->n + n) * pixel, pixel);
         char *memory = ts_scratch(1, sizeof(conv_pair) * (size_t)(2 * most) + sizeof(ts_segment) * (size_t)(most * most));
         ts_segment *segment = (ts_segment *)(void *)memory;
         conv_pair *row = (conv_pair *)(void *)(segment + most * most), *column = row + most;
@@ -96,7 +104,7 @@ void conv_run_positions(const conv_plan *p)
                     for (int tile = 0; tile < tiles; tile++) {
                         int begin, end;
                         conv_part(p->n, tiles, tile, &begin, &end);
-                        conv_run_tile(&t, conv_vectors(p->oc, panel), staged + begin * pixel, y + begin * t.y_stride, end - begin);
+                        conv_run_tile(&t, conv_vectors(p->oc, panel), staged + begin * pixel, y + begin * t.y_stride, end - begin, p->bf16);
                     }
                 }
             }

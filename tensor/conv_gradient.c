@@ -15,7 +15,7 @@ enum {
 void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
 {
     const int reach = c->dilation * (c->k / 2), fold = c->pad == TS_PAD_REPLICATE ? reach : 0;
-    const conv_plan p = {.n = c->n, .h = c->h, .w = c->w, .ic = c->oc, .oc = c->ic, .k = c->k, .dilation = c->dilation,
+    const conv_plan p = {.n = c->n, .h = c->h, .w = c->w, .ic = c->oc, .channels = c->oc, .oc = c->ic, .k = c->k, .dilation = c->dilation,
                          .first = -reach - fold, .fold = fold, .x = dy, .packed = packed, .y = dx, .leak = 1, .add = accumulate};
     conv_run(&p);
 }
@@ -46,7 +46,7 @@ static int64_t block_cost(int m, int n)
 static job make_job(const ts_conv *c, const float *x, const float *dy)
 {
     job g = {.c = c, .x = x, .dy = dy};
-    g.plan = (conv_plan){.n = c->n, .h = c->h, .w = c->w, .ic = c->ic, .oc = c->oc, .k = c->k, .dilation = c->dilation,
+    g.plan = (conv_plan){.n = c->n, .h = c->h, .w = c->w, .ic = c->ic, .channels = c->ic, .oc = c->oc, .k = c->k, .dilation = c->dilation,
                          .first = -c->dilation * (c->k / 2), .replicate = c->pad == TS_PAD_REPLICATE, .x = x};
     g.pixel = c->k == 1 ? c->ic : conv_stage_make(&g.plan, 1, 0, 1).pixel;
     g.taps = c->dilation == 1 && g.pixel == c->ic ? 1 : c->k;

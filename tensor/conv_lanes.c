@@ -18,7 +18,7 @@ bool conv_few_channels(int oc, int k) { return k > 1 && oc <= 2 * conv_lanes() &
 bool conv_by_lanes(const conv_plan *p)
 {
     const int out_w = p->w + 2 * p->fold;
-    return conv_few_channels(p->oc, p->k) && (int64_t)14 * p->oc * padded_pixels(out_w) < panel_cost(p->oc, out_w);
+    return !p->bf16 && conv_few_channels(p->oc, p->k) && (int64_t)14 * p->oc * padded_pixels(out_w) < panel_cost(p->oc, out_w);
 }
 
 /* [block of outputs][tap][input][output of the block] */

@@ -1,5 +1,7 @@
 /* The naive twins of the convolutions: what the fast ones must compute. */
 #include "tensor/conv.h"
+#include <math.h>
+#include <string.h>
 
 /* The input coordinate that tap t of output coordinate i reads; -1 where zero padding has nothing. */
 static int source(int i, int t, const ts_conv *c, int size)
@@ -12,6 +14,25 @@ static int source(int i, int t, const ts_conv *c, int size)
 
 static int64_t at(const ts_conv *c, int n, int i, int j, int channels) { return (((int64_t)n * c->h + i) * c->w + j) * channels; }
 static int64_t tap(const ts_conv *c, int o, int ch, int ky, int kx) { return (((int64_t)o * c->ic + ch) * c->k + ky) * c->k + kx; }
+
+/* Of the two neighbours the nearer one; infinity is the neighbour 2^128. */
+float ts_bf16_naive(float x)
+{
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    const uint32_t low = bits & 0xffff0000, high = low + 0x10000;
+    if (isinf(x)) return x;
+    float a, b;
+    if (isnan(x)) {
+        const uint32_t quiet = low | 0x00400000;
+        memcpy(&a, &quiet, sizeof a);
+        return a;
+    }
+    memcpy(&a, &low, sizeof a);
+    memcpy(&b, &high, sizeof b);
+    const double size = fabs((double)x), below = size - fabs((double)a), above = (isinf(b) ? 0x1p128 : fabs((double)b)) - size;
+    return below < above || (below == above && !(low >> 16 & 1)) ? a : b;
+}
 
 void ts_conv_forward_naive(const ts_conv *c, const float *x, const float *weight, const float *bias, float leak, float *y)
 {

@@ -8,7 +8,7 @@
  * The gradient under replicate padding is computed on a domain that is larger by fold on each side, and what falls outside is
  * added to the nearest border pixel: that is exactly the transpose of replicating it. */
 typedef struct conv_plan {
-    int n, h, w, ic; /* input */
+    int n, h, w, ic; /* input; of bf16: pairs of channels */
     int oc, k, dilation;
     int first;      /* coordinate that tap 0 reads for output 0 */
     bool replicate; /* else zeros */
@@ -17,12 +17,17 @@ typedef struct conv_plan {
     float *y;
     float leak;
     bool add;
+    bool bf16;    /* weights, and x as tiles read it, are pairs of bf16 values, each where a float would be; */
+    int channels; /* x itself is floats, so many a pixel */
 } conv_plan;
 
 enum {
     CONV_BLOCK_BYTES = 640 << 10, /* weights that stay in the second cache while pixels pass by */
     CONV_STAGE_SLACK = 64         /* the weight gradient reads whole vectors past the last pixel */
 };
+
+/* n consecutive pixels of x as tiles read them, stride floats apart. */
+void conv_put_pixels(const conv_plan *p, const float *from, ptrdiff_t n, float *to, ptrdiff_t stride);
 
 /* A window of input rows with their padding columns, of which a row is made when first needed. */
 typedef struct conv_stage {
@@ -69,9 +74,9 @@ static inline void conv_part(int total, int parts, int i, int *begin, int *end)
 
 /* A tile of the panel without its pixels; and one run on pixels from a to y. */
 ts_tile conv_panel_tile(const conv_plan *p, int panel);
-void conv_run_tile(ts_tile *t, int vectors, const float *a, float *y, int pixels);
+void conv_run_tile(ts_tile *t, int vectors, const float *a, float *y, int pixels, bool bf16);
 
-/* Side 1, serial: pixels [first, first + count) of panels [panel0, panel1). */
+/* Side 1, serial: pixels [first, first + count) of panels [panel0, panel1); p->x is as tiles read it. */
 void conv_run_pixels(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, int panel0, int panel1);
 
 void conv_run_rows(const conv_plan *p);
@@ -80,6 +85,9 @@ void conv_run_positions(const conv_plan *p);
 void conv_run_lanes(const conv_plan *p);
 /* Whichever of them suits. */
 void conv_run(const conv_plan *p);
+
+static inline int conv_bf16_depth(int channels) { return (channels + 1) / 2; }
+void conv_pack_bf16(const ts_conv *c, bool forward, const float *weight, float *packed);
 
 /* Floats of the panels; weights to few channels are packed behind them once more for conv_run_lanes. */
 ptrdiff_t conv_panels_count(int ic, int oc, int k);

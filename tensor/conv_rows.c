@@ -1,5 +1,5 @@
 /* Convolution row by row. Tiles of pixels inside the image read it where it is; for those at the left and right edge the columns
- * that they need are copied, with their padding, into strips of a few rows. */
+ * that they need are copied, with their padding, into strips of a few rows. bf16 tiles read strips alone. */
 #include "tensor/conv_plan.h"
 #include "tensor/threads.h"
 #include <string.h>
@@ -58,7 +58,7 @@ static void make_sources(runner *r, int rows)
     while (inside < r->tiles && (tile_range(r, inside, &begin, &end), begin + p->first < 0)) inside++;
     while (outside > inside && (tile_range(r, outside - 1, &begin, &end), end - 1 + p->first + reach >= p->w)) outside--;
     /* Strides of a multiple of 2 KiB put all pixels of a tile into two sets of the first cache: copy all. */
-    if (inside >= outside || p->ic % 512 == 0) inside = r->tiles, outside = r->tiles;
+    if (inside >= outside || p->ic % 512 == 0 || p->bf16) inside = r->tiles, outside = r->tiles;
     const int cut[4] = {0, inside, outside, r->tiles};
     float *memory = NULL;
     size_t used = 0;
@@ -154,7 +154,8 @@ static void run_row(runner *r, int e, int ky0, int ky1, int panel0, int panel1, 
                 int begin, end;
                 tile_range(r, tile, &begin, &end);
                 t.fetch[1] = to + end * t.y_stride;
-                conv_run_tile(&t, conv_vectors(p->oc, panel), s->pixel0 + begin * s->pixel, to + begin * t.y_stride, end - begin);
+                conv_run_tile(&t, conv_vectors(p->oc, panel), s->pixel0 + begin * s->pixel, to + begin * t.y_stride, end - begin,
+                              p->bf16);
             }
         }
         if (p->fold) fold_row(p, r->extended, y + o0, channels, first);

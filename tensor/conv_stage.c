@@ -12,17 +12,19 @@ conv_stage conv_stage_make(const conv_plan *p, int rows, int left, int columns)
     return s;
 }
 
-/* n pixels: copies from consecutive ones, or of the same one, or zeros where from is NULL. */
-static void fill_pixels(const conv_stage *s, const conv_plan *p, float *to, const float *from, int n, bool advance)
+void conv_put_pixels(const conv_plan *p, const float *from, ptrdiff_t n, float *to, ptrdiff_t stride)
 {
-    if (n <= 0) return;
-    if (s->pixel == p->ic && (advance || !from)) {
-        if (from) memcpy(to, from, sizeof(float) * (size_t)n * (size_t)p->ic);
-        else memset(to, 0, sizeof(float) * (size_t)n * (size_t)p->ic);
-        return;
-    }
+    if (p->bf16) ts_conv_k()->pairs(from, n, p->channels, to, stride);
+    else if (stride == p->ic) memcpy(to, from, sizeof(float) * (size_t)n * (size_t)p->ic);
+    else
+        for (ptrdiff_t j = 0; j < n; j++) memcpy(to + j * stride, from + j * p->ic, sizeof(float) * (size_t)p->ic);
+}
+
+/* n pixels: copies of one, or zeros where from is NULL. */
+static void fill_pixels(const conv_stage *s, const conv_plan *p, float *to, const float *from, int n)
+{
     for (int j = 0; j < n; j++, to += s->pixel) {
-        if (from) memcpy(to, from + (advance ? (ptrdiff_t)j * p->ic : 0), sizeof(float) * (size_t)p->ic);
+        if (from) conv_put_pixels(p, from, 1, to, s->pixel);
         else memset(to, 0, sizeof(float) * (size_t)p->ic);
     }
 }
@@ -35,10 +37,10 @@ void conv_stage_fill(conv_stage *s, const conv_plan *p, int n, int first, int la
     const int before = (end < 0 ? end : 0) - s->left, inside = end_in - begin_in, behind = end - (s->left > p->w ? s->left : p->w);
     for (int r = s->next > first ? s->next : first; r <= last; r++) {
         float *to = s->memory + r % s->rows * s->row;
-        const float *from = p->x + ((ptrdiff_t)n * p->h + r) * p->w * p->ic;
-        fill_pixels(s, p, to, p->replicate ? from : NULL, before, false);
-        fill_pixels(s, p, to + (begin_in - s->left) * s->pixel, from + (ptrdiff_t)begin_in * p->ic, inside, true);
-        fill_pixels(s, p, to + (s->columns - behind) * s->pixel, p->replicate ? from + (ptrdiff_t)(p->w - 1) * p->ic : NULL, behind, false);
+        const float *from = p->x + ((ptrdiff_t)n * p->h + r) * p->w * p->channels;
+        fill_pixels(s, p, to, p->replicate ? from : NULL, before);
+        if (inside > 0) conv_put_pixels(p, from + (ptrdiff_t)begin_in * p->channels, inside, to + (begin_in - s->left) * s->pixel, s->pixel);
+        fill_pixels(s, p, to + (s->columns - behind) * s->pixel, p->replicate ? from + (ptrdiff_t)(p->w - 1) * p->channels : NULL, behind);
     }
     if (last >= s->next) s->next = last + 1;
 }

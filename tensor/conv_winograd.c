@@ -123,7 +123,7 @@ static void multiply(const ts_conv *c, const float *u, const float *v, int count
                 t.fetch[0] = next + i * (size / groups);
                 t.fetch[1] = t.fetch[0] + size / groups / 2;
                 conv_run_tile(&t, vectors, v + q * plane_size(c->ic) + (ptrdiff_t)begin * c->ic, m + q * plane_size(c->oc) + o0 + (ptrdiff_t)begin * c->oc,
-                              end - begin);
+                              end - begin, false);
             }
         }
 }

@@ -6,7 +6,7 @@
 #include <cpuid.h>
 #endif
 
-static const char *const names[TS_ISA_COUNT] = {"base", "avx2", "avx512"};
+static const char *const names[TS_ISA_COUNT] = {"base", "avx2", "avx512", "avx512bf16"};
 
 #if defined(__x86_64__)
 /* XCR0: which register files the operating system saves (Intel SDM vol. 1, 13.3). */
@@ -31,7 +31,9 @@ static ts_isa detect(void)
     const unsigned f = 1u << 16, dq = 1u << 17, bw = 1u << 30, vl = 1u << 31;
     if ((b & (f | dq | bw | vl)) != (f | dq | bw | vl)) return TS_AVX2;
     if ((saved & 0xe6) != 0xe6) return TS_AVX2; /* mask registers and zmm */
-    return TS_AVX512;
+    const unsigned bf16 = 1u << 5;
+    if (!__get_cpuid_count(7, 1, &a, &b, &c, &d) || !(a & bf16)) return TS_AVX512;
+    return TS_AVX512BF16;
 }
 #else
 static ts_isa detect(void) { return TS_BASE; }
@@ -74,5 +76,5 @@ ts_code ts_isa_init(ts_status *st)
             ts_isa_use((ts_isa)i);
             return TS_OK;
         }
-    return ts_fail(st, TS_INVALID, "LGD_ISA=%s is not an instruction set; use base, avx2 or avx512", want);
+    return ts_fail(st, TS_INVALID, "LGD_ISA=%s is not an instruction set; use base, avx2, avx512 or avx512bf16", want);
 }

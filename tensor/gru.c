@@ -13,27 +13,37 @@ enum {
 ts_conv ts_gru_input(const ts_gru *g) { return (ts_conv){1, 1, 1, g->ic, 3 * g->c, 1, 1, TS_PAD_ZERO}; }
 ts_conv ts_gru_hidden(const ts_gru *g) { return (ts_conv){1, 1, 1, g->c, 3 * g->c, 1, 1, TS_PAD_ZERO}; }
 
+static conv_plan gates_of(const ts_gru *g, int channels, const float *packed, const float *bias)
+{
+    return (conv_plan){.ic = g->bf16 ? conv_bf16_depth(channels) : channels, .channels = channels, .oc = 3 * g->c, .k = 1, .packed = packed, .bias = bias,
+                       .leak = 1, .bf16 = g->bf16};
+}
+
+/* y [count][3c] = the gates of x [count][channels] */
+static void gates_forward(conv_plan p, const float *x, int count, float *y)
+{
+    p.x = x;
+    p.y = y;
+    if (p.bf16) {
+        float *rounded = ts_scratch(2, sizeof(float) * (size_t)(BAND * p.ic));
+        conv_put_pixels(&p, x, count, rounded, p.ic);
+        p.x = rounded;
+    }
+    conv_run_pixels(&p, 0, count, 0, conv_panels(p.oc));
+}
+
 void ts_gru_forward(const ts_gru *g, const float *x, const float *old, const float *ih_packed, const float *ih_bias, const float *hh_packed,
                     const float *hh_bias, float *y, float *saved)
 {
     const struct ts_elementwise_kernels *k = ts_elementwise_k();
     const int gates = 3 * g->c;
-    const conv_plan input = {.ic = g->ic, .oc = gates, .k = 1, .packed = ih_packed, .bias = ih_bias, .leak = 1};
-    const conv_plan hidden = {.ic = g->c, .oc = gates, .k = 1, .packed = hh_packed, .bias = hh_bias, .leak = 1};
+    const conv_plan input = gates_of(g, g->ic, ih_packed, ih_bias), hidden = gates_of(g, g->c, hh_packed, hh_bias);
 #pragma omp parallel for schedule(dynamic, 4) num_threads(ts_threads())
     for (int64_t p = 0; p < g->pixels; p += BAND) {
         const int count = (int)(g->pixels - p < BAND ? g->pixels - p : BAND);
         float *ih = ts_scratch(0, sizeof(float) * (size_t)(BAND * gates)), *hh = ts_scratch(1, sizeof(float) * (size_t)(BAND * gates));
-        conv_plan now = input;
-        now.x = x + p * g->ic;
-        now.y = ih;
-        conv_run_pixels(&now, 0, count, 0, conv_panels(gates));
-        if (old) {
-            now = hidden;
-            now.x = old + p * g->c;
-            now.y = hh;
-            conv_run_pixels(&now, 0, count, 0, conv_panels(gates));
-        }
+        gates_forward(input, x + p * g->ic, count, ih);
+        if (old) gates_forward(hidden, old + p * g->c, count, hh);
         /* A zero state leaves of the hidden gates their bias. */
         k->gru(count, g->c, ih, old ? hh : hh_bias, old ? gates : 0, old ? old + p * g->c : NULL, y + p * g->c, saved ? saved + p * 4 * g->c : NULL);
     }
@@ -51,7 +61,8 @@ static void product(const float *a, ptrdiff_t a_stride, const ts_segment *segmen
         t.segments = segments;
         t.a_stride = a_stride;
         for (int p = 0; p < count; p += k->pixels)
-            conv_run_tile(&t, conv_vectors(oc, panel), a + p * a_stride, y + (ptrdiff_t)p * oc + panel * 2 * k->lanes, count - p < k->pixels ? count - p : k->pixels);
+            conv_run_tile(&t, conv_vectors(oc, panel), a + p * a_stride, y + (ptrdiff_t)p * oc + panel * 2 * k->lanes, count - p < k->pixels ? count - p : k->pixels,
+                          false);
     }
 }
 

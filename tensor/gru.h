@@ -12,6 +12,7 @@
 typedef struct ts_gru {
     int64_t pixels;
     int ic, c; /* channels of x and of the state */
+    bool bf16; /* both products of forward on rounded x, old and weights, as in tensor/conv.h; weights packed for TS_CONV_FORWARD_BF16 */
 } ts_gru;
 
 /* The products as convolutions: what ts_conv_pack packs the weights W_ih [3c][ic] and W_hh [3c][c] for. */

@@ -103,7 +103,7 @@ TEST(gru_naive)
     for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
         ts_isa_use((ts_isa)isa);
         for (int i = 0; i < 40; i++) {
-            subject s = make((ts_gru){pixels[i < 4 ? 9 : ts_rng_int(&r, 9)], channels[ts_rng_int(&r, 9)], channels[ts_rng_int(&r, i < 4 ? 5 : 9)]}, (uint64_t)i);
+            subject s = make((ts_gru){pixels[i < 4 ? 9 : ts_rng_int(&r, 9)], channels[ts_rng_int(&r, 9)], channels[ts_rng_int(&r, i < 4 ? 5 : 9)], false}, (uint64_t)i);
             results a = fast(&s, i % 3, i % 2), b = naive(&s, i % 3, i % 2);
             same("state", &s, a.y, b.y, s.counts[DY], 2e-5);
             same("saved", &s, a.saved, b.saved, 4 * s.counts[DY], 2e-5);
@@ -117,7 +117,7 @@ TEST(gru_naive)
 
 TEST(gru_same_bytes_for_any_threads)
 {
-    subject s = make((ts_gru){5000, 20, 24}, 77);
+    subject s = make((ts_gru){5000, 20, 24, false}, 77);
     results first = {0};
     for (int threads = 1; threads <= 3; threads++) {
         ts_threads_set(threads);

@@ -15,6 +15,7 @@
 #endif
 #define INLINE static inline __attribute__((always_inline))
 #define UNROLL _Pragma("GCC unroll 16")
+typedef int32_t pair __attribute__((may_alias)); /* two bf16 values, kept where a float would be */
 
 /* A panel's channels that exist, to and from memory. Vectors with a tail need a mask, or a detour where there are no masks. */
 #if VL == 16
@@ -52,15 +53,31 @@ INLINE void store_lanes(float *p, vf v, lanes n)
  * terms, and a part costs a hundredth of its time to put away. */
 enum { PART = 96 };
 
-/* One k: pixels x vectors multiplications. */
+/* acc + the products of both halves of x and b. A bf16 value is the upper half of the float that it stands for. */
+INLINE vf dot2(vf acc, vf x, vf b)
+{
+#if defined(__AVX512BF16__)
+    return (vf)_mm512_dpbf16_ps((__m512)acc, (__m512bh)x, (__m512bh)b);
+#else
+    const vi high = v_seti(-65536);
+    return v_fma((vf)((vi)x << 16), (vf)((vi)b << 16), v_fma((vf)((vi)x & high), (vf)((vi)b & high), acc));
+#endif
+}
+
+/* One k, or pair of them: pixels x vectors multiplications. */
 #define STEP(u)                                                                                               \
     {                                                                                                         \
         vf b[2];                                                                                              \
         UNROLL for (int v = 0; v < vectors; v++) b[v] = v_load(w + ((u) * vectors + v) * VL);                 \
         UNROLL for (int p = 0; p < pixels; p++) {                                                             \
             const char *at = a[p / TS_TILE_GROUP] + stride[p % TS_TILE_GROUP];                                \
-            vf x = v_set(((const float *)(const void *)at)[u]);                                               \
-            UNROLL for (int v = 0; v < vectors; v++) acc[p][v] += x * b[v];                                   \
+            if (bf16) {                                                                                       \
+                const vf x = (vf)v_seti(((const pair *)(const void *)at)[u]);                                 \
+                UNROLL for (int v = 0; v < vectors; v++) acc[p][v] = dot2(acc[p][v], x, b[v]);                \
+            } else {                                                                                          \
+                const vf x = v_set(((const float *)(const void *)at)[u]);                                     \
+                UNROLL for (int v = 0; v < vectors; v++) acc[p][v] += x * b[v];                               \
+            }                                                                                                 \
         }                                                                                                     \
     }
 /* Base pointers and strides stay as they are, in registers: left alone, the compiler makes an address for each pixel and k,
@@ -69,7 +86,7 @@ enum { PART = 96 };
     __asm__("" : "+r"(a[0]), "+r"(a[1]), "+r"(a[2]));                                                         \
     __asm__("" : "+r"(stride[1]), "+r"(stride[2]), "+r"(stride[3]), "+r"(stride[4]));
 
-INLINE void tile(const ts_tile *t, const int pixels, const int vectors)
+INLINE void tile(const ts_tile *t, const int pixels, const int vectors, const bool bf16)
 {
     vf acc[PIXELS][2], whole[PIXELS][2];
     const ptrdiff_t ys = t->y_stride;
@@ -172,6 +189,37 @@ INLINE void sum(const ts_sum *t, const int rows, const int vectors)
     UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++) v_store(t->c + m * t->c_stride + v * VL, acc[m][v]);
 }
 
+typedef uint32_t vu __attribute__((vector_size(VL * 4)));
+
+/* The upper half of each lane is the nearest bf16: 0x7fff carries into it from above the middle, and 1 more in the middle where it is odd. */
+INLINE vu round_bf16(vf x)
+{
+    const vu bits = (vu)x;
+    return (vu)v_select(x == x, (vf)(bits + 0x7fff + (bits >> 16 & 1)), (vf)(bits | 0x00400000));
+}
+
+#if VL == 16
+#define EVERY_OTHER(first) first, first + 2, first + 4, first + 6, first + 8, first + 10, first + 12, first + 14, first + 16, first + 18, first + 20, \
+    first + 22, first + 24, first + 26, first + 28, first + 30
+#elif VL == 8
+#define EVERY_OTHER(first) first, first + 2, first + 4, first + 6, first + 8, first + 10, first + 12, first + 14
+#else
+#define EVERY_OTHER(first) first, first + 2, first + 4, first + 6
+#endif
+
+static void pairs(const float *x, int64_t pixels, int channels, float *to, ptrdiff_t stride)
+{
+    int64_t run = channels; /* of values without a gap */
+    if (channels % 2 == 0 && stride == channels / 2) run *= pixels, pixels = 1;
+    for (; pixels > 0; pixels--, x += run, to += stride)
+        for (int64_t i = 0; i < run; i += 2 * VL) {
+            const int64_t left = run - i;
+            const vu a = round_bf16(v_load_part(x + i, left)), b = left > VL ? round_bf16(v_load_part(x + i + VL, left - VL)) : (vu){0};
+            const vu even = __builtin_shufflevector(a, b, EVERY_OTHER(0)), odd = __builtin_shufflevector(a, b, EVERY_OTHER(1));
+            v_store_part(to + i / 2, (vf)(even >> 16 | (odd & 0xffff0000)), (left + 1) / 2);
+        }
+}
+
 static void columns(const float *x, int64_t pixels, int channels, float *restrict sum)
 {
     const float *a = x, *b = x + channels, *c = b + channels, *d = c + channels;
@@ -258,14 +306,18 @@ static void collect(const float *x, ptrdiff_t plane, int pixels, int channels, b
 #define FOR_ALL(DO) FOR_5(DO)
 #endif
 #define FUNCTIONS(n)                                                       \
-    static void tile_##n##_1(const ts_tile *t) { tile(t, n, 1); }          \
-    static void tile_##n##_2(const ts_tile *t) { tile(t, n, 2); }          \
+    static void tile_##n##_1(const ts_tile *t) { tile(t, n, 1, false); }   \
+    static void tile_##n##_2(const ts_tile *t) { tile(t, n, 2, false); }   \
+    static void bf16_##n##_1(const ts_tile *t) { tile(t, n, 1, true); }    \
+    static void bf16_##n##_2(const ts_tile *t) { tile(t, n, 2, true); }    \
     static void sum_##n##_1(const ts_sum *t) { sum(t, n, 1); }             \
     static void sum_##n##_2(const ts_sum *t) { sum(t, n, 2); }
 FOR_ALL(FUNCTIONS)
 
 #define TILE_1(n) [n] = tile_##n##_1,
 #define TILE_2(n) [n] = tile_##n##_2,
+#define BF16_1(n) [n] = bf16_##n##_1,
+#define BF16_2(n) [n] = bf16_##n##_2,
 #define SUM_1(n) [n] = sum_##n##_1,
 #define SUM_2(n) [n] = sum_##n##_2,
 const struct ts_conv_kernels TS_TABLE(conv) = {
@@ -273,7 +325,9 @@ const struct ts_conv_kernels TS_TABLE(conv) = {
     .pixels = PIXELS,
     .rows = ROWS,
     .tile = {{FOR_ALL(TILE_1)}, {FOR_ALL(TILE_2)}},
+    .tile_bf16 = {{FOR_ALL(BF16_1)}, {FOR_ALL(BF16_2)}},
     .sum = {{FOR_ALL(SUM_1)}, {FOR_ALL(SUM_2)}},
+    .pairs = pairs,
     .columns = columns,
     .transpose = transpose,
     .collect = collect,

@@ -1,7 +1,9 @@
-/* The two inner loops of convolutions and matrix products.
+/* The inner loops of convolutions and matrix products.
  *
  * tile: y[p][o] = act(init[o] + sum_k a[p][k] w[k][o]) for a few pixels p and one panel of output channels o. The sum over k is
  * a list of segments: runs of k that are contiguous in the input of each pixel.
+ * tile_bf16: the same where each float of a and w holds a pair of bf16 values of neighbouring k, the even one in the low half, and a product is
+ * the sum of two: made from the halves as floats, or by vdpbf16ps, which takes denormals for zeros. Sums are f32; segments count pairs.
  * sum: c[m][o] += sum_p a[p][m] b[p][o] for a block of m and o over many pixels p: the gradient of weights. */
 #ifndef TS_KERNELS_CONV_H
 #define TS_KERNELS_CONV_H
@@ -56,7 +58,11 @@ struct ts_conv_kernels {
     int pixels; /* largest tile */
     int rows;   /* largest m of a sum */
     ts_tile_function *tile[2][TS_TILE_PIXELS + 1]; /* [vectors - 1][pixels] */
+    ts_tile_function *tile_bf16[2][TS_TILE_PIXELS + 1];
     ts_sum_function *sum[2][TS_SUM_ROWS + 1];      /* [vectors - 1][m] */
+    /* to[p stride + i] = channels 2i and 2i + 1 of pixel p, rounded to the nearest bf16, ties to even, NaNs quiet; the last pair of an odd number
+     * of channels ends with a zero */
+    void (*pairs)(const float *x, int64_t pixels, int channels, float *to, ptrdiff_t stride);
     void (*columns)(const float *x, int64_t pixels, int channels, float *sum); /* sum[o] += sum_p x[p][o] */
     void (*transpose)(const float *x, int pixels, int channels, float *to, ptrdiff_t plane); /* to[c plane + p] = x[p][c] */
     /* y[p stride + c] = act(x[c plane + p] (+ y[p stride + c])) */
