@@ -137,6 +137,8 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
         return ts_fail(st, TS_INVALID, "lgd_estimate: threads is %d and must lie in 1 .. %d, or be 0 for all", o->threads, THREADS_MAX);
     if (!(o->tolerance >= 0 && o->tolerance <= 1) && o->tolerance != LGD_TOLERANCE_USUAL)
         return ts_fail(st, TS_INVALID, "lgd_estimate: tolerance is %g and must lie in 0 .. 1, or be %g for the usual one", o->tolerance, LGD_TOLERANCE_USUAL);
+    if (o->precision != LGD_F32 && o->precision != LGD_BF16)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: precision is %d and must be %d for f32 or %d for bf16", o->precision, LGD_F32, LGD_BF16);
     if (o->orientations != 0 && o->orientations != 1 && o->orientations != 8)
         return ts_fail(st, TS_INVALID, "lgd_estimate: orientations is %d and must be 1 or 8", o->orientations);
     if ((o->tolerance > 0 || o->mask) && !lgd_tiles_exact(&model->net->arch))
@@ -324,9 +326,12 @@ int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, in
         if (o.tolerance == LGD_TOLERANCE_USUAL)
             o.tolerance = o.iterations == -1 && !o.exact && lgd_tiles_exact(&model->net->arch) ? LGD_TOLERANCE : 0;
         const bool was = ts_conv_exact();
+        const ts_precision before = ts_conv_precision();
         ts_threads_set(o.threads);
         ts_conv_exact_set(o.exact || model->net->arch.compat == NN_COMPAT_PUBLISHED); /* whoever runs that wants its numbers */
+        ts_conv_precision_set(o.precision == LGD_BF16 ? TS_BF16 : TS_F32);
         estimate(model, photo, photos, side, &o, maps, &st);
+        ts_conv_precision_set(before);
         ts_conv_exact_set(was);
     }
     return report(error, &st);

@@ -66,7 +66,7 @@ static void compute(lgd_item *item, void *user)
     run *r = user;
     const int size = item->square.width;
     const lgd_options options = {.iterations = r->command->iterations, .threads = r->command->threads, .progress = after_step, .user = r,
-                                 .power = r->command->power > 0 ? NULL : &item->power, .exact = r->command->exact, .orientations = r->command->orientations, .mask = item->mask, .tolerance = r->command->tolerance, .tile = before_tile};
+                                 .power = r->command->power > 0 ? NULL : &item->power, .exact = r->command->exact, .precision = r->command->bf16 ? LGD_BF16 : LGD_F32, .orientations = r->command->orientations, .mask = item->mask, .tolerance = r->command->tolerance, .tile = before_tile};
     lgd_error error;
     lgd_photo photo[IO_CAPTURE_IMAGES] = {lgd_flash_photo(item->square.data)};
     int photos = 1;

@@ -14,7 +14,7 @@ typedef struct lgd_command {
     int orientations; /* 1 or 8 */
     double power; /* of the light, in usual ones; 0: estimated */
     unsigned outputs; /* LGD_OUT_... */
-    bool directx, metallic, exact, quiet, help, version;
+    bool directx, metallic, exact, bf16, quiet, help, version;
     char **photo; /* into argv; with a capture, that alone */
     char *only[1];
     int photos;

@@ -195,6 +195,21 @@ directx_normals() {
     for f in diffuse.png specular.png roughness.png render.png preview.png; do cmp -s "$T/gl/p/$f" "$T/dx/p/$f" || fail "$f differs"; done
 }
 
+precision() {
+    model
+    photo "$T/p.ppm" 33 33
+    expect 2 infer --precision f16 "$T/p.ppm" -o "$T/o"
+    says "$T/err" "--precision"
+    for p in f32 bf16; do expect 0 infer --precision $p --maps normal,exr "$T/p.ppm" -o "$T/$p"; done
+    expect 0 infer --maps normal,exr "$T/p.ppm" -o "$T/usual"
+    cmp -s "$T/usual/p/maps.exr" "$T/f32/p/maps.exr" || fail "f32 is not the default"
+    cmp -s "$T/bf16/p/maps.exr" "$T/f32/p/maps.exr" && fail "bf16 gives the maps of f32" # how near they are: tests/test_precision.c
+    for isa in base avx2 avx512 avx512bf16; do
+        if LGD_ISA=$isa infer --help >/dev/null 2>&1; then expect 0 env LGD_ISA=$isa "$BIN/lgd-infer" --size 32 --threads 1 --precision bf16 "$T/p.ppm" -o "$T/$isa"
+        else expect 2 env LGD_ISA=$isa "$BIN/lgd-infer" --precision bf16 "$T/p.ppm" -o "$T/$isa"; fi
+    done
+}
+
 instruction_sets() {
     photo "$T/p.ppm" 8 8
     expect 2 env LGD_ISA=mmx "$BIN/lgd-infer" "$T/p.ppm" -o "$T/o"
@@ -249,5 +264,6 @@ check infer_mask_and_tolerance mask_and_tolerance
 check infer_usual_tolerance usual_tolerance
 check infer_comma_locale comma_locale
 check infer_directx_normals directx_normals
+check infer_precision precision
 check infer_instruction_sets instruction_sets
 check infer_all_photographs all_photographs

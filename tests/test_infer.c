@@ -269,6 +269,8 @@ TEST(infer_wrong_arguments_are_named)
         CHECK(lgd_estimate(m, image, wrong[i].side, &o, maps, &e) != 0 && strstr(e.message, wrong[i].word), "case %zu: '%s'", i, e.message);
     }
     lgd_error e = {0};
+    const lgd_options third = {.iterations = 1, .precision = 2};
+    CHECK(lgd_estimate(m, image, 2, &third, maps, &e) == TS_INVALID && strstr(e.message, "precision"), "'%s'", e.message);
     CHECK(lgd_estimate(NULL, image, 2, NULL, maps, &e) == TS_INVALID, "no model is taken");
     CHECK(lgd_estimate(m, NULL, 2, NULL, maps, &e) == TS_INVALID, "no image is taken");
     CHECK(lgd_estimate(m, image, 2, NULL, NULL, NULL) == TS_INVALID, "no maps are taken");
