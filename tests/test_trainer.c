@@ -200,25 +200,54 @@ TEST(trainer_pretraining_leaves_the_refiner_alone)
     nn_model_free(&start);
 }
 
-TEST(trainer_learns_a_little)
+/* The loss of the first step, and of the last ten. */
+static void learn(ts_precision precision, const char *where, double *first, double *last)
 {
     tr_config c = small();
     ts_status st = {0};
     c.train.pretrain_steps = 60;
     c.train.steps = 0;
+    c.train.precision = precision;
     c.validate.every = 0;
     double early = 0, late = 0;
-    tr_trainer *t = tr_create(&c, folder("learn"), false, NULL, &st);
+    tr_trainer *t = tr_create(&c, where, false, NULL, &st);
     CHECK(t, "%s", st.message);
     for (int i = 0; i < 60; i++) {
         tr_row row;
         CHECK(tr_step(t, &row, &st) == TS_OK, "%s", st.message);
         CHECK(fabs(row.loss - (row.render_start + row.map_start)) < 1e-5 * row.loss, "the loss is not the sum of its parts");
+        CHECK(ts_conv_precision() == TS_F32, "the choice outlives the step");
+        if (i == 0) *first = row.loss;
         if (i < 10) early += row.loss / 10;
         if (i >= 50) late += row.loss / 10;
     }
     tr_destroy(&t);
-    CHECK(late < 0.8 * early, "the loss went from %g to %g only", early, late);
+    CHECK(late < 0.8 * early, "%s: the loss went from %g to %g only", ts_precision_name(precision), early, late);
+    *last = late;
+}
+
+TEST(trainer_learns_a_little)
+{
+    double first[2], last[2];
+    learn(TS_F32, folder("learn"), &first[0], &last[0]);
+    learn(TS_BF16, folder("learn_bf16"), &first[1], &last[1]);
+    CHECK(first[0] != first[1] && fabs(first[0] - first[1]) < 0.005 * first[0], "the first step's loss is %g, in bf16 %g", first[0], first[1]);
+    CHECK(fabs(last[0] - last[1]) < 0.1 * last[0], "the loss ends at %g, in bf16 at %g", last[0], last[1]);
+}
+
+TEST(trainer_in_bf16_keeps_the_rules)
+{
+    tr_config c = small();
+    ts_status st;
+    watch w = {.stop_at = 7}, rest = {0};
+    c.train.precision = TS_BF16;
+    run_whole(&c, folder("whole"));
+    CHECK(run(&c, folder("part"), false, &w, &st) == TS_INTERRUPTED, "%s", st.message);
+    ts_threads_set(3);
+    CHECK(run(&c, folder("part"), true, &rest, &st) == TS_OK, "%s", st.message);
+    expect_same_run(folder("whole"), folder("part"));
+    c.train.precision = TS_F32;
+    CHECK(run(&c, folder("whole"), true, &rest, &st) == TS_INVALID && strstr(st.message, "precision"), "'%s'", st.message);
 }
 
 TEST(trainer_refuses_another_configuration_by_key)

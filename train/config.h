@@ -3,6 +3,7 @@
 #define TR_CONFIG_H
 #include "data/procedural.h"
 #include "nn/model.h"
+#include "tensor/conv.h"
 #include <stdio.h>
 
 typedef struct tr_config {
@@ -22,6 +23,7 @@ typedef struct tr_config {
         int iterations_min, iterations_max; /* 0: arch.iterations */
         int given_min;                      /* 0: arch.images */
         bool checkpoint_steps;
+        ts_precision precision;
         int64_t seed, checkpoint_every, log_every;
         int max_skipped;
         char init[1024];

@@ -5,6 +5,7 @@
 static const char *const encoding_names[] = {"raw", "asinh", NULL}; /* as nn_gradient */
 static const char *const compat_names[] = {"none", "published", NULL}; /* as nn_compat */
 static const char *const descent_names[] = {"none", "gradient", "newton", NULL}; /* as nn_descent */
+static const char *const precision_names[] = {"f32", "bf16", NULL}; /* as ts_precision */
 static const char *const rmse_names[] = {"start", "batch", NULL}; /* as nn_rmse */
 
 #define AT(field) offsetof(tr_config, field)
@@ -88,6 +89,8 @@ const tr_key tr_keys[] = {
      "fewest photographs of a training step, drawn uniformly up to model.images; 0: always so many"},
     {"train", "checkpoint_steps", TR_BOOL, AT(train.checkpoint_steps), 0, 1, "no", NULL, true,
      "keep of each refinement only the maps and h's states, and compute the rest again for the gradient: less memory, a third more time, the same numbers"},
+    {"train", "precision", TR_CHOICE, AT(train.precision), 0, TS_PRECISION_COUNT - 1, "f32", precision_names, false,
+     "what convolutions multiply, forward and for the gradients of their inputs: f32, or both operands rounded to bf16 (for CPUs with AVX512-BF16, slower on others); weights, their gradients, Adam and all sums stay f32, and so does validation"},
     {"train", "seed", TR_INT64, AT(train.seed), 0, 1e15, "1", NULL, false, "seed of the initial weights, the loss's views and the drawn iterations"},
     {"train", "checkpoint_every", TR_INT64, AT(train.checkpoint_every), 1, 1e9, "500", NULL, true, "steps between checkpoints"},
     {"train", "log_every", TR_INT64, AT(train.log_every), 1, 1e9, "50", NULL, true, "steps between lines of progress when stderr is no terminal"},

@@ -156,9 +156,11 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
     size_t first = 0, last = t->model->count;
     if (row->pretraining || t->model->g_fixed) nn_model_range(t->model, t->model->g_fixed, &first, &last);
     ag_reset(t->tape);
+    ts_conv_precision_set(c->train.precision);
     ag_value *loss = forward(t, target, given, row);
     if (loss) row->loss = (double)loss->t.data[0];
     if (loss && isfinite(row->loss) && ag_backward(t->tape, loss) == TS_OK) row->norm = nn_gradient_norm(t->model, first, last);
+    ts_conv_precision_set(TS_F32);
     if (ag_status(t->tape)->code) {
         *st = *ag_status(t->tape);
         return st->code;

@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 static struct {
     bool on;
@@ -73,7 +74,14 @@ static void step(const tr_row *row, void *user)
     t->skipped = (long)row->skipped_total;
 }
 
-bool stress_training(const stress *s)
+static bool bound(ts_precision p, const char *what, double measured)
+{
+    char text[128];
+    snprintf(text, sizeof text, "training, %s: %s", ts_precision_name(p), what);
+    return stress_row(text, measured, 0);
+}
+
+static bool train(const stress *s, ts_precision precision)
 {
     static const char *const keys[] = {"model.g_width=4", "model.g_width_max=8", "model.g_levels=2", "model.g_size=16", "model.h_width=8", "model.h_gru=4", "model.iterations=2",
                                        "data.patch=16", "data.threads=1", "train.batch=2", "train.warmup=10", "train.ema=0.99", "validate.count=4", "validate.size=16"};
@@ -83,6 +91,7 @@ bool stress_training(const stress *s)
         if (tr_config_set_assignment(&c, keys[i], &st)) return printf("%s\n", st.message), false;
     c.train.pretrain_steps = s->full ? 5000 : 100;
     c.train.steps = s->full ? 15000 : 300;
+    c.train.precision = precision;
     c.train.rate *= 30;
     c.train.pretrain_rate *= 30;
     c.train.checkpoint_every = s->full ? 500 : 50;
@@ -94,7 +103,10 @@ bool stress_training(const stress *s)
     poison.maps = malloc((size_t)poison.batch * (size_t)poison.size * (size_t)poison.size * MAP_CHANNELS * sizeof *poison.maps);
     told seen = {0, 0};
     const tr_listener listener = {.step = step, .user = &seen};
-    tr_trainer *t = poison.maps ? tr_create(&c, s->folder, false, &listener, &st) : NULL;
+    char folder[1200];
+    snprintf(folder, sizeof folder, "%s/%s", s->folder, ts_precision_name(precision));
+    mkdir(folder, 0777);
+    tr_trainer *t = poison.maps ? tr_create(&c, folder, false, &listener, &st) : NULL;
     if (!t) {
         free(poison.maps);
         return printf("%s\n", st.message), false;
@@ -105,14 +117,20 @@ bool stress_training(const stress *s)
     tr_destroy(&t);
     free(poison.maps);
     const long all = c.train.pretrain_steps + c.train.steps;
-    printf("training: %ld of %ld steps, %ld inputs spoilt, %ld steps skipped; %s\n", seen.steps, all, poison.spoilt, seen.skipped, code ? st.message : "to its end");
-    bool ok = stress_row("training: stopped early without a reason", code ? !st.message[0] : seen.steps != all, 0);
-    ok = stress_row("training: no input was spoilt", poison.spoilt == 0, 0) && ok;
-    ok = stress_row("training: weights on disk that are not finite", !finite_weights(s->folder, "last.safetensors"), 0) && ok;
+    printf("training, %s: %ld of %ld steps, %ld inputs spoilt, %ld steps skipped; %s\n", ts_precision_name(precision), seen.steps, all, poison.spoilt, seen.skipped, code ? st.message : "to its end");
+    bool ok = bound(precision, "stopped early without a reason", code ? !st.message[0] : seen.steps != all);
+    ok = bound(precision, "no input was spoilt", poison.spoilt == 0) && ok;
+    ok = bound(precision, "weights on disk that are not finite", !finite_weights(folder, "last.safetensors")) && ok;
     st = (ts_status){0};
-    t = tr_create(&c, s->folder, true, NULL, &st); /* which refuses a checkpoint with a value that is not finite */
+    t = tr_create(&c, folder, true, NULL, &st); /* which refuses a checkpoint with a value that is not finite */
     if (!t) printf("%s\n", st.message);
-    ok = stress_row("training: a checkpoint that does not resume", !t, 0) && ok;
+    ok = bound(precision, "a checkpoint that does not resume", !t) && ok;
     tr_destroy(&t);
     return ok;
+}
+
+bool stress_training(const stress *s)
+{
+    const bool f32 = train(s, TS_F32);
+    return train(s, TS_BF16) && f32;
 }
