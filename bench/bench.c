@@ -3,7 +3,6 @@
 #include "bench/bench.h"
 #include "tensor/cpu.h"
 #include "tensor/kernels/peak.h"
-#include "tensor/peak.h"
 #include "tensor/threads.h"
 #include <omp.h>
 #include <stdbool.h>
@@ -42,18 +41,27 @@ static double now(void)
     return ((double)t.tv_sec + 1e-9 * (double)t.tv_nsec) / ts_threads();
 }
 
-static double peak(void)
+static double peak_of(double (*run)(long rounds))
 {
     double best = 0;
-    for (int i = 0; i < 4 && processor_time; i++) {
+    for (int i = 0; i < 4; i++) {
         double flop = 0;
         const double begin = now();
 #pragma omp parallel num_threads(ts_threads()) reduction(+ : flop)
-        flop += ts_peak_k()->run(2000000);
+        flop += run(2000000);
         const double speed = flop / (now() - begin);
         if (speed > best) best = speed;
     }
-    return processor_time ? best : ts_fma_peak();
+    return best;
+}
+
+static double peak(void) { return peak_of(ts_peak_k()->run); }
+
+bool bench_bf16(bench_time *t)
+{
+    if (!ts_peak_k()->run_bf16) return false;
+    t->peak = peak_of(ts_peak_k()->run_bf16);
+    return true;
 }
 
 static int by_value(const void *a, const void *b)

@@ -5,10 +5,11 @@
 #include "tensor/threads.h"
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct work {
     ts_conv c;
-    float *x, *y, *weight, *bias, *packed, *packed_gradient, *packed_winograd;
+    float *x, *y, *weight, *bias, *packed, *packed_gradient, *packed_winograd, *packed_bf16, *packed_gradient_bf16;
 } work;
 
 static float *values(size_t count, float scale)
@@ -25,7 +26,10 @@ static work make(ts_conv c)
     const size_t pixels = (size_t)c.n * (size_t)c.h * (size_t)c.w, weights = (size_t)c.ic * (size_t)c.oc * (size_t)(c.k * c.k);
     work w = {c, values(pixels * (size_t)c.ic, 1), values(pixels * (size_t)c.oc, 1), values(weights, 0.01f), values((size_t)c.oc, 1),
               values(ts_conv_packed_count(&c, TS_CONV_FORWARD), 1), values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT), 1),
-              c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_WINOGRAD), 1) : NULL};
+              c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_WINOGRAD), 1) : NULL, values(ts_conv_packed_count(&c, TS_CONV_FORWARD_BF16), 1),
+              values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT_BF16), 1)};
+    ts_conv_pack(&c, TS_CONV_FORWARD_BF16, w.weight, w.packed_bf16);
+    ts_conv_pack(&c, TS_CONV_DATA_GRADIENT_BF16, w.weight, w.packed_gradient_bf16);
     ts_conv_pack(&c, TS_CONV_FORWARD, w.weight, w.packed);
     ts_conv_pack(&c, TS_CONV_DATA_GRADIENT, w.weight, w.packed_gradient);
     if (c.k == 3) ts_conv_pack(&c, TS_CONV_WINOGRAD, w.weight, w.packed_winograd);
@@ -34,7 +38,8 @@ static work make(ts_conv c)
 
 static void discard(work *w)
 {
-    free(w->x), free(w->y), free(w->weight), free(w->bias), free(w->packed), free(w->packed_gradient), free(w->packed_winograd);
+    free(w->x), free(w->y), free(w->weight), free(w->bias), free(w->packed), free(w->packed_gradient), free(w->packed_winograd), free(w->packed_bf16);
+    free(w->packed_gradient_bf16);
 }
 
 static void forward(void *user)
@@ -61,6 +66,18 @@ static void weight_gradient(void *user)
     ts_conv_weight_gradient(&w->c, w->x, w->y, w->weight, w->bias);
 }
 
+static void forward_bf16(void *user)
+{
+    work *w = user;
+    ts_conv_forward_bf16(&w->c, w->x, w->packed_bf16, w->bias, 0.2f, w->y);
+}
+
+static void data_gradient_bf16(void *user)
+{
+    work *w = user;
+    ts_conv_data_gradient_bf16(&w->c, w->y, w->packed_gradient_bf16, w->x, false);
+}
+
 static void forward_naive(void *user)
 {
     work *w = user;
@@ -73,7 +90,9 @@ static void row(const char *what, ts_conv c, void (*f)(void *user))
     snprintf(label, sizeof label, "%s n%d %dx%d %d->%d %dx%d%s%s", what, c.n, c.h, c.w, c.ic, c.oc, c.k, c.k, c.dilation > 1 ? " d2" : "",
              c.pad == TS_PAD_REPLICATE ? " rep" : "");
     work w = make(c);
-    bench_row(label, bench_measure(f, &w), 2.0 * c.n * c.h * c.w * c.ic * c.oc * c.k * c.k);
+    bench_time t = bench_measure(f, &w);
+    if ((f == forward_bf16 || f == data_gradient_bf16) && !bench_bf16(&t)) snprintf(label + strlen(label), sizeof label - strlen(label), ", emulated");
+    bench_row(label, t, 2.0 * c.n * c.h * c.w * c.ic * c.oc * c.k * c.k);
     discard(&w);
 }
 
@@ -148,6 +167,18 @@ BENCH(conv_winograd)
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
         row("forward", shape[i], forward);
         row("Winograd forward", shape[i], winograd);
+    }
+}
+
+/* Where it is not emulated, % of the peak is that of vdpbf16ps. */
+BENCH(conv_bf16)
+{
+    bench_heading("bf16, inputs rounded on the way, each below f32");
+    for (size_t i = 0; i < 5; i++) {
+        row("forward", published[i], forward);
+        row("bf16 forward", published[i], forward_bf16);
+        row("data gradient", published[i], data_gradient);
+        row("bf16 data gradient", published[i], data_gradient_bf16);
     }
 }
 

@@ -1,5 +1,6 @@
 #include "eval/figure.h"
 #include "eval/plot.h"
+#include "tensor/cpu.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -108,20 +109,29 @@ static ts_code of_report(const ev_report *r, bool time, const char *folder, ts_s
 ts_code ev_figure_iterations(const ev_report *r, const char *folder, ts_status *st) { return of_report(r, false, folder, st); }
 ts_code ev_figure_methods(const ev_report *r, const char *folder, ts_status *st) { return of_report(r, true, folder, st); }
 
-/* A report's first method over its steps, the others as one line over their tolerances. */
-static bool add_size(figure *g, const ev_report *r, const char *const *tolerance)
+/* A method over its steps. */
+static void add_steps(figure *g, const ev_report *r, int m, const char *what)
 {
     char name[EV_NAME], label[16];
-    if (!grow(g, 2, r->columns)) return false;
-    snprintf(name, sizeof name, "%d pixels, T = 0 .. 24", r->size);
+    snprintf(name, sizeof name, "%d pixels, %s", r->size, what);
     begin_series(g, name);
-    for (int c = 0; c < r->method[0].points; c++) {
+    for (int i = 0; i < r->method[m].points; i++) {
+        const int c = r->method[m].first + i;
         snprintf(label, sizeof label, "%s%d", "T=", r->step[c]);
         put_point(g, r, c, ev_report_seconds(r, -1, c), r->step[c] % 6 == 0 ? label : "");
     }
+}
+
+/* A report's first two methods over their steps, the others as one line over their tolerances. */
+static bool add_size(figure *g, const ev_report *r, const char *const *tolerance)
+{
+    char name[EV_NAME];
+    if (!grow(g, 3, r->columns)) return false;
+    add_steps(g, r, 0, "T = 0 .. 24");
+    add_steps(g, r, 1, ts_isa_now() < TS_AVX512BF16 ? "bf16, emulated" : "bf16");
     snprintf(name, sizeof name, "%d pixels, tolerance", r->size);
     begin_series(g, name);
-    for (int m = 1; m < r->methods; m++) put_point(g, r, r->method[m].first, ev_report_seconds(r, -1, r->method[m].first), tolerance[m - 1]);
+    for (int m = 2; m < r->methods; m++) put_point(g, r, r->method[m].first, ev_report_seconds(r, -1, r->method[m].first), tolerance[m - 2]);
     return true;
 }
 
@@ -130,19 +140,20 @@ ts_code ev_pareto(const ev_run *r, const int *sizes, int count, const char *mode
     static const char *const tolerance[] = {"0.003", "0.006", "0.0125", "0.025", "0.05"};
     enum { TOLERANCES = 5 };
     figure g = {.axes = {"seconds for one photograph", "RMSE of the renderings", true}, .x_name = "seconds"};
-    ev_estimator *method = malloc((1 + TOLERANCES) * sizeof *method);
+    ev_estimator *method = malloc((2 + TOLERANCES) * sizeof *method);
     ts_code code = method ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory");
     if (!code) code = ev_method_parse("lgd:iterations=24", model, -1, &method[0], st);
+    if (!code) code = ev_method_parse("lgd:iterations=24,precision=bf16", model, -1, &method[1], st);
     for (int i = 0; i < TOLERANCES && !code; i++) {
         char spec[64];
         snprintf(spec, sizeof spec, "lgd:tolerance=%s", tolerance[i]);
-        code = ev_method_parse(spec, model, -1, &method[1 + i], st);
+        code = ev_method_parse(spec, model, -1, &method[2 + i], st);
     }
     for (int s = 0; s < count && !code; s++) {
         ev_run at = *r;
         at.size = sizes[s];
         at.method = method;
-        at.methods = 1 + TOLERANCES;
+        at.methods = 2 + TOLERANCES;
         at.perceptual = at.pictures = false;
         code = ev_run_all(&at, st);
         if (!code && at.report.results == 0) code = ts_fail(st, TS_INVALID, "no material could be evaluated at %d pixels", at.size);

@@ -36,7 +36,7 @@ static const lgd_argument arguments[] = {
     {PIN, "pin", NULL, "bind every thread to a CPU of its own"},
     {EXACT, "exact", NULL, "compute all convolutions directly, not by Winograd's way where it is faster, as lgd-infer does"},
     {FIGURE, "figure", "NAME", "also write DIR/NAME.svg and .csv: iterations (error over T, 0 .. 24 unless told) or methods (error over time)"},
-    {PARETO, "pareto", NULL, "instead: DIR/pareto.svg and .csv, lgd's time against error at 128, 256, 512 pixels, T = 0 .. 24, and tolerances"},
+    {PARETO, "pareto", NULL, "instead: DIR/pareto.svg and .csv, lgd's time against error at 128, 256, 512 pixels, T = 0 .. 24, f32 and bf16, and tolerances"},
     {TUNE, "tune", NULL, "instead: search the grids of the methods' settings (default: of those that need no weights), DIR/tune.csv"},
     {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {'q', "quiet", NULL, "no progress"},

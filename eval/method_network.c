@@ -2,6 +2,7 @@
 #include "eval/method.h"
 #include "infer/power.h"
 #include "infer/tiles.h"
+#include "tensor/conv.h"
 #include <string.h>
 
 enum { UNTILED = 512, TILE = 256 }; /* as lgd-infer's where a tolerance ends tiles early: up to the first the whole is one */
@@ -82,7 +83,7 @@ static ts_code run_tiles(ev_estimator *e, const ev_case *c, const float *const *
     return TS_OK;
 }
 
-static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
+static ts_code refine(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
 {
     const float *image[NN_MAX_IMAGES];
     rd_view view[NN_MAX_IMAGES];
@@ -98,6 +99,14 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
     return st->code;
 }
 
+static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
+{
+    ts_conv_precision_set((ts_precision)ev_number(e, "precision"));
+    const ts_code code = refine(e, c, seen, user, st);
+    ts_conv_precision_set(TS_F32);
+    return code;
+}
+
 #define MODEL_GIVEN(text) {.key = "model", .type = EV_WEIGHTS, .help = text}
 #define MODEL(text) {.key = "model", .type = EV_WEIGHTS, .initial = "", .help = text}
 #define ITERATIONS                                                                                                                        \
@@ -111,7 +120,8 @@ static const ev_setting joint[] = {MODEL("weights of g and h, by default the pro
 #define POWER                                                                                                                             \
     {.key = "power", .type = EV_WORD, .words = "told auto known", .initial = "told",                                                      \
      .help = "of the light: the usual one, estimated as lgd-infer --light-power auto, or what --exposure made of it"}
-#define REFINER ITERATIONS, TOLERANCE, EV_ORIENTATIONS, PHOTOS, POWER, {0}
+#define PRECISION {.key = "precision", .type = EV_WORD, .words = "f32 bf16", .initial = "f32", .help = "of what convolutions multiply, as lgd-infer --precision"}
+#define REFINER ITERATIONS, TOLERANCE, EV_ORIENTATIONS, PHOTOS, POWER, PRECISION, {0}
 
 static const ev_setting lgd[] = {MODEL("weights of g and h, by default the program's"), REFINER};
 static const ev_setting nograd[] = {MODEL_GIVEN("weights trained with model.gradient = no"), REFINER};

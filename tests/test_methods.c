@@ -281,7 +281,7 @@ TEST(methods_pareto_has_every_size)
         lines++;
         finite += at && name_end && sscanf(name_end, "\",%*[^,],%lf,%lf", &seconds, &error) == 2;
     }
-    CHECK(f && lines == 1 + 2 * (25 + 5), "%d lines", lines);
-    CHECK(finite >= 2 * (5 + 5), "%d labelled lines with numbers", finite);
+    CHECK(f && lines == 1 + 2 * (2 * 25 + 5), "%d lines", lines);
+    CHECK(finite >= 2 * (2 * 5 + 5), "%d labelled lines with numbers", finite);
     ev_set_close(&set);
 }

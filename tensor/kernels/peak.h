@@ -4,7 +4,8 @@
 #include "tensor/kernels/family.h"
 
 struct ts_peak_kernels {
-    double (*run)(long rounds); /* rounds of independent multiply-adds in registers; returns the FLOP done */
+    double (*run)(long rounds);      /* rounds of independent multiply-adds in registers; returns the FLOP done */
+    double (*run_bf16)(long rounds); /* the same of vdpbf16ps; NULL for an instruction set without it */
 };
 TS_FAMILY(peak)
 #endif
