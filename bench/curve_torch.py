@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """lgd-train and PyTorch from the same weights on the same batches: curve_torch.py CONFIG.ini OUT.svg [BUILD]
 
-Draws both training losses, means of 50 steps, and prints how far they are apart. BUILD: where the programs are, build.
+Draws the training losses, lgd-train's in f32 and bf16, as means of 50 steps, and prints how far they are apart. BUILD: where the programs are, build.
 The configuration has whole patches of model.g_size, descent = none and no moving average.
 """
 import csv
@@ -114,8 +114,9 @@ def theirs(keys, build, config, weights):
     return losses
 
 
-def ours(build, config, folder):
-    subprocess.run([f"{build}/bin/lgd-train", config, "--set", "output.folder=" + folder], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+def ours(build, config, folder, precision):
+    settings = ["--set", "output.folder=" + folder, "--set", "train.precision=" + precision]
+    subprocess.run([f"{build}/bin/lgd-train", config, *settings], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     with open(folder + "/log.csv") as f:
         return [float(row["loss"]) for row in csv.DictReader(f)]
 
@@ -135,10 +136,11 @@ def draw(path, curves):
         for k in range(0, steps + 1, steps // 4):
             f.write(f'<text x="{left + k / steps * (width - left - 20):.1f}" y="{height - 20}" text-anchor="middle">{k}</text>\n')
         f.write(f'<text x="{width / 2}" y="{height - 4}" text-anchor="middle">steps; the training loss, means of {MEAN}</text>\n')
-        for (name, _), mean, colour, dash in zip(curves.items(), means, ("#0072b2", "#d55e00"), ("", "6 4")):
+        at = 22
+        for (name, _), mean, colour, dash in zip(curves.items(), means, ("#0072b2", "#d55e00", "#009e73"), ("", "6 4", "2 3")):
             points = " ".join(f"{across(i):.1f},{down(v):.1f}" for i, v in enumerate(mean))
             f.write(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>\n')
-            at = 40 if not dash else 58
+            at += 18
             f.write(f'<line x1="{width - 200}" x2="{width - 170}" y1="{at - 4}" y2="{at - 4}" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/><text x="{width - 164}" y="{at}">{name}</text>\n')
         f.write("</svg>\n")
     return means
@@ -152,12 +154,15 @@ def main():
     torch.set_num_threads(int(os.environ.get("OMP_NUM_THREADS", os.cpu_count())))
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([f"{build}/bin/lgd-train", config, "--initial", folder + "/start.safetensors"], check=True)
-        curves = {"lgd-train": ours(build, config, folder + "/run"), f"PyTorch {torch.__version__}": theirs(keys, build, config, folder + "/start.safetensors")}
+        curves = {"lgd-train": ours(build, config, folder + "/run", "f32"), f"PyTorch {torch.__version__}": theirs(keys, build, config, folder + "/start.safetensors"),
+                  "lgd-train, bf16": ours(build, config, folder + "/bf16", "bf16")}
     means = draw(out, curves)
-    apart = [abs(a - b) / b for a, b in zip(*means)]
-    first = [abs(a - b) / b for a, b in zip(*(c[:20] for c in curves.values()))]
-    print(f"first step {curves['lgd-train'][0]:.6f} and {list(curves.values())[1][0]:.6f}; apart over the first 20 steps {100 * max(first):.3f} %, "
-          f"means of {MEAN} steps {100 * max(apart):.2f} % at most, the last {means[0][-1]:.4f} and {means[1][-1]:.4f}")
+    ours_f32, *others = zip(curves, curves.values(), means)
+    for name, curve, mean in others:
+        apart = [abs(a - b) / b for a, b in zip(ours_f32[2], mean)]
+        first = [abs(a - b) / b for a, b in zip(ours_f32[1][:20], curve)]
+        print(f"{name}: first step {curve[0]:.6f}, lgd-train {ours_f32[1][0]:.6f}; apart over the first 20 steps {100 * max(first):.3f} %, "
+              f"means of {MEAN} steps {100 * max(apart):.2f} % at most, the last {mean[-1]:.4f} and {ours_f32[2][-1]:.4f}")
 
 
 if __name__ == "__main__":
