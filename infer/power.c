@@ -6,15 +6,17 @@
 
 /* Stops by which R_0's brightness errs where nothing is amiss: the estimate is that much nearer to 1, so that usual photographs keep the usual light. */
 #define USUAL_STOPS 0.2
-#define CLIPPED 0.98f /* sensor values at and above say only that there is more light */
+#define MOST_STOPS 3.0
+#define STEP_STOPS 0.05 /* a tenth of the least that an eye sees */
 
-static void add_products(size_t values, const float *photo, const float *rendered, double *photo_rendered, double *rendered_rendered)
+/* How far the photographs' renderings are from them when every light is 2^stops times as strong: the loss of training, which a few pixels in a highlight
+ * that is in another place do not decide; both as a camera clips them. */
+static double distance(size_t values, const float *photo, const float *rendered, double stops)
 {
-    for (size_t i = 0; i < values; i++) {
-        if (photo[i] >= CLIPPED) continue;
-        *photo_rendered += (double)photo[i] * (double)rendered[i];
-        *rendered_rendered += (double)rendered[i] * (double)rendered[i];
-    }
+    const float factor = (float)exp2(stops);
+    double sum = 0;
+    for (size_t i = 0; i < values; i++) sum += fabs((double)logf((fminf(photo[i], 1) + 0.01f) / (fminf(factor * rendered[i], 1) + 0.01f)));
+    return sum;
 }
 
 ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given, int side, double *factor, ts_status *st)
@@ -24,7 +26,7 @@ ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *
     const size_t values = (size_t)size * (size_t)size * 3, whole = (size_t)side * (size_t)side * 3;
     *factor = 1;
     ag_reset(tape);
-    ag_value *small = ag_empty(tape, (ts_shape){given, size, size, 3}), *rendered = ag_empty(tape, (ts_shape){1, size, size, 3});
+    ag_value *small = ag_empty(tape, (ts_shape){given, size, size, 3}), *rendered = ag_empty(tape, (ts_shape){given, size, size, 3});
     const ts_mark mark = ag_scope_begin(tape);
     ag_value *full = ag_empty(tape, (ts_shape){given, side, side, 3});
     if (!small || !rendered || !full) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
@@ -39,14 +41,16 @@ ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *
         *st = *ag_status(tape);
         return st->code;
     }
-    double products = 0, squares = 0;
-    for (int k = 0; k < given; k++) {
-        rd_render(grid, maps->t.data, maps->t.shape.c, &views[k], false, rendered->t.data);
-        add_products(values, small->t.data + (size_t)k * values, rendered->t.data, &products, &squares);
+    for (int k = 0; k < given; k++) rd_render(grid, maps->t.data, maps->t.shape.c, &views[k], false, rendered->t.data + (size_t)k * values);
+    double best = INFINITY, found = 0;
+    bool tells = false; /* black: any light would be too strong; clipped: none would be */
+    for (size_t i = 0; i < (size_t)given * values && !tells; i++) tells = small->t.data[i] > 0 && small->t.data[i] < 1;
+    if (!tells) return TS_OK;
+    for (double stops = -MOST_STOPS - USUAL_STOPS; stops < MOST_STOPS + USUAL_STOPS + STEP_STOPS; stops += STEP_STOPS) {
+        const double far = distance((size_t)given * values, small->t.data, rendered->t.data, stops);
+        if (far < best) best = far, found = stops;
     }
-    if (products > 0 && squares > 0) {
-        const double stops = log2(products / squares), beyond = fmin(fmax(fabs(stops) - USUAL_STOPS, 0), 3);
-        *factor = exp2(stops < 0 ? -beyond : beyond);
-    }
+    const double beyond = fmin(fmax(fabs(found) - USUAL_STOPS, 0), MOST_STOPS);
+    *factor = exp2(found < 0 ? -beyond : beyond);
     return TS_OK;
 }
