@@ -27,7 +27,7 @@ int lgd_most_photos(const lgd_model *model);        /* photographs that it reads
 enum { LGD_AUTO = -2, LGD_AUTO_MOST = 24 };
 
 /* What costs the least time for renderings that are at most 1% worse than those of all steps (docs/performance.md). */
-#define LGD_TOLERANCE 0.004
+#define LGD_TOLERANCE 0.003
 #define LGD_TOLERANCE_USUAL (-1.0)
 
 enum { LGD_F32, LGD_BF16 };
