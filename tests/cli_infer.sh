@@ -158,7 +158,7 @@ mask_and_tolerance() {
 }
 
 usual_tolerance() {
-    photo "$T/p.ppm" 64 64
+    photo "$T/p.ppm" 64 64 120
     run="$BIN/lgd-infer --size 64 --threads 1 --maps normal,exr $T/p.ppm"
     expect 0 $run -o "$T/usual"
     expect 0 $run --tolerance 0.003 -o "$T/same"
