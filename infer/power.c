@@ -7,7 +7,7 @@
 /* Stops by which R_0's brightness errs where nothing is amiss: the estimate is that much nearer to 1, so that usual photographs keep the usual light. */
 #define USUAL_STOPS 0.2
 #define MOST_STOPS 3.0
-#define STEP_STOPS 0.05 /* a tenth of the least that an eye sees */
+#define STEP_STOPS 0.05 /* a quarter of what is left out anyway */
 
 /* How far the photographs' renderings are from them when every light is 2^stops times as strong: the loss of training, which a few pixels in a highlight
  * that is in another place do not decide; both as a camera clips them. */
