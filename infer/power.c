@@ -7,7 +7,8 @@
 /* Stops by which R_0's brightness errs where nothing is amiss: the estimate is that much nearer to 1, so that usual photographs keep the usual light. */
 #define USUAL_STOPS 0.2
 #define MOST_STOPS 3.0
-#define STEP_STOPS 0.05 /* a quarter of what is left out anyway */
+#define COARSE_STOPS 0.4 /* first these, then the finer ones around the best of them, a quarter of what is left out anyway */
+#define STEP_STOPS 0.05
 
 /* How far the photographs' renderings are from them when every light is 2^stops times as strong: the loss of training, which a few pixels in a highlight
  * that is in another place do not decide; both as a camera clips them. */
@@ -46,9 +47,13 @@ ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *
     bool tells = false; /* black: any light would be too strong; clipped: none would be */
     for (size_t i = 0; i < (size_t)given * values && !tells; i++) tells = small->t.data[i] > 0 && small->t.data[i] < 1;
     if (!tells) return TS_OK;
-    for (double stops = -MOST_STOPS - USUAL_STOPS; stops < MOST_STOPS + USUAL_STOPS + STEP_STOPS; stops += STEP_STOPS) {
-        const double far = distance((size_t)given * values, small->t.data, rendered->t.data, stops);
-        if (far < best) best = far, found = stops;
+    double middle = 0, reach = MOST_STOPS + USUAL_STOPS;
+    for (int fine = 0; fine < 2; fine++, middle = found, reach = COARSE_STOPS) {
+        const double step = fine ? STEP_STOPS : COARSE_STOPS;
+        for (int i = (int)-lround(reach / step); i <= lround(reach / step); i++) {
+            const double stops = middle + i * step, far = distance((size_t)given * values, small->t.data, rendered->t.data, stops);
+            if (far < best) best = far, found = stops;
+        }
     }
     const double beyond = fmin(fmax(fabs(found) - USUAL_STOPS, 0), MOST_STOPS);
     *factor = exp2(found < 0 ? -beyond : beyond);
