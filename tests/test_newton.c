@@ -1,47 +1,10 @@
 /* The steps of Gauss and Newton's method, of every instruction set, against the same equations in double. */
+#include "tests/normal_equations.h"
 #include "tests/shading.h"
-#include "tensor/kernels/newton.h"
 #include <math.h>
 #include <string.h>
 
 enum { SIDE = 19, PIXELS = SIDE * SIDE, MOST = RD_CAPTURE_VIEWS };
-
-/* The normal equations of a pixel: a = J' W J + damping, b = -J' W e. */
-static void equations(const float *maps, const double point[2], const rd_view *views, float *const *image, int64_t pixel, int count, double damping, double a[C][C], double b[C])
-{
-    double m[C];
-    to_double(maps, m);
-    memset(a, 0, C * sizeof *a), memset(b, 0, C * sizeof *b);
-    for (int i = 0; i < C; i++) a[i][i] = damping;
-    for (int k = 0; k < count; k++) {
-        double value[3], by[3][C];
-        rd_radiance(m, point, &views[k], value, by);
-        for (int c = 0; c < 3; c++) {
-            if (value[c] > 1) continue;
-            const double target = (double)image[k][pixel * 3 + c], w = 1 / (target + (double)TS_NEWTON_NOISE);
-            for (int i = 0; i < C; i++) {
-                b[i] -= w * by[c][i] * (value[c] - target);
-                for (int j = 0; j < C; j++) a[i][j] += w * by[c][i] * by[c][j];
-            }
-        }
-    }
-}
-
-/* Gauss's elimination; a is positive definite and needs no pivots. */
-static void solve(double a[C][C], double b[C], double x[C])
-{
-    for (int i = 0; i < C; i++)
-        for (int j = i + 1; j < C; j++) {
-            const double f = a[j][i] / a[i][i];
-            for (int k = i; k < C; k++) a[j][k] -= f * a[i][k];
-            b[j] -= f * b[i];
-        }
-    for (int i = C - 1; i >= 0; i--) {
-        x[i] = b[i];
-        for (int k = i + 1; k < C; k++) x[i] -= a[i][k] * x[k];
-        x[i] /= a[i][i];
-    }
-}
 
 static void plain_maps(ts_rng *rng, float *maps)
 {
@@ -67,7 +30,6 @@ TEST(newton_solves_the_equations)
     for (int isa = TS_BASE; isa <= (int)ts_isa_best(); isa++) {
         ts_isa_use((ts_isa)isa);
         double worst = 0;
-        long compared = 0;
         for (int count = 1; count <= MOST; count += 2) {
             ts_rng rng = ts_rng_make(8, TS_STREAM_TEST, (uint64_t)count);
             rd_view views[MOST];
@@ -77,23 +39,19 @@ TEST(newton_solves_the_equations)
             for (int i = 0; i < C; i++) damping[i] = 1;
             rd_newton_step(grid, maps, C, views, (const float *const *)image, count, damping, step);
             for (int p = 0; p < PIXELS; p++) {
-                double point[2], a[C][C], b[C], x[C], largest = 0;
+                double point[2], a[C][C], b[C], x[C];
                 rd_centre(grid, p % SIDE, p / SIDE, point);
-                equations(maps + p * C, point, views, image, p, count, 1, a, b);
-                for (int i = 0; i < C; i++) largest = fmax(largest, a[i][i]);
-                if (largest > 1e4) continue; /* single precision has no more digits than the equations lose */
-                solve(a, b, x);
-                compared++;
+                normal_equations(maps + p * C, point, views, (const float *const *)image, p, count, damping, a, b);
+                normal_solve(a, b, x);
                 for (int i = 0; i < C; i++) {
                     const double at = (double)maps[p * C + i], expected = fmin(fmax(at + x[i], -1), 1) - at, error = fabs((double)step[p * C + i] - expected);
                     worst = fmax(worst, error);
-                    CHECK(error <= 1e-4, "%s, %d photographs: channel %d goes by %g, not %g", ts_isa_name((ts_isa)isa), count, i, (double)step[p * C + i], expected);
+                    CHECK(error <= 1e-5, "%s, %d photographs: channel %d goes by %g, not %g", ts_isa_name((ts_isa)isa), count, i, (double)step[p * C + i], expected);
                 }
             }
             for (int k = 0; k < count; k++) free(image[k]);
         }
-        printf("%s: %ld pixels, off by %.2g at most\n", ts_isa_name((ts_isa)isa), compared, worst);
-        CHECK(compared > 4 * PIXELS, "only %ld pixels were compared", compared);
+        printf("%s: off by %.2g at most\n", ts_isa_name((ts_isa)isa), worst);
     }
     free(truth), free(maps), free(step);
 }

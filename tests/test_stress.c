@@ -11,6 +11,7 @@ static void run(bool (*part)(const stress *))
 }
 
 TEST(stress_shading_in_float) { run(stress_shading); }
+TEST(stress_newton_in_float) { run(stress_newton); }
 TEST(stress_refinement_from_any_picture) { run(stress_refinement); }
 TEST(stress_training_with_spoilt_inputs) { run(stress_training); }
 TEST(stress_gradient_of_the_unrolled_loop) { run(stress_unrolled); }

@@ -1,5 +1,6 @@
-/* Of nine unknowns a colour's rendering sees five: its own diffuse and specular, and roughness and normal, which the colours share. So the normal
- * equations are three blocks of 2 x 2 and one of 3 x 3 with what couples them: the blocks are eliminated, then 3 x 3 are left. */
+/* Of nine unknowns a colour's rendering sees five: its own diffuse and specular, and roughness and normal, which the colours share. The equations are
+ * never summed: their factor L D L' begins as the damping and takes up one row of J after the other (Gill, Golub, Murray, Saunders 1974, method C1), which,
+ * like Givens rotations, loses half of the digits that J' W J would. */
 #include "tensor/kernels/newton.h"
 #include "tensor/kernels/shade_lanes.h"
 
@@ -7,12 +8,29 @@ enum { SHARED = 3 };
 #define STEEPEST 1e6f /* of a derivative: with a light at the surface products of four would overflow */
 static const int shared_map[SHARED] = {MAP_ROUGHNESS, MAP_NORMAL, MAP_NORMAL + 1};
 
+enum { ROW = 2 + SHARED };
+
+/* A factor in the order of elimination: a colour's diffuse, its specular, what is shared. L's columns without their 1; L' x = z. */
+typedef struct pivot {
+    vf d, z, l[ROW - 1];
+} pivot;
 typedef struct equations {
-    vf dd[3], ds[3], ss[3];          /* of a colour's diffuse and specular */
-    vf d[3][SHARED], s[3][SHARED];   /* theirs with the shared ones */
-    vf own[SHARED][SHARED];          /* lower half */
-    vf right_d[3], right_s[3], right[SHARED];
+    pivot own[3][2], shared[SHARED];
 } equations;
+
+/* row: the derivatives by the pivot's own map and by the count after it; the pivot takes its share of them and of the error, and what is left weighs less. */
+V_INLINE void take_up(pivot *p, vf *row, int count, vf *error, vf *weight)
+{
+    const vf scaled = *weight * row[0], d = p->d + scaled * row[0], inverse = 1.0f / d, share = scaled * inverse;
+    for (int i = 0; i < count; i++) {
+        row[i + 1] -= row[0] * p->l[i];
+        p->l[i] += share * row[i + 1];
+    }
+    *error -= row[0] * p->z;
+    p->z += share * *error;
+    *weight *= p->d * inverse;
+    p->d = d;
+}
 
 V_INLINE void add_view(const ts_shade_view *view, ts_shade_kind kind, const ts_shade_row *row, int first, int n, const float *image, const surface *s, equations *q)
 {
@@ -32,67 +50,37 @@ V_INLINE void add_view(const ts_shade_view *view, ts_shade_kind kind, const ts_s
         derive(kind, s, &e, &g, &r, u, &d);
         encode(s, &d, j);
         for (int i = 0; i < MAP_CHANNELS; i++) j[i] = v_min(v_max(j[i], v_set(-STEEPEST)), v_set(STEEPEST));
-        const vf w = 1.0f / (v_max(target[c], v_set(0)) + TS_NEWTON_NOISE), error = w * (v_min(r.value[c], v_set(1)) - target[c]);
-        const vf jd = j[MAP_DIFFUSE + c], js = j[MAP_SPECULAR + c], wd = w * jd, ws = w * js;
-        q->dd[c] += wd * jd;
-        q->ds[c] += wd * js;
-        q->ss[c] += ws * js;
-        q->right_d[c] -= jd * error;
-        q->right_s[c] -= js * error;
-        for (int a = 0; a < SHARED; a++) {
-            const vf ja = j[shared_map[a]];
-            q->d[c][a] += wd * ja;
-            q->s[c][a] += ws * ja;
-            q->right[a] -= ja * error;
-            for (int b = 0; b <= a; b++) q->own[a][b] += w * ja * j[shared_map[b]];
-        }
+        vf error = target[c] - v_min(r.value[c], v_set(1)), weight = 1.0f / (v_max(target[c], v_set(0)) + TS_NEWTON_NOISE);
+        vf by[ROW] = {j[MAP_DIFFUSE + c], j[MAP_SPECULAR + c], j[MAP_ROUGHNESS], j[MAP_NORMAL], j[MAP_NORMAL + 1]};
+        for (int i = 0; i < 2; i++) take_up(&q->own[c][i], by + i, ROW - 1 - i, &error, &weight);
+        for (int i = 0; i < SHARED; i++) take_up(&q->shared[i], by + 2 + i, SHARED - 1 - i, &error, &weight);
     }
 }
 
-/* The damping is a lower bound of every pivot; rounding is kept above it. */
-V_INLINE void solve(equations *q, const float *damping, vf x[MAP_CHANNELS])
+V_INLINE void begin(const float *damping, equations *q)
 {
-    vf inverse[3], dd[3], ss[3], to_d[3][SHARED], to_s[3][SHARED];
-    for (int a = 0; a < SHARED; a++) q->own[a][a] += damping[shared_map[a]];
     for (int c = 0; c < 3; c++) {
-        const float least_d = damping[MAP_DIFFUSE + c], least_s = damping[MAP_SPECULAR + c];
-        dd[c] = q->dd[c] + least_d;
-        ss[c] = q->ss[c] + least_s;
-        inverse[c] = 1.0f / v_max(dd[c] * ss[c] - q->ds[c] * q->ds[c], v_max(dd[c] * least_s, ss[c] * least_d));
-        for (int a = 0; a < SHARED; a++) { /* block^-1 times what couples it */
-            to_d[c][a] = (ss[c] * q->d[c][a] - q->ds[c] * q->s[c][a]) * inverse[c];
-            to_s[c][a] = (dd[c] * q->s[c][a] - q->ds[c] * q->d[c][a]) * inverse[c];
-        }
-        for (int a = 0; a < SHARED; a++) {
-            for (int b = 0; b <= a; b++) q->own[a][b] -= q->d[c][a] * to_d[c][b] + q->s[c][a] * to_s[c][b];
-            q->right[a] -= to_d[c][a] * q->right_d[c] + to_s[c][a] * q->right_s[c];
-        }
+        q->own[c][0] = (pivot){.d = v_set(damping[MAP_DIFFUSE + c])};
+        q->own[c][1] = (pivot){.d = v_set(damping[MAP_SPECULAR + c])};
     }
+    for (int i = 0; i < SHARED; i++) q->shared[i] = (pivot){.d = v_set(damping[shared_map[i]])};
+}
+
+V_INLINE void solve(const equations *q, vf x[MAP_CHANNELS])
+{
     vf y[SHARED];
-    for (int a = 0; a < SHARED; a++) { /* own = L D L', L below the diagonal */
-        y[a] = q->right[a];
-        for (int b = 0; b < a; b++) {
-            vf l = q->own[a][b];
-            for (int k = 0; k < b; k++) l -= q->own[a][k] * q->own[b][k] * q->own[k][k];
-            q->own[a][b] = l / q->own[b][b];
-            y[a] -= q->own[a][b] * y[b];
-        }
-        for (int k = 0; k < a; k++) q->own[a][a] -= q->own[a][k] * q->own[a][k] * q->own[k][k];
-        q->own[a][a] = v_max(q->own[a][a], v_set(damping[shared_map[a]]));
-    }
-    for (int a = SHARED - 1; a >= 0; a--) {
-        y[a] /= q->own[a][a];
-        for (int b = a + 1; b < SHARED; b++) y[a] -= q->own[b][a] * y[b];
-        x[shared_map[a]] = y[a];
+    for (int i = SHARED - 1; i >= 0; i--) {
+        y[i] = q->shared[i].z;
+        for (int k = i + 1; k < SHARED; k++) y[i] -= q->shared[i].l[k - i - 1] * y[k];
+        x[shared_map[i]] = y[i];
     }
     for (int c = 0; c < 3; c++) {
-        vf d = (ss[c] * q->right_d[c] - q->ds[c] * q->right_s[c]) * inverse[c], s = (dd[c] * q->right_s[c] - q->ds[c] * q->right_d[c]) * inverse[c];
-        for (int a = 0; a < SHARED; a++) {
-            d -= to_d[c][a] * y[a];
-            s -= to_s[c][a] * y[a];
-        }
-        x[MAP_DIFFUSE + c] = d;
+        vf s = q->own[c][1].z, d = q->own[c][0].z;
+        for (int k = 0; k < SHARED; k++) s -= q->own[c][1].l[k] * y[k];
+        d -= q->own[c][0].l[0] * s;
+        for (int k = 0; k < SHARED; k++) d -= q->own[c][0].l[1 + k] * y[k];
         x[MAP_SPECULAR + c] = s;
+        x[MAP_DIFFUSE + c] = d;
     }
 }
 
@@ -102,14 +90,15 @@ static void step(const ts_shade_view *views, const float *const *images, int cou
         const int n = lanes_left(row, i);
         const float *maps = row->maps + (int64_t)i * row->channels;
         surface s;
-        equations q = {0};
+        equations q;
         vf x[MAP_CHANNELS], now[MAP_CHANNELS];
+        begin(damping, &q);
         decode(views->guards, maps, row->channels, n, &s);
         for (int v = 0; v < count; v++) {
             if (views[v].kind == TS_SHADE_COLLOCATED) add_view(&views[v], TS_SHADE_COLLOCATED, row, i, n, images[v], &s, &q);
             else add_view(&views[v], TS_SHADE_POSITIONS, row, i, n, images[v], &s, &q);
         }
-        solve(&q, damping, x);
+        solve(&q, x);
         v_load_pixels(maps, row->channels, n, MAP_CHANNELS, now);
         for (int c = 0; c < MAP_CHANNELS; c++) x[c] = v_min(v_max(now[c] + x[c], v_set(-1)), v_set(1)) - now[c];
         v_store_pixels(to + (int64_t)i * row->channels, row->channels, n, MAP_CHANNELS, x);

@@ -10,7 +10,7 @@ int main(int argc, char **argv)
     static const struct {
         const char *name;
         bool (*run)(const stress *);
-    } parts[] = {{"shading", stress_shading}, {"threads", stress_threads}, {"sums", stress_sums}, {"unrolled", stress_unrolled}, {"refinement", stress_refinement}, {"training", stress_training}};
+    } parts[] = {{"shading", stress_shading}, {"newton", stress_newton}, {"threads", stress_threads}, {"sums", stress_sums}, {"unrolled", stress_unrolled}, {"refinement", stress_refinement}, {"training", stress_training}};
     char folder[] = "/tmp/lgd-stress-XXXXXX", command[64];
     ts_status st = {0};
     if (ts_isa_init(&st) != TS_OK) return fprintf(stderr, "lgd-stress: %s\n", st.message), 2;

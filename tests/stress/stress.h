@@ -11,6 +11,7 @@ typedef struct stress {
 } stress;
 
 bool stress_shading(const stress *s);
+bool stress_newton(const stress *s);
 bool stress_refinement(const stress *s);
 bool stress_training(const stress *s);
 bool stress_unrolled(const stress *s);
