@@ -150,9 +150,17 @@ static void run_row(runner *r, int e, int ky0, int ky1, int panel0, int panel1, 
             t.segment = s->segment;
             t.segments = s->segments;
             t.a_stride = s->pixel;
+            /* So is its newest input row while the first panel passes by; a strip is in the cache. */
+            const float *fresh = NULL;
+            if (panel == panel0 && s->segments && !s->stage.rows) {
+                const ts_segment *newest = &s->segment[s->segments - 1];
+                fresh = s->pixel0 + newest->a + (newest->count == p->ic ? 0 : reach) * s->pixel; /* it begins at the row's last tap, or at its first */
+            }
+            t.fetch_step[0] = fresh ? r->tile_size * s->pixel * (ptrdiff_t)sizeof(float) / calls : 0;
             for (int tile = s->begin; tile < s->end; tile++) {
                 int begin, end;
                 tile_range(r, tile, &begin, &end);
+                t.fetch[0] = fresh ? fresh + end * s->pixel : p->packed;
                 t.fetch[1] = to + end * t.y_stride;
                 conv_run_tile(&t, conv_vectors(p->oc, panel), s->pixel0 + begin * s->pixel, to + begin * t.y_stride, end - begin,
                               p->bf16);

@@ -50,8 +50,8 @@ INLINE void store_lanes(float *p, vf v, lanes n)
 #endif
 
 /* Sums over more k than this are made of parts: the rounding of a float sum grows with its length, a published convolution has 25,600
- * terms, and a part costs a hundredth of its time to put away. */
-enum { PART = 96 };
+ * terms, and a part of 96 cost a fiftieth of its time to put away. */
+enum { PART = 192 };
 
 /* acc + the products of both halves of x and b. A bf16 value is the upper half of the float that it stands for. */
 INLINE vf dot2(vf acc, vf x, vf b)
