@@ -61,8 +61,8 @@ static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, 
 
 static const ev_setting settings[] = {
     {.key = "start", .type = EV_WORD, .words = "r0 constant", .initial = "r0", .grid = "r0 constant", .help = "the code of g's R_0, or of the mean of procedural materials"},
-    {.key = "rate", .type = EV_REAL, .lo = 0, .hi = 10, .initial = "0.03", .grid = "0.003 0.01 0.03 0.1 0.3", .help = "Adam's rate"},
-    {.key = "steps", .type = EV_WHOLE, .lo = 0, .hi = 100000, .initial = "50", .grid = "0 1 2 5 10 20 50 100", .steps = true, .help = "of Adam"},
+    {.key = "rate", .type = EV_REAL, .lo = 0, .hi = 10, .initial = "0.03", .grid = "0.0003 0.001 0.003 0.01 0.03 0.1", .help = "Adam's rate"},
+    {.key = "steps", .type = EV_WHOLE, .lo = 0, .hi = 100000, .initial = "50", .grid = "0 1 2 5 10 20 50 100 200", .steps = true, .help = "of Adam"},
     {.key = "model", .type = EV_WEIGHTS, .help = "of an auto-encoder, trained with configs/ablation/latent.ini"},
     {.key = "g", .type = EV_WEIGHTS, .initial = "", .help = "whose R_0, by default the program's"},
     {0}};
