@@ -83,6 +83,7 @@ bench_time bench_measure(void (*f)(void *user), void *user)
     } while (t.runs < MOST_RUNS && (t.runs < 3 || now() - begin < 0.33));
     t.peak = 0.5 * (t.peak + peak());
     qsort(times, (size_t)t.runs, sizeof *times, by_value);
+    t.best = times[0];
     t.seconds = t.runs % 2 ? times[t.runs / 2] : 0.5 * (times[t.runs / 2 - 1] + times[t.runs / 2]);
     return t;
 }
@@ -112,7 +113,7 @@ void bench_heading(const char *text) { printf("\n%s\n", text); }
 void bench_row(const char *label, bench_time t, double flop)
 {
     printf("  %-56s %11.4f ms", label, 1e3 * t.seconds);
-    if (flop > 0) printf(" %9.1f GFLOP/s %6.1f %% of the peak", 1e-9 * flop / t.seconds, 100 * flop / t.seconds / t.peak);
+    if (flop > 0) printf(" %9.1f GFLOP/s %6.1f %% of the peak (best %.1f)", 1e-9 * flop / t.seconds, 100 * flop / t.seconds / t.peak, 100 * flop / t.best / t.peak);
     printf("\n");
     fflush(stdout);
 }

@@ -14,6 +14,7 @@ void bench_register(const char *name, bench_function f);
  * and after, so that a row's fraction refers to the machine's speed at that moment. */
 typedef struct bench_time {
     double seconds; /* median of one call */
+    double best;    /* the shortest: what the code can do where neighbours hold up the others */
     double peak;    /* FLOP/s of the FMA peak with the threads in use, the mean of before and after */
     int runs;
 } bench_time;
@@ -25,7 +26,7 @@ bool bench_bf16(bench_time *t);
 /* Times are processor time (lgd-bench --cpu). */
 bool bench_cpu(void);
 
-/* A row: label, milliseconds, GFLOP/s and the fraction of the peak (flop = 0: no such columns). */
+/* A row: label, milliseconds, GFLOP/s and the fraction of the peak, at the median and at the best (flop = 0: no such columns). */
 void bench_row(const char *label, bench_time t, double flop);
 /* A row with a figure in another unit, for example 150.2 "Mpixel/s". */
 void bench_row_unit(const char *label, bench_time t, double value, const char *unit);

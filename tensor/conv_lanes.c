@@ -109,8 +109,8 @@ static void sum_row(const conv_plan *p, const rows *s, int e, float *out)
             }
             for (int j = 0; j < s->width; j += 2 * lanes) {
                 const ts_sum t = {.a = w, .b = s->memory + j, .a_row = w_row, .b_row = x_row, .rows = runs, .count = count, .a_stride = end - begin,
-                                  .b_stride = s->plane, .c = out + (ptrdiff_t)begin * s->width + j, .c_stride = s->width, .fetch = (const char *)out};
-                kernels->sum[s->width - j > lanes][end - begin](&t);
+                                  .b_stride = s->plane, .c = out + (ptrdiff_t)begin * s->width + j, .c_stride = s->width};
+                kernels->sum_near[s->width - j > lanes][end - begin](&t);
             }
             w += (ptrdiff_t)taps * count * (end - begin);
         }
@@ -154,7 +154,7 @@ static void run_band(const conv_plan *p, int image, int begin, int end)
 
 void conv_run_lanes(const conv_plan *p)
 {
-    int bands = (16 + p->n - 1) / p->n;
+    int bands = (4 * ts_threads() + p->n - 1) / p->n; /* each makes the rows around it anew */
     if (bands > (p->h + 7) / 8) bands = (p->h + 7) / 8;
 #pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads())
     for (int n = 0; n < p->n; n++)

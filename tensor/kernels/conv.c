@@ -163,13 +163,12 @@ INLINE void tile(const ts_tile *t, const int pixels, const int vectors, const bo
             vf x = v_set(a[m]);                                                                               \
             UNROLL for (int v = 0; v < vectors; v++) acc[m][v] += x * y[v];                                   \
         }                                                                                                     \
-        __builtin_prefetch(b + ahead);                                                                        \
-        __builtin_prefetch(b + ahead + VL);                                                                   \
+        if (!near) __builtin_prefetch(b + ahead), __builtin_prefetch(b + ahead + VL);                         \
         a += as;                                                                                              \
         b += bs;                                                                                              \
     }
 
-INLINE void sum(const ts_sum *t, const int rows, const int vectors)
+INLINE void sum(const ts_sum *t, const int rows, const int vectors, const bool near)
 {
     vf acc[ROWS][2];
     UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++) acc[m][v] = v_load(t->c + m * t->c_stride + v * VL);
@@ -180,8 +179,7 @@ INLINE void sum(const ts_sum *t, const int rows, const int vectors)
         int p = t->count;
         for (; p >= 2; p -= 2, fetch += step) {
             PIXEL
-            __builtin_prefetch(fetch, 0, 2);
-            __builtin_prefetch(fetch + 64, 0, 2);
+            if (!near) __builtin_prefetch(fetch, 0, 2), __builtin_prefetch(fetch + 64, 0, 2);
             PIXEL
         }
         if (p) PIXEL
@@ -310,8 +308,10 @@ static void collect(const float *x, ptrdiff_t plane, int pixels, int channels, b
     static void tile_##n##_2(const ts_tile *t) { tile(t, n, 2, false); }   \
     static void bf16_##n##_1(const ts_tile *t) { tile(t, n, 1, true); }    \
     static void bf16_##n##_2(const ts_tile *t) { tile(t, n, 2, true); }    \
-    static void sum_##n##_1(const ts_sum *t) { sum(t, n, 1); }             \
-    static void sum_##n##_2(const ts_sum *t) { sum(t, n, 2); }
+    static void sum_##n##_1(const ts_sum *t) { sum(t, n, 1, false); }      \
+    static void sum_##n##_2(const ts_sum *t) { sum(t, n, 2, false); }      \
+    static void near_##n##_1(const ts_sum *t) { sum(t, n, 1, true); }      \
+    static void near_##n##_2(const ts_sum *t) { sum(t, n, 2, true); }
 FOR_ALL(FUNCTIONS)
 
 #define TILE_1(n) [n] = tile_##n##_1,
@@ -320,6 +320,8 @@ FOR_ALL(FUNCTIONS)
 #define BF16_2(n) [n] = bf16_##n##_2,
 #define SUM_1(n) [n] = sum_##n##_1,
 #define SUM_2(n) [n] = sum_##n##_2,
+#define NEAR_1(n) [n] = near_##n##_1,
+#define NEAR_2(n) [n] = near_##n##_2,
 const struct ts_conv_kernels TS_TABLE(conv) = {
     .lanes = VL,
     .pixels = PIXELS,
@@ -327,6 +329,7 @@ const struct ts_conv_kernels TS_TABLE(conv) = {
     .tile = {{FOR_ALL(TILE_1)}, {FOR_ALL(TILE_2)}},
     .tile_bf16 = {{FOR_ALL(BF16_1)}, {FOR_ALL(BF16_2)}},
     .sum = {{FOR_ALL(SUM_1)}, {FOR_ALL(SUM_2)}},
+    .sum_near = {{FOR_ALL(NEAR_1)}, {FOR_ALL(NEAR_2)}},
     .pairs = pairs,
     .columns = columns,
     .transpose = transpose,

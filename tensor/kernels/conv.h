@@ -46,7 +46,7 @@ typedef struct ts_sum {
     ptrdiff_t a_stride, b_stride; /* from pixel to pixel */
     float *c;
     ptrdiff_t c_stride;
-    const char *fetch;    /* prefetched into the second cache, two lines for every other pixel; never read, but should be mapped */
+    const char *fetch;    /* prefetched into the second cache, two lines for every other pixel (not by sum_near); never read, but should be mapped */
     ptrdiff_t fetch_step; /* bytes forward for two pixels */
 } ts_sum;
 
@@ -60,6 +60,7 @@ struct ts_conv_kernels {
     ts_tile_function *tile[2][TS_TILE_PIXELS + 1]; /* [vectors - 1][pixels] */
     ts_tile_function *tile_bf16[2][TS_TILE_PIXELS + 1];
     ts_sum_function *sum[2][TS_SUM_ROWS + 1];      /* [vectors - 1][m] */
+    ts_sum_function *sum_near[2][TS_SUM_ROWS + 1]; /* the same of what lies in the first cache: nothing is fetched ahead */
     /* to[p stride + i] = channels 2i and 2i + 1 of pixel p, rounded to the nearest bf16, ties to even, NaNs quiet; the last pair of an odd number
      * of channels ends with a zero */
     void (*pairs)(const float *x, int64_t pixels, int channels, float *to, ptrdiff_t stride);
