@@ -1,7 +1,9 @@
 #include "tensor/conv.h"
 #include "tensor/cpu.h"
+#include "tensor/kernels/conv.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"
+#include "tests/conv_shapes.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
@@ -62,26 +64,6 @@ static void same(const buffer *a, const buffer *b, double count, const char *wha
     for (size_t i = 0; i < a->count; i++)
         CHECK(fabs((double)a->data[i] - b->data[i]) <= bound, "%s differs at %zu: %.9g, naive %.9g (%s)", what, i, a->data[i], b->data[i],
               describe(c));
-}
-
-static ts_conv draw(ts_rng *r)
-{
-    static const int channels[] = {1, 2, 3, 9, 16, 18, 20, 31, 32, 33, 48, 64}, sides[] = {1, 3, 3, 5, 5, 7};
-    static const int sizes[] = {1, 2, 3, 4, 5, 7, 8, 13, 14, 15, 17, 29};
-    ts_conv c = {.n = 1, .ic = channels[ts_rng_int(r, 12)], .oc = channels[ts_rng_int(r, 12)], .k = sides[ts_rng_int(r, 6)],
-                 .dilation = 1 + ts_rng_int(r, 2), .pad = ts_rng_int(r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE};
-    c.h = sizes[ts_rng_int(r, 12)];
-    c.w = sizes[ts_rng_int(r, 12)];
-    c.n = 1 + ts_rng_int(r, 6);
-    /* The naive twin decides how long this takes. */
-    while ((double)c.n * c.h * c.w * c.ic * c.oc * c.k * c.k > 2e6) {
-        if (c.n > 1 && c.h * c.w > 64) c.n--;
-        else if (c.h > c.w && c.h > 4) c.h = c.h / 2;
-        else if (c.w > 4) c.w = c.w / 2;
-        else if (c.ic > c.oc) c.ic = c.ic / 2 + 1;
-        else c.oc = c.oc / 2 + 1;
-    }
-    return c;
 }
 
 typedef struct problem {
@@ -190,7 +172,7 @@ static void against_naive(void (*check)(const problem *p), uint64_t seed)
     for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
         ts_isa_use((ts_isa)isa);
         for (int i = 0; i < 150; i++) {
-            problem p = make_problem(draw(&r), &r);
+            problem p = make_problem(any_conv(&r, 2e6), &r);
             check(&p);
             finish_problem(&p);
         }
@@ -228,6 +210,26 @@ TEST(conv_chosen_shapes)
     }
 }
 
+/* Few channels: blocks of columns end before, at and behind what padding folds onto the border. */
+TEST(conv_blocks_of_columns)
+{
+    ts_rng r = ts_rng_make(9, TS_STREAM_TEST, 0);
+    for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
+        ts_isa_use((ts_isa)isa);
+        const int lanes = ts_conv_k()->lanes;
+        for (int blocks = 4; blocks <= 8; blocks += 2)
+            for (int off = -5; off <= 5; off++) {
+                const ts_conv c = {1, 2 + ts_rng_int(&r, 3), blocks * lanes + off, 1 + ts_rng_int(&r, 40), 1 + ts_rng_int(&r, lanes),
+                                   ts_rng_int(&r, 2) ? 3 : 5, 1 + ts_rng_int(&r, 2), ts_rng_int(&r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE};
+                ts_conv back = c;
+                back.ic = c.oc, back.oc = c.ic;
+                problem p = make_problem(c, &r), q = make_problem(back, &r);
+                check_forward(&p), check_data_gradient(&q);
+                finish_problem(&p), finish_problem(&q);
+            }
+    }
+}
+
 static double dot(const buffer *a, const buffer *b)
 {
     double s = 0;
@@ -242,7 +244,7 @@ TEST(conv_adjoint)
     for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
         ts_isa_use((ts_isa)isa);
         for (int i = 0; i < 150; i++) {
-            problem p = make_problem(draw(&r), &r);
+            problem p = make_problem(any_conv(&r, 2e6), &r);
             buffer *const inputs[] = {&p.x, &p.weight, &p.dy};
             for (int b = 0; b < 3; b++)
                 for (size_t j = 0; j < inputs[b]->count; j++) inputs[b]->data[j] = (float)(ts_rng_int(&r, 5) - 2);

@@ -6,6 +6,7 @@
 #include "tensor/kernels/conv.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"
+#include "tests/conv_shapes.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
@@ -154,22 +155,6 @@ static void against_naive(ts_conv c, ts_rng *r)
     finish(&p);
 }
 
-static ts_conv draw(ts_rng *r)
-{
-    static const int channels[] = {1, 2, 3, 9, 16, 18, 20, 31, 32, 33, 48, 64}, sides[] = {1, 3, 3, 5, 5, 7};
-    static const int sizes[] = {1, 2, 3, 4, 5, 7, 8, 13, 14, 15, 17, 29};
-    ts_conv c = {1 + ts_rng_int(r, 6), sizes[ts_rng_int(r, 12)], sizes[ts_rng_int(r, 12)], channels[ts_rng_int(r, 12)], channels[ts_rng_int(r, 12)],
-                 sides[ts_rng_int(r, 6)], 1 + ts_rng_int(r, 2), ts_rng_int(r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE};
-    while ((double)c.n * c.h * c.w * c.ic * c.oc * c.k * c.k > 1e6) { /* the naive twin decides how long this takes */
-        if (c.n > 1 && c.h * c.w > 64) c.n--;
-        else if (c.h > c.w && c.h > 4) c.h = c.h / 2;
-        else if (c.w > 4) c.w = c.w / 2;
-        else if (c.ic > c.oc) c.ic = c.ic / 2 + 1;
-        else c.oc = c.oc / 2 + 1;
-    }
-    return c;
-}
-
 TEST(bf16_conv_naive)
 {
     static const ts_conv shapes[] = {
@@ -180,7 +165,7 @@ TEST(bf16_conv_naive)
     ts_rng r = ts_rng_make(22, TS_STREAM_TEST, 0);
     for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
         ts_isa_use((ts_isa)isa);
-        for (int i = 0; i < 120; i++) against_naive(draw(&r), &r);
+        for (int i = 0; i < 120; i++) against_naive(any_conv(&r, 1e6), &r);
         for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) against_naive(shapes[i], &r);
     }
 }
