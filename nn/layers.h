@@ -41,6 +41,12 @@ typedef struct nn_layers {
 #define NN_NEWTON_START (-3.0) /* half the identity: the equations are linear only near the maps */
 #define NN_DESCENT_START (-2.0) /* -0.003 times the identity, shared by the photographs: six such steps lower the loss of a trained g's R_0 without overshooting anywhere */
 
+/* Channels of g's level 0 .. g_levels. */
+int nn_level_width(const nn_arch *a, int level);
+
+void nn_param_dims(const nn_param *p, int64_t dim[4]);
+bool nn_all_finite(const float *v, size_t count);
+
 /* Parameter number index as a value on the tape, NULL for index -1. */
 ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index);
 ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad, float leak);

@@ -83,7 +83,7 @@ static nn_unet_block unet_block(nn_model *m, const char *way, int number, int in
     return b;
 }
 
-static int level_width(const nn_arch *a, int level)
+int nn_level_width(const nn_arch *a, int level)
 {
     int64_t w = (int64_t)a->g_width << level;
     return w < a->g_width_max ? (int)w : a->g_width_max;
@@ -93,15 +93,15 @@ static void plan_g(nn_model *m)
 {
     const nn_arch *a = &m->arch;
     nn_layers *l = m->layers;
-    int levels = a->g_levels, w0 = level_width(a, 0);
+    int levels = a->g_levels, w0 = nn_level_width(a, 0);
     l->input_conv = conv(m, "g.input.conv", w0, 3 * a->images, 3, true, leaky_gain(NN_LEAK_G));
     l->input_global = linear(m, "g.input.global", w0, 3 * a->images, 1);
     for (int i = 1; i <= levels; i++) {
-        int in = level_width(a, i - 1), out = level_width(a, i);
+        int in = nn_level_width(a, i - 1), out = nn_level_width(a, i);
         l->down[i - 1] = unet_block(m, "down", i, in, out, out, in, i == 1 ? a->g_kernel_first : a->g_kernel);
     }
-    for (int i = 1, deep = level_width(a, levels); i <= levels; i++) {
-        int skip = level_width(a, levels - i), out = i < levels ? level_width(a, levels - i - 1) : w0;
+    for (int i = 1, deep = nn_level_width(a, levels); i <= levels; i++) {
+        int skip = nn_level_width(a, levels - i), out = i < levels ? nn_level_width(a, levels - i - 1) : w0;
         l->up[i - 1] = unet_block(m, "up", i, skip + deep, (skip + deep) / 2, out, deep, a->g_kernel);
         deep = out;
     }
@@ -153,15 +153,15 @@ static void plan_latent(nn_model *m)
     char name[64];
     for (int i = 0; i <= levels; i++) {
         snprintf(name, sizeof name, "a.encoder%d", i);
-        l->encoder[i] = conv(m, name, level_width(a, i), i ? level_width(a, i - 1) : a->channels, 3, true, gain);
+        l->encoder[i] = conv(m, name, nn_level_width(a, i), i ? nn_level_width(a, i - 1) : a->channels, 3, true, gain);
     }
-    l->code = conv(m, "a.code", a->latent, level_width(a, levels), 3, true, 1);
+    l->code = conv(m, "a.code", a->latent, nn_level_width(a, levels), 3, true, 1);
     for (int i = levels; i >= 0; i--)
         for (int j = 0; j < (i < levels ? 2 : 1); j++) {
             snprintf(name, sizeof name, "a.decoder%d.conv%d", i, j + 1);
-            l->decoder[i][j] = conv(m, name, level_width(a, i), j ? level_width(a, i) : i == levels ? a->latent : level_width(a, i + 1), 3, true, gain);
+            l->decoder[i][j] = conv(m, name, nn_level_width(a, i), j ? nn_level_width(a, i) : i == levels ? a->latent : nn_level_width(a, i + 1), 3, true, gain);
         }
-    l->decoded = conv(m, "a.output", a->channels, level_width(a, 0), 3, true, 0.25);
+    l->decoded = conv(m, "a.output", a->channels, nn_level_width(a, 0), 3, true, 0.25);
 }
 
 nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)

@@ -1,5 +1,7 @@
 /* Weights files: what is written comes back, and no file that is something else does any harm. */
 #include "nn/weights.h"
+#include "tensor/maps.h"
+#include "tensor/rng.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
@@ -231,6 +233,46 @@ TEST(weights_init_from_takes_what_fits)
     CHECK(nn_model_init_from(n, path, &taken, &left, &st) == TS_FORMAT && strstr(st.message, path), "'%s'", st.message);
     st = (ts_status){0};
     CHECK(nn_model_init_from(n, path_of("none"), &taken, &left, &st) == TS_IO, "'%s'", st.message);
+}
+
+/* Every width of g grows by another factor, some to more than twice theirs; h stays. */
+TEST(weights_init_from_a_narrower_g_computes_the_same)
+{
+    enum { SIDE = 16, VALUES = SIDE * SIDE * MAP_CHANNELS };
+    ts_status st = {0};
+    nn_arch narrow = small(), wide = small();
+    narrow.g_size = wide.g_size = 8;
+    wide.g_width = 8, wide.g_width_max = 9;
+    nn_model *m = nn_model_create(&narrow, &st), *n = nn_model_create(&wide, &st);
+    nn_model_init(m, 3);
+    nn_model_init(n, 4);
+    const char *path = path_of("narrow.safetensors");
+    CHECK(!nn_model_save(m, m->value, path, NULL, 0, &st), "%s", st.message);
+    int taken, left;
+    CHECK(!nn_model_init_from(n, path, &taken, &left, &st) && taken == n->params && left == 0, "%d taken, %d left: %s", taken, left, st.message);
+    float image[SIDE * SIDE * 3], first[VALUES];
+    ts_rng rng = ts_rng_make(3, TS_STREAM_TEST, 0);
+    for (int i = 0; i < SIDE * SIDE * 3; i++) image[i] = ts_rng_uniform(&rng);
+    const nn_input in = {.image = ts_view(image, (ts_shape){1, SIDE, SIDE, 3}), .grid = rd_grid_full(SIDE), .view = rd_flash()};
+    for (int k = 0; k < 2; k++) {
+        ag_tape *t = ag_tape_create(false, &st);
+        const ag_value *maps = nn_predict(t, k ? n : m, &in);
+        CHECK(maps, "%s", ag_status(t)->message);
+        for (int i = 0; i < VALUES; i++) {
+            if (!k) first[i] = maps->t.data[i];
+            CHECK(fabsf(maps->t.data[i] - first[i]) <= 2e-5f, "value %d: %g, of the narrow one %g", i, (double)maps->t.data[i], (double)first[i]);
+        }
+        ag_tape_destroy(&t);
+    }
+    /* Copies are read with different weights, or they would stay the same for ever. */
+    const nn_param *p = nn_model_find(n, "g.down1.conv1.weight");
+    const float *w = n->value + p->offset;
+    CHECK(p->dim[1] == 8 && w[0] != w[3 * 9] && w[3 * 9] != w[6 * 9], "copies of channel 0 have the weights %g, %g and %g", (double)w[0], (double)w[3 * 9], (double)w[6 * 9]);
+    wide.g_levels = 1;
+    nn_model_free(&n);
+    n = nn_model_create(&wide, &st);
+    CHECK(!nn_model_init_from(n, path, &taken, &left, &st) && left > 0, "another depth was taken");
+    nn_model_free(&m), nn_model_free(&n);
 }
 
 TEST(weights_writing_leaves_the_old_file_or_the_new_one)
