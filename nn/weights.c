@@ -2,8 +2,21 @@
 #include "nn/weights.h"
 #include "nn/layers.h"
 #include "nn/published.h"
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+void nn_param_dims(const nn_param *p, int64_t dim[4])
+{
+    for (int i = 0; i < 4; i++) dim[i] = p->dim[i];
+}
+
+bool nn_all_finite(const float *v, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (!isfinite(v[i])) return false;
+    return true;
+}
 
 static bool of_network(const char *name)
 {

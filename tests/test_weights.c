@@ -268,6 +268,8 @@ TEST(weights_init_from_a_narrower_g_computes_the_same)
     const nn_param *p = nn_model_find(n, "g.down1.conv1.weight");
     const float *w = n->value + p->offset;
     CHECK(p->dim[1] == 8 && w[0] != w[3 * 9] && w[3 * 9] != w[6 * 9], "copies of channel 0 have the weights %g, %g and %g", (double)w[0], (double)w[3 * 9], (double)w[6 * 9]);
+    m->arch.g_width = 5; /* a file that states other widths than it has */
+    CHECK(!nn_model_save(m, m->value, path, NULL, 0, &st) && !nn_model_init_from(n, path, &taken, &left, &st) && left > 0, "widths that are not there were taken");
     wide.g_levels = 1;
     nn_model_free(&n);
     n = nn_model_create(&wide, &st);
