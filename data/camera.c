@@ -126,6 +126,18 @@ static void expose(const io_camera *c, const faults *f, uint64_t seed, uint64_t 
         }
 }
 
+/* Of variance read^2 + gain v, clipped again. */
+static void add_noise(ts_rng *rng, float read, float gain, size_t count, float *image)
+{
+    enum { PART = 1024 };
+    float normal[PART];
+    for (size_t begin = 0; begin < count; begin += PART, image += PART) {
+        const int n = count - begin < PART ? (int)(count - begin) : PART;
+        ts_rng_normals(rng, n, normal);
+        for (int i = 0; i < n; i++) image[i] = nz_clamp(image[i] + __builtin_sqrtf(read * read + gain * image[i]) * normal[i], 0, 1);
+    }
+}
+
 void io_camera_apply(const io_camera *c, uint64_t seed, uint64_t index, int size, float *image)
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
@@ -143,12 +155,7 @@ void io_camera_apply(const io_camera *c, uint64_t seed, uint64_t index, int size
     if (c->exposure > 0 || c->vignette > 0 || c->white_balance > 0) expose(c, &f, seed, index, size, image);
     for (size_t i = 0; i < count; i++) image[i] = nz_clamp(image[i], 0, 1);
     if (sigma > 0.15f) blur(size, sigma, image); /* a narrower one changes nothing that 8 bits show */
-    if (strength > 0)
-        for (size_t i = 0; i < count; i++) {
-            float v = nz_clamp(image[i], 0, 1);
-            v += sqrtf(read * read + gain * v) * ts_rng_normal(&rng);
-            image[i] = nz_clamp(v, 0, 1);
-        }
+    if (strength > 0) add_noise(&rng, read, gain, count, image);
     if (!c->quantise && !c->jpeg) return;
     pthread_once(&once, make_codes);
     uint8_t *codes = ts_scratch(TS_SCRATCH_SLOTS - 1, count); /* the blur's: it is done */

@@ -1,5 +1,6 @@
 /* The naive twin of tensor/kernels/noise.c: a point at a time. The same operations in the same order, since the bytes must be the same. */
 #include "tensor/kernels/noise.h"
+#include "tensor/rng.h"
 #include <math.h>
 #include <stddef.h>
 
@@ -61,4 +62,10 @@ static void cell(int n, const float *u, const float *v, ts_noise_cells c, float 
     }
 }
 
-const struct ts_noise_kernels ts_noise_naive = {.octave = octave, .cell = cell};
+static void normal(int64_t blocks, const uint32_t key[2], const uint32_t counter[4], float *out)
+{
+    ts_rng r = {.key = {key[0], key[1]}, .counter = {counter[0], counter[1], counter[2], counter[3]}};
+    for (int64_t i = 0; i < 2 * blocks; i++) out[i] = ts_rng_normal(&r);
+}
+
+const struct ts_noise_kernels ts_noise_naive = {.octave = octave, .cell = cell, .normal = normal};

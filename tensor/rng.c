@@ -1,4 +1,5 @@
 #include "tensor/rng.h"
+#include "tensor/kernels/noise.h"
 #include <math.h>
 
 static void philox(const uint32_t key[2], const uint32_t counter[4], uint32_t out[4])
@@ -50,4 +51,14 @@ float ts_rng_normal(ts_rng *r)
 {
     const double u = ((double)ts_rng_u32(r) + 1.0) * 0x1p-32, v = (double)ts_rng_u32(r) * 0x1p-32;
     return (float)(sqrt(-2.0 * log(u)) * cos(6.283185307179586 * v));
+}
+
+void ts_rng_normals(ts_rng *r, int64_t n, float *out)
+{
+    int64_t i = 0;
+    for (; i < n && r->left > 0; i++) out[i] = ts_rng_normal(r); /* to the next block, or never there where one number of a block is left */
+    const int64_t blocks = (n - i) / 2;
+    ts_noise_k()->normal(blocks, r->key, r->counter, out + i);
+    r->counter[0] += (uint32_t)blocks;
+    for (i += 2 * blocks; i < n; i++) out[i] = ts_rng_normal(r);
 }

@@ -2,6 +2,7 @@
 #include "tensor/kernels/noise.h"
 #include "tensor/rng.h"
 #include "tests/test.h"
+#include <math.h>
 #include <string.h>
 
 enum { MOST = 700 };
@@ -46,6 +47,28 @@ TEST(noise_kernels_match_their_naive_twin_exactly)
                 for (int i = 0; i < MOST; i++)
                     CHECK(!memcmp(&ours[k][i], &theirs[k][i], sizeof(float)), "%s: output %d of point %d of %d (trial %d) is %.9g, not %.9g",
                           ts_isa_name((ts_isa)isa), k, i, n, trial, (double)ours[k][i], (double)theirs[k][i]);
+        }
+    }
+}
+
+TEST(noise_kernels_give_the_normal_numbers_of_the_stream)
+{
+    static float first[MOST], many[MOST];
+    for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
+        ts_isa_use((ts_isa)isa);
+        for (int trial = 0; trial < 200; trial++) {
+            ts_rng a = ts_rng_make(11, TS_STREAM_TEST, (uint64_t)trial), b = a;
+            const int before = trial % 5, n = trial * 37 % MOST; /* blocks are entered at every place */
+            for (int i = 0; i < before; i++) CHECK(ts_rng_u32(&a) == ts_rng_u32(&b), "the same stream");
+            ts_rng_normals(&a, n, many);
+            for (int i = 0; i < n; i++) {
+                const float one = ts_rng_normal(&b);
+                CHECK(fabsf(many[i] - one) < 3e-4f, "%s: number %d of %d is %.9g, not %.9g", ts_isa_name((ts_isa)isa), i, n, (double)many[i], (double)one);
+            }
+            CHECK(ts_rng_u32(&a) == ts_rng_u32(&b), "%s: %d numbers leave the stream elsewhere", ts_isa_name((ts_isa)isa), n);
+            if (trial != 18) continue;
+            if (isa == 0) memcpy(first, many, sizeof first);
+            CHECK(n > 600 && !memcmp(first, many, (size_t)n * sizeof *many), "%s: other bytes than the first instruction set's", ts_isa_name((ts_isa)isa));
         }
     }
 }

@@ -1,4 +1,4 @@
-/* Gradient noise and cells at many points. Nothing is contracted to FMA here (the Makefile says so): every instruction set gives the same bytes,
+/* Gradient noise and cells at many points, and normal random numbers. Nothing is contracted to FMA here (the Makefile says so): every instruction set gives the same bytes,
  * so that procedural materials do not depend on the machine. */
 #ifndef TS_KERNELS_NOISE_H
 #define TS_KERNELS_NOISE_H
@@ -34,6 +34,9 @@ struct ts_noise_kernels {
     /* The nearest of the nine feature points around: near its distance, edge the distance to the border with the second's cell, id in [0, 1), x and y
      * from the point. Any may be NULL. */
     void (*cell)(int n, const float *u, const float *v, ts_noise_cells c, float *near, float *edge, float *id, float *x, float *y);
+    /* out[2i] and out[2i + 1], i < blocks: the normal random numbers of ts_rng_normal (tensor/rng.h) by Philox block counter[0] + i, in float: within 3e-4
+     * of its double. */
+    void (*normal)(int64_t blocks, const uint32_t key[2], const uint32_t counter[4], float *out);
 };
 TS_FAMILY(noise)
 
