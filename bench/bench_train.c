@@ -40,11 +40,14 @@ static void step(void *user)
     if (ag_status(s->tape)->code) return;
     ag_value *loss = loss_of(s, maps[0]);
     ag_backward(s->tape, s->steps > 0 ? ag_add(s->tape, loss_of(s, maps[s->steps]), loss) : loss);
-    size_t first = 0, last = s->model->count;
-    if (s->model->g_fixed) nn_model_range(s->model, true, &first, &last);
-    nn_gradient_norm(s->model, first, last);
     nn_adam_next(&s->adam);
-    nn_adam_step(&s->adam, s->model, first, last, 1e-4f, 1);
+    for (int part = NN_G; part <= NN_COARSE; part++) {
+        size_t first, last;
+        nn_model_range(s->model, (nn_part)part, &first, &last);
+        if (s->model->fixed[part] || first == last) continue;
+        nn_gradient_norm(s->model, first, last);
+        nn_adam_step(&s->adam, s->model, first, last, 1e-4f, 1);
+    }
 }
 
 static void losses(void *user)
@@ -70,7 +73,7 @@ static double peer(const subject *s)
     char job[256];
     bench_peer_network("train", &s->model->arch, s->steps, job, sizeof job);
     const size_t n = strlen(job);
-    snprintf(job + n, sizeof job - n, " %d %d %d %d", s->c.train.batch, s->c.data.patch, s->in.grid.w, s->model->g_fixed);
+    snprintf(job + n, sizeof job - n, " %d %d %d %d", s->c.train.batch, s->c.data.patch, s->in.grid.w, s->model->fixed[NN_G]);
     return bench_peer(job);
 }
 
@@ -94,8 +97,10 @@ static void measure(subject *s)
 {
     const int batch = s->c.train.batch, side = s->in.grid.w;
     char label[96];
-    const double g = bench_network_flop(s->model, "g.", side), h = bench_network_flop(s->model, "h.", side), flop = batch * ((s->model->g_fixed ? 1 : 3) * g + 3 * s->steps * h);
-    snprintf(label, sizeof label, "%d patches of %d^2, window %d, T = %d%s", batch, s->c.data.patch, side, s->steps, s->model->g_fixed ? ", g fixed" : "");
+    const int coarse = s->steps < s->model->arch.coarse_steps ? s->steps : s->model->arch.coarse_steps;
+    const double g = bench_network_flop(s->model, "g.", side), h = bench_network_flop(s->model, "h.", side), c = bench_network_flop(s->model, "coarse.", side);
+    const double flop = batch * ((s->model->fixed[NN_G] ? 1 : 3) * g + (s->model->fixed[NN_COARSE] ? 1 : 3) * coarse * c + 3 * (s->steps - coarse) * h);
+    snprintf(label, sizeof label, "%d patches of %d^2, window %d, T = %d%s", batch, s->c.data.patch, side, s->steps, s->model->fixed[NN_G] ? ", g fixed" : "");
     const bench_time t = bench_measure(step, s);
     bench_row(label, t, flop);
     bench_row_peer(t, flop, peer(s));
@@ -138,7 +143,8 @@ static void train(const char *config, const char *heading)
     for (size_t i = 0; i < batch * part * 3; i++) shown[i] = ts_rng_uniform(&rng);
     for (size_t i = 0; i < batch * part * MAP_CHANNELS; i++) s.window[i] = ts_rng_range(&rng, -0.5f, 0.5f), s.goal[i] = ts_rng_range(&rng, -0.5f, 0.5f);
     for (size_t i = 0; i < batch; i++) rd_loss_views(&rng, s.views + i * RD_LOSS_VIEWS);
-    s.model->g_fixed = s.c.train.steps && s.c.train.g_rate == 0;
+    s.model->fixed[NN_G] = s.c.train.steps && s.c.train.g_rate == 0;
+    s.model->fixed[NN_COARSE] = s.c.train.coarse_rate == 0;
     s.steps = s.c.train.steps ? s.c.arch.iterations : 0;
     s.in = (nn_input){.image = ts_view(shown, (ts_shape){(int)batch, side, side, 3}), .grid = {.h = side, .w = side, .side = patch}, .view = rd_flash()};
     if (side < patch) s.in.whole = ts_view(s.images, (ts_shape){(int)batch, patch, patch, 3});

@@ -7,8 +7,8 @@ Reads jobs from standard input, one a line, and answers each with its median tim
     clock cpu                                processor time of all threads over their number, in place of wall time
     conv N H W IC OC K DILATION PAD          forward, the better of both memory formats; PAD: zero or replicate
     gradient N H W IC OC K DILATION PAD      gradients of input and weights together
-    infer G_WIDTH G_MAX G_LEVELS G_FIRST G_KERNEL G_SIZE H_WIDTH H_GRU CHANNELS RECURRENT T SIDE
-    train (the same up to T) BATCH PATCH WINDOW FIXED   T 0: g alone; FIXED 1: h alone
+    infer G_WIDTH G_MAX G_LEVELS G_FIRST G_KERNEL G_SIZE H_WIDTH H_GRU CHANNELS RECURRENT T COARSE_T COARSE_WIDTH COARSE_GRU SIDE
+    train (the same up to COARSE_GRU) BATCH PATCH WINDOW FIXED   T 0: g alone; FIXED 1: all but g; H_WIDTH 0: the coarse steps alone
 Weights are random: time does not depend on them. Renderer's gradients are included, by autograd.
 """
 import math
@@ -185,27 +185,38 @@ class LGD(nn.Module):
         super().__init__()
         self.a = a
         self.g = UNet(a["g_width"], a["g_max"], a["g_levels"], a["g_first"], a["g_kernel"], a["channels"])
-        self.h = Refiner(a["h_width"], a["h_gru"], a["channels"], a["recurrent"])
+        self.h = Refiner(a["h_width"], a["h_gru"], a["channels"], a["recurrent"]) if a["h_width"] else None
+        self.coarse = Refiner(a["c_width"], a["c_gru"], a["channels"], a["recurrent"]) if a["c_steps"] else None
 
     def forward(self, whole, image, y0, x0):
         side, size, (h, w) = whole.shape[2], self.a["g_size"], image.shape[2:]
         x = whole if side == size else F.interpolate(whole, size=(size, size), mode="area")
+        def seen(maps):
+            if side != size:
+                maps = F.interpolate(maps, size=(side, side), mode="bilinear")
+            return maps[:, :, y0:y0 + h, x0:x0 + w]
+
         maps = self.g(2 * torch.log((x + 0.01) / 0.01) / math.log(101) - 1)
-        if side != size:
-            maps = F.interpolate(maps, size=(side, side), mode="bilinear")
-        first = maps = maps[:, :, y0:y0 + h, x0:x0 + w]
+        first = seen(maps)
+        maps = seen(refined(self.coarse, self.a["c_gru"], self.a["c_steps"], maps, x, positions(size, size, size)))
         place = positions(side, side, side)[:, :, y0:y0 + h, x0:x0 + w]
-        with torch.no_grad():
-            rmse = (flash(first, place) - image).square().mean((1, 2, 3), keepdim=True).sqrt()
-        state = [torch.zeros(image.shape[0], self.a["h_gru"], h, w)] * 2
-        for _ in range(self.a["steps"]):
-            gradient = torch.asinh(10 * gradient_of_loss(maps, image, place, rmse))
-            delta, state = self.h(torch.cat([maps, gradient], 1), state)
-            maps = maps + delta
-        return first, maps
+        return first, refined(self.h, self.a["h_gru"], self.a["steps"] - self.a["c_steps"], maps, image, place)
 
 
-NAMES = ["g_width", "g_max", "g_levels", "g_first", "g_kernel", "g_size", "h_width", "h_gru", "channels", "recurrent", "steps"]
+def refined(h, gru, steps, maps, image, place):
+    if h is None or not steps:
+        return maps
+    with torch.no_grad():
+        rmse = (flash(maps, place) - image).square().mean((1, 2, 3), keepdim=True).sqrt()
+    state = [torch.zeros(image.shape[0], gru, *image.shape[2:])] * 2
+    for _ in range(steps):
+        gradient = torch.asinh(10 * gradient_of_loss(maps, image, place, rmse))
+        delta, state = h(torch.cat([maps, gradient], 1), state)
+        maps = maps + delta
+    return maps
+
+
+NAMES = ["g_width", "g_max", "g_levels", "g_first", "g_kernel", "g_size", "h_width", "h_gru", "channels", "recurrent", "steps", "c_steps", "c_width", "c_gru"]
 
 
 def network(words):

@@ -22,7 +22,7 @@ static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, 
     const float rate = (float)ev_number(e, "rate");
     const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){1, c->size, c->size, 3}), .grid = rd_grid_full(c->size), .view = c->view};
     size_t first, last;
-    nn_model_range(e->net, false, &first, &last);
+    nn_model_range(e->net, NN_G, &first, &last);
     memset(e->adam.m, 0, e->adam.count * sizeof *e->adam.m);
     memset(e->adam.v, 0, e->adam.count * sizeof *e->adam.v);
     e->adam.step = 0;

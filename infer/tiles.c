@@ -25,7 +25,8 @@ typedef struct work {
     const nn_model *model;
     lgd_tiles *t;
     int channels;
-    const ag_value *predicted; /* R_0 as g gives it, at its own size */
+    ag_value **coarse;         /* [coarse_steps + 1]: R_0 … of the steps at g's size */
+    int coarse_steps;          /* of t->steps */
     ts_taps taps;              /* from there to side, along rows and columns alike */
     double *rmse0;             /* [given] */
     double *squares;           /* [steps + 1]: sums over the pixels of squared differences, by t */
@@ -37,11 +38,11 @@ static ts_taps part(const ts_taps *t, int first, int count)
     return (ts_taps){t->in, count, t->first + first, t->offset + first, t->weight};
 }
 
-/* R_0 in an area. */
-static void start(const work *w, area a, float *maps)
+/* R_t of a coarse step in an area. */
+static void start(const work *w, int t, area a, float *maps)
 {
     const ts_taps down = part(&w->taps, a.y0, rows(a)), across = part(&w->taps, a.x0, columns(a));
-    ts_resample(1, w->channels, &down, &across, w->predicted->t.data, maps, false);
+    ts_resample(1, w->channels, &down, &across, w->coarse[t]->t.data, maps, false);
 }
 
 /* The given photographs in an area, one after the other. */
@@ -104,9 +105,10 @@ static double change(const float *a, const float *b, size_t values)
 static void refine(work *w, area core, float *to)
 {
     lgd_tiles *t = w->t;
-    const int reach = nn_refiner_reach(w->model), gru = w->model->arch.h_gru;
+    const int reach = nn_refiner_reach(w->model), gru = w->model->arch.h_gru, begin = w->coarse_steps;
+    const int most = nn_arch_refines_full(&w->model->arch) ? t->steps : begin;
     ag_tape *tape = w->tape;
-    area now = grown(core, reach * t->steps, t->side);
+    area now = grown(core, reach * (most - begin), t->side);
     const int carried = nn_arch_carries(&w->model->arch) ? 2 : 0;
     const ts_shape s = {1, rows(now), columns(now), w->channels};
     ag_value *maps = ag_empty(tape, s), *image = ag_empty(tape, (ts_shape){t->given, s.h, s.w, 3});
@@ -114,20 +116,22 @@ static void refine(work *w, area core, float *to)
     for (int i = 0; i < carried; i++) states[i] = ag_empty(tape, (ts_shape){1, s.h, s.w, gru});
     if (ag_status(tape)->code) return;
     float *const buffer = maps->t.data, *const photo = image->t.data;
-    start(w, now, buffer);
-    nn_state state = {.rmse0 = w->rmse0};
-    double last = t->rmse ? square_sum(w, now, core, buffer) : 0;
-    if (t->rmse) w->squares[0] += last;
-    int step = 0;
-    for (bool on = true; step < t->steps && on;) {
-        const area next = grown(core, reach * (t->steps - step - 1), t->side);
+    double last = 0;
+    for (int i = t->rmse ? 0 : begin; i <= begin; i++) {
+        start(w, i, now, buffer);
+        if (t->rmse) w->squares[i] += last = square_sum(w, now, core, buffer);
+    }
+    nn_state state = {.rmse0 = w->rmse0, .step = begin};
+    int step = begin;
+    for (bool on = true; step < most && on;) {
+        const area next = grown(core, reach * (most - step - 1), t->side);
         const ts_mark mark = ag_scope_begin(tape);
         photographs(w, now, photo);
         const ts_shape shape = {1, rows(now), columns(now), w->channels};
         const nn_input in = {.image = ts_view(photo, (ts_shape){t->given, shape.h, shape.w, 3}), .grid = grid_of(now, t->side), .views = t->views, .given = t->given};
         for (int i = 0; i < carried; i++) {
             state.to[i] = ag_constant(tape, ts_view(states[i]->t.data, (ts_shape){1, shape.h, shape.w, gru}));
-            state.gru[i] = step > 0 ? state.to[i] : NULL;
+            state.gru[i] = step > begin ? state.to[i] : NULL;
         }
         ag_value *out = nn_refine(tape, w->model, &in, ag_constant(tape, ts_view(buffer, shape)), &state);
         if (!out) return;
@@ -140,7 +144,7 @@ static void refine(work *w, area core, float *to)
         step++;
         if (t->rmse) w->squares[step] += last = square_sum(w, now, core, buffer);
     }
-    t->refined += (int64_t)rows(core) * columns(core) * step;
+    t->refined += (int64_t)rows(core) * columns(core) * (step - begin);
     for (int i = step + 1; i <= t->steps && t->rmse; i++) w->squares[i] += last;
     crop(now, core, w->channels, buffer, to);
 }
@@ -176,7 +180,7 @@ static void tile(work *w, area a, float *maps)
     const area todo = wanted(w->t, a);
     if (!own) ag_fail(w->tape, TS_NOMEM, "out of memory for a tile of %d x %d pixels", columns(a), rows(a));
     else if (rows(todo) < rows(a) || columns(todo) < columns(a)) {
-        start(w, a, own);
+        start(w, w->coarse_steps, a, own);
         put(w, a, own, maps);
     }
     if (own && rows(todo) > 0) {
@@ -186,7 +190,7 @@ static void tile(work *w, area a, float *maps)
     ag_scope_end(w->tape, mark, NULL, 0);
 }
 
-/* g works on the whole photograph at its own size; the loss's scale is that of the whole R_0, measured in bands. */
+/* g and the first steps work on the whole photograph at g's size; the loss's scale is that of what they leave, measured in bands. */
 static ts_code prepare(work *w)
 {
     ts_arena *arena = ag_arena(w->tape);
@@ -203,7 +207,10 @@ static ts_code prepare(work *w)
     else if (ts_resize(&small->t, &whole->t, arena, &st)) ag_fail(w->tape, st.code, "%s", st.message);
     ag_scope_end(w->tape, mark, NULL, 0);
     const nn_input in = {.image = small->t, .grid = rd_grid_full(size), .views = w->t->views, .given = given, .oriented = w->t->oriented};
-    w->predicted = nn_predict(w->tape, w->model, &in);
+    w->coarse_steps = w->t->steps < w->model->arch.coarse_steps ? w->t->steps : w->model->arch.coarse_steps;
+    w->coarse = ts_arena_zalloc(arena, (size_t)w->coarse_steps + 1, sizeof *w->coarse);
+    if (!w->coarse) return ag_fail(w->tape, TS_NOMEM, "out of memory"), TS_NOMEM;
+    if (nn_lgd(w->tape, w->model, &in, w->coarse_steps, true, w->coarse, NULL, NULL) != TS_OK) return ag_status(w->tape)->code;
     w->taps = ts_taps_triangle(arena, size, side);
     w->squares = ts_arena_zalloc(arena, (size_t)w->t->steps + 1, sizeof *w->squares);
     w->rmse0 = ts_arena_zalloc(arena, (size_t)given, sizeof *w->rmse0);
@@ -213,7 +220,7 @@ static ts_code prepare(work *w)
         const ts_mark before = ag_scope_begin(w->tape);
         const ag_value *maps = ag_empty(w->tape, (ts_shape){1, rows(band), side, w->channels});
         if (maps) {
-            start(w, band, maps->t.data);
+            start(w, w->coarse_steps, band, maps->t.data);
             add_squares(w, band, band, maps->t.data, w->rmse0);
         }
         ag_scope_end(w->tape, before, NULL, 0);

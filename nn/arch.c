@@ -43,6 +43,9 @@ static const field fields[] = {
     {"encoding", FIELD_WORD, AT(encoding), NN_GRADIENT_RAW, NN_GRADIENT_ASINH, NN_GRADIENT_ASINH, encoding_words, false},
     {.key = "images", .kind = FIELD_INT, .at = AT(images), .lo = 1, .hi = NN_MAX_IMAGES, .start = 1, .late = true},
     {.key = "compat", .kind = FIELD_WORD, .at = AT(compat), .hi = NN_COMPAT_PUBLISHED, .words = compat_words, .late = true},
+    {.key = "coarse_steps", .kind = FIELD_INT, .at = AT(coarse_steps), .hi = 1000, .late = true},
+    {.key = "coarse_width", .kind = FIELD_INT, .at = AT(coarse_width), .lo = 1, .hi = 4096, .start = 128, .late = true},
+    {.key = "coarse_gru", .kind = FIELD_INT, .at = AT(coarse_gru), .lo = 1, .hi = 1024, .start = 64, .late = true},
     {.key = "latent", .kind = FIELD_INT, .at = AT(latent), .hi = 1024, .late = true},
 };
 enum { FIELDS = sizeof fields / sizeof *fields };
@@ -72,7 +75,9 @@ nn_arch nn_arch_default(void)
     return a;
 }
 
-bool nn_arch_refines(const nn_arch *a)
+bool nn_arch_refines(const nn_arch *a) { return a->coarse_steps > 0 || nn_arch_refines_full(a); }
+
+bool nn_arch_refines_full(const nn_arch *a)
 {
     return a->h_width > 0 || (a->iterations > 0 && a->latent == 0 && a->gradient && a->descent != NN_DESCENT_NONE);
 }
@@ -97,8 +102,12 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
         return ts_fail(st, TS_INVALID, "images is %d: with rmse = batch it must be 1", a->images);
     if (a->compat == NN_COMPAT_PUBLISHED && (a->descent != NN_DESCENT_NONE || a->images > 1 || a->latent > 0 || a->rmse != NN_RMSE_BATCH))
         return ts_fail(st, TS_INVALID, "compat is published: that needs descent = none, rmse = batch, images 1 and latent 0");
-    if (a->iterations != 0 && !nn_arch_refines(a))
-        return ts_fail(st, TS_INVALID, "iterations is %d: with h_width 0 and no descent (or no gradient) it must be 0", a->iterations);
+    if (a->coarse_steps > 0 && (a->compat == NN_COMPAT_PUBLISHED || a->latent > 0 || a->rmse != NN_RMSE_START))
+        return ts_fail(st, TS_INVALID, "coarse_steps is %d: that needs compat = none, rmse = start and latent 0", a->coarse_steps);
+    if (a->coarse_steps > a->iterations)
+        return ts_fail(st, TS_INVALID, "coarse_steps is %d: at most all of the %d iterations can be coarse", a->coarse_steps, a->iterations);
+    if (a->iterations > a->coarse_steps && !nn_arch_refines_full(a))
+        return ts_fail(st, TS_INVALID, "iterations is %d: with h_width 0 and no descent (or no gradient) it must be coarse_steps, %d", a->iterations, a->coarse_steps);
     return TS_OK;
 }
 

@@ -12,10 +12,10 @@ static bool with_more_photographs(const nn_model *model, int index, nn_file *f)
     const nn_layers *l = model->layers;
     const nn_param *p = &model->param[index];
     const int images = model->arch.images, in = p->dim[1];
-    const bool refiner = model->arch.h_width > 0 && index == l->cell[0].conv.weight;
+    const bool refiner = (l->h.width > 0 && index == l->h.cell[0].conv.weight) || (l->coarse.width > 0 && index == l->coarse.cell[0].conv.weight);
+    const bool descends = model->arch.descent == NN_DESCENT_GRADIENT && ((nn_arch_refines_full(&model->arch) && index == l->h.path.weight) || (model->arch.coarse_steps > 0 && index == l->coarse.path.weight));
     const int first = refiner ? model->arch.channels : 0, each = (in - first) / images; /* h reads the maps, then the gradients */
-    if (images == 1 || !(refiner || index == l->input_conv.weight || index == l->input_global.weight ||
-                         (model->arch.descent == NN_DESCENT_GRADIENT && nn_arch_refines(&model->arch) && index == l->h_path.weight)))
+    if (images == 1 || !(refiner || index == l->input_conv.weight || index == l->input_global.weight || descends))
         return false;
     const size_t kernel = (size_t)p->dim[2] * (size_t)p->dim[3], single = (size_t)(first + each) * kernel;
     float *one = malloc((size_t)p->dim[0] * single * sizeof *one);

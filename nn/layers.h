@@ -25,14 +25,20 @@ typedef struct nn_cell {
     nn_layer conv, input, hidden;
 } nn_cell;
 
+/* What does a step. */
+typedef struct nn_refiner {
+    int width, gru; /* width 0: no network, path alone */
+    nn_cell cell[2];
+    nn_layer output, path; /* path: of arch.descent, weight -1 where there is none */
+} nn_refiner;
+
 typedef struct nn_layers {
     nn_layer input_conv, input_global;
     nn_unet_block down[NN_MAX_LEVELS], up[NN_MAX_LEVELS];
     nn_layer output_conv1, output_conv2, output_add;
-    nn_cell cell[2];
+    nn_refiner h, coarse;
     nn_layer encoder[NN_MAX_LEVELS + 1], code, decoder[NN_MAX_LEVELS + 1][2], decoded; /* the deepest decoder level has one convolution */
-    nn_layer h_output, h_path; /* h_path: of arch.descent, weight -1 where there is none */
-    int refiner;   /* index of h's first parameter */
+    int first[4];  /* index of each nn_part's first parameter, and their number */
     double *start; /* per parameter: standard deviation of the first values, 0 for zeros, or one of these: */
 } nn_layers;
 #define NN_ORTHOGONAL (-1.0)
@@ -61,8 +67,8 @@ ag_value *nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value 
 
 /* h: input [N, H, W, (1 + images) channels] and the states (updated; NULL = zero) -> the change of the maps. to: NULL, or for each new state
  * the value to write it into, which may be the old one (a tape without gradients). */
-ag_value *nn_refiner(ag_tape *tape, const nn_model *model, ag_value *x, ag_value *gru[2], ag_value *const to[2]);
+ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *x, ag_value *gru[2], ag_value *const to[2]);
 
 /* R_{t+1} from both = [R_t, its encoded gradients], [N, H, W, (1 + images) channels]; maps is a part of it. path: what arch.descent lets past h, or NULL. */
-ag_value *nn_step(ag_tape *tape, const nn_model *model, ag_value *maps, ag_value *path, ag_value *both, ag_value *gru[2], ag_value *const to[2]);
+ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path, ag_value *both, ag_value *gru[2], ag_value *const to[2]);
 #endif

@@ -9,7 +9,7 @@
 #include <string.h>
 
 /* Parameters of the largest model: 8 levels, two blocks of 11 each, and what lies before and after them. */
-enum { MAX_PARAMS = 4 + 2 * 11 * NN_MAX_LEVELS + 6 + 14 };
+enum { MAX_PARAMS = 4 + 2 * 11 * NN_MAX_LEVELS + 6 + 2 * 14 };
 
 static nn_layers *layers_of(const nn_model *m) { return m->layers; }
 
@@ -111,36 +111,39 @@ static void plan_g(nn_model *m)
     l->output_add = linear(m, "g.output.add", a->channels, w0, 0.25);
 }
 
-static void plan_h(nn_model *m)
+/* name: what the parameters' names begin with. */
+static void plan_refiner(nn_model *m, const char *name, int width, int gru, nn_refiner *h)
 {
     const nn_arch *a = &m->arch;
     nn_layers *l = m->layers;
-    double gain = leaky_gain(NN_LEAK_H);
-    for (int i = 0; i < 2 && a->h_width > 0; i++) {
-        nn_cell *c = &l->cell[i];
-        char name[64];
+    const double gain = leaky_gain(NN_LEAK_H);
+    char full[64];
+    *h = (nn_refiner){.width = width, .gru = gru, .path = {-1, -1}};
+    for (int i = 0; i < 2 && width > 0; i++) {
+        nn_cell *c = &h->cell[i];
         const bool last = a->compat == NN_COMPAT_PUBLISHED; /* in the published order the convolution comes last */
         for (int pass = 0; pass < 2; pass++)
             if (pass == last) {
-                snprintf(name, sizeof name, "h.conv%d", i + 1);
-                c->conv = conv(m, name, a->h_width, i ? a->h_gru : (1 + a->images) * a->channels, i ? 3 : 5, true, gain);
+                snprintf(full, sizeof full, "%s.conv%d", name, i + 1);
+                c->conv = conv(m, full, width, i ? gru : (1 + a->images) * a->channels, i ? 3 : 5, true, gain);
             } else {
-                snprintf(name, sizeof name, "h.gru%d.ih", i + 1);
-                c->input = conv(m, name, 3 * a->h_gru, a->h_width, 1, true, 1);
-                snprintf(name, sizeof name, "h.gru%d.hh", i + 1);
-                c->hidden = conv(m, name, 3 * a->h_gru, a->h_gru, 1, true, 1);
+                snprintf(full, sizeof full, "%s.gru%d.ih", name, i + 1);
+                c->input = conv(m, full, 3 * gru, width, 1, true, 1);
+                snprintf(full, sizeof full, "%s.gru%d.hh", name, i + 1);
+                c->hidden = conv(m, full, 3 * gru, gru, 1, true, 1);
                 l->start[c->hidden.weight] = NN_ORTHOGONAL;
             }
     }
-    if (a->h_width > 0) {
-        l->h_output = conv(m, "h.output", a->channels, a->h_gru, 3, false, 1);
-        l->start[l->h_output.weight] = 1e-3; /* h starts as nothing, nearly */
+    if (width > 0) {
+        snprintf(full, sizeof full, "%s.output", name);
+        h->output = conv(m, full, a->channels, gru, 3, false, 1);
+        l->start[h->output.weight] = 1e-3; /* h starts as nothing, nearly */
     }
-    l->h_path = (nn_layer){-1, -1};
     if (a->descent == NN_DESCENT_NONE || !a->gradient) return;
     const bool newton = a->descent == NN_DESCENT_NEWTON;
-    l->h_path = conv(m, newton ? "h.newton" : "h.descent", a->channels, newton ? a->channels : a->images * a->channels, 1, false, 1);
-    l->start[l->h_path.weight] = newton ? NN_NEWTON_START : NN_DESCENT_START;
+    snprintf(full, sizeof full, "%s.%s", name, newton ? "newton" : "descent");
+    h->path = conv(m, full, a->channels, newton ? a->channels : a->images * a->channels, 1, false, 1);
+    l->start[h->path.weight] = newton ? NN_NEWTON_START : NN_DESCENT_START;
 }
 
 /* The encoder pools between its convolutions; the decoder has two a level, since it alone has to make the detail. */
@@ -181,8 +184,11 @@ nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
     m->arch = *arch;
     if (arch->latent > 0) plan_latent(m);
     else plan_g(m);
-    l->refiner = m->params;
-    if (nn_arch_refines(arch)) plan_h(m);
+    l->first[NN_H] = m->params;
+    if (nn_arch_refines_full(arch)) plan_refiner(m, "h", arch->h_width, arch->h_gru, &l->h);
+    l->first[NN_COARSE] = m->params;
+    if (arch->coarse_steps > 0) plan_refiner(m, "coarse", arch->coarse_width, arch->coarse_gru, &l->coarse);
+    l->first[NN_COARSE + 1] = m->params;
     return m;
 }
 
@@ -227,19 +233,18 @@ const nn_param *nn_model_find(const nn_model *model, const char *name)
     return NULL;
 }
 
-void nn_model_range(const nn_model *model, bool refiner, size_t *first, size_t *last)
+static size_t offset_of(const nn_model *m, int index) { return index < m->params ? m->param[index].offset : m->count; }
+
+void nn_model_range(const nn_model *model, nn_part part, size_t *first, size_t *last)
 {
-    int at = layers_of(model)->refiner;
-    size_t border = at < model->params ? model->param[at].offset : model->count;
-    *first = refiner ? border : 0;
-    *last = refiner ? model->count : border;
+    *first = offset_of(model, layers_of(model)->first[part]);
+    *last = offset_of(model, layers_of(model)->first[part + 1]);
 }
 
-size_t nn_model_numbers(const nn_model *model, bool refiner)
+size_t nn_model_numbers(const nn_model *model, nn_part part)
 {
     size_t sum = 0;
-    for (int i = 0; i < model->params; i++)
-        if ((i >= layers_of(model)->refiner) == refiner) sum += model->param[i].count;
+    for (int i = layers_of(model)->first[part]; i < layers_of(model)->first[part + 1]; i++) sum += model->param[i].count;
     return sum;
 }
 
@@ -250,8 +255,9 @@ ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index)
     ts_shape s = {1, 1, 1, p->dim[0]};
     if (p->rank == 2) s = (ts_shape){1, 1, p->dim[0], p->dim[1]};
     if (p->rank == 4) s = (ts_shape){p->dim[0], p->dim[1], p->dim[2], p->dim[3]};
-    const bool fixed = model->g_fixed && index < layers_of(model)->refiner;
-    float *grad = model->grad && ag_gradients(tape) && !fixed ? model->grad + p->offset : NULL;
+    int part = NN_G;
+    while (index >= layers_of(model)->first[part + 1]) part++;
+    float *grad = model->grad && ag_gradients(tape) && !model->fixed[part] ? model->grad + p->offset : NULL;
     return ag_parameter(tape, ts_view(model->value + p->offset, s), grad);
 }
 

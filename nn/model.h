@@ -42,6 +42,9 @@ typedef struct nn_arch {
     int g_size;         /* side in pixels that g works at (a multiple of 2^g_levels); a photograph of another size is resampled for g */
     int h_width;        /* of h's convolutions; 0: h is what descent lets past it, or, where iterations is 0 or descent none, nothing */
     int h_gru;          /* of h's states */
+    int coarse_steps;   /* of the iterations, the first that many are taken at g_size, by a network of h's kind but with parameters of its own */
+    int coarse_width;   /* of its convolutions; both are of no meaning where coarse_steps is 0 */
+    int coarse_gru;     /* of its states */
     int iterations;     /* T that it was trained for */
     bool recurrent;     /* h carries its states from step to step */
     bool gradient;      /* h reads the gradient (false: zeros, the ablation) */
@@ -57,7 +60,8 @@ typedef struct nn_arch {
 nn_arch nn_arch_default(void);
 ts_code nn_arch_check(const nn_arch *a, ts_status *st);
 bool nn_arch_refines(const nn_arch *a); /* there is something to do steps with */
-bool nn_arch_carries(const nn_arch *a); /* the steps have states */
+bool nn_arch_refines_full(const nn_arch *a); /* at the photograph's size */
+bool nn_arch_carries(const nn_arch *a); /* those steps have states */
 
 typedef struct nn_param {
     char name[96];
@@ -72,7 +76,7 @@ typedef struct nn_model {
     size_t count;  /* floats in a block (each parameter starts at a multiple of 16) */
     float *value;  /* one aligned block */
     float *grad;   /* the same, or NULL until nn_model_train */
-    bool g_fixed;  /* g's parameters are constants: no gradient is computed for them, nor through g */
+    bool fixed[3]; /* nn_part: its parameters are constants, no gradient is computed for them */
     void *layers;  /* nn's own */
 } nn_model;
 
@@ -83,8 +87,15 @@ nn_model *nn_model_plan(const nn_arch *arch, ts_status *st);
 nn_model *nn_model_create(const nn_arch *arch, ts_status *st);
 void nn_model_free(nn_model **model);
 
-/* Trained numbers in g and in h, without the blocks' padding. */
-size_t nn_model_numbers(const nn_model *model, bool refiner);
+/* Three runs of the block, in this order. */
+typedef enum nn_part {
+    NN_G, /* or the auto-encoder */
+    NN_H, /* what refines at the photograph's size */
+    NN_COARSE /* what refines at g_size */
+} nn_part;
+
+/* Trained numbers in a part, without the block's padding. */
+size_t nn_model_numbers(const nn_model *model, nn_part part);
 
 /* Allocates the gradient block (zero); idempotent. */
 ts_code nn_model_train(nn_model *model, ts_status *st);
@@ -93,8 +104,8 @@ ts_code nn_model_train(nn_model *model, ts_status *st);
 void nn_model_init(nn_model *model, uint64_t seed);
 
 const nn_param *nn_model_find(const nn_model *model, const char *name);
-/* The parameters of g alone and of h alone: [first, last) in floats of the block (g comes first). */
-void nn_model_range(const nn_model *model, bool refiner, size_t *first, size_t *last);
+/* The parameters of a part alone: [first, last) in floats of the block. */
+void nn_model_range(const nn_model *model, nn_part part, size_t *first, size_t *last);
 
 /* A batch of N materials, each in `given` photographs, one material's after the other's; linear, clamped to [0, 1]. g sees whole photographs, h
  * refines any window of them. */
@@ -131,12 +142,13 @@ typedef struct nn_state {
     int step; /* how many were done: those beyond arch.iterations are shortened, the t-th to (T / t)^2 of its length (not where compat is published) */
 } nn_state;
 
-/* R_{t+1} = R_t + h(R_t, e) + D p, e being dL/dR_t as arch.encoding has it, one for each photograph (zero where none is given). D is a learned matrix over
+/* A step at the photograph's size: R_{t+1} = R_t + h(R_t, e) + D p, e being dL/dR_t as arch.encoding has it, one for each photograph (zero where none is given). D is a learned matrix over
  * the channels, and arch.descent says of what: p = e and D begins as -0.003 times the identity, so that an untrained loop is plain descent; or p is the
  * step of Gauss and Newton's method, damped by 0.1 beside the photographs' variance and by 1 in F0, and D begins as half the identity; or, as published, D is 0. */
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
-/* The unrolled loop on the grid's window: maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate
+/* The unrolled loop on the grid's window. The first arch.coarse_steps steps refine R_t at g_size, as nn_refine does but with NN_COARSE's parameters, and
+ * give it resampled; the others begin with what these leave. maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate
  * memory is released on a tape without gradients. after (may be NULL) sees every R_t and may stop the loop by returning false;
  * what is left of maps is then filled with the last R_t. */
 typedef bool (*nn_after)(int step, const ag_value *maps, void *user);

@@ -10,30 +10,28 @@ static ag_value *cell(ag_tape *tape, const nn_model *model, const nn_cell *c, ag
                   nn_parameter(tape, model, c->hidden.weight), nn_parameter(tape, model, c->hidden.bias));
 }
 
-ag_value *nn_refiner(ag_tape *tape, const nn_model *model, ag_value *x, ag_value *gru[2], ag_value *const to[2])
+ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *x, ag_value *gru[2], ag_value *const to[2])
 {
-    const nn_layers *l = model->layers;
     for (int i = 0; i < 2; i++) {
         ts_mark mark = ag_scope_begin(tape);
-        gru[i] = cell(tape, model, &l->cell[i], x, i + 1, model->arch.recurrent ? gru[i] : NULL, to ? to[i] : NULL);
+        gru[i] = cell(tape, model, &h->cell[i], x, i + 1, model->arch.recurrent ? gru[i] : NULL, to ? to[i] : NULL);
         ag_scope_end(tape, mark, &gru[i], 1);
         x = gru[i];
     }
-    return ag_tanh(tape, nn_conv(tape, model, l->h_output, x, 1, TS_PAD_REPLICATE, 1));
+    return ag_tanh(tape, nn_conv(tape, model, h->output, x, 1, TS_PAD_REPLICATE, 1));
 }
 
-ag_value *nn_step(ag_tape *tape, const nn_model *model, ag_value *maps, ag_value *path, ag_value *both, ag_value *gru[2], ag_value *const to[2])
+ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path, ag_value *both, ag_value *gru[2], ag_value *const to[2])
 {
-    const nn_layers *l = model->layers;
-    ag_value *next = model->arch.h_width > 0 ? ag_add(tape, maps, nn_refiner(tape, model, both, gru, to)) : maps;
-    return path ? ag_add(tape, next, nn_conv(tape, model, l->h_path, path, 1, TS_PAD_ZERO, 1)) : next;
+    ag_value *next = h->width > 0 ? ag_add(tape, maps, nn_change(tape, model, h, both, gru, to)) : maps;
+    return path ? ag_add(tape, next, nn_conv(tape, model, h->path, path, 1, TS_PAD_ZERO, 1)) : next;
 }
 
 int nn_refiner_reach(const nn_model *model)
 {
-    const nn_layers *l = model->layers;
-    if (model->arch.h_width == 0) return 0;
-    int reach = model->param[l->h_output.weight].dim[2] / 2;
-    for (int i = 0; i < 2; i++) reach += (i + 1) * (model->param[l->cell[i].conv.weight].dim[2] / 2); /* the second is dilated by 2 */
+    const nn_refiner *h = &((const nn_layers *)model->layers)->h;
+    if (h->width == 0) return 0;
+    int reach = model->param[h->output.weight].dim[2] / 2;
+    for (int i = 0; i < 2; i++) reach += (i + 1) * (model->param[h->cell[i].conv.weight].dim[2] / 2); /* the second is dilated by 2 */
     return reach;
 }

@@ -42,7 +42,7 @@ TEST(nn_adam_is_the_papers)
     ts_status st = {0};
     CHECK(!nn_adam_create(&adam, m, 0.5f, &st), "%s", st.message);
     size_t first, last;
-    nn_model_range(m, false, &first, &last);
+    nn_model_range(m, NN_G, &first, &last);
     double *w = malloc(last * sizeof *w), *mean = calloc(last, sizeof *w), *square = calloc(last, sizeof *w), *ema = malloc(last * sizeof *w);
     float *rest = malloc(m->count * sizeof *rest);
     memcpy(rest, m->value, m->count * sizeof *rest);

@@ -34,7 +34,7 @@ static lgd_model *load(nn_arch a)
     CHECK(m, "%s", st.message);
     nn_model_init(m, 7);
     size_t first, last;
-    nn_model_range(m, true, &first, &last);
+    nn_model_range(m, NN_H, &first, &last);
     ts_rng rng = ts_rng_make(3, TS_STREAM_TEST, 0);
     for (size_t i = first; i < last; i++) m->value[i] += ts_rng_range(&rng, -0.05f, 0.05f);
     CHECK(nn_model_save(m, m->value, path, NULL, 0, &st) == TS_OK, "%s", st.message);

@@ -77,10 +77,10 @@ TEST(trainer_with_g_rate_0_leaves_g_alone)
         if (i == 4) memcpy(before, t->model->value, t->model->count * sizeof *before); /* g's own phase ends */
         CHECK(tr_step(t, &row, &st) == TS_OK && !row.skip, "%s", st.message);
     }
-    nn_model_range(t->model, false, &first, &last);
+    nn_model_range(t->model, NN_G, &first, &last);
     CHECK(!memcmp(before + first, t->model->value + first, (last - first) * sizeof *before), "g has moved");
     for (size_t i = first; i < last; i++) CHECK(t->model->grad[i] == 0, "a gradient reaches g");
-    nn_model_range(t->model, true, &first, &last);
+    nn_model_range(t->model, NN_H, &first, &last);
     CHECK(memcmp(before + first, t->model->value + first, (last - first) * sizeof *before) != 0, "h has not");
     tr_destroy(&t);
     CHECK(tr_config_set_assignment(&c, "model.h_width=0", &st) == TS_OK && tr_config_set_assignment(&c, "model.iterations=0", &st) == TS_OK, "%s", st.message);

@@ -1,12 +1,14 @@
 /* The unrolled loop: the laws that it obeys however it is run. */
+#include "render/losses.h"
 #include "tests/networks.h"
 
 TEST(nn_loop_is_the_same_however_it_is_run)
 {
     enum { STEPS = 4 };
-    for (int variant = 0; variant < 6; variant++) {
+    for (int variant = 0; variant < 8; variant++) {
         nn_arch a = tiny();
-        a.recurrent = variant & 1, a.rmse = variant & 2 ? NN_RMSE_BATCH : NN_RMSE_START;
+        a.recurrent = variant & 1, a.rmse = variant < 6 && variant & 2 ? NN_RMSE_BATCH : NN_RMSE_START;
+        if (variant > 5) a.coarse_steps = 2, a.coarse_width = 6, a.coarse_gru = 3;
         if (variant > 3) a.h_width = 0, a.descent = variant & 1 ? NN_DESCENT_GRADIENT : NN_DESCENT_NEWTON;
         nn_model *m = create(&a, 7);
         enliven(m);
@@ -25,6 +27,60 @@ TEST(nn_loop_is_the_same_however_it_is_run)
         CHECK(same(w, x[STEPS]), "R_T is another one when only it is kept (variant %d)", variant);
         nn_model_free(&m);
     }
+}
+
+/* The first steps are those of a loop over the photograph resampled to g's size, by their own parameters; the others go on from what these leave. */
+TEST(nn_coarse_steps_are_a_loop_at_g_s_size)
+{
+    enum { COARSE = 2, ALL = 4, LARGER = 40 };
+    nn_arch whole = tiny(), alone = tiny();
+    whole.coarse_steps = COARSE, whole.coarse_width = whole.h_width = alone.h_width, whole.coarse_gru = alone.h_gru;
+    nn_model *m = create(&whole, 7), *small = create(&alone, 7);
+    enliven(m);
+    for (int i = 0; i < small->params; i++) { /* h of the small one is the other's coarse network */
+        char name[128];
+        const bool h = strncmp(small->param[i].name, "h.", 2) == 0;
+        snprintf(name, sizeof name, "%s%s", h ? "coarse." : "", small->param[i].name + (h ? 2 : 0));
+        const nn_param *from = nn_model_find(m, name);
+        CHECK(from && from->count == small->param[i].count, "%s", name);
+        memcpy(small->value + small->param[i].offset, m->value + from->offset, from->count * sizeof(float));
+    }
+    nn_input in = photographs(2, LARGER, 4, NULL), reduced = in;
+    reduced.grid = rd_grid_full(SIDE);
+    ag_tape *a = tape_create(false), *b = tape_create(false);
+    ag_value *x[ALL + 1], *y[COARSE + 1];
+    ag_value *photo = ag_resize(b, ag_constant(b, in.image), SIDE, SIDE);
+    reduced.image = photo->t;
+    CHECK(!nn_lgd(a, m, &in, ALL, true, x, NULL, NULL), "%s", ag_status(a)->message);
+    CHECK(!nn_lgd(b, small, &reduced, COARSE, true, y, NULL, NULL), "%s", ag_status(b)->message);
+    for (int t = 0; t <= COARSE; t++) CHECK(same(x[t], ag_resize(b, y[t], LARGER, LARGER)), "R_%d is another one than at g's size", t);
+    nn_state state = {.step = COARSE};
+    ag_value *next = x[COARSE];
+    for (int t = COARSE + 1; t <= ALL; t++) {
+        next = nn_refine(a, m, &in, next, &state);
+        CHECK(next && same(next, x[t]), "R_%d does not go on from R_%d", t, COARSE);
+    }
+    for (int part = NN_G; part <= NN_COARSE; part++) { /* a fixed part gets no gradient, the others do */
+        ag_tape *t = tape_create(true);
+        ag_value *maps[ALL + 1];
+        memset(m->grad, 0, m->count * sizeof *m->grad);
+        for (int k = NN_G; k <= NN_COARSE; k++) m->fixed[k] = k == part;
+        CHECK(!nn_lgd(t, m, &in, ALL, true, maps, NULL, NULL), "%s", ag_status(t)->message);
+        float *goal = numbers((size_t)ts_count(maps[ALL]->t.shape), 5, -0.5f, 0.5f);
+        CHECK(!ag_backward(t, ag_map_loss(t, maps[ALL], ag_constant(t, ts_view(goal, maps[ALL]->t.shape)))), "%s", ag_status(t)->message);
+        for (int k = NN_G; k <= NN_COARSE; k++) {
+            size_t first, last, nonzero = 0;
+            nn_model_range(m, (nn_part)k, &first, &last);
+            for (size_t i = first; i < last; i++) nonzero += m->grad[i] != 0;
+            CHECK((nonzero > 0) == (k != part), "part %d fixed: part %d has %zu gradients", part, k, nonzero);
+        }
+        free(goal);
+        ag_tape_destroy(&t);
+    }
+    ag_tape_destroy(&a);
+    ag_tape_destroy(&b);
+    nn_model_free(&m);
+    nn_model_free(&small);
 }
 
 TEST(nn_steps_beyond_the_trained_ones_are_shortened)
@@ -122,8 +178,8 @@ TEST(nn_refiner_is_translation_equivariant)
         ag_value *x = ag_empty(t, (ts_shape){1, H, W, C}), *gru[2] = {NULL, NULL};
         ts_tensor part = ts_window(&whole, s * DY, s * DX, H, W);
         ts_copy(&x->t, &part);
-        nn_refiner(t, m, x, gru, NULL);
-        out[s] = nn_refiner(t, m, x, gru, NULL);
+        nn_change(t, m, &((const nn_layers *)m->layers)->h, x, gru, NULL);
+        out[s] = nn_change(t, m, &((const nn_layers *)m->layers)->h, x, gru, NULL);
     }
     check_tape(t);
     double size = 0;
@@ -248,7 +304,7 @@ TEST(nn_batch_rmse_couples_the_batch)
     for (int i = 0; i < 2; i++) rd_flash_gradient(in.grid, maps[0]->t.data + i * one, 9, &in.view, in.image.data + i * image, whole, g + i * one, NULL);
     for (size_t i = 0; i < 2 * one; i++) g[i] *= 256.0f * 256 / (2 * SIDE * SIDE);
     ag_value *gradient = ag_constant(t, ts_view(g, (ts_shape){2, SIDE, SIDE, 9}));
-    ag_value *y = nn_step(t, m, maps[0], gradient, ag_concat(t, maps[0], gradient), gru, NULL);
+    ag_value *y = nn_step(t, m, &((const nn_layers *)m->layers)->h, maps[0], gradient, ag_concat(t, maps[0], gradient), gru, NULL);
     check_tape(t);
     for (int64_t i = 0; i < ts_count(y->t.shape); i++)
         CHECK(fabsf(y->t.data[i] - maps[1]->t.data[i]) < 1e-5f, "value %lld: %g, not %g", (long long)i, (double)maps[1]->t.data[i], (double)y->t.data[i]);

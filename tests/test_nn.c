@@ -10,14 +10,14 @@ TEST(nn_trial_model_has_the_size_of_the_design)
     nn_arch a = nn_arch_default();
     nn_model *m = nn_model_plan(&a, &st);
     CHECK(m, "%s", st.message);
-    size_t g = nn_model_numbers(m, false), h = nn_model_numbers(m, true), first, last;
+    size_t g = nn_model_numbers(m, NN_G), h = nn_model_numbers(m, NN_H), first, last;
     printf("  trial model: g %zu, h %zu numbers\n", g, h);
     CHECK(g > 2000000 && g < 2200000, "g has %zu numbers, not the 2.2 M of the trial less the linear layers that it never used", g);
     CHECK(h > 68500 && h < 69500, "h has %zu numbers, not about 69 k", h);
     CHECK(!m->value, "a plan holds no values");
-    nn_model_range(m, false, &first, &last);
+    nn_model_range(m, NN_G, &first, &last);
     CHECK(first == 0 && last >= g && last < g + 16 * 80, "g's range is [%zu, %zu)", first, last);
-    nn_model_range(m, true, &first, &last);
+    nn_model_range(m, NN_H, &first, &last);
     CHECK(last == m->count && last - first >= h, "h's range is [%zu, %zu) of %zu", first, last, m->count);
     for (int i = 0; i < m->params; i++) {
         CHECK(m->param[i].offset % 16 == 0, "%s is not aligned", m->param[i].name);
@@ -36,7 +36,7 @@ TEST(nn_arch_check_names_the_key)
     } bad[] = {{"channels", offsetof(nn_arch, channels), 8},        {"g_width", offsetof(nn_arch, g_width), 0},     {"g_width_max", offsetof(nn_arch, g_width_max), 8},
                {"g_levels", offsetof(nn_arch, g_levels), 9},        {"g_kernel", offsetof(nn_arch, g_kernel), 4},   {"g_kernel_first", offsetof(nn_arch, g_kernel_first), 2},
                {"g_size", offsetof(nn_arch, g_size), 48},           {"h_width", offsetof(nn_arch, h_width), -1},    {"h_gru", offsetof(nn_arch, h_gru), 0},
-               {"iterations", offsetof(nn_arch, iterations), -1}};
+               {"iterations", offsetof(nn_arch, iterations), -1},   {"coarse_steps", offsetof(nn_arch, coarse_steps), 7}};
     nn_arch a = nn_arch_default();
     ts_status st = {0};
     CHECK(!nn_arch_check(&a, &st), "%s", st.message);
@@ -129,7 +129,7 @@ static ag_value *loop(ag_tape *t, const nn_model *m, const nn_input *in, int ste
     ag_value *now = nn_predict(t, m, in), *gru[2] = {NULL, NULL};
     for (int i = 0; i < steps; i++) {
         ag_value *gradient = ag_constant(t, ts_view(frozen[i], now->t.shape));
-        now = nn_step(t, m, now, gradient, ag_concat(t, now, gradient), gru, NULL);
+        now = nn_step(t, m, &((const nn_layers *)m->layers)->h, now, gradient, ag_concat(t, now, gradient), gru, NULL);
     }
     check_tape(t);
     return now;
@@ -192,6 +192,16 @@ TEST(nn_whole_loop_gradient_without_the_renderer)
     nn_model *m = create(&a, 3);
     enliven(m);
     nn_input in = photographs(1, SIDE, 1, NULL);
+    check_directions(m, &in, 3, NULL);
+}
+
+TEST(nn_whole_loop_gradient_with_coarse_steps)
+{
+    nn_arch a = tiny();
+    a.gradient = false, a.coarse_steps = 2, a.coarse_width = 6, a.coarse_gru = 3;
+    nn_model *m = create(&a, 5);
+    enliven(m);
+    nn_input in = photographs(1, 24, 1, NULL);
     check_directions(m, &in, 3, NULL);
 }
 

@@ -51,8 +51,8 @@ TEST(published_parameters_are_counted)
     ts_status st = {0};
     nn_model *m = nn_model_plan(&a, &st);
     CHECK(m, "%s", st.message);
-    CHECK(nn_model_numbers(m, false) == 159741922 && nn_model_numbers(m, true) == 405376, "g has %zu parameters, h %zu", nn_model_numbers(m, false),
-          nn_model_numbers(m, true));
+    CHECK(nn_model_numbers(m, NN_G) == 159741922 && nn_model_numbers(m, NN_H) == 405376, "g has %zu parameters, h %zu", nn_model_numbers(m, NN_G),
+          nn_model_numbers(m, NN_H));
     nn_model_free(&m);
 }
 

@@ -15,7 +15,7 @@ static void make_image(float *image, int side)
     for (int i = 0; i < side * side * 3; i++) image[i] = 0.2f + 0.6f * ts_rng_uniform(&rng);
 }
 
-static nn_model *random_model_of(int h_width, bool recurrent, int images)
+static nn_model *random_model_of(int h_width, bool recurrent, int images, int coarse_steps)
 {
     nn_arch a = nn_arch_default();
     a.images = images;
@@ -25,19 +25,21 @@ static nn_model *random_model_of(int h_width, bool recurrent, int images)
     a.g_size = 16;
     a.h_width = h_width;
     a.h_gru = 4;
+    a.coarse_steps = coarse_steps, a.coarse_width = 6, a.coarse_gru = 3;
     ts_status st = {0};
     a.recurrent = recurrent;
     nn_model *m = nn_model_create(&a, &st);
     CHECK(m, "%s", st.message);
     nn_model_init(m, 7);
-    size_t first, last;
-    nn_model_range(m, true, &first, &last);
+    size_t first, last, unused;
+    nn_model_range(m, NN_H, &first, &unused);
+    nn_model_range(m, NN_COARSE, &unused, &last); /* they follow each other */
     ts_rng rng = ts_rng_make(3, TS_STREAM_TEST, 0);
     for (size_t i = first; i < last; i++) m->value[i] += ts_rng_range(&rng, -0.05f, 0.05f);
     return m;
 }
 
-static nn_model *random_model(bool recurrent) { return random_model_of(8, recurrent, 1); }
+static nn_model *random_model(bool recurrent) { return random_model_of(8, recurrent, 1, 0); }
 
 /* One flash photograph in tiles. */
 static lgd_tiles flash_tiles(const float *const *image, int side, int tile, int steps)
@@ -80,9 +82,11 @@ static const float *const only[] = {large};
 TEST(infer_tiles_give_the_untiled_result)
 {
     ag_tape *tape = frozen_tape();
-    for (int variant = 0; variant < 3; variant++) { /* h without states, with them, none but the Newton step */
-        nn_model *m = random_model_of(variant < 2 ? 8 : 0, variant == 1, 1);
-        CHECK(nn_refiner_reach(m) == (variant < 2 ? 5 : 0), "h reaches %d pixels", nn_refiner_reach(m));
+    for (int variant = 0; variant < 6; variant++) { /* h without states, with them, none but the Newton step; the first two or all steps at g's size */
+        const int coarse = variant < 3 ? 0 : variant < 5 ? 2 : TILES_T;
+        const bool network = variant % 3 < 2;
+        nn_model *m = random_model_of(network ? 8 : 0, variant % 3 == 1, 1, coarse);
+        CHECK(nn_refiner_reach(m) == (network ? 5 : 0), "h reaches %d pixels", nn_refiner_reach(m));
         static const int sides[] = {LARGE, 33, 7, 1}, tiles[] = {1000, 32, 17, 9};
         for (size_t s = 0; s < sizeof sides / sizeof *sides; s++) {
             const int side = sides[s];
@@ -91,8 +95,8 @@ TEST(infer_tiles_give_the_untiled_result)
             for (int t = 0; t <= TILES_T; t++) maps[t] = whole_maps[t];
             make_image(large, side);
             untiled(tape, m, large, side, maps);
-            const bool saturated = variant == 2 && side == 1; /* its one pixel has no gradient */
-            CHECK(saturated || farthest(maps[TILES_T], maps[TILES_T - 1], values) > (variant < 2 ? 1e-3 : 0), "a step changes nothing"); /* Newton's come to rest */
+            const bool saturated = !network && side == 1; /* its one pixel has no gradient */
+            CHECK(saturated || farthest(maps[TILES_T], maps[TILES_T - 1], values) > (network ? 1e-3 : 0), "a step changes nothing"); /* Newton's come to rest */
             for (size_t k = 0; k < sizeof tiles / sizeof *tiles; k++) {
                 double rmse[TILES_T + 1];
                 ts_status st = {0};
@@ -107,7 +111,7 @@ TEST(infer_tiles_give_the_untiled_result)
                     rd_flash_rmse(rd_grid_full(side), maps[i], MAP_CHANNELS, &view, large, &want);
                     CHECK(fabs(rmse[i] - want) < 1e-5, "side %d, tiles of %d: RMSE %g at step %d, not %g", side, tiles[k], rmse[i], i, want);
                 }
-                CHECK(t.refined == (int64_t)side * side * TILES_T, "%lld pixels are refined", (long long)t.refined);
+                CHECK(t.refined == (int64_t)side * side * (TILES_T - coarse), "%lld pixels are refined", (long long)t.refined);
             }
         }
         nn_model_free(&m);
@@ -121,7 +125,7 @@ TEST(infer_tiles_of_several_photographs)
     enum { GIVEN = 2 };
     static float images[GIVEN][LARGE * LARGE * 3];
     ag_tape *tape = frozen_tape();
-    nn_model *m = random_model_of(8, true, 3);
+    nn_model *m = random_model_of(8, true, 3, 1);
     rd_view views[GIVEN];
     make_image(images[0], LARGE);
     make_image(images[1], LARGE - 1);

@@ -192,9 +192,9 @@ TEST(trainer_pretraining_leaves_the_refiner_alone)
     nn_model *trained = nn_model_load(path, &st), *start = nn_model_create(&c.arch, &st);
     CHECK(trained && start, "%s", st.message);
     nn_model_init(start, (uint64_t)c.train.seed);
-    nn_model_range(start, true, &first, &last);
+    nn_model_range(start, NN_H, &first, &last);
     CHECK(last > first && !memcmp(trained->value + first, start->value + first, (last - first) * sizeof(float)), "h changed");
-    nn_model_range(start, false, &first, &last);
+    nn_model_range(start, NN_G, &first, &last);
     CHECK(memcmp(trained->value + first, start->value + first, (last - first) * sizeof(float)) != 0, "g did not change");
     nn_model_free(&trained);
     nn_model_free(&start);

@@ -224,7 +224,7 @@ TEST(weights_init_from_takes_what_fits)
     float before = n->value[nn_model_find(n, "h.output.weight")->offset];
     CHECK(!nn_model_init_from(n, path, &taken, &left, &st), "%s", st.message);
     size_t first, last;
-    nn_model_range(n, false, &first, &last);
+    nn_model_range(n, NN_G, &first, &last);
     CHECK(!memcmp(m->value, n->value, last * sizeof(float)), "g was not taken");
     CHECK(n->value[nn_model_find(n, "h.output.weight")->offset] == before, "h was touched");
     CHECK(taken + left == n->params && left == 10, "%d taken, %d left of %d", taken, left, n->params);

@@ -237,7 +237,7 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
                            c->arch.g_levels, unit);
         if (c->train.pretrain_steps || c->train.window) return ts_fail(st, TS_INVALID, "an auto-encoder (model.latent) has one phase and whole patches: train.pretrain_steps and train.window must be 0");
     }
-    if (c->train.steps && c->train.g_rate == 0 && !nn_arch_refines(&c->arch)) return ts_fail(st, TS_INVALID, "train.g_rate is 0 and there is no refiner (model.h_width): nothing would be trained");
+    if (c->train.steps && c->train.g_rate == 0 && !(c->arch.coarse_steps > 0 && c->train.coarse_rate > 0) && !nn_arch_refines_full(&c->arch)) return ts_fail(st, TS_INVALID, "train.g_rate is 0 and there is no refiner (model.h_width): nothing would be trained");
     if (c->train.window && (c->train.window < 8 || c->train.window > c->data.patch))
         return ts_fail(st, TS_INVALID, "train.window is %d: use 8 to data.patch, which is %d, or 0", c->train.window, c->data.patch);
     if (c->train.given_min > c->arch.images)

@@ -18,7 +18,7 @@ typedef struct tr_config {
     struct { /* [train] */
         int batch, window; /* window 0: whole patches */
         int64_t pretrain_steps, steps, warmup;
-        double pretrain_rate, pretrain_floor, rate, g_rate, rate_floor;
+        double pretrain_rate, pretrain_floor, rate, g_rate, coarse_rate, rate_floor;
         double clip, spike, ema, start_weight, map_weight;
         int iterations_min, iterations_max; /* 0: arch.iterations */
         int given_min;                      /* 0: arch.images */

@@ -128,6 +128,27 @@ static const char *why_skip(const tr_trainer *t, const tr_row *row)
     return NULL;
 }
 
+/* By which the learning rate is multiplied for each part of the model. */
+static void rate_factors(const tr_config *c, bool pretraining, double factor[NN_COARSE + 1])
+{
+    factor[NN_G] = pretraining ? 1 : c->train.g_rate;
+    factor[NN_H] = !pretraining;
+    factor[NN_COARSE] = pretraining ? 0 : c->train.coarse_rate;
+}
+
+/* Of what is trained. */
+static double gradient_norm(const nn_model *model)
+{
+    double squares = 0;
+    for (int part = NN_G; part <= NN_COARSE; part++) {
+        size_t first, last;
+        nn_model_range(model, (nn_part)part, &first, &last);
+        const double norm = model->fixed[part] || first == last ? 0 : nn_gradient_norm(model, first, last);
+        squares += norm * norm;
+    }
+    return sqrt(squares);
+}
+
 ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
 {
     const tr_config *c = &t->config;
@@ -152,14 +173,14 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
     ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_SCENE, (uint64_t)t->step);
     for (int i = 0; i < batch; i++) rd_loss_views(&rng, t->views + i * RD_LOSS_VIEWS);
 
-    t->model->g_fixed = !row->pretraining && c->train.g_rate == 0;
-    size_t first = 0, last = t->model->count;
-    if (row->pretraining || t->model->g_fixed) nn_model_range(t->model, t->model->g_fixed, &first, &last);
+    double factor[NN_COARSE + 1]; /* of the rate, for each part */
+    rate_factors(c, row->pretraining, factor);
+    for (int part = NN_G; part <= NN_COARSE; part++) t->model->fixed[part] = factor[part] == 0;
     ag_reset(t->tape);
     ts_conv_precision_set(c->train.precision);
     ag_value *loss = forward(t, target, given, row);
     if (loss) row->loss = (double)loss->t.data[0];
-    if (loss && isfinite(row->loss) && ag_backward(t->tape, loss) == TS_OK) row->norm = nn_gradient_norm(t->model, first, last);
+    if (loss && isfinite(row->loss) && ag_backward(t->tape, loss) == TS_OK) row->norm = gradient_norm(t->model);
     ts_conv_precision_set(TS_F32);
     if (ag_status(t->tape)->code) {
         *st = *ag_status(t->tape);
@@ -175,10 +196,10 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
         const double clip = c->train.clip;
         const float scale = clip > 0 && row->norm > clip ? (float)(clip / row->norm) : 1.0f;
         nn_adam_next(&t->adam);
-        for (int refiner = t->model->g_fixed; refiner <= !row->pretraining; refiner++) {
-            nn_model_range(t->model, refiner, &first, &last);
-            const double factor = row->pretraining || refiner ? 1 : c->train.g_rate;
-            nn_adam_step(&t->adam, t->model, first, last, (float)(row->rate * factor), scale);
+        for (int part = NN_G; part <= NN_COARSE; part++) {
+            size_t first, last;
+            nn_model_range(t->model, (nn_part)part, &first, &last);
+            if (!t->model->fixed[part] && last > first) nn_adam_step(&t->adam, t->model, first, last, (float)(row->rate * factor[part]), scale);
         }
         t->usual_norm = t->adam.step == 1 ? row->norm : USUAL_DECAY * t->usual_norm + (1 - USUAL_DECAY) * row->norm;
         t->in_a_row = 0;

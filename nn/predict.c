@@ -1,0 +1,99 @@
+/* R_0 = g(photographs). */
+#include "nn/unrolled.h"
+#include "ops.h"
+#include "render/tone.h"
+#include "tensor/resize.h"
+#include <string.h>
+
+int nn_given(const nn_input *in) { return in->given > 0 ? in->given : 1; }
+int nn_materials(const nn_input *in) { return in->image.shape.n / nn_given(in); }
+
+/* Under which a photograph was taken, as the model's renderer has it. */
+rd_view nn_view_of(const nn_model *model, const nn_input *in, int photograph)
+{
+    rd_view view = in->views ? in->views[photograph] : in->view;
+    if (model->arch.compat == NN_COMPAT_PUBLISHED && view.kind == RD_POINT) view.kind = RD_PUBLISHED;
+    return view;
+}
+
+bool nn_input_check(ag_tape *tape, const nn_model *model, const nn_input *in)
+{
+    ts_shape s = in->image.shape;
+    if (ag_status(tape)->code) return false;
+    if (!model->value) ag_fail(tape, TS_INVALID, "the model has no parameters");
+    else if (model->arch.latent > 0) ag_fail(tape, TS_INVALID, "the model is an auto-encoder of maps: it cannot read a photograph");
+    else if (!in->image.data || s.c != 3) ag_fail(tape, TS_INVALID, "the photograph has %d channels: 3 are needed", s.c);
+    else if (nn_given(in) > model->arch.images)
+        ag_fail(tape, TS_INVALID, "%d photographs are given: the model reads %d", nn_given(in), model->arch.images);
+    else if (s.n % nn_given(in) != 0) ag_fail(tape, TS_INVALID, "%d photographs are not a multiple of %d", s.n, nn_given(in));
+    else if (!ts_contiguous(&in->image)) ag_fail(tape, TS_INVALID, "the photograph is not contiguous");
+    else if (s.h != in->grid.h || s.w != in->grid.w)
+        ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels, its grid %d x %d", s.w, s.h, in->grid.w, in->grid.h);
+    else if (in->whole.data && !ts_same(in->whole.shape, (ts_shape){s.n, in->grid.side, in->grid.side, 3}))
+        ag_fail(tape, TS_INVALID, "the whole photograph is %d x %d pixels, the window's grid says %d", in->whole.shape.w, in->whole.shape.h,
+                in->grid.side);
+    return !ag_status(tape)->code;
+}
+
+/* [N * given, S, S, 3] to [N, S, S, 3 images]. */
+static void side_by_side(const ts_tensor *from, int count, int images, float *to)
+{
+    const int64_t pixels = (int64_t)from->shape.h * from->shape.w, rows = from->shape.n / count * pixels;
+    for (int64_t i = 0; i < rows; i++) {
+        const int64_t n = i / pixels, at = i % pixels;
+        for (int k = 0; k < images; k++)
+            for (int c = 0; c < 3; c++)
+                to[(i * images + k) * 3 + c] = k < count ? from->data[((n * count + k) * pixels + at) * 3 + c] : -1.0f; /* -1: black, encoded */
+    }
+}
+
+bool nn_reduce(ag_tape *tape, const nn_model *model, const nn_input *in, nn_input *small)
+{
+    if (!nn_input_check(tape, model, in)) return false;
+    const ts_tensor *whole = in->whole.data ? &in->whole : &in->image;
+    const int size = model->arch.g_size;
+    if (whole->shape.h != whole->shape.w)
+        return ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels: g needs a square", whole->shape.w, whole->shape.h), false;
+    *small = (nn_input){.image = *whole, .grid = rd_grid_full(size), .view = in->view, .views = in->views, .given = in->given, .oriented = in->oriented};
+    if (whole->shape.h == size) return true;
+    ts_status st = {0};
+    ag_value *to = ag_empty(tape, (ts_shape){whole->shape.n, size, size, 3});
+    if (to && ts_resize(&to->t, whole, ag_arena(tape), &st)) ag_fail(tape, st.code, "%s", st.message);
+    if (!to || ag_status(tape)->code) return false;
+    small->image = to->t;
+    return true;
+}
+
+static bool central(const float p[3]) { return p[0] == 0 && p[1] == 0; }
+
+bool nn_orients(const nn_model *model, const nn_input *in)
+{
+    const rd_view view = nn_view_of(model, in, 0);
+    return in->image.shape.n == 1 && model->arch.compat == NN_COMPAT_NONE && central(view.camera) && central(view.light);
+}
+
+ag_value *nn_propose(ag_tape *tape, const nn_model *model, const nn_input *small)
+{
+    const ts_shape s = small->image.shape;
+    const int images = model->arch.images, count = nn_given(small);
+    const ts_mark mark = ag_scope_begin(tape);
+    ag_value *x = ag_empty(tape, (ts_shape){s.n / count, s.h, s.w, 3 * images}), *each = images == 1 ? x : ag_empty(tape, s);
+    if (!x || !each) return NULL;
+    rd_log_encode(ts_count(s), small->image.data, each->t.data);
+    if (images > 1) side_by_side(&each->t, count, images, x->t.data);
+    ag_value *maps = small->oriented && !ag_gradients(tape) && nn_orients(model, small) ? nn_unet_oriented(tape, model, x) : nn_unet(tape, model, x);
+    ag_scope_end(tape, mark, &maps, 1);
+    return maps;
+}
+
+ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in)
+{
+    nn_input small;
+    const ts_mark mark = ag_scope_begin(tape);
+    if (!nn_reduce(tape, model, in, &small)) return NULL;
+    ag_value *maps = nn_propose(tape, model, &small);
+    const int side = in->whole.data ? in->whole.shape.h : in->image.shape.h;
+    if (side != model->arch.g_size) maps = ag_resize(tape, maps, side, side);
+    ag_scope_end(tape, mark, &maps, 1);
+    return maps;
+}

@@ -1,0 +1,172 @@
+/* A refinement step: what the renderer says about R_t, and what is made of it. */
+#include "nn/unrolled.h"
+#include "ops.h"
+#include "render/published.h"
+#include "render/render.h"
+#include "tensor/kernels/elementwise.h"
+#include "tensor/maps.h"
+#include "tensor/threads.h"
+#include <math.h>
+#include <string.h>
+
+/* The RMSE of R_0, which scales all later gradients: of the whole photographs where they are given, maps then being theirs. */
+bool nn_measure_start(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, nn_state *state)
+{
+    if (!maps || !model->arch.gradient) return maps != NULL;
+    const ts_tensor *image = in->whole.data ? &in->whole : &in->image;
+    const rd_grid grid = in->whole.data ? rd_grid_full(in->grid.side) : in->grid;
+    const ts_shape s = maps->t.shape;
+    const int64_t one = (int64_t)s.h * s.w;
+    const int photographs = image->shape.n;
+    state->rmse0 = ts_arena_alloc(ag_arena(tape), (size_t)photographs * sizeof *state->rmse0);
+    if (!state->rmse0) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", photographs), false;
+    for (int i = 0; i < photographs; i++) {
+        const rd_view view = nn_view_of(model, in, i);
+        rd_flash_rmse(grid, maps->t.data + i / nn_given(in) * one * s.c, s.c, &view, image->data + i * one * 3, &state->rmse0[i]);
+    }
+    return true;
+}
+
+/* to [pixels, images channels] = from [pixels, channels] at photograph k's place. */
+static void place(int64_t pixels, int channels, int images, int k, const float *from, float *to)
+{
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int64_t i = 0; i < pixels; i++) memcpy(to + (i * images + k) * channels, from + i * channels, (size_t)channels * sizeof *to);
+}
+
+/* dL/dR_t of every photograph, as the renderer gives it: to is [N, H, W, images channels]. False without memory. */
+static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, const nn_state *state, float *to)
+{
+    const ts_shape s = maps->t.shape;
+    const int64_t pixels = (int64_t)s.h * s.w;
+    const int count = nn_given(in), images = model->arch.images;
+    const bool batch = model->arch.rmse == NN_RMSE_BATCH;
+    const ts_mark mark = ts_arena_mark(ag_arena(tape));
+    float *apart = images > 1 ? ts_arena_alloc(ag_arena(tape), (size_t)(pixels * s.c) * sizeof *apart) : NULL;
+    if (images > 1 && !apart) return ag_fail(tape, TS_NOMEM, "no memory for the gradient of %d x %d pixels", s.w, s.h), false;
+    if (count < images) memset(to, 0, (size_t)(s.n * pixels * images * s.c) * sizeof *to);
+    double common = 0;
+    for (int i = 0; batch && i < s.n; i++) {
+        double rmse;
+        const rd_view view = nn_view_of(model, in, i);
+        rd_flash_rmse(in->grid, maps->t.data + i * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, &rmse);
+        common += rmse * rmse / s.n;
+    }
+    for (int i = 0; i < s.n * count; i++) {
+        const int n = i / count, k = i % count;
+        const double rmse = batch ? sqrt(common) : state->rmse0[i];
+        const rd_view view = nn_view_of(model, in, i);
+        float *own = to + n * pixels * images * s.c;
+        rd_flash_gradient(in->grid, maps->t.data + n * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, rmse, apart ? apart : own,
+                          NULL);
+        if (apart) place(pixels, s.c, images, k, apart, own);
+    }
+    ts_arena_release(ag_arena(tape), mark);
+    return true;
+}
+
+/* The gradients: a constant of the tape, [N, H, W, images channels]. */
+static ag_value *loss_gradient(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, const nn_state *state)
+{
+    ts_shape s = maps->t.shape;
+    ag_value *gradient = ag_empty(tape, (ts_shape){s.n, s.h, s.w, s.c * model->arch.images});
+    if (!gradient) return NULL;
+    float *g = gradient->t.data;
+    const int64_t rows = (int64_t)s.n * s.h, row = (int64_t)s.w * gradient->t.shape.c;
+    if (!model->arch.gradient) {
+        memset(g, 0, (size_t)(rows * row) * sizeof *g);
+        return gradient;
+    }
+    if (!gradients(tape, model, in, maps, state, g)) return NULL;
+    if (model->arch.rmse == NN_RMSE_BATCH) { /* d RMSE of the whole batch has 1 / (3 N H W) where rd_flash_gradient has 1 / (3 256^2) */
+        float scale = (float)(256.0 * 256.0 / ((double)s.n * s.h * s.w));
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+        for (int64_t i = 0; i < rows * row; i++) g[i] *= scale;
+    }
+    return gradient;
+}
+
+/* Encodes the gradients where they are. both (NULL: not asked for): [N, H, W, (1 + images) channels], the maps and the encoded gradients. */
+static void encode(const nn_model *model, const ag_value *maps, ag_value *gradient, ag_value *both)
+{
+    const struct ts_elementwise_kernels *k = ts_elementwise_k();
+    const ts_shape s = maps->t.shape;
+    const int own = gradient->t.shape.c, all = s.c + own;
+    const int64_t rows = (int64_t)s.n * s.h, w = s.w;
+    const bool asinh_too = model->arch.encoding == NN_GRADIENT_ASINH && model->arch.gradient;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int64_t y = 0; y < rows; y++) {
+        float *g = gradient->t.data + y * w * own;
+        if (asinh_too) k->asinh(w * own, NN_GRADIENT_SCALE, g, g);
+        if (!both) continue;
+        float *to = both->t.data + y * w * all;
+        k->copy(w, s.c, maps->t.data + y * w * s.c, s.c, to, all, false);
+        k->copy(w, own, g, own, to + s.c, all, false);
+    }
+}
+
+/* Where Gauss and Newton's method would go: a constant of the tape, [N, H, W, channels]. */
+static ag_value *newton_step(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps)
+{
+    float damping[MAP_CHANNELS];
+    for (int i = 0; i < MAP_CHANNELS; i++) damping[i] = i >= MAP_SPECULAR ? NN_NEWTON_DAMPING_SPECULAR : NN_NEWTON_DAMPING;
+    const ts_shape s = maps->t.shape;
+    const int64_t pixels = (int64_t)s.h * s.w;
+    const int count = nn_given(in);
+    ag_value *to = ag_empty(tape, s);
+    if (!to) return NULL;
+    if (s.c > MAP_CHANNELS) memset(to->t.data, 0, (size_t)ts_count(s) * sizeof *to->t.data);
+    for (int n = 0; n < s.n; n++) {
+        rd_view view[NN_MAX_IMAGES];
+        const float *image[NN_MAX_IMAGES];
+        for (int k = 0; k < count; k++) {
+            view[k] = nn_view_of(model, in, n * count + k);
+            image[k] = in->image.data + (n * count + k) * pixels * 3;
+        }
+        rd_newton_step(in->grid, maps->t.data + n * pixels * s.c, s.c, view, image, count, damping, to->t.data + n * pixels * s.c);
+    }
+    return to;
+}
+
+/* Nothing taught h that its steps must come to rest: beyond those it was trained for, what is left of them adds up to a drift. So step t > T goes
+ * (T / t)^2 of its way, and all those together less than T whole steps. The published loop has no such rule. */
+static ag_value *shortened(ag_tape *tape, const nn_arch *a, int t, ag_value *maps, ag_value *next)
+{
+    if (!next || t <= a->iterations || a->compat == NN_COMPAT_PUBLISHED) return next;
+    const float left = (float)(a->iterations > 0 ? a->iterations : 1) / (float)t, weight = left * left, rest = 1 - weight;
+    if (ag_gradients(tape)) return ag_add(tape, ag_scale(tape, maps, rest), ag_scale(tape, next, weight));
+    const int64_t count = ts_count(next->t.shape); /* the same bytes, without memory of their own */
+    const float *from = maps->t.data;
+    float *to = next->t.data;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int64_t i = 0; i < count; i++) to[i] = rest * from[i] + weight * to[i];
+    return next;
+}
+
+ag_value *nn_refine_by(ag_tape *tape, const nn_model *model, const nn_refiner *h, const nn_input *in, ag_value *maps, nn_state *state)
+{
+    if (!nn_input_check(tape, model, in) || !maps) return NULL;
+    ts_shape s = maps->t.shape;
+    if (!ts_same(s, (ts_shape){nn_materials(in), in->grid.h, in->grid.w, model->arch.channels}))
+        return ag_fail(tape, TS_INVALID, "the maps are %d x %d x %d x %d, not the photograph's size and the model's %d channels", s.n, s.h, s.w, s.c,
+                       model->arch.channels);
+    if (model->arch.rmse == NN_RMSE_START && !state->rmse0 && !nn_measure_start(tape, model, in, maps, state)) return NULL;
+    const bool newton = model->arch.gradient && model->arch.descent == NN_DESCENT_NEWTON, read = h->width > 0;
+    ag_value *gradient = read || !newton ? loss_gradient(tape, model, in, maps, state) : NULL, *both = NULL, *path = NULL;
+    if (model->arch.gradient && model->arch.descent == NN_DESCENT_GRADIENT) path = gradient;
+    if (newton && !(path = newton_step(tape, model, in, maps))) return NULL;
+    const bool joined = read && !ag_gradients(tape); /* else the gradient of R_t needs an operation that joins them */
+    if (joined) both = ag_empty(tape, (ts_shape){s.n, s.h, s.w, (1 + model->arch.images) * s.c});
+    if (ag_status(tape)->code) return NULL;
+    if (gradient) encode(model, maps, gradient, both);
+    if (read && !joined) both = ag_concat(tape, maps, gradient);
+    ag_value *next = nn_step(tape, model, h, maps, path, both, state->gru, state->to);
+    state->step++;
+    return shortened(tape, &model->arch, state->step, maps, next);
+}
+
+ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state)
+{
+    if (!ag_status(tape)->code && !nn_arch_refines_full(&model->arch)) return ag_fail(tape, TS_INVALID, "the model has no refiner: 0 iterations are all that it can do");
+    return nn_refine_by(tape, model, &((const nn_layers *)model->layers)->h, in, maps, state);
+}
