@@ -59,60 +59,29 @@ static ag_value *step_and_release(ag_tape *tape, const nn_model *model, const nn
     return to;
 }
 
-/* R_t at g_size, and what its steps carry. */
-typedef struct coarse {
-    nn_input in;
-    ag_value *maps;
-    nn_state state;
-} coarse;
-
-static bool coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, coarse *c)
-{
-    *c = (coarse){0};
-    if (!nn_reduce(tape, model, in, &c->in)) return false;
-    c->maps = nn_propose(tape, model, &c->in);
-    return c->maps != NULL;
-}
-
-static bool coarse_step(ag_tape *tape, const nn_model *model, coarse *c)
-{
-    const nn_layers *l = model->layers;
-    if (!c->state.rmse0 && !nn_measure_start(tape, model, &c->in, c->maps, &c->state)) return false;
-    const ts_mark mark = ag_scope_begin(tape);
-    c->maps = nn_refine_by(tape, model, &l->coarse, &c->in, c->maps, &c->state);
-    if (!c->maps) return false;
-    ag_value *keep[3] = {c->maps, c->state.gru[0], c->state.gru[1]};
-    ag_scope_end(tape, mark, keep, 3);
-    c->maps = keep[0];
-    c->state.gru[0] = keep[1];
-    c->state.gru[1] = keep[2];
-    return true;
-}
-
 /* Of the whole, at its own size. */
-static ag_value *resampled(ag_tape *tape, const nn_input *in, ag_value *maps)
+static ag_value *resampled(ag_tape *tape, int side, ag_value *maps)
 {
-    const int side = in->whole.data ? in->whole.shape.h : in->image.shape.h;
     return maps->t.shape.h == side ? maps : ag_resize(tape, maps, side, side);
 }
 
 /* R_0 and those that the first steps leave, into maps as nn_lgd has it. Returns the last, of the whole photographs, and in *t its step; *on: to go on. */
-static ag_value *coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps, nn_after after, void *user, int *t, bool *on)
+static ag_value *first_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps, nn_after after, void *user, int *t, bool *on)
 {
     const int most = steps < model->arch.coarse_steps ? steps : model->arch.coarse_steps;
-    coarse c;
+    nn_coarse c;
     ag_value *whole = NULL;
-    *on = coarse_begin(tape, model, in, &c);
+    *on = nn_coarse_begin(tape, model, in, &c);
     for (*t = 0; *on; ++*t) {
         const ts_mark mark = ag_scope_begin(tape);
         if (*t == most || keep_all || after) {
-            whole = resampled(tape, in, c.maps);
+            whole = resampled(tape, c.in.grid.side, c.maps);
             maps[keep_all ? *t : 0] = whole ? window(tape, in, whole) : NULL;
             if (!whole || (after && !after(*t, maps[keep_all ? *t : 0], user))) *on = false;
         }
         if (*t == most || !*on) break;
         if (!keep_all) ag_scope_end(tape, mark, NULL, 0); /* nobody looks at it again */
-        *on = coarse_step(tape, model, &c);
+        *on = nn_coarse_step(tape, model, &c);
     }
     return whole;
 }
@@ -123,7 +92,7 @@ ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int ste
     int t;
     bool on;
     if (steps > 0 && !ag_status(tape)->code && !nn_arch_refines(&model->arch)) ag_fail(tape, TS_INVALID, "the model has no refiner: 0 iterations are all that it can do");
-    ag_value *whole = coarse_steps(tape, model, in, steps, keep_all, maps, after, user, &t, &on), *buffer = NULL; /* buffer: of R_t */
+    ag_value *whole = first_steps(tape, model, in, steps, keep_all, maps, after, user, &t, &on), *buffer = NULL; /* buffer: of R_t */
     ag_value *now = whole ? maps[keep_all ? t : 0] : NULL;
     nn_state state = {.step = t};
     const bool full = now && on && t < steps && nn_arch_refines_full(&model->arch);

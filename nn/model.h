@@ -124,6 +124,9 @@ typedef struct nn_input {
 /* R_0 by g of the whole: [N, S, S, channels]. Photographs that are not given are black. The log encoding, the resampling to g_size and back are in here. */
 ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in);
 
+/* R_0 … R_steps at g_size, [N, g_size, g_size, channels], by g and the coarse steps: steps <= arch.coarse_steps. */
+ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps);
+
 /* One photograph is given, its light and camera are above the centre, and the weights are not published ones. */
 bool nn_orients(const nn_model *model, const nn_input *in);
 
@@ -147,8 +150,8 @@ typedef struct nn_state {
  * step of Gauss and Newton's method, damped by 0.1 beside the photographs' variance and by 1 in F0, and D begins as half the identity; or, as published, D is 0. */
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
-/* The unrolled loop on the grid's window. The first arch.coarse_steps steps refine R_t at g_size, as nn_refine does but with NN_COARSE's parameters, and
- * give it resampled; the others begin with what these leave. maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate
+/* The unrolled loop on the grid's window. The first arch.coarse_steps steps refine R_t at g_size, as nn_refine does but with NN_COARSE's parameters and the averages of
+ * what the photographs say at their own size, and give it resampled; the others begin with what these leave. maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate
  * memory is released on a tape without gradients. after (may be NULL) sees every R_t and may stop the loop by returning false;
  * what is left of maps is then filled with the last R_t. */
 typedef bool (*nn_after)(int step, const ag_value *maps, void *user);

@@ -47,7 +47,8 @@ static void side_by_side(const ts_tensor *from, int count, int images, float *to
     }
 }
 
-bool nn_reduce(ag_tape *tape, const nn_model *model, const nn_input *in, nn_input *small)
+/* The whole photographs, linear, resampled to g_size: small. False after an error. */
+static bool reduce(ag_tape *tape, const nn_model *model, const nn_input *in, nn_input *small)
 {
     if (!nn_input_check(tape, model, in)) return false;
     const ts_tensor *whole = in->whole.data ? &in->whole : &in->image;
@@ -72,7 +73,8 @@ bool nn_orients(const nn_model *model, const nn_input *in)
     return in->image.shape.n == 1 && model->arch.compat == NN_COMPAT_NONE && central(view.camera) && central(view.light);
 }
 
-ag_value *nn_propose(ag_tape *tape, const nn_model *model, const nn_input *small)
+/* R_0 of reduced photographs: [N, g_size, g_size, channels]. */
+static ag_value *propose(ag_tape *tape, const nn_model *model, const nn_input *small)
 {
     const ts_shape s = small->image.shape;
     const int images = model->arch.images, count = nn_given(small);
@@ -86,13 +88,27 @@ ag_value *nn_propose(ag_tape *tape, const nn_model *model, const nn_input *small
     return maps;
 }
 
-ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in)
+bool nn_coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, nn_coarse *c)
 {
     nn_input small;
+    *c = (nn_coarse){0};
     const ts_mark mark = ag_scope_begin(tape);
-    if (!nn_reduce(tape, model, in, &small)) return NULL;
-    ag_value *maps = nn_propose(tape, model, &small);
-    const int side = in->whole.data ? in->whole.shape.h : in->image.shape.h;
+    if (!reduce(tape, model, in, &small)) return false;
+    c->maps = propose(tape, model, &small);
+    ag_scope_end(tape, mark, &c->maps, 1);
+    if (!c->maps) return false;
+    const ts_tensor whole = in->whole.data ? in->whole : in->image;
+    c->in = (nn_input){.image = whole, .grid = rd_grid_full(whole.shape.h), .view = in->view, .views = in->views, .given = in->given};
+    return true;
+}
+
+ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in)
+{
+    nn_coarse c;
+    const ts_mark mark = ag_scope_begin(tape);
+    if (!nn_coarse_begin(tape, model, in, &c)) return NULL;
+    ag_value *maps = c.maps;
+    const int side = c.in.grid.side;
     if (side != model->arch.g_size) maps = ag_resize(tape, maps, side, side);
     ag_scope_end(tape, mark, &maps, 1);
     return maps;

@@ -34,10 +34,10 @@ static void place(int64_t pixels, int channels, int images, int k, const float *
     for (int64_t i = 0; i < pixels; i++) memcpy(to + (i * images + k) * channels, from + i * channels, (size_t)channels * sizeof *to);
 }
 
-/* dL/dR_t of every photograph, as the renderer gives it: to is [N, H, W, images channels]. False without memory. */
-static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, const nn_state *state, float *to)
+/* dL/dR_t of every photograph, as the renderer gives it: to is [N, H, W, images channels]. */
+static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps, const double *rmse0, float *to)
 {
-    const ts_shape s = maps->t.shape;
+    const ts_shape s = maps->shape;
     const int64_t pixels = (int64_t)s.h * s.w;
     const int count = nn_given(in), images = model->arch.images;
     const bool batch = model->arch.rmse == NN_RMSE_BATCH;
@@ -49,73 +49,36 @@ static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, 
     for (int i = 0; batch && i < s.n; i++) {
         double rmse;
         const rd_view view = nn_view_of(model, in, i);
-        rd_flash_rmse(in->grid, maps->t.data + i * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, &rmse);
+        rd_flash_rmse(in->grid, maps->data + i * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, &rmse);
         common += rmse * rmse / s.n;
     }
     for (int i = 0; i < s.n * count; i++) {
         const int n = i / count, k = i % count;
-        const double rmse = batch ? sqrt(common) : state->rmse0[i];
+        const double rmse = batch ? sqrt(common) : rmse0[i];
         const rd_view view = nn_view_of(model, in, i);
         float *own = to + n * pixels * images * s.c;
-        rd_flash_gradient(in->grid, maps->t.data + n * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, rmse, apart ? apart : own,
-                          NULL);
+        rd_flash_gradient(in->grid, maps->data + n * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, rmse, apart ? apart : own, NULL);
         if (apart) place(pixels, s.c, images, k, apart, own);
     }
     ts_arena_release(ag_arena(tape), mark);
+    if (batch) { /* d RMSE of the whole batch has 1 / (3 N H W) where rd_flash_gradient has 1 / (3 256^2) */
+        const float scale = (float)(256.0 * 256.0 / ((double)s.n * s.h * s.w));
+        const int64_t values = s.n * pixels * images * s.c;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+        for (int64_t i = 0; i < values; i++) to[i] *= scale;
+    }
     return true;
 }
 
-/* The gradients: a constant of the tape, [N, H, W, images channels]. */
-static ag_value *loss_gradient(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, const nn_state *state)
-{
-    ts_shape s = maps->t.shape;
-    ag_value *gradient = ag_empty(tape, (ts_shape){s.n, s.h, s.w, s.c * model->arch.images});
-    if (!gradient) return NULL;
-    float *g = gradient->t.data;
-    const int64_t rows = (int64_t)s.n * s.h, row = (int64_t)s.w * gradient->t.shape.c;
-    if (!model->arch.gradient) {
-        memset(g, 0, (size_t)(rows * row) * sizeof *g);
-        return gradient;
-    }
-    if (!gradients(tape, model, in, maps, state, g)) return NULL;
-    if (model->arch.rmse == NN_RMSE_BATCH) { /* d RMSE of the whole batch has 1 / (3 N H W) where rd_flash_gradient has 1 / (3 256^2) */
-        float scale = (float)(256.0 * 256.0 / ((double)s.n * s.h * s.w));
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-        for (int64_t i = 0; i < rows * row; i++) g[i] *= scale;
-    }
-    return gradient;
-}
-
-/* Encodes the gradients where they are. both (NULL: not asked for): [N, H, W, (1 + images) channels], the maps and the encoded gradients. */
-static void encode(const nn_model *model, const ag_value *maps, ag_value *gradient, ag_value *both)
-{
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
-    const ts_shape s = maps->t.shape;
-    const int own = gradient->t.shape.c, all = s.c + own;
-    const int64_t rows = (int64_t)s.n * s.h, w = s.w;
-    const bool asinh_too = model->arch.encoding == NN_GRADIENT_ASINH && model->arch.gradient;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int64_t y = 0; y < rows; y++) {
-        float *g = gradient->t.data + y * w * own;
-        if (asinh_too) k->asinh(w * own, NN_GRADIENT_SCALE, g, g);
-        if (!both) continue;
-        float *to = both->t.data + y * w * all;
-        k->copy(w, s.c, maps->t.data + y * w * s.c, s.c, to, all, false);
-        k->copy(w, own, g, own, to + s.c, all, false);
-    }
-}
-
-/* Where Gauss and Newton's method would go: a constant of the tape, [N, H, W, channels]. */
-static ag_value *newton_step(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps)
+/* Where Gauss and Newton's method would go: to is [N, H, W, channels]. */
+static void newton_step(const nn_model *model, const nn_input *in, const ts_tensor *maps, float *to)
 {
     float damping[MAP_CHANNELS];
     for (int i = 0; i < MAP_CHANNELS; i++) damping[i] = i >= MAP_SPECULAR ? NN_NEWTON_DAMPING_SPECULAR : NN_NEWTON_DAMPING;
-    const ts_shape s = maps->t.shape;
+    const ts_shape s = maps->shape;
     const int64_t pixels = (int64_t)s.h * s.w;
     const int count = nn_given(in);
-    ag_value *to = ag_empty(tape, s);
-    if (!to) return NULL;
-    if (s.c > MAP_CHANNELS) memset(to->t.data, 0, (size_t)ts_count(s) * sizeof *to->t.data);
+    if (s.c > MAP_CHANNELS) memset(to, 0, (size_t)ts_count(s) * sizeof *to);
     for (int n = 0; n < s.n; n++) {
         rd_view view[NN_MAX_IMAGES];
         const float *image[NN_MAX_IMAGES];
@@ -123,9 +86,39 @@ static ag_value *newton_step(ag_tape *tape, const nn_model *model, const nn_inpu
             view[k] = nn_view_of(model, in, n * count + k);
             image[k] = in->image.data + (n * count + k) * pixels * 3;
         }
-        rd_newton_step(in->grid, maps->t.data + n * pixels * s.c, s.c, view, image, count, damping, to->t.data + n * pixels * s.c);
+        rd_newton_step(in->grid, maps->data + n * pixels * s.c, s.c, view, image, count, damping, to + n * pixels * s.c);
     }
-    return to;
+}
+
+bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps, const double *rmse0, float *gradient, float *newton)
+{
+    const ts_shape s = maps->shape;
+    const int64_t rows = (int64_t)s.n * s.h, row = (int64_t)s.w * s.c * model->arch.images;
+    if (newton) newton_step(model, in, maps, newton);
+    if (!gradient) return true;
+    if (!model->arch.gradient) {
+        memset(gradient, 0, (size_t)(rows * row) * sizeof *gradient);
+        return true;
+    }
+    if (!gradients(tape, model, in, maps, rmse0, gradient)) return false;
+    if (model->arch.encoding != NN_GRADIENT_ASINH) return true;
+    const struct ts_elementwise_kernels *k = ts_elementwise_k();
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int64_t y = 0; y < rows; y++) k->asinh(row, NN_GRADIENT_SCALE, gradient + y * row, gradient + y * row);
+    return true;
+}
+
+/* to [N, H, W, a's and b's channels]: without a tape's node. */
+static void join(const ag_value *a, const ag_value *b, ag_value *to)
+{
+    const struct ts_elementwise_kernels *k = ts_elementwise_k();
+    const int64_t rows = (int64_t)a->t.shape.n * a->t.shape.h, w = a->t.shape.w;
+    const int ca = a->t.shape.c, cb = b->t.shape.c, all = ca + cb;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int64_t y = 0; y < rows; y++) {
+        k->copy(w, ca, a->t.data + y * w * ca, ca, to->t.data + y * w * all, all, false);
+        k->copy(w, cb, b->t.data + y * w * cb, cb, to->t.data + y * w * all + ca, all, false);
+    }
 }
 
 /* Nothing taught h that its steps must come to rest: beyond those it was trained for, what is left of them adds up to a drift. So step t > T goes
@@ -143,23 +136,14 @@ static ag_value *shortened(ag_tape *tape, const nn_arch *a, int t, ag_value *map
     return next;
 }
 
-ag_value *nn_refine_by(ag_tape *tape, const nn_model *model, const nn_refiner *h, const nn_input *in, ag_value *maps, nn_state *state)
+bool nn_descends(const nn_model *model, nn_descent how) { return model->arch.gradient && model->arch.descent == how; }
+
+ag_value *nn_apply(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient, ag_value *newton, nn_state *state)
 {
-    if (!nn_input_check(tape, model, in) || !maps) return NULL;
-    ts_shape s = maps->t.shape;
-    if (!ts_same(s, (ts_shape){nn_materials(in), in->grid.h, in->grid.w, model->arch.channels}))
-        return ag_fail(tape, TS_INVALID, "the maps are %d x %d x %d x %d, not the photograph's size and the model's %d channels", s.n, s.h, s.w, s.c,
-                       model->arch.channels);
-    if (model->arch.rmse == NN_RMSE_START && !state->rmse0 && !nn_measure_start(tape, model, in, maps, state)) return NULL;
-    const bool newton = model->arch.gradient && model->arch.descent == NN_DESCENT_NEWTON, read = h->width > 0;
-    ag_value *gradient = read || !newton ? loss_gradient(tape, model, in, maps, state) : NULL, *both = NULL, *path = NULL;
-    if (model->arch.gradient && model->arch.descent == NN_DESCENT_GRADIENT) path = gradient;
-    if (newton && !(path = newton_step(tape, model, in, maps))) return NULL;
-    const bool joined = read && !ag_gradients(tape); /* else the gradient of R_t needs an operation that joins them */
-    if (joined) both = ag_empty(tape, (ts_shape){s.n, s.h, s.w, (1 + model->arch.images) * s.c});
+    ag_value *both = NULL, *path = nn_descends(model, NN_DESCENT_GRADIENT) ? gradient : newton;
+    if (h->width > 0 && ag_gradients(tape)) both = ag_concat(tape, maps, gradient); /* the gradient of R_t needs an operation that joins them */
+    else if (h->width > 0 && maps && gradient && (both = ag_empty(tape, (ts_shape){maps->t.shape.n, maps->t.shape.h, maps->t.shape.w, maps->t.shape.c + gradient->t.shape.c}))) join(maps, gradient, both);
     if (ag_status(tape)->code) return NULL;
-    if (gradient) encode(model, maps, gradient, both);
-    if (read && !joined) both = ag_concat(tape, maps, gradient);
     ag_value *next = nn_step(tape, model, h, maps, path, both, state->gru, state->to);
     state->step++;
     return shortened(tape, &model->arch, state->step, maps, next);
@@ -167,6 +151,18 @@ ag_value *nn_refine_by(ag_tape *tape, const nn_model *model, const nn_refiner *h
 
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state)
 {
-    if (!ag_status(tape)->code && !nn_arch_refines_full(&model->arch)) return ag_fail(tape, TS_INVALID, "the model has no refiner: 0 iterations are all that it can do");
-    return nn_refine_by(tape, model, &((const nn_layers *)model->layers)->h, in, maps, state);
+    if (!nn_input_check(tape, model, in) || !maps) return NULL;
+    const nn_refiner *h = &((const nn_layers *)model->layers)->h;
+    ts_shape s = maps->t.shape;
+    if (!nn_arch_refines_full(&model->arch)) return ag_fail(tape, TS_INVALID, "the model has no refiner: 0 iterations are all that it can do");
+    if (!ts_same(s, (ts_shape){nn_materials(in), in->grid.h, in->grid.w, model->arch.channels}))
+        return ag_fail(tape, TS_INVALID, "the maps are %d x %d x %d x %d, not the photograph's size and the model's %d channels", s.n, s.h, s.w, s.c,
+                       model->arch.channels);
+    if (model->arch.rmse == NN_RMSE_START && !state->rmse0 && !nn_measure_start(tape, model, in, maps, state)) return NULL;
+    ag_value *gradient = NULL, *newton = NULL;
+    if (h->width > 0 || nn_descends(model, NN_DESCENT_GRADIENT)) gradient = ag_empty(tape, (ts_shape){s.n, s.h, s.w, s.c * model->arch.images});
+    if (nn_descends(model, NN_DESCENT_NEWTON)) newton = ag_empty(tape, s);
+    if (ag_status(tape)->code) return NULL;
+    if (!nn_read(tape, model, in, &maps->t, state->rmse0, gradient ? gradient->t.data : NULL, newton ? newton->t.data : NULL)) return NULL;
+    return nn_apply(tape, model, h, maps, gradient, newton, state);
 }

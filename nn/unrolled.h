@@ -2,6 +2,7 @@
 #ifndef NN_UNROLLED_H
 #define NN_UNROLLED_H
 #include "nn/layers.h"
+#include "tensor/resample.h"
 
 int nn_given(const nn_input *in);
 int nn_materials(const nn_input *in);
@@ -12,15 +13,30 @@ rd_view nn_view_of(const nn_model *model, const nn_input *in, int photograph);
 /* The input fits the model, and no error is on the tape; else the tape gets one. */
 bool nn_input_check(ag_tape *tape, const nn_model *model, const nn_input *in);
 
-/* The whole photographs, linear, resampled to g_size: small is the input that the coarse steps have. False after an error. */
-bool nn_reduce(ag_tape *tape, const nn_model *model, const nn_input *in, nn_input *small);
-
-/* R_0 of reduced photographs: [N, g_size, g_size, channels]. */
-ag_value *nn_propose(ag_tape *tape, const nn_model *model, const nn_input *small);
-
 /* The RMSE of the photographs by maps, which scales all later gradients: of the whole photographs where they are given, maps then being theirs. */
 bool nn_measure_start(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, nn_state *state);
 
-/* nn_refine by h or by the coarse steps' network. */
-ag_value *nn_refine_by(ag_tape *tape, const nn_model *model, const nn_refiner *h, const nn_input *in, ag_value *maps, nn_state *state);
+bool nn_descends(const nn_model *model, nn_descent how);
+
+/* What the photographs say about maps [N, H, W, channels] of in's grid: gradient [N, H, W, images channels] as h reads it, newton [N, H, W, channels], either may be
+ * NULL. rmse0: of each photograph. False without memory. */
+bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps, const double *rmse0, float *gradient, float *newton);
+
+/* R_{t+1} by h from what was read, gradient and newton being constants (or NULL where they are not needed). */
+ag_value *nn_apply(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient, ag_value *newton, nn_state *state);
+
+/* R_t at g's size [N, g_size, g_size, channels], and what its steps carry. */
+typedef struct nn_coarse {
+    nn_input in;      /* the whole photographs */
+    ts_taps up, down; /* between g's size and theirs */
+    ag_value *maps;
+    nn_state state;
+} nn_coarse;
+
+/* R_0. False after an error, which the tape has. */
+bool nn_coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, nn_coarse *c);
+
+/* A step. It reads the photographs at their own size, and of what they say there the average: detail that maps of g's size cannot have leaves the average alone,
+ * where a photograph that is resampled first is not one of resampled maps. */
+bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c);
 #endif

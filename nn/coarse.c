@@ -1,0 +1,117 @@
+/* The steps at g's size. */
+#include "nn/unrolled.h"
+#include "ops.h"
+#include "render/render.h"
+#include <math.h>
+#include <string.h>
+
+enum { BAND = 1 << 17 }; /* pixels of the photograph that are read at a time, about */
+
+/* The taps of out positions first .. first + count - 1 alone; offset counts from the first of all, so the weights stay where they are. */
+static ts_taps part(const ts_taps *t, int first, int count) { return (ts_taps){t->in, count, t->first + first, t->offset + first, t->weight}; }
+
+/* Maps of material n in rows y0 .. y0 + rows - 1 of its photographs. */
+static void upsampled(const nn_coarse *c, int n, int y0, int rows, float *to)
+{
+    const ts_shape s = c->maps->t.shape;
+    const ts_taps own = part(&c->up, y0, rows);
+    ts_resample(1, s.c, &own, &c->up, c->maps->t.data + (int64_t)n * s.h * s.w * s.c, to, false);
+}
+
+/* RMSE(R_0) at the photographs' size, in bands. */
+static bool measure(ag_tape *tape, const nn_model *model, nn_coarse *c)
+{
+    const int side = c->in.grid.side, count = nn_given(&c->in), most = BAND / side > 0 ? BAND / side : 1, channels = c->maps->t.shape.c;
+    c->state.rmse0 = ts_arena_zalloc(ag_arena(tape), (size_t)c->in.image.shape.n, sizeof *c->state.rmse0);
+    const ts_mark mark = ts_arena_mark(ag_arena(tape));
+    float *maps = ts_arena_alloc(ag_arena(tape), (size_t)(most < side ? most : side) * (size_t)side * (size_t)channels * sizeof *maps);
+    if (!c->state.rmse0 || !maps) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d x %d pixels", side, side), false;
+    for (int i = 0; i < c->in.image.shape.n; i++) {
+        const rd_view view = nn_view_of(model, &c->in, i);
+        double squares = 0;
+        for (int y = 0; y < side; y += most) {
+            const int rows = y + most < side ? most : side - y;
+            double rmse;
+            upsampled(c, i / count, y, rows, maps);
+            rd_flash_rmse((rd_grid){.h = rows, .w = side, .y0 = y, .side = side}, maps, channels, &view, c->in.image.data + ((int64_t)i * side + y) * side * 3, &rmse);
+            squares += rmse * rmse * rows;
+        }
+        c->state.rmse0[i] = sqrt(squares / side);
+    }
+    ts_arena_release(ag_arena(tape), mark);
+    return true;
+}
+
+/* Rows first .. last - 1 of what the photographs of material n say: gradient and newton (or NULL) are the material's. */
+static bool read_band(ag_tape *tape, const nn_model *model, const nn_coarse *c, int n, int first, int last, float *gradient, float *newton)
+{
+    ts_arena *arena = ag_arena(tape);
+    const int side = c->in.grid.side, count = nn_given(&c->in), channels = c->maps->t.shape.c, read = channels * model->arch.images, end = last - 1;
+    const int y0 = c->down.first[first], rows = c->down.first[end] + c->down.offset[end + 1] - c->down.offset[end] - y0;
+    const size_t pixels = (size_t)rows * (size_t)side;
+    const ts_mark mark = ts_arena_mark(arena);
+    ts_tensor maps = ts_new(arena, (ts_shape){1, rows, side, channels}), photo = ts_new(arena, (ts_shape){count, rows, side, 3});
+    float *g = ts_arena_alloc(arena, pixels * (size_t)read * sizeof *g), *d = newton ? ts_arena_alloc(arena, pixels * (size_t)channels * sizeof *d) : NULL;
+    int *from = ts_arena_alloc(arena, (size_t)(last - first) * sizeof *from);
+    bool fine = maps.data && photo.data && g && from && (d || !newton);
+    if (!fine) ag_fail(tape, TS_NOMEM, "no memory for %d x %d pixels", side, rows);
+    for (int k = 0; fine && k < count; k++)
+        memcpy(photo.data + (size_t)k * pixels * 3, c->in.image.data + ((int64_t)(n * count + k) * side + y0) * side * 3, pixels * 3 * sizeof(float));
+    if (fine) {
+        const nn_input in = {.image = photo, .grid = {.h = rows, .w = side, .y0 = y0, .side = side}, .view = c->in.view, .views = c->in.views ? c->in.views + n * count : NULL,
+                             .given = count};
+        upsampled(c, n, y0, rows, maps.data);
+        fine = nn_read(tape, model, &in, &maps, c->state.rmse0 ? c->state.rmse0 + n * count : NULL, g, d);
+    }
+    if (fine) {
+        ts_taps own = part(&c->down, first, last - first);
+        for (int j = first; j < last; j++) from[j - first] = c->down.first[j] - y0;
+        own.in = rows;
+        own.first = from;
+        const int64_t row = (int64_t)c->down.out;
+        ts_resample(1, read, &own, &c->down, g, gradient + first * row * read, false);
+        if (newton) ts_resample(1, channels, &own, &c->down, d, newton + first * row * channels, false);
+    }
+    ts_arena_release(arena, mark);
+    return fine;
+}
+
+bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c)
+{
+    const nn_refiner *h = &((const nn_layers *)model->layers)->coarse;
+    const ts_shape s = c->maps->t.shape;
+    const int side = c->in.grid.side;
+    if (!c->up.weight) {
+        c->up = ts_taps_triangle(ag_arena(tape), s.h, side);
+        c->down = ts_taps_triangle(ag_arena(tape), side, s.h);
+        if (!c->up.weight || !c->down.weight) return ag_fail(tape, TS_NOMEM, "no memory for the filter"), false;
+    }
+    if (model->arch.gradient && !c->state.rmse0 && !measure(tape, model, c)) return false;
+    const ts_mark mark = ag_scope_begin(tape);
+    ag_value *gradient = ag_empty(tape, (ts_shape){s.n, s.h, s.w, s.c * model->arch.images});
+    ag_value *newton = nn_descends(model, NN_DESCENT_NEWTON) ? ag_empty(tape, s) : NULL;
+    if (ag_status(tape)->code) return false;
+    const int64_t pixels = (int64_t)s.h * s.w, rows = (int64_t)s.h * BAND / ((int64_t)side * side), most = rows < 1 ? 1 : rows > s.h ? s.h : rows;
+    for (int n = 0; n < s.n; n++)
+        for (int y = 0; y < s.h; y += (int)most)
+            if (!read_band(tape, model, c, n, y, y + (int)most < s.h ? y + (int)most : s.h, gradient->t.data + n * pixels * gradient->t.shape.c, newton ? newton->t.data + n * pixels * s.c : NULL))
+                return false;
+    ag_value *keep[3] = {nn_apply(tape, model, h, c->maps, gradient, newton, &c->state), c->state.gru[0], c->state.gru[1]};
+    if (!keep[0]) return false;
+    ag_scope_end(tape, mark, keep, 3);
+    c->maps = keep[0];
+    c->state.gru[0] = keep[1];
+    c->state.gru[1] = keep[2];
+    return true;
+}
+
+ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps)
+{
+    nn_coarse c;
+    bool on = nn_coarse_begin(tape, model, in, &c);
+    for (int t = 0; on; on = nn_coarse_step(tape, model, &c)) {
+        maps[t] = c.maps;
+        if (t++ == steps) break;
+    }
+    return ag_status(tape)->code;
+}
