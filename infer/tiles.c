@@ -27,7 +27,7 @@ typedef struct work {
     int channels;
     ag_value **coarse;         /* [coarse_steps + 1]: R_0 … of the steps at g's size */
     int coarse_steps;          /* of t->steps */
-    ts_taps taps;              /* from there to side, along rows and columns alike */
+    ts_taps taps[2];           /* from R_0 and from the others to side, along rows and columns alike */
     double *rmse0;             /* [given] */
     double *squares;           /* [steps + 1]: sums over the pixels of squared differences, by t */
 } work;
@@ -41,7 +41,7 @@ static ts_taps part(const ts_taps *t, int first, int count)
 /* R_t of a coarse step in an area. */
 static void start(const work *w, int t, area a, float *maps)
 {
-    const ts_taps down = part(&w->taps, a.y0, rows(a)), across = part(&w->taps, a.x0, columns(a));
+    const ts_taps down = part(&w->taps[t > 0], a.y0, rows(a)), across = part(&w->taps[t > 0], a.x0, columns(a));
     ts_resample(1, w->channels, &down, &across, w->coarse[t]->t.data, maps, false);
 }
 
@@ -194,7 +194,7 @@ static void tile(work *w, area a, float *maps)
 static ts_code prepare(work *w)
 {
     ts_arena *arena = ag_arena(w->tape);
-    const int side = w->t->side, size = w->model->arch.g_size, given = w->t->given;
+    const int side = w->t->side, given = w->t->given;
     const area all = {0, 0, side, side};
     w->coarse_steps = w->t->steps < w->model->arch.coarse_steps ? w->t->steps : w->model->arch.coarse_steps;
     w->coarse = ts_arena_zalloc(arena, (size_t)w->coarse_steps + 1, sizeof *w->coarse);
@@ -206,10 +206,10 @@ static ts_code prepare(work *w)
     const nn_input in = {.image = whole->t, .grid = rd_grid_full(side), .views = w->t->views, .given = given, .oriented = w->t->oriented};
     if (nn_coarse_steps(w->tape, w->model, &in, w->coarse_steps, w->coarse) != TS_OK) return ag_status(w->tape)->code;
     ag_scope_end(w->tape, mark, w->coarse, w->coarse_steps + 1);
-    w->taps = ts_taps_triangle(arena, size, side);
+    for (int i = 0; i < 2; i++) w->taps[i] = ts_taps_triangle(arena, w->coarse[i ? w->coarse_steps : 0]->t.shape.h, side);
     w->squares = ts_arena_zalloc(arena, (size_t)w->t->steps + 1, sizeof *w->squares);
     w->rmse0 = ts_arena_zalloc(arena, (size_t)given, sizeof *w->rmse0);
-    if (!w->taps.weight || !w->squares || !w->rmse0) ag_fail(w->tape, TS_NOMEM, "out of memory");
+    if (!w->taps[0].weight || !w->taps[1].weight || !w->squares || !w->rmse0) ag_fail(w->tape, TS_NOMEM, "out of memory");
     for (int y = 0; y < side && !ag_status(w->tape)->code; y += w->t->tile) {
         const area band = {y, 0, y + w->t->tile < side ? y + w->t->tile : side, side};
         const ts_mark before = ag_scope_begin(w->tape);

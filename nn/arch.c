@@ -44,6 +44,7 @@ static const field fields[] = {
     {.key = "images", .kind = FIELD_INT, .at = AT(images), .lo = 1, .hi = NN_MAX_IMAGES, .start = 1, .late = true},
     {.key = "compat", .kind = FIELD_WORD, .at = AT(compat), .hi = NN_COMPAT_PUBLISHED, .words = compat_words, .late = true},
     {.key = "coarse_steps", .kind = FIELD_INT, .at = AT(coarse_steps), .hi = 1000, .late = true},
+    {.key = "coarse_size", .kind = FIELD_INT, .at = AT(coarse_size), .lo = 1, .hi = 8192, .start = 128, .late = true},
     {.key = "coarse_width", .kind = FIELD_INT, .at = AT(coarse_width), .lo = 1, .hi = 4096, .start = 128, .late = true},
     {.key = "coarse_gru", .kind = FIELD_INT, .at = AT(coarse_gru), .lo = 1, .hi = 1024, .start = 64, .late = true},
     {.key = "latent", .kind = FIELD_INT, .at = AT(latent), .hi = 1024, .late = true},

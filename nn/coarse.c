@@ -1,4 +1,4 @@
-/* The steps at g's size. */
+/* The coarse steps. */
 #include "nn/unrolled.h"
 #include "ops.h"
 #include "render/render.h"
@@ -79,8 +79,10 @@ static bool read_band(ag_tape *tape, const nn_model *model, const nn_coarse *c, 
 bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c)
 {
     const nn_refiner *h = &((const nn_layers *)model->layers)->coarse;
+    const int side = c->in.grid.side, size = side < model->arch.coarse_size ? side : model->arch.coarse_size;
+    if (c->maps->t.shape.h != size) c->maps = ag_resize(tape, c->maps, size, size); /* it came from g */
+    if (!c->maps) return false;
     const ts_shape s = c->maps->t.shape;
-    const int side = c->in.grid.side;
     if (!c->up.weight) {
         c->up = ts_taps_triangle(ag_arena(tape), s.h, side);
         c->down = ts_taps_triangle(ag_arena(tape), side, s.h);

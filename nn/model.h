@@ -42,8 +42,9 @@ typedef struct nn_arch {
     int g_size;         /* side in pixels that g works at (a multiple of 2^g_levels); a photograph of another size is resampled for g */
     int h_width;        /* of h's convolutions; 0: h is what descent lets past it, or, where iterations is 0 or descent none, nothing */
     int h_gru;          /* of h's states */
-    int coarse_steps;   /* of the iterations, the first that many are taken at g_size, by a network of h's kind but with parameters of its own */
-    int coarse_width;   /* of its convolutions; both are of no meaning where coarse_steps is 0 */
+    int coarse_steps;   /* of the iterations, the first that many refine maps of coarse_size pixels a side, by a network of h's kind but with parameters of its own */
+    int coarse_size;    /* a smaller photograph has its own size; this and the next are of no meaning where coarse_steps is 0 */
+    int coarse_width;   /* of that network's convolutions */
     int coarse_gru;     /* of its states */
     int iterations;     /* T that it was trained for */
     bool recurrent;     /* h carries its states from step to step */
@@ -91,7 +92,7 @@ void nn_model_free(nn_model **model);
 typedef enum nn_part {
     NN_G, /* or the auto-encoder */
     NN_H, /* what refines at the photograph's size */
-    NN_COARSE /* what refines at g_size */
+    NN_COARSE /* what refines at coarse_size */
 } nn_part;
 
 /* Trained numbers in a part, without the block's padding. */
@@ -124,7 +125,7 @@ typedef struct nn_input {
 /* R_0 by g of the whole: [N, S, S, channels]. Photographs that are not given are black. The log encoding, the resampling to g_size and back are in here. */
 ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in);
 
-/* R_0 … R_steps at g_size, [N, g_size, g_size, channels], by g and the coarse steps: steps <= arch.coarse_steps. */
+/* R_0 at g_size and R_1 … R_steps at coarse_size or the photographs' size, by g and the coarse steps: steps <= arch.coarse_steps. */
 ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps);
 
 /* One photograph is given, its light and camera are above the centre, and the weights are not published ones. */
@@ -150,7 +151,7 @@ typedef struct nn_state {
  * step of Gauss and Newton's method, damped by 0.1 beside the photographs' variance and by 1 in F0, and D begins as half the identity; or, as published, D is 0. */
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
-/* The unrolled loop on the grid's window. The first arch.coarse_steps steps refine R_t at g_size, as nn_refine does but with NN_COARSE's parameters and the averages of
+/* The unrolled loop on the grid's window. The first arch.coarse_steps steps refine R_t at coarse_size, as nn_refine does but with NN_COARSE's parameters and the averages of
  * what the photographs say at their own size, and give it resampled; the others begin with what these leave. maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate
  * memory is released on a tape without gradients. after (may be NULL) sees every R_t and may stop the loop by returning false;
  * what is left of maps is then filled with the last R_t. */

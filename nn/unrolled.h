@@ -25,10 +25,10 @@ bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_
 /* R_{t+1} by h from what was read, gradient and newton being constants (or NULL where they are not needed). */
 ag_value *nn_apply(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient, ag_value *newton, nn_state *state);
 
-/* R_t at g's size [N, g_size, g_size, channels], and what its steps carry. */
+/* R_t, first at g's size and from the first step on at the coarse one, and what its steps carry. */
 typedef struct nn_coarse {
     nn_input in;      /* the whole photographs */
-    ts_taps up, down; /* between g's size and theirs */
+    ts_taps up, down; /* between the coarse size and theirs */
     ag_value *maps;
     nn_state state;
 } nn_coarse;
@@ -36,7 +36,7 @@ typedef struct nn_coarse {
 /* R_0. False after an error, which the tape has. */
 bool nn_coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, nn_coarse *c);
 
-/* A step. It reads the photographs at their own size, and of what they say there the average: detail that maps of g's size cannot have leaves the average alone,
+/* A step. It reads the photographs at their own size, and of what they say there the average: detail that coarse maps cannot have leaves the average alone,
  * where a photograph that is resampled first is not one of resampled maps. */
 bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c);
 #endif

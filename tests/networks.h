@@ -15,7 +15,7 @@ enum { SIDE = 16, MOST = 16 };
 static inline nn_arch tiny(void)
 {
     nn_arch a = nn_arch_default();
-    a.g_width = 4, a.g_width_max = 8, a.g_levels = 2, a.g_size = SIDE, a.h_width = 8, a.h_gru = 4;
+    a.g_width = 4, a.g_width_max = 8, a.g_levels = 2, a.g_size = SIDE, a.h_width = 8, a.h_gru = 4, a.coarse_size = SIDE;
     return a;
 }
 

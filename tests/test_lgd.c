@@ -29,12 +29,12 @@ TEST(nn_loop_is_the_same_however_it_is_run)
     }
 }
 
-/* A photograph of g's size: the first steps are those of a loop of their own parameters, the others go on from what these leave. */
-TEST(nn_coarse_steps_are_a_loop_at_g_s_size)
+/* A photograph that is no larger than coarse_size: the first steps are those of a loop of their own parameters, the others go on from what these leave. */
+TEST(nn_coarse_steps_of_a_small_photograph_are_a_loop_like_any)
 {
     enum { COARSE = 2, ALL = 4 };
     nn_arch whole = tiny(), alone = tiny();
-    whole.coarse_steps = COARSE, whole.coarse_width = whole.h_width = alone.h_width, whole.coarse_gru = alone.h_gru;
+    whole.coarse_steps = COARSE, whole.coarse_size = 30, whole.coarse_width = whole.h_width = alone.h_width, whole.coarse_gru = alone.h_gru;
     nn_model *m = create(&whole, 7), *small = create(&alone, 7);
     enliven(m);
     for (int i = 0; i < small->params; i++) { /* h of the small one is the other's coarse network */
@@ -45,7 +45,7 @@ TEST(nn_coarse_steps_are_a_loop_at_g_s_size)
         CHECK(from && from->count == small->param[i].count, "%s", name);
         memcpy(small->value + small->param[i].offset, m->value + from->offset, from->count * sizeof(float));
     }
-    nn_input in = photographs(2, SIDE, 4, NULL);
+    nn_input in = photographs(2, 24, 4, NULL);
     ag_tape *a = tape_create(false), *b = tape_create(false);
     ag_value *x[ALL + 1], *y[COARSE + 1];
     CHECK(!nn_lgd(a, m, &in, ALL, true, x, NULL, NULL), "%s", ag_status(a)->message);
@@ -79,16 +79,17 @@ TEST(nn_coarse_steps_read_the_photograph_at_its_size)
         ag_tape *t = tape_create(false);
         ag_value *maps[2];
         CHECK(!nn_coarse_steps(t, m, &in, 1, maps), "%s", ag_status(t)->message);
-        ag_value *full = ag_resize(t, maps[0], sides[k], sides[k]), *newton = ag_empty(t, full->t.shape);
+        const int coarse = sides[k] < SIDE ? sides[k] : SIDE;
+        ag_value *from = ag_resize(t, maps[0], coarse, coarse), *full = ag_resize(t, from, sides[k], sides[k]), *newton = ag_empty(t, full->t.shape);
         const size_t pixels = (size_t)sides[k] * (size_t)sides[k];
         for (size_t n = 0; n < 2; n++) {
             const float *image = in.image.data + n * pixels * 3;
             rd_newton_step(in.grid, full->t.data + n * pixels * 9, 9, &in.view, &image, 1, damping, newton->t.data + n * pixels * 9);
         }
-        newton = ag_resize(t, newton, SIDE, SIDE);
+        newton = ag_resize(t, newton, coarse, coarse);
         double worst = 0, most = 0;
-        for (int64_t i = 0; i < ts_count(maps[0]->t.shape); i++) {
-            const double change = maps[1]->t.data[i] - maps[0]->t.data[i];
+        for (int64_t i = 0; i < ts_count(maps[1]->t.shape); i++) {
+            const double change = maps[1]->t.data[i] - from->t.data[i];
             worst = fmax(worst, fabs(change - 0.5 * newton->t.data[i]));
             most = fmax(most, fabs(change));
         }

@@ -25,7 +25,7 @@ static nn_model *random_model_of(int h_width, bool recurrent, int images, int co
     a.g_size = 16;
     a.h_width = h_width;
     a.h_gru = 4;
-    a.coarse_steps = coarse_steps, a.coarse_width = 6, a.coarse_gru = 3;
+    a.coarse_steps = coarse_steps, a.coarse_size = 20, a.coarse_width = 6, a.coarse_gru = 3;
     ts_status st = {0};
     a.recurrent = recurrent;
     nn_model *m = nn_model_create(&a, &st);
