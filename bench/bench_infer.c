@@ -67,14 +67,19 @@ static void measure(nn_arch arch, const char *heading)
 
     const double g = bench_network_flop(s.model, "g.", SIDE), h = bench_network_flop(s.model, "h.", SIDE);
     const double unused = bench_network_flop(s.model, "h.gru1.hh", SIDE) + bench_network_flop(s.model, "h.gru2.hh", SIDE); /* without states */
-    const double step_flop = arch.recurrent ? h : h - unused;
+    const double step_flop = arch.recurrent ? h : h - unused, coarse = arch.coarse_steps * bench_network_flop(s.model, "coarse.", SIDE);
     snprintf(label, sizeof label, "g at %d x %d and its maps resampled", arch.g_size, arch.g_size);
     bench_row(label, bench_measure(whole, &s), g);
-    bench_row("one step of h with its gradient", bench_measure(step, &s), step_flop);
+    if (arch.coarse_steps > 0) {
+        s.steps = arch.coarse_steps;
+        snprintf(label, sizeof label, "g and %d coarse steps", s.steps);
+        bench_row(label, bench_measure(whole, &s), g + coarse);
+    }
+    bench_row(arch.h_width ? "one step of h with its gradient" : "one step at the photograph's size", bench_measure(step, &s), step_flop);
     bench_time t = bench_measure(gradient, &s);
     bench_row_unit("  of which the renderer's gradient", t, SIDE * SIDE / t.seconds * 1e-6, "Mpixel/s");
     s.steps = arch.iterations;
-    const double flop = g + s.steps * h - (arch.recurrent ? 1 : s.steps) * unused;
+    const double flop = g + coarse + (s.steps - arch.coarse_steps) * h - (arch.recurrent ? 1 : s.steps) * unused;
     bench_peer_network("infer", &arch, s.steps, job, sizeof job);
     snprintf(job + strlen(job), sizeof job - strlen(job), " %d", SIDE);
     for (int exact = 1; exact >= 0; exact--) {
@@ -97,7 +102,7 @@ BENCH(infer) { measure(nn_arch_default(), "inference, 256 x 256, default archite
 BENCH(infer_shipped)
 {
     nn_arch a = nn_arch_default();
-    a.h_width = 32, a.h_gru = 16;
+    a.g_width = 24, a.g_width_max = 192, a.h_width = 0, a.coarse_steps = 3, a.coarse_size = 64;
     measure(a, "inference, 256 x 256, the shipped model's architecture");
 }
 

@@ -145,7 +145,7 @@ static void train(const char *config, const char *heading)
     for (size_t i = 0; i < batch; i++) rd_loss_views(&rng, s.views + i * RD_LOSS_VIEWS);
     s.model->fixed[NN_G] = s.c.train.steps && s.c.train.g_rate == 0;
     s.model->fixed[NN_COARSE] = s.c.train.coarse_rate == 0;
-    s.steps = s.c.train.steps ? s.c.arch.iterations : 0;
+    s.steps = !s.c.train.steps ? 0 : s.c.train.iterations_max ? s.c.train.iterations_max : s.c.arch.iterations;
     s.in = (nn_input){.image = ts_view(shown, (ts_shape){(int)batch, side, side, 3}), .grid = {.h = side, .w = side, .side = patch}, .view = rd_flash()};
     if (side < patch) s.in.whole = ts_view(s.images, (ts_shape){(int)batch, patch, patch, 3});
     measure(&s);
@@ -156,6 +156,6 @@ static void train(const char *config, const char *heading)
     free(s.maps), free(s.images), free(s.window), free(s.goal), free(s.views), free(shown);
 }
 
-BENCH(train) { train("configs/single.ini", "a training step of configs/single.ini: g, h with its Newton steps (which the peer does not have), losses, all gradients that are asked for, Adam"); }
+BENCH(train) { train("configs/single.ini", "a training step of configs/single.ini: g, the coarse steps with their Newton steps (which the peer does not have; its gradient is of the photograph at g's size), losses, all gradients that are asked for, Adam"); }
 BENCH(train_g) { train("configs/single-g.ini", "a training step of configs/single-g.ini: g alone"); }
-BENCH(train_both) { train("configs/ablation/t6.ini", "a training step of configs/ablation/t6.ini: g and h together"); }
+BENCH(train_both) { train("configs/ablation/joint.ini", "a training step of configs/ablation/joint.ini: g and h together"); }

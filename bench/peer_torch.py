@@ -7,7 +7,7 @@ Reads jobs from standard input, one a line, and answers each with its median tim
     clock cpu                                processor time of all threads over their number, in place of wall time
     conv N H W IC OC K DILATION PAD          forward, the better of both memory formats; PAD: zero or replicate
     gradient N H W IC OC K DILATION PAD      gradients of input and weights together
-    infer G_WIDTH G_MAX G_LEVELS G_FIRST G_KERNEL G_SIZE H_WIDTH H_GRU CHANNELS RECURRENT T COARSE_T COARSE_WIDTH COARSE_GRU SIDE
+    infer G_WIDTH G_MAX G_LEVELS G_FIRST G_KERNEL G_SIZE H_WIDTH H_GRU CHANNELS RECURRENT T COARSE_T COARSE_SIZE COARSE_WIDTH COARSE_GRU SIDE
     train (the same up to COARSE_GRU) BATCH PATCH WINDOW FIXED   T 0: g alone; FIXED 1: all but g; H_WIDTH 0: the coarse steps alone
 Weights are random: time does not depend on them. Renderer's gradients are included, by autograd.
 """
@@ -192,13 +192,17 @@ class LGD(nn.Module):
         side, size, (h, w) = whole.shape[2], self.a["g_size"], image.shape[2:]
         x = whole if side == size else F.interpolate(whole, size=(size, size), mode="area")
         def seen(maps):
-            if side != size:
+            if side != maps.shape[2]:
                 maps = F.interpolate(maps, size=(side, side), mode="bilinear")
             return maps[:, :, y0:y0 + h, x0:x0 + w]
 
         maps = self.g(2 * torch.log((x + 0.01) / 0.01) / math.log(101) - 1)
         first = seen(maps)
-        maps = seen(refined(self.coarse, self.a["c_gru"], self.a["c_steps"], maps, x, positions(size, size, size)))
+        if self.coarse is not None:
+            small = min(self.a["c_size"], side)
+            maps, x = (v if v.shape[2] == small else F.interpolate(v, size=(small, small), mode="bilinear") for v in (maps, whole))
+            maps = refined(self.coarse, self.a["c_gru"], self.a["c_steps"], maps, x, positions(small, small, small))
+        maps = seen(maps)
         place = positions(side, side, side)[:, :, y0:y0 + h, x0:x0 + w]
         return first, refined(self.h, self.a["h_gru"], self.a["steps"] - self.a["c_steps"], maps, image, place)
 
@@ -216,7 +220,7 @@ def refined(h, gru, steps, maps, image, place):
     return maps
 
 
-NAMES = ["g_width", "g_max", "g_levels", "g_first", "g_kernel", "g_size", "h_width", "h_gru", "channels", "recurrent", "steps", "c_steps", "c_width", "c_gru"]
+NAMES = ["g_width", "g_max", "g_levels", "g_first", "g_kernel", "g_size", "h_width", "h_gru", "channels", "recurrent", "steps", "c_steps", "c_size", "c_width", "c_gru"]
 
 
 def network(words):
