@@ -102,7 +102,7 @@ BENCH(infer) { measure(nn_arch_default(), "inference, 256 x 256, default archite
 BENCH(infer_shipped)
 {
     nn_arch a = nn_arch_default();
-    a.g_width = 24, a.g_width_max = 192, a.h_width = 0, a.coarse_steps = 3, a.coarse_size = 64;
+    a.g_width = 24, a.g_width_max = 192, a.h_width = 0, a.coarse_steps = 2, a.coarse_size = 64;
     measure(a, "inference, 256 x 256, the shipped model's architecture");
 }
 

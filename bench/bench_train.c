@@ -158,4 +158,4 @@ static void train(const char *config, const char *heading)
 
 BENCH(train) { train("configs/single.ini", "a training step of configs/single.ini: g, the coarse steps with their Newton steps (which the peer does not have; its gradient is of the photograph at g's size), losses, all gradients that are asked for, Adam"); }
 BENCH(train_g) { train("configs/single-g.ini", "a training step of configs/single-g.ini: g alone"); }
-BENCH(train_both) { train("configs/ablation/joint.ini", "a training step of configs/ablation/joint.ini: g and h together"); }
+BENCH(train_both) { train("configs/ablation/t6.ini", "a training step of configs/ablation/t6.ini: g and h together"); }
