@@ -1,5 +1,4 @@
 /* The unrolled loop: the laws that it obeys however it is run. */
-#include "render/losses.h"
 #include "tests/networks.h"
 
 TEST(nn_loop_is_the_same_however_it_is_run)
@@ -27,105 +26,6 @@ TEST(nn_loop_is_the_same_however_it_is_run)
         CHECK(same(w, x[STEPS]), "R_T is another one when only it is kept (variant %d)", variant);
         nn_model_free(&m);
     }
-}
-
-/* A photograph that is no larger than coarse_size: the first steps are those of a loop of their own parameters, the others go on from what these leave. */
-TEST(nn_coarse_steps_of_a_small_photograph_are_a_loop_like_any)
-{
-    enum { COARSE = 2, ALL = 4 };
-    nn_arch whole = tiny(), alone = tiny();
-    whole.coarse_steps = COARSE, whole.coarse_size = 30, whole.coarse_width = whole.h_width = alone.h_width, whole.coarse_gru = alone.h_gru;
-    nn_model *m = create(&whole, 7), *small = create(&alone, 7);
-    enliven(m);
-    for (int i = 0; i < small->params; i++) { /* h of the small one is the other's coarse network */
-        char name[128];
-        const bool h = strncmp(small->param[i].name, "h.", 2) == 0;
-        snprintf(name, sizeof name, "%s%s", h ? "coarse." : "", small->param[i].name + (h ? 2 : 0));
-        const nn_param *from = nn_model_find(m, name);
-        CHECK(from && from->count == small->param[i].count, "%s", name);
-        memcpy(small->value + small->param[i].offset, m->value + from->offset, from->count * sizeof(float));
-    }
-    nn_input in = photographs(2, 24, 4, NULL);
-    ag_tape *a = tape_create(false), *b = tape_create(false);
-    ag_value *x[ALL + 1], *y[COARSE + 1];
-    CHECK(!nn_lgd(a, m, &in, ALL, true, x, NULL, NULL), "%s", ag_status(a)->message);
-    CHECK(!nn_lgd(b, small, &in, COARSE, true, y, NULL, NULL), "%s", ag_status(b)->message);
-    for (int t = 0; t <= COARSE; t++) CHECK(same(x[t], y[t]), "R_%d is another one than h's", t);
-    nn_state state = {.step = COARSE};
-    ag_value *next = x[COARSE];
-    for (int t = COARSE + 1; t <= ALL; t++) {
-        next = nn_refine(a, m, &in, next, &state);
-        CHECK(next && same(next, x[t]), "R_%d does not go on from R_%d", t, COARSE);
-    }
-    ag_tape_destroy(&a);
-    ag_tape_destroy(&b);
-    nn_model_free(&m);
-    nn_model_free(&small);
-}
-
-/* What a larger photograph says is averaged: without its network a coarse step is half of the mean of Newton's. Photographs of 600 pixels are read in bands. */
-TEST(nn_coarse_steps_read_the_photograph_at_its_size)
-{
-    static const int sides[] = {40, 600, 9};
-    nn_arch a = tiny();
-    a.coarse_steps = 1, a.h_width = 0;
-    nn_model *m = create(&a, 7);
-    const nn_param *p = nn_model_find(m, "coarse.output.weight");
-    memset(m->value + p->offset, 0, p->count * sizeof *m->value);
-    const float damping[9] = {NN_NEWTON_DAMPING, NN_NEWTON_DAMPING, NN_NEWTON_DAMPING, NN_NEWTON_DAMPING, NN_NEWTON_DAMPING, NN_NEWTON_DAMPING,
-                              NN_NEWTON_DAMPING_SPECULAR, NN_NEWTON_DAMPING_SPECULAR, NN_NEWTON_DAMPING_SPECULAR};
-    for (int k = 0; k < 3; k++) {
-        nn_input in = photographs(2, sides[k], 4, NULL);
-        ag_tape *t = tape_create(false);
-        ag_value *maps[2];
-        CHECK(!nn_coarse_steps(t, m, &in, 1, maps), "%s", ag_status(t)->message);
-        const int coarse = sides[k] < SIDE ? sides[k] : SIDE;
-        ag_value *from = ag_resize(t, maps[0], coarse, coarse), *full = ag_resize(t, from, sides[k], sides[k]), *newton = ag_empty(t, full->t.shape);
-        const size_t pixels = (size_t)sides[k] * (size_t)sides[k];
-        for (size_t n = 0; n < 2; n++) {
-            const float *image = in.image.data + n * pixels * 3;
-            rd_newton_step(in.grid, full->t.data + n * pixels * 9, 9, &in.view, &image, 1, damping, newton->t.data + n * pixels * 9);
-        }
-        newton = ag_resize(t, newton, coarse, coarse);
-        double worst = 0, most = 0;
-        for (int64_t i = 0; i < ts_count(maps[1]->t.shape); i++) {
-            const double change = maps[1]->t.data[i] - from->t.data[i];
-            worst = fmax(worst, fabs(change - 0.5 * newton->t.data[i]));
-            most = fmax(most, fabs(change));
-        }
-        CHECK(worst < 1e-6 && most > 1e-3, "%d pixels: the step is up to %g off, itself up to %g", sides[k], worst, most);
-        ag_tape_destroy(&t);
-    }
-    nn_model_free(&m);
-}
-
-/* A fixed part gets no gradient, the others do. */
-TEST(nn_parts_can_be_fixed)
-{
-    enum { STEPS = 3 };
-    nn_arch a = tiny();
-    a.coarse_steps = 2, a.coarse_width = 6, a.coarse_gru = 3;
-    nn_model *m = create(&a, 7);
-    enliven(m);
-    nn_input in = photographs(1, 24, 4, NULL);
-    for (int part = NN_G; part <= NN_COARSE; part++) {
-        ag_tape *t = tape_create(true);
-        ag_value *maps[STEPS + 1];
-        memset(m->grad, 0, m->count * sizeof *m->grad);
-        for (int k = NN_G; k <= NN_COARSE; k++) m->fixed[k] = k == part;
-        CHECK(!nn_lgd(t, m, &in, STEPS, true, maps, NULL, NULL), "%s", ag_status(t)->message);
-        float *goal = numbers((size_t)ts_count(maps[STEPS]->t.shape), 5, -0.5f, 0.5f);
-        CHECK(!ag_backward(t, ag_map_loss(t, maps[STEPS], ag_constant(t, ts_view(goal, maps[STEPS]->t.shape)))), "%s", ag_status(t)->message);
-        for (int k = NN_G; k <= NN_COARSE; k++) {
-            size_t first, last, nonzero = 0;
-            nn_model_range(m, (nn_part)k, &first, &last);
-            for (size_t i = first; i < last; i++) nonzero += m->grad[i] != 0;
-            CHECK((nonzero > 0) == (k != part), "part %d fixed: part %d has %zu gradients", part, k, nonzero);
-        }
-        free(goal);
-        ag_tape_destroy(&t);
-    }
-    nn_model_free(&m);
 }
 
 TEST(nn_steps_beyond_the_trained_ones_are_shortened)
@@ -239,11 +139,11 @@ TEST(nn_refiner_is_translation_equivariant)
 }
 
 /* What is refined in a window is what the whole has there, but for the reach of T steps from the window's border. */
-TEST(nn_window_equals_the_whole)
+static void check_window(int coarse_steps)
 {
     enum { WHOLE = 64, Y0 = 9, X0 = 17, H = 31, W = 40, STEPS = 2, REACH = STEPS * 5 };
     nn_arch a = tiny();
-    a.g_size = 32;
+    a.g_size = 32, a.coarse_steps = coarse_steps, a.coarse_width = 6, a.coarse_gru = 3;
     nn_model *m = create(&a, 21);
     enliven(m);
     nn_input whole = photographs(2, WHOLE, 22, NULL), part = whole;
@@ -274,6 +174,11 @@ TEST(nn_window_equals_the_whole)
                     }
     CHECK(moved > 0.01, "the refinement is too small to say anything: %g", moved);
     ts_arena_destroy(&arena);
+}
+
+TEST(nn_window_equals_the_whole)
+{
+    for (int coarse = 0; coarse < 2; coarse++) check_window(coarse);
 }
 
 static void scale(nn_model *m, const char *name, float factor)
