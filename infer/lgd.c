@@ -324,7 +324,7 @@ int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, in
     lgd_options o = options ? *options : lgd_options_default();
     if (check_arguments(model, photo, photos, side, &o, maps, &st) == TS_OK) {
         if (o.tolerance == LGD_TOLERANCE_USUAL)
-            o.tolerance = o.iterations == -1 && !o.exact && lgd_tiles_exact(&model->net->arch) ? LGD_TOLERANCE : 0;
+            o.tolerance = o.iterations == -1 && !o.exact && model->net->arch.h_width > 0 && lgd_tiles_exact(&model->net->arch) ? LGD_TOLERANCE : 0;
         const bool was = ts_conv_exact();
         const ts_precision before = ts_conv_precision();
         ts_threads_set(o.threads);

@@ -26,7 +26,8 @@ int lgd_most_photos(const lgd_model *model);        /* photographs that it reads
  * photographs that are refined tile by tile the steps are counted on the photograph at 256 x 256 pixels. */
 enum { LGD_AUTO = -2, LGD_AUTO_MOST = 24 };
 
-/* What costs the least time for renderings that are at most 1% worse than those of all steps (docs/performance.md). */
+/* What costs the least time for renderings that are at most 1% worse than those of all steps, where steps at the photograph's size have a network; where they have none they
+ * cost so little that ending them early saves nothing (docs/performance.md). */
 #define LGD_TOLERANCE 0.003
 #define LGD_TOLERANCE_USUAL (-1.0)
 
@@ -48,7 +49,7 @@ typedef struct lgd_options {
      * be the first estimate. */
     const unsigned char *mask;
     /* The photograph (over 512 pixels a side: each of its tiles of 256 x 256, with a mask of 128 x 128) is refined no further once the RMS of a step's change of its maps (in their encoding, [-1, 1]), over it and all
-     * that it reads, is below this: its maps are then exactly those of that step. 0: never. LGD_TOLERANCE_USUAL: LGD_TOLERANCE where iterations is -1,
+     * that it reads, is below this: its maps are then exactly those of that step. 0: never. LGD_TOLERANCE_USUAL: LGD_TOLERANCE where a network refines at the photograph's size, iterations is -1,
      * exact 0 and the weights are not the published ones, whose steps couple all pixels; else 0. */
     double tolerance;
     /* Photographs over 512 pixels a side, and those with mask or tolerance, are refined tile by tile, all steps of a tile at a time: progress is

@@ -150,8 +150,10 @@ mask_and_tolerance() {
         expect 2 infer --tolerance $x "$T/p.ppm" -o "$T/o"
         says "$T/err" "--tolerance"
     done
-    expect 0 "$BIN/lgd-infer" --size 32 --threads 1 --tolerance 1 "$T/p.ppm" -o "$T/one"
-    cmp -s "$T/one/p/normal.png" "$T/plain/p/normal.png" || fail "with a tolerance above every change it is not the first step that counts"
+    one="$BIN/lgd-infer --size 32 --threads 1 --model models/ablation/t6.safetensors $T/p.ppm"
+    expect 0 $one --iterations 1 -o "$T/step"
+    expect 0 $one --tolerance 1 -o "$T/one"
+    cmp -s "$T/one/p/normal.png" "$T/step/p/normal.png" || fail "with a tolerance above every change it is not the first step that counts"
     expect 0 infer --size 520 "$T/p.ppm" -o "$T/large" # in tiles
     complete "$T/large/p"
     says "$T/err" "(R_1)"
@@ -159,7 +161,7 @@ mask_and_tolerance() {
 
 usual_tolerance() {
     photo "$T/p.ppm" 64 64 120
-    run="$BIN/lgd-infer --size 64 --threads 1 --maps normal,exr $T/p.ppm"
+    run="$BIN/lgd-infer --size 64 --threads 1 --maps normal,exr --model models/ablation/t6.safetensors $T/p.ppm"
     expect 0 $run -o "$T/usual"
     expect 0 $run --tolerance 0.003 -o "$T/same"
     expect 0 $run --tolerance 0 -o "$T/all"
@@ -170,6 +172,10 @@ usual_tolerance() {
     cmp -s "$T/usual/p/maps.exr" "$T/all/p/maps.exr" && fail "it ends nothing early"
     cmp -s "$T/six/p/maps.exr" "$T/all/p/maps.exr" || fail "there is a tolerance where the number of steps is given"
     cmp -s "$T/exact/p/maps.exr" "$T/exact_all/p/maps.exr" || fail "there is a tolerance with --exact"
+    run="$BIN/lgd-infer --size 64 --threads 1 --maps normal,exr $T/p.ppm" # no network refines at the photograph's size
+    expect 0 $run -o "$T/usual"
+    expect 0 $run --tolerance 0 -o "$T/all"
+    cmp -s "$T/usual/p/maps.exr" "$T/all/p/maps.exr" || fail "there is a tolerance where it saves nothing"
 }
 
 comma_locale() {
