@@ -22,7 +22,7 @@ const lgd_argument lgd_infer_arguments[] = {
     {MASK, "mask", "FILE", "an image of the photographs' shape: only where it is brighter than black are the maps sure to be refined,\n"
                            "as they would be without it; elsewhere they may be the first estimate"},
     {TOLERANCE, "tolerance", "X", "0 .. 1: the photograph (over 512 pixels: a tile of it) is refined no further once a step changes its maps by less than X (RMS,\n"
-                                  "of values in -1 .. 1); 0: never (default: 0.003 for models with a network there (multi); 0 for others,\n"
+                                  "of values in -1 .. 1); 0: never (default: 0.003 for models with a network at that size, which the shipped ones have not; 0 for others,\n"
                                   "with --iterations, with --exact and with published weights)"},
     {'m', "model", "FILE", "weights: a file, or the name of a model that ships with the program: single (default) or multi (default: $LGD_MODEL)"},
     {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},

@@ -3,6 +3,7 @@
 #include "tensor/resample.h"
 #include "tensor/resize.h"
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 bool lgd_tiles_exact(const nn_arch *arch) { return arch->rmse == NN_RMSE_START || !arch->gradient; }
@@ -190,6 +191,13 @@ static void tile(work *w, area a, float *maps)
     ag_scope_end(w->tape, mark, NULL, 0);
 }
 
+static bool within(const float *v, int64_t count)
+{
+    bool fine = true;
+    for (int64_t i = 0; i < count; i++) fine &= v[i] >= 0 && v[i] <= 1;
+    return fine;
+}
+
 /* g and the first steps work on the whole photograph at g's size; the loss's scale is that of what they leave, measured in bands. */
 static ts_code prepare(work *w)
 {
@@ -200,10 +208,14 @@ static ts_code prepare(work *w)
     w->coarse = ts_arena_zalloc(arena, (size_t)w->coarse_steps + 1, sizeof *w->coarse);
     if (!w->coarse) return ag_fail(w->tape, TS_NOMEM, "out of memory"), TS_NOMEM;
     const ts_mark mark = ag_scope_begin(w->tape);
-    ag_value *whole = ag_empty(w->tape, (ts_shape){given, side, side, 3});
-    if (!whole) return ag_status(w->tape)->code;
-    photographs(w, all, whole->t.data);
-    const nn_input in = {.image = whole->t, .grid = rd_grid_full(side), .views = w->t->views, .given = given, .oriented = w->t->oriented};
+    ts_tensor photo = ts_view((float *)(uintptr_t)w->t->image[0], (ts_shape){given, side, side, 3});
+    if (given > 1 || !within(w->t->image[0], ts_count(photo.shape))) { /* else a large photograph need not be there twice */
+        const ag_value *whole = ag_empty(w->tape, photo.shape);
+        if (!whole) return ag_status(w->tape)->code;
+        photographs(w, all, whole->t.data);
+        photo = whole->t;
+    }
+    const nn_input in = {.image = photo, .grid = rd_grid_full(side), .views = w->t->views, .given = given, .oriented = w->t->oriented};
     if (nn_coarse_steps(w->tape, w->model, &in, w->coarse_steps, w->coarse) != TS_OK) return ag_status(w->tape)->code;
     ag_scope_end(w->tape, mark, w->coarse, w->coarse_steps + 1);
     for (int i = 0; i < 2; i++) w->taps[i] = ts_taps_triangle(arena, w->coarse[i ? w->coarse_steps : 0]->t.shape.h, side);
