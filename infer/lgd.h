@@ -46,7 +46,7 @@ typedef struct lgd_options {
     int (*progress)(int step, double rmse, void *user);
     void *user;
     /* side x side, or NULL: only where it is not zero are the maps sure to be refined, exactly as they would be without it; elsewhere they may
-     * be the first estimate. */
+     * be those of an earlier step. */
     const unsigned char *mask;
     /* The photograph (over 512 pixels a side: each of its tiles of 256 x 256, with a mask of 128 x 128) is refined no further once the RMS of a step's change of its maps (in their encoding, [-1, 1]), over it and all
      * that it reads, is below this: its maps are then exactly those of that step. 0: never. LGD_TOLERANCE_USUAL: LGD_TOLERANCE where a network refines at the photograph's size, iterations is -1,

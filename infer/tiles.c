@@ -173,7 +173,7 @@ static void put(const work *w, area b, const float *from, float *maps)
         memcpy(maps + ((size_t)y * (size_t)w->t->side + (size_t)b.x0) * channels, from, row * sizeof *from);
 }
 
-/* The first estimate everywhere, and what is refined over it. */
+/* What the coarse steps leave everywhere, and what is refined over it. */
 static void tile(work *w, area a, float *maps)
 {
     const ts_mark mark = ag_scope_begin(w->tape);

@@ -8,7 +8,7 @@ typedef struct lgd_tiles {
     const float *const *image; /* [given] of [side][side][3], linear; clamped to [0, 1] on the way */
     const rd_view *views;      /* [given] */
     int given;                 /* photographs, 1 .. arch.images */
-    const unsigned char *mask; /* [side][side] or NULL: tiles without a nonzero pixel keep R_0, and of the others only the area that holds such is sure to be refined */
+    const unsigned char *mask; /* [side][side] or NULL: tiles without a nonzero pixel keep what the coarse steps left (R_0), and of the others only the area that holds such is sure to be refined */
     int side, tile, steps;     /* tile: pixels of a tile's side */
     bool oriented;             /* as in nn_input */
     double tolerance;          /* a tile ends at R_t when the RMS of R_t - R_{t-1} over it and what it reads is below; 0: never */
