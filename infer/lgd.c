@@ -183,7 +183,7 @@ void lgd_encode(const float *maps, int side, float *encoded)
  * both gates' inputs and the new state. g works at its own size and needs less. */
 static double step_bytes(const nn_arch *a, int side)
 {
-    const double cells = a->h_width > 0 ? 2.0 * (a->h_width + 8.0 * a->h_gru) : 0; /* the coarse steps' are at g's size */
+    const double cells = a->h_width > 0 ? 2.0 * (a->h_width + 8.0 * a->h_gru) : 0; /* the coarse steps' are at a size of their own */
     return (3.0 * a->images + (3.0 + 2.0 * a->images) * a->channels + cells) * sizeof(float) * side * side;
 }
 

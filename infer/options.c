@@ -20,7 +20,7 @@ const lgd_argument lgd_infer_arguments[] = {
     {POWER, "light-power", "P", "how strong the light is, in usual ones (of a capture: in those that it names): a number in 0.01 .. 100, or\n"
                                 "auto, estimated from the photograph and reported (the default; of a capture 1)"},
     {MASK, "mask", "FILE", "an image of the photographs' shape: only where it is brighter than black are the maps sure to be refined,\n"
-                           "as they would be without it; elsewhere they may be that of an earlier step"},
+                           "as they would be without it; elsewhere they may be those of an earlier step"},
     {TOLERANCE, "tolerance", "X", "0 .. 1: the photograph (over 512 pixels: a tile of it) is refined no further once a step changes its maps by less than X (RMS,\n"
                                   "of values in -1 .. 1); 0: never (default: 0.003 for models with a network at that size, which the shipped ones have not; 0 for others,\n"
                                   "with --iterations, with --exact and with published weights)"},

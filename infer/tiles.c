@@ -1,7 +1,6 @@
 #include "infer/tiles.h"
 #include "render/render.h"
 #include "tensor/resample.h"
-#include "tensor/resize.h"
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -26,23 +25,17 @@ typedef struct work {
     const nn_model *model;
     lgd_tiles *t;
     int channels;
-    ag_value **coarse;         /* [coarse_steps + 1]: R_0 … of the steps at g's size */
+    ag_value **coarse;         /* [coarse_steps + 1]: R_0 at g's size, then those of the coarse steps at theirs */
     int coarse_steps;          /* of t->steps */
     ts_taps taps[2];           /* from R_0 and from the others to side, along rows and columns alike */
     double *rmse0;             /* [given] */
     double *squares;           /* [steps + 1]: sums over the pixels of squared differences, by t */
 } work;
 
-/* The taps of out positions first .. first + count - 1 alone: views of t. offset counts from the first of all, so the weights stay where they are. */
-static ts_taps part(const ts_taps *t, int first, int count)
-{
-    return (ts_taps){t->in, count, t->first + first, t->offset + first, t->weight};
-}
-
 /* R_t of a coarse step in an area. */
 static void start(const work *w, int t, area a, float *maps)
 {
-    const ts_taps down = part(&w->taps[t > 0], a.y0, rows(a)), across = part(&w->taps[t > 0], a.x0, columns(a));
+    const ts_taps down = ts_taps_part(&w->taps[t > 0], a.y0, rows(a)), across = ts_taps_part(&w->taps[t > 0], a.x0, columns(a));
     ts_resample(1, w->channels, &down, &across, w->coarse[t]->t.data, maps, false);
 }
 
@@ -191,6 +184,7 @@ static void tile(work *w, area a, float *maps)
     ag_scope_end(w->tape, mark, NULL, 0);
 }
 
+/* All in [0, 1], as photographs() would have it. */
 static bool within(const float *v, int64_t count)
 {
     bool fine = true;
@@ -198,7 +192,7 @@ static bool within(const float *v, int64_t count)
     return fine;
 }
 
-/* g and the first steps work on the whole photograph at g's size; the loss's scale is that of what they leave, measured in bands. */
+/* g and the coarse steps work on the whole photograph; the loss's scale is that of what they leave, measured in bands. */
 static ts_code prepare(work *w)
 {
     ts_arena *arena = ag_arena(w->tape);
@@ -222,7 +216,7 @@ static ts_code prepare(work *w)
     w->squares = ts_arena_zalloc(arena, (size_t)w->t->steps + 1, sizeof *w->squares);
     w->rmse0 = ts_arena_zalloc(arena, (size_t)given, sizeof *w->rmse0);
     if (!w->taps[0].weight || !w->taps[1].weight || !w->squares || !w->rmse0) ag_fail(w->tape, TS_NOMEM, "out of memory");
-    for (int y = 0; y < side && !ag_status(w->tape)->code; y += w->t->tile) {
+    for (int y = 0; y < side && nn_arch_reads(&w->model->arch) && !ag_status(w->tape)->code; y += w->t->tile) {
         const area band = {y, 0, y + w->t->tile < side ? y + w->t->tile : side, side};
         const ts_mark before = ag_scope_begin(w->tape);
         const ag_value *maps = ag_empty(w->tape, (ts_shape){1, rows(band), side, w->channels});

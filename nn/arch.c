@@ -50,6 +50,7 @@ static const field fields[] = {
     {.key = "latent", .kind = FIELD_INT, .at = AT(latent), .hi = 1024, .late = true},
 };
 enum { FIELDS = sizeof fields / sizeof *fields };
+_Static_assert(FIELDS + 1 <= NN_ARCH_META, "there is metadata for every field and the format");
 static const char prefix[] = "arch.";
 
 static int get(const nn_arch *a, const field *f)
@@ -82,6 +83,8 @@ bool nn_arch_refines_full(const nn_arch *a)
 {
     return a->h_width > 0 || (a->iterations > 0 && a->latent == 0 && a->gradient && a->descent != NN_DESCENT_NONE);
 }
+
+bool nn_arch_reads(const nn_arch *a) { return a->gradient && (a->h_width > 0 || a->descent == NN_DESCENT_GRADIENT); }
 
 bool nn_arch_carries(const nn_arch *a) { return a->recurrent && a->h_width > 0; }
 

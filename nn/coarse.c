@@ -7,14 +7,11 @@
 
 enum { BAND = 1 << 17 }; /* pixels of the photograph that are read at a time, about */
 
-/* The taps of out positions first .. first + count - 1 alone; offset counts from the first of all, so the weights stay where they are. */
-static ts_taps part(const ts_taps *t, int first, int count) { return (ts_taps){t->in, count, t->first + first, t->offset + first, t->weight}; }
-
 /* Maps of material n in rows y0 .. y0 + rows - 1 of its photographs. */
 static void upsampled(const nn_coarse *c, int n, int y0, int rows, float *to)
 {
     const ts_shape s = c->maps->t.shape;
-    const ts_taps own = part(&c->up, y0, rows);
+    const ts_taps own = ts_taps_part(&c->up, y0, rows);
     ts_resample(1, s.c, &own, &c->up, c->maps->t.data + (int64_t)n * s.h * s.w * s.c, to, false);
 }
 
@@ -64,7 +61,7 @@ static bool read_band(ag_tape *tape, const nn_model *model, const nn_coarse *c, 
         fine = nn_read(tape, model, &in, &maps, c->state.rmse0 ? c->state.rmse0 + n * count : NULL, g, d);
     }
     if (fine) {
-        ts_taps own = part(&c->down, first, last - first);
+        ts_taps own = ts_taps_part(&c->down, first, last - first);
         for (int j = first; j < last; j++) from[j - first] = c->down.first[j] - y0;
         own.in = rows;
         own.first = from;

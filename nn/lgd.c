@@ -96,7 +96,7 @@ ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int ste
     ag_value *now = whole ? maps[keep_all ? t : 0] : NULL;
     nn_state state = {.step = t};
     const bool full = now && on && t < steps && nn_arch_refines_full(&model->arch);
-    if (full && model->arch.rmse != NN_RMSE_BATCH && !nn_measure_start(tape, model, in, whole, &state)) return ag_status(tape)->code;
+    if (full && nn_arch_reads(&model->arch) && model->arch.rmse != NN_RMSE_BATCH && !nn_measure_start(tape, model, in, whole, &state)) return ag_status(tape)->code;
     if (full && release) {
         ts_shape s = now->t.shape;
         buffer = now;

@@ -62,7 +62,8 @@ nn_arch nn_arch_default(void);
 ts_code nn_arch_check(const nn_arch *a, ts_status *st);
 bool nn_arch_refines(const nn_arch *a); /* there is something to do steps with */
 bool nn_arch_refines_full(const nn_arch *a); /* at the photograph's size */
-bool nn_arch_carries(const nn_arch *a); /* those steps have states */
+bool nn_arch_reads(const nn_arch *a); /* those steps read the gradient, which the RMSE of what they begin with scales */
+bool nn_arch_carries(const nn_arch *a); /* they have states */
 
 typedef struct nn_param {
     char name[96];

@@ -158,7 +158,7 @@ ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag
     if (!ts_same(s, (ts_shape){nn_materials(in), in->grid.h, in->grid.w, model->arch.channels}))
         return ag_fail(tape, TS_INVALID, "the maps are %d x %d x %d x %d, not the photograph's size and the model's %d channels", s.n, s.h, s.w, s.c,
                        model->arch.channels);
-    if (model->arch.rmse == NN_RMSE_START && !state->rmse0 && !nn_measure_start(tape, model, in, maps, state)) return NULL;
+    if (nn_arch_reads(&model->arch) && model->arch.rmse == NN_RMSE_START && !state->rmse0 && !nn_measure_start(tape, model, in, maps, state)) return NULL;
     ag_value *gradient = NULL, *newton = NULL;
     if (h->width > 0 || nn_descends(model, NN_DESCENT_GRADIENT)) gradient = ag_empty(tape, (ts_shape){s.n, s.h, s.w, s.c * model->arch.images});
     if (nn_descends(model, NN_DESCENT_NEWTON)) newton = ag_empty(tape, s);

@@ -20,7 +20,7 @@ bool nn_all_finite(const float *v, size_t count)
 
 static bool of_network(const char *name)
 {
-    return !strncmp(name, "g.", 2) || !strncmp(name, "h.", 2) || !strncmp(name, "a.", 2) || nn_published_tensor(name);
+    return !strncmp(name, "g.", 2) || !strncmp(name, "h.", 2) || !strncmp(name, "coarse.", 7) || !strncmp(name, "a.", 2) || nn_published_tensor(name);
 }
 
 nn_model *nn_model_load(const char *path, ts_status *st)

@@ -18,6 +18,12 @@ ts_taps ts_taps_aligned(ts_arena *arena, int in, int out);
 /* Triangle filter of half-width max(1, in / out) around (j + 1/2) in / out - 1/2, positions outside read the edge's value. */
 ts_taps ts_taps_triangle(ts_arena *arena, int in, int out);
 
+/* The taps of out positions first .. first + count - 1 alone: views of t. offset counts from the first of all, so the weights stay where they are. */
+static inline ts_taps ts_taps_part(const ts_taps *t, int first, int count)
+{
+    return (ts_taps){t->in, count, t->first + first, t->offset + first, t->weight};
+}
+
 /* The transposed matrix. */
 ts_taps ts_taps_transpose(ts_arena *arena, const ts_taps *t);
 

@@ -43,6 +43,7 @@ TEST(weights_round_trip_is_exact)
 {
     ts_status st = {0};
     nn_arch a = small();
+    a.coarse_steps = 2, a.coarse_size = 20, a.coarse_width = 5, a.coarse_gru = 3;
     nn_model *m = nn_model_create(&a, &st);
     CHECK(m, "%s", st.message);
     nn_model_init(m, 1);
@@ -184,9 +185,10 @@ TEST(weights_of_another_architecture_are_refused)
     } expected[] = {{"\"h.conv1.weight\" has the shape [8, 18, 5, 5], not [6, 18, 5, 5]", TS_FORMAT},
                     {"\"h.newton.weight\" is missing", TS_FORMAT},
                     {"\"g.extra\" does not belong", TS_FORMAT},
+                    {"\"coarse.extra\" does not belong", TS_FORMAT},
                     {"\"g.down1.conv2.weight\" holds a value that is not finite", TS_NUMERIC}};
     const char *path = path_of("x.safetensors");
-    for (int c = 0; c < 4; c++) {
+    for (int c = 0; c < 5; c++) {
         const nn_model *from = c ? m : n;
         int count = 0;
         for (int i = 0; i < from->params; i++) {
@@ -194,8 +196,8 @@ TEST(weights_of_another_architecture_are_refused)
             if (c == 1 && i == from->params - 1) continue;
             block[count++] = (nn_block){p->name, p->rank, {p->dim[0], p->dim[1], p->dim[2], p->dim[3]}, from->value + p->offset};
         }
-        if (c == 2) block[count++] = (nn_block){"g.extra", 1, {1}, m->value};
-        if (c == 3) m->value[nn_model_find(m, "g.down1.conv2.weight")->offset + 2] = NAN;
+        if (c == 2 || c == 3) block[count++] = (nn_block){c == 2 ? "g.extra" : "coarse.extra", 1, {1}, m->value};
+        if (c == 4) m->value[nn_model_find(m, "g.down1.conv2.weight")->offset + 2] = NAN;
         st = (ts_status){0};
         CHECK(!nn_safetensors_write(path, block, count, meta, metas, &st), "%s", st.message);
         nn_model *bad = nn_model_load(path, &st);
