@@ -10,19 +10,22 @@
 ag_value *ag_concat(ag_tape *tape, ag_value *a, ag_value *b);
 #endif
 
+void ag_join(const ag_value *a, const ag_value *b, float *to)
+{
+    const struct ts_elementwise_kernels *k = ts_elementwise_k();
+    const int ca = a->t.shape.c, cb = b->t.shape.c, c = ca + cb;
+    const int64_t pixels = ts_pixels(a->t.shape), chunk = ag_pixel_chunk(c);
+    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels > chunk)
+    for (int64_t p = 0; p < pixels; p += chunk) {
+        k->copy(ag_part(pixels, p, chunk), ca, a->t.data + p * ca, ca, to + p * c, c, false);
+        k->copy(ag_part(pixels, p, chunk), cb, b->t.data + p * cb, cb, to + p * c + ca, c, false);
+    }
+}
+
 static void forward(ag_tape *tape, ag_node *node)
 {
     (void)tape;
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
-    const int a = node->in[0]->t.shape.c, b = node->in[1]->t.shape.c, c = a + b;
-    const float *xa = node->in[0]->t.data, *xb = node->in[1]->t.data;
-    float *y = node->out->t.data;
-    const int64_t pixels = ts_pixels(node->out->t.shape), chunk = ag_pixel_chunk(c);
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels > chunk)
-    for (int64_t p = 0; p < pixels; p += chunk) {
-        k->copy(ag_part(pixels, p, chunk), a, xa + p * a, a, y + p * c, c, false);
-        k->copy(ag_part(pixels, p, chunk), b, xb + p * b, b, y + p * c + a, c, false);
-    }
+    ag_join(node->in[0], node->in[1], node->out->t.data);
 }
 
 static void backward(ag_tape *tape, ag_node *node)

@@ -1,6 +1,6 @@
 /* u[n,i,j,o] = bias[o] + sum_{ky,kx,c} x[n, i + d (ky - K/2), j + d (kx - K/2), c] weight[o,c,ky,kx],   y = u > 0 ? u : leak u
  * du = y > 0 ? dy : leak dy, then dx, dweight and dbias as in tensor/conv.h
- * x: [N,H,W,I], weight: {O,I,K,K}, bias: [1,1,1,O], y: [N,H,W,O] */
+ * x: [N,H,W,I], or its first channels, and the others as constants; weight: {O,I,K,K}, bias: [1,1,1,O], y: [N,H,W,O] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
@@ -11,22 +11,42 @@
 /* Same-size convolution of x [N,H,W,ic] with weight {oc,ic,k,k}, bias [1,1,1,oc] or NULL, and a leaky ReLU: [N,H,W,oc].
  * leak in (0, 1]; 1: no activation. dilation 1 or 2. */
 ag_value *ag_conv(ag_tape *tape, ag_value *x, ag_value *weight, ag_value *bias, int dilation, ts_pad pad, float leak);
+/* The same of x [N,H,W,i] and, behind its channels, constants [N,H,W,ic-i], which get no gradient, and for which none is computed: an error if
+ * they want one. NULL: of x alone. */
+ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias, int dilation, ts_pad pad, float leak);
 #endif
+
+enum { X, WEIGHT, BIAS, CONSTANTS, INPUTS };
 
 typedef struct conv_attr {
     ts_conv conv;
     float leak;
 } conv_attr;
 
+/* All channels of the input; what is joined is there until the arena is released to before. */
+static const float *input(ag_tape *tape, const ag_node *node)
+{
+    const ag_value *x = node->in[X], *constants = node->in[CONSTANTS];
+    if (!constants) return x->t.data;
+    ts_shape s = x->t.shape;
+    s.c += constants->t.shape.c;
+    float *both = ts_new(ag_arena(tape), s).data;
+    if (both) ag_join(x, constants, both);
+    else ag_fail(tape, TS_NOMEM, "conv: no memory for %lld values", (long long)ts_count(s));
+    return both;
+}
+
 static void forward(ag_tape *tape, ag_node *node)
 {
     const conv_attr *a = node->attr;
     const ts_conv_use use = ts_conv_precision() == TS_BF16 ? TS_CONV_FORWARD_BF16
                             : ts_conv_exact() || !ts_conv_winograd(&a->conv) ? TS_CONV_FORWARD : TS_CONV_WINOGRAD;
-    const float *packed = ag_packed(tape, &a->conv, use, node->in[1]->t.data);
+    const float *packed = ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data);
     if (!packed) return;
-    const float *bias = node->in[2] ? node->in[2]->t.data : NULL;
-    (use == TS_CONV_FORWARD_BF16 ? ts_conv_forward_bf16 : use == TS_CONV_FORWARD ? ts_conv_forward : ts_conv_forward_winograd)(&a->conv, node->in[0]->t.data, packed, bias, a->leak, node->out->t.data);
+    const ts_mark mark = ts_arena_mark(ag_arena(tape));
+    const float *x = input(tape, node), *bias = node->in[BIAS] ? node->in[BIAS]->t.data : NULL;
+    if (x) (use == TS_CONV_FORWARD_BF16 ? ts_conv_forward_bf16 : use == TS_CONV_FORWARD ? ts_conv_forward : ts_conv_forward_winograd)(&a->conv, x, packed, bias, a->leak, node->out->t.data);
+    ts_arena_release(ag_arena(tape), mark);
 }
 
 static void backward(ag_tape *tape, ag_node *node)
@@ -40,12 +60,15 @@ static void backward(ag_tape *tape, ag_node *node)
         #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
         for (int64_t i = 0; i < n; i += AG_CHUNK) k->leaky_backward(ag_part(n, i, AG_CHUNK), y + i, dy + i, a->leak, dy + i, false);
     }
-    float *dweight = ag_grad_add(tape, node->in[1]), *dbias = ag_grad_add(tape, node->in[2]);
-    if (dweight || dbias) ts_conv_weight_gradient(&a->conv, node->in[0]->t.data, dy, dweight, dbias);
+    float *dweight = ag_grad_add(tape, node->in[WEIGHT]), *dbias = ag_grad_add(tape, node->in[BIAS]);
+    const ts_mark mark = ts_arena_mark(ag_arena(tape));
+    const float *x = dweight || dbias ? input(tape, node) : NULL;
+    if (x) ts_conv_weight_gradient(&a->conv, x, dy, dweight, dbias);
+    ts_arena_release(ag_arena(tape), mark);
     bool accumulate;
-    float *dx = ag_grad_target(tape, node->in[0], &accumulate);
+    float *dx = ag_grad_target(tape, node->in[X], &accumulate);
     const bool bf16 = ts_conv_precision() == TS_BF16;
-    const float *packed = dx ? ag_packed(tape, &a->conv, bf16 ? TS_CONV_DATA_GRADIENT_BF16 : TS_CONV_DATA_GRADIENT, node->in[1]->t.data) : NULL;
+    const float *packed = dx ? ag_packed(tape, &a->conv, bf16 ? TS_CONV_DATA_GRADIENT_BF16 : TS_CONV_DATA_GRADIENT, node->in[WEIGHT]->t.data) : NULL;
     if (packed) (bf16 ? ts_conv_data_gradient_bf16 : ts_conv_data_gradient)(&a->conv, dy, packed, dx, accumulate);
 }
 
@@ -59,13 +82,16 @@ static int place(int at, int size, ts_pad pad)
 /* u of one output value */
 static double plain(const ts_conv *c, const double *const *in, int n, int i, int j, int o)
 {
-    double s = in[2] ? in[2][o] : 0;
+    const int variables = ts_conv_variables(c);
+    double s = in[BIAS] ? in[BIAS][o] : 0;
     for (int ky = 0; ky < c->k; ky++)
         for (int kx = 0; kx < c->k; kx++) {
             const int y = place(i + c->dilation * (ky - c->k / 2), c->h, c->pad), x = place(j + c->dilation * (kx - c->k / 2), c->w, c->pad);
             if (y < 0 || x < 0) continue;
+            const int64_t pixel = (int64_t)(n * c->h + y) * c->w + x;
             for (int q = 0; q < c->ic; q++)
-                s += in[0][((int64_t)(n * c->h + y) * c->w + x) * c->ic + q] * in[1][((o * c->ic + q) * c->k + ky) * c->k + kx];
+                s += (q < variables ? in[X][pixel * variables + q] : in[CONSTANTS][pixel * c->constants + q - variables]) *
+                     in[WEIGHT][((o * c->ic + q) * c->k + ky) * c->k + kx];
         }
     return s;
 }
@@ -91,7 +117,8 @@ typedef struct conv_case {
 static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
 {
     const conv_case *c = user;
-    return ag_conv(tape, in[0], in[1], c->bias ? in[2] : NULL, c->attr.conv.dilation, c->attr.conv.pad, c->attr.leak);
+    const ts_conv *v = &c->attr.conv;
+    return ag_conv_beside(tape, in[X], v->constants ? in[CONSTANTS] : NULL, in[WEIGHT], c->bias ? in[BIAS] : NULL, v->dilation, v->pad, c->attr.leak);
 }
 
 /* u is linear in each value alone: it crosses 0 within the step when its signs at both ends differ. */
@@ -100,7 +127,7 @@ static bool kink(const double *const *in, int input, int64_t at, double step, co
     const conv_case *k = user;
     const ts_conv *c = &k->attr.conv;
     if (k->attr.leak == 1.0f) return false;
-    const double *moved[3] = {in[0], in[1], k->bias ? in[2] : NULL};
+    const double *moved[INPUTS] = {in[X], in[WEIGHT], k->bias ? in[BIAS] : NULL, c->constants ? in[CONSTANTS] : NULL};
     double *value = (double *)(uintptr_t)(in[input] + at), was = *value; /* the checker's own array, restored below */
     bool crossed = false;
     for (int64_t q = 0; !crossed && q < (int64_t)c->n * c->h * c->w * c->oc; q++) {
@@ -127,31 +154,45 @@ static void cases(ag_gradcheck *check)
     for (int t = 0; t < edges + 8; t++) {
         conv_case k = {.bias = t % 3 != 0};
         k.attr.leak = t % 2 ? 0.2f : 1.0f;
-        if (t < edges) k.attr.conv = (ts_conv){1 + t % 2, edge[t].h, edge[t].w, edge[t].ic, edge[t].oc, edge[t].k, edge[t].dilation, edge[t].pad};
+        if (t < edges) k.attr.conv = (ts_conv){1 + t % 2, edge[t].h, edge[t].w, edge[t].ic, edge[t].oc, edge[t].k, edge[t].dilation, edge[t].pad, 0};
         else k.attr.conv = (ts_conv){1 + ts_rng_int(r, 2), 1 + ts_rng_int(r, 5), 1 + ts_rng_int(r, 6), 1 + ts_rng_int(r, 8), 1 + ts_rng_int(r, 8),
-                                     1 + 2 * ts_rng_int(r, 3), 1 + ts_rng_int(r, 2), ts_rng_int(r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE};
-        const ts_conv *v = &k.attr.conv;
-        ag_case c = {.label = t < edges ? edge[t].label : "random", .inputs = k.bias ? 3 : 2, .lo = -1, .hi = 1, .kink = kink, .build = build, .user = &k,
-                     .shape = {{v->n, v->h, v->w, v->ic}, {v->oc, v->ic, v->k, v->k}, {1, 1, 1, v->oc}}};
+                                     1 + 2 * ts_rng_int(r, 3), 1 + ts_rng_int(r, 2), ts_rng_int(r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE, 0};
+        ts_conv *v = &k.attr.conv;
+        v->constants = t % 4 == 1 ? v->ic / 2 : 0;
+        ag_case c = {.label = t < edges ? edge[t].label : "random", .inputs = v->constants ? INPUTS : k.bias ? CONSTANTS : BIAS, .lo = -1, .hi = 1, .kink = kink, .build = build, .user = &k,
+                     .shape = {{v->n, v->h, v->w, ts_conv_variables(v)}, {v->oc, v->ic, v->k, v->k}, {1, 1, 1, v->oc}, {v->n, v->h, v->w, v->constants}}};
+        c.fixed[CONSTANTS] = true;
+        c.fixed[BIAS] = !k.bias;
         ag_gradcheck_run(check, &c);
     }
 }
 
 const ag_op op_conv = {"conv", forward, backward, reference, cases};
 
-ag_value *ag_conv(ag_tape *tape, ag_value *x, ag_value *weight, ag_value *bias, int dilation, ts_pad pad, float leak)
+ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias, int dilation, ts_pad pad, float leak)
 {
-    ag_value *in[3] = {x, weight, bias};
-    char text[AG_SHAPE_TEXT];
-    if (!ag_ready(tape, "conv", 2, in)) return NULL;
-    const ts_shape s = x->t.shape, w = weight->t.shape; /* w: n = oc, h = ic, w = c = k */
+    ag_value *in[INPUTS] = {x, weight, bias, constants};
+    char text[AG_SHAPE_TEXT], more[AG_SHAPE_TEXT];
+    if (!ag_ready(tape, "conv", BIAS, in)) return NULL;
+    ts_shape s = x->t.shape, w = weight->t.shape; /* w: n = oc, h = ic, w = c = k */
+    if (constants) {
+        const ts_shape q = constants->t.shape;
+        if (q.n != s.n || q.h != s.h || q.w != s.w) return ag_fail(tape, TS_INVALID, "conv: %s and %s differ in more than the channels", ag_shape_text(text, s), ag_shape_text(more, q));
+        if (constants->needs_grad) return ag_fail(tape, TS_INVALID, "conv: what stands beside the input is a constant and has no gradient");
+        s.c += q.c;
+    }
     if (w.w != w.c) return ag_fail(tape, TS_INVALID, "conv: weight %s is not {oc,ic,k,k}", ag_shape_text(text, w));
     if (s.c != w.h) return ag_fail(tape, TS_INVALID, "conv: input has %d channels, weight wants %d", s.c, w.h);
     if (bias && !ts_same(bias->t.shape, (ts_shape){1, 1, 1, w.n}))
         return ag_fail(tape, TS_INVALID, "conv: bias %s is not [1,1,1,%d]", ag_shape_text(text, bias->t.shape), w.n);
     if (!(leak > 0 && leak <= 1)) return ag_fail(tape, TS_INVALID, "conv: leak is %g, it must lie in (0, 1]", (double)leak);
-    const conv_attr a = {{s.n, s.h, s.w, s.c, w.n, w.c, dilation, pad}, leak};
+    const conv_attr a = {{s.n, s.h, s.w, s.c, w.n, w.c, dilation, pad, s.c - x->t.shape.c}, leak};
     ts_status st = {0};
     if (ts_conv_check(&a.conv, &st) != TS_OK) return ag_fail(tape, st.code, "%s", st.message);
-    return ag_apply(tape, &op_conv, 3, in, (ts_shape){s.n, s.h, s.w, w.n}, &a, sizeof a);
+    return ag_apply(tape, &op_conv, INPUTS, in, (ts_shape){s.n, s.h, s.w, w.n}, &a, sizeof a);
+}
+
+ag_value *ag_conv(ag_tape *tape, ag_value *x, ag_value *weight, ag_value *bias, int dilation, ts_pad pad, float leak)
+{
+    return ag_conv_beside(tape, x, NULL, weight, bias, dilation, pad, leak);
 }

@@ -228,7 +228,7 @@ const float *ag_packed(ag_tape *tape, const ts_conv *c, ts_conv_use use, const f
     for (size_t i = 0; i < tape->packs; i++) {
         const ag_pack *p = &tape->pack[i];
         if (p->weight == weight && p->use == use && p->conv.ic == c->ic && p->conv.oc == c->oc && p->conv.k == c->k &&
-            p->conv.dilation == c->dilation && p->conv.pad == c->pad)
+            p->conv.dilation == c->dilation && p->conv.pad == c->pad && p->conv.constants == c->constants)
             return p->packed;
     }
     float *packed = ts_arena_alloc(tape->packs_arena, ts_conv_packed_count(c, use) * sizeof(float));

@@ -89,10 +89,12 @@ static void row(const char *what, ts_conv c, void (*f)(void *user))
     char label[96];
     snprintf(label, sizeof label, "%s n%d %dx%d %d->%d %dx%d%s%s", what, c.n, c.h, c.w, c.ic, c.oc, c.k, c.k, c.dilation > 1 ? " d2" : "",
              c.pad == TS_PAD_REPLICATE ? " rep" : "");
+    const bool back = f == data_gradient || f == data_gradient_bf16;
+    if (back && c.constants) snprintf(label + strlen(label), sizeof label - strlen(label), " (of %d)", ts_conv_variables(&c));
     work w = make(c);
     bench_time t = bench_measure(f, &w);
     if ((f == forward_bf16 || f == data_gradient_bf16) && !bench_bf16(&t)) snprintf(label + strlen(label), sizeof label - strlen(label), ", emulated");
-    bench_row(label, t, 2.0 * c.n * c.h * c.w * c.ic * c.oc * c.k * c.k);
+    bench_row(label, t, 2.0 * c.n * c.h * c.w * (back ? ts_conv_variables(&c) : c.ic) * c.oc * c.k * c.k);
     discard(&w);
 }
 
@@ -116,22 +118,22 @@ static void both_gradients(void *user)
 }
 
 static const ts_conv published[] = {
-    {1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO},        {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE}, {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE},
-    {1, 256, 256, 256, 192, 1, 1, TS_PAD_REPLICATE}, {1, 256, 256, 64, 192, 1, 1, TS_PAD_REPLICATE}, {1, 256, 256, 64, 10, 3, 1, TS_PAD_REPLICATE},
-    {1, 64, 64, 512, 512, 5, 1, TS_PAD_ZERO},        {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO},         {1, 4, 4, 512, 512, 5, 1, TS_PAD_ZERO},
+    {1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0},        {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 10}, {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0},
+    {1, 256, 256, 256, 192, 1, 1, TS_PAD_REPLICATE, 0}, {1, 256, 256, 64, 192, 1, 1, TS_PAD_REPLICATE, 0}, {1, 256, 256, 64, 10, 3, 1, TS_PAD_REPLICATE, 0},
+    {1, 64, 64, 512, 512, 5, 1, TS_PAD_ZERO, 0},        {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO, 0},         {1, 4, 4, 512, 512, 5, 1, TS_PAD_ZERO, 0},
 };
 
 static const ts_conv refiner[] = {
-    {8, 64, 64, 18, 64, 5, 1, TS_PAD_REPLICATE}, {8, 64, 64, 64, 96, 1, 1, TS_PAD_REPLICATE}, {8, 64, 64, 32, 96, 1, 1, TS_PAD_REPLICATE},
-    {8, 64, 64, 32, 64, 3, 2, TS_PAD_REPLICATE}, {8, 64, 64, 32, 9, 3, 1, TS_PAD_REPLICATE},
+    {8, 64, 64, 18, 64, 5, 1, TS_PAD_REPLICATE, 9}, {8, 64, 64, 64, 96, 1, 1, TS_PAD_REPLICATE, 0}, {8, 64, 64, 32, 96, 1, 1, TS_PAD_REPLICATE, 0},
+    {8, 64, 64, 32, 64, 3, 2, TS_PAD_REPLICATE, 0}, {8, 64, 64, 32, 9, 3, 1, TS_PAD_REPLICATE, 0},
 };
 
 static const ts_conv unet[] = {
-    {8, 64, 64, 3, 16, 3, 1, TS_PAD_ZERO},   {8, 32, 32, 16, 32, 5, 1, TS_PAD_ZERO},  {8, 16, 16, 32, 64, 5, 1, TS_PAD_ZERO},
-    {8, 8, 8, 64, 128, 5, 1, TS_PAD_ZERO},   {8, 4, 4, 128, 256, 5, 1, TS_PAD_ZERO},  {8, 2, 2, 256, 256, 5, 1, TS_PAD_ZERO},
-    {8, 4, 4, 512, 256, 5, 1, TS_PAD_ZERO},  {8, 8, 8, 256, 128, 5, 1, TS_PAD_ZERO},  {8, 16, 16, 128, 64, 5, 1, TS_PAD_ZERO},
-    {8, 32, 32, 64, 32, 3, 1, TS_PAD_ZERO},  {8, 8, 8, 64, 128, 3, 1, TS_PAD_ZERO},   {8, 16, 16, 32, 64, 3, 1, TS_PAD_ZERO},
-    {8, 16, 16, 128, 64, 3, 1, TS_PAD_ZERO}, {8, 64, 64, 32, 16, 3, 1, TS_PAD_ZERO},
+    {8, 64, 64, 3, 16, 3, 1, TS_PAD_ZERO, 0},   {8, 32, 32, 16, 32, 5, 1, TS_PAD_ZERO, 0},  {8, 16, 16, 32, 64, 5, 1, TS_PAD_ZERO, 0},
+    {8, 8, 8, 64, 128, 5, 1, TS_PAD_ZERO, 0},   {8, 4, 4, 128, 256, 5, 1, TS_PAD_ZERO, 0},  {8, 2, 2, 256, 256, 5, 1, TS_PAD_ZERO, 0},
+    {8, 4, 4, 512, 256, 5, 1, TS_PAD_ZERO, 0},  {8, 8, 8, 256, 128, 5, 1, TS_PAD_ZERO, 0},  {8, 16, 16, 128, 64, 5, 1, TS_PAD_ZERO, 0},
+    {8, 32, 32, 64, 32, 3, 1, TS_PAD_ZERO, 0},  {8, 8, 8, 64, 128, 3, 1, TS_PAD_ZERO, 0},   {8, 16, 16, 32, 64, 3, 1, TS_PAD_ZERO, 0},
+    {8, 16, 16, 128, 64, 3, 1, TS_PAD_ZERO, 0}, {8, 64, 64, 32, 16, 3, 1, TS_PAD_ZERO, 0},
 };
 
 static void all(const ts_conv *shape, size_t count)
@@ -161,8 +163,8 @@ BENCH(conv_unet)
 
 BENCH(conv_winograd)
 {
-    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO}, {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE},
-                                    {1, 256, 256, 32, 64, 3, 2, TS_PAD_REPLICATE}, {1, 28, 28, 64, 64, 3, 1, TS_PAD_ZERO}};
+    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0}, {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0},
+                                    {1, 256, 256, 32, 64, 3, 2, TS_PAD_REPLICATE, 0}, {1, 28, 28, 64, 64, 3, 1, TS_PAD_ZERO, 0}};
     bench_heading("Winograd's F(4 x 4, 3 x 3), counting the direct way's multiplications, each below the direct way");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
         row("forward", shape[i], forward);
@@ -184,9 +186,9 @@ BENCH(conv_bf16)
 
 BENCH(peer_conv)
 {
-    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO}, {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE},
-                                    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE}, {1, 256, 256, 256, 192, 1, 1, TS_PAD_ZERO},
-                                    {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO}, {4, 80, 80, 18, 64, 5, 1, TS_PAD_REPLICATE}};
+    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0}, {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 0},
+                                    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0}, {1, 256, 256, 256, 192, 1, 1, TS_PAD_ZERO, 0},
+                                    {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO, 0}, {4, 80, 80, 18, 64, 5, 1, TS_PAD_REPLICATE, 0}};
     bench_heading("single convolutions beside their floor (the peak) and the peer");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
         peer_row("forward", "conv", shape[i], forward, 1);
@@ -197,8 +199,8 @@ BENCH(peer_conv)
 
 BENCH(two_threads)
 {
-    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO}, {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE},
-                                    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE}};
+    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0}, {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 0},
+                                    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0}};
     static void (*const f[])(void *user) = {forward, data_gradient, weight_gradient, winograd};
     static const char *const what[] = {"forward", "data gradient", "weight gradient", "Winograd forward"};
     const int all = ts_threads();
@@ -221,7 +223,7 @@ BENCH(two_threads)
 
 BENCH(conv_naive)
 {
-    const ts_conv c = {1, 64, 64, 64, 64, 3, 1, TS_PAD_ZERO};
+    const ts_conv c = {1, 64, 64, 64, 64, 3, 1, TS_PAD_ZERO, 0};
     bench_heading("A convolution and its naive twin");
     row("forward", c, forward);
     row("naive forward", c, forward_naive);

@@ -93,14 +93,24 @@ static double megabytes(subject *s, int steps, bool recompute)
     return most;
 }
 
+/* Of the gradients of a first convolution: those of its constants are not made, nor any of its input in a first step whose R_0 is fixed. */
+static double not_made(const subject *s, const char *conv, int steps, bool fixed)
+{
+    const int images = s->model->arch.images;
+    return steps > 0 ? bench_network_flop(s->model, conv, s->in.grid.w) * (steps * images + fixed) / (1 + images) : 0;
+}
+
 static void measure(subject *s)
 {
     const int batch = s->c.train.batch, side = s->in.grid.w;
     char label[96];
     const int coarse = s->steps < s->model->arch.coarse_steps ? s->steps : s->model->arch.coarse_steps;
     const double g = bench_network_flop(s->model, "g.", side), h = bench_network_flop(s->model, "h.", side), c = bench_network_flop(s->model, "coarse.", side);
-    const double flop = batch * ((s->model->fixed[NN_G] ? 1 : 3) * g + (s->model->fixed[NN_COARSE] ? 1 : 3) * coarse * c + 3 * (s->steps - coarse) * h);
-    snprintf(label, sizeof label, "%d patches of %d^2, window %d, T = %d%s", batch, s->c.data.patch, side, s->steps, s->model->fixed[NN_G] ? ", g fixed" : "");
+    const bool *fixed = s->model->fixed;
+    const double of_coarse = fixed[NN_COARSE] ? coarse * c : 3 * coarse * c - not_made(s, "coarse.conv1", coarse, fixed[NN_G]);
+    const double of_h = 3 * (s->steps - coarse) * h - not_made(s, "h.conv1", s->steps - coarse, fixed[NN_G] && (coarse == 0 || fixed[NN_COARSE]));
+    const double flop = batch * ((fixed[NN_G] ? 1 : 3) * g + of_coarse + of_h);
+    snprintf(label, sizeof label, "%d patches of %d^2, window %d, T = %d%s", batch, s->c.data.patch, side, s->steps, fixed[NN_G] ? ", g fixed" : "");
     const bench_time t = bench_measure(step, s);
     bench_row(label, t, flop);
     bench_row_peer(t, flop, peer(s));

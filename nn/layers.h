@@ -56,6 +56,8 @@ bool nn_all_finite(const float *v, size_t count);
 /* Parameter number index as a value on the tape, NULL for index -1. */
 ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index);
 ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad, float leak);
+/* constants: NULL, or further channels of the input, as ag_conv_beside has them. */
+ag_value *nn_conv_beside(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants, int dilation, ts_pad pad, float leak);
 ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x);
 
 /* g on its own input: x [N, g_size, g_size, 3 images] log-encoded -> [N, g_size, g_size, channels] in [-1, 1]. */
@@ -65,10 +67,10 @@ ag_value *nn_unet(ag_tape *tape, const nn_model *model, ag_value *x);
  * show alike in all of them. On a tape without gradients. */
 ag_value *nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *x);
 
-/* h: input [N, H, W, (1 + images) channels] and the states (updated; NULL = zero) -> the change of the maps. to: NULL, or for each new state
- * the value to write it into, which may be the old one (a tape without gradients). */
-ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *x, ag_value *gru[2], ag_value *const to[2]);
+/* h: R_t [N, H, W, channels], its encoded gradients [N, H, W, images channels] (constants) and the states (updated; NULL = zero) -> the change of
+ * the maps. to: NULL, or for each new state the value to write it into, which may be the old one (a tape without gradients). */
+ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient, ag_value *gru[2], ag_value *const to[2]);
 
-/* R_{t+1} from both = [R_t, its encoded gradients], [N, H, W, (1 + images) channels]; maps is a part of it. path: what arch.descent lets past h, or NULL. */
-ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path, ag_value *both, ag_value *gru[2], ag_value *const to[2]);
+/* R_{t+1} from R_t and its encoded gradients. path: what arch.descent lets past h, or NULL. */
+ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path, ag_value *gradient, ag_value *gru[2], ag_value *const to[2]);
 #endif

@@ -2,28 +2,29 @@
 #include "nn/layers.h"
 #include "ops.h"
 
-static ag_value *cell(ag_tape *tape, const nn_model *model, const nn_cell *c, ag_value *x, int dilation, ag_value *old, ag_value *to)
+static ag_value *cell(ag_tape *tape, const nn_model *model, const nn_cell *c, ag_value *x, ag_value *constants, int dilation, ag_value *old, ag_value *to)
 {
-    x = nn_conv(tape, model, c->conv, x, dilation, TS_PAD_REPLICATE, NN_LEAK_H);
+    x = nn_conv_beside(tape, model, c->conv, x, constants, dilation, TS_PAD_REPLICATE, NN_LEAK_H);
     if (to) ag_into(tape, to);
     return ag_gru(tape, x, old, nn_parameter(tape, model, c->input.weight), nn_parameter(tape, model, c->input.bias),
                   nn_parameter(tape, model, c->hidden.weight), nn_parameter(tape, model, c->hidden.bias));
 }
 
-ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *x, ag_value *gru[2], ag_value *const to[2])
+ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient, ag_value *gru[2], ag_value *const to[2])
 {
+    ag_value *x = maps;
     for (int i = 0; i < 2; i++) {
         ts_mark mark = ag_scope_begin(tape);
-        gru[i] = cell(tape, model, &h->cell[i], x, i + 1, model->arch.recurrent ? gru[i] : NULL, to ? to[i] : NULL);
+        gru[i] = cell(tape, model, &h->cell[i], x, i == 0 ? gradient : NULL, i + 1, model->arch.recurrent ? gru[i] : NULL, to ? to[i] : NULL);
         ag_scope_end(tape, mark, &gru[i], 1);
         x = gru[i];
     }
     return ag_tanh(tape, nn_conv(tape, model, h->output, x, 1, TS_PAD_REPLICATE, 1));
 }
 
-ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path, ag_value *both, ag_value *gru[2], ag_value *const to[2])
+ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path, ag_value *gradient, ag_value *gru[2], ag_value *const to[2])
 {
-    ag_value *next = h->width > 0 ? ag_add(tape, maps, nn_change(tape, model, h, both, gru, to)) : maps;
+    ag_value *next = h->width > 0 ? ag_add(tape, maps, nn_change(tape, model, h, maps, gradient, gru, to)) : maps;
     return path ? ag_add(tape, next, nn_conv(tape, model, h->path, path, 1, TS_PAD_ZERO, 1)) : next;
 }
 

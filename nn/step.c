@@ -108,19 +108,6 @@ bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_
     return true;
 }
 
-/* to [N, H, W, a's and b's channels]: without a tape's node. */
-static void join(const ag_value *a, const ag_value *b, ag_value *to)
-{
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
-    const int64_t rows = (int64_t)a->t.shape.n * a->t.shape.h, w = a->t.shape.w;
-    const int ca = a->t.shape.c, cb = b->t.shape.c, all = ca + cb;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int64_t y = 0; y < rows; y++) {
-        k->copy(w, ca, a->t.data + y * w * ca, ca, to->t.data + y * w * all, all, false);
-        k->copy(w, cb, b->t.data + y * w * cb, cb, to->t.data + y * w * all + ca, all, false);
-    }
-}
-
 /* Nothing taught h that its steps must come to rest: beyond those it was trained for, what is left of them adds up to a drift. So step t > T goes
  * (T / t)^2 of its way, and all those together less than T whole steps. The published loop has no such rule. */
 static ag_value *shortened(ag_tape *tape, const nn_arch *a, int t, ag_value *maps, ag_value *next)
@@ -140,11 +127,8 @@ bool nn_descends(const nn_model *model, nn_descent how) { return model->arch.gra
 
 ag_value *nn_apply(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient, ag_value *newton, nn_state *state)
 {
-    ag_value *both = NULL, *path = nn_descends(model, NN_DESCENT_GRADIENT) ? gradient : newton;
-    if (h->width > 0 && ag_gradients(tape)) both = ag_concat(tape, maps, gradient); /* the gradient of R_t needs an operation that joins them */
-    else if (h->width > 0 && maps && gradient && (both = ag_empty(tape, (ts_shape){maps->t.shape.n, maps->t.shape.h, maps->t.shape.w, maps->t.shape.c + gradient->t.shape.c}))) join(maps, gradient, both);
-    if (ag_status(tape)->code) return NULL;
-    ag_value *next = nn_step(tape, model, h, maps, path, both, state->gru, state->to);
+    ag_value *path = nn_descends(model, NN_DESCENT_GRADIENT) ? gradient : newton;
+    ag_value *next = nn_step(tape, model, h, maps, path, gradient, state->gru, state->to);
     state->step++;
     return shortened(tape, &model->arch, state->step, maps, next);
 }

@@ -12,6 +12,8 @@ ts_code ts_conv_check(const ts_conv *c, ts_status *st)
     if (c->dilation != 1 && c->dilation != 2) return ts_fail(st, TS_INVALID, "convolution dilation %d: use 1 or 2", c->dilation);
     if (c->pad != TS_PAD_ZERO && c->pad != TS_PAD_REPLICATE)
         return ts_fail(st, TS_INVALID, "convolution padding %d: use TS_PAD_ZERO or TS_PAD_REPLICATE", (int)c->pad);
+    if (c->constants < 0 || c->constants >= c->ic)
+        return ts_fail(st, TS_INVALID, "convolution of %d channels of which %d are constants: there must be others", c->ic, c->constants);
     const int64_t limit = INT64_C(1) << 40; /* floats: offsets stay far from overflow */
     const int64_t pixels = (int64_t)c->h * c->w, channels = c->ic > c->oc ? c->ic : c->oc;
     if (pixels > limit / c->n || pixels * c->n > limit / channels || (int64_t)c->ic * c->oc > (INT64_C(1) << 31) / (c->k * c->k))
@@ -30,8 +32,8 @@ size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
 {
     if (use == TS_CONV_WINOGRAD) return conv_winograd_count(c);
     if (use == TS_CONV_FORWARD_BF16) return (size_t)conv_panels_count(conv_bf16_depth(c->ic), c->oc, c->k);
-    if (use == TS_CONV_DATA_GRADIENT_BF16) return (size_t)conv_panels_count(conv_bf16_depth(c->oc), c->ic, c->k);
-    const int ic = use == TS_CONV_FORWARD ? c->ic : c->oc, oc = use == TS_CONV_FORWARD ? c->oc : c->ic;
+    if (use == TS_CONV_DATA_GRADIENT_BF16) return (size_t)conv_panels_count(conv_bf16_depth(c->oc), ts_conv_variables(c), c->k);
+    const int ic = use == TS_CONV_FORWARD ? c->ic : c->oc, oc = use == TS_CONV_FORWARD ? c->oc : ts_conv_variables(c);
     return (size_t)conv_panels_count(ic, oc, c->k) + (conv_few_channels(oc, c->k) ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
 }
 
@@ -47,7 +49,7 @@ void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float 
         return;
     }
     const bool forward = use == TS_CONV_FORWARD;
-    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : c->ic, taps = c->k * c->k;
+    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), taps = c->k * c->k;
     const int panel_width = 2 * conv_lanes(), panels = conv_panels(oc);
     /* weight[o][c][tap]: strides of the packed input and output channel */
     const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * taps : taps, i_step = forward ? taps : (ptrdiff_t)c->ic * taps;

@@ -13,11 +13,14 @@ typedef struct ts_conv {
     int k;        /* kernel side: odd, 1 .. 15 */
     int dilation; /* 1 or 2 */
     ts_pad pad;   /* padding of dilation * (k - 1) / 2 on each side */
+    int constants; /* of the input's channels, the last: the data gradient is that of the others alone */
 } ts_conv;
 
 /* Which order the packed weights are in: for the output, for the gradient of the input, for the output by Winograd's way; and the first two
  * as pairs of bf16 values. */
 typedef enum ts_conv_use { TS_CONV_FORWARD, TS_CONV_DATA_GRADIENT, TS_CONV_WINOGRAD, TS_CONV_FORWARD_BF16, TS_CONV_DATA_GRADIENT_BF16 } ts_conv_use;
+
+static inline int ts_conv_variables(const ts_conv *c) { return c->ic - c->constants; }
 
 ts_code ts_conv_check(const ts_conv *c, ts_status *st);
 
@@ -41,7 +44,7 @@ void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *pac
 void ts_conv_exact_set(bool exact);
 bool ts_conv_exact(void);
 
-/* dx (+)= the gradient of the input given dy = the gradient before the activation. */
+/* dx [n,h,w,ts_conv_variables] (+)= the gradient of the input given dy = the gradient before the activation. */
 void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
 
 /* Both with x, dy and the weights rounded to bf16 (the nearest, ties to even), products and sums in f32, weights packed for the use of that

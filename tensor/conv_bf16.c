@@ -12,7 +12,7 @@ const char *ts_precision_name(ts_precision p) { return p == TS_BF16 ? "bf16" : "
 /* packed: [panel][ky][kx][pair of inputs][channel of the panel, zeros where there is none] */
 void conv_pack_bf16(const ts_conv *c, bool forward, const float *weight, float *packed)
 {
-    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : c->ic, taps = c->k * c->k, lanes = conv_lanes(), depth = conv_bf16_depth(ic);
+    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), taps = c->k * c->k, lanes = conv_lanes(), depth = conv_bf16_depth(ic);
     const int panels = conv_panels(oc);
     /* weight[o][c][tap]: strides of the packed input and output channel */
     const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * taps : taps, i_step = forward ? taps : (ptrdiff_t)c->ic * taps;
@@ -41,7 +41,7 @@ void ts_conv_forward_bf16(const ts_conv *c, const float *x, const float *packed,
 void ts_conv_data_gradient_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
 {
     const int reach = c->dilation * (c->k / 2), fold = c->pad == TS_PAD_REPLICATE ? reach : 0;
-    const conv_plan p = {.n = c->n, .h = c->h, .w = c->w, .ic = conv_bf16_depth(c->oc), .channels = c->oc, .oc = c->ic, .k = c->k,
+    const conv_plan p = {.n = c->n, .h = c->h, .w = c->w, .ic = conv_bf16_depth(c->oc), .channels = c->oc, .oc = ts_conv_variables(c), .k = c->k,
                          .dilation = c->dilation, .first = -reach - fold, .fold = fold, .x = dy, .packed = packed, .y = dx, .leak = 1,
                          .add = accumulate, .bf16 = true};
     conv_run(&p);

@@ -15,7 +15,7 @@ enum {
 void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
 {
     const int reach = c->dilation * (c->k / 2), fold = c->pad == TS_PAD_REPLICATE ? reach : 0;
-    const conv_plan p = {.n = c->n, .h = c->h, .w = c->w, .ic = c->oc, .channels = c->oc, .oc = c->ic, .k = c->k, .dilation = c->dilation,
+    const conv_plan p = {.n = c->n, .h = c->h, .w = c->w, .ic = c->oc, .channels = c->oc, .oc = ts_conv_variables(c), .k = c->k, .dilation = c->dilation,
                          .first = -reach - fold, .fold = fold, .x = dy, .packed = packed, .y = dx, .leak = 1, .add = accumulate};
     conv_run(&p);
 }

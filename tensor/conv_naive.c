@@ -55,11 +55,11 @@ void ts_conv_forward_naive(const ts_conv *c, const float *x, const float *weight
 /* Gathers, so that the sum can be in double: dx[s] = sum over the outputs and taps that read s. */
 void ts_conv_data_gradient_naive(const ts_conv *c, const float *dy, const float *weight, float *dx, bool accumulate)
 {
-    int reach = c->dilation * (c->k / 2);
+    const int reach = c->dilation * (c->k / 2), channels = ts_conv_variables(c);
     for (int n = 0; n < c->n; n++)
         for (int i = 0; i < c->h; i++)
             for (int j = 0; j < c->w; j++)
-                for (int ch = 0; ch < c->ic; ch++) {
+                for (int ch = 0; ch < channels; ch++) {
                     double sum = 0;
                     for (int oi = i > reach ? i - reach : 0; oi < c->h && oi <= i + reach; oi++)
                         for (int oj = j > reach ? j - reach : 0; oj < c->w && oj <= j + reach; oj++)
@@ -69,7 +69,7 @@ void ts_conv_data_gradient_naive(const ts_conv *c, const float *dy, const float 
                                     const float *p = dy + at(c, n, oi, oj, c->oc);
                                     for (int o = 0; o < c->oc; o++) sum += (double)p[o] * weight[tap(c, o, ch, ky, kx)];
                                 }
-                    float *d = dx + at(c, n, i, j, c->ic) + ch;
+                    float *d = dx + at(c, n, i, j, channels) + ch;
                     *d = (float)(accumulate ? *d + sum : sum);
                 }
 }

@@ -10,8 +10,8 @@ enum {
     PARTS = 16                 /* and no more of them, by shape alone */
 };
 
-ts_conv ts_gru_input(const ts_gru *g) { return (ts_conv){1, 1, 1, g->ic, 3 * g->c, 1, 1, TS_PAD_ZERO}; }
-ts_conv ts_gru_hidden(const ts_gru *g) { return (ts_conv){1, 1, 1, g->c, 3 * g->c, 1, 1, TS_PAD_ZERO}; }
+ts_conv ts_gru_input(const ts_gru *g) { return (ts_conv){1, 1, 1, g->ic, 3 * g->c, 1, 1, TS_PAD_ZERO, 0}; }
+ts_conv ts_gru_hidden(const ts_gru *g) { return (ts_conv){1, 1, 1, g->c, 3 * g->c, 1, 1, TS_PAD_ZERO, 0}; }
 
 static conv_plan gates_of(const ts_gru *g, int channels, const float *packed, const float *bias)
 {

@@ -314,7 +314,7 @@ TEST(tape_frozen_weights_are_packed_once)
     ag_tape *tape = prepared(false);
     static float w[4 * 3 * 9];
     fill(w, 4 * 3 * 9, 3, -1, 1);
-    const ts_conv c = {1, 8, 8, 3, 4, 3, 1, TS_PAD_ZERO};
+    const ts_conv c = {1, 8, 8, 3, 4, 3, 1, TS_PAD_ZERO, 0};
     for (int frozen = 0; frozen < 2; frozen++) {
         ag_freeze(tape, frozen);
         ag_reset(tape);

@@ -73,6 +73,7 @@ typedef struct problem {
 } problem;
 
 static size_t in_count(const ts_conv *c) { return (size_t)c->n * (size_t)c->h * (size_t)c->w * (size_t)c->ic; }
+static size_t variable_count(const ts_conv *c) { return in_count(c) / (size_t)c->ic * (size_t)ts_conv_variables(c); }
 static size_t out_count(const ts_conv *c) { return (size_t)c->n * (size_t)c->h * (size_t)c->w * (size_t)c->oc; }
 static size_t weight_count(const ts_conv *c) { return (size_t)c->ic * (size_t)c->oc * (size_t)(c->k * c->k); }
 
@@ -109,8 +110,8 @@ static buffer forward(const problem *p, bool bias)
 /* start != NULL: accumulates onto it */
 static buffer data_gradient(const problem *p, const buffer *start)
 {
-    buffer w = packed(p, TS_CONV_DATA_GRADIENT), dx = make(in_count(&p->c));
-    if (start) memcpy(dx.data, start->data, dx.count * sizeof(float));
+    buffer w = packed(p, TS_CONV_DATA_GRADIENT), dx = make(variable_count(&p->c));
+    if (start) memcpy(dx.data, start->data, dx.count * sizeof(float)); /* start may be longer */
     ts_conv_data_gradient(&p->c, p->dy.data, w.data, dx.data, start != NULL);
     finish(&w, "packed");
     return dx;
@@ -131,11 +132,14 @@ static void check_forward(const problem *p)
 static void check_data_gradient(const problem *p)
 {
     const double terms = (double)p->c.oc * p->c.k * p->c.k * p->c.k * p->c.k;
-    for (int add = 0; add < 2; add++) {
-        buffer dx = data_gradient(p, add ? &p->x : NULL), naive = make(dx.count);
+    for (int i = 0; i < 4; i++) {
+        const bool add = i % 2;
+        problem q = *p;
+        q.c.constants = i / 2 ? p->c.ic / 2 : 0; /* of a single channel none */
+        buffer dx = data_gradient(&q, add ? &p->x : NULL), naive = make(dx.count);
         memcpy(naive.data, p->x.data, naive.count * sizeof(float));
-        ts_conv_data_gradient_naive(&p->c, p->dy.data, p->weight.data, naive.data, add);
-        same(&dx, &naive, terms, add ? "added data gradient" : "data gradient", &p->c);
+        ts_conv_data_gradient_naive(&q.c, p->dy.data, p->weight.data, naive.data, add);
+        same(&dx, &naive, terms, add ? "added data gradient" : "data gradient", &q.c);
         finish(&dx, "dx");
         finish(&naive, "naive dx");
     }
@@ -187,15 +191,15 @@ TEST(conv_weight_gradient_naive) { against_naive(check_weight_gradient, 3); }
 TEST(conv_chosen_shapes)
 {
     static const ts_conv shapes[] = {
-        {1, 1, 1, 1, 1, 15, 2, TS_PAD_REPLICATE}, {2, 1, 1, 3, 2, 15, 2, TS_PAD_ZERO},
-        {1, 1, 300, 3, 9, 3, 1, TS_PAD_REPLICATE}, {1, 300, 1, 9, 3, 5, 2, TS_PAD_REPLICATE},
-        {1, 3, 211, 2, 33, 5, 1, TS_PAD_ZERO}, {4, 2, 2, 512, 40, 3, 1, TS_PAD_ZERO},
-        {1, 2, 3, 512, 33, 3, 1, TS_PAD_REPLICATE}, {1, 5, 4, 40, 512, 3, 2, TS_PAD_REPLICATE},
-        {1, 3, 3, 700, 5, 7, 1, TS_PAD_ZERO}, {1, 9, 7, 5, 700, 7, 1, TS_PAD_REPLICATE},
-        {9, 8, 8, 16, 16, 5, 2, TS_PAD_REPLICATE}, {5, 8, 8, 3, 20, 5, 1, TS_PAD_ZERO},
-        {1, 40, 40, 18, 33, 1, 1, TS_PAD_ZERO}, {17, 2, 2, 33, 65, 5, 1, TS_PAD_ZERO},
-        {1, 64, 64, 3, 16, 3, 1, TS_PAD_ZERO}, {2, 33, 64, 16, 9, 3, 2, TS_PAD_REPLICATE},
-        {2, 20, 70, 24, 10, 5, 2, TS_PAD_REPLICATE},
+        {1, 1, 1, 1, 1, 15, 2, TS_PAD_REPLICATE, 0}, {2, 1, 1, 3, 2, 15, 2, TS_PAD_ZERO, 0},
+        {1, 1, 300, 3, 9, 3, 1, TS_PAD_REPLICATE, 0}, {1, 300, 1, 9, 3, 5, 2, TS_PAD_REPLICATE, 0},
+        {1, 3, 211, 2, 33, 5, 1, TS_PAD_ZERO, 0}, {4, 2, 2, 512, 40, 3, 1, TS_PAD_ZERO, 0},
+        {1, 2, 3, 512, 33, 3, 1, TS_PAD_REPLICATE, 0}, {1, 5, 4, 40, 512, 3, 2, TS_PAD_REPLICATE, 0},
+        {1, 3, 3, 700, 5, 7, 1, TS_PAD_ZERO, 0}, {1, 9, 7, 5, 700, 7, 1, TS_PAD_REPLICATE, 0},
+        {9, 8, 8, 16, 16, 5, 2, TS_PAD_REPLICATE, 0}, {5, 8, 8, 3, 20, 5, 1, TS_PAD_ZERO, 0},
+        {1, 40, 40, 18, 33, 1, 1, TS_PAD_ZERO, 0}, {17, 2, 2, 33, 65, 5, 1, TS_PAD_ZERO, 0},
+        {1, 64, 64, 3, 16, 3, 1, TS_PAD_ZERO, 0}, {2, 33, 64, 16, 9, 3, 2, TS_PAD_REPLICATE, 0},
+        {2, 20, 70, 24, 10, 5, 2, TS_PAD_REPLICATE, 0},
     };
     ts_rng r = ts_rng_make(4, TS_STREAM_TEST, 0);
     for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
@@ -220,7 +224,7 @@ TEST(conv_blocks_of_columns)
         for (int blocks = 4; blocks <= 8; blocks += 2)
             for (int off = -5; off <= 5; off++) {
                 const ts_conv c = {1, 2 + ts_rng_int(&r, 3), blocks * lanes + off, 1 + ts_rng_int(&r, 40), 1 + ts_rng_int(&r, lanes),
-                                   ts_rng_int(&r, 2) ? 3 : 5, 1 + ts_rng_int(&r, 2), ts_rng_int(&r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE};
+                                   ts_rng_int(&r, 2) ? 3 : 5, 1 + ts_rng_int(&r, 2), ts_rng_int(&r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE, 0};
                 ts_conv back = c;
                 back.ic = c.oc, back.oc = c.ic;
                 problem p = make_problem(c, &r), q = make_problem(back, &r);
@@ -265,8 +269,8 @@ TEST(conv_adjoint)
 TEST(conv_same_bytes_for_any_threads)
 {
     static const ts_conv shapes[] = {
-        {3, 37, 41, 18, 40, 5, 1, TS_PAD_REPLICATE}, {1, 8, 8, 96, 130, 3, 1, TS_PAD_ZERO}, {8, 4, 4, 48, 66, 5, 1, TS_PAD_ZERO},
-        {2, 64, 50, 20, 9, 3, 2, TS_PAD_REPLICATE},  {2, 30, 31, 33, 70, 1, 1, TS_PAD_ZERO}, {1, 6, 5, 700, 33, 7, 1, TS_PAD_REPLICATE},
+        {3, 37, 41, 18, 40, 5, 1, TS_PAD_REPLICATE, 0}, {1, 8, 8, 96, 130, 3, 1, TS_PAD_ZERO, 0}, {8, 4, 4, 48, 66, 5, 1, TS_PAD_ZERO, 0},
+        {2, 64, 50, 20, 9, 3, 2, TS_PAD_REPLICATE, 0},  {2, 30, 31, 33, 70, 1, 1, TS_PAD_ZERO, 0}, {1, 6, 5, 700, 33, 7, 1, TS_PAD_REPLICATE, 0},
     };
     static const int threads[] = {1, 2, 3, 7};
     ts_rng r = ts_rng_make(6, TS_STREAM_TEST, 0);
@@ -323,9 +327,9 @@ TEST(conv_long_sums_stay_accurate)
 
 TEST(conv_check_refuses)
 {
-    const ts_conv good = {1, 4, 4, 3, 5, 3, 1, TS_PAD_ZERO};
+    const ts_conv good = {1, 4, 4, 3, 5, 3, 1, TS_PAD_ZERO, 0};
     CHECK(ts_conv_check(&good, NULL) == TS_OK, "a good shape is refused");
-    for (int i = 0; i < 9; i++) {
+    for (int i = 0; i < 11; i++) {
         ts_conv c = good;
         if (i == 0) c.n = 0;
         if (i == 1) c.h = 0;
@@ -336,6 +340,8 @@ TEST(conv_check_refuses)
         if (i == 6) c.k = 17;
         if (i == 7) c.dilation = 3;
         if (i == 8) c.n = c.h = c.w = c.ic = 1 << 20;
+        if (i == 9) c.constants = c.ic;
+        if (i == 10) c.constants = -1;
         ts_status st = {0};
         CHECK(ts_conv_check(&c, &st) == TS_INVALID && st.message[0], "bad shape %d is accepted or has no message", i);
     }

@@ -96,6 +96,7 @@ TEST(bf16_pairs_naive)
 }
 
 static size_t in_count(const ts_conv *c) { return (size_t)c->n * (size_t)c->h * (size_t)c->w * (size_t)c->ic; }
+static size_t variable_count(const ts_conv *c) { return in_count(c) / (size_t)c->ic * (size_t)ts_conv_variables(c); }
 static size_t out_count(const ts_conv *c) { return (size_t)c->n * (size_t)c->h * (size_t)c->w * (size_t)c->oc; }
 static size_t weight_count(const ts_conv *c) { return (size_t)c->ic * (size_t)c->oc * (size_t)(c->k * c->k); }
 
@@ -116,7 +117,7 @@ static void finish(problem *p) { free(p->x), free(p->weight), free(p->bias), fre
 static float *run(const problem *p, ts_conv_use use, const float *bias, const float *start)
 {
     const bool forward = use == TS_CONV_FORWARD_BF16;
-    const size_t count = forward ? out_count(&p->c) : in_count(&p->c);
+    const size_t count = forward ? out_count(&p->c) : variable_count(&p->c);
     float *packed = values(ts_conv_packed_count(&p->c, use), NULL), *y = values(count + 2 * GUARD, NULL);
     if (start) memcpy(y + GUARD, start, count * sizeof(float));
     ts_conv_pack(&p->c, use, p->weight, packed);
@@ -145,10 +146,13 @@ static void against_naive(ts_conv c, ts_rng *r)
         ts_conv_forward_naive(&c, x, weight, b ? p.bias : NULL, p.leak, naive);
         same(y, naive, out_count(&c), (double)c.ic * c.k * c.k, "forward", &c);
         free(y), free(naive);
-        float *dx = run(&p, TS_CONV_DATA_GRADIENT_BF16, NULL, b ? p.x : NULL), *naive_dx = values(in_count(&c), NULL);
-        memcpy(naive_dx, p.x, in_count(&c) * sizeof(float));
-        ts_conv_data_gradient_naive(&c, dy, weight, naive_dx, b);
-        same(dx, naive_dx, in_count(&c), (double)c.oc * pow(c.k, 4), b ? "added data gradient" : "data gradient", &c);
+        problem q = p;
+        q.c.constants = b ? c.ic / 2 : 0; /* of a single channel none */
+        const size_t count = variable_count(&q.c);
+        float *dx = run(&q, TS_CONV_DATA_GRADIENT_BF16, NULL, b ? p.x : NULL), *naive_dx = values(count, NULL);
+        memcpy(naive_dx, p.x, count * sizeof(float));
+        ts_conv_data_gradient_naive(&q.c, dy, weight, naive_dx, b);
+        same(dx, naive_dx, count, (double)c.oc * pow(c.k, 4), b ? "added data gradient" : "data gradient", &c);
         free(dx), free(naive_dx);
     }
     free(x), free(dy), free(weight);
@@ -158,9 +162,9 @@ static void against_naive(ts_conv c, ts_rng *r)
 TEST(bf16_conv_naive)
 {
     static const ts_conv shapes[] = {
-        {1, 1, 1, 1, 1, 15, 2, TS_PAD_REPLICATE}, {1, 300, 1, 9, 3, 5, 2, TS_PAD_REPLICATE}, {1, 3, 211, 2, 33, 5, 1, TS_PAD_ZERO},
-        {4, 2, 2, 512, 40, 3, 1, TS_PAD_ZERO},    {1, 2, 3, 1024, 33, 3, 1, TS_PAD_REPLICATE}, {1, 9, 7, 5, 700, 7, 1, TS_PAD_REPLICATE},
-        {1, 40, 40, 18, 33, 1, 1, TS_PAD_ZERO},   {17, 2, 2, 33, 65, 5, 1, TS_PAD_ZERO},     {2, 20, 70, 24, 10, 5, 2, TS_PAD_REPLICATE},
+        {1, 1, 1, 1, 1, 15, 2, TS_PAD_REPLICATE, 0}, {1, 300, 1, 9, 3, 5, 2, TS_PAD_REPLICATE, 0}, {1, 3, 211, 2, 33, 5, 1, TS_PAD_ZERO, 0},
+        {4, 2, 2, 512, 40, 3, 1, TS_PAD_ZERO, 0},    {1, 2, 3, 1024, 33, 3, 1, TS_PAD_REPLICATE, 0}, {1, 9, 7, 5, 700, 7, 1, TS_PAD_REPLICATE, 0},
+        {1, 40, 40, 18, 33, 1, 1, TS_PAD_ZERO, 0},   {17, 2, 2, 33, 65, 5, 1, TS_PAD_ZERO, 0},     {2, 20, 70, 24, 10, 5, 2, TS_PAD_REPLICATE, 0},
     };
     ts_rng r = ts_rng_make(22, TS_STREAM_TEST, 0);
     for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
@@ -172,8 +176,8 @@ TEST(bf16_conv_naive)
 
 TEST(bf16_conv_same_bytes_for_any_threads)
 {
-    static const ts_conv shapes[] = {{3, 37, 41, 18, 40, 5, 1, TS_PAD_REPLICATE}, {1, 8, 8, 96, 130, 3, 1, TS_PAD_ZERO}, {8, 4, 4, 47, 66, 5, 1, TS_PAD_ZERO},
-                                     {2, 64, 50, 20, 9, 3, 2, TS_PAD_REPLICATE},  {2, 30, 31, 33, 70, 1, 1, TS_PAD_ZERO}, {1, 6, 5, 700, 33, 7, 1, TS_PAD_REPLICATE}};
+    static const ts_conv shapes[] = {{3, 37, 41, 18, 40, 5, 1, TS_PAD_REPLICATE, 0}, {1, 8, 8, 96, 130, 3, 1, TS_PAD_ZERO, 0}, {8, 4, 4, 47, 66, 5, 1, TS_PAD_ZERO, 0},
+                                     {2, 64, 50, 20, 9, 3, 2, TS_PAD_REPLICATE, 0},  {2, 30, 31, 33, 70, 1, 1, TS_PAD_ZERO, 0}, {1, 6, 5, 700, 33, 7, 1, TS_PAD_REPLICATE, 0}};
     static const int threads[] = {1, 2, 3, 7};
     ts_rng r = ts_rng_make(23, TS_STREAM_TEST, 0);
     for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
@@ -248,7 +252,7 @@ TEST(bf16_in_ag_conv)
 {
     CHECK(ts_conv_precision() == TS_F32, "f32 is not the default");
     ts_rng r = ts_rng_make(25, TS_STREAM_TEST, 0);
-    problem p = make_problem((ts_conv){1, 16, 32, 20, 33, 3, 2, TS_PAD_REPLICATE}, &r);
+    problem p = make_problem((ts_conv){1, 16, 32, 20, 33, 3, 2, TS_PAD_REPLICATE, 0}, &r);
     const ts_conv *c = &p.c;
     float *y[3], *dx[3], *dweight[3];
     for (int i = 0; i < 3; i++) {

@@ -123,8 +123,8 @@ TEST(nn_refiner_is_translation_equivariant)
         ag_value *x = ag_empty(t, (ts_shape){1, H, W, C}), *gru[2] = {NULL, NULL};
         ts_tensor part = ts_window(&whole, s * DY, s * DX, H, W);
         ts_copy(&x->t, &part);
-        nn_change(t, m, &((const nn_layers *)m->layers)->h, x, gru, NULL);
-        out[s] = nn_change(t, m, &((const nn_layers *)m->layers)->h, x, gru, NULL);
+        nn_change(t, m, &((const nn_layers *)m->layers)->h, x, NULL, gru, NULL);
+        out[s] = nn_change(t, m, &((const nn_layers *)m->layers)->h, x, NULL, gru, NULL);
     }
     check_tape(t);
     double size = 0;
@@ -254,7 +254,7 @@ TEST(nn_batch_rmse_couples_the_batch)
     for (int i = 0; i < 2; i++) rd_flash_gradient(in.grid, maps[0]->t.data + i * one, 9, &in.view, in.image.data + i * image, whole, g + i * one, NULL);
     for (size_t i = 0; i < 2 * one; i++) g[i] *= 256.0f * 256 / (2 * SIDE * SIDE);
     ag_value *gradient = ag_constant(t, ts_view(g, (ts_shape){2, SIDE, SIDE, 9}));
-    ag_value *y = nn_step(t, m, &((const nn_layers *)m->layers)->h, maps[0], gradient, ag_concat(t, maps[0], gradient), gru, NULL);
+    ag_value *y = nn_step(t, m, &((const nn_layers *)m->layers)->h, maps[0], gradient, gradient, gru, NULL);
     check_tape(t);
     for (int64_t i = 0; i < ts_count(y->t.shape); i++)
         CHECK(fabsf(y->t.data[i] - maps[1]->t.data[i]) < 1e-5f, "value %lld: %g, not %g", (long long)i, (double)maps[1]->t.data[i], (double)y->t.data[i]);

@@ -62,16 +62,16 @@ TEST(winograd_naive)
         ts_isa_use((ts_isa)isa);
         for (int i = 0; i < 80; i++)
             against_naive((ts_conv){1 + ts_rng_int(&r, 2), sizes[ts_rng_int(&r, 11)], sizes[ts_rng_int(&r, 11)], channels[ts_rng_int(&r, 8)],
-                                    channels[ts_rng_int(&r, 8)], 3, 1 + ts_rng_int(&r, 2), ts_rng_int(&r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE}, &r);
-        against_naive((ts_conv){1, 43, 29, 64, 64, 3, 1, TS_PAD_ZERO}, &r);
-        against_naive((ts_conv){1, 24, 37, 32, 70, 3, 2, TS_PAD_REPLICATE}, &r);
+                                    channels[ts_rng_int(&r, 8)], 3, 1 + ts_rng_int(&r, 2), ts_rng_int(&r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE, 0}, &r);
+        against_naive((ts_conv){1, 43, 29, 64, 64, 3, 1, TS_PAD_ZERO, 0}, &r);
+        against_naive((ts_conv){1, 24, 37, 32, 70, 3, 2, TS_PAD_REPLICATE, 0}, &r);
     }
 }
 
 TEST(winograd_same_bytes_for_any_threads)
 {
     static const int threads[] = {1, 2, 3};
-    const ts_conv c = {2, 37, 31, 33, 40, 3, 2, TS_PAD_REPLICATE};
+    const ts_conv c = {2, 37, 31, 33, 40, 3, 2, TS_PAD_REPLICATE, 0};
     ts_rng r = ts_rng_make(12, TS_STREAM_TEST, 0);
     float *x = values(count_x(&c), &r), *weight = values((size_t)c.ic * (size_t)c.oc * 9, &r), *first = NULL;
     for (int t = 0; t < 3; t++) {
@@ -87,7 +87,7 @@ TEST(winograd_same_bytes_for_any_threads)
 /* ag_conv takes Winograd's way only when it was allowed, and only for kernels of side 3. */
 TEST(winograd_in_ag_conv)
 {
-    const ts_conv c = {1, 32, 40, 20, 32, 3, 1, TS_PAD_REPLICATE};
+    const ts_conv c = {1, 32, 40, 20, 32, 3, 1, TS_PAD_REPLICATE, 0};
     ts_rng r = ts_rng_make(13, TS_STREAM_TEST, 0);
     float *x = values(count_x(&c), &r), *weight = values((size_t)c.ic * (size_t)c.oc * 9, &r), *result[3];
     CHECK(ts_conv_exact(), "direct is not the default");
