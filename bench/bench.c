@@ -2,6 +2,7 @@
 #include "bench/batches.h"
 #include "bench/bench.h"
 #include "tensor/cpu.h"
+#include "tensor/kernels/conv.h"
 #include "tensor/kernels/peak.h"
 #include "tensor/threads.h"
 #include <omp.h>
@@ -12,6 +13,7 @@
 #include <time.h>
 
 enum { MOST = 256, MOST_RUNS = 1000 };
+#define LOOP_EVERY 0.02 /* seconds */
 static struct entry {
     const char *name;
     bench_function f;
@@ -57,10 +59,36 @@ static double peak_of(double (*run)(long rounds))
 
 static double peak(void) { return peak_of(ts_peak_k()->run); }
 
+/* The largest tile over and over, of as few k as a part of a sum has channels. */
+static double inner_loop(void)
+{
+    enum { DEPTH = 96, TIMES = 400 };
+    static _Alignas(64) float input[TS_TILE_PIXELS * DEPTH], weights[DEPTH * 2 * 16]; /* zeros; no vector has more than 16 lanes */
+    const struct ts_conv_kernels *k = ts_conv_k();
+    const ts_segment segment = {0, 0, DEPTH};
+    double speed = 0; /* each thread's own: convolutions deal out their work as threads come for it */
+#pragma omp parallel num_threads(ts_threads()) reduction(+ : speed)
+    {
+        float out[TS_TILE_PIXELS * 2 * 16];
+        ts_tile t = {.segment = &segment, .segments = 1, .a_stride = DEPTH, .y_stride = 2 * k->lanes, .w = weights, .leak = 1, .channels = 2 * k->lanes, .fetch = {weights, weights}};
+        for (int i = 0; i < 3; i++) {
+            const int pixel = i * TS_TILE_GROUP < k->pixels ? i * TS_TILE_GROUP : 0;
+            t.a[i] = input + pixel * t.a_stride;
+            t.y[i] = out + pixel * t.y_stride;
+        }
+#pragma omp barrier
+        const double begin = now();
+        for (int i = 0; i < TIMES; i++) k->tile[1][k->pixels](&t);
+        speed = 2.0 * TIMES * DEPTH * k->pixels * 2 * k->lanes / (now() - begin);
+    }
+    return speed;
+}
+
 bool bench_bf16(bench_time *t)
 {
     if (!ts_peak_k()->run_bf16) return false;
     t->peak = peak_of(ts_peak_k()->run_bf16);
+    t->loop = 0;
     return true;
 }
 
@@ -70,21 +98,35 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+/* Of count values, which it sorts. */
+static double median(double *v, int count)
+{
+    qsort(v, (size_t)count, sizeof *v, by_value);
+    return count % 2 ? v[count / 2] : 0.5 * (v[count / 2 - 1] + v[count / 2]);
+}
+
 bench_time bench_measure(void (*f)(void *user), void *user)
 {
-    static double times[MOST_RUNS];
+    static double times[MOST_RUNS], loops[MOST_RUNS];
     bench_time t = {.peak = peak()};
+    int looped = 0;
     f(user);
     const double begin = now();
+    double last = begin - LOOP_EVERY;
     do {
+        if (now() - last >= LOOP_EVERY) {
+            loops[looped++] = inner_loop();
+            last = now();
+        }
         const double start = now();
         f(user);
         times[t.runs++] = now() - start;
     } while (t.runs < MOST_RUNS && (t.runs < 3 || now() - begin < 0.33));
+    if (looped < MOST_RUNS) loops[looped++] = inner_loop();
     t.peak = 0.5 * (t.peak + peak());
-    qsort(times, (size_t)t.runs, sizeof *times, by_value);
+    t.loop = median(loops, looped);
+    t.seconds = median(times, t.runs);
     t.best = times[0];
-    t.seconds = t.runs % 2 ? times[t.runs / 2] : 0.5 * (times[t.runs / 2 - 1] + times[t.runs / 2]);
     return t;
 }
 
@@ -102,9 +144,7 @@ void bench_row_threads(void (*f)(void *user), void *user)
         gain[i] = one.seconds / many.seconds;
         of_peak[i] = many.peak / one.peak;
     }
-    qsort(gain, ROUNDS, sizeof *gain, by_value);
-    qsort(of_peak, ROUNDS, sizeof *of_peak, by_value);
-    printf("    %d threads: %.2f times as fast as one, the peak %.2f times\n", all, gain[ROUNDS / 2], of_peak[ROUNDS / 2]);
+    printf("    %d threads: %.2f times as fast as one, the peak %.2f times\n", all, median(gain, ROUNDS), median(of_peak, ROUNDS));
     fflush(stdout);
 }
 
@@ -114,6 +154,7 @@ void bench_row(const char *label, bench_time t, double flop)
 {
     printf("  %-56s %11.4f ms", label, 1e3 * t.seconds);
     if (flop > 0) printf(" %9.1f GFLOP/s %6.1f %% of the peak (best %.1f)", 1e-9 * flop / t.seconds, 100 * flop / t.seconds / t.peak, 100 * flop / t.best / t.peak);
+    if (flop > 0 && t.loop > 0) printf(", %.1f %% of the inner loop", 100 * flop / t.seconds / t.loop);
     printf("\n");
     fflush(stdout);
 }

@@ -11,11 +11,14 @@ void bench_register(const char *name, bench_function f);
     static void bench_##name(void)
 
 /* Median seconds of one call of f(user), after a warm-up, for about a third of a second in all. The FMA peak is measured before
- * and after, so that a row's fraction refers to the machine's speed at that moment. */
+ * and after, so that a row's fraction refers to the machine's speed at that moment. The peak's FMAs need half of what a core can issue, the
+ * convolutions' inner loop nearly all of it: where another program has the core's other half (simultaneous multithreading), the one
+ * stays as it was and the other falls to two thirds, so that both are measured. */
 typedef struct bench_time {
     double seconds; /* median of one call */
     double best;    /* the shortest: what the code can do where neighbours hold up the others */
     double peak;    /* FLOP/s of the FMA peak with the threads in use, the mean of before and after */
+    double loop;    /* FLOP/s of the convolutions' inner loop on data in the first cache, the median of before, between and after; 0: does not apply */
     int runs;
 } bench_time;
 bench_time bench_measure(void (*f)(void *user), void *user);
@@ -26,7 +29,7 @@ bool bench_bf16(bench_time *t);
 /* Times are processor time (lgd-bench --cpu). */
 bool bench_cpu(void);
 
-/* A row: label, milliseconds, GFLOP/s and the fraction of the peak, at the median and at the best (flop = 0: no such columns). */
+/* A row: label, milliseconds, GFLOP/s and the fraction of the peak, at the median and at the best, and of the inner loop (flop = 0: no such columns). */
 void bench_row(const char *label, bench_time t, double flop);
 /* A row with a figure in another unit, for example 150.2 "Mpixel/s". */
 void bench_row_unit(const char *label, bench_time t, double value, const char *unit);

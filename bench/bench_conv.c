@@ -123,17 +123,19 @@ static const ts_conv published[] = {
     {1, 64, 64, 512, 512, 5, 1, TS_PAD_ZERO, 0},        {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO, 0},         {1, 4, 4, 512, 512, 5, 1, TS_PAD_ZERO, 0},
 };
 
+/* h of the shipped model's coarse steps. */
 static const ts_conv refiner[] = {
-    {8, 64, 64, 18, 64, 5, 1, TS_PAD_REPLICATE, 9}, {8, 64, 64, 64, 96, 1, 1, TS_PAD_REPLICATE, 0}, {8, 64, 64, 32, 96, 1, 1, TS_PAD_REPLICATE, 0},
-    {8, 64, 64, 32, 64, 3, 2, TS_PAD_REPLICATE, 0}, {8, 64, 64, 32, 9, 3, 1, TS_PAD_REPLICATE, 0},
+    {8, 64, 64, 18, 128, 5, 1, TS_PAD_REPLICATE, 9}, {8, 64, 64, 128, 192, 1, 1, TS_PAD_REPLICATE, 0}, {8, 64, 64, 64, 192, 1, 1, TS_PAD_REPLICATE, 0},
+    {8, 64, 64, 64, 128, 3, 2, TS_PAD_REPLICATE, 0}, {8, 64, 64, 64, 9, 3, 1, TS_PAD_REPLICATE, 0},
 };
 
+/* Its g, some layers of each size; and larger kernels. */
 static const ts_conv unet[] = {
-    {8, 64, 64, 3, 16, 3, 1, TS_PAD_ZERO, 0},   {8, 32, 32, 16, 32, 5, 1, TS_PAD_ZERO, 0},  {8, 16, 16, 32, 64, 5, 1, TS_PAD_ZERO, 0},
-    {8, 8, 8, 64, 128, 5, 1, TS_PAD_ZERO, 0},   {8, 4, 4, 128, 256, 5, 1, TS_PAD_ZERO, 0},  {8, 2, 2, 256, 256, 5, 1, TS_PAD_ZERO, 0},
-    {8, 4, 4, 512, 256, 5, 1, TS_PAD_ZERO, 0},  {8, 8, 8, 256, 128, 5, 1, TS_PAD_ZERO, 0},  {8, 16, 16, 128, 64, 5, 1, TS_PAD_ZERO, 0},
-    {8, 32, 32, 64, 32, 3, 1, TS_PAD_ZERO, 0},  {8, 8, 8, 64, 128, 3, 1, TS_PAD_ZERO, 0},   {8, 16, 16, 32, 64, 3, 1, TS_PAD_ZERO, 0},
-    {8, 16, 16, 128, 64, 3, 1, TS_PAD_ZERO, 0}, {8, 64, 64, 32, 16, 3, 1, TS_PAD_ZERO, 0},
+    {8, 64, 64, 3, 24, 3, 1, TS_PAD_ZERO, 0},   {8, 32, 32, 24, 48, 3, 1, TS_PAD_ZERO, 0},  {8, 16, 16, 96, 96, 3, 1, TS_PAD_ZERO, 0},
+    {8, 8, 8, 192, 192, 3, 1, TS_PAD_ZERO, 0},  {8, 4, 4, 192, 192, 3, 1, TS_PAD_ZERO, 0},  {8, 2, 2, 192, 192, 3, 1, TS_PAD_ZERO, 0},
+    {8, 8, 8, 384, 192, 3, 1, TS_PAD_ZERO, 0},  {8, 16, 16, 192, 96, 3, 1, TS_PAD_ZERO, 0}, {8, 32, 32, 96, 48, 3, 1, TS_PAD_ZERO, 0},
+    {8, 64, 64, 48, 24, 3, 1, TS_PAD_ZERO, 0},  {8, 64, 64, 24, 24, 3, 1, TS_PAD_ZERO, 0},  {8, 64, 64, 24, 9, 3, 1, TS_PAD_ZERO, 0},
+    {8, 8, 8, 64, 128, 5, 1, TS_PAD_ZERO, 0},   {8, 16, 16, 128, 64, 5, 1, TS_PAD_ZERO, 0},
 };
 
 static void all(const ts_conv *shape, size_t count)
@@ -151,13 +153,13 @@ BENCH(conv_published)
 
 BENCH(conv_refiner)
 {
-    bench_heading("Convolutions of a small refiner in training");
+    bench_heading("Convolutions of a coarse step in training");
     all(refiner, sizeof refiner / sizeof *refiner);
 }
 
 BENCH(conv_unet)
 {
-    bench_heading("Convolutions of a small U-Net in training (small images: zero padding is skipped, so more than the peak is possible)");
+    bench_heading("Convolutions of g in training (small images: zero padding is skipped, so more than the peak is possible)");
     all(unet, sizeof unet / sizeof *unet);
 }
 
