@@ -36,11 +36,19 @@ static const float *input(ag_tape *tape, const ag_node *node)
     return both;
 }
 
+static bool winograd(const ts_conv *c, ts_conv_use use) { return !ts_conv_exact() && ts_conv_winograd(c, use); }
+
+static void weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
+{
+    const bool other = dweight && !ts_conv_exact() && ts_conv_winograd_weights(c);
+    if (other) ts_conv_weight_gradient_winograd(c, x, dy, dweight);
+    ts_conv_weight_gradient(c, x, dy, other ? NULL : dweight, dbias);
+}
+
 static void forward(ag_tape *tape, ag_node *node)
 {
     const conv_attr *a = node->attr;
-    const ts_conv_use use = ts_conv_precision() == TS_BF16 ? TS_CONV_FORWARD_BF16
-                            : ts_conv_exact() || !ts_conv_winograd(&a->conv) ? TS_CONV_FORWARD : TS_CONV_WINOGRAD;
+    const ts_conv_use use = ts_conv_precision() == TS_BF16 ? TS_CONV_FORWARD_BF16 : winograd(&a->conv, TS_CONV_WINOGRAD) ? TS_CONV_WINOGRAD : TS_CONV_FORWARD;
     const float *packed = ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data);
     if (!packed) return;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
@@ -63,13 +71,15 @@ static void backward(ag_tape *tape, ag_node *node)
     float *dweight = ag_grad_add(tape, node->in[WEIGHT]), *dbias = ag_grad_add(tape, node->in[BIAS]);
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
     const float *x = dweight || dbias ? input(tape, node) : NULL;
-    if (x) ts_conv_weight_gradient(&a->conv, x, dy, dweight, dbias);
+    if (x) weight_gradient(&a->conv, x, dy, dweight, dbias);
     ts_arena_release(ag_arena(tape), mark);
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[X], &accumulate);
-    const bool bf16 = ts_conv_precision() == TS_BF16;
-    const float *packed = dx ? ag_packed(tape, &a->conv, bf16 ? TS_CONV_DATA_GRADIENT_BF16 : TS_CONV_DATA_GRADIENT, node->in[WEIGHT]->t.data) : NULL;
-    if (packed) (bf16 ? ts_conv_data_gradient_bf16 : ts_conv_data_gradient)(&a->conv, dy, packed, dx, accumulate);
+    const ts_conv_use use = ts_conv_precision() == TS_BF16 ? TS_CONV_DATA_GRADIENT_BF16 : winograd(&a->conv, TS_CONV_DATA_GRADIENT_WINOGRAD) ? TS_CONV_DATA_GRADIENT_WINOGRAD : TS_CONV_DATA_GRADIENT;
+    const float *packed = dx ? ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data) : NULL;
+    if (packed)
+        (use == TS_CONV_DATA_GRADIENT_BF16 ? ts_conv_data_gradient_bf16 : use == TS_CONV_DATA_GRADIENT ? ts_conv_data_gradient : ts_conv_data_gradient_winograd)(
+            &a->conv, dy, packed, dx, accumulate);
 }
 
 /* Where a tap falls; -1: on a zero. */

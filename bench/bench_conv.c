@@ -9,7 +9,7 @@
 
 typedef struct work {
     ts_conv c;
-    float *x, *y, *weight, *bias, *packed, *packed_gradient, *packed_winograd, *packed_bf16, *packed_gradient_bf16;
+    float *x, *y, *weight, *bias, *packed, *packed_gradient, *packed_winograd, *packed_gradient_winograd, *packed_bf16, *packed_gradient_bf16;
 } work;
 
 static float *values(size_t count, float scale)
@@ -26,19 +26,20 @@ static work make(ts_conv c)
     const size_t pixels = (size_t)c.n * (size_t)c.h * (size_t)c.w, weights = (size_t)c.ic * (size_t)c.oc * (size_t)(c.k * c.k);
     work w = {c, values(pixels * (size_t)c.ic, 1), values(pixels * (size_t)c.oc, 1), values(weights, 0.01f), values((size_t)c.oc, 1),
               values(ts_conv_packed_count(&c, TS_CONV_FORWARD), 1), values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT), 1),
-              c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_WINOGRAD), 1) : NULL, values(ts_conv_packed_count(&c, TS_CONV_FORWARD_BF16), 1),
+              c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_WINOGRAD), 1) : NULL,
+              c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT_WINOGRAD), 1) : NULL, values(ts_conv_packed_count(&c, TS_CONV_FORWARD_BF16), 1),
               values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT_BF16), 1)};
     ts_conv_pack(&c, TS_CONV_FORWARD_BF16, w.weight, w.packed_bf16);
     ts_conv_pack(&c, TS_CONV_DATA_GRADIENT_BF16, w.weight, w.packed_gradient_bf16);
     ts_conv_pack(&c, TS_CONV_FORWARD, w.weight, w.packed);
     ts_conv_pack(&c, TS_CONV_DATA_GRADIENT, w.weight, w.packed_gradient);
-    if (c.k == 3) ts_conv_pack(&c, TS_CONV_WINOGRAD, w.weight, w.packed_winograd);
+    if (c.k == 3) ts_conv_pack(&c, TS_CONV_WINOGRAD, w.weight, w.packed_winograd), ts_conv_pack(&c, TS_CONV_DATA_GRADIENT_WINOGRAD, w.weight, w.packed_gradient_winograd);
     return w;
 }
 
 static void discard(work *w)
 {
-    free(w->x), free(w->y), free(w->weight), free(w->bias), free(w->packed), free(w->packed_gradient), free(w->packed_winograd), free(w->packed_bf16);
+    free(w->x), free(w->y), free(w->weight), free(w->bias), free(w->packed), free(w->packed_gradient), free(w->packed_winograd), free(w->packed_gradient_winograd), free(w->packed_bf16);
     free(w->packed_gradient_bf16);
 }
 
@@ -66,6 +67,18 @@ static void weight_gradient(void *user)
     ts_conv_weight_gradient(&w->c, w->x, w->y, w->weight, w->bias);
 }
 
+static void data_gradient_winograd(void *user)
+{
+    work *w = user;
+    ts_conv_data_gradient_winograd(&w->c, w->y, w->packed_gradient_winograd, w->x, false);
+}
+
+static void weight_gradient_winograd(void *user)
+{
+    work *w = user;
+    ts_conv_weight_gradient_winograd(&w->c, w->x, w->y, w->weight);
+}
+
 static void forward_bf16(void *user)
 {
     work *w = user;
@@ -89,7 +102,7 @@ static void row(const char *what, ts_conv c, void (*f)(void *user))
     char label[96];
     snprintf(label, sizeof label, "%s n%d %dx%d %d->%d %dx%d%s%s", what, c.n, c.h, c.w, c.ic, c.oc, c.k, c.k, c.dilation > 1 ? " d2" : "",
              c.pad == TS_PAD_REPLICATE ? " rep" : "");
-    const bool back = f == data_gradient || f == data_gradient_bf16;
+    const bool back = f == data_gradient || f == data_gradient_winograd || f == data_gradient_bf16;
     if (back && c.constants) snprintf(label + strlen(label), sizeof label - strlen(label), " (of %d)", ts_conv_variables(&c));
     work w = make(c);
     bench_time t = bench_measure(f, &w);
@@ -167,10 +180,20 @@ BENCH(conv_winograd)
 {
     static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0}, {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0},
                                     {1, 256, 256, 32, 64, 3, 2, TS_PAD_REPLICATE, 0}, {1, 28, 28, 64, 64, 3, 1, TS_PAD_ZERO, 0}};
+    static const ts_conv trained[] = {{8, 64, 64, 48, 24, 3, 1, TS_PAD_ZERO, 0}, {8, 32, 32, 96, 48, 3, 1, TS_PAD_ZERO, 0}, {8, 64, 64, 64, 128, 3, 2, TS_PAD_REPLICATE, 0}};
     bench_heading("Winograd's F(4 x 4, 3 x 3), counting the direct way's multiplications, each below the direct way");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
         row("forward", shape[i], forward);
         row("Winograd forward", shape[i], winograd);
+    }
+    bench_heading("The same in training: g's larger layers and a coarse step's");
+    for (size_t i = 0; i < sizeof trained / sizeof *trained; i++) {
+        row("forward", trained[i], forward);
+        row("Winograd forward", trained[i], winograd);
+        row("data gradient", trained[i], data_gradient);
+        row("Winograd data gradient", trained[i], data_gradient_winograd);
+        row("weight gradient", trained[i], weight_gradient);
+        row("Winograd weight gradient", trained[i], weight_gradient_winograd);
     }
 }
 
@@ -194,7 +217,7 @@ BENCH(peer_conv)
     bench_heading("single convolutions beside their floor (the peak) and the peer");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
         peer_row("forward", "conv", shape[i], forward, 1);
-        if (ts_conv_winograd(&shape[i])) peer_row("Winograd forward", "conv", shape[i], winograd, 1);
+        if (ts_conv_winograd(&shape[i], TS_CONV_WINOGRAD)) peer_row("Winograd forward", "conv", shape[i], winograd, 1);
         peer_row("both gradients", "gradient", shape[i], both_gradients, 2);
     }
 }
@@ -209,7 +232,7 @@ BENCH(two_threads)
     bench_heading("all threads beside one, and what the peak gains");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++)
         for (int k = 0; k < 4; k++) {
-            if (k == 3 && !ts_conv_winograd(&shape[i])) continue;
+            if (k == 3 && !ts_conv_winograd(&shape[i], TS_CONV_WINOGRAD)) continue;
             work w = make(shape[i]);
             ts_threads_set(1);
             const bench_time one = bench_measure(f[k], &w);

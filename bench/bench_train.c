@@ -111,6 +111,9 @@ static void measure(subject *s)
     const double of_h = 3 * (s->steps - coarse) * h - not_made(s, "h.conv1", s->steps - coarse, fixed[NN_G] && (coarse == 0 || fixed[NN_COARSE]));
     const double flop = batch * ((fixed[NN_G] ? 1 : 3) * g + of_coarse + of_h);
     snprintf(label, sizeof label, "%d patches of %d^2, window %d, T = %d%s", batch, s->c.data.patch, side, s->steps, fixed[NN_G] ? ", g fixed" : "");
+    ts_conv_exact_set(true);
+    bench_row("  all convolutions computed directly", bench_measure(step, s), flop);
+    ts_conv_exact_set(false);
     const bench_time t = bench_measure(step, s);
     bench_row(label, t, flop);
     bench_row_peer(t, flop, peer(s));
@@ -159,6 +162,7 @@ static void train(const char *config, const char *heading)
     s.in = (nn_input){.image = ts_view(shown, (ts_shape){(int)batch, side, side, 3}), .grid = {.h = side, .w = side, .side = patch}, .view = rd_flash()};
     if (side < patch) s.in.whole = ts_view(s.images, (ts_shape){(int)batch, patch, patch, 3});
     measure(&s);
+    ts_conv_exact_set(true);
     if (ag_status(s.tape)->code) printf("  %s\n", ag_status(s.tape)->message);
     ag_tape_destroy(&s.tape);
     nn_model_free(&s.model);

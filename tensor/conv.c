@@ -30,7 +30,8 @@ ptrdiff_t conv_panels_count(int ic, int oc, int k)
 
 size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
 {
-    if (use == TS_CONV_WINOGRAD) return conv_winograd_count(c);
+    if (use == TS_CONV_WINOGRAD) return conv_winograd_count(c->ic, c->oc);
+    if (use == TS_CONV_DATA_GRADIENT_WINOGRAD) return conv_winograd_count(c->oc, ts_conv_variables(c));
     if (use == TS_CONV_FORWARD_BF16) return (size_t)conv_panels_count(conv_bf16_depth(c->ic), c->oc, c->k);
     if (use == TS_CONV_DATA_GRADIENT_BF16) return (size_t)conv_panels_count(conv_bf16_depth(c->oc), ts_conv_variables(c), c->k);
     const int ic = use == TS_CONV_FORWARD ? c->ic : c->oc, oc = use == TS_CONV_FORWARD ? c->oc : ts_conv_variables(c);
@@ -40,8 +41,8 @@ size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
 /* packed: [panel][ky][kx][input][channel of the panel, zeros where there is none] */
 void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float *packed)
 {
-    if (use == TS_CONV_WINOGRAD) {
-        conv_winograd_pack(c, weight, packed);
+    if (use == TS_CONV_WINOGRAD || use == TS_CONV_DATA_GRADIENT_WINOGRAD) {
+        conv_winograd_pack(c, use == TS_CONV_WINOGRAD, weight, packed);
         return;
     }
     if (use == TS_CONV_FORWARD_BF16 || use == TS_CONV_DATA_GRADIENT_BF16) {

@@ -16,9 +16,15 @@ typedef struct ts_conv {
     int constants; /* of the input's channels, the last: the data gradient is that of the others alone */
 } ts_conv;
 
-/* Which order the packed weights are in: for the output, for the gradient of the input, for the output by Winograd's way; and the first two
- * as pairs of bf16 values. */
-typedef enum ts_conv_use { TS_CONV_FORWARD, TS_CONV_DATA_GRADIENT, TS_CONV_WINOGRAD, TS_CONV_FORWARD_BF16, TS_CONV_DATA_GRADIENT_BF16 } ts_conv_use;
+/* Which order the packed weights are in: for the output and for the gradient of the input; both by Winograd's way; both as pairs of bf16 values. */
+typedef enum ts_conv_use {
+    TS_CONV_FORWARD,
+    TS_CONV_DATA_GRADIENT,
+    TS_CONV_WINOGRAD,
+    TS_CONV_DATA_GRADIENT_WINOGRAD,
+    TS_CONV_FORWARD_BF16,
+    TS_CONV_DATA_GRADIENT_BF16
+} ts_conv_use;
 
 static inline int ts_conv_variables(const ts_conv *c) { return c->ic - c->constants; }
 
@@ -32,15 +38,18 @@ void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight /* [oc]
  * act(v) = v > 0 ? v : leak v (0 <= leak <= 1; 1: the identity, 0: ReLU). bias may be NULL. x and y contiguous, not overlapping. */
 void ts_conv_forward(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y);
 
-/* The same y by Winograd's F(4 x 4, 3 x 3) with weights packed for TS_CONV_WINOGRAD; c->k must be 3. Its products are a quarter of
- * the direct way's, its rounding errors about ten times as large (1e-5 of the largest value, not 1e-6).
- * ts_conv_winograd: whether it pays for this shape. */
-bool ts_conv_winograd(const ts_conv *c);
+/* The same y, and the gradients below, by Winograd's F(4 x 4, 3 x 3) with weights packed for the use of that name; c->k must be 3. Its
+ * products are a quarter of the direct way's, its rounding errors about ten times as large (1e-5 of the largest value, not 1e-6).
+ * ts_conv_winograd: whether it pays for this shape, use being one of the two; _weights: for the gradient of its weights. */
+bool ts_conv_winograd(const ts_conv *c, ts_conv_use use);
+bool ts_conv_winograd_weights(const ts_conv *c);
 void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y);
+void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
+void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const float *dy, float *dweight);
 
-/* Process-wide: whether ag_conv computes directly wherever it can (true: the default, and what training and comparisons with other
- * programs want) or by Winograd's way where ts_conv_winograd says so. A program that only infers calls ts_conv_exact_set(false) before
- * it builds its first tape; weights that a tape has packed for one way are packed anew for the other. */
+/* Process-wide: whether ag_conv computes directly wherever it can (true: the default, and what comparisons with other programs want) or
+ * by Winograd's way where ts_conv_winograd says so. A program calls ts_conv_exact_set(false) before it builds its first tape; weights that
+ * a tape has packed for one way are packed anew for the other. */
 void ts_conv_exact_set(bool exact);
 bool ts_conv_exact(void);
 

@@ -96,8 +96,8 @@ bool conv_by_lanes(const conv_plan *p);
 /* weight[i * i_step + o * o_step + tap] */
 void conv_pack_few(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step, float *packed);
 
-size_t conv_winograd_count(const ts_conv *c);
-void conv_winograd_pack(const ts_conv *c, const float *weight, float *packed);
+size_t conv_winograd_count(int ic, int oc);
+void conv_winograd_pack(const ts_conv *c, bool forward, const float *weight, float *packed);
 
 /* dweight += for at most CONV_POSITIONS pixels an image. */
 void conv_weight_positions(const ts_conv *c, const float *x, const float *dy, float *dweight);

@@ -75,18 +75,19 @@ static void run(lgd_model *m, const float *image, int side, int iterations, int 
 /* Winograd's way, where the network is wide enough for it. */
 TEST(infer_exact_and_fast_maps_are_near)
 {
+    enum { LARGE = 40, MAPS = LARGE * LARGE * 9 }; /* as many tiles as pay */
     nn_arch a = tiny();
     a.h_width = 32;
     a.h_gru = 24;
     lgd_model *m = load(a);
-    static float image[SIDE * SIDE * 3], exact[VALUES], fast[VALUES], again[VALUES];
+    static float image[LARGE * LARGE * 3], exact[MAPS], fast[MAPS], again[MAPS];
     lgd_error e;
-    make_image(image, SIDE);
+    make_image(image, LARGE);
     const lgd_options direct = {.iterations = T, .exact = 1}, quick = {.iterations = T, .threads = 1}, three = {.iterations = T, .threads = 3};
-    CHECK(!lgd_estimate(m, image, SIDE, &direct, exact, &e) && !lgd_estimate(m, image, SIDE, &quick, fast, &e) && !lgd_estimate(m, image, SIDE, &three, again, &e),
+    CHECK(!lgd_estimate(m, image, LARGE, &direct, exact, &e) && !lgd_estimate(m, image, LARGE, &quick, fast, &e) && !lgd_estimate(m, image, LARGE, &three, again, &e),
           "%s", e.message);
     double most = 0;
-    for (int i = 0; i < VALUES; i++) most = fmax(most, fabs((double)exact[i] - fast[i]));
+    for (int i = 0; i < MAPS; i++) most = fmax(most, fabs((double)exact[i] - fast[i]));
     CHECK(most > 0 && most <= 1e-4, "the maps differ by %g", most);
     CHECK(!memcmp(fast, again, sizeof fast), "other maps with three threads");
     lgd_free(&m);

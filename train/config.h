@@ -24,6 +24,7 @@ typedef struct tr_config {
         int given_min;                      /* 0: arch.images */
         bool checkpoint_steps;
         ts_precision precision;
+        bool exact;
         int64_t seed, checkpoint_every, log_every;
         int max_skipped;
         char init[1024];

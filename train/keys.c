@@ -98,6 +98,8 @@ const tr_key tr_keys[] = {
      "keep of each refinement at the photograph's size only the maps and h's states, and compute the rest again for the gradient: less memory, a third more time, the same numbers"},
     {"train", "precision", TR_CHOICE, AT(train.precision), 0, TS_PRECISION_COUNT - 1, "f32", precision_names, false,
      "what convolutions multiply, forward and for the gradients of their inputs: f32, or both operands rounded to bf16 (for CPUs with AVX512-BF16, slower on others); weights, their gradients, Adam and all sums stay f32, and so does validation"},
+    {"train", "exact", TR_BOOL, AT(train.exact), 0, 1, "no", NULL, false,
+     "compute all convolutions and their gradients directly, not by Winograd's way where it is faster; the two differ by less than 1e-4"},
     {"train", "seed", TR_INT64, AT(train.seed), 0, 1e15, "1", NULL, false, "seed of the initial weights, the loss's views and the drawn iterations"},
     {"train", "checkpoint_every", TR_INT64, AT(train.checkpoint_every), 1, 1e9, "500", NULL, true, "steps between checkpoints"},
     {"train", "log_every", TR_INT64, AT(train.log_every), 1, 1e9, "50", NULL, true, "steps between lines of progress when stderr is no terminal"},
