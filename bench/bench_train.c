@@ -125,7 +125,8 @@ static void measure(subject *s)
     bench_row_unit("  its materials, one thread beside it", part, 100 * part.seconds / t.seconds, "% of the step");
     const int trained = s->steps;
     if (trained == 0) return;
-    const double states = (double)batch * side * side * (s->model->arch.channels + 2 * s->model->arch.h_gru) * sizeof(float) / (1 << 20);
+    const nn_arch *a = &s->model->arch;
+    const double states = (double)batch * side * side * (a->channels + (a->h_width ? 2 * a->h_gru : 0)) * sizeof(float) / (1 << 20);
     const double plain = megabytes(s, trained, false), few = megabytes(s, trained, true), many = megabytes(s, 24, true);
     printf("  memory: %.0f MiB; with train.checkpoint_steps %.0f MiB, and %.0f MiB at T = 24: %.2f MiB a step more, R_t and the states are %.2f MiB\n", plain, few, many,
            (many - few) / (24 - trained), states);

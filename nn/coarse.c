@@ -73,19 +73,12 @@ static bool read_band(ag_tape *tape, const nn_model *model, const nn_coarse *c, 
     return fine;
 }
 
-bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c)
+/* Reads what the photographs say of R_t and makes R_{t+1} and its states of it. */
+static bool step(ag_tape *tape, const nn_model *model, nn_coarse *c)
 {
     const nn_refiner *h = &((const nn_layers *)model->layers)->coarse;
-    const int side = c->in.grid.side, size = side < model->arch.coarse_size ? side : model->arch.coarse_size;
-    if (c->maps->t.shape.h != size) c->maps = ag_resize(tape, c->maps, size, size); /* it came from g */
-    if (!c->maps) return false;
     const ts_shape s = c->maps->t.shape;
-    if (!c->up.weight) {
-        c->up = ts_taps_triangle(ag_arena(tape), s.h, side);
-        c->down = ts_taps_triangle(ag_arena(tape), side, s.h);
-        if (!c->up.weight || !c->down.weight) return ag_fail(tape, TS_NOMEM, "no memory for the filter"), false;
-    }
-    if (model->arch.gradient && !c->state.rmse0 && !measure(tape, model, c)) return false;
+    const int side = c->in.grid.side;
     const ts_mark mark = ag_scope_begin(tape);
     ag_value *gradient = ag_empty(tape, (ts_shape){s.n, s.h, s.w, s.c * model->arch.images});
     ag_value *newton = nn_descends(model, NN_DESCENT_NEWTON) ? ag_empty(tape, s) : NULL;
@@ -102,6 +95,51 @@ bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c)
     c->state.gru[0] = keep[1];
     c->state.gru[1] = keep[2];
     return true;
+}
+
+typedef struct step_of {
+    const nn_model *model;
+    nn_coarse c;
+} step_of;
+
+/* in and out: R and the states, as nn/lgd.c has them. */
+static void step_again(ag_tape *tape, ag_value *const *in, ag_value **out, const void *user)
+{
+    const step_of *s = user;
+    nn_coarse c = s->c;
+    c.maps = in[0];
+    for (int i = 0; i < 2; i++) c.state.gru[i] = in[i + 1];
+    if (!step(tape, s->model, &c)) return;
+    out[0] = c.maps;
+    for (int i = 0; i < 2 && s->model->arch.recurrent; i++) out[i + 1] = c.state.gru[i];
+}
+
+static bool step_and_forget(ag_tape *tape, const nn_model *model, nn_coarse *c)
+{
+    const step_of of = {model, *c};
+    ag_value *const from[3] = {c->maps, c->state.gru[0], c->state.gru[1]};
+    ag_value *to[3] = {0};
+    if (!ag_checkpoint(tape, step_again, &of, sizeof of, 3, from, c->room[c->state.step % 2], model->arch.recurrent ? 3 : 1, to)) return false;
+    c->maps = to[0];
+    for (int i = 0; i < 2; i++) c->state.gru[i] = to[i + 1];
+    c->state.step++;
+    return true;
+}
+
+bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c)
+{
+    const int side = c->in.grid.side, size = side < model->arch.coarse_size ? side : model->arch.coarse_size;
+    if (c->maps->t.shape.h != size) c->maps = ag_resize(tape, c->maps, size, size); /* it came from g */
+    if (!c->maps) return false;
+    const ts_shape s = c->maps->t.shape;
+    if (!c->up.weight) {
+        c->up = ts_taps_triangle(ag_arena(tape), s.h, side);
+        c->down = ts_taps_triangle(ag_arena(tape), side, s.h);
+        if (!c->up.weight || !c->down.weight) return ag_fail(tape, TS_NOMEM, "no memory for the filter"), false;
+    }
+    if (model->arch.gradient && !c->state.rmse0 && !measure(tape, model, c)) return false;
+    if (!c->in.recompute || !ag_gradients(tape)) return step(tape, model, c);
+    return (c->room[0][0] || nn_gradient_rooms(tape, c->maps, model->arch.coarse_gru, c->room)) && step_and_forget(tape, model, c);
 }
 
 ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps)

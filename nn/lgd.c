@@ -27,12 +27,15 @@ static void step_again(ag_tape *tape, ag_value *const *in, ag_value **out, const
     for (int i = 0; i < 2 && nn_arch_carries(&s->model->arch); i++) out[i + 1] = state.gru[i];
 }
 
-/* Room for the gradients of R_t and the states: a step's and the next one's take turns. */
-static float *gradient_room(ag_tape *tape, const ag_value *maps, int channels)
+bool nn_gradient_rooms(ag_tape *tape, const ag_value *maps, int gru, float *room[2][3])
 {
-    float *room = ts_arena_alloc(ag_arena(tape), (size_t)ts_pixels(maps->t.shape) * (size_t)channels * sizeof *room);
-    if (!room) ag_fail(tape, TS_NOMEM, "no memory for a step's gradients");
-    return room;
+    const size_t pixels = (size_t)ts_pixels(maps->t.shape);
+    for (int i = 0; i < 6; i++) {
+        const int channels = i % 3 ? gru : maps->t.shape.c;
+        room[i / 3][i % 3] = channels ? ts_arena_alloc(ag_arena(tape), pixels * (size_t)channels * sizeof(float)) : NULL;
+        if (channels && !room[i / 3][i % 3]) return ag_fail(tape, TS_NOMEM, "no memory for a step's gradients"), false;
+    }
+    return true;
 }
 
 static ag_value *step_and_forget(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state, float *const room[3])
@@ -103,7 +106,7 @@ ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int ste
         for (int i = 0; i < 2 && nn_arch_carries(&model->arch); i++) state.to[i] = ag_empty(tape, (ts_shape){s.n, s.h, s.w, model->arch.h_gru});
     }
     float *room[2][3] = {{0}};
-    for (int i = 0; full && !release && in->recompute && i < 6; i++) room[i / 3][i % 3] = gradient_room(tape, now, i % 3 ? model->arch.h_gru : now->t.shape.c);
+    if (full && !release && in->recompute && !nn_gradient_rooms(tape, now, model->arch.h_width ? model->arch.h_gru : 0, room)) return ag_status(tape)->code;
     while (now && on && t < steps) {
         if (!full) { /* nothing is left to do */
         } else if (release) {

@@ -98,7 +98,7 @@ bool nn_coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, n
     ag_scope_end(tape, mark, &c->maps, 1);
     if (!c->maps) return false;
     const ts_tensor whole = in->whole.data ? in->whole : in->image;
-    c->in = (nn_input){.image = whole, .grid = rd_grid_full(whole.shape.h), .view = in->view, .views = in->views, .given = in->given};
+    c->in = (nn_input){.image = whole, .grid = rd_grid_full(whole.shape.h), .view = in->view, .views = in->views, .given = in->given, .recompute = in->recompute};
     return true;
 }
 

@@ -66,6 +66,30 @@ TEST(checkpoint_steps_same_gradients)
     a = tiny();
     a.h_width = 0;
     compare(a, 2);
+    a = tiny();
+    a.coarse_steps = 3, a.coarse_size = 12, a.coarse_width = 8, a.coarse_gru = 4;
+    compare(a, 2);
+    compare(a, 5);
+    a.h_width = 0;
+    compare(a, 5);
+    a.recurrent = false;
+    compare(a, 3);
+}
+
+/* From 6 steps to so many. */
+static void grow(nn_arch a, int most, size_t state)
+{
+    nn_model *m = create(&a, 5);
+    float *target;
+    nn_input in = photographs(2, SIDE, 6, &target);
+    size_t few, many;
+    double loss;
+    free(gradient(m, &in, target, 6, true, &few, &loss));
+    free(gradient(m, &in, target, most, true, &many, &loss));
+    const size_t states = (size_t)(most - 6) * state, small = (size_t)(most - 6) * 4096; /* nodes, headers */
+    CHECK(many - few <= states + small, "%zu bytes more for %d more steps, their states are %zu", many - few, most - 6, states);
+    free(target), free(in.image.data);
+    nn_model_free(&m);
 }
 
 TEST(checkpoint_steps_memory_grows_by_states)
@@ -73,15 +97,8 @@ TEST(checkpoint_steps_memory_grows_by_states)
     nn_arch a = tiny();
     a.h_width = 16;
     a.iterations = 24; /* no step is shortened, which would take a little more */
-    nn_model *m = create(&a, 5);
-    float *target;
-    nn_input in = photographs(2, SIDE, 6, &target);
-    size_t few, many;
-    double loss;
-    free(gradient(m, &in, target, 6, true, &few, &loss));
-    free(gradient(m, &in, target, 24, true, &many, &loss));
-    const size_t states = (size_t)(24 - 6) * 2 * SIDE * SIDE * (size_t)(a.channels + 2 * a.h_gru) * sizeof(float), small = 18 * 4096; /* nodes, headers */
-    CHECK(many - few <= states + small, "%zu bytes more for 18 more steps, their states are %zu", many - few, states);
-    free(target), free(in.image.data);
-    nn_model_free(&m);
+    grow(a, 24, 2 * SIDE * SIDE * (size_t)(a.channels + 2 * a.h_gru) * sizeof(float));
+    a.coarse_steps = 16, a.coarse_size = 12, a.coarse_width = 16, a.coarse_gru = 6;
+    const size_t kept = 2 * SIDE * SIDE * (size_t)a.channels * sizeof(float); /* R_t at the photograph's size, since the test asks for all */
+    grow(a, 16, 2 * 12 * 12 * (size_t)(a.channels + 2 * a.coarse_gru) * sizeof(float) + kept);
 }

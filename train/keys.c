@@ -95,7 +95,7 @@ const tr_key tr_keys[] = {
     {"train", "given_min", TR_INT, AT(train.given_min), 0, NN_MAX_IMAGES, "0", NULL, false,
      "fewest photographs of a training step, drawn uniformly up to model.images; 0: always so many"},
     {"train", "checkpoint_steps", TR_BOOL, AT(train.checkpoint_steps), 0, 1, "no", NULL, true,
-     "keep of each refinement at the photograph's size only the maps and h's states, and compute the rest again for the gradient: less memory, a third more time, the same numbers"},
+     "keep of each refinement only the maps and h's states, and compute the rest again for the gradient: less memory, a third more time, the same numbers"},
     {"train", "precision", TR_CHOICE, AT(train.precision), 0, TS_PRECISION_COUNT - 1, "f32", precision_names, false,
      "what convolutions multiply, forward and for the gradients of their inputs: f32, or both operands rounded to bf16 (for CPUs with AVX512-BF16, slower on others); weights, their gradients, Adam and all sums stay f32, and so does validation"},
     {"train", "exact", TR_BOOL, AT(train.exact), 0, 1, "no", NULL, false,
