@@ -138,7 +138,7 @@ double ev_number(const ev_estimator *e, const char *key)
     return v;
 }
 
-bool ev_oriented(const ev_estimator *e) { return find(e->method, "orientations") >= 0 && ev_number(e, "orientations") == 1; }
+int ev_orientations(const ev_estimator *e) { return find(e->method, "orientations") >= 0 ? 1 << (int)ev_number(e, "orientations") : 1; }
 
 ts_code ev_open(ev_estimator *e, ts_status *st)
 {
@@ -217,7 +217,7 @@ ts_code ev_start_r0(ev_estimator *e, const ev_case *c, float *maps, ts_status *s
 {
     const int64_t pixels = (int64_t)c->size * c->size;
     ag_reset(e->tape);
-    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){1, c->size, c->size, 3}), .grid = rd_grid_full(c->size), .view = c->view, .oriented = ev_oriented(e)};
+    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){1, c->size, c->size, 3}), .grid = rd_grid_full(c->size), .view = c->view, .orientations = ev_orientations(e)};
     const ag_value *out = nn_predict(e->tape, e->net, &in);
     if (!out) {
         *st = *ag_status(e->tape);

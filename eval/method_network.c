@@ -77,7 +77,7 @@ static ts_code run_tiles(ev_estimator *e, const ev_case *c, const float *const *
 {
     const int channels = e->net->arch.channels;
     if (ev_block(e, (size_t)c->size * (size_t)c->size * (size_t)channels, st) != TS_OK) return st->code;
-    lgd_tiles t = {.image = image, .views = view, .given = photos(e), .side = c->size, .tile = c->size > UNTILED ? TILE : c->size, .steps = steps(e), .oriented = ev_oriented(e), .tolerance = ev_number(e, "tolerance")};
+    lgd_tiles t = {.image = image, .views = view, .given = photos(e), .side = c->size, .tile = c->size > UNTILED ? TILE : c->size, .steps = steps(e), .orientations = ev_orientations(e), .tolerance = ev_number(e, "tolerance")};
     if (lgd_tiles_run(e->tape, e->net, &t, e->x, st) != TS_OK) return st->code;
     seen(t.steps, e->x, channels, user);
     return TS_OK;
@@ -93,7 +93,7 @@ static ts_code refine(ev_estimator *e, const ev_case *c, ev_seen seen, void *use
     ag_value *out = NULL;
     ag_reset(e->tape);
     const int given = photos(e);
-    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){given, c->size, c->size, 3}), .grid = rd_grid_full(c->size), .views = view, .given = given, .oriented = ev_oriented(e)};
+    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){given, c->size, c->size, 3}), .grid = rd_grid_full(c->size), .views = view, .given = given, .orientations = ev_orientations(e)};
     if (nn_lgd(e->tape, e->net, &in, steps(e), false, &out, after, &t) == TS_OK) return TS_OK;
     *st = *ag_status(e->tape);
     return st->code;

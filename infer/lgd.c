@@ -46,7 +46,7 @@ _Static_assert(sizeof((lgd_error *)0)->message == sizeof((ts_status *)0)->messag
 
 const char *lgd_version(void) { return LGD_VERSION; }
 
-lgd_options lgd_options_default(void) { return (lgd_options){.iterations = -1, .orientations = 8, .tolerance = LGD_TOLERANCE_USUAL}; }
+lgd_options lgd_options_default(void) { return (lgd_options){.iterations = -1, .orientations = LGD_ORIENTATIONS_USUAL, .tolerance = LGD_TOLERANCE_USUAL}; }
 
 int lgd_trained_iterations(const lgd_model *model) { return model->net->arch.iterations; }
 
@@ -139,8 +139,8 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
         return ts_fail(st, TS_INVALID, "lgd_estimate: tolerance is %g and must lie in 0 .. 1, or be %g for the usual one", o->tolerance, LGD_TOLERANCE_USUAL);
     if (o->precision != LGD_F32 && o->precision != LGD_BF16)
         return ts_fail(st, TS_INVALID, "lgd_estimate: precision is %d and must be %d for f32 or %d for bf16", o->precision, LGD_F32, LGD_BF16);
-    if (o->orientations != 0 && o->orientations != 1 && o->orientations != 8)
-        return ts_fail(st, TS_INVALID, "lgd_estimate: orientations is %d and must be 1 or 8", o->orientations);
+    if (o->orientations != 0 && o->orientations != 1 && o->orientations != 2 && o->orientations != 4 && o->orientations != 8)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: orientations is %d and must be 1, 2, 4 or 8", o->orientations);
     if ((o->tolerance > 0 || o->mask) && !lgd_tiles_exact(&model->net->arch))
         return ts_fail(st, TS_UNSUPPORTED, "lgd_estimate: these weights' loss is taken anew over the whole photograph at every step: no mask and no tolerance");
     if (o->iterations > 0 && !nn_arch_refines(&model->net->arch))
@@ -199,7 +199,7 @@ static ts_code run_whole(lgd_model *model, const float *const *image, const rd_v
     ag_reset(model->tape);
     const double more = step_bytes(&model->net->arch, side) - (double)ts_arena_peak(ag_arena(model->tape)); /* than earlier calls left */
     if (more > 0 && lgd_memory_check(more, st) != TS_OK) return ts_context(st, "%d x %d pixels", side, side);
-    nn_input in = {.image = ts_new(ag_arena(model->tape), (ts_shape){given, side, side, 3}), .grid = rd_grid_full(side), .views = views, .given = given, .oriented = o->orientations == 8};
+    nn_input in = {.image = ts_new(ag_arena(model->tape), (ts_shape){given, side, side, 3}), .grid = rd_grid_full(side), .views = views, .given = given, .orientations = o->orientations};
     if (!in.image.data) return ts_fail(st, TS_NOMEM, "out of memory for an image of %d x %d pixels", side, side);
     const int64_t values = (int64_t)side * side * 3;
     for (int k = 0; k < given; k++)
@@ -271,7 +271,7 @@ static ts_code estimate_tiles(lgd_model *model, const float *const *image, const
     float *raw = arch->channels == MAP_CHANNELS ? maps : malloc((size_t)pixels * (size_t)arch->channels * sizeof *raw);
     double *rmse = calloc((size_t)steps + 1, sizeof *rmse);
     ts_code code = raw && rmse ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
-    lgd_tiles t = {.image = image, .views = views, .given = given, .mask = o->mask, .side = side, .tile = tile, .steps = steps, .oriented = o->orientations == 8, .tolerance = o->tolerance, .rmse = o->progress ? rmse : NULL,
+    lgd_tiles t = {.image = image, .views = views, .given = given, .mask = o->mask, .side = side, .tile = tile, .steps = steps, .orientations = o->orientations, .tolerance = o->tolerance, .rmse = o->progress ? rmse : NULL,
                    .alive = before_tile, .user = &w};
     if (!code) code = lgd_tiles_run(model->tape, model->net, &t, raw, st);
     int stop = steps;

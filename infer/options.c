@@ -12,7 +12,8 @@ const lgd_argument lgd_infer_arguments[] = {
     {'s', "size", "N", "pixels of a side of the maps, 1 .. 8192 (default 256)"},
     {'i', "iterations", "N|auto", "refinement steps, 0 .. 1000; 0 = the first estimate alone; auto = as long as the reconstruction improves,\n"
                                   "24 at most (default: as trained)"},
-    {ORIENTATIONS, "orientations", "N", "8 (default): the first estimate is the mean over the photograph's quarter turns and mirror images; 1: that of the photograph as it is"},
+    {ORIENTATIONS, "orientations", "N", "the first estimate is the mean over so many of the photograph's orientations: 1 (as it is), 2 (and turned by a half), 4 (quarter turns;\n"
+                                       "the default) or 8 (and their mirror images)"},
     {EXACT, "exact", NULL, "compute all convolutions directly; the default, Winograd's way where it is faster, differs by less than 1e-4"},
     {PRECISION, "precision", "f32|bf16", "what convolutions multiply (default f32); bf16 is for CPUs with AVX512-BF16, slower on others, and its maps differ by less than 0.005 (RMS)"},
     {CAPTURE, "capture", "WHERE", "in place of PHOTO: several photographs of one sample under known lights, listed in an INI file\n"
@@ -55,7 +56,7 @@ static ts_code take_capture(const char *value, lgd_command *c, ts_status *st)
 
 ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
 {
-    *c = (lgd_command){.size = 256, .iterations = -1, .orientations = 8, .tolerance = LGD_TOLERANCE_USUAL, .max_pixels = IO_MAX_PIXELS_DEFAULT};
+    *c = (lgd_command){.size = 256, .iterations = -1, .orientations = LGD_ORIENTATIONS_USUAL, .tolerance = LGD_TOLERANCE_USUAL, .max_pixels = IO_MAX_PIXELS_DEFAULT};
     const char *value = NULL;
     int key, operands = argc;
     int64_t n = 0;
@@ -83,8 +84,8 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
             c->threads = (int)n;
             break;
         case ORIENTATIONS:
-            c->orientations = strcmp(value, "8") == 0 ? 8 : 1;
-            if (c->orientations == 1 && strcmp(value, "1") != 0) code = ts_fail(st, TS_INVALID, "--orientations: '%s' is neither 1 nor 8", value);
+            c->orientations = strlen(value) == 1 ? value[0] - '0' : 0;
+            if (c->orientations < 1 || !strchr("1248", value[0])) code = ts_fail(st, TS_INVALID, "--orientations: '%s' is not 1, 2, 4 or 8", value);
             break;
         case EXACT: c->exact = true; break;
         case PRECISION:

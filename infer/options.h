@@ -11,7 +11,7 @@ typedef struct lgd_command {
     int size, iterations /* -1: as trained; LGD_AUTO */, threads;
     int64_t max_pixels;
     double tolerance;
-    int orientations; /* 1 or 8 */
+    int orientations; /* 1, 2, 4 or 8 */
     double power; /* of the light, in usual ones; 0: estimated */
     unsigned outputs; /* LGD_OUT_... */
     bool directx, metallic, exact, bf16, quiet, help, version;

@@ -63,9 +63,9 @@ ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_val
 /* g on its own input: x [N, g_size, g_size, 3 images] log-encoded -> [N, g_size, g_size, channels] in [-1, 1]. */
 ag_value *nn_unet(ag_tape *tape, const nn_model *model, ag_value *x);
 
-/* The mean of g's maps of x [1, ...] in its eight orientations, each turned back: of a photograph that the light and the camera above its centre
+/* The mean of g's maps of x [1, ...] in 2, 4 or 8 of its orientations, each turned back: of a photograph that the light and the camera above its centre
  * show alike in all of them. On a tape without gradients. */
-ag_value *nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *x);
+ag_value *nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *x, int count);
 
 /* h: R_t [N, H, W, channels], its encoded gradients [N, H, W, images channels] (constants) and the states (updated; NULL = zero) -> the change of
  * the maps. to: NULL, or for each new state the value to write it into, which may be the old one (a tape without gradients). */

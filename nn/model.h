@@ -118,8 +118,8 @@ typedef struct nn_input {
     ts_tensor whole; /* [N * given, side, side, 3]: the photographs of which image is the window; no data: image is the whole */
     const rd_view *views; /* [N * given], or NULL */
     int given;            /* 1 .. arch.images; 0 stands for 1 */
-    bool oriented;        /* R_0 is the mean of g's maps of the photograph in its eight orientations (quarter turns and their mirror images), where
-                           * nn_orients says that they are alike; on a tape without gradients */
+    int orientations;     /* 2, 4, 8: R_0 is the mean of g's maps of the photograph in so many orientations (as it is and turned by a half, all quarter
+                           * turns, and their mirror images), where nn_orients says that they are alike; on a tape without gradients. 0, 1: as it is */
     bool recompute;       /* on a tape with gradients: of each step only R_t and h's states are kept, the rest is computed again for the gradient */
 } nn_input;
 

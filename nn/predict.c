@@ -55,7 +55,7 @@ static bool reduce(ag_tape *tape, const nn_model *model, const nn_input *in, nn_
     const int size = model->arch.g_size;
     if (whole->shape.h != whole->shape.w)
         return ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels: g needs a square", whole->shape.w, whole->shape.h), false;
-    *small = (nn_input){.image = *whole, .grid = rd_grid_full(size), .view = in->view, .views = in->views, .given = in->given, .oriented = in->oriented};
+    *small = (nn_input){.image = *whole, .grid = rd_grid_full(size), .view = in->view, .views = in->views, .given = in->given, .orientations = in->orientations};
     if (whole->shape.h == size) return true;
     ts_status st = {0};
     ag_value *to = ag_empty(tape, (ts_shape){whole->shape.n, size, size, 3});
@@ -83,7 +83,7 @@ static ag_value *propose(ag_tape *tape, const nn_model *model, const nn_input *s
     if (!x || !each) return NULL;
     rd_log_encode(ts_count(s), small->image.data, each->t.data);
     if (images > 1) side_by_side(&each->t, count, images, x->t.data);
-    ag_value *maps = small->oriented && !ag_gradients(tape) && nn_orients(model, small) ? nn_unet_oriented(tape, model, x) : nn_unet(tape, model, x);
+    ag_value *maps = small->orientations > 1 && !ag_gradients(tape) && nn_orients(model, small) ? nn_unet_oriented(tape, model, x, small->orientations) : nn_unet(tape, model, x);
     ag_scope_end(tape, mark, &maps, 1);
     return maps;
 }
