@@ -1,4 +1,5 @@
-/* maps.exr through OpenEXR's C core: channels diffuse.R .G .B, normal.X .Y .Z, roughness.Y, specular.R .G .B, 32-bit float, ZIP. */
+/* maps.exr through OpenEXR's C core: channels diffuse.R .G .B, normal.X .Y .Z, roughness.Y, specular.R .G .B, 32-bit float, written uncompressed:
+ * ZIP took two thirds of lgd-infer's time for a file that was a twelfth smaller. */
 #include "data/exr.h"
 #include "data/file.h"
 #include "data/name.h"
@@ -104,8 +105,7 @@ static exr_result_t write_header(exr_context_t f, int size, bool directx)
 {
     int part = 0;
     exr_result_t r = exr_add_part(f, "maps", EXR_STORAGE_SCANLINE, &part);
-    if (!r) r = exr_initialize_required_attr_simple(f, part, size, size, EXR_COMPRESSION_ZIP);
-    if (!r) r = exr_set_zip_compression_level(f, part, 1); /* noisy floats hardly shrink further, and level 4 takes several times as long */
+    if (!r) r = exr_initialize_required_attr_simple(f, part, size, size, EXR_COMPRESSION_NONE);
     for (int c = 0; c < CHANNELS && !r; c++) {
         bool linear = c >= 3 && c <= 6; /* normals and roughness are no colours */
         r = exr_add_channel(f, part, names[c], EXR_PIXEL_FLOAT, linear ? EXR_PERCEPTUALLY_LINEAR : EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
@@ -114,24 +114,23 @@ static exr_result_t write_header(exr_context_t f, int size, bool directx)
     return r ? r : exr_write_header(f);
 }
 
-/* rows: memory for the scan lines of one chunk, [lines][size][CHANNELS]. */
-static exr_result_t write_chunks(exr_context_t f, const io_material *m, bool directx, float *rows, int lines)
+/* row: memory for a scan line, which is a chunk where nothing is compressed, [size][CHANNELS]. */
+static exr_result_t write_chunks(exr_context_t f, const io_material *m, bool directx, float *row)
 {
     exr_encode_pipeline_t encoder = EXR_ENCODE_PIPELINE_INITIALIZER;
     exr_result_t r = EXR_ERR_SUCCESS;
-    for (int y = 0; y < m->size && !r; y += lines) {
-        int count = m->size - y < lines ? m->size - y : lines;
-        for (size_t i = 0; i < (size_t)count * (size_t)m->size; i++) {
+    for (int y = 0; y < m->size && !r; y++) {
+        for (size_t i = 0; i < (size_t)m->size; i++) {
             io_texel t = io_texel_get(m->maps + ((size_t)y * (size_t)m->size + i) * MAP_CHANNELS);
             if (directx) t.normal[1] = -t.normal[1];
-            to_values(&t, rows + i * CHANNELS);
+            to_values(&t, row + i * CHANNELS);
         }
         exr_chunk_info_t chunk;
         r = exr_write_scanline_chunk_info(f, 0, y, &chunk);
         if (!r) r = y == 0 ? exr_encoding_initialize(f, 0, &chunk, &encoder) : exr_encoding_update(f, 0, &chunk, &encoder);
         for (int c = 0; c < encoder.channel_count && !r; c++) {
             exr_coding_channel_info_t *info = &encoder.channels[c];
-            info->encode_from_ptr = (const uint8_t *)(rows + c);
+            info->encode_from_ptr = (const uint8_t *)(row + c);
             info->user_pixel_stride = CHANNELS * sizeof(float);
             info->user_line_stride = CHANNELS * (int32_t)sizeof(float) * m->size;
             info->user_bytes_per_element = sizeof(float);
@@ -146,10 +145,15 @@ static exr_result_t write_chunks(exr_context_t f, const io_material *m, bool dir
 
 ts_code io_write_maps_exr(const char *path, const io_material *m, bool directx, ts_status *st)
 {
-    enum { LINES = 16 }; /* a ZIP chunk */
-    stream s = {.fd = -1};
-    float *rows = malloc((size_t)m->size * LINES * CHANNELS * sizeof(float));
-    if (!rows) return ts_fail(st, TS_NOMEM, "%s: out of memory", path);
+    enum { HEADER = 1 << 16 }; /* more than it takes, as 16 bytes are more than a line has beside its values; on_write has the last word */
+    const size_t line = (size_t)m->size * CHANNELS * sizeof(float);
+    stream s = {.fd = -1, .capacity = HEADER + (size_t)m->size * (line + 16)};
+    float *row = malloc(line);
+    s.bytes = calloc(s.capacity, 1);
+    if (!row || !s.bytes) {
+        free(row), free(s.bytes);
+        return ts_fail(st, TS_NOMEM, "%s: no memory for %zu bytes", path, s.capacity);
+    }
     exr_context_t f = NULL;
     exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
     init.error_handler_fn = on_error;
@@ -157,10 +161,10 @@ ts_code io_write_maps_exr(const char *path, const io_material *m, bool directx, 
     init.write_fn = on_write;
     exr_result_t r = exr_start_write(&f, path, EXR_WRITE_FILE_DIRECTLY, &init);
     if (!r) r = write_header(f, m->size, directx);
-    if (!r) r = write_chunks(f, m, directx, rows, LINES);
+    if (!r) r = write_chunks(f, m, directx, row);
     exr_result_t finish = exr_finish(&f);
     if (!r) r = finish;
-    free(rows);
+    free(row);
     ts_code code = r ? ts_fail(st, TS_IO, "%s: %s", path, s.message[0] ? s.message : exr_get_error_code_as_string(r))
                      : io_write_bytes(path, s.bytes, s.size, st);
     free(s.bytes);
