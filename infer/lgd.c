@@ -2,6 +2,7 @@
  * encoding into the values that the header promises. */
 #include "infer/lgd.h"
 #include "data/material.h"
+#include "infer/clip.h"
 #include "infer/encode.h"
 #include "infer/memory.h"
 #include "infer/power.h"
@@ -203,7 +204,7 @@ static ts_code run_whole(lgd_model *model, const float *const *image, const rd_v
     if (!in.image.data) return ts_fail(st, TS_NOMEM, "out of memory for an image of %d x %d pixels", side, side);
     const int64_t values = (int64_t)side * side * 3;
     for (int k = 0; k < given; k++)
-        for (int64_t i = 0; i < values; i++) in.image.data[k * values + i] = isfinite(image[k][i]) ? fminf(fmaxf(image[k][i], 0), 1) : 0;
+        lgd_clip(values, image[k], in.image.data + k * values);
 
     watch w = {.in = &in, .options = o, .steps = steps};
     ag_value *out = NULL;

@@ -1,4 +1,5 @@
 #include "infer/power.h"
+#include "infer/clip.h"
 #include "render/render.h"
 #include "tensor/resize.h"
 #include <math.h>
@@ -32,7 +33,7 @@ ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *
     ag_value *full = ag_empty(tape, (ts_shape){given, side, side, 3});
     if (!small || !rendered || !full) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
     for (int k = 0; k < given; k++)
-        for (size_t i = 0; i < whole; i++) full->t.data[(size_t)k * whole + i] = isfinite(image[k][i]) ? fminf(fmaxf(image[k][i], 0), 1) : 0;
+        lgd_clip((int64_t)whole, image[k], full->t.data + (size_t)k * whole);
     if (side == size) memcpy(small->t.data, full->t.data, (size_t)given * values * sizeof(float));
     else if (ts_resize(&small->t, &full->t, ag_arena(tape), st)) return st->code;
     ag_scope_end(tape, mark, NULL, 0);

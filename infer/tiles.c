@@ -1,4 +1,5 @@
 #include "infer/tiles.h"
+#include "infer/clip.h"
 #include "render/render.h"
 #include "tensor/resample.h"
 #include <math.h>
@@ -45,7 +46,8 @@ static void photographs(const work *w, area a, float *to)
     for (int k = 0; k < w->t->given; k++)
         for (int y = a.y0; y < a.y1; y++) {
             const float *from = w->t->image[k] + ((size_t)y * (size_t)w->t->side + (size_t)a.x0) * 3;
-            for (int i = 0; i < 3 * columns(a); i++) *to++ = isfinite(from[i]) ? fminf(fmaxf(from[i], 0), 1) : 0;
+            lgd_clip(3 * columns(a), from, to);
+            to += 3 * columns(a);
         }
 }
 
