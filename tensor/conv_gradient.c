@@ -5,8 +5,8 @@
 #include <string.h>
 
 enum {
-    PASS_PIXELS = 256,   /* a pass of one panel of dy stays in the first cache for all blocks of inputs */
-    PASS_COLUMNS = 256,
+    PASS_PIXELS = 256,   /* a pass of one panel of dy stays in the first cache for all blocks of inputs, */
+    PASS_POINTWISE = 128, /* and of inputs that have no neighbours to share all that they need too */
     CHUNK_PIXELS = 1024, /* so many that clearing and adding the sums of a chunk is little beside making them */
     CHUNKS = 16,
     UNITS = 16           /* of work, at least, where the shape allows */
@@ -104,6 +104,9 @@ static void sum_line(const job *g, ts_sum *t, pass *s, int panel, float *c)
     for (int i = 0; i < tiles; i++) {
         int begin, end;
         conv_part(g->m, tiles, i, &begin, &end);
+        /* The next block's sums, which are in memory where there are many weights. */
+        const float *next = c + (ptrdiff_t)end * g->padded + panel * 2 * kernels->lanes;
+        for (int m = end; m < g->m && m < end + kernels->rows; m++, next += g->padded) __builtin_prefetch(next, 1), __builtin_prefetch(next + 16, 1);
         t->a = a + begin;
         t->c = c + (ptrdiff_t)begin * g->padded + panel * 2 * kernels->lanes;
         t->fetch = s->fetched < s->next_bytes[0] ? s->next[0] + s->fetched : s->next[1] + (s->fetched - s->next_bytes[0]);
@@ -167,7 +170,7 @@ static void plan_fetch(const job *g, pass *s, int row_end, int rows, int blocks)
 static void run_chunk(const job *g, int chunk, int group, bool weights)
 {
     const ts_conv *c = g->c;
-    const int lanes2 = 2 * conv_lanes(), rows_pass = c->w < PASS_PIXELS ? PASS_PIXELS / c->w : 1, blocks = (c->w + PASS_COLUMNS - 1) / PASS_COLUMNS;
+    const int lanes2 = 2 * conv_lanes(), most = c->k == 1 ? PASS_POINTWISE : PASS_PIXELS, rows_pass = c->w < most ? most / c->w : 1, blocks = (c->w + most - 1) / most;
     const int reach = (c->k - 1) * c->dilation;
     const bool staged = weights && c->k > 1;
     pass s = {0};
