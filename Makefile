@@ -29,7 +29,7 @@ LDLIBS_ALL = $(PKG_LIBS) -fopenmp -lpthread -ldl -lm $(SANITIZE) $(LDLIBS)
 
 MACHINE := $(shell $(CC) -dumpmachine)
 ifneq (,$(filter x86_64%,$(MACHINE)))
-ISAS := base avx2 avx512 avx512bf16
+ISAS := base avx2 avx512 avx512bf16 amx
 else
 ISAS := base
 endif
@@ -42,6 +42,7 @@ ISA_FLAGS_base :=
 ISA_FLAGS_avx2 := -mavx2 -mfma -mbmi2
 ISA_FLAGS_avx512 := -mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx2 -mfma -mbmi2 -mprefer-vector-width=512
 ISA_FLAGS_avx512bf16 := $(ISA_FLAGS_avx512) -mavx512bf16
+ISA_FLAGS_amx := $(ISA_FLAGS_avx512bf16) -mamx-tile -mamx-bf16
 
 PROGRAMS := train infer eval data convert
 LIB_C := $(filter-out %main.c,$(wildcard tensor/*.c autograd/*.c render/*.c nn/*.c data/*.c train/*.c infer/*.c eval/*.c cli/*.c))

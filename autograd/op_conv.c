@@ -40,9 +40,10 @@ static bool winograd(const ts_conv *c, ts_conv_use use) { return !ts_conv_exact(
 
 static void weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
 {
-    const bool other = dweight && !ts_conv_exact() && ts_conv_winograd_weights(c);
+    const bool rounded = dweight && ts_conv_precision() == TS_BF16 && ts_conv_bf16_weights(), other = dweight && !rounded && !ts_conv_exact() && ts_conv_winograd_weights(c);
+    if (rounded) ts_conv_weight_gradient_bf16(c, x, dy, dweight);
     if (other) ts_conv_weight_gradient_winograd(c, x, dy, dweight);
-    ts_conv_weight_gradient(c, x, dy, other ? NULL : dweight, dbias);
+    ts_conv_weight_gradient(c, x, dy, rounded || other ? NULL : dweight, dbias);
 }
 
 static void forward(ag_tape *tape, ag_node *node)

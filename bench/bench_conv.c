@@ -91,6 +91,12 @@ static void data_gradient_bf16(void *user)
     ts_conv_data_gradient_bf16(&w->c, w->y, w->packed_gradient_bf16, w->x, false);
 }
 
+static void weight_gradient_bf16(void *user)
+{
+    work *w = user;
+    ts_conv_weight_gradient_bf16(&w->c, w->x, w->y, w->weight);
+}
+
 static void forward_naive(void *user)
 {
     work *w = user;
@@ -106,7 +112,7 @@ static void row(const char *what, ts_conv c, void (*f)(void *user))
     if (back && c.constants) snprintf(label + strlen(label), sizeof label - strlen(label), " (of %d)", ts_conv_variables(&c));
     work w = make(c);
     bench_time t = bench_measure(f, &w);
-    if ((f == forward_bf16 || f == data_gradient_bf16) && !bench_bf16(&t)) snprintf(label + strlen(label), sizeof label - strlen(label), ", emulated");
+    if ((f == forward_bf16 || f == data_gradient_bf16 || f == weight_gradient_bf16) && !bench_bf16(&t)) snprintf(label + strlen(label), sizeof label - strlen(label), ", emulated");
     bench_row(label, t, 2.0 * c.n * c.h * c.w * (back ? ts_conv_variables(&c) : c.ic) * c.oc * c.k * c.k);
     discard(&w);
 }
@@ -197,7 +203,7 @@ BENCH(conv_winograd)
     }
 }
 
-/* Where it is not emulated, % of the peak is that of vdpbf16ps. */
+/* Where it is not emulated, % of the peak is that of the matrix unit or of vdpbf16ps: LGD_ISA=avx512bf16 for the latter where there are both. */
 BENCH(conv_bf16)
 {
     bench_heading("bf16, inputs rounded on the way, each below f32");
@@ -206,6 +212,9 @@ BENCH(conv_bf16)
         row("bf16 forward", published[i], forward_bf16);
         row("data gradient", published[i], data_gradient);
         row("bf16 data gradient", published[i], data_gradient_bf16);
+        if (!ts_conv_bf16_weights()) continue;
+        row("weight gradient", published[i], weight_gradient);
+        row("bf16 weight gradient", published[i], weight_gradient_bf16);
     }
 }
 

@@ -38,7 +38,7 @@ typedef struct lgd_options {
     int iterations; /* refinement steps; 0: R_0 alone, -1: as trained, LGD_AUTO */
     int exact;      /* 0: 3 x 3 convolutions by Winograd's way where that is faster, with maps that differ by less than 1e-4; else directly, as weights
                      * of the published network always are */
-    int precision;  /* LGD_F32, or LGD_BF16: inputs and weights of convolutions rounded to bf16, multiplied by the CPU's AVX512-BF16 or, much slower, from
+    int precision;  /* LGD_F32, or LGD_BF16: inputs and weights of convolutions rounded to bf16, multiplied by the CPU's AMX or AVX512-BF16 or, much slower, from
                      * f32; sums, renderer and maps stay f32 (docs/performance.md says how far the maps differ) */
     int orientations; /* 2, 4, 8: the first estimate is the mean of those of so many of the photograph's orientations (as it is and turned by a half, all
                        * quarter turns, and their mirror images), where it is the only one and light and camera are above its centre (not with the

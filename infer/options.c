@@ -15,7 +15,7 @@ const lgd_argument lgd_infer_arguments[] = {
     {ORIENTATIONS, "orientations", "N", "the first estimate is the mean over so many of the photograph's orientations: 1 (as it is), 2 (and turned by a half), 4 (quarter turns;\n"
                                        "the default) or 8 (and their mirror images)"},
     {EXACT, "exact", NULL, "compute all convolutions directly; the default, Winograd's way where it is faster, differs by less than 1e-4"},
-    {PRECISION, "precision", "f32|bf16", "what convolutions multiply (default f32); bf16 is for CPUs with AVX512-BF16, slower on others, and its maps differ by less than 0.005 (RMS)"},
+    {PRECISION, "precision", "f32|bf16", "what convolutions multiply (default f32); bf16 is for CPUs with AMX, or AMD's with AVX512-BF16, slower on others, and its maps differ by less than 0.005 (RMS)"},
     {CAPTURE, "capture", "WHERE", "in place of PHOTO: several photographs of one sample under known lights, listed in an INI file\n"
                                   "or a folder in MaterialGAN's layout; by default with the weights named multi"},
     {POWER, "light-power", "P", "how strong the light is, in usual ones (of a capture: in those that it names): a number in 0.01 .. 100, or\n"

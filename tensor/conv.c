@@ -32,8 +32,8 @@ size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
 {
     if (use == TS_CONV_WINOGRAD) return conv_winograd_count(c->ic, c->oc);
     if (use == TS_CONV_DATA_GRADIENT_WINOGRAD) return conv_winograd_count(c->oc, ts_conv_variables(c));
-    if (use == TS_CONV_FORWARD_BF16) return (size_t)conv_panels_count(conv_bf16_depth(c->ic), c->oc, c->k);
-    if (use == TS_CONV_DATA_GRADIENT_BF16) return (size_t)conv_panels_count(conv_bf16_depth(c->oc), ts_conv_variables(c), c->k);
+    if (use == TS_CONV_FORWARD_BF16) return conv_bf16_count(c, c->ic, c->oc);
+    if (use == TS_CONV_DATA_GRADIENT_BF16) return conv_bf16_count(c, c->oc, ts_conv_variables(c));
     const int ic = use == TS_CONV_FORWARD ? c->ic : c->oc, oc = use == TS_CONV_FORWARD ? c->oc : ts_conv_variables(c);
     return (size_t)conv_panels_count(ic, oc, c->k) + (conv_few_channels(oc, c->k) ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
 }
@@ -92,7 +92,8 @@ void conv_run_tile(ts_tile *t, int vectors, const float *a, float *y, int pixels
 
 void conv_run(const conv_plan *p)
 {
-    if (p->k == 1) conv_run_pointwise(p);
+    if (p->bf16 && conv_by_matrix()) conv_run_matrix(p);
+    else if (p->k == 1) conv_run_pointwise(p);
     else if (conv_by_position(p->n, p->h, p->w)) conv_run_positions(p);
     else if (conv_by_lanes(p)) conv_run_lanes(p);
     else conv_run_rows(p);

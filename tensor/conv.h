@@ -61,6 +61,10 @@ void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packe
 void ts_conv_forward_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y);
 void ts_conv_data_gradient_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
 
+/* dweight[oc][ic][k][k] += with x and dy rounded so, for CPUs with a matrix unit alone (Intel AMX): where ts_conv_bf16_weights says that this is one. */
+bool ts_conv_bf16_weights(void);
+void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight);
+
 /* Process-wide, f32 unless said otherwise: how ag_conv and ag_gru multiply in forward and ag_conv for the gradient of its input. Gradients of
  * weights, and whatever else is summed, stay f32. Set between tapes, or at least between a tape's forward and the next. */
 typedef enum ts_precision { TS_F32, TS_BF16, TS_PRECISION_COUNT } ts_precision;

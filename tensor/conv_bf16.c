@@ -9,9 +9,18 @@ void ts_conv_precision_set(ts_precision p) { precision = p; }
 ts_precision ts_conv_precision(void) { return precision; }
 const char *ts_precision_name(ts_precision p) { return p == TS_BF16 ? "bf16" : "f32"; }
 
+size_t conv_bf16_count(const ts_conv *c, int ic, int oc)
+{
+    return conv_by_matrix() ? conv_matrix_count(ic, oc, c->k, c->dilation) : (size_t)conv_panels_count(conv_bf16_depth(ic), oc, c->k);
+}
+
 /* packed: [panel][ky][kx][pair of inputs][channel of the panel, zeros where there is none] */
 void conv_pack_bf16(const ts_conv *c, bool forward, const float *weight, float *packed)
 {
+    if (conv_by_matrix()) {
+        conv_matrix_pack(c, forward, weight, packed);
+        return;
+    }
     const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), taps = c->k * c->k, lanes = conv_lanes(), depth = conv_bf16_depth(ic);
     const int panels = conv_panels(oc);
     /* weight[o][c][tap]: strides of the packed input and output channel */

@@ -86,7 +86,17 @@ void conv_run_lanes(const conv_plan *p);
 /* Whichever of them suits. */
 void conv_run(const conv_plan *p);
 
+/* bf16 where the CPU has a matrix unit: weights are packed for it alone. */
+bool conv_by_matrix(void);
+size_t conv_matrix_count(int ic, int oc, int k, int dilation);
+void conv_matrix_pack(const ts_conv *c, bool forward, const float *weight, float *packed);
+void conv_run_matrix(const conv_plan *p);
+/* Side 1, serial: count pixels of pairs p->x, behind which CONV_MATRIX_SLACK pixels and 32 more values can be read and are finite. */
+enum { CONV_MATRIX_SLACK = 32 };
+void conv_matrix_pixels(const conv_plan *p, int count);
+
 static inline int conv_bf16_depth(int channels) { return (channels + 1) / 2; }
+size_t conv_bf16_count(const ts_conv *c, int ic, int oc);
 void conv_pack_bf16(const ts_conv *c, bool forward, const float *weight, float *packed);
 
 /* Floats of the panels; weights to few channels are packed behind them once more for conv_run_lanes. */

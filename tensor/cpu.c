@@ -4,9 +4,14 @@
 #include <string.h>
 #if defined(__x86_64__)
 #include <cpuid.h>
+#include <stdbool.h>
+#if defined(__linux__)
+#include <sys/syscall.h>
+#include <unistd.h>
+#endif
 #endif
 
-static const char *const names[TS_ISA_COUNT] = {"base", "avx2", "avx512", "avx512bf16"};
+static const char *const names[TS_ISA_COUNT] = {"base", "avx2", "avx512", "avx512bf16", "amx"};
 
 #if defined(__x86_64__)
 /* XCR0: which register files the operating system saves (Intel SDM vol. 1, 13.3). */
@@ -15,6 +20,17 @@ static unsigned xcr0(void)
     unsigned lo, hi;
     __asm__ volatile("xgetbv" : "=a"(lo), "=d"(hi) : "c"(0));
     return lo;
+}
+
+/* Linux saves the 8 KiB of a thread's tiles only for processes that ask for it (Documentation/arch/x86/xstate.rst). Holds for all threads. */
+static bool may_use_tiles(void)
+{
+#if defined(__linux__)
+    enum { REQUEST_PERMISSION = 0x1023, TILE_DATA = 18 }; /* ARCH_REQ_XCOMP_PERM, which older headers lack, and XFEATURE_XTILEDATA */
+    return syscall(SYS_arch_prctl, REQUEST_PERMISSION, TILE_DATA) == 0;
+#else
+    return false;
+#endif
 }
 
 static ts_isa detect(void)
@@ -31,9 +47,10 @@ static ts_isa detect(void)
     const unsigned f = 1u << 16, dq = 1u << 17, bw = 1u << 30, vl = 1u << 31;
     if ((b & (f | dq | bw | vl)) != (f | dq | bw | vl)) return TS_AVX2;
     if ((saved & 0xe6) != 0xe6) return TS_AVX2; /* mask registers and zmm */
-    const unsigned bf16 = 1u << 5;
+    const unsigned bf16 = 1u << 5, tiles_bf16 = 1u << 22, tiles = 1u << 24, matrix = d;
     if (!__get_cpuid_count(7, 1, &a, &b, &c, &d) || !(a & bf16)) return TS_AVX512;
-    return TS_AVX512BF16;
+    if ((matrix & (tiles_bf16 | tiles)) != (tiles_bf16 | tiles) || (saved & 0x60000) != 0x60000 || !may_use_tiles()) return TS_AVX512BF16;
+    return TS_AMX;
 }
 #else
 static ts_isa detect(void) { return TS_BASE; }
@@ -76,5 +93,5 @@ ts_code ts_isa_init(ts_status *st)
             ts_isa_use((ts_isa)i);
             return TS_OK;
         }
-    return ts_fail(st, TS_INVALID, "LGD_ISA=%s is not an instruction set; use base, avx2, avx512 or avx512bf16", want);
+    return ts_fail(st, TS_INVALID, "LGD_ISA=%s is not an instruction set; use base, avx2, avx512, avx512bf16 or amx", want);
 }

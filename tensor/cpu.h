@@ -3,9 +3,9 @@
 #define TS_CPU_H
 #include "tensor/status.h"
 
-typedef enum ts_isa { TS_BASE = 0, TS_AVX2 = 1, TS_AVX512 = 2, TS_AVX512BF16 = 3, TS_ISA_COUNT = 4 } ts_isa;
+typedef enum ts_isa { TS_BASE = 0, TS_AVX2 = 1, TS_AVX512 = 2, TS_AVX512BF16 = 3, TS_AMX = 4, TS_ISA_COUNT = 5 } ts_isa;
 
-/* Reads LGD_ISA (base, avx2, avx512, avx512bf16) once and fixes the choice. TS_INVALID for another word or for more than the CPU has.
+/* Reads LGD_ISA (base, avx2, avx512, avx512bf16, amx) once and fixes the choice. TS_INVALID for another word or for more than the CPU has.
  * Every main calls it first; without the call the first kernel uses the best that is there and ignores LGD_ISA's errors. */
 ts_code ts_isa_init(ts_status *st);
 

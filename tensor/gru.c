@@ -25,9 +25,15 @@ static void gates_forward(conv_plan p, const float *x, int count, float *y)
     p.x = x;
     p.y = y;
     if (p.bf16) {
-        float *rounded = ts_scratch(2, sizeof(float) * (size_t)(BAND * p.ic));
+        const size_t behind = (size_t)(CONV_MATRIX_SLACK * (p.ic + 1));
+        float *rounded = ts_scratch(2, sizeof(float) * ((size_t)(BAND * p.ic) + behind));
         conv_put_pixels(&p, x, count, rounded, p.ic);
         p.x = rounded;
+        if (conv_by_matrix()) {
+            memset(rounded + count * p.ic, 0, behind * sizeof(float));
+            conv_matrix_pixels(&p, count);
+            return;
+        }
     }
     conv_run_pixels(&p, 0, count, 0, conv_panels(p.oc));
 }

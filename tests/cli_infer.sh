@@ -210,7 +210,7 @@ precision() {
     expect 0 infer --maps normal,exr "$T/p.ppm" -o "$T/usual"
     cmp -s "$T/usual/p/maps.exr" "$T/f32/p/maps.exr" || fail "f32 is not the default"
     cmp -s "$T/bf16/p/maps.exr" "$T/f32/p/maps.exr" && fail "bf16 gives the maps of f32" # how near they are: tests/test_precision.c
-    for isa in base avx2 avx512 avx512bf16; do
+    for isa in base avx2 avx512 avx512bf16 amx; do
         if LGD_ISA=$isa infer --help >/dev/null 2>&1; then expect 0 env LGD_ISA=$isa "$BIN/lgd-infer" --size 32 --threads 1 --precision bf16 "$T/p.ppm" -o "$T/$isa"
         else expect 2 env LGD_ISA=$isa "$BIN/lgd-infer" --precision bf16 "$T/p.ppm" -o "$T/$isa"; fi
     done

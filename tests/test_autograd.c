@@ -71,6 +71,7 @@ TEST(gradcheck_base) { gradcheck_on(TS_BASE); }
 TEST(gradcheck_avx2) { gradcheck_on(TS_AVX2); }
 TEST(gradcheck_avx512) { gradcheck_on(TS_AVX512); }
 TEST(gradcheck_avx512bf16) { gradcheck_on(TS_AVX512BF16); }
+TEST(gradcheck_amx) { gradcheck_on(TS_AMX); }
 
 /* A small network with every kind of node: parameters in one block, as in training. */
 enum { N = 2, SIDE = 48, WIDE = 10 };

@@ -129,6 +129,18 @@ static float *run(const problem *p, ts_conv_use use, const float *bias, const fl
     return y;
 }
 
+/* Added to the weights themselves. */
+static float *gradient_of_weights(const problem *p)
+{
+    const size_t count = weight_count(&p->c);
+    float *dweight = values(count + 2 * GUARD, NULL);
+    memcpy(dweight + GUARD, p->weight, count * sizeof(float));
+    ts_conv_weight_gradient_bf16(&p->c, p->x, p->dy, dweight + GUARD);
+    for (size_t i = 0; i < GUARD; i++) CHECK(isnan(dweight[i]) && isnan(dweight[GUARD + count + i]), "written %zu floats outside the gradient", i);
+    memmove(dweight, dweight + GUARD, count * sizeof(float));
+    return dweight;
+}
+
 /* Products of bf16 values are exact in f32: the bound is that of f32's sums of count products in [-1, 1]. */
 static void same(const float *a, const float *naive, size_t n, double count, const char *what, const ts_conv *c)
 {
@@ -154,6 +166,13 @@ static void against_naive(ts_conv c, ts_rng *r)
         ts_conv_data_gradient_naive(&q.c, dy, weight, naive_dx, b);
         same(dx, naive_dx, count, (double)c.oc * pow(c.k, 4), b ? "added data gradient" : "data gradient", &c);
         free(dx), free(naive_dx);
+    }
+    if (ts_conv_bf16_weights()) {
+        float *dweight = gradient_of_weights(&p), *naive = values(weight_count(&c), NULL);
+        memcpy(naive, p.weight, weight_count(&c) * sizeof(float));
+        ts_conv_weight_gradient_naive(&c, x, dy, naive, NULL);
+        same(dweight, naive, weight_count(&c), (double)c.n * c.h * c.w, "weight gradient", &c);
+        free(dweight), free(naive);
     }
     free(x), free(dy), free(weight);
     finish(&p);
@@ -184,16 +203,19 @@ TEST(bf16_conv_same_bytes_for_any_threads)
         ts_isa_use((ts_isa)isa);
         for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
             problem p = make_problem(shapes[i], &r);
-            float *y = NULL, *dx = NULL;
+            float *y = NULL, *dx = NULL, *dweight = NULL;
             for (int t = 0; t < 4; t++) {
                 ts_threads_set(threads[t]);
                 float *y_now = run(&p, TS_CONV_FORWARD_BF16, p.bias, NULL), *dx_now = run(&p, TS_CONV_DATA_GRADIENT_BF16, NULL, NULL);
+                float *dweight_now = ts_conv_bf16_weights() ? gradient_of_weights(&p) : NULL;
                 CHECK(!y || (!memcmp(y, y_now, out_count(&p.c) * sizeof(float)) && !memcmp(dx, dx_now, in_count(&p.c) * sizeof(float))),
                       "%s: shape %zu: other bytes with %d threads", ts_isa_name((ts_isa)isa), i, threads[t]);
-                free(y), free(dx);
-                y = y_now, dx = dx_now;
+                CHECK(!dweight || !memcmp(dweight, dweight_now, weight_count(&p.c) * sizeof(float)), "%s: shape %zu: another gradient of weights with %d threads",
+                      ts_isa_name((ts_isa)isa), i, threads[t]);
+                free(y), free(dx), free(dweight);
+                y = y_now, dx = dx_now, dweight = dweight_now;
             }
-            free(y), free(dx);
+            free(y), free(dx), free(dweight);
             finish(&p);
         }
     }
@@ -247,7 +269,7 @@ static void on_tape(ts_precision precision, const problem *p, float *y, float *d
     ts_conv_precision_set(TS_F32);
 }
 
-/* Forward and the data gradient follow the choice, the weight gradient is the same bytes: neither of its operands is rounded. */
+/* Forward and the data gradient follow the choice. The weight gradient's operands are rounded for a matrix unit, and its bytes are the same elsewhere. */
 TEST(bf16_in_ag_conv)
 {
     CHECK(ts_conv_precision() == TS_F32, "f32 is not the default");
@@ -266,7 +288,11 @@ TEST(bf16_in_ag_conv)
     ts_conv_data_gradient_naive(c, p.dy, weight, dx[2], false);
     same(dx[1], dx[2], in_count(c), 9. * c->oc / 512, "data gradient", c);
     CHECK(memcmp(y[0], y[1], out_count(c) * sizeof(float)) && memcmp(dx[0], dx[1], in_count(c) * sizeof(float)), "bf16 gives what f32 gives");
-    CHECK(!memcmp(dweight[0], dweight[1], weight_count(c) * sizeof(float)), "the weight gradient is not f32's");
+    if (ts_conv_bf16_weights()) {
+        memset(dweight[2], 0, weight_count(c) * sizeof(float));
+        ts_conv_weight_gradient_naive(c, x, p.dy, dweight[2], NULL);
+        same(dweight[1], dweight[2], weight_count(c), (double)c->h * c->w / 512, "weight gradient", c);
+    } else CHECK(!memcmp(dweight[0], dweight[1], weight_count(c) * sizeof(float)), "the weight gradient is not f32's");
     for (int i = 0; i < 3; i++) free(y[i]), free(dx[i]), free(dweight[i]);
     free(x), free(weight);
     finish(&p);

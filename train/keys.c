@@ -97,7 +97,7 @@ const tr_key tr_keys[] = {
     {"train", "checkpoint_steps", TR_BOOL, AT(train.checkpoint_steps), 0, 1, "no", NULL, true,
      "keep of each refinement only the maps and h's states, and compute the rest again for the gradient: less memory, a third more time, the same numbers"},
     {"train", "precision", TR_CHOICE, AT(train.precision), 0, TS_PRECISION_COUNT - 1, "f32", precision_names, false,
-     "what convolutions multiply, forward and for the gradients of their inputs: f32, or both operands rounded to bf16 (for CPUs with AVX512-BF16, slower on others); weights, their gradients, Adam and all sums stay f32, and so does validation"},
+     "what convolutions multiply, forward and for the gradients of their inputs: f32, or both operands rounded to bf16 (for CPUs with AMX, or AMD's with AVX512-BF16, slower on others; with AMX for the gradients of weights too); weights, their gradients, Adam and all sums stay f32, and so does validation"},
     {"train", "exact", TR_BOOL, AT(train.exact), 0, 1, "no", NULL, false,
      "compute all convolutions and their gradients directly, not by Winograd's way where it is faster; the two differ by less than 1e-4"},
     {"train", "seed", TR_INT64, AT(train.seed), 0, 1e15, "1", NULL, false, "seed of the initial weights, the loss's views and the drawn iterations"},

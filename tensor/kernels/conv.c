@@ -1,6 +1,7 @@
 /* See conv.h. Each size is a function of its own, so that all accumulators live in registers: with 32 registers 14 x 2 of
  * them leave room for two weights and one broadcast value. */
 #include "tensor/kernels/conv.h"
+#include "tensor/kernels/turn.h"
 #include "tensor/kernels/vec.h"
 
 #if VL == 16
@@ -187,15 +188,6 @@ INLINE void sum(const ts_sum *t, const int rows, const int vectors, const bool n
     UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++) v_store(t->c + m * t->c_stride + v * VL, acc[m][v]);
 }
 
-typedef uint32_t vu __attribute__((vector_size(VL * 4)));
-
-/* The upper half of each lane is the nearest bf16: 0x7fff carries into it from above the middle, and 1 more in the middle where it is odd. */
-INLINE vu round_bf16(vf x)
-{
-    const vu bits = (vu)x;
-    return (vu)v_select(x == x, (vf)(bits + 0x7fff + (bits >> 16 & 1)), (vf)(bits | 0x00400000));
-}
-
 #if VL == 16
 #define EVERY_OTHER(first) first, first + 2, first + 4, first + 6, first + 8, first + 10, first + 12, first + 14, first + 16, first + 18, first + 20, \
     first + 22, first + 24, first + 26, first + 28, first + 30
@@ -212,7 +204,7 @@ static void pairs(const float *x, int64_t pixels, int channels, float *to, ptrdi
     for (; pixels > 0; pixels--, x += run, to += stride)
         for (int64_t i = 0; i < run; i += 2 * VL) {
             const int64_t left = run - i;
-            const vu a = round_bf16(v_load_part(x + i, left)), b = left > VL ? round_bf16(v_load_part(x + i + VL, left - VL)) : (vu){0};
+            const vu a = v_bf16(v_load_part(x + i, left)), b = left > VL ? v_bf16(v_load_part(x + i + VL, left - VL)) : (vu){0};
             const vu even = __builtin_shufflevector(a, b, EVERY_OTHER(0)), odd = __builtin_shufflevector(a, b, EVERY_OTHER(1));
             v_store_part(to + i / 2, (vf)(even >> 16 | (odd & 0xffff0000)), (left + 1) / 2);
         }
@@ -227,38 +219,6 @@ static void columns(const float *x, int64_t pixels, int channels, float *restric
         for (int o = 0; o < channels; o++) sum[o] += a[o];
 }
 
-/* Lane l of the two vectors that a stage of a transposition makes of a and b: squares of side h trade places. */
-#define LOW(l, h) ((l) & (h) ? VL + (l) - (h) : (l))
-#define HIGH(l, h) ((l) & (h) ? VL + (l) : (l) + (h))
-#define LANES_4(f, i, h) f(i, h), f(i + 1, h), f(i + 2, h), f(i + 3, h)
-#if VL == 16
-#define LANES(f, h) LANES_4(f, 0, h), LANES_4(f, 4, h), LANES_4(f, 8, h), LANES_4(f, 12, h)
-#elif VL == 8
-#define LANES(f, h) LANES_4(f, 0, h), LANES_4(f, 4, h)
-#else
-#define LANES(f, h) LANES_4(f, 0, h)
-#endif
-#define STAGE(h)                                                                      \
-    UNROLL for (int i = 0; i < VL; i++) if (!(i & (h)))                               \
-    {                                                                                 \
-        const vf a = r[i], b = r[i + (h)];                                            \
-        r[i] = __builtin_shufflevector(a, b, LANES(LOW, h));                          \
-        r[i + (h)] = __builtin_shufflevector(a, b, LANES(HIGH, h));                   \
-    }
-
-/* VL rows of VL values: columns become rows. */
-INLINE void turn(vf r[VL])
-{
-#if VL == 16
-    STAGE(8)
-#endif
-#if VL >= 8
-    STAGE(4)
-#endif
-    STAGE(2)
-    STAGE(1)
-}
-
 static void transpose(const float *x, int pixels, int channels, float *to, ptrdiff_t plane)
 {
     const int whole = pixels / VL * VL;
@@ -266,7 +226,7 @@ static void transpose(const float *x, int pixels, int channels, float *to, ptrdi
         for (int c = 0; c < channels; c += VL) {
             vf r[VL];
             UNROLL for (int i = 0; i < VL; i++) r[i] = v_load_part(x + (ptrdiff_t)(p + i) * channels + c, channels - c);
-            turn(r);
+            v_turn(r);
             UNROLL for (int i = 0; i < VL; i++) if (i < channels - c) v_store(to + (c + i) * plane + p, r[i]);
         }
     for (int p = whole; p < pixels; p++)
@@ -280,7 +240,7 @@ static void collect(const float *x, ptrdiff_t plane, int pixels, int channels, b
         for (int c = 0; c < channels; c += VL) {
             vf r[VL];
             UNROLL for (int i = 0; i < VL; i++) r[i] = i < channels - c ? v_load(x + (c + i) * plane + p) : (vf){0};
-            turn(r);
+            v_turn(r);
             for (int i = 0; i < VL; i++) {
                 float *to = y + (p + i) * stride + c;
                 const vf v = add ? r[i] + v_load_part(to, channels - c) : r[i];

@@ -19,7 +19,22 @@ static double run(long rounds)
     return 12.0 * 2 * VL * (double)rounds;
 }
 
-#if defined(__AVX512BF16__)
+#if defined(__AMX_BF16__)
+#include "tensor/kernels/tiles.h"
+
+static double run_bf16(long rounds)
+{
+    tiles_begin();
+    for (long i = 0; i < rounds; i++) {
+        _tile_dpbf16ps(0, 4, 6);
+        _tile_dpbf16ps(1, 4, 7);
+        _tile_dpbf16ps(2, 5, 6);
+        _tile_dpbf16ps(3, 5, 7);
+    }
+    tiles_end();
+    return 4.0 * 2 * 16 * 16 * 32 * (double)rounds;
+}
+#elif defined(__AVX512BF16__)
 static double run_bf16(long rounds)
 {
     enum { CHAINS = 12 };
@@ -34,6 +49,9 @@ static double run_bf16(long rounds)
     (void)keep;
     return CHAINS * 4.0 * VL * (double)rounds;
 }
+#endif
+
+#if defined(__AVX512BF16__)
 const struct ts_peak_kernels TS_TABLE(peak) = {.run = run, .run_bf16 = run_bf16};
 #else
 const struct ts_peak_kernels TS_TABLE(peak) = {.run = run};

@@ -51,6 +51,15 @@ static inline vf v_fma(vf a, vf b, vf c)
 #endif
 }
 
+typedef uint32_t vu __attribute__((vector_size(VL * 4)));
+
+/* The upper half of each lane becomes the nearest bf16: 0x7fff carries into it from above the middle, and 1 more in the middle where it is odd. */
+static inline vu v_bf16(vf x)
+{
+    const vu bits = (vu)x;
+    return (vu)v_select(x == x, (vf)(bits + 0x7fff + (bits >> 16 & 1)), (vf)(bits | 0x00400000));
+}
+
 static inline vf v_sqrt(vf x)
 {
 #if defined(__AVX512F__)
