@@ -38,8 +38,9 @@ void bench_heading(const char *text);
 void bench_row_threads(void (*f)(void *user), void *user);
 
 /* Median seconds that the peer (bench/peer_torch.py, whose head lists the jobs) takes for a job; NaN where there is no peer or it fails, which is said
- * once. bench_row_peer: below a row, its floor (flop at the peak) and the peer's time. */
+ * once. bench_row_peer: below a row, its floor (flop at the peak) and the peer's time; bench_row_peer_bf16: the peer's time for the same in bf16, with its own autocast. */
 double bench_peer(const char *job);
 const char *bench_peer_name(void);
 void bench_row_peer(bench_time t, double flop, double peer);
+void bench_row_peer_bf16(bench_time t, const char *job);
 #endif

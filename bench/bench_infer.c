@@ -4,6 +4,7 @@
 #include "bench/shape.h"
 #include "nn/model.h"
 #include "render/render.h"
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -82,15 +83,23 @@ static void measure(nn_arch arch, const char *heading)
     const double flop = g + coarse + (s.steps - arch.coarse_steps) * h - (arch.recurrent ? 1 : s.steps) * unused;
     bench_peer_network("infer", &arch, s.steps, job, sizeof job);
     snprintf(job + strlen(job), sizeof job - strlen(job), " %d", SIDE);
+    double peer = NAN;
     for (int exact = 1; exact >= 0; exact--) {
         ts_conv_exact_set(exact);
         snprintf(label, sizeof label, "g and %d steps, %s", s.steps, exact ? "direct" : "Winograd where it wins");
         t = bench_measure(whole, &s);
         bench_row(label, t, flop);
-        if (!exact) bench_row_peer(t, flop, bench_peer(job));
+        if (!exact) bench_row_peer(t, flop, peer = bench_peer(job));
         if (exact) bench_row_threads(whole, &s);
     }
     ts_conv_exact_set(true);
+    ts_conv_precision_set(TS_BF16);
+    t = bench_measure(whole, &s);
+    snprintf(label, sizeof label, "g and %d steps, bf16%s", s.steps, bench_bf16(&t) ? "" : ", emulated");
+    bench_row(label, t, flop);
+    bench_row_peer(t, flop, peer);
+    bench_row_peer_bf16(t, job);
+    ts_conv_precision_set(TS_F32);
     if (ag_status(s.tape)->code) printf("  %s\n", ag_status(s.tape)->message);
     ag_tape_destroy(&s.tape);
     nn_model_free(&s.model);

@@ -68,13 +68,11 @@ static void material(void *user)
 }
 
 /* The same network and steps for the peer. */
-static double peer(const subject *s)
+static void peer_job(const subject *s, char *job, size_t room)
 {
-    char job[256];
-    bench_peer_network("train", &s->model->arch, s->steps, job, sizeof job);
+    bench_peer_network("train", &s->model->arch, s->steps, job, (int)room);
     const size_t n = strlen(job);
-    snprintf(job + n, sizeof job - n, " %d %d %d %d", s->c.train.batch, s->c.data.patch, s->in.grid.w, s->model->fixed[NN_G]);
-    return bench_peer(job);
+    snprintf(job + n, room - n, " %d %d %d %d", s->c.train.batch, s->c.data.patch, s->in.grid.w, s->model->fixed[NN_G]);
 }
 
 static double megabytes(subject *s, int steps, bool recompute)
@@ -116,8 +114,17 @@ static void measure(subject *s)
     ts_conv_exact_set(false);
     const bench_time t = bench_measure(step, s);
     bench_row(label, t, flop);
-    bench_row_peer(t, flop, peer(s));
+    char job[256];
+    peer_job(s, job, sizeof job);
+    const double peer = bench_peer(job);
+    bench_row_peer(t, flop, peer);
     bench_row_threads(step, s);
+    ts_conv_precision_set(TS_BF16);
+    bench_time rounded = bench_measure(step, s);
+    bench_row(bench_bf16(&rounded) ? "  in bf16" : "  in bf16, emulated", rounded, flop);
+    bench_row_peer(rounded, flop, peer);
+    bench_row_peer_bf16(rounded, job);
+    ts_conv_precision_set(TS_F32);
     bench_time part = bench_measure(losses, s);
     bench_row_unit(s->steps > 0 ? "  of which both losses, 9 renderings each" : "  of which the loss, 9 renderings", part, 100 * part.seconds / t.seconds, "% of the step");
     part = bench_measure(material, s);

@@ -86,6 +86,15 @@ double bench_peer(const char *job)
 
 const char *bench_peer_name(void) { return name; }
 
+void bench_row_peer_bf16(bench_time t, const char *job)
+{
+    char rounded[300];
+    snprintf(rounded, sizeof rounded, "bf16 %s", job);
+    const double peer = bench_peer(rounded);
+    if (isfinite(peer)) printf("    %s in bf16 %.3f ms: %.2f x ours\n", name, 1e3 * peer, peer / t.seconds);
+    fflush(stdout);
+}
+
 void bench_row_peer(bench_time t, double flop, double peer)
 {
     printf("    floor %.3f ms", 1e3 * flop / t.peak);

@@ -9,6 +9,7 @@ Reads jobs from standard input, one a line, and answers each with its median tim
     gradient N H W IC OC K DILATION PAD      gradients of input and weights together
     infer G_WIDTH G_MAX G_LEVELS G_FIRST G_KERNEL G_SIZE H_WIDTH H_GRU CHANNELS RECURRENT T COARSE_T COARSE_SIZE COARSE_WIDTH COARSE_GRU SIDE
     train (the same up to COARSE_GRU) BATCH PATCH WINDOW FIXED   T 0: g alone; FIXED 1: all but g; H_WIDTH 0: the coarse steps alone
+    bf16 infer ..., bf16 train ...           the same with the networks under autocast to bfloat16
 Weights are random: time does not depend on them. Renderer's gradients are included, by autograd.
 """
 import math
@@ -24,7 +25,11 @@ except ImportError:
     sys.exit(0)
 
 
-wall, clock, threads = time.perf_counter, time.perf_counter, 1
+wall, clock, threads, rounded = time.perf_counter, time.perf_counter, 1, False
+
+
+def precision():
+    return torch.autocast("cpu", dtype=torch.bfloat16, enabled=rounded)
 
 
 def median_time(f, least=0.7, most=10.0):
@@ -139,7 +144,7 @@ def dot(a, b):
 
 def radiance(maps, l, v, strength):
     """f n.l strength of each pixel (render/brdf.h); maps [N, 9.., H, W] in [-1, 1], l and v of length 1."""
-    maps = maps.clamp(-1, 1)
+    maps = maps.float().clamp(-1, 1)
     xy = maps[:, 3:5]
     n = F.normalize(torch.cat([xy, (1 - (xy * xy).sum(1, keepdim=True)).clamp_min(1e-6).sqrt()], 1), dim=1)
     half = F.normalize(l + v, dim=1)
@@ -234,7 +239,7 @@ def infer(words):
         net, (side,) = network(words)
         net = net.to(memory_format=layout).eval()
         image = torch.rand(1, 3, side, side).contiguous(memory_format=layout)
-        with torch.no_grad():
+        with torch.no_grad(), precision():
             best = min(best, median_time(lambda: net(image, image, 0, 0)))
     return best
 
@@ -263,7 +268,8 @@ def train(words):
 
         def step():
             adam.zero_grad(set_to_none=True)
-            first, last = net(whole, image, 0, 0)
+            with precision():
+                first, last = (maps.float() for maps in net(whole, image, 0, 0))
             loss = training_loss(last, target, place, light, camera)
             if net.a["steps"] and not fixed:
                 loss = loss + training_loss(first, target, place, light, camera)
@@ -276,7 +282,10 @@ def train(words):
 
 
 def answer(words):
-    global clock, threads
+    global clock, threads, rounded
+    rounded = words[0] == "bf16"
+    if rounded:
+        words = words[1:]
     if words[0] == "version":
         return f"PyTorch {torch.__version__}"
     if words[0] == "threads":
