@@ -2,7 +2,9 @@
  * rest (norms, resampling, the renderer's gradient) is what keeps the fraction of the peak below a convolution's. */
 #include "bench/bench.h"
 #include "bench/shape.h"
+#include "nn/file.h"
 #include "nn/model.h"
+#include "nn/weights.h"
 #include "render/render.h"
 #include <math.h>
 #include <stdio.h>
@@ -110,9 +112,12 @@ BENCH(infer) { measure(nn_arch_default(), "inference, 256 x 256, default archite
 /* The shipped model's, whose Newton steps the peer does not have. */
 BENCH(infer_shipped)
 {
-    nn_arch a = nn_arch_default();
-    a.g_width = 24, a.g_width_max = 192, a.h_width = 0, a.coarse_steps = 2, a.coarse_size = 64;
-    measure(a, "inference, 256 x 256, the shipped model's architecture");
+    ts_status st = {0};
+    nn_arch a;
+    nn_file *file = nn_file_open("models/single.safetensors", &st);
+    if (!file || nn_arch_from_file(file, &a, &st)) printf("  %s\n", st.message);
+    else measure(a, "inference, 256 x 256, the architecture of models/single.safetensors");
+    nn_file_close(&file);
 }
 
 /* The published networks with random weights. */
