@@ -93,7 +93,7 @@ static bool grown(const nn_model *model, const nn_model *narrow, int index, nn_f
     return fine;
 }
 
-ts_code nn_model_init_from(nn_model *model, const char *path, int *taken, int *left, ts_status *st)
+ts_code nn_model_init_from(nn_model *model, const char *path, bool *begun, int *taken, int *left, ts_status *st)
 {
     nn_file *f = nn_file_open(path, st);
     if (!f) return st ? st->code : TS_IO;
@@ -104,13 +104,17 @@ ts_code nn_model_init_from(nn_model *model, const char *path, int *taken, int *l
     for (int i = 0; i < model->params && !code; i++) {
         const nn_param *p = &model->param[i];
         int64_t dim[4];
+        if (begun && begun[i]) continue;
         nn_param_dims(p, dim);
         if (nn_file_read(f, p->name, p->rank, dim, model->value + p->offset, NULL) && !with_more_photographs(model, i, f) && !(narrow && grown(model, narrow, i, f))) ++*left;
         else if (!nn_all_finite(model->value + p->offset, p->count))
             code = ts_fail(st, TS_NUMERIC, "%s: tensor \"%s\" holds a value that is not finite", path, p->name);
-        else ++*taken;
+        else {
+            ++*taken;
+            if (begun) begun[i] = true;
+        }
     }
-    if (!code && *taken == 0) code = ts_fail(st, TS_FORMAT, "%s: no tensor has the name and shape of one of the model's", path);
+    if (!code && *taken == 0) code = ts_fail(st, TS_FORMAT, "%s: no tensor has the name and shape of one of the model's%s", path, begun ? " that is still as it was drawn" : "");
     nn_model_free(&narrow);
     nn_file_close(&f);
     return code;

@@ -21,8 +21,9 @@ nn_model *nn_model_load(const char *path, ts_status *st);
 /* values: the block to write, model->value or an EMA. Extra metadata may be given. TS_NUMERIC when a value is not finite. */
 ts_code nn_model_save(const nn_model *model, const float *values, const char *path, const nn_meta *extra, int extras, ts_status *st);
 /* Parameters that have the same name and shape are taken from the file; a model of several photographs takes those of a model of one too, and is then
- * blind to all but the first; one whose g is wider takes those of a narrower g, and computes the same with channels that are there more than once; how many were, and were not, is returned through the pointers. */
-ts_code nn_model_init_from(nn_model *model, const char *path, int *taken, int *left, ts_status *st);
+ * blind to all but the first; one whose g is wider takes those of a narrower g, and computes the same with channels that are there more than once; how many were, and were not, is returned through the pointers.
+ * begun (model->params of them, or NULL): parameters that are so marked stay as they are and are not counted; those taken are marked, for another file to give the rest. TS_FORMAT where none was taken. */
+ts_code nn_model_init_from(nn_model *model, const char *path, bool *begun, int *taken, int *left, ts_status *st);
 /* The architecture to metadata ("format" = "lgd" and one key "arch.FIELD" each: NN_ARCH_META entries, NN_ARCH_TEXT bytes of text are
  * enough) and back. A field that came later is written only where it is not its default, and may be missing. Returns the number of entries, -1 when capacity or text_size is too small. Keys that do not begin with "arch." are
  * free for other use. */

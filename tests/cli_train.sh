@@ -193,6 +193,15 @@ init_from_weights() {
     says "$T/err" "$T/nothing.safetensors"
     expect 1 train --init "$T/small.ini"
     says "$T/err" "$T/small.ini"
+    # The second file gives what the first does not have: here g is the other's and h this one's, or the other way round.
+    expect 0 train --set train.seed=5 --set model.h_width=0 --set train.steps=0 --initial "$T/g.safetensors"
+    expect 0 train --init "$T/g.safetensors" --init "$T/first/last.safetensors" --initial "$T/both.safetensors"
+    expect 0 train --init "$T/first/last.safetensors" --initial "$T/first.safetensors"
+    expect 0 train --init "$T/g.safetensors" --initial "$T/drawn.safetensors"
+    for other in first drawn; do cmp -s "$T/both.safetensors" "$T/$other.safetensors" && fail "two files give what one gives ($other)"; done
+    expect 1 train --init "$T/first/last.safetensors" --init "$T/first/last.safetensors" --initial "$T/twice.safetensors"
+    says "$T/err" "$T/first/last.safetensors"
+    expect 2 train --init "$T/a" --init "$T/b" --init "$T/c"
 }
 
 divergence_stops_with_a_reason() {

@@ -42,7 +42,7 @@ TEST(nn_images_begin_with_the_first)
     int taken, left;
     CHECK(mkstemp(path) >= 0, "no temporary file");
     CHECK(!nn_model_save(m, m->value, path, NULL, 0, &st), "%s", st.message);
-    CHECK(!nn_model_init_from(more, path, &taken, &left, &st) && taken == m->params && left == 0, "%d taken, %d left: %s", taken, left, st.message);
+    CHECK(!nn_model_init_from(more, path, NULL, &taken, &left, &st) && taken == m->params && left == 0, "%d taken, %d left: %s", taken, left, st.message);
     remove(path);
     nn_input in = photographs(2, SIDE, 32, NULL), copies = in;
     float *image = malloc(2 * IMAGES * PIXELS * 3 * sizeof *image);

@@ -181,7 +181,7 @@ TEST(torch_model_round_trip)
     CHECK(!memcmp(&back->arch, &m->arch, sizeof a) && !memcmp(back->value, m->value, m->count * sizeof(float)), "another model");
     int taken, left;
     nn_model_init(back, 2);
-    CHECK(!nn_model_init_from(back, path_of("m.pth"), &taken, &left, &st) && left == 0, "%s", st.message);
+    CHECK(!nn_model_init_from(back, path_of("m.pth"), NULL, &taken, &left, &st) && left == 0, "%s", st.message);
     CHECK(!memcmp(back->value, m->value, m->count * sizeof(float)), "other values");
     nn_model_free(&m);
     nn_model_free(&back);

@@ -224,7 +224,7 @@ TEST(weights_init_from_takes_what_fits)
     CHECK(!nn_model_save(m, m->value, path, NULL, 0, &st), "%s", st.message);
     int taken, left;
     float before = n->value[nn_model_find(n, "h.output.weight")->offset];
-    CHECK(!nn_model_init_from(n, path, &taken, &left, &st), "%s", st.message);
+    CHECK(!nn_model_init_from(n, path, NULL, &taken, &left, &st), "%s", st.message);
     size_t first, last;
     nn_model_range(n, NN_G, &first, &last);
     CHECK(!memcmp(m->value, n->value, last * sizeof(float)), "g was not taken");
@@ -232,9 +232,9 @@ TEST(weights_init_from_takes_what_fits)
     CHECK(taken + left == n->params && left == 10, "%d taken, %d left of %d", taken, left, n->params);
     st = (ts_status){0};
     nn_safetensors_write(path, NULL, 0, NULL, 0, &st);
-    CHECK(nn_model_init_from(n, path, &taken, &left, &st) == TS_FORMAT && strstr(st.message, path), "'%s'", st.message);
+    CHECK(nn_model_init_from(n, path, NULL, &taken, &left, &st) == TS_FORMAT && strstr(st.message, path), "'%s'", st.message);
     st = (ts_status){0};
-    CHECK(nn_model_init_from(n, path_of("none"), &taken, &left, &st) == TS_IO, "'%s'", st.message);
+    CHECK(nn_model_init_from(n, path_of("none"), NULL, &taken, &left, &st) == TS_IO, "'%s'", st.message);
 }
 
 /* Every width of g grows by another factor, some to more than twice theirs; h stays. */
@@ -251,7 +251,7 @@ TEST(weights_init_from_a_narrower_g_computes_the_same)
     const char *path = path_of("narrow.safetensors");
     CHECK(!nn_model_save(m, m->value, path, NULL, 0, &st), "%s", st.message);
     int taken, left;
-    CHECK(!nn_model_init_from(n, path, &taken, &left, &st) && taken == n->params && left == 0, "%d taken, %d left: %s", taken, left, st.message);
+    CHECK(!nn_model_init_from(n, path, NULL, &taken, &left, &st) && taken == n->params && left == 0, "%d taken, %d left: %s", taken, left, st.message);
     float image[SIDE * SIDE * 3], first[VALUES];
     ts_rng rng = ts_rng_make(3, TS_STREAM_TEST, 0);
     for (int i = 0; i < SIDE * SIDE * 3; i++) image[i] = ts_rng_uniform(&rng);
@@ -271,11 +271,11 @@ TEST(weights_init_from_a_narrower_g_computes_the_same)
     const float *w = n->value + p->offset;
     CHECK(p->dim[1] == 8 && w[0] != w[3 * 9] && w[3 * 9] != w[6 * 9], "copies of channel 0 have the weights %g, %g and %g", (double)w[0], (double)w[3 * 9], (double)w[6 * 9]);
     m->arch.g_width = 5; /* a file that states other widths than it has */
-    CHECK(!nn_model_save(m, m->value, path, NULL, 0, &st) && !nn_model_init_from(n, path, &taken, &left, &st) && left > 0, "widths that are not there were taken");
+    CHECK(!nn_model_save(m, m->value, path, NULL, 0, &st) && !nn_model_init_from(n, path, NULL, &taken, &left, &st) && left > 0, "widths that are not there were taken");
     wide.g_levels = 1;
     nn_model_free(&n);
     n = nn_model_create(&wide, &st);
-    CHECK(!nn_model_init_from(n, path, &taken, &left, &st) && left > 0, "another depth was taken");
+    CHECK(!nn_model_init_from(n, path, NULL, &taken, &left, &st) && left > 0, "another depth was taken");
     nn_model_free(&m), nn_model_free(&n);
 }
 

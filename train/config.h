@@ -27,7 +27,7 @@ typedef struct tr_config {
         bool exact;
         int64_t seed, checkpoint_every, log_every;
         int max_skipped;
-        char init[1024];
+        char init[1024], init_rest[1024];
     } train;
     struct { /* [validate] */
         int64_t every, seed;

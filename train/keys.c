@@ -107,6 +107,8 @@ const tr_key tr_keys[] = {
      "steps in a row that may be skipped (no finite loss and gradient, or a spike); one more ends the run"},
     {"train", "init", TR_TEXT, AT(train.init), 0, sizeof((tr_config *)0)->train.init, "", NULL, true,
      "weights file whose parameters of the same name and shape the run begins with"},
+    {"train", "init_rest", TR_TEXT, AT(train.init_rest), 0, sizeof((tr_config *)0)->train.init_rest, "", NULL, true,
+     "weights file for the parameters that train.init does not have, for example the coarse steps of another run"},
 
     {"validate", "every", TR_INT64, AT(validate.every), 0, 1e9, "500", NULL, false, "steps between validations (and one at the end); 0: never"},
     {"validate", "seed", TR_INT64, AT(validate.seed), 0, 1e15, "1000001", NULL, false, "seed of the validation materials, another than data.seed"},

@@ -14,7 +14,8 @@ static const char usage[] = "Usage: lgd-train CONFIG.ini [options]\n"
                             "\n"
                             "  --set SECTION.KEY=VALUE  set a key after the file was read; may be given several times\n"
                             "  --resume                 go on from the folder's checkpoint, exactly as if the run had not stopped\n"
-                            "  --init WEIGHTS           begin with the parameters of a weights file (the same as --set train.init=WEIGHTS)\n"
+                            "  --init WEIGHTS           begin with the parameters of a weights file (the same as --set train.init=WEIGHTS); given twice, the\n"
+                            "                           second file gives what the first does not have (train.init_rest)\n"
                             "  --initial FILE           write the weights that the run would begin with, and end\n"
                             "  --threads N              threads to compute with (default: all that the process may use)\n"
                             "  --help-config            print every key with its range, default and meaning\n"
@@ -128,7 +129,7 @@ static const struct option options[] = {
 int main(int argc, char **argv)
 {
     bool resume = false, print = false;
-    const char *init = NULL, *initial = NULL;
+    const char *init[2] = {NULL, NULL}, *initial = NULL;
     const char **set = malloc((size_t)argc * sizeof *set);
     int sets = 0, option, code = cl_init("lgd-train");
     ts_status st = {0};
@@ -139,7 +140,13 @@ int main(int argc, char **argv)
         switch (option) {
         case SET: set[sets++] = optarg; break;
         case RESUME: resume = true; break;
-        case INIT: init = optarg; break;
+        case INIT:
+            if (init[1]) {
+                code = cl_usage("--init may be given twice, not more often");
+                goto end;
+            }
+            init[init[0] != NULL] = optarg;
+            break;
         case INITIAL: initial = optarg; break;
         case PRINT_CONFIG: print = true; break;
         case THREADS:
@@ -170,7 +177,7 @@ int main(int argc, char **argv)
                         files);
         goto end;
     }
-    if (init && resume) {
+    if (init[0] && resume) {
         code = cl_usage("--init begins a run and --resume goes on with one: choose one of them");
         goto end;
     }
@@ -184,7 +191,8 @@ int main(int argc, char **argv)
         goto end;
     }
     for (int i = 0; i < sets && st.code == TS_OK; i++) tr_config_set_assignment(&config, set[i], &st);
-    if (init && st.code == TS_OK) tr_config_set(&config, "--init", "train", "init", init, &st);
+    if (init[0] && st.code == TS_OK) tr_config_set(&config, "--init", "train", "init", init[0], &st);
+    if (init[1] && st.code == TS_OK) tr_config_set(&config, "--init", "train", "init_rest", init[1], &st);
     if (st.code == TS_OK) tr_config_check(&config, &st);
     if (st.code != TS_OK) {
         code = cl_usage("%s", st.message);

@@ -85,25 +85,28 @@ static ts_code write_config(const tr_trainer *t, ts_status *st)
     return TS_OK;
 }
 
-static ts_code init_weights(tr_trainer *t, ts_status *st)
+/* The parameters that a run begins with. t: may be NULL, who is told. */
+static ts_code init_weights(nn_model *model, const tr_config *c, tr_trainer *t, ts_status *st)
 {
-    const char *path = t->config.train.init;
-    int taken, left;
-    nn_model_init(t->model, (uint64_t)t->config.train.seed);
-    if (!*path) return TS_OK;
-    if (nn_model_init_from(t->model, path, &taken, &left, st) != TS_OK) return st->code;
-    if (taken == 0) return ts_fail(st, TS_INVALID, "%s: none of its parameters has a name and a shape of this model ([model] differs)", path);
-    tr_note(t, "%d parameters begin as in %s, %d as drawn", taken, path, left);
-    return TS_OK;
+    const char *const path[] = {c->train.init, c->train.init_rest};
+    nn_model_init(model, (uint64_t)c->train.seed);
+    bool *begun = calloc((size_t)model->params, sizeof *begun);
+    if (!begun) return ts_fail(st, TS_NOMEM, "out of memory for %d parameters", model->params);
+    ts_code code = TS_OK;
+    for (int i = 0, taken, left; i < 2 && !code; i++) {
+        if (!*path[i]) continue;
+        code = nn_model_init_from(model, path[i], begun, &taken, &left, st);
+        if (!code && t) tr_note(t, "%d parameters begin as in %s, %d as drawn", taken, path[i], left);
+    }
+    free(begun);
+    return code;
 }
 
 ts_code tr_initial(const tr_config *config, const char *path, ts_status *st)
 {
-    int taken, left;
     nn_model *m = nn_model_create(&config->arch, st);
     if (!m) return st->code;
-    nn_model_init(m, (uint64_t)config->train.seed);
-    ts_code code = *config->train.init ? nn_model_init_from(m, config->train.init, &taken, &left, st) : TS_OK;
+    ts_code code = init_weights(m, config, NULL, st);
     if (!code) code = nn_model_save(m, m->value, path, NULL, 0, st);
     nn_model_free(&m);
     return code;
@@ -120,7 +123,7 @@ static ts_code build(tr_trainer *t, bool resume, ts_status *st)
     t->views = malloc(batch * RD_LOSS_VIEWS * sizeof *t->views);
     if (!t->images || !t->captures || !t->views) return ts_fail(st, TS_NOMEM, "no memory for %zu photographs", photographs);
     t->model = nn_model_create(&c->arch, st);
-    if (!t->model || nn_model_train(t->model, st) != TS_OK || (!resume && init_weights(t, st) != TS_OK)) return st->code;
+    if (!t->model || nn_model_train(t->model, st) != TS_OK || (!resume && init_weights(t->model, c, t, st) != TS_OK)) return st->code;
     if (nn_adam_create(&t->adam, t->model, (float)c->train.ema, st) != TS_OK || (resume && tr_resume(t, st) != TS_OK)) return st->code;
     t->tape = ag_tape_create(true, st);
     if (!t->tape || (c->validate.every && tr_validator_create(t, st) != TS_OK)) return st->code;
