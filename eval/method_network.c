@@ -3,6 +3,7 @@
 #include "infer/power.h"
 #include "infer/tiles.h"
 #include "tensor/conv.h"
+#include <stdlib.h>
 #include <string.h>
 
 enum { UNTILED = 512, TILE = 256 }; /* as lgd-infer's where a tolerance ends tiles early: up to the first the whole is one */
@@ -59,44 +60,57 @@ static bool after(int step, const ag_value *maps, void *user)
 
 enum { POWER_TOLD, POWER_AUTO, POWER_KNOWN };
 
-/* The inputs' pictures and views, with the lights' power as the key says. Returns how many. */
-static ts_code inputs(ev_estimator *e, const ev_case *c, const float *image[NN_MAX_IMAGES], rd_view view[NN_MAX_IMAGES], ts_status *st)
+/* The inputs' pictures and views, with the lights' power as the key says; *proposed: R_0 where that needed it (the caller frees it), else NULL. */
+static ts_code inputs(ev_estimator *e, const ev_case *c, const float *image[NN_MAX_IMAGES], rd_view view[NN_MAX_IMAGES], float **proposed, ts_status *st)
 {
+    *proposed = NULL;
     double factor = (int)ev_number(e, "power") == POWER_KNOWN ? c->exposure : 1;
     const int count = photos(e);
     for (int k = 0; k < count; k++) {
         image[k] = c->image + (size_t)k * (size_t)c->size * (size_t)c->size * 3;
         view[k] = c->input[k];
     }
-    if ((int)ev_number(e, "power") == POWER_AUTO && lgd_fit_power(e->tape, e->net, image, view, count, c->size, &factor, st) != TS_OK) return st->code;
+    if ((int)ev_number(e, "power") == POWER_AUTO) {
+        const size_t size = (size_t)e->net->arch.g_size;
+        *proposed = malloc(size * size * (size_t)e->net->arch.channels * sizeof **proposed);
+        if (!*proposed) return ts_fail(st, TS_NOMEM, "out of memory");
+        if (lgd_fit_power(e->tape, e->net, image, view, count, c->size, ev_orientations(e), *proposed, &factor, st) != TS_OK) return st->code;
+    }
     for (int k = 0; k < count; k++) view[k].power *= (float)factor;
     return TS_OK;
 }
 
-static ts_code run_tiles(ev_estimator *e, const ev_case *c, const float *const *image, const rd_view *view, ev_seen seen, void *user, ts_status *st)
+static ts_code run_tiles(ev_estimator *e, const ev_case *c, const float *const *image, const rd_view *view, const float *proposed, ev_seen seen, void *user, ts_status *st)
 {
     const int channels = e->net->arch.channels;
     if (ev_block(e, (size_t)c->size * (size_t)c->size * (size_t)channels, st) != TS_OK) return st->code;
-    lgd_tiles t = {.image = image, .views = view, .given = photos(e), .side = c->size, .tile = c->size > UNTILED ? TILE : c->size, .steps = steps(e), .orientations = ev_orientations(e), .tolerance = ev_number(e, "tolerance")};
+    lgd_tiles t = {.image = image, .views = view, .given = photos(e), .side = c->size, .tile = c->size > UNTILED ? TILE : c->size, .steps = steps(e), .orientations = ev_orientations(e), .proposed = proposed, .tolerance = ev_number(e, "tolerance")};
     if (lgd_tiles_run(e->tape, e->net, &t, e->x, st) != TS_OK) return st->code;
     seen(t.steps, e->x, channels, user);
     return TS_OK;
+}
+
+static ts_code run_whole(ev_estimator *e, const ev_case *c, const rd_view *view, const float *proposed, ev_seen seen, void *user, ts_status *st)
+{
+    told t = {seen, user};
+    ag_value *out = NULL;
+    ag_reset(e->tape);
+    const int given = photos(e);
+    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){given, c->size, c->size, 3}), .grid = rd_grid_full(c->size), .views = view, .given = given, .orientations = ev_orientations(e), .proposed = proposed};
+    if (nn_lgd(e->tape, e->net, &in, steps(e), false, &out, after, &t) == TS_OK) return TS_OK;
+    *st = *ag_status(e->tape);
+    return st->code;
 }
 
 static ts_code refine(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
 {
     const float *image[NN_MAX_IMAGES];
     rd_view view[NN_MAX_IMAGES];
-    if (inputs(e, c, image, view, st) != TS_OK) return st->code;
-    if (e->last_alone) return run_tiles(e, c, image, view, seen, user, st);
-    told t = {seen, user};
-    ag_value *out = NULL;
-    ag_reset(e->tape);
-    const int given = photos(e);
-    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){given, c->size, c->size, 3}), .grid = rd_grid_full(c->size), .views = view, .given = given, .orientations = ev_orientations(e)};
-    if (nn_lgd(e->tape, e->net, &in, steps(e), false, &out, after, &t) == TS_OK) return TS_OK;
-    *st = *ag_status(e->tape);
-    return st->code;
+    float *proposed;
+    ts_code code = inputs(e, c, image, view, &proposed, st);
+    if (!code) code = e->last_alone ? run_tiles(e, c, image, view, proposed, seen, user, st) : run_whole(e, c, view, proposed, seen, user, st);
+    free(proposed);
+    return code;
 }
 
 static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)

@@ -193,18 +193,26 @@ static ts_code not_finite(ts_status *st)
     return ts_fail(st, TS_NUMERIC, "the network's maps are not finite: the weights are damaged or did not train");
 }
 
+/* What is estimated from; proposed: R_0 where it is known, as in nn_input. */
+typedef struct given_photos {
+    const float *const *image;
+    const rd_view *views;
+    int count, side;
+    const float *proposed;
+} given_photos;
+
 /* taken: NULL, or gets the number of steps that were made. */
-static ts_code run_whole(lgd_model *model, const float *const *image, const rd_view *views, int given, int side, int steps, const lgd_options *o, float *maps,
-                         int *taken, ts_status *st)
+static ts_code run_whole(lgd_model *model, const given_photos *p, int steps, const lgd_options *o, float *maps, int *taken, ts_status *st)
 {
+    const int side = p->side, given = p->count;
     ag_reset(model->tape);
     const double more = step_bytes(&model->net->arch, side) - (double)ts_arena_peak(ag_arena(model->tape)); /* than earlier calls left */
     if (more > 0 && lgd_memory_check(more, st) != TS_OK) return ts_context(st, "%d x %d pixels", side, side);
-    nn_input in = {.image = ts_new(ag_arena(model->tape), (ts_shape){given, side, side, 3}), .grid = rd_grid_full(side), .views = views, .given = given, .orientations = o->orientations};
+    nn_input in = {.image = ts_new(ag_arena(model->tape), (ts_shape){given, side, side, 3}), .grid = rd_grid_full(side), .views = p->views, .given = given, .orientations = o->orientations, .proposed = p->proposed};
     if (!in.image.data) return ts_fail(st, TS_NOMEM, "out of memory for an image of %d x %d pixels", side, side);
     const int64_t values = (int64_t)side * side * 3;
     for (int k = 0; k < given; k++)
-        lgd_clip(values, image[k], in.image.data + k * values);
+        lgd_clip(values, p->image[k], in.image.data + k * values);
 
     watch w = {.in = &in, .options = o, .steps = steps};
     ag_value *out = NULL;
@@ -220,16 +228,16 @@ static ts_code run_whole(lgd_model *model, const float *const *image, const rd_v
     return decode(w.best ? w.best : out->t.data, out->t.shape.c, (int64_t)side * side, maps) ? TS_OK : not_finite(st);
 }
 
-static ts_code estimate_whole(lgd_model *model, const float *const *image, const rd_view *views, int given, int side, int steps, const lgd_options *o, float *maps, ts_status *st)
+static ts_code estimate_whole(lgd_model *model, const given_photos *p, int steps, const lgd_options *o, float *maps, ts_status *st)
 {
-    return run_whole(model, image, views, given, side, steps, o, maps, NULL, st);
+    return run_whole(model, p, steps, o, maps, NULL, st);
 }
 
 /* The number of steps that the photographs take at AUTO_SIDE pixels. */
-static ts_code count_steps(lgd_model *model, const float *const *image, const rd_view *views, int given, int side, int most, int orientations, int *steps, ts_status *st)
+static ts_code count_steps(lgd_model *model, const given_photos *p, int most, int orientations, int *steps, ts_status *st)
 {
     enum { AUTO_SIDE = 256 };
-    const int small = side < AUTO_SIDE ? side : AUTO_SIDE;
+    const int side = p->side, given = p->count, small = side < AUTO_SIDE ? side : AUTO_SIDE;
     const size_t pixels = (size_t)small * (size_t)small;
     const lgd_options o = {.iterations = LGD_AUTO, .orientations = orientations};
     float *photo = malloc((size_t)given * pixels * 3 * sizeof *photo), *maps = malloc(pixels * MAP_CHANNELS * sizeof *maps);
@@ -238,12 +246,12 @@ static ts_code count_steps(lgd_model *model, const float *const *image, const rd
     ts_code code = photo && maps && arena ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory");
     for (int k = 0; k < given && !code; k++) {
         ts_tensor to = ts_view(photo + (size_t)k * pixels * 3, (ts_shape){1, small, small, 3});
-        const ts_tensor from = ts_view((float *)(uintptr_t)image[k], (ts_shape){1, side, side, 3});
-        if (small == side) memcpy(to.data, image[k], pixels * 3 * sizeof *photo);
+        const ts_tensor from = ts_view((float *)(uintptr_t)p->image[k], (ts_shape){1, side, side, 3});
+        if (small == side) memcpy(to.data, p->image[k], pixels * 3 * sizeof *photo);
         else code = ts_resize(&to, &from, arena, st);
         each[k] = to.data;
     }
-    if (!code) code = run_whole(model, each, views, given, small, most, &o, maps, steps, st);
+    if (!code) code = run_whole(model, &(given_photos){each, p->views, given, small, NULL}, most, &o, maps, steps, st);
     ts_arena_destroy(&arena);
     free(photo);
     free(maps);
@@ -262,8 +270,9 @@ static int before_tile(void *user)
     return w->options->tile ? w->options->tile(w->begun++ / w->tiles, w->options->user) : 0;
 }
 
-static ts_code estimate_tiles(lgd_model *model, const float *const *image, const rd_view *views, int given, int side, int steps, const lgd_options *o, float *maps, ts_status *st)
+static ts_code estimate_tiles(lgd_model *model, const given_photos *p, int steps, const lgd_options *o, float *maps, ts_status *st)
 {
+    const int side = p->side;
     const nn_arch *arch = &model->net->arch;
     const int64_t pixels = (int64_t)side * side;
     const int early = side > UNTILED ? TILE_EARLY : side, tile = o->mask ? TILE_MASK : o->tolerance > 0 ? early : TILE, across = (side + tile - 1) / tile;
@@ -272,7 +281,7 @@ static ts_code estimate_tiles(lgd_model *model, const float *const *image, const
     float *raw = arch->channels == MAP_CHANNELS ? maps : malloc((size_t)pixels * (size_t)arch->channels * sizeof *raw);
     double *rmse = calloc((size_t)steps + 1, sizeof *rmse);
     ts_code code = raw && rmse ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
-    lgd_tiles t = {.image = image, .views = views, .given = given, .mask = o->mask, .side = side, .tile = tile, .steps = steps, .orientations = o->orientations, .tolerance = o->tolerance, .rmse = o->progress ? rmse : NULL,
+    lgd_tiles t = {.image = p->image, .views = p->views, .given = p->count, .proposed = p->proposed, .mask = o->mask, .side = side, .tile = tile, .steps = steps, .orientations = o->orientations, .tolerance = o->tolerance, .rmse = o->progress ? rmse : NULL,
                    .alive = before_tile, .user = &w};
     if (!code) code = lgd_tiles_run(model->tape, model->net, &t, raw, st);
     int stop = steps;
@@ -307,16 +316,25 @@ static ts_code estimate(lgd_model *model, const lgd_photo *photo, int photos, in
     }
     const bool tiles = lgd_tiles_exact(&model->net->arch) && (side > UNTILED || o->mask || o->tolerance > 0);
     if (o->power) *o->power = 1;
+    given_photos p = {image, views, photos, side, NULL};
+    float *proposed = NULL;
+    ts_code code = TS_OK;
     if (o->power && model->net->arch.compat == NN_COMPAT_NONE) {
-        if (lgd_fit_power(model->tape, model->net, image, views, photos, side, o->power, st) != TS_OK) return st->code;
+        const size_t size = (size_t)model->net->arch.g_size;
+        proposed = malloc(size * size * (size_t)model->net->arch.channels * sizeof *proposed);
+        if (!proposed) return ts_fail(st, TS_NOMEM, "out of memory");
+        code = lgd_fit_power(model->tape, model->net, image, views, photos, side, o->orientations, proposed, o->power, st);
         for (int k = 0; k < photos; k++) views[k].power *= (float)*o->power;
+        p.proposed = proposed;
     }
     int steps = o->iterations == -1 ? lgd_trained_iterations(model) : o->iterations;
     if (o->iterations == LGD_AUTO) {
         steps = nn_arch_refines(&model->net->arch) ? LGD_AUTO_MOST : 0;
-        if (tiles && count_steps(model, image, views, photos, side, steps, o->orientations, &steps, st)) return st->code;
+        if (!code && tiles) code = count_steps(model, &p, steps, o->orientations, &steps, st);
     }
-    return (tiles ? estimate_tiles : estimate_whole)(model, image, views, photos, side, steps, o, maps, st);
+    if (!code) code = (tiles ? estimate_tiles : estimate_whole)(model, &p, steps, o, maps, st);
+    free(proposed);
+    return code;
 }
 
 int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options, float *maps, lgd_error *error)

@@ -21,7 +21,8 @@ static double distance(size_t values, const float *photo, const float *rendered,
     return sum;
 }
 
-ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given, int side, double *factor, ts_status *st)
+ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given, int side, int orientations, float *proposed, double *factor,
+                      ts_status *st)
 {
     const int size = model->arch.g_size;
     const rd_grid grid = rd_grid_full(size);
@@ -37,12 +38,13 @@ ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *
     if (side == size) memcpy(small->t.data, full->t.data, (size_t)given * values * sizeof(float));
     else if (ts_resize(&small->t, &full->t, ag_arena(tape), st)) return st->code;
     ag_scope_end(tape, mark, NULL, 0);
-    const nn_input in = {.image = small->t, .grid = grid, .views = views, .given = given};
+    const nn_input in = {.image = small->t, .grid = grid, .views = views, .given = given, .orientations = orientations};
     const ag_value *maps = nn_predict(tape, model, &in);
     if (!maps) {
         *st = *ag_status(tape);
         return st->code;
     }
+    memcpy(proposed, maps->t.data, (size_t)ts_count(maps->t.shape) * sizeof(float));
     for (int k = 0; k < given; k++) rd_render(grid, maps->t.data, maps->t.shape.c, &views[k], false, rendered->t.data + (size_t)k * values);
     double best = INFINITY, found = 0;
     bool tells = false; /* black: any light would be too strong; clipped: none would be */

@@ -10,7 +10,8 @@ typedef struct lgd_tiles {
     int given;                 /* photographs, 1 .. arch.images */
     const unsigned char *mask; /* [side][side] or NULL: tiles without a nonzero pixel keep what the coarse steps left (R_0), and of the others only the area that holds such is sure to be refined */
     int side, tile, steps;     /* tile: pixels of a tile's side */
-    int orientations;          /* as in nn_input */
+    int orientations;          /* as in nn_input, */
+    const float *proposed;     /* and this too */
     double tolerance;          /* a tile ends at R_t when the RMS of R_t - R_{t-1} over it and what it reads is below; 0: never */
     int (*alive)(void *user);  /* asked before each tile; nonzero: TS_INTERRUPTED. May be NULL */
     void *user;

@@ -1,5 +1,6 @@
 /* The light's strength from the photograph. */
 #include "infer/power.h"
+#include "infer/tiles.h"
 #include "tests/networks.h"
 
 enum { LARGE = 40 };
@@ -22,7 +23,9 @@ static double fit(const nn_model *m, const float *const *image, const rd_view *v
     ts_status st = {0};
     ag_tape *t = tape_create(false);
     double factor = -1;
-    CHECK(!lgd_fit_power(t, m, image, views, given, side, &factor, &st), "%s", st.message);
+    float *proposed = malloc((size_t)(m->arch.g_size * m->arch.g_size * m->arch.channels) * sizeof *proposed);
+    CHECK(proposed && !lgd_fit_power(t, m, image, views, given, side, 1, proposed, &factor, &st), "%s", st.message);
+    free(proposed);
     ag_tape_destroy(&t);
     return factor;
 }
@@ -61,5 +64,43 @@ TEST(infer_power_stays_in_its_range)
     CHECK(fit(m, image, &flash, 1, LARGE) == 1, "a white photograph has a light of %g", fit(m, image, &flash, 1, LARGE));
     for (int i = 0; i < LARGE * LARGE * 3; i++) photo[i] = i % 2 ? NAN : 1e-4f;
     CHECK(fit(m, image, &flash, 1, LARGE) == 0.125, "a dark one has %g", fit(m, image, &flash, 1, LARGE));
+    nn_model_free(&m);
+}
+
+/* What follows the fit begins with the fit's R_0 in place of running g again, to the same bytes, on the whole and in tiles. */
+TEST(infer_power_leaves_r0_for_what_follows)
+{
+    ts_status st = {0};
+    nn_arch a = tiny();
+    nn_model *m = create(&a, 52);
+    static float photo[LARGE * LARGE * 3], maps[2][LARGE * LARGE * 9];
+    ts_rng r = ts_rng_make(53, TS_STREAM_TEST, 0);
+    for (int i = 0; i < LARGE * LARGE * 3; i++) photo[i] = 0.3f * ts_rng_uniform(&r);
+    const float *const image[] = {photo};
+    float *proposed = malloc((size_t)(a.g_size * a.g_size * a.channels) * sizeof *proposed);
+    CHECK(proposed, "no memory");
+    for (int orientations = 1; orientations <= 4; orientations *= 4) {
+        rd_view flash = rd_flash();
+        double factor = 1;
+        ag_tape *t = tape_create(false);
+        CHECK(!lgd_fit_power(t, m, image, &flash, 1, LARGE, orientations, proposed, &factor, &st), "%s", st.message);
+        flash.power *= (float)factor;
+        for (int tiles = 0; tiles < 2; tiles++) {
+            for (int again = 0; again < 2; again++) {
+                nn_input in = {.image = ts_view(photo, (ts_shape){1, LARGE, LARGE, 3}), .grid = rd_grid_full(LARGE), .view = flash, .orientations = orientations, .proposed = again ? NULL : proposed};
+                lgd_tiles of = {.image = image, .views = &flash, .given = 1, .side = LARGE, .tile = 16, .steps = 2, .orientations = orientations, .proposed = in.proposed};
+                ag_value *out;
+                ag_reset(t);
+                if (tiles) CHECK(!lgd_tiles_run(t, m, &of, maps[again], &st), "%s", st.message);
+                else {
+                    CHECK(!nn_lgd(t, m, &in, 2, false, &out, NULL, NULL), "%s", ag_status(t)->message);
+                    memcpy(maps[again], out->t.data, sizeof maps[again]);
+                }
+            }
+            CHECK(!memcmp(maps[0], maps[1], sizeof maps[0]), "%d orientations, %s: other maps", orientations, tiles ? "tiles" : "whole");
+        }
+        ag_tape_destroy(&t);
+    }
+    free(proposed);
     nn_model_free(&m);
 }
