@@ -58,9 +58,9 @@ static inline int conv_lanes(void) { return ts_conv_k()->lanes; }
 static inline int conv_panels(int oc) { return (oc + 2 * conv_lanes() - 1) / (2 * conv_lanes()); }
 static inline int conv_vectors(int oc, int panel) { return oc - panel * 2 * conv_lanes() > conv_lanes() ? 2 : 1; }
 
-/* Few pixels in an image and several images: tiles run over the images at one position, which needs no padding at all. */
-enum { CONV_POSITIONS = 64 };
-static inline bool conv_by_position(int n, int h, int w) { return n >= 4 && h * w <= CONV_POSITIONS; }
+/* Few pixels in an image and several images: tiles run over the images at one position, which needs no padding at all. A tile of four is slower than a row of eight. */
+enum { CONV_POSITIONS = 64, CONV_POSITIONS_OF_FEW = 16 };
+static inline bool conv_by_position(int n, int h, int w) { return n >= 4 && h * w <= (n < 8 ? CONV_POSITIONS_OF_FEW : CONV_POSITIONS); }
 
 static inline int conv_clamp(int i, int size) { return i < 0 ? 0 : i >= size ? size - 1 : i; }
 
