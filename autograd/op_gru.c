@@ -51,8 +51,9 @@ static void backward(ag_tape *tape, ag_node *node)
     to.ih_bias = ag_grad_add(tape, node->in[IH_BIAS]);
     to.hh_weight = ag_grad_add(tape, node->in[HH]);
     to.hh_bias = ag_grad_add(tape, node->in[HH_BIAS]);
-    const float *ih = to.dx ? packed(tape, ts_gru_input(&g), TS_CONV_DATA_GRADIENT, node->in[IH]) : NULL;
-    const float *hh = to.dold ? packed(tape, ts_gru_hidden(&g), TS_CONV_DATA_GRADIENT, node->in[HH]) : NULL;
+    const ts_conv_use use = ts_gru_backward_bf16(&g) ? TS_CONV_DATA_GRADIENT_BF16 : TS_CONV_DATA_GRADIENT;
+    const float *ih = to.dx ? packed(tape, ts_gru_input(&g), use, node->in[IH]) : NULL;
+    const float *hh = to.dold ? packed(tape, ts_gru_hidden(&g), use, node->in[HH]) : NULL;
     if (ag_status(tape)->code) return;
     ts_gru_backward(&g, node->in[X]->t.data, old, ih, hh, node->saved, node->out->grad, &to);
 }

@@ -206,6 +206,11 @@ void conv_matrix_pixels(const conv_plan *p, int count)
     const int steps = row_steps(p->ic, 1, 1);
     ptrdiff_t *at = ts_scratch(3, sizeof *at * (size_t)steps);
     place_steps(p, 1, at);
+    conv_matrix_steps(p, at, steps, count);
+}
+
+void conv_matrix_steps(const conv_plan *p, const ptrdiff_t *at, int steps, int count)
+{
     const line l = {p, p->x, at, steps, count, count, count};
     float *y = p->y;
     ts_matrix_k()->begin();

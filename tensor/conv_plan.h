@@ -94,6 +94,8 @@ void conv_run_matrix(const conv_plan *p);
 /* Side 1, serial: count pixels of pairs p->x, behind which CONV_MATRIX_SLACK pixels and 32 more values can be read and are finite. */
 enum { CONV_MATRIX_SLACK = 32 };
 void conv_matrix_pixels(const conv_plan *p, int count);
+/* The same of steps of 32 channels that begin at bytes from a pixel, which are p->ic pairs apart. */
+void conv_matrix_steps(const conv_plan *p, const ptrdiff_t *at, int steps, int count);
 
 static inline int conv_bf16_depth(int channels) { return (channels + 1) / 2; }
 size_t conv_bf16_count(const ts_conv *c, int ic, int oc);

@@ -1,11 +1,9 @@
-#include "tensor/gru.h"
-#include "tensor/conv_plan.h"
+#include "tensor/gru_parts.h"
 #include "tensor/kernels/elementwise.h"
 #include "tensor/threads.h"
 #include <string.h>
 
 enum {
-    BAND = 8 * TS_TILE_PIXELS, /* pixels: with 64 and 32 channels, or 256 and 64, all that a band touches stays in the second cache */
     PART_PIXELS = 1024,        /* weight gradients: private sums for so many pixels at least, */
     PARTS = 16                 /* and no more of them, by shape alone */
 };
@@ -26,7 +24,7 @@ static void gates_forward(conv_plan p, const float *x, int count, float *y)
     p.y = y;
     if (p.bf16) {
         const size_t behind = (size_t)(CONV_MATRIX_SLACK * (p.ic + 1));
-        float *rounded = ts_scratch(2, sizeof(float) * ((size_t)(BAND * p.ic) + behind));
+        float *rounded = ts_scratch(2, sizeof(float) * ((size_t)(GRU_BAND * p.ic) + behind));
         conv_put_pixels(&p, x, count, rounded, p.ic);
         p.x = rounded;
         if (conv_by_matrix()) {
@@ -45,9 +43,9 @@ void ts_gru_forward(const ts_gru *g, const float *x, const float *old, const flo
     const int gates = 3 * g->c;
     const conv_plan input = gates_of(g, g->ic, ih_packed, ih_bias), hidden = gates_of(g, g->c, hh_packed, hh_bias);
 #pragma omp parallel for schedule(dynamic, 4) num_threads(ts_threads())
-    for (int64_t p = 0; p < g->pixels; p += BAND) {
-        const int count = (int)(g->pixels - p < BAND ? g->pixels - p : BAND);
-        float *ih = ts_scratch(0, sizeof(float) * (size_t)(BAND * gates)), *hh = ts_scratch(1, sizeof(float) * (size_t)(BAND * gates));
+    for (int64_t p = 0; p < g->pixels; p += GRU_BAND) {
+        const int count = (int)(g->pixels - p < GRU_BAND ? g->pixels - p : GRU_BAND);
+        float *ih = ts_scratch(0, sizeof(float) * (size_t)(GRU_BAND * gates)), *hh = ts_scratch(1, sizeof(float) * (size_t)(GRU_BAND * gates));
         gates_forward(input, x + p * g->ic, count, ih);
         if (old) gates_forward(hidden, old + p * g->c, count, hh);
         /* A zero state leaves of the hidden gates their bias. */
@@ -89,7 +87,7 @@ static void add_products(const float *d, int c, const float *b, int channels, in
     const ptrdiff_t zero = 0;
     ptrdiff_t b_stride = channels;
     if (width != channels) { /* whole vectors are read */
-        float *staged = ts_scratch(1, sizeof(float) * (size_t)(BAND * width));
+        float *staged = ts_scratch(1, sizeof(float) * (size_t)(GRU_BAND * width));
         for (int p = 0; p < count; p++) {
             memcpy(staged + (ptrdiff_t)p * width, b + (ptrdiff_t)p * channels, sizeof(float) * (size_t)channels);
             memset(staged + (ptrdiff_t)p * width + channels, 0, sizeof(float) * (size_t)(width - channels));
@@ -112,8 +110,16 @@ static void run_band(const ts_gru *g, int64_t p, int count, const float *x, cons
 {
     const int c = g->c;
     const ts_segment input[2] = {{c, 0, 2 * c}, {0, 2 * c, c}}, hidden = {c, 0, 3 * c};
-    float *d = ts_scratch(0, sizeof(float) * (size_t)(BAND * 4 * c)), *dold = to->dold ? to->dold + p * c : NULL;
+    float *d = ts_scratch(0, sizeof(float) * (size_t)(GRU_BAND * 4 * c)), *dold = to->dold ? to->dold + p * c : NULL;
     ts_elementwise_k()->gru_backward(count, c, saved + p * 4 * c, old ? old + p * c : NULL, dy + p * c, d, dold, to->dold_add, s.bias);
+    if (ts_gru_backward_bf16(g)) {
+        const gru_rounded r = gru_round(g, d, count);
+        if (dold) gru_matrix_product(&r, true, hh_packed, c, dold, true);
+        if (to->dx) gru_matrix_product(&r, false, ih_packed, g->ic, to->dx + p * g->ic, to->dx_add);
+        if (to->ih_weight) gru_matrix_weights(&r, false, x + p * g->ic, g->ic, s.input);
+        if (to->hh_weight && old) gru_matrix_weights(&r, true, old + p * c, c, s.hidden);
+        return;
+    }
     if (dold) product(d, 4 * c, &hidden, 1, 3 * c, hh_packed, c, dold, true, count);
     if (to->dx) product(d, 4 * c, input, 2, 3 * c, ih_packed, g->ic, to->dx + p * g->ic, to->dx_add, count);
     if (to->ih_weight) add_products(d, c, x + p * g->ic, g->ic, count, s.input);
@@ -159,8 +165,8 @@ void ts_gru_backward(const ts_gru *g, const float *x, const float *old, const fl
             memset(own, 0, sizeof(double) * (size_t)size);
             const sums s = {weights, weights + input, to->ih_bias || to->hh_bias ? own : NULL};
             const int64_t begin = g->pixels * part / parts, end = g->pixels * (part + 1) / parts;
-            for (int64_t p = begin; p < end; p += BAND)
-                run_band(g, p, (int)(end - p < BAND ? end - p : BAND), x, old, ih_packed, hh_packed, saved, dy, to, s);
+            for (int64_t p = begin; p < end; p += GRU_BAND)
+                run_band(g, p, (int)(end - p < GRU_BAND ? end - p : GRU_BAND), x, old, ih_packed, hh_packed, saved, dy, to, s);
         }
 #pragma omp for schedule(static)
         for (int m = 0; m < gates; m++) {

@@ -12,7 +12,7 @@
 typedef struct ts_gru {
     int64_t pixels;
     int ic, c; /* channels of x and of the state */
-    bool bf16; /* both products of forward on rounded x, old and weights, as in tensor/conv.h; weights packed for TS_CONV_FORWARD_BF16 */
+    bool bf16; /* both products of forward on rounded x, old and weights, as in tensor/conv.h; weights packed for TS_CONV_FORWARD_BF16; of backward where ts_gru_backward_bf16 says so */
 } ts_gru;
 
 /* The products as convolutions: what ts_conv_pack packs the weights W_ih [3c][ic] and W_hh [3c][c] for. */
@@ -32,7 +32,10 @@ typedef struct ts_gru_gradients {
     float *ih_weight, *ih_bias, *hh_weight, *hh_bias; /* unpacked shapes */
 } ts_gru_gradients;
 
-/* Weights packed for TS_CONV_DATA_GRADIENT. */
+/* Whether backward multiplies rounded values too: of g->bf16 on CPUs with a matrix unit, c a multiple of 16. */
+bool ts_gru_backward_bf16(const ts_gru *g);
+
+/* Weights packed for TS_CONV_DATA_GRADIENT, or TS_CONV_DATA_GRADIENT_BF16. */
 void ts_gru_backward(const ts_gru *g, const float *x, const float *old, const float *ih_packed, const float *hh_packed, const float *saved,
                      const float *dy, const ts_gru_gradients *to);
 

@@ -1,5 +1,6 @@
 #include "tensor/cpu.h"
 #include "tensor/gru.h"
+#include "tensor/kernels/elementwise.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"
 #include "tests/test.h"
@@ -68,9 +69,10 @@ static results fast(const subject *s, bool old, bool add)
 {
     results r = room(s, old, add);
     const float *state = old ? s->in[OLD] : NULL;
+    const ts_conv_use forward = s->g.bf16 ? TS_CONV_FORWARD_BF16 : TS_CONV_FORWARD, backward = ts_gru_backward_bf16(&s->g) ? TS_CONV_DATA_GRADIENT_BF16 : TS_CONV_DATA_GRADIENT;
     float *p[4];
     for (int i = 0; i < 4; i++)
-        p[i] = pack(i % 2 ? ts_gru_hidden(&s->g) : ts_gru_input(&s->g), i < 2 ? TS_CONV_FORWARD : TS_CONV_DATA_GRADIENT, s->in[i % 2 ? HH : IH]);
+        p[i] = pack(i % 2 ? ts_gru_hidden(&s->g) : ts_gru_input(&s->g), i < 2 ? forward : backward, s->in[i % 2 ? HH : IH]);
     ts_gru_forward(&s->g, s->in[X], state, p[0], s->in[IH_BIAS], p[1], s->in[HH_BIAS], r.y, r.saved);
     ts_gru_backward(&s->g, s->in[X], state, p[2], p[3], r.saved, s->in[DY], &r.to);
     for (int i = 0; i < 4; i++) free(p[i]);
@@ -117,19 +119,80 @@ TEST(gru_naive)
 
 TEST(gru_same_bytes_for_any_threads)
 {
-    subject s = make((ts_gru){5000, 20, 24, false}, 77);
-    results first = {0};
-    for (int threads = 1; threads <= 3; threads++) {
-        ts_threads_set(threads);
-        results r = fast(&s, true, false);
-        if (threads == 1) {
-            first = r;
-            continue;
+    for (int bf16 = 0; bf16 < 2; bf16++) {
+        subject s = make((ts_gru){5000, 20, 32, bf16}, 77);
+        results first = {0};
+        for (int threads = 1; threads <= 3; threads++) {
+            ts_threads_set(threads);
+            results r = fast(&s, true, false);
+            if (threads == 1) {
+                first = r;
+                continue;
+            }
+            CHECK(!memcmp(first.y, r.y, s.counts[DY] * 4) && !memcmp(first.dx, r.dx, s.counts[X] * 4) && !memcmp(first.dold, r.dold, s.counts[OLD] * 4) &&
+                      !memcmp(first.weights, r.weights, s.gradients * 4), "other bytes with %d threads", threads);
+            empty(&r);
         }
-        CHECK(!memcmp(first.y, r.y, s.counts[DY] * 4) && !memcmp(first.dx, r.dx, s.counts[X] * 4) && !memcmp(first.dold, r.dold, s.counts[OLD] * 4) &&
-                  !memcmp(first.weights, r.weights, s.gradients * 4), "other bytes with %d threads", threads);
-        empty(&r);
+        empty(&first), discard(&s);
     }
-    empty(&first), discard(&s);
     ts_threads_set(0);
+}
+
+static float *rounded(const float *x, size_t count)
+{
+    float *p = values(count, NULL);
+    for (size_t i = 0; i < count; i++) p[i] = ts_bf16_naive(x[i]);
+    return p;
+}
+
+/* The products of backward from the same gradients before the activations, which are rounded as the weights, x and the state are; biases and what passes the gates are not. */
+TEST(gru_backward_bf16_naive)
+{
+    static const int channels[] = {16, 32, 48, 64}, inputs[] = {1, 9, 16, 33, 128}, pixels[] = {1, 15, 17, 112, 113, 300, 2100};
+    if (ts_isa_best() < TS_AMX) test_skip("this CPU has no %s", ts_isa_name(TS_AMX));
+    ts_isa_use(TS_AMX);
+    ts_rng r = ts_rng_make(32, TS_STREAM_TEST, 0);
+    for (int i = 0; i < 30; i++) {
+        const int ic = inputs[ts_rng_int(&r, 5)], c = channels[ts_rng_int(&r, 4)];
+        subject s = make((ts_gru){pixels[i < 3 ? 6 : ts_rng_int(&r, 6)], ic, c, true}, (uint64_t)i);
+        const bool old = i % 3, add = i % 2;
+        CHECK(ts_gru_backward_bf16(&s.g), "%d channels are not rounded", c);
+        results a = fast(&s, old, add), b = room(&s, old, add);
+        const size_t count = (size_t)s.g.pixels, gates = 3 * (size_t)c, n_ic = (size_t)ic, n_c = (size_t)c;
+        float *d = values(4 * count * n_c, NULL), *own = values(count * n_c, NULL);
+        memcpy(own, b.dold, count * n_c * sizeof *own);
+        ts_elementwise_k()->gru_backward(s.g.pixels, c, a.saved, old ? s.in[OLD] : NULL, s.in[DY], d, own, add, NULL);
+        float *dr = rounded(d, 4 * count * n_c), *ih = rounded(s.in[IH], gates * n_ic), *hh = rounded(s.in[HH], gates * n_c), *x = rounded(s.in[X], count * n_ic), *state = rounded(s.in[OLD], count * n_c);
+        float *dx = values(count * n_ic, NULL), *weights = values(gates * (n_ic + n_c), NULL);
+        for (size_t k = 0; k < gates * (n_ic + n_c); k++) weights[k] = 1;
+        for (size_t p = 0; p < count; p++) {
+            const float *now = dr + 4 * p * n_c; /* n, z, r, n' */
+            for (size_t k = 0; k < n_ic; k++) {
+                double sum = add;
+                for (size_t m = 0; m < gates; m++) sum += (double)now[(m + n_c) % gates] * ih[m * n_ic + k];
+                dx[p * n_ic + k] = (float)sum;
+            }
+            for (size_t k = 0; k < n_c; k++)
+                for (size_t m = 0; m < gates; m++) own[p * n_c + k] += now[m + n_c] * hh[m * n_c + k];
+        }
+        for (size_t m = 0; m < gates; m++) {
+            for (size_t k = 0; k < n_ic; k++) {
+                double sum = 1;
+                for (size_t p = 0; p < count; p++) sum += (double)dr[4 * p * n_c + (m + n_c) % gates] * x[p * n_ic + k];
+                weights[m * n_ic + k] = (float)sum;
+            }
+            for (size_t k = 0; k < n_c; k++) {
+                double sum = 1;
+                for (size_t p = 0; p < count && old; p++) sum += (double)dr[4 * p * n_c + m + n_c] * state[p * n_c + k];
+                weights[gates * n_ic + m * n_c + k] = (float)sum;
+            }
+        }
+        same("dx", &s, a.dx, dx, s.counts[X], 1e-4);
+        if (old) same("dold", &s, a.dold, own, s.counts[OLD], 1e-4);
+        same("weights of the input", &s, a.weights, weights, gates * n_ic, 1e-4);
+        same("weights of the state", &s, a.weights + gates * (n_ic + 1), weights + gates * n_ic, gates * n_c, 1e-4);
+        float *const all[] = {d, own, dr, ih, hh, x, state, dx, weights};
+        for (size_t k = 0; k < sizeof all / sizeof *all; k++) free(all[k]);
+        empty(&a), empty(&b), discard(&s);
+    }
 }
