@@ -90,7 +90,8 @@ def rate(keys, step):
 
 
 def theirs(keys, build, config, weights):
-    names = ["g_width", "g_width_max", "g_levels", "g_kernel_first", "g_kernel", "g_size", "h_width", "h_gru", "channels", "", "iterations"]
+    names = ["g_width", "g_width_max", "g_levels", "g_kernel_first", "g_kernel", "g_size", "h_width", "h_gru", "channels", "", "iterations", "coarse_steps", "coarse_size", "coarse_width",
+             "coarse_gru"]
     yes = keys["model.recurrent"] == "yes"
     net, _ = peer.network([str(int(yes)) if not n else keys["model." + n] for n in names])
     load(net, weights)
