@@ -181,7 +181,7 @@ fuzz: $(FUZZ:%=$(BUILD)/fuzz/bin/%) $(IMAGE_LIB)
 
 # The sanitizers' build lives beside the ordinary one.
 asan:
-	@ASAN_OPTIONS=allocator_may_return_null=1 $(MAKE) --no-print-directory BUILD=$(BUILD)/asan OPT='-O1 -g -fno-omit-frame-pointer' SANITIZE='-fsanitize=address,undefined -fno-sanitize-recover=all' test
+	@ASAN_OPTIONS=allocator_may_return_null=1 $(MAKE) --no-print-directory BUILD=$(BUILD)-asan OPT='-O1 -g -fno-omit-frame-pointer' SANITIZE='-fsanitize=address,undefined -fno-sanitize-recover=all' test
 
 demo: deps
 	@$(MAKE) --no-print-directory all
@@ -204,7 +204,7 @@ uninstall:
 	-rmdir $(DESTDIR)$(PREFIX)/share/lgd $(DESTDIR)$(PREFIX)/lib/lgd
 
 clean:
-	rm -rf $(BUILD)
+	rm -rf $(BUILD) $(BUILD)-asan
 
 .PHONY: all deps test bench bench-deps stress fuzz asan demo install uninstall clean
 .SECONDARY:
