@@ -23,7 +23,7 @@ typedef struct bench_time {
 } bench_time;
 bench_time bench_measure(void (*f)(void *user), void *user);
 
-/* Makes vdpbf16ps's peak, measured now, the time's. False, with nothing changed, where the instruction set in use has none. */
+/* Makes the peak of bf16 (the matrix unit's, or vdpbf16ps'), measured now, the time's. False, with nothing changed, where the instruction set in use has none. */
 bool bench_bf16(bench_time *t);
 
 /* Times are processor time (lgd-bench --cpu). */
