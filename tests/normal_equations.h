@@ -21,11 +21,12 @@ static inline void normal_equations(const float *maps, const double point[2], co
         double value[3], by[3][MAP_CHANNELS];
         rd_radiance(m, point, &views[k], value, by);
         for (int c = 0; c < 3; c++) {
-            if (value[c] > 1) continue;
             const double target = (double)image[k][pixel * 3 + c], w = 1 / (target + (double)TS_NEWTON_NOISE);
+            if (value[c] > 1 && target >= 1) continue;
+            const double seen = value[c] > 1 ? 1 + log(value[c]) : value[c], slope = 1 / fmax(value[c], 1);
             for (int i = 0; i < MAP_CHANNELS; i++) {
-                b[i] -= w * by[c][i] * (value[c] - target);
-                for (int j = 0; j < MAP_CHANNELS; j++) a[i][j] += w * by[c][i] * by[c][j];
+                b[i] -= w * slope * by[c][i] * (seen - target);
+                for (int j = 0; j < MAP_CHANNELS; j++) a[i][j] += w * slope * slope * by[c][i] * by[c][j];
             }
         }
     }

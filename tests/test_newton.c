@@ -97,6 +97,39 @@ TEST(newton_finds_the_truth)
     free(truth), free(maps), free(step);
 }
 
+/* A highlight far above 1 comes back to a photograph below 1, and stays where the photograph is 1 as well. */
+TEST(newton_leaves_the_clamp)
+{
+    float *truth = floats(PIXELS * C), *maps = floats(PIXELS * C), *step = floats(PIXELS * C), *image = floats(PIXELS * 3), damping[C];
+    const rd_grid grid = rd_grid_full(SIDE);
+    const rd_view flash = rd_flash();
+    for (int p = 0; p < PIXELS; p++)
+        for (int i = 0; i < C; i++) {
+            truth[p * C + i] = i == MAP_ROUGHNESS ? 0.3f : i == MAP_NORMAL || i == MAP_NORMAL + 1 ? 0 : -0.6f;
+            maps[p * C + i] = i == MAP_ROUGHNESS ? -0.5f : truth[p * C + i];
+        }
+    for (int i = 0; i < C; i++) damping[i] = 0.1f;
+    rd_render(grid, truth, C, &flash, true, image);
+    const int centre = SIDE / 2 * SIDE + SIDE / 2;
+    float bright[3 * PIXELS];
+    rd_render(grid, maps, C, &flash, false, bright);
+    CHECK(image[centre * 3] < 0.9f && bright[centre * 3] > 4, "%g in the photograph, %g rendered: no such case", (double)image[centre * 3], (double)bright[centre * 3]);
+    const rd_view *views = &flash;
+    const float *photographs = image;
+    for (int t = 0; t < 12; t++) {
+        rd_newton_step(grid, maps, C, views, &photographs, 1, damping, step);
+        for (int i = 0; i < PIXELS * C; i++) maps[i] += step[i];
+    }
+    rd_render(grid, maps, C, &flash, false, bright);
+    for (int i = 0; i < 3; i++)
+        CHECK(fabsf(bright[centre * 3 + i] - image[centre * 3 + i]) < 1e-3f, "%g, not %g", (double)bright[centre * 3 + i], (double)image[centre * 3 + i]);
+    for (int p = 0; p < PIXELS; p++) maps[p * C + MAP_ROUGHNESS] = -0.5f;
+    for (int i = 0; i < 3; i++) image[centre * 3 + i] = 1;
+    rd_newton_step(grid, maps, C, views, &photographs, 1, damping, step);
+    for (int i = 0; i < C; i++) CHECK(step[centre * C + i] == 0, "channel %d moves by %g where the photograph is 1", i, (double)step[centre * C + i]);
+    free(truth), free(maps), free(step), free(image);
+}
+
 TEST(newton_is_finite_everywhere)
 {
     static const float extreme[] = {-1, 1, 0, -0.999999f, 0.999999f, -1.0000001f, 1.0000001f, 0.98f, -0.98f, 2, -5, 1e30f, -1e30f, 1e-30f, 1e-40f};

@@ -3,9 +3,11 @@
  * like Givens rotations, loses half of the digits that J' W J would. */
 #include "tensor/kernels/newton.h"
 #include "tensor/kernels/shade_lanes.h"
+#include "tensor/kernels/vmath.h"
 
 enum { SHARED = 3 };
 #define STEEPEST 1e6f /* of a derivative: with a light at the surface products of four would overflow */
+#define BRIGHTEST 1e30f /* of a radiance, which may be infinite there */
 static const int shared_map[SHARED] = {MAP_ROUGHNESS, MAP_NORMAL, MAP_NORMAL + 1};
 
 enum { ROW = 2 + SHARED };
@@ -32,6 +34,19 @@ V_INLINE void take_up(pivot *p, vf *row, int count, vf *error, vf *weight)
     p->d = d;
 }
 
+/* The radiance as the equations see it, and its slope: above 1 its logarithm, which leads back from a highlight of thousands in a few steps, where the clamp has
+ * no slope; none where the photograph is burnt out as well, whose 1 may stand for more. */
+V_INLINE vf exposed(vf value, vf photograph, vf *slope)
+{
+    const vi bright = ~(value <= v_set(1));
+    *slope = v_set(1);
+    if (!v_any(bright)) return value;
+    const vf above = v_max(v_min(value, v_set(BRIGHTEST)), v_set(1));
+    const vi burnt = bright & (photograph >= v_set(1));
+    *slope = v_select(burnt, v_set(0), 1.0f / above);
+    return v_select(bright, v_log(above) + v_set(1), value);
+}
+
 V_INLINE void add_view(const ts_shade_view *view, ts_shade_kind kind, const ts_shade_row *row, int first, int n, const float *image, const surface *s, equations *q)
 {
     lighting e;
@@ -46,11 +61,11 @@ V_INLINE void add_view(const ts_shade_view *view, ts_shade_kind kind, const ts_s
     for (int c = 0; c < 3; c++) {
         vf u[3] = {0}, j[MAP_CHANNELS];
         slopes d = {0};
-        u[c] = v_select(r.value[c] <= v_set(1), v_set(1), v_set(0));
+        const vf seen = exposed(r.value[c], target[c], &u[c]);
         derive(kind, s, &e, &g, &r, u, &d);
         encode(s, &d, j);
         for (int i = 0; i < MAP_CHANNELS; i++) j[i] = v_min(v_max(j[i], v_set(-STEEPEST)), v_set(STEEPEST));
-        vf error = target[c] - v_min(r.value[c], v_set(1)), weight = 1.0f / (v_max(target[c], v_set(0)) + TS_NEWTON_NOISE);
+        vf error = target[c] - seen, weight = 1.0f / (v_max(target[c], v_set(0)) + TS_NEWTON_NOISE);
         vf by[ROW] = {j[MAP_DIFFUSE + c], j[MAP_SPECULAR + c], j[MAP_ROUGHNESS], j[MAP_NORMAL], j[MAP_NORMAL + 1]};
         for (int i = 0; i < 2; i++) take_up(&q->own[c][i], by + i, ROW - 1 - i, &error, &weight);
         for (int i = 0; i < SHARED; i++) take_up(&q->shared[i], by + 2 + i, SHARED - 1 - i, &error, &weight);

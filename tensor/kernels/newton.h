@@ -5,9 +5,10 @@
 #include "tensor/maps.h"
 
 struct ts_newton_kernels {
-    /* Of each pixel by itself: step[count, channels] = -(J' W J + diag(damping))^-1 J' W e, e = min(radiance, 1) - image over the views and rgb,
-     * J = d min(radiance, 1) / d maps, W = 1 / (image + TS_NEWTON_NOISE); where maps + step would leave [-1, 1] it ends there. images[v][count, 3]
-     * belongs to views[v]; damping[MAP_CHANNELS] > 0. Channels beyond the maps' are not written. */
+    /* Of each pixel by itself: step[count, channels] = -(J' W J + diag(damping))^-1 J' W e, e = seen - image over the views and rgb,
+     * seen = radiance up to 1 and 1 + log(radiance) above, or 1 where the image is 1 as well; J = d seen / d maps, W = 1 / (image + TS_NEWTON_NOISE);
+     * where maps + step would leave [-1, 1] it ends there. images[v][count, 3], in [0, 1], belongs to views[v]; damping[MAP_CHANNELS] > 0.
+     * Channels beyond the maps' are not written. */
     void (*step)(const ts_shade_view *views, const float *const *images, int count, const ts_shade_row *row, const float *damping, float *step);
 };
 /* The variance of a photograph's value grows with it: shot noise, and 8 bits after the gamma curve. */
