@@ -22,7 +22,7 @@ static inline void normal_equations(const float *maps, const double point[2], co
         rd_radiance(m, point, &views[k], value, by);
         for (int c = 0; c < 3; c++) {
             const double target = (double)image[k][pixel * 3 + c], w = 1 / (target + (double)TS_NEWTON_NOISE);
-            if (value[c] > 1 && target >= 1) continue;
+            if (value[c] > 1 && image[k][pixel * 3 + c] >= TS_NEWTON_BURNT) continue;
             const double seen = value[c] > 1 ? 1 + log(value[c]) : value[c], slope = 1 / fmax(value[c], 1);
             for (int i = 0; i < MAP_CHANNELS; i++) {
                 b[i] -= w * slope * by[c][i] * (seen - target);

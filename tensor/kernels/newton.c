@@ -35,14 +35,14 @@ V_INLINE void take_up(pivot *p, vf *row, int count, vf *error, vf *weight)
 }
 
 /* The radiance as the equations see it, and its slope: above 1 its logarithm, which leads back from a highlight of thousands in a few steps, where the clamp has
- * no slope; none where the photograph is burnt out as well, whose 1 may stand for more. */
+ * no slope; none where the photograph is burnt out as well, whose value may stand for more. */
 V_INLINE vf exposed(vf value, vf photograph, vf *slope)
 {
     const vi bright = ~(value <= v_set(1));
     *slope = v_set(1);
     if (!v_any(bright)) return value;
     const vf above = v_max(v_min(value, v_set(BRIGHTEST)), v_set(1));
-    const vi burnt = bright & (photograph >= v_set(1));
+    const vi burnt = bright & (photograph >= v_set(TS_NEWTON_BURNT));
     *slope = v_select(burnt, v_set(0), 1.0f / above);
     return v_select(bright, v_log(above) + v_set(1), value);
 }
