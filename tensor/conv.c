@@ -35,7 +35,9 @@ size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
     if (use == TS_CONV_FORWARD_BF16) return conv_bf16_count(c, c->ic, c->oc);
     if (use == TS_CONV_DATA_GRADIENT_BF16) return conv_bf16_count(c, c->oc, ts_conv_variables(c));
     const int ic = use == TS_CONV_FORWARD ? c->ic : c->oc, oc = use == TS_CONV_FORWARD ? c->oc : ts_conv_variables(c);
-    return (size_t)conv_panels_count(ic, oc, c->k) + (conv_few_channels(oc, c->k) ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
+    const size_t panels = (size_t)conv_panels_count(ic, oc, c->k);
+    if (conv_by_col2im(ic, oc, c->k)) return panels + (size_t)conv_col2im_count(ic, oc, c->k);
+    return panels + (conv_few_channels(oc, c->k) ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
 }
 
 /* packed: [panel][ky][kx][input][channel of the panel, zeros where there is none] */
@@ -55,7 +57,9 @@ void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float 
     /* weight[o][c][tap]: strides of the packed input and output channel */
     const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * taps : taps, i_step = forward ? taps : (ptrdiff_t)c->ic * taps;
     const int parts = ic > 16 ? 16 : ic;
-    if (conv_few_channels(oc, c->k)) conv_pack_few(ic, oc, c->k, !forward, weight, i_step, o_step, packed + conv_panels_count(ic, oc, c->k));
+    float *few = packed + conv_panels_count(ic, oc, c->k);
+    if (conv_by_col2im(ic, oc, c->k)) conv_pack_col2im(ic, oc, c->k, !forward, weight, i_step, o_step, few);
+    else if (conv_few_channels(oc, c->k)) conv_pack_lanes(ic, oc, c->k, !forward, weight, i_step, o_step, few);
 #pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
     for (int panel = 0; panel < panels; panel++)
         for (int part = 0; part < parts; part++) {
@@ -95,6 +99,7 @@ void conv_run(const conv_plan *p)
     if (p->bf16 && conv_by_matrix()) conv_run_matrix(p);
     else if (p->k == 1) conv_run_pointwise(p);
     else if (conv_by_position(p->n, p->h, p->w)) conv_run_positions(p);
+    else if (!p->bf16 && conv_by_col2im(p->ic, p->oc, p->k)) conv_run_col2im(p);
     else if (conv_by_lanes(p)) conv_run_lanes(p);
     else conv_run_rows(p);
 }

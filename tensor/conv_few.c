@@ -7,7 +7,8 @@ enum { PANELS_TOGETHER = 8 };
 /* Panels [panel0, panel1), at most PANELS_TOGETHER of them. */
 static void run_together(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, int panel0, int panel1)
 {
-    const ptrdiff_t step = ts_conv_k()->pixels, panels = panel1 - panel0, calls = (p->ic + 3) / 4;
+    const ptrdiff_t tiles = (count + ts_conv_k()->pixels - 1) / ts_conv_k()->pixels, step = (count + tiles - 1) / tiles; /* a short last tile would wait for its own sums */
+    const ptrdiff_t panels = panel1 - panel0, calls = (p->ic + 3) / 4;
     const ts_segment segment = {0, 0, p->ic};
     ts_tile tile[PANELS_TOGETHER];
     /* Each panel fetches its share of the next tile's input and output: few k leave no time to wait for memory. */

@@ -1,4 +1,4 @@
-/* Convolution to few output channels, which would leave most lanes empty: lanes are pixels of a row instead. A block of columns goes down the image;
+/* Convolution of few inputs to few output channels, which would leave most lanes empty: lanes are pixels of a row instead. A block of columns goes down the image;
  * its rows of input, transposed to [channel][column], stay in the second cache, and a block of output channels x pixels stays in registers over all
  * taps and inputs. */
 #include "tensor/conv_plan.h"
@@ -26,7 +26,7 @@ bool conv_by_lanes(const conv_plan *p)
 static int chunk_of(int k) { return 84 / k; }
 
 /* [block of outputs][chunk of inputs][tap][input][output of the block] */
-void conv_pack_few(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step, float *packed)
+void conv_pack_lanes(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step, float *packed)
 {
     const int rows = ts_conv_k()->rows, blocks = (oc + rows - 1) / rows, taps = k * k, chunk = chunk_of(k);
     for (int block = 0; block < blocks; block++) {

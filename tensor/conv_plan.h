@@ -83,6 +83,7 @@ void conv_run_rows(const conv_plan *p);
 void conv_run_pointwise(const conv_plan *p);
 void conv_run_positions(const conv_plan *p);
 void conv_run_lanes(const conv_plan *p);
+void conv_run_col2im(const conv_plan *p);
 /* Whichever of them suits. */
 void conv_run(const conv_plan *p);
 
@@ -101,12 +102,15 @@ static inline int conv_bf16_depth(int channels) { return (channels + 1) / 2; }
 size_t conv_bf16_count(const ts_conv *c, int ic, int oc);
 void conv_pack_bf16(const ts_conv *c, bool forward, const float *weight, float *packed);
 
-/* Floats of the panels; weights to few channels are packed behind them once more for conv_run_lanes. */
 ptrdiff_t conv_panels_count(int ic, int oc, int k);
+/* To few channels weights are packed behind the panels once more: for conv_run_col2im, or else for conv_run_lanes, which leaves narrow images to the panels. */
+bool conv_by_col2im(int ic, int oc, int k);
+ptrdiff_t conv_col2im_count(int ic, int oc, int k);
 bool conv_few_channels(int oc, int k);
 bool conv_by_lanes(const conv_plan *p);
 /* weight[i * i_step + o * o_step + tap] */
-void conv_pack_few(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step, float *packed);
+void conv_pack_col2im(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step, float *packed);
+void conv_pack_lanes(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step, float *packed);
 
 size_t conv_winograd_count(int ic, int oc);
 void conv_winograd_pack(const ts_conv *c, bool forward, const float *weight, float *packed);

@@ -255,6 +255,37 @@ static void collect(const float *x, ptrdiff_t plane, int pixels, int channels, b
         }
 }
 
+INLINE void gather_vectors(const float *x, ptrdiff_t step, const int taps, ptrdiff_t next, int pixels, const int vectors, float *to)
+{
+    for (int p = 0; p < pixels; p++, x += step, to += vectors * VL) {
+        vf sum[2];
+        UNROLL for (int v = 0; v < vectors; v++) sum[v] = v_load(to + v * VL);
+        UNROLL for (int t = 0; t < taps; t++) UNROLL for (int v = 0; v < vectors; v++) sum[v] += v_load(x + t * next + v * VL);
+        UNROLL for (int v = 0; v < vectors; v++) v_store(to + v * VL, sum[v]);
+    }
+}
+
+static void gather(const float *x, ptrdiff_t step, int taps, ptrdiff_t next, int pixels, int vectors, float *to)
+{
+    if (taps == 3 && vectors == 1) gather_vectors(x, step, 3, next, pixels, 1, to);
+    else if (taps == 5 && vectors == 1) gather_vectors(x, step, 5, next, pixels, 1, to);
+    else gather_vectors(x, step, taps, next, pixels, vectors, to);
+}
+
+static void finish(float *x, int64_t pixels, int channels, bool add, float leak, float *y)
+{
+    const int vectors = (channels + VL - 1) / VL;
+    /* Each vector's end is written over by the next pixel's; what was just stored is not read, which would have to be waited for. */
+    for (int64_t p = 0; p < pixels; p++)
+        for (int v = 0; v < vectors; v++) v_store(x + p * channels + v * VL, v_load(x + (p * vectors + v) * VL));
+    const int64_t count = pixels * channels;
+    for (int64_t i = 0; i < count; i += VL) {
+        vf v = v_load_part(x + i, count - i);
+        if (add) v += v_load_part(y + i, count - i);
+        v_store_part(y + i, v_max(v_set(leak) * v, v), count - i);
+    }
+}
+
 #define FOR_5(DO) DO(1) DO(2) DO(3) DO(4) DO(5)
 #if PIXELS == 14
 #define FOR_ALL(DO) FOR_5(DO) DO(6) DO(7) DO(8) DO(9) DO(10) DO(11) DO(12) DO(13) DO(14)
@@ -294,4 +325,6 @@ const struct ts_conv_kernels TS_TABLE(conv) = {
     .columns = columns,
     .transpose = transpose,
     .collect = collect,
+    .gather = gather,
+    .finish = finish,
 };

@@ -68,6 +68,10 @@ struct ts_conv_kernels {
     void (*transpose)(const float *x, int pixels, int channels, float *to, ptrdiff_t plane); /* to[c plane + p] = x[p][c] */
     /* y[p stride + c] = act(x[c plane + p] (+ y[p stride + c])) */
     void (*collect)(const float *x, ptrdiff_t plane, int pixels, int channels, bool add, float leak, float *y, ptrdiff_t stride);
+    /* to[p][i] += sum_t x[p step + t next + i], i < vectors * lanes */
+    void (*gather)(const float *x, ptrdiff_t step, int taps, ptrdiff_t next, int pixels, int vectors, float *to);
+    /* y[p][c] = act(x[p][c] (+ y[p][c])); x has whole vectors of channels a pixel, and is written over */
+    void (*finish)(float *x, int64_t pixels, int channels, bool add, float leak, float *y);
 };
 TS_FAMILY(conv)
 #endif
