@@ -199,9 +199,9 @@ TEST(conv_chosen_shapes)
         {9, 8, 8, 16, 16, 5, 2, TS_PAD_REPLICATE, 0}, {5, 8, 8, 3, 20, 5, 1, TS_PAD_ZERO, 0},
         {1, 40, 40, 18, 33, 1, 1, TS_PAD_ZERO, 0}, {17, 2, 2, 33, 65, 5, 1, TS_PAD_ZERO, 0},
         {1, 64, 64, 3, 16, 3, 1, TS_PAD_ZERO, 0}, {2, 33, 64, 16, 9, 3, 2, TS_PAD_REPLICATE, 0},
-        {2, 20, 70, 24, 10, 5, 2, TS_PAD_REPLICATE, 0}, {1, 19, 300, 96, 9, 3, 1, TS_PAD_REPLICATE, 0},
-        {1, 20, 150, 80, 10, 5, 2, TS_PAD_ZERO, 0}, {1, 25, 130, 9, 90, 5, 2, TS_PAD_REPLICATE, 0},
-        {2, 17, 170, 10, 70, 5, 1, TS_PAD_REPLICATE, 0},
+        {2, 20, 70, 24, 10, 5, 2, TS_PAD_REPLICATE, 0}, {1, 17, 150, 48, 9, 3, 1, TS_PAD_REPLICATE, 0},
+        {1, 7, 80, 80, 10, 5, 2, TS_PAD_ZERO, 0}, {1, 9, 80, 9, 90, 5, 2, TS_PAD_REPLICATE, 0},
+        {2, 5, 70, 10, 70, 5, 1, TS_PAD_REPLICATE, 0},
     };
     ts_rng r = ts_rng_make(4, TS_STREAM_TEST, 0);
     for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
