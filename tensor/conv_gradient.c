@@ -84,14 +84,9 @@ typedef struct pass {
 static void stage_dy(const job *g, const pass *s, int panel, float *to)
 {
     const int lanes = conv_lanes(), oc = g->c->oc;
-    const int width = conv_vectors(oc, panel) * lanes, o0 = panel * 2 * lanes, count = oc - o0 < width ? oc - o0 : width;
-    for (int i = s->begin; i < s->end; i++) {
-        const float *from = g->dy + (((ptrdiff_t)s->image * g->c->h + i) * g->c->w + s->left) * oc + o0;
-        for (int j = s->left; j < s->right; j++, from += oc, to += width) {
-            memcpy(to, from, sizeof(float) * (size_t)count);
-            for (int o = count; o < width; o++) to[o] = 0;
-        }
-    }
+    const int width = conv_vectors(oc, panel) * lanes, o0 = panel * 2 * lanes, count = s->right - s->left;
+    for (int i = s->begin; i < s->end; i++, to += (ptrdiff_t)count * width)
+        ts_conv_k()->panel(g->dy + (((ptrdiff_t)s->image * g->c->h + i) * g->c->w + s->left) * oc + o0, oc, count, oc - o0 < width ? oc - o0 : width, to);
 }
 
 /* All blocks of m of one line and one panel of n. */

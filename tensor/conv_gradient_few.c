@@ -25,10 +25,8 @@ static staged stage(const ts_conv *c, const float *x, const float *dy)
             const ptrdiff_t to = (ptrdiff_t)q * c->n + n, from = (ptrdiff_t)n * positions + q;
             memcpy(to_x + to * pixel, x + from * c->ic, sizeof(float) * (size_t)c->ic);
             for (int panel = 0; panel < panels; panel++) {
-                const int width = conv_vectors(c->oc, panel) * lanes, o0 = panel * 2 * lanes, count = c->oc - o0 < width ? c->oc - o0 : width;
-                float *d = to_dy + pixels * o0 + to * width;
-                memcpy(d, dy + from * c->oc + o0, sizeof(float) * (size_t)count);
-                for (int o = count; o < width; o++) d[o] = 0;
+                const int width = conv_vectors(c->oc, panel) * lanes, o0 = panel * 2 * lanes;
+                ts_conv_k()->panel(dy + from * c->oc + o0, 0, 1, c->oc - o0 < width ? c->oc - o0 : width, to_dy + pixels * o0 + to * width);
             }
         }
     return (staged){to_x, to_dy, pixel};

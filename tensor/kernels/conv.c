@@ -219,6 +219,18 @@ static void columns(const float *x, int64_t pixels, int channels, float *restric
         for (int o = 0; o < channels; o++) sum[o] += a[o];
 }
 
+static void panel(const float *x, ptrdiff_t stride, int64_t pixels, int channels, float *to)
+{
+    const lanes first = lanes_of(channels), second = lanes_of(channels - VL);
+    if (channels <= VL)
+        for (; pixels > 0; pixels--, x += stride, to += VL) v_store(to, load_lanes(x, first));
+    else
+        for (; pixels > 0; pixels--, x += stride, to += 2 * VL) {
+            v_store(to, v_load(x));
+            v_store(to + VL, load_lanes(x + VL, second));
+        }
+}
+
 static void transpose(const float *x, int pixels, int channels, float *to, ptrdiff_t plane)
 {
     const int whole = pixels / VL * VL;
@@ -323,6 +335,7 @@ const struct ts_conv_kernels TS_TABLE(conv) = {
     .sum_near = {{FOR_ALL(NEAR_1)}, {FOR_ALL(NEAR_2)}},
     .pairs = pairs,
     .columns = columns,
+    .panel = panel,
     .transpose = transpose,
     .collect = collect,
     .gather = gather,
