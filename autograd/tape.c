@@ -1,6 +1,7 @@
 #include "autograd/tape.h"
 #include "autograd/op.h"
 #include "autograd/tape_inside.h"
+#include "tensor/block.h"
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -258,7 +259,7 @@ void ag_scope_end(ag_tape *tape, ts_mark mark, ag_value **keep, int count)
             kept = NULL;
             break;
         }
-        memcpy(kept[i].data, keep[i]->t.data, bytes);
+        ts_block_copy(kept[i].data, keep[i]->t.data, bytes);
     }
     if (!kept) { /* nothing is lost: the memory stays taken */
         no_memory(tape, "the values that a scope keeps");
@@ -269,7 +270,7 @@ void ag_scope_end(ag_tape *tape, ts_mark mark, ag_value **keep, int count)
     for (int i = 0; i < count; i++) {
         if (!kept[i].data) continue;
         keep[i] = ag_empty(tape, kept[i].shape);
-        if (keep[i]) memcpy(keep[i]->t.data, kept[i].data, (size_t)ts_count(kept[i].shape) * sizeof(float));
+        if (keep[i]) ts_block_copy(keep[i]->t.data, kept[i].data, (size_t)ts_count(kept[i].shape) * sizeof(float));
     }
     ts_arena_release(tape->moving, moving);
     if (ts_arena_used(tape->moving) == 0) ts_arena_reset(tape->moving); /* several chunks become one */

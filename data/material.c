@@ -36,6 +36,9 @@ static float level(float v)
     return v > 0 ? v < 1 ? 2 * v - 1 : 1 : -1;
 }
 
+/* To [-1, 1]; NaN to -1: a value still. */
+static float clamped(float x) { return x > -1 ? x < 1 ? x : 1 : -1; }
+
 io_texel io_texel_get(const float *maps9)
 {
     io_texel t = {.roughness = unit(maps9[MAP_ROUGHNESS])};
@@ -43,7 +46,7 @@ io_texel io_texel_get(const float *maps9)
         t.diffuse[c] = unit(maps9[MAP_DIFFUSE + c]);
         t.specular[c] = unit(maps9[MAP_SPECULAR + c]);
     }
-    float x = fminf(fmaxf(maps9[MAP_NORMAL], -1), 1), y = fminf(fmaxf(maps9[MAP_NORMAL + 1], -1), 1); /* NaN to -1: a value still */
+    float x = clamped(maps9[MAP_NORMAL]), y = clamped(maps9[MAP_NORMAL + 1]);
     float s = x * x + y * y;
     /* Refined maps may leave the unit circle; the renderer's rule (n_x^2 + n_y^2 at most 1 - 1e-6, then unit length) keeps z above 0. */
     if (s > 1 - 1e-6f) {
@@ -77,14 +80,16 @@ void io_texel_put(float *maps9, const io_texel *t)
 /* One map as an image: diffuse, specular and roughness in [0, 1], normals as (n + 1) / 2. */
 static void fill_map(const io_material *m, unsigned which, bool directx, io_image *image)
 {
-    size_t pixels = (size_t)m->size * (size_t)m->size;
+    const size_t pixels = (size_t)m->size * (size_t)m->size;
+    const int channels = image->channels, from = which == IO_MAPS_DIFFUSE ? MAP_DIFFUSE : which == IO_MAPS_SPECULAR ? MAP_SPECULAR : MAP_ROUGHNESS;
     for (size_t i = 0; i < pixels; i++) {
-        io_texel t = io_texel_get(m->maps + i * MAP_CHANNELS);
-        float *out = image->data + i * (size_t)image->channels;
-        if (which == IO_MAPS_ROUGHNESS) *out = t.roughness;
-        for (int c = 0; c < 3 && which != IO_MAPS_ROUGHNESS; c++) {
-            float n = c == 1 && directx ? -t.normal[c] : t.normal[c];
-            out[c] = which == IO_MAPS_DIFFUSE ? t.diffuse[c] : which == IO_MAPS_SPECULAR ? t.specular[c] : n * 0.5f + 0.5f;
+        const float *maps = m->maps + i * MAP_CHANNELS;
+        float *out = image->data + i * (size_t)channels;
+        if (which == IO_MAPS_NORMAL) {
+            const io_texel t = io_texel_get(maps);
+            for (int c = 0; c < 3; c++) out[c] = (c == 1 && directx ? -t.normal[c] : t.normal[c]) * 0.5f + 0.5f;
+        } else {
+            for (int c = 0; c < channels; c++) out[c] = unit(maps[from + c]);
         }
     }
 }

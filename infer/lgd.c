@@ -152,11 +152,12 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
 /* The network's encoding to the header's values. False when one is not finite. */
 static bool decode(const float *from, int channels, int64_t pixels, float *maps)
 {
+    bool finite = true;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) reduction(&& : finite)
     for (int64_t i = 0; i < pixels; i++) {
         const float *x = from + i * channels;
         float *m = maps + i * MAP_CHANNELS;
-        for (int c = 0; c < MAP_CHANNELS; c++)
-            if (!isfinite(x[c])) return false;
+        for (int c = 0; c < MAP_CHANNELS; c++) finite = finite && isfinite(x[c]);
         const io_texel t = io_texel_get(x);
         memcpy(m + MAP_DIFFUSE, t.diffuse, sizeof t.diffuse);
         m[MAP_NORMAL] = t.normal[0];
@@ -164,12 +165,13 @@ static bool decode(const float *from, int channels, int64_t pixels, float *maps)
         m[MAP_ROUGHNESS] = t.roughness;
         memcpy(m + MAP_SPECULAR, t.specular, sizeof t.specular);
     }
-    return true;
+    return finite;
 }
 
 void lgd_encode(const float *maps, int side, float *encoded)
 {
     const int64_t pixels = (int64_t)side * side;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
     for (int64_t i = 0; i < pixels; i++) {
         const float *m = maps + i * MAP_CHANNELS;
         const float x = m[MAP_NORMAL], y = m[MAP_NORMAL + 1];

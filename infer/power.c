@@ -2,6 +2,7 @@
 #include "infer/clip.h"
 #include "render/render.h"
 #include "tensor/resize.h"
+#include "tensor/threads.h"
 #include <math.h>
 #include <string.h>
 
@@ -10,15 +11,32 @@
 #define MOST_STOPS 3.0
 #define COARSE_STOPS 0.4 /* first these, then the finer ones around the best of them, a quarter of what is left out anyway */
 #define STEP_STOPS 0.05
+enum { MOST_TRIED = 8 }; /* on either side of the middle */
 
 /* How far the photographs' renderings are from them when every light is 2^stops times as strong: the loss of training, which a few pixels in a highlight
  * that is in another place do not decide; both as a camera clips them. */
-static double distance(size_t values, const float *photo, const float *rendered, double stops)
+static double distance(size_t values, const float *log_photo, const float *rendered, double stops)
 {
     const float factor = (float)exp2(stops);
     double sum = 0;
-    for (size_t i = 0; i < values; i++) sum += fabs((double)logf((fminf(photo[i], 1) + 0.01f) / (fminf(factor * rendered[i], 1) + 0.01f)));
+    for (size_t i = 0; i < values; i++) {
+        const float bright = factor * rendered[i];
+        sum += fabs((double)(log_photo[i] - logf((bright < 1 ? bright : 1) + 0.01f)));
+    }
     return sum;
+}
+
+/* The stops around middle at which it is least. */
+static double nearest(size_t values, const float *log_photo, const float *rendered, double middle, double reach, double step)
+{
+    double far[2 * MOST_TRIED + 1];
+    const int most = (int)lround(reach / step);
+    int best = 0;
+#pragma omp parallel for num_threads(ts_threads()) schedule(dynamic)
+    for (int i = 0; i <= 2 * most; i++) far[i] = distance(values, log_photo, rendered, middle + (i - most) * step);
+    for (int i = 1; i <= 2 * most; i++)
+        if (far[i] < far[best]) best = i;
+    return middle + (best - most) * step;
 }
 
 ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given, int side, int orientations, float *proposed, double *factor,
@@ -46,18 +64,13 @@ ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *
     }
     memcpy(proposed, maps->t.data, (size_t)ts_count(maps->t.shape) * sizeof(float));
     for (int k = 0; k < given; k++) rd_render(grid, maps->t.data, maps->t.shape.c, &views[k], false, rendered->t.data + (size_t)k * values);
-    double best = INFINITY, found = 0;
     bool tells = false; /* black: any light would be too strong; clipped: none would be */
     for (size_t i = 0; i < (size_t)given * values && !tells; i++) tells = small->t.data[i] > 0 && small->t.data[i] < 1;
     if (!tells) return TS_OK;
-    double middle = 0, reach = MOST_STOPS + USUAL_STOPS;
-    for (int fine = 0; fine < 2; fine++, middle = found, reach = COARSE_STOPS) {
-        const double step = fine ? STEP_STOPS : COARSE_STOPS;
-        for (int i = (int)-lround(reach / step); i <= lround(reach / step); i++) {
-            const double stops = middle + i * step, far = distance((size_t)given * values, small->t.data, rendered->t.data, stops);
-            if (far < best) best = far, found = stops;
-        }
-    }
+    float *log_photo = small->t.data;
+    for (size_t i = 0; i < (size_t)given * values; i++) log_photo[i] = logf((log_photo[i] < 1 ? log_photo[i] : 1) + 0.01f);
+    const double middle = nearest((size_t)given * values, log_photo, rendered->t.data, 0, MOST_STOPS + USUAL_STOPS, COARSE_STOPS);
+    const double found = nearest((size_t)given * values, log_photo, rendered->t.data, middle, COARSE_STOPS, STEP_STOPS);
     const double beyond = fmin(fmax(fabs(found) - USUAL_STOPS, 0), MOST_STOPS);
     *factor = exp2(found < 0 ? -beyond : beyond);
     return TS_OK;

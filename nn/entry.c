@@ -1,5 +1,6 @@
 /* The numbers of a tensor, from whatever type, order and layout they have in a file. */
 #include "nn/file_parts.h"
+#include "tensor/threads.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -54,12 +55,12 @@ static uint32_t as_bits(float f)
     return bits;
 }
 
-/* IEEE 754 binary16 to binary32, exactly. */
+/* IEEE 754 binary16 to binary32, exactly; without branches, so that loops over it become vectors. */
 static float from_half(uint16_t h)
 {
-    uint32_t sign = (uint32_t)(h & 0x8000) << 16, exponent = h >> 10 & 31, fraction = h & 0x3ff;
-    if (exponent == 0) return as_float(sign | as_bits((float)fraction * 0x1p-24f));
-    return as_float(sign | (exponent == 31 ? 255u : exponent + 112) << 23 | fraction << 13);
+    const uint32_t sign = (uint32_t)(h & 0x8000) << 16, exponent = h >> 10 & 31, fraction = h & 0x3ff;
+    const uint32_t usual = (exponent == 31 ? 255u : exponent + 112) << 23 | fraction << 13, subnormal = as_bits((float)(int32_t)fraction * 0x1p-24f);
+    return as_float(sign | (exponent ? usual : subnormal));
 }
 
 /* binary32 to binary16, to nearest, ties to even. A finite number from 65520 on becomes infinite and *overflow true. */
@@ -85,8 +86,16 @@ static uint16_t to_brain(float f)
     return (uint16_t)((bits + 0x7fff + (bits >> 16 & 1)) >> 16);
 }
 
+enum { CHUNK = 1024 };
+
 static void load(const nn_entry *e, const unsigned char *p, int64_t step, int n, float *out)
 {
+    if (e->dtype == NN_F16 && step == 2 && !e->swapped) { /* as the models that ship are */
+        uint16_t half[CHUNK];
+        memcpy(half, p, sizeof *half * (size_t)n);
+        for (int i = 0; i < n; i++) out[i] = from_half(half[i]);
+        return;
+    }
     switch (e->dtype) {
     case NN_F16:
         for (int i = 0; i < n; i++, p += step) out[i] = from_half(take16(p, e->swapped));
@@ -110,11 +119,11 @@ static void load(const nn_entry *e, const unsigned char *p, int64_t step, int n,
 static bool store(const float *in, nn_dtype to, int n, unsigned char *out)
 {
     bool overflow = false;
-    for (int i = 0; i < n; i++) {
+    if (to == NN_F32) memcpy(out, in, sizeof *in * (size_t)n);
+    for (int i = 0; to != NN_F32 && i < n; i++) {
         double d = in[i];
         uint16_t h = to == NN_F16 ? to_half(in[i], &overflow) : to == NN_BF16 ? to_brain(in[i]) : 0;
-        if (to == NN_F32) memcpy(out + 4 * i, &in[i], 4);
-        else if (to == NN_F64) memcpy(out + 8 * i, &d, 8);
+        if (to == NN_F64) memcpy(out + 8 * i, &d, 8);
         else memcpy(out + 2 * i, &h, 2);
     }
     return !overflow;
@@ -160,7 +169,6 @@ bool nn_entry_plain(const nn_entry *e)
 
 bool nn_entry_copy(const nn_entry *e, nn_dtype to, void *out)
 {
-    enum { CHUNK = 1024 };
     int64_t dim[NN_RANK_MAX], stride[NN_RANK_MAX], at[NN_RANK_MAX] = {0};
     if (e->count == 0) return true;
     const unsigned char *p = e->data;
@@ -170,11 +178,12 @@ bool nn_entry_copy(const nn_entry *e, nn_dtype to, void *out)
     bool good = true;
     for (int j = 0; j >= 0;) {
         if (to == e->dtype) copy_as_is(e, p, step, run, o);
-        for (int64_t i = 0; to != e->dtype && i < run; i += CHUNK) {
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) reduction(&& : good) if (run > 64 * CHUNK)
+        for (int64_t i = 0; i < (to == e->dtype ? 0 : run); i += CHUNK) {
             float part[CHUNK];
             const int m = (int)(run - i < CHUNK ? run - i : CHUNK);
             load(e, p + i * step, step, m, part);
-            good &= store(part, to, m, o + i * types[to].size);
+            good = store(part, to, m, o + i * types[to].size) && good;
         }
         o += run * types[to].size;
         for (j = n - 2; j >= 0 && ++at[j] == dim[j]; j--) { /* to the next run, like an odometer */

@@ -2,6 +2,7 @@
  * 2024): R_0 = g(image), R_{t+1} = R_t + h(R_t, dL/dR_t). */
 #include "nn/unrolled.h"
 #include "ops.h"
+#include "tensor/block.h"
 #include <string.h>
 
 /* The part of maps of the whole that in->image shows. */
@@ -56,7 +57,7 @@ static ag_value *step_and_release(ag_tape *tape, const nn_model *model, const nn
     ts_mark mark = ag_scope_begin(tape);
     ag_value *next = nn_refine(tape, model, in, maps, state);
     if (!next) return NULL;
-    memcpy(to->t.data, next->t.data, (size_t)ts_count(to->t.shape) * sizeof(float));
+    ts_block_copy(to->t.data, next->t.data, (size_t)ts_count(to->t.shape) * sizeof(float));
     ag_scope_end(tape, mark, NULL, 0);
     for (int i = 0; i < 2; i++) state->gru[i] = state->to[i];
     return to;

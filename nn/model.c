@@ -195,7 +195,7 @@ nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
 static float *block(size_t count, const char *what, ts_status *st)
 {
     float *p = ts_block(count * sizeof *p);
-    if (p) memset(p, 0, count * sizeof *p);
+    if (p) ts_block_clear(p, count * sizeof *p);
     else ts_fail(st, TS_NOMEM, "no memory for the model's %s (%.0f MB)", what, (double)count * sizeof *p / 1e6);
     return p;
 }
