@@ -26,7 +26,7 @@ winograd_grid winograd_grid_gradient(const ts_conv *c, int fold);
 typedef struct winograd_place {
     int image, i, j; /* first output pixel; the others are dilation apart */
 } winograd_place;
-winograd_place winograd_locate(const winograd_grid *g, int64_t tile);
+void winograd_locate(const winograd_grid *g, int64_t first, int count, winograd_place *place); /* of tiles first, first + 1, ... */
 
 /* The 6 x 6 pixels of x that a tile reads; nothing, a pixel of zeros, for those outside. */
 void winograd_sources(const winograd_grid *g, const float *x, const float *nothing, winograd_place at, const float *pixel[WINOGRAD_AREA]);

@@ -44,10 +44,10 @@ static job make_job(const ts_conv *c, const float *x, const float *dy)
     return j;
 }
 
-static void put_sources(const job *j, int64_t tile, const float *nothing, const float *pixel[WINOGRAD_SIDE * WINOGRAD_SIDE])
+static void put_sources(const job *j, winograd_place tile, const float *nothing, const float *pixel[WINOGRAD_SIDE * WINOGRAD_SIDE])
 {
     ptrdiff_t at[WINOGRAD_SIDE * WINOGRAD_SIDE];
-    winograd_targets(&j->g, winograd_locate(&j->g, tile), at);
+    winograd_targets(&j->g, tile, at);
     for (int i = 0; i < WINOGRAD_SIDE * WINOGRAD_SIDE; i++) pixel[i] = at[i] < 0 ? nothing : j->dy + at[i];
 }
 
@@ -57,12 +57,14 @@ static void transform(const job *j, int64_t first, int count, const float *nothi
     const struct ts_winograd_kernels *k = ts_winograd_k();
     const winograd_grid *g = &j->g;
     const float *x[2][WINOGRAD_AREA], *dy[2][WINOGRAD_SIDE * WINOGRAD_SIDE];
-    winograd_sources(g, j->x, nothing, winograd_locate(g, first), x[0]);
-    put_sources(j, first, nothing, dy[0]);
+    winograd_place place[GROUP_TILES + 1];
+    winograd_locate(g, first, count, place);
+    place[count] = place[count - 1];
+    winograd_sources(g, j->x, nothing, place[0], x[0]);
+    put_sources(j, place[0], nothing, dy[0]);
     for (int i = 0; i < count; i++) {
-        const int64_t next = first + (i + 1 < count ? i + 1 : i);
-        winograd_sources(g, j->x, nothing, winograd_locate(g, next), x[(i + 1) & 1]);
-        put_sources(j, next, nothing, dy[(i + 1) & 1]);
+        winograd_sources(g, j->x, nothing, place[i + 1], x[(i + 1) & 1]);
+        put_sources(j, place[i + 1], nothing, dy[(i + 1) & 1]);
         k->input(x[i & 1], x[(i + 1) & 1], g->ic, v + (ptrdiff_t)i * g->ic, j->in);
         k->output_gradient(dy[i & 1], dy[(i + 1) & 1], g->oc, m + (ptrdiff_t)i * j->padded, j->out);
     }
