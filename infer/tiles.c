@@ -214,7 +214,7 @@ static ts_code prepare(work *w)
     const nn_input in = {.image = photo, .grid = rd_grid_full(side), .views = w->t->views, .given = given, .orientations = w->t->orientations, .proposed = w->t->proposed};
     if (nn_coarse_steps(w->tape, w->model, &in, w->coarse_steps, w->coarse) != TS_OK) return ag_status(w->tape)->code;
     ag_scope_end(w->tape, mark, w->coarse, w->coarse_steps + 1);
-    for (int i = 0; i < 2; i++) w->taps[i] = ts_taps_triangle(arena, w->coarse[i ? w->coarse_steps : 0]->t.shape.h, side);
+    for (int i = 0; i < 2; i++) w->taps[i] = ts_taps_smooth(arena, w->coarse[i ? w->coarse_steps : 0]->t.shape.h, side);
     w->squares = ts_arena_zalloc(arena, (size_t)w->t->steps + 1, sizeof *w->squares);
     w->rmse0 = ts_arena_zalloc(arena, (size_t)given, sizeof *w->rmse0);
     if (!w->taps[0].weight || !w->taps[1].weight || !w->squares || !w->rmse0) ag_fail(w->tape, TS_NOMEM, "out of memory");

@@ -133,7 +133,7 @@ bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c)
     if (!c->maps) return false;
     const ts_shape s = c->maps->t.shape;
     if (!c->up.weight) {
-        c->up = ts_taps_triangle(ag_arena(tape), s.h, side);
+        c->up = ts_taps_smooth(ag_arena(tape), s.h, side);
         c->down = ts_taps_triangle(ag_arena(tape), side, s.h);
         if (!c->up.weight || !c->down.weight) return ag_fail(tape, TS_NOMEM, "no memory for the filter"), false;
     }

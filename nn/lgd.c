@@ -66,7 +66,7 @@ static ag_value *step_and_release(ag_tape *tape, const nn_model *model, const nn
 /* Of the whole, at its own size. */
 static ag_value *resampled(ag_tape *tape, int side, ag_value *maps)
 {
-    return maps->t.shape.h == side ? maps : ag_resize(tape, maps, side, side);
+    return maps->t.shape.h == side ? maps : ag_resize_smooth(tape, maps, side, side);
 }
 
 /* R_0 and those that the first steps leave, into maps as nn_lgd has it. Returns the last, of the whole photographs, and in *t its step; *on: to go on. */

@@ -115,7 +115,7 @@ ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in)
     if (!nn_coarse_begin(tape, model, in, &c)) return NULL;
     ag_value *maps = c.maps;
     const int side = c.in.grid.side;
-    if (side != model->arch.g_size) maps = ag_resize(tape, maps, side, side);
+    if (side != model->arch.g_size) maps = ag_resize_smooth(tape, maps, side, side);
     ag_scope_end(tape, mark, &maps, 1);
     return maps;
 }

@@ -29,24 +29,36 @@ ts_taps ts_taps_aligned(ts_arena *arena, int in, int out)
     return t;
 }
 
-ts_taps ts_taps_triangle(ts_arena *arena, int in, int out)
+static double triangle(double x) { return x < 1 ? 1 - x : 0; }
+
+/* Mitchell and Netravali, Reconstruction filters in computer graphics, 1988, with B = .6, C = .2. */
+static double cubic(double x)
 {
-    const double step = (double)in / out, radius = step > 1 ? step : 1;
+    const double b = 0.6, c = 0.2;
+    if (x < 1) return (12 - 9 * b - 6 * c) / 6 * x * x * x - (18 - 12 * b - 6 * c) / 6 * x * x + (6 - 2 * b) / 6;
+    if (x < 2) return -(b + 6 * c) / 6 * x * x * x + (b + 5 * c) * x * x - (2 * b + 8 * c) * x + (8 * b + 24 * c) / 6;
+    return 0;
+}
+
+/* weight is not 0 for distances below support, in units of scale. */
+static ts_taps make_filter(ts_arena *arena, int in, int out, double scale, double support, double (*weight)(double))
+{
+    const double step = (double)in / out, radius = scale * support;
     const size_t most = 2 * (size_t)ceil(radius) + 1;
     ts_taps t = make_taps(arena, in, out, most * (size_t)out);
     if (!t.weight) return t;
     for (int j = 0, at = 0; j < out; j++) {
         const double centre = (j + 0.5) * step - 0.5;
-        const int lo = (int)floor(centre - radius) + 1, hi = (int)ceil(centre + radius) - 1; /* where the triangle is above 0 */
+        const int lo = (int)floor(centre - radius) + 1, hi = (int)ceil(centre + radius) - 1; /* where there is a weight */
         const int from = lo < 0 ? 0 : lo, to = hi > in - 1 ? in - 1 : hi;
         double sum = 0;
-        for (int i = lo; i <= hi; i++) sum += 1 - fabs(i - centre) / radius;
+        for (int i = lo; i <= hi; i++) sum += weight(fabs(i - centre) / scale);
         for (int i = from; i <= to; i++) {
-            double w = 1 - fabs(i - centre) / radius;
+            double w = weight(fabs(i - centre) / scale);
             if (i == 0)
-                for (int q = lo; q < 0; q++) w += 1 - fabs(q - centre) / radius;
+                for (int q = lo; q < 0; q++) w += weight(fabs(q - centre) / scale);
             if (i == in - 1)
-                for (int q = in; q <= hi; q++) w += 1 - fabs(q - centre) / radius;
+                for (int q = in; q <= hi; q++) w += weight(fabs(q - centre) / scale);
             t.weight[at + i - from] = (float)(w / sum);
         }
         t.first[j] = from;
@@ -55,6 +67,10 @@ ts_taps ts_taps_triangle(ts_arena *arena, int in, int out)
     }
     return t;
 }
+
+ts_taps ts_taps_triangle(ts_arena *arena, int in, int out) { return make_filter(arena, in, out, in > out ? (double)in / out : 1, 1, triangle); }
+
+ts_taps ts_taps_smooth(ts_arena *arena, int in, int out) { return out > in ? make_filter(arena, in, out, 1, 2, cubic) : ts_taps_triangle(arena, in, out); }
 
 ts_taps ts_taps_transpose(ts_arena *arena, const ts_taps *t)
 {

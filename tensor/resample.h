@@ -18,6 +18,10 @@ ts_taps ts_taps_aligned(ts_arena *arena, int in, int out);
 /* Triangle filter of half-width max(1, in / out) around (j + 1/2) in / out - 1/2, positions outside read the edge's value. */
 ts_taps ts_taps_triangle(ts_arena *arena, int in, int out);
 
+/* To more positions by Mitchell and Netravali's cubic with B = .6 and C = .2, of half-width 2: with continuous slopes, which linear interpolation has not, a little blurred, and
+ * up to 3% of a step beyond the values. To as many or fewer the triangle filter. */
+ts_taps ts_taps_smooth(ts_arena *arena, int in, int out);
+
 /* The taps of out positions first .. first + count - 1 alone: views of t. offset counts from the first of all, so the weights stay where they are. */
 static inline ts_taps ts_taps_part(const ts_taps *t, int first, int count)
 {
