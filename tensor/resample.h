@@ -19,7 +19,7 @@ ts_taps ts_taps_aligned(ts_arena *arena, int in, int out);
 ts_taps ts_taps_triangle(ts_arena *arena, int in, int out);
 
 /* To more positions by Mitchell and Netravali's cubic with B = .6 and C = .2, of half-width 2: with continuous slopes, which linear interpolation has not, a little blurred, and
- * up to 3% of a step beyond the values. To as many or fewer the triangle filter. */
+ * up to 1.3% of a step beyond the values. To as many or fewer the triangle filter. */
 ts_taps ts_taps_smooth(ts_arena *arena, int in, int out);
 
 /* The taps of out positions first .. first + count - 1 alone: views of t. offset counts from the first of all, so the weights stay where they are. */
