@@ -129,7 +129,7 @@ static bool step_and_forget(ag_tape *tape, const nn_model *model, nn_coarse *c)
 bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c)
 {
     const int side = c->in.grid.side, size = side < model->arch.coarse_size ? side : model->arch.coarse_size;
-    if (c->maps->t.shape.h != size) c->maps = ag_resize(tape, c->maps, size, size); /* it came from g */
+    if (c->maps->t.shape.h != size) c->maps = ag_resize_smooth(tape, c->maps, size, size); /* it came from g */
     if (!c->maps) return false;
     const ts_shape s = c->maps->t.shape;
     if (!c->up.weight) {

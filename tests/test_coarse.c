@@ -53,7 +53,7 @@ TEST(nn_coarse_steps_read_the_photograph_at_its_size)
         ag_value *maps[2];
         CHECK(!nn_coarse_steps(t, m, &in, 1, maps), "%s", ag_status(t)->message);
         const int coarse = sides[k] < SIDE ? sides[k] : SIDE;
-        ag_value *from = ag_resize(t, maps[0], coarse, coarse), *full = ag_resize_smooth(t, from, sides[k], sides[k]), *newton = ag_empty(t, full->t.shape);
+        ag_value *from = ag_resize_smooth(t, maps[0], coarse, coarse), *full = ag_resize_smooth(t, from, sides[k], sides[k]), *newton = ag_empty(t, full->t.shape);
         const size_t pixels = (size_t)sides[k] * (size_t)sides[k];
         for (size_t n = 0; n < 2; n++) {
             const float *image = in.image.data + n * pixels * 3;
