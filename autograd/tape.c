@@ -7,18 +7,33 @@
 #include <stdlib.h>
 #include <string.h>
 
-ag_tape *ag_tape_create(bool gradients, ts_status *st)
+/* packs: the tape's to release, also after failure; NULL after an error. */
+static ag_tape *create(bool gradients, ag_packs *packs, ts_status *st)
 {
-    ag_tape *tape = calloc(1, sizeof *tape);
+    ag_tape *tape = packs ? calloc(1, sizeof *tape) : NULL;
     if (!tape) {
-        ts_fail(st, TS_NOMEM, "no memory for a tape");
+        if (packs) ts_fail(st, TS_NOMEM, "no memory for a tape");
+        ag_packs_release(&packs);
         return NULL;
     }
     tape->gradients = gradients;
+    tape->packs = packs;
     tape->arena = ts_arena_create(0, st);
-    tape->packs_arena = tape->arena ? ts_arena_create(0, st) : NULL;
-    tape->moving = tape->packs_arena ? ts_arena_create(0, st) : NULL;
+    tape->moving = tape->arena ? ts_arena_create(0, st) : NULL;
     if (!tape->moving) ag_tape_destroy(&tape);
+    return tape;
+}
+
+ag_tape *ag_tape_create(bool gradients, ts_status *st) { return create(gradients, ag_packs_create(st), st); }
+
+ag_tape *ag_tape_beside(const ag_tape *other, ts_status *st)
+{
+    if (!other->frozen) {
+        ts_fail(st, TS_INVALID, "a tape beside one that is not frozen");
+        return NULL;
+    }
+    ag_tape *tape = create(false, ag_packs_hold(other->packs), st);
+    if (tape) tape->frozen = true;
     return tape;
 }
 
@@ -26,10 +41,9 @@ void ag_tape_destroy(ag_tape **tape)
 {
     if (!*tape) return;
     ts_arena_destroy(&(*tape)->arena);
-    ts_arena_destroy(&(*tape)->packs_arena);
+    ag_packs_release(&(*tape)->packs);
     ts_arena_destroy(&(*tape)->moving);
     free((*tape)->node);
-    free((*tape)->pack);
     free(*tape);
     *tape = NULL;
 }
@@ -41,10 +55,7 @@ void ag_reset(ag_tape *tape)
     tape->nodes = 0;
     tape->into = NULL;
     tape->status = (ts_status){0};
-    if (!tape->frozen) {
-        ts_arena_reset(tape->packs_arena);
-        tape->packs = 0;
-    }
+    if (!tape->frozen) ag_packs_forget(tape->packs);
 }
 
 const ts_status *ag_status(const ag_tape *tape) { return &tape->status; }
@@ -124,21 +135,15 @@ ag_value *ag_detach(ag_tape *tape, ag_value *v)
     return ag_new_value(tape, v->t, NULL);
 }
 
-/* One more slot in a list; false without memory. */
-static bool grow(void **list, size_t item, size_t count, size_t *room)
-{
-    if (count < *room) return true;
-    size_t more = *room ? 2 * *room : 256;
-    void *p = realloc(*list, more * item);
-    if (!p) return false;
-    *list = p;
-    *room = more;
-    return true;
-}
-
 bool ag_record(ag_tape *tape, ag_node *node)
 {
-    if (!grow((void **)&tape->node, sizeof *tape->node, tape->nodes, &tape->node_room)) return no_memory(tape, "the list of operations");
+    if (tape->nodes == tape->node_room) {
+        const size_t more = tape->node_room ? 2 * tape->node_room : 256;
+        ag_node **grown = realloc(tape->node, more * sizeof *grown);
+        if (!grown) return no_memory(tape, "the list of operations");
+        tape->node = grown;
+        tape->node_room = more;
+    }
     tape->node[tape->nodes++] = node;
     return true;
 }
@@ -226,19 +231,8 @@ ts_code ag_backward(ag_tape *tape, ag_value *loss)
 
 const float *ag_packed(ag_tape *tape, const ts_conv *c, ts_conv_use use, const float *weight)
 {
-    for (size_t i = 0; i < tape->packs; i++) {
-        const ag_pack *p = &tape->pack[i];
-        if (p->weight == weight && p->use == use && p->conv.ic == c->ic && p->conv.oc == c->oc && p->conv.k == c->k &&
-            p->conv.dilation == c->dilation && p->conv.pad == c->pad && p->conv.constants == c->constants)
-            return p->packed;
-    }
-    float *packed = ts_arena_alloc(tape->packs_arena, ts_conv_packed_count(c, use) * sizeof(float));
-    if (!packed || !grow((void **)&tape->pack, sizeof *tape->pack, tape->packs, &tape->pack_room)) {
-        no_memory(tape, "packed weights");
-        return NULL;
-    }
-    ts_conv_pack(c, use, weight, packed);
-    tape->pack[tape->packs++] = (ag_pack){weight, use, *c, packed};
+    const float *packed = ag_packs_find(tape->packs, c, use, weight);
+    if (!packed) no_memory(tape, "packed weights");
     return packed;
 }
 

@@ -1,6 +1,7 @@
 /* What the tape is made of: for autograd/tape.c and autograd/checkpoint.c alone. */
 #ifndef AG_TAPE_INSIDE_H
 #define AG_TAPE_INSIDE_H
+#include "autograd/packs.h"
 #include "autograd/tape.h"
 
 /* A value and where the arena stood before it was made: scopes ask which side of a mark it is on. */
@@ -9,21 +10,13 @@ typedef struct ag_held {
     size_t born;
 } ag_held;
 
-typedef struct ag_pack {
-    const float *weight;
-    ts_conv_use use;
-    ts_conv conv; /* n, h, w play no part */
-    float *packed;
-} ag_pack;
-
 struct ag_tape {
-    ts_arena *arena, *packs_arena, *moving; /* moving: what a scope keeps, while the arena is released */
+    ts_arena *arena, *moving; /* moving: what a scope keeps, while the arena is released */
+    ag_packs *packs;
     bool gradients, frozen;
     ag_value *into; /* of the next operation */
-    ag_node **node; /* grown by doubling and never shrunk, as is pack */
+    ag_node **node; /* grown by doubling and never shrunk */
     size_t nodes, node_room;
-    ag_pack *pack;
-    size_t packs, pack_room;
     ts_status status;
 };
 

@@ -15,7 +15,8 @@ typedef struct lgd_error {
     char message[512];
 } lgd_error;
 
-/* Reads weights (safetensors). NULL and error on failure. The caller frees. One model may serve one call at a time. */
+/* Reads weights (safetensors). NULL and error on failure. The caller frees, when no call uses it. Any number of threads may call lgd_estimate with one model at
+ * once: each such call has memory of its own (20 MB at 256 x 256 pixels), which the model keeps for later calls. */
 lgd_model *lgd_load(const char *weights, lgd_error *error);
 void lgd_free(lgd_model **model);
 
@@ -43,7 +44,7 @@ typedef struct lgd_options {
     int orientations; /* 2, 4, 8: the first estimate is the mean of those of so many of the photograph's orientations (as it is and turned by a half, all
                        * quarter turns, and their mirror images), where it is the only one and light and camera are above its centre (not with the
                        * published weights); 1 or 0: of the photograph as it is */
-    int threads;    /* 0: as many as the process may use */
+    int threads;    /* that the call computes on; 0: as many as the process may use */
     /* Called after R_0 (step 0) and after every refinement with the reconstruction RMSE; return nonzero to stop there. May be NULL. */
     int (*progress)(int step, double rmse, void *user);
     void *user;

@@ -11,33 +11,51 @@
 #include "infer/pipeline.h"
 #include "tensor/threads.h"
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 typedef struct run {
     const lgd_command *command;
     lgd_model *model;
+    pthread_mutex_t lock; /* of the bar and of what is printed */
     cl_progress bar;
-    lgd_item *item;         /* the one that is computed */
+    double shown;           /* photographs that the bar has, and parts of such */
     int jobs, done, failed; /* photographs: all, with complete files, without */
     int steps;              /* refinement steps of each */
 } run;
 
+/* What the library's calls get as their user. */
+typedef struct task {
+    run *r;
+    lgd_item *item;
+} task;
+
+/* done: of the item, 0 .. 1. */
+static void show(run *r, lgd_item *item, double done)
+{
+    pthread_mutex_lock(&r->lock);
+    r->shown += done - item->shown;
+    item->shown = done;
+    if (!r->command->quiet) cl_progress_show(&r->bar, (int64_t)(r->shown * (r->steps + 1) + 0.5), item->job->photo);
+    pthread_mutex_unlock(&r->lock);
+}
+
 static int after_step(int step, double rmse, void *user)
 {
-    run *r = user;
-    if (step == 0) r->item->first = rmse;
-    r->item->last = rmse;
-    r->item->steps = step;
-    if (!r->command->quiet) cl_progress_show(&r->bar, (int64_t)r->item->index * (r->steps + 1) + step + 1, r->item->job->photo);
+    const task *t = user;
+    if (step == 0) t->item->first = rmse;
+    t->item->last = rmse;
+    t->item->steps = step;
+    show(t->r, t->item, (step + 1.0) / (t->r->steps + 1));
     return cl_interrupted();
 }
 
 /* Of a photograph that is refined in tiles. */
 static int before_tile(double done, void *user)
 {
-    run *r = user;
-    if (!r->command->quiet) cl_progress_show(&r->bar, (int64_t)((r->item->index + done) * (r->steps + 1)), r->item->job->photo);
+    const task *t = user;
+    show(t->r, t->item, done);
     return cl_interrupted();
 }
 
@@ -65,18 +83,19 @@ static void compute(lgd_item *item, void *user)
 {
     run *r = user;
     const int size = item->square.width;
-    const lgd_options options = {.iterations = r->command->iterations, .threads = r->command->threads, .progress = after_step, .user = r,
+    task t = {r, item};
+    const lgd_options options = {.iterations = r->command->iterations, .threads = item->threads, .progress = after_step, .user = &t,
                                  .power = r->command->power > 0 ? NULL : &item->power, .exact = r->command->exact, .precision = r->command->bf16 ? LGD_BF16 : LGD_F32, .orientations = r->command->orientations, .mask = item->mask, .tolerance = r->command->tolerance, .tile = before_tile};
     lgd_error error;
     lgd_photo photo[IO_CAPTURE_IMAGES] = {lgd_flash_photo(item->square.data)};
     int photos = 1;
     if (item->capture.images) {
         photos = lgd_capture_photos(&item->capture, lgd_most_photos(r->model), photo);
-        if (photos < item->capture.images) cl_note("%s: note: the first %d of its %d photographs are used: these weights read no more", item->job->photo, photos, item->capture.images);
+        if (photos < item->capture.images)
+            cl_note("%s: note: the first %d of its %d photographs are used: these weights read no more", item->job->photo, photos, item->capture.images);
     }
     item->power = r->command->power > 0 ? r->command->power : 1;
     for (int k = 0; k < photos; k++) photo[k].power *= (float)item->power;
-    r->item = item;
     if (io_material_create(&item->m, size, &item->st) != TS_OK) ts_context(&item->st, "%s", item->job->photo);
     else if (lgd_estimate_photos(r->model, photo, photos, size, &options, item->m.maps, &error) && !cl_interrupted())
         ts_fail(&item->st, (ts_code)error.code, "%s: %s", item->job->photo, error.message);
@@ -84,10 +103,8 @@ static void compute(lgd_item *item, void *user)
     else lgd_encode(item->m.maps, size, item->m.maps);
 }
 
-static void finished(const lgd_item *item, void *user)
+static void tell(run *r, const lgd_item *item)
 {
-    run *r = user;
-    if (item->st.code == TS_INTERRUPTED) return;
     cl_progress_end(&r->bar);
     if (item->square.data) look_at(item);
     if (item->st.code) {
@@ -104,6 +121,16 @@ static void finished(const lgd_item *item, void *user)
     if (fabs(item->power - 1) >= 0.005) cl_note("%s: light power %.2f of the %s", item->job->photo, item->power, item->capture.images ? "capture's" : "usual");
     if (item->steps > 0) cl_note("%s: reconstruction RMSE %.4f (R_0) -> %.4f (R_%d)", item->job->photo, item->first, item->last, item->steps);
     else cl_note("%s: reconstruction RMSE %.4f (R_0)", item->job->photo, item->first);
+}
+
+static void finished(const lgd_item *item, void *user)
+{
+    run *r = user;
+    if (item->st.code == TS_INTERRUPTED) return;
+    pthread_mutex_lock(&r->lock);
+    r->shown += 1 - item->shown; /* of one that failed or ended early too */
+    tell(r, item);
+    pthread_mutex_unlock(&r->lock);
 }
 
 static int all(run *r, lgd_pipeline *pipeline)
@@ -140,7 +167,7 @@ static int work(const lgd_command *c)
     char weights[LGD_PATH_MAX];
     if (lgd_plan_make(c->photo, c->photos, c->out, &plan, &st) != TS_OK) return cl_usage("%s", st.message);
     ts_threads_set(c->threads);
-    run r = {.command = c, .jobs = plan.jobs};
+    run r = {.command = c, .jobs = plan.jobs, .lock = PTHREAD_MUTEX_INITIALIZER};
     int code = CL_FAILED;
     bool published = false;
     lgd_pipeline *pipeline = NULL;

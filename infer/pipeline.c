@@ -1,24 +1,32 @@
 #include "infer/pipeline.h"
 #include "infer/output.h"
 #include "infer/photograph.h"
-#include "infer/queue.h"
 #include "tensor/threads.h"
 #include <math.h>
-#include <stdatomic.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* One item each in decoding, computing and writing. Where maps are large there is one in all: the memory counts more than the time. */
-enum { ITEMS = 3, LARGE = 1024 };
+/* Threads that wait for each other between the loops of one small photograph do less than as many that each have one of their own. Of large ones there is
+ * one in all: the memory counts more than the time. */
+enum { LANES = 8, AHEAD = 2, LARGE = 1024 };
+
+enum { IDLE, DECODING, DECODED, COMPUTING, FINISHED }; /* an item's stages */
 
 struct lgd_pipeline {
     const lgd_plan *plan;
     const lgd_command *command;
-    lgd_item item[ITEMS];
-    lgd_queue idle, inbox, computed; /* inbox: for the computing thread; NULL there: no more is decoded */
-    pthread_t decoder, writer;
-    bool published, decoding, writing;
-    atomic_bool stopped;
+    lgd_compute compute;
+    bool (*stop)(void);
+    void *user;
+    pthread_t decoder;
+    bool published, decoding;
+    int lanes, items; /* photographs that are computed at once, and in all */
+    pthread_mutex_t lock; /* of what follows */
+    pthread_cond_t changed;
+    lgd_item item[LANES + AHEAD];
+    int begun, told; /* decodings, and items that are told of */
+    bool all_begun, stopped;
 };
 
 /* The mask is cut and resampled as the photograph is; what is not black in a pixel makes it wanted. */
@@ -64,37 +72,119 @@ static void decode(const lgd_command *c, bool published, lgd_item *item)
     io_image_free(&photo);
 }
 
+/* The first in the plan's order; NULL: there is none. */
+static lgd_item *first_at(lgd_pipeline *p, int stage)
+{
+    lgd_item *first = NULL;
+    for (int i = 0; i < p->items; i++)
+        if (p->item[i].stage == stage && (!first || p->item[i].index < first->index)) first = &p->item[i];
+    return first;
+}
+
+static void move(lgd_pipeline *p, lgd_item *item, int stage)
+{
+    pthread_mutex_lock(&p->lock);
+    item->stage = stage;
+    pthread_cond_broadcast(&p->changed);
+    pthread_mutex_unlock(&p->lock);
+}
+
+static void end_early(lgd_pipeline *p)
+{
+    pthread_mutex_lock(&p->lock);
+    p->stopped = true;
+    pthread_cond_broadcast(&p->changed);
+    pthread_mutex_unlock(&p->lock);
+}
+
+/* For the next photograph; NULL: there is none, or no more are wanted. */
+static lgd_item *begin_decoding(lgd_pipeline *p)
+{
+    lgd_item *item = NULL;
+    pthread_mutex_lock(&p->lock);
+    while (p->begun < p->plan->jobs && !p->stopped && !(item = first_at(p, IDLE))) pthread_cond_wait(&p->changed, &p->lock);
+    if (item) {
+        *item = (lgd_item){.job = &p->plan->job[p->begun], .index = p->begun, .stage = DECODING};
+        p->begun++;
+    } else {
+        p->all_begun = true;
+        pthread_cond_broadcast(&p->changed);
+    }
+    pthread_mutex_unlock(&p->lock);
+    return item;
+}
+
 static void *decode_all(void *user)
 {
     lgd_pipeline *p = user;
-    void *next;
-    for (int i = 0; i < p->plan->jobs && lgd_queue_pop(&p->idle, &next) && !p->stopped; i++) {
-        lgd_item *item = next;
-        *item = (lgd_item){.job = &p->plan->job[i], .index = i, .decoded = true};
+    lgd_item *item;
+    if (p->lanes > 1) ts_threads_own(1); /* the others have work */
+    while ((item = begin_decoding(p))) {
         decode(p->command, p->published, item);
-        lgd_queue_push(&p->inbox, item);
+        move(p, item, DECODED);
     }
-    lgd_queue_push(&p->inbox, NULL);
     return NULL;
 }
 
-static void *write_all(void *user)
+/* The threads are dealt anew for every round of the lanes: the last may have fewer photographs. */
+static int threads_for(const lgd_pipeline *p, int index)
+{
+    const int left = p->plan->jobs - index / p->lanes * p->lanes, at_once = left < p->lanes ? left : p->lanes;
+    return ts_threads() > at_once ? ts_threads() / at_once : 1;
+}
+
+static void write_files(const lgd_command *c, lgd_item *item)
+{
+    lgd_photo first = lgd_flash_photo(item->square.data);
+    if (item->capture.images) lgd_capture_photos(&item->capture, 1, &first);
+    first.power *= (float)item->power;
+    if (lgd_output_write(c->out, item->job->stem, &item->m, &first, c->outputs, c->directx, item->threads, &item->lost, &item->st))
+        ts_context(&item->st, "%s", item->job->photo);
+}
+
+/* From decoded to finished. A failed one too: results keep their order. */
+static void work_on(lgd_pipeline *p, lgd_item *item)
+{
+    item->threads = threads_for(p, item->index);
+    const int threads = ts_threads_own(item->threads);
+    if (p->stop()) {
+        end_early(p);
+        ts_fail(&item->st, TS_INTERRUPTED, "interrupted");
+    }
+    if (!item->st.code) p->compute(item, p->user);
+    if (!item->st.code) write_files(p->command, item);
+    ts_threads_own(threads);
+    move(p, item, FINISHED);
+}
+
+/* What the calling thread does next: an item to work on, or where it tells, the next to be told of. NULL: nothing is left. */
+static lgd_item *next(lgd_pipeline *p, bool tells)
+{
+    lgd_item *item = NULL;
+    pthread_mutex_lock(&p->lock);
+    for (;;) {
+        lgd_item *finished = tells ? first_at(p, FINISHED) : NULL;
+        if (finished && finished->index == p->told) {
+            p->told++;
+            item = finished;
+            break;
+        }
+        if ((item = first_at(p, DECODED))) {
+            item->stage = COMPUTING;
+            break;
+        }
+        if (p->all_begun && (tells ? p->told == p->begun : !first_at(p, DECODING))) break;
+        pthread_cond_wait(&p->changed, &p->lock);
+    }
+    pthread_mutex_unlock(&p->lock);
+    return item;
+}
+
+static void *lane(void *user)
 {
     lgd_pipeline *p = user;
-    const lgd_command *c = p->command;
-    void *next;
-    while (lgd_queue_pop(&p->computed, &next)) {
-        lgd_item *item = next;
-        /* The last one has all threads to itself: nothing is computed any more. */
-        const int threads = item->index + 1 < p->plan->jobs && c->size <= LARGE ? 1 : ts_threads();
-        lgd_photo first = lgd_flash_photo(item->square.data);
-        if (item->capture.images) lgd_capture_photos(&item->capture, 1, &first);
-        first.power *= (float)item->power;
-        if (!item->st.code && lgd_output_write(c->out, item->job->stem, &item->m, &first, c->outputs, c->directx, threads, &item->lost, &item->st))
-            ts_context(&item->st, "%s", item->job->photo);
-        item->decoded = false;
-        lgd_queue_push(&p->inbox, item);
-    }
+    lgd_item *item;
+    while ((item = next(p, false))) work_on(p, item);
     return NULL;
 }
 
@@ -102,66 +192,57 @@ lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *comman
 {
     lgd_pipeline *p = calloc(1, sizeof *p);
     if (!p) return ts_fail(st, TS_NOMEM, "out of memory"), NULL;
-    *p = (lgd_pipeline){.plan = plan, .command = command, .published = published, .idle = LGD_QUEUE_INITIALIZER, .inbox = LGD_QUEUE_INITIALIZER, .computed = LGD_QUEUE_INITIALIZER};
-    for (int i = 0; i < (command->size > LARGE ? 1 : ITEMS); i++) lgd_queue_push(&p->idle, &p->item[i]);
+    *p = (lgd_pipeline){.plan = plan, .command = command, .published = published, .lock = PTHREAD_MUTEX_INITIALIZER, .changed = PTHREAD_COND_INITIALIZER, .lanes = 1, .items = 1};
+    if (command->size <= LARGE) {
+        const int most = plan->jobs < LANES ? plan->jobs : LANES;
+        p->lanes = ts_threads() < most ? ts_threads() : most;
+        p->items = p->lanes + AHEAD;
+    }
     p->decoding = pthread_create(&p->decoder, NULL, decode_all, p) == 0;
-    p->writing = p->decoding && pthread_create(&p->writer, NULL, write_all, p) == 0;
-    if (!p->writing) {
+    if (!p->decoding) {
         ts_fail(st, TS_NOMEM, "no more threads can be started here");
         lgd_pipeline_end(&p);
     }
     return p;
 }
 
-static void release(lgd_pipeline *p, lgd_item *item)
+static void release(lgd_item *item)
 {
     io_image_free(&item->square);
     io_capture_free(&item->capture);
     io_material_free(&item->m);
     free(item->mask);
     item->mask = NULL;
-    lgd_queue_push(&p->idle, item);
 }
 
 void lgd_pipeline_run(lgd_pipeline *p, lgd_compute compute, lgd_finished finished, bool (*stop)(void), void *user)
 {
-    bool more = true; /* is decoded */
-    int under_way = 0;
-    void *next;
-    while ((more || under_way > 0) && lgd_queue_pop(&p->inbox, &next)) {
-        lgd_item *item = next;
-        if (!item) more = false;
-        else if (item->decoded) {
-            if (stop()) {
-                p->stopped = true;
-                ts_fail(&item->st, TS_INTERRUPTED, "interrupted");
-            }
-            if (!item->st.code) compute(item, user);
-            under_way++;
-            lgd_queue_push(&p->computed, item); /* a failed one too: results keep their order */
-        } else {
+    pthread_t other[LANES];
+    lgd_item *item;
+    int others = 0;
+    p->compute = compute;
+    p->stop = stop;
+    p->user = user;
+    while (others < p->lanes - 1 && pthread_create(&other[others], NULL, lane, p) == 0) others++; /* fewer do the same work */
+    while ((item = next(p, true))) {
+        if (item->stage == FINISHED) {
             finished(item, user);
-            under_way--;
-            release(p, item);
-        }
+            release(item);
+            move(p, item, IDLE);
+        } else work_on(p, item);
     }
+    for (int i = 0; i < others; i++) pthread_join(other[i], NULL);
 }
 
 void lgd_pipeline_end(lgd_pipeline **pp)
 {
     lgd_pipeline *p = *pp;
     if (!p) return;
-    p->stopped = true;
-    lgd_queue_close(&p->idle);
-    lgd_queue_close(&p->computed);
+    end_early(p);
     if (p->decoding) pthread_join(p->decoder, NULL);
-    if (p->writing) pthread_join(p->writer, NULL);
-    for (int i = 0; i < ITEMS; i++) {
-        io_image_free(&p->item[i].square);
-        io_capture_free(&p->item[i].capture);
-        io_material_free(&p->item[i].m);
-        free(p->item[i].mask);
-    }
+    for (int i = 0; i < p->items; i++) release(&p->item[i]);
+    pthread_cond_destroy(&p->changed);
+    pthread_mutex_destroy(&p->lock);
     free(p);
     *pp = NULL;
 }

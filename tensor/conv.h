@@ -47,8 +47,8 @@ void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *pac
 void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
 void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const float *dy, float *dweight);
 
-/* Process-wide: whether ag_conv computes directly wherever it can (true: the default, and what comparisons with other programs want) or
- * by Winograd's way where ts_conv_winograd says so. A program calls ts_conv_exact_set(false) before it builds its first tape; weights that
+/* Of the calling thread: whether ag_conv computes directly wherever it can (true: the default, and what comparisons with other programs want) or
+ * by Winograd's way where ts_conv_winograd says so. Set before what is to be computed so; weights that
  * a tape has packed for one way are packed anew for the other. */
 void ts_conv_exact_set(bool exact);
 bool ts_conv_exact(void);
@@ -65,7 +65,7 @@ void ts_conv_data_gradient_bf16(const ts_conv *c, const float *dy, const float *
 bool ts_conv_bf16_weights(void);
 void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight);
 
-/* Process-wide, f32 unless said otherwise: how ag_conv and ag_gru multiply in forward and ag_conv for the gradient of its input. Gradients of
+/* Of the calling thread, f32 unless said otherwise: how ag_conv and ag_gru multiply in forward and ag_conv for the gradient of its input. Gradients of
  * weights, and whatever else is summed, stay f32. Set between tapes, or at least between a tape's forward and the next. */
 typedef enum ts_precision { TS_F32, TS_BF16, TS_PRECISION_COUNT } ts_precision;
 void ts_conv_precision_set(ts_precision p);

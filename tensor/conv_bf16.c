@@ -1,9 +1,8 @@
 /* Convolutions of values rounded to bf16: the same ways as those of f32 (tensor/conv.c), with pairs of channels in place of channels. */
 #include "tensor/conv_plan.h"
 #include "tensor/threads.h"
-#include <stdatomic.h>
 
-static _Atomic ts_precision precision = TS_F32;
+static _Thread_local ts_precision precision = TS_F32;
 
 void ts_conv_precision_set(ts_precision p) { precision = p; }
 ts_precision ts_conv_precision(void) { return precision; }

@@ -4,7 +4,6 @@
 #include "tensor/kernels/elementwise.h"
 #include "tensor/kernels/winograd.h"
 #include "tensor/threads.h"
-#include <stdatomic.h>
 #include <string.h>
 
 enum {
@@ -12,7 +11,7 @@ enum {
     TILES_LEAST = 64 /* fewer save less than the transformation of the weights costs */
 };
 
-static _Atomic bool exact = true;
+static _Thread_local bool exact = true;
 
 void ts_conv_exact_set(bool on) { exact = on; }
 bool ts_conv_exact(void) { return exact; }

@@ -9,6 +9,7 @@
 #include <string.h>
 
 static atomic_int wanted;
+static _Thread_local int own;
 
 bool ts_threads_pin(void)
 {
@@ -83,8 +84,16 @@ int ts_threads_allowed(void)
 
 void ts_threads_set(int n) { atomic_store(&wanted, n >= 1 ? n : ts_threads_allowed()); }
 
+int ts_threads_own(int n)
+{
+    const int before = own;
+    own = n;
+    return before;
+}
+
 int ts_threads(void)
 {
+    if (own > 0) return own;
     if (atomic_load_explicit(&wanted, memory_order_relaxed) == 0) ts_threads_set(0);
     return atomic_load_explicit(&wanted, memory_order_relaxed);
 }

@@ -4,10 +4,13 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* n >= 1: use n threads; 0: as many as the process may use (affinity mask and cgroup CPU quota). */
+/* Process-wide. n >= 1: use n threads; 0: as many as the process may use (affinity mask and cgroup CPU quota). */
 void ts_threads_set(int n);
-int ts_threads(void);
 int ts_threads_allowed(void); /* what 0 stands for */
+
+/* For loops that the calling thread begins: n threads whatever the process uses, n >= 1, or 0 for the process's again. Returns what it was. */
+int ts_threads_own(int n);
+int ts_threads(void); /* of the calling thread's loops */
 
 /* Binds each of the threads in use to a CPU of its own, in the order of the process's affinity mask, so that times do not depend on where the system
  * moves them. False, with nothing changed, when there are fewer CPUs than threads. Call after ts_threads_set. */

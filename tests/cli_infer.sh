@@ -56,7 +56,7 @@ only_what_is_asked_for() {
     complete "$T/all/p"
 }
 
-# Photographs in the same order, with the same words and the same bytes, whether they overlap or come one at a time.
+# Photographs in the same order, with the same words and the same bytes, whether several are computed at once or they come one at a time.
 overlap_changes_nothing() {
     model
     list=
@@ -65,18 +65,19 @@ overlap_changes_nothing() {
         list="$list $T/$i.ppm"
     done
     echo bad >"$T/4.ppm"
-    # shellcheck disable=SC2086
-    expect 1 infer $list -o "$T/o"
-    cp "$T/out" "$T/names"
-    cp "$T/err" "$T/words"
     : >"$T/one_names"
     : >"$T/one_words"
     for p in $list; do
         infer "$p" -o "$T/one" >>"$T/one_names" 2>>"$T/one_words"
     done
-    sed "s|$T/one/|$T/o/|" "$T/one_names" | cmp -s - "$T/names" || fail "other folders, or in another order"
-    grep -v "1 of 7 photographs failed" "$T/words" | cmp -s - "$T/one_words" || fail "other words: $(diff "$T/words" "$T/one_words" | head -n 3)"
-    diff -r "$T/o" "$T/one" >/dev/null || fail "other files"
+    for n in 1 2 3 5 20; do
+        # shellcheck disable=SC2086
+        expect 1 infer --threads $n $list -o "$T/o"
+        sed "s|$T/one/|$T/o/|" "$T/one_names" | cmp -s - "$T/out" || fail "$n threads: other folders, or in another order"
+        grep -v "1 of 7 photographs failed" "$T/err" | cmp -s - "$T/one_words" || fail "$n threads: other words: $(grep -v photographs "$T/err" | diff - "$T/one_words" | head -n 3)"
+        diff -r "$T/o" "$T/one" >/dev/null || fail "$n threads: other files"
+        rm -r "$T/o"
+    done
 }
 
 old_results() {

@@ -310,6 +310,27 @@ TEST(tape_scope_gives_memory_back)
     ag_tape_destroy(&tape);
 }
 
+/* The weights of a frozen tape, which may be destroyed before the one beside it. */
+TEST(tape_beside_another_shares_its_packed_weights)
+{
+    ts_status st = {0};
+    static float w[4 * 3 * 9];
+    fill(w, 4 * 3 * 9, 3, -1, 1);
+    const ts_conv c = {1, 8, 8, 3, 4, 3, 1, TS_PAD_ZERO, 0};
+    ag_tape *tape = prepared(false);
+    ag_freeze(tape, false);
+    CHECK(!ag_tape_beside(tape, &st) && st.code == TS_INVALID, "beside one whose weights change");
+    ag_freeze(tape, true);
+    ag_tape *other = ag_tape_beside(tape, &st);
+    CHECK(other, "%s", st.message);
+    const float *packed = ag_packed(other, &c, TS_CONV_FORWARD, w), first = packed[0];
+    ag_reset(other);
+    CHECK(ag_packed(tape, &c, TS_CONV_FORWARD, w) == packed, "packed for each");
+    ag_tape_destroy(&tape);
+    CHECK(ag_packed(other, &c, TS_CONV_FORWARD, w) == packed && packed[0] == first, "gone with the first tape");
+    ag_tape_destroy(&other);
+}
+
 TEST(tape_frozen_weights_are_packed_once)
 {
     ag_tape *tape = prepared(false);

@@ -6,6 +6,7 @@
 #include "tensor/maps.h"
 #include "tests/test.h"
 #include <math.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -179,6 +180,52 @@ static bool in_range(const float *maps, int side)
         if (p[MAP_NORMAL] * p[MAP_NORMAL] + p[MAP_NORMAL + 1] * p[MAP_NORMAL + 1] > 1) return false;
     }
     return true;
+}
+
+/* Calls on several threads, each with its own image and options; again[2]: what it gave, the second time while the others run. */
+enum { AT_ONCE = 40 }; /* pixels: Winograd's way pays */
+typedef struct caller {
+    lgd_model *model;
+    lgd_options options;
+    float image[AT_ONCE * AT_ONCE * 3], again[2][AT_ONCE * AT_ONCE * MAP_CHANNELS];
+    int code[2];
+} caller;
+
+static void *call_twice(void *user)
+{
+    caller *c = user;
+    for (int i = 0; i < 2; i++) c->code[i] = lgd_estimate(c->model, c->image, AT_ONCE, &c->options, c->again[i], NULL);
+    return NULL;
+}
+
+TEST(infer_calls_at_once_are_calls_in_turn)
+{
+    enum { CALLERS = 5 };
+    static caller c[CALLERS];
+    static float alone[AT_ONCE * AT_ONCE * MAP_CHANNELS];
+    const lgd_options options[CALLERS] = {{.iterations = T, .threads = 1}, {.iterations = T, .threads = 2}, {.iterations = 1, .threads = 1, .exact = 1},
+                                          {.iterations = T, .threads = 1, .precision = LGD_BF16}, {.iterations = T, .threads = 3, .exact = 1}};
+    pthread_t thread[CALLERS];
+    nn_arch a = tiny();
+    a.h_width = 32; /* so that the ways of computing differ */
+    a.h_gru = 24;
+    lgd_model *m = load(a), *fresh = load(a);
+    int started = 0;
+    for (int i = 0; i < CALLERS; i++) {
+        c[i].model = m;
+        c[i].options = options[i];
+        make_image(c[i].image, AT_ONCE);
+        c[i].image[5 * i] = 1;
+    }
+    while (started < CALLERS && !pthread_create(&thread[started], NULL, call_twice, &c[started])) started++;
+    for (int i = 0; i < started; i++) pthread_join(thread[i], NULL);
+    CHECK(started == CALLERS, "%d threads", started);
+    for (int i = 0; i < CALLERS; i++) {
+        CHECK(!lgd_estimate(fresh, c[i].image, AT_ONCE, &options[i], alone, NULL), "call %d", i);
+        for (int k = 0; k < 2; k++) CHECK(!c[i].code[k] && !memcmp(c[i].again[k], alone, sizeof alone), "call %d: other bytes the time %d", i, k);
+    }
+    lgd_free(&m);
+    lgd_free(&fresh);
 }
 
 TEST(infer_any_image_of_any_size_gives_maps)

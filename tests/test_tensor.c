@@ -7,6 +7,7 @@
 #include "tensor/threads.h"
 #include "tests/test.h"
 #include <math.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -144,6 +145,12 @@ TEST(cpu_refuses_what_is_not_there)
     CHECK(ts_isa_init(&st) == TS_OK && ts_isa_now() == ts_isa_best(), "unset: the best");
 }
 
+static void *threads_seen(void *user)
+{
+    *(int *)user = ts_threads();
+    return NULL;
+}
+
 TEST(threads_and_scratch)
 {
     CHECK(ts_threads_allowed() >= 1, "allowed");
@@ -151,6 +158,13 @@ TEST(threads_and_scratch)
     CHECK(ts_threads() == 3, "set");
     ts_threads_set(0);
     CHECK(ts_threads() == ts_threads_allowed(), "default");
+    ts_threads_set(2);
+    CHECK(ts_threads_own(5) == 0 && ts_threads() == 5, "the calling thread's own");
+    pthread_t other;
+    int seen = 0;
+    CHECK(!pthread_create(&other, NULL, threads_seen, &seen) && !pthread_join(other, NULL) && seen == 2, "another thread uses %d", seen);
+    CHECK(ts_threads_own(0) == 5 && ts_threads() == 2, "the process's again");
+    ts_threads_set(0);
     unsigned char *a = ts_scratch(0, 1000), *b = ts_scratch(1, 1000);
     CHECK(a != b && (uintptr_t)a % 64 == 0, "slots are apart and aligned");
     memset(a, 1, 1000);
