@@ -89,11 +89,9 @@ typedef struct given_photos {
     const float *proposed;
 } given_photos;
 
-/* taken: NULL, or gets the number of steps that were made. */
-static ts_code run_whole(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o, float *maps, int *taken, ts_status *st)
+static ts_code run_loop(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o, float *maps, int *taken, ts_status *st)
 {
     const int side = p->side, given = p->count;
-    ag_reset(e->tape);
     const double more = step_bytes(&e->net->arch, side) - (double)ts_arena_peak(ag_arena(e->tape)); /* than earlier calls left */
     if (more > 0 && lgd_memory_check(more, st) != TS_OK) return ts_context(st, "%d x %d pixels", side, side);
     nn_input in = {.image = ts_new(ag_arena(e->tape), (ts_shape){given, side, side, 3}), .grid = rd_grid_full(side), .views = p->views, .given = given, .orientations = o->orientations, .proposed = p->proposed};
@@ -114,6 +112,15 @@ static ts_code run_whole(const lgd_estimator *e, const given_photos *p, int step
     }
     if (taken) *taken = w.steps;
     return decode(w.best ? w.best : out->t.data, out->t.shape.c, (int64_t)side * side, maps) ? TS_OK : not_finite(st);
+}
+
+/* taken: NULL, or gets the number of steps that were made. */
+static ts_code run_whole(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o, float *maps, int *taken, ts_status *st)
+{
+    const ts_mark mark = ag_scope_begin(e->tape);
+    const ts_code code = run_loop(e, p, steps, o, maps, taken, st);
+    ag_scope_end(e->tape, mark, NULL, 0);
+    return code;
 }
 
 static ts_code estimate_whole(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o, float *maps, ts_status *st)
@@ -202,6 +209,8 @@ ts_code lgd_estimator_run(const lgd_estimator *e, const lgd_photo *photo, int ph
         image[k] = photo[order[k]].image;
         views[k] = given[order[k]];
     }
+    /* Once: memory that one stage has touched is there for the next, and touching it first costs as much as computing. */
+    ag_reset(e->tape);
     const bool tiles = lgd_tiles_exact(&e->net->arch) && (side > UNTILED || o->mask || o->tolerance > 0);
     if (o->power) *o->power = 1;
     given_photos p = {image, views, photos, side, NULL};

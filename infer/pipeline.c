@@ -118,7 +118,7 @@ static void *decode_all(void *user)
 {
     lgd_pipeline *p = user;
     lgd_item *item;
-    if (p->lanes > 1) ts_threads_own(1); /* the others have work */
+    ts_threads_own(1); /* the others have work, if only the weights to read */
     while ((item = begin_decoding(p))) {
         decode(p->command, p->published, item);
         move(p, item, DECODED);

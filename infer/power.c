@@ -39,14 +39,13 @@ static double nearest(size_t values, const float *log_photo, const float *render
     return middle + (best - most) * step;
 }
 
-ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given, int side, int orientations, float *proposed, double *factor,
-                      ts_status *st)
+static ts_code fit(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given, int side, int orientations, float *proposed, double *factor,
+                   ts_status *st)
 {
     const int size = model->arch.g_size;
     const rd_grid grid = rd_grid_full(size);
     const size_t values = (size_t)size * (size_t)size * 3, whole = (size_t)side * (size_t)side * 3;
     *factor = 1;
-    ag_reset(tape);
     ag_value *small = ag_empty(tape, (ts_shape){given, size, size, 3}), *rendered = ag_empty(tape, (ts_shape){given, size, size, 3});
     const ts_mark mark = ag_scope_begin(tape);
     ag_value *full = ag_empty(tape, (ts_shape){given, side, side, 3});
@@ -74,4 +73,13 @@ ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *
     const double beyond = fmin(fmax(fabs(found) - USUAL_STOPS, 0), MOST_STOPS);
     *factor = exp2(found < 0 ? -beyond : beyond);
     return TS_OK;
+}
+
+ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given, int side, int orientations, float *proposed, double *factor,
+                      ts_status *st)
+{
+    const ts_mark mark = ag_scope_begin(tape);
+    const ts_code code = fit(tape, model, image, views, given, side, orientations, proposed, factor, st);
+    ag_scope_end(tape, mark, NULL, 0);
+    return code;
 }

@@ -232,10 +232,9 @@ static ts_code prepare(work *w)
     return ag_status(w->tape)->code;
 }
 
-ts_code lgd_tiles_run(ag_tape *tape, const nn_model *model, lgd_tiles *t, float *maps, ts_status *st)
+static ts_code run(ag_tape *tape, const nn_model *model, lgd_tiles *t, float *maps, ts_status *st)
 {
     work w = {.tape = tape, .model = model, .t = t, .channels = model->arch.channels};
-    ag_reset(tape);
     t->refined = 0;
     ts_code code = prepare(&w);
     int64_t pixels = 0;
@@ -250,4 +249,12 @@ ts_code lgd_tiles_run(ag_tape *tape, const nn_model *model, lgd_tiles *t, float 
     if (code) return ts_fail(st, code, "%s", ag_status(tape)->message);
     for (int i = 0; i <= t->steps && t->rmse; i++) t->rmse[i] = pixels > 0 ? sqrt(w.squares[i] / (double)pixels) : 0;
     return TS_OK;
+}
+
+ts_code lgd_tiles_run(ag_tape *tape, const nn_model *model, lgd_tiles *t, float *maps, ts_status *st)
+{
+    const ts_mark mark = ag_scope_begin(tape);
+    const ts_code code = run(tape, model, t, maps, st);
+    ag_scope_end(tape, mark, NULL, 0);
+    return code;
 }

@@ -22,7 +22,7 @@ typedef struct lgd_tiles {
 /* Whether the result is the untiled one: the published loss couples all pixels at every step, ours does not. */
 bool lgd_tiles_exact(const nn_arch *arch);
 
-/* maps: [side][side][channels of the model], R_T in the encoding of tensor/maps.h. The tape has no gradients and is reset; everything is
- * allocated from its arena. */
+/* maps: [side][side][channels of the model], R_T in the encoding of tensor/maps.h. The tape has no gradients; everything is
+ * allocated from its arena and given back. */
 ts_code lgd_tiles_run(ag_tape *tape, const nn_model *model, lgd_tiles *t, float *maps, ts_status *st);
 #endif

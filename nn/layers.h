@@ -73,4 +73,7 @@ ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, a
 
 /* R_{t+1} from R_t and its encoded gradients. path: what arch.descent lets past h, or NULL. */
 ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path, ag_value *gradient, ag_value *gru[2], ag_value *const to[2]);
+
+/* Memory for the parameters of a plan (nn_model_plan), zero only between them: for who then writes them all. */
+ts_code nn_model_room(nn_model *model, ts_status *st);
 #endif

@@ -192,19 +192,37 @@ nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
     return m;
 }
 
+static size_t offset_of(const nn_model *m, int index) { return index < m->params ? m->param[index].offset : m->count; }
+
 static float *block(size_t count, const char *what, ts_status *st)
 {
     float *p = ts_block(count * sizeof *p);
+    if (!p) ts_fail(st, TS_NOMEM, "no memory for the model's %s (%.0f MB)", what, (double)count * sizeof *p / 1e6);
+    return p;
+}
+
+static float *zero_block(size_t count, const char *what, ts_status *st)
+{
+    float *p = block(count, what, st);
     if (p) ts_block_clear(p, count * sizeof *p);
-    else ts_fail(st, TS_NOMEM, "no memory for the model's %s (%.0f MB)", what, (double)count * sizeof *p / 1e6);
     return p;
 }
 
 nn_model *nn_model_create(const nn_arch *arch, ts_status *st)
 {
     nn_model *m = nn_model_plan(arch, st);
-    if (m && !(m->value = block(m->count, "parameters", st))) nn_model_free(&m);
+    if (m && !(m->value = zero_block(m->count, "parameters", st))) nn_model_free(&m);
     return m;
+}
+
+ts_code nn_model_room(nn_model *m, ts_status *st)
+{
+    m->value = block(m->count, "parameters", st);
+    for (int i = 0; m->value && i < m->params; i++) {
+        const size_t end = m->param[i].offset + m->param[i].count;
+        memset(m->value + end, 0, (offset_of(m, i + 1) - end) * sizeof *m->value);
+    }
+    return m->value ? TS_OK : st->code;
 }
 
 void nn_model_free(nn_model **model)
@@ -222,7 +240,7 @@ void nn_model_free(nn_model **model)
 
 ts_code nn_model_train(nn_model *model, ts_status *st)
 {
-    if (!model->grad) model->grad = block(model->count, "gradients", st);
+    if (!model->grad) model->grad = zero_block(model->count, "gradients", st);
     return model->grad ? TS_OK : TS_NOMEM;
 }
 
@@ -232,8 +250,6 @@ const nn_param *nn_model_find(const nn_model *model, const char *name)
         if (!strcmp(model->param[i].name, name)) return &model->param[i];
     return NULL;
 }
-
-static size_t offset_of(const nn_model *m, int index) { return index < m->params ? m->param[index].offset : m->count; }
 
 void nn_model_range(const nn_model *model, nn_part part, size_t *first, size_t *last)
 {

@@ -26,6 +26,29 @@ static bool of_network(const char *name)
     return !strncmp(name, "g.", 2) || !strncmp(name, "h.", 2) || !strncmp(name, "coarse.", 7) || !strncmp(name, "a.", 2) || nn_published_tensor(name);
 }
 
+/* A tensor by each thread at a time: they wait for each other once, not at every tensor, while another thread may be decoding. Of several that fail st
+ * names the first. */
+static ts_code read_values(const nn_file *f, const char *path, nn_model *m, ts_status *st)
+{
+    int failed = m->params;
+#pragma omp parallel for num_threads(ts_threads()) schedule(dynamic)
+    for (int i = 0; i < m->params; i++) {
+        const nn_param *p = &m->param[i];
+        ts_status own = {0};
+        int64_t dim[4];
+        nn_param_dims(p, dim);
+        if (nn_file_read(f, p->name, p->rank, dim, m->value + p->offset, &own) == TS_OK && !nn_all_finite(m->value + p->offset, p->count))
+            ts_fail(&own, TS_NUMERIC, "%s: tensor \"%s\" holds a value that is not finite", path, p->name);
+        if (!own.code) continue;
+#pragma omp critical(nn_read_values)
+        if (i < failed) {
+            failed = i;
+            *st = own;
+        }
+    }
+    return failed < m->params ? st->code : TS_OK;
+}
+
 nn_model *nn_model_load(const char *path, ts_status *st)
 {
     nn_arch arch;
@@ -45,19 +68,7 @@ nn_model *nn_model_load(const char *path, ts_status *st)
                 ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" is missing", path, m->param[i].name);
                 nn_model_free(&m);
             }
-        if (m) {
-            nn_model_free(&m);
-            m = nn_model_create(&arch, st);
-        }
-        for (int i = 0; m && i < m->params; i++) {
-            const nn_param *p = &m->param[i];
-            int64_t dim[4];
-            nn_param_dims(p, dim);
-            ts_code code = nn_file_read(f, p->name, p->rank, dim, m->value + p->offset, st);
-            if (!code && !nn_all_finite(m->value + p->offset, p->count))
-                code = ts_fail(st, TS_NUMERIC, "%s: tensor \"%s\" holds a value that is not finite", path, p->name);
-            if (code) nn_model_free(&m);
-        }
+        if (m && (nn_model_room(m, st) || read_values(f, path, m, st))) nn_model_free(&m);
     }
     nn_file_close(&f);
     return m;

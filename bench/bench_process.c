@@ -1,0 +1,146 @@
+/* lgd-infer as a process, from the command to maps on disk: one photograph and a folder of them. Wall time of processes in turn; the computing alone is the
+ * library's call in this process, when everything is warm. */
+#include "bench/bench.h"
+#include "data/image.h"
+#include "infer/lgd.h"
+#include "infer/model_path.h"
+#include <fcntl.h>
+#include <libgen.h>
+#include <limits.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { SIDE = 256, ROUNDS = 7, FOLDER = 26, MOST_ARGUMENTS = FOLDER + 16, NAME = 300 };
+static const char photograph[] = "demo/flash.jpg";
+extern char **environ;
+
+/* A program with its words, without what it prints. Its exit status, or -1. */
+static int run(const char *const *argv)
+{
+    posix_spawn_file_actions_t actions;
+    pid_t child;
+    int status = -1;
+    posix_spawn_file_actions_init(&actions);
+    posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+    posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+    if (posix_spawnp(&child, argv[0], &actions, NULL, (char *const *)(uintptr_t)argv, environ) || waitpid(child, &status, 0) != child) status = -1;
+    posix_spawn_file_actions_destroy(&actions);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+static double seconds(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static int ascending(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+typedef struct command {
+    const char *label;
+    const char *word[8]; /* after the program's name */
+    int photographs, status;
+    double time[ROUNDS];
+} command;
+
+static bool round_of(command *c, int round, const char *program, const char *out, char (*link)[NAME])
+{
+    const char *argv[MOST_ARGUMENTS] = {program, "-q", "-o", out};
+    int n = 4;
+    for (const char *const *w = c->word; *w; w++) argv[n++] = *w;
+    for (int i = 0; i < c->photographs; i++) argv[n++] = link[i];
+    const double begin = seconds();
+    const int status = run(argv);
+    c->time[round] = seconds() - begin;
+    if (status != c->status) printf("  %s: exit status %d\n", c->label, status);
+    return status == c->status;
+}
+
+typedef struct call {
+    lgd_model *model;
+    io_image image;
+    float *maps;
+    double power;
+} call;
+
+static void estimate(void *user)
+{
+    call *c = user;
+    lgd_error e;
+    lgd_options o = lgd_options_default();
+    o.power = &c->power;
+    if (lgd_estimate(c->model, c->image.data, SIDE, &o, c->maps, &e)) abort();
+}
+
+/* The median of what the library's call takes; 0 where it cannot be made. */
+static double computing(void)
+{
+    char path[PATH_MAX];
+    ts_status st = {0};
+    lgd_error e = {0};
+    call c = {.maps = malloc(SIDE * SIDE * 9 * sizeof(float))};
+    double t = 0;
+    io_image whole = {0};
+    if (!c.maps || lgd_model_path(NULL, "single", path, &st) || !(c.model = lgd_load(path, &e)) || io_read_photo(photograph, SIDE * SIDE * 16, &whole, &st) ||
+        io_centre_square(&whole, SIDE, &c.image, &st))
+        printf("  the computing was not measured: %s\n", st.code ? st.message : e.message);
+    else {
+        const bench_time time = bench_measure(estimate, &c);
+        t = time.seconds;
+        bench_row_unit("the computing alone, in a library", time, 1 / t, "photographs/s");
+    }
+    io_image_free(&whole);
+    io_image_free(&c.image);
+    lgd_free(&c.model);
+    free(c.maps);
+    return t;
+}
+
+BENCH(process)
+{
+    static command all[] = {{.label = "--help", .word = {"--help"}},
+                            {.label = "a wrong option", .word = {"--nonsense"}, .status = 2},
+                            {.label = "one photograph, -i 0 --maps diffuse", .word = {"-i", "0", "--maps", "diffuse"}, .photographs = 1},
+                            {.label = "one photograph, four maps", .word = {"--maps", "diffuse,specular,roughness,normal"}, .photographs = 1},
+                            {.label = "one photograph, every file", .photographs = 1},
+                            {.label = "one photograph, every file, --precision bf16", .word = {"--precision", "bf16"}, .photographs = 1},
+                            {.label = "26 photographs, four maps", .word = {"--maps", "diffuse,specular,roughness,normal"}, .photographs = FOLDER},
+                            {.label = "26 photographs, every file", .photographs = FOLDER},
+                            {.label = "26 photographs, every file, --threads 1", .word = {"--threads", "1"}, .photographs = FOLDER}};
+    enum { COMMANDS = sizeof all / sizeof *all, ONE_FOUR_MAPS = 3 };
+    static char link[FOLDER][NAME];
+    char folder[] = "/tmp/lgd-bench-XXXXXX", own[PATH_MAX] = "", program[PATH_MAX + 16], out[NAME], source[PATH_MAX];
+    bool fine = true;
+    bench_heading("lgd-infer as a process, 256 x 256 (medians of seven, in turn)");
+    if (readlink("/proc/self/exe", own, sizeof own - 1) <= 0 || !realpath(photograph, source) || !mkdtemp(folder)) {
+        printf("  no %s here, or no room for files: nothing is measured\n", photograph);
+        return;
+    }
+    snprintf(program, sizeof program, "%s/lgd-infer", dirname(own));
+    snprintf(out, sizeof out, "%s/out", folder);
+    for (int i = 0; i < FOLDER; i++) {
+        snprintf(link[i], NAME, "%s/%d.jpg", folder, i);
+        fine = fine && symlink(source, link[i]) == 0;
+    }
+    const double warm = computing();
+    for (int round = -1; round < ROUNDS && fine; round++) /* the first warms up */
+        for (int i = 0; i < COMMANDS && fine; i++) fine = round_of(&all[i], round < 0 ? 0 : round, program, out, link);
+    for (int i = 0; i < COMMANDS && fine; i++) {
+        qsort(all[i].time, ROUNDS, sizeof *all[i].time, ascending);
+        const bench_time t = {.seconds = all[i].time[ROUNDS / 2]};
+        if (all[i].photographs > 1) bench_row_unit(all[i].label, t, all[i].photographs / t.seconds, "photographs/s");
+        else bench_row(all[i].label, t, 0);
+        if (i == ONE_FOUR_MAPS && warm > 0) printf("    beyond the computing: %.1f ms\n", 1e3 * (t.seconds - warm));
+    }
+    run((const char *const[]){"rm", "-r", folder, NULL});
+}
