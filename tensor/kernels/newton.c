@@ -34,6 +34,16 @@ V_INLINE void take_up(pivot *p, vf *row, int count, vf *error, vf *weight)
     p->d = d;
 }
 
+/* The same of a pivot that holds its damping alone. */
+V_INLINE void take_first(float damping, pivot *p, const vf *row, int count, vf error, vf *weight)
+{
+    const vf scaled = *weight * row[0], d = damping + scaled * row[0], inverse = 1.0f / d, share = scaled * inverse;
+    for (int i = 0; i < count; i++) p->l[i] = share * row[i + 1];
+    p->z = share * error;
+    *weight *= damping * inverse;
+    p->d = d;
+}
+
 /* The radiance as the equations see it, and its slope: above 1 its logarithm, which leads back from a highlight of thousands in a few steps, where the clamp has
  * no slope; none where the photograph is burnt out as well, whose value may stand for more. */
 V_INLINE vf exposed(vf value, vf photograph, vf *slope)
@@ -47,38 +57,77 @@ V_INLINE vf exposed(vf value, vf photograph, vf *slope)
     return v_select(bright, v_log(above) + v_set(1), value);
 }
 
-V_INLINE void add_view(const ts_shade_view *view, ts_shade_kind kind, const ts_shade_row *row, int first, int n, const float *image, const surface *s, equations *q)
+/* A colour's derivatives by its own diffuse and specular and by what is shared, for encoded maps; normal[0] times its diffuse, normal[1] times its mirror part. */
+V_INLINE void row_of(int c, const surface *s, const lighting *e, const radiance *r, const couplings *k, const vf (*normal)[2], vf slope, vf row[ROW])
 {
-    lighting e;
-    angles g;
-    radiance r;
-    vf target[3];
-    light(view, kind, row, first, &e);
-    measure(s, &e, kind, &g);
-    if (!v_any(g.seen)) return;
-    shade(view, kind, s, &e, &g, &r);
-    v_load_pixels(image + (int64_t)first * 3, 3, n, 3, target);
-    for (int c = 0; c < 3; c++) {
-        vf u[3] = {0}, j[MAP_CHANNELS];
-        slopes d = {0};
-        const vf seen = exposed(r.value[c], target[c], &u[c]);
-        derive(kind, s, &e, &g, &r, u, &d);
-        encode(s, &d, j);
-        for (int i = 0; i < MAP_CHANNELS; i++) j[i] = v_min(v_max(j[i], v_set(-STEEPEST)), v_set(STEEPEST));
-        vf error = target[c] - seen, weight = 1.0f / (v_max(target[c], v_set(0)) + TS_NEWTON_NOISE);
-        vf by[ROW] = {j[MAP_DIFFUSE + c], j[MAP_SPECULAR + c], j[MAP_ROUGHNESS], j[MAP_NORMAL], j[MAP_NORMAL + 1]};
-        for (int i = 0; i < 2; i++) take_up(&q->own[c][i], by + i, ROW - 1 - i, &error, &weight);
-        for (int i = 0; i < SHARED; i++) take_up(&q->shared[i], by + 2 + i, SHARED - 1 - i, &error, &weight);
-    }
+    const vf ud = slope * diffuse_part(s, c), um = slope * r->fresnel[c];
+    row[0] = slope * by_diffuse(s, r, c) * s->slope[MAP_DIFFUSE + c];
+    row[1] = slope * by_specular(s, e, r, c) * s->slope[MAP_SPECULAR + c];
+    row[2] = um * k->roughness * s->slope[MAP_ROUGHNESS];
+    for (int i = 0; i < 2; i++) row[3 + i] = ud * normal[0][i] + um * normal[1][i];
+    for (int i = 0; i < ROW; i++) row[i] = v_min(v_max(row[i], v_set(-STEEPEST)), v_set(STEEPEST));
+}
+
+V_INLINE void none(pivot *p, float damping)
+{
+    p->d = v_set(damping);
+    p->z = v_set(0);
+    for (int i = 0; i < ROW - 1; i++) p->l[i] = v_set(0);
 }
 
 V_INLINE void begin(const float *damping, equations *q)
 {
     for (int c = 0; c < 3; c++) {
-        q->own[c][0] = (pivot){.d = v_set(damping[MAP_DIFFUSE + c])};
-        q->own[c][1] = (pivot){.d = v_set(damping[MAP_SPECULAR + c])};
+        none(&q->own[c][0], damping[MAP_DIFFUSE + c]);
+        none(&q->own[c][1], damping[MAP_SPECULAR + c]);
     }
-    for (int i = 0; i < SHARED; i++) q->shared[i] = (pivot){.d = v_set(damping[shared_map[i]])};
+    for (int i = 0; i < SHARED; i++) none(&q->shared[i], damping[shared_map[i]]);
+}
+
+/* first_view: q is unset. */
+V_INLINE void add_view(const ts_shade_view *view, ts_shade_kind kind, bool first_view, const float *damping, const ts_shade_row *row, int first, int n, const float *image,
+                       const surface *s, equations *q)
+{
+    lighting e;
+    angles g;
+    radiance r;
+    couplings k;
+    vf target[3], normal[2][2], across[2][3];
+    light(view, kind, row, first, &e);
+    measure(s, &e, kind, &g);
+    if (!v_any(g.seen)) {
+        if (first_view) begin(damping, q);
+        return;
+    }
+    shade(view, kind, s, &e, &g, &r);
+    couple(kind, s, &e, &g, &r, &k);
+    for (int i = 0; i < 3; i++) {
+        across[0][i] = k.diffuse_l * g.l[i];
+        across[1][i] = k.mirror_l * g.l[i] + k.mirror_v * g.v[i] + k.mirror_h * g.h[i];
+    }
+    for (int i = 0; i < 2; i++) encode_normal(s, across[i], &normal[i][0], &normal[i][1]);
+    v_load_pixels(image + (int64_t)first * 3, 3, n, 3, target);
+    for (int c = 0; c < 3; c++) {
+        vf by[ROW], slope;
+        const vf seen = exposed(r.value[c], target[c], &slope);
+        row_of(c, s, &e, &r, &k, (const vf(*)[2])normal, slope, by);
+        vf error = target[c] - seen, weight = 1.0f / (v_max(target[c], v_set(0)) + TS_NEWTON_NOISE);
+        if (first_view) {
+            take_first(damping[MAP_DIFFUSE + c], &q->own[c][0], by, ROW - 1, error, &weight);
+            take_first(damping[MAP_SPECULAR + c], &q->own[c][1], by + 1, ROW - 2, error, &weight);
+        } else
+            for (int i = 0; i < 2; i++) take_up(&q->own[c][i], by + i, ROW - 1 - i, &error, &weight);
+        for (int i = 0; i < SHARED; i++) {
+            if (first_view && c == 0) take_first(damping[shared_map[i]], &q->shared[i], by + 2 + i, SHARED - 1 - i, error, &weight);
+            else take_up(&q->shared[i], by + 2 + i, SHARED - 1 - i, &error, &weight);
+        }
+    }
+}
+
+V_INLINE void add(const ts_shade_view *view, bool first_view, const float *damping, const ts_shade_row *row, int first, int n, const float *image, const surface *s, equations *q)
+{
+    if (view->kind == TS_SHADE_COLLOCATED) add_view(view, TS_SHADE_COLLOCATED, first_view, damping, row, first, n, image, s, q);
+    else add_view(view, TS_SHADE_POSITIONS, first_view, damping, row, first, n, image, s, q);
 }
 
 V_INLINE void solve(const equations *q, vf x[MAP_CHANNELS])
@@ -107,12 +156,9 @@ static void step(const ts_shade_view *views, const float *const *images, int cou
         surface s;
         equations q;
         vf x[MAP_CHANNELS], now[MAP_CHANNELS];
-        begin(damping, &q);
         decode(views->guards, maps, row->channels, n, &s);
-        for (int v = 0; v < count; v++) {
-            if (views[v].kind == TS_SHADE_COLLOCATED) add_view(&views[v], TS_SHADE_COLLOCATED, row, i, n, images[v], &s, &q);
-            else add_view(&views[v], TS_SHADE_POSITIONS, row, i, n, images[v], &s, &q);
-        }
+        add(views, true, damping, row, i, n, images[0], &s, &q);
+        for (int v = 1; v < count; v++) add(views + v, false, damping, row, i, n, images[v], &s, &q);
         solve(&q, x);
         v_load_pixels(maps, row->channels, n, MAP_CHANNELS, now);
         for (int c = 0; c < MAP_CHANNELS; c++) x[c] = v_min(v_max(now[c] + x[c], v_set(-1)), v_set(1)) - now[c];

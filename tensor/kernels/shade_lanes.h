@@ -205,6 +205,30 @@ V_INLINE void shade(const ts_shade_view *view, ts_shade_kind kind, const surface
     }
 }
 
+/* What the derivatives of the colours have in common. Of a colour with the diffuse part ud = (1 - s) diffuse / pi and the mirror part um = F, the one by
+ * roughness is um roughness, and by n, as n x (d / d n), ud diffuse_l n x l + um (mirror_l n x l + mirror_v n x v + mirror_h n x h). */
+typedef struct couplings {
+    vf roughness, diffuse_l, mirror_l, mirror_v, mirror_h;
+} couplings;
+
+V_INLINE void couple(ts_shade_kind kind, const surface *s, const lighting *e, const angles *g, const radiance *r, couplings *c)
+{
+    const bool published = kind == TS_SHADE_PUBLISHED;
+    const vf k = r->k, an = r->a * g->nh, log_d = (g->sine2 - an * an) * r->i, mirror = r->lobe * r->scale; /* times d log lobe */
+    const vf log_alpha = 2.0f * (published ? log_d + r->guarded : log_d) / r->a - 0.5f * ((1.0f - g->nl) * r->il + (1.0f - g->nv) * r->iv);
+    c->roughness = mirror * log_alpha * (2.0f * s->roughness);
+    /* n.l / (n.l (1 - k) + k) by n.l, and not the difference of the product's two terms, which nearly cancel at a grazing light. */
+    c->diffuse_l = v_select(g->seen, e->strength, v_set(0));
+    c->mirror_l = c->diffuse_l * (r->lobe * k * r->il);
+    c->mirror_v = -mirror * (1.0f - k) * r->iv;
+    c->mirror_h = mirror * (4.0f * (1.0f - r->a) * (1.0f + r->a)) * g->nh * r->i;
+    if (published) c->mirror_l += mirror * r->cosine, c->mirror_v += mirror * r->cosine;
+}
+
+V_INLINE vf by_diffuse(const surface *s, const radiance *r, int c) { return r->scale * (1.0f - s->specular[c]) * INV_PI; }
+V_INLINE vf by_specular(const surface *s, const lighting *e, const radiance *r, int c) { return r->scale * (r->lobe * (1.0f - e->fresnel) - s->diffuse[c] * INV_PI); }
+V_INLINE vf diffuse_part(const surface *s, int c) { return (1.0f - s->specular[c]) * s->diffuse[c] * INV_PI; }
+
 /* Derivatives by what was decoded; n is kept as n x (d / d n) until the end. */
 typedef struct slopes {
     vf diffuse[3], specular[3], roughness, n[3];
@@ -213,46 +237,42 @@ typedef struct slopes {
 /* Adds the derivatives of sum over c of u[c] value[c]. */
 V_INLINE void derive(ts_shade_kind kind, const surface *s, const lighting *e, const angles *g, const radiance *r, const vf u[3], slopes *d)
 {
-    vf ud = {0}, um = {0}; /* times the diffuse and the mirror part, without lobe and scale */
+    couplings k;
+    vf ud = {0}, um = {0};
+    couple(kind, s, e, g, r, &k);
     for (int c = 0; c < 3; c++) {
-        vf t = u[c] * r->scale;
-        d->diffuse[c] += t * (1.0f - s->specular[c]) * INV_PI;
-        d->specular[c] += t * (r->lobe * (1.0f - e->fresnel) - s->diffuse[c] * INV_PI);
-        ud += u[c] * (1.0f - s->specular[c]) * s->diffuse[c] * INV_PI;
+        d->diffuse[c] += u[c] * by_diffuse(s, r, c);
+        d->specular[c] += u[c] * by_specular(s, e, r, c);
+        ud += u[c] * diffuse_part(s, c);
         um += u[c] * r->fresnel[c];
     }
-    um = um * r->lobe;
-    vf us = um * r->scale; /* times d log lobe from here on */
-    const bool published = kind == TS_SHADE_PUBLISHED;
-    vf k = r->k, an = r->a * g->nh, log_d = (g->sine2 - an * an) * r->i;
-    vf log_alpha = 2.0f * (published ? log_d + r->guarded : log_d) / r->a - 0.5f * ((1.0f - g->nl) * r->il + (1.0f - g->nv) * r->iv);
-    d->roughness += us * log_alpha * (2.0f * s->roughness);
-    /* n.l / (n.l (1 - k) + k) by n.l, and not the difference of the product's two terms, which nearly cancel at a grazing light. */
-    vf by_l = v_select(g->seen, (ud + um * k * r->il) * e->strength, v_set(0));
-    vf by_v = -us * (1.0f - k) * r->iv;
-    if (published) by_l += us * r->cosine, by_v += us * r->cosine;
-    vf by_h = us * (4.0f * (1.0f - r->a) * (1.0f + r->a)) * g->nh * r->i;
+    d->roughness += um * k.roughness;
+    const vf by_l = ud * k.diffuse_l + um * k.mirror_l, by_v = um * k.mirror_v, by_h = um * k.mirror_h;
     for (int i = 0; i < 3; i++) d->n[i] += by_l * g->l[i] + by_v * g->v[i] + by_h * g->h[i];
 }
 
 /* To derivatives by the encoded maps. By n_x: n_z follows, (1, 0, -n_x/n_z), which is (n x a)_y / n_z for n.a; in the guard n_z
  * stays and the normalisation leaves the part of (1, 0, 0) / length across n, which is ((n x a) x n)_x / length. */
+V_INLINE void encode_normal(const surface *s, const vf n[3], vf *x, vf *y)
+{
+    *x = n[1];
+    *y = -n[0];
+    if (s->guarded) {
+        *x = v_select(s->guard, n[1] * s->nz - n[2] * s->ny, *x);
+        *y = v_select(s->guard, n[2] * s->nx - n[0] * s->nz, *y);
+    }
+    *x *= s->inverse * s->slope[MAP_NORMAL];
+    *y *= s->inverse * s->slope[MAP_NORMAL + 1];
+}
+
 V_INLINE void encode(const surface *s, const slopes *d, vf out[MAP_CHANNELS])
 {
     for (int c = 0; c < 3; c++) {
-        out[MAP_DIFFUSE + c] = d->diffuse[c];
-        out[MAP_SPECULAR + c] = d->specular[c];
+        out[MAP_DIFFUSE + c] = d->diffuse[c] * s->slope[MAP_DIFFUSE + c];
+        out[MAP_SPECULAR + c] = d->specular[c] * s->slope[MAP_SPECULAR + c];
     }
-    out[MAP_ROUGHNESS] = d->roughness;
-    out[MAP_NORMAL] = d->n[1];
-    out[MAP_NORMAL + 1] = -d->n[0];
-    if (s->guarded) {
-        out[MAP_NORMAL] = v_select(s->guard, d->n[1] * s->nz - d->n[2] * s->ny, out[MAP_NORMAL]);
-        out[MAP_NORMAL + 1] = v_select(s->guard, d->n[2] * s->nx - d->n[0] * s->nz, out[MAP_NORMAL + 1]);
-    }
-    out[MAP_NORMAL] *= s->inverse;
-    out[MAP_NORMAL + 1] *= s->inverse;
-    for (int i = 0; i < MAP_CHANNELS; i++) out[i] *= s->slope[i];
+    out[MAP_ROUGHNESS] = d->roughness * s->slope[MAP_ROUGHNESS];
+    encode_normal(s, d->n, &out[MAP_NORMAL], &out[MAP_NORMAL + 1]);
 }
 
 V_INLINE int lanes_left(const ts_shade_row *row, int first)
