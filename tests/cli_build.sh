@@ -65,24 +65,13 @@ install_link_uninstall() {
     for f in bin/lgd-infer bin/lgd-train bin/lgd-eval bin/lgd-data lib/liblgd.a lib/lgd/liblgd_image.so include/lgd.h share/lgd/single.safetensors lib/pkgconfig/lgd.pc; do
         grep -qx "/usr/local/$f" "$T/files" || fail "$f is not installed"
     done
-    cat >"$T/user.c" <<'C'
-#include <lgd.h>
-#include <stdio.h>
-int main(int argc, char **argv)
-{
-    lgd_error error;
-    lgd_model *m = lgd_load(argc > 1 ? argv[1] : "nothing", &error);
-    if (!m) return puts(error.message), 1;
-    printf("%d\n", lgd_trained_iterations(m));
-    lgd_free(&m);
-    return 0;
-}
-C
+    sed -n '/^## As a library/,/^## /s/^    //p' README.md >"$T/user.c" # the README's own program
     PKG_CONFIG_PATH=$T/root/usr/local/lib/pkgconfig
     export PKG_CONFIG_PATH
     # shellcheck disable=SC2046
     expect 0 ${CC:-gcc} -o "$T/user" "$T/user.c" $(pkg-config --define-prefix --cflags --libs lgd)
     expect 0 "$T/user" "$T/root/usr/local/share/lgd/single.safetensors"
+    says "$T/out" "roughness of the first pixel: 0."
     expect 1 "$T/user" "$T/absent.safetensors"
     says "$T/out" "absent.safetensors"
     expect 0 make --no-print-directory uninstall BUILD="$BUILD" DESTDIR="$T/root" PREFIX=/usr/local
