@@ -2,6 +2,7 @@
 #include "infer/clip.h"
 #include "render/render.h"
 #include "tensor/resample.h"
+#include "tensor/threads.h"
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -43,49 +44,56 @@ static void start(const work *w, int t, area a, float *maps)
 /* The given photographs in an area, one after the other. */
 static void photographs(const work *w, area a, float *to)
 {
+    const int64_t row = 3 * (int64_t)columns(a);
+#pragma omp parallel for collapse(2) num_threads(ts_threads()) schedule(static)
     for (int k = 0; k < w->t->given; k++)
-        for (int y = a.y0; y < a.y1; y++) {
-            const float *from = w->t->image[k] + ((size_t)y * (size_t)w->t->side + (size_t)a.x0) * 3;
-            lgd_clip(3 * columns(a), from, to);
-            to += 3 * columns(a);
-        }
+        for (int y = 0; y < rows(a); y++)
+            lgd_clip(row, w->t->image[k] + ((size_t)(a.y0 + y) * (size_t)w->t->side + (size_t)a.x0) * 3, to + ((int64_t)k * rows(a) + y) * row);
 }
 
-/* to (area b) = the part of from (area a) that it shows; b lies in a. */
+/* to (area b) = the part of from (area a) that it shows; b lies in a. Where they are the same memory rows move one after the other. */
 static void crop(area a, area b, int channels, const float *from, float *to)
 {
     const size_t row = (size_t)columns(b) * (size_t)channels;
-    for (int y = b.y0; y < b.y1; y++, to += row)
-        memmove(to, from + ((size_t)(y - a.y0) * (size_t)columns(a) + (size_t)(b.x0 - a.x0)) * (size_t)channels, row * sizeof *to);
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (from != to)
+    for (int y = 0; y < rows(b); y++)
+        memmove(to + (size_t)y * row, from + ((size_t)(b.y0 + y - a.y0) * (size_t)columns(a) + (size_t)(b.x0 - a.x0)) * (size_t)channels, row * sizeof *to);
 }
 
 static rd_grid grid_of(area a, int side) { return (rd_grid){rows(a), columns(a), a.y0, a.x0, side}; }
 
-/* Sum of squared differences between each photograph and the rendering of the maps (of area a) in core, added to sum [given]. */
-static void add_squares(const work *w, area a, area core, const float *maps, double *sum)
+static bool same(area a, area b) { return a.y0 == b.y0 && a.x0 == b.x0 && a.y1 == b.y1 && a.x1 == b.x1; }
+
+/* Sum of squared differences between each photograph (of area a, as photographs has it) and the rendering of the maps (of a too) in core, added to sum [given]. */
+static void add_squares(const work *w, area a, area core, const float *photo, const float *maps, double *sum)
 {
     const ts_mark mark = ts_arena_mark(ag_arena(w->tape));
     const int given = w->t->given;
-    const size_t pixels = (size_t)rows(core) * (size_t)columns(core);
-    float *part_of = ts_arena_alloc(ag_arena(w->tape), pixels * (size_t)w->channels * sizeof *part_of);
-    float *image = ts_arena_alloc(ag_arena(w->tape), pixels * (size_t)given * 3 * sizeof *image);
-    if (part_of && image) {
-        crop(a, core, w->channels, maps, part_of);
-        photographs(w, core, image);
-        for (int k = 0; k < given; k++) {
-            double rmse;
-            rd_flash_rmse(grid_of(core, w->t->side), part_of, w->channels, &w->t->views[k], image + (size_t)k * pixels * 3, &rmse);
-            sum[k] += rmse * rmse * (double)pixels;
-        }
-    } else ag_fail(w->tape, TS_NOMEM, "out of memory");
+    const size_t pixels = (size_t)rows(core) * (size_t)columns(core), all = (size_t)rows(a) * (size_t)columns(a);
+    float *cut = same(a, core) ? NULL : ts_arena_alloc(ag_arena(w->tape), pixels * (size_t)(w->channels + 3 * given) * sizeof *cut);
+    if (!same(a, core) && !cut) {
+        ag_fail(w->tape, TS_NOMEM, "out of memory");
+        return;
+    }
+    if (cut) {
+        crop(a, core, w->channels, maps, cut);
+        for (int k = 0; k < given; k++) crop(a, core, 3, photo + (size_t)k * all * 3, cut + pixels * (size_t)(w->channels + 3 * k));
+        maps = cut;
+        photo = cut + pixels * (size_t)w->channels;
+    }
+    for (int k = 0; k < given; k++) {
+        double rmse;
+        rd_flash_rmse(grid_of(core, w->t->side), maps, w->channels, &w->t->views[k], photo + (size_t)k * pixels * 3, &rmse);
+        sum[k] += rmse * rmse * (double)pixels;
+    }
     ts_arena_release(ag_arena(w->tape), mark);
 }
 
 /* Of all photographs together. */
-static double square_sum(const work *w, area a, area core, const float *maps)
+static double square_sum(const work *w, area a, area core, const float *photo, const float *maps)
 {
     double each[NN_MAX_IMAGES] = {0}, sum = 0;
-    add_squares(w, a, core, maps, each);
+    add_squares(w, a, core, photo, maps, each);
     for (int k = 0; k < w->t->given; k++) sum += each[k] / w->t->given;
     return sum;
 }
@@ -113,16 +121,16 @@ static void refine(work *w, area core, float *to)
     if (ag_status(tape)->code) return;
     float *const buffer = maps->t.data, *const photo = image->t.data;
     double last = 0;
+    photographs(w, now, photo);
     for (int i = t->rmse ? 0 : begin; i <= begin; i++) {
         start(w, i, now, buffer);
-        if (t->rmse) w->squares[i] += last = square_sum(w, now, core, buffer);
+        if (t->rmse) w->squares[i] += last = square_sum(w, now, core, photo, buffer);
     }
     nn_state state = {.rmse0 = w->rmse0, .step = begin};
     int step = begin;
     for (bool on = true; step < most && on;) {
         const area next = grown(core, reach * (most - step - 1), t->side);
         const ts_mark mark = ag_scope_begin(tape);
-        photographs(w, now, photo);
         const ts_shape shape = {1, rows(now), columns(now), w->channels};
         const nn_input in = {.image = ts_view(photo, (ts_shape){t->given, shape.h, shape.w, 3}), .grid = grid_of(now, t->side), .views = t->views, .given = t->given};
         for (int i = 0; i < carried; i++) {
@@ -136,9 +144,9 @@ static void refine(work *w, area core, float *to)
         for (int i = 0; i < carried; i++) crop(now, next, gru, states[i]->t.data, states[i]->t.data);
         state.gru[0] = state.gru[1] = NULL;
         ag_scope_end(tape, mark, NULL, 0);
-        now = next;
+        if (!same(now, next)) photographs(w, now = next, photo);
         step++;
-        if (t->rmse) w->squares[step] += last = square_sum(w, now, core, buffer);
+        if (t->rmse) w->squares[step] += last = square_sum(w, now, core, photo, buffer);
     }
     t->refined += (int64_t)rows(core) * columns(core) * (step - begin);
     for (int i = step + 1; i <= t->steps && t->rmse; i++) w->squares[i] += last;
@@ -164,8 +172,9 @@ static area wanted(const lgd_tiles *t, area a)
 static void put(const work *w, area b, const float *from, float *maps)
 {
     const size_t channels = (size_t)w->channels, row = (size_t)columns(b) * channels;
-    for (int y = b.y0; y < b.y1; y++, from += row)
-        memcpy(maps + ((size_t)y * (size_t)w->t->side + (size_t)b.x0) * channels, from, row * sizeof *from);
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int y = 0; y < rows(b); y++)
+        memcpy(maps + ((size_t)(b.y0 + y) * (size_t)w->t->side + (size_t)b.x0) * channels, from + (size_t)y * row, row * sizeof *from);
 }
 
 /* What the coarse steps leave everywhere, and what is refined over it. */
@@ -190,7 +199,8 @@ static void tile(work *w, area a, float *maps)
 static bool within(const float *v, int64_t count)
 {
     bool fine = true;
-    for (int64_t i = 0; i < count; i++) fine &= v[i] >= 0 && v[i] <= 1;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) reduction(&& : fine)
+    for (int64_t i = 0; i < count; i++) fine = fine && v[i] >= 0 && v[i] <= 1;
     return fine;
 }
 
@@ -221,10 +231,11 @@ static ts_code prepare(work *w)
     for (int y = 0; y < side && nn_arch_reads(&w->model->arch) && !ag_status(w->tape)->code; y += w->t->tile) {
         const area band = {y, 0, y + w->t->tile < side ? y + w->t->tile : side, side};
         const ts_mark before = ag_scope_begin(w->tape);
-        const ag_value *maps = ag_empty(w->tape, (ts_shape){1, rows(band), side, w->channels});
-        if (maps) {
+        const ag_value *maps = ag_empty(w->tape, (ts_shape){1, rows(band), side, w->channels}), *image = ag_empty(w->tape, (ts_shape){given, rows(band), side, 3});
+        if (maps && image) {
             start(w, w->coarse_steps, band, maps->t.data);
-            add_squares(w, band, band, maps->t.data, w->rmse0);
+            photographs(w, band, image->t.data);
+            add_squares(w, band, band, image->t.data, maps->t.data, w->rmse0);
         }
         ag_scope_end(w->tape, before, NULL, 0);
     }
