@@ -1,5 +1,6 @@
 /* The numbers of a tensor, from whatever type, order and layout they have in a file. */
 #include "nn/file_parts.h"
+#include "tensor/kernels/elementwise.h"
 #include "tensor/threads.h"
 #include <math.h>
 #include <stdlib.h>
@@ -55,14 +56,6 @@ static uint32_t as_bits(float f)
     return bits;
 }
 
-/* IEEE 754 binary16 to binary32, exactly; without branches, so that loops over it become vectors. */
-static float from_half(uint16_t h)
-{
-    const uint32_t sign = (uint32_t)(h & 0x8000) << 16, exponent = h >> 10 & 31, fraction = h & 0x3ff;
-    const uint32_t usual = (exponent == 31 ? 255u : exponent + 112) << 23 | fraction << 13, subnormal = as_bits((float)(int32_t)fraction * 0x1p-24f);
-    return as_float(sign | (exponent ? usual : subnormal));
-}
-
 /* binary32 to binary16, to nearest, ties to even. A finite number from 65520 on becomes infinite and *overflow true. */
 static uint16_t to_half(float f, bool *overflow)
 {
@@ -90,15 +83,13 @@ enum { CHUNK = 1024 };
 
 static void load(const nn_entry *e, const unsigned char *p, int64_t step, int n, float *out)
 {
-    if (e->dtype == NN_F16 && step == 2 && !e->swapped) { /* as the models that ship are */
-        uint16_t half[CHUNK];
-        memcpy(half, p, sizeof *half * (size_t)n);
-        for (int i = 0; i < n; i++) out[i] = from_half(half[i]);
-        return;
-    }
+    uint16_t half[CHUNK];
     switch (e->dtype) {
     case NN_F16:
-        for (int i = 0; i < n; i++, p += step) out[i] = from_half(take16(p, e->swapped));
+        if (step == 2 && !e->swapped) memcpy(half, p, sizeof *half * (size_t)n); /* as the models that ship are */
+        else
+            for (int i = 0; i < n; i++, p += step) half[i] = take16(p, e->swapped);
+        ts_elementwise_k()->from_half(n, half, out);
         break;
     case NN_BF16:
         for (int i = 0; i < n; i++, p += step) out[i] = as_float((uint32_t)take16(p, e->swapped) << 16);

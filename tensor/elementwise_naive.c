@@ -112,8 +112,17 @@ static void gru_backward(int64_t pixels, int c, const float *saved, const float 
     }
 }
 
+static void from_half(int64_t n, const uint16_t *x, float *y)
+{
+    for (int64_t i = 0; i < n; i++) {
+        const int exponent = x[i] >> 10 & 31, fraction = x[i] & 0x3ff;
+        const double size = exponent == 31 ? fraction ? NAN : INFINITY : exponent ? ldexp(1024 + fraction, exponent - 25) : ldexp(fraction, -24);
+        y[i] = (float)copysign(size, x[i] & 0x8000 ? -1 : 1);
+    }
+}
+
 const struct ts_elementwise_kernels ts_elementwise_naive = {
     .leaky = leaky, .leaky_backward = leaky_backward, .tanh = tanh_forward, .tanh_backward = tanh_backward, .selu = selu,
-    .selu_backward = selu_backward, .asinh = asinh_scaled, .add = add, .scale = scale, .add_leaky = add_leaky, .add_leaky_backward = add_leaky_backward,
+    .selu_backward = selu_backward, .asinh = asinh_scaled, .from_half = from_half, .add = add, .scale = scale, .add_leaky = add_leaky, .add_leaky_backward = add_leaky_backward,
     .broadcast = broadcast, .copy = copy, .gru = gru, .gru_backward = gru_backward,
 };

@@ -94,6 +94,23 @@ TEST(elementwise_twins)
     }
 }
 
+/* Every value there is, in one run and in short ones. */
+TEST(elementwise_from_half_is_exact)
+{
+    enum { ALL = 1 << 16, SHORT = 37 };
+    static uint16_t half[ALL];
+    static float expected[ALL], got[ALL];
+    for (int i = 0; i < ALL; i++) half[i] = (uint16_t)i;
+    ts_elementwise_naive.from_half(ALL, half, expected);
+    EVERY_ISA for (int run = SHORT; run <= ALL; run += ALL - SHORT)
+    {
+        for (int i = 0; i < ALL; i += run) ts_elementwise_k()->from_half(ALL - i < run ? ALL - i : run, half + i, got + i);
+        for (int i = 0; i < ALL; i++)
+            CHECK(isnan(expected[i]) ? isnan(got[i]) && !signbit(got[i]) == !(i & 0x8000) : !memcmp(&got[i], &expected[i], sizeof got[i]), "%04x on %s: %g, not %g", i,
+                  ts_isa_name(ts_isa_now()), (double)got[i], (double)expected[i]);
+    }
+}
+
 TEST(elementwise_pixel_twins)
 {
     const struct ts_elementwise_kernels *n = &ts_elementwise_naive;

@@ -1,6 +1,7 @@
 #include "tensor/kernels/elementwise.h"
 #include "tensor/kernels/vmath.h"
 #include <stddef.h>
+#include <string.h>
 
 static inline void put(float *p, vf x, int64_t left, bool accumulate)
 {
@@ -178,8 +179,26 @@ static void gru_backward(int64_t pixels, int c, const float *saved, const float 
     }
 }
 
+static inline uint32_t bits_of(float f)
+{
+    uint32_t bits;
+    memcpy(&bits, &f, sizeof bits);
+    return bits;
+}
+
+/* Without branches, so that the loop becomes one of vectors. */
+static void from_half(int64_t n, const uint16_t *restrict x, float *restrict y)
+{
+    for (int64_t i = 0; i < n; i++) {
+        const uint32_t h = x[i], sign = (h & 0x8000) << 16, exponent = h >> 10 & 31, fraction = h & 0x3ff;
+        const uint32_t usual = (exponent == 31 ? 255u : exponent + 112) << 23 | fraction << 13, subnormal = bits_of((float)(int32_t)fraction * 0x1p-24f);
+        const uint32_t bits = sign | (exponent ? usual : subnormal);
+        memcpy(&y[i], &bits, sizeof bits);
+    }
+}
+
 const struct ts_elementwise_kernels TS_TABLE(elementwise) = {
     .leaky = leaky, .leaky_backward = leaky_backward, .tanh = tanh_forward, .tanh_backward = tanh_backward, .selu = selu,
-    .selu_backward = selu_backward, .asinh = asinh_scaled, .add = add, .scale = scale, .add_leaky = add_leaky, .add_leaky_backward = add_leaky_backward,
+    .selu_backward = selu_backward, .asinh = asinh_scaled, .from_half = from_half, .add = add, .scale = scale, .add_leaky = add_leaky, .add_leaky_backward = add_leaky_backward,
     .broadcast = broadcast, .copy = copy, .gru = gru, .gru_backward = gru_backward,
 };
