@@ -14,6 +14,7 @@ typedef struct area {
     int y0, x0, y1, x1;
 } area;
 
+static bool same(area a, area b) { return a.y0 == b.y0 && a.x0 == b.x0 && a.y1 == b.y1 && a.x1 == b.x1; }
 static int rows(area a) { return a.y1 - a.y0; }
 static int columns(area a) { return a.x1 - a.x0; }
 
@@ -55,14 +56,13 @@ static void photographs(const work *w, area a, float *to)
 static void crop(area a, area b, int channels, const float *from, float *to)
 {
     const size_t row = (size_t)columns(b) * (size_t)channels;
+    if (from == to && same(a, b)) return;
 #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (from != to)
     for (int y = 0; y < rows(b); y++)
         memmove(to + (size_t)y * row, from + ((size_t)(b.y0 + y - a.y0) * (size_t)columns(a) + (size_t)(b.x0 - a.x0)) * (size_t)channels, row * sizeof *to);
 }
 
 static rd_grid grid_of(area a, int side) { return (rd_grid){rows(a), columns(a), a.y0, a.x0, side}; }
-
-static bool same(area a, area b) { return a.y0 == b.y0 && a.x0 == b.x0 && a.y1 == b.y1 && a.x1 == b.x1; }
 
 /* Sum of squared differences between each photograph (of area a, as photographs has it) and the rendering of the maps (of a too) in core, added to sum [given]. */
 static void add_squares(const work *w, area a, area core, const float *photo, const float *maps, double *sum)
@@ -137,7 +137,9 @@ static void refine(work *w, area core, float *to)
             state.to[i] = ag_constant(tape, ts_view(states[i]->t.data, (ts_shape){1, shape.h, shape.w, gru}));
             state.gru[i] = step > begin ? state.to[i] : NULL;
         }
-        ag_value *out = nn_refine(tape, w->model, &in, ag_constant(tape, ts_view(buffer, shape)), &state);
+        ag_value *before = ag_constant(tape, ts_view(buffer, shape));
+        state.into = t->tolerance > 0 ? NULL : before;
+        ag_value *out = nn_refine(tape, w->model, &in, before, &state);
         if (!out) return;
         on = !(t->tolerance > 0) || change(buffer, out->t.data, (size_t)ts_count(shape)) >= t->tolerance;
         crop(now, next, w->channels, out->t.data, buffer);

@@ -47,13 +47,14 @@ static bool read_band(ag_tape *tape, const nn_model *model, const nn_coarse *c, 
     const int y0 = c->down.first[first], rows = c->down.first[end] + c->down.offset[end + 1] - c->down.offset[end] - y0;
     const size_t pixels = (size_t)rows * (size_t)side;
     const ts_mark mark = ts_arena_mark(arena);
-    ts_tensor maps = ts_new(arena, (ts_shape){1, rows, side, channels}), photo = ts_new(arena, (ts_shape){count, rows, side, 3});
+    float *const first_photo = c->in.image.data + ((int64_t)n * count * side + y0) * side * 3;
+    ts_tensor maps = ts_new(arena, (ts_shape){1, rows, side, channels});
+    ts_tensor photo = count > 1 ? ts_new(arena, (ts_shape){count, rows, side, 3}) : ts_view(first_photo, (ts_shape){1, rows, side, 3});
     float *g = ts_arena_alloc(arena, pixels * (size_t)read * sizeof *g), *d = newton ? ts_arena_alloc(arena, pixels * (size_t)channels * sizeof *d) : NULL;
     int *from = ts_arena_alloc(arena, (size_t)(last - first) * sizeof *from);
     bool fine = maps.data && photo.data && g && from && (d || !newton);
     if (!fine) ag_fail(tape, TS_NOMEM, "no memory for %d x %d pixels", side, rows);
-    for (int k = 0; fine && k < count; k++)
-        memcpy(photo.data + (size_t)k * pixels * 3, c->in.image.data + ((int64_t)(n * count + k) * side + y0) * side * 3, pixels * 3 * sizeof(float));
+    for (int k = 0; fine && count > 1 && k < count; k++) memcpy(photo.data + (size_t)k * pixels * 3, first_photo + (int64_t)k * side * side * 3, pixels * 3 * sizeof(float));
     if (fine) {
         const nn_input in = {.image = photo, .grid = {.h = rows, .w = side, .y0 = y0, .side = side}, .view = c->in.view, .views = c->in.views ? c->in.views + n * count : NULL,
                              .given = count};

@@ -71,8 +71,8 @@ ag_value *nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value 
  * the maps. to: NULL, or for each new state the value to write it into, which may be the old one (a tape without gradients). */
 ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient, ag_value *gru[2], ag_value *const to[2]);
 
-/* R_{t+1} from R_t and its encoded gradients. path: what arch.descent lets past h, or NULL. */
-ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path, ag_value *gradient, ag_value *gru[2], ag_value *const to[2]);
+/* R_{t+1} from R_t and its encoded gradients. path: what arch.descent lets past h, or NULL. length: of the step, 1 for the whole. into: NULL, or the value to write it into, which may be R_t's. */
+ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path, ag_value *gradient, ag_value *gru[2], ag_value *const to[2], float length, ag_value *into);
 
 /* Memory for the parameters of a plan (nn_model_plan), zero only between them: for who then writes them all. */
 ts_code nn_model_room(nn_model *model, ts_status *st);

@@ -2,7 +2,6 @@
  * 2024): R_0 = g(image), R_{t+1} = R_t + h(R_t, dL/dR_t). */
 #include "nn/unrolled.h"
 #include "ops.h"
-#include "tensor/block.h"
 #include <string.h>
 
 /* The part of maps of the whole that in->image shows. */
@@ -55,9 +54,8 @@ static ag_value *step_and_forget(ag_tape *tape, const nn_model *model, const nn_
 static ag_value *step_and_release(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state, ag_value *to)
 {
     ts_mark mark = ag_scope_begin(tape);
-    ag_value *next = nn_refine(tape, model, in, maps, state);
-    if (!next) return NULL;
-    ts_block_copy(to->t.data, next->t.data, (size_t)ts_count(to->t.shape) * sizeof(float));
+    state->into = to;
+    if (!nn_refine(tape, model, in, maps, state)) return NULL;
     ag_scope_end(tape, mark, NULL, 0);
     for (int i = 0; i < 2; i++) state->gru[i] = state->to[i];
     return to;

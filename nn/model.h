@@ -144,6 +144,7 @@ int nn_refiner_reach(const nn_model *model);
 /* What h keeps from step to step, and the loss's scale; zero-initialise it. */
 typedef struct nn_state {
     ag_value *gru[2], *to[2]; /* to: NULL, or where the new states are written (a tape without gradients); to[i] may be gru[i] */
+    ag_value *into; /* NULL, or where nn_refine writes R_{t+1} (a tape without gradients); may be R_t */
     double *rmse0; /* of each of the whole photographs by R_0, in the tape's arena; NULL: nn_refine measures it on the maps that it is given */
     int step; /* how many were done: those beyond arch.iterations are shortened, the t-th to (T / t)^2 of its length (not where compat is published) */
 } nn_state;

@@ -22,10 +22,27 @@ ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, a
     return ag_tanh(tape, nn_conv(tape, model, h->output, x, 1, TS_PAD_REPLICATE, 1));
 }
 
-ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path, ag_value *gradient, ag_value *gru[2], ag_value *const to[2])
+/* d itself on a tape without gradients. */
+static ag_value *scaled(ag_tape *tape, ag_value *d, float length)
 {
-    ag_value *next = h->width > 0 ? ag_add(tape, maps, nn_change(tape, model, h, maps, gradient, gru, to)) : maps;
-    return path ? ag_add(tape, next, nn_conv(tape, model, h->path, path, 1, TS_PAD_ZERO, 1)) : next;
+    if (length == 1) return d;
+    if (d && !ag_gradients(tape)) ag_into(tape, d);
+    return ag_scale(tape, d, length);
+}
+
+ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path, ag_value *gradient, ag_value *gru[2], ag_value *const to[2], float length,
+                  ag_value *into)
+{
+    ag_value *next = maps;
+    if (h->width > 0) {
+        ag_value *change = scaled(tape, nn_change(tape, model, h, maps, gradient, gru, to), length);
+        if (!path) ag_into(tape, into);
+        next = ag_add(tape, maps, change);
+    }
+    if (!path) return next;
+    ag_value *past = scaled(tape, nn_conv(tape, model, h->path, path, 1, TS_PAD_ZERO, 1), length);
+    ag_into(tape, into);
+    return ag_add(tape, next, past);
 }
 
 int nn_refiner_reach(const nn_model *model)

@@ -110,17 +110,11 @@ bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_
 
 /* Nothing taught h that its steps must come to rest: beyond those it was trained for, what is left of them adds up to a drift. So step t > T goes
  * (T / t)^2 of its way, and all those together less than T whole steps. The published loop has no such rule. */
-static ag_value *shortened(ag_tape *tape, const nn_arch *a, int t, ag_value *maps, ag_value *next)
+static float length(const nn_arch *a, int t)
 {
-    if (!next || t <= a->iterations || a->compat == NN_COMPAT_PUBLISHED) return next;
-    const float left = (float)(a->iterations > 0 ? a->iterations : 1) / (float)t, weight = left * left, rest = 1 - weight;
-    if (ag_gradients(tape)) return ag_add(tape, ag_scale(tape, maps, rest), ag_scale(tape, next, weight));
-    const int64_t count = ts_count(next->t.shape); /* the same bytes, without memory of their own */
-    const float *from = maps->t.data;
-    float *to = next->t.data;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int64_t i = 0; i < count; i++) to[i] = rest * from[i] + weight * to[i];
-    return next;
+    if (t <= a->iterations || a->compat == NN_COMPAT_PUBLISHED) return 1;
+    const float left = (float)(a->iterations > 0 ? a->iterations : 1) / (float)t;
+    return left * left;
 }
 
 bool nn_descends(const nn_model *model, nn_descent how) { return model->arch.gradient && model->arch.descent == how; }
@@ -128,9 +122,8 @@ bool nn_descends(const nn_model *model, nn_descent how) { return model->arch.gra
 ag_value *nn_apply(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient, ag_value *newton, nn_state *state)
 {
     ag_value *path = nn_descends(model, NN_DESCENT_GRADIENT) ? gradient : newton;
-    ag_value *next = nn_step(tape, model, h, maps, path, gradient, state->gru, state->to);
     state->step++;
-    return shortened(tape, &model->arch, state->step, maps, next);
+    return nn_step(tape, model, h, maps, path, gradient, state->gru, state->to, length(&model->arch, state->step), state->into);
 }
 
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state)

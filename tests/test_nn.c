@@ -129,7 +129,7 @@ static ag_value *loop(ag_tape *t, const nn_model *m, const nn_input *in, int ste
     ag_value *now = nn_predict(t, m, in), *gru[2] = {NULL, NULL};
     for (int i = 0; i < steps; i++) {
         ag_value *gradient = ag_constant(t, ts_view(frozen[i], now->t.shape));
-        now = nn_step(t, m, &((const nn_layers *)m->layers)->h, now, gradient, gradient, gru, NULL);
+        now = nn_step(t, m, &((const nn_layers *)m->layers)->h, now, gradient, gradient, gru, NULL, 1, NULL);
     }
     check_tape(t);
     return now;
