@@ -183,7 +183,7 @@ comma_locale() {
     model
     if ! locale -a 2>/dev/null | grep -qi '^de_DE.utf-\?8$'; then
         localedef -i de_DE -f UTF-8 "$T/de_DE.UTF-8" 2>/dev/null || skip "there is no comma-decimal locale and none can be made"
-        export LOCPATH="$T"
+        export LOCPATH="$T" ASAN_OPTIONS="${ASAN_OPTIONS-}:detect_leaks=0" # the C library never frees what it makes of LOCPATH
     fi
     photo "$T/p.ppm" 24 24
     expect 0 infer "$T/p.ppm" -o "$T/c"
