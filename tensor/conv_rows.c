@@ -203,6 +203,9 @@ void conv_run_rows(const conv_plan *p)
     int bands = (16 + p->n - 1) / p->n;
     if (bands > (p->h + 3) / 4) bands = (p->h + 3) / 4;
     int groups = p->n * bands < 8 ? (8 + p->n * bands - 1) / (p->n * bands) : 1;
+    /* More weights than values: a block of them stays in the second cache while all images pass by. */
+    const int blocks = (panels + block.panels - 1) / block.panels;
+    if ((ptrdiff_t)p->k * p->k * p->oc > (ptrdiff_t)p->n * p->h * p->w && groups < blocks) groups = blocks;
     if (groups > panels) groups = panels;
 #pragma omp parallel for collapse(3) schedule(dynamic) num_threads(ts_threads())
     for (int g = 0; g < groups; g++)
