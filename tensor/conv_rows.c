@@ -7,6 +7,7 @@
 typedef struct band {
     int image, begin, end; /* rows of y */
     int panel_begin, panel_end;
+    int next; /* panel whose weights will be needed after these, and are fetched meanwhile; -1: none is known */
 } band;
 
 /* Panels are taken together for a row, and taps in blocks of ky, so that their weights stay in cache. */
@@ -48,6 +49,8 @@ static void tile_range(const runner *r, int tile, int *begin, int *end)
     *begin = tile * r->tile_size + (tile < r->larger ? tile : r->larger);
     *end = *begin + r->tile_size + (tile < r->larger);
 }
+
+enum { WHOLE_ROWS = 16 }; /* of an image that is not worth cutting into bands */
 
 /* Which tiles lie inside, and strips for the others. */
 static void make_sources(runner *r, int rows)
@@ -157,10 +160,17 @@ static void run_row(runner *r, int e, int ky0, int ky1, int panel0, int panel1, 
                 fresh = s->pixel0 + newest->a + (newest->count == p->ic ? 0 : reach) * s->pixel; /* it begins at the row's last tap, or at its first */
             }
             t.fetch_step[0] = fresh ? r->tile_size * s->pixel * (ptrdiff_t)sizeof(float) / calls : 0;
+            const float *coming = NULL;
+            ptrdiff_t share = 0; /* of the coming weights for a tile, in floats */
+            if (!fresh && r->b->next >= 0) {
+                share = (ptrdiff_t)p->k * p->k * p->ic * lanes2 / ((ptrdiff_t)p->n * p->h * r->tiles);
+                coming = conv_panel_tile(p, r->b->next).w + share * r->tiles * ((ptrdiff_t)r->b->image * p->h + conv_clamp(e - p->fold, p->h));
+                t.fetch_step[0] = share * (ptrdiff_t)sizeof(float) / calls;
+            }
             for (int tile = s->begin; tile < s->end; tile++) {
                 int begin, end;
                 tile_range(r, tile, &begin, &end);
-                t.fetch[0] = fresh ? fresh + end * s->pixel : p->packed;
+                t.fetch[0] = fresh ? fresh + end * s->pixel : coming ? coming + share * tile : p->packed;
                 t.fetch[1] = to + end * t.y_stride;
                 conv_run_tile(&t, conv_vectors(p->oc, panel), s->pixel0 + begin * s->pixel, to + begin * t.y_stride, end - begin,
                               p->bf16);
@@ -203,15 +213,17 @@ void conv_run_rows(const conv_plan *p)
     int bands = (16 + p->n - 1) / p->n;
     if (bands > (p->h + 3) / 4) bands = (p->h + 3) / 4;
     int groups = p->n * bands < 8 ? (8 + p->n * bands - 1) / (p->n * bands) : 1;
-    /* More weights than values: a block of them stays in the second cache while all images pass by. */
-    const int blocks = (panels + block.panels - 1) / block.panels;
-    if ((ptrdiff_t)p->k * p->k * p->oc > (ptrdiff_t)p->n * p->h * p->w && groups < blocks) groups = blocks;
+    /* More weights than values: a block of them stays in the second cache while all images pass by, and where it is a panel those who come to it next have it fetched. */
+    const int blocks = (panels + block.panels - 1) / block.panels, ahead = ts_threads();
+    const bool weighty = (ptrdiff_t)p->k * p->k * p->oc > (ptrdiff_t)p->n * p->h * p->w;
+    if (weighty && groups < blocks) groups = blocks;
     if (groups > panels) groups = panels;
+    if (weighty && p->h <= WHOLE_ROWS && groups * p->n >= 8) bands = 1;
 #pragma omp parallel for collapse(3) schedule(dynamic) num_threads(ts_threads())
     for (int g = 0; g < groups; g++)
         for (int n = 0; n < p->n; n++)
             for (int i = 0; i < bands; i++) {
-                band b = {.image = n};
+                band b = {.image = n, .next = weighty && block.ky == p->k && bands == 1 && groups == panels && g + ahead < panels ? g + ahead : -1};
                 conv_part(p->h, bands, i, &b.begin, &b.end);
                 conv_part(panels, groups, g, &b.panel_begin, &b.panel_end);
                 run_band(p, block, &b);
