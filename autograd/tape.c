@@ -58,6 +58,13 @@ void ag_reset(ag_tape *tape)
     if (!tape->frozen) ag_packs_forget(tape->packs);
 }
 
+void ag_drop(ag_tape *tape)
+{
+    ag_reset(tape);
+    ts_arena_drop(tape->arena);
+    ts_arena_drop(tape->moving);
+}
+
 const ts_status *ag_status(const ag_tape *tape) { return &tape->status; }
 ts_arena *ag_arena(ag_tape *tape) { return tape->arena; }
 bool ag_gradients(const ag_tape *tape) { return tape->gradients; }

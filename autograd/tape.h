@@ -58,6 +58,9 @@ void ag_tape_destroy(ag_tape **tape);
 /* Forgets all values and the error, keeps the memory. Packed weights are forgotten too unless ag_freeze was called. */
 void ag_reset(ag_tape *tape);
 
+/* ag_reset, and the memory goes back to the system, but for packed weights. */
+void ag_drop(ag_tape *tape);
+
 const ts_status *ag_status(const ag_tape *tape);       /* the first error, or code TS_OK */
 ts_arena *ag_arena(ag_tape *tape);
 bool ag_gradients(const ag_tape *tape);

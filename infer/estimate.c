@@ -230,6 +230,7 @@ ts_code lgd_estimator_run(const lgd_estimator *e, const lgd_photo *photo, int ph
         if (!code && tiles) code = count_steps(e, &p, steps, o->orientations, &steps, st);
     }
     if (!code) code = (tiles ? estimate_tiles : estimate_whole)(e, &p, steps, o, maps, st);
+    if (side > UNTILED) ag_drop(e->tape); /* what is done with such maps needs memory of its own */
     free(proposed);
     return code;
 }

@@ -4,6 +4,7 @@
 #include "tensor/resize.h"
 #include "tensor/threads.h"
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
 /* Stops by which R_0's brightness errs where nothing is amiss: the estimate is that much nearer to 1, so that usual photographs keep the usual light. */
@@ -48,12 +49,12 @@ static ts_code fit(ag_tape *tape, const nn_model *model, const float *const *ima
     *factor = 1;
     ag_value *small = ag_empty(tape, (ts_shape){given, size, size, 3}), *rendered = ag_empty(tape, (ts_shape){given, size, size, 3});
     const ts_mark mark = ag_scope_begin(tape);
-    ag_value *full = ag_empty(tape, (ts_shape){given, side, side, 3});
-    if (!small || !rendered || !full) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
-    for (int k = 0; k < given; k++)
-        lgd_clip((int64_t)whole, image[k], full->t.data + (size_t)k * whole);
-    if (side == size) memcpy(small->t.data, full->t.data, (size_t)given * values * sizeof(float));
-    else if (ts_resize(&small->t, &full->t, ag_arena(tape), st)) return st->code;
+    ts_tensor full = ts_view((float *)(uintptr_t)image[0], (ts_shape){given, side, side, 3});
+    if (given > 1 || !lgd_clipped((int64_t)whole, image[0])) full = ts_new(ag_arena(tape), full.shape);
+    if (!small || !rendered || !full.data) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
+    for (int k = 0; k < given && full.data != image[0]; k++) lgd_clip((int64_t)whole, image[k], full.data + (size_t)k * whole);
+    if (side == size) memcpy(small->t.data, full.data, (size_t)given * values * sizeof(float));
+    else if (ts_resize(&small->t, &full, ag_arena(tape), st)) return st->code;
     ag_scope_end(tape, mark, NULL, 0);
     const nn_input in = {.image = small->t, .grid = grid, .views = views, .given = given, .orientations = orientations};
     const ag_value *maps = nn_predict(tape, model, &in);

@@ -197,15 +197,6 @@ static void tile(work *w, area a, float *maps)
     ag_scope_end(w->tape, mark, NULL, 0);
 }
 
-/* All in [0, 1], as photographs() would have it. */
-static bool within(const float *v, int64_t count)
-{
-    bool fine = true;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) reduction(&& : fine)
-    for (int64_t i = 0; i < count; i++) fine = fine && v[i] >= 0 && v[i] <= 1;
-    return fine;
-}
-
 /* g and the coarse steps work on the whole photograph; the loss's scale is that of what they leave, measured in bands. */
 static ts_code prepare(work *w)
 {
@@ -217,7 +208,7 @@ static ts_code prepare(work *w)
     if (!w->coarse) return ag_fail(w->tape, TS_NOMEM, "out of memory"), TS_NOMEM;
     const ts_mark mark = ag_scope_begin(w->tape);
     ts_tensor photo = ts_view((float *)(uintptr_t)w->t->image[0], (ts_shape){given, side, side, 3});
-    if (given > 1 || !within(w->t->image[0], ts_count(photo.shape))) { /* else a large photograph need not be there twice */
+    if (given > 1 || !lgd_clipped(ts_count(photo.shape), w->t->image[0])) {
         const ag_value *whole = ag_empty(w->tape, photo.shape);
         if (!whole) return ag_status(w->tape)->code;
         photographs(w, all, whole->t.data);

@@ -118,5 +118,11 @@ void ts_arena_reset(ts_arena *a)
     a->at = a->used = a->total = 0;
 }
 
+void ts_arena_drop(ts_arena *a)
+{
+    free_chunks(a);
+    a->total = a->peak = 0;
+}
+
 size_t ts_arena_used(const ts_arena *a) { return a->total; }
 size_t ts_arena_peak(const ts_arena *a) { return a->peak; }

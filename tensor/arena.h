@@ -30,7 +30,10 @@ void ts_arena_release(ts_arena *arena, ts_mark mark);
  * workload allocates nothing from its third round on. */
 void ts_arena_reset(ts_arena *arena);
 
-/* Bytes in use now, and the most that ever was. */
+/* The same, and the memory goes back to the system. */
+void ts_arena_drop(ts_arena *arena);
+
+/* Bytes in use now, and the most that ever was (since ts_arena_drop). */
 size_t ts_arena_used(const ts_arena *arena);
 size_t ts_arena_peak(const ts_arena *arena);
 #endif

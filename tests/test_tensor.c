@@ -59,6 +59,10 @@ TEST(arena_aligns_grows_releases_and_merges)
         CHECK(ts_arena_alloc(a, 5 << 20) == q, "released memory is used again");
         ts_arena_reset(a);
         CHECK(ts_arena_used(a) == 0, "reset");
+        if (round % 2) {
+            ts_arena_drop(a);
+            CHECK(ts_arena_used(a) == 0 && ts_arena_peak(a) == 0, "drop");
+        }
     }
     CHECK(ts_arena_alloc(a, SIZE_MAX / 2) == NULL, "too much memory gives NULL");
     CHECK(ts_arena_zalloc(a, SIZE_MAX / 2, 16) == NULL, "an overflowing product gives NULL");
