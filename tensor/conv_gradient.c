@@ -5,8 +5,8 @@
 #include <string.h>
 
 enum {
-    PASS_PIXELS = 256,   /* a pass of one panel of dy stays in the first cache for all blocks of inputs, */
-    PASS_POINTWISE = 128, /* and of inputs that have no neighbours to share all that they need too */
+    PASS_PIXELS = 512,   /* a pass's inputs stay in the second cache for all panels of dy, */
+    PASS_POINTWISE = 128, /* and, where they have no neighbours to share, in the first with the panel */
     CHUNK_PIXELS = 1024, /* so many that clearing and adding the sums of a chunk is little beside making them */
     CHUNKS = 16,
     UNITS = 16           /* of work, at least, where the shape allows */
@@ -75,6 +75,7 @@ static job make_job(const ts_conv *c, const float *x, const float *dy)
 /* One pass: rows [begin, end) of image n, columns [left, right), items [item, item_end) of (panel, line). */
 typedef struct pass {
     int image, begin, end, left, right, item, item_end;
+    bool first; /* of the chunk */
     /* What the next pass reads, fetched a little with each block. */
     const char *next[2];
     ptrdiff_t next_bytes[2], fetched, fetch_each;
@@ -133,7 +134,7 @@ static void run_pass(const job *g, pass *s, const conv_stage *stage, float *sums
             dy_row[rows++] = g->direct_dy ? at * c->oc : (ptrdiff_t)(i - s->begin) * count * width;
         }
         const ptrdiff_t dy_stride = g->direct_dy ? c->oc : width;
-        ts_sum t = {.rows = rows, .count = count, .fetch_step = s->fetch_each / (rows * (count / 2) + 1)};
+        ts_sum t = {.rows = rows, .count = count, .begin = s->first, .fetch_step = s->fetch_each / (rows * (count / 2) + 1)};
         if (g->swapped) {
             t.a = dy, t.a_row = dy_row, t.a_stride = dy_stride;
             t.b = x + panel * 2 * lanes, t.b_row = x_row, t.b_stride = g->pixel;
@@ -165,7 +166,7 @@ static void plan_fetch(const job *g, pass *s, int row_end, int rows, int blocks)
 static void run_chunk(const job *g, int chunk, int group, bool weights)
 {
     const ts_conv *c = g->c;
-    const int lanes2 = 2 * conv_lanes(), most = c->k == 1 ? PASS_POINTWISE : PASS_PIXELS, rows_pass = c->w < most ? most / c->w : 1, blocks = (c->w + most - 1) / most;
+    const int most = c->k == 1 ? PASS_POINTWISE : PASS_PIXELS, rows_pass = c->w < most ? most / c->w : 1, blocks = (c->w + most - 1) / most;
     const int reach = (c->k - 1) * c->dilation;
     const bool staged = weights && c->k > 1;
     pass s = {0};
@@ -173,12 +174,6 @@ static void run_chunk(const job *g, int chunk, int group, bool weights)
     conv_part(c->n * c->h, g->chunks, chunk, &begin, &end);
     conv_part(conv_panels(g->n) * g->lines, g->groups, group, &s.item, &s.item_end);
     float *sums = g->sums + chunk * g->size, *bias = g->bias_sums && group == 0 ? g->bias_sums + (ptrdiff_t)chunk * c->oc : NULL;
-    for (int item = s.item; weights && item < s.item_end; item++) {
-        const int panel = item / g->lines, line = item % g->lines;
-        for (int m = 0; m < g->m; m++)
-            memset(sums + ((ptrdiff_t)line * g->m + m) * g->padded + panel * lanes2, 0,
-                   sizeof(float) * (size_t)(conv_vectors(g->n, panel) * conv_lanes()));
-    }
     if (bias) memset(bias, 0, sizeof(float) * (size_t)c->oc);
     conv_stage stage = {0};
     if (staged) {
@@ -200,6 +195,7 @@ static void run_chunk(const job *g, int chunk, int group, bool weights)
         if (weights) plan_fetch(g, &s, row + s.end - s.begin, s.end - s.begin, blocks);
         for (int b = 0; weights && b < blocks; b++) {
             conv_part(c->w, blocks, b, &s.left, &s.right);
+            s.first = row == begin && b == 0;
             run_pass(g, &s, &stage, sums);
         }
         if (bias) ts_conv_k()->columns(g->dy + (ptrdiff_t)row * c->w * c->oc, (int64_t)(s.end - s.begin) * c->w, c->oc, bias);

@@ -172,7 +172,8 @@ INLINE void tile(const ts_tile *t, const int pixels, const int vectors, const bo
 INLINE void sum(const ts_sum *t, const int rows, const int vectors, const bool near)
 {
     vf acc[ROWS][2];
-    UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++) acc[m][v] = v_load(t->c + m * t->c_stride + v * VL);
+    if (t->begin) UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++) acc[m][v] = (vf){0};
+    else UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++) acc[m][v] = v_load(t->c + m * t->c_stride + v * VL);
     const ptrdiff_t as = t->a_stride, bs = t->b_stride, ahead = 8 * bs, step = t->fetch_step;
     const char *fetch = t->fetch;
     for (int r = 0; r < t->rows; r++) {

@@ -46,6 +46,7 @@ typedef struct ts_sum {
     ptrdiff_t a_stride, b_stride; /* from pixel to pixel */
     float *c;
     ptrdiff_t c_stride;
+    bool begin;           /* c's sums begin with these: it holds nothing yet */
     const char *fetch;    /* prefetched into the second cache, two lines for every other pixel (not by sum_near); never read, but should be mapped */
     ptrdiff_t fetch_step; /* bytes forward for two pixels */
 } ts_sum;
