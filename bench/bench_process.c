@@ -119,9 +119,11 @@ BENCH(process)
                             {.label = "26 photographs, every file, --threads 1", .word = {"--threads", "1"}, .photographs = FOLDER}};
     enum { COMMANDS = sizeof all / sizeof *all, ONE_FOUR_MAPS = 3 };
     static char link[FOLDER][NAME];
-    char folder[] = "/tmp/lgd-bench-XXXXXX", own[PATH_MAX] = "", program[PATH_MAX + 16], out[NAME], source[PATH_MAX];
+    char folder[NAME / 2], own[PATH_MAX] = "", program[PATH_MAX + 16], out[NAME], source[PATH_MAX];
     bool fine = true;
     bench_heading("lgd-infer as a process, 256 x 256 (medians of seven, in turn)");
+    const char *temporary = getenv("TMPDIR");
+    snprintf(folder, sizeof folder, "%s/lgd-bench-XXXXXX", temporary && *temporary ? temporary : P_tmpdir);
     if (readlink("/proc/self/exe", own, sizeof own - 1) <= 0 || !realpath(photograph, source) || !mkdtemp(folder)) {
         printf("  no %s here, or no room for files: nothing is measured\n", photograph);
         return;
