@@ -16,7 +16,7 @@ typedef struct lgd_error {
 } lgd_error;
 
 /* Reads weights (safetensors). NULL and error on failure. The caller frees, when no call uses it. Any number of threads may call lgd_estimate with one model at
- * once: each such call has memory of its own (20 MB at 256 x 256 pixels), which the model keeps for later calls, but for what photographs over 512 pixels a side took. */
+ * once: each such call has memory of its own (30 MB at 256 x 256 pixels), which the model keeps for later calls, but for what photographs over 512 pixels a side took. */
 lgd_model *lgd_load(const char *weights, lgd_error *error);
 void lgd_free(lgd_model **model);
 

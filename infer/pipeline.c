@@ -1,4 +1,5 @@
 #include "infer/pipeline.h"
+#include "infer/memory.h"
 #include "infer/output.h"
 #include "infer/photograph.h"
 #include "tensor/threads.h"
@@ -188,14 +189,24 @@ static void *lane(void *user)
     return NULL;
 }
 
+/* Photographs that are computed at once: one for each thread, and fewer where the memory would not do. */
+static int most_at_once(int jobs, int size)
+{
+    const double each = 64e6 + 200.0 * size * size; /* bytes, more than were seen */
+    ts_status full = {0};
+    int lanes = jobs < LANES ? jobs : LANES;
+    if (lanes > ts_threads()) lanes = ts_threads();
+    while (lanes > 1 && lgd_memory_check(lanes * each, &full) != TS_OK) lanes--;
+    return lanes;
+}
+
 lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *command, bool published, ts_status *st)
 {
     lgd_pipeline *p = calloc(1, sizeof *p);
     if (!p) return ts_fail(st, TS_NOMEM, "out of memory"), NULL;
     *p = (lgd_pipeline){.plan = plan, .command = command, .published = published, .lock = PTHREAD_MUTEX_INITIALIZER, .changed = PTHREAD_COND_INITIALIZER, .lanes = 1, .items = 1};
     if (command->size <= LARGE) {
-        const int most = plan->jobs < LANES ? plan->jobs : LANES;
-        p->lanes = ts_threads() < most ? ts_threads() : most;
+        p->lanes = most_at_once(plan->jobs, command->size);
         p->items = p->lanes + AHEAD;
     }
     p->decoding = pthread_create(&p->decoder, NULL, decode_all, p) == 0;
