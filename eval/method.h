@@ -76,7 +76,7 @@ double ev_number(const ev_estimator *e, const char *key);
 const char *ev_text(const ev_estimator *e, const char *key);
 bool ev_given(const ev_estimator *e, const char *key);
 /* Of the methods that have this key: nn_input.orientations; of the others 1. */
-#define EV_ORIENTATIONS {.key = "orientations", .type = EV_WORD, .words = "1 2 4 8", .initial = "1", .help = "of the photograph that R_0 is the mean of, as lgd-infer --orientations (whose default is 4)"}
+#define EV_ORIENTATIONS {.key = "orientations", .type = EV_WORD, .words = "1 2 4 8", .initial = "1", .help = "of the photograph that R_0 is the mean of, as lgd-infer --orientations (whose default is 2)"}
 int ev_orientations(const ev_estimator *e);
 /* e->net from the key's weights, and the tape without gradients. */
 ts_code ev_open_net(ev_estimator *e, const char *key, ts_status *st);

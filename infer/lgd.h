@@ -30,7 +30,7 @@ enum { LGD_AUTO = -2, LGD_AUTO_MOST = 24 };
 /* What costs the least time for renderings that are at most 1% worse than those of all steps, where steps at the photograph's size have a network; where they have none they
  * cost so little that ending them early saves nothing (docs/performance.md). */
 #define LGD_TOLERANCE 0.003
-#define LGD_ORIENTATIONS_USUAL 4 /* as little error in renderings as 8 in half of g's time (docs/performance.md) */
+#define LGD_ORIENTATIONS_USUAL 2 /* as little error in renderings as 8 in a quarter of g's time (docs/performance.md) */
 #define LGD_TOLERANCE_USUAL (-1.0)
 
 enum { LGD_F32, LGD_BF16 };
@@ -41,7 +41,7 @@ typedef struct lgd_options {
                      * of the published network always are */
     int precision;  /* LGD_F32, or LGD_BF16: inputs and weights of convolutions rounded to bf16, multiplied by the CPU's AMX or AVX512-BF16 or, much slower, from
                      * f32; sums, renderer and maps stay f32 (docs/performance.md says how far the maps differ) */
-    int orientations; /* 2, 4, 8: the first estimate is the mean of those of so many of the photograph's orientations (as it is and turned by a half, all
+    int orientations; /* 2, 4, 8: the first estimate is the mean of those of so many of the photograph's orientations (as it is and turned by a quarter, all
                        * quarter turns, and their mirror images), where it is the only one and light and camera are above its centre (not with the
                        * published weights); 1 or 0: of the photograph as it is */
     int threads;    /* that the call computes on; 0: as many as the process may use */

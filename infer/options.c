@@ -12,8 +12,8 @@ const lgd_argument lgd_infer_arguments[] = {
     {'s', "size", "N", "pixels of a side of the maps, 1 .. 8192 (default 256)"},
     {'i', "iterations", "N|auto", "refinement steps, 0 .. 1000; 0 = the first estimate alone; auto = as long as the reconstruction improves,\n"
                                   "24 at most (default: as trained)"},
-    {ORIENTATIONS, "orientations", "N", "the first estimate is the mean over so many of the photograph's orientations: 1 (as it is), 2 (and turned by a half), 4 (quarter turns;\n"
-                                       "the default) or 8 (and their mirror images)"},
+    {ORIENTATIONS, "orientations", "N", "the first estimate is the mean over so many of the photograph's orientations: 1 (as it is), 2 (and turned by a quarter;\n"
+                                       "the default), 4 (all quarter turns) or 8 (and their mirror images)"},
     {EXACT, "exact", NULL, "compute all convolutions directly; the default, Winograd's way where it is faster, differs by less than 1e-4"},
     {PRECISION, "precision", "f32|bf16", "what convolutions multiply (default f32); bf16 is for CPUs with AMX, or AMD's with AVX512-BF16, slower on others, and its maps differ by less than 0.005 (RMS)"},
     {CAPTURE, "capture", "WHERE", "in place of PHOTO: several photographs of one sample under known lights, listed in an INI file\n"

@@ -118,7 +118,7 @@ typedef struct nn_input {
     ts_tensor whole; /* [N * given, side, side, 3]: the photographs of which image is the window; no data: image is the whole */
     const rd_view *views; /* [N * given], or NULL */
     int given;            /* 1 .. arch.images; 0 stands for 1 */
-    int orientations;     /* 2, 4, 8: R_0 is the mean of g's maps of the photograph in so many orientations (as it is and turned by a half, all quarter
+    int orientations;     /* 2, 4, 8: R_0 is the mean of g's maps of the photograph in so many orientations (as it is and turned by a quarter, all quarter
                            * turns, and their mirror images), where nn_orients says that they are alike; on a tape without gradients. 0, 1: as it is */
     const float *proposed; /* R_0 of these photographs in these orientations, [N, g_size, g_size, channels] as nn_coarse_steps gives it; NULL: g is run */
     bool recompute;       /* on a tape with gradients: of each step only R_t and h's states are kept, the rest is computed again for the gradient */
