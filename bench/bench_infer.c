@@ -26,7 +26,7 @@ static void whole(void *user)
     subject *s = user;
     ag_value *maps;
     const ts_mark mark = ag_scope_begin(s->tape);
-    nn_lgd(s->tape, s->model, &s->in, s->steps, false, &maps, NULL, NULL);
+    nn_lgd(s->tape, s->model, &s->in, s->steps, false, &maps, NULL);
     ag_scope_end(s->tape, mark, NULL, 0);
 }
 

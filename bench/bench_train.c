@@ -36,7 +36,7 @@ static void step(void *user)
     subject *s = user;
     ag_value *maps[65];
     ag_reset(s->tape);
-    nn_lgd(s->tape, s->model, &s->in, s->steps, true, maps, NULL, NULL);
+    nn_lgd(s->tape, s->model, &s->in, s->steps, true, maps, NULL);
     if (ag_status(s->tape)->code) return;
     ag_value *loss = loss_of(s, maps[0]);
     ag_backward(s->tape, s->steps > 0 ? ag_add(s->tape, loss_of(s, maps[s->steps]), loss) : loss);

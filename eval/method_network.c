@@ -97,7 +97,7 @@ static ts_code run_whole(ev_estimator *e, const ev_case *c, const rd_view *view,
     ag_reset(e->tape);
     const int given = photos(e);
     const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){given, c->size, c->size, 3}), .grid = rd_grid_full(c->size), .views = view, .given = given, .orientations = ev_orientations(e), .proposed = proposed};
-    if (nn_lgd(e->tape, e->net, &in, steps(e), false, &out, after, &t) == TS_OK) return TS_OK;
+    if (nn_lgd(e->tape, e->net, &in, steps(e), false, &out, &(nn_watch){after, &t, false}) == TS_OK) return TS_OK;
     *st = *ag_status(e->tape);
     return st->code;
 }

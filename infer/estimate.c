@@ -29,17 +29,22 @@ typedef struct watch {
 
 #define AUTO_LEAST 1e-3 /* of the RMSE: a step that lowers it by less is not worth its time */
 
+static double rmse_of(const nn_input *in, const ag_value *maps)
+{
+    const rd_grid g = in->grid;
+    double squares = 0;
+    for (int k = 0; k < in->given; k++) {
+        double one;
+        rd_flash_rmse(g, maps->t.data, maps->t.shape.c, &in->views[k], in->image.data + (size_t)k * (size_t)g.h * (size_t)g.w * 3, &one);
+        squares += one * one / in->given;
+    }
+    return sqrt(squares);
+}
+
 static bool after_step(int step, const ag_value *maps, void *user)
 {
     watch *w = user;
-    const rd_grid g = w->in->grid;
-    double squares = 0;
-    for (int k = 0; k < w->in->given; k++) {
-        double one;
-        rd_flash_rmse(g, maps->t.data, maps->t.shape.c, &w->in->views[k], w->in->image.data + (size_t)k * (size_t)g.h * (size_t)g.w * 3, &one);
-        squares += one * one / w->in->given;
-    }
-    const double rmse = sqrt(squares);
+    const double rmse = maps ? rmse_of(w->in, maps) : NAN;
     if (w->best) {
         if (step > 0 && !(rmse < w->best_rmse * (1 - AUTO_LEAST))) return false;
         memcpy(w->best, maps->t.data, (size_t)ts_count(maps->t.shape) * sizeof *w->best);
@@ -106,7 +111,7 @@ static ts_code run_loop(const lgd_estimator *e, const given_photos *p, int steps
         w.best = ts_arena_alloc(ag_arena(e->tape), (size_t)side * (size_t)side * (size_t)e->net->arch.channels * sizeof *w.best);
         if (!w.best) return ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
     }
-    if (nn_lgd(e->tape, e->net, &in, steps, false, &out, o->progress || w.best ? after_step : NULL, &w) != TS_OK || !out) {
+    if (nn_lgd(e->tape, e->net, &in, steps, false, &out, o->progress || w.best ? &(nn_watch){after_step, &w, !w.best && !o->every_rmse} : NULL) != TS_OK || !out) {
         *st = *ag_status(e->tape);
         return st->code ? st->code : ts_fail(st, TS_NUMERIC, "the network gave no result");
     }
@@ -176,7 +181,7 @@ static ts_code estimate_tiles(const lgd_estimator *e, const given_photos *p, int
     float *raw = arch->channels == MAP_CHANNELS ? maps : malloc((size_t)pixels * (size_t)arch->channels * sizeof *raw);
     double *rmse = calloc((size_t)steps + 1, sizeof *rmse);
     ts_code code = raw && rmse ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
-    lgd_tiles t = {.image = p->image, .views = p->views, .given = p->count, .proposed = p->proposed, .mask = o->mask, .side = side, .tile = tile, .steps = steps, .orientations = o->orientations, .tolerance = o->tolerance, .rmse = o->progress ? rmse : NULL,
+    lgd_tiles t = {.image = p->image, .views = p->views, .given = p->count, .proposed = p->proposed, .mask = o->mask, .side = side, .tile = tile, .steps = steps, .orientations = o->orientations, .tolerance = o->tolerance, .rmse = o->progress ? rmse : NULL, .ends_alone = !o->every_rmse && o->iterations != LGD_AUTO,
                    .alive = before_tile, .user = &w};
     if (!code) code = lgd_tiles_run(e->tape, e->net, &t, raw, st);
     int stop = steps;

@@ -45,9 +45,11 @@ typedef struct lgd_options {
                        * quarter turns, and their mirror images), where it is the only one and light and camera are above its centre (not with the
                        * published weights); 1 or 0: of the photograph as it is */
     int threads;    /* that the call computes on; 0: as many as the process may use */
-    /* Called after R_0 (step 0) and after every refinement with the reconstruction RMSE; return nonzero to stop there. May be NULL. */
+    /* Called after R_0 (step 0) and after every refinement; return nonzero to stop there. May be NULL. rmse: the reconstruction RMSE after R_0, after the
+     * last of the iterations and, where they are LGD_AUTO or every_rmse is not 0, which takes a tenth more time, after every other; else NAN. */
     int (*progress)(int step, double rmse, void *user);
     void *user;
+    int every_rmse;
     /* side x side, or NULL: only where it is not zero are the maps sure to be refined, exactly as they would be without it; elsewhere they may
      * be those of an earlier step. */
     const unsigned char *mask;

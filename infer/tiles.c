@@ -105,6 +105,8 @@ static double change(const float *a, const float *b, size_t values)
     return sqrt(sum / (double)values);
 }
 
+static bool measured(const lgd_tiles *t, int step) { return t->rmse && (!t->ends_alone || step == 0 || step == t->steps); }
+
 /* The steps of a tile: what is refined shrinks towards the tile by h's reach at every step. Leaves R_T of the tile in to. */
 static void refine(work *w, area core, float *to)
 {
@@ -120,11 +122,11 @@ static void refine(work *w, area core, float *to)
     for (int i = 0; i < carried; i++) states[i] = ag_empty(tape, (ts_shape){1, s.h, s.w, gru});
     if (ag_status(tape)->code) return;
     float *const buffer = maps->t.data, *const photo = image->t.data;
-    double last = 0;
     photographs(w, now, photo);
     for (int i = t->rmse ? 0 : begin; i <= begin; i++) {
+        if (i < begin && !measured(t, i)) continue;
         start(w, i, now, buffer);
-        if (t->rmse) w->squares[i] += last = square_sum(w, now, core, photo, buffer);
+        if (measured(t, i)) w->squares[i] += square_sum(w, now, core, photo, buffer);
     }
     nn_state state = {.rmse0 = w->rmse0, .step = begin};
     int step = begin;
@@ -148,10 +150,13 @@ static void refine(work *w, area core, float *to)
         ag_scope_end(tape, mark, NULL, 0);
         if (!same(now, next)) photographs(w, now = next, photo);
         step++;
-        if (t->rmse) w->squares[step] += last = square_sum(w, now, core, photo, buffer);
+        if (measured(t, step)) w->squares[step] += square_sum(w, now, core, photo, buffer);
+    }
+    if (t->rmse && step < t->steps) {
+        const double last = square_sum(w, now, core, photo, buffer);
+        for (int i = step + 1; i <= t->steps; i++) w->squares[i] += last;
     }
     t->refined += (int64_t)rows(core) * columns(core) * (step - begin);
-    for (int i = step + 1; i <= t->steps && t->rmse; i++) w->squares[i] += last;
     crop(now, core, w->channels, buffer, to);
 }
 
@@ -251,7 +256,7 @@ static ts_code run(ag_tape *tape, const nn_model *model, lgd_tiles *t, float *ma
             code = ag_status(tape)->code;
         }
     if (code) return ts_fail(st, code, "%s", ag_status(tape)->message);
-    for (int i = 0; i <= t->steps && t->rmse; i++) t->rmse[i] = pixels > 0 ? sqrt(w.squares[i] / (double)pixels) : 0;
+    for (int i = 0; i <= t->steps && t->rmse; i++) t->rmse[i] = !measured(t, i) ? NAN : pixels > 0 ? sqrt(w.squares[i] / (double)pixels) : 0;
     return TS_OK;
 }
 

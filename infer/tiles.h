@@ -15,7 +15,8 @@ typedef struct lgd_tiles {
     double tolerance;          /* a tile ends at R_t when the RMS of R_t - R_{t-1} over it and what it reads is below; 0: never */
     int (*alive)(void *user);  /* asked before each tile; nonzero: TS_INTERRUPTED. May be NULL */
     void *user;
-    double *rmse;              /* NULL, or [steps + 1]: reconstruction RMSE at R_t of what is refined (tiles that ended earlier: their last maps) */
+    double *rmse;              /* NULL, or [steps + 1]: reconstruction RMSE at R_t of what is refined (tiles that ended earlier: their last maps), */
+    bool ends_alone;           /* of R_0 and R_steps alone, which saves rendering, and NAN between */
     int64_t refined;           /* out: pixels times steps that were refined, surroundings not counted */
 } lgd_tiles;
 

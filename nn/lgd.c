@@ -67,8 +67,19 @@ static ag_value *resampled(ag_tape *tape, int side, ag_value *maps)
     return maps->t.shape.h == side ? maps : ag_resize_smooth(tape, maps, side, side);
 }
 
+static bool looks(const nn_watch *watch, int t, int steps) { return watch && (!watch->ends_alone || t == 0 || t == steps); }
+
+static bool goes_on(const nn_watch *watch, int t, int steps, const ag_value *maps) { return !watch || watch->after(t, looks(watch, t, steps) ? maps : NULL, watch->user); }
+
+/* R_t of the coarse steps as others see it; the whole photographs' too. */
+static ag_value *show(ag_tape *tape, const nn_input *in, const nn_coarse *c, ag_value **whole)
+{
+    *whole = resampled(tape, c->in.grid.side, c->maps);
+    return *whole ? window(tape, in, *whole) : NULL;
+}
+
 /* R_0 and those that the first steps leave, into maps as nn_lgd has it. Returns the last, of the whole photographs, and in *t its step; *on: to go on. */
-static ag_value *first_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps, nn_after after, void *user, int *t, bool *on)
+static ag_value *first_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps, const nn_watch *watch, int *t, bool *on)
 {
     const int most = steps < model->arch.coarse_steps ? steps : model->arch.coarse_steps;
     nn_coarse c;
@@ -76,11 +87,12 @@ static ag_value *first_steps(ag_tape *tape, const nn_model *model, const nn_inpu
     *on = nn_coarse_begin(tape, model, in, &c);
     for (*t = 0; *on; ++*t) {
         const ts_mark mark = ag_scope_begin(tape);
-        if (*t == most || keep_all || after) {
-            whole = resampled(tape, c.in.grid.side, c.maps);
-            maps[keep_all ? *t : 0] = whole ? window(tape, in, whole) : NULL;
-            if (!whole || (after && !after(*t, maps[keep_all ? *t : 0], user))) *on = false;
-        }
+        ag_value *seen = NULL;
+        const bool wanted = *t == most || keep_all || looks(watch, *t, steps);
+        if (wanted && !(seen = show(tape, in, &c, &whole))) return NULL;
+        *on = goes_on(watch, *t, steps, seen);
+        if (!*on && !seen && !(seen = show(tape, in, &c, &whole))) return NULL;
+        if (seen) maps[keep_all ? *t : 0] = seen;
         if (*t == most || !*on) break;
         if (!keep_all) ag_scope_end(tape, mark, NULL, 0); /* nobody looks at it again */
         *on = nn_coarse_step(tape, model, &c);
@@ -88,13 +100,13 @@ static ag_value *first_steps(ag_tape *tape, const nn_model *model, const nn_inpu
     return whole;
 }
 
-ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps, nn_after after, void *user)
+ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps, const nn_watch *watch)
 {
     const bool release = !ag_gradients(tape);
     int t;
     bool on;
     if (steps > 0 && !ag_status(tape)->code && !nn_arch_refines(&model->arch)) ag_fail(tape, TS_INVALID, "the model has no refiner: 0 iterations are all that it can do");
-    ag_value *whole = first_steps(tape, model, in, steps, keep_all, maps, after, user, &t, &on), *buffer = NULL; /* buffer: of R_t */
+    ag_value *whole = first_steps(tape, model, in, steps, keep_all, maps, watch, &t, &on), *buffer = NULL; /* buffer: of R_t */
     ag_value *now = whole ? maps[keep_all ? t : 0] : NULL;
     nn_state state = {.step = t};
     const bool full = now && on && t < steps && nn_arch_refines_full(&model->arch);
@@ -116,7 +128,7 @@ ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int ste
         if (!now) break;
         t++;
         maps[keep_all ? t : 0] = now;
-        on = !after || after(t, now, user);
+        on = goes_on(watch, t, steps, now);
     }
     if (keep_all)
         for (int i = t + 1; i <= steps; i++) maps[i] = now;

@@ -156,8 +156,11 @@ ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag
 
 /* The unrolled loop on the grid's window. The first arch.coarse_steps steps refine R_t at coarse_size, as nn_refine does but with NN_COARSE's parameters and the averages of
  * what the photographs say at their own size, and give it resampled; the others begin with what these leave. maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate
- * memory is released on a tape without gradients. after (may be NULL) sees every R_t and may stop the loop by returning false;
- * what is left of maps is then filled with the last R_t. */
-typedef bool (*nn_after)(int step, const ag_value *maps, void *user);
-ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps, nn_after after, void *user);
+ * memory is released on a tape without gradients. */
+typedef struct nn_watch {
+    bool (*after)(int step, const ag_value *maps, void *user); /* is told of every R_t; false: stop here, what is left of maps is filled with it */
+    void *user;
+    bool ends_alone; /* after gets the maps of R_0 and R_steps alone, which saves resampling, and NULL between */
+} nn_watch;
+ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps, const nn_watch *watch);
 #endif

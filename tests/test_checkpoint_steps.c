@@ -14,7 +14,7 @@ static float *gradient(nn_model *m, const nn_input *in, const float *target, int
     for (int repeat = 0; repeat < 2; repeat++) { /* the second time in memory that was used */
         ag_reset(t);
         memset(m->grad, 0, m->count * sizeof(float));
-        nn_lgd(t, m, &now, steps, true, maps, NULL, NULL);
+        nn_lgd(t, m, &now, steps, true, maps, NULL);
         check_tape(t);
         ag_value *goal = ag_constant(t, ts_view((float *)(uintptr_t)target, maps[0]->t.shape));
         ag_value *loss = ag_add(t, ag_map_loss(t, maps[steps], goal), ag_map_loss(t, maps[0], goal));

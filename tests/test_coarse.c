@@ -21,8 +21,8 @@ TEST(nn_coarse_steps_of_a_small_photograph_are_a_loop_like_any)
     nn_input in = photographs(2, 24, 4, NULL);
     ag_tape *a = tape_create(false), *b = tape_create(false);
     ag_value *x[ALL + 1], *y[COARSE + 1];
-    CHECK(!nn_lgd(a, m, &in, ALL, true, x, NULL, NULL), "%s", ag_status(a)->message);
-    CHECK(!nn_lgd(b, small, &in, COARSE, true, y, NULL, NULL), "%s", ag_status(b)->message);
+    CHECK(!nn_lgd(a, m, &in, ALL, true, x, NULL), "%s", ag_status(a)->message);
+    CHECK(!nn_lgd(b, small, &in, COARSE, true, y, NULL), "%s", ag_status(b)->message);
     for (int t = 0; t <= COARSE; t++) CHECK(same(x[t], y[t]), "R_%d is another one than h's", t);
     nn_state state = {.step = COARSE};
     ag_value *next = x[COARSE];
@@ -86,7 +86,7 @@ TEST(nn_parts_can_be_fixed)
         ag_value *maps[STEPS + 1];
         memset(m->grad, 0, m->count * sizeof *m->grad);
         for (int k = NN_G; k <= NN_COARSE; k++) m->fixed[k] = k == part;
-        CHECK(!nn_lgd(t, m, &in, STEPS, true, maps, NULL, NULL), "%s", ag_status(t)->message);
+        CHECK(!nn_lgd(t, m, &in, STEPS, true, maps, NULL), "%s", ag_status(t)->message);
         float *goal = numbers((size_t)ts_count(maps[STEPS]->t.shape), 5, -0.5f, 0.5f);
         CHECK(!ag_backward(t, ag_map_loss(t, maps[STEPS], ag_constant(t, ts_view(goal, maps[STEPS]->t.shape)))), "%s", ag_status(t)->message);
         for (int k = NN_G; k <= NN_COARSE; k++) {

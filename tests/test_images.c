@@ -52,8 +52,8 @@ TEST(nn_images_begin_with_the_first)
     copies.given = IMAGES;
     ag_tape *t = tape_create(false), *u = tape_create(false);
     ag_value *a[4], *b[4];
-    CHECK(!nn_lgd(t, m, &in, 3, true, a, NULL, NULL), "%s", ag_status(t)->message);
-    CHECK(!nn_lgd(u, more, &copies, 3, true, b, NULL, NULL), "%s", ag_status(u)->message);
+    CHECK(!nn_lgd(t, m, &in, 3, true, a, NULL), "%s", ag_status(t)->message);
+    CHECK(!nn_lgd(u, more, &copies, 3, true, b, NULL), "%s", ag_status(u)->message);
     for (int step = 0; step <= 3; step++)
         for (int64_t i = 0; i < ts_count(a[step]->t.shape); i++)
             CHECK(fabsf(a[step]->t.data[i] - b[step]->t.data[i]) < 1e-4f, "step %d, value %lld: %g and %g", step, (long long)i, (double)a[step]->t.data[i],
@@ -72,7 +72,7 @@ TEST(nn_images_have_a_gradient_each)
         nn_input in = captures(2, given, &truth);
         ag_tape *t = tape_create(false);
         ag_value *maps[2];
-        CHECK(!nn_lgd(t, m, &in, 1, true, maps, NULL, NULL), "%s", ag_status(t)->message);
+        CHECK(!nn_lgd(t, m, &in, 1, true, maps, NULL), "%s", ag_status(t)->message);
         for (int n = 0; n < 2; n++) {
             const float *start = maps[0]->t.data + (size_t)n * PIXELS * 9, *end = maps[1]->t.data + (size_t)n * PIXELS * 9;
             double sum[PIXELS * 9] = {0};
@@ -106,7 +106,7 @@ TEST(nn_images_meet_in_a_newton_step)
         nn_input in = captures(2, given, &truth);
         ag_tape *t = tape_create(false);
         ag_value *maps[2];
-        CHECK(!nn_lgd(t, m, &in, 1, true, maps, NULL, NULL), "%s", ag_status(t)->message);
+        CHECK(!nn_lgd(t, m, &in, 1, true, maps, NULL), "%s", ag_status(t)->message);
         for (int n = 0; n < 2; n++) {
             const float *start = maps[0]->t.data + (size_t)n * PIXELS * 9, *end = maps[1]->t.data + (size_t)n * PIXELS * 9, *image[IMAGES];
             for (int k = 0; k < given; k++) image[k] = in.image.data + (size_t)(n * given + k) * PIXELS * 3;

@@ -69,7 +69,7 @@ static int record(int step, double rmse, void *user)
 static void run(lgd_model *m, const float *image, int side, int iterations, int threads, trace *t, float *maps)
 {
     lgd_error e = {.code = 77};
-    const lgd_options o = {.iterations = iterations, .threads = threads, .progress = t ? record : NULL, .user = t};
+    const lgd_options o = {.iterations = iterations, .threads = threads, .progress = t ? record : NULL, .user = t, .every_rmse = 1};
     CHECK(lgd_estimate(m, image, side, &o, maps, &e) == 0 && e.code == 0 && !e.message[0], "%s", e.message);
 }
 
@@ -135,6 +135,35 @@ TEST(infer_progress_sees_every_step)
     CHECK(!m, "lgd_free leaves the pointer");
     lgd_free(&m);
     lgd_free(NULL);
+}
+
+/* Nobody pays for the RMSE of the steps between unless he wants it: the ends' are the same, and so are the maps, and those of a stop between. */
+TEST(infer_rmse_of_the_ends_alone)
+{
+    static float image[SIDE * SIDE * 3], maps[VALUES], other[VALUES];
+    static unsigned char mask[SIDE * SIDE];
+    nn_arch coarse = tiny();
+    coarse.coarse_steps = 2, coarse.coarse_size = 16, coarse.coarse_width = 6, coarse.coarse_gru = 3;
+    lgd_model *const model[2] = {load(tiny()), load(coarse)};
+    lgd_error e;
+    make_image(image, SIDE);
+    memset(mask, 1, sizeof mask);
+    for (int way = 0; way < 4; way++) {
+        lgd_model *m = model[way / 2];
+        const int tiles = way % 2;
+        for (int stop = -1; stop < T; stop++) {
+            trace all = {.stop_at = stop}, ends = all;
+            const lgd_options every = {.iterations = T, .progress = record, .user = &all, .every_rmse = 1, .mask = tiles ? mask : NULL}, few = {.iterations = T, .progress = record, .user = &ends, .mask = every.mask};
+            CHECK(!lgd_estimate(m, image, SIDE, &every, maps, &e) && !lgd_estimate(m, image, SIDE, &few, other, &e), "%s", e.message);
+            CHECK(!memcmp(maps, other, sizeof maps), "tiles %d, stopped at %d: other maps", tiles, stop);
+            CHECK(all.calls == ends.calls && ends.calls == (stop < 0 ? T : stop) + 1, "tiles %d, stopped at %d: %d calls", tiles, stop, ends.calls);
+            for (int i = 0; i < ends.calls; i++) {
+                const bool end = i == 0 || i == T;
+                CHECK(end ? ends.rmse[i] == all.rmse[i] : isnan(ends.rmse[i]), "tiles %d, step %d: %g, not %g", tiles, i, ends.rmse[i], all.rmse[i]);
+            }
+        }
+    }
+    for (int i = 0; i < 2; i++) lgd_free(&(lgd_model *){model[i]});
 }
 
 TEST(infer_stopping_at_a_step_is_asking_for_that_many)

@@ -14,10 +14,10 @@ TEST(nn_loop_is_the_same_however_it_is_run)
         nn_input in = photographs(2, 24, 4, NULL);
         ag_tape *train = tape_create(true), *longer = tape_create(true), *infer = tape_create(false), *last = tape_create(false);
         ag_value *x[STEPS + 1], *y[STEPS + 2], *z[STEPS + 1], *w = NULL;
-        CHECK(!nn_lgd(train, m, &in, STEPS, true, x, NULL, NULL), "%s", ag_status(train)->message);
-        CHECK(!nn_lgd(longer, m, &in, STEPS + 1, true, y, NULL, NULL), "%s", ag_status(longer)->message);
-        CHECK(!nn_lgd(infer, m, &in, STEPS, true, z, NULL, NULL), "%s", ag_status(infer)->message);
-        CHECK(!nn_lgd(last, m, &in, STEPS, false, &w, NULL, NULL), "%s", ag_status(last)->message);
+        CHECK(!nn_lgd(train, m, &in, STEPS, true, x, NULL), "%s", ag_status(train)->message);
+        CHECK(!nn_lgd(longer, m, &in, STEPS + 1, true, y, NULL), "%s", ag_status(longer)->message);
+        CHECK(!nn_lgd(infer, m, &in, STEPS, true, z, NULL), "%s", ag_status(infer)->message);
+        CHECK(!nn_lgd(last, m, &in, STEPS, false, &w, NULL), "%s", ag_status(last)->message);
         for (int i = 0; i <= STEPS; i++) {
             CHECK(same(x[i], y[i]), "R_%d depends on the number of steps (variant %d)", i, variant);
             CHECK(same(x[i], z[i]), "R_%d is another one without gradients (variant %d)", i, variant);
@@ -41,9 +41,9 @@ TEST(nn_steps_beyond_the_trained_ones_are_shortened)
         in.recompute = variant == 2;
         m->arch.compat = variant == 3 ? NN_COMPAT_PUBLISHED : NN_COMPAT_NONE;
         m->arch.iterations = 2;
-        CHECK(!nn_lgd(short_of, m, &in, 3, true, x, NULL, NULL), "%s", ag_status(short_of)->message);
+        CHECK(!nn_lgd(short_of, m, &in, 3, true, x, NULL), "%s", ag_status(short_of)->message);
         m->arch.iterations = 3;
-        CHECK(!nn_lgd(whole, m, &in, 3, true, y, NULL, NULL), "%s", ag_status(whole)->message);
+        CHECK(!nn_lgd(whole, m, &in, 3, true, y, NULL), "%s", ag_status(whole)->message);
         CHECK(same(x[2], y[2]), "a trained step is shortened (variant %d)", variant);
         double worst = 0;
         for (int64_t i = 0; i < ts_count(x[3]->t.shape); i++) {
@@ -67,7 +67,7 @@ TEST(nn_memory_of_inference_does_not_grow_with_steps)
     ag_value *maps[MOST + 1];
     for (int i = 0; i < 3; i++) {
         ag_tape *t = tape_create(false);
-        CHECK(!nn_lgd(t, m, &in, i ? 12 : 3, i == 2, maps, NULL, NULL), "%s", ag_status(t)->message);
+        CHECK(!nn_lgd(t, m, &in, i ? 12 : 3, i == 2, maps, NULL), "%s", ag_status(t)->message);
         peak[i] = ts_arena_peak(ag_arena(t));
         ag_tape_destroy(&t);
     }
@@ -98,13 +98,13 @@ TEST(nn_after_sees_every_step_and_can_stop)
         ag_tape *t = tape_create(gradients);
         ag_value *maps[7];
         seen s = {0, 3, {0}};
-        CHECK(!nn_lgd(t, m, &in, 6, true, maps, watch, &s), "%s", ag_status(t)->message);
+        CHECK(!nn_lgd(t, m, &in, 6, true, maps, &(nn_watch){watch, &s, false}), "%s", ag_status(t)->message);
         CHECK(s.count == 4, "%d calls, not 4", s.count);
         for (int i = 0; i < 4; i++) CHECK(s.first[i] == maps[i]->t.data[5], "step %d was told other maps", i);
         for (int i = 4; i <= 6; i++) CHECK(maps[i] == maps[3], "R_%d after the stop is not R_3", i);
         ag_reset(t);
         s = (seen){0, 0, {0}};
-        CHECK(!nn_lgd(t, m, &in, 6, false, maps, watch, &s) && s.count == 1 && same(maps[0], maps[0]), "stopped at R_0");
+        CHECK(!nn_lgd(t, m, &in, 6, false, maps, &(nn_watch){watch, &s, false}) && s.count == 1 && same(maps[0], maps[0]), "stopped at R_0");
         CHECK(maps[0]->t.data[5] == s.first[0], "R_0 is what is left");
     }
 }
@@ -158,8 +158,8 @@ static void check_window(int coarse_steps)
     part.grid = (rd_grid){.h = H, .w = W, .y0 = Y0, .x0 = X0, .side = WHOLE};
     ag_tape *t[2] = {tape_create(false), tape_create(false)};
     ag_value *maps[2][STEPS + 1];
-    nn_lgd(t[0], m, &whole, STEPS, true, maps[0], NULL, NULL);
-    nn_lgd(t[1], m, &part, STEPS, true, maps[1], NULL, NULL);
+    nn_lgd(t[0], m, &whole, STEPS, true, maps[0], NULL);
+    nn_lgd(t[1], m, &part, STEPS, true, maps[1], NULL);
     check_tape(t[0]);
     check_tape(t[1]);
     double moved = 0;
@@ -204,7 +204,7 @@ TEST(nn_state_is_carried_when_recurrent)
             if (i == 1) scale(m, "h.gru1.hh.weight", 3);
             for (size_t j = 0; i == 2 && j < b->count; j++) m->value[b->offset + j] = 0.5f;
             ag_tape *t = tape_create(false); /* a tape keeps packed weights: changed ones need another */
-            CHECK(!nn_lgd(t, m, &in, 2, true, maps[i], NULL, NULL), "%s", ag_status(t)->message);
+            CHECK(!nn_lgd(t, m, &in, 2, true, maps[i], NULL), "%s", ag_status(t)->message);
         }
         CHECK(same(x[1], y[1]), "hidden weights matter in the first step");
         CHECK(same(x[2], y[2]) == !recurrent, "recurrent %d: hidden weights %s in the second step", recurrent, recurrent ? "do not matter" : "matter");
@@ -246,7 +246,7 @@ TEST(nn_batch_rmse_couples_the_batch)
     nn_input in = photographs(2, SIDE, 10, NULL);
     ag_tape *t = tape_create(false);
     ag_value *maps[3], *gru[2] = {NULL, NULL};
-    CHECK(!nn_lgd(t, m, &in, 1, true, maps, NULL, NULL), "%s", ag_status(t)->message);
+    CHECK(!nn_lgd(t, m, &in, 1, true, maps, NULL), "%s", ag_status(t)->message);
     size_t one = (size_t)SIDE * SIDE * 9, image = (size_t)SIDE * SIDE * 3;
     double r[2];
     for (int i = 0; i < 2; i++) rd_flash_rmse(in.grid, maps[0]->t.data + i * one, 9, &in.view, in.image.data + i * image, &r[i]);
@@ -270,8 +270,8 @@ TEST(nn_images_of_a_batch_do_not_meet)
     alone.image = ts_images(&in.image, 1, 1);
     ag_tape *t = tape_create(false);
     ag_value *x = NULL, *y = NULL;
-    nn_lgd(t, m, &in, 2, false, &x, NULL, NULL);
-    nn_lgd(t, m, &alone, 2, false, &y, NULL, NULL);
+    nn_lgd(t, m, &in, 2, false, &x, NULL);
+    nn_lgd(t, m, &alone, 2, false, &y, NULL);
     check_tape(t);
     for (int64_t i = 0; i < ts_count(y->t.shape); i++)
         CHECK(fabsf(y->t.data[i] - x->t.data[ts_count(y->t.shape) + i]) < 1e-5f, "value %lld depends on the rest of the batch", (long long)i);
@@ -285,14 +285,14 @@ TEST(nn_wrong_input_is_an_error_with_a_message)
     nn_input in = photographs(1, SIDE, 12, NULL), bad = in;
     ag_tape *t = tape_create(false);
     ag_value *maps[3];
-    CHECK(nn_lgd(t, m, &in, 0, false, maps, NULL, NULL) == TS_OK && maps[0], "g alone: %s", ag_status(t)->message);
-    CHECK(nn_lgd(t, m, &in, 2, true, maps, NULL, NULL) == TS_INVALID && strstr(ag_status(t)->message, "refiner"), "'%s'", ag_status(t)->message);
+    CHECK(nn_lgd(t, m, &in, 0, false, maps, NULL) == TS_OK && maps[0], "g alone: %s", ag_status(t)->message);
+    CHECK(nn_lgd(t, m, &in, 2, true, maps, NULL) == TS_INVALID && strstr(ag_status(t)->message, "refiner"), "'%s'", ag_status(t)->message);
     ag_reset(t);
     bad.grid = rd_grid_full(SIDE + 1);
-    CHECK(nn_lgd(t, m, &bad, 0, false, maps, NULL, NULL) == TS_INVALID && strstr(ag_status(t)->message, "17"), "'%s'", ag_status(t)->message);
+    CHECK(nn_lgd(t, m, &bad, 0, false, maps, NULL) == TS_INVALID && strstr(ag_status(t)->message, "17"), "'%s'", ag_status(t)->message);
     ag_reset(t);
     bad = in;
     bad.grid.h = SIDE / 2;
     bad.image = ts_view(in.image.data, (ts_shape){1, SIDE / 2, SIDE, 3});
-    CHECK(nn_lgd(t, m, &bad, 0, false, maps, NULL, NULL) == TS_INVALID && strstr(ag_status(t)->message, "square"), "'%s'", ag_status(t)->message);
+    CHECK(nn_lgd(t, m, &bad, 0, false, maps, NULL) == TS_INVALID && strstr(ag_status(t)->message, "square"), "'%s'", ag_status(t)->message);
 }

@@ -122,7 +122,7 @@ static ag_value *loop(ag_tape *t, const nn_model *m, const nn_input *in, int ste
 {
     ag_value *maps[MOST + 1];
     if (!frozen) {
-        nn_lgd(t, m, in, steps, true, maps, NULL, NULL);
+        nn_lgd(t, m, in, steps, true, maps, NULL);
         check_tape(t);
         return maps[steps];
     }
@@ -229,7 +229,7 @@ TEST(nn_renderer_gradient_is_a_constant)
     float *frozen[STEPS], *first = malloc(m->count * sizeof *first);
     ag_tape *t = tape_create(true);
     ag_value *maps[STEPS + 1];
-    CHECK(!nn_lgd(t, m, &in, STEPS, true, maps, NULL, NULL), "%s", ag_status(t)->message);
+    CHECK(!nn_lgd(t, m, &in, STEPS, true, maps, NULL), "%s", ag_status(t)->message);
     double rmse0, rmse;
     rd_flash_rmse(in.grid, maps[0]->t.data, 9, &in.view, in.image.data, &rmse0);
     for (int i = 0; i < STEPS; i++) {

@@ -134,7 +134,7 @@ TEST(parity_with_the_published_network)
     nn_input in = {.image = ts_view(image, (ts_shape){1, SIDE, SIDE, 3}), .grid = rd_grid_full(SIDE), .view = rd_flash()};
     seen s = {m, &in, f, malloc((size_t)SIDE * SIDE * CHANNELS * sizeof(float))};
     ag_value *out = NULL;
-    CHECK(!nn_lgd(t, m, &in, m->arch.iterations, false, &out, look, &s), "%s", ag_status(t)->message);
+    CHECK(!nn_lgd(t, m, &in, m->arch.iterations, false, &out, &(nn_watch){look, &s, false}), "%s", ag_status(t)->message);
     compare("lgd.output", out->t.data, stored(f, "lgd.output", CHANNELS), CHANNELS, 0, 3e-3);
 }
 

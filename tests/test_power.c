@@ -93,7 +93,7 @@ TEST(infer_power_leaves_r0_for_what_follows)
                 ag_reset(t);
                 if (tiles) CHECK(!lgd_tiles_run(t, m, &of, maps[again], &st), "%s", st.message);
                 else {
-                    CHECK(!nn_lgd(t, m, &in, 2, false, &out, NULL, NULL), "%s", ag_status(t)->message);
+                    CHECK(!nn_lgd(t, m, &in, 2, false, &out, NULL), "%s", ag_status(t)->message);
                     memcpy(maps[again], out->t.data, sizeof maps[again]);
                 }
             }

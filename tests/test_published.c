@@ -256,7 +256,7 @@ TEST(published_network_on_every_instruction_set)
         ts_isa_use((ts_isa)isa);
         ag_tape *t = ag_tape_create(false, &st);
         ag_value *maps[STEPS + 1];
-        CHECK(t && !nn_lgd(t, m, &in, STEPS, true, maps, NULL, NULL), "%s", t ? ag_status(t)->message : st.message);
+        CHECK(t && !nn_lgd(t, m, &in, STEPS, true, maps, NULL), "%s", t ? ag_status(t)->message : st.message);
         for (int k = 0; k <= STEPS; k++) {
             double sum = 0;
             for (int i = 0; i < VALUES; i++) {

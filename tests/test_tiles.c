@@ -64,7 +64,7 @@ static void untiled(ag_tape *tape, const nn_model *m, float *image, int side, fl
     nn_input in = {.image = ts_view(image, (ts_shape){1, side, side, 3}), .grid = rd_grid_full(side), .view = rd_flash()};
     ag_value *out[TILES_T + 1];
     ag_reset(tape);
-    CHECK(nn_lgd(tape, m, &in, TILES_T, true, out, NULL, NULL) == TS_OK, "%s", ag_status(tape)->message);
+    CHECK(nn_lgd(tape, m, &in, TILES_T, true, out, NULL) == TS_OK, "%s", ag_status(tape)->message);
     for (int t = 0; t <= TILES_T; t++) memcpy(maps[t], out[t]->t.data, (size_t)ts_count(out[t]->t.shape) * sizeof(float));
 }
 
@@ -133,7 +133,7 @@ TEST(infer_tiles_of_several_photographs)
     const nn_input in = {.image = ts_view(images[0], (ts_shape){GIVEN, LARGE, LARGE, 3}), .grid = rd_grid_full(LARGE), .views = views, .given = GIVEN};
     ag_value *out;
     ag_reset(tape);
-    CHECK(nn_lgd(tape, m, &in, TILES_T, false, &out, NULL, NULL) == TS_OK, "%s", ag_status(tape)->message);
+    CHECK(nn_lgd(tape, m, &in, TILES_T, false, &out, NULL) == TS_OK, "%s", ag_status(tape)->message);
     const size_t values = LARGE * LARGE * MAP_CHANNELS;
     memcpy(whole_maps[0], out->t.data, values * sizeof(float));
     ts_status st = {0};

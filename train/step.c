@@ -87,7 +87,7 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
     }
     ag_value *goal = ag_constant(t->tape, goals);
     row->iterations = draw_iterations(c, t->step);
-    if (nn_lgd(t->tape, t->model, &in, row->iterations, true, maps, NULL, NULL) != TS_OK) return NULL;
+    if (nn_lgd(t->tape, t->model, &in, row->iterations, true, maps, NULL) != TS_OK) return NULL;
     ag_value *loss = add_loss(t, NULL, maps[row->iterations], goal, 1, &row->render_end, &row->map_end);
     if (row->iterations > 0 && c->train.start_weight > 0)
         loss = add_loss(t, loss, maps[0], goal, c->train.start_weight, &row->render_start, &row->map_start);

@@ -81,7 +81,7 @@ static ts_code add_errors(tr_trainer *t, int first, int n, tr_validation *out, t
     if (v->model->arch.latent > 0) { /* how well the maps themselves come back */
         float *truth = v->maps + (size_t)first * pixels * MAP_CHANNELS;
         maps[0] = nn_decode(v->tape, v->model, nn_encode(v->tape, v->model, ag_constant(v->tape, ts_view(truth, (ts_shape){n, size, size, MAP_CHANNELS}))));
-    } else nn_lgd(v->tape, v->model, &in, out->iterations, true, maps, NULL, NULL);
+    } else nn_lgd(v->tape, v->model, &in, out->iterations, true, maps, NULL);
     if (ag_status(v->tape)->code != TS_OK) {
         *st = *ag_status(v->tape);
         return st->code;

@@ -52,7 +52,7 @@ static bool run(ag_tape *tape, const nn_model *model, float *image, watch *w)
     ag_reset(tape);
     w->finite = true;
     w->largest = 0;
-    return nn_lgd(tape, model, &in, w->steps, false, &maps, after, w) == TS_OK && w->finite;
+    return nn_lgd(tape, model, &in, w->steps, false, &maps, &(nn_watch){after, w, false}) == TS_OK && w->finite;
 }
 
 /* An adversary: rectangles of pure colours are put into noise, and stay where they drive the maps further out. */

@@ -28,7 +28,7 @@ static bool work(const nn_model *start, const float *truth, const float *image, 
         ts_rng rng = ts_rng_make(3, TS_STREAM_TEST, (uint64_t)n);
         for (int i = 0; i < 2; i++) rd_loss_views(&rng, views + i * RD_LOSS_VIEWS);
         ag_reset(tape);
-        nn_lgd(tape, m, &in, STEPS, true, maps, NULL, NULL);
+        nn_lgd(tape, m, &in, STEPS, true, maps, NULL);
         ag_value *goal = ag_constant(tape, ts_view((float *)(uintptr_t)truth, (ts_shape){2, SIDE, SIDE, C}));
         ok = ag_backward(tape, ag_render_loss(tape, maps[STEPS], goal, views, RD_LOSS_VIEWS)) == TS_OK;
         if (!ok) break;

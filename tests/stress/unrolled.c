@@ -87,7 +87,7 @@ bool stress_unrolled(const stress *s)
         ag_value *maps[MOST + 1];
         ag_reset(tape);
         for (size_t i = 0; i < m->count; i++) m->grad[i] = 0;
-        nn_lgd(tape, m, &in, steps, true, maps, NULL, NULL);
+        nn_lgd(tape, m, &in, steps, true, maps, NULL);
         ag_value *goal = ag_constant(tape, ts_view(truth, (ts_shape){1, SIDE, SIDE, C}));
         ag_value *loss = ag_add(tape, ag_render_loss(tape, maps[steps], goal, views, RD_LOSS_VIEWS), ag_map_loss(tape, maps[steps], goal));
         if (ag_backward(tape, loss)) {
