@@ -77,8 +77,7 @@ static ts_code write_directly(const char *path, const void *bytes, size_t size, 
     return error ? ts_fail(st, TS_IO, "%s: %s", path, strerror(error)) : TS_OK;
 }
 
-/* The folder's own entry reaches the disk too, so that the rename survives a power cut. Failure is no failure of the write. */
-static void sync_folder(const char *folder)
+void io_sync_folder(const char *folder)
 {
     int fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (fd < 0) return;
@@ -113,7 +112,6 @@ static ts_code replace(const char *name, const char *path, const void *bytes, si
         unlink(temporary);
         return ts_fail(st, TS_IO, "%s: %s", name, strerror(error));
     }
-    sync_folder(folder);
     return TS_OK;
 }
 

@@ -1,4 +1,5 @@
 #include "infer/output.h"
+#include "data/file.h"
 #include "data/height.h"
 #include "infer/export.h"
 #include "render/render.h"
@@ -234,5 +235,7 @@ ts_code lgd_output_write(const char *parent, const char *stem, const io_material
     if (!code && there) code = move_files(hidden, folder, st);
     else if (!code && rename(hidden, folder) != 0) code = ts_fail(st, TS_IO, "%s: cannot be made: %s", folder, strerror(errno));
     if (code || there) remove_hidden(hidden);
+    if (!code) io_sync_folder(folder);
+    if (!code && !there) io_sync_folder(parent);
     return code;
 }
