@@ -33,6 +33,17 @@ static inline vd d_max(vd a, vd b) { return (vd)_mm256_max_pd((__m256d)a, (__m25
 static inline vd d_max(vd a, vd b) { return d_select(a > b, a, b); }
 #endif
 
+static inline vd d_fma(vd a, vd b, vd c) /* as v_fma */
+{
+#if defined(__AVX512F__)
+    return (vd)_mm512_fmadd_pd((__m512d)a, (__m512d)b, (__m512d)c);
+#elif defined(__AVX2__)
+    return (vd)_mm256_fmadd_pd((__m256d)a, (__m256d)b, (__m256d)c);
+#else
+    return a * b + c;
+#endif
+}
+
 V_INLINE void d_split(vf x, vd half[2])
 {
     half[0] = __builtin_convertvector(__builtin_shufflevector(x, x, V_LOW), vd);
@@ -86,80 +97,5 @@ static inline bool v_any(vi mask)
 #else
     return ((mask[0] | mask[1]) | (mask[2] | mask[3])) != 0;
 #endif
-}
-
-#if VL >= 8
-V_INLINE void v_transpose8(v8 r[8])
-{
-    v8 t[8], u[8];
-    for (int i = 0; i < 4; i++) {
-        t[2 * i] = __builtin_shufflevector(r[2 * i], r[2 * i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
-        t[2 * i + 1] = __builtin_shufflevector(r[2 * i], r[2 * i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
-    }
-    for (int i = 0; i < 2; i++)
-        for (int j = 0; j < 2; j++) {
-            u[4 * i + 2 * j] = __builtin_shufflevector(t[4 * i + j], t[4 * i + j + 2], 0, 1, 8, 9, 4, 5, 12, 13);
-            u[4 * i + 2 * j + 1] = __builtin_shufflevector(t[4 * i + j], t[4 * i + j + 2], 2, 3, 10, 11, 6, 7, 14, 15);
-        }
-    for (int i = 0; i < 4; i++) {
-        r[i] = __builtin_shufflevector(u[i], u[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
-        r[i + 4] = __builtin_shufflevector(u[i], u[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
-    }
-}
-#endif
-
-/* 3 or 9 channels of n pixels, stride values apart, to lanes; lanes from n on repeat pixel 0, so that they are valid numbers. */
-V_INLINE void v_load_pixels(const float *p, int stride, int n, int channels, vf *out)
-{
-    int first = 0;
-#if VL >= 8
-    if (channels == 9) { /* eight by transposing rows of eight, the ninth with what follows */
-        v8 r[VL];
-        for (int i = 0; i < VL; i++) memcpy(&r[i], p + (i < n ? i : 0) * stride, sizeof(v8));
-        for (int i = 0; i < VL; i += 8) v_transpose8(r + i);
-        for (int c = 0; c < 8; c++)
-#if VL == 16
-            out[c] = __builtin_shufflevector(r[c], r[8 + c], V_LOW, V_HIGH);
-#else
-            out[c] = r[c];
-#endif
-        first = 8;
-    }
-#endif
-    float t[9][VL];
-    for (int i = 0; i < VL; i++)
-        for (int c = first; c < channels; c++) t[c][i] = p[(i < n ? i : 0) * stride + c];
-    for (int c = first; c < channels; c++) out[c] = v_load(t[c]);
-}
-
-/* The other way; what a pixel has beyond these channels becomes 0. */
-V_INLINE void v_store_pixels(float *p, int stride, int n, int channels, const vf *in)
-{
-    int first = 0;
-#if VL >= 8
-    if (channels == 9) {
-        v8 r[VL];
-        for (int c = 0; c < 8; c++) {
-#if VL == 16
-            r[c] = __builtin_shufflevector(in[c], in[c], V_LOW);
-            r[8 + c] = __builtin_shufflevector(in[c], in[c], V_HIGH);
-#else
-            r[c] = in[c];
-#endif
-        }
-        for (int i = 0; i < VL; i += 8) v_transpose8(r + i);
-        if (n == VL)
-            for (int i = 0; i < VL; i++) memcpy(p + i * stride, &r[i], sizeof(v8));
-        else
-            for (int i = 0; i < n; i++) memcpy(p + i * stride, &r[i], sizeof(v8));
-        first = 8;
-    }
-#endif
-    float t[9][VL];
-    for (int c = first; c < channels; c++) v_store(t[c], in[c]);
-    for (int i = 0; i < n; i++)
-        for (int c = first; c < channels; c++) p[i * stride + c] = t[c][i];
-    for (int i = 0; i < n && channels < stride; i++)
-        for (int c = channels; c < stride; c++) p[i * stride + c] = 0;
 }
 #endif

@@ -44,16 +44,20 @@ V_INLINE void take_first(float damping, pivot *p, const vf *row, int count, vf e
     p->d = d;
 }
 
+V_INLINE vi above_one(vf value) { return ~(value <= v_set(1)); }
+
+/* Where the photograph is burnt out as well, its value may stand for more: nothing follows from it. */
+V_INLINE vi burnt_out(vf value, vf photograph) { return above_one(value) & (photograph >= v_set(TS_NEWTON_BURNT)); }
+
 /* The radiance as the equations see it, and its slope: above 1 its logarithm, which leads back from a highlight of thousands in a few steps, where the clamp has
- * no slope; none where the photograph is burnt out as well, whose value may stand for more. */
+ * no slope; none where both are burnt out. */
 V_INLINE vf exposed(vf value, vf photograph, vf *slope)
 {
-    const vi bright = ~(value <= v_set(1));
+    const vi bright = above_one(value);
     *slope = v_set(1);
     if (!v_any(bright)) return value;
     const vf above = v_max(v_min(value, v_set(BRIGHTEST)), v_set(1));
-    const vi burnt = bright & (photograph >= v_set(TS_NEWTON_BURNT));
-    *slope = v_select(burnt, v_set(0), 1.0f / above);
+    *slope = v_select(burnt_out(value, photograph), v_set(0), 1.0f / above);
     return v_select(bright, v_log(above) + v_set(1), value);
 }
 
@@ -95,18 +99,22 @@ V_INLINE void add_view(const ts_shade_view *view, ts_shade_kind kind, bool first
     vf target[3], normal[2][2], across[2][3];
     light(view, kind, row, first, &e);
     measure(s, &e, kind, &g);
-    if (!v_any(g.seen)) {
+    vi tells = g.seen;
+    if (v_any(tells)) {
+        shade(view, kind, s, &e, &g, &r);
+        v_load_pixels(image + (int64_t)first * 3, 3, n, 3, target);
+        tells &= ~(burnt_out(r.value[0], target[0]) & burnt_out(r.value[1], target[1]) & burnt_out(r.value[2], target[2]));
+    }
+    if (!v_any(tells)) {
         if (first_view) begin(damping, q);
         return;
     }
-    shade(view, kind, s, &e, &g, &r);
     couple(kind, s, &e, &g, &r, &k);
     for (int i = 0; i < 3; i++) {
         across[0][i] = k.diffuse_l * g.l[i];
         across[1][i] = k.mirror_l * g.l[i] + k.mirror_v * g.v[i] + k.mirror_h * g.h[i];
     }
     for (int i = 0; i < 2; i++) encode_normal(s, across[i], &normal[i][0], &normal[i][1]);
-    v_load_pixels(image + (int64_t)first * 3, 3, n, 3, target);
     for (int c = 0; c < 3; c++) {
         vf by[ROW], slope;
         const vf seen = exposed(r.value[c], target[c], &slope);

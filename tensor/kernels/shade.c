@@ -12,7 +12,8 @@ V_INLINE void render_kind(const ts_shade_view *view, ts_shade_kind kind, const t
         decode(view->guards, row->maps + (int64_t)i * row->channels, row->channels, n, &s);
         light(view, kind, row, i, &e);
         measure(&s, &e, kind, &g);
-        shade(view, kind, &s, &e, &g, &r);
+        if (v_any(g.seen)) shade(view, kind, &s, &e, &g, &r);
+        else r = (radiance){0};
         for (int c = 0; c < 3; c++) r.value[c] = v_min(r.value[c], v_set(limit));
         v_store_pixels(image + (int64_t)i * 3, 3, n, 3, r.value);
     }
@@ -28,22 +29,27 @@ V_INLINE double flash_kind(const ts_shade_view *view, ts_shade_kind kind, const 
         lighting e;
         angles g;
         radiance r;
-        vf target[3], u[3], squares = {0}, out[MAP_CHANNELS];
+        vf target[3], u[3], squares = {0}, out[MAP_CHANNELS] = {0};
+        vi moves = {0};
         decode(view->guards, row->maps + (int64_t)i * row->channels, row->channels, n, &s);
         light(view, kind, row, i, &e);
         measure(&s, &e, kind, &g);
         shade(view, kind, &s, &e, &g, &r);
         v_load_pixels(image + (int64_t)i * 3, 3, n, 3, target);
         for (int c = 0; c < 3; c++) {
-            vf error = v_min(r.value[c], v_set(1)) - target[c];
+            const vf error = v_min(r.value[c], v_set(1)) - target[c];
+            const vi below = r.value[c] <= v_set(1);
             squares += error * error;
-            u[c] = v_select(r.value[c] <= v_set(1), error * scale, v_set(0));
+            u[c] = v_select(below, error * scale, v_set(0));
+            moves |= below;
         }
         sum += (double)v_sum(v_select(live, squares, v_set(0)));
         if (!gradient) continue;
-        slopes d = {0};
-        derive(kind, &s, &e, &g, &r, u, &d);
-        encode(&s, &d, out);
+        if (v_any(moves & g.seen)) {
+            slopes d = {0};
+            derive(kind, &s, &e, &g, &r, u, &d);
+            encode(&s, &d, out);
+        }
         v_store_pixels(gradient + (int64_t)i * row->channels, row->channels, n, MAP_CHANNELS, out);
     }
     return sum;

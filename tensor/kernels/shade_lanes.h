@@ -3,7 +3,7 @@
 #ifndef TS_SHADE_LANES_H
 #define TS_SHADE_LANES_H
 #include "tensor/kernels/shade.h"
-#include "tensor/kernels/lanes.h"
+#include "tensor/kernels/pixels.h"
 #include "tensor/kernels/vmath.h"
 #include "tensor/maps.h"
 
@@ -14,11 +14,11 @@ typedef struct direction {
     vd x, y, z;
 } direction;
 
-V_INLINE vd dot(direction a, direction b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+V_INLINE vd dot(direction a, direction b) { return d_fma(a.x, b.x, d_fma(a.y, b.y, a.z * b.z)); }
 
 V_INLINE direction cross(direction a, direction b)
 {
-    return (direction){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+    return (direction){d_fma(a.y, b.z, -(a.z * b.y)), d_fma(a.z, b.x, -(a.x * b.z)), d_fma(a.x, b.y, -(a.y * b.x))};
 }
 
 /* The zero vector stays zero. *inverse: 1 / length. */
@@ -156,7 +156,7 @@ V_INLINE void measure(const surface *s, const lighting *e, ts_shade_kind kind, a
 {
     a->nl = a->nv = v_max(dot_lanes(s, e->l), v_set(0));
     cross_lanes(s, e->h, a->h);
-    a->sine2 = a->h[0] * a->h[0] + a->h[1] * a->h[1] + a->h[2] * a->h[2];
+    a->sine2 = v_fma(a->h[0], a->h[0], v_fma(a->h[1], a->h[1], a->h[2] * a->h[2]));
     if (one_place(kind)) {
         a->seen = a->nl > v_set(0);
         a->nh = v_select(a->seen, a->nl, v_set(1));
@@ -261,8 +261,8 @@ V_INLINE void encode_normal(const surface *s, const vf n[3], vf *x, vf *y)
         *x = v_select(s->guard, n[1] * s->nz - n[2] * s->ny, *x);
         *y = v_select(s->guard, n[2] * s->nx - n[0] * s->nz, *y);
     }
-    *x *= s->inverse * s->slope[MAP_NORMAL];
-    *y *= s->inverse * s->slope[MAP_NORMAL + 1];
+    *x = *x * (s->inverse * s->slope[MAP_NORMAL]) + 0.0f; /* not -0, as where a vector is skipped */
+    *y = *y * (s->inverse * s->slope[MAP_NORMAL + 1]) + 0.0f;
 }
 
 V_INLINE void encode(const surface *s, const slopes *d, vf out[MAP_CHANNELS])
