@@ -81,6 +81,13 @@ static uint16_t to_brain(float f)
 
 enum { CHUNK = 1024 };
 
+static bool all_finite(const float *v, int n)
+{
+    int bad = 0;
+    for (int i = 0; i < n; i++) bad |= (as_bits(v[i]) & 0x7f800000) == 0x7f800000;
+    return !bad;
+}
+
 static void load(const nn_entry *e, const unsigned char *p, int64_t step, int n, float *out)
 {
     uint16_t half[CHUNK];
@@ -103,15 +110,16 @@ static void load(const nn_entry *e, const unsigned char *p, int64_t step, int n,
         }
         break;
     default:
-        for (int i = 0; i < n; i++, p += step) out[i] = as_float(take32(p, e->swapped));
+        if (step == 4 && !e->swapped) memcpy(out, p, sizeof *out * (size_t)n);
+        else
+            for (int i = 0; i < n; i++, p += step) out[i] = as_float(take32(p, e->swapped));
     }
 }
 
 static bool store(const float *in, nn_dtype to, int n, unsigned char *out)
 {
     bool overflow = false;
-    if (to == NN_F32) memcpy(out, in, sizeof *in * (size_t)n);
-    for (int i = 0; to != NN_F32 && i < n; i++) {
+    for (int i = 0; i < n; i++) {
         double d = in[i];
         uint16_t h = to == NN_F16 ? to_half(in[i], &overflow) : to == NN_BF16 ? to_brain(in[i]) : 0;
         if (to == NN_F64) memcpy(out + 8 * i, &d, 8);
@@ -158,7 +166,8 @@ bool nn_entry_plain(const nn_entry *e)
     return n == 1 && (stride[0] == 1 || dim[0] == 1) && (!e->swapped || types[e->dtype].size == 1);
 }
 
-bool nn_entry_copy(const nn_entry *e, nn_dtype to, void *out)
+/* finite: NULL, or false where a number is not, as F32 (to). */
+static bool copy(const nn_entry *e, nn_dtype to, void *out, bool *finite)
 {
     int64_t dim[NN_RANK_MAX], stride[NN_RANK_MAX], at[NN_RANK_MAX] = {0};
     if (e->count == 0) return true;
@@ -166,15 +175,18 @@ bool nn_entry_copy(const nn_entry *e, nn_dtype to, void *out)
     unsigned char *o = out;
     const int n = collapse(e, dim, stride), size = types[e->dtype].size;
     const int64_t step = stride[n - 1] * size, run = dim[n - 1];
-    bool good = true;
+    bool good = true, all = true;
     for (int j = 0; j >= 0;) {
-        if (to == e->dtype) copy_as_is(e, p, step, run, o);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) reduction(&& : good) if (run > 64 * CHUNK)
-        for (int64_t i = 0; i < (to == e->dtype ? 0 : run); i += CHUNK) {
+        const bool as_is = to == e->dtype && !finite;
+        if (as_is) copy_as_is(e, p, step, run, o);
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) reduction(&& : good, all) if (run > 64 * CHUNK)
+        for (int64_t i = 0; i < (as_is ? 0 : run); i += CHUNK) {
             float part[CHUNK];
             const int m = (int)(run - i < CHUNK ? run - i : CHUNK);
-            load(e, p + i * step, step, m, part);
-            good = store(part, to, m, o + i * types[to].size) && good;
+            float *there = to == NN_F32 ? (float *)(void *)(o + i * types[to].size) : part;
+            load(e, p + i * step, step, m, there);
+            if (finite) all = all_finite(there, m) && all; /* while it is in the first cache */
+            if (to != NN_F32) good = store(part, to, m, o + i * types[to].size) && good;
         }
         o += run * types[to].size;
         for (j = n - 2; j >= 0 && ++at[j] == dim[j]; j--) { /* to the next run, like an odometer */
@@ -183,7 +195,17 @@ bool nn_entry_copy(const nn_entry *e, nn_dtype to, void *out)
         }
         if (j >= 0) p += stride[j] * size;
     }
+    if (finite) *finite = all;
     return good;
+}
+
+bool nn_entry_copy(const nn_entry *e, nn_dtype to, void *out) { return copy(e, to, out, NULL); }
+
+bool nn_entry_finite(const nn_entry *e, float *out)
+{
+    bool finite = true;
+    copy(e, NN_F32, out, &finite);
+    return finite;
 }
 
 const void *nn_entry_bytes(const nn_entry *e, nn_dtype to, const char *path, void **work, size_t *work_size, ts_status *st)

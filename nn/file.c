@@ -151,18 +151,32 @@ void nn_shape_text(int rank, const int64_t *dim, char *out, size_t size)
     if (at < size) snprintf(out + at, size - at, "]");
 }
 
-ts_code nn_file_read(const nn_file *file, const char *name, int rank, const int64_t *dim, float *out, ts_status *st)
+static const nn_entry *find_real(const nn_file *file, const char *name, int rank, const int64_t *dim, ts_status *st)
 {
     const nn_entry *e = nn_file_find(file, name);
-    if (!e) return ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" is missing", file->path, name);
+    if (!e) return ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" is missing", file->path, name), NULL;
     if (e->rank != rank || memcmp(e->dim, dim, (size_t)rank * sizeof *dim) != 0) {
         char has[160], needs[160];
         nn_shape_text(e->rank, e->dim, has, sizeof has);
         nn_shape_text(rank, dim, needs, sizeof needs);
-        return ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" has the shape %s, not %s", file->path, name, has, needs);
+        return ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" has the shape %s, not %s", file->path, name, has, needs), NULL;
     }
     if (!nn_dtype_real(e->dtype))
-        return ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" has dtype %s: F32, F16, BF16 or F64 is needed", file->path, name, nn_dtype_name(e->dtype));
+        return ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" has dtype %s: F32, F16, BF16 or F64 is needed", file->path, name, nn_dtype_name(e->dtype)), NULL;
+    return e;
+}
+
+ts_code nn_file_read(const nn_file *file, const char *name, int rank, const int64_t *dim, float *out, ts_status *st)
+{
+    const nn_entry *e = find_real(file, name, rank, dim, st);
+    if (!e) return TS_FORMAT;
     nn_entry_copy(e, NN_F32, out);
     return TS_OK;
+}
+
+ts_code nn_file_read_finite(const nn_file *file, const char *name, int rank, const int64_t *dim, float *out, ts_status *st)
+{
+    const nn_entry *e = find_real(file, name, rank, dim, st);
+    if (!e) return TS_FORMAT;
+    return nn_entry_finite(e, out) ? TS_OK : ts_fail(st, TS_NUMERIC, "%s: tensor \"%s\" holds a value that is not finite", file->path, name);
 }

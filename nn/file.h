@@ -53,10 +53,14 @@ const char *nn_file_meta_key(const nn_file *file, int i);       /* in the file's
 /* Copies tensor name into out (as many floats as dim says, row-major); TS_FORMAT when it is missing, has another shape or is not of real numbers.
  * F64 is rounded. */
 ts_code nn_file_read(const nn_file *file, const char *name, int rank, const int64_t *dim, float *out, ts_status *st);
+/* And TS_NUMERIC when one is not finite. */
+ts_code nn_file_read_finite(const nn_file *file, const char *name, int rank, const int64_t *dim, float *out, ts_status *st);
 
-/* Copies the numbers of e, row-major and little endian, into out (count * nn_dtype_size(to) bytes). to is e's own type, or both are real; rounds to
+/* Copies the numbers of e, row-major and little endian, into out (count * nn_dtype_size(to) bytes, aligned to one). to is e's own type, or both are real; rounds to
  * nearest even (F64 to a half by way of F32). False: a finite number is too large for F16. */
 bool nn_entry_copy(const nn_entry *e, nn_dtype to, void *out);
+/* Of real numbers, as F32. False: one is not finite. */
+bool nn_entry_finite(const nn_entry *e, float *out);
 /* Row-major without gaps, little endian: data may be used as it is. */
 bool nn_entry_plain(const nn_entry *e);
 /* "[64, 3, 3, 3]" */

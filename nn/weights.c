@@ -28,7 +28,7 @@ static bool of_network(const char *name)
 
 /* A tensor by each thread at a time: they wait for each other once, not at every tensor, while another thread may be decoding. Of several that fail st
  * names the first. */
-static ts_code read_values(const nn_file *f, const char *path, nn_model *m, ts_status *st)
+static ts_code read_values(const nn_file *f, nn_model *m, ts_status *st)
 {
     int failed = m->params;
 #pragma omp parallel for num_threads(ts_threads()) schedule(dynamic)
@@ -37,9 +37,7 @@ static ts_code read_values(const nn_file *f, const char *path, nn_model *m, ts_s
         ts_status own = {0};
         int64_t dim[4];
         nn_param_dims(p, dim);
-        if (nn_file_read(f, p->name, p->rank, dim, m->value + p->offset, &own) == TS_OK && !nn_all_finite(m->value + p->offset, p->count))
-            ts_fail(&own, TS_NUMERIC, "%s: tensor \"%s\" holds a value that is not finite", path, p->name);
-        if (!own.code) continue;
+        if (nn_file_read_finite(f, p->name, p->rank, dim, m->value + p->offset, &own) == TS_OK) continue;
 #pragma omp critical(nn_read_values)
         if (i < failed) {
             failed = i;
@@ -68,7 +66,7 @@ nn_model *nn_model_load(const char *path, ts_status *st)
                 ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" is missing", path, m->param[i].name);
                 nn_model_free(&m);
             }
-        if (m && (nn_model_room(m, st) || read_values(f, path, m, st))) nn_model_free(&m);
+        if (m && (nn_model_room(m, st) || read_values(f, m, st))) nn_model_free(&m);
     }
     nn_file_close(&f);
     return m;
