@@ -83,12 +83,11 @@ static ts_code read_square(const char *path, const photo *p, int64_t max_pixels,
     const int folder = slash && p->file[0] != '/' ? (int)(slash + 1 - path) : 0;
     if (snprintf(name, sizeof name, "%.*s%s", folder, path, p->file) >= PATH_MAX)
         return ts_fail(st, TS_INVALID, "%s:%d: the file's name is too long", path, p->line);
-    io_image whole = {0}, square = {0};
-    ts_code code = io_read_photo(name, max_pixels, &whole, st);
-    if (!code && io_centre_square(&whole, c->size, &square, st)) code = ts_context(st, "%s", name);
+    io_image square;
+    int width, height;
+    const ts_code code = io_read_square(name, max_pixels, c->size, &square, &width, &height, st);
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
     if (!code) memcpy(c->image + (size_t)k * values, square.data, values * sizeof(float));
-    io_image_free(&whole);
     io_image_free(&square);
     return code;
 }

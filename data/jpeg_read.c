@@ -1,5 +1,6 @@
 /* Ordinary JPEG files, without the image library (data/common_read.h). */
 #include "data/common_read.h"
+#include "tensor/block.h"
 #include <setjmp.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +12,6 @@ typedef struct reading {
     struct jpeg_error_mgr errors;
     jmp_buf back;
     FILE *file;
-    JSAMPROW row;
     JOCTET *profile;
     oi_image *image;
     int64_t max_pixels;
@@ -53,13 +53,12 @@ static bool pixels(reading *r)
 {
     oi_image *image = r->image;
     const size_t values = (size_t)image->width * (size_t)image->channels;
-    image->data = malloc(values * (size_t)image->height * sizeof(float));
-    r->row = malloc(values);
-    if (!image->data || !r->row) return false;
+    image->type = OI_U8;
+    image->data = ts_block(values * (size_t)image->height);
+    if (!image->data) return false;
     for (int y = 0; y < image->height; y++) {
-        float *out = image->data + (size_t)y * values;
-        if (jpeg_read_scanlines(&r->jpeg, &r->row, 1) != 1) return false;
-        for (size_t i = 0; i < values; i++) out[i] = (float)r->row[i] * (1.0f / 255);
+        JSAMPROW row = (JSAMPROW)image->data + (size_t)y * values;
+        if (jpeg_read_scanlines(&r->jpeg, &row, 1) != 1) return false;
     }
     return true;
 }
@@ -110,7 +109,6 @@ bool io_read_jpeg_file(const char *path, int64_t max_pixels, oi_image *image)
         jpeg_destroy_decompress(&r.jpeg);
     }
     if (r.file) fclose(r.file);
-    free(r.row);
     free(r.profile);
     if (!done) oi_free(image);
     return done;

@@ -109,7 +109,8 @@ static ts_code read_file(const char *path, int64_t max_pixels, oi_image *image, 
     image->width = spec.width;
     image->height = spec.height;
     image->channels = last - first + 1;
-    image->data = (float *)calloc((size_t)spec.width * spec.height * image->channels, sizeof(float));
+    image->type = OI_F32;
+    image->data = calloc((size_t)spec.width * spec.height * image->channels, sizeof(float));
     if (!image->data) return ts_fail(st, TS_NOMEM, "%s: no memory for %d x %d pixels", path, spec.width, spec.height);
     if (!in->read_image(0, 0, first, last + 1, TypeDesc::FLOAT, image->data))
         return ts_fail(st, TS_FORMAT, "%s: damaged or cut short: %s", path, one_line(in->geterror()).c_str());

@@ -11,10 +11,13 @@ extern "C" {
 #endif
 #include "tensor/status.h"
 
-/* The first page of a file, values as stored: integers / their maximum, floats as they are. */
+typedef enum oi_type { OI_F32, OI_U8, OI_U16 } oi_type;
+
+/* The first page of a file, values as stored: OI_F32: integers / their maximum, floats as they are; OI_U8, OI_U16: the integers themselves. */
 typedef struct oi_image {
     int width, height, channels;
-    float *data;                 /* [height][width][channels] */
+    oi_type type;
+    void *data;                  /* [height][width][channels] */
     int colour[3], alpha;        /* channel numbers of red, green, blue (all the same when grey), of alpha or -1 */
     bool grey, floating;         /* floating: stored as half, float or double */
     int levels;                  /* how many values an integer file tells apart: 256 or 65536 (more are rounded to that) */
@@ -26,6 +29,16 @@ typedef struct oi_image {
     unsigned char *icc;          /* ICC profile, or NULL */
     size_t icc_size;
 } oi_image;
+
+/* The i-th value of data as OI_F32 would have it. */
+static inline float oi_value(const oi_image *image, size_t i)
+{
+    switch (image->type) {
+    case OI_U8: return (float)((const uint8_t *)image->data)[i] * (1.0f / 255);
+    case OI_U16: return (float)((const uint16_t *)image->data)[i] * (1.0f / 65535);
+    default: return ((const float *)image->data)[i];
+    }
+}
 
 /* The size is checked against max_pixels before memory is taken. On success the caller calls oi_free. */
 ts_code oi_read(const char *path, int64_t max_pixels, oi_image *image, ts_status *st);
@@ -49,7 +62,7 @@ typedef struct oi_library {
     bool (*knows_extension)(const char *extension);
 } oi_library;
 #define OI_LIBRARY "lgd_image_library"
-#define OI_BUILD "lgd " LGD_VERSION " image library 1"
+#define OI_BUILD "lgd " LGD_VERSION " image library 2"
 
 #ifdef __cplusplus
 }

@@ -1,5 +1,6 @@
 /* Ordinary PNG files, without the image library (data/common_read.h). */
 #include "data/common_read.h"
+#include "tensor/block.h"
 #include <png.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,7 +10,6 @@ typedef struct reading {
     FILE *file;
     png_structp png;
     png_infop info;
-    png_bytep row;
     oi_image *image;
     int64_t max_pixels;
     int bits;
@@ -70,16 +70,13 @@ static bool profile(reading *r)
 static bool pixels(reading *r)
 {
     oi_image *image = r->image;
-    const size_t values = (size_t)image->width * (size_t)image->channels;
-    image->data = malloc(values * (size_t)image->height * sizeof(float));
-    r->row = malloc(png_get_rowbytes(r->png, r->info));
-    if (!image->data || !r->row) return false;
-    for (int y = 0; y < image->height; y++) {
-        float *out = image->data + (size_t)y * values;
-        png_read_row(r->png, r->row, NULL);
-        for (size_t i = 0; i < values && r->bits == 8; i++) out[i] = (float)r->row[i] * (1.0f / 255);
-        for (size_t i = 0; i < values && r->bits == 16; i++) out[i] = (float)(r->row[2 * i] << 8 | r->row[2 * i + 1]) * (1.0f / 65535);
-    }
+    const size_t row = (size_t)image->width * (size_t)image->channels * (size_t)(r->bits / 8);
+    image->type = r->bits == 8 ? OI_U8 : OI_U16;
+    image->data = ts_block(row * (size_t)image->height);
+    if (!image->data) return false;
+    const uint16_t one = 1;
+    if (r->bits == 16 && *(const uint8_t *)&one) png_set_swap(r->png); /* the file's are big endian */
+    for (int y = 0; y < image->height; y++) png_read_row(r->png, (png_bytep)image->data + (size_t)y * row, NULL);
     return true;
 }
 
@@ -119,7 +116,6 @@ bool io_read_png_file(const char *path, int64_t max_pixels, oi_image *image)
         png_destroy_read_struct(&r.png, &r.info, NULL);
     }
     if (r.file) fclose(r.file);
-    free(r.row);
     if (!done) oi_free(image);
     return done;
 }

@@ -13,16 +13,22 @@ ts_code lgd_weights_published(const char *path, bool *published, ts_status *st)
     return code;
 }
 
-ts_code lgd_photograph_read(const char *path, bool published, int64_t max_pixels, io_image *photo, ts_status *st)
+static ts_code published_square(const char *path, int64_t max_pixels, int size, io_image *square, int *width, int *height, ts_status *st)
 {
-    return published ? io_read_stored(path, max_pixels, rd_published.gamma, photo, st) : io_read_photo(path, max_pixels, photo, st);
-}
-
-ts_code lgd_photograph_square(const io_image *photo, bool published, int size, io_image *square, ts_status *st)
-{
-    if (!published) return io_centre_square(photo, size, square, st);
-    const ts_code code = io_centre_square_scikit(photo, size, square, st);
+    io_image whole;
+    *square = (io_image){0};
+    ts_code code = io_read_stored(path, max_pixels, rd_published.gamma, &whole, st);
+    if (code) return code;
+    *width = whole.width, *height = whole.height;
+    code = io_centre_square_scikit(&whole, size, square, st);
+    if (code) ts_context(st, "%s", path);
     const int64_t values = code ? 0 : (int64_t)size * size * 3;
     for (int64_t i = 0; i < values; i++) square->data[i] = powf(square->data[i], (float)rd_published.gamma);
+    io_image_free(&whole);
     return code;
+}
+
+ts_code lgd_photograph_square(const char *path, bool published, int64_t max_pixels, int size, io_image *square, int *width, int *height, ts_status *st)
+{
+    return (published ? published_square : io_read_square)(path, max_pixels, size, square, width, height, st);
 }

@@ -7,9 +7,7 @@
  * file's head is read. */
 ts_code lgd_weights_published(const char *path, bool *published, ts_status *st);
 
-/* The photograph upright: linear, or, published, as it is stored. Messages name it. */
-ts_code lgd_photograph_read(const char *path, bool published, int64_t max_pixels, io_image *photo, ts_status *st);
-/* Its largest centred square at size x size pixels, linear. published: resampled by io_centre_square_scikit as it is stored (8-bit values / 255) and only
- * then raised to rd_published.gamma; otherwise resampled while linear. */
-ts_code lgd_photograph_square(const io_image *photo, bool published, int size, io_image *square, ts_status *st);
+/* The photograph's largest centred square at size x size pixels, linear, which the caller frees. published: resampled by io_centre_square_scikit as it is stored
+ * (8-bit values / 255) and only then raised to rd_published.gamma; otherwise resampled while linear. width, height: of the whole, upright. Messages name it. */
+ts_code lgd_photograph_square(const char *path, bool published, int64_t max_pixels, int size, io_image *square, int *width, int *height, ts_status *st);
 #endif

@@ -31,16 +31,15 @@ struct lgd_pipeline {
 };
 
 /* The mask is cut and resampled as the photograph is; what is not black in a pixel makes it wanted. */
-static ts_code read_mask(const lgd_command *c, const io_image *photo, unsigned char **mask, ts_status *st)
+static ts_code read_mask(const lgd_command *c, int width, int height, unsigned char **mask, ts_status *st)
 {
     io_image whole = {0}, square = {0};
     const size_t pixels = (size_t)c->size * (size_t)c->size;
     ts_code code = io_read_data(c->mask, 1, c->max_pixels, &whole, st);
     if (code) return code;
-    const double difference = (double)whole.width * photo->height - (double)whole.height * photo->width; /* a pixel of rounding is none */
-    if (fabs(difference) > fmax(whole.width, whole.height) + fmax(photo->width, photo->height))
-        code = ts_fail(st, TS_INVALID, "the mask %s is %d x %d pixels and the photograph %d x %d: not the same shape", c->mask, whole.width, whole.height, photo->width,
-                       photo->height);
+    const double difference = (double)whole.width * height - (double)whole.height * width; /* a pixel of rounding is none */
+    if (fabs(difference) > fmax(whole.width, whole.height) + fmax(width, height))
+        code = ts_fail(st, TS_INVALID, "the mask %s is %d x %d pixels and the photograph %d x %d: not the same shape", c->mask, whole.width, whole.height, width, height);
     if (!code) code = io_centre_square(&whole, c->size, &square, st);
     if (!code && !(*mask = malloc(pixels))) code = ts_fail(st, TS_NOMEM, "out of memory for the mask");
     for (size_t i = 0; i < pixels && !code; i++) (*mask)[i] = square.data[i] > 0;
@@ -63,14 +62,10 @@ static void decode(const lgd_command *c, bool published, lgd_item *item)
         decode_capture(c, item);
         return;
     }
-    io_image photo = {0};
-    ts_code code = lgd_photograph_read(item->job->photo, published, c->max_pixels, &photo, &item->st);
-    if (!code) {
-        item->photo_side = photo.width < photo.height ? photo.width : photo.height;
-        if (lgd_photograph_square(&photo, published, c->size, &item->square, &item->st) || (c->mask && read_mask(c, &photo, &item->mask, &item->st)))
-            ts_context(&item->st, "%s", item->job->photo);
-    }
-    io_image_free(&photo);
+    int width, height;
+    if (lgd_photograph_square(item->job->photo, published, c->max_pixels, c->size, &item->square, &width, &height, &item->st)) return;
+    item->photo_side = width < height ? width : height;
+    if (c->mask && read_mask(c, width, height, &item->mask, &item->st)) ts_context(&item->st, "%s", item->job->photo);
 }
 
 /* The first in the plan's order; NULL: there is none. */

@@ -1,8 +1,11 @@
 /* The centre square of a photograph at the size of the network. */
 #include "data/image.h"
+#include "tensor/threads.h"
+#include "tests/awkward.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 static io_image square_of(const io_image *in, int size)
 {
@@ -87,4 +90,63 @@ TEST(image_sizes_without_sense)
     CHECK(io_image_create(&image, 4, -4, 3, &st) == TS_INVALID && !image.data, "-4 high");
     CHECK(io_image_create(&image, 2147483647, 2147483647, 2147483647, &st) == TS_NOMEM && !image.data && st.message[0], "larger than any memory");
     io_image_free(&image);
+}
+
+/* Read at once or cut from the whole: the same bytes, for any number of threads. */
+static void same_square(const char *path, int size)
+{
+    io_image whole, cut, square;
+    ts_status st = {0};
+    int width, height;
+    CHECK(!io_read_photo(path, 1 << 20, &whole, &st) && !io_centre_square(&whole, size, &cut, &st), "%s", st.message);
+    for (int threads = 1; threads <= 3; threads++) {
+        ts_threads_set(threads);
+        CHECK(!io_read_square(path, 1 << 20, size, &square, &width, &height, &st), "%s", st.message);
+        CHECK(width == whole.width && height == whole.height && square.width == size && square.height == size && square.channels == 3, "%s: %d x %d", path, width, height);
+        CHECK(!memcmp(square.data, cut.data, (size_t)size * (size_t)size * 3 * sizeof(float)), "%s to %d pixels on %d threads: other values", path, size, threads);
+        io_image_free(&square);
+    }
+    ts_threads_set(0);
+    io_image_free(&cut), io_image_free(&whole);
+}
+
+TEST(square_of_a_file_is_that_of_the_whole)
+{
+    static const int sizes[] = {1, 7, 16, 61, 64, 100};
+    char path[512];
+    ts_status st = {0};
+    for (int k = 0; k < 9; k++) { /* 8 and 16 bits, grey, in colour, and with alpha over black */
+        static const int channels[] = {3, 3, 1, 3, 4, 3, 4, 1, 3};
+        io_image in = blank(shapes[k][0], shapes[k][1], channels[k]);
+        for (int i = 0; i < in.width * in.height * in.channels; i++) in.data[i] = (float)(i * 7919 % 4099) / 4098;
+        snprintf(path, sizeof path, "%s/p.png", test_folder());
+        CHECK(!io_write_png(path, &in, k % 2 ? 16 : 8, true, &st), "%s", st.message);
+        for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) same_square(path, sizes[i]);
+        io_image_free(&in);
+    }
+    io_image in = blank(97, 61, 3);
+    for (int i = 0; i < 97 * 61 * 3; i++) in.data[i] = (float)(i * 7919 % 4099) / 4098;
+    snprintf(path, sizeof path, "%s/upright.jpg", test_folder());
+    CHECK(!io_write_jpeg(path, &in, 90, &st), "%s", st.message);
+    for (int orientation = 1; orientation <= 8; orientation++) {
+        bytes b = bytes_load(path);
+        jpeg_orientation(&b, orientation);
+        const char *name = bytes_save(&b, test_folder(), "turned.jpg");
+        for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) same_square(name, sizes[i]);
+    }
+    float pixels[5 * 9 * 3];
+    for (int i = 0; i < 5 * 9 * 3; i++) pixels[i] = (float)(i * 7919 % 4099) / 512;
+    bytes exr = exr_file(5, 9, pixels, NULL);
+    const char *floats = bytes_save(&exr, test_folder(), "f.exr");
+    for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) same_square(floats, sizes[i]);
+    snprintf(path, sizeof path, "%s/none.png", test_folder());
+    io_image square = {0};
+    int width, height;
+    CHECK(io_read_square(path, 1 << 20, 8, &square, &width, &height, &st) == TS_IO && !square.data, "a missing file");
+    st = (ts_status){0};
+    snprintf(path, sizeof path, "%s/upright.jpg", test_folder());
+    CHECK(io_read_square(path, 97 * 61 - 1, 8, &square, &width, &height, &st) == TS_UNSUPPORTED && !square.data && strstr(st.message, "97 x 61"), "the limit: %s", st.message);
+    st = (ts_status){0};
+    CHECK(io_read_square(path, 1 << 20, 0, &square, &width, &height, &st) == TS_INVALID && !square.data, "size 0");
+    io_image_free(&in);
 }
