@@ -4,6 +4,7 @@
 #include "data/image.h"
 #include "infer/lgd.h"
 #include "infer/model_path.h"
+#include "tensor/rng.h"
 #include <fcntl.h>
 #include <libgen.h>
 #include <limits.h>
@@ -50,15 +51,35 @@ typedef struct command {
     const char *label;
     const char *word[8]; /* after the program's name */
     int photographs, status;
+    bool large; /* the photograph is one as a telephone takes it */
     double time[ROUNDS];
 } command;
 
-static bool round_of(command *c, int round, const char *program, const char *out, char (*link)[NAME])
+enum { WIDE = 4032, TALL = 3024 };
+
+/* The photograph in as many pixels as a telephone's has, with noise, and with as many bytes. */
+static bool make_large(const char *path)
+{
+    io_image square = {0}, large = {0};
+    ts_status st = {0};
+    int width, height;
+    ts_rng rng = ts_rng_make(1, TS_STREAM_TEST, 0);
+    bool fine = !io_read_square(photograph, 1 << 24, TALL, &square, &width, &height, &st) && !io_image_create(&large, WIDE, TALL, 3, &st);
+    for (int y = 0; y < TALL && fine; y++)
+        for (int x = 0; x < WIDE; x++)
+            for (int c = 0; c < 3; c++) large.data[((size_t)y * WIDE + (size_t)x) * 3 + (size_t)c] = square.data[((size_t)y * TALL + (size_t)(x % TALL)) * 3 + (size_t)c] * ts_rng_range(&rng, 0.97f, 1.03f);
+    fine = fine && !io_write_jpeg(path, &large, 85, &st);
+    if (!fine) printf("  no large photograph: %s\n", st.message);
+    io_image_free(&square), io_image_free(&large);
+    return fine;
+}
+
+static bool round_of(command *c, int round, const char *program, const char *out, char (*link)[NAME], const char *large)
 {
     const char *argv[MOST_ARGUMENTS] = {program, "-q", "-o", out};
     int n = 4;
     for (const char *const *w = c->word; *w; w++) argv[n++] = *w;
-    for (int i = 0; i < c->photographs; i++) argv[n++] = link[i];
+    for (int i = 0; i < c->photographs; i++) argv[n++] = c->large ? large : link[i];
     const double begin = seconds();
     const int status = run(argv);
     c->time[round] = seconds() - begin;
@@ -90,16 +111,15 @@ static double computing(void)
     lgd_error e = {0};
     call c = {.maps = malloc(SIDE * SIDE * 9 * sizeof(float))};
     double t = 0;
-    io_image whole = {0};
-    if (!c.maps || lgd_model_path(NULL, "single", path, &st) || !(c.model = lgd_load(path, &e)) || io_read_photo(photograph, SIDE * SIDE * 16, &whole, &st) ||
-        io_centre_square(&whole, SIDE, &c.image, &st))
+    int width, height;
+    if (!c.maps || lgd_model_path(NULL, "single", path, &st) || !(c.model = lgd_load(path, &e)) ||
+        io_read_square(photograph, 1 << 24, SIDE, &c.image, &width, &height, &st))
         printf("  the computing was not measured: %s\n", st.code ? st.message : e.message);
     else {
         const bench_time time = bench_measure(estimate, &c);
         t = time.seconds;
         bench_row_unit("the computing alone, in a library", time, 1 / t, "photographs/s");
     }
-    io_image_free(&whole);
     io_image_free(&c.image);
     lgd_free(&c.model);
     free(c.maps);
@@ -114,12 +134,13 @@ BENCH(process)
                             {.label = "one photograph, four maps", .word = {"--maps", "diffuse,specular,roughness,normal"}, .photographs = 1},
                             {.label = "one photograph, every file", .photographs = 1},
                             {.label = "one photograph, every file, --precision bf16", .word = {"--precision", "bf16"}, .photographs = 1},
+                            {.label = "one photograph of 4032 x 3024 pixels, four maps", .word = {"--maps", "diffuse,specular,roughness,normal"}, .photographs = 1, .large = true},
                             {.label = "26 photographs, four maps", .word = {"--maps", "diffuse,specular,roughness,normal"}, .photographs = FOLDER},
                             {.label = "26 photographs, every file", .photographs = FOLDER},
                             {.label = "26 photographs, every file, --threads 1", .word = {"--threads", "1"}, .photographs = FOLDER}};
     enum { COMMANDS = sizeof all / sizeof *all, ONE_FOUR_MAPS = 3 };
     static char link[FOLDER][NAME];
-    char folder[NAME / 2], own[PATH_MAX] = "", program[PATH_MAX + 16], out[NAME], source[PATH_MAX];
+    char folder[NAME / 2], own[PATH_MAX] = "", program[PATH_MAX + 16], out[NAME], large[NAME], source[PATH_MAX];
     bool fine = true;
     bench_heading("lgd-infer as a process, 256 x 256 (medians of seven, in turn)");
     const char *temporary = getenv("TMPDIR");
@@ -134,9 +155,11 @@ BENCH(process)
         snprintf(link[i], NAME, "%s/%d.jpg", folder, i);
         fine = fine && symlink(source, link[i]) == 0;
     }
+    snprintf(large, sizeof large, "%s/large.jpg", folder);
+    fine = fine && make_large(large);
     const double warm = computing();
     for (int round = -1; round < ROUNDS && fine; round++) /* the first warms up */
-        for (int i = 0; i < COMMANDS && fine; i++) fine = round_of(&all[i], round < 0 ? 0 : round, program, out, link);
+        for (int i = 0; i < COMMANDS && fine; i++) fine = round_of(&all[i], round < 0 ? 0 : round, program, out, link, large);
     for (int i = 0; i < COMMANDS && fine; i++) {
         qsort(all[i].time, ROUNDS, sizeof *all[i].time, ascending);
         const bench_time t = {.seconds = all[i].time[ROUNDS / 2]};

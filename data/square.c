@@ -6,7 +6,7 @@
 #include "tensor/threads.h"
 #include <string.h>
 
-enum { BAND = 4 }; /* rows of the result at a time */
+enum { BAND = 4, LARGE = 1024 }; /* rows of the result at a time; pixels a side from which on threads pay */
 
 typedef struct cut {
     const io_photo_rows *photo;
@@ -26,6 +26,7 @@ static int read_by(const ts_taps *t, int j, int count, int *first)
 static void make(const cut *c, int begin, int end, float *rows, float *to)
 {
     const size_t row = (size_t)c->side * 3;
+    const int threads = ts_threads_own(1);
     int have = 0, until = 0; /* the photograph's rows in rows */
     for (int j = begin, first; j < end; j += BAND) {
         const int count = j + BAND < end ? BAND : end - j, last = read_by(c->taps, j, count, &first);
@@ -39,11 +40,12 @@ static void make(const cut *c, int begin, int end, float *rows, float *to)
         own.first = from;
         ts_resample(1, 3, &own, c->taps, rows, to + (size_t)j * (size_t)c->taps->out * 3, false);
     }
+    ts_threads_own(threads);
 }
 
 static ts_code resample(const io_photo_rows *photo, const cut *c, ts_arena *arena, io_image *square, ts_status *st)
 {
-    const int size = c->taps->out, threads = ts_threads() < size ? ts_threads() : size, each = (size + threads - 1) / threads;
+    const int size = c->taps->out, most_threads = c->side < LARGE ? 1 : ts_threads(), threads = most_threads < size ? most_threads : size, each = (size + threads - 1) / threads;
     size_t most = 0;
     for (int j = 0; j < size; j++) { /* wherever a band begins */
         int first;

@@ -114,7 +114,7 @@ static void *decode_all(void *user)
 {
     lgd_pipeline *p = user;
     lgd_item *item;
-    ts_threads_own(1); /* the others have work, if only the weights to read */
+    if (p->plan->jobs > 1) ts_threads_own(1); /* the others have work */
     while ((item = begin_decoding(p))) {
         decode(p->command, p->published, item);
         move(p, item, DECODED);
