@@ -103,6 +103,8 @@ static void compute(lgd_item *item, void *user)
     else lgd_encode(item->m.maps, size, item->m.maps);
 }
 
+#define FAR 0.01 /* reconstruction RMSE after the trained steps from which a highlight may be seen where the photograph has none */
+
 static void tell(run *r, const lgd_item *item)
 {
     cl_progress_end(&r->bar);
@@ -119,7 +121,8 @@ static void tell(run *r, const lgd_item *item)
     fflush(stdout); /* a reader at the other end of a pipe gets each folder when it is there */
     if (r->command->quiet) return;
     if (fabs(item->power - 1) >= 0.005) cl_note("%s: light power %.2f of the %s", item->job->photo, item->power, item->capture.images ? "capture's" : "usual");
-    if (item->steps > 0) cl_note("%s: reconstruction RMSE %.4f (R_0) -> %.4f (R_%d)", item->job->photo, item->first, item->last, item->steps);
+    const char *hint = r->command->iterations == -1 && item->last > FAR ? "; --iterations auto may come nearer" : ""; /* each step halves what is left */
+    if (item->steps > 0) cl_note("%s: reconstruction RMSE %.4f (R_0) -> %.4f (R_%d)%s", item->job->photo, item->first, item->last, item->steps, hint);
     else cl_note("%s: reconstruction RMSE %.4f (R_0)", item->job->photo, item->first);
 }
 

@@ -32,6 +32,18 @@ whole_run() {
     if cmp -s "$T/a/b/wall/maps.exr" "$T/c/wall/maps.exr"; then fail "refinement changes nothing"; fi
 }
 
+# What the trained steps leave far from the photograph is said, with what may help, and that helps.
+far_from_the_photograph() {
+    model
+    { printf 'P3 64 64 255\n'; awk 'BEGIN { for (i = 0; i < 64 * 64; i++) print int(i / 64 / 8) % 2 == int(i % 64 / 8) % 2 ? "255 20 20" : "3 3 3" }'; } > "$T/chequer.ppm"
+    expect 0 "$BIN/lgd-infer" -s 64 --maps diffuse "$T/chequer.ppm" -o "$T/o"
+    says "$T/err" "; --iterations auto may come nearer"
+    left=$(sed -n 's/.*-> \([0-9.]*\) .*/\1/p' "$T/err")
+    expect 0 "$BIN/lgd-infer" -s 64 --maps diffuse -i auto "$T/chequer.ppm" -o "$T/o"
+    if grep -q "may come nearer" "$T/err"; then fail "it is said of --iterations auto itself"; fi
+    awk -v a="$left" -v b="$(sed -n 's/.*-> \([0-9.]*\) .*/\1/p' "$T/err")" 'BEGIN { exit !(b < a && a > 0.01) }' || fail "$left before, after: $(cat "$T/err")"
+}
+
 threads_agree() {
     model
     photo "$T/p.ppm" 33 33
@@ -260,6 +272,7 @@ light_power() {
 check infer_help_names_the_options help_names_the_options
 check infer_wrong_usage wrong_usage
 check infer_whole_run whole_run
+check infer_far_from_the_photograph far_from_the_photograph
 check infer_threads_agree threads_agree
 check infer_writes_only_what_is_asked_for only_what_is_asked_for
 check infer_overlap_changes_nothing overlap_changes_nothing
