@@ -77,21 +77,29 @@ void io_texel_put(float *maps9, const io_texel *t)
     maps9[MAP_NORMAL + 1] = usable ? y * scale : 0;
 }
 
-/* One map as an image: diffuse, specular and roughness in [0, 1], normals as (n + 1) / 2. */
-static void fill_map(const io_material *m, unsigned which, bool directx, io_image *image)
+typedef struct map {
+    const io_material *m;
+    unsigned which;
+    bool directx;
+} map;
+
+/* Rows of a map: diffuse, specular and roughness in [0, 1], normals as (n + 1) / 2. */
+static ts_code make_rows(int y, int count, float *out, void *user, ts_status *st)
 {
-    const size_t pixels = (size_t)m->size * (size_t)m->size;
-    const int channels = image->channels, from = which == IO_MAPS_DIFFUSE ? MAP_DIFFUSE : which == IO_MAPS_SPECULAR ? MAP_SPECULAR : MAP_ROUGHNESS;
-    for (size_t i = 0; i < pixels; i++) {
-        const float *maps = m->maps + i * MAP_CHANNELS;
-        float *out = image->data + i * (size_t)channels;
-        if (which == IO_MAPS_NORMAL) {
+    const map *q = user;
+    const size_t first = (size_t)y * (size_t)q->m->size, pixels = (size_t)count * (size_t)q->m->size;
+    const int from = q->which == IO_MAPS_DIFFUSE ? MAP_DIFFUSE : q->which == IO_MAPS_SPECULAR ? MAP_SPECULAR : MAP_ROUGHNESS, channels = q->which == IO_MAPS_ROUGHNESS ? 1 : 3;
+    (void)st;
+    for (size_t i = 0; i < pixels; i++, out += channels) {
+        const float *maps = q->m->maps + (first + i) * MAP_CHANNELS;
+        if (q->which == IO_MAPS_NORMAL) {
             const io_texel t = io_texel_get(maps);
-            for (int c = 0; c < 3; c++) out[c] = (c == 1 && directx ? -t.normal[c] : t.normal[c]) * 0.5f + 0.5f;
+            for (int c = 0; c < 3; c++) out[c] = (c == 1 && q->directx ? -t.normal[c] : t.normal[c]) * 0.5f + 0.5f;
         } else {
             for (int c = 0; c < channels; c++) out[c] = unit(maps[from + c]);
         }
     }
+    return TS_OK;
 }
 
 static ts_code write_map(const char *folder, const char *file, const io_material *m, unsigned which, bool directx, ts_status *st)
@@ -100,14 +108,10 @@ static ts_code write_map(const char *folder, const char *file, const io_material
     if (snprintf(path, sizeof path, "%s/%s", folder, file) >= (int)sizeof path) return ts_fail(st, TS_INVALID, "%s: name too long", folder);
     if (which == IO_MAPS_EXR) return io_write_maps_exr(path, m, directx, st);
     bool colour = which == IO_MAPS_DIFFUSE || which == IO_MAPS_SPECULAR;
-    io_image image;
-    ts_code code = io_image_create(&image, m->size, m->size, which == IO_MAPS_ROUGHNESS ? 1 : 3, st);
-    if (code != TS_OK) return code;
-    fill_map(m, which, directx, &image);
+    map q = {m, which, directx};
+    const io_rows rows = {.width = m->size, .height = m->size, .channels = which == IO_MAPS_ROUGHNESS ? 1 : 3, .make = make_rows, .user = &q};
     /* Eight bits of the sRGB curve are enough for albedo; steps of a normal or of roughness are seen in highlights. */
-    code = io_write_png(path, &image, colour ? 8 : 16, colour, st);
-    io_image_free(&image);
-    return code;
+    return io_write_png_rows(path, &rows, colour ? 8 : 16, colour, st);
 }
 
 /* What the files mean, for whoever reads them next (io_read_map_folder does). */
