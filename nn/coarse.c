@@ -2,6 +2,7 @@
 #include "nn/unrolled.h"
 #include "ops.h"
 #include "render/render.h"
+#include "tensor/resize.h"
 #include <math.h>
 #include <string.h>
 
@@ -127,13 +128,30 @@ static bool step_and_forget(ag_tape *tape, const nn_model *model, nn_coarse *c)
     return true;
 }
 
+/* What the steps read: the photographs, or smaller ones. */
+static bool reduce(ag_tape *tape, const nn_model *model, nn_coarse *c)
+{
+    const int64_t most = (int64_t)model->arch.coarse_size * NN_COARSE_READS;
+    if (c->side <= most) return true;
+    const ts_tensor whole = c->in.image;
+    ts_status st = {0};
+    ag_value *to = ag_empty(tape, (ts_shape){whole.shape.n, (int)most, (int)most, 3});
+    if (to && ts_resize(&to->t, &whole, ag_arena(tape), &st)) ag_fail(tape, st.code, "%s", st.message);
+    if (!to || ag_status(tape)->code) return false;
+    c->in.image = to->t;
+    c->in.grid = rd_grid_full((int)most);
+    return true;
+}
+
 bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c)
 {
-    const int side = c->in.grid.side, size = side < model->arch.coarse_size ? side : model->arch.coarse_size;
+    const int size = c->side < model->arch.coarse_size ? c->side : model->arch.coarse_size;
     if (c->maps->t.shape.h != size) c->maps = ag_resize_smooth(tape, c->maps, size, size); /* it came from g */
     if (!c->maps) return false;
     const ts_shape s = c->maps->t.shape;
     if (!c->up.weight) {
+        if (!reduce(tape, model, c)) return false;
+        const int side = c->in.grid.side;
         c->up = ts_taps_smooth(ag_arena(tape), s.h, side);
         c->down = ts_taps_triangle(ag_arena(tape), side, s.h);
         if (!c->up.weight || !c->down.weight) return ag_fail(tape, TS_NOMEM, "no memory for the filter"), false;

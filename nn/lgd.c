@@ -74,7 +74,7 @@ static bool goes_on(const nn_watch *watch, int t, int steps, const ag_value *map
 /* R_t of the coarse steps as others see it; the whole photographs' too. */
 static ag_value *show(ag_tape *tape, const nn_input *in, const nn_coarse *c, ag_value **whole)
 {
-    *whole = resampled(tape, c->in.grid.side, c->maps);
+    *whole = resampled(tape, c->side, c->maps);
     return *whole ? window(tape, in, *whole) : NULL;
 }
 

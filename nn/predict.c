@@ -104,6 +104,7 @@ bool nn_coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, n
     ag_scope_end(tape, mark, &c->maps, 1);
     if (!c->maps) return false;
     const ts_tensor whole = in->whole.data ? in->whole : in->image;
+    c->side = whole.shape.h;
     c->in = (nn_input){.image = whole, .grid = rd_grid_full(whole.shape.h), .view = in->view, .views = in->views, .given = in->given, .recompute = in->recompute};
     return true;
 }
@@ -114,7 +115,7 @@ ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in)
     const ts_mark mark = ag_scope_begin(tape);
     if (!nn_coarse_begin(tape, model, in, &c)) return NULL;
     ag_value *maps = c.maps;
-    const int side = c.in.grid.side;
+    const int side = c.side;
     if (side != model->arch.g_size) maps = ag_resize_smooth(tape, maps, side, side);
     ag_scope_end(tape, mark, &maps, 1);
     return maps;

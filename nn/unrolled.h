@@ -31,7 +31,8 @@ ag_value *nn_apply(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag
 
 /* R_t, first at g's size and from the first step on at the coarse one, and what its steps carry. */
 typedef struct nn_coarse {
-    nn_input in;      /* the whole photographs */
+    int side;         /* of the whole photographs */
+    nn_input in;      /* these, or, where they are larger than NN_COARSE_READS times the coarse size, of that size */
     ts_taps up, down; /* between the coarse size and theirs */
     ag_value *maps;
     nn_state state;
@@ -41,7 +42,8 @@ typedef struct nn_coarse {
 /* R_0. False after an error, which the tape has. */
 bool nn_coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, nn_coarse *c);
 
-/* A step. It reads the photographs at their own size, and of what they say there the average: detail that coarse maps cannot have leaves the average alone,
- * where a photograph that is resampled first is not one of resampled maps. */
+/* A step. It reads photographs that are larger than the maps, and of what they say the average: detail that coarse maps cannot have leaves the average alone,
+ * where a photograph that is resampled to their size is not one of resampled maps. From twice their size on nothing more was gained (docs/performance.md). */
+enum { NN_COARSE_READS = 2 };
 bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c);
 #endif

@@ -36,28 +36,42 @@ TEST(nn_coarse_steps_of_a_small_photograph_are_a_loop_like_any)
     nn_model_free(&small);
 }
 
-/* What a larger photograph says is averaged: without its network a coarse step is half of the mean of Newton's. Photographs of 600 pixels are read in bands. */
-TEST(nn_coarse_steps_read_the_photograph_at_its_size)
+/* The photographs at most twice the coarse size. */
+static ag_value *as_read(ag_tape *t, const nn_input *in, int side, int coarse)
 {
-    static const int sides[] = {40, 600, 9};
-    nn_arch a = tiny();
-    a.coarse_steps = 1, a.h_width = 0;
-    nn_model *m = create(&a, 7);
-    const nn_param *p = nn_model_find(m, "coarse.output.weight");
-    memset(m->value + p->offset, 0, p->count * sizeof *m->value);
+    ag_value *image = ag_constant(t, in->image);
+    return side > 2 * coarse ? ag_resize(t, image, 2 * coarse, 2 * coarse) : image;
+}
+
+/* What a larger photograph says is averaged: without its network a coarse step is half of the mean of Newton's. Of one that is more than twice as large this is
+ * said of what is left at twice the size. 400 pixels are read in bands. */
+TEST(nn_coarse_steps_read_the_photograph_at_up_to_twice_their_size)
+{
+    static const struct {
+        int side, coarse;
+    } sizes[] = {{30, SIDE}, {40, SIDE}, {300, SIDE}, {9, SIDE}, {600, 200}, {390, 200}};
     const float damping[9] = {NN_NEWTON_DAMPING, NN_NEWTON_DAMPING, NN_NEWTON_DAMPING, NN_NEWTON_DAMPING, NN_NEWTON_DAMPING, NN_NEWTON_DAMPING,
                               NN_NEWTON_DAMPING_SPECULAR, NN_NEWTON_DAMPING_SPECULAR, NN_NEWTON_DAMPING_SPECULAR};
-    for (int k = 0; k < 3; k++) {
-        nn_input in = photographs(2, sides[k], 4, NULL);
+    for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
+        const int side = sizes[k].side;
+        nn_arch a = tiny();
+        a.coarse_steps = 1, a.h_width = 0, a.coarse_size = sizes[k].coarse;
+        nn_model *m = create(&a, 7);
+        const nn_param *p = nn_model_find(m, "coarse.output.weight");
+        memset(m->value + p->offset, 0, p->count * sizeof *m->value);
+        nn_input in = photographs(2, side, 4, NULL);
         ag_tape *t = tape_create(false);
         ag_value *maps[2];
         CHECK(!nn_coarse_steps(t, m, &in, 1, maps), "%s", ag_status(t)->message);
-        const int coarse = sides[k] < SIDE ? sides[k] : SIDE;
-        ag_value *from = ag_resize_smooth(t, maps[0], coarse, coarse), *full = ag_resize_smooth(t, from, sides[k], sides[k]), *newton = ag_empty(t, full->t.shape);
-        const size_t pixels = (size_t)sides[k] * (size_t)sides[k];
+        const int coarse = side < sizes[k].coarse ? side : sizes[k].coarse;
+        const ag_value *read = as_read(t, &in, side, coarse);
+        const int size = read->t.shape.h;
+        CHECK(size == (side < 2 * coarse ? side : 2 * coarse), "%d pixels are read", size);
+        ag_value *from = ag_resize_smooth(t, maps[0], coarse, coarse), *full = ag_resize_smooth(t, from, size, size), *newton = ag_empty(t, full->t.shape);
+        const size_t pixels = (size_t)size * (size_t)size;
         for (size_t n = 0; n < 2; n++) {
-            const float *image = in.image.data + n * pixels * 3;
-            rd_newton_step(in.grid, full->t.data + n * pixels * 9, 9, &in.view, &image, 1, damping, newton->t.data + n * pixels * 9);
+            const float *image = read->t.data + n * pixels * 3;
+            rd_newton_step(rd_grid_full(size), full->t.data + n * pixels * 9, 9, &in.view, &image, 1, damping, newton->t.data + n * pixels * 9);
         }
         newton = ag_resize(t, newton, coarse, coarse);
         double worst = 0, most = 0;
@@ -66,10 +80,10 @@ TEST(nn_coarse_steps_read_the_photograph_at_its_size)
             worst = fmax(worst, fabs(change - 0.5 * newton->t.data[i]));
             most = fmax(most, fabs(change));
         }
-        CHECK(worst < 1e-6 && most > 1e-3, "%d pixels: the step is up to %g off, itself up to %g", sides[k], worst, most);
+        CHECK(worst < 1e-6 && most > 1e-3, "%d pixels: the step is up to %g off, itself up to %g", side, worst, most);
         ag_tape_destroy(&t);
+        nn_model_free(&m);
     }
-    nn_model_free(&m);
 }
 
 /* A fixed part gets no gradient, the others do. */
