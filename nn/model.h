@@ -155,7 +155,7 @@ typedef struct nn_state {
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
 /* The unrolled loop on the grid's window. The first arch.coarse_steps steps refine R_t at coarse_size, as nn_refine does but with NN_COARSE's parameters and the averages of
- * what the photographs say at their own size, and give it resampled; the others begin with what these leave. maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate
+ * what the photographs say at twice that size, or their own where it is less, and give it resampled; the others begin with what these leave. maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate
  * memory is released on a tape without gradients. */
 typedef struct nn_watch {
     bool (*after)(int step, const ag_value *maps, void *user); /* is told of every R_t; false: stop here, what is left of maps is filled with it */
