@@ -2,7 +2,6 @@
 #include "nn/unrolled.h"
 #include "ops.h"
 #include "render/render.h"
-#include "tensor/resize.h"
 #include <math.h>
 #include <string.h>
 
@@ -134,13 +133,8 @@ static bool reduce(ag_tape *tape, const nn_model *model, nn_coarse *c)
     const int64_t most = (int64_t)model->arch.coarse_size * NN_COARSE_READS;
     if (c->side <= most) return true;
     const ts_tensor whole = c->in.image;
-    ts_status st = {0};
-    ag_value *to = ag_empty(tape, (ts_shape){whole.shape.n, (int)most, (int)most, 3});
-    if (to && ts_resize(&to->t, &whole, ag_arena(tape), &st)) ag_fail(tape, st.code, "%s", st.message);
-    if (!to || ag_status(tape)->code) return false;
-    c->in.image = to->t;
     c->in.grid = rd_grid_full((int)most);
-    return true;
+    return nn_resized(tape, &whole, (int)most, &c->in.image);
 }
 
 bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c)

@@ -47,6 +47,16 @@ static void side_by_side(const ts_tensor *from, int count, int images, float *to
     }
 }
 
+bool nn_resized(ag_tape *tape, const ts_tensor *photographs, int size, ts_tensor *to)
+{
+    ts_status st = {0};
+    ag_value *v = ag_empty(tape, (ts_shape){photographs->shape.n, size, size, 3});
+    if (v && ts_resize(&v->t, photographs, ag_arena(tape), &st)) ag_fail(tape, st.code, "%s", st.message);
+    if (!v || ag_status(tape)->code) return false;
+    *to = v->t;
+    return true;
+}
+
 /* The whole photographs, linear, resampled to g_size: small. False after an error. */
 static bool reduce(ag_tape *tape, const nn_model *model, const nn_input *in, nn_input *small)
 {
@@ -56,13 +66,7 @@ static bool reduce(ag_tape *tape, const nn_model *model, const nn_input *in, nn_
     if (whole->shape.h != whole->shape.w)
         return ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels: g needs a square", whole->shape.w, whole->shape.h), false;
     *small = (nn_input){.image = *whole, .grid = rd_grid_full(size), .view = in->view, .views = in->views, .given = in->given, .orientations = in->orientations};
-    if (whole->shape.h == size) return true;
-    ts_status st = {0};
-    ag_value *to = ag_empty(tape, (ts_shape){whole->shape.n, size, size, 3});
-    if (to && ts_resize(&to->t, whole, ag_arena(tape), &st)) ag_fail(tape, st.code, "%s", st.message);
-    if (!to || ag_status(tape)->code) return false;
-    small->image = to->t;
-    return true;
+    return whole->shape.h == size || nn_resized(tape, whole, size, &small->image);
 }
 
 static bool central(const float p[3]) { return p[0] == 0 && p[1] == 0; }

@@ -29,6 +29,9 @@ bool nn_gradient_rooms(ag_tape *tape, const ag_value *maps, int gru, float *room
 /* R_{t+1} by h from what was read, gradient and newton being constants (or NULL where they are not needed). */
 ag_value *nn_apply(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient, ag_value *newton, nn_state *state);
 
+/* The photographs, [n, h, w, 3], resampled to size x size, in the tape's arena. False after an error, which the tape has. */
+bool nn_resized(ag_tape *tape, const ts_tensor *photographs, int size, ts_tensor *to);
+
 /* R_t, first at g's size and from the first step on at the coarse one, and what its steps carry. */
 typedef struct nn_coarse {
     int side;         /* of the whole photographs */
