@@ -45,8 +45,9 @@ ISA_FLAGS_avx512bf16 := $(ISA_FLAGS_avx512) -mavx512bf16
 ISA_FLAGS_amx := $(ISA_FLAGS_avx512bf16) -mamx-tile -mamx-bf16
 
 PROGRAMS := train infer eval data convert
-LIB_C := $(filter-out %main.c,$(wildcard tensor/*.c autograd/*.c render/*.c nn/*.c data/*.c train/*.c infer/*.c eval/*.c cli/*.c))
-KERNELS := $(wildcard tensor/kernels/*.c)
+ROOMS := tensor tensor/conv autograd render nn nn/weights data data/image data/materials train infer eval eval/methods eval/metrics cli cli/infer
+LIB_C := $(filter-out %main.c,$(wildcard $(ROOMS:%=%/*.c)))
+KERNELS := $(wildcard tensor/kernels/*.c render/kernels/*.c)
 OPS := $(sort $(wildcard autograd/op_*.c render/op_*.c))
 OBJ := $(BUILD)/obj
 LIB_OBJ := $(LIB_C:%.c=$(OBJ)/%.o) $(OBJ)/gen/op_list.o \
@@ -56,7 +57,7 @@ IMAGE_LIB := $(BUILD)/lib/lgd/liblgd_image.so
 BIN := $(PROGRAMS:%=$(BUILD)/bin/lgd-%)
 STRESS_C := $(filter-out %main.c,$(wildcard tests/stress/*.c))
 FUZZ_C := $(filter-out %main.c,$(wildcard tests/fuzz/*.c))
-TEST_C := $(wildcard tests/*.c) $(STRESS_C) $(FUZZ_C)
+TEST_C := $(wildcard tests/*.c $(filter-out tests/stress/%.c tests/fuzz/%.c,$(wildcard tests/*/*.c))) $(STRESS_C) $(FUZZ_C)
 BENCH_C := $(wildcard bench/*.c)
 TEST_BIN := $(BUILD)/bin/lgd-test
 BENCH_BIN := $(BUILD)/bin/lgd-bench
@@ -70,7 +71,7 @@ $(BUILD)/bin/lgd-%: $(OBJ)/%/main.o $(LIB)
 	@mkdir -p $(@D)
 	$(CC) -o $@ $< $(LIB) $(LDLIBS_ALL)
 
-$(BUILD)/bin/lgd-convert: $(OBJ)/infer/convert_main.o $(LIB)
+$(BUILD)/bin/lgd-infer $(BUILD)/bin/lgd-convert: $(BUILD)/bin/lgd-%: $(OBJ)/cli/%/main.o $(LIB)
 	@mkdir -p $(@D)
 	$(CC) -o $@ $< $(LIB) $(LDLIBS_ALL)
 
@@ -90,8 +91,8 @@ $(LIB): $(LIB_OBJ)
 	@rm -f $@
 	$(AR) rcs $@ $^
 
-# OpenImageIO, behind the table in data/oiio.h. Loaded when an image needs it, never linked.
-$(IMAGE_LIB): $(OBJ)/data/oiio.o $(OBJ)/tensor/status.o
+# OpenImageIO, behind the table in data/image/oiio.h. Loaded when an image needs it, never linked.
+$(IMAGE_LIB): $(OBJ)/data/image/oiio.o $(OBJ)/tensor/status.o
 	@mkdir -p $(@D)
 	$(CXX) -shared -Wl,-Bsymbolic -o $@ $^ $(shell pkg-config --libs $(PKG_IMAGE)) $(SANITIZE) $(LDLIBS)
 
@@ -101,7 +102,7 @@ $(shell mkdir -p $(BUILD)/gen; echo '$(FLAGS_NOW)' | cmp -s - $(BUILD)/gen/flags
 
 $(OBJ)/%.o: %.c $(BUILD)/gen/flags | $(BUILD)/gen/ops.h
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS_ALL) $(if $(filter data/% nn/%,$<),$(PKG_CFLAGS)) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
+	$(CC) $(CPPFLAGS_ALL) $(if $(filter data/image/% nn/weights/%,$<),$(PKG_CFLAGS)) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
 
 $(OBJ)/gen/%.o: $(BUILD)/gen/%.c $(BUILD)/gen/flags
 	@mkdir -p $(@D)
@@ -114,9 +115,9 @@ $(OBJ)/%.o: %.cpp $(BUILD)/gen/flags
 # One kernel source, once per instruction set. Contraction to FMA is part of what a kernel is, but for those whose bytes must not depend on the machine.
 CONTRACT_noise := off
 define KERNEL_RULE
-$(OBJ)/tensor/kernels/%.$(1).o: tensor/kernels/%.c $(BUILD)/gen/flags
+$(OBJ)/%.$(1).o: %.c $(BUILD)/gen/flags
 	@mkdir -p $$(@D)
-	$$(CC) $$(CPPFLAGS_ALL) $$(CFLAGS_ALL) $$(ISA_FLAGS_$(1)) $$(WHOLE_JUMPS) -ffp-contract=$$(or $$(CONTRACT_$$*),fast) -DTS_ISA_SUFFIX=$(1) -MMD -MP -c -o $$@ $$<
+	$$(CC) $$(CPPFLAGS_ALL) $$(CFLAGS_ALL) $$(ISA_FLAGS_$(1)) $$(WHOLE_JUMPS) -ffp-contract=$$(or $$(CONTRACT_$$(*F)),fast) -DTS_ISA_SUFFIX=$(1) -MMD -MP -c -o $$@ $$<
 endef
 $(foreach isa,$(ISAS),$(eval $(call KERNEL_RULE,$(isa))))
 
@@ -156,10 +157,10 @@ stress: $(STRESS_BIN)
 FUZZ ?= safetensors torch photo image config folder
 FUZZ_SECONDS ?= 600
 FUZZ_CC ?= clang
-FUZZED := $(wildcard $(addprefix nn/,file.c entry.c json.c safetensors_read.c zip.c pickle.c torch_objects.c torch_read.c) \
-  $(addprefix data/,png_file.c png_read.c jpeg_read.c exif.c colour.c image.c image_read.c image_library.c capture.c capture_ini.c ini.c file.c name.c map_folder.c \
-  map_names.c material.c) \
-  train/config.c train/config_text.c train/keys.c eval/set_ini.c) $(FUZZ_C)
+FUZZED := $(addprefix nn/weights/,file.c tensor_convert.c json.c safetensors_read.c zip.c pickle.c torch_objects.c torch_read.c) \
+  $(addprefix data/image/,png_file.c png_read.c jpeg_read.c exif.c colour.c image.c image_read.c image_library.c) \
+  $(addprefix data/,capture.c capture_ini.c ini.c file.c name.c map_folder.c map_names.c material.c) \
+  train/config.c train/config_text.c train/keys.c eval/set_ini.c $(FUZZ_C)
 FUZZ_FLAGS := -O1 -g -fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=all
 FUZZ_OBJ := $(FUZZED:%.c=$(BUILD)/fuzz/obj/%.o)
 

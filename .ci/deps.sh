@@ -12,7 +12,7 @@ for module in "$@"; do
     OpenImageIO) missing="$missing libopenimageio-dev" ;;
     OpenEXR) missing="$missing libopenexr-dev" ;;
     libpng) missing="$missing libpng-dev" ;;
-    zlib) missing="$missing zlib1g-dev" ;; # nn/zip.c: compressed entries of PyTorch's files
+    zlib) missing="$missing zlib1g-dev" ;; # nn/weights/zip.c: compressed entries of PyTorch's files
     libjpeg) missing="$missing libjpeg-dev" ;;
     *) echo "deps: no package is known for $module" >&2; exit 1 ;;
     esac

@@ -1,7 +1,7 @@
-/* Parts whose inner values are computed again for the gradient. On the tape a part is one node that computes, whose output is a token, followed
- * by one for each result, which tells the first that a gradient has come. */
+/* Parts whose inner values are computed again for the gradient. On the tape a part is one node that computes, whose
+ * output is a token, followed by one for each result, which tells the first that a gradient has come. */
 #include "autograd/op.h"
-#include "autograd/tape_inside.h"
+#include "autograd/tape_internal.h"
 #include <string.h>
 
 typedef struct part {
@@ -57,7 +57,8 @@ static void again(ag_tape *tape, ag_node *node)
     ts_arena_release(tape->arena, mark);
 }
 
-static const ag_op part_op = {.name = "part", .backward = again}, result_op = {.name = "result of a part", .backward = arrive};
+static const ag_op part_op = {.name = "part", .backward = again},
+                   result_op = {.name = "result of a part", .backward = arrive};
 
 static bool put(ag_tape *tape, part *p, const ag_op *op, ag_value *out)
 {
@@ -68,7 +69,8 @@ static bool put(ag_tape *tape, part *p, const ag_op *op, ag_value *out)
     return ag_record(tape, node);
 }
 
-bool ag_checkpoint(ag_tape *tape, ag_body body, const void *user, size_t size, int ins, ag_value *const *in, float *const *room, int outs, ag_value **out)
+bool ag_checkpoint(ag_tape *tape, ag_body body, const void *user, size_t size, int ins, ag_value *const *in,
+                   float *const *room, int outs, ag_value **out)
 {
     if (!ag_ready(tape, "checkpoint", 0, in)) return false;
     if (!tape->gradients) {
@@ -77,7 +79,12 @@ bool ag_checkpoint(ag_tape *tape, ag_body body, const void *user, size_t size, i
     }
     part *p = ts_arena_zalloc(tape->arena, 1, sizeof *p);
     ag_value *plain[AG_PART_MOST] = {0};
-    if (p) *p = (part){.body = body, .user = ts_arena_alloc(tape->arena, size), .ins = ins, .outs = outs, .token = ag_empty(tape, (ts_shape){1, 1, 1, 1})};
+    if (p)
+        *p = (part){.body = body,
+                    .user = ts_arena_alloc(tape->arena, size),
+                    .ins = ins,
+                    .outs = outs,
+                    .token = ag_empty(tape, (ts_shape){1, 1, 1, 1})};
     if (!p || !p->user || !p->token) return ag_fail(tape, TS_NOMEM, "no memory for a part");
     memcpy(p->user, user, size);
     for (int i = 0; i < ins; i++) {

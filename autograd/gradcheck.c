@@ -19,14 +19,14 @@ struct ag_gradcheck {
 typedef struct check {
     ag_gradcheck *g;
     const ag_case *c;
-    const ag_node *node;             /* of the last run; valid until the next */
-    ag_value *in[AG_MAX_INPUTS];     /* what build was given */
-    float *f[AG_MAX_INPUTS];         /* the values of the inputs, */
-    double *d[AG_MAX_INPUTS];        /* the same in double, */
-    float *grad[AG_MAX_INPUTS];      /* and their gradients */
-    float *weight;                   /* of the outputs in the loss */
+    const ag_node *node;         /* of the last run; valid until the next */
+    ag_value *in[AG_MAX_INPUTS]; /* what build was given */
+    float *f[AG_MAX_INPUTS];     /* the values of the inputs, */
+    double *d[AG_MAX_INPUTS];    /* the same in double, */
+    float *grad[AG_MAX_INPUTS];  /* and their gradients */
+    float *weight;               /* of the outputs in the loss */
     int64_t outputs;
-    double *reference;               /* [outputs] */
+    double *reference; /* [outputs] */
 } check;
 
 /* y = x: its gradient is the first to reach what it copies, so that ops are tested overwriting as well as adding. */
@@ -124,7 +124,8 @@ static double loss_at(const check *k, double *out, double *place, double x)
     return sum;
 }
 
-/* The central difference at a step where it agrees best with the one of the next smaller step; false: a kink is too near. */
+/* The central difference at a step where it agrees best with the one of the next smaller step; false: a kink is too
+ * near. */
 static bool difference(const check *k, double *out, int input, int64_t i, double *slope)
 {
     static const double steps[] = {1e-3, 1e-4, 1e-5, 1e-6};
@@ -133,7 +134,8 @@ static bool difference(const check *k, double *out, int input, int64_t i, double
     for (int s = 0; s < 4; s++) {
         const double h = steps[s] * size;
         if (k->c->kink && k->c->kink((const double *const *)k->d, input, i, h, k->c->user)) continue;
-        const double now = (loss_at(k, out, &k->d[input][i], x + h) - loss_at(k, out, &k->d[input][i], x - h)) / (2 * h);
+        const double now = (loss_at(k, out, &k->d[input][i], x + h) - loss_at(k, out, &k->d[input][i], x - h)) /
+            (2 * h);
         if (have && fabs(now - last) < best) {
             best = fabs(now - last);
             *slope = now;
@@ -157,7 +159,8 @@ static ts_code check_gradient(check *k, int input)
     enum { MOST = 64 };
     const int64_t n = ts_count(k->c->shape[input]);
     const int64_t tries = n < MOST ? n : MOST;
-    double *numeric = ts_arena_zalloc(k->g->arena, (size_t)tries, sizeof(double)), *out = ts_arena_zalloc(k->g->arena, (size_t)k->outputs, sizeof(double));
+    double *numeric = ts_arena_zalloc(k->g->arena, (size_t)tries, sizeof(double)),
+           *out = ts_arena_zalloc(k->g->arena, (size_t)k->outputs, sizeof(double));
     int64_t *which = ts_arena_zalloc(k->g->arena, (size_t)tries, sizeof(int64_t));
     if (!numeric || !out || !which) return fail(k, "no memory");
     double scale = largest(k->grad[input], n);
@@ -183,18 +186,21 @@ static ts_code check_gradient(check *k, int input)
         }
     }
     if (!(error <= tolerance * scale))
-        return fail(k, "input %d value %lld: gradient %.9g, by differences %.9g (largest %.3g)", input, (long long)which[worst],
-                    (double)k->grad[input][which[worst]], numeric[worst], scale);
+        return fail(k, "input %d value %lld: gradient %.9g, by differences %.9g (largest %.3g)", input,
+                    (long long)which[worst], (double)k->grad[input][which[worst]], numeric[worst], scale);
     return TS_OK;
 }
 
-/* Gradients must not depend on which others are wanted, on whether they come first or are added, or on an earlier backward. */
-static ts_code check_variant(check *k, unsigned wanted, bool copied, int times, float *const *expected, const char *what)
+/* Gradients must not depend on which others are wanted, on whether they come first or are added, or on an earlier
+ * backward. */
+static ts_code check_variant(check *k, unsigned wanted, bool copied, int times, float *const *expected,
+                             const char *what)
 {
     if (!run(k, wanted, copied, true)) return fail(k, "%s: %s", what, ag_status(k->g->tape)->message);
     for (int t = 1; t < times; t++) {
         ag_value *y = k->node->out;
-        ag_backward(k->g->tape, ag_apply(k->g->tape, &weighted_sum, 1, &y, (ts_shape){1, 1, 1, 1}, &k->weight, sizeof k->weight));
+        ag_backward(k->g->tape,
+                    ag_apply(k->g->tape, &weighted_sum, 1, &y, (ts_shape){1, 1, 1, 1}, &k->weight, sizeof k->weight));
     }
     for (int i = 0; i < k->c->inputs; i++) {
         const int64_t n = ts_count(k->c->shape[i]);
@@ -202,7 +208,8 @@ static ts_code check_variant(check *k, unsigned wanted, bool copied, int times, 
         for (int64_t j = 0; j < n; j++) {
             double want = wanted >> i & 1 ? (double)times * expected[i][j] : 0;
             if (!(fabs(k->grad[i][j] - want) <= 1e-5 * scale))
-                return fail(k, "%s: input %d value %lld: gradient %.9g, not %.9g", what, i, (long long)j, (double)k->grad[i][j], want);
+                return fail(k, "%s: input %d value %lld: gradient %.9g, not %.9g", what, i, (long long)j,
+                            (double)k->grad[i][j], want);
         }
     }
     return TS_OK;
@@ -227,7 +234,8 @@ static ts_code check_case(check *k)
 
     const ag_value *y = run(k, all, false, false);
     if (!y) return fail(k, "%s", ag_status(g->tape)->message);
-    if (!k->node || k->node->op != g->op) return fail(k, "the output was not made by the op from an input with a gradient");
+    if (!k->node || k->node->op != g->op)
+        return fail(k, "the output was not made by the op from an input with a gradient");
     k->outputs = ts_count(y->t.shape);
     k->weight = ts_arena_alloc(g->arena, (size_t)k->outputs * sizeof(float));
     k->reference = ts_arena_zalloc(g->arena, (size_t)k->outputs, sizeof(double));
@@ -240,7 +248,8 @@ static ts_code check_case(check *k)
     const double tolerance = k->c->forward_tolerance > 0 ? k->c->forward_tolerance : 1e-5;
     for (int64_t i = 0; i < k->outputs; i++)
         if (!(fabs(y->t.data[i] - k->reference[i]) <= tolerance * scale))
-            return fail(k, "output %lld is %.9g, the reference %.9g (largest %.3g)", (long long)i, (double)y->t.data[i], k->reference[i], scale);
+            return fail(k, "output %lld is %.9g, the reference %.9g (largest %.3g)", (long long)i, (double)y->t.data[i],
+                        k->reference[i], scale);
 
     if (!run(k, all, false, true)) return fail(k, "%s", ag_status(g->tape)->message);
     for (int i = 0; i < k->c->inputs; i++)
@@ -269,7 +278,10 @@ ts_code ag_gradcheck_run(ag_gradcheck *g, const ag_case *c)
     return check_case(&k);
 }
 
-int ag_gradcheck_all(uint64_t seed, void (*report)(const char *op, int cases, int64_t compared, int64_t excluded, const ts_status *st, void *user), void *user)
+int ag_gradcheck_all(uint64_t seed,
+                     void (*report)(const char *op, int cases, int64_t compared, int64_t excluded, const ts_status *st,
+                                    void *user),
+                     void *user)
 {
     int failed = 0;
     for (int i = 0; ag_op_list[i]; i++) {
@@ -277,7 +289,8 @@ int ag_gradcheck_all(uint64_t seed, void (*report)(const char *op, int cases, in
         g.tape = ag_tape_create(true, &g.status);
         g.arena = g.tape ? ts_arena_create(0, &g.status) : NULL;
         if (g.arena) g.op->cases(&g);
-        if (g.status.code == TS_OK && g.compared == 0) ts_fail(&g.status, TS_INVALID, "%s: no gradient was compared", g.op->name);
+        if (g.status.code == TS_OK && g.compared == 0)
+            ts_fail(&g.status, TS_INVALID, "%s: no gradient was compared", g.op->name);
         if (g.status.code != TS_OK) failed++;
         if (report) report(g.op->name, g.cases, g.compared, g.excluded, &g.status, user);
         ts_arena_destroy(&g.arena);

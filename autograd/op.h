@@ -15,7 +15,8 @@ const ag_node *ag_node_of(const ag_tape *tape, const ag_value *v);
 
 /* Loops over values or pixels run in chunks whose size does not depend on the number of threads:
  *     for (int64_t i = 0; i < n; i += AG_CHUNK) f(ag_part(n, i, AG_CHUNK), x + i);
- * 64 KiB: several chunks for every thread at training sizes, and a chunk stays in the L2 cache between the passes over it. */
+ * 64 KiB: several chunks for every thread at training sizes, and a chunk stays in the L2 cache between the passes over
+ * it. */
 enum { AG_CHUNK = 1 << 14 };
 static inline int64_t ag_part(int64_t n, int64_t first, int64_t chunk) { return n - first < chunk ? n - first : chunk; }
 /* The same in pixels of c channels. */

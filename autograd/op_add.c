@@ -16,7 +16,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const float *a = node->in[0]->t.data, *b = node->in[1]->t.data;
     float *y = node->out->t.data;
     const int64_t n = ts_count(node->out->t.shape);
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
     for (int64_t i = 0; i < n; i += AG_CHUNK) k->add(ag_part(n, i, AG_CHUNK), a + i, b + i, y + i);
 }
 
@@ -29,7 +29,7 @@ static void backward(ag_tape *tape, ag_node *node)
         bool accumulate;
         float *dx = ag_grad_target(tape, node->in[j], &accumulate);
         if (!dx) continue;
-        #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
         for (int64_t i = 0; i < n; i += AG_CHUNK) k->scale(ag_part(n, i, AG_CHUNK), 1.0f, dy + i, dx + i, accumulate);
     }
 }
@@ -56,10 +56,16 @@ static void cases(ag_gradcheck *check)
     ts_rng *r = ag_gradcheck_rng(check);
     for (int i = 0; i < 4; i++) {
         ag_case c = {.label = "random", .inputs = 2, .lo = -1, .hi = 1, .build = build};
-        c.shape[0] = c.shape[1] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9), 1 + ts_rng_int(r, 33)};
+        c.shape[0] = c.shape[1] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9),
+                                             1 + ts_rng_int(r, 33)};
         ag_gradcheck_run(check, &c);
     }
-    ag_case c = {.label = "a value added to itself", .inputs = 1, .shape = {{1, 3, 5, 7}}, .lo = -1, .hi = 1, .build = build_twice};
+    ag_case c = {.label = "a value added to itself",
+                 .inputs = 1,
+                 .shape = {{1, 3, 5, 7}},
+                 .lo = -1,
+                 .hi = 1,
+                 .build = build_twice};
     ag_gradcheck_run(check, &c);
 }
 
@@ -71,6 +77,7 @@ ag_value *ag_add(ag_tape *tape, ag_value *a, ag_value *b)
     char ta[AG_SHAPE_TEXT], tb[AG_SHAPE_TEXT];
     if (!ag_ready(tape, "add", 2, in)) return NULL;
     if (!ts_same(a->t.shape, b->t.shape))
-        return ag_fail(tape, TS_INVALID, "add: shapes %s and %s differ", ag_shape_text(ta, a->t.shape), ag_shape_text(tb, b->t.shape));
+        return ag_fail(tape, TS_INVALID, "add: shapes %s and %s differ", ag_shape_text(ta, a->t.shape),
+                       ag_shape_text(tb, b->t.shape));
     return ag_apply(tape, &op_add, 2, in, a->t.shape, NULL, 0);
 }

@@ -1,5 +1,5 @@
-/* u[n,p,c] = x[n,p,c] + g[n,c],   y = u > 0 ? u : leak u;   dx = y > 0 ? dy : leak dy,   dg[n,c] = sum over the pixels p of dx[n,p,c]
- * x, y: [N,H,W,C], g: [N,1,1,C] */
+/* u[n,p,c] = x[n,p,c] + g[n,c],   y = u > 0 ? u : leak u;   dx = y > 0 ? dy : leak dy,   dg[n,c] = sum over the pixels
+ * p of dx[n,p,c] x, y: [N,H,W,C], g: [N,1,1,C] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
@@ -21,8 +21,9 @@ static void forward(ag_tape *tape, ag_node *node)
     const int c = s.c;
     const float leak = leak_of(node), *x = node->in[0]->t.data, *g = node->in[1]->t.data;
     float *y = node->out->t.data;
-    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_pixel_chunk(c), parts = (pixels + chunk - 1) / chunk, tasks = parts * s.n;
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_pixel_chunk(c), parts = (pixels + chunk - 1) / chunk,
+                  tasks = parts * s.n;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t n = t / parts, p = t % parts * chunk, at = (n * pixels + p) * c;
         k->add_leaky(ag_part(pixels, p, chunk), c, x + at, g + n * c, leak, y + at);
@@ -35,7 +36,8 @@ static void backward(ag_tape *tape, ag_node *node)
     const ts_shape s = node->out->t.shape;
     const int c = s.c;
     const float leak = leak_of(node), *y = node->out->t.data, *dy = node->out->grad;
-    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_sum_chunk(pixels, c), parts = (pixels + chunk - 1) / chunk, tasks = parts * s.n;
+    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_sum_chunk(pixels, c), parts = (pixels + chunk - 1) / chunk,
+                  tasks = parts * s.n;
     bool accumulate = false, g_accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate), *dg = ag_grad_target(tape, node->in[1], &g_accumulate);
     if (!dx && !dg) return;
@@ -45,10 +47,11 @@ static void backward(ag_tape *tape, ag_node *node)
         ag_fail(tape, TS_NOMEM, "add_leaky: no memory for the sums");
         return;
     }
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t p = t % parts * chunk, at = (t / parts * pixels + p) * c;
-        k->add_leaky_backward(ag_part(pixels, p, chunk), c, y + at, dy + at, leak, dx ? dx + at : NULL, accumulate, dg ? part + t * c : NULL);
+        k->add_leaky_backward(ag_part(pixels, p, chunk), c, y + at, dy + at, leak, dx ? dx + at : NULL, accumulate,
+                              dg ? part + t * c : NULL);
     }
     for (int64_t i = 0; dg && i < (int64_t)s.n * c; i++) {
         double sum = 0;
@@ -72,7 +75,10 @@ typedef struct add_case {
     float leak;
 } add_case;
 
-static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user) { return ag_add_leaky(tape, in[0], in[1], ((const add_case *)user)->leak); }
+static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
+{
+    return ag_add_leaky(tape, in[0], in[1], ((const add_case *)user)->leak);
+}
 
 static bool kink(const double *const *in, int input, int64_t i, double step, const void *user)
 {
@@ -90,9 +96,19 @@ static void cases(ag_gradcheck *check)
 {
     ts_rng *r = ag_gradcheck_rng(check);
     for (int i = 0; i < 7; i++) {
-        const add_case k = {i == 6 ? (ts_shape){1, 49, 48, 7} : (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 6), 1 + ts_rng_int(r, 6), 1 + ts_rng_int(r, 33)},
-                            i % 3 ? 0.2f : i ? 1.0f : 0.01f};
-        ag_case c = {.label = i == 6 ? "several chunks" : "random", .inputs = 2, .lo = -1, .hi = 1, .kink = kink, .build = build, .user = &k,
+        const add_case k = {i == 6 ? (ts_shape){1, 49, 48, 7}
+                                   : (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 6), 1 + ts_rng_int(r, 6),
+                                                1 + ts_rng_int(r, 33)},
+                            i % 3   ? 0.2f
+                                : i ? 1.0f
+                                    : 0.01f};
+        ag_case c = {.label = i == 6 ? "several chunks" : "random",
+                     .inputs = 2,
+                     .lo = -1,
+                     .hi = 1,
+                     .kink = kink,
+                     .build = build,
+                     .user = &k,
                      .shape = {k.shape, {k.shape.n, 1, 1, k.shape.c}}};
         ag_gradcheck_run(check, &c);
     }
@@ -107,7 +123,9 @@ ag_value *ag_add_leaky(ag_tape *tape, ag_value *x, ag_value *g, float leak)
     if (!ag_ready(tape, "add_leaky", 2, in)) return NULL;
     const ts_shape s = x->t.shape;
     if (!ts_same(g->t.shape, (ts_shape){s.n, 1, 1, s.c}))
-        return ag_fail(tape, TS_INVALID, "add_leaky: %s cannot be added to every pixel of %s", ag_shape_text(tg, g->t.shape), ag_shape_text(tx, s));
-    if (!(leak >= 0 && leak <= 1)) return ag_fail(tape, TS_INVALID, "add_leaky: leak is %g, it must lie in [0, 1]", (double)leak);
+        return ag_fail(tape, TS_INVALID, "add_leaky: %s cannot be added to every pixel of %s",
+                       ag_shape_text(tg, g->t.shape), ag_shape_text(tx, s));
+    if (!(leak >= 0 && leak <= 1))
+        return ag_fail(tape, TS_INVALID, "add_leaky: leak is %g, it must lie in [0, 1]", (double)leak);
     return ag_apply(tape, &op_add_leaky, 2, in, s, &leak, sizeof leak);
 }

@@ -18,14 +18,15 @@ static void forward(ag_tape *tape, ag_node *node)
     const int c = s.c;
     const float *x = node->in[0]->t.data;
     float *y = node->out->t.data;
-    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_sum_chunk(pixels, c), parts = (pixels + chunk - 1) / chunk, tasks = parts * s.n;
+    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_sum_chunk(pixels, c), parts = (pixels + chunk - 1) / chunk,
+                  tasks = parts * s.n;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
     double *part = ts_arena_zalloc(ag_arena(tape), (size_t)tasks * (size_t)c, sizeof(double)); /* [N][parts][C] */
     if (!part) {
         ag_fail(tape, TS_NOMEM, "channel_mean: no memory for the sums");
         return;
     }
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t p = t % parts * chunk;
         k->sums(ag_part(pixels, p, chunk), c, x + (t / parts * pixels + p) * c, part + t * c);
@@ -44,7 +45,8 @@ static void backward(ag_tape *tape, ag_node *node)
     const ts_shape s = node->in[0]->t.shape;
     const int c = s.c;
     const float *dy = node->out->grad;
-    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_pixel_chunk(c), parts = (pixels + chunk - 1) / chunk, tasks = parts * s.n;
+    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_pixel_chunk(c), parts = (pixels + chunk - 1) / chunk,
+                  tasks = parts * s.n;
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
     if (!dx) return;
@@ -55,7 +57,7 @@ static void backward(ag_tape *tape, ag_node *node)
         return;
     }
     k->scale((int64_t)s.n * c, (float)(1.0 / (double)pixels), dy, each, false);
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t n = t / parts, p = t % parts * chunk;
         k->broadcast(ag_part(pixels, p, chunk), c, each + n * c, dx + (n * pixels + p) * c, accumulate);
@@ -84,10 +86,12 @@ static void cases(ag_gradcheck *check)
     ts_rng *r = ag_gradcheck_rng(check);
     for (int i = 0; i < 5; i++) {
         ag_case c = {.label = "random", .inputs = 1, .lo = -1, .hi = 2, .build = build};
-        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9), 1 + ts_rng_int(r, 33)};
+        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9),
+                                1 + ts_rng_int(r, 33)};
         ag_gradcheck_run(check, &c);
     }
-    ag_case big = {.label = "several chunks", .inputs = 1, .shape = {{2, 70, 61, 7}}, .lo = -1, .hi = 3, .build = build};
+    ag_case big = {
+        .label = "several chunks", .inputs = 1, .shape = {{2, 70, 61, 7}}, .lo = -1, .hi = 3, .build = build};
     ag_gradcheck_run(check, &big);
 }
 

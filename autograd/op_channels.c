@@ -17,7 +17,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const int64_t pixels = ts_pixels(node->out->t.shape);
     const float *x = node->in[0]->t.data;
     float *y = node->out->t.data;
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels * d > AG_CHUNK)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels * d > AG_CHUNK)
     for (int64_t p = 0; p < pixels; p++) memcpy(y + p * d, x + p * c, (size_t)d * sizeof *y);
 }
 
@@ -29,7 +29,7 @@ static void backward(ag_tape *tape, ag_node *node)
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
     if (!dx) return;
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels * d > AG_CHUNK)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels * d > AG_CHUNK)
     for (int64_t p = 0; p < pixels; p++)
         for (int i = 0; i < c; i++) {
             const float g = i < d ? dy[p * d + i] : 0;
@@ -43,7 +43,10 @@ static void reference(const ag_node *node, const double *const *in, double *out)
     for (int64_t q = 0; q < ts_count(node->out->t.shape); q++) out[q] = in[0][q / d * c + q % d];
 }
 
-static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user) { return ag_channels(tape, in[0], *(const int *)user); }
+static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
+{
+    return ag_channels(tape, in[0], *(const int *)user);
+}
 
 static void cases(ag_gradcheck *check)
 {
@@ -51,7 +54,13 @@ static void cases(ag_gradcheck *check)
     for (int i = 0; i < 5; i++) {
         const ts_shape s = {1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 6), 1 + ts_rng_int(r, 6), 1 + ts_rng_int(r, 12)};
         const int count = i ? 1 + ts_rng_int(r, s.c) : s.c;
-        ag_case c = {.label = i ? "random" : "all", .inputs = 1, .shape = {s}, .lo = -1, .hi = 1, .build = build, .user = &count};
+        ag_case c = {.label = i ? "random" : "all",
+                     .inputs = 1,
+                     .shape = {s},
+                     .lo = -1,
+                     .hi = 1,
+                     .build = build,
+                     .user = &count};
         ag_gradcheck_run(check, &c);
     }
 }
@@ -63,7 +72,8 @@ ag_value *ag_channels(ag_tape *tape, ag_value *x, int count)
     char text[AG_SHAPE_TEXT];
     if (!ag_ready(tape, "channels", 1, &x)) return NULL;
     ts_shape s = x->t.shape;
-    if (count < 1 || count > s.c) return ag_fail(tape, TS_INVALID, "channels: %s has no %d channels", ag_shape_text(text, s), count);
+    if (count < 1 || count > s.c)
+        return ag_fail(tape, TS_INVALID, "channels: %s has no %d channels", ag_shape_text(text, s), count);
     s.c = count;
     return ag_apply(tape, &op_channels, 1, &x, s, NULL, 0);
 }

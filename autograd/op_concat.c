@@ -15,7 +15,7 @@ void ag_join(const ag_value *a, const ag_value *b, float *to)
     const struct ts_elementwise_kernels *k = ts_elementwise_k();
     const int ca = a->t.shape.c, cb = b->t.shape.c, c = ca + cb;
     const int64_t pixels = ts_pixels(a->t.shape), chunk = ag_pixel_chunk(c);
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels > chunk)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels > chunk)
     for (int64_t p = 0; p < pixels; p += chunk) {
         k->copy(ag_part(pixels, p, chunk), ca, a->t.data + p * ca, ca, to + p * c, c, false);
         k->copy(ag_part(pixels, p, chunk), cb, b->t.data + p * cb, cb, to + p * c + ca, c, false);
@@ -39,8 +39,9 @@ static void backward(ag_tape *tape, ag_node *node)
         bool accumulate;
         float *dx = ag_grad_target(tape, node->in[j], &accumulate);
         if (!dx) continue;
-        #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels > chunk)
-        for (int64_t p = 0; p < pixels; p += chunk) k->copy(ag_part(pixels, p, chunk), m, dy + p * c, c, dx + p * m, m, accumulate);
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels > chunk)
+        for (int64_t p = 0; p < pixels; p += chunk)
+            k->copy(ag_part(pixels, p, chunk), m, dy + p * c, c, dx + p * m, m, accumulate);
     }
 }
 
@@ -62,7 +63,8 @@ static void cases(ag_gradcheck *check)
     ts_rng *r = ag_gradcheck_rng(check);
     for (int i = 0; i < 6; i++) {
         ag_case c = {.label = "random", .inputs = 2, .lo = -1, .hi = 1, .build = build};
-        c.shape[0] = c.shape[1] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9), 1 + ts_rng_int(r, 33)};
+        c.shape[0] = c.shape[1] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9),
+                                             1 + ts_rng_int(r, 33)};
         c.shape[1].c = 1 + ts_rng_int(r, 20);
         ag_gradcheck_run(check, &c);
     }
@@ -77,7 +79,8 @@ ag_value *ag_concat(ag_tape *tape, ag_value *a, ag_value *b)
     if (!ag_ready(tape, "concat", 2, in)) return NULL;
     ts_shape s = a->t.shape, q = b->t.shape;
     if (s.n != q.n || s.h != q.h || s.w != q.w)
-        return ag_fail(tape, TS_INVALID, "concat: %s and %s differ in more than the channels", ag_shape_text(ta, s), ag_shape_text(tb, q));
+        return ag_fail(tape, TS_INVALID, "concat: %s and %s differ in more than the channels", ag_shape_text(ta, s),
+                       ag_shape_text(tb, q));
     s.c += q.c;
     return ag_apply(tape, &op_concat, 2, in, s, NULL, 0);
 }

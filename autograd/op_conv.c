@@ -1,19 +1,20 @@
-/* u[n,i,j,o] = bias[o] + sum_{ky,kx,c} x[n, i + d (ky - K/2), j + d (kx - K/2), c] weight[o,c,ky,kx],   y = u > 0 ? u : leak u
- * du = y > 0 ? dy : leak dy, then dx, dweight and dbias as in tensor/conv.h
- * x: [N,H,W,I], or its first channels, and the others as constants; weight: {O,I,K,K}, bias: [1,1,1,O], y: [N,H,W,O] */
+/* u[n,i,j,o] = bias[o] + sum_{ky,kx,c} x[n, i + d (ky - K/2), j + d (kx - K/2), c] weight[o,c,ky,kx],   y = u > 0 ? u :
+ * leak u du = y > 0 ? dy : leak dy, then dx, dweight and dbias as in tensor/conv/conv.h x: [N,H,W,I], or its first
+ * channels, and the others as constants; weight: {O,I,K,K}, bias: [1,1,1,O], y: [N,H,W,O] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
-#include "tensor/conv.h"
+#include "tensor/conv/conv.h"
 #include "tensor/kernels/elementwise.h"
 
 #ifdef AG_API
 /* Same-size convolution of x [N,H,W,ic] with weight {oc,ic,k,k}, bias [1,1,1,oc] or NULL, and a leaky ReLU: [N,H,W,oc].
  * leak in (0, 1]; 1: no activation. dilation 1 or 2. */
 ag_value *ag_conv(ag_tape *tape, ag_value *x, ag_value *weight, ag_value *bias, int dilation, ts_pad pad, float leak);
-/* The same of x [N,H,W,i] and, behind its channels, constants [N,H,W,ic-i], which get no gradient, and for which none is computed: an error if
- * they want one. NULL: of x alone. */
-ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias, int dilation, ts_pad pad, float leak);
+/* The same of x [N,H,W,i] and, behind its channels, constants [N,H,W,ic-i], which get no gradient, and for which none
+ * is computed: an error if they want one. NULL: of x alone. */
+ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias,
+                         int dilation, ts_pad pad, float leak);
 #endif
 
 enum { X, WEIGHT, BIAS, CONSTANTS, INPUTS };
@@ -40,7 +41,8 @@ static bool winograd(const ts_conv *c, ts_conv_use use) { return !ts_conv_exact(
 
 static void weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
 {
-    const bool rounded = dweight && ts_conv_precision() == TS_BF16 && ts_conv_bf16_weights(), other = dweight && !rounded && !ts_conv_exact() && ts_conv_winograd_weights(c);
+    const bool rounded = dweight && ts_conv_precision() == TS_BF16 && ts_conv_bf16_weights(),
+               other = dweight && !rounded && !ts_conv_exact() && ts_conv_winograd_weights(c);
     if (rounded) ts_conv_weight_gradient_bf16(c, x, dy, dweight);
     if (other) ts_conv_weight_gradient_winograd(c, x, dy, dweight);
     ts_conv_weight_gradient(c, x, dy, rounded || other ? NULL : dweight, dbias);
@@ -49,12 +51,18 @@ static void weight_gradient(const ts_conv *c, const float *x, const float *dy, f
 static void forward(ag_tape *tape, ag_node *node)
 {
     const conv_attr *a = node->attr;
-    const ts_conv_use use = ts_conv_precision() == TS_BF16 ? TS_CONV_FORWARD_BF16 : winograd(&a->conv, TS_CONV_WINOGRAD) ? TS_CONV_WINOGRAD : TS_CONV_FORWARD;
+    const ts_conv_use use = ts_conv_precision() == TS_BF16 ? TS_CONV_FORWARD_BF16
+        : winograd(&a->conv, TS_CONV_WINOGRAD)             ? TS_CONV_WINOGRAD
+                                                           : TS_CONV_FORWARD;
     const float *packed = ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data);
     if (!packed) return;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
     const float *x = input(tape, node), *bias = node->in[BIAS] ? node->in[BIAS]->t.data : NULL;
-    if (x) (use == TS_CONV_FORWARD_BF16 ? ts_conv_forward_bf16 : use == TS_CONV_FORWARD ? ts_conv_forward : ts_conv_forward_winograd)(&a->conv, x, packed, bias, a->leak, node->out->t.data);
+    if (x)
+        (use == TS_CONV_FORWARD_BF16 ? ts_conv_forward_bf16
+             : use == TS_CONV_FORWARD
+             ? ts_conv_forward
+             : ts_conv_forward_winograd)(&a->conv, x, packed, bias, a->leak, node->out->t.data);
     ts_arena_release(ag_arena(tape), mark);
 }
 
@@ -66,8 +74,9 @@ static void backward(ag_tape *tape, ag_node *node)
         const struct ts_elementwise_kernels *k = ts_elementwise_k();
         const float *y = node->out->t.data;
         const int64_t n = ts_count(node->out->t.shape);
-        #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
-        for (int64_t i = 0; i < n; i += AG_CHUNK) k->leaky_backward(ag_part(n, i, AG_CHUNK), y + i, dy + i, a->leak, dy + i, false);
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+        for (int64_t i = 0; i < n; i += AG_CHUNK)
+            k->leaky_backward(ag_part(n, i, AG_CHUNK), y + i, dy + i, a->leak, dy + i, false);
     }
     float *dweight = ag_grad_add(tape, node->in[WEIGHT]), *dbias = ag_grad_add(tape, node->in[BIAS]);
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
@@ -76,11 +85,14 @@ static void backward(ag_tape *tape, ag_node *node)
     ts_arena_release(ag_arena(tape), mark);
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[X], &accumulate);
-    const ts_conv_use use = ts_conv_precision() == TS_BF16 ? TS_CONV_DATA_GRADIENT_BF16 : winograd(&a->conv, TS_CONV_DATA_GRADIENT_WINOGRAD) ? TS_CONV_DATA_GRADIENT_WINOGRAD : TS_CONV_DATA_GRADIENT;
+    const ts_conv_use use = ts_conv_precision() == TS_BF16   ? TS_CONV_DATA_GRADIENT_BF16
+        : winograd(&a->conv, TS_CONV_DATA_GRADIENT_WINOGRAD) ? TS_CONV_DATA_GRADIENT_WINOGRAD
+                                                             : TS_CONV_DATA_GRADIENT;
     const float *packed = dx ? ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data) : NULL;
     if (packed)
-        (use == TS_CONV_DATA_GRADIENT_BF16 ? ts_conv_data_gradient_bf16 : use == TS_CONV_DATA_GRADIENT ? ts_conv_data_gradient : ts_conv_data_gradient_winograd)(
-            &a->conv, dy, packed, dx, accumulate);
+        (use == TS_CONV_DATA_GRADIENT_BF16  ? ts_conv_data_gradient_bf16
+             : use == TS_CONV_DATA_GRADIENT ? ts_conv_data_gradient
+                                            : ts_conv_data_gradient_winograd)(&a->conv, dy, packed, dx, accumulate);
 }
 
 /* Where a tap falls; -1: on a zero. */
@@ -97,12 +109,14 @@ static double plain(const ts_conv *c, const double *const *in, int n, int i, int
     double s = in[BIAS] ? in[BIAS][o] : 0;
     for (int ky = 0; ky < c->k; ky++)
         for (int kx = 0; kx < c->k; kx++) {
-            const int y = place(i + c->dilation * (ky - c->k / 2), c->h, c->pad), x = place(j + c->dilation * (kx - c->k / 2), c->w, c->pad);
+            const int y = place(i + c->dilation * (ky - c->k / 2), c->h, c->pad),
+                      x = place(j + c->dilation * (kx - c->k / 2), c->w, c->pad);
             if (y < 0 || x < 0) continue;
             const int64_t pixel = (int64_t)(n * c->h + y) * c->w + x;
             for (int q = 0; q < c->ic; q++)
-                s += (q < variables ? in[X][pixel * variables + q] : in[CONSTANTS][pixel * c->constants + q - variables]) *
-                     in[WEIGHT][((o * c->ic + q) * c->k + ky) * c->k + kx];
+                s += (q < variables ? in[X][pixel * variables + q]
+                                    : in[CONSTANTS][pixel * c->constants + q - variables]) *
+                    in[WEIGHT][((o * c->ic + q) * c->k + ky) * c->k + kx];
         }
     return s;
 }
@@ -129,7 +143,8 @@ static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
 {
     const conv_case *c = user;
     const ts_conv *v = &c->attr.conv;
-    return ag_conv_beside(tape, in[X], v->constants ? in[CONSTANTS] : NULL, in[WEIGHT], c->bias ? in[BIAS] : NULL, v->dilation, v->pad, c->attr.leak);
+    return ag_conv_beside(tape, in[X], v->constants ? in[CONSTANTS] : NULL, in[WEIGHT], c->bias ? in[BIAS] : NULL,
+                          v->dilation, v->pad, c->attr.leak);
 }
 
 /* u is linear in each value alone: it crosses 0 within the step when its signs at both ends differ. */
@@ -142,7 +157,8 @@ static bool kink(const double *const *in, int input, int64_t at, double step, co
     double *value = (double *)(uintptr_t)(in[input] + at), was = *value; /* the checker's own array, restored below */
     bool crossed = false;
     for (int64_t q = 0; !crossed && q < (int64_t)c->n * c->h * c->w * c->oc; q++) {
-        const int o = (int)(q % c->oc), j = (int)(q / c->oc % c->w), i = (int)(q / c->oc / c->w % c->h), n = (int)(q / c->oc / c->w / c->h);
+        const int o = (int)(q % c->oc), j = (int)(q / c->oc % c->w), i = (int)(q / c->oc / c->w % c->h),
+                  n = (int)(q / c->oc / c->w / c->h);
         *value = was - step;
         double low = plain(c, moved, n, i, j, o);
         *value = was + step;
@@ -156,22 +172,50 @@ static bool kink(const double *const *in, int input, int64_t at, double step, co
 static void cases(ag_gradcheck *check)
 {
     ts_rng *r = ag_gradcheck_rng(check);
-    static const struct { const char *label; int h, w, ic, oc, k, dilation; ts_pad pad; } edge[] = {
-        {"one pixel, 5x5, replicate", 1, 1, 3, 4, 5, 1, TS_PAD_REPLICATE}, {"one pixel, 3x3, zero", 1, 1, 2, 3, 3, 1, TS_PAD_ZERO},
-        {"one row, dilated", 1, 9, 4, 2, 3, 2, TS_PAD_REPLICATE},          {"narrower than the kernel, dilated", 3, 2, 1, 1, 5, 2, TS_PAD_ZERO},
-        {"18 channels, 1x1", 3, 4, 18, 5, 1, 1, TS_PAD_ZERO},              {"3x3 to 9 channels, replicate", 5, 4, 7, 9, 3, 1, TS_PAD_REPLICATE},
+    static const struct {
+        const char *label;
+        int h, w, ic, oc, k, dilation;
+        ts_pad pad;
+    } edge[] = {
+        {"one pixel, 5x5, replicate", 1, 1, 3, 4, 5, 1, TS_PAD_REPLICATE},
+        {"one pixel, 3x3, zero", 1, 1, 2, 3, 3, 1, TS_PAD_ZERO},
+        {"one row, dilated", 1, 9, 4, 2, 3, 2, TS_PAD_REPLICATE},
+        {"narrower than the kernel, dilated", 3, 2, 1, 1, 5, 2, TS_PAD_ZERO},
+        {"18 channels, 1x1", 3, 4, 18, 5, 1, 1, TS_PAD_ZERO},
+        {"3x3 to 9 channels, replicate", 5, 4, 7, 9, 3, 1, TS_PAD_REPLICATE},
     };
     const int edges = (int)(sizeof edge / sizeof *edge);
     for (int t = 0; t < edges + 8; t++) {
         conv_case k = {.bias = t % 3 != 0};
         k.attr.leak = t % 2 ? 0.2f : 1.0f;
-        if (t < edges) k.attr.conv = (ts_conv){1 + t % 2, edge[t].h, edge[t].w, edge[t].ic, edge[t].oc, edge[t].k, edge[t].dilation, edge[t].pad, 0};
-        else k.attr.conv = (ts_conv){1 + ts_rng_int(r, 2), 1 + ts_rng_int(r, 5), 1 + ts_rng_int(r, 6), 1 + ts_rng_int(r, 8), 1 + ts_rng_int(r, 8),
-                                     1 + 2 * ts_rng_int(r, 3), 1 + ts_rng_int(r, 2), ts_rng_int(r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE, 0};
+        if (t < edges)
+            k.attr.conv = (ts_conv){1 + t % 2, edge[t].h,        edge[t].w,   edge[t].ic, edge[t].oc,
+                                    edge[t].k, edge[t].dilation, edge[t].pad, 0};
+        else
+            k.attr.conv = (ts_conv){1 + ts_rng_int(r, 2),
+                                    1 + ts_rng_int(r, 5),
+                                    1 + ts_rng_int(r, 6),
+                                    1 + ts_rng_int(r, 8),
+                                    1 + ts_rng_int(r, 8),
+                                    1 + 2 * ts_rng_int(r, 3),
+                                    1 + ts_rng_int(r, 2),
+                                    ts_rng_int(r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE,
+                                    0};
         ts_conv *v = &k.attr.conv;
         v->constants = t % 4 == 1 ? v->ic / 2 : 0;
-        ag_case c = {.label = t < edges ? edge[t].label : "random", .inputs = v->constants ? INPUTS : k.bias ? CONSTANTS : BIAS, .lo = -1, .hi = 1, .kink = kink, .build = build, .user = &k,
-                     .shape = {{v->n, v->h, v->w, ts_conv_variables(v)}, {v->oc, v->ic, v->k, v->k}, {1, 1, 1, v->oc}, {v->n, v->h, v->w, v->constants}}};
+        ag_case c = {.label = t < edges ? edge[t].label : "random",
+                     .inputs = v->constants ? INPUTS
+                         : k.bias           ? CONSTANTS
+                                            : BIAS,
+                     .lo = -1,
+                     .hi = 1,
+                     .kink = kink,
+                     .build = build,
+                     .user = &k,
+                     .shape = {{v->n, v->h, v->w, ts_conv_variables(v)},
+                               {v->oc, v->ic, v->k, v->k},
+                               {1, 1, 1, v->oc},
+                               {v->n, v->h, v->w, v->constants}}};
         c.fixed[CONSTANTS] = true;
         c.fixed[BIAS] = !k.bias;
         ag_gradcheck_run(check, &c);
@@ -180,7 +224,8 @@ static void cases(ag_gradcheck *check)
 
 const ag_op op_conv = {"conv", forward, backward, reference, cases};
 
-ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias, int dilation, ts_pad pad, float leak)
+ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias,
+                         int dilation, ts_pad pad, float leak)
 {
     ag_value *in[INPUTS] = {x, weight, bias, constants};
     char text[AG_SHAPE_TEXT], more[AG_SHAPE_TEXT];
@@ -188,15 +233,19 @@ ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_val
     ts_shape s = x->t.shape, w = weight->t.shape; /* w: n = oc, h = ic, w = c = k */
     if (constants) {
         const ts_shape q = constants->t.shape;
-        if (q.n != s.n || q.h != s.h || q.w != s.w) return ag_fail(tape, TS_INVALID, "conv: %s and %s differ in more than the channels", ag_shape_text(text, s), ag_shape_text(more, q));
-        if (constants->needs_grad) return ag_fail(tape, TS_INVALID, "conv: what stands beside the input is a constant and has no gradient");
+        if (q.n != s.n || q.h != s.h || q.w != s.w)
+            return ag_fail(tape, TS_INVALID, "conv: %s and %s differ in more than the channels", ag_shape_text(text, s),
+                           ag_shape_text(more, q));
+        if (constants->needs_grad)
+            return ag_fail(tape, TS_INVALID, "conv: what stands beside the input is a constant and has no gradient");
         s.c += q.c;
     }
     if (w.w != w.c) return ag_fail(tape, TS_INVALID, "conv: weight %s is not {oc,ic,k,k}", ag_shape_text(text, w));
     if (s.c != w.h) return ag_fail(tape, TS_INVALID, "conv: input has %d channels, weight wants %d", s.c, w.h);
     if (bias && !ts_same(bias->t.shape, (ts_shape){1, 1, 1, w.n}))
         return ag_fail(tape, TS_INVALID, "conv: bias %s is not [1,1,1,%d]", ag_shape_text(text, bias->t.shape), w.n);
-    if (!(leak > 0 && leak <= 1)) return ag_fail(tape, TS_INVALID, "conv: leak is %g, it must lie in (0, 1]", (double)leak);
+    if (!(leak > 0 && leak <= 1))
+        return ag_fail(tape, TS_INVALID, "conv: leak is %g, it must lie in (0, 1]", (double)leak);
     const conv_attr a = {{s.n, s.h, s.w, s.c, w.n, w.c, dilation, pad, s.c - x->t.shape.c}, leak};
     ts_status st = {0};
     if (ts_conv_check(&a.conv, &st) != TS_OK) return ag_fail(tape, st.code, "%s", st.message);

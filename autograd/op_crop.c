@@ -24,7 +24,8 @@ static void forward(ag_tape *tape, ag_node *node)
     const float *x = node->in[0]->t.data + ((int64_t)a->y0 * s.w + a->x0) * s.c;
     float *y = node->out->t.data;
 #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (ts_count(d) > AG_CHUNK)
-    for (int i = 0; i < d.n * d.h; i++) memcpy(y + i * row, x + ((int64_t)(i / d.h) * s.h + i % d.h) * s.w * s.c, (size_t)row * sizeof(float));
+    for (int i = 0; i < d.n * d.h; i++)
+        memcpy(y + i * row, x + ((int64_t)(i / d.h) * s.h + i % d.h) * s.w * s.c, (size_t)row * sizeof(float));
 }
 
 static void backward(ag_tape *tape, ag_node *node)
@@ -75,7 +76,13 @@ static void cases(ag_gradcheck *check)
         place p = {.h = i ? 1 + ts_rng_int(r, s.h) : s.h, .w = i ? 1 + ts_rng_int(r, s.w) : s.w};
         p.y0 = ts_rng_int(r, s.h - p.h + 1);
         p.x0 = ts_rng_int(r, s.w - p.w + 1);
-        ag_case c = {.label = i ? "random" : "all of it", .inputs = 1, .shape = {s}, .lo = -1, .hi = 1, .build = build, .user = &p};
+        ag_case c = {.label = i ? "random" : "all of it",
+                     .inputs = 1,
+                     .shape = {s},
+                     .lo = -1,
+                     .hi = 1,
+                     .build = build,
+                     .user = &p};
         ag_gradcheck_run(check, &c);
     }
 }
@@ -88,7 +95,8 @@ ag_value *ag_crop(ag_tape *tape, ag_value *x, int y0, int x0, int h, int w)
     if (!ag_ready(tape, "crop", 1, &x)) return NULL;
     const ts_shape s = x->t.shape;
     if (h < 1 || w < 1 || y0 < 0 || x0 < 0 || h > s.h - y0 || w > s.w - x0)
-        return ag_fail(tape, TS_INVALID, "crop: rows %d + %d and columns %d + %d are not inside %s", y0, h, x0, w, ag_shape_text(text, s));
+        return ag_fail(tape, TS_INVALID, "crop: rows %d + %d and columns %d + %d are not inside %s", y0, h, x0, w,
+                       ag_shape_text(text, s));
     const attributes a = {y0, x0};
     return ag_apply(tape, &op_crop, 1, &x, (ts_shape){s.n, h, w, s.c}, &a, sizeof a);
 }

@@ -1,6 +1,7 @@
-/* ih = x W_ih' + b_ih,  hh = old W_hh' + b_hh,  z = sigmoid(ih_z + hh_z),  r = sigmoid(ih_r + hh_r),  m = tanh(ih_n + r hh_n),
- * y = (1 - z) old + z m; its gradients as in tensor/kernels/elementwise.h and tensor/gru.h, where the source is named
- * x: [N,H,W,I], old: [N,H,W,C] or NULL = 0, W_ih: {3C,I,1,1}, W_hh: {3C,C,1,1} in chunks z, r, n, biases: [1,1,1,3C], y: [N,H,W,C] */
+/* ih = x W_ih' + b_ih,  hh = old W_hh' + b_hh,  z = sigmoid(ih_z + hh_z),  r = sigmoid(ih_r + hh_r),  m = tanh(ih_n + r
+ * hh_n), y = (1 - z) old + z m; its gradients as in tensor/kernels/elementwise.h and tensor/gru.h, where the source is
+ * named x: [N,H,W,I], old: [N,H,W,C] or NULL = 0, W_ih: {3C,I,1,1}, W_hh: {3C,C,1,1} in chunks z, r, n, biases:
+ * [1,1,1,3C], y: [N,H,W,C] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
@@ -8,25 +9,31 @@
 #include <math.h>
 
 #ifdef AG_API
-/* The new state [N,H,W,C] of a gated recurrent unit whose gates are 1 x 1 convolutions: of x [N,H,W,I] with ih {3C,I,1,1}, of old [N,H,W,C]
- * (NULL: a state of zeros) with hh {3C,C,1,1}; biases [1,1,1,3C]; chunks z, r, n. */
-ag_value *ag_gru(ag_tape *tape, ag_value *x, ag_value *old, ag_value *ih, ag_value *ih_bias, ag_value *hh, ag_value *hh_bias);
+/* The new state [N,H,W,C] of a gated recurrent unit whose gates are 1 x 1 convolutions: of x [N,H,W,I] with ih
+ * {3C,I,1,1}, of old [N,H,W,C] (NULL: a state of zeros) with hh {3C,C,1,1}; biases [1,1,1,3C]; chunks z, r, n. */
+ag_value *ag_gru(ag_tape *tape, ag_value *x, ag_value *old, ag_value *ih, ag_value *ih_bias, ag_value *hh,
+                 ag_value *hh_bias);
 #endif
 
 enum { X, IH, IH_BIAS, HH, HH_BIAS, OLD, INPUTS };
 
 static ts_gru shape(const ag_node *node)
 {
-    return (ts_gru){ts_pixels(node->out->t.shape), node->in[X]->t.shape.c, node->out->t.shape.c, ts_conv_precision() == TS_BF16};
+    return (ts_gru){ts_pixels(node->out->t.shape), node->in[X]->t.shape.c, node->out->t.shape.c,
+                    ts_conv_precision() == TS_BF16};
 }
 
-static const float *packed(ag_tape *tape, ts_conv c, ts_conv_use use, const ag_value *weight) { return ag_packed(tape, &c, use, weight->t.data); }
+static const float *packed(ag_tape *tape, ts_conv c, ts_conv_use use, const ag_value *weight)
+{
+    return ag_packed(tape, &c, use, weight->t.data);
+}
 
 static void forward(ag_tape *tape, ag_node *node)
 {
     const ts_gru g = shape(node);
     const ts_conv_use use = g.bf16 ? TS_CONV_FORWARD_BF16 : TS_CONV_FORWARD;
-    const float *ih = packed(tape, ts_gru_input(&g), use, node->in[IH]), *old = node->in[OLD] ? node->in[OLD]->t.data : NULL;
+    const float *ih = packed(tape, ts_gru_input(&g), use, node->in[IH]),
+                *old = node->in[OLD] ? node->in[OLD]->t.data : NULL;
     const float *hh = ih && old ? packed(tape, ts_gru_hidden(&g), use, node->in[HH]) : NULL;
     if (!ih || (old && !hh)) return;
     if (node->out->needs_grad) {
@@ -36,7 +43,8 @@ static void forward(ag_tape *tape, ag_node *node)
             return;
         }
     }
-    ts_gru_forward(&g, node->in[X]->t.data, old, ih, node->in[IH_BIAS]->t.data, hh, node->in[HH_BIAS]->t.data, node->out->t.data, node->saved);
+    ts_gru_forward(&g, node->in[X]->t.data, old, ih, node->in[IH_BIAS]->t.data, hh, node->in[HH_BIAS]->t.data,
+                   node->out->t.data, node->saved);
 }
 
 static void backward(ag_tape *tape, ag_node *node)
@@ -87,12 +95,18 @@ enum { STATE_NONE, STATE_GIVEN, STATE_X };
 static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
 {
     const int state = *(const int *)user;
-    return ag_gru(tape, in[X], state == STATE_NONE ? NULL : in[state == STATE_X ? X : OLD], in[IH], in[IH_BIAS], in[HH], in[HH_BIAS]);
+    return ag_gru(tape, in[X], state == STATE_NONE ? NULL : in[state == STATE_X ? X : OLD], in[IH], in[IH_BIAS], in[HH],
+                  in[HH_BIAS]);
 }
 
 static ag_case make_case(const char *label, ts_shape s, int ic, const int *state)
 {
-    ag_case c = {.label = label, .inputs = *state == STATE_GIVEN ? INPUTS : OLD, .lo = -1, .hi = 1, .build = build, .user = state};
+    ag_case c = {.label = label,
+                 .inputs = *state == STATE_GIVEN ? INPUTS : OLD,
+                 .lo = -1,
+                 .hi = 1,
+                 .build = build,
+                 .user = state};
     c.shape[X] = (ts_shape){s.n, s.h, s.w, ic};
     c.shape[IH] = (ts_shape){3 * s.c, ic, 1, 1};
     c.shape[HH] = (ts_shape){3 * s.c, s.c, 1, 1};
@@ -107,7 +121,8 @@ static void cases(ag_gradcheck *check)
     static const char *const labels[] = {"no state", "state", "the state is x"};
     for (int t = 0; t < 9; t++) {
         const int state = t % 3;
-        const ts_shape s = {1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 5), 1 + ts_rng_int(r, 5), 1 + ts_rng_int(r, t < 6 ? 6 : 35)};
+        const ts_shape s = {1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 5), 1 + ts_rng_int(r, 5),
+                            1 + ts_rng_int(r, t < 6 ? 6 : 35)};
         const ag_case c = make_case(labels[state], s, state == STATE_X ? s.c : 1 + ts_rng_int(r, 20), &state);
         ag_gradcheck_run(check, &c);
     }
@@ -118,7 +133,8 @@ static void cases(ag_gradcheck *check)
 
 const ag_op op_gru = {"gru", forward, backward, reference, cases};
 
-ag_value *ag_gru(ag_tape *tape, ag_value *x, ag_value *old, ag_value *ih, ag_value *ih_bias, ag_value *hh, ag_value *hh_bias)
+ag_value *ag_gru(ag_tape *tape, ag_value *x, ag_value *old, ag_value *ih, ag_value *ih_bias, ag_value *hh,
+                 ag_value *hh_bias)
 {
     ag_value *in[INPUTS] = {x, ih, ih_bias, hh, hh_bias, old};
     char a[AG_SHAPE_TEXT], b[AG_SHAPE_TEXT];
@@ -126,12 +142,18 @@ ag_value *ag_gru(ag_tape *tape, ag_value *x, ag_value *old, ag_value *ih, ag_val
     ts_shape s = x->t.shape;
     const int gates = ih->t.shape.n;
     if (gates % 3 || !ts_same(ih->t.shape, (ts_shape){gates, s.c, 1, 1}))
-        return ag_fail(tape, TS_INVALID, "gru: ih is %s for %d input channels, not {3c,ic,1,1}", ag_shape_text(a, ih->t.shape), s.c);
+        return ag_fail(tape, TS_INVALID, "gru: ih is %s for %d input channels, not {3c,ic,1,1}",
+                       ag_shape_text(a, ih->t.shape), s.c);
     s.c = gates / 3;
     if (!ts_same(hh->t.shape, (ts_shape){gates, s.c, 1, 1}))
-        return ag_fail(tape, TS_INVALID, "gru: hh is %s for a state of %d channels, not {3c,c,1,1}", ag_shape_text(a, hh->t.shape), s.c);
-    if (!ts_same(ih_bias->t.shape, (ts_shape){1, 1, 1, gates}) || !ts_same(hh_bias->t.shape, (ts_shape){1, 1, 1, gates}))
-        return ag_fail(tape, TS_INVALID, "gru: the biases are %s and %s, not [1,1,1,%d]", ag_shape_text(a, ih_bias->t.shape), ag_shape_text(b, hh_bias->t.shape), gates);
-    if (old && !ts_same(old->t.shape, s)) return ag_fail(tape, TS_INVALID, "gru: the state is %s, not %s", ag_shape_text(b, old->t.shape), ag_shape_text(a, s));
+        return ag_fail(tape, TS_INVALID, "gru: hh is %s for a state of %d channels, not {3c,c,1,1}",
+                       ag_shape_text(a, hh->t.shape), s.c);
+    if (!ts_same(ih_bias->t.shape, (ts_shape){1, 1, 1, gates}) ||
+        !ts_same(hh_bias->t.shape, (ts_shape){1, 1, 1, gates}))
+        return ag_fail(tape, TS_INVALID, "gru: the biases are %s and %s, not [1,1,1,%d]",
+                       ag_shape_text(a, ih_bias->t.shape), ag_shape_text(b, hh_bias->t.shape), gates);
+    if (old && !ts_same(old->t.shape, s))
+        return ag_fail(tape, TS_INVALID, "gru: the state is %s, not %s", ag_shape_text(b, old->t.shape),
+                       ag_shape_text(a, s));
     return ag_apply(tape, &op_gru, INPUTS, in, s, NULL, 0);
 }

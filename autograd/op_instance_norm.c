@@ -1,7 +1,6 @@
-/* y[n,p,c] = (x[n,p,c] - mean_nc) q_nc,   q = 1 / sqrt(variance_nc + epsilon), both over the P pixels p of one image, variance biased
- * dx = q (dy - mean_p(dy) - y mean_p(dy y))
- * Ulyanov et al., "Instance Normalization", 2016, equation 1; without scale and shift.
- * x, y: [N,H,W,C]; q: [N,C]. epsilon keeps a constant channel finite: it becomes 0. */
+/* y[n,p,c] = (x[n,p,c] - mean_nc) q_nc,   q = 1 / sqrt(variance_nc + epsilon), both over the P pixels p of one image,
+ * variance biased dx = q (dy - mean_p(dy) - y mean_p(dy y)) Ulyanov et al., "Instance Normalization", 2016, equation 1;
+ * without scale and shift. x, y: [N,H,W,C]; q: [N,C]. epsilon keeps a constant channel finite: it becomes 0. */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
@@ -9,7 +8,8 @@
 #include <math.h>
 
 #ifdef AG_API
-/* Every channel of every image of x [N,H,W,C] with mean 0 and variance 1 over its pixels (biased variance, no affine). */
+/* Every channel of every image of x [N,H,W,C] with mean 0 and variance 1 over its pixels (biased variance, no affine).
+ */
 ag_value *ag_instance_norm(ag_tape *tape, ag_value *x, float epsilon);
 #endif
 
@@ -21,17 +21,19 @@ static void forward(ag_tape *tape, ag_node *node)
     const size_t nc = (size_t)s.n * (size_t)c;
     const float epsilon = *(const float *)node->attr, *x = node->in[0]->t.data;
     float *y = node->out->t.data;
-    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_sum_chunk(pixels, c), parts = (pixels + chunk - 1) / chunk, tasks = parts * s.n;
+    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_sum_chunk(pixels, c), parts = (pixels + chunk - 1) / chunk,
+                  tasks = parts * s.n;
     float *q = node->out->needs_grad ? ts_arena_alloc(ag_arena(tape), nc * sizeof(float)) : NULL;
     node->saved = q;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
-    double *part = ts_arena_alloc(ag_arena(tape), (size_t)tasks * 2 * (size_t)c * sizeof(double)); /* [N][parts][mean, m2][C] */
-    float *stat = ts_arena_alloc(ag_arena(tape), nc * 3 * sizeof(float));                         /* [N][high, low, q][C] */
+    double *part = ts_arena_alloc(ag_arena(tape),
+                                  (size_t)tasks * 2 * (size_t)c * sizeof(double)); /* [N][parts][mean, m2][C] */
+    float *stat = ts_arena_alloc(ag_arena(tape), nc * 3 * sizeof(float));          /* [N][high, low, q][C] */
     if (!part || !stat || (node->out->needs_grad && !q)) {
         ag_fail(tape, TS_NOMEM, "instance_norm: no memory for the sums");
         return;
     }
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t n = t / parts, p = t % parts * chunk;
         k->moments(ag_part(pixels, p, chunk), c, x + (n * pixels + p) * c, part + t * 2 * c, part + t * 2 * c + c);
@@ -40,7 +42,8 @@ static void forward(ag_tape *tape, ag_node *node)
         const int64_t n = i / c, j = i % c;
         double mean = 0, m2 = 0, count = 0; /* Chan, Golub, LeVeque 1979: moments of parts into those of the whole */
         for (int64_t t = 0; t < parts; t++) {
-            const double *from = part + (n * parts + t) * 2 * c + j, m = (double)ag_part(pixels, t * chunk, chunk), d = from[0] - mean;
+            const double *from = part + (n * parts + t) * 2 * c + j, m = (double)ag_part(pixels, t * chunk, chunk),
+                         d = from[0] - mean;
             count += m;
             mean += d * m / count;
             m2 += from[c] + d * d * m * (count - m) / count;
@@ -51,10 +54,11 @@ static void forward(ag_tape *tape, ag_node *node)
         to[2 * c] = (float)(1 / sqrt(m2 / (double)pixels + epsilon));
         if (q) q[i] = to[2 * c];
     }
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t n = t / parts, p = t % parts * chunk, at = (n * pixels + p) * c;
-        k->normalise(ag_part(pixels, p, chunk), c, x + at, stat + n * 3 * c, stat + n * 3 * c + c, stat + n * 3 * c + 2 * c, y + at);
+        k->normalise(ag_part(pixels, p, chunk), c, x + at, stat + n * 3 * c, stat + n * 3 * c + c,
+                     stat + n * 3 * c + 2 * c, y + at);
     }
     ts_arena_release(ag_arena(tape), mark);
 }
@@ -66,18 +70,20 @@ static void backward(ag_tape *tape, ag_node *node)
     const int c = s.c;
     const size_t nc = (size_t)s.n * (size_t)c;
     const float *y = node->out->t.data, *dy = node->out->grad, *q = node->saved;
-    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_sum_chunk(pixels, c), parts = (pixels + chunk - 1) / chunk, tasks = parts * s.n;
+    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_sum_chunk(pixels, c), parts = (pixels + chunk - 1) / chunk,
+                  tasks = parts * s.n;
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
     if (!dx) return;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
-    double *part = ts_arena_zalloc(ag_arena(tape), (size_t)tasks * 2 * (size_t)c, sizeof(double)); /* [N][parts][dy, dy y][C] */
-    float *mean = ts_arena_alloc(ag_arena(tape), nc * 2 * sizeof(float));                         /* [N][dy, dy y][C] */
+    double *part = ts_arena_zalloc(ag_arena(tape), (size_t)tasks * 2 * (size_t)c,
+                                   sizeof(double));                       /* [N][parts][dy, dy y][C] */
+    float *mean = ts_arena_alloc(ag_arena(tape), nc * 2 * sizeof(float)); /* [N][dy, dy y][C] */
     if (!part || !mean) {
         ag_fail(tape, TS_NOMEM, "instance_norm: no memory for the sums");
         return;
     }
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t p = t % parts * chunk, at = (t / parts * pixels + p) * c;
         k->gradient_sums(ag_part(pixels, p, chunk), c, y + at, dy + at, part + t * 2 * c, part + t * 2 * c + c);
@@ -87,10 +93,11 @@ static void backward(ag_tape *tape, ag_node *node)
         for (int64_t t = 0; t < parts; t++) sum += part[(i / (2 * c) * parts + t) * 2 * c + i % (2 * c)];
         mean[i] = (float)(sum / (double)pixels);
     }
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t n = t / parts, p = t % parts * chunk, at = (n * pixels + p) * c;
-        k->gradient(ag_part(pixels, p, chunk), c, y + at, dy + at, mean + n * 2 * c, mean + n * 2 * c + c, q + n * c, dx + at, accumulate);
+        k->gradient(ag_part(pixels, p, chunk), c, y + at, dy + at, mean + n * 2 * c, mean + n * 2 * c + c, q + n * c,
+                    dx + at, accumulate);
     }
     ts_arena_release(ag_arena(tape), mark);
 }
@@ -105,11 +112,16 @@ static void reference(const ag_node *node, const double *const *in, double *out)
             double mean = 0, variance = 0;
             for (int p = 0; p < pixels; p++) mean += x[p * s.c] / pixels;
             for (int p = 0; p < pixels; p++) variance += (x[p * s.c] - mean) * (x[p * s.c] - mean) / pixels;
-            for (int p = 0; p < pixels; p++) out[((int64_t)n * pixels + p) * s.c + c] = (x[p * s.c] - mean) / sqrt(variance + *(const float *)node->attr);
+            for (int p = 0; p < pixels; p++)
+                out[((int64_t)n * pixels + p) * s.c + c] = (x[p * s.c] - mean) /
+                    sqrt(variance + *(const float *)node->attr);
         }
 }
 
-static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user) { return ag_instance_norm(tape, in[0], *(const float *)user); }
+static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
+{
+    return ag_instance_norm(tape, in[0], *(const float *)user);
+}
 
 static void offset(float *const *in, const void *user)
 {
@@ -122,15 +134,36 @@ static void cases(ag_gradcheck *check)
     static const float epsilon = 1e-5f, large = 0.1f;
     ts_rng *r = ag_gradcheck_rng(check);
     for (int i = 0; i < 6; i++) {
-        ag_case c = {.label = "random", .inputs = 1, .lo = -1, .hi = 1, .build = build, .user = i % 2 ? &large : &epsilon};
-        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 3), 2 + ts_rng_int(r, 7), 2 + ts_rng_int(r, 9), 1 + ts_rng_int(r, 33)};
+        ag_case c = {
+            .label = "random", .inputs = 1, .lo = -1, .hi = 1, .build = build, .user = i % 2 ? &large : &epsilon};
+        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 3), 2 + ts_rng_int(r, 7), 2 + ts_rng_int(r, 9),
+                                1 + ts_rng_int(r, 33)};
         ag_gradcheck_run(check, &c);
     }
-    ag_case one = {.label = "one pixel becomes 0", .inputs = 1, .shape = {{2, 1, 1, 5}}, .lo = -1, .hi = 1, .build = build, .user = &epsilon};
+    ag_case one = {.label = "one pixel becomes 0",
+                   .inputs = 1,
+                   .shape = {{2, 1, 1, 5}},
+                   .lo = -1,
+                   .hi = 1,
+                   .build = build,
+                   .user = &epsilon};
     ag_gradcheck_run(check, &one);
-    ag_case far = {.label = "mean 1000, spread 0.6", .inputs = 1, .shape = {{1, 4, 5, 3}}, .lo = -1, .hi = 1, .build = build, .user = &epsilon, .prepare = offset};
+    ag_case far = {.label = "mean 1000, spread 0.6",
+                   .inputs = 1,
+                   .shape = {{1, 4, 5, 3}},
+                   .lo = -1,
+                   .hi = 1,
+                   .build = build,
+                   .user = &epsilon,
+                   .prepare = offset};
     ag_gradcheck_run(check, &far);
-    ag_case big = {.label = "several chunks", .inputs = 1, .shape = {{2, 70, 61, 7}}, .lo = -1, .hi = 3, .build = build, .user = &epsilon};
+    ag_case big = {.label = "several chunks",
+                   .inputs = 1,
+                   .shape = {{2, 70, 61, 7}},
+                   .lo = -1,
+                   .hi = 3,
+                   .build = build,
+                   .user = &epsilon};
     ag_gradcheck_run(check, &big);
 }
 
@@ -139,6 +172,7 @@ const ag_op op_instance_norm = {"instance_norm", forward, backward, reference, c
 ag_value *ag_instance_norm(ag_tape *tape, ag_value *x, float epsilon)
 {
     if (!ag_ready(tape, "instance_norm", 1, &x)) return NULL;
-    if (!(epsilon > 0)) return ag_fail(tape, TS_INVALID, "instance_norm: epsilon is %g, it must be positive", (double)epsilon);
+    if (!(epsilon > 0))
+        return ag_fail(tape, TS_INVALID, "instance_norm: epsilon is %g, it must be positive", (double)epsilon);
     return ag_apply(tape, &op_instance_norm, 1, &x, x->t.shape, &epsilon, sizeof epsilon);
 }

@@ -20,7 +20,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const float leak = leak_of(node), *x = node->in[0]->t.data;
     float *y = node->out->t.data;
     const int64_t n = ts_count(node->out->t.shape);
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
     for (int64_t i = 0; i < n; i += AG_CHUNK) k->leaky(ag_part(n, i, AG_CHUNK), x + i, leak, y + i);
 }
 
@@ -32,16 +32,21 @@ static void backward(ag_tape *tape, ag_node *node)
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
     if (!dx) return;
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
-    for (int64_t i = 0; i < n; i += AG_CHUNK) k->leaky_backward(ag_part(n, i, AG_CHUNK), y + i, dy + i, leak, dx + i, accumulate);
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+    for (int64_t i = 0; i < n; i += AG_CHUNK)
+        k->leaky_backward(ag_part(n, i, AG_CHUNK), y + i, dy + i, leak, dx + i, accumulate);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)
 {
-    for (int64_t i = 0; i < ts_count(node->out->t.shape); i++) out[i] = in[0][i] > 0 ? in[0][i] : leak_of(node) * in[0][i];
+    for (int64_t i = 0; i < ts_count(node->out->t.shape); i++)
+        out[i] = in[0][i] > 0 ? in[0][i] : leak_of(node) * in[0][i];
 }
 
-static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user) { return ag_leaky(tape, in[0], *(const float *)user); }
+static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
+{
+    return ag_leaky(tape, in[0], *(const float *)user);
+}
 
 static bool kink(const double *const *in, int input, int64_t i, double step, const void *user)
 {
@@ -53,11 +58,19 @@ static void cases(ag_gradcheck *check)
     static const float leaks[] = {0.2f, 0.01f, 0.0f, 1.0f};
     ts_rng *r = ag_gradcheck_rng(check);
     for (int i = 0; i < 8; i++) {
-        ag_case c = {.label = "random", .inputs = 1, .lo = -1, .hi = 1, .kink = kink, .build = build, .user = &leaks[i % 4]};
-        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9), 1 + ts_rng_int(r, 33)};
+        ag_case c = {
+            .label = "random", .inputs = 1, .lo = -1, .hi = 1, .kink = kink, .build = build, .user = &leaks[i % 4]};
+        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9),
+                                1 + ts_rng_int(r, 33)};
         ag_gradcheck_run(check, &c);
     }
-    ag_case c = {.label = "one value", .inputs = 1, .shape = {{1, 1, 1, 1}}, .lo = -2, .hi = -1, .build = build, .user = &leaks[0]};
+    ag_case c = {.label = "one value",
+                 .inputs = 1,
+                 .shape = {{1, 1, 1, 1}},
+                 .lo = -2,
+                 .hi = -1,
+                 .build = build,
+                 .user = &leaks[0]};
     ag_gradcheck_run(check, &c);
 }
 
@@ -66,6 +79,7 @@ const ag_op op_leaky = {"leaky", forward, backward, reference, cases};
 ag_value *ag_leaky(ag_tape *tape, ag_value *x, float leak)
 {
     if (!ag_ready(tape, "leaky", 1, &x)) return NULL;
-    if (!(leak >= 0 && leak <= 1)) return ag_fail(tape, TS_INVALID, "leaky: leak is %g, it must lie in [0, 1]", (double)leak);
+    if (!(leak >= 0 && leak <= 1))
+        return ag_fail(tape, TS_INVALID, "leaky: leak is %g, it must lie in [0, 1]", (double)leak);
     return ag_apply(tape, &op_leaky, 1, &x, x->t.shape, &leak, sizeof leak);
 }

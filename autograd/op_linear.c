@@ -17,7 +17,8 @@ static void forward(ag_tape *tape, ag_node *node)
     (void)tape;
     const int n = node->out->t.shape.n, o = node->out->t.shape.c, i = node->in[0]->t.shape.c;
     float *y = node->out->t.data;
-    for (int j = 0; node->in[2] && j < n; j++) memcpy(y + (size_t)j * (size_t)o, node->in[2]->t.data, (size_t)o * sizeof(float));
+    for (int j = 0; node->in[2] && j < n; j++)
+        memcpy(y + (size_t)j * (size_t)o, node->in[2]->t.data, (size_t)o * sizeof(float));
     ts_gemm(false, true, n, o, i, 1.0f, node->in[0]->t.data, node->in[1]->t.data, node->in[2] ? 1.0f : 0.0f, y);
 }
 
@@ -46,14 +47,22 @@ static void reference(const ag_node *node, const double *const *in, double *out)
         }
 }
 
-static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user) { return ag_linear(tape, in[0], in[1], user ? in[2] : NULL); }
+static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
+{
+    return ag_linear(tape, in[0], in[1], user ? in[2] : NULL);
+}
 
 static void cases(ag_gradcheck *check)
 {
     ts_rng *r = ag_gradcheck_rng(check);
     for (int k = 0; k < 8; k++) {
         const int n = 1 + ts_rng_int(r, 9), i = k ? 1 + ts_rng_int(r, 70) : 1, o = k ? 1 + ts_rng_int(r, 40) : 1;
-        ag_case c = {.label = k % 2 ? "with bias" : "without bias", .inputs = k % 2 ? 3 : 2, .lo = -1, .hi = 1, .build = build, .user = k % 2 ? check : NULL,
+        ag_case c = {.label = k % 2 ? "with bias" : "without bias",
+                     .inputs = k % 2 ? 3 : 2,
+                     .lo = -1,
+                     .hi = 1,
+                     .build = build,
+                     .user = k % 2 ? check : NULL,
                      .shape = {{n, 1, 1, i}, {1, 1, o, i}, {1, 1, 1, o}}};
         ag_gradcheck_run(check, &c);
     }
@@ -67,8 +76,10 @@ ag_value *ag_linear(ag_tape *tape, ag_value *x, ag_value *weight, ag_value *bias
     char text[AG_SHAPE_TEXT];
     if (!ag_ready(tape, "linear", 2, in)) return NULL;
     const ts_shape s = x->t.shape, w = weight->t.shape;
-    if (s.h != 1 || s.w != 1) return ag_fail(tape, TS_INVALID, "linear: input %s is not [N,1,1,in]", ag_shape_text(text, s));
-    if (w.n != 1 || w.h != 1) return ag_fail(tape, TS_INVALID, "linear: weight %s is not {1,1,out,in}", ag_shape_text(text, w));
+    if (s.h != 1 || s.w != 1)
+        return ag_fail(tape, TS_INVALID, "linear: input %s is not [N,1,1,in]", ag_shape_text(text, s));
+    if (w.n != 1 || w.h != 1)
+        return ag_fail(tape, TS_INVALID, "linear: weight %s is not {1,1,out,in}", ag_shape_text(text, w));
     if (s.c != w.c) return ag_fail(tape, TS_INVALID, "linear: input has %d channels, weight wants %d", s.c, w.c);
     if (bias && !ts_same(bias->t.shape, (ts_shape){1, 1, 1, w.w}))
         return ag_fail(tape, TS_INVALID, "linear: bias %s is not [1,1,1,%d]", ag_shape_text(text, bias->t.shape), w.w);

@@ -1,5 +1,5 @@
-/* y[n,i,j,c] = max of x[n, 2i + {0,1}, 2j + {0,1}, c];   dy goes to the largest, to the first in reading order of equal ones
- * x: [N,2H,2W,C], y: [N,H,W,C] */
+/* y[n,i,j,c] = max of x[n, 2i + {0,1}, 2j + {0,1}, c];   dy goes to the largest, to the first in reading order of equal
+ * ones x: [N,2H,2W,C], y: [N,H,W,C] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
@@ -18,7 +18,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const float *x = node->in[0]->t.data;
     float *y = node->out->t.data;
     const int64_t lines = (int64_t)s.n * s.h, row = 2 * (int64_t)s.w * s.c;
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
     for (int64_t i = 0; i < lines; i++) k->max(s.w, s.c, x + 2 * i * row, x + (2 * i + 1) * row, y + i * s.w * s.c);
 }
 
@@ -31,9 +31,10 @@ static void backward(ag_tape *tape, ag_node *node)
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
     if (!dx) return;
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
     for (int64_t i = 0; i < lines; i++)
-        k->max_backward(s.w, s.c, x + 2 * i * row, x + (2 * i + 1) * row, dy + i * s.w * s.c, dx + 2 * i * row, dx + (2 * i + 1) * row, accumulate);
+        k->max_backward(s.w, s.c, x + 2 * i * row, x + (2 * i + 1) * row, dy + i * s.w * s.c, dx + 2 * i * row,
+                        dx + (2 * i + 1) * row, accumulate);
 }
 
 /* Value q (0 .. 3 in reading order) of the block of output value i. */
@@ -83,8 +84,15 @@ static void cases(ag_gradcheck *check)
     ts_rng *r = ag_gradcheck_rng(check);
     for (int i = 0; i < 7; i++) {
         const ts_shape s = {1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 5), 1 + ts_rng_int(r, 5), 1 + ts_rng_int(r, 35)};
-        ag_case c = {.label = i == 6 ? "equal values" : "random", .inputs = 1, .lo = -1, .hi = 1, .kink = kink, .build = build, .user = &s,
-                     .shape = {{s.n, 2 * s.h, 2 * s.w, s.c}}, .prepare = i == 6 ? equal_pairs : NULL};
+        ag_case c = {.label = i == 6 ? "equal values" : "random",
+                     .inputs = 1,
+                     .lo = -1,
+                     .hi = 1,
+                     .kink = kink,
+                     .build = build,
+                     .user = &s,
+                     .shape = {{s.n, 2 * s.h, 2 * s.w, s.c}},
+                     .prepare = i == 6 ? equal_pairs : NULL};
         ag_gradcheck_run(check, &c);
     }
 }
@@ -95,6 +103,7 @@ ag_value *ag_max_pool(ag_tape *tape, ag_value *x)
 {
     if (!ag_ready(tape, "max_pool", 1, &x)) return NULL;
     const ts_shape s = x->t.shape;
-    if (s.h % 2 || s.w % 2) return ag_fail(tape, TS_INVALID, "max_pool: the image is %d x %d, both sizes must be even", s.h, s.w);
+    if (s.h % 2 || s.w % 2)
+        return ag_fail(tape, TS_INVALID, "max_pool: the image is %d x %d, both sizes must be even", s.h, s.w);
     return ag_apply(tape, &op_max_pool, 1, &x, (ts_shape){s.n, s.h / 2, s.w / 2, s.c}, NULL, 0);
 }

@@ -1,5 +1,5 @@
-/* y = A x B^T for every image and channel: A and B hold a filter of tensor/resample.h for rows and columns;   dx = A^T dy B
- * x: [N,H,W,C], y: [N,h,w,C] */
+/* y = A x B^T for every image and channel: A and B hold a filter of tensor/resample.h for rows and columns;   dx = A^T
+ * dy B x: [N,H,W,C], y: [N,h,w,C] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
@@ -28,7 +28,8 @@ static void forward(ag_tape *tape, ag_node *node)
     const ts_shape s = node->in[0]->t.shape, d = node->out->t.shape;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
     const ts_taps rows = taps(tape, node, s.h, d.h), columns = taps(tape, node, s.w, d.w);
-    if (rows.weight && columns.weight) ts_resample(s.n, s.c, &rows, &columns, node->in[0]->t.data, node->out->t.data, false);
+    if (rows.weight && columns.weight)
+        ts_resample(s.n, s.c, &rows, &columns, node->in[0]->t.data, node->out->t.data, false);
     else ag_fail(tape, TS_NOMEM, "resize: no memory for the filter");
     ts_arena_release(ag_arena(tape), mark);
 }
@@ -56,8 +57,12 @@ static double weight_of(bool smooth, int in, int out, int j, int i)
 {
     const double step = (double)in / out, radius = step > 1 ? step : 1, d = fabs(i - (j + 0.5) * step + 0.5) / radius;
     if (!smooth || out <= in) return d < 1 ? 1 - d : 0;
-    const double far = fmax(2 - d, 0), near = fmax(1 - d, 0), b = 0.6, c = 0.2; /* of Mitchell and Netravali: the B-spline's part in truncated powers, and Keys's */
-    const double keys = d < 1 ? d * d * (1 - d) : d < 2 ? -(d - 1) * far * far : 0, linear = d < 1 ? (1 + 2 * d) * near * near : 0;
+    const double far = fmax(2 - d, 0), near = fmax(1 - d, 0), b = 0.6,
+                 c = 0.2; /* of Mitchell and Netravali: the B-spline's part in truncated powers, and Keys's */
+    const double keys = d < 1 ? d * d * (1 - d)
+        : d < 2               ? -(d - 1) * far * far
+                              : 0,
+                 linear = d < 1 ? (1 + 2 * d) * near * near : 0;
     return b * (far * far * far - 4 * near * near * near) / 6 + (1 - b) * linear + c * keys;
 }
 
@@ -68,7 +73,8 @@ static void reference(const ag_node *node, const double *const *in, double *out)
     const ts_shape s = node->in[0]->t.shape, d = node->out->t.shape;
     const bool smooth = ((const resize_attr *)node->attr)->smooth;
     for (int64_t q = 0; q < ts_count(d); q++) {
-        const int c = (int)(q % d.c), j = (int)(q / d.c % d.w), i = (int)(q / d.c / d.w % d.h), n = (int)(q / d.c / d.w / d.h);
+        const int c = (int)(q % d.c), j = (int)(q / d.c % d.w), i = (int)(q / d.c / d.w % d.h),
+                  n = (int)(q / d.c / d.w / d.h);
         double sum = 0, weights = 0;
         for (int y = -s.h; y < 2 * s.h; y++)
             for (int x = -s.w; x < 2 * s.w; x++) {
@@ -88,20 +94,36 @@ static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
 
 static void cases(ag_gradcheck *check)
 {
-    static const struct { const char *label; ts_shape in; int out[3]; } edges[] = {
-        {"the same size", {1, 4, 3, 2}, {4, 3}}, {"to one pixel", {2, 5, 4, 3}, {1, 1}}, {"from one pixel", {1, 1, 1, 3}, {3, 4}},
-        {"half", {1, 6, 8, 5}, {3, 4}},          {"up and down", {1, 3, 7, 2}, {8, 3}},
-        {"smooth", {1, 3, 7, 2}, {8, 19, 1}},    {"smooth from one pixel", {1, 1, 1, 3}, {3, 4, 1}}, {"smooth up and down", {1, 5, 4, 2}, {6, 3, 1}},
+    static const struct {
+        const char *label;
+        ts_shape in;
+        int out[3];
+    } edges[] = {
+        {"the same size", {1, 4, 3, 2}, {4, 3}},
+        {"to one pixel", {2, 5, 4, 3}, {1, 1}},
+        {"from one pixel", {1, 1, 1, 3}, {3, 4}},
+        {"half", {1, 6, 8, 5}, {3, 4}},
+        {"up and down", {1, 3, 7, 2}, {8, 3}},
+        {"smooth", {1, 3, 7, 2}, {8, 19, 1}},
+        {"smooth from one pixel", {1, 1, 1, 3}, {3, 4, 1}},
+        {"smooth up and down", {1, 5, 4, 2}, {6, 3, 1}},
     };
     ts_rng *r = ag_gradcheck_rng(check);
     for (size_t i = 0; i < sizeof edges / sizeof *edges; i++) {
-        ag_case c = {.label = edges[i].label, .inputs = 1, .shape = {edges[i].in}, .lo = -1, .hi = 1, .build = build, .user = edges[i].out};
+        ag_case c = {.label = edges[i].label,
+                     .inputs = 1,
+                     .shape = {edges[i].in},
+                     .lo = -1,
+                     .hi = 1,
+                     .build = build,
+                     .user = edges[i].out};
         ag_gradcheck_run(check, &c);
     }
     for (int i = 0; i < 4; i++) {
         const int size[3] = {1 + ts_rng_int(r, 10), 1 + ts_rng_int(r, 10), i % 2};
         ag_case c = {.label = "random", .inputs = 1, .lo = -1, .hi = 1, .build = build, .user = size};
-        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 2), 1 + ts_rng_int(r, 9), 1 + ts_rng_int(r, 9), 1 + ts_rng_int(r, 20)};
+        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 2), 1 + ts_rng_int(r, 9), 1 + ts_rng_int(r, 9),
+                                1 + ts_rng_int(r, 20)};
         ag_gradcheck_run(check, &c);
     }
 }

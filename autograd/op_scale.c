@@ -18,7 +18,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const float s = factor(node), *x = node->in[0]->t.data;
     float *y = node->out->t.data;
     const int64_t n = ts_count(node->out->t.shape);
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
     for (int64_t i = 0; i < n; i += AG_CHUNK) k->scale(ag_part(n, i, AG_CHUNK), s, x + i, y + i, false);
 }
 
@@ -30,7 +30,7 @@ static void backward(ag_tape *tape, ag_node *node)
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
     if (!dx) return;
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
     for (int64_t i = 0; i < n; i += AG_CHUNK) k->scale(ag_part(n, i, AG_CHUNK), s, dy + i, dx + i, accumulate);
 }
 
@@ -39,7 +39,10 @@ static void reference(const ag_node *node, const double *const *in, double *out)
     for (int64_t i = 0; i < ts_count(node->out->t.shape); i++) out[i] = factor(node) * in[0][i];
 }
 
-static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user) { return ag_scale(tape, in[0], *(const float *)user); }
+static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
+{
+    return ag_scale(tape, in[0], *(const float *)user);
+}
 
 static void cases(ag_gradcheck *check)
 {
@@ -47,7 +50,8 @@ static void cases(ag_gradcheck *check)
     ts_rng *r = ag_gradcheck_rng(check);
     for (int i = 0; i < 4; i++) {
         ag_case c = {.label = "random", .inputs = 1, .lo = -1, .hi = 1, .build = build, .user = &factors[i]};
-        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9), 1 + ts_rng_int(r, 33)};
+        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9),
+                                1 + ts_rng_int(r, 33)};
         ag_gradcheck_run(check, &c);
     }
 }

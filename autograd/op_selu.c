@@ -18,7 +18,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const float *x = node->in[0]->t.data;
     float *y = node->out->t.data;
     const int64_t n = ts_count(node->out->t.shape);
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
     for (int64_t i = 0; i < n; i += AG_CHUNK) k->selu(ag_part(n, i, AG_CHUNK), x + i, y + i);
 }
 
@@ -30,13 +30,15 @@ static void backward(ag_tape *tape, ag_node *node)
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
     if (!dx) return;
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
-    for (int64_t i = 0; i < n; i += AG_CHUNK) k->selu_backward(ag_part(n, i, AG_CHUNK), y + i, dy + i, dx + i, accumulate);
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+    for (int64_t i = 0; i < n; i += AG_CHUNK)
+        k->selu_backward(ag_part(n, i, AG_CHUNK), y + i, dy + i, dx + i, accumulate);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)
 {
-    for (int64_t i = 0; i < ts_count(node->out->t.shape); i++) out[i] = TS_SELU_SCALE * (in[0][i] > 0 ? in[0][i] : TS_SELU_ALPHA * expm1(in[0][i]));
+    for (int64_t i = 0; i < ts_count(node->out->t.shape); i++)
+        out[i] = TS_SELU_SCALE * (in[0][i] > 0 ? in[0][i] : TS_SELU_ALPHA * expm1(in[0][i]));
 }
 
 static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
@@ -56,12 +58,25 @@ static void cases(ag_gradcheck *check)
     ts_rng *r = ag_gradcheck_rng(check);
     for (int i = 0; i < 6; i++) {
         ag_case c = {.label = "random", .inputs = 1, .lo = -3, .hi = 3, .kink = kink, .build = build};
-        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9), 1 + ts_rng_int(r, 33)};
+        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9),
+                                1 + ts_rng_int(r, 33)};
         ag_gradcheck_run(check, &c);
     }
-    ag_case tiny = {.label = "near zero", .inputs = 1, .shape = {{1, 1, 3, 5}}, .lo = 1e-3f, .hi = 1e-2f, .kink = kink, .build = build};
+    ag_case tiny = {.label = "near zero",
+                    .inputs = 1,
+                    .shape = {{1, 1, 3, 5}},
+                    .lo = 1e-3f,
+                    .hi = 1e-2f,
+                    .kink = kink,
+                    .build = build};
     ag_gradcheck_run(check, &tiny);
-    ag_case far = {.label = "far from zero", .inputs = 1, .shape = {{2, 1, 1, 19}}, .lo = -12, .hi = 12, .kink = kink, .build = build};
+    ag_case far = {.label = "far from zero",
+                   .inputs = 1,
+                   .shape = {{2, 1, 1, 19}},
+                   .lo = -12,
+                   .hi = 12,
+                   .kink = kink,
+                   .build = build};
     ag_gradcheck_run(check, &far);
 }
 

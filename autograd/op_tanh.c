@@ -17,7 +17,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const float *x = node->in[0]->t.data;
     float *y = node->out->t.data;
     const int64_t n = ts_count(node->out->t.shape);
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
     for (int64_t i = 0; i < n; i += AG_CHUNK) k->tanh(ag_part(n, i, AG_CHUNK), x + i, y + i);
 }
 
@@ -29,8 +29,9 @@ static void backward(ag_tape *tape, ag_node *node)
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
     if (!dx) return;
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
-    for (int64_t i = 0; i < n; i += AG_CHUNK) k->tanh_backward(ag_part(n, i, AG_CHUNK), y + i, dy + i, dx + i, accumulate);
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+    for (int64_t i = 0; i < n; i += AG_CHUNK)
+        k->tanh_backward(ag_part(n, i, AG_CHUNK), y + i, dy + i, dx + i, accumulate);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)
@@ -49,12 +50,15 @@ static void cases(ag_gradcheck *check)
     ts_rng *r = ag_gradcheck_rng(check);
     for (int i = 0; i < 6; i++) {
         ag_case c = {.label = "random", .inputs = 1, .lo = -3, .hi = 3, .build = build};
-        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9), 1 + ts_rng_int(r, 33)};
+        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 7), 1 + ts_rng_int(r, 9),
+                                1 + ts_rng_int(r, 33)};
         ag_gradcheck_run(check, &c);
     }
-    ag_case tiny = {.label = "near zero", .inputs = 1, .shape = {{1, 1, 3, 5}}, .lo = 1e-3f, .hi = 1e-2f, .build = build};
+    ag_case tiny = {
+        .label = "near zero", .inputs = 1, .shape = {{1, 1, 3, 5}}, .lo = 1e-3f, .hi = 1e-2f, .build = build};
     ag_gradcheck_run(check, &tiny);
-    ag_case far = {.label = "far from zero", .inputs = 1, .shape = {{2, 1, 1, 19}}, .lo = -12, .hi = 12, .build = build};
+    ag_case far = {
+        .label = "far from zero", .inputs = 1, .shape = {{2, 1, 1, 19}}, .lo = -12, .hi = 12, .build = build};
     ag_gradcheck_run(check, &far);
 }
 

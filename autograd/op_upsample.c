@@ -1,5 +1,5 @@
-/* y[n,i,j,c] = bilinear x[n, i (H-1)/(2H-1), j (W-1)/(2W-1), c]: twice the size, corners on corners;   dx = the transposed weights on dy
- * x: [N,H,W,C], y: [N,2H,2W,C] */
+/* y[n,i,j,c] = bilinear x[n, i (H-1)/(2H-1), j (W-1)/(2W-1), c]: twice the size, corners on corners;   dx = the
+ * transposed weights on dy x: [N,H,W,C], y: [N,2H,2W,C] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
@@ -15,8 +15,10 @@ static void forward(ag_tape *tape, ag_node *node)
 {
     const ts_shape s = node->in[0]->t.shape;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
-    const ts_taps rows = ts_taps_aligned(ag_arena(tape), s.h, 2 * s.h), columns = ts_taps_aligned(ag_arena(tape), s.w, 2 * s.w);
-    if (rows.weight && columns.weight) ts_resample(s.n, s.c, &rows, &columns, node->in[0]->t.data, node->out->t.data, false);
+    const ts_taps rows = ts_taps_aligned(ag_arena(tape), s.h, 2 * s.h),
+                  columns = ts_taps_aligned(ag_arena(tape), s.w, 2 * s.w);
+    if (rows.weight && columns.weight)
+        ts_resample(s.n, s.c, &rows, &columns, node->in[0]->t.data, node->out->t.data, false);
     else ag_fail(tape, TS_NOMEM, "upsample: no memory for the weights");
     ts_arena_release(ag_arena(tape), mark);
 }
@@ -28,7 +30,8 @@ static void backward(ag_tape *tape, ag_node *node)
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
     if (!dx) return;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
-    const ts_taps rows = ts_taps_aligned(ag_arena(tape), s.h, 2 * s.h), columns = ts_taps_aligned(ag_arena(tape), s.w, 2 * s.w);
+    const ts_taps rows = ts_taps_aligned(ag_arena(tape), s.h, 2 * s.h),
+                  columns = ts_taps_aligned(ag_arena(tape), s.w, 2 * s.w);
     ts_taps up = {0}, left = {0};
     if (rows.weight && columns.weight) {
         up = ts_taps_transpose(ag_arena(tape), &rows);
@@ -47,9 +50,12 @@ static void reference(const ag_node *node, const double *const *in, double *out)
             for (int j = 0; j < 2 * s.w; j++)
                 for (int c = 0; c < s.c; c++) {
                     const double y = i * (s.h - 1.0) / (2 * s.h - 1), x = j * (s.w - 1.0) / (2 * s.w - 1);
-                    const int y0 = (int)y, x0 = (int)x, y1 = y0 + 1 < s.h ? y0 + 1 : y0, x1 = x0 + 1 < s.w ? x0 + 1 : x0;
-                    const double *a = in[0] + ((int64_t)n * s.h + y0) * s.w * s.c + c, *b = in[0] + ((int64_t)n * s.h + y1) * s.w * s.c + c;
-                    *out++ = (1 - y + y0) * ((1 - x + x0) * a[x0 * s.c] + (x - x0) * a[x1 * s.c]) + (y - y0) * ((1 - x + x0) * b[x0 * s.c] + (x - x0) * b[x1 * s.c]);
+                    const int y0 = (int)y, x0 = (int)x, y1 = y0 + 1 < s.h ? y0 + 1 : y0,
+                              x1 = x0 + 1 < s.w ? x0 + 1 : x0;
+                    const double *a = in[0] + ((int64_t)n * s.h + y0) * s.w * s.c + c,
+                                 *b = in[0] + ((int64_t)n * s.h + y1) * s.w * s.c + c;
+                    *out++ = (1 - y + y0) * ((1 - x + x0) * a[x0 * s.c] + (x - x0) * a[x1 * s.c]) +
+                        (y - y0) * ((1 - x + x0) * b[x0 * s.c] + (x - x0) * b[x1 * s.c]);
                 }
 }
 
@@ -66,7 +72,8 @@ static void cases(ag_gradcheck *check)
     ag_gradcheck_run(check, &one);
     for (int i = 0; i < 6; i++) {
         ag_case c = {.label = "random", .inputs = 1, .lo = -1, .hi = 1, .build = build};
-        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 6), 1 + ts_rng_int(r, 6), 1 + ts_rng_int(r, 33)};
+        c.shape[0] = (ts_shape){1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 6), 1 + ts_rng_int(r, 6),
+                                1 + ts_rng_int(r, 33)};
         ag_gradcheck_run(check, &c);
     }
 }

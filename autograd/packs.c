@@ -65,8 +65,8 @@ void ag_packs_forget(ag_packs *p)
 static bool is(const pack *p, const ts_conv *c, ts_conv_use use, const float *weight)
 {
     const ts_conv *has = &p->conv;
-    return p->weight == weight && p->use == use && has->ic == c->ic && has->oc == c->oc && has->k == c->k && has->dilation == c->dilation && has->pad == c->pad &&
-           has->constants == c->constants;
+    return p->weight == weight && p->use == use && has->ic == c->ic && has->oc == c->oc && has->k == c->k &&
+        has->dilation == c->dilation && has->pad == c->pad && has->constants == c->constants;
 }
 
 static bool room_for_one(ag_packs *p)

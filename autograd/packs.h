@@ -1,7 +1,7 @@
 /* Packed weights of convolutions, for the tapes that share them. */
 #ifndef AG_PACKS_H
 #define AG_PACKS_H
-#include "tensor/conv.h"
+#include "tensor/conv/conv.h"
 #include "tensor/status.h"
 
 typedef struct ag_packs ag_packs;
@@ -15,7 +15,7 @@ void ag_packs_release(ag_packs **p);
 /* Forgets all of them, keeps the memory. No other holder may be using one. */
 void ag_packs_forget(ag_packs *p);
 
-/* Those of weight for that use, packed at the first request; they stay where they are until forgotten. The key is weight's address, use and c but for
- * n, h and w. Threads may ask at once. NULL when memory is out. */
+/* Those of weight for that use, packed at the first request; they stay where they are until forgotten. The key is
+ * weight's address, use and c but for n, h and w. Threads may ask at once. NULL when memory is out. */
 const float *ag_packs_find(ag_packs *p, const ts_conv *c, ts_conv_use use, const float *weight);
 #endif

@@ -1,7 +1,7 @@
 #include "autograd/tape.h"
 #include "autograd/op.h"
-#include "autograd/tape_inside.h"
-#include "tensor/block.h"
+#include "autograd/tape_internal.h"
+#include "tensor/memory.h"
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -84,8 +84,8 @@ ag_value *ag_fail(ag_tape *tape, ts_code code, const char *format, ...)
 
 static ag_value *no_memory(ag_tape *tape, const char *what)
 {
-    return ag_fail(tape, TS_NOMEM, "no memory for %s (the tape already holds %zu MiB); use smaller images or batches", what,
-                   ts_arena_used(tape->arena) >> 20);
+    return ag_fail(tape, TS_NOMEM, "no memory for %s (the tape already holds %zu MiB); use smaller images or batches",
+                   what, ts_arena_used(tape->arena) >> 20);
 }
 
 bool ag_ready(ag_tape *tape, const char *op, int count, ag_value *const *in)
@@ -119,13 +119,18 @@ static ag_value *new_leaf(ag_tape *tape, ts_tensor t, float *grad)
 {
     if (tape->status.code != TS_OK) return NULL;
     if (!t.data || t.shape.n < 1 || t.shape.h < 1 || t.shape.w < 1 || t.shape.c < 1)
-        return ag_fail(tape, TS_INVALID, "leaf: no data or an empty shape [%d,%d,%d,%d]", t.shape.n, t.shape.h, t.shape.w, t.shape.c);
-    if (!ts_contiguous(&t)) return ag_fail(tape, TS_INVALID, "leaf: the tensor is a strided view; copy it with ts_copy first");
+        return ag_fail(tape, TS_INVALID, "leaf: no data or an empty shape [%d,%d,%d,%d]", t.shape.n, t.shape.h,
+                       t.shape.w, t.shape.c);
+    if (!ts_contiguous(&t))
+        return ag_fail(tape, TS_INVALID, "leaf: the tensor is a strided view; copy it with ts_copy first");
     return ag_new_value(tape, t, grad);
 }
 
 ag_value *ag_constant(ag_tape *tape, ts_tensor t) { return new_leaf(tape, t, NULL); }
-ag_value *ag_parameter(ag_tape *tape, ts_tensor t, float *grad) { return new_leaf(tape, t, tape->gradients ? grad : NULL); }
+ag_value *ag_parameter(ag_tape *tape, ts_tensor t, float *grad)
+{
+    return new_leaf(tape, t, tape->gradients ? grad : NULL);
+}
 
 ag_value *ag_empty(ag_tape *tape, ts_shape shape)
 {
@@ -168,10 +173,13 @@ static ag_value *result(ag_tape *tape, const ag_op *op, ts_shape out)
     tape->into = NULL;
     if (!v) return ag_empty(tape, out);
     char a[AG_SHAPE_TEXT], b[AG_SHAPE_TEXT];
-    return ts_same(v->t.shape, out) ? v : ag_fail(tape, TS_INVALID, "%s: the result is %s, the place for it %s", op->name, ag_shape_text(a, out), ag_shape_text(b, v->t.shape));
+    return ts_same(v->t.shape, out) ? v
+                                    : ag_fail(tape, TS_INVALID, "%s: the result is %s, the place for it %s", op->name,
+                                              ag_shape_text(a, out), ag_shape_text(b, v->t.shape));
 }
 
-ag_value *ag_apply(ag_tape *tape, const ag_op *op, int inputs, ag_value *const *in, ts_shape out, const void *attr, size_t attr_size)
+ag_value *ag_apply(ag_tape *tape, const ag_op *op, int inputs, ag_value *const *in, ts_shape out, const void *attr,
+                   size_t attr_size)
 {
     if (tape->status.code != TS_OK) return NULL;
     ag_value *v = result(tape, op, out);
@@ -227,7 +235,8 @@ ts_code ag_backward(ag_tape *tape, ag_value *loss)
 {
     if (!ag_ready(tape, "backward", 1, &loss)) return tape->status.code;
     if (!tape->gradients) ag_fail(tape, TS_INVALID, "backward: the tape was created without gradients");
-    else if (ts_count(loss->t.shape) != 1) ag_fail(tape, TS_INVALID, "backward: the loss has %lld values, not one", (long long)ts_count(loss->t.shape));
+    else if (ts_count(loss->t.shape) != 1)
+        ag_fail(tape, TS_INVALID, "backward: the loss has %lld values, not one", (long long)ts_count(loss->t.shape));
     else if (!loss->needs_grad) ag_fail(tape, TS_INVALID, "backward: the loss does not depend on any parameter");
     float *seed = tape->status.code == TS_OK ? ag_grad_add(tape, loss) : NULL;
     if (!seed) return tape->status.code;
@@ -250,7 +259,10 @@ void ag_scope_end(ag_tape *tape, ts_mark mark, ag_value **keep, int count)
     if (tape->gradients) return;
     ts_mark moving = ts_arena_mark(tape->moving);
     /* Out of the way first, back in afterwards: what is kept may be larger than the room before it. */
-    struct { ts_shape shape; float *data; } *kept = ts_arena_zalloc(tape->moving, (size_t)(count > 0 ? count : 1), sizeof *kept);
+    struct {
+        ts_shape shape;
+        float *data;
+    } *kept = ts_arena_zalloc(tape->moving, (size_t)(count > 0 ? count : 1), sizeof *kept);
     for (int i = 0; kept && i < count; i++) {
         if (!keep[i] || ((const ag_held *)keep[i])->born < mark.total) continue;
         size_t bytes = (size_t)ts_count(keep[i]->t.shape) * sizeof(float);

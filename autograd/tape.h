@@ -3,12 +3,12 @@
  *
  * Memory: values, saved data and gradients live in the tape's arena until ag_reset. A tape that was created without
  * gradients records nothing, and ag_scope_... gives intermediate memory back early.
- * Errors are sticky: the first is kept in the tape, every constructor then returns NULL and accepts NULL inputs, so that model
- * code needs one check at its end (ag_status). */
+ * Errors are sticky: the first is kept in the tape, every constructor then returns NULL and accepts NULL inputs, so
+ * that model code needs one check at its end (ag_status). */
 #ifndef AG_TAPE_H
 #define AG_TAPE_H
 #include "tensor/arena.h"
-#include "tensor/conv.h"
+#include "tensor/conv/conv.h"
 #include "tensor/rng.h"
 #include "tensor/tensor.h"
 
@@ -20,20 +20,23 @@ typedef struct ag_gradcheck ag_gradcheck;
 enum { AG_MAX_INPUTS = 8 };
 
 struct ag_value {
-    ts_tensor t;      /* contiguous */
-    float *grad;      /* the same shape, or NULL while no gradient has reached it; only a parameter's is of use after ag_backward */
-    bool needs_grad;  /* a parameter, or made from one */
-    bool grad_ready;  /* grad holds values to be added to (false: the next writer overwrites) */
+    ts_tensor t;     /* contiguous */
+    float *grad;     /* the same shape, or NULL while no gradient has reached it; only a parameter's is of use after
+                        ag_backward */
+    bool needs_grad; /* a parameter, or made from one */
+    bool grad_ready; /* grad holds values to be added to (false: the next writer overwrites) */
 };
 
-/* What an operation is. One constant of this type per file autograd/op_NAME.c or render/op_NAME.c, called op_NAME; make collects them. */
+/* What an operation is. One constant of this type per file autograd/op_NAME.c or render/op_NAME.c, called op_NAME; make
+ * collects them. */
 typedef struct ag_op {
     const char *name;
     /* out->t.data from in[...]->t.data; shapes were validated. */
     void (*forward)(ag_tape *tape, ag_node *node);
     /* Adds to the gradients of the inputs that need one (ag_grad_target), from node->out->grad. */
     void (*backward)(ag_tape *tape, ag_node *node);
-    /* The same function as forward in double and as plain as possible: the oracle of the tests. in[i] has the input's count. */
+    /* The same function as forward in double and as plain as possible: the oracle of the tests. in[i] has the input's
+     * count. */
     void (*reference)(const ag_node *node, const double *const *in, double *out);
     /* Puts random cases, edges included, through ag_gradcheck_run. */
     void (*cases)(ag_gradcheck *check);
@@ -50,8 +53,8 @@ struct ag_node {
 
 /* gradients: whether ag_backward will be called. The arena is the tape's own. NULL and st set on failure. */
 ag_tape *ag_tape_create(bool gradients, ts_status *st);
-/* One without gradients, frozen, with the packed weights of other, which is frozen too and stays so while both exist: the two may be used by two threads
- * at once, and destroyed in any order. NULL and st set on failure. */
+/* One without gradients, frozen, with the packed weights of other, which is frozen too and stays so while both exist:
+ * the two may be used by two threads at once, and destroyed in any order. NULL and st set on failure. */
 ag_tape *ag_tape_beside(const ag_tape *other, ts_status *st);
 void ag_tape_destroy(ag_tape **tape);
 
@@ -61,7 +64,7 @@ void ag_reset(ag_tape *tape);
 /* ag_reset, and the memory goes back to the system, but for packed weights. */
 void ag_drop(ag_tape *tape);
 
-const ts_status *ag_status(const ag_tape *tape);       /* the first error, or code TS_OK */
+const ts_status *ag_status(const ag_tape *tape); /* the first error, or code TS_OK */
 ts_arena *ag_arena(ag_tape *tape);
 bool ag_gradients(const ag_tape *tape);
 /* Sets the sticky error (the first one stays). Returns NULL for convenience. */
@@ -69,48 +72,53 @@ ag_value *ag_fail(ag_tape *tape, ts_code code, const char *format, ...) __attrib
 
 /* A leaf without gradient: the data is the caller's and outlives the tape's use of it. */
 ag_value *ag_constant(ag_tape *tape, ts_tensor t);
-/* A leaf with gradient: grad has t's shape, belongs to the caller, and is added to by ag_backward. grad NULL: as ag_constant. */
+/* A leaf with gradient: grad has t's shape, belongs to the caller, and is added to by ag_backward. grad NULL: as
+ * ag_constant. */
 ag_value *ag_parameter(ag_tape *tape, ts_tensor t, float *grad);
 /* Uninitialised constant of that shape in the arena. */
 ag_value *ag_empty(ag_tape *tape, ts_shape shape);
-/* The next operation on a tape without gradients writes its result into the memory of to (NULL: of a new value) and returns to, whose shape
- * must fit. Operations that go value by value or pixel by pixel (ag_add, ag_tanh, ag_gru's state) may overwrite an input so. */
+/* The next operation on a tape without gradients writes its result into the memory of to (NULL: of a new value) and
+ * returns to, whose shape must fit. Operations that go value by value or pixel by pixel (ag_add, ag_tanh, ag_gru's
+ * state) may overwrite an input so. */
 void ag_into(ag_tape *tape, ag_value *to);
 /* The same data without its history: no gradient flows through. */
 ag_value *ag_detach(ag_tape *tape, ag_value *v);
 
 /* For op constructors: makes the output, runs forward, records the node when a gradient will be asked for.
  * attr (attr_size bytes) is copied. The caller has validated shapes. NULL after an error. */
-ag_value *ag_apply(ag_tape *tape, const ag_op *op, int inputs, ag_value *const *in, ts_shape out, const void *attr, size_t attr_size);
+ag_value *ag_apply(ag_tape *tape, const ag_op *op, int inputs, ag_value *const *in, ts_shape out, const void *attr,
+                   size_t attr_size);
 
-/* For backward: where to put the gradient of v, or NULL when nobody needs it. *accumulate says whether to add to what is
- * there (true) or to overwrite every value (false); afterwards the gradient counts as written. */
+/* For backward: where to put the gradient of v, or NULL when nobody needs it. *accumulate says whether to add to what
+ * is there (true) or to overwrite every value (false); afterwards the gradient counts as written. */
 float *ag_grad_target(ag_tape *tape, ag_value *v, bool *accumulate);
 /* The same, always to be added to (zeros were put there when it was fresh). */
 float *ag_grad_add(ag_tape *tape, ag_value *v);
 
-/* d loss / d parameter is added to every parameter's grad. loss: one value. Returns the tape's code. May be called again, for
- * another loss or the same one: the gradients of all calls add up. */
+/* d loss / d parameter is added to every parameter's grad. loss: one value. Returns the tape's code. May be called
+ * again, for another loss or the same one: the gradients of all calls add up. */
 ts_code ag_backward(ag_tape *tape, ag_value *loss);
 
-/* A part of a network of which a tape with gradients keeps the results alone: body puts its operations on the tape, is called once for the
- * results, without recording, and once more in ag_backward for the gradient (Chen et al., "Training Deep Nets with Sublinear Memory Cost",
- * 2016). The same numbers as without. in[i] may be NULL and reaches body so, with gradients otherwise as it has them; body sets out[0 .. outs - 1]
- * to values that its own operations made, and must do the same each time. user (size bytes) is copied.
- * room[i]: NULL, or memory for the gradient of in[i], which is of use from the end of the backward of what follows this part to the end of its own:
- * neighbours in a chain of parts take turns with two.
- * On a tape without gradients body is simply called. False after an error. */
+/* A part of a network of which a tape with gradients keeps the results alone: body puts its operations on the tape, is
+ * called once for the results, without recording, and once more in ag_backward for the gradient (Chen et al., "Training
+ * Deep Nets with Sublinear Memory Cost", 2016). The same numbers as without. in[i] may be NULL and reaches body so,
+ * with gradients otherwise as it has them; body sets out[0 .. outs - 1] to values that its own operations made, and
+ * must do the same each time. user (size bytes) is copied. room[i]: NULL, or memory for the gradient of in[i], which is
+ * of use from the end of the backward of what follows this part to the end of its own: neighbours in a chain of parts
+ * take turns with two. On a tape without gradients body is simply called. False after an error. */
 enum { AG_PART_MOST = 4 }; /* ins and outs */
 typedef void (*ag_body)(ag_tape *tape, ag_value *const *in, ag_value **out, const void *user);
-bool ag_checkpoint(ag_tape *tape, ag_body body, const void *user, size_t size, int ins, ag_value *const *in, float *const *room, int outs, ag_value **out);
+bool ag_checkpoint(ag_tape *tape, ag_body body, const void *user, size_t size, int ins, ag_value *const *in,
+                   float *const *room, int outs, ag_value **out);
 
 /* Packed weights of a convolution, made once per reset (or once for all after ag_freeze(tape, true)). Keyed by weight
  * address, use and shape. */
 const float *ag_packed(ag_tape *tape, const ts_conv *c, ts_conv_use use, const float *weight);
 void ag_freeze(ag_tape *tape, bool frozen);
 
-/* A scope for a tape without gradients: ag_scope_end gives back what was allocated since begin, except that the values in
- * keep[0 .. count-1] survive (they are moved; the pointers in keep are updated). On a tape with gradients both do nothing. */
+/* A scope for a tape without gradients: ag_scope_end gives back what was allocated since begin, except that the values
+ * in keep[0 .. count-1] survive (they are moved; the pointers in keep are updated). On a tape with gradients both do
+ * nothing. */
 ts_mark ag_scope_begin(ag_tape *tape);
 void ag_scope_end(ag_tape *tape, ts_mark mark, ag_value **keep, int count);
 #endif

@@ -1,4 +1,5 @@
-/* lgd-bench [--cpu] [NAME...]: runs the benchmarks whose name contains one of the words (all without a word), in order of name. */
+/* lgd-bench [--cpu] [NAME...]: runs the benchmarks whose name contains one of the words (all without a word), in order
+ * of name. */
 #include "bench/batches.h"
 #include "bench/bench.h"
 #include "tensor/cpu.h"
@@ -33,8 +34,8 @@ static bool processor_time;
 
 bool bench_cpu(void) { return processor_time; }
 
-/* Wall time; or the processor time of all threads over their number, which does not see what other programs take on a busy machine (nor threads that
- * wait for each other). */
+/* Wall time; or the processor time of all threads over their number, which does not see what other programs take on a
+ * busy machine (nor threads that wait for each other). */
 static double now(void)
 {
     struct timespec t;
@@ -63,14 +64,22 @@ static double peak(void) { return peak_of(ts_peak_k()->run); }
 static double inner_loop(void)
 {
     enum { DEPTH = 96, TIMES = 400 };
-    static _Alignas(64) float input[TS_TILE_PIXELS * DEPTH], weights[DEPTH * 2 * 16]; /* zeros; no vector has more than 16 lanes */
+    static _Alignas(64) float input[TS_TILE_PIXELS * DEPTH],
+        weights[DEPTH * 2 * 16]; /* zeros; no vector has more than 16 lanes */
     const struct ts_conv_kernels *k = ts_conv_k();
     const ts_segment segment = {0, 0, DEPTH};
     double speed = 0; /* each thread's own: convolutions deal out their work as threads come for it */
 #pragma omp parallel num_threads(ts_threads()) reduction(+ : speed)
     {
         float out[TS_TILE_PIXELS * 2 * 16];
-        ts_tile t = {.segment = &segment, .segments = 1, .a_stride = DEPTH, .y_stride = 2 * k->lanes, .w = weights, .leak = 1, .channels = 2 * k->lanes, .fetch = {weights, weights}};
+        ts_tile t = {.segment = &segment,
+                     .segments = 1,
+                     .a_stride = DEPTH,
+                     .y_stride = 2 * k->lanes,
+                     .w = weights,
+                     .leak = 1,
+                     .channels = 2 * k->lanes,
+                     .fetch = {weights, weights}};
         for (int i = 0; i < 3; i++) {
             const int pixel = i * TS_TILE_GROUP < k->pixels ? i * TS_TILE_GROUP : 0;
             t.a[i] = input + pixel * t.a_stride;
@@ -144,7 +153,8 @@ void bench_row_threads(void (*f)(void *user), void *user)
         gain[i] = one.seconds / many.seconds;
         of_peak[i] = many.peak / one.peak;
     }
-    printf("    %d threads: %.2f times as fast as one, the peak %.2f times\n", all, median(gain, ROUNDS), median(of_peak, ROUNDS));
+    printf("    %d threads: %.2f times as fast as one, the peak %.2f times\n", all, median(gain, ROUNDS),
+           median(of_peak, ROUNDS));
     fflush(stdout);
 }
 
@@ -153,7 +163,9 @@ void bench_heading(const char *text) { printf("\n%s\n", text); }
 void bench_row(const char *label, bench_time t, double flop)
 {
     printf("  %-56s %11.4f ms", label, 1e3 * t.seconds);
-    if (flop > 0) printf(" %9.1f GFLOP/s %6.1f %% of the peak (best %.1f)", 1e-9 * flop / t.seconds, 100 * flop / t.seconds / t.peak, 100 * flop / t.best / t.peak);
+    if (flop > 0)
+        printf(" %9.1f GFLOP/s %6.1f %% of the peak (best %.1f)", 1e-9 * flop / t.seconds,
+               100 * flop / t.seconds / t.peak, 100 * flop / t.best / t.peak);
     if (flop > 0 && t.loop > 0) printf(", %.1f %% of the inner loop", 100 * flop / t.seconds / t.loop);
     printf("\n");
     fflush(stdout);
@@ -165,14 +177,20 @@ void bench_row_unit(const char *label, bench_time t, double value, const char *u
     fflush(stdout);
 }
 
-static int by_name(const void *a, const void *b) { return strcmp(((const struct entry *)a)->name, ((const struct entry *)b)->name); }
+static int by_name(const void *a, const void *b)
+{
+    return strcmp(((const struct entry *)a)->name, ((const struct entry *)b)->name);
+}
 
 int main(int argc, char **argv)
 {
     ts_status st = {0};
     if (argc == 2 && strcmp(argv[1], "--help") == 0) {
-        printf("usage: lgd-bench [--list | --cpu | --batches CONFIG.ini] [NAME...]\nRuns the benchmarks whose name contains one of the words; all of them without a word. --cpu: processor\n"
-               "time over the number of threads in place of wall time, for a machine that others use too (set OMP_WAIT_POLICY=passive).\n--batches writes what lgd-train would train with to standard output (bench/batches.h).\n");
+        printf("usage: lgd-bench [--list | --cpu | --batches CONFIG.ini] [NAME...]\nRuns the benchmarks whose name "
+               "contains one of the words; all of them without a word. --cpu: processor\n"
+               "time over the number of threads in place of wall time, for a machine that others use too (set "
+               "OMP_WAIT_POLICY=passive).\n--batches writes what lgd-train would train with to standard output "
+               "(bench/batches.h).\n");
         return 0;
     }
     qsort(list, (size_t)entries, sizeof *list, by_name);
@@ -182,7 +200,8 @@ int main(int argc, char **argv)
         argv++;
     }
     if (argc == 3 && strcmp(argv[1], "--batches") == 0) {
-        if (ts_isa_init(&st) != TS_OK || bench_batches(argv[2], &st) != TS_OK) fprintf(stderr, "lgd-bench: %s\n", st.message);
+        if (ts_isa_init(&st) != TS_OK || bench_batches(argv[2], &st) != TS_OK)
+            fprintf(stderr, "lgd-bench: %s\n", st.message);
         return st.code ? 1 : 0;
     }
     if (argc == 2 && strcmp(argv[1], "--list") == 0) {
@@ -193,7 +212,8 @@ int main(int argc, char **argv)
         fprintf(stderr, "lgd-bench: %s\n", st.message);
         return 1;
     }
-    printf("%s, %d threads, FMA peak %.1f GFLOP/s%s\n", ts_isa_name(ts_isa_now()), ts_threads(), 1e-9 * peak(), processor_time ? ", processor time" : "");
+    printf("%s, %d threads, FMA peak %.1f GFLOP/s%s\n", ts_isa_name(ts_isa_now()), ts_threads(), 1e-9 * peak(),
+           processor_time ? ", processor time" : "");
     int ran = 0;
     for (int i = 0; i < entries; i++) {
         bool wanted = argc == 1;

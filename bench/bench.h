@@ -1,44 +1,51 @@
-/* The bench's interface. A file bench/bench_NAME.c holds BENCH(name) { … } blocks, run in order of name by build/bin/lgd-bench. */
+/* The bench's interface. A file bench/bench_NAME.c holds BENCH(name) { … } blocks, run in order of name by
+ * build/bin/lgd-bench. */
 #ifndef BENCH_H
 #define BENCH_H
 #include <stdbool.h>
 
 typedef void (*bench_function)(void);
 void bench_register(const char *name, bench_function f);
-#define BENCH(name)                                                                                    \
-    static void bench_##name(void);                                                                    \
+#define BENCH(name)                                                                                         \
+    static void bench_##name(void);                                                                         \
     __attribute__((constructor)) static void register_##name(void) { bench_register(#name, bench_##name); } \
     static void bench_##name(void)
 
-/* Median seconds of one call of f(user), after a warm-up, for about a third of a second in all. The FMA peak is measured before
- * and after, so that a row's fraction refers to the machine's speed at that moment. The peak's FMAs need half of what a core can issue, the
- * convolutions' inner loop nearly all of it: where another program has the core's other half (simultaneous multithreading), the one
- * stays as it was and the other falls to two thirds, so that both are measured. */
+/* Median seconds of one call of f(user), after a warm-up, for about a third of a second in all. The FMA peak is
+ * measured before and after, so that a row's fraction refers to the machine's speed at that moment. The peak's FMAs
+ * need half of what a core can issue, the convolutions' inner loop nearly all of it: where another program has the
+ * core's other half (simultaneous multithreading), the one stays as it was and the other falls to two thirds, so that
+ * both are measured. */
 typedef struct bench_time {
     double seconds; /* median of one call */
     double best;    /* the shortest: what the code can do where neighbours hold up the others */
     double peak;    /* FLOP/s of the FMA peak with the threads in use, the mean of before and after */
-    double loop;    /* FLOP/s of the convolutions' inner loop on data in the first cache, the median of before, between and after; 0: does not apply */
+    double loop; /* FLOP/s of the convolutions' inner loop on data in the first cache, the median of before, between and
+                    after; 0: does not apply */
     int runs;
 } bench_time;
 bench_time bench_measure(void (*f)(void *user), void *user);
 
-/* Makes the peak of bf16 (the matrix unit's, or vdpbf16ps'), measured now, the time's. False, with nothing changed, where the instruction set in use has none. */
+/* Makes the peak of bf16 (the matrix unit's, or vdpbf16ps'), measured now, the time's. False, with nothing changed,
+ * where the instruction set in use has none. */
 bool bench_bf16(bench_time *t);
 
 /* Times are processor time (lgd-bench --cpu). */
 bool bench_cpu(void);
 
-/* A row: label, milliseconds, GFLOP/s and the fraction of the peak, at the median and at the best, and of the inner loop (flop = 0: no such columns). */
+/* A row: label, milliseconds, GFLOP/s and the fraction of the peak, at the median and at the best, and of the inner
+ * loop (flop = 0: no such columns). */
 void bench_row(const char *label, bench_time t, double flop);
 /* A row with a figure in another unit, for example 150.2 "Mpixel/s". */
 void bench_row_unit(const char *label, bench_time t, double value, const char *unit);
 void bench_heading(const char *text);
-/* A row: how many times as fast as one thread all of them are, median of five measured in turn, and the same of the FMA peak. Wall time only. */
+/* A row: how many times as fast as one thread all of them are, median of five measured in turn, and the same of the FMA
+ * peak. Wall time only. */
 void bench_row_threads(void (*f)(void *user), void *user);
 
-/* Median seconds that the peer (bench/peer_torch.py, whose head lists the jobs) takes for a job; NaN where there is no peer or it fails, which is said
- * once. bench_row_peer: below a row, its floor (flop at the peak) and the peer's time; bench_row_peer_bf16: the peer's time for the same in bf16, with its own autocast. */
+/* Median seconds that the peer (bench/peer_torch.py, whose head lists the jobs) takes for a job; NaN where there is no
+ * peer or it fails, which is said once. bench_row_peer: below a row, its floor (flop at the peak) and the peer's time;
+ * bench_row_peer_bf16: the peer's time for the same in bf16, with its own autocast. */
 double bench_peer(const char *job);
 const char *bench_peer_name(void);
 void bench_row_peer(bench_time t, double flop, double peer);

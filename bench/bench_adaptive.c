@@ -1,8 +1,9 @@
-/* What refinement costs where it is not all wanted: tolerances, a mask, the automatic number of steps, each beside the fixed number of steps of
- * the whole. Processor seconds of all threads, which a busy machine changes less than wall time. The error is that of renderings under 20 views
- * (lgd-eval's), over procedural materials and the map sets of TESTDATA. */
+/* What refinement costs where it is not all wanted: tolerances, a mask, the automatic number of steps, each beside the
+ * fixed number of steps of the whole. Processor seconds of all threads, which a busy machine changes less than wall
+ * time. The error is that of renderings under 20 views (lgd-eval's), over procedural materials and the map sets of
+ * TESTDATA. */
 #include "bench/bench.h"
-#include "eval/metrics.h"
+#include "eval/metrics/metrics.h"
 #include "eval/sets.h"
 #include "infer/encode.h"
 #include "infer/lgd.h"
@@ -80,7 +81,8 @@ static void table(lgd_model *model, const char *what, sample *s, int count, cons
         double t, e;
         run(model, &k[i], s, count, &t, &e);
         if (i == 0) time0 = t, error0 = e;
-        printf("    %-28s %8.1f ms %5.2f x faster   render RMSE %.5f (%+.2f %%)\n", k[i].label, 1e3 * t, time0 / t, e, 100 * (e / error0 - 1));
+        printf("    %-28s %8.1f ms %5.2f x faster   render RMSE %.5f (%+.2f %%)\n", k[i].label, 1e3 * t, time0 / t, e,
+               100 * (e / error0 - 1));
         fflush(stdout);
     }
 }
@@ -100,11 +102,17 @@ BENCH(adaptive)
         return;
     }
     for (int i = 0; i < PIXELS; i++) mask[i] = i % SIDE < SIDE / 4 && i / SIDE < SIDE / 2;
-    setting k[] = {{"fixed", {.iterations = -1}}, {"fixed, --exact", {.iterations = -1, .exact = 1}}, {"--tolerance 0.0001", {.iterations = -1, .tolerance = 1e-4}},
-                   {"--tolerance 0.001", {.iterations = -1, .tolerance = 1e-3}}, {"--tolerance 0.0015", {.iterations = -1, .tolerance = 1.5e-3}},
-                   {"--tolerance 0.002", {.iterations = -1, .tolerance = 2e-3}}, {"--tolerance 0.0025", {.iterations = -1, .tolerance = 2.5e-3}},
-                   {"--tolerance 0.003", {.iterations = -1, .tolerance = 3e-3}}, {"--tolerance 0.01", {.iterations = -1, .tolerance = 1e-2}},
-                   {"--iterations auto", {.iterations = LGD_AUTO}}, {"--mask, an eighth wanted", {.iterations = -1, .mask = mask}}};
+    setting k[] = {{"fixed", {.iterations = -1}},
+                   {"fixed, --exact", {.iterations = -1, .exact = 1}},
+                   {"--tolerance 0.0001", {.iterations = -1, .tolerance = 1e-4}},
+                   {"--tolerance 0.001", {.iterations = -1, .tolerance = 1e-3}},
+                   {"--tolerance 0.0015", {.iterations = -1, .tolerance = 1.5e-3}},
+                   {"--tolerance 0.002", {.iterations = -1, .tolerance = 2e-3}},
+                   {"--tolerance 0.0025", {.iterations = -1, .tolerance = 2.5e-3}},
+                   {"--tolerance 0.003", {.iterations = -1, .tolerance = 3e-3}},
+                   {"--tolerance 0.01", {.iterations = -1, .tolerance = 1e-2}},
+                   {"--iterations auto", {.iterations = LGD_AUTO}},
+                   {"--mask, an eighth wanted", {.iterations = -1, .mask = mask}}};
     const int settings = sizeof k / sizeof *k;
     const int procedural = load("procedural:1000003,8", 1, s, MOST);
     snprintf(path, sizeof path, "maps:%s/maps", data ? data : "../shared/testdata");

@@ -1,6 +1,6 @@
 /* Convolutions and their gradients: sizes of the published networks at 256 x 256, and of a small model in training. */
 #include "bench/bench.h"
-#include "tensor/conv.h"
+#include "tensor/conv/conv.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"
 #include <stdio.h>
@@ -9,7 +9,8 @@
 
 typedef struct work {
     ts_conv c;
-    float *x, *y, *weight, *bias, *packed, *packed_gradient, *packed_winograd, *packed_gradient_winograd, *packed_bf16, *packed_gradient_bf16;
+    float *x, *y, *weight, *bias, *packed, *packed_gradient, *packed_winograd, *packed_gradient_winograd, *packed_bf16,
+        *packed_gradient_bf16;
 } work;
 
 static float *values(size_t count, float scale)
@@ -23,23 +24,33 @@ static float *values(size_t count, float scale)
 
 static work make(ts_conv c)
 {
-    const size_t pixels = (size_t)c.n * (size_t)c.h * (size_t)c.w, weights = (size_t)c.ic * (size_t)c.oc * (size_t)(c.k * c.k);
-    work w = {c, values(pixels * (size_t)c.ic, 1), values(pixels * (size_t)c.oc, 1), values(weights, 0.01f), values((size_t)c.oc, 1),
-              values(ts_conv_packed_count(&c, TS_CONV_FORWARD), 1), values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT), 1),
+    const size_t pixels = (size_t)c.n * (size_t)c.h * (size_t)c.w,
+                 weights = (size_t)c.ic * (size_t)c.oc * (size_t)(c.k * c.k);
+    work w = {c,
+              values(pixels * (size_t)c.ic, 1),
+              values(pixels * (size_t)c.oc, 1),
+              values(weights, 0.01f),
+              values((size_t)c.oc, 1),
+              values(ts_conv_packed_count(&c, TS_CONV_FORWARD), 1),
+              values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT), 1),
               c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_WINOGRAD), 1) : NULL,
-              c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT_WINOGRAD), 1) : NULL, values(ts_conv_packed_count(&c, TS_CONV_FORWARD_BF16), 1),
+              c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT_WINOGRAD), 1) : NULL,
+              values(ts_conv_packed_count(&c, TS_CONV_FORWARD_BF16), 1),
               values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT_BF16), 1)};
     ts_conv_pack(&c, TS_CONV_FORWARD_BF16, w.weight, w.packed_bf16);
     ts_conv_pack(&c, TS_CONV_DATA_GRADIENT_BF16, w.weight, w.packed_gradient_bf16);
     ts_conv_pack(&c, TS_CONV_FORWARD, w.weight, w.packed);
     ts_conv_pack(&c, TS_CONV_DATA_GRADIENT, w.weight, w.packed_gradient);
-    if (c.k == 3) ts_conv_pack(&c, TS_CONV_WINOGRAD, w.weight, w.packed_winograd), ts_conv_pack(&c, TS_CONV_DATA_GRADIENT_WINOGRAD, w.weight, w.packed_gradient_winograd);
+    if (c.k == 3)
+        ts_conv_pack(&c, TS_CONV_WINOGRAD, w.weight, w.packed_winograd),
+            ts_conv_pack(&c, TS_CONV_DATA_GRADIENT_WINOGRAD, w.weight, w.packed_gradient_winograd);
     return w;
 }
 
 static void discard(work *w)
 {
-    free(w->x), free(w->y), free(w->weight), free(w->bias), free(w->packed), free(w->packed_gradient), free(w->packed_winograd), free(w->packed_gradient_winograd), free(w->packed_bf16);
+    free(w->x), free(w->y), free(w->weight), free(w->bias), free(w->packed), free(w->packed_gradient),
+        free(w->packed_winograd), free(w->packed_gradient_winograd), free(w->packed_bf16);
     free(w->packed_gradient_bf16);
 }
 
@@ -106,13 +117,15 @@ static void forward_naive(void *user)
 static void row(const char *what, ts_conv c, void (*f)(void *user))
 {
     char label[96];
-    snprintf(label, sizeof label, "%s n%d %dx%d %d->%d %dx%d%s%s", what, c.n, c.h, c.w, c.ic, c.oc, c.k, c.k, c.dilation > 1 ? " d2" : "",
-             c.pad == TS_PAD_REPLICATE ? " rep" : "");
+    snprintf(label, sizeof label, "%s n%d %dx%d %d->%d %dx%d%s%s", what, c.n, c.h, c.w, c.ic, c.oc, c.k, c.k,
+             c.dilation > 1 ? " d2" : "", c.pad == TS_PAD_REPLICATE ? " rep" : "");
     const bool back = f == data_gradient || f == data_gradient_winograd || f == data_gradient_bf16;
-    if (back && c.constants) snprintf(label + strlen(label), sizeof label - strlen(label), " (of %d)", ts_conv_variables(&c));
+    if (back && c.constants)
+        snprintf(label + strlen(label), sizeof label - strlen(label), " (of %d)", ts_conv_variables(&c));
     work w = make(c);
     bench_time t = bench_measure(f, &w);
-    if ((f == forward_bf16 || f == data_gradient_bf16 || f == weight_gradient_bf16) && !bench_bf16(&t)) snprintf(label + strlen(label), sizeof label - strlen(label), ", emulated");
+    if ((f == forward_bf16 || f == data_gradient_bf16 || f == weight_gradient_bf16) && !bench_bf16(&t))
+        snprintf(label + strlen(label), sizeof label - strlen(label), ", emulated");
     bench_row(label, t, 2.0 * c.n * c.h * c.w * (back ? ts_conv_variables(&c) : c.ic) * c.oc * c.k * c.k);
     discard(&w);
 }
@@ -120,8 +133,10 @@ static void row(const char *what, ts_conv c, void (*f)(void *user))
 static void peer_row(const char *what, const char *job, ts_conv c, void (*f)(void *user), double times)
 {
     char label[96], text[128];
-    snprintf(label, sizeof label, "%s n%d %dx%d %d->%d %dx%d%s", what, c.n, c.h, c.w, c.ic, c.oc, c.k, c.k, c.dilation > 1 ? " d2" : "");
-    snprintf(text, sizeof text, "%s %d %d %d %d %d %d %d %s", job, c.n, c.h, c.w, c.ic, c.oc, c.k, c.dilation, c.pad == TS_PAD_ZERO ? "zero" : "replicate");
+    snprintf(label, sizeof label, "%s n%d %dx%d %d->%d %dx%d%s", what, c.n, c.h, c.w, c.ic, c.oc, c.k, c.k,
+             c.dilation > 1 ? " d2" : "");
+    snprintf(text, sizeof text, "%s %d %d %d %d %d %d %d %s", job, c.n, c.h, c.w, c.ic, c.oc, c.k, c.dilation,
+             c.pad == TS_PAD_ZERO ? "zero" : "replicate");
     work w = make(c);
     const double flop = times * 2.0 * c.n * c.h * c.w * c.ic * c.oc * c.k * c.k;
     const bench_time t = bench_measure(f, &w);
@@ -137,24 +152,29 @@ static void both_gradients(void *user)
 }
 
 static const ts_conv published[] = {
-    {1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0},        {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 10}, {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0},
-    {1, 256, 256, 256, 192, 1, 1, TS_PAD_REPLICATE, 0}, {1, 256, 256, 64, 192, 1, 1, TS_PAD_REPLICATE, 0}, {1, 256, 256, 64, 10, 3, 1, TS_PAD_REPLICATE, 0},
-    {1, 64, 64, 512, 512, 5, 1, TS_PAD_ZERO, 0},        {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO, 0},         {1, 4, 4, 512, 512, 5, 1, TS_PAD_ZERO, 0},
+    {1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0},       {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 10},
+    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0}, {1, 256, 256, 256, 192, 1, 1, TS_PAD_REPLICATE, 0},
+    {1, 256, 256, 64, 192, 1, 1, TS_PAD_REPLICATE, 0}, {1, 256, 256, 64, 10, 3, 1, TS_PAD_REPLICATE, 0},
+    {1, 64, 64, 512, 512, 5, 1, TS_PAD_ZERO, 0},       {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO, 0},
+    {1, 4, 4, 512, 512, 5, 1, TS_PAD_ZERO, 0},
 };
 
 /* h of the shipped model's coarse steps. */
 static const ts_conv refiner[] = {
-    {8, 64, 64, 18, 128, 5, 1, TS_PAD_REPLICATE, 9}, {8, 64, 64, 128, 192, 1, 1, TS_PAD_REPLICATE, 0}, {8, 64, 64, 64, 192, 1, 1, TS_PAD_REPLICATE, 0},
-    {8, 64, 64, 64, 128, 3, 2, TS_PAD_REPLICATE, 0}, {8, 64, 64, 64, 9, 3, 1, TS_PAD_REPLICATE, 0},
+    {8, 64, 64, 18, 128, 5, 1, TS_PAD_REPLICATE, 9}, {8, 64, 64, 128, 192, 1, 1, TS_PAD_REPLICATE, 0},
+    {8, 64, 64, 64, 192, 1, 1, TS_PAD_REPLICATE, 0}, {8, 64, 64, 64, 128, 3, 2, TS_PAD_REPLICATE, 0},
+    {8, 64, 64, 64, 9, 3, 1, TS_PAD_REPLICATE, 0},
 };
 
 /* Its g, some layers of each size; and larger kernels. */
 static const ts_conv unet[] = {
-    {8, 64, 64, 3, 24, 3, 1, TS_PAD_ZERO, 0},   {8, 32, 32, 24, 48, 3, 1, TS_PAD_ZERO, 0},  {8, 16, 16, 96, 96, 3, 1, TS_PAD_ZERO, 0},
-    {8, 8, 8, 192, 192, 3, 1, TS_PAD_ZERO, 0},  {8, 4, 4, 192, 192, 3, 1, TS_PAD_ZERO, 0},  {8, 2, 2, 192, 192, 3, 1, TS_PAD_ZERO, 0},
-    {8, 8, 8, 384, 192, 3, 1, TS_PAD_ZERO, 0},  {8, 16, 16, 192, 96, 3, 1, TS_PAD_ZERO, 0}, {8, 32, 32, 96, 48, 3, 1, TS_PAD_ZERO, 0},
-    {8, 64, 64, 48, 24, 3, 1, TS_PAD_ZERO, 0},  {8, 64, 64, 24, 24, 3, 1, TS_PAD_ZERO, 0},  {8, 64, 64, 24, 9, 3, 1, TS_PAD_ZERO, 0},
-    {8, 8, 8, 64, 128, 5, 1, TS_PAD_ZERO, 0},   {8, 16, 16, 128, 64, 5, 1, TS_PAD_ZERO, 0},
+    {8, 64, 64, 3, 24, 3, 1, TS_PAD_ZERO, 0},  {8, 32, 32, 24, 48, 3, 1, TS_PAD_ZERO, 0},
+    {8, 16, 16, 96, 96, 3, 1, TS_PAD_ZERO, 0}, {8, 8, 8, 192, 192, 3, 1, TS_PAD_ZERO, 0},
+    {8, 4, 4, 192, 192, 3, 1, TS_PAD_ZERO, 0}, {8, 2, 2, 192, 192, 3, 1, TS_PAD_ZERO, 0},
+    {8, 8, 8, 384, 192, 3, 1, TS_PAD_ZERO, 0}, {8, 16, 16, 192, 96, 3, 1, TS_PAD_ZERO, 0},
+    {8, 32, 32, 96, 48, 3, 1, TS_PAD_ZERO, 0}, {8, 64, 64, 48, 24, 3, 1, TS_PAD_ZERO, 0},
+    {8, 64, 64, 24, 24, 3, 1, TS_PAD_ZERO, 0}, {8, 64, 64, 24, 9, 3, 1, TS_PAD_ZERO, 0},
+    {8, 8, 8, 64, 128, 5, 1, TS_PAD_ZERO, 0},  {8, 16, 16, 128, 64, 5, 1, TS_PAD_ZERO, 0},
 };
 
 static void all(const ts_conv *shape, size_t count)
@@ -178,15 +198,20 @@ BENCH(conv_refiner)
 
 BENCH(conv_unet)
 {
-    bench_heading("Convolutions of g in training (small images: zero padding is skipped, so more than the peak is possible)");
+    bench_heading(
+        "Convolutions of g in training (small images: zero padding is skipped, so more than the peak is possible)");
     all(unet, sizeof unet / sizeof *unet);
 }
 
 BENCH(conv_winograd)
 {
-    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0}, {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0},
-                                    {1, 256, 256, 32, 64, 3, 2, TS_PAD_REPLICATE, 0}, {1, 28, 28, 64, 64, 3, 1, TS_PAD_ZERO, 0}};
-    static const ts_conv trained[] = {{8, 64, 64, 48, 24, 3, 1, TS_PAD_ZERO, 0}, {8, 32, 32, 96, 48, 3, 1, TS_PAD_ZERO, 0}, {8, 64, 64, 64, 128, 3, 2, TS_PAD_REPLICATE, 0}};
+    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0},
+                                    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0},
+                                    {1, 256, 256, 32, 64, 3, 2, TS_PAD_REPLICATE, 0},
+                                    {1, 28, 28, 64, 64, 3, 1, TS_PAD_ZERO, 0}};
+    static const ts_conv trained[] = {{8, 64, 64, 48, 24, 3, 1, TS_PAD_ZERO, 0},
+                                      {8, 32, 32, 96, 48, 3, 1, TS_PAD_ZERO, 0},
+                                      {8, 64, 64, 64, 128, 3, 2, TS_PAD_REPLICATE, 0}};
     bench_heading("Winograd's F(4 x 4, 3 x 3), counting the direct way's multiplications, each below the direct way");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
         row("forward", shape[i], forward);
@@ -203,7 +228,8 @@ BENCH(conv_winograd)
     }
 }
 
-/* Where it is not emulated, % of the peak is that of the matrix unit or of vdpbf16ps: LGD_ISA=avx512bf16 for the latter where there are both. */
+/* Where it is not emulated, % of the peak is that of the matrix unit or of vdpbf16ps: LGD_ISA=avx512bf16 for the latter
+ * where there are both. */
 BENCH(conv_bf16)
 {
     bench_heading("bf16, inputs rounded on the way, each below f32");
@@ -220,9 +246,10 @@ BENCH(conv_bf16)
 
 BENCH(peer_conv)
 {
-    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0}, {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 0},
-                                    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0}, {1, 256, 256, 256, 192, 1, 1, TS_PAD_ZERO, 0},
-                                    {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO, 0}, {4, 80, 80, 18, 64, 5, 1, TS_PAD_REPLICATE, 0}};
+    static const ts_conv shape[] = {
+        {1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0},       {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 0},
+        {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0}, {1, 256, 256, 256, 192, 1, 1, TS_PAD_ZERO, 0},
+        {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO, 0},         {4, 80, 80, 18, 64, 5, 1, TS_PAD_REPLICATE, 0}};
     bench_heading("single convolutions beside their floor (the peak) and the peer");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
         peer_row("forward", "conv", shape[i], forward, 1);
@@ -233,7 +260,8 @@ BENCH(peer_conv)
 
 BENCH(two_threads)
 {
-    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0}, {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 0},
+    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0},
+                                    {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 0},
                                     {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0}};
     static void (*const f[])(void *user) = {forward, data_gradient, weight_gradient, winograd};
     static const char *const what[] = {"forward", "data gradient", "weight gradient", "Winograd forward"};
@@ -248,8 +276,8 @@ BENCH(two_threads)
             ts_threads_set(all);
             const bench_time t = bench_measure(f[k], &w);
             char label[96];
-            snprintf(label, sizeof label, "%s %d->%d %dx%d: %.2f x (peak %.2f x)", what[k], shape[i].ic, shape[i].oc, shape[i].k, shape[i].k, one.seconds / t.seconds,
-                     t.peak / one.peak);
+            snprintf(label, sizeof label, "%s %d->%d %dx%d: %.2f x (peak %.2f x)", what[k], shape[i].ic, shape[i].oc,
+                     shape[i].k, shape[i].k, one.seconds / t.seconds, t.peak / one.peak);
             bench_row_unit(label, t, all, "threads");
             discard(&w);
         }

@@ -1,7 +1,8 @@
-/* What feeds the training: materials, their noise beside its naive twin, the camera. On one thread, as a loader's thread and one photograph are. */
+/* What feeds the training: materials, their noise beside its naive twin, the camera. On one thread, as a loader's
+ * thread and one photograph are. */
 #include "bench/bench.h"
 #include "data/camera.h"
-#include "data/procedural.h"
+#include "data/materials/procedural.h"
 #include "tensor/kernels/noise.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -38,7 +39,8 @@ static void octave(void *user)
 static void cell(void *user)
 {
     subject *s = user;
-    s->noise->cell(PIXELS, s->maps, s->maps + PIXELS, (ts_noise_cells){8, 1, 0, 3}, s->image, s->image + PIXELS, NULL, NULL, NULL);
+    s->noise->cell(PIXELS, s->maps, s->maps + PIXELS, (ts_noise_cells){8, 1, 0, 3}, s->image, s->image + PIXELS, NULL,
+                   NULL, NULL);
 }
 
 static void photograph(void *user)
@@ -50,7 +52,9 @@ static void photograph(void *user)
 
 BENCH(data)
 {
-    subject s = {.procedural = {.seed = 1}, .maps = malloc(PIXELS * MAP_CHANNELS * sizeof(float)), .image = calloc(PIXELS * 3, sizeof(float))};
+    subject s = {.procedural = {.seed = 1},
+                 .maps = malloc(PIXELS * MAP_CHANNELS * sizeof(float)),
+                 .image = calloc(PIXELS * 3, sizeof(float))};
     bench_heading("Materials and photographs, one thread");
     for (s.size = 64; s.maps && s.image && s.size <= SIDE; s.size *= 2) {
         char label[64];
@@ -63,11 +67,18 @@ BENCH(data)
         for (int k = 0; k < 2 * PIXELS; k++) s.maps[k] = (float)(k < PIXELS ? k % SIDE : (k - PIXELS) / SIDE) / SIDE;
         s.noise = i ? &ts_noise_naive : ts_noise_k();
         bench_time t = bench_measure(octave, &s);
-        bench_row_unit(i ? "an octave of noise 256^2, naive twin" : "an octave of noise 256^2", t, PIXELS / t.seconds * 1e-6, "Mpixel/s");
+        bench_row_unit(i ? "an octave of noise 256^2, naive twin" : "an octave of noise 256^2", t,
+                       PIXELS / t.seconds * 1e-6, "Mpixel/s");
         t = bench_measure(cell, &s);
         bench_row_unit(i ? "cells 256^2, naive twin" : "cells 256^2", t, PIXELS / t.seconds * 1e-6, "Mpixel/s");
     }
-    s.camera = (io_camera){.noise = 0.3f, .noise_spread = 1, .blur = 0.7f, .quantise = true, .exposure = 0.1f, .vignette = 0.1f, .jpeg = 75};
+    s.camera = (io_camera){.noise = 0.3f,
+                           .noise_spread = 1,
+                           .blur = 0.7f,
+                           .quantise = true,
+                           .exposure = 0.1f,
+                           .vignette = 0.1f,
+                           .jpeg = 75};
     s.size = SIDE;
     if (s.maps && s.image) {
         for (int k = 0; k < 3 * PIXELS; k++) s.maps[k] = (float)(k % 255) / 200;

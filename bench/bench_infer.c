@@ -1,10 +1,11 @@
-/* The whole inference of one photograph at 256 x 256 with the default architecture. FLOP are those of the convolutions: the
- * rest (norms, resampling, the renderer's gradient) is what keeps the fraction of the peak below a convolution's. */
+/* The whole inference of one photograph at 256 x 256 with the default architecture. FLOP are those of the convolutions:
+ * the rest (norms, resampling, the renderer's gradient) is what keeps the fraction of the peak below a convolution's.
+ */
 #include "bench/bench.h"
 #include "bench/shape.h"
-#include "nn/file.h"
+#include "nn/weights/file.h"
 #include "nn/model.h"
-#include "nn/weights.h"
+#include "nn/weights/weights.h"
 #include "render/render.h"
 #include <math.h>
 #include <stdio.h>
@@ -44,7 +45,9 @@ static void gradient(void *user)
     subject *s = user;
     const ts_mark mark = ag_scope_begin(s->tape);
     float *to = ts_arena_alloc(ag_arena(s->tape), (size_t)SIDE * SIDE * (size_t)s->maps->t.shape.c * sizeof *to);
-    if (to) rd_flash_gradient(s->in.grid, s->maps->t.data, s->maps->t.shape.c, &s->in.view, s->in.image.data, 0.1, to, NULL);
+    if (to)
+        rd_flash_gradient(s->in.grid, s->maps->t.data, s->maps->t.shape.c, &s->in.view, s->in.image.data, 0.1, to,
+                          NULL);
     ag_scope_end(s->tape, mark, NULL, 0);
 }
 
@@ -64,13 +67,16 @@ static void measure(nn_arch arch, const char *heading)
     ag_freeze(s.tape, true);
     static float image[SIDE * SIDE * 3];
     for (int i = 0; i < SIDE * SIDE * 3; i++) image[i] = (float)(i % 97) / 97;
-    s.in = (nn_input){.image = ts_view(image, (ts_shape){1, SIDE, SIDE, 3}), .grid = rd_grid_full(SIDE), .view = rd_flash()};
+    s.in = (nn_input){
+        .image = ts_view(image, (ts_shape){1, SIDE, SIDE, 3}), .grid = rd_grid_full(SIDE), .view = rd_flash()};
     s.maps = nn_predict(s.tape, s.model, &s.in);
     s.maps = nn_refine(s.tape, s.model, &s.in, s.maps, &s.state);
 
     const double g = bench_network_flop(s.model, "g.", SIDE), h = bench_network_flop(s.model, "h.", SIDE);
-    const double unused = bench_network_flop(s.model, "h.gru1.hh", SIDE) + bench_network_flop(s.model, "h.gru2.hh", SIDE); /* without states */
-    const double step_flop = arch.recurrent ? h : h - unused, coarse = arch.coarse_steps * bench_network_flop(s.model, "coarse.", SIDE);
+    const double unused = bench_network_flop(s.model, "h.gru1.hh", SIDE) +
+        bench_network_flop(s.model, "h.gru2.hh", SIDE); /* without states */
+    const double step_flop = arch.recurrent ? h : h - unused,
+                 coarse = arch.coarse_steps * bench_network_flop(s.model, "coarse.", SIDE);
     snprintf(label, sizeof label, "g at %d x %d and its maps resampled", arch.g_size, arch.g_size);
     bench_row(label, bench_measure(whole, &s), g);
     if (arch.coarse_steps > 0) {
@@ -78,7 +84,8 @@ static void measure(nn_arch arch, const char *heading)
         snprintf(label, sizeof label, "g and %d coarse steps", s.steps);
         bench_row(label, bench_measure(whole, &s), g + coarse);
     }
-    bench_row(arch.h_width ? "one step of h with its gradient" : "one step at the photograph's size", bench_measure(step, &s), step_flop);
+    bench_row(arch.h_width ? "one step of h with its gradient" : "one step at the photograph's size",
+              bench_measure(step, &s), step_flop);
     bench_time t = bench_measure(gradient, &s);
     bench_row_unit("  of which the renderer's gradient", t, SIDE * SIDE / t.seconds * 1e-6, "Mpixel/s");
     s.steps = arch.iterations;
@@ -124,8 +131,10 @@ BENCH(infer_shipped)
 BENCH(infer_paper)
 {
     nn_arch a = nn_arch_default();
-    a.channels = 10, a.g_width = 64, a.g_width_max = 512, a.g_levels = 7, a.g_kernel_first = 3, a.g_kernel = 5, a.g_size = SIDE;
-    a.h_width = 256, a.h_gru = 64, a.iterations = 6, a.recurrent = false, a.descent = NN_DESCENT_NONE, a.mean_before_norm = false;
+    a.channels = 10, a.g_width = 64, a.g_width_max = 512, a.g_levels = 7, a.g_kernel_first = 3, a.g_kernel = 5,
+    a.g_size = SIDE;
+    a.h_width = 256, a.h_gru = 64, a.iterations = 6, a.recurrent = false, a.descent = NN_DESCENT_NONE,
+    a.mean_before_norm = false;
     a.rmse = NN_RMSE_BATCH, a.encoding = NN_GRADIENT_RAW;
     measure(a, "inference, 256 x 256, the published networks");
 }

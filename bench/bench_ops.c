@@ -1,5 +1,6 @@
-/* The ops between the convolutions at training shapes, forward and backward, as memory traffic: the bytes that an op cannot avoid
- * (inputs and output once; backward the output's gradient, what it needs of the values, and the inputs' gradients) over its time. */
+/* The ops between the convolutions at training shapes, forward and backward, as memory traffic: the bytes that an op
+ * cannot avoid (inputs and output once; backward the output's gradient, what it needs of the values, and the inputs'
+ * gradients) over its time. */
 #include "autograd/op.h"
 #include "bench/bench.h"
 #include "ops.h"
@@ -84,8 +85,9 @@ static void adam(void *user)
 {
     block *b = user;
     const struct ts_adam_kernels *k = ts_adam_k();
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int i = 0; i < PARAMETERS; i += PART) k->step(PART, b->p + i, b->g + i, b->m + i, b->v + i, 0.9f, 0.999f, 1e-3f, 1e-8f, 1.0f);
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int i = 0; i < PARAMETERS; i += PART)
+        k->step(PART, b->p + i, b->g + i, b->m + i, b->v + i, 0.9f, 0.999f, 1e-3f, 1e-8f, 1.0f);
 }
 
 static void norm(void *user)
@@ -97,7 +99,7 @@ static void norm(void *user)
 static void copy(void *user)
 {
     block *b = user;
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
     for (int i = 0; i < PARAMETERS; i += PART) memcpy(b->m + i, b->g + i, PART * sizeof(float));
 }
 
@@ -105,12 +107,14 @@ BENCH(ops)
 {
     ag_tape *tape = ag_tape_create(true, NULL);
     ts_rng r = ts_rng_make(1, TS_STREAM_TEST, 0);
-    block b = {calloc(PARAMETERS, sizeof(float)), calloc(PARAMETERS, sizeof(float)), calloc(PARAMETERS, sizeof(float)), calloc(PARAMETERS, sizeof(float)), 0};
+    block b = {calloc(PARAMETERS, sizeof(float)), calloc(PARAMETERS, sizeof(float)), calloc(PARAMETERS, sizeof(float)),
+               calloc(PARAMETERS, sizeof(float)), 0};
     if (!tape || !b.p || !b.g || !b.m || !b.v) abort();
     bench_heading("ops at [8,64,64,64]");
     bench_time t = bench_measure(copy, &b);
     bench_row_unit("memcpy, 16 MiB", t, 8e-9 * PARAMETERS / t.seconds, "GB/s");
-    ag_value *x = random_value(tape, &r, image), *y = random_value(tape, &r, image), *g = random_value(tape, &r, (ts_shape){N, 1, 1, C});
+    ag_value *x = random_value(tape, &r, image), *y = random_value(tape, &r, image),
+             *g = random_value(tape, &r, (ts_shape){N, 1, 1, C});
     const double n = (double)ts_count(image);
     rows(tape, ag_leaky(tape, x, 0.2f), n);
     rows(tape, ag_tanh(tape, x), n);
@@ -125,9 +129,13 @@ BENCH(ops)
     rows(tape, ag_upsample(tape, x), 0);
     rows(tape, ag_resize(tape, x, 2 * SIDE, 2 * SIDE), 0);
     ag_value *one = random_value(tape, &r, (ts_shape){1, 1, 1, 96});
-    rows(tape, ag_gru(tape, x, random_value(tape, &r, (ts_shape){N, SIDE, SIDE, 32}), random_value(tape, &r, (ts_shape){96, C, 1, 1}), one,
-                      random_value(tape, &r, (ts_shape){96, 32, 1, 1}), one), 7 * n / 2);
-    ag_value *weight = random_value(tape, &r, (ts_shape){1, 1, 256, 512}), *bias = random_value(tape, &r, (ts_shape){1, 1, 1, 256});
+    rows(tape,
+         ag_gru(tape, x, random_value(tape, &r, (ts_shape){N, SIDE, SIDE, 32}),
+                random_value(tape, &r, (ts_shape){96, C, 1, 1}), one, random_value(tape, &r, (ts_shape){96, 32, 1, 1}),
+                one),
+         7 * n / 2);
+    ag_value *weight = random_value(tape, &r, (ts_shape){1, 1, 256, 512}),
+             *bias = random_value(tape, &r, (ts_shape){1, 1, 1, 256});
     rows(tape, ag_linear(tape, random_value(tape, &r, (ts_shape){N, 1, 1, 512}), weight, bias), 256 * 512);
     t = bench_measure(adam, &b);
     bench_row_unit("Adam, 4 M parameters", t, 28e-9 * PARAMETERS / t.seconds, "GB/s");

@@ -1,7 +1,7 @@
-/* lgd-infer as a process, from the command to maps on disk: one photograph and a folder of them. Wall time of processes in turn; the computing alone is the
- * library's call in this process, when everything is warm. */
+/* lgd-infer as a process, from the command to maps on disk: one photograph and a folder of them. Wall time of processes
+ * in turn; the computing alone is the library's call in this process, when everything is warm. */
 #include "bench/bench.h"
-#include "data/image.h"
+#include "data/image/image.h"
 #include "infer/lgd.h"
 #include "infer/model_path.h"
 #include "tensor/rng.h"
@@ -29,7 +29,9 @@ static int run(const char *const *argv)
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
     posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-    if (posix_spawnp(&child, argv[0], &actions, NULL, (char *const *)(uintptr_t)argv, environ) || waitpid(child, &status, 0) != child) status = -1;
+    if (posix_spawnp(&child, argv[0], &actions, NULL, (char *const *)(uintptr_t)argv, environ) ||
+        waitpid(child, &status, 0) != child)
+        status = -1;
     posix_spawn_file_actions_destroy(&actions);
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
@@ -64,10 +66,14 @@ static bool make_large(const char *path)
     ts_status st = {0};
     int width, height;
     ts_rng rng = ts_rng_make(1, TS_STREAM_TEST, 0);
-    bool fine = !io_read_square(photograph, 1 << 24, TALL, &square, &width, &height, &st) && !io_image_create(&large, WIDE, TALL, 3, &st);
+    bool fine = !io_read_square(photograph, 1 << 24, TALL, &square, &width, &height, &st) &&
+        !io_image_create(&large, WIDE, TALL, 3, &st);
     for (int y = 0; y < TALL && fine; y++)
         for (int x = 0; x < WIDE; x++)
-            for (int c = 0; c < 3; c++) large.data[((size_t)y * WIDE + (size_t)x) * 3 + (size_t)c] = square.data[((size_t)y * TALL + (size_t)(x % TALL)) * 3 + (size_t)c] * ts_rng_range(&rng, 0.97f, 1.03f);
+            for (int c = 0; c < 3; c++)
+                large.data[((size_t)y * WIDE + (size_t)x) * 3 + (size_t)c] =
+                    square.data[((size_t)y * TALL + (size_t)(x % TALL)) * 3 + (size_t)c] *
+                    ts_rng_range(&rng, 0.97f, 1.03f);
     fine = fine && !io_write_jpeg(path, &large, 85, &st);
     if (!fine) printf("  no large photograph: %s\n", st.message);
     io_image_free(&square), io_image_free(&large);
@@ -128,16 +134,24 @@ static double computing(void)
 
 BENCH(process)
 {
-    static command all[] = {{.label = "--help", .word = {"--help"}},
-                            {.label = "a wrong option", .word = {"--nonsense"}, .status = 2},
-                            {.label = "one photograph, -i 0 --maps diffuse", .word = {"-i", "0", "--maps", "diffuse"}, .photographs = 1},
-                            {.label = "one photograph, four maps", .word = {"--maps", "diffuse,specular,roughness,normal"}, .photographs = 1},
-                            {.label = "one photograph, every file", .photographs = 1},
-                            {.label = "one photograph, every file, --precision bf16", .word = {"--precision", "bf16"}, .photographs = 1},
-                            {.label = "one photograph of 4032 x 3024 pixels, four maps", .word = {"--maps", "diffuse,specular,roughness,normal"}, .photographs = 1, .large = true},
-                            {.label = "26 photographs, four maps", .word = {"--maps", "diffuse,specular,roughness,normal"}, .photographs = FOLDER},
-                            {.label = "26 photographs, every file", .photographs = FOLDER},
-                            {.label = "26 photographs, every file, --threads 1", .word = {"--threads", "1"}, .photographs = FOLDER}};
+    static command all[] = {
+        {.label = "--help", .word = {"--help"}},
+        {.label = "a wrong option", .word = {"--nonsense"}, .status = 2},
+        {.label = "one photograph, -i 0 --maps diffuse", .word = {"-i", "0", "--maps", "diffuse"}, .photographs = 1},
+        {.label = "one photograph, four maps",
+         .word = {"--maps", "diffuse,specular,roughness,normal"},
+         .photographs = 1},
+        {.label = "one photograph, every file", .photographs = 1},
+        {.label = "one photograph, every file, --precision bf16", .word = {"--precision", "bf16"}, .photographs = 1},
+        {.label = "one photograph of 4032 x 3024 pixels, four maps",
+         .word = {"--maps", "diffuse,specular,roughness,normal"},
+         .photographs = 1,
+         .large = true},
+        {.label = "26 photographs, four maps",
+         .word = {"--maps", "diffuse,specular,roughness,normal"},
+         .photographs = FOLDER},
+        {.label = "26 photographs, every file", .photographs = FOLDER},
+        {.label = "26 photographs, every file, --threads 1", .word = {"--threads", "1"}, .photographs = FOLDER}};
     enum { COMMANDS = sizeof all / sizeof *all, ONE_FOUR_MAPS = 3 };
     static char link[FOLDER][NAME];
     char folder[NAME / 2], own[PATH_MAX] = "", program[PATH_MAX + 16], out[NAME], large[NAME], source[PATH_MAX];
@@ -159,7 +173,8 @@ BENCH(process)
     fine = fine && make_large(large);
     const double warm = computing();
     for (int round = -1; round < ROUNDS && fine; round++) /* the first warms up */
-        for (int i = 0; i < COMMANDS && fine; i++) fine = round_of(&all[i], round < 0 ? 0 : round, program, out, link, large);
+        for (int i = 0; i < COMMANDS && fine; i++)
+            fine = round_of(&all[i], round < 0 ? 0 : round, program, out, link, large);
     for (int i = 0; i < COMMANDS && fine; i++) {
         qsort(all[i].time, ROUNDS, sizeof *all[i].time, ascending);
         const bench_time t = {.seconds = all[i].time[ROUNDS / 2]};

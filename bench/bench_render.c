@@ -53,22 +53,28 @@ static void loss(void *user)
     job *j = user;
     ts_shape shape = {N, S, S, MAP_CHANNELS};
     ag_reset(j->tape);
-    ag_value *maps = ag_parameter(j->tape, ts_view(j->maps, shape), j->gradient), *target = ag_constant(j->tape, ts_view(j->target, shape));
+    ag_value *maps = ag_parameter(j->tape, ts_view(j->maps, shape), j->gradient),
+             *target = ag_constant(j->tape, ts_view(j->target, shape));
     ag_backward(j->tape, ag_render_loss(j->tape, maps, target, j->views, RD_LOSS_VIEWS));
 }
 
-/* What has no gradient or no light is skipped, vector by vector: the same calls on such scenes. The rows are in the second cache, or memory would set the time. */
+/* What has no gradient or no light is skipped, vector by vector: the same calls on such scenes. The rows are in the
+ * second cache, or memory would set the time. */
 static void skipped(job *j)
 {
-    static const char *const name[3][2] = {{"flash loss and gradient", "  white and overexposed"}, {"Newton step", "  white and overexposed"}, {"value, light and camera apart", "  the light below the horizon"}};
+    static const char *const name[3][2] = {{"flash loss and gradient", "  white and overexposed"},
+                                           {"Newton step", "  white and overexposed"},
+                                           {"value, light and camera apart", "  the light below the horizon"}};
     const size_t pixels = (size_t)PART * PART;
-    const rd_view side = {.kind = RD_POINT, .camera = {0, 0.5f, 1}, .light = {0.5f, 0, 1}, .power = 5}, below = {.kind = RD_POINT, .camera = {0, 0.5f, 1}, .light = {0.5f, 0, -1}, .power = 5};
+    const rd_view side = {.kind = RD_POINT, .camera = {0, 0.5f, 1}, .light = {0.5f, 0, 1}, .power = 5},
+                  below = {.kind = RD_POINT, .camera = {0, 0.5f, 1}, .light = {0.5f, 0, -1}, .power = 5};
     void (*const call[3])(void *) = {gradient, newton, under};
     bench_heading("what a vector of pixels does not need (128 x 128)");
     j->side = PART;
     j->photographs = 1;
     for (int scene = 0; scene < 2; scene++) {
-        for (size_t i = 0; i < pixels * MAP_CHANNELS && scene; i++) j->maps[i] = i % MAP_CHANNELS < MAP_DIFFUSE + 3 ? 1 : i % MAP_CHANNELS >= MAP_SPECULAR ? -0.9f : 0;
+        for (size_t i = 0; i < pixels * MAP_CHANNELS && scene; i++)
+            j->maps[i] = i % MAP_CHANNELS < MAP_DIFFUSE + 3 ? 1 : i % MAP_CHANNELS >= MAP_SPECULAR ? -0.9f : 0;
         for (size_t i = 0; i < pixels * 3 && scene; i++) j->image[i] = 1;
         j->below = scene ? &below : &side;
         for (int k = 0; k < 3; k++) {
@@ -109,7 +115,8 @@ BENCH(render)
     skipped(&j);
     t = bench_measure(loss, &j);
     /* prediction and target are both rendered, and counted once */
-    bench_row_unit("render_loss with gradient, 8 x 64^2, 9 views", t, (double)N * S * S * RD_LOSS_VIEWS / t.seconds * 1e-6, "Mpixel/s");
+    bench_row_unit("render_loss with gradient, 8 x 64^2, 9 views", t,
+                   (double)N * S * S * RD_LOSS_VIEWS / t.seconds * 1e-6, "Mpixel/s");
     ag_tape_destroy(&j.tape);
     free(j.maps), free(j.target), free(j.gradient), free(j.image);
 }

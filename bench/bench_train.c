@@ -1,8 +1,8 @@
-/* Training steps of the shipped configurations' shapes, what its data and its renderings cost beside it, and its memory with and without
- * train.checkpoint_steps. */
+/* Training steps of the shipped configurations' shapes, what its data and its renderings cost beside it, and its memory
+ * with and without train.checkpoint_steps. */
 #include "bench/bench.h"
 #include "bench/shape.h"
-#include "data/procedural.h"
+#include "data/materials/procedural.h"
 #include "nn/adam.h"
 #include "ops.h"
 #include "nn/model.h"
@@ -28,7 +28,8 @@ typedef struct subject {
 static ag_value *loss_of(subject *s, ag_value *maps)
 {
     ag_value *goal = ag_constant(s->tape, ts_view(s->goal, maps->t.shape));
-    return ag_add(s->tape, ag_render_loss(s->tape, maps, goal, s->views, RD_LOSS_VIEWS), ag_map_loss(s->tape, maps, goal));
+    return ag_add(s->tape, ag_render_loss(s->tape, maps, goal, s->views, RD_LOSS_VIEWS),
+                  ag_map_loss(s->tape, maps, goal));
 }
 
 static void step(void *user)
@@ -56,7 +57,8 @@ static void losses(void *user)
     ag_reset(s->tape);
     const ts_shape shape = {s->c.train.batch, s->in.grid.h, s->in.grid.w, MAP_CHANNELS};
     float *gradient = ts_arena_zalloc(ag_arena(s->tape), (size_t)ts_count(shape), sizeof *gradient);
-    for (int i = 0; i < (s->steps > 0 ? 2 : 1); i++) ag_backward(s->tape, loss_of(s, ag_parameter(s->tape, ts_view(s->window, shape), gradient)));
+    for (int i = 0; i < (s->steps > 0 ? 2 : 1); i++)
+        ag_backward(s->tape, loss_of(s, ag_parameter(s->tape, ts_view(s->window, shape), gradient)));
 }
 
 static void material(void *user)
@@ -91,7 +93,8 @@ static double megabytes(subject *s, int steps, bool recompute)
     return most;
 }
 
-/* Of the gradients of a first convolution: those of its constants are not made, nor any of its input in a first step whose R_0 is fixed. */
+/* Of the gradients of a first convolution: those of its constants are not made, nor any of its input in a first step
+ * whose R_0 is fixed. */
 static double not_made(const subject *s, const char *conv, int steps, bool fixed)
 {
     const int images = s->model->arch.images;
@@ -103,12 +106,16 @@ static void measure(subject *s)
     const int batch = s->c.train.batch, side = s->in.grid.w;
     char label[96];
     const int coarse = s->steps < s->model->arch.coarse_steps ? s->steps : s->model->arch.coarse_steps;
-    const double g = bench_network_flop(s->model, "g.", side), h = bench_network_flop(s->model, "h.", side), c = bench_network_flop(s->model, "coarse.", side);
+    const double g = bench_network_flop(s->model, "g.", side), h = bench_network_flop(s->model, "h.", side),
+                 c = bench_network_flop(s->model, "coarse.", side);
     const bool *fixed = s->model->fixed;
-    const double of_coarse = fixed[NN_COARSE] ? coarse * c : 3 * coarse * c - not_made(s, "coarse.conv1", coarse, fixed[NN_G]);
-    const double of_h = 3 * (s->steps - coarse) * h - not_made(s, "h.conv1", s->steps - coarse, fixed[NN_G] && (coarse == 0 || fixed[NN_COARSE]));
+    const double of_coarse = fixed[NN_COARSE] ? coarse * c
+                                              : 3 * coarse * c - not_made(s, "coarse.conv1", coarse, fixed[NN_G]);
+    const double of_h = 3 * (s->steps - coarse) * h -
+        not_made(s, "h.conv1", s->steps - coarse, fixed[NN_G] && (coarse == 0 || fixed[NN_COARSE]));
     const double flop = batch * ((fixed[NN_G] ? 1 : 3) * g + of_coarse + of_h);
-    snprintf(label, sizeof label, "%d patches of %d^2, window %d, T = %d%s", batch, s->c.data.patch, side, s->steps, fixed[NN_G] ? ", g fixed" : "");
+    snprintf(label, sizeof label, "%d patches of %d^2, window %d, T = %d%s", batch, s->c.data.patch, side, s->steps,
+             fixed[NN_G] ? ", g fixed" : "");
     ts_conv_exact_set(true);
     bench_row("  all convolutions computed directly", bench_measure(step, s), flop);
     ts_conv_exact_set(false);
@@ -126,17 +133,20 @@ static void measure(subject *s)
     bench_row_peer_bf16(rounded, job);
     ts_conv_precision_set(TS_F32);
     bench_time part = bench_measure(losses, s);
-    bench_row_unit(s->steps > 0 ? "  of which both losses, 9 renderings each" : "  of which the loss, 9 renderings", part, 100 * part.seconds / t.seconds, "% of the step");
+    bench_row_unit(s->steps > 0 ? "  of which both losses, 9 renderings each" : "  of which the loss, 9 renderings",
+                   part, 100 * part.seconds / t.seconds, "% of the step");
     part = bench_measure(material, s);
     part.seconds *= batch;
     bench_row_unit("  its materials, one thread beside it", part, 100 * part.seconds / t.seconds, "% of the step");
     const int trained = s->steps;
     if (trained == 0) return;
     const nn_arch *a = &s->model->arch;
-    const double states = (double)batch * side * side * (a->channels + (a->h_width ? 2 * a->h_gru : 0)) * sizeof(float) / (1 << 20);
+    const double states = (double)batch * side * side * (a->channels + (a->h_width ? 2 * a->h_gru : 0)) *
+        sizeof(float) / (1 << 20);
     const double plain = megabytes(s, trained, false), few = megabytes(s, trained, true), many = megabytes(s, 24, true);
-    printf("  memory: %.0f MiB; with train.checkpoint_steps %.0f MiB, and %.0f MiB at T = 24: %.2f MiB a step more, R_t and the states are %.2f MiB\n", plain, few, many,
-           (many - few) / (24 - trained), states);
+    printf("  memory: %.0f MiB; with train.checkpoint_steps %.0f MiB, and %.0f MiB at T = 24: %.2f MiB a step more, "
+           "R_t and the states are %.2f MiB\n",
+           plain, few, many, (many - few) / (24 - trained), states);
 }
 
 static void train(const char *config, const char *heading)
@@ -144,14 +154,15 @@ static void train(const char *config, const char *heading)
     ts_status st = {0};
     subject s = {.c = tr_config_default(), .tape = ag_tape_create(true, &st)};
     bench_heading(heading);
-    if (!s.tape || tr_config_read(&s.c, config, &st) || !(s.model = nn_model_create(&s.c.arch, &st)) || nn_model_train(s.model, &st) ||
-        nn_adam_create(&s.adam, s.model, 0, &st)) {
+    if (!s.tape || tr_config_read(&s.c, config, &st) || !(s.model = nn_model_create(&s.c.arch, &st)) ||
+        nn_model_train(s.model, &st) || nn_adam_create(&s.adam, s.model, 0, &st)) {
         printf("  %s\n", st.message);
         return;
     }
     nn_model_init(s.model, 1);
     const int patch = s.c.data.patch, side = s.c.train.window ? s.c.train.window : patch;
-    const size_t batch = (size_t)s.c.train.batch, pixels = (size_t)patch * (size_t)patch, part = (size_t)side * (size_t)side;
+    const size_t batch = (size_t)s.c.train.batch, pixels = (size_t)patch * (size_t)patch,
+                 part = (size_t)side * (size_t)side;
     ts_rng rng = ts_rng_make(1, TS_STREAM_TEST, 0);
     s.maps = malloc(pixels * MAP_CHANNELS * sizeof(float));
     s.images = malloc(batch * pixels * 3 * sizeof(float));
@@ -162,12 +173,15 @@ static void train(const char *config, const char *heading)
     if (!s.maps || !s.images || !s.window || !s.goal || !s.views || !shown) abort();
     for (size_t i = 0; i < batch * pixels * 3; i++) s.images[i] = ts_rng_uniform(&rng);
     for (size_t i = 0; i < batch * part * 3; i++) shown[i] = ts_rng_uniform(&rng);
-    for (size_t i = 0; i < batch * part * MAP_CHANNELS; i++) s.window[i] = ts_rng_range(&rng, -0.5f, 0.5f), s.goal[i] = ts_rng_range(&rng, -0.5f, 0.5f);
+    for (size_t i = 0; i < batch * part * MAP_CHANNELS; i++)
+        s.window[i] = ts_rng_range(&rng, -0.5f, 0.5f), s.goal[i] = ts_rng_range(&rng, -0.5f, 0.5f);
     for (size_t i = 0; i < batch; i++) rd_loss_views(&rng, s.views + i * RD_LOSS_VIEWS);
     s.model->fixed[NN_G] = s.c.train.steps && s.c.train.g_rate == 0;
     s.model->fixed[NN_COARSE] = s.c.train.coarse_rate == 0;
     s.steps = !s.c.train.steps ? 0 : s.c.train.iterations_max ? s.c.train.iterations_max : s.c.arch.iterations;
-    s.in = (nn_input){.image = ts_view(shown, (ts_shape){(int)batch, side, side, 3}), .grid = {.h = side, .w = side, .side = patch}, .view = rd_flash()};
+    s.in = (nn_input){.image = ts_view(shown, (ts_shape){(int)batch, side, side, 3}),
+                      .grid = {.h = side, .w = side, .side = patch},
+                      .view = rd_flash()};
     if (side < patch) s.in.whole = ts_view(s.images, (ts_shape){(int)batch, patch, patch, 3});
     measure(&s);
     ts_conv_exact_set(true);
@@ -178,6 +192,11 @@ static void train(const char *config, const char *heading)
     free(s.maps), free(s.images), free(s.window), free(s.goal), free(s.views), free(shown);
 }
 
-BENCH(train) { train("configs/single.ini", "a training step of configs/single.ini: g, the coarse steps with their Newton steps (which the peer does not have; its gradient is of the photograph at g's size), losses, all gradients that are asked for, Adam"); }
+BENCH(train)
+{
+    train("configs/single.ini",
+          "a training step of configs/single.ini: g, the coarse steps with their Newton steps (which the peer does not "
+          "have; its gradient is of the photograph at g's size), losses, all gradients that are asked for, Adam");
+}
 BENCH(train_g) { train("configs/single-g.ini", "a training step of configs/single-g.ini: g alone"); }
 BENCH(train_both) { train("configs/ablation/t6.ini", "a training step of configs/ablation/t6.ini: g and h together"); }

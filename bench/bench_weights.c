@@ -1,7 +1,8 @@
-/* Weights of the published network's size, 640 MB in PyTorch's form, from the page cache into memory. The file lies in $TMPDIR or /tmp meanwhile. */
+/* Weights of the published network's size, 640 MB in PyTorch's form, from the page cache into memory. The file lies in
+ * $TMPDIR or /tmp meanwhile. */
 #include "bench/bench.h"
-#include "nn/file.h"
-#include "tensor/block.h"
+#include "nn/weights/file.h"
+#include "tensor/memory.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -35,7 +36,14 @@ BENCH(weights)
     for (int i = 0; s.block && i < TENSORS * SIDE * SIDE; i++) s.block[i] = (float)(i % 1000) * 1e-3f;
     for (int i = 0; i < TENSORS; i++) {
         snprintf(names[i], sizeof names[i], "w%d", i);
-        entry[i] = (nn_entry){names[i], NN_F32, false, 2, {SIDE, SIDE}, {SIDE, 1}, (int64_t)SIDE * SIDE, (const unsigned char *)(s.block + (size_t)i * SIDE * SIDE)};
+        entry[i] = (nn_entry){names[i],
+                              NN_F32,
+                              false,
+                              2,
+                              {SIDE, SIDE},
+                              {SIDE, 1},
+                              (int64_t)SIDE * SIDE,
+                              (const unsigned char *)(s.block + (size_t)i * SIDE * SIDE)};
     }
     static const nn_dtype type[] = {NN_F32, NN_F16, NN_BF16};
     for (int k = 0; s.block && k < 3; k++) {
@@ -44,7 +52,8 @@ BENCH(weights)
         if (nn_file_write(s.path, NN_FORM_TORCH_ZIP, entry, TENSORS, type[k], NULL, 0, &s.st) == TS_OK) {
             const bench_time t = bench_measure(load, &s);
             snprintf(label, sizeof label, "open a .pth of %s and read it as floats", nn_dtype_name(type[k]));
-            if (!s.st.code) bench_row_unit(label, t, 1e-9 * TENSORS * SIDE * SIDE * nn_dtype_size(type[k]) / t.seconds, "GB/s");
+            if (!s.st.code)
+                bench_row_unit(label, t, 1e-9 * TENSORS * SIDE * SIDE * nn_dtype_size(type[k]) / t.seconds, "GB/s");
         }
         if (s.st.code) printf("  %s\n", s.st.message);
         unlink(s.path);

@@ -48,7 +48,8 @@ static bool start_with(const char *interpreter)
     if (child == 0) {
         dup2(there[0], 0), dup2(back[1], 1);
         close(there[0]), close(there[1]), close(back[0]), close(back[1]);
-        execl(interpreter, interpreter /* by which Python finds its environment */, "bench/peer_torch.py", (char *)NULL);
+        execl(interpreter, interpreter /* by which Python finds its environment */, "bench/peer_torch.py",
+              (char *)NULL);
         _exit(127);
     }
     close(there[0]), close(back[1]);

@@ -20,7 +20,7 @@ double bench_network_flop(const nn_model *m, const char *prefix, int side)
 
 void bench_peer_network(const char *work, const nn_arch *a, int steps, char *job, size_t size)
 {
-    snprintf(job, size, "%s %d %d %d %d %d %d %d %d %d %d %d %d %d %d %d", work, a->g_width, a->g_width_max, a->g_levels, a->g_kernel_first, a->g_kernel, a->g_size,
-             a->h_width, a->h_gru, a->channels, a->recurrent, steps, steps < a->coarse_steps ? steps : a->coarse_steps,
-             a->coarse_size, a->coarse_width, a->coarse_gru);
+    snprintf(job, size, "%s %d %d %d %d %d %d %d %d %d %d %d %d %d %d %d", work, a->g_width, a->g_width_max,
+             a->g_levels, a->g_kernel_first, a->g_kernel, a->g_size, a->h_width, a->h_gru, a->channels, a->recurrent,
+             steps, steps < a->coarse_steps ? steps : a->coarse_steps, a->coarse_size, a->coarse_width, a->coarse_gru);
 }

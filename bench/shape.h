@@ -3,7 +3,8 @@
 #define BENCH_SHAPE_H
 #include "nn/model.h"
 
-/* Multiplications and additions of the convolutions whose name starts with prefix: g at its own size, h at side x side. */
+/* Multiplications and additions of the convolutions whose name starts with prefix: g at its own size, h at side x side.
+ */
 double bench_network_flop(const nn_model *m, const char *prefix, int side);
 
 /* "WORK g_width ... T" for bench/peer_torch.py. */

@@ -120,7 +120,8 @@ void cl_progress_show(cl_progress *p, int64_t done, const char *extra)
     const double elapsed = now - p->start, rate = elapsed > 0 ? (double)done / elapsed : 0;
     char eta[32] = "-";
     if (rate > 0) print_duration(eta, sizeof eta, (double)(p->total - done) / rate);
-    fprintf(stderr, "\r\033[K%s %lld/%lld  %.2f/s  ETA %s  %s", p->what, (long long)done, (long long)p->total, rate, eta, extra ? extra : "");
+    fprintf(stderr, "\r\033[K%s %lld/%lld  %.2f/s  ETA %s  %s", p->what, (long long)done, (long long)p->total, rate,
+            eta, extra ? extra : "");
 }
 
 void cl_progress_end(cl_progress *p)
@@ -159,7 +160,8 @@ ts_code cl_make_folder(const char *path, ts_status *st)
         if (path[i] != '/' && path[i] != 0) continue;
         memcpy(part, path, i);
         part[i] = 0;
-        if (mkdir(part, 0777) != 0 && errno != EEXIST) return ts_fail(st, TS_IO, "%s: cannot create the folder: %s", part, strerror(errno));
+        if (mkdir(part, 0777) != 0 && errno != EEXIST)
+            return ts_fail(st, TS_IO, "%s: cannot create the folder: %s", part, strerror(errno));
     }
     struct stat info;
     if (stat(path, &info) != 0 || !S_ISDIR(info.st_mode)) return ts_fail(st, TS_IO, "%s: is not a folder", path);

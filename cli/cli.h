@@ -1,4 +1,5 @@
-/* What the five programs share: exit codes, messages, progress, Ctrl-C. The only code besides the main.c files that prints. */
+/* What the five programs share: exit codes, messages, progress, Ctrl-C. The only code besides the main.c files that
+ * prints. */
 #ifndef CL_CLI_H
 #define CL_CLI_H
 #include "tensor/status.h"
@@ -8,10 +9,12 @@
 
 enum { CL_OK = 0, CL_FAILED = 1, CL_USAGE = 2 };
 
-/* Locale "C" for numbers, SIGPIPE as an error of write, LGD_ISA checked. Returns CL_OK or prints one line and returns CL_USAGE. */
+/* Locale "C" for numbers, SIGPIPE as an error of write, LGD_ISA checked. Returns CL_OK or prints one line and returns
+ * CL_USAGE. */
 int cl_init(const char *program);
 
-/* "program: message" on stderr. cl_usage adds "try 'program --help'" and returns CL_USAGE; cl_failed returns CL_FAILED. */
+/* "program: message" on stderr. cl_usage adds "try 'program --help'" and returns CL_USAGE; cl_failed returns CL_FAILED.
+ */
 int cl_usage(const char *format, ...) __attribute__((format(printf, 1, 2)));
 int cl_failed(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void cl_note(const char *format, ...) __attribute__((format(printf, 1, 2)));

@@ -1,6 +1,6 @@
 #include "data/camera.h"
-#include "data/image.h"
-#include "data/noise.h"
+#include "data/image/image.h"
+#include "data/materials/noise.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"
 #include <math.h>
@@ -81,8 +81,8 @@ static void blur(int size, float sigma, float *image)
         }
 }
 
-/* The 8-bit codes of io_linear_to_srgb without its powf for every value: guess[] by the linear value's leading 12 bits, where a code spans more
- * than one step, then the exact threshold. */
+/* The 8-bit codes of io_linear_to_srgb without its powf for every value: guess[] by the linear value's leading 12 bits,
+ * where a code spans more than one step, then the exact threshold. */
 enum { GUESSES = 4096 };
 static float threshold[257], linear[256]; /* threshold[c]: the least value that has code c */
 static uint8_t guess[GUESSES + 1];
@@ -117,7 +117,8 @@ static inline int srgb_code(float v)
 static void expose(const io_camera *c, const faults *f, uint64_t seed, uint64_t index, int size, float *image)
 {
     const float exposure = io_camera_exposure(c, seed, index), loss = c->vignette * f->vignette;
-    const float gain[3] = {exposure * (1 + c->white_balance * f->red), exposure, exposure * (1 + c->white_balance * f->blue)};
+    const float gain[3] = {exposure * (1 + c->white_balance * f->red), exposure,
+                           exposure * (1 + c->white_balance * f->blue)};
     for (int y = 0; y < size; y++)
         for (int x = 0; x < size; x++) {
             const float px = ((float)x + 0.5f) / (float)size - 0.5f, py = ((float)y + 0.5f) / (float)size - 0.5f;
@@ -134,7 +135,8 @@ static void add_noise(ts_rng *rng, float read, float gain, size_t count, float *
     for (size_t begin = 0; begin < count; begin += PART, image += PART) {
         const int n = count - begin < PART ? (int)(count - begin) : PART;
         ts_rng_normals(rng, n, normal);
-        for (int i = 0; i < n; i++) image[i] = nz_clamp(image[i] + __builtin_sqrtf(read * read + gain * image[i]) * normal[i], 0, 1);
+        for (int i = 0; i < n; i++)
+            image[i] = nz_clamp(image[i] + __builtin_sqrtf(read * read + gain * image[i]) * normal[i], 0, 1);
     }
 }
 
@@ -145,7 +147,8 @@ void io_camera_apply(const io_camera *c, uint64_t seed, uint64_t index, int size
     const faults f = draw(seed, index);
     float sigma = c->blur * ts_rng_uniform(&rng) * (float)size / 256;
     float strength = c->noise * ts_rng_uniform(&rng);
-    /* Variance read^2 + gain * signal (Foi et al., "Practical Poissonian-Gaussian Noise Modeling and Fitting for Single-Image Raw-Data", 2008). */
+    /* Variance read^2 + gain * signal (Foi et al., "Practical Poissonian-Gaussian Noise Modeling and Fitting for
+     * Single-Image Raw-Data", 2008). */
     float read = 0.01f * strength, gain = 0.002f * strength;
     if (c->noise_spread > 0) {
         read *= exp2f(c->noise_spread * f.read);

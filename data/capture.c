@@ -8,15 +8,18 @@
 #include <string.h>
 #include <unistd.h>
 
-static const char camera_file[] = "camera_pos.txt", light_file[] = "light_pos.txt", side_file[] = "image_size.txt", power_file[] = "light_power.txt";
+static const char camera_file[] = "camera_pos.txt", light_file[] = "light_pos.txt", side_file[] = "image_size.txt",
+                  power_file[] = "light_power.txt";
 enum { TEXT_MAX = 1 << 16 };
 
 ts_code io_capture_create(io_capture *c, int images, int size, ts_status *st)
 {
     *c = (io_capture){.images = images, .size = size, .side = 1};
-    if (images < 1 || images > IO_CAPTURE_IMAGES) return ts_fail(st, TS_INVALID, "a capture of %d pictures: 1 to %d are possible", images, IO_CAPTURE_IMAGES);
+    if (images < 1 || images > IO_CAPTURE_IMAGES)
+        return ts_fail(st, TS_INVALID, "a capture of %d pictures: 1 to %d are possible", images, IO_CAPTURE_IMAGES);
     c->image = calloc((size_t)images * (size_t)size * (size_t)size * 3, sizeof *c->image);
-    return c->image ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for %d pictures of %d x %d pixels", images, size, size);
+    return c->image ? TS_OK
+                    : ts_fail(st, TS_NOMEM, "out of memory for %d pictures of %d x %d pixels", images, size, size);
 }
 
 void io_capture_free(io_capture *c)
@@ -27,7 +30,9 @@ void io_capture_free(io_capture *c)
 
 static ts_code join(char path[PATH_MAX], const char *folder, const char *name, ts_status *st)
 {
-    return snprintf(path, PATH_MAX, "%s/%s", folder, name) < PATH_MAX ? TS_OK : ts_fail(st, TS_INVALID, "%s: the name is too long", folder);
+    return snprintf(path, PATH_MAX, "%s/%s", folder, name) < PATH_MAX
+        ? TS_OK
+        : ts_fail(st, TS_INVALID, "%s: the name is too long", folder);
 }
 
 bool io_is_capture(const char *folder)
@@ -37,7 +42,8 @@ bool io_is_capture(const char *folder)
     return join(path, folder, camera_file, &st) == TS_OK && access(path, F_OK) == 0;
 }
 
-/* Lines of `columns` finite numbers between commas or blanks; empty lines count for nothing. The number of lines, or -1 with st. */
+/* Lines of `columns` finite numbers between commas or blanks; empty lines count for nothing. The number of lines, or -1
+ * with st. */
 static int read_table(const char *folder, const char *name, int columns, int most, float *value, ts_status *st)
 {
     char path[PATH_MAX], *text;
@@ -60,7 +66,9 @@ static int read_table(const char *folder, const char *name, int columns, int mos
         bad = bad || (column && column != columns);
         if (bad) {
             if (rows == most) ts_fail(st, TS_FORMAT, "%s:%d: more than %d lines", path, line, most);
-            else ts_fail(st, TS_FORMAT, "%s:%d: not %d finite number%s%s", path, line, columns, columns > 1 ? "s" : "", columns > 1 ? " between commas" : "");
+            else
+                ts_fail(st, TS_FORMAT, "%s:%d: not %d finite number%s%s", path, line, columns, columns > 1 ? "s" : "",
+                        columns > 1 ? " between commas" : "");
             free(text);
             return -1;
         }
@@ -71,13 +79,17 @@ static int read_table(const char *folder, const char *name, int columns, int mos
     return rows;
 }
 
-static ts_code read_places(const char *folder, const char *name, float side, float place[IO_CAPTURE_IMAGES][3], int *count, ts_status *st)
+static ts_code read_places(const char *folder, const char *name, float side, float place[IO_CAPTURE_IMAGES][3],
+                           int *count, ts_status *st)
 {
     *count = read_table(folder, name, 3, IO_CAPTURE_IMAGES, place[0], st);
     if (*count < 0) return st->code;
-    if (*count == 0) return ts_fail(st, TS_FORMAT, "%s/%s: is empty: it should have a line x,y,z for each picture", folder, name);
+    if (*count == 0)
+        return ts_fail(st, TS_FORMAT, "%s/%s: is empty: it should have a line x,y,z for each picture", folder, name);
     for (int i = 0; i < *count; i++) {
-        if (!(place[i][2] > 0)) return ts_fail(st, TS_FORMAT, "%s/%s: number %d has z = %g: it should be above the sample", folder, name, i + 1, (double)place[i][2]);
+        if (!(place[i][2] > 0))
+            return ts_fail(st, TS_FORMAT, "%s/%s: number %d has z = %g: it should be above the sample", folder, name,
+                           i + 1, (double)place[i][2]);
         for (int k = 0; k < 3; k++) place[i][k] /= side;
     }
     return TS_OK;
@@ -91,8 +103,10 @@ static ts_code read_picture(const char *folder, int number, io_capture *c, int s
     ts_code code = join(path, folder, name, st);
     if (!code) code = io_read_data(path, 3, IO_MAX_PIXELS_DEFAULT, &image, st);
     if (!code && image.width != image.height)
-        code = ts_fail(st, TS_FORMAT, "%s: %d x %d pixels: a rectified picture of the sample should be square", path, image.width, image.height);
-    for (size_t i = 0; !code && i < (size_t)image.width * (size_t)image.height * 3; i++) image.data[i] = powf(fmaxf(image.data[i], 0), 2.2f);
+        code = ts_fail(st, TS_FORMAT, "%s: %d x %d pixels: a rectified picture of the sample should be square", path,
+                       image.width, image.height);
+    for (size_t i = 0; !code && i < (size_t)image.width * (size_t)image.height * 3; i++)
+        image.data[i] = powf(fmaxf(image.data[i], 0), 2.2f);
     if (!code && number == 0) {
         const io_capture before = *c;
         code = io_capture_create(c, before.images, size > 0 ? size : image.width, st);
@@ -114,7 +128,9 @@ ts_code io_read_capture(const char *folder, int size, io_capture *c, ts_status *
     *c = (io_capture){0};
     int lights = 0, rows = read_table(folder, side_file, 1, 1, &c->side, st);
     ts_code code = rows < 0 ? st->code : TS_OK;
-    if (!code && (rows != 1 || !(c->side > 0))) code = ts_fail(st, TS_FORMAT, "%s/%s: should be one number, the sample's side in centimetres", folder, side_file);
+    if (!code && (rows != 1 || !(c->side > 0)))
+        code = ts_fail(st, TS_FORMAT, "%s/%s: should be one number, the sample's side in centimetres", folder,
+                       side_file);
     if (!code) {
         rows = read_table(folder, power_file, 3, 1, c->power, st);
         if (rows < 0) code = st->code;
@@ -125,11 +141,13 @@ ts_code io_read_capture(const char *folder, int size, io_capture *c, ts_status *
     if (!code) code = read_places(folder, camera_file, c->side, c->camera, &c->images, st);
     if (!code) code = read_places(folder, light_file, c->side, c->light, &lights, st);
     if (!code && lights != c->images)
-        code = ts_fail(st, TS_FORMAT, "%s: %d lines in %s, but %d in %s", folder, c->images, camera_file, lights, light_file);
+        code = ts_fail(st, TS_FORMAT, "%s: %d lines in %s, but %d in %s", folder, c->images, camera_file, lights,
+                       light_file);
     char path[PATH_MAX], name[16];
     snprintf(name, sizeof name, "%02d.png", c->images);
     if (!code && c->images < IO_CAPTURE_IMAGES && join(path, folder, name, st) == TS_OK && access(path, F_OK) == 0)
-        code = ts_fail(st, TS_FORMAT, "%s: there is a %s, but %s has only %d lines", folder, name, camera_file, c->images);
+        code = ts_fail(st, TS_FORMAT, "%s: there is a %s, but %s has only %d lines", folder, name, camera_file,
+                       c->images);
     for (int i = 0; i < c->images && !code; i++) code = read_picture(folder, i, c, size, st);
     if (code) io_capture_free(c);
     else io_name_from_path(folder, c->name, sizeof c->name);
@@ -142,17 +160,20 @@ static ts_code write_picture(const char *folder, int number, const io_capture *c
     char path[PATH_MAX], name[16];
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
     snprintf(name, sizeof name, "%02d.png", number);
-    for (size_t i = 0; i < values; i++) image->data[i] = powf(fminf(fmaxf(c->image[(size_t)number * values + i], 0), 1), 1 / 2.2f);
+    for (size_t i = 0; i < values; i++)
+        image->data[i] = powf(fminf(fmaxf(c->image[(size_t)number * values + i], 0), 1), 1 / 2.2f);
     const ts_code code = join(path, folder, name, st);
     return code ? code : io_write_png(path, image, 8, false, st);
 }
 
-static ts_code write_text(const char *folder, const char *name, const float *value, int rows, int columns, float scale, ts_status *st)
+static ts_code write_text(const char *folder, const char *name, const float *value, int rows, int columns, float scale,
+                          ts_status *st)
 {
     char path[PATH_MAX], text[IO_CAPTURE_IMAGES * 3 * 24];
     size_t used = 0;
     for (int i = 0; i < rows * columns; i++) /* nine digits bring every float back */
-        used += (size_t)snprintf(text + used, sizeof text - used, "%.9g%c", (double)value[i] * (double)scale, (i + 1) % columns ? ',' : '\n');
+        used += (size_t)snprintf(text + used, sizeof text - used, "%.9g%c", (double)value[i] * (double)scale,
+                                 (i + 1) % columns ? ',' : '\n');
     const ts_code code = join(path, folder, name, st);
     return code ? code : io_write_bytes(path, text, used, st);
 }

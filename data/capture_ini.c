@@ -20,8 +20,8 @@ static ts_code read_numbers(const char *path, const io_ini_entry *e, int count, 
         if (i + 1 < count) fine = fine && *p++ == ',';
     }
     if (fine && !*p) return TS_OK;
-    return ts_fail(st, TS_INVALID, "%s:%d: %s.%s is \"%.60s\": it must be %s", path, e->line, e->section, e->key, e->value,
-                   count == 1 ? "a number" : "three numbers x, y, z");
+    return ts_fail(st, TS_INVALID, "%s:%d: %s.%s is \"%.60s\": it must be %s", path, e->line, e->section, e->key,
+                   e->value, count == 1 ? "a number" : "three numbers x, y, z");
 }
 
 typedef struct photo {
@@ -33,12 +33,16 @@ typedef struct photo {
 static ts_code take_head(const char *path, const io_ini_entry *e, float *side, float *power, ts_status *st)
 {
     float *to = !strcmp(e->key, "side") ? side : !strcmp(e->key, "power") ? power : NULL;
-    if (!to) return ts_fail(st, TS_INVALID, "%s:%d: [capture] has the keys side and power, not %s", path, e->line, e->key);
+    if (!to)
+        return ts_fail(st, TS_INVALID, "%s:%d: [capture] has the keys side and power, not %s", path, e->line, e->key);
     if (read_numbers(path, e, 1, to, st) != TS_OK) return st->code;
-    return *to > 0 ? TS_OK : ts_fail(st, TS_INVALID, "%s:%d: capture.%s is %s: it must be above 0", path, e->line, e->key, e->value);
+    return *to > 0
+        ? TS_OK
+        : ts_fail(st, TS_INVALID, "%s:%d: capture.%s is %s: it must be above 0", path, e->line, e->key, e->value);
 }
 
-static ts_code take_photo(const char *path, const io_ini_entry *e, photo *p, float light[3], float camera[3], ts_status *st)
+static ts_code take_photo(const char *path, const io_ini_entry *e, photo *p, float light[3], float camera[3],
+                          ts_status *st)
 {
     if (!strcmp(e->key, "file")) {
         p->file = e->value;
@@ -46,11 +50,14 @@ static ts_code take_photo(const char *path, const io_ini_entry *e, photo *p, flo
     }
     const bool is_light = !strcmp(e->key, "light");
     if (!is_light && strcmp(e->key, "camera") != 0)
-        return ts_fail(st, TS_INVALID, "%s:%d: a photograph has the keys file, light and camera, not %s", path, e->line, e->key);
+        return ts_fail(st, TS_INVALID, "%s:%d: a photograph has the keys file, light and camera, not %s", path, e->line,
+                       e->key);
     float *to = is_light ? light : camera;
     *(is_light ? &p->light : &p->camera) = true;
     if (read_numbers(path, e, 3, to, st) != TS_OK) return st->code;
-    return to[2] > 0 ? TS_OK : ts_fail(st, TS_INVALID, "%s:%d: %s.%s has z = %g: it must be above the sample", path, e->line, e->section, e->key, (double)to[2]);
+    return to[2] > 0 ? TS_OK
+                     : ts_fail(st, TS_INVALID, "%s:%d: %s.%s has z = %g: it must be above the sample", path, e->line,
+                               e->section, e->key, (double)to[2]);
 }
 
 static ts_code take(const char *path, const io_ini *ini, photo *photos, io_capture *c, float *power, ts_status *st)
@@ -63,14 +70,20 @@ static ts_code take(const char *path, const io_ini *ini, photo *photos, io_captu
             continue;
         }
         while (k < c->images && strcmp(photos[k].section, e->section) != 0) k++;
-        if (k == IO_CAPTURE_IMAGES) return ts_fail(st, TS_INVALID, "%s:%d: more than %d photographs", path, e->line, IO_CAPTURE_IMAGES);
+        if (k == IO_CAPTURE_IMAGES)
+            return ts_fail(st, TS_INVALID, "%s:%d: more than %d photographs", path, e->line, IO_CAPTURE_IMAGES);
         if (k == c->images) photos[c->images++] = (photo){.section = e->section, .line = e->line};
         if (take_photo(path, e, &photos[k], c->light[k], c->camera[k], st) != TS_OK) return st->code;
     }
-    if (c->images == 0) return ts_fail(st, TS_INVALID, "%s: lists no photograph: a section with file, light and camera for each", path);
+    if (c->images == 0)
+        return ts_fail(st, TS_INVALID, "%s: lists no photograph: a section with file, light and camera for each", path);
     for (int k = 0; k < c->images; k++) {
-        const char *missing = !photos[k].file ? "file" : !photos[k].light ? "light" : !photos[k].camera ? "camera" : NULL;
-        if (missing) return ts_fail(st, TS_INVALID, "%s:%d: [%s] has no %s", path, photos[k].line, photos[k].section, missing);
+        const char *missing = !photos[k].file ? "file"
+            : !photos[k].light                ? "light"
+            : !photos[k].camera               ? "camera"
+                                              : NULL;
+        if (missing)
+            return ts_fail(st, TS_INVALID, "%s:%d: [%s] has no %s", path, photos[k].line, photos[k].section, missing);
     }
     return TS_OK;
 }

@@ -99,7 +99,8 @@ static ts_code replace(const char *name, const char *path, const void *bytes, si
     static int counter;
     int fd = -1;
     for (int tries = 0; fd < 0 && tries < 100; tries++) {
-        snprintf(temporary, sizeof temporary, "%s/.lgd-%ld-%d.tmp", folder, (long)getpid(), __atomic_add_fetch(&counter, 1, __ATOMIC_RELAXED));
+        snprintf(temporary, sizeof temporary, "%s/.lgd-%ld-%d.tmp", folder, (long)getpid(),
+                 __atomic_add_fetch(&counter, 1, __ATOMIC_RELAXED));
         fd = open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
         if (fd < 0 && errno != EEXIST) break;
     }

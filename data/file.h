@@ -4,8 +4,10 @@
 #include "tensor/status.h"
 #include <stddef.h>
 
-/* Writes a temporary file in the same folder, syncs it and renames it to path: a reader sees the old file or the whole new one, and after a
- * failure nothing is left behind. That the new name survives a power cut too is io_sync_folder's, once for all files of a folder. A path that exists and is no regular file (a device, a pipe) is written to directly; a symbolic link is followed. */
+/* Writes a temporary file in the same folder, syncs it and renames it to path: a reader sees the old file or the whole
+ * new one, and after a failure nothing is left behind. That the new name survives a power cut too is io_sync_folder's,
+ * once for all files of a folder. A path that exists and is no regular file (a device, a pipe) is written to directly;
+ * a symbolic link is followed. */
 ts_code io_write_bytes(const char *path, const void *bytes, size_t size, ts_status *st);
 
 /* The names in folder reach the disk. Failure is none of what was written. */

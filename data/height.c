@@ -1,5 +1,5 @@
 #include "data/height.h"
-#include "tensor/block.h"
+#include "tensor/memory.h"
 #include "tensor/gemm.h"
 #include <math.h>
 #include <stdlib.h>
@@ -35,13 +35,16 @@ static void divergence(int n, const float *p, const float *q, float *out)
         }
 }
 
-/* Row k: the orthonormal cosine sqrt(2/n) cos(pi k (j + 1/2) / n), an eigenvector of D^T D with the eigenvalue 2 - 2 cos(pi k / n). */
+/* Row k: the orthonormal cosine sqrt(2/n) cos(pi k (j + 1/2) / n), an eigenvector of D^T D with the eigenvalue 2 - 2
+ * cos(pi k / n). */
 static void cosines(int n, float *c)
 {
     for (int k = 0; k < n; k++)
         for (int j = 0; j < n; j++) {
-            const int phase = (int)((int64_t)k * (2 * j + 1) % (4 * (int64_t)n)); /* exact, where the angle itself would lose digits */
-            c[(size_t)k * (size_t)n + (size_t)j] = (float)((k ? sqrt(2.0 / n) : sqrt(1.0 / n)) * cos(PI * phase / (2.0 * n)));
+            const int phase = (int)((int64_t)k * (2 * j + 1) %
+                                    (4 * (int64_t)n)); /* exact, where the angle itself would lose digits */
+            c[(size_t)k * (size_t)n + (size_t)j] = (float)((k ? sqrt(2.0 / n) : sqrt(1.0 / n)) *
+                                                           cos(PI * phase / (2.0 * n)));
         }
 }
 

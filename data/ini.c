@@ -32,7 +32,8 @@ static bool is_name(const char *s)
 {
     if (!*s) return false;
     for (; *s; s++)
-        if (!((*s >= 'a' && *s <= 'z') || (*s >= 'A' && *s <= 'Z') || (*s >= '0' && *s <= '9') || *s == '_')) return false;
+        if (!((*s >= 'a' && *s <= 'z') || (*s >= 'A' && *s <= 'Z') || (*s >= '0' && *s <= '9') || *s == '_'))
+            return false;
     return true;
 }
 
@@ -40,7 +41,8 @@ static ts_code add(io_ini *ini, int *capacity, io_ini_entry e, ts_status *st)
 {
     for (int i = 0; i < ini->count; i++)
         if (!strcmp(ini->entry[i].section, e.section) && !strcmp(ini->entry[i].key, e.key))
-            return ts_fail(st, TS_INVALID, "%s:%d: %s.%s is given twice (first in line %d)", ini->name, e.line, e.section, e.key, ini->entry[i].line);
+            return ts_fail(st, TS_INVALID, "%s:%d: %s.%s is given twice (first in line %d)", ini->name, e.line,
+                           e.section, e.key, ini->entry[i].line);
     if (ini->count == *capacity) {
         const int more = *capacity ? 2 * *capacity : 64;
         io_ini_entry *grown = realloc(ini->entry, (size_t)more * sizeof *grown);
@@ -59,10 +61,12 @@ static ts_code parse_line(io_ini *ini, int *capacity, char *line, int number, co
     if (!*s) return TS_OK;
     if (*s == '[') {
         char *end = strchr(s, ']');
-        if (!end || end[1]) return ts_fail(st, TS_INVALID, "%s:%d: a section is written [name], not \"%.60s\"", ini->name, number, s);
+        if (!end || end[1])
+            return ts_fail(st, TS_INVALID, "%s:%d: a section is written [name], not \"%.60s\"", ini->name, number, s);
         *end = 0;
         *section = trim(s + 1);
-        if (!is_name(*section)) return ts_fail(st, TS_INVALID, "%s:%d: \"%.60s\" is no section name", ini->name, number, *section);
+        if (!is_name(*section))
+            return ts_fail(st, TS_INVALID, "%s:%d: \"%.60s\" is no section name", ini->name, number, *section);
         return TS_OK;
     }
     char *equals = strchr(s, '=');
@@ -70,7 +74,8 @@ static ts_code parse_line(io_ini *ini, int *capacity, char *line, int number, co
     *equals = 0;
     io_ini_entry e = {.section = *section, .key = trim(s), .value = trim(equals + 1), .line = number};
     if (!is_name(e.key)) return ts_fail(st, TS_INVALID, "%s:%d: \"%.60s\" is no key name", ini->name, number, e.key);
-    if (!e.section) return ts_fail(st, TS_INVALID, "%s:%d: %s stands before the first [section]", ini->name, number, e.key);
+    if (!e.section)
+        return ts_fail(st, TS_INVALID, "%s:%d: %s stands before the first [section]", ini->name, number, e.key);
     return add(ini, capacity, e, st);
 }
 
@@ -115,14 +120,10 @@ ts_code io_ini_read(const char *path, io_ini *ini, ts_status *st)
     const int error = ferror(f) ? errno : 0;
     fclose(f);
     ts_code code;
-    if (!text)
-        code = ts_fail(st, TS_NOMEM, "%s: out of memory", path);
-    else if (error)
-        code = ts_fail(st, TS_IO, "%s: %s", path, strerror(error));
-    else if (size > LARGEST)
-        code = ts_fail(st, TS_INVALID, "%s: larger than 1 MB, this is no configuration", path);
-    else
-        code = io_ini_parse(path, text, size, ini, st);
+    if (!text) code = ts_fail(st, TS_NOMEM, "%s: out of memory", path);
+    else if (error) code = ts_fail(st, TS_IO, "%s: %s", path, strerror(error));
+    else if (size > LARGEST) code = ts_fail(st, TS_INVALID, "%s: larger than 1 MB, this is no configuration", path);
+    else code = io_ini_parse(path, text, size, ini, st);
     free(text);
     return code;
 }

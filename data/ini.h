@@ -1,5 +1,6 @@
-/* INI files: [section], key = value, comments from # or ; (at the start of a line or after a blank), CRLF or LF, an optional
- * UTF-8 byte-order mark. Strict: what is none of these, a key outside a section and a key given twice are errors with FILE:LINE. */
+/* INI files: [section], key = value, comments from # or ; (at the start of a line or after a blank), CRLF or LF, an
+ * optional UTF-8 byte-order mark. Strict: what is none of these, a key outside a section and a key given twice are
+ * errors with FILE:LINE. */
 #ifndef IO_INI_H
 #define IO_INI_H
 #include "tensor/status.h"
@@ -16,7 +17,8 @@ typedef struct io_ini {
     int count;
 } io_ini;
 
-/* TS_IO when the file cannot be read, TS_INVALID for its content. On failure ini is empty; the caller frees it after success. */
+/* TS_IO when the file cannot be read, TS_INVALID for its content. On failure ini is empty; the caller frees it after
+ * success. */
 ts_code io_ini_read(const char *path, io_ini *ini, ts_status *st);
 ts_code io_ini_parse(const char *name, const char *text, size_t size, io_ini *ini, ts_status *st);
 void io_ini_free(io_ini *ini); /* and zeroes the struct */

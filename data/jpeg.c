@@ -1,19 +1,22 @@
-/* What baseline JPEG does to a picture: colour transform, chroma at half the resolution, 8x8 cosine transform, quantisation, and back. The entropy
- * coder loses nothing and is left out. A library would write and read a file for every photograph, and its bytes depend on its build. */
+/* What baseline JPEG does to a picture: colour transform, chroma at half the resolution, 8x8 cosine transform,
+ * quantisation, and back. The entropy coder loses nothing and is left out. A library would write and read a file for
+ * every photograph, and its bytes depend on its build. */
 #include "data/camera.h"
-#include "data/noise.h"
+#include "data/materials/noise.h"
 #include "tensor/threads.h"
 #include <math.h>
 #include <pthread.h>
 #include <stddef.h>
 
 /* ITU-T T.81, tables K.1 and K.2 */
-static const uint8_t luminance[64] = {16, 11, 10, 16, 24,  40,  51,  61,  12, 12, 14, 19, 26,  58,  60,  55,  14, 13, 16, 24, 40,
-                                      57, 69, 56, 14, 17,  22,  29,  51,  87, 80, 62, 18, 22,  37,  56,  68,  109, 103, 77, 24, 35,
-                                      55, 64, 81, 104, 113, 92, 49,  64,  78, 87, 103, 121, 120, 101, 72, 92, 95, 98, 112, 100, 103, 99};
-static const uint8_t chrominance[64] = {17, 18, 24, 47, 99, 99, 99, 99, 18, 21, 26, 66, 99, 99, 99, 99, 24, 26, 56, 99, 99, 99,
-                                        99, 99, 47, 66, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99,
-                                        99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99};
+static const uint8_t luminance[64] = {16, 11, 10, 16, 24,  40,  51,  61,  12, 12, 14, 19, 26,  58,  60,  55,
+                                      14, 13, 16, 24, 40,  57,  69,  56,  14, 17, 22, 29, 51,  87,  80,  62,
+                                      18, 22, 37, 56, 68,  109, 103, 77,  24, 35, 55, 64, 81,  104, 113, 92,
+                                      49, 64, 78, 87, 103, 121, 120, 101, 72, 92, 95, 98, 112, 100, 103, 99};
+static const uint8_t chrominance[64] = {17, 18, 24, 47, 99, 99, 99, 99, 18, 21, 26, 66, 99, 99, 99, 99,
+                                        24, 26, 56, 99, 99, 99, 99, 99, 47, 66, 99, 99, 99, 99, 99, 99,
+                                        99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99,
+                                        99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99, 99};
 
 static float cosine[64], transposed[64]; /* the orthonormal DCT-II, [frequency][sample] and [sample][frequency] */
 
@@ -52,7 +55,8 @@ static void quantise(int width, int height, const float step[64], float *plane)
             multiply(transposed, block, work);
             multiply(work, cosine, block);
             for (int i = 0; i < 8; i++)
-                for (int j = 0; j < 8; j++) p[(size_t)i * (size_t)width + (size_t)j] = nz_clamp(block[i * 8 + j] + 128, 0, 255);
+                for (int j = 0; j < 8; j++)
+                    p[(size_t)i * (size_t)width + (size_t)j] = nz_clamp(block[i * 8 + j] + 128, 0, 255);
         }
 }
 
@@ -69,9 +73,11 @@ static void steps(const uint8_t table[64], int quality, float step[64])
 static void pad(int side, int stride, float *p)
 {
     for (int y = 0; y < side; y++)
-        for (int x = side; x < stride; x++) p[(size_t)y * (size_t)stride + (size_t)x] = p[(size_t)y * (size_t)stride + (size_t)side - 1];
+        for (int x = side; x < stride; x++)
+            p[(size_t)y * (size_t)stride + (size_t)x] = p[(size_t)y * (size_t)stride + (size_t)side - 1];
     for (int y = side; y < stride; y++)
-        for (int x = 0; x < stride; x++) p[(size_t)y * (size_t)stride + (size_t)x] = p[(size_t)(side - 1) * (size_t)stride + (size_t)x];
+        for (int x = 0; x < stride; x++)
+            p[(size_t)y * (size_t)stride + (size_t)x] = p[(size_t)(side - 1) * (size_t)stride + (size_t)x];
 }
 
 /* Means of 2 x 2 pixels; the last ones again where the side is odd. */
@@ -85,7 +91,8 @@ static void halve(int side, int stride, const float *in, int half_stride, float 
         }
 }
 
-/* Back: each pixel 9/16 of its own value, 3/16 of the two beside it and 1/16 of the one across, as common decoders interpolate. */
+/* Back: each pixel 9/16 of its own value, 3/16 of the two beside it and 1/16 of the one across, as common decoders
+ * interpolate. */
 static void twice(int side, int half_stride, const float *in, int stride, float *out)
 {
     const int last = (side + 1) / 2 - 1;
@@ -94,7 +101,8 @@ static void twice(int side, int half_stride, const float *in, int stride, float 
         const float *a = in + (size_t)own * (size_t)half_stride, *b = in + (size_t)other * (size_t)half_stride;
         for (int x = 0; x < side; x++) {
             const int at = x / 2, next = x % 2 ? (at < last ? at + 1 : at) : (at > 0 ? at - 1 : at);
-            out[(size_t)y * (size_t)stride + (size_t)x] = 0.5625f * a[at] + 0.1875f * (a[next] + b[at]) + 0.0625f * b[next];
+            out[(size_t)y * (size_t)stride + (size_t)x] = 0.5625f * a[at] + 0.1875f * (a[next] + b[at]) +
+                0.0625f * b[next];
         }
     }
 }
@@ -105,7 +113,8 @@ void io_jpeg_codes(int size, int quality, bool halved, uint8_t *codes)
     pthread_once(&once, make_cosine);
     const int stride = (size + 7) / 8 * 8, half = (size + 1) / 2, half_stride = (half + 7) / 8 * 8;
     const size_t area = (size_t)stride * (size_t)stride;
-    float *plane[3] = {ts_scratch(TS_SCRATCH_SLOTS - 2, (3 * area + (size_t)half_stride * (size_t)half_stride) * sizeof(float))};
+    float *plane[3] = {
+        ts_scratch(TS_SCRATCH_SLOTS - 2, (3 * area + (size_t)half_stride * (size_t)half_stride) * sizeof(float))};
     plane[1] = plane[0] + area;
     plane[2] = plane[1] + area;
     float *small = plane[2] + area, step[64];
@@ -136,6 +145,8 @@ void io_jpeg_codes(int size, int quality, bool halved, uint8_t *codes)
             const size_t i = (size_t)y * (size_t)stride + (size_t)x;
             const float l = plane[0][i], cb = plane[1][i] - 128, cr = plane[2][i] - 128;
             const float rgb[3] = {l + 1.402f * cr, l - 0.344136f * cb - 0.714136f * cr, l + 1.772f * cb};
-            for (int k = 0; k < 3; k++) codes[((size_t)y * (size_t)size + (size_t)x) * 3 + (size_t)k] = (uint8_t)nz_clamp(rgb[k] + 0.5f, 0, 255);
+            for (int k = 0; k < 3; k++)
+                codes[((size_t)y * (size_t)size + (size_t)x) * 3 + (size_t)k] = (uint8_t)nz_clamp(rgb[k] + 0.5f, 0,
+                                                                                                  255);
         }
 }

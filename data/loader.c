@@ -4,7 +4,8 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-/* Threads take one material at a time, in order; batch b lives in slot b % slots. One slot more than depth: the one that the caller reads. */
+/* Threads take one material at a time, in order; batch b lives in slot b % slots. One slot more than depth: the one
+ * that the caller reads. */
 struct io_loader {
     io_procedural procedural;
     int size, batch, slots, threads;
@@ -48,8 +49,10 @@ static void *work(void *argument)
         bool good = all_finite(m.maps, values);
         pthread_mutex_lock(&l->lock);
         if (!good) {
-            ts_fail(&l->error, TS_NUMERIC, "procedural material %s (seed %llu) has a value that is not finite; leave its family out and report it",
-                    m.name, (unsigned long long)l->procedural.seed);
+            ts_fail(
+                &l->error, TS_NUMERIC,
+                "procedural material %s (seed %llu) has a value that is not finite; leave its family out and report it",
+                m.name, (unsigned long long)l->procedural.seed);
             l->stop = true;
         }
         if (++l->done[slot] == l->batch || !good) pthread_cond_broadcast(&l->changed);
@@ -58,10 +61,12 @@ static void *work(void *argument)
     return NULL;
 }
 
-io_loader *io_loader_create(const io_procedural *p, int size, int batch, uint64_t first, int depth, int threads, ts_status *st)
+io_loader *io_loader_create(const io_procedural *p, int size, int batch, uint64_t first, int depth, int threads,
+                            ts_status *st)
 {
     if (size < 1 || size > 16384 || batch < 1 || depth < 1 || depth > 1024 || threads < 1 || threads > 1024) {
-        ts_fail(st, TS_INVALID, "loader: size %d, batch %d, depth %d and threads %d must be at least 1", size, batch, depth, threads);
+        ts_fail(st, TS_INVALID, "loader: size %d, batch %d, depth %d and threads %d must be at least 1", size, batch,
+                depth, threads);
         return NULL;
     }
     io_loader *l = calloc(1, sizeof *l);
@@ -81,7 +86,8 @@ io_loader *io_loader_create(const io_procedural *p, int size, int batch, uint64_
     l->thread = calloc((size_t)threads, sizeof *l->thread);
     l->maps = items <= PTRDIFF_MAX / bytes ? malloc(items * bytes) : NULL;
     if (!l->done || !l->thread || !l->maps) {
-        ts_fail(st, TS_NOMEM, "loader: no memory for %zu materials of %d x %d (lower the batch or the size)", items, size, size);
+        ts_fail(st, TS_NOMEM, "loader: no memory for %zu materials of %d x %d (lower the batch or the size)", items,
+                size, size);
         io_loader_destroy(&l);
         return NULL;
     }

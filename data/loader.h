@@ -1,12 +1,14 @@
 /* Materials made ahead of time by background threads. Order and bytes depend on the seed alone. */
 #ifndef IO_LOADER_H
 #define IO_LOADER_H
-#include "data/procedural.h"
+#include "data/materials/procedural.h"
 
 typedef struct io_loader io_loader;
 
-/* Batches first, first+1, …; batch b holds the materials b*batch .. b*batch+batch-1. depth batches are kept ready; threads >= 1. */
-io_loader *io_loader_create(const io_procedural *p, int size, int batch, uint64_t first, int depth, int threads, ts_status *st);
+/* Batches first, first+1, …; batch b holds the materials b*batch .. b*batch+batch-1. depth batches are kept ready;
+ * threads >= 1. */
+io_loader *io_loader_create(const io_procedural *p, int size, int batch, uint64_t first, int depth, int threads,
+                            ts_status *st);
 /* The next batch, [batch][size][size][9], valid until the next call. NULL only after an error in a thread (st). */
 const float *io_loader_next(io_loader *loader, ts_status *st);
 void io_loader_destroy(io_loader **loader);

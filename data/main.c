@@ -1,10 +1,11 @@
-/* lgd-data: procedural materials as map folders, strips, photographs or a contact sheet, and how they compare with others' materials. */
+/* lgd-data: procedural materials as map folders, strips, photographs or a contact sheet, and how they compare with
+ * others' materials. */
 #include "cli/cli.h"
 #include "data/capture.h"
 #include "data/camera.h"
-#include "data/histogram.h"
+#include "data/materials/histogram.h"
 #include "data/sheet.h"
-#include "data/statistics.h"
+#include "data/materials/statistics.h"
 #include "render/render.h"
 #include "tensor/threads.h"
 #include <errno.h>
@@ -77,24 +78,27 @@ static const struct option long_options[] = {{"output", required_argument, NULL,
 
 static void print_help(void)
 {
-    printf("Usage: lgd-data [options] -o DIR\n"
-           "       lgd-data --statistics --testdata DIR [options]\n"
-           "Writes procedural materials: numbers FIRST .. FIRST+COUNT-1 of the endless sequence that SEED names.\n\n"
-           "What to write (the default is --format folders):\n"
-           "  -o, --output DIR      where to; made when absent\n"
-           "      --format FORMAT   folders: DIR/NAME/ with diffuse.png, specular.png, roughness.png, normal.png, maps.exr;\n"
-           "                        strips: DIR/NAME.png, five panels: photograph, normal, diffuse, roughness, specular;\n"
-           "                        captures: DIR/NAME/ with nine photographs 00.png .. 08.png and their lights and cameras\n"
-           "      --photographs     DIR/NAME.jpg, rendered under the flash, with sensor noise, blur and JPEG\n"
-           "      --contact-sheet   DIR/contact-sheet.png, a row for each family\n"
-           "      --statistics      compare maps with those of TESTDATA: a table on stdout\n"
-           "      --histograms      of each map beside those of TESTDATA: DIR/histograms.svg and DIR/histograms.csv\n\n"
-           "Which materials:\n"
-           "      --seed N          default 1\n"
-           "      --first N         default 0\n"
-           "      --count N         default 16; contact sheet 3 for each family; statistics and histograms 512\n"
-           "      --size N          8 .. 2048 pixels, default 256; contact sheet, statistics and histograms 128\n"
-           "      --families LIST   some of: ");
+    printf(
+        "Usage: lgd-data [options] -o DIR\n"
+        "       lgd-data --statistics --testdata DIR [options]\n"
+        "Writes procedural materials: numbers FIRST .. FIRST+COUNT-1 of the endless sequence that SEED names.\n\n"
+        "What to write (the default is --format folders):\n"
+        "  -o, --output DIR      where to; made when absent\n"
+        "      --format FORMAT   folders: DIR/NAME/ with diffuse.png, specular.png, roughness.png, normal.png, "
+        "maps.exr;\n"
+        "                        strips: DIR/NAME.png, five panels: photograph, normal, diffuse, roughness, specular;\n"
+        "                        captures: DIR/NAME/ with nine photographs 00.png .. 08.png and their lights and "
+        "cameras\n"
+        "      --photographs     DIR/NAME.jpg, rendered under the flash, with sensor noise, blur and JPEG\n"
+        "      --contact-sheet   DIR/contact-sheet.png, a row for each family\n"
+        "      --statistics      compare maps with those of TESTDATA: a table on stdout\n"
+        "      --histograms      of each map beside those of TESTDATA: DIR/histograms.svg and DIR/histograms.csv\n\n"
+        "Which materials:\n"
+        "      --seed N          default 1\n"
+        "      --first N         default 0\n"
+        "      --count N         default 16; contact sheet 3 for each family; statistics and histograms 512\n"
+        "      --size N          8 .. 2048 pixels, default 256; contact sheet, statistics and histograms 128\n"
+        "      --families LIST   some of: ");
     for (int i = 0; i < io_family_count(); i++)
         printf("%s%s%s", i ? "," : "", i && i % 9 == 0 ? "\n                        " : "", io_family_name(i));
     printf("\n\nHow:\n"
@@ -102,9 +106,11 @@ static void print_help(void)
            "      --blur X          of photographs, largest sigma in pixels at 256 (default 0.6)\n"
            "      --exposure X      of photographs, up to this many stops brighter or darker (default 0)\n"
            "      --vignette X      of photographs, largest share of light lost in the corners, 0 .. 0.9 (default 0)\n"
-           "      --white-balance X of photographs, red and blue up to this share stronger or weaker, 0 .. 0.9 (default 0)\n"
+           "      --white-balance X of photographs, red and blue up to this share stronger or weaker, 0 .. 0.9 "
+           "(default 0)\n"
            "      --tilt X          of photographs, largest angle of the camera in degrees, 0 .. 30 (default 0)\n"
-           "      --off-centre X    of photographs, how far the camera may be off the centre in patch widths, 0 .. 0.4 (default 0)\n"
+           "      --off-centre X    of photographs, how far the camera may be off the centre in patch widths, 0 .. 0.4 "
+           "(default 0)\n"
            "      --quality N       of photographs' JPEG, 1 .. 100 (default 90)\n"
            "      --testdata DIR    a folder with maps/ (map folders) and strips/ to compare with\n"
            "      --threads N       default: as many as the process may use\n"
@@ -126,8 +132,8 @@ static int parse_families(char *list, uint64_t *families)
 static int parse_number(const char *option, const char *text, int64_t lo, int64_t hi, int64_t *value)
 {
     return cl_parse_int(text, lo, hi, value)
-               ? CL_OK
-               : cl_usage("--%s: '%s' is not a whole number from %lld to %lld", option, text, (long long)lo, (long long)hi);
+        ? CL_OK
+        : cl_usage("--%s: '%s' is not a whole number from %lld to %lld", option, text, (long long)lo, (long long)hi);
 }
 
 static int parse_share(const char *option, const char *text, double hi, float *value)
@@ -181,7 +187,8 @@ static int parse_options(int argc, char **argv, options *o)
     if (!o->statistics && !writes) o->format = FORMAT_FOLDERS;
     if (!o->output && (writes || !o->statistics)) return cl_usage("where to? Give -o DIR");
     const bool compares = o->statistics || o->histograms;
-    if (compares && !o->testdata) return cl_usage("%s needs --testdata DIR", o->statistics ? "--statistics" : "--histograms");
+    if (compares && !o->testdata)
+        return cl_usage("%s needs --testdata DIR", o->statistics ? "--statistics" : "--histograms");
     if (o->testdata && !compares) return cl_usage("--testdata is for --statistics and --histograms");
     o->procedural.seed = (uint64_t)seed;
     return CL_OK;
@@ -189,11 +196,13 @@ static int parse_options(int argc, char **argv, options *o)
 
 static ts_code make_path(char path[4096], const options *o, const char *name, const char *suffix, ts_status *st)
 {
-    if (snprintf(path, 4096, "%s/%s%s", o->output, name, suffix) >= 4096) return ts_fail(st, TS_INVALID, "%s: the path is too long", o->output);
+    if (snprintf(path, 4096, "%s/%s%s", o->output, name, suffix) >= 4096)
+        return ts_fail(st, TS_INVALID, "%s: the path is too long", o->output);
     return TS_OK;
 }
 
-/* A hand-held phone: the first picture is the flash photograph, the others are taken around it with the flash beside the lens. */
+/* A hand-held phone: the first picture is the flash photograph, the others are taken around it with the flash beside
+ * the lens. */
 static ts_code write_capture(const options *o, const io_material *m, ts_status *st)
 {
     enum { PICTURES = 9 };
@@ -252,7 +261,8 @@ static ts_code write_material(const options *o, uint64_t index, io_material *m, 
 
 typedef ts_code task(const options *o, int64_t number, io_material *m, io_image *photo, io_sheet *sheet, ts_status *st);
 
-static ts_code write_task(const options *o, int64_t number, io_material *m, io_image *photo, io_sheet *sheet, ts_status *st)
+static ts_code write_task(const options *o, int64_t number, io_material *m, io_image *photo, io_sheet *sheet,
+                          ts_status *st)
 {
     (void)sheet;
     return write_material(o, (uint64_t)(o->first + number), m, photo, st);
@@ -265,7 +275,8 @@ static int row_family(const options *o, int row)
     return 0;
 }
 
-static ts_code sheet_task(const options *o, int64_t number, io_material *m, io_image *photo, io_sheet *sheet, ts_status *st)
+static ts_code sheet_task(const options *o, int64_t number, io_material *m, io_image *photo, io_sheet *sheet,
+                          ts_status *st)
 {
     (void)st;
     int column = (int)(number % sheet->columns), row = (int)(number / sheet->columns);
@@ -321,8 +332,9 @@ static ts_code make_sheet(const options *o, ts_status *st)
     int64_t columns = o->count ? (o->count + rows - 1) / rows : 3;
     io_sheet sheet = {0};
     char path[4096];
-    ts_code code =
-        columns > 1000 ? ts_fail(st, TS_INVALID, "a contact sheet of %lld materials is too large: ask for fewer", (long long)o->count) : TS_OK;
+    ts_code code = columns > 1000
+        ? ts_fail(st, TS_INVALID, "a contact sheet of %lld materials is too large: ask for fewer", (long long)o->count)
+        : TS_OK;
     if (!code) code = io_sheet_create(&sheet, (int)columns, rows, o->size ? (int)o->size : 128, st);
     if (!code) code = run(o, "contact sheet", sheet_task, columns * rows, sheet.size, &sheet, st);
     if (!code) code = make_path(path, o, "contact-sheet", ".png", st);
@@ -338,7 +350,8 @@ static ts_code compare(const options *o, ts_status *st)
     ts_code code = io_features_folder(o->testdata, size, &theirs, st);
     if (!code) code = io_features_procedural(&o->procedural, count, size, &ours, st);
     if (!code) {
-        double each[IO_FEATURES], distance = io_feature_distance(&ours, &theirs, each), halves = io_feature_halves(&theirs, 200, 1);
+        double each[IO_FEATURES], distance = io_feature_distance(&ours, &theirs, each),
+                                  halves = io_feature_halves(&theirs, 200, 1);
         printf("%-20s %15s %20s %10s\n", "", "testdata", "procedural", "distance");
         for (int i = 0; i < IO_FEATURES; i++) {
             double m, s, n, t;
@@ -346,8 +359,10 @@ static ts_code compare(const options *o, ts_status *st)
             io_feature_summary(&ours, i, &n, &t);
             printf("%-20s %8.3f +- %5.3f %10.3f +- %5.3f %10.2f\n", io_feature_name(i), m, s, n, t, each[i]);
         }
-        printf("distance of %d procedural materials from %d in %s: %.3f\n", ours.count, theirs.count, o->testdata, distance);
-        printf("distance between two halves of the latter, mean of 200 halvings: %.3f (ratio %.2f)\n", halves, distance / halves);
+        printf("distance of %d procedural materials from %d in %s: %.3f\n", ours.count, theirs.count, o->testdata,
+               distance);
+        printf("distance between two halves of the latter, mean of 200 halvings: %.3f (ratio %.2f)\n", halves,
+               distance / halves);
     }
     io_feature_set_free(&ours);
     io_feature_set_free(&theirs);
@@ -387,7 +402,8 @@ int main(int argc, char **argv)
     ts_threads_set((int)o.threads);
     cl_catch_interrupt();
     if (o.output) cl_make_folder(o.output, &st);
-    if (!st.code && (o.format || o.photographs)) run(&o, "materials", write_task, o.count ? o.count : 16, o.size ? (int)o.size : 256, NULL, &st);
+    if (!st.code && (o.format || o.photographs))
+        run(&o, "materials", write_task, o.count ? o.count : 16, o.size ? (int)o.size : 256, NULL, &st);
     if (!st.code && o.sheet) make_sheet(&o, &st);
     if (!st.code && o.statistics) compare(&o, &st);
     if (!st.code && o.histograms) make_histograms(&o, &st);

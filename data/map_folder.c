@@ -1,6 +1,6 @@
 /* Map folders: the images of a set, read, brought to one size and combined to our maps. */
 #include "data/map_folder.h"
-#include "data/image_read.h"
+#include "data/image/image_read.h"
 #include "data/name.h"
 #include <limits.h>
 #include <math.h>
@@ -11,7 +11,8 @@
 static ts_code read_map(const char *folder, const io_map_set *set, int kind, io_image *image, ts_status *st)
 {
     char path[PATH_MAX];
-    if (snprintf(path, sizeof path, "%s/%s", folder, set->file[kind]) >= (int)sizeof path) return ts_fail(st, TS_INVALID, "%s: name too long", folder);
+    if (snprintf(path, sizeof path, "%s/%s", folder, set->file[kind]) >= (int)sizeof path)
+        return ts_fail(st, TS_INVALID, "%s: name too long", folder);
     bool colour = kind == IO_BASECOLOR || kind == IO_DIFFUSE_MAP || kind == IO_SPECULAR_MAP;
     if (colour && !set->linear[kind]) return io_read_colour_map(path, IO_MAX_PIXELS_DEFAULT, image, st);
     ts_code code = io_read_data(path, colour || kind == IO_NORMAL_MAP ? 3 : 1, IO_MAX_PIXELS_DEFAULT, image, st);
@@ -37,8 +38,8 @@ static ts_code to_square(io_image *image, int size, ts_status *st)
     return TS_OK;
 }
 
-/* Metallic workflow: a dielectric's F0 of 0.04 (Burley, "Physically Based Shading at Disney", 2012; the glTF 2.0 specification, appendix B)
- * gives way to the base colour. out: diffuse 3, F0 3, roughness, normal 3. */
+/* Metallic workflow: a dielectric's F0 of 0.04 (Burley, "Physically Based Shading at Disney", 2012; the glTF 2.0
+ * specification, appendix B) gives way to the base colour. out: diffuse 3, F0 3, roughness, normal 3. */
 enum { MIXED = 10 };
 static void mix_pixel(const io_map_set *set, const io_image map[IO_MAP_KINDS], size_t i, float out[MIXED])
 {
@@ -46,7 +47,8 @@ static void mix_pixel(const io_map_set *set, const io_image map[IO_MAP_KINDS], s
     float metallic = map[IO_METALLIC_MAP].data ? fminf(fmaxf(map[IO_METALLIC_MAP].data[i], 0), 1) : 0;
     for (int c = 0; c < 3; c++) {
         out[c] = set->specular ? base[c] : base[c] * (1 - metallic);
-        out[3 + c] = set->specular ? map[IO_SPECULAR_MAP].data[3 * i + (size_t)c] : 0.04f * (1 - metallic) + base[c] * metallic;
+        out[3 + c] = set->specular ? map[IO_SPECULAR_MAP].data[3 * i + (size_t)c]
+                                   : 0.04f * (1 - metallic) + base[c] * metallic;
         out[7 + c] = map[IO_NORMAL_MAP].data[3 * i + (size_t)c];
     }
     out[6] = map[IO_ROUGHNESS_MAP].data ? map[IO_ROUGHNESS_MAP].data[i] : 1 - map[IO_GLOSS_MAP].data[i];
@@ -64,7 +66,8 @@ static void put_pixels(const io_image *mixed, io_material *m)
     }
 }
 
-/* Products are formed at the largest stored size and averaged after: the mean of base colour times metallic is not the product of means. */
+/* Products are formed at the largest stored size and averaged after: the mean of base colour times metallic is not the
+ * product of means. */
 static ts_code combine(const io_map_set *set, io_image map[IO_MAP_KINDS], int size, io_material *m, ts_status *st)
 {
     int side = 0;
@@ -75,7 +78,8 @@ static ts_code combine(const io_map_set *set, io_image map[IO_MAP_KINDS], int si
         if (map[k].data) code = to_square(&map[k], side, st);
     io_image mixed = {0};
     if (code == TS_OK) code = io_image_create(&mixed, side, side, MIXED, st);
-    for (size_t i = 0, n = (size_t)side * (size_t)side; i < n && code == TS_OK; i++) mix_pixel(set, map, i, mixed.data + i * MIXED);
+    for (size_t i = 0, n = (size_t)side * (size_t)side; i < n && code == TS_OK; i++)
+        mix_pixel(set, map, i, mixed.data + i * MIXED);
     for (int k = 0; k < IO_MAP_KINDS; k++) io_image_free(&map[k]);
     if (code == TS_OK) code = to_square(&mixed, size > 0 ? size : side, st);
     if (code == TS_OK) code = io_material_create(m, mixed.width, st);
@@ -92,7 +96,8 @@ ts_code io_read_map_folder(const char *path, const io_map_convention *told, int 
     ts_code code = io_describe_map_folder(path, told, &set, st);
     if (code != TS_OK) return code;
     for (int k = 0; k < IO_MAP_KINDS && code == TS_OK; k++) {
-        bool wanted = set.file[k][0] && !(k == IO_METALLIC_MAP && set.specular) && !(k == IO_SPECULAR_MAP && !set.specular);
+        bool wanted = set.file[k][0] && !(k == IO_METALLIC_MAP && set.specular) &&
+            !(k == IO_SPECULAR_MAP && !set.specular);
         if (wanted) code = read_map(path, &set, k, &map[k], st);
     }
     if (code == TS_OK) {

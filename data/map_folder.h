@@ -3,7 +3,16 @@
 #define IO_MAP_FOLDER_H
 #include "data/material.h"
 
-enum { IO_BASECOLOR, IO_DIFFUSE_MAP, IO_NORMAL_MAP, IO_ROUGHNESS_MAP, IO_GLOSS_MAP, IO_METALLIC_MAP, IO_SPECULAR_MAP, IO_MAP_KINDS };
+enum {
+    IO_BASECOLOR,
+    IO_DIFFUSE_MAP,
+    IO_NORMAL_MAP,
+    IO_ROUGHNESS_MAP,
+    IO_GLOSS_MAP,
+    IO_METALLIC_MAP,
+    IO_SPECULAR_MAP,
+    IO_MAP_KINDS
+};
 extern const char *const io_map_kind_name[IO_MAP_KINDS];
 
 typedef struct io_map_set {

@@ -7,7 +7,7 @@
  *   file.MAP: NAME                           where names do not say it; MAP as in io_map_kind_name */
 #include "data/file.h"
 #include "data/map_folder.h"
-#include "data/oiio.h"
+#include "data/image/oiio.h"
 #include <ctype.h>
 #include <dirent.h>
 #include <errno.h>
@@ -17,18 +17,21 @@
 #include <string.h>
 #include <strings.h>
 
-const char *const io_map_kind_name[IO_MAP_KINDS] = {"basecolor", "diffuse", "normal", "roughness", "gloss", "metallic", "specular"};
+const char *const io_map_kind_name[IO_MAP_KINDS] = {"basecolor", "diffuse",  "normal",  "roughness",
+                                                    "gloss",     "metallic", "specular"};
 
 static const struct {
     const char *word;
     int kind;
 } words[] = {
-    {"basecolor", IO_BASECOLOR},     {"basecolour", IO_BASECOLOR},    {"albedo", IO_BASECOLOR},      {"color", IO_BASECOLOR},
-    {"colour", IO_BASECOLOR},        {"col", IO_BASECOLOR},           {"diffuse", IO_DIFFUSE_MAP},   {"diff", IO_DIFFUSE_MAP},
-    {"normal", IO_NORMAL_MAP},       {"normals", IO_NORMAL_MAP},      {"normalgl", IO_NORMAL_MAP},   {"normaldx", IO_NORMAL_MAP},
-    {"nor", IO_NORMAL_MAP},          {"nrm", IO_NORMAL_MAP},          {"roughness", IO_ROUGHNESS_MAP}, {"rough", IO_ROUGHNESS_MAP},
-    {"gloss", IO_GLOSS_MAP},         {"glossiness", IO_GLOSS_MAP},    {"metallic", IO_METALLIC_MAP}, {"metalness", IO_METALLIC_MAP},
-    {"metal", IO_METALLIC_MAP},      {"specular", IO_SPECULAR_MAP},   {"spec", IO_SPECULAR_MAP},
+    {"basecolor", IO_BASECOLOR},   {"basecolour", IO_BASECOLOR},   {"albedo", IO_BASECOLOR},
+    {"color", IO_BASECOLOR},       {"colour", IO_BASECOLOR},       {"col", IO_BASECOLOR},
+    {"diffuse", IO_DIFFUSE_MAP},   {"diff", IO_DIFFUSE_MAP},       {"normal", IO_NORMAL_MAP},
+    {"normals", IO_NORMAL_MAP},    {"normalgl", IO_NORMAL_MAP},    {"normaldx", IO_NORMAL_MAP},
+    {"nor", IO_NORMAL_MAP},        {"nrm", IO_NORMAL_MAP},         {"roughness", IO_ROUGHNESS_MAP},
+    {"rough", IO_ROUGHNESS_MAP},   {"gloss", IO_GLOSS_MAP},        {"glossiness", IO_GLOSS_MAP},
+    {"metallic", IO_METALLIC_MAP}, {"metalness", IO_METALLIC_MAP}, {"metal", IO_METALLIC_MAP},
+    {"specular", IO_SPECULAR_MAP}, {"spec", IO_SPECULAR_MAP},
 };
 
 /* The words of a file name, cut at everything that is no letter or digit and where a capital follows a small letter. */
@@ -60,7 +63,9 @@ static int kind_of_name(const char *name, side *y)
         for (size_t w = 0; w < sizeof words / sizeof words[0]; w++)
             if (!strcmp(word[i], words[w].word)) kind = words[w].kind;
     for (int i = 0; i < count && kind == IO_NORMAL_MAP; i++) {
-        if (!strcmp(word[i], "gl") || !strcmp(word[i], "opengl") || !strcmp(word[i], "ogl") || !strcmp(word[i], "normalgl")) *y = GL;
+        if (!strcmp(word[i], "gl") || !strcmp(word[i], "opengl") || !strcmp(word[i], "ogl") ||
+            !strcmp(word[i], "normalgl"))
+            *y = GL;
         if (!strcmp(word[i], "dx") || !strcmp(word[i], "directx") || !strcmp(word[i], "normaldx")) *y = DX;
     }
     return kind;
@@ -123,8 +128,10 @@ static ts_code scan(const char *path, io_map_set *set, side wanted, side *file_s
             if (kind == IO_NORMAL_MAP) *file_side = y;
         } else if (kind != IO_NORMAL_MAP || !choose_normal(set, file_side, entry->d_name, y, wanted)) {
             bool swap = strcmp(file, entry->d_name) > 0; /* the same message whatever order the system lists them in */
-            code = ts_fail(st, TS_INVALID, "%s: both %s and %s could be the %s map; remove one, or name it in meta.txt (file.%s: ...)", path,
-                           swap ? entry->d_name : file, swap ? file : entry->d_name, io_map_kind_name[kind], io_map_kind_name[kind]);
+            code = ts_fail(st, TS_INVALID,
+                           "%s: both %s and %s could be the %s map; remove one, or name it in meta.txt (file.%s: ...)",
+                           path, swap ? entry->d_name : file, swap ? file : entry->d_name, io_map_kind_name[kind],
+                           io_map_kind_name[kind]);
         }
     }
     closedir(folder);
@@ -143,7 +150,8 @@ static bool named_files(const char *meta, io_map_set *set)
     return any;
 }
 
-static ts_code settle_normal(const char *path, const char *meta, io_normal convention, side file_side, io_map_set *set, ts_status *st)
+static ts_code settle_normal(const char *path, const char *meta, io_normal convention, side file_side, io_map_set *set,
+                             ts_status *st)
 {
     char text[512] = "";
     side y = file_side;
@@ -153,14 +161,19 @@ static ts_code settle_normal(const char *path, const char *meta, io_normal conve
         set->directx = y == DX;
         return TS_OK;
     }
-    return ts_fail(st, TS_INVALID, "%s: %s; put \"normal: OpenGL y\" or \"normal: DirectX y\" into meta.txt, or say which by lgd-eval's --normal or a set.ini", path,
-                   y == BOTH ? "meta.txt names both conventions for the normal's y" : "nothing says whether the normal's y is OpenGL or DirectX");
+    return ts_fail(st, TS_INVALID,
+                   "%s: %s; put \"normal: OpenGL y\" or \"normal: DirectX y\" into meta.txt, or say which by "
+                   "lgd-eval's --normal or a set.ini",
+                   path,
+                   y == BOTH ? "meta.txt names both conventions for the normal's y"
+                             : "nothing says whether the normal's y is OpenGL or DirectX");
 }
 
 static ts_code settle_workflow(const char *path, const char *meta, io_workflow told, io_map_set *set, ts_status *st)
 {
     char text[512] = "";
-    bool base = set->file[IO_BASECOLOR][0], diffuse = set->file[IO_DIFFUSE_MAP][0], metallic = set->file[IO_METALLIC_MAP][0];
+    bool base = set->file[IO_BASECOLOR][0], diffuse = set->file[IO_DIFFUSE_MAP][0],
+         metallic = set->file[IO_METALLIC_MAP][0];
     bool specular = set->file[IO_SPECULAR_MAP][0], said_specular = false, said_metallic = false;
     if (told != IO_WORKFLOW_FROM_FILE) {
         said_specular = told == IO_WORKFLOW_SPECULAR;
@@ -170,19 +183,29 @@ static ts_code settle_workflow(const char *path, const char *meta, io_workflow t
         said_metallic = !strncasecmp(text, "metal", 5);
     }
     if (base && diffuse)
-        return ts_fail(st, TS_INVALID, "%s: both %s and %s could be the colour map; remove one, or name it in meta.txt (file.basecolor: ...)", path,
-                       set->file[IO_BASECOLOR], set->file[IO_DIFFUSE_MAP]);
+        return ts_fail(
+            st, TS_INVALID,
+            "%s: both %s and %s could be the colour map; remove one, or name it in meta.txt (file.basecolor: ...)",
+            path, set->file[IO_BASECOLOR], set->file[IO_DIFFUSE_MAP]);
     if (metallic && specular && !said_specular && !said_metallic)
-        return ts_fail(st, TS_INVALID, "%s: has both %s and %s; put \"workflow: metallic\" or \"workflow: specular\" into meta.txt, or say which by lgd-eval's --workflow or a set.ini", path,
-                       set->file[IO_METALLIC_MAP], set->file[IO_SPECULAR_MAP]);
+        return ts_fail(st, TS_INVALID,
+                       "%s: has both %s and %s; put \"workflow: metallic\" or \"workflow: specular\" into meta.txt, or "
+                       "say which by lgd-eval's --workflow or a set.ini",
+                       path, set->file[IO_METALLIC_MAP], set->file[IO_SPECULAR_MAP]);
     set->specular = said_specular || (specular && !said_metallic);
-    if (set->specular && !specular) return ts_fail(st, TS_INVALID, "%s: should be of the specular workflow, but there is no specular map", path);
+    if (set->specular && !specular)
+        return ts_fail(st, TS_INVALID, "%s: should be of the specular workflow, but there is no specular map", path);
     if (set->file[IO_ROUGHNESS_MAP][0] && set->file[IO_GLOSS_MAP][0])
-        return ts_fail(st, TS_INVALID, "%s: has both %s and %s; remove one", path, set->file[IO_ROUGHNESS_MAP], set->file[IO_GLOSS_MAP]);
-    if (!base && !diffuse) return ts_fail(st, TS_INVALID, "%s: no colour map (basecolor, albedo, diffuse or color in its file name)", path);
-    if (!set->file[IO_NORMAL_MAP][0]) return ts_fail(st, TS_INVALID, "%s: no normal map (normal in its file name)", path);
+        return ts_fail(st, TS_INVALID, "%s: has both %s and %s; remove one", path, set->file[IO_ROUGHNESS_MAP],
+                       set->file[IO_GLOSS_MAP]);
+    if (!base && !diffuse)
+        return ts_fail(st, TS_INVALID, "%s: no colour map (basecolor, albedo, diffuse or color in its file name)",
+                       path);
+    if (!set->file[IO_NORMAL_MAP][0])
+        return ts_fail(st, TS_INVALID, "%s: no normal map (normal in its file name)", path);
     if (!set->file[IO_ROUGHNESS_MAP][0] && !set->file[IO_GLOSS_MAP][0])
-        return ts_fail(st, TS_INVALID, "%s: no roughness map (roughness in its file name; a packed map must be taken apart)", path);
+        return ts_fail(st, TS_INVALID,
+                       "%s: no roughness map (roughness in its file name; a packed map must be taken apart)", path);
     return TS_OK;
 }
 
@@ -194,7 +217,8 @@ ts_code io_describe_map_folder(const char *path, const io_map_convention *told, 
     size_t size;
     side file_side = UNKNOWN;
     ts_code code = TS_OK;
-    if (snprintf(meta_path, sizeof meta_path, "%s/meta.txt", path) >= (int)sizeof meta_path) return ts_fail(st, TS_INVALID, "%s: name too long", path);
+    if (snprintf(meta_path, sizeof meta_path, "%s/meta.txt", path) >= (int)sizeof meta_path)
+        return ts_fail(st, TS_INVALID, "%s: name too long", path);
     FILE *exists = fopen(meta_path, "re");
     if (exists) {
         fclose(exists);
@@ -202,12 +226,17 @@ ts_code io_describe_map_folder(const char *path, const io_map_convention *told, 
     }
     const char *words_of = meta ? meta : "";
     if (code == TS_OK && !named_files(words_of, set))
-        code = scan(path, set, say.normal == IO_NORMAL_DX ? DX : say.normal == IO_NORMAL_GL ? GL : UNKNOWN, &file_side, st);
+        code = scan(path, set,
+                    say.normal == IO_NORMAL_DX       ? DX
+                        : say.normal == IO_NORMAL_GL ? GL
+                                                     : UNKNOWN,
+                    &file_side, st);
     if (code == TS_OK) code = settle_workflow(path, words_of, say.workflow, set, st);
     if (code == TS_OK) code = settle_normal(path, words_of, say.normal, file_side, set, st);
     for (int k = 0; k < IO_MAP_KINDS && code == TS_OK; k++)
-        set->linear[k] = say.colour ? say.colour == IO_ENCODING_LINEAR
-                                    : find_key(words_of, io_map_kind_name[k], text, sizeof text) && says(text, "linear") && !says(text, "srgb");
+        set->linear[k] = say.colour
+            ? say.colour == IO_ENCODING_LINEAR
+            : find_key(words_of, io_map_kind_name[k], text, sizeof text) && says(text, "linear") && !says(text, "srgb");
     free(meta);
     return code;
 }

@@ -1,5 +1,5 @@
 #include "data/material.h"
-#include "data/exr.h"
+#include "data/image/exr.h"
 #include "data/file.h"
 #include <limits.h>
 #include <math.h>
@@ -12,7 +12,8 @@ enum { MAX_SIZE = 1 << 15 };
 ts_code io_material_create(io_material *m, int size, ts_status *st)
 {
     memset(m, 0, sizeof *m);
-    if (size < 1 || size > MAX_SIZE) return ts_fail(st, TS_INVALID, "maps of %d x %d pixels: the size must be 1 .. %d", size, size, MAX_SIZE);
+    if (size < 1 || size > MAX_SIZE)
+        return ts_fail(st, TS_INVALID, "maps of %d x %d pixels: the size must be 1 .. %d", size, size, MAX_SIZE);
     m->maps = calloc((size_t)size * (size_t)size, MAP_CHANNELS * sizeof(float));
     if (!m->maps) return ts_fail(st, TS_NOMEM, "no memory for maps of %d x %d pixels", size, size);
     m->size = size;
@@ -31,10 +32,7 @@ static float unit(float x)
     return v > 0 ? v < 1 ? v : 1 : 0; /* NaN to 0 */
 }
 
-static float level(float v)
-{
-    return v > 0 ? v < 1 ? 2 * v - 1 : 1 : -1;
-}
+static float level(float v) { return v > 0 ? v < 1 ? 2 * v - 1 : 1 : -1; }
 
 /* To [-1, 1]; NaN to -1: a value still. */
 static float clamped(float x) { return x > -1 ? x < 1 ? x : 1 : -1; }
@@ -48,7 +46,8 @@ io_texel io_texel_get(const float *maps9)
     }
     float x = clamped(maps9[MAP_NORMAL]), y = clamped(maps9[MAP_NORMAL + 1]);
     float s = x * x + y * y;
-    /* Refined maps may leave the unit circle; the renderer's rule (n_x^2 + n_y^2 at most 1 - 1e-6, then unit length) keeps z above 0. */
+    /* Refined maps may leave the unit circle; the renderer's rule (n_x^2 + n_y^2 at most 1 - 1e-6, then unit length)
+     * keeps z above 0. */
     if (s > 1 - 1e-6f) {
         float length = sqrtf(s + 1e-6f);
         t.normal[0] = x / length;
@@ -71,7 +70,8 @@ void io_texel_put(float *maps9, const io_texel *t)
     maps9[MAP_ROUGHNESS] = level(t->roughness);
     float x = t->normal[0], y = t->normal[1], z = t->normal[2], s = x * x + y * y + z * z;
     bool usable = isfinite(s) && s > 1e-12f;
-    /* A normal that is of unit length already keeps its exact x and y, so that reading back what was written changes nothing. */
+    /* A normal that is of unit length already keeps its exact x and y, so that reading back what was written changes
+     * nothing. */
     float scale = !usable ? 0 : fabsf(s - 1) < 1e-6f ? 1 : 1 / sqrtf(s);
     maps9[MAP_NORMAL] = usable ? x * scale : 0;
     maps9[MAP_NORMAL + 1] = usable ? y * scale : 0;
@@ -88,7 +88,10 @@ static ts_code make_rows(int y, int count, float *out, void *user, ts_status *st
 {
     const map *q = user;
     const size_t first = (size_t)y * (size_t)q->m->size, pixels = (size_t)count * (size_t)q->m->size;
-    const int from = q->which == IO_MAPS_DIFFUSE ? MAP_DIFFUSE : q->which == IO_MAPS_SPECULAR ? MAP_SPECULAR : MAP_ROUGHNESS, channels = q->which == IO_MAPS_ROUGHNESS ? 1 : 3;
+    const int from = q->which == IO_MAPS_DIFFUSE ? MAP_DIFFUSE
+        : q->which == IO_MAPS_SPECULAR           ? MAP_SPECULAR
+                                                 : MAP_ROUGHNESS,
+              channels = q->which == IO_MAPS_ROUGHNESS ? 1 : 3;
     (void)st;
     for (size_t i = 0; i < pixels; i++, out += channels) {
         const float *maps = q->m->maps + (first + i) * MAP_CHANNELS;
@@ -102,14 +105,20 @@ static ts_code make_rows(int y, int count, float *out, void *user, ts_status *st
     return TS_OK;
 }
 
-static ts_code write_map(const char *folder, const char *file, const io_material *m, unsigned which, bool directx, ts_status *st)
+static ts_code write_map(const char *folder, const char *file, const io_material *m, unsigned which, bool directx,
+                         ts_status *st)
 {
     char path[PATH_MAX];
-    if (snprintf(path, sizeof path, "%s/%s", folder, file) >= (int)sizeof path) return ts_fail(st, TS_INVALID, "%s: name too long", folder);
+    if (snprintf(path, sizeof path, "%s/%s", folder, file) >= (int)sizeof path)
+        return ts_fail(st, TS_INVALID, "%s: name too long", folder);
     if (which == IO_MAPS_EXR) return io_write_maps_exr(path, m, directx, st);
     bool colour = which == IO_MAPS_DIFFUSE || which == IO_MAPS_SPECULAR;
     map q = {m, which, directx};
-    const io_rows rows = {.width = m->size, .height = m->size, .channels = which == IO_MAPS_ROUGHNESS ? 1 : 3, .make = make_rows, .user = &q};
+    const io_rows rows = {.width = m->size,
+                          .height = m->size,
+                          .channels = which == IO_MAPS_ROUGHNESS ? 1 : 3,
+                          .make = make_rows,
+                          .user = &q};
     /* Eight bits of the sRGB curve are enough for albedo; steps of a normal or of roughness are seen in highlights. */
     return io_write_png_rows(path, &rows, colour ? 8 : 16, colour, st);
 }
@@ -118,11 +127,15 @@ static ts_code write_map(const char *folder, const char *file, const io_material
 ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_status *st)
 {
     char path[PATH_MAX], text[512];
-    if (snprintf(path, sizeof path, "%s/meta.txt", folder) >= (int)sizeof path) return ts_fail(st, TS_INVALID, "%s: name too long", folder);
+    if (snprintf(path, sizeof path, "%s/meta.txt", folder) >= (int)sizeof path)
+        return ts_fail(st, TS_INVALID, "%s: name too long", folder);
     /* Beside a base colour and a metallic map the reader is not to look for F0. */
-    int length = snprintf(text, sizeof text, "%sroughness: linear value, perceptual (alpha = roughness^2)\nnormal: tangent space, %s y\n%s",
-                          which & (IO_MAPS_DIFFUSE | IO_MAPS_SPECULAR) ? "workflow: specular (F0)\ndiffuse: sRGB\nspecular: sRGB\n" : "",
-                          directx ? "DirectX" : "OpenGL", which & IO_MAPS_EXR ? "maps.exr: diffuse, specular (F0), roughness and normal, linear\n" : "");
+    int length = snprintf(
+        text, sizeof text,
+        "%sroughness: linear value, perceptual (alpha = roughness^2)\nnormal: tangent space, %s y\n%s",
+        which & (IO_MAPS_DIFFUSE | IO_MAPS_SPECULAR) ? "workflow: specular (F0)\ndiffuse: sRGB\nspecular: sRGB\n" : "",
+        directx ? "DirectX" : "OpenGL",
+        which & IO_MAPS_EXR ? "maps.exr: diffuse, specular (F0), roughness and normal, linear\n" : "");
     return io_write_bytes(path, text, (size_t)length, st);
 }
 
@@ -131,8 +144,11 @@ ts_code io_write_map_files(const char *folder, const io_material *m, unsigned wh
     static const struct {
         unsigned which;
         const char *file;
-    } files[] = {{IO_MAPS_DIFFUSE, "diffuse.png"}, {IO_MAPS_SPECULAR, "specular.png"}, {IO_MAPS_ROUGHNESS, "roughness.png"},
-                 {IO_MAPS_NORMAL, "normal.png"}, {IO_MAPS_EXR, "maps.exr"}};
+    } files[] = {{IO_MAPS_DIFFUSE, "diffuse.png"},
+                 {IO_MAPS_SPECULAR, "specular.png"},
+                 {IO_MAPS_ROUGHNESS, "roughness.png"},
+                 {IO_MAPS_NORMAL, "normal.png"},
+                 {IO_MAPS_EXR, "maps.exr"}};
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
         if (!(which & files[i].which)) continue;
         ts_code code = write_map(folder, files[i].file, m, files[i].which, directx, st);

@@ -46,7 +46,8 @@ io_metallic_error io_to_metallic(const io_material *m, float *basecolor, float *
         metallic[i] = (float)k;
         for (int c = 0; c < 3; c++) {
             basecolor[3 * i + (size_t)c] = (float)base[c];
-            const double d = base[c] * (1 - k) - (double)t.diffuse[c], s = DIELECTRIC * (1 - k) + base[c] * k - (double)t.specular[c];
+            const double d = base[c] * (1 - k) - (double)t.diffuse[c],
+                         s = DIELECTRIC * (1 - k) + base[c] * k - (double)t.specular[c];
             e.diffuse += d * d;
             e.specular += s * s;
         }

@@ -23,7 +23,8 @@ void io_normal_decode(const float stored[3], bool directx, float normal[3])
 {
     float x = 2 * stored[0] - 1, y = 2 * stored[1] - 1, z = 2 * stored[2] - 1;
     if (directx) y = -y;
-    /* Compression and averaging leave normals at or below the surface, which nothing can show: they are lifted to the grazing limit. */
+    /* Compression and averaging leave normals at or below the surface, which nothing can show: they are lifted to the
+     * grazing limit. */
     float length = sqrtf(x * x + y * y + z * z);
     if (!(length > 1e-6f) || !isfinite(length)) x = y = 0, z = length = 1;
     x /= length, y /= length, z /= length;

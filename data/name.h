@@ -4,7 +4,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* The last part of a path without its extension ("a/b.c.png" gives "b.c", "a/b/" gives "b"), cut to capacity - 1 bytes. */
+/* The last part of a path without its extension ("a/b.c.png" gives "b.c", "a/b/" gives "b"), cut to capacity - 1 bytes.
+ */
 void io_name_from_path(const char *path, char *name, size_t capacity);
 
 /* A stored normal, (n + 1) / 2 per channel, to a unit vector with z > 0; directx: its y points down. */

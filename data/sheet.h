@@ -1,4 +1,5 @@
-/* A contact sheet: one cell for each material, with its photograph, normals, diffuse colour, roughness and specular colour side by side. */
+/* A contact sheet: one cell for each material, with its photograph, normals, diffuse colour, roughness and specular
+ * colour side by side. */
 #ifndef IO_SHEET_H
 #define IO_SHEET_H
 #include "data/material.h"

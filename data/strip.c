@@ -11,7 +11,8 @@ static ts_code cut_panel(const io_image *strip, int panel, int size, io_image *o
     io_image whole;
     if (io_image_create(&whole, side, side, 3, st) != TS_OK) return TS_NOMEM;
     for (int y = 0; y < side; y++)
-        memcpy(whole.data + (size_t)y * (size_t)side * 3, strip->data + ((size_t)y * (size_t)strip->width + (size_t)panel * (size_t)side) * 3,
+        memcpy(whole.data + (size_t)y * (size_t)side * 3,
+               strip->data + ((size_t)y * (size_t)strip->width + (size_t)panel * (size_t)side) * 3,
                (size_t)side * 3 * sizeof(float));
     ts_code code = io_centre_square(&whole, size, out, st);
     io_image_free(&whole);
@@ -38,7 +39,8 @@ ts_code io_read_strip(const char *path, int size, io_material *m, io_image *inpu
     ts_code code = io_read_data(path, 3, IO_MAX_PIXELS_DEFAULT, &strip, st);
     if (code != TS_OK) return code;
     if ((int64_t)strip.height * PANELS != strip.width) {
-        code = ts_fail(st, TS_FORMAT, "%s: %d x %d pixels is no strip of five square panels", path, strip.width, strip.height);
+        code = ts_fail(st, TS_FORMAT, "%s: %d x %d pixels is no strip of five square panels", path, strip.width,
+                       strip.height);
         io_image_free(&strip);
         return code;
     }
@@ -61,8 +63,8 @@ ts_code io_read_strip(const char *path, int size, io_material *m, io_image *inpu
 ts_code io_write_strip(const char *path, const io_material *m, const io_image *input, ts_status *st)
 {
     if (input->width != m->size || input->height != m->size || input->channels != 3)
-        return ts_fail(st, TS_INVALID, "%s: the input is %d x %d with %d channels, the maps are %d x %d", path, input->width, input->height,
-                       input->channels, m->size, m->size);
+        return ts_fail(st, TS_INVALID, "%s: the input is %d x %d with %d channels, the maps are %d x %d", path,
+                       input->width, input->height, input->channels, m->size, m->size);
     io_image strip;
     ts_code code = io_image_create(&strip, m->size * PANELS, m->size, 3, st);
     if (code != TS_OK) return code;
@@ -71,7 +73,8 @@ ts_code io_write_strip(const char *path, const io_material *m, const io_image *i
             size_t i = (size_t)y * (size_t)m->size + (size_t)x;
             io_texel t = io_texel_get(m->maps + i * MAP_CHANNELS);
             for (int c = 0; c < 3; c++) {
-                float v[PANELS] = {input->data[3 * i + (size_t)c], t.normal[c] * 0.5f + 0.5f, t.diffuse[c], t.roughness, t.specular[c]};
+                float v[PANELS] = {input->data[3 * i + (size_t)c], t.normal[c] * 0.5f + 0.5f, t.diffuse[c], t.roughness,
+                                   t.specular[c]};
                 for (int p = 0; p < PANELS; p++)
                     strip.data[(((size_t)y * PANELS + (size_t)p) * (size_t)m->size + (size_t)x) * 3 + (size_t)c] = v[p];
             }

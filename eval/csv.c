@@ -101,11 +101,12 @@ static void write_times(const void *what, FILE *f)
 static void write_json(const void *what, FILE *f) { ev_json_write(what, f); }
 static void write_html(const void *what, FILE *f) { ev_html_write(what, f); }
 
-ts_code ev_replace(const char *folder, const char *name, void (*write_to)(const void *what, FILE *f), const void *what, ts_status *st)
+ts_code ev_replace(const char *folder, const char *name, void (*write_to)(const void *what, FILE *f), const void *what,
+                   ts_status *st)
 {
     char path[PATH_LENGTH], part[PATH_LENGTH];
-    if (snprintf(path, sizeof path, "%s/%s", folder, name) >= (int)sizeof path
-        || snprintf(part, sizeof part, "%s/.%s.%ld", folder, name, (long)getpid()) >= (int)sizeof part)
+    if (snprintf(path, sizeof path, "%s/%s", folder, name) >= (int)sizeof path ||
+        snprintf(part, sizeof part, "%s/.%s.%ld", folder, name, (long)getpid()) >= (int)sizeof part)
         return ts_fail(st, TS_INVALID, "%s: the name is too long", folder);
     FILE *f = fopen(part, "we");
     if (!f) return ts_fail(st, TS_IO, "%s: cannot be written: %s", path, strerror(errno));
@@ -125,8 +126,13 @@ ts_code ev_report_write(const ev_report *r, const char *folder, ts_status *st)
     static const struct {
         const char *name;
         void (*write_to)(const void *, FILE *);
-    } files[] = {{"results.csv", write_results}, {"summary.csv", write_summary}, {"times.csv", write_times}, {"results.json", write_json}, {"report.html", write_html}};
+    } files[] = {{"results.csv", write_results},
+                 {"summary.csv", write_summary},
+                 {"times.csv", write_times},
+                 {"results.json", write_json},
+                 {"report.html", write_html}};
     ts_code code = TS_OK;
-    for (size_t i = 0; i < sizeof files / sizeof *files && !code; i++) code = ev_replace(folder, files[i].name, files[i].write_to, r, st);
+    for (size_t i = 0; i < sizeof files / sizeof *files && !code; i++)
+        code = ev_replace(folder, files[i].name, files[i].write_to, r, st);
     return code;
 }

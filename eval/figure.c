@@ -89,14 +89,16 @@ static ts_code finish(figure *g, const char *folder, const char *stem, ts_status
 
 static ts_code of_report(const ev_report *r, bool time, const char *folder, ts_status *st)
 {
-    figure g = {.axes = {time ? "seconds for one photograph" : "refinement steps", "RMSE of the renderings", time}, .x_name = time ? "seconds" : "step"};
+    figure g = {.axes = {time ? "seconds for one photograph" : "refinement steps", "RMSE of the renderings", time},
+                .x_name = time ? "seconds" : "step"};
     ts_code code = grow(&g, r->methods, r->columns) ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for a figure");
     for (int m = 0; m < r->methods && !code; m++) {
         begin_series(&g, r->method[m].label);
         for (int i = 0; i < r->method[m].points; i++) {
             const int c = r->method[m].first + i, step = r->step[c];
             char label[16] = "";
-            if (time && r->method[m].points > 1 && (i == 0 || i == r->method[m].points - 1 || step % 6 == 0)) snprintf(label, sizeof label, "%d", step);
+            if (time && r->method[m].points > 1 && (i == 0 || i == r->method[m].points - 1 || step % 6 == 0))
+                snprintf(label, sizeof label, "%d", step);
             put_point(&g, r, c, time ? ev_report_seconds(r, -1, c) : step, label);
         }
         g.series[m].level = !time && r->method[m].points == 1;
@@ -106,8 +108,14 @@ static ts_code of_report(const ev_report *r, bool time, const char *folder, ts_s
     return code;
 }
 
-ts_code ev_figure_iterations(const ev_report *r, const char *folder, ts_status *st) { return of_report(r, false, folder, st); }
-ts_code ev_figure_methods(const ev_report *r, const char *folder, ts_status *st) { return of_report(r, true, folder, st); }
+ts_code ev_figure_iterations(const ev_report *r, const char *folder, ts_status *st)
+{
+    return of_report(r, false, folder, st);
+}
+ts_code ev_figure_methods(const ev_report *r, const char *folder, ts_status *st)
+{
+    return of_report(r, true, folder, st);
+}
 
 /* A method over its steps. */
 static void add_steps(figure *g, const ev_report *r, int m, const char *what)
@@ -131,7 +139,8 @@ static bool add_size(figure *g, const ev_report *r, const char *const *tolerance
     add_steps(g, r, 1, ts_isa_now() < TS_AVX512BF16 ? "bf16, emulated" : "bf16");
     snprintf(name, sizeof name, "%d pixels, tolerance", r->size);
     begin_series(g, name);
-    for (int m = 2; m < r->methods; m++) put_point(g, r, r->method[m].first, ev_report_seconds(r, -1, r->method[m].first), tolerance[m - 2]);
+    for (int m = 2; m < r->methods; m++)
+        put_point(g, r, r->method[m].first, ev_report_seconds(r, -1, r->method[m].first), tolerance[m - 2]);
     return true;
 }
 
@@ -156,7 +165,8 @@ ts_code ev_pareto(const ev_run *r, const int *sizes, int count, const char *mode
         at.methods = 2 + TOLERANCES;
         at.perceptual = at.pictures = false;
         code = ev_run_all(&at, st);
-        if (!code && at.report.results == 0) code = ts_fail(st, TS_INVALID, "no material could be evaluated at %d pixels", at.size);
+        if (!code && at.report.results == 0)
+            code = ts_fail(st, TS_INVALID, "no material could be evaluated at %d pixels", at.size);
         if (!code && !add_size(&g, &at.report, tolerance)) code = ts_fail(st, TS_NOMEM, "out of memory for a figure");
         ev_run_free(&at);
     }

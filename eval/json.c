@@ -1,6 +1,6 @@
 /* results.json. */
 #include "eval/html.h"
-#include "tensor/conv.h"
+#include "tensor/conv/conv.h"
 #include <math.h>
 
 static void put_string(FILE *f, const char *text)
@@ -42,8 +42,11 @@ void ev_json_write(const ev_report *r, FILE *f)
 {
     fprintf(f, "{\n\"version\": \"%s\",\n\"model\": ", LGD_VERSION);
     put_string(f, r->model);
-    fprintf(f, ",\n\"size\": %d,\n\"threads\": %d,\n\"pinned\": %s,\n\"repeat\": %d,\n\"isa\": \"%s\",\n\"convolutions\": \"%s\",\n\"methods\": [", r->size, r->threads,
-            r->pinned ? "true" : "false", r->repeat, r->isa, ts_conv_exact() ? "direct" : "Winograd");
+    fprintf(f,
+            ",\n\"size\": %d,\n\"threads\": %d,\n\"pinned\": %s,\n\"repeat\": %d,\n\"isa\": \"%s\",\n\"convolutions\": "
+            "\"%s\",\n\"methods\": [",
+            r->size, r->threads, r->pinned ? "true" : "false", r->repeat, r->isa,
+            ts_conv_exact() ? "direct" : "Winograd");
     for (int m = 0; m < r->methods; m++) {
         fputs(m ? ",\n{\"label\": " : "\n{\"label\": ", f);
         put_string(f, r->method[m].label);

@@ -2,42 +2,80 @@
 #include "cli/cli.h"
 #include "eval/figure.h"
 #include "eval/set_ini.h"
-#include "eval/tune.h"
-#include "infer/arguments.h"
+#include "eval/methods/tune.h"
+#include "cli/arguments.h"
 #include "infer/model_path.h"
-#include "tensor/conv.h"
+#include "tensor/conv/conv.h"
 #include "tensor/threads.h"
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { SETS_MAX = 64, METHODS_MAX = 64, IMAGES = 256, NOISE, SIZE, SEED, FAST, NORMAL, WORKFLOW, COLOUR, METHOD, REPEAT, PIN, LPIPS, EXACT, TUNE, FIGURE, PARETO, EXPOSURE, LIGHT, PATH_LENGTH = 4096 };
+enum {
+    SETS_MAX = 64,
+    METHODS_MAX = 64,
+    IMAGES = 256,
+    NOISE,
+    SIZE,
+    SEED,
+    FAST,
+    NORMAL,
+    WORKFLOW,
+    COLOUR,
+    METHOD,
+    REPEAT,
+    PIN,
+    LPIPS,
+    EXACT,
+    TUNE,
+    FIGURE,
+    PARETO,
+    EXPOSURE,
+    LIGHT,
+    PATH_LENGTH = 4096
+};
 
 static const lgd_argument arguments[] = {
     {'o', "output", "DIR", "write results.csv, summary.csv, times.csv, results.json and report.html there (required)"},
-    {'d', "set", "KIND:WHERE", "what to evaluate (required, may be repeated):\nprocedural:SEED,COUNT  generated materials\n"
-        "strips:FOLDER  images of five panels: input, normal, diffuse, roughness, specular\nmaps:FOLDER  a folder of map folders\nmultiview:FOLDER  a capture, or a folder of them: 00.png, 01.png ..., camera_pos.txt,\nlight_pos.txt, image_size.txt, light_power.txt; 00.png is the input"},
+    {'d', "set", "KIND:WHERE",
+     "what to evaluate (required, may be repeated):\nprocedural:SEED,COUNT  generated materials\n"
+     "strips:FOLDER  images of five panels: input, normal, diffuse, roughness, specular\nmaps:FOLDER  a folder of map "
+     "folders\nmultiview:FOLDER  a capture, or a folder of them: 00.png, 01.png ..., camera_pos.txt,\nlight_pos.txt, "
+     "image_size.txt, light_power.txt; 00.png is the input"},
     {NORMAL, "normal", "Y", "of map folders: opengl or directx (default: as set.ini, meta.txt or the file name says)"},
     {WORKFLOW, "workflow", "W", "of map folders: metallic or specular (default: likewise, or as the files are)"},
     {COLOUR, "colour", "C", "of map folders: srgb or linear (default: likewise, or sRGB)"},
-    {METHOD, "method", "NAME[:KEY=VALUE,...]", "a method to compare (may be repeated; default: lgd, every step); below are their keys"},
+    {METHOD, "method", "NAME[:KEY=VALUE,...]",
+     "a method to compare (may be repeated; default: lgd, every step); below are their keys"},
     {'i', "iterations", "N", "refinement steps, 0 .. 1000 (default: as trained)"},
     {'m', "model", "FILE", "weights (default: $LGD_MODEL, or those installed or built with the program)"},
     {SIZE, "size", "N", "pixels of a side, 1 .. 4096 (default 256)"},
     {SEED, "seed", "N", "draws the renderings' lights and cameras, and the noise (default 1)"},
     {NOISE, "noise", "X", "sensor noise of the input picture, 0 = none .. 1 = a phone at night (default 0)"},
-    {EXPOSURE, "exposure", "S", "photographs under a light S times as strong as the methods are told, 0.01 .. 100; renderings are then compared after one\n"
-        "factor on the estimate's is fitted (default 1, and no fit)"},
-    {LIGHT, "light", "X,Y", "place the flash X, Y patch widths from the centre, -4 .. 4 each; the methods are told (default 0,0)"},
-    {IMAGES, "images", NULL, "also write DIR/images/SET-MATERIAL.png: truth, first and last estimate in three rows;\nof several methods a file each"},
-    {LPIPS, "lpips-weights", "TRUNK LINEAR", "measure LPIPS 0.1 too: torchvision's AlexNet and the lpips package's linear heads, two files (.pth or safetensors)"},
+    {EXPOSURE, "exposure", "S",
+     "photographs under a light S times as strong as the methods are told, 0.01 .. 100; renderings are then compared "
+     "after one\n"
+     "factor on the estimate's is fitted (default 1, and no fit)"},
+    {LIGHT, "light", "X,Y",
+     "place the flash X, Y patch widths from the centre, -4 .. 4 each; the methods are told (default 0,0)"},
+    {IMAGES, "images", NULL,
+     "also write DIR/images/SET-MATERIAL.png: truth, first and last estimate in three rows;\nof several methods a file "
+     "each"},
+    {LPIPS, "lpips-weights", "TRUNK LINEAR",
+     "measure LPIPS 0.1 too: torchvision's AlexNet and the lpips package's linear heads, two files (.pth or "
+     "safetensors)"},
     {FAST, "fast", NULL, "no SSIM and FLIP, which take most of the time"},
     {REPEAT, "repeat", "N", "estimate each photograph N times, 1 .. 1000, and take the median time (default 1)"},
     {PIN, "pin", NULL, "bind every thread to a CPU of its own"},
-    {EXACT, "exact", NULL, "compute all convolutions directly, not by Winograd's way where it is faster, as lgd-infer does"},
-    {FIGURE, "figure", "NAME", "also write DIR/NAME.svg and .csv: iterations (error over T, 0 .. 24 unless told) or methods (error over time)"},
-    {PARETO, "pareto", NULL, "instead: DIR/pareto.svg and .csv, lgd's time against error at 128, 256, 512 pixels, T = 0 .. 24, f32 and bf16, and tolerances"},
-    {TUNE, "tune", NULL, "instead: search the grids of the methods' settings (default: of those that need no weights), DIR/tune.csv"},
+    {EXACT, "exact", NULL,
+     "compute all convolutions directly, not by Winograd's way where it is faster, as lgd-infer does"},
+    {FIGURE, "figure", "NAME",
+     "also write DIR/NAME.svg and .csv: iterations (error over T, 0 .. 24 unless told) or methods (error over time)"},
+    {PARETO, "pareto", NULL,
+     "instead: DIR/pareto.svg and .csv, lgd's time against error at 128, 256, 512 pixels, T = 0 .. 24, f32 and bf16, "
+     "and tolerances"},
+    {TUNE, "tune", NULL,
+     "instead: search the grids of the methods' settings (default: of those that need no weights), DIR/tune.csv"},
     {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {'q', "quiet", NULL, "no progress"},
     {'h', "help", NULL, "print this help"},
@@ -56,7 +94,8 @@ typedef struct command {
 static ts_code whole(const char *name, const char *text, int64_t lo, int64_t hi, int64_t *value, ts_status *st)
 {
     if (cl_parse_int(text, lo, hi, value)) return TS_OK;
-    return ts_fail(st, TS_INVALID, "--%s: '%s' is not a whole number in %lld .. %lld", name, text, (long long)lo, (long long)hi);
+    return ts_fail(st, TS_INVALID, "--%s: '%s' is not a whole number in %lld .. %lld", name, text, (long long)lo,
+                   (long long)hi);
 }
 
 static ts_code parse_light(const char *text, double light[2], ts_status *st)
@@ -79,7 +118,8 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
     int key, operands = argc;
     int64_t n = 0;
     ts_code code = TS_OK;
-    while (!code && !c->help && !c->version && (key = lgd_argument_next(argc, argv, arguments, &value, &operands, st)) != LGD_ARGUMENT_END) {
+    while (!code && !c->help && !c->version &&
+           (key = lgd_argument_next(argc, argv, arguments, &value, &operands, st)) != LGD_ARGUMENT_END) {
         switch (key) {
         case 'o': c->out = value; break;
         case 'm': c->model = value; break;
@@ -96,7 +136,8 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
             else code = ts_fail(st, TS_INVALID, "--figure: '%s' is neither 'iterations' nor 'methods'", value);
             break;
         case METHOD:
-            if (c->methods == METHODS_MAX) code = ts_fail(st, TS_INVALID, "--method: more than %d methods", METHODS_MAX);
+            if (c->methods == METHODS_MAX)
+                code = ts_fail(st, TS_INVALID, "--method: more than %d methods", METHODS_MAX);
             else c->method[c->methods++] = value;
             break;
         case REPEAT:
@@ -104,14 +145,16 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
             c->repeat = (int)n;
             break;
         case EXPOSURE:
-            if (!cl_parse_real(value, 0.01, 100, &c->exposure)) code = ts_fail(st, TS_INVALID, "--exposure: '%s' is not a number in 0.01 .. 100", value);
+            if (!cl_parse_real(value, 0.01, 100, &c->exposure))
+                code = ts_fail(st, TS_INVALID, "--exposure: '%s' is not a number in 0.01 .. 100", value);
             break;
         case LIGHT: code = parse_light(value, c->light, st); break;
         case IMAGES: c->images = true; break;
         case FAST: c->fast = true; break;
         case LPIPS:
             c->lpips[0] = value;
-            if (!(c->lpips[1] = lgd_argument_second(argc, argv))) code = ts_fail(st, TS_INVALID, "--lpips-weights needs two files: TRUNK LINEAR");
+            if (!(c->lpips[1] = lgd_argument_second(argc, argv)))
+                code = ts_fail(st, TS_INVALID, "--lpips-weights needs two files: TRUNK LINEAR");
             break;
         case SEED: code = whole("seed", value, 0, INT64_MAX, &c->seed, st); break;
         case 'd':
@@ -131,26 +174,35 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
             c->threads = (int)n;
             break;
         case NORMAL:
-            if (!ev_set_ini_key("normal", value, &c->told)) code = ts_fail(st, TS_INVALID, "--normal: '%s' is neither 'opengl' nor 'directx'", value);
+            if (!ev_set_ini_key("normal", value, &c->told))
+                code = ts_fail(st, TS_INVALID, "--normal: '%s' is neither 'opengl' nor 'directx'", value);
             break;
         case WORKFLOW:
-            if (!ev_set_ini_key("workflow", value, &c->told)) code = ts_fail(st, TS_INVALID, "--workflow: '%s' is neither 'metallic' nor 'specular'", value);
+            if (!ev_set_ini_key("workflow", value, &c->told))
+                code = ts_fail(st, TS_INVALID, "--workflow: '%s' is neither 'metallic' nor 'specular'", value);
             break;
         case COLOUR:
-            if (!ev_set_ini_key("colour", value, &c->told)) code = ts_fail(st, TS_INVALID, "--colour: '%s' is neither 'srgb' nor 'linear'", value);
+            if (!ev_set_ini_key("colour", value, &c->told))
+                code = ts_fail(st, TS_INVALID, "--colour: '%s' is neither 'srgb' nor 'linear'", value);
             break;
         case NOISE:
-            if (!cl_parse_real(value, 0, 1, &c->noise)) code = ts_fail(st, TS_INVALID, "--noise: '%s' is not a number in 0 .. 1", value);
+            if (!cl_parse_real(value, 0, 1, &c->noise))
+                code = ts_fail(st, TS_INVALID, "--noise: '%s' is not a number in 0 .. 1", value);
             break;
         default: code = st->code;
         }
     }
     if (code || c->help || c->version) return code;
-    if (operands < argc) return ts_fail(st, TS_INVALID, "'%s' is not an option; sets are given as --set KIND:WHERE", argv[operands]);
+    if (operands < argc)
+        return ts_fail(st, TS_INVALID, "'%s' is not an option; sets are given as --set KIND:WHERE", argv[operands]);
     if (c->sets == 0) return ts_fail(st, TS_INVALID, "no set is given: --set KIND:WHERE");
-    if (c->tune + c->pareto + (c->iterations_figure || c->methods_figure) > 1) return ts_fail(st, TS_INVALID, "--tune, --pareto and --figure are different tasks: choose one");
-    if (c->pareto && (c->methods || c->iterations >= 0)) return ts_fail(st, TS_INVALID, "--pareto has its own methods and iterations: --method and --iterations do not go with it");
-    if ((c->tune || c->pareto) && c->images) return ts_fail(st, TS_INVALID, "--images does not go with --tune or --pareto");
+    if (c->tune + c->pareto + (c->iterations_figure || c->methods_figure) > 1)
+        return ts_fail(st, TS_INVALID, "--tune, --pareto and --figure are different tasks: choose one");
+    if (c->pareto && (c->methods || c->iterations >= 0))
+        return ts_fail(st, TS_INVALID,
+                       "--pareto has its own methods and iterations: --method and --iterations do not go with it");
+    if ((c->tune || c->pareto) && c->images)
+        return ts_fail(st, TS_INVALID, "--images does not go with --tune or --pareto");
     if (c->iterations_figure && c->iterations < 0) c->iterations = 24;
     if (!c->out || !*c->out) return ts_fail(st, TS_INVALID, "no output folder is given: -o DIR");
     return TS_OK;
@@ -159,14 +211,19 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
 static void print_help(void)
 {
     puts("Usage: lgd-eval [options] --set KIND:WHERE... -o DIR\n"
-         "Renders each known material under a flash (of a capture: takes its first picture), estimates its maps from that, and prints the RMSE of the maps (diffuse and\n"
-         "specular in gamma space, roughness and normal as they are) and of renderings under other lights and cameras, the mean angle\n"
-         "between the normals in degrees, and SSIM and FLIP (and LPIPS) of the renderings, for R_0 and after every refinement step (these\n"
-         "three: for R_0 and the last), or for each method that is named. The same seed gives the same numbers, for any number of threads.\n");
+         "Renders each known material under a flash (of a capture: takes its first picture), estimates its maps from "
+         "that, and prints the RMSE of the maps (diffuse and\n"
+         "specular in gamma space, roughness and normal as they are) and of renderings under other lights and cameras, "
+         "the mean angle\n"
+         "between the normals in degrees, and SSIM and FLIP (and LPIPS) of the renderings, for R_0 and after every "
+         "refinement step (these\n"
+         "three: for R_0 and the last), or for each method that is named. The same seed gives the same numbers, for "
+         "any number of threads.\n");
     lgd_argument_help(arguments, stdout);
     puts("\nMethods (values have no commas; every method also takes label=TEXT):");
     ev_method_help(stdout);
-    puts("\nExit status: 0 done, 1 a material failed (the others are in the results) or nothing could be written, 2 wrong usage.");
+    puts("\nExit status: 0 done, 1 a material failed (the others are in the results) or nothing could be written, 2 "
+         "wrong usage.");
 }
 
 /* Everything that one run holds. */
@@ -206,10 +263,13 @@ static ts_code parse_methods(work *w, ts_status *st)
     w->method = calloc((size_t)w->run.methods, sizeof *w->method);
     if (!w->method) return ts_fail(st, TS_NOMEM, "out of memory");
     for (int i = 0; i < w->run.methods; i++) {
-        if (ev_method_parse(c->methods ? c->method[i] : "lgd", w->model, c->iterations, &w->method[i], st) != TS_OK) return st->code;
+        if (ev_method_parse(c->methods ? c->method[i] : "lgd", w->model, c->iterations, &w->method[i], st) != TS_OK)
+            return st->code;
         for (int j = 0; j < i; j++)
             if (!strcmp(w->method[i].label, w->method[j].label))
-                return ts_fail(st, TS_INVALID, "--method %s: there is another method '%s': give one of them a label=", c->method[i], w->method[i].label);
+                return ts_fail(st, TS_INVALID,
+                               "--method %s: there is another method '%s': give one of them a label=", c->method[i],
+                               w->method[i].label);
     }
     w->run.method = w->method;
     return TS_OK;
@@ -239,7 +299,9 @@ static int finish(work *w, ts_status *st)
     if (code) return cl_failed("%s", st->message);
     if (w->c->tune) ev_tune_print(&w->tuning, &r->report, stdout);
     else ev_report_print(&r->report, stdout);
-    if (r->failures > 0) return cl_failed("%d of %" PRId64 " %s failed: they are not in the means", r->failures, w->total, r->methods > 1 ? "estimates" : "materials");
+    if (r->failures > 0)
+        return cl_failed("%d of %" PRId64 " %s failed: they are not in the means", r->failures, w->total,
+                         r->methods > 1 ? "estimates" : "materials");
     return CL_OK;
 }
 
@@ -247,13 +309,16 @@ static int finish(work *w, ts_status *st)
 static int evaluate(work *w, ts_status *st)
 {
     const command *c = w->c;
-    const char *name[SETS_MAX], *slash = strrchr(w->model, '/'); /* where it lay says nothing to whom the report is sent */
+    const char *name[SETS_MAX],
+        *slash = strrchr(w->model, '/'); /* where it lay says nothing to whom the report is sent */
     for (int s = 0; s < c->sets; s++) name[s] = c->spec[s];
     if (cl_make_folder(c->out, st) != TS_OK) return cl_failed("%s", st->message);
-    if (snprintf(w->images, sizeof w->images, "%s/images", c->out) >= (int)sizeof w->images) return cl_failed("%s: the name is too long", c->out);
+    if (snprintf(w->images, sizeof w->images, "%s/images", c->out) >= (int)sizeof w->images)
+        return cl_failed("%s: the name is too long", c->out);
     if (c->images && cl_make_folder(w->images, st) != TS_OK) return cl_failed("%s", st->message);
     if (c->pin && !ts_threads_pin()) return cl_failed("--pin: there are fewer CPUs than the %d threads", ts_threads());
-    if (c->lpips[0] && c->size < EV_LPIPS_SIDE) return cl_failed("LPIPS needs pictures of at least %d x %d pixels: --size", EV_LPIPS_SIDE, EV_LPIPS_SIDE);
+    if (c->lpips[0] && c->size < EV_LPIPS_SIDE)
+        return cl_failed("LPIPS needs pictures of at least %d x %d pixels: --size", EV_LPIPS_SIDE, EV_LPIPS_SIDE);
     if (c->lpips[0] && !(w->lpips = ev_lpips_load(c->lpips[0], c->lpips[1], st))) return cl_failed("%s", st->message);
     ev_run *r = &w->run;
     r->lpips = w->lpips;
@@ -281,7 +346,9 @@ static int evaluate(work *w, ts_status *st)
     static const int sizes[] = {128, 256, 512};
     const ts_code code = c->pareto ? ev_pareto(r, sizes, 3, w->model, c->out, st) : ev_run_all(r, st);
     cl_progress_end(&w->bar);
-    if (code == TS_INTERRUPTED) return cl_failed("interrupted after %" PRId64 " of %" PRId64 " %s: no results are written", w->done, w->total, r->methods != 1 ? "estimates" : "materials");
+    if (code == TS_INTERRUPTED)
+        return cl_failed("interrupted after %" PRId64 " of %" PRId64 " %s: no results are written", w->done, w->total,
+                         r->methods != 1 ? "estimates" : "materials");
     if (code) return cl_failed("%s", st->message);
     return c->pareto ? CL_OK : finish(w, st);
 }
@@ -294,10 +361,12 @@ static int start(const command *c)
     int code = CL_OK;
     w->c = c;
     for (int s = 0; s < c->sets && code == CL_OK; s++)
-        if (ev_set_open(c->spec[s], &c->told, &w->set[s], &st) != TS_OK) code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
+        if (ev_set_open(c->spec[s], &c->told, &w->set[s], &st) != TS_OK)
+            code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
     ts_threads_set(c->threads);
     if (code == CL_OK && lgd_model_path(c->model, "single", w->model, &st) != TS_OK) code = cl_failed("%s", st.message);
-    if (code == CL_OK && (c->tune ? parse_tuning(w, &st) : c->pareto ? TS_OK : parse_methods(w, &st)) != TS_OK) code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
+    if (code == CL_OK && (c->tune ? parse_tuning(w, &st) : c->pareto ? TS_OK : parse_methods(w, &st)) != TS_OK)
+        code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
     if (code == CL_OK) code = evaluate(w, &st);
     for (int s = 0; s < c->sets; s++) ev_set_close(&w->set[s]);
     ev_run_free(&w->run);

@@ -1,5 +1,5 @@
 #include "eval/multiview.h"
-#include "eval/flip.h"
+#include "eval/metrics/flip.h"
 #include "eval/ssim.h"
 #include "render/render.h"
 #include "render/tone.h"
@@ -11,7 +11,8 @@ static void input_gain(const io_capture *c, float gain[3])
 {
     const float *l = c->light[0];
     const float distance2 = l[0] * l[0] + l[1] * l[1] + l[2] * l[2];
-    for (int k = 0; k < 3; k++) gain[k] = RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE) * distance2 / c->power[k];
+    for (int k = 0; k < 3; k++)
+        gain[k] = RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE) * distance2 / c->power[k];
 }
 
 rd_view ev_capture_view(const io_capture *c, int picture)
@@ -31,7 +32,8 @@ void ev_capture_input(const io_capture *c, int inputs, float *image)
 {
     float gain[3];
     input_gain(c, gain);
-    for (size_t i = 0; i < (size_t)inputs * (size_t)c->size * (size_t)c->size * 3; i++) image[i] = fminf(c->image[i] * gain[i % 3], 1);
+    for (size_t i = 0; i < (size_t)inputs * (size_t)c->size * (size_t)c->size * 3; i++)
+        image[i] = fminf(c->image[i] * gain[i % 3], 1);
 }
 
 /* Linear radiance in the capture's own brightness. */
@@ -60,8 +62,8 @@ static double difference(size_t values, const float *photo, const float *scene, 
     return sqrt(sum / (double)values);
 }
 
-/* The exposure of least difference: the best of a coarse row of stops, then golden section between its neighbours. Clamping makes the
- * difference flat far away, so that a descent from anywhere would not do. */
+/* The exposure of least difference: the best of a coarse row of stops, then golden section between its neighbours.
+ * Clamping makes the difference flat far away, so that a descent from anywhere would not do. */
 static double fit(size_t values, const float *photo, const float *scene)
 {
     const double golden = 0.6180339887498949;
@@ -87,12 +89,14 @@ static double fit(size_t values, const float *photo, const float *scene)
     return exp2((lo + hi) / 2);
 }
 
-ev_row ev_capture_score(const io_capture *c, int inputs, const float *maps, int channels, bool perceptual, ev_lpips *lpips)
+ev_row ev_capture_score(const io_capture *c, int inputs, const float *maps, int channels, bool perceptual,
+                        ev_lpips *lpips)
 {
     ev_row row;
     for (int k = 0; k < EV_METRICS; k++) row.value[k] = NAN;
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
-    float *memory = malloc(3 * values * sizeof *memory), *photo = memory, *scene = memory + values, *shown = memory + 2 * values;
+    float *memory = malloc(3 * values * sizeof *memory), *photo = memory, *scene = memory + values,
+          *shown = memory + 2 * values;
     if (!memory || c->images <= inputs) {
         free(memory);
         return row;

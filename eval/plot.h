@@ -5,9 +5,9 @@
 #include <stdio.h>
 
 typedef struct ev_point {
-    double x, y;       /* x > 0 on a logarithmic axis */
-    double deviation;  /* of y: shown when one points at it */
-    char label[32];    /* beside the point; may be empty */
+    double x, y;      /* x > 0 on a logarithmic axis */
+    double deviation; /* of y: shown when one points at it */
+    char label[32];   /* beside the point; may be empty */
 } ev_point;
 
 typedef struct ev_series {
@@ -25,6 +25,7 @@ typedef struct ev_axes {
     bool log_x;
 } ev_axes;
 
-/* A whole <svg> element. Points that are not finite, or whose x is not above 0 on a logarithmic axis, are left out; without any a line says so. */
+/* A whole <svg> element. Points that are not finite, or whose x is not above 0 on a logarithmic axis, are left out;
+ * without any a line says so. */
 void ev_plot_write(FILE *f, const ev_axes *axes, const ev_series *series, int count);
 #endif

@@ -15,10 +15,15 @@ int ev_report_add(ev_report *r, int set, const char *material, ts_status *st)
     }
     const size_t columns = (size_t)r->columns, methods = (size_t)r->methods;
     ev_result *to = &r->result[r->results++];
-    *to = (ev_result){.set = set, .row = malloc(columns * sizeof *to->row), .seconds = malloc(columns * sizeof *to->seconds), .peak = malloc(methods * sizeof *to->peak),
-                      .png = calloc(methods, sizeof *to->png), .png_size = calloc(methods, sizeof *to->png_size)};
+    *to = (ev_result){.set = set,
+                      .row = malloc(columns * sizeof *to->row),
+                      .seconds = malloc(columns * sizeof *to->seconds),
+                      .peak = malloc(methods * sizeof *to->peak),
+                      .png = calloc(methods, sizeof *to->png),
+                      .png_size = calloc(methods, sizeof *to->png_size)};
     snprintf(to->material, sizeof to->material, "%s", material);
-    if (!to->row || !to->seconds || !to->peak || !to->png || !to->png_size) return ts_fail(st, TS_NOMEM, "out of memory for the results"), -1;
+    if (!to->row || !to->seconds || !to->peak || !to->png || !to->png_size)
+        return ts_fail(st, TS_NOMEM, "out of memory for the results"), -1;
     for (int i = 0; i < r->columns; i++) {
         to->seconds[i] = NAN;
         for (int k = 0; k < EV_METRICS; k++) to->row[i].value[k] = NAN;
@@ -131,11 +136,14 @@ static void print_table(const ev_report *r, int set, const int *column, int colu
     if (n == 0) return;
     ev_report_summary(r, set, column[0], &mean, &deviation);
     const double start = mean.value[EV_RENDER];
-    fprintf(out, "%s%s: %d %s, %d x %d pixels", set != 0 ? "\n" : "", set < 0 ? "all sets" : r->set_name[set], n, n == 1 ? "material" : "materials", r->size, r->size);
+    fprintf(out, "%s%s: %d %s, %d x %d pixels", set != 0 ? "\n" : "", set < 0 ? "all sets" : r->set_name[set], n,
+            n == 1 ? "material" : "materials", r->size, r->size);
     if (isnan(any.value[EV_DIFFUSE])) fputs(", each picture but the first", out);
     else if (!isnan(any.value[EV_DIFFUSE])) fprintf(out, ", %d renderings each", RD_EVAL_VIEWS);
-    fprintf(out, "; RMSE (angle: degrees; ssim, flip, exposure, lpips: themselves), mean +- standard deviation; %d thread%s%s, seconds: median\n%*s", r->threads,
-        r->threads == 1 ? "" : "s", r->pinned ? ", pinned" : "", width, "");
+    fprintf(out,
+            "; RMSE (angle: degrees; ssim, flip, exposure, lpips: themselves), mean +- standard deviation; %d "
+            "thread%s%s, seconds: median\n%*s",
+            r->threads, r->threads == 1 ? "" : "s", r->pinned ? ", pinned" : "", width, "");
     for (int k = 0; k < EV_METRICS; k++)
         if (!isnan(any.value[k])) fprintf(out, "  %-16s", ev_metric_name[k]);
     fputs("  render change  seconds  GFLOP/s peak      MB\n", out);
@@ -146,10 +154,13 @@ static void print_table(const ev_report *r, int set, const int *column, int colu
         for (int k = 0; k < EV_METRICS; k++) {
             if (isnan(any.value[k])) continue;
             if (isnan(mean.value[k])) fprintf(out, "  %-16s", "-");
-            else fprintf(out, k == EV_ANGLE || k == EV_EXPOSURE ? "  %6.2f +- %6.2f" : "  %.4f +- %.4f", mean.value[k], deviation.value[k]);
+            else
+                fprintf(out, k == EV_ANGLE || k == EV_EXPOSURE ? "  %6.2f +- %6.2f" : "  %.4f +- %.4f", mean.value[k],
+                        deviation.value[k]);
         }
-        fprintf(out, "  %+12.1f%%  %7.3f  %12.0f  %6.0f\n", start > 0 ? 100 * (mean.value[EV_RENDER] / start - 1) : 0, ev_report_seconds(r, set, column[i]),
-            1e-9 * ev_report_peak(r, set, m), 1e-6 * (double)r->method[m].bytes);
+        fprintf(out, "  %+12.1f%%  %7.3f  %12.0f  %6.0f\n", start > 0 ? 100 * (mean.value[EV_RENDER] / start - 1) : 0,
+                ev_report_seconds(r, set, column[i]), 1e-9 * ev_report_peak(r, set, m),
+                1e-6 * (double)r->method[m].bytes);
     }
 }
 

@@ -1,22 +1,22 @@
 /* Scores of all materials, as a table, CSV files and a report. */
 #ifndef EV_REPORT_H
 #define EV_REPORT_H
-#include "eval/metrics.h"
+#include "eval/metrics/metrics.h"
 #include <stdio.h>
 
 /* A method's results: columns first .. first + points - 1 of every material. */
 typedef struct ev_subject {
     const char *label; /* the caller's */
     int first, points;
-    size_t bytes;      /* its peak of memory */
+    size_t bytes; /* its peak of memory */
 } ev_subject;
 
 typedef struct ev_result {
     int set;
     char material[128];
-    ev_row *row;     /* a column each; NaN: not estimated */
-    double *seconds; /* from the photograph to that step; NaN likewise */
-    double *peak;    /* a method each: FLOP/s that the machine could do beside it */
+    ev_row *row;         /* a column each; NaN: not estimated */
+    double *seconds;     /* from the photograph to that step; NaN likewise */
+    double *peak;        /* a method each: FLOP/s that the machine could do beside it */
     unsigned char **png; /* a method each: a picture for the report, or NULL; owned */
     size_t *png_size;
 } ev_result;
@@ -38,31 +38,34 @@ typedef struct ev_report {
 int ev_report_add(ev_report *r, int set, const char *material, ts_status *st);
 void ev_report_free(ev_report *r);
 
-/* Mean and (with n - 1) standard deviation over the materials of a set, or of all sets with set = -1, that have the number (NaN: none has);
- * how many materials there are. */
+/* Mean and (with n - 1) standard deviation over the materials of a set, or of all sets with set = -1, that have the
+ * number (NaN: none has); how many materials there are. */
 int ev_report_summary(const ev_report *r, int set, int column, ev_row *mean, ev_row *deviation);
 
-/* Medians over the materials of a set (-1: of all) of the seconds to a column, and of the FLOP/s beside a method; NaN when there are none. */
+/* Medians over the materials of a set (-1: of all) of the seconds to a column, and of the FLOP/s beside a method; NaN
+ * when there are none. */
 double ev_report_seconds(const ev_report *r, int set, int column);
 double ev_report_peak(const ev_report *r, int set, int method);
 
-/* What tables show: every step of a lone method, of several the last each. Column numbers into column[]; how many. A column's name: "R_3" or the
- * method's label. */
+/* What tables show: every step of a lone method, of several the last each. Column numbers into column[]; how many. A
+ * column's name: "R_3" or the method's label. */
 enum { EV_NAME = 80 };
 int ev_report_shown(const ev_report *r, int *column);
 const char *ev_report_name(const ev_report *r, int column, char name[EV_NAME]);
 int ev_report_method(const ev_report *r, int column);
 
-/* For each set, and for all together when there are several: a line for each shown column, and how far the renderings' error is from the first's. */
+/* For each set, and for all together when there are several: a line for each shown column, and how far the renderings'
+ * error is from the first's. */
 void ev_report_print(const ev_report *r, FILE *out);
 
-/* folder/results.csv: a line for each material, method and step; folder/summary.csv: a line for each set, method and step; times.csv: their times and
- * memory; results.json; report.html (eval/html.h). Each is replaced as a whole. results.csv and summary.csv hold no times: they are the same bytes for
- * the same seed. */
+/* folder/results.csv: a line for each material, method and step; folder/summary.csv: a line for each set, method and
+ * step; times.csv: their times and memory; results.json; report.html (eval/html.h). Each is replaced as a whole.
+ * results.csv and summary.csv hold no times: they are the same bytes for the same seed. */
 ts_code ev_report_write(const ev_report *r, const char *folder, ts_status *st);
 
 /* Writes folder/name by write_to, as a whole or not at all. */
-ts_code ev_replace(const char *folder, const char *name, void (*write_to)(const void *what, FILE *f), const void *what, ts_status *st);
+ts_code ev_replace(const char *folder, const char *name, void (*write_to)(const void *what, FILE *f), const void *what,
+                   ts_status *st);
 /* RFC 4180: a field in quotes when it has to be; ",NUMBER", empty for what was not measured. */
 void ev_csv_field(FILE *f, const char *text);
 void ev_csv_number(FILE *f, double v);

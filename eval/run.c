@@ -29,11 +29,14 @@ static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, t
     const uint64_t identity = ev_set_identity(set, i);
     const bool capture = set->kind == EV_MULTIVIEW;
     b->name = "";
-    if ((capture ? ev_set_load_capture(set, i, r->size, &b->capture, st) : ev_set_load(set, i, r->size, &b->truth, st)) != TS_OK) return st->code;
+    if ((capture ? ev_set_load_capture(set, i, r->size, &b->capture, st)
+                 : ev_set_load(set, i, r->size, &b->truth, st)) != TS_OK)
+        return st->code;
     if (capture) {
         b->name = b->capture.name;
         if (b->capture.images <= r->inputs)
-            return ts_fail(st, TS_FORMAT, "%s: has %d pictures: %d are the input, and one more at least is compared", b->name, b->capture.images, r->inputs);
+            return ts_fail(st, TS_FORMAT, "%s: has %d pictures: %d are the input, and one more at least is compared",
+                           b->name, b->capture.images, r->inputs);
         ev_capture_input(&b->capture, r->inputs, b->image);
         *c = ev_case_of_capture(&b->capture, b->image, r->inputs, r->perceptual);
         c->lpips = r->lpips;
@@ -49,7 +52,8 @@ static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, t
     c->fit = r->fit;
     ev_input_views(&c->view, c->inputs, r->seed, identity, c->input);
     for (int k = 0; k < c->inputs; k++) {
-        const ev_photo photo = {c->input[k], c->exposure, (float)r->noise, r->seed, identity * NN_MAX_IMAGES + (uint64_t)k};
+        const ev_photo photo = {c->input[k], c->exposure, (float)r->noise, r->seed,
+                                identity * NN_MAX_IMAGES + (uint64_t)k};
         ev_photograph(&b->truth, &photo, b->image + (size_t)k * (size_t)r->size * (size_t)r->size * 3);
     }
     c->lpips = r->lpips;
@@ -66,7 +70,8 @@ static ts_code sheet(const ev_run *r, const bench *b, const ev_case *c, int set,
 {
     char path[PATH_LENGTH];
     const char *label = r->methods > 1 ? r->method[method].label : "";
-    if (snprintf(path, sizeof path, "%s/%d-%s%s%s.png", r->images, set + 1, b->name, *label ? "-" : "", label) >= (int)sizeof path)
+    if (snprintf(path, sizeof path, "%s/%d-%s%s%s.png", r->images, set + 1, b->name, *label ? "-" : "", label) >=
+        (int)sizeof path)
         return ts_fail(st, TS_INVALID, "%s: the name is too long", r->images);
     return ev_sheet_write(path, c, b->first, b->last, st);
 }
@@ -78,7 +83,8 @@ static ts_code one(ev_run *r, bench *b, int set, int m, int64_t number, const ev
     const ev_subject *s = &r->subject[m];
     unsigned char *png = NULL;
     size_t png_size = 0;
-    ts_code code = ev_estimate(e, c, r->step + s->first, s->points, r->repeat, b->row, b->seconds, b->first, b->last, st);
+    ts_code code = ev_estimate(e, c, r->step + s->first, s->points, r->repeat, b->row, b->seconds, b->first, b->last,
+                               st);
     if (!code && r->images) code = sheet(r, b, c, set, m, st);
     if (!code && r->pictures && b->pictures < PICTURES) {
         code = ev_sheet_png(c, b->last, &png, &png_size, st);
@@ -117,7 +123,9 @@ static ts_code all_materials(ev_run *r, bench *b, int m, int64_t total, ts_statu
             }
             if (!st->code && one(r, b, s, m, number, &c, st) == TS_INTERRUPTED) return st->code;
             if (st->code) {
-                if (!b->bad[number]) ts_context(st, "%s: %s%s%s", r->set[s].spec, b->name, r->methods > 1 ? ", " : "", r->methods > 1 ? r->method[m].label : "");
+                if (!b->bad[number])
+                    ts_context(st, "%s: %s%s%s", r->set[s].spec, b->name, r->methods > 1 ? ", " : "",
+                               r->methods > 1 ? r->method[m].label : "");
                 if (r->failed) r->failed(st->message, r->user);
                 r->failures++;
             }
@@ -138,7 +146,8 @@ static ts_code plan(ev_run *r, ts_status *st)
     for (int m = 0, columns = 0; m < r->methods && !code; m++) {
         code = ev_open(&r->method[m], st);
         if (code) break;
-        const int points = ev_points(&r->method[m], step), photos = r->method[m].method->photos ? r->method[m].method->photos(&r->method[m]) : 1;
+        const int points = ev_points(&r->method[m], step),
+                  photos = r->method[m].method->photos ? r->method[m].method->photos(&r->method[m]) : 1;
         if (photos > r->inputs) r->inputs = photos;
         int *more = realloc(r->step, (size_t)(columns + points) * sizeof *more);
         if (!more) code = ts_fail(st, TS_NOMEM, "out of memory");
@@ -184,12 +193,20 @@ ts_code ev_run_all(ev_run *r, ts_status *st)
     bench b = {0};
     int64_t total = 0;
     for (int s = 0; s < r->sets; s++) total += r->set[s].count;
-    r->report = (ev_report){.sets = r->sets, .size = r->size, .threads = ts_threads(), .repeat = r->repeat, .pinned = r->pinned, .set_name = r->set_name, .model = r->model,
-                            .isa = ts_isa_name(ts_isa_now()), .methods = r->methods};
+    r->report = (ev_report){.sets = r->sets,
+                            .size = r->size,
+                            .threads = ts_threads(),
+                            .repeat = r->repeat,
+                            .pinned = r->pinned,
+                            .set_name = r->set_name,
+                            .model = r->model,
+                            .isa = ts_isa_name(ts_isa_now()),
+                            .methods = r->methods};
     ts_code code = plan(r, st);
     r->report.method = r->subject;
     r->report.step = r->step;
-    if (!code && !make(r, &b, total)) code = ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", r->size, r->size);
+    if (!code && !make(r, &b, total))
+        code = ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", r->size, r->size);
     for (int m = 0; m < r->methods && !code; m++) {
         code = ev_open(&r->method[m], st);
         if (!code) code = all_materials(r, &b, m, total, st);

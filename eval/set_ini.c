@@ -43,7 +43,10 @@ static ts_code parse(const char *path, char *text, io_map_convention *c, ts_stat
         char *equals = strchr(now, '=');
         if (equals) *equals = 0;
         if (!equals || !ev_set_ini_key(trim(now), trim(equals + 1), c))
-            return ts_fail(st, TS_FORMAT, "%s:%d: should be workflow = metallic | specular, normal = opengl | directx or colour = srgb | linear", path, line);
+            return ts_fail(
+                st, TS_FORMAT,
+                "%s:%d: should be workflow = metallic | specular, normal = opengl | directx or colour = srgb | linear",
+                path, line);
     }
     return TS_OK;
 }
@@ -53,7 +56,8 @@ ts_code ev_set_ini(const char *folder, const io_map_convention *told, io_map_con
     char path[PATH_MAX], *text;
     size_t size;
     *out = (io_map_convention){0};
-    if (snprintf(path, sizeof path, "%s/set.ini", folder) >= (int)sizeof path) return ts_fail(st, TS_INVALID, "%s: the name is too long", folder);
+    if (snprintf(path, sizeof path, "%s/set.ini", folder) >= (int)sizeof path)
+        return ts_fail(st, TS_INVALID, "%s: the name is too long", folder);
     if (access(path, F_OK) == 0) {
         ts_code code = io_read_bytes(path, 1 << 16, &text, &size, st);
         if (code) return code;

@@ -1,6 +1,5 @@
-/* set.ini: what holds for a map folder, or, in the folder of them all, for every one. Lines "key = value", '#' or ';' begins a comment:
- *   workflow = metallic | specular
- *   normal = opengl | directx       which way the normal's y points
+/* set.ini: what holds for a map folder, or, in the folder of them all, for every one. Lines "key = value", '#' or ';'
+ * begins a comment: workflow = metallic | specular normal = opengl | directx       which way the normal's y points
  *   colour = srgb | linear          how colour maps are stored
  * Any other line is an error that names it. */
 #ifndef EV_SET_INI_H

@@ -1,5 +1,5 @@
 #include "eval/sets.h"
-#include "data/procedural.h"
+#include "data/materials/procedural.h"
 #include "eval/set_ini.h"
 #include <dirent.h>
 #include <errno.h>
@@ -22,7 +22,9 @@ static bool belongs(const ev_set *set, const char *name)
     static const char *const images[] = {"png", "jpg", "jpeg", "tif", "tiff", "exr", "bmp", "webp", "tga", "ppm"};
     char path[PATH_LENGTH];
     struct stat info;
-    if (name[0] == '.' || snprintf(path, sizeof path, "%s/%s", set->where, name) >= (int)sizeof path || stat(path, &info) != 0) return false;
+    if (name[0] == '.' || snprintf(path, sizeof path, "%s/%s", set->where, name) >= (int)sizeof path ||
+        stat(path, &info) != 0)
+        return false;
     if (set->kind == EV_MAPS) return S_ISDIR(info.st_mode);
     if (set->kind == EV_MULTIVIEW) return S_ISDIR(info.st_mode) && io_is_capture(path);
     const char *dot = strrchr(name, '.');
@@ -45,12 +47,16 @@ static ts_code list_folder(ev_set *set, ts_status *st)
             if (!more) code = ts_fail(st, TS_NOMEM, "%s: out of memory", set->where);
             else set->entry = more;
         }
-        if (!code && !(set->entry[set->count] = strdup(e->d_name))) code = ts_fail(st, TS_NOMEM, "%s: out of memory", set->where);
+        if (!code && !(set->entry[set->count] = strdup(e->d_name)))
+            code = ts_fail(st, TS_NOMEM, "%s: out of memory", set->where);
         if (!code) set->count++;
     }
     closedir(d);
     if (!code && set->count == 0)
-        code = ts_fail(st, TS_IO, "%s: there is no %s in this folder", set->where, set->kind == EV_MAPS ? "map folder" : set->kind == EV_STRIPS ? "strip image" : "capture (a folder with 00.png, camera_pos.txt ...)");
+        code = ts_fail(st, TS_IO, "%s: there is no %s in this folder", set->where,
+                       set->kind == EV_MAPS         ? "map folder"
+                           : set->kind == EV_STRIPS ? "strip image"
+                                                    : "capture (a folder with 00.png, camera_pos.txt ...)");
     if (!code) qsort(set->entry, (size_t)set->count, sizeof *set->entry, by_name);
     return code;
 }
@@ -64,7 +70,8 @@ static ts_code parse_procedural(ev_set *set, ts_status *st)
     const bool seed = digit && !errno && end[0] == ',' && end[1] >= '0' && end[1] <= '9';
     const long count = seed ? strtol(end + 1, &end, 10) : 0;
     if (!seed || errno || *end || count < 1 || count > COUNT_MAX)
-        return ts_fail(st, TS_INVALID, "--set %s: should be procedural:SEED,COUNT with COUNT in 1 .. %d", set->spec, COUNT_MAX);
+        return ts_fail(st, TS_INVALID, "--set %s: should be procedural:SEED,COUNT with COUNT in 1 .. %d", set->spec,
+                       COUNT_MAX);
     set->count = (int)count;
     return TS_OK;
 }
@@ -85,13 +92,19 @@ ts_code ev_set_open(const char *spec, const io_map_convention *told, ev_set *set
     if (!set->spec) return ts_fail(st, TS_NOMEM, "--set %s: out of memory", spec);
     const char *colon = strchr(set->spec, ':');
     for (int k = 0; colon && k < EV_KINDS; k++)
-        if (strlen(kind_name[k]) == (size_t)(colon - set->spec) && strncmp(kind_name[k], set->spec, (size_t)(colon - set->spec)) == 0) set->kind = (ev_kind)k;
+        if (strlen(kind_name[k]) == (size_t)(colon - set->spec) &&
+            strncmp(kind_name[k], set->spec, (size_t)(colon - set->spec)) == 0)
+            set->kind = (ev_kind)k;
     ts_code code = TS_OK;
     if (set->kind == EV_KINDS || !colon[1])
-        code = ts_fail(st, TS_INVALID, "--set %s: should be procedural:SEED,COUNT, strips:FOLDER, maps:FOLDER or multiview:FOLDER", spec);
+        code = ts_fail(st, TS_INVALID,
+                       "--set %s: should be procedural:SEED,COUNT, strips:FOLDER, maps:FOLDER or multiview:FOLDER",
+                       spec);
     else {
         set->where = colon + 1;
-        code = set->kind == EV_PROCEDURAL ? parse_procedural(set, st) : set->kind == EV_MULTIVIEW ? list_captures(set, st) : list_folder(set, st);
+        code = set->kind == EV_PROCEDURAL ? parse_procedural(set, st)
+            : set->kind == EV_MULTIVIEW   ? list_captures(set, st)
+                                          : list_folder(set, st);
         if (!code && set->kind == EV_MAPS) code = ev_set_ini(set->where, told, &set->told, st);
         if (told) set->option = *told;
     }
@@ -110,8 +123,11 @@ void ev_set_close(ev_set *set)
 uint64_t ev_set_identity(const ev_set *set, int i)
 {
     char text[PATH_LENGTH];
-    if (set->kind == EV_PROCEDURAL) snprintf(text, sizeof text, "%s %" PRIu64 " %d", kind_name[set->kind], set->seed, i);
-    else snprintf(text, sizeof text, "%s %s", kind_name[set->kind], set->entry[i]); /* a lone capture has no views to draw */
+    if (set->kind == EV_PROCEDURAL)
+        snprintf(text, sizeof text, "%s %" PRIu64 " %d", kind_name[set->kind], set->seed, i);
+    else
+        snprintf(text, sizeof text, "%s %s", kind_name[set->kind],
+                 set->entry[i]);                  /* a lone capture has no views to draw */
     uint64_t hash = UINT64_C(0xcbf29ce484222325); /* FNV-1a */
     for (const char *c = text; *c; c++) hash = (hash ^ (unsigned char)*c) * UINT64_C(0x100000001b3);
     return hash;
@@ -142,7 +158,8 @@ ts_code ev_set_load(const ev_set *set, int i, int size, io_material *m, ts_statu
     char path[PATH_LENGTH];
     if (snprintf(path, sizeof path, "%s/%s", set->where, set->entry[i]) >= (int)sizeof path)
         return ts_fail(st, TS_INVALID, "%s: the name is too long", set->where);
-    const ts_code code = set->kind == EV_STRIPS ? io_read_strip(path, size, m, NULL, st) : load_maps(set, path, size, m, st);
+    const ts_code code = set->kind == EV_STRIPS ? io_read_strip(path, size, m, NULL, st)
+                                                : load_maps(set, path, size, m, st);
     if (code) return code;
     snprintf(m->name, sizeof m->name, "%s", set->entry[i]);
     char *dot = set->kind == EV_STRIPS ? strrchr(m->name, '.') : NULL;
@@ -157,6 +174,7 @@ ts_code ev_set_load_capture(const ev_set *set, int i, int size, io_capture *c, t
     if (snprintf(path, sizeof path, "%s%s%s", set->where, *set->entry[i] ? "/" : "", set->entry[i]) >= (int)sizeof path)
         return ts_fail(st, TS_INVALID, "%s: the name is too long", set->where);
     const ts_code code = io_read_capture(path, size, c, st);
-    if (!code && c->images < 2) return ts_fail(st, TS_FORMAT, "%s: has one picture: one is the input, the others are compared", path);
+    if (!code && c->images < 2)
+        return ts_fail(st, TS_FORMAT, "%s: has one picture: one is the input, the others are compared", path);
     return code;
 }

@@ -7,23 +7,25 @@
 typedef enum ev_kind { EV_PROCEDURAL, EV_STRIPS, EV_MAPS, EV_MULTIVIEW, EV_KINDS } ev_kind;
 
 typedef struct ev_set {
-    char *spec;    /* as given: KIND:WHERE */
+    char *spec; /* as given: KIND:WHERE */
     ev_kind kind;
     const char *where; /* into spec */
-    uint64_t seed; /* EV_PROCEDURAL */
+    uint64_t seed;     /* EV_PROCEDURAL */
     int count;
     io_map_convention option, told; /* EV_MAPS: what the options say, and with set.ini */
-    char **entry;  /* the names in the folder, sorted; NULL for EV_PROCEDURAL */
+    char **entry;                   /* the names in the folder, sorted; NULL for EV_PROCEDURAL */
 } ev_set;
 
-/* procedural:SEED,COUNT, strips:FOLDER (a folder of strip images), maps:FOLDER (a folder of map folders) or multiview:FOLDER (a capture, or a
- * folder of them). A file set.ini in a map folder says (eval/set_ini.h) what the options (told, may be NULL), which win, leave open, and one in the
- * folder of all of them what is still open then. The caller closes it after success. TS_INVALID for a wrong spec, TS_IO for a folder that cannot be read or has nothing of that kind. */
+/* procedural:SEED,COUNT, strips:FOLDER (a folder of strip images), maps:FOLDER (a folder of map folders) or
+ * multiview:FOLDER (a capture, or a folder of them). A file set.ini in a map folder says (eval/set_ini.h) what the
+ * options (told, may be NULL), which win, leave open, and one in the folder of all of them what is still open then. The
+ * caller closes it after success. TS_INVALID for a wrong spec, TS_IO for a folder that cannot be read or has nothing of
+ * that kind. */
 ts_code ev_set_open(const char *spec, const io_map_convention *told, ev_set *set, ts_status *st);
 void ev_set_close(ev_set *set);
 
-/* Material number i of 0 .. count-1, size x size pixels; m->name is its name within the set. m is zeroed or a material to be reused. Not of
- * EV_MULTIVIEW. */
+/* Material number i of 0 .. count-1, size x size pixels; m->name is its name within the set. m is zeroed or a material
+ * to be reused. Not of EV_MULTIVIEW. */
 ts_code ev_set_load(const ev_set *set, int i, int size, io_material *m, ts_status *st);
 /* The same of an EV_MULTIVIEW set. */
 ts_code ev_set_load_capture(const ev_set *set, int i, int size, io_capture *c, ts_status *st);

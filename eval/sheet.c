@@ -6,13 +6,18 @@
 
 enum { ROWS = 3, RENDERINGS = 3, COLUMNS = 1 + LGD_MAP_PANELS + RENDERINGS };
 
-static int columns_of(const ev_case *c) { return c->capture && c->capture->images < COLUMNS ? c->capture->images : COLUMNS; }
+static int columns_of(const ev_case *c)
+{
+    return c->capture && c->capture->images < COLUMNS ? c->capture->images : COLUMNS;
+}
 
 /* maps NULL: the photographs. Each estimate has its own exposure. */
 static void capture_row(io_image *sheet, const ev_case *c, int row, const float *maps, float *picture)
 {
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
-    const double exposure = maps ? ev_capture_score(c->capture, c->inputs, maps, MAP_CHANNELS, false, NULL).value[EV_EXPOSURE] : 1;
+    const double exposure = maps
+        ? ev_capture_score(c->capture, c->inputs, maps, MAP_CHANNELS, false, NULL).value[EV_EXPOSURE]
+        : 1;
     for (int i = 0; i < columns_of(c); i++) {
         if (maps) ev_capture_render(c->capture, i, maps, MAP_CHANNELS, exposure, picture);
         lgd_panel_put(sheet, c->size, i, row, maps ? picture : c->capture->image + (size_t)i * values);
@@ -26,16 +31,19 @@ static void maps_row(io_image *sheet, const ev_case *c, int row, const float *ma
     if (maps) lgd_panel_render(sheet, 0, row, &m, &c->view, picture);
     else lgd_panel_put(sheet, c->size, 0, row, c->image);
     lgd_panel_maps(sheet, 1, row, &m, picture);
-    for (int i = 0; i < RENDERINGS; i++) lgd_panel_render(sheet, 1 + LGD_MAP_PANELS + i, row, &m, &c->views[i], picture);
+    for (int i = 0; i < RENDERINGS; i++)
+        lgd_panel_render(sheet, 1 + LGD_MAP_PANELS + i, row, &m, &c->views[i], picture);
 }
 
 /* Row i shows maps[i]; the sheet has rows of them and is linear. */
-static ts_code make(const ev_case *c, const float *const *maps, int rows, int sheet_rows, io_image *sheet, ts_status *st)
+static ts_code make(const ev_case *c, const float *const *maps, int rows, int sheet_rows, io_image *sheet,
+                    ts_status *st)
 {
     io_image picture = {0};
     ts_code code = io_image_create(sheet, columns_of(c) * c->size, sheet_rows * c->size, 3, st);
     if (!code) code = io_image_create(&picture, c->size, c->size, 3, st);
-    for (int row = 0; row < rows && !code; row++) (c->capture ? capture_row : maps_row)(sheet, c, row, maps[row], picture.data);
+    for (int row = 0; row < rows && !code; row++)
+        (c->capture ? capture_row : maps_row)(sheet, c, row, maps[row], picture.data);
     io_image_free(&picture);
     return code;
 }
@@ -83,7 +91,8 @@ ts_code ev_sheet_png(const ev_case *c, const float *estimate, unsigned char **by
     *bytes = NULL;
     ts_code code = make(c, maps, 2, ROWS, &sheet, st);
     if (!code) difference_row(&sheet);
-    if (!code && c->size > EV_SHEET_PANEL) code = shrink(&sheet, columns_of(c) * EV_SHEET_PANEL, ROWS * EV_SHEET_PANEL, st);
+    if (!code && c->size > EV_SHEET_PANEL)
+        code = shrink(&sheet, columns_of(c) * EV_SHEET_PANEL, ROWS * EV_SHEET_PANEL, st);
     if (!code) code = io_png_bytes(&sheet, 8, true, bytes, size, st);
     io_image_free(&sheet);
     return code;

@@ -13,7 +13,8 @@ static bool is_folder(const char *path)
 
 ts_code lgd_read_capture(const char *path, int size, int64_t max_pixels, io_capture *c, ts_status *st)
 {
-    const ts_code code = is_folder(path) ? io_read_capture(path, size, c, st) : io_read_capture_ini(path, size, RD_FLASH_POWER, max_pixels, c, st);
+    const ts_code code = is_folder(path) ? io_read_capture(path, size, c, st)
+                                         : io_read_capture_ini(path, size, RD_FLASH_POWER, max_pixels, c, st);
     if (code) return code;
     const float *l = c->light[0], distance2 = l[0] * l[0] + l[1] * l[1] + l[2] * l[2];
     float gain[3];
@@ -30,7 +31,8 @@ int lgd_capture_photos(const io_capture *c, int most, lgd_photo *photo)
 {
     const int count = c->images < most ? c->images : most;
     for (int k = 0; k < count; k++) {
-        photo[k] = (lgd_photo){.image = c->image + (size_t)k * (size_t)c->size * (size_t)c->size * 3, .power = c->power[0]};
+        photo[k] = (lgd_photo){.image = c->image + (size_t)k * (size_t)c->size * (size_t)c->size * 3,
+                               .power = c->power[0]};
         memcpy(photo[k].light, c->light[k], sizeof photo[k].light);
         memcpy(photo[k].camera, c->camera[k], sizeof photo[k].camera);
     }

@@ -12,10 +12,11 @@
 #include <string.h>
 
 enum {
-    UNTILED = 512,         /* pixels a side up to which a step of h is one piece: at most 0.8 GB with the default architecture */
-    TILE = 320,            /* the surroundings add a fifth to its work */
-    TILE_MASK = 128,       /* small enough to fit what they follow */
-    TILE_EARLY = 256       /* tiles that end early: the surroundings of smaller ones cost more than ending saves */
+    UNTILED =
+        512,    /* pixels a side up to which a step of h is one piece: at most 0.8 GB with the default architecture */
+    TILE = 320, /* the surroundings add a fifth to its work */
+    TILE_MASK = 128, /* small enough to fit what they follow */
+    TILE_EARLY = 256 /* tiles that end early: the surroundings of smaller ones cost more than ending saves */
 };
 
 /* What the unrolled loop reports to: the caller's function, and what finds the end of the automatic number of steps. */
@@ -24,7 +25,7 @@ typedef struct watch {
     const lgd_options *options;
     float *best; /* NULL, or R_t of the last step that paid */
     double best_rmse;
-    int steps;   /* t of best */
+    int steps; /* t of best */
 } watch;
 
 #define AUTO_LEAST 1e-3 /* of the RMSE: a step that lowers it by less is not worth its time */
@@ -35,7 +36,8 @@ static double rmse_of(const nn_input *in, const ag_value *maps)
     double squares = 0;
     for (int k = 0; k < in->given; k++) {
         double one;
-        rd_flash_rmse(g, maps->t.data, maps->t.shape.c, &in->views[k], in->image.data + (size_t)k * (size_t)g.h * (size_t)g.w * 3, &one);
+        rd_flash_rmse(g, maps->t.data, maps->t.shape.c, &in->views[k],
+                      in->image.data + (size_t)k * (size_t)g.h * (size_t)g.w * 3, &one);
         squares += one * one / in->given;
     }
     return sqrt(squares);
@@ -73,11 +75,12 @@ static bool decode(const float *from, int channels, int64_t pixels, float *maps)
     return finite;
 }
 
-/* What a step of h holds at once: maps, their gradient and change, the carried states, and for each of its two cells the convolution,
- * both gates' inputs and the new state. g works at its own size and needs less. */
+/* What a step of h holds at once: maps, their gradient and change, the carried states, and for each of its two cells
+ * the convolution, both gates' inputs and the new state. g works at its own size and needs less. */
 static double step_bytes(const nn_arch *a, int side)
 {
-    const double cells = a->h_width > 0 ? 2.0 * (a->h_width + 8.0 * a->h_gru) : 0; /* the coarse steps' are at a size of their own */
+    const double cells = a->h_width > 0 ? 2.0 * (a->h_width + 8.0 * a->h_gru)
+                                        : 0; /* the coarse steps' are at a size of their own */
     return (3.0 * a->images + (3.0 + 2.0 * a->images) * a->channels + cells) * sizeof(float) * side * side;
 }
 
@@ -94,24 +97,33 @@ typedef struct given_photos {
     const float *proposed;
 } given_photos;
 
-static ts_code run_loop(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o, float *maps, int *taken, ts_status *st)
+static ts_code run_loop(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o, float *maps,
+                        int *taken, ts_status *st)
 {
     const int side = p->side, given = p->count;
-    const double more = step_bytes(&e->net->arch, side) - (double)ts_arena_peak(ag_arena(e->tape)); /* than earlier calls left */
+    const double more = step_bytes(&e->net->arch, side) -
+        (double)ts_arena_peak(ag_arena(e->tape)); /* than earlier calls left */
     if (more > 0 && lgd_memory_check(more, st) != TS_OK) return ts_context(st, "%d x %d pixels", side, side);
-    nn_input in = {.image = ts_new(ag_arena(e->tape), (ts_shape){given, side, side, 3}), .grid = rd_grid_full(side), .views = p->views, .given = given, .orientations = o->orientations, .proposed = p->proposed};
+    nn_input in = {.image = ts_new(ag_arena(e->tape), (ts_shape){given, side, side, 3}),
+                   .grid = rd_grid_full(side),
+                   .views = p->views,
+                   .given = given,
+                   .orientations = o->orientations,
+                   .proposed = p->proposed};
     if (!in.image.data) return ts_fail(st, TS_NOMEM, "out of memory for an image of %d x %d pixels", side, side);
     const int64_t values = (int64_t)side * side * 3;
-    for (int k = 0; k < given; k++)
-        lgd_clip(values, p->image[k], in.image.data + k * values);
+    for (int k = 0; k < given; k++) lgd_clip(values, p->image[k], in.image.data + k * values);
 
     watch w = {.in = &in, .options = o, .steps = steps};
     ag_value *out = NULL;
     if (o->iterations == LGD_AUTO) {
-        w.best = ts_arena_alloc(ag_arena(e->tape), (size_t)side * (size_t)side * (size_t)e->net->arch.channels * sizeof *w.best);
+        w.best = ts_arena_alloc(ag_arena(e->tape),
+                                (size_t)side * (size_t)side * (size_t)e->net->arch.channels * sizeof *w.best);
         if (!w.best) return ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
     }
-    if (nn_lgd(e->tape, e->net, &in, steps, false, &out, o->progress || w.best ? &(nn_watch){after_step, &w, !w.best && !o->every_rmse} : NULL) != TS_OK || !out) {
+    if (nn_lgd(e->tape, e->net, &in, steps, false, &out,
+               o->progress || w.best ? &(nn_watch){after_step, &w, !w.best && !o->every_rmse} : NULL) != TS_OK ||
+        !out) {
         *st = *ag_status(e->tape);
         return st->code ? st->code : ts_fail(st, TS_NUMERIC, "the network gave no result");
     }
@@ -120,7 +132,8 @@ static ts_code run_loop(const lgd_estimator *e, const given_photos *p, int steps
 }
 
 /* taken: NULL, or gets the number of steps that were made. */
-static ts_code run_whole(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o, float *maps, int *taken, ts_status *st)
+static ts_code run_whole(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o, float *maps,
+                         int *taken, ts_status *st)
 {
     const ts_mark mark = ag_scope_begin(e->tape);
     const ts_code code = run_loop(e, p, steps, o, maps, taken, st);
@@ -128,19 +141,22 @@ static ts_code run_whole(const lgd_estimator *e, const given_photos *p, int step
     return code;
 }
 
-static ts_code estimate_whole(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o, float *maps, ts_status *st)
+static ts_code estimate_whole(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o,
+                              float *maps, ts_status *st)
 {
     return run_whole(e, p, steps, o, maps, NULL, st);
 }
 
 /* The number of steps that the photographs take at AUTO_SIDE pixels. */
-static ts_code count_steps(const lgd_estimator *e, const given_photos *p, int most, int orientations, int *steps, ts_status *st)
+static ts_code count_steps(const lgd_estimator *e, const given_photos *p, int most, int orientations, int *steps,
+                           ts_status *st)
 {
     enum { AUTO_SIDE = 256 };
     const int side = p->side, given = p->count, small = side < AUTO_SIDE ? side : AUTO_SIDE;
     const size_t pixels = (size_t)small * (size_t)small;
     const lgd_options o = {.iterations = LGD_AUTO, .orientations = orientations};
-    float *photo = malloc((size_t)given * pixels * 3 * sizeof *photo), *maps = malloc(pixels * MAP_CHANNELS * sizeof *maps);
+    float *photo = malloc((size_t)given * pixels * 3 * sizeof *photo),
+          *maps = malloc(pixels * MAP_CHANNELS * sizeof *maps);
     const float *each[NN_MAX_IMAGES];
     ts_arena *arena = ts_arena_create(0, st);
     ts_code code = photo && maps && arena ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory");
@@ -170,19 +186,36 @@ static int before_tile(void *user)
     return w->options->tile ? w->options->tile(w->begun++ / w->tiles, w->options->user) : 0;
 }
 
-static ts_code estimate_tiles(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o, float *maps, ts_status *st)
+static ts_code estimate_tiles(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o,
+                              float *maps, ts_status *st)
 {
     const int side = p->side;
     const nn_arch *arch = &e->net->arch;
     const int64_t pixels = (int64_t)side * side;
-    const int early = side > UNTILED ? TILE_EARLY : side, tile = o->mask ? TILE_MASK : o->tolerance > 0 ? early : TILE, across = (side + tile - 1) / tile;
+    const int early = side > UNTILED ? TILE_EARLY : side,
+              tile = o->mask ? TILE_MASK
+        : o->tolerance > 0   ? early
+                             : TILE,
+              across = (side + tile - 1) / tile;
     tile_watch w = {o, (double)across * across, 0};
     /* the network's channels are the caller's, but for published models */
     float *raw = arch->channels == MAP_CHANNELS ? maps : malloc((size_t)pixels * (size_t)arch->channels * sizeof *raw);
     double *rmse = calloc((size_t)steps + 1, sizeof *rmse);
     ts_code code = raw && rmse ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
-    lgd_tiles t = {.image = p->image, .views = p->views, .given = p->count, .proposed = p->proposed, .mask = o->mask, .side = side, .tile = tile, .steps = steps, .orientations = o->orientations, .tolerance = o->tolerance, .rmse = o->progress ? rmse : NULL, .ends_alone = !o->every_rmse && o->iterations != LGD_AUTO,
-                   .alive = before_tile, .user = &w};
+    lgd_tiles t = {.image = p->image,
+                   .views = p->views,
+                   .given = p->count,
+                   .proposed = p->proposed,
+                   .mask = o->mask,
+                   .side = side,
+                   .tile = tile,
+                   .steps = steps,
+                   .orientations = o->orientations,
+                   .tolerance = o->tolerance,
+                   .rmse = o->progress ? rmse : NULL,
+                   .ends_alone = !o->every_rmse && o->iterations != LGD_AUTO,
+                   .alive = before_tile,
+                   .user = &w};
     if (!code) code = lgd_tiles_run(e->tape, e->net, &t, raw, st);
     int stop = steps;
     for (int i = 0; !code && o->progress && i < stop; i++)
@@ -198,7 +231,8 @@ static ts_code estimate_tiles(const lgd_estimator *e, const given_photos *p, int
     return code;
 }
 
-ts_code lgd_estimator_run(const lgd_estimator *e, const lgd_photo *photo, int photos, int side, const lgd_options *o, float *maps, ts_status *st)
+ts_code lgd_estimator_run(const lgd_estimator *e, const lgd_photo *photo, int photos, int side, const lgd_options *o,
+                          float *maps, ts_status *st)
 {
     const float *image[NN_MAX_IMAGES];
     rd_view views[NN_MAX_IMAGES];
@@ -214,7 +248,8 @@ ts_code lgd_estimator_run(const lgd_estimator *e, const lgd_photo *photo, int ph
         image[k] = photo[order[k]].image;
         views[k] = given[order[k]];
     }
-    /* Once: memory that one stage has touched is there for the next, and touching it first costs as much as computing. */
+    /* Once: memory that one stage has touched is there for the next, and touching it first costs as much as computing.
+     */
     ag_reset(e->tape);
     const bool tiles = lgd_tiles_exact(&e->net->arch) && (side > UNTILED || o->mask || o->tolerance > 0);
     if (o->power) *o->power = 1;
@@ -239,4 +274,3 @@ ts_code lgd_estimator_run(const lgd_estimator *e, const lgd_photo *photo, int ph
     free(proposed);
     return code;
 }
-

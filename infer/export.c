@@ -9,7 +9,8 @@ static void base64(FILE *f, const unsigned char *bytes, size_t n)
 {
     static const char digit[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     for (size_t i = 0; i < n; i += 3) {
-        const uint32_t v = (uint32_t)bytes[i] << 16 | (i + 1 < n ? (uint32_t)bytes[i + 1] << 8 : 0) | (i + 2 < n ? bytes[i + 2] : 0);
+        const uint32_t v = (uint32_t)bytes[i] << 16 | (i + 1 < n ? (uint32_t)bytes[i + 1] << 8 : 0) |
+            (i + 2 < n ? bytes[i + 2] : 0);
         fputc(digit[v >> 18], f);
         fputc(digit[v >> 12 & 63], f);
         fputc(i + 1 < n ? digit[v >> 6 & 63] : '=', f);
@@ -48,16 +49,21 @@ static const char gltf_before[] =
     "  \"scene\": 0,\n"
     "  \"scenes\": [{\"nodes\": [0]}],\n"
     "  \"nodes\": [{\"mesh\": 0, \"name\": \"sample\"}],\n"
-    "  \"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0, \"NORMAL\": 1, \"TANGENT\": 2, \"TEXCOORD_0\": 3}, \"indices\": 4, \"material\": 0}]}],\n"
+    "  \"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0, \"NORMAL\": 1, \"TANGENT\": 2, "
+    "\"TEXCOORD_0\": 3}, \"indices\": 4, \"material\": 0}]}],\n"
     "  \"materials\": [{\n"
     "    \"name\": \"sample\",\n"
-    "    \"pbrMetallicRoughness\": {\"baseColorTexture\": {\"index\": 0}, \"metallicFactor\": 0, \"metallicRoughnessTexture\": {\"index\": 2}},\n"
+    "    \"pbrMetallicRoughness\": {\"baseColorTexture\": {\"index\": 0}, \"metallicFactor\": 0, "
+    "\"metallicRoughnessTexture\": {\"index\": 2}},\n"
     "    \"normalTexture\": {\"index\": 3},\n"
-    "    \"extensions\": {\"KHR_materials_ior\": {\"ior\": 0}, \"KHR_materials_specular\": {\"specularColorTexture\": {\"index\": 1}}}\n"
+    "    \"extensions\": {\"KHR_materials_ior\": {\"ior\": 0}, \"KHR_materials_specular\": {\"specularColorTexture\": "
+    "{\"index\": 1}}}\n"
     "  }],\n"
-    "  \"textures\": [{\"source\": 0, \"sampler\": 0}, {\"source\": 1, \"sampler\": 0}, {\"source\": 2, \"sampler\": 0}, {\"source\": 3, \"sampler\": 0}],\n"
+    "  \"textures\": [{\"source\": 0, \"sampler\": 0}, {\"source\": 1, \"sampler\": 0}, {\"source\": 2, \"sampler\": "
+    "0}, {\"source\": 3, \"sampler\": 0}],\n"
     "  \"samplers\": [{\"magFilter\": 9729, \"minFilter\": 9987, \"wrapS\": 33071, \"wrapT\": 33071}],\n"
-    "  \"images\": [{\"uri\": \"diffuse.png\"}, {\"uri\": \"specular.png\"}, {\"uri\": \"roughness.png\"}, {\"uri\": \"normal.png\"}],\n";
+    "  \"images\": [{\"uri\": \"diffuse.png\"}, {\"uri\": \"specular.png\"}, {\"uri\": \"roughness.png\"}, {\"uri\": "
+    "\"normal.png\"}],\n";
 
 static void print_gltf(FILE *f)
 {
@@ -66,7 +72,8 @@ static void print_gltf(FILE *f)
     fputs(gltf_before, f);
     fprintf(f,
             "  \"accessors\": [\n"
-            "    {\"bufferView\": 0, \"byteOffset\": %d, \"componentType\": 5126, \"count\": 4, \"type\": \"VEC3\", \"min\": [-0.5, -0.5, 0], \"max\": [0.5, 0.5, 0]},\n"
+            "    {\"bufferView\": 0, \"byteOffset\": %d, \"componentType\": 5126, \"count\": 4, \"type\": \"VEC3\", "
+            "\"min\": [-0.5, -0.5, 0], \"max\": [0.5, 0.5, 0]},\n"
             "    {\"bufferView\": 0, \"byteOffset\": %d, \"componentType\": 5126, \"count\": 4, \"type\": \"VEC3\"},\n"
             "    {\"bufferView\": 1, \"byteOffset\": 0, \"componentType\": 5126, \"count\": 4, \"type\": \"VEC4\"},\n"
             "    {\"bufferView\": 2, \"byteOffset\": 0, \"componentType\": 5126, \"count\": 4, \"type\": \"VEC2\"},\n"
@@ -79,7 +86,8 @@ static void print_gltf(FILE *f)
             "    {\"buffer\": 0, \"byteOffset\": %d, \"byteLength\": %d, \"target\": 34963}\n"
             "  ],\n"
             "  \"buffers\": [{\"byteLength\": %d, \"uri\": \"data:application/octet-stream;base64,",
-            POSITION, NORMAL, TANGENT, TANGENT, TEXCOORD - TANGENT, TEXCOORD, INDEX - TEXCOORD, INDEX, BUFFER - INDEX, BUFFER);
+            POSITION, NORMAL, TANGENT, TANGENT, TEXCOORD - TANGENT, TEXCOORD, INDEX - TEXCOORD, INDEX, BUFFER - INDEX,
+            BUFFER);
     base64(f, bytes, sizeof bytes);
     fputs("\"}]\n}\n", f);
 }
@@ -88,20 +96,31 @@ static const char materialx[] =
     "<?xml version=\"1.0\"?>\n"
     "<materialx version=\"1.39\" colorspace=\"lin_rec709\">\n"
     "  <nodegraph name=\"maps\">\n"
-    "    <image name=\"diffuse\" type=\"color3\"><input name=\"file\" type=\"filename\" value=\"diffuse.png\" colorspace=\"srgb_texture\"/></image>\n"
-    "    <image name=\"f0\" type=\"color3\"><input name=\"file\" type=\"filename\" value=\"specular.png\" colorspace=\"srgb_texture\"/></image>\n"
-    "    <image name=\"roughness\" type=\"float\"><input name=\"file\" type=\"filename\" value=\"roughness.png\"/></image>\n"
-    "    <image name=\"normal_file\" type=\"vector3\"><input name=\"file\" type=\"filename\" value=\"normal.png\"/></image>\n"
-    "    <normalmap name=\"normal\" type=\"vector3\"><input name=\"in\" type=\"vector3\" nodename=\"normal_file\"/></normalmap>\n"
+    "    <image name=\"diffuse\" type=\"color3\"><input name=\"file\" type=\"filename\" value=\"diffuse.png\" "
+    "colorspace=\"srgb_texture\"/></image>\n"
+    "    <image name=\"f0\" type=\"color3\"><input name=\"file\" type=\"filename\" value=\"specular.png\" "
+    "colorspace=\"srgb_texture\"/></image>\n"
+    "    <image name=\"roughness\" type=\"float\"><input name=\"file\" type=\"filename\" "
+    "value=\"roughness.png\"/></image>\n"
+    "    <image name=\"normal_file\" type=\"vector3\"><input name=\"file\" type=\"filename\" "
+    "value=\"normal.png\"/></image>\n"
+    "    <normalmap name=\"normal\" type=\"vector3\"><input name=\"in\" type=\"vector3\" "
+    "nodename=\"normal_file\"/></normalmap>\n"
     "    <luminance name=\"grey\" type=\"color3\"><input name=\"in\" type=\"color3\" nodename=\"f0\"/></luminance>\n"
-    "    <extract name=\"grey_value\" type=\"float\"><input name=\"in\" type=\"color3\" nodename=\"grey\"/><input name=\"index\" type=\"integer\" value=\"0\"/></extract>\n"
-    "    <clamp name=\"level\" type=\"float\"><input name=\"in\" type=\"float\" nodename=\"grey_value\"/><input name=\"low\" type=\"float\" value=\"0.0001\"/>"
+    "    <extract name=\"grey_value\" type=\"float\"><input name=\"in\" type=\"color3\" nodename=\"grey\"/><input "
+    "name=\"index\" type=\"integer\" value=\"0\"/></extract>\n"
+    "    <clamp name=\"level\" type=\"float\"><input name=\"in\" type=\"float\" nodename=\"grey_value\"/><input "
+    "name=\"low\" type=\"float\" value=\"0.0001\"/>"
     "<input name=\"high\" type=\"float\" value=\"0.98\"/></clamp>\n"
-    "    <divide name=\"tint\" type=\"color3\"><input name=\"in1\" type=\"color3\" nodename=\"f0\"/><input name=\"in2\" type=\"float\" nodename=\"level\"/></divide>\n"
+    "    <divide name=\"tint\" type=\"color3\"><input name=\"in1\" type=\"color3\" nodename=\"f0\"/><input "
+    "name=\"in2\" type=\"float\" nodename=\"level\"/></divide>\n"
     "    <sqrt name=\"root\" type=\"float\"><input name=\"in\" type=\"float\" nodename=\"level\"/></sqrt>\n"
-    "    <add name=\"above\" type=\"float\"><input name=\"in1\" type=\"float\" value=\"1\"/><input name=\"in2\" type=\"float\" nodename=\"root\"/></add>\n"
-    "    <subtract name=\"below\" type=\"float\"><input name=\"in1\" type=\"float\" value=\"1\"/><input name=\"in2\" type=\"float\" nodename=\"root\"/></subtract>\n"
-    "    <divide name=\"ior\" type=\"float\"><input name=\"in1\" type=\"float\" nodename=\"above\"/><input name=\"in2\" type=\"float\" nodename=\"below\"/></divide>\n"
+    "    <add name=\"above\" type=\"float\"><input name=\"in1\" type=\"float\" value=\"1\"/><input name=\"in2\" "
+    "type=\"float\" nodename=\"root\"/></add>\n"
+    "    <subtract name=\"below\" type=\"float\"><input name=\"in1\" type=\"float\" value=\"1\"/><input name=\"in2\" "
+    "type=\"float\" nodename=\"root\"/></subtract>\n"
+    "    <divide name=\"ior\" type=\"float\"><input name=\"in1\" type=\"float\" nodename=\"above\"/><input "
+    "name=\"in2\" type=\"float\" nodename=\"below\"/></divide>\n"
     "    <output name=\"diffuse_out\" type=\"color3\" nodename=\"diffuse\"/>\n"
     "    <output name=\"tint_out\" type=\"color3\" nodename=\"tint\"/>\n"
     "    <output name=\"ior_out\" type=\"float\" nodename=\"ior\"/>\n"
@@ -124,8 +143,10 @@ static const char materialx[] =
     "    <input name=\"specular_roughness\" type=\"float\" nodegraph=\"maps\" output=\"roughness_out\"/>\n"
     "    <input name=\"geometry_normal\" type=\"vector3\" nodegraph=\"maps\" output=\"normal_out\"/>\n"
     "  </open_pbr_surface>\n"
-    "  <surfacematerial name=\"surface\" type=\"material\"><input name=\"surfaceshader\" type=\"surfaceshader\" nodename=\"surface_shader\"/></surfacematerial>\n"
-    "  <surfacematerial name=\"openpbr\" type=\"material\"><input name=\"surfaceshader\" type=\"surfaceshader\" nodename=\"openpbr_shader\"/></surfacematerial>\n"
+    "  <surfacematerial name=\"surface\" type=\"material\"><input name=\"surfaceshader\" type=\"surfaceshader\" "
+    "nodename=\"surface_shader\"/></surfacematerial>\n"
+    "  <surfacematerial name=\"openpbr\" type=\"material\"><input name=\"surfaceshader\" type=\"surfaceshader\" "
+    "nodename=\"openpbr_shader\"/></surfacematerial>\n"
     "</materialx>\n";
 
 static void print_materialx(FILE *f) { fputs(materialx, f); }

@@ -4,7 +4,7 @@
 #include "infer/encode.h"
 #include "infer/estimate.h"
 #include "infer/tiles.h"
-#include "nn/weights.h"
+#include "nn/weights/weights.h"
 #include "render/render.h"
 #include "tensor/threads.h"
 #include <math.h>
@@ -15,7 +15,7 @@
 #include <string.h>
 
 enum {
-    SIDE_MAX = 16384,     /* 9.7 GB of maps: a larger number is a mistake */
+    SIDE_MAX = 16384,      /* 9.7 GB of maps: a larger number is a mistake */
     ITERATIONS_MAX = 1000, /* the same: nothing changes after some ten */
     THREADS_MAX = 1024
 };
@@ -47,7 +47,10 @@ _Static_assert(sizeof((lgd_error *)0)->message == sizeof((ts_status *)0)->messag
 
 const char *lgd_version(void) { return LGD_VERSION; }
 
-lgd_options lgd_options_default(void) { return (lgd_options){.iterations = -1, .orientations = LGD_ORIENTATIONS_USUAL, .tolerance = LGD_TOLERANCE_USUAL}; }
+lgd_options lgd_options_default(void)
+{
+    return (lgd_options){.iterations = -1, .orientations = LGD_ORIENTATIONS_USUAL, .tolerance = LGD_TOLERANCE_USUAL};
+}
 
 int lgd_trained_iterations(const lgd_model *model) { return model->net->arch.iterations; }
 
@@ -126,33 +129,49 @@ static ts_code check_photo(const lgd_photo *p, int number, ts_status *st)
     if (!p->image) return ts_fail(st, TS_INVALID, "lgd_estimate: photograph %d has no image", number);
     bool fine = isfinite(p->power) && p->power > 0 && p->light[2] > 0 && p->camera[2] > 0;
     for (int i = 0; i < 3; i++) fine = fine && isfinite(p->light[i]) && isfinite(p->camera[i]);
-    if (!fine) return ts_fail(st, TS_INVALID, "lgd_estimate: light and camera of photograph %d must be above the sample, its power above 0", number);
+    if (!fine)
+        return ts_fail(st, TS_INVALID,
+                       "lgd_estimate: light and camera of photograph %d must be above the sample, its power above 0",
+                       number);
     return TS_OK;
 }
 
-static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *o, const float *maps, ts_status *st)
+static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, int photos, int side,
+                               const lgd_options *o, const float *maps, ts_status *st)
 {
     if (!model || !photo || !maps) return ts_fail(st, TS_INVALID, "lgd_estimate: model, image and maps must be given");
     if (photos < 1 || photos > model->net->arch.images)
-        return ts_fail(st, TS_INVALID, "lgd_estimate: %d photographs: these weights read 1 .. %d", photos, model->net->arch.images);
+        return ts_fail(st, TS_INVALID, "lgd_estimate: %d photographs: these weights read 1 .. %d", photos,
+                       model->net->arch.images);
     for (int k = 0; k < photos; k++)
         if (check_photo(&photo[k], k + 1, st) != TS_OK) return st->code;
-    if (side < 1 || side > SIDE_MAX) return ts_fail(st, TS_INVALID, "lgd_estimate: side is %d and must lie in 1 .. %d", side, SIDE_MAX);
+    if (side < 1 || side > SIDE_MAX)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: side is %d and must lie in 1 .. %d", side, SIDE_MAX);
     if (o->iterations < LGD_AUTO || o->iterations > ITERATIONS_MAX)
-        return ts_fail(st, TS_INVALID, "lgd_estimate: iterations is %d and must lie in 0 .. %d, or be -1 for as trained or %d for automatic", o->iterations,
-                       ITERATIONS_MAX, LGD_AUTO);
+        return ts_fail(
+            st, TS_INVALID,
+            "lgd_estimate: iterations is %d and must lie in 0 .. %d, or be -1 for as trained or %d for automatic",
+            o->iterations, ITERATIONS_MAX, LGD_AUTO);
     if (o->threads < 0 || o->threads > THREADS_MAX)
-        return ts_fail(st, TS_INVALID, "lgd_estimate: threads is %d and must lie in 1 .. %d, or be 0 for all", o->threads, THREADS_MAX);
+        return ts_fail(st, TS_INVALID, "lgd_estimate: threads is %d and must lie in 1 .. %d, or be 0 for all",
+                       o->threads, THREADS_MAX);
     if (!(o->tolerance >= 0 && o->tolerance <= 1) && o->tolerance != LGD_TOLERANCE_USUAL)
-        return ts_fail(st, TS_INVALID, "lgd_estimate: tolerance is %g and must lie in 0 .. 1, or be %g for the usual one", o->tolerance, LGD_TOLERANCE_USUAL);
+        return ts_fail(st, TS_INVALID,
+                       "lgd_estimate: tolerance is %g and must lie in 0 .. 1, or be %g for the usual one", o->tolerance,
+                       LGD_TOLERANCE_USUAL);
     if (o->precision != LGD_F32 && o->precision != LGD_BF16)
-        return ts_fail(st, TS_INVALID, "lgd_estimate: precision is %d and must be %d for f32 or %d for bf16", o->precision, LGD_F32, LGD_BF16);
-    if (o->orientations != 0 && o->orientations != 1 && o->orientations != 2 && o->orientations != 4 && o->orientations != 8)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: precision is %d and must be %d for f32 or %d for bf16",
+                       o->precision, LGD_F32, LGD_BF16);
+    if (o->orientations != 0 && o->orientations != 1 && o->orientations != 2 && o->orientations != 4 &&
+        o->orientations != 8)
         return ts_fail(st, TS_INVALID, "lgd_estimate: orientations is %d and must be 1, 2, 4 or 8", o->orientations);
     if ((o->tolerance > 0 || o->mask) && !lgd_tiles_exact(&model->net->arch))
-        return ts_fail(st, TS_UNSUPPORTED, "lgd_estimate: these weights' loss is taken anew over the whole photograph at every step: no mask and no tolerance");
+        return ts_fail(st, TS_UNSUPPORTED,
+                       "lgd_estimate: these weights' loss is taken anew over the whole photograph at every step: no "
+                       "mask and no tolerance");
     if (o->iterations > 0 && !nn_arch_refines(&model->net->arch))
-        return ts_fail(st, TS_UNSUPPORTED, "lgd_estimate: these weights have no refiner: only 0 iterations are possible");
+        return ts_fail(st, TS_UNSUPPORTED,
+                       "lgd_estimate: these weights have no refiner: only 0 iterations are possible");
     return TS_OK;
 }
 
@@ -170,7 +189,8 @@ void lgd_encode(const float *maps, int side, float *encoded)
     }
 }
 
-int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options, float *maps, lgd_error *error)
+int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,
+                        float *maps, lgd_error *error)
 {
     ts_status st = {0};
     lgd_options o = options ? *options : lgd_options_default();
@@ -178,11 +198,15 @@ int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, in
     if (w) {
         const lgd_estimator e = {model->net, w->tape};
         if (o.tolerance == LGD_TOLERANCE_USUAL)
-            o.tolerance = o.iterations == -1 && !o.exact && model->net->arch.h_width > 0 && lgd_tiles_exact(&model->net->arch) ? LGD_TOLERANCE : 0;
+            o.tolerance = o.iterations == -1 && !o.exact && model->net->arch.h_width > 0 &&
+                    lgd_tiles_exact(&model->net->arch)
+                ? LGD_TOLERANCE
+                : 0;
         const bool exact = ts_conv_exact();
         const ts_precision precision = ts_conv_precision();
         const int threads = ts_threads_own(o.threads > 0 ? o.threads : ts_threads_allowed());
-        ts_conv_exact_set(o.exact || model->net->arch.compat == NN_COMPAT_PUBLISHED); /* whoever runs that wants its numbers */
+        ts_conv_exact_set(o.exact ||
+                          model->net->arch.compat == NN_COMPAT_PUBLISHED); /* whoever runs that wants its numbers */
         ts_conv_precision_set(o.precision == LGD_BF16 ? TS_BF16 : TS_F32);
         lgd_estimator_run(&e, photo, photos, side, &o, maps, &st);
         ts_conv_precision_set(precision);
@@ -193,13 +217,15 @@ int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, in
     return report(error, &st);
 }
 
-int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps, lgd_error *error)
+int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps,
+                 lgd_error *error)
 {
     const lgd_photo photo = lgd_flash_photo(image);
     return lgd_estimate_photos(model, &photo, 1, side, options, maps, error);
 }
 
-int lgd_render(const float *maps, int side, const float light[3], const float camera[3], float power, float *image, lgd_error *error)
+int lgd_render(const float *maps, int side, const float light[3], const float camera[3], float power, float *image,
+               lgd_error *error)
 {
     ts_status st = {0};
     rd_view view = {.kind = RD_POINT, .power = power};
@@ -213,8 +239,10 @@ int lgd_render(const float *maps, int side, const float light[3], const float ca
         view.camera[i] = camera[i];
         finite = finite && isfinite(light[i]) && isfinite(camera[i]);
     }
-    if (!finite || power < 0) ts_fail(&st, TS_INVALID, "lgd_render: light, camera and power must be finite and power not negative");
-    else if (side < 1 || side > SIDE_MAX) ts_fail(&st, TS_INVALID, "lgd_render: side is %d and must lie in 1 .. %d", side, SIDE_MAX);
+    if (!finite || power < 0)
+        ts_fail(&st, TS_INVALID, "lgd_render: light, camera and power must be finite and power not negative");
+    else if (side < 1 || side > SIDE_MAX)
+        ts_fail(&st, TS_INVALID, "lgd_render: side is %d and must lie in 1 .. %d", side, SIDE_MAX);
     if (st.code) return report(error, &st);
 
     const size_t pixels = (size_t)side * (size_t)side;

@@ -33,8 +33,10 @@ static double system_free(void)
 ts_code lgd_memory_check(double bytes, ts_status *st)
 {
     double left = system_free();
-    const double limit = number_in("/sys/fs/cgroup/memory.max"), used = number_in("/sys/fs/cgroup/memory.current"); /* a container's own */
+    const double limit = number_in("/sys/fs/cgroup/memory.max"),
+                 used = number_in("/sys/fs/cgroup/memory.current"); /* a container's own */
     if (limit > 0 && used >= 0) left = fmin(left, fmax(limit - used, 0));
     if (bytes <= left) return TS_OK;
-    return ts_fail(st, TS_NOMEM, "about %.1f GB of memory are needed and %.1f GB are free: use a smaller size", bytes * 1e-9, left * 1e-9);
+    return ts_fail(st, TS_NOMEM, "about %.1f GB of memory are needed and %.1f GB are free: use a smaller size",
+                   bytes * 1e-9, left * 1e-9);
 }

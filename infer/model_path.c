@@ -9,7 +9,8 @@ enum { LGD_NAME_MAX = 64 }; /* of a shipped model's name */
 
 static ts_code take(const char *from, char path[LGD_PATH_MAX], ts_status *st)
 {
-    if (snprintf(path, LGD_PATH_MAX, "%s", from) >= LGD_PATH_MAX) return ts_fail(st, TS_INVALID, "the name of the weights file is too long");
+    if (snprintf(path, LGD_PATH_MAX, "%s", from) >= LGD_PATH_MAX)
+        return ts_fail(st, TS_INVALID, "the name of the weights file is too long");
     return TS_OK;
 }
 
@@ -32,7 +33,10 @@ static bool shipped(const char *name, char path[LGD_PATH_MAX])
     return access(path, F_OK) == 0;
 }
 
-static bool is_name(const char *option) { return *option && strlen(option) < LGD_NAME_MAX && !strpbrk(option, "/.") && access(option, F_OK) != 0; }
+static bool is_name(const char *option)
+{
+    return *option && strlen(option) < LGD_NAME_MAX && !strpbrk(option, "/.") && access(option, F_OK) != 0;
+}
 
 ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_MAX], ts_status *st)
 {
@@ -41,5 +45,8 @@ ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_
     if (option && !is_name(option)) return take(option, path, st);
     if (option) name = option;
     if (shipped(name, path)) return TS_OK;
-    return ts_fail(st, TS_IO, "no %s.safetensors found in ../share/lgd or ../../models beside the program or in %s: name a file with --model or LGD_MODEL", name, LGD_DATADIR);
+    return ts_fail(st, TS_IO,
+                   "no %s.safetensors found in ../share/lgd or ../../models beside the program or in %s: name a file "
+                   "with --model or LGD_MODEL",
+                   name, LGD_DATADIR);
 }

@@ -13,10 +13,11 @@
 
 enum { PATH_LENGTH = 4096 };
 
-const char *const lgd_output_names[LGD_OUTPUTS] = {"diffuse",   "specular", "roughness", "normal", "exr",  "render",
-                                                   "preview",   "basecolor", "metallic", "height", "gltf", "materialx"};
-const char *const lgd_files[LGD_FILES] = {"diffuse.png", "specular.png",  "roughness.png", "normal.png", "maps.exr",      "render.png",   "preview.png",
-                                          "basecolor.png", "metallic.png", "height.png",   "material.gltf", "material.mtlx", "meta.txt"};
+const char *const lgd_output_names[LGD_OUTPUTS] = {"diffuse", "specular",  "roughness", "normal", "exr",  "render",
+                                                   "preview", "basecolor", "metallic",  "height", "gltf", "materialx"};
+const char *const lgd_files[LGD_FILES] = {
+    "diffuse.png",   "specular.png", "roughness.png", "normal.png",    "maps.exr",      "render.png", "preview.png",
+    "basecolor.png", "metallic.png", "height.png",    "material.gltf", "material.mtlx", "meta.txt"};
 
 ts_code lgd_output_parse(const char *list, unsigned *which, ts_status *st)
 {
@@ -25,19 +26,22 @@ ts_code lgd_output_parse(const char *list, unsigned *which, ts_status *st)
         const size_t n = strcspn(at, ",");
         int k = 0;
         while (k < LGD_OUTPUTS && (strlen(lgd_output_names[k]) != n || strncmp(at, lgd_output_names[k], n) != 0)) k++;
-        if (k == LGD_OUTPUTS) return ts_fail(st, TS_INVALID, "'%.*s' is nothing that can be written", (int)(n < 40 ? n : 40), at);
+        if (k == LGD_OUTPUTS)
+            return ts_fail(st, TS_INVALID, "'%.*s' is nothing that can be written", (int)(n < 40 ? n : 40), at);
         *which |= 1u << k;
         at += n;
         if (!*at) break;
     }
-    if (*which & (LGD_OUT_GLTF | LGD_OUT_MATERIALX)) *which |= LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR | LGD_OUT_ROUGHNESS | LGD_OUT_NORMAL;
+    if (*which & (LGD_OUT_GLTF | LGD_OUT_MATERIALX))
+        *which |= LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR | LGD_OUT_ROUGHNESS | LGD_OUT_NORMAL;
     return TS_OK;
 }
 
 /* folder/name; TS_INVALID when it is too long. */
 static ts_code join(char path[PATH_LENGTH], const char *folder, const char *name, ts_status *st)
 {
-    if (snprintf(path, PATH_LENGTH, "%s/%s", folder, name) >= PATH_LENGTH) return ts_fail(st, TS_INVALID, "%.200s...: the name is too long", folder);
+    if (snprintf(path, PATH_LENGTH, "%s/%s", folder, name) >= PATH_LENGTH)
+        return ts_fail(st, TS_INVALID, "%.200s...: the name is too long", folder);
     return TS_OK;
 }
 
@@ -98,8 +102,10 @@ static ts_code make_rows(int y, int count, float *values, void *user, ts_status 
     for (int k = 0; k < s->panels; k++) {
         const float *from = k == 0 && s->photo ? s->photo->image + first * 3 : picture;
         if (from == picture)
-            rd_render((rd_grid){.h = count, .w = size, .y0 = y, .side = size}, s->m->maps + first * MAP_CHANNELS, MAP_CHANNELS, &s->view[k], true, picture);
-        for (int i = 0; i < count; i++) memcpy(values + (size_t)i * row + (size_t)k * panel, from + (size_t)i * panel, panel * sizeof *values);
+            rd_render((rd_grid){.h = count, .w = size, .y0 = y, .side = size}, s->m->maps + first * MAP_CHANNELS,
+                      MAP_CHANNELS, &s->view[k], true, picture);
+        for (int i = 0; i < count; i++)
+            memcpy(values + (size_t)i * row + (size_t)k * panel, from + (size_t)i * panel, panel * sizeof *values);
     }
     free(picture);
     return TS_OK;
@@ -129,7 +135,8 @@ static ts_code write_preview(const char *folder, const io_material *m, ts_status
     return write_strip(folder, "preview.png", &s, st);
 }
 
-static ts_code write_metallic(const char *folder, const io_material *m, unsigned which, io_metallic_error *lost, ts_status *st)
+static ts_code write_metallic(const char *folder, const io_material *m, unsigned which, io_metallic_error *lost,
+                              ts_status *st)
 {
     io_image base = {0}, metal = {0};
     ts_code code = io_image_create(&base, m->size, m->size, 3, st);
@@ -156,15 +163,18 @@ static ts_code write_height(const char *folder, const io_material *m, ts_status 
     return code;
 }
 
-static ts_code write_document(const char *folder, const char *name, ts_code (*write)(const char *path, ts_status *st), ts_status *st)
+static ts_code write_document(const char *folder, const char *name, ts_code (*write)(const char *path, ts_status *st),
+                              ts_status *st)
 {
     char path[PATH_LENGTH];
     return join(path, folder, name, st) ? st->code : write(path, st);
 }
 
 /* What is made in one go; bits of which. Slow ones first, so that two threads end together. */
-static const unsigned portions[] = {LGD_OUT_EXR, LGD_OUT_HEIGHT, LGD_OUT_PREVIEW, LGD_OUT_NORMAL, LGD_OUT_BASECOLOR | LGD_OUT_METALLIC, LGD_OUT_RENDER,
-                                    LGD_OUT_ROUGHNESS, LGD_OUT_DIFFUSE, LGD_OUT_SPECULAR, LGD_OUT_GLTF, LGD_OUT_MATERIALX};
+static const unsigned portions[] = {
+    LGD_OUT_EXR,      LGD_OUT_HEIGHT,    LGD_OUT_PREVIEW, LGD_OUT_NORMAL,   LGD_OUT_BASECOLOR | LGD_OUT_METALLIC,
+    LGD_OUT_RENDER,   LGD_OUT_ROUGHNESS, LGD_OUT_DIFFUSE, LGD_OUT_SPECULAR, LGD_OUT_GLTF,
+    LGD_OUT_MATERIALX};
 enum { PORTIONS = sizeof portions / sizeof *portions };
 
 /* The bits of data/material.h. */
@@ -172,16 +182,19 @@ static unsigned map_bits(unsigned which)
 {
     static const struct {
         unsigned output, maps;
-    } same[] = {{LGD_OUT_DIFFUSE, IO_MAPS_DIFFUSE}, {LGD_OUT_SPECULAR, IO_MAPS_SPECULAR}, {LGD_OUT_ROUGHNESS, IO_MAPS_ROUGHNESS},
-                {LGD_OUT_NORMAL, IO_MAPS_NORMAL}, {LGD_OUT_EXR, IO_MAPS_EXR}};
+    } same[] = {{LGD_OUT_DIFFUSE, IO_MAPS_DIFFUSE},
+                {LGD_OUT_SPECULAR, IO_MAPS_SPECULAR},
+                {LGD_OUT_ROUGHNESS, IO_MAPS_ROUGHNESS},
+                {LGD_OUT_NORMAL, IO_MAPS_NORMAL},
+                {LGD_OUT_EXR, IO_MAPS_EXR}};
     unsigned maps = 0;
     for (size_t i = 0; i < sizeof same / sizeof *same; i++)
         if (which & same[i].output) maps |= same[i].maps;
     return maps;
 }
 
-static ts_code write_portion(const char *folder, const io_material *m, const lgd_photo *photo, unsigned which, bool directx, io_metallic_error *lost,
-                             ts_status *st)
+static ts_code write_portion(const char *folder, const io_material *m, const lgd_photo *photo, unsigned which,
+                             bool directx, io_metallic_error *lost, ts_status *st)
 {
     switch (which) {
     case 0: return TS_OK;
@@ -191,14 +204,15 @@ static ts_code write_portion(const char *folder, const io_material *m, const lgd
     case LGD_OUT_GLTF: return write_document(folder, "material.gltf", lgd_write_gltf, st);
     case LGD_OUT_MATERIALX: return write_document(folder, "material.mtlx", lgd_write_materialx, st);
     default:
-        return which & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC) ? write_metallic(folder, m, which, lost, st)
-                                                              : io_write_map_files(folder, m, map_bits(which), directx, st);
+        return which & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC)
+            ? write_metallic(folder, m, which, lost, st)
+            : io_write_map_files(folder, m, map_bits(which), directx, st);
     }
 }
 
 /* Of several failures the first portion's is told. */
-static ts_code write_all(const char *folder, const io_material *m, const lgd_photo *photo, unsigned which, bool directx, int threads,
-                         io_metallic_error *lost, ts_status *st)
+static ts_code write_all(const char *folder, const io_material *m, const lgd_photo *photo, unsigned which, bool directx,
+                         int threads, io_metallic_error *lost, ts_status *st)
 {
     ts_status failure[PORTIONS] = {{0}};
 #pragma omp parallel for num_threads(threads) schedule(dynamic)
@@ -214,15 +228,16 @@ static ts_code move_files(const char *hidden, const char *folder, ts_status *st)
 {
     char from[PATH_LENGTH], to[PATH_LENGTH];
     for (int i = 0; i < LGD_FILES; i++) {
-        if (join(from, hidden, lgd_files[i], st) != TS_OK || join(to, folder, lgd_files[i], st) != TS_OK) return st->code;
+        if (join(from, hidden, lgd_files[i], st) != TS_OK || join(to, folder, lgd_files[i], st) != TS_OK)
+            return st->code;
         if (access(from, F_OK) != 0) continue; /* not asked for */
         if (rename(from, to) != 0) return ts_fail(st, TS_IO, "%s: cannot be replaced: %s", to, strerror(errno));
     }
     return TS_OK;
 }
 
-ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const lgd_photo *photo, unsigned which, bool directx,
-                         int threads, io_metallic_error *lost, ts_status *st)
+ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const lgd_photo *photo,
+                         unsigned which, bool directx, int threads, io_metallic_error *lost, ts_status *st)
 {
     char folder[PATH_LENGTH], hidden[PATH_LENGTH];
     struct stat info;
@@ -233,7 +248,8 @@ ts_code lgd_output_write(const char *parent, const char *stem, const io_material
     if (make_hidden(there ? folder : parent, hidden, st) != TS_OK) return st->code;
     ts_code code = write_all(hidden, m, photo, which, directx, threads, lost, st);
     if (!code && there) code = move_files(hidden, folder, st);
-    else if (!code && rename(hidden, folder) != 0) code = ts_fail(st, TS_IO, "%s: cannot be made: %s", folder, strerror(errno));
+    else if (!code && rename(hidden, folder) != 0)
+        code = ts_fail(st, TS_IO, "%s: cannot be made: %s", folder, strerror(errno));
     if (code || there) remove_hidden(hidden);
     if (!code) io_sync_folder(folder);
     if (!code && !there) io_sync_folder(parent);

@@ -16,8 +16,8 @@ enum {
     LGD_OUT_PREVIEW = 1 << 6,   /* preview.png: LGD_PREVIEW_LIGHTS light positions */
     LGD_OUT_BASECOLOR = 1 << 7, /* basecolor.png, sRGB (data/metallic.h) */
     LGD_OUT_METALLIC = 1 << 8,  /* metallic.png, linear, 16 bit */
-    LGD_OUT_HEIGHT = 1 << 9,    /* height.png, 16 bit: 0.5 is the mean, the full range one patch width (data/height.h) */
-    LGD_OUT_GLTF = 1 << 10,     /* material.gltf (infer/export.h) */
+    LGD_OUT_HEIGHT = 1 << 9, /* height.png, 16 bit: 0.5 is the mean, the full range one patch width (data/height.h) */
+    LGD_OUT_GLTF = 1 << 10,  /* material.gltf (infer/export.h) */
     LGD_OUT_MATERIALX = 1 << 11 /* material.mtlx */
 };
 enum { LGD_OUTPUTS = 12, LGD_FILES = LGD_OUTPUTS + 1, LGD_PREVIEW_LIGHTS = 4 };
@@ -25,15 +25,17 @@ enum { LGD_OUTPUTS = 12, LGD_FILES = LGD_OUTPUTS + 1, LGD_PREVIEW_LIGHTS = 4 };
 extern const char *const lgd_output_names[LGD_OUTPUTS];
 extern const char *const lgd_files[LGD_FILES]; /* the file of each, then meta.txt */
 
-/* A list such as "normal,height" as bits. The documents bring the four maps that they refer to. TS_INVALID names the word. */
+/* A list such as "normal,height" as bits. The documents bring the four maps that they refer to. TS_INVALID names the
+ * word. */
 ts_code lgd_output_parse(const char *list, unsigned *which, ts_status *st);
 
 /* Fails with one clear line when nothing can be made inside the folder, before any work is done for it. */
 ts_code lgd_output_check(const char *folder, ts_status *st);
 
-/* Writes which (bits) and, beside maps, meta.txt (what they mean) to parent/stem; nothing else is computed. They are written to a hidden
- * folder first and renamed when all are complete: a failure leaves what was there before, and nothing else. photo: of the
- * material's size. lost: what base colour and metalness cannot express, where they are written; may be NULL. Files are made on as many threads as given. */
-ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const lgd_photo *photo, unsigned which, bool directx,
-                         int threads, io_metallic_error *lost, ts_status *st);
+/* Writes which (bits) and, beside maps, meta.txt (what they mean) to parent/stem; nothing else is computed. They are
+ * written to a hidden folder first and renamed when all are complete: a failure leaves what was there before, and
+ * nothing else. photo: of the material's size. lost: what base colour and metalness cannot express, where they are
+ * written; may be NULL. Files are made on as many threads as given. */
+ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const lgd_photo *photo,
+                         unsigned which, bool directx, int threads, io_metallic_error *lost, ts_status *st);
 #endif

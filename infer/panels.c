@@ -25,7 +25,8 @@ void lgd_panel_maps(io_image *sheet, int column, int row, const io_material *m, 
         for (int64_t i = 0; i < pixels; i++) {
             const io_texel t = io_texel_get(m->maps + i * MAP_CHANNELS);
             for (int c = 0; c < 3; c++) {
-                const float v[LGD_MAP_PANELS] = {t.diffuse[c], t.specular[c], io_srgb_to_linear(t.roughness), io_srgb_to_linear(0.5f * t.normal[c] + 0.5f)};
+                const float v[LGD_MAP_PANELS] = {t.diffuse[c], t.specular[c], io_srgb_to_linear(t.roughness),
+                                                 io_srgb_to_linear(0.5f * t.normal[c] + 0.5f)};
                 picture[3 * i + c] = v[panel];
             }
         }

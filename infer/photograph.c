@@ -1,5 +1,5 @@
 #include "infer/photograph.h"
-#include "nn/weights.h"
+#include "nn/weights/weights.h"
 #include "render/published.h"
 #include <math.h>
 
@@ -13,7 +13,8 @@ ts_code lgd_weights_published(const char *path, bool *published, ts_status *st)
     return code;
 }
 
-static ts_code published_square(const char *path, int64_t max_pixels, int size, io_image *square, int *width, int *height, ts_status *st)
+static ts_code published_square(const char *path, int64_t max_pixels, int size, io_image *square, int *width,
+                                int *height, ts_status *st)
 {
     io_image whole;
     *square = (io_image){0};
@@ -28,7 +29,8 @@ static ts_code published_square(const char *path, int64_t max_pixels, int size, 
     return code;
 }
 
-ts_code lgd_photograph_square(const char *path, bool published, int64_t max_pixels, int size, io_image *square, int *width, int *height, ts_status *st)
+ts_code lgd_photograph_square(const char *path, bool published, int64_t max_pixels, int size, io_image *square,
+                              int *width, int *height, ts_status *st)
 {
     return (published ? published_square : io_read_square)(path, max_pixels, size, square, width, height, st);
 }

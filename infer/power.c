@@ -7,15 +7,17 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Stops by which R_0's brightness errs where nothing is amiss: the estimate is that much nearer to 1, so that usual photographs keep the usual light. */
+/* Stops by which R_0's brightness errs where nothing is amiss: the estimate is that much nearer to 1, so that usual
+ * photographs keep the usual light. */
 #define USUAL_STOPS 0.2
 #define MOST_STOPS 3.0
-#define COARSE_STOPS 0.4 /* first these, then the finer ones around the best of them, a quarter of what is left out anyway */
+#define COARSE_STOPS \
+    0.4 /* first these, then the finer ones around the best of them, a quarter of what is left out anyway */
 #define STEP_STOPS 0.05
 enum { MOST_TRIED = 8 }; /* on either side of the middle */
 
-/* How far the photographs' renderings are from them when every light is 2^stops times as strong: the loss of training, which a few pixels in a highlight
- * that is in another place do not decide; both as a camera clips them. */
+/* How far the photographs' renderings are from them when every light is 2^stops times as strong: the loss of training,
+ * which a few pixels in a highlight that is in another place do not decide; both as a camera clips them. */
 static double distance(size_t values, const float *log_photo, const float *rendered, double stops)
 {
     const float factor = (float)exp2(stops);
@@ -28,7 +30,8 @@ static double distance(size_t values, const float *log_photo, const float *rende
 }
 
 /* The stops around middle at which it is least. */
-static double nearest(size_t values, const float *log_photo, const float *rendered, double middle, double reach, double step)
+static double nearest(size_t values, const float *log_photo, const float *rendered, double middle, double reach,
+                      double step)
 {
     double far[2 * MOST_TRIED + 1];
     const int most = (int)lround(reach / step);
@@ -40,19 +43,21 @@ static double nearest(size_t values, const float *log_photo, const float *render
     return middle + (best - most) * step;
 }
 
-static ts_code fit(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given, int side, int orientations, float *proposed, double *factor,
-                   ts_status *st)
+static ts_code fit(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given,
+                   int side, int orientations, float *proposed, double *factor, ts_status *st)
 {
     const int size = model->arch.g_size;
     const rd_grid grid = rd_grid_full(size);
     const size_t values = (size_t)size * (size_t)size * 3, whole = (size_t)side * (size_t)side * 3;
     *factor = 1;
-    ag_value *small = ag_empty(tape, (ts_shape){given, size, size, 3}), *rendered = ag_empty(tape, (ts_shape){given, size, size, 3});
+    ag_value *small = ag_empty(tape, (ts_shape){given, size, size, 3}),
+             *rendered = ag_empty(tape, (ts_shape){given, size, size, 3});
     const ts_mark mark = ag_scope_begin(tape);
     ts_tensor full = ts_view((float *)(uintptr_t)image[0], (ts_shape){given, side, side, 3});
     if (given > 1 || !lgd_clipped((int64_t)whole, image[0])) full = ts_new(ag_arena(tape), full.shape);
     if (!small || !rendered || !full.data) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
-    for (int k = 0; k < given && full.data != image[0]; k++) lgd_clip((int64_t)whole, image[k], full.data + (size_t)k * whole);
+    for (int k = 0; k < given && full.data != image[0]; k++)
+        lgd_clip((int64_t)whole, image[k], full.data + (size_t)k * whole);
     if (side == size) memcpy(small->t.data, full.data, (size_t)given * values * sizeof(float));
     else if (ts_resize(&small->t, &full, ag_arena(tape), st)) return st->code;
     ag_scope_end(tape, mark, NULL, 0);
@@ -63,21 +68,24 @@ static ts_code fit(ag_tape *tape, const nn_model *model, const float *const *ima
         return st->code;
     }
     memcpy(proposed, maps->t.data, (size_t)ts_count(maps->t.shape) * sizeof(float));
-    for (int k = 0; k < given; k++) rd_render(grid, maps->t.data, maps->t.shape.c, &views[k], false, rendered->t.data + (size_t)k * values);
+    for (int k = 0; k < given; k++)
+        rd_render(grid, maps->t.data, maps->t.shape.c, &views[k], false, rendered->t.data + (size_t)k * values);
     bool tells = false; /* black: any light would be too strong; clipped: none would be */
     for (size_t i = 0; i < (size_t)given * values && !tells; i++) tells = small->t.data[i] > 0 && small->t.data[i] < 1;
     if (!tells) return TS_OK;
     float *log_photo = small->t.data;
-    for (size_t i = 0; i < (size_t)given * values; i++) log_photo[i] = logf((log_photo[i] < 1 ? log_photo[i] : 1) + 0.01f);
-    const double middle = nearest((size_t)given * values, log_photo, rendered->t.data, 0, MOST_STOPS + USUAL_STOPS, COARSE_STOPS);
+    for (size_t i = 0; i < (size_t)given * values; i++)
+        log_photo[i] = logf((log_photo[i] < 1 ? log_photo[i] : 1) + 0.01f);
+    const double middle = nearest((size_t)given * values, log_photo, rendered->t.data, 0, MOST_STOPS + USUAL_STOPS,
+                                  COARSE_STOPS);
     const double found = nearest((size_t)given * values, log_photo, rendered->t.data, middle, COARSE_STOPS, STEP_STOPS);
     const double beyond = fmin(fmax(fabs(found) - USUAL_STOPS, 0), MOST_STOPS);
     *factor = exp2(found < 0 ? -beyond : beyond);
     return TS_OK;
 }
 
-ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given, int side, int orientations, float *proposed, double *factor,
-                      ts_status *st)
+ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given,
+                      int side, int orientations, float *proposed, double *factor, ts_status *st)
 {
     const ts_mark mark = ag_scope_begin(tape);
     const ts_code code = fit(tape, model, image, views, given, side, orientations, proposed, factor, st);

@@ -20,7 +20,8 @@ static int columns(area a) { return a.x1 - a.x0; }
 
 static area grown(area a, int by, int side)
 {
-    return (area){a.y0 > by ? a.y0 - by : 0, a.x0 > by ? a.x0 - by : 0, a.y1 + by < side ? a.y1 + by : side, a.x1 + by < side ? a.x1 + by : side};
+    return (area){a.y0 > by ? a.y0 - by : 0, a.x0 > by ? a.x0 - by : 0, a.y1 + by < side ? a.y1 + by : side,
+                  a.x1 + by < side ? a.x1 + by : side};
 }
 
 typedef struct work {
@@ -28,17 +29,18 @@ typedef struct work {
     const nn_model *model;
     lgd_tiles *t;
     int channels;
-    ag_value **coarse;         /* [coarse_steps + 1]: R_0 at g's size, then those of the coarse steps at theirs */
-    int coarse_steps;          /* of t->steps */
-    ts_taps taps[2];           /* from R_0 and from the others to side, along rows and columns alike */
-    double *rmse0;             /* [given] */
-    double *squares;           /* [steps + 1]: sums over the pixels of squared differences, by t */
+    ag_value **coarse; /* [coarse_steps + 1]: R_0 at g's size, then those of the coarse steps at theirs */
+    int coarse_steps;  /* of t->steps */
+    ts_taps taps[2];   /* from R_0 and from the others to side, along rows and columns alike */
+    double *rmse0;     /* [given] */
+    double *squares;   /* [steps + 1]: sums over the pixels of squared differences, by t */
 } work;
 
 /* R_t of a coarse step in an area. */
 static void start(const work *w, int t, area a, float *maps)
 {
-    const ts_taps down = ts_taps_part(&w->taps[t > 0], a.y0, rows(a)), across = ts_taps_part(&w->taps[t > 0], a.x0, columns(a));
+    const ts_taps down = ts_taps_part(&w->taps[t > 0], a.y0, rows(a)),
+                  across = ts_taps_part(&w->taps[t > 0], a.x0, columns(a));
     ts_resample(1, w->channels, &down, &across, w->coarse[t]->t.data, maps, false);
 }
 
@@ -49,41 +51,50 @@ static void photographs(const work *w, area a, float *to)
 #pragma omp parallel for collapse(2) num_threads(ts_threads()) schedule(static)
     for (int k = 0; k < w->t->given; k++)
         for (int y = 0; y < rows(a); y++)
-            lgd_clip(row, w->t->image[k] + ((size_t)(a.y0 + y) * (size_t)w->t->side + (size_t)a.x0) * 3, to + ((int64_t)k * rows(a) + y) * row);
+            lgd_clip(row, w->t->image[k] + ((size_t)(a.y0 + y) * (size_t)w->t->side + (size_t)a.x0) * 3,
+                     to + ((int64_t)k * rows(a) + y) * row);
 }
 
-/* to (area b) = the part of from (area a) that it shows; b lies in a. Where they are the same memory rows move one after the other. */
+/* to (area b) = the part of from (area a) that it shows; b lies in a. Where they are the same memory rows move one
+ * after the other. */
 static void crop(area a, area b, int channels, const float *from, float *to)
 {
     const size_t row = (size_t)columns(b) * (size_t)channels;
     if (from == to && same(a, b)) return;
 #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (from != to)
     for (int y = 0; y < rows(b); y++)
-        memmove(to + (size_t)y * row, from + ((size_t)(b.y0 + y - a.y0) * (size_t)columns(a) + (size_t)(b.x0 - a.x0)) * (size_t)channels, row * sizeof *to);
+        memmove(to + (size_t)y * row,
+                from + ((size_t)(b.y0 + y - a.y0) * (size_t)columns(a) + (size_t)(b.x0 - a.x0)) * (size_t)channels,
+                row * sizeof *to);
 }
 
 static rd_grid grid_of(area a, int side) { return (rd_grid){rows(a), columns(a), a.y0, a.x0, side}; }
 
-/* Sum of squared differences between each photograph (of area a, as photographs has it) and the rendering of the maps (of a too) in core, added to sum [given]. */
+/* Sum of squared differences between each photograph (of area a, as photographs has it) and the rendering of the maps
+ * (of a too) in core, added to sum [given]. */
 static void add_squares(const work *w, area a, area core, const float *photo, const float *maps, double *sum)
 {
     const ts_mark mark = ts_arena_mark(ag_arena(w->tape));
     const int given = w->t->given;
     const size_t pixels = (size_t)rows(core) * (size_t)columns(core), all = (size_t)rows(a) * (size_t)columns(a);
-    float *cut = same(a, core) ? NULL : ts_arena_alloc(ag_arena(w->tape), pixels * (size_t)(w->channels + 3 * given) * sizeof *cut);
+    float *cut = same(a, core)
+        ? NULL
+        : ts_arena_alloc(ag_arena(w->tape), pixels * (size_t)(w->channels + 3 * given) * sizeof *cut);
     if (!same(a, core) && !cut) {
         ag_fail(w->tape, TS_NOMEM, "out of memory");
         return;
     }
     if (cut) {
         crop(a, core, w->channels, maps, cut);
-        for (int k = 0; k < given; k++) crop(a, core, 3, photo + (size_t)k * all * 3, cut + pixels * (size_t)(w->channels + 3 * k));
+        for (int k = 0; k < given; k++)
+            crop(a, core, 3, photo + (size_t)k * all * 3, cut + pixels * (size_t)(w->channels + 3 * k));
         maps = cut;
         photo = cut + pixels * (size_t)w->channels;
     }
     for (int k = 0; k < given; k++) {
         double rmse;
-        rd_flash_rmse(grid_of(core, w->t->side), maps, w->channels, &w->t->views[k], photo + (size_t)k * pixels * 3, &rmse);
+        rd_flash_rmse(grid_of(core, w->t->side), maps, w->channels, &w->t->views[k], photo + (size_t)k * pixels * 3,
+                      &rmse);
         sum[k] += rmse * rmse * (double)pixels;
     }
     ts_arena_release(ag_arena(w->tape), mark);
@@ -105,9 +116,13 @@ static double change(const float *a, const float *b, size_t values)
     return sqrt(sum / (double)values);
 }
 
-static bool measured(const lgd_tiles *t, int step) { return t->rmse && (!t->ends_alone || step == 0 || step == t->steps); }
+static bool measured(const lgd_tiles *t, int step)
+{
+    return t->rmse && (!t->ends_alone || step == 0 || step == t->steps);
+}
 
-/* The steps of a tile: what is refined shrinks towards the tile by h's reach at every step. Leaves R_T of the tile in to. */
+/* The steps of a tile: what is refined shrinks towards the tile by h's reach at every step. Leaves R_T of the tile in
+ * to. */
 static void refine(work *w, area core, float *to)
 {
     lgd_tiles *t = w->t;
@@ -134,7 +149,10 @@ static void refine(work *w, area core, float *to)
         const area next = grown(core, reach * (most - step - 1), t->side);
         const ts_mark mark = ag_scope_begin(tape);
         const ts_shape shape = {1, rows(now), columns(now), w->channels};
-        const nn_input in = {.image = ts_view(photo, (ts_shape){t->given, shape.h, shape.w, 3}), .grid = grid_of(now, t->side), .views = t->views, .given = t->given};
+        const nn_input in = {.image = ts_view(photo, (ts_shape){t->given, shape.h, shape.w, 3}),
+                             .grid = grid_of(now, t->side),
+                             .views = t->views,
+                             .given = t->given};
         for (int i = 0; i < carried; i++) {
             state.to[i] = ag_constant(tape, ts_view(states[i]->t.data, (ts_shape){1, shape.h, shape.w, gru}));
             state.gru[i] = step > begin ? state.to[i] : NULL;
@@ -181,14 +199,16 @@ static void put(const work *w, area b, const float *from, float *maps)
     const size_t channels = (size_t)w->channels, row = (size_t)columns(b) * channels;
 #pragma omp parallel for num_threads(ts_threads()) schedule(static)
     for (int y = 0; y < rows(b); y++)
-        memcpy(maps + ((size_t)(b.y0 + y) * (size_t)w->t->side + (size_t)b.x0) * channels, from + (size_t)y * row, row * sizeof *from);
+        memcpy(maps + ((size_t)(b.y0 + y) * (size_t)w->t->side + (size_t)b.x0) * channels, from + (size_t)y * row,
+               row * sizeof *from);
 }
 
 /* What the coarse steps leave everywhere, and what is refined over it. */
 static void tile(work *w, area a, float *maps)
 {
     const ts_mark mark = ag_scope_begin(w->tape);
-    float *own = ts_arena_alloc(ag_arena(w->tape), (size_t)rows(a) * (size_t)columns(a) * (size_t)w->channels * sizeof *own);
+    float *own = ts_arena_alloc(ag_arena(w->tape),
+                                (size_t)rows(a) * (size_t)columns(a) * (size_t)w->channels * sizeof *own);
     const area todo = wanted(w->t, a);
     if (!own) ag_fail(w->tape, TS_NOMEM, "out of memory for a tile of %d x %d pixels", columns(a), rows(a));
     else if (rows(todo) < rows(a) || columns(todo) < columns(a)) {
@@ -202,7 +222,8 @@ static void tile(work *w, area a, float *maps)
     ag_scope_end(w->tape, mark, NULL, 0);
 }
 
-/* g and the coarse steps work on the whole photograph; the loss's scale is that of what they leave, measured in bands. */
+/* g and the coarse steps work on the whole photograph; the loss's scale is that of what they leave, measured in bands.
+ */
 static ts_code prepare(work *w)
 {
     ts_arena *arena = ag_arena(w->tape);
@@ -219,17 +240,24 @@ static ts_code prepare(work *w)
         photographs(w, all, whole->t.data);
         photo = whole->t;
     }
-    const nn_input in = {.image = photo, .grid = rd_grid_full(side), .views = w->t->views, .given = given, .orientations = w->t->orientations, .proposed = w->t->proposed};
+    const nn_input in = {.image = photo,
+                         .grid = rd_grid_full(side),
+                         .views = w->t->views,
+                         .given = given,
+                         .orientations = w->t->orientations,
+                         .proposed = w->t->proposed};
     if (nn_coarse_steps(w->tape, w->model, &in, w->coarse_steps, w->coarse) != TS_OK) return ag_status(w->tape)->code;
     ag_scope_end(w->tape, mark, w->coarse, w->coarse_steps + 1);
     for (int i = 0; i < 2; i++) w->taps[i] = ts_taps_smooth(arena, w->coarse[i ? w->coarse_steps : 0]->t.shape.h, side);
     w->squares = ts_arena_zalloc(arena, (size_t)w->t->steps + 1, sizeof *w->squares);
     w->rmse0 = ts_arena_zalloc(arena, (size_t)given, sizeof *w->rmse0);
-    if (!w->taps[0].weight || !w->taps[1].weight || !w->squares || !w->rmse0) ag_fail(w->tape, TS_NOMEM, "out of memory");
+    if (!w->taps[0].weight || !w->taps[1].weight || !w->squares || !w->rmse0)
+        ag_fail(w->tape, TS_NOMEM, "out of memory");
     for (int y = 0; y < side && nn_arch_reads(&w->model->arch) && !ag_status(w->tape)->code; y += w->t->tile) {
         const area band = {y, 0, y + w->t->tile < side ? y + w->t->tile : side, side};
         const ts_mark before = ag_scope_begin(w->tape);
-        const ag_value *maps = ag_empty(w->tape, (ts_shape){1, rows(band), side, w->channels}), *image = ag_empty(w->tape, (ts_shape){given, rows(band), side, 3});
+        const ag_value *maps = ag_empty(w->tape, (ts_shape){1, rows(band), side, w->channels}),
+                       *image = ag_empty(w->tape, (ts_shape){given, rows(band), side, 3});
         if (maps && image) {
             start(w, w->coarse_steps, band, maps->t.data);
             photographs(w, band, image->t.data);
@@ -237,7 +265,8 @@ static ts_code prepare(work *w)
         }
         ag_scope_end(w->tape, before, NULL, 0);
     }
-    for (int k = 0; k < given && !ag_status(w->tape)->code; k++) w->rmse0[k] = sqrt(w->rmse0[k] / ((double)side * side));
+    for (int k = 0; k < given && !ag_status(w->tape)->code; k++)
+        w->rmse0[k] = sqrt(w->rmse0[k] / ((double)side * side));
     return ag_status(w->tape)->code;
 }
 
@@ -249,14 +278,17 @@ static ts_code run(ag_tape *tape, const nn_model *model, lgd_tiles *t, float *ma
     int64_t pixels = 0;
     for (int y = 0; y < t->side && !code; y += t->tile)
         for (int x = 0; x < t->side && !code; x += t->tile) {
-            const area a = {y, x, y + t->tile < t->side ? y + t->tile : t->side, x + t->tile < t->side ? x + t->tile : t->side}, b = wanted(t, a);
+            const area a = {y, x, y + t->tile < t->side ? y + t->tile : t->side,
+                            x + t->tile < t->side ? x + t->tile : t->side},
+                       b = wanted(t, a);
             if (t->alive && t->alive(t->user)) return ts_fail(st, TS_INTERRUPTED, "interrupted");
             tile(&w, a, maps);
             pixels += (int64_t)rows(b) * columns(b);
             code = ag_status(tape)->code;
         }
     if (code) return ts_fail(st, code, "%s", ag_status(tape)->message);
-    for (int i = 0; i <= t->steps && t->rmse; i++) t->rmse[i] = !measured(t, i) ? NAN : pixels > 0 ? sqrt(w.squares[i] / (double)pixels) : 0;
+    for (int i = 0; i <= t->steps && t->rmse; i++)
+        t->rmse[i] = !measured(t, i) ? NAN : pixels > 0 ? sqrt(w.squares[i] / (double)pixels) : 0;
     return TS_OK;
 }
 

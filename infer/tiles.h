@@ -1,5 +1,5 @@
-/* Refinement in tiles: each runs all its steps with as much of its surroundings as its last step can depend on, so its result is that of the
- * whole photograph's refinement, and no more memory is taken than for one tile. */
+/* Refinement in tiles: each runs all its steps with as much of its surroundings as its last step can depend on, so its
+ * result is that of the whole photograph's refinement, and no more memory is taken than for one tile. */
 #ifndef LGD_TILES_H
 #define LGD_TILES_H
 #include "nn/model.h"
@@ -8,22 +8,25 @@ typedef struct lgd_tiles {
     const float *const *image; /* [given] of [side][side][3], linear; clamped to [0, 1] on the way */
     const rd_view *views;      /* [given] */
     int given;                 /* photographs, 1 .. arch.images */
-    const unsigned char *mask; /* [side][side] or NULL: tiles without a nonzero pixel keep what the coarse steps left (R_0), and of the others only the area that holds such is sure to be refined */
+    const unsigned char *mask; /* [side][side] or NULL: tiles without a nonzero pixel keep what the coarse steps left
+                                  (R_0), and of the others only the area that holds such is sure to be refined */
     int side, tile, steps;     /* tile: pixels of a tile's side */
     int orientations;          /* as in nn_input, */
     const float *proposed;     /* and this too */
-    double tolerance;          /* a tile ends at R_t when the RMS of R_t - R_{t-1} over it and what it reads is below; 0: never */
-    int (*alive)(void *user);  /* asked before each tile; nonzero: TS_INTERRUPTED. May be NULL */
+    double
+        tolerance; /* a tile ends at R_t when the RMS of R_t - R_{t-1} over it and what it reads is below; 0: never */
+    int (*alive)(void *user); /* asked before each tile; nonzero: TS_INTERRUPTED. May be NULL */
     void *user;
-    double *rmse;              /* NULL, or [steps + 1]: reconstruction RMSE at R_t of what is refined (tiles that ended earlier: their last maps), */
-    bool ends_alone;           /* of R_0 and R_steps alone, which saves rendering, and NAN between */
-    int64_t refined;           /* out: pixels times steps that were refined, surroundings not counted */
+    double *rmse;    /* NULL, or [steps + 1]: reconstruction RMSE at R_t of what is refined (tiles that ended earlier:
+                        their last maps), */
+    bool ends_alone; /* of R_0 and R_steps alone, which saves rendering, and NAN between */
+    int64_t refined; /* out: pixels times steps that were refined, surroundings not counted */
 } lgd_tiles;
 
 /* Whether the result is the untiled one: the published loss couples all pixels at every step, ours does not. */
 bool lgd_tiles_exact(const nn_arch *arch);
 
-/* maps: [side][side][channels of the model], R_T in the encoding of tensor/maps.h. The tape has no gradients; everything is
- * allocated from its arena and given back. */
+/* maps: [side][side][channels of the model], R_T in the encoding of tensor/maps.h. The tape has no gradients;
+ * everything is allocated from its arena and given back. */
 ts_code lgd_tiles_run(ag_tape *tape, const nn_model *model, lgd_tiles *t, float *maps, ts_status *st);
 #endif

@@ -1,7 +1,7 @@
 #include "nn/adam.h"
 #include "tensor/kernels/adam.h"
 #include "tensor/threads.h"
-#include "tensor/block.h"
+#include "tensor/memory.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -23,7 +23,8 @@ ts_code nn_adam_create(nn_adam *adam, const nn_model *model, float ema_decay, ts
     if (ema_decay > 0) adam->ema = aligned(model->count);
     if (!adam->m || !adam->v || (ema_decay > 0 && !adam->ema)) {
         nn_adam_free(adam);
-        return ts_fail(st, TS_NOMEM, "no memory for Adam's moments (%.0f MB)", (double)model->count * sizeof(float) * 2e-6);
+        return ts_fail(st, TS_NOMEM, "no memory for Adam's moments (%.0f MB)",
+                       (double)model->count * sizeof(float) * 2e-6);
     }
     if (adam->ema) memcpy(adam->ema, model->value, model->count * sizeof *adam->ema);
     return TS_OK;
@@ -62,8 +63,8 @@ void nn_adam_next(nn_adam *adam) { adam->step++; }
 
 void nn_adam_step(const nn_adam *adam, nn_model *model, size_t first, size_t last, float rate, float scale)
 {
-    /* The moments start at zero, which the corrections make up for (Kingma and Ba, section 3). The average's memory is short at first, so
-     * that the first weights are soon forgotten. */
+    /* The moments start at zero, which the corrections make up for (Kingma and Ba, section 3). The average's memory is
+     * short at first, so that the first weights are soon forgotten. */
     double n = (double)adam->step, root = sqrt(1 - pow(adam->beta2, n)), ramp = (1 + n) / (10 + n);
     float corrected = (float)(rate * root / (1 - pow(adam->beta1, n))), epsilon = (float)(adam->epsilon * root);
     float decay = ramp < adam->ema_decay ? (float)ramp : adam->ema_decay;
@@ -72,7 +73,8 @@ void nn_adam_step(const nn_adam *adam, nn_model *model, size_t first, size_t las
     for (int64_t c = 0; c < chunks; c++) {
         size_t at = first + (size_t)c * CHUNK, count = last - at < CHUNK ? last - at : CHUNK;
         float *value = model->value + at, *grad = model->grad + at;
-        ts_adam_k()->step(count, value, grad, adam->m + at, adam->v + at, adam->beta1, adam->beta2, corrected, epsilon, scale);
+        ts_adam_k()->step(count, value, grad, adam->m + at, adam->v + at, adam->beta1, adam->beta2, corrected, epsilon,
+                          scale);
         if (adam->ema) ts_adam_k()->average(count, adam->ema + at, value, decay);
         memset(grad, 0, count * sizeof *grad);
     }

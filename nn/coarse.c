@@ -1,5 +1,5 @@
 /* The coarse steps. */
-#include "nn/unrolled.h"
+#include "nn/lgd_internal.h"
 #include "ops.h"
 #include "render/render.h"
 #include <math.h>
@@ -18,11 +18,14 @@ static void upsampled(const nn_coarse *c, int n, int y0, int rows, float *to)
 /* RMSE(R_0) at the photographs' size, in bands. */
 static bool measure(ag_tape *tape, const nn_model *model, nn_coarse *c)
 {
-    const int side = c->in.grid.side, count = nn_given(&c->in), most = BAND / side > 0 ? BAND / side : 1, channels = c->maps->t.shape.c;
+    const int side = c->in.grid.side, count = nn_given(&c->in), most = BAND / side > 0 ? BAND / side : 1,
+              channels = c->maps->t.shape.c;
     c->state.rmse0 = ts_arena_zalloc(ag_arena(tape), (size_t)c->in.image.shape.n, sizeof *c->state.rmse0);
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
-    float *maps = ts_arena_alloc(ag_arena(tape), (size_t)(most < side ? most : side) * (size_t)side * (size_t)channels * sizeof *maps);
-    if (!c->state.rmse0 || !maps) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d x %d pixels", side, side), false;
+    float *maps = ts_arena_alloc(ag_arena(tape),
+                                 (size_t)(most < side ? most : side) * (size_t)side * (size_t)channels * sizeof *maps);
+    if (!c->state.rmse0 || !maps)
+        return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d x %d pixels", side, side), false;
     for (int i = 0; i < c->in.image.shape.n; i++) {
         const rd_view view = nn_view_of(model, &c->in, i);
         double squares = 0;
@@ -30,7 +33,8 @@ static bool measure(ag_tape *tape, const nn_model *model, nn_coarse *c)
             const int rows = y + most < side ? most : side - y;
             double rmse;
             upsampled(c, i / count, y, rows, maps);
-            rd_flash_rmse((rd_grid){.h = rows, .w = side, .y0 = y, .side = side}, maps, channels, &view, c->in.image.data + ((int64_t)i * side + y) * side * 3, &rmse);
+            rd_flash_rmse((rd_grid){.h = rows, .w = side, .y0 = y, .side = side}, maps, channels, &view,
+                          c->in.image.data + ((int64_t)i * side + y) * side * 3, &rmse);
             squares += rmse * rmse * rows;
         }
         c->state.rmse0[i] = sqrt(squares / side);
@@ -39,24 +43,34 @@ static bool measure(ag_tape *tape, const nn_model *model, nn_coarse *c)
     return true;
 }
 
-/* Rows first .. last - 1 of what the photographs of material n say: gradient and newton (or NULL) are the material's. */
-static bool read_band(ag_tape *tape, const nn_model *model, const nn_coarse *c, int n, int first, int last, float *gradient, float *newton)
+/* Rows first .. last - 1 of what the photographs of material n say: gradient and newton (or NULL) are the material's.
+ */
+static bool read_band(ag_tape *tape, const nn_model *model, const nn_coarse *c, int n, int first, int last,
+                      float *gradient, float *newton)
 {
     ts_arena *arena = ag_arena(tape);
-    const int side = c->in.grid.side, count = nn_given(&c->in), channels = c->maps->t.shape.c, read = channels * model->arch.images, end = last - 1;
+    const int side = c->in.grid.side, count = nn_given(&c->in), channels = c->maps->t.shape.c,
+              read = channels * model->arch.images, end = last - 1;
     const int y0 = c->down.first[first], rows = c->down.first[end] + c->down.offset[end + 1] - c->down.offset[end] - y0;
     const size_t pixels = (size_t)rows * (size_t)side;
     const ts_mark mark = ts_arena_mark(arena);
     float *const first_photo = c->in.image.data + ((int64_t)n * count * side + y0) * side * 3;
     ts_tensor maps = ts_new(arena, (ts_shape){1, rows, side, channels});
-    ts_tensor photo = count > 1 ? ts_new(arena, (ts_shape){count, rows, side, 3}) : ts_view(first_photo, (ts_shape){1, rows, side, 3});
-    float *g = ts_arena_alloc(arena, pixels * (size_t)read * sizeof *g), *d = newton ? ts_arena_alloc(arena, pixels * (size_t)channels * sizeof *d) : NULL;
+    ts_tensor photo = count > 1 ? ts_new(arena, (ts_shape){count, rows, side, 3})
+                                : ts_view(first_photo, (ts_shape){1, rows, side, 3});
+    float *g = ts_arena_alloc(arena, pixels * (size_t)read * sizeof *g),
+          *d = newton ? ts_arena_alloc(arena, pixels * (size_t)channels * sizeof *d) : NULL;
     int *from = ts_arena_alloc(arena, (size_t)(last - first) * sizeof *from);
     bool fine = maps.data && photo.data && g && from && (d || !newton);
     if (!fine) ag_fail(tape, TS_NOMEM, "no memory for %d x %d pixels", side, rows);
-    for (int k = 0; fine && count > 1 && k < count; k++) memcpy(photo.data + (size_t)k * pixels * 3, first_photo + (int64_t)k * side * side * 3, pixels * 3 * sizeof(float));
+    for (int k = 0; fine && count > 1 && k < count; k++)
+        memcpy(photo.data + (size_t)k * pixels * 3, first_photo + (int64_t)k * side * side * 3,
+               pixels * 3 * sizeof(float));
     if (fine) {
-        const nn_input in = {.image = photo, .grid = {.h = rows, .w = side, .y0 = y0, .side = side}, .view = c->in.view, .views = c->in.views ? c->in.views + n * count : NULL,
+        const nn_input in = {.image = photo,
+                             .grid = {.h = rows, .w = side, .y0 = y0, .side = side},
+                             .view = c->in.view,
+                             .views = c->in.views ? c->in.views + n * count : NULL,
                              .given = count};
         upsampled(c, n, y0, rows, maps.data);
         fine = nn_read(tape, model, &in, &maps, c->state.rmse0 ? c->state.rmse0 + n * count : NULL, g, d);
@@ -84,12 +98,18 @@ static bool step(ag_tape *tape, const nn_model *model, nn_coarse *c)
     ag_value *gradient = ag_empty(tape, (ts_shape){s.n, s.h, s.w, s.c * model->arch.images});
     ag_value *newton = nn_descends(model, NN_DESCENT_NEWTON) ? ag_empty(tape, s) : NULL;
     if (ag_status(tape)->code) return false;
-    const int64_t pixels = (int64_t)s.h * s.w, rows = (int64_t)s.h * BAND / ((int64_t)side * side), most = rows < 1 ? 1 : rows > s.h ? s.h : rows;
+    const int64_t pixels = (int64_t)s.h * s.w, rows = (int64_t)s.h * BAND / ((int64_t)side * side),
+                  most = rows < 1 ? 1
+        : rows > s.h              ? s.h
+                                  : rows;
     for (int n = 0; n < s.n; n++)
         for (int y = 0; y < s.h; y += (int)most)
-            if (!read_band(tape, model, c, n, y, y + (int)most < s.h ? y + (int)most : s.h, gradient->t.data + n * pixels * gradient->t.shape.c, newton ? newton->t.data + n * pixels * s.c : NULL))
+            if (!read_band(tape, model, c, n, y, y + (int)most < s.h ? y + (int)most : s.h,
+                           gradient->t.data + n * pixels * gradient->t.shape.c,
+                           newton ? newton->t.data + n * pixels * s.c : NULL))
                 return false;
-    ag_value *keep[3] = {nn_apply(tape, model, h, c->maps, gradient, newton, &c->state), c->state.gru[0], c->state.gru[1]};
+    ag_value *keep[3] = {nn_apply(tape, model, h, c->maps, gradient, newton, &c->state), c->state.gru[0],
+                         c->state.gru[1]};
     if (!keep[0]) return false;
     ag_scope_end(tape, mark, keep, 3);
     c->maps = keep[0];
@@ -120,7 +140,9 @@ static bool step_and_forget(ag_tape *tape, const nn_model *model, nn_coarse *c)
     const step_of of = {model, *c};
     ag_value *const from[3] = {c->maps, c->state.gru[0], c->state.gru[1]};
     ag_value *to[3] = {0};
-    if (!ag_checkpoint(tape, step_again, &of, sizeof of, 3, from, c->room[c->state.step % 2], model->arch.recurrent ? 3 : 1, to)) return false;
+    if (!ag_checkpoint(tape, step_again, &of, sizeof of, 3, from, c->room[c->state.step % 2],
+                       model->arch.recurrent ? 3 : 1, to))
+        return false;
     c->maps = to[0];
     for (int i = 0; i < 2; i++) c->state.gru[i] = to[i + 1];
     c->state.step++;
@@ -152,7 +174,8 @@ bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c)
     }
     if (model->arch.gradient && !c->state.rmse0 && !measure(tape, model, c)) return false;
     if (!c->in.recompute || !ag_gradients(tape)) return step(tape, model, c);
-    return (c->room[0][0] || nn_gradient_rooms(tape, c->maps, model->arch.coarse_gru, c->room)) && step_and_forget(tape, model, c);
+    return (c->room[0][0] || nn_gradient_rooms(tape, c->maps, model->arch.coarse_gru, c->room)) &&
+        step_and_forget(tape, model, c);
 }
 
 ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps)

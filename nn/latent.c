@@ -21,7 +21,9 @@ ag_value *nn_encode(ag_tape *tape, const nn_model *model, ag_value *maps)
     if (!is_one(tape, model) || !maps) return NULL;
     const ts_shape s = maps->t.shape;
     if (s.h % unit || s.w % unit || s.c != model->arch.channels)
-        return ag_fail(tape, TS_INVALID, "the auto-encoder takes %d channels and sides that are multiples of %d, not %d x %d x %d", model->arch.channels, unit, s.h, s.w, s.c);
+        return ag_fail(tape, TS_INVALID,
+                       "the auto-encoder takes %d channels and sides that are multiples of %d, not %d x %d x %d",
+                       model->arch.channels, unit, s.h, s.w, s.c);
     ts_mark mark = ag_scope_begin(tape);
     ag_value *x = layer(tape, model, l->encoder[0], maps);
     for (int i = 1; i <= levels; i++) x = layer(tape, model, l->encoder[i], ag_max_pool(tape, x));

@@ -37,15 +37,20 @@ typedef struct nn_layers {
     nn_unet_block down[NN_MAX_LEVELS], up[NN_MAX_LEVELS];
     nn_layer output_conv1, output_conv2, output_add;
     nn_refiner h, coarse;
-    nn_layer encoder[NN_MAX_LEVELS + 1], code, decoder[NN_MAX_LEVELS + 1][2], decoded; /* the deepest decoder level has one convolution */
+    nn_layer encoder[NN_MAX_LEVELS + 1], code, decoder[NN_MAX_LEVELS + 1][2],
+        decoded;   /* the deepest decoder level has one convolution */
     int first[4];  /* index of each nn_part's first parameter, and their number */
     double *start; /* per parameter: standard deviation of the first values, 0 for zeros, or one of these: */
 } nn_layers;
 #define NN_ORTHOGONAL (-1.0)
-#define NN_NEWTON_DAMPING 0.1f /* 0.03 to 0.3 are within some percent of each other, from one photograph and from five */
-#define NN_NEWTON_DAMPING_SPECULAR 1.0f /* one photograph cannot tell F0 from albedo: without this the detail of both goes into F0 */
+#define NN_NEWTON_DAMPING \
+    0.1f /* 0.03 to 0.3 are within some percent of each other, from one photograph and from five */
+#define NN_NEWTON_DAMPING_SPECULAR \
+    1.0f /* one photograph cannot tell F0 from albedo: without this the detail of both goes into F0 */
 #define NN_NEWTON_START (-3.0) /* half the identity: the equations are linear only near the maps */
-#define NN_DESCENT_START (-2.0) /* -0.003 times the identity, shared by the photographs: six such steps lower the loss of a trained g's R_0 without overshooting anywhere */
+#define NN_DESCENT_START                                                                                               \
+    (-2.0) /* -0.003 times the identity, shared by the photographs: six such steps lower the loss of a trained g's R_0 \
+            * without overshooting anywhere */
 
 /* Channels of g's level 0 .. g_levels. */
 int nn_level_width(const nn_arch *a, int level);
@@ -55,24 +60,30 @@ bool nn_all_finite(const float *v, size_t count);
 
 /* Parameter number index as a value on the tape, NULL for index -1. */
 ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index);
-ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad, float leak);
+ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad,
+                  float leak);
 /* constants: NULL, or further channels of the input, as ag_conv_beside has them. */
-ag_value *nn_conv_beside(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants, int dilation, ts_pad pad, float leak);
+ag_value *nn_conv_beside(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants,
+                         int dilation, ts_pad pad, float leak);
 ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x);
 
 /* g on its own input: x [N, g_size, g_size, 3 images] log-encoded -> [N, g_size, g_size, channels] in [-1, 1]. */
 ag_value *nn_unet(ag_tape *tape, const nn_model *model, ag_value *x);
 
-/* The mean of g's maps of x [1, ...] in 2, 4 or 8 of its orientations, each turned back: of a photograph that the light and the camera above its centre
- * show alike in all of them. On a tape without gradients. */
+/* The mean of g's maps of x [1, ...] in 2, 4 or 8 of its orientations, each turned back: of a photograph that the light
+ * and the camera above its centre show alike in all of them. On a tape without gradients. */
 ag_value *nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *x, int count);
 
-/* h: R_t [N, H, W, channels], its encoded gradients [N, H, W, images channels] (constants) and the states (updated; NULL = zero) -> the change of
- * the maps. to: NULL, or for each new state the value to write it into, which may be the old one (a tape without gradients). */
-ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient, ag_value *gru[2], ag_value *const to[2]);
+/* h: R_t [N, H, W, channels], its encoded gradients [N, H, W, images channels] (constants) and the states (updated;
+ * NULL = zero) -> the change of the maps. to: NULL, or for each new state the value to write it into, which may be the
+ * old one (a tape without gradients). */
+ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient,
+                    ag_value *gru[2], ag_value *const to[2]);
 
-/* R_{t+1} from R_t and its encoded gradients. path: what arch.descent lets past h, or NULL. length: of the step, 1 for the whole. into: NULL, or the value to write it into, which may be R_t's. */
-ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path, ag_value *gradient, ag_value *gru[2], ag_value *const to[2], float length, ag_value *into);
+/* R_{t+1} from R_t and its encoded gradients. path: what arch.descent lets past h, or NULL. length: of the step, 1 for
+ * the whole. into: NULL, or the value to write it into, which may be R_t's. */
+ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path,
+                  ag_value *gradient, ag_value *gru[2], ag_value *const to[2], float length, ag_value *into);
 
 /* Memory for the parameters of a plan (nn_model_plan), zero only between them: for who then writes them all. */
 ts_code nn_model_room(nn_model *model, ts_status *st);

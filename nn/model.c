@@ -1,8 +1,8 @@
 /* The list of parameters and the blocks that hold them. */
 #include "nn/layers.h"
-#include "nn/published.h"
+#include "nn/weights/published.h"
 #include "ops.h"
-#include "tensor/block.h"
+#include "tensor/memory.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -48,8 +48,8 @@ static nn_layer linear(nn_model *m, const char *name, int out, int in, double ga
     return l;
 }
 
-/* Kaiming's factors (He et al., "Delving Deep into Rectifiers", ICCV 2015, eq. 15); SELU keeps a unit variance with gain 1 (Klambauer et al.,
- * "Self-Normalizing Neural Networks", NIPS 2017). */
+/* Kaiming's factors (He et al., "Delving Deep into Rectifiers", ICCV 2015, eq. 15); SELU keeps a unit variance with
+ * gain 1 (Klambauer et al., "Self-Normalizing Neural Networks", NIPS 2017). */
 static double leaky_gain(double leak) { return sqrt(2 / (1 + leak * leak)); }
 
 /* A linear layer of a block, called way and number. */
@@ -60,20 +60,23 @@ static nn_layer block_linear(nn_model *m, const char *way, int number, const cha
     return linear(m, name, out, in, gain);
 }
 
-static nn_unet_block unet_block(nn_model *m, const char *way, int number, int in, int middle, int out, int global, int k)
+static nn_unet_block unet_block(nn_model *m, const char *way, int number, int in, int middle, int out, int global,
+                                int k)
 {
     char name[64];
     nn_unet_block b;
     const bool published = m->arch.compat == NN_COMPAT_PUBLISHED, up = way[0] == 'u';
     double gain = leaky_gain(NN_LEAK_G);
-    for (int pass = 0; pass < 3; pass++) /* the published order is: linears of the way down, those of the way up, convolutions */
+    for (int pass = 0; pass < 3;
+         pass++) /* the published order is: linears of the way down, those of the way up, convolutions */
         if (pass == (published ? 2 : 0)) {
             snprintf(name, sizeof name, "g.%s%d.conv1", way, number);
             b.conv1 = conv(m, name, middle, in, k, true, 1); /* conv2 follows at once */
             snprintf(name, sizeof name, "g.%s%d.conv2", way, number);
             b.conv2 = conv(m, name, out, middle, k, false, gain);
         } else if (pass == (published ? up : 1)) {
-            b.add = block_linear(m, way, number, "add", out, global, gain / sqrt(2)); /* one of two summands: the features themselves have unit variance */
+            b.add = block_linear(m, way, number, "add", out, global,
+                                 gain / sqrt(2)); /* one of two summands: the features themselves have unit variance */
             b.global = block_linear(m, way, number, "global", out, out + global, 1);
         } else if (published) { /* made, kept in files, never read */
             const int other = up ? in : in / 2;
@@ -162,7 +165,11 @@ static void plan_latent(nn_model *m)
     for (int i = levels; i >= 0; i--)
         for (int j = 0; j < (i < levels ? 2 : 1); j++) {
             snprintf(name, sizeof name, "a.decoder%d.conv%d", i, j + 1);
-            l->decoder[i][j] = conv(m, name, nn_level_width(a, i), j ? nn_level_width(a, i) : i == levels ? a->latent : nn_level_width(a, i + 1), 3, true, gain);
+            l->decoder[i][j] = conv(m, name, nn_level_width(a, i),
+                                    j                 ? nn_level_width(a, i)
+                                        : i == levels ? a->latent
+                                                      : nn_level_width(a, i + 1),
+                                    3, true, gain);
         }
     l->decoded = conv(m, "a.output", a->channels, nn_level_width(a, 0), 3, true, 0.25);
 }
@@ -260,7 +267,8 @@ void nn_model_range(const nn_model *model, nn_part part, size_t *first, size_t *
 size_t nn_model_numbers(const nn_model *model, nn_part part)
 {
     size_t sum = 0;
-    for (int i = layers_of(model)->first[part]; i < layers_of(model)->first[part + 1]; i++) sum += model->param[i].count;
+    for (int i = layers_of(model)->first[part]; i < layers_of(model)->first[part + 1]; i++)
+        sum += model->param[i].count;
     return sum;
 }
 
@@ -277,12 +285,15 @@ ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index)
     return ag_parameter(tape, ts_view(model->value + p->offset, s), grad);
 }
 
-ag_value *nn_conv_beside(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants, int dilation, ts_pad pad, float leak)
+ag_value *nn_conv_beside(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants,
+                         int dilation, ts_pad pad, float leak)
 {
-    return ag_conv_beside(tape, x, constants, nn_parameter(tape, model, layer.weight), nn_parameter(tape, model, layer.bias), dilation, pad, leak);
+    return ag_conv_beside(tape, x, constants, nn_parameter(tape, model, layer.weight),
+                          nn_parameter(tape, model, layer.bias), dilation, pad, leak);
 }
 
-ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad, float leak)
+ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad,
+                  float leak)
 {
     return nn_conv_beside(tape, model, layer, x, NULL, dilation, pad, leak);
 }

@@ -1,4 +1,5 @@
-/* The network: its architecture as plain data, its parameters in one block, and the ONE definition of the unrolled loop. */
+/* The network: its architecture as plain data, its parameters in one block, and the ONE definition of the unrolled
+ * loop. */
 #ifndef NN_MODEL_H
 #define NN_MODEL_H
 #include "autograd/tape.h"
@@ -11,63 +12,69 @@ typedef enum nn_rmse {
 
 typedef enum nn_gradient {
     NN_GRADIENT_RAW,  /* as it is (published) */
-    NN_GRADIENT_ASINH /* asinh(NN_GRADIENT_SCALE x): near a sharp highlight the gradient is thousands of times that elsewhere, and a
-                       * network that reads both as they are learns from neither (docs/math.md) */
+    NN_GRADIENT_ASINH /* asinh(NN_GRADIENT_SCALE x): near a sharp highlight the gradient is thousands of times that
+                       * elsewhere, and a network that reads both as they are learns from neither (docs/math.md) */
 } nn_gradient;
 #define NN_GRADIENT_SCALE 10.0f
 
 typedef enum nn_compat {
     NN_COMPAT_NONE,
-    NN_COMPAT_PUBLISHED /* Luo et al.'s code: its names of tensors, the linears that it has and never uses, its flash renderer (render/published.h), its
-                         * photographs (infer/photograph.h) */
+    NN_COMPAT_PUBLISHED /* Luo et al.'s code: its names of tensors, the linears that it has and never uses, its flash
+                         * renderer (render/published.h), its photographs (infer/photograph.h) */
 } nn_compat;
 
 /* What reaches the maps past h. */
 typedef enum nn_descent {
     NN_DESCENT_NONE,     /* nothing (published) */
     NN_DESCENT_GRADIENT, /* the encoded gradients, by a learned matrix over their channels */
-    NN_DESCENT_NEWTON    /* the step of Gauss and Newton's method that fits each pixel to its photographs (rd_newton_step), by a learned 9 x 9 matrix */
+    NN_DESCENT_NEWTON /* the step of Gauss and Newton's method that fits each pixel to its photographs (rd_newton_step),
+                         by a learned 9 x 9 matrix */
 } nn_descent;
 
 /* Everything that a weights file must say about itself (its metadata, one key each). */
 enum { NN_MAX_IMAGES = 9 };
 typedef struct nn_arch {
-    int images;         /* most photographs of a material that are read at once, each under a light and view of its own (fewer may be given) */
-    int channels;       /* of the maps: 9, or 10 (published) */
-    int g_width;        /* of g's first convolution; level i has min(g_width * 2^i, g_width_max) */
+    int images;   /* most photographs of a material that are read at once, each under a light and view of its own (fewer
+                     may be given) */
+    int channels; /* of the maps: 9, or 10 (published) */
+    int g_width;  /* of g's first convolution; level i has min(g_width * 2^i, g_width_max) */
     int g_width_max;
     int g_levels;       /* down blocks, 1 .. 8 */
     int g_kernel_first; /* of the first down block: odd */
     int g_kernel;       /* of all others */
-    int g_size;         /* side in pixels that g works at (a multiple of 2^g_levels); a photograph of another size is resampled for g */
-    int h_width;        /* of h's convolutions; 0: h is what descent lets past it, or, where iterations is 0 or descent none, nothing */
-    int h_gru;          /* of h's states */
-    int coarse_steps;   /* of the iterations, the first that many refine maps of coarse_size pixels a side, by a network of h's kind but with parameters of its own */
-    int coarse_size;    /* a smaller photograph has its own size; this and the next are of no meaning where coarse_steps is 0 */
-    int coarse_width;   /* of that network's convolutions */
-    int coarse_gru;     /* of its states */
-    int iterations;     /* T that it was trained for */
-    bool recurrent;     /* h carries its states from step to step */
-    bool gradient;      /* h reads the gradient (false: zeros, the ablation) */
+    int g_size;  /* side in pixels that g works at (a multiple of 2^g_levels); a photograph of another size is resampled
+                    for g */
+    int h_width; /* of h's convolutions; 0: h is what descent lets past it, or, where iterations is 0 or descent none,
+                    nothing */
+    int h_gru;   /* of h's states */
+    int coarse_steps; /* of the iterations, the first that many refine maps of coarse_size pixels a side, by a network
+                         of h's kind but with parameters of its own */
+    int coarse_size; /* a smaller photograph has its own size; this and the next are of no meaning where coarse_steps is
+                        0 */
+    int coarse_width;      /* of that network's convolutions */
+    int coarse_gru;        /* of its states */
+    int iterations;        /* T that it was trained for */
+    bool recurrent;        /* h carries its states from step to step */
+    bool gradient;         /* h reads the gradient (false: zeros, the ablation) */
     bool mean_before_norm; /* the global track's mean: before (ours) or after (published) the normalisation */
     nn_rmse rmse;
     nn_gradient encoding; /* of the gradient for h */
     nn_descent descent;
     nn_compat compat;
-    int latent;         /* channels of an auto-encoder's code: the model then is one of maps (nn_encode), shaped by g_width, g_width_max and g_levels, and
-                         * has neither g nor h; 0: g and h */
+    int latent; /* channels of an auto-encoder's code: the model then is one of maps (nn_encode), shaped by g_width,
+                 * g_width_max and g_levels, and has neither g nor h; 0: g and h */
 } nn_arch;
 
 nn_arch nn_arch_default(void);
 ts_code nn_arch_check(const nn_arch *a, ts_status *st);
-bool nn_arch_refines(const nn_arch *a); /* there is something to do steps with */
+bool nn_arch_refines(const nn_arch *a);      /* there is something to do steps with */
 bool nn_arch_refines_full(const nn_arch *a); /* at the photograph's size */
 bool nn_arch_reads(const nn_arch *a); /* those steps read the gradient, which the RMSE of what they begin with scales */
 bool nn_arch_carries(const nn_arch *a); /* they have states */
 
 typedef struct nn_param {
     char name[96];
-    int rank, dim[4]; /* convolution [oc, ic, k, k], linear [out, in], bias [out] */
+    int rank, dim[4];     /* convolution [oc, ic, k, k], linear [out, in], bias [out] */
     size_t offset, count; /* floats into the blocks */
 } nn_param;
 
@@ -91,8 +98,8 @@ void nn_model_free(nn_model **model);
 
 /* Three runs of the block, in this order. */
 typedef enum nn_part {
-    NN_G, /* or the auto-encoder */
-    NN_H, /* what refines at the photograph's size */
+    NN_G,     /* or the auto-encoder */
+    NN_H,     /* what refines at the photograph's size */
     NN_COARSE /* what refines at coarse_size */
 } nn_part;
 
@@ -102,38 +109,46 @@ size_t nn_model_numbers(const nn_model *model, nn_part part);
 /* Allocates the gradient block (zero); idempotent. */
 ts_code nn_model_train(nn_model *model, ts_status *st);
 
-/* Kaiming for what a leaky ReLU or SELU follows, orthogonal for the recurrent weights, sigma 1e-3 for h's last layer, zero biases. */
+/* Kaiming for what a leaky ReLU or SELU follows, orthogonal for the recurrent weights, sigma 1e-3 for h's last layer,
+ * zero biases. */
 void nn_model_init(nn_model *model, uint64_t seed);
 
 const nn_param *nn_model_find(const nn_model *model, const char *name);
 /* The parameters of a part alone: [first, last) in floats of the block. */
 void nn_model_range(const nn_model *model, nn_part part, size_t *first, size_t *last);
 
-/* A batch of N materials, each in `given` photographs, one material's after the other's; linear, clamped to [0, 1]. g sees whole photographs, h
- * refines any window of them. */
+/* A batch of N materials, each in `given` photographs, one material's after the other's; linear, clamped to [0, 1]. g
+ * sees whole photographs, h refines any window of them. */
 typedef struct nn_input {
     ts_tensor image; /* [N * given, h, w, 3]: what is refined, the grid's pixels */
     rd_grid grid;    /* of every photograph */
     rd_view view;    /* of every photograph where views is NULL: the flash */
-    ts_tensor whole; /* [N * given, side, side, 3]: the photographs of which image is the window; no data: image is the whole */
+    ts_tensor whole; /* [N * given, side, side, 3]: the photographs of which image is the window; no data: image is the
+                        whole */
     const rd_view *views; /* [N * given], or NULL */
     int given;            /* 1 .. arch.images; 0 stands for 1 */
-    int orientations;     /* 2, 4, 8: R_0 is the mean of g's maps of the photograph in so many orientations (as it is and turned by a quarter, all quarter
-                           * turns, and their mirror images), where nn_orients says that they are alike; on a tape without gradients. 0, 1: as it is */
-    const float *proposed; /* R_0 of these photographs in these orientations, [N, g_size, g_size, channels] as nn_coarse_steps gives it; NULL: g is run */
-    bool recompute;       /* on a tape with gradients: of each step only R_t and h's states are kept, the rest is computed again for the gradient */
+    int orientations; /* 2, 4, 8: R_0 is the mean of g's maps of the photograph in so many orientations (as it is and
+                       * turned by a quarter, all quarter turns, and their mirror images), where nn_orients says that
+                       * they are alike; on a tape without gradients. 0, 1: as it is */
+    const float *proposed; /* R_0 of these photographs in these orientations, [N, g_size, g_size, channels] as
+                              nn_coarse_steps gives it; NULL: g is run */
+    bool recompute; /* on a tape with gradients: of each step only R_t and h's states are kept, the rest is computed
+                       again for the gradient */
 } nn_input;
 
-/* R_0 by g of the whole: [N, S, S, channels]. Photographs that are not given are black. The log encoding, the resampling to g_size and back are in here. */
+/* R_0 by g of the whole: [N, S, S, channels]. Photographs that are not given are black. The log encoding, the
+ * resampling to g_size and back are in here. */
 ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in);
 
-/* R_0 at g_size and R_1 … R_steps at coarse_size or the photographs' size, by g and the coarse steps: steps <= arch.coarse_steps. */
+/* R_0 at g_size and R_1 … R_steps at coarse_size or the photographs' size, by g and the coarse steps: steps <=
+ * arch.coarse_steps. */
 ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps);
 
 /* One photograph is given, its light and camera are above the centre, and the weights are not published ones. */
 bool nn_orients(const nn_model *model, const nn_input *in);
 
-/* An auto-encoder of maps (arch.latent): [N, S, S, channels] to its code [N, S / 2^g_levels, S / 2^g_levels, latent], and back to maps in
+/* An auto-encoder of maps (arch.latent): [N, S, S, channels] to its code [N, S / 2^g_levels, S / 2^g_levels, latent],
+ * and back to maps in
  * [-1, 1]. Convolutional: any S that is a multiple of 2^g_levels. */
 ag_value *nn_encode(ag_tape *tape, const nn_model *model, ag_value *maps);
 ag_value *nn_decode(ag_tape *tape, const nn_model *model, ag_value *code);
@@ -143,24 +158,33 @@ int nn_refiner_reach(const nn_model *model);
 
 /* What h keeps from step to step, and the loss's scale; zero-initialise it. */
 typedef struct nn_state {
-    ag_value *gru[2], *to[2]; /* to: NULL, or where the new states are written (a tape without gradients); to[i] may be gru[i] */
+    ag_value *gru[2],
+        *to[2];     /* to: NULL, or where the new states are written (a tape without gradients); to[i] may be gru[i] */
     ag_value *into; /* NULL, or where nn_refine writes R_{t+1} (a tape without gradients); may be R_t */
-    double *rmse0; /* of each of the whole photographs by R_0, in the tape's arena; NULL: nn_refine measures it on the maps that it is given */
-    int step; /* how many were done: those beyond arch.iterations are shortened, the t-th to (T / t)^2 of its length (not where compat is published) */
+    double *rmse0;  /* of each of the whole photographs by R_0, in the tape's arena; NULL: nn_refine measures it on the
+                       maps that it is given */
+    int step; /* how many were done: those beyond arch.iterations are shortened, the t-th to (T / t)^2 of its length
+                 (not where compat is published) */
 } nn_state;
 
-/* A step at the photograph's size: R_{t+1} = R_t + h(R_t, e) + D p, e being dL/dR_t as arch.encoding has it, one for each photograph (zero where none is given). D is a learned matrix over
- * the channels, and arch.descent says of what: p = e and D begins as -0.003 times the identity, so that an untrained loop is plain descent; or p is the
- * step of Gauss and Newton's method, damped by 0.1 beside the photographs' variance and by 1 in F0, and D begins as half the identity; or, as published, D is 0. */
+/* A step at the photograph's size: R_{t+1} = R_t + h(R_t, e) + D p, e being dL/dR_t as arch.encoding has it, one for
+ * each photograph (zero where none is given). D is a learned matrix over the channels, and arch.descent says of what: p
+ * = e and D begins as -0.003 times the identity, so that an untrained loop is plain descent; or p is the step of Gauss
+ * and Newton's method, damped by 0.1 beside the photographs' variance and by 1 in F0, and D begins as half the
+ * identity; or, as published, D is 0. */
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
-/* The unrolled loop on the grid's window. The first arch.coarse_steps steps refine R_t at coarse_size, as nn_refine does but with NN_COARSE's parameters and the averages of
- * what the photographs say at twice that size, or their own where it is less, and give it resampled; the others begin with what these leave. maps[0] = R_0 … maps[steps] = R_T when keep_all; otherwise only maps[0] = R_T is given and intermediate
- * memory is released on a tape without gradients. */
+/* The unrolled loop on the grid's window. The first arch.coarse_steps steps refine R_t at coarse_size, as nn_refine
+ * does but with NN_COARSE's parameters and the averages of what the photographs say at twice that size, or their own
+ * where it is less, and give it resampled; the others begin with what these leave. maps[0] = R_0 … maps[steps] = R_T
+ * when keep_all; otherwise only maps[0] = R_T is given and intermediate memory is released on a tape without gradients.
+ */
 typedef struct nn_watch {
-    bool (*after)(int step, const ag_value *maps, void *user); /* is told of every R_t; false: stop here, what is left of maps is filled with it */
+    bool (*after)(int step, const ag_value *maps,
+                  void *user); /* is told of every R_t; false: stop here, what is left of maps is filled with it */
     void *user;
     bool ends_alone; /* after gets the maps of R_0 and R_steps alone, which saves resampling, and NULL between */
 } nn_watch;
-ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps, const nn_watch *watch);
+ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps,
+               const nn_watch *watch);
 #endif

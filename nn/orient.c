@@ -3,11 +3,13 @@
 #include "tensor/maps.h"
 #include <string.h>
 
-/* As it is, turned by a quarter, the other turns, and all these mirrored. The first 1, 4 and 8 are groups, so that their mean turns with the photograph; of two the
- * quarter turn, which is none, gave less error in renderings than what would be (a half turn, a mirror image, the transpose). */
+/* As it is, turned by a quarter, the other turns, and all these mirrored. The first 1, 4 and 8 are groups, so that
+ * their mean turns with the photograph; of two the quarter turn, which is none, gave less error in renderings than what
+ * would be (a half turn, a mirror image, the transpose). */
 static const int orientations[8] = {0, 5, 3, 6, 1, 2, 4, 7};
 
-/* Orientation k of a picture has at (y, x) what the picture has at (*from_y, *from_x): mirrored in x, in y, and transposed, a bit of k each. */
+/* Orientation k of a picture has at (y, x) what the picture has at (*from_y, *from_x): mirrored in x, in y, and
+ * transposed, a bit of k each. */
 static void source(int k, int side, int y, int x, int *from_y, int *from_x)
 {
     if (k & 1) x = side - 1 - x;
@@ -37,7 +39,8 @@ ag_value *nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value 
     for (int k = 0; k < count; k++)
         for (int i = 0; i < side * side; i++) {
             source(orientations[k], side, i / side, i % side, &sy, &sx);
-            memcpy(all->t.data + ((size_t)k * pixels + (size_t)i) * (size_t)read, x->t.data + (size_t)(sy * side + sx) * (size_t)read, (size_t)read * sizeof(float));
+            memcpy(all->t.data + ((size_t)k * pixels + (size_t)i) * (size_t)read,
+                   x->t.data + (size_t)(sy * side + sx) * (size_t)read, (size_t)read * sizeof(float));
         }
     const ag_value *maps = nn_unet(tape, model, all);
     if (!maps) return NULL;

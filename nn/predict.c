@@ -1,5 +1,5 @@
 /* R_0 = g(photographs). */
-#include "nn/unrolled.h"
+#include "nn/lgd_internal.h"
 #include "ops.h"
 #include "render/tone.h"
 #include "tensor/resize.h"
@@ -21,17 +21,21 @@ bool nn_input_check(ag_tape *tape, const nn_model *model, const nn_input *in)
     ts_shape s = in->image.shape;
     if (ag_status(tape)->code) return false;
     if (!model->value) ag_fail(tape, TS_INVALID, "the model has no parameters");
-    else if (model->arch.latent > 0) ag_fail(tape, TS_INVALID, "the model is an auto-encoder of maps: it cannot read a photograph");
-    else if (!in->image.data || s.c != 3) ag_fail(tape, TS_INVALID, "the photograph has %d channels: 3 are needed", s.c);
+    else if (model->arch.latent > 0)
+        ag_fail(tape, TS_INVALID, "the model is an auto-encoder of maps: it cannot read a photograph");
+    else if (!in->image.data || s.c != 3)
+        ag_fail(tape, TS_INVALID, "the photograph has %d channels: 3 are needed", s.c);
     else if (nn_given(in) > model->arch.images)
         ag_fail(tape, TS_INVALID, "%d photographs are given: the model reads %d", nn_given(in), model->arch.images);
-    else if (s.n % nn_given(in) != 0) ag_fail(tape, TS_INVALID, "%d photographs are not a multiple of %d", s.n, nn_given(in));
+    else if (s.n % nn_given(in) != 0)
+        ag_fail(tape, TS_INVALID, "%d photographs are not a multiple of %d", s.n, nn_given(in));
     else if (!ts_contiguous(&in->image)) ag_fail(tape, TS_INVALID, "the photograph is not contiguous");
     else if (s.h != in->grid.h || s.w != in->grid.w)
-        ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels, its grid %d x %d", s.w, s.h, in->grid.w, in->grid.h);
+        ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels, its grid %d x %d", s.w, s.h, in->grid.w,
+                in->grid.h);
     else if (in->whole.data && !ts_same(in->whole.shape, (ts_shape){s.n, in->grid.side, in->grid.side, 3}))
-        ag_fail(tape, TS_INVALID, "the whole photograph is %d x %d pixels, the window's grid says %d", in->whole.shape.w, in->whole.shape.h,
-                in->grid.side);
+        ag_fail(tape, TS_INVALID, "the whole photograph is %d x %d pixels, the window's grid says %d",
+                in->whole.shape.w, in->whole.shape.h, in->grid.side);
     return !ag_status(tape)->code;
 }
 
@@ -43,7 +47,8 @@ static void side_by_side(const ts_tensor *from, int count, int images, float *to
         const int64_t n = i / pixels, at = i % pixels;
         for (int k = 0; k < images; k++)
             for (int c = 0; c < 3; c++)
-                to[(i * images + k) * 3 + c] = k < count ? from->data[((n * count + k) * pixels + at) * 3 + c] : -1.0f; /* -1: black, encoded */
+                to[(i * images + k) * 3 + c] = k < count ? from->data[((n * count + k) * pixels + at) * 3 + c]
+                                                         : -1.0f; /* -1: black, encoded */
     }
 }
 
@@ -64,8 +69,15 @@ static bool reduce(ag_tape *tape, const nn_model *model, const nn_input *in, nn_
     const ts_tensor *whole = in->whole.data ? &in->whole : &in->image;
     const int size = model->arch.g_size;
     if (whole->shape.h != whole->shape.w)
-        return ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels: g needs a square", whole->shape.w, whole->shape.h), false;
-    *small = (nn_input){.image = *whole, .grid = rd_grid_full(size), .view = in->view, .views = in->views, .given = in->given, .orientations = in->orientations};
+        return ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels: g needs a square", whole->shape.w,
+                       whole->shape.h),
+               false;
+    *small = (nn_input){.image = *whole,
+                        .grid = rd_grid_full(size),
+                        .view = in->view,
+                        .views = in->views,
+                        .given = in->given,
+                        .orientations = in->orientations};
     return whole->shape.h == size || nn_resized(tape, whole, size, &small->image);
 }
 
@@ -74,7 +86,8 @@ static bool central(const float p[3]) { return p[0] == 0 && p[1] == 0; }
 bool nn_orients(const nn_model *model, const nn_input *in)
 {
     const rd_view view = nn_view_of(model, in, 0);
-    return in->image.shape.n == 1 && model->arch.compat == NN_COMPAT_NONE && central(view.camera) && central(view.light);
+    return in->image.shape.n == 1 && model->arch.compat == NN_COMPAT_NONE && central(view.camera) &&
+        central(view.light);
 }
 
 /* R_0 of reduced photographs: [N, g_size, g_size, channels]. */
@@ -83,11 +96,14 @@ static ag_value *propose(ag_tape *tape, const nn_model *model, const nn_input *s
     const ts_shape s = small->image.shape;
     const int images = model->arch.images, count = nn_given(small);
     const ts_mark mark = ag_scope_begin(tape);
-    ag_value *x = ag_empty(tape, (ts_shape){s.n / count, s.h, s.w, 3 * images}), *each = images == 1 ? x : ag_empty(tape, s);
+    ag_value *x = ag_empty(tape, (ts_shape){s.n / count, s.h, s.w, 3 * images}),
+             *each = images == 1 ? x : ag_empty(tape, s);
     if (!x || !each) return NULL;
     rd_log_encode(ts_count(s), small->image.data, each->t.data);
     if (images > 1) side_by_side(&each->t, count, images, x->t.data);
-    ag_value *maps = small->orientations > 1 && !ag_gradients(tape) && nn_orients(model, small) ? nn_unet_oriented(tape, model, x, small->orientations) : nn_unet(tape, model, x);
+    ag_value *maps = small->orientations > 1 && !ag_gradients(tape) && nn_orients(model, small)
+        ? nn_unet_oriented(tape, model, x, small->orientations)
+        : nn_unet(tape, model, x);
     ag_scope_end(tape, mark, &maps, 1);
     return maps;
 }
@@ -100,7 +116,9 @@ bool nn_coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, n
     if (in->proposed) {
         const int size = model->arch.g_size;
         if (!nn_input_check(tape, model, in)) return false;
-        c->maps = ag_constant(tape, ts_view((float *)(uintptr_t)in->proposed, (ts_shape){nn_materials(in), size, size, model->arch.channels}));
+        c->maps = ag_constant(
+            tape,
+            ts_view((float *)(uintptr_t)in->proposed, (ts_shape){nn_materials(in), size, size, model->arch.channels}));
     } else {
         if (!reduce(tape, model, in, &small)) return false;
         c->maps = propose(tape, model, &small);
@@ -109,7 +127,12 @@ bool nn_coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, n
     if (!c->maps) return false;
     const ts_tensor whole = in->whole.data ? in->whole : in->image;
     c->side = whole.shape.h;
-    c->in = (nn_input){.image = whole, .grid = rd_grid_full(whole.shape.h), .view = in->view, .views = in->views, .given = in->given, .recompute = in->recompute};
+    c->in = (nn_input){.image = whole,
+                       .grid = rd_grid_full(whole.shape.h),
+                       .view = in->view,
+                       .views = in->views,
+                       .given = in->given,
+                       .recompute = in->recompute};
     return true;
 }
 

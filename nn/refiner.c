@@ -2,7 +2,8 @@
 #include "nn/layers.h"
 #include "ops.h"
 
-static ag_value *cell(ag_tape *tape, const nn_model *model, const nn_cell *c, ag_value *x, ag_value *constants, int dilation, ag_value *old, ag_value *to)
+static ag_value *cell(ag_tape *tape, const nn_model *model, const nn_cell *c, ag_value *x, ag_value *constants,
+                      int dilation, ag_value *old, ag_value *to)
 {
     x = nn_conv_beside(tape, model, c->conv, x, constants, dilation, TS_PAD_REPLICATE, NN_LEAK_H);
     if (to) ag_into(tape, to);
@@ -10,12 +11,14 @@ static ag_value *cell(ag_tape *tape, const nn_model *model, const nn_cell *c, ag
                   nn_parameter(tape, model, c->hidden.weight), nn_parameter(tape, model, c->hidden.bias));
 }
 
-ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient, ag_value *gru[2], ag_value *const to[2])
+ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient,
+                    ag_value *gru[2], ag_value *const to[2])
 {
     ag_value *x = maps;
     for (int i = 0; i < 2; i++) {
         ts_mark mark = ag_scope_begin(tape);
-        gru[i] = cell(tape, model, &h->cell[i], x, i == 0 ? gradient : NULL, i + 1, model->arch.recurrent ? gru[i] : NULL, to ? to[i] : NULL);
+        gru[i] = cell(tape, model, &h->cell[i], x, i == 0 ? gradient : NULL, i + 1,
+                      model->arch.recurrent ? gru[i] : NULL, to ? to[i] : NULL);
         ag_scope_end(tape, mark, &gru[i], 1);
         x = gru[i];
     }
@@ -30,8 +33,8 @@ static ag_value *scaled(ag_tape *tape, ag_value *d, float length)
     return ag_scale(tape, d, length);
 }
 
-ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path, ag_value *gradient, ag_value *gru[2], ag_value *const to[2], float length,
-                  ag_value *into)
+ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path,
+                  ag_value *gradient, ag_value *gru[2], ag_value *const to[2], float length, ag_value *into)
 {
     ag_value *next = maps;
     if (h->width > 0) {
@@ -50,6 +53,7 @@ int nn_refiner_reach(const nn_model *model)
     const nn_refiner *h = &((const nn_layers *)model->layers)->h;
     if (h->width == 0) return 0;
     int reach = model->param[h->output.weight].dim[2] / 2;
-    for (int i = 0; i < 2; i++) reach += (i + 1) * (model->param[h->cell[i].conv.weight].dim[2] / 2); /* the second is dilated by 2 */
+    for (int i = 0; i < 2; i++)
+        reach += (i + 1) * (model->param[h->cell[i].conv.weight].dim[2] / 2); /* the second is dilated by 2 */
     return reach;
 }

@@ -1,5 +1,5 @@
 /* A refinement step: what the renderer says about R_t, and what is made of it. */
-#include "nn/unrolled.h"
+#include "nn/lgd_internal.h"
 #include "ops.h"
 #include "render/published.h"
 #include "render/render.h"
@@ -9,7 +9,8 @@
 #include <math.h>
 #include <string.h>
 
-/* The RMSE of R_0, which scales all later gradients: of the whole photographs where they are given, maps then being theirs. */
+/* The RMSE of R_0, which scales all later gradients: of the whole photographs where they are given, maps then being
+ * theirs. */
 bool nn_measure_start(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, nn_state *state)
 {
     if (!maps || !model->arch.gradient) return maps != NULL;
@@ -22,7 +23,8 @@ bool nn_measure_start(ag_tape *tape, const nn_model *model, const nn_input *in, 
     if (!state->rmse0) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", photographs), false;
     for (int i = 0; i < photographs; i++) {
         const rd_view view = nn_view_of(model, in, i);
-        rd_flash_rmse(grid, maps->t.data + i / nn_given(in) * one * s.c, s.c, &view, image->data + i * one * 3, &state->rmse0[i]);
+        rd_flash_rmse(grid, maps->t.data + i / nn_given(in) * one * s.c, s.c, &view, image->data + i * one * 3,
+                      &state->rmse0[i]);
     }
     return true;
 }
@@ -31,11 +33,13 @@ bool nn_measure_start(ag_tape *tape, const nn_model *model, const nn_input *in, 
 static void place(int64_t pixels, int channels, int images, int k, const float *from, float *to)
 {
 #pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int64_t i = 0; i < pixels; i++) memcpy(to + (i * images + k) * channels, from + i * channels, (size_t)channels * sizeof *to);
+    for (int64_t i = 0; i < pixels; i++)
+        memcpy(to + (i * images + k) * channels, from + i * channels, (size_t)channels * sizeof *to);
 }
 
 /* dL/dR_t of every photograph, as the renderer gives it: to is [N, H, W, images channels]. */
-static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps, const double *rmse0, float *to)
+static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps,
+                      const double *rmse0, float *to)
 {
     const ts_shape s = maps->shape;
     const int64_t pixels = (int64_t)s.h * s.w;
@@ -43,7 +47,8 @@ static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, 
     const bool batch = model->arch.rmse == NN_RMSE_BATCH;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
     float *apart = images > 1 ? ts_arena_alloc(ag_arena(tape), (size_t)(pixels * s.c) * sizeof *apart) : NULL;
-    if (images > 1 && !apart) return ag_fail(tape, TS_NOMEM, "no memory for the gradient of %d x %d pixels", s.w, s.h), false;
+    if (images > 1 && !apart)
+        return ag_fail(tape, TS_NOMEM, "no memory for the gradient of %d x %d pixels", s.w, s.h), false;
     if (count < images) memset(to, 0, (size_t)(s.n * pixels * images * s.c) * sizeof *to);
     double common = 0;
     for (int i = 0; batch && i < s.n; i++) {
@@ -57,7 +62,8 @@ static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, 
         const double rmse = batch ? sqrt(common) : rmse0[i];
         const rd_view view = nn_view_of(model, in, i);
         float *own = to + n * pixels * images * s.c;
-        rd_flash_gradient(in->grid, maps->data + n * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, rmse, apart ? apart : own, NULL);
+        rd_flash_gradient(in->grid, maps->data + n * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, rmse,
+                          apart ? apart : own, NULL);
         if (apart) place(pixels, s.c, images, k, apart, own);
     }
     ts_arena_release(ag_arena(tape), mark);
@@ -74,7 +80,8 @@ static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, 
 static void newton_step(const nn_model *model, const nn_input *in, const ts_tensor *maps, float *to)
 {
     float damping[MAP_CHANNELS];
-    for (int i = 0; i < MAP_CHANNELS; i++) damping[i] = i >= MAP_SPECULAR ? NN_NEWTON_DAMPING_SPECULAR : NN_NEWTON_DAMPING;
+    for (int i = 0; i < MAP_CHANNELS; i++)
+        damping[i] = i >= MAP_SPECULAR ? NN_NEWTON_DAMPING_SPECULAR : NN_NEWTON_DAMPING;
     const ts_shape s = maps->shape;
     const int64_t pixels = (int64_t)s.h * s.w;
     const int count = nn_given(in);
@@ -86,11 +93,13 @@ static void newton_step(const nn_model *model, const nn_input *in, const ts_tens
             view[k] = nn_view_of(model, in, n * count + k);
             image[k] = in->image.data + (n * count + k) * pixels * 3;
         }
-        rd_newton_step(in->grid, maps->data + n * pixels * s.c, s.c, view, image, count, damping, to + n * pixels * s.c);
+        rd_newton_step(in->grid, maps->data + n * pixels * s.c, s.c, view, image, count, damping,
+                       to + n * pixels * s.c);
     }
 }
 
-bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps, const double *rmse0, float *gradient, float *newton)
+bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps, const double *rmse0,
+             float *gradient, float *newton)
 {
     const ts_shape s = maps->shape;
     const int64_t rows = (int64_t)s.n * s.h, row = (int64_t)s.w * s.c * model->arch.images;
@@ -108,8 +117,9 @@ bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_
     return true;
 }
 
-/* Nothing taught h that its steps must come to rest: beyond those it was trained for, what is left of them adds up to a drift. So step t > T goes
- * (T / t)^2 of its way, and all those together less than T whole steps. The published loop has no such rule. */
+/* Nothing taught h that its steps must come to rest: beyond those it was trained for, what is left of them adds up to a
+ * drift. So step t > T goes (T / t)^2 of its way, and all those together less than T whole steps. The published loop
+ * has no such rule. */
 static float length(const nn_arch *a, int t)
 {
     if (t <= a->iterations || a->compat == NN_COMPAT_PUBLISHED) return 1;
@@ -119,11 +129,13 @@ static float length(const nn_arch *a, int t)
 
 bool nn_descends(const nn_model *model, nn_descent how) { return model->arch.gradient && model->arch.descent == how; }
 
-ag_value *nn_apply(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient, ag_value *newton, nn_state *state)
+ag_value *nn_apply(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient,
+                   ag_value *newton, nn_state *state)
 {
     ag_value *path = nn_descends(model, NN_DESCENT_GRADIENT) ? gradient : newton;
     state->step++;
-    return nn_step(tape, model, h, maps, path, gradient, state->gru, state->to, length(&model->arch, state->step), state->into);
+    return nn_step(tape, model, h, maps, path, gradient, state->gru, state->to, length(&model->arch, state->step),
+                   state->into);
 }
 
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state)
@@ -131,15 +143,22 @@ ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag
     if (!nn_input_check(tape, model, in) || !maps) return NULL;
     const nn_refiner *h = &((const nn_layers *)model->layers)->h;
     ts_shape s = maps->t.shape;
-    if (!nn_arch_refines_full(&model->arch)) return ag_fail(tape, TS_INVALID, "the model has no refiner: 0 iterations are all that it can do");
+    if (!nn_arch_refines_full(&model->arch))
+        return ag_fail(tape, TS_INVALID, "the model has no refiner: 0 iterations are all that it can do");
     if (!ts_same(s, (ts_shape){nn_materials(in), in->grid.h, in->grid.w, model->arch.channels}))
-        return ag_fail(tape, TS_INVALID, "the maps are %d x %d x %d x %d, not the photograph's size and the model's %d channels", s.n, s.h, s.w, s.c,
-                       model->arch.channels);
-    if (nn_arch_reads(&model->arch) && model->arch.rmse == NN_RMSE_START && !state->rmse0 && !nn_measure_start(tape, model, in, maps, state)) return NULL;
+        return ag_fail(tape, TS_INVALID,
+                       "the maps are %d x %d x %d x %d, not the photograph's size and the model's %d channels", s.n,
+                       s.h, s.w, s.c, model->arch.channels);
+    if (nn_arch_reads(&model->arch) && model->arch.rmse == NN_RMSE_START && !state->rmse0 &&
+        !nn_measure_start(tape, model, in, maps, state))
+        return NULL;
     ag_value *gradient = NULL, *newton = NULL;
-    if (h->width > 0 || nn_descends(model, NN_DESCENT_GRADIENT)) gradient = ag_empty(tape, (ts_shape){s.n, s.h, s.w, s.c * model->arch.images});
+    if (h->width > 0 || nn_descends(model, NN_DESCENT_GRADIENT))
+        gradient = ag_empty(tape, (ts_shape){s.n, s.h, s.w, s.c * model->arch.images});
     if (nn_descends(model, NN_DESCENT_NEWTON)) newton = ag_empty(tape, s);
     if (ag_status(tape)->code) return NULL;
-    if (!nn_read(tape, model, in, &maps->t, state->rmse0, gradient ? gradient->t.data : NULL, newton ? newton->t.data : NULL)) return NULL;
+    if (!nn_read(tape, model, in, &maps->t, state->rmse0, gradient ? gradient->t.data : NULL,
+                 newton ? newton->t.data : NULL))
+        return NULL;
     return nn_apply(tape, model, h, maps, gradient, newton, state);
 }

@@ -5,7 +5,8 @@
 #define NORM_EPSILON 1e-5f /* as published; a constant channel becomes zero instead of 0/0 */
 
 /* x [N, H, W, in] -> [N, H, W, out], global [N, 1, 1, in'] -> [N, 1, 1, out]. */
-static void block(ag_tape *tape, const nn_model *model, const nn_unet_block *b, bool norm, ag_value **x, ag_value **global)
+static void block(ag_tape *tape, const nn_model *model, const nn_unet_block *b, bool norm, ag_value **x,
+                  ag_value **global)
 {
     ag_value *y = nn_conv(tape, model, b->conv1, *x, 1, TS_PAD_ZERO, 1);
     y = nn_conv(tape, model, b->conv2, y, 1, TS_PAD_ZERO, 1);
@@ -20,7 +21,8 @@ ag_value *nn_unet(ag_tape *tape, const nn_model *model, ag_value *x)
 {
     const nn_layers *l = model->layers;
     int levels = model->arch.g_levels;
-    ag_value *skip[NN_MAX_LEVELS], *global = ag_selu(tape, nn_linear(tape, model, l->input_global, ag_channel_mean(tape, x)));
+    ag_value *skip[NN_MAX_LEVELS],
+        *global = ag_selu(tape, nn_linear(tape, model, l->input_global, ag_channel_mean(tape, x)));
     x = nn_conv(tape, model, l->input_conv, x, 1, TS_PAD_ZERO, NN_LEAK_G);
     for (int i = 0; i < levels; i++) {
         skip[i] = x;

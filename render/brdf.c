@@ -3,8 +3,8 @@
 #include <math.h>
 
 const ts_shade_guards rd_guards = {
-    /* alpha = 1e-4: such a highlight is 2e-4 patch widths across, less than a pixel up to 4096, so nothing sharper can be told
-     * from it; and 1 / alpha^2, which D and its derivatives contain twice, stays far inside float. */
+    /* alpha = 1e-4: such a highlight is 2e-4 patch widths across, less than a pixel up to 4096, so nothing sharper can
+     * be told from it; and 1 / alpha^2, which D and its derivatives contain twice, stays far inside float. */
     .roughness = 0.01,
     /* As published. d n_z / d n_x = -n_x / n_z is at most 1000, instead of infinite where |n_xy| reaches 1. */
     .nz2 = 1e-6,
@@ -16,15 +16,9 @@ const ts_shade_guards rd_guards = {
 
 #define PI 3.14159265358979323846
 
-double rd_alpha(double roughness)
-{
-    return TS_ALPHA(roughness);
-}
+double rd_alpha(double roughness) { return TS_ALPHA(roughness); }
 
-static double dot3(const double a[3], const double b[3])
-{
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+static double dot3(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 /* Also |n x h|^2, which keeps its relative accuracy where 1 - (n.h)^2 has none left. */
 static double cross2(const double a[3], const double b[3])
@@ -41,7 +35,10 @@ static double normalize3(double a[3])
     return length;
 }
 
-static const ts_shade_guards *guards_of(const rd_view *view) { return view->kind == RD_PUBLISHED ? &rd_published.guards : &rd_guards; }
+static const ts_shade_guards *guards_of(const rd_view *view)
+{
+    return view->kind == RD_PUBLISHED ? &rd_published.guards : &rd_guards;
+}
 
 static void decode(const ts_shade_guards *guards, const double maps[MAP_CHANNELS], rd_surface *s)
 {
@@ -82,10 +79,7 @@ void rd_decode(const float maps[MAP_CHANNELS], rd_surface *s)
     rd_decode_double(m, s);
 }
 
-double rd_fresnel(double vh)
-{
-    return exp2((-5.55473 * vh - 6.98316) * vh);
-}
+double rd_fresnel(double vh) { return exp2((-5.55473 * vh - 6.98316) * vh); }
 
 double rd_half(const double l[3], const double v[3], double h[3])
 {
@@ -110,13 +104,17 @@ static lobe evaluate(const ts_shade_guards *guards, const rd_surface *s, const d
     double s2 = cross2(s->n, b.h), inner = a2 * nh * nh + s2, below = PI * inner * inner + guards->distribution;
     double gl = b.nl * (1 - k) + k, gv = b.nv * (1 - k) + k;
     /* Without a guard this is 1 / 4, and its logarithm has no derivative. */
-    double cosines = b.nl * b.nv / (4 * b.nl * b.nv + guards->cosines), by_cosine = guards->cosines / (4 * b.nl * b.nv + guards->cosines);
+    double cosines = b.nl * b.nv / (4 * b.nl * b.nv + guards->cosines),
+           by_cosine = guards->cosines / (4 * b.nl * b.nv + guards->cosines);
     b.specular = a2 / below / (gl * gv) * cosines;
     b.fresnel = rd_fresnel(vh);
-    b.by_alpha = b.specular * (2 * (PI * inner * (s2 - a2 * nh * nh) + guards->distribution) / (alpha * below) - ((1 - b.nl) / gl + (1 - b.nv) / gv) / 2);
+    b.by_alpha = b.specular *
+        (2 * (PI * inner * (s2 - a2 * nh * nh) + guards->distribution) / (alpha * below) -
+         ((1 - b.nl) / gl + (1 - b.nv) / gv) / 2);
     b.by_nl = b.specular * (by_cosine / b.nl - (1 - k) / gl);
     b.by_nv = b.specular * (by_cosine / b.nv - (1 - k) / gv);
-    b.by_nh = b.specular * 4 * PI * inner * (1 - alpha) * (1 + alpha) * nh / below; /* n moves on the sphere, so |n x h|^2 = 1 - (n.h)^2 */
+    b.by_nh = b.specular * 4 * PI * inner * (1 - alpha) * (1 + alpha) * nh /
+        below; /* n moves on the sphere, so |n x h|^2 = 1 - (n.h)^2 */
     return b;
 }
 
@@ -146,11 +144,13 @@ double rd_light(const rd_view *view, const double point[2], double l[3], double 
     double distance2 = dot3(l, l);
     normalize3(l);
     normalize3(v);
-    if (view->kind == RD_POINT || view->kind == RD_PUBLISHED) return view->power / fmax(distance2, guards_of(view)->distance2);
+    if (view->kind == RD_POINT || view->kind == RD_PUBLISHED)
+        return view->power / fmax(distance2, guards_of(view)->distance2);
     return PI / fmax(l[2], rd_guards.lz);
 }
 
-void rd_radiance(const double maps[MAP_CHANNELS], const double point[2], const rd_view *view, double radiance[3], double gradient[3][MAP_CHANNELS])
+void rd_radiance(const double maps[MAP_CHANNELS], const double point[2], const rd_view *view, double radiance[3],
+                 double gradient[3][MAP_CHANNELS])
 {
     rd_surface s;
     double l[3], v[3], strength = rd_light(view, point, l, v);
@@ -170,7 +170,8 @@ void rd_radiance(const double maps[MAP_CHANNELS], const double point[2], const r
         g[MAP_ROUGHNESS] = e * fresnel * b.by_alpha * 2 * s.roughness * s.slope[MAP_ROUGHNESS];
         for (int j = 0; j < 2; j++) {
             double dl = dot3(s.dn[j], l), dv = dot3(s.dn[j], v), dh = dot3(s.dn[j], b.h);
-            g[MAP_NORMAL + j] = (strength * f * dl + e * fresnel * (b.by_nl * dl + b.by_nv * dv + b.by_nh * dh)) * s.slope[MAP_NORMAL + j];
+            g[MAP_NORMAL + j] = (strength * f * dl + e * fresnel * (b.by_nl * dl + b.by_nv * dv + b.by_nh * dh)) *
+                s.slope[MAP_NORMAL + j];
         }
     }
 }

@@ -2,23 +2,22 @@
  *
  * Maps (tensor/maps.h). Each of the nine values x is clamped to [-1, 1]; outside it has no gradient.
  *     diffuse d, specular s (F0), roughness r:  (x + 1) / 2;     r >= guards.roughness;     alpha = r^2
- *     normal n: (x, y, sqrt(max(1 - x^2 - y^2, guards.nz2))), divided by its length (which differs from 1 only in the guard)
- * BRDF (Cook and Torrance, "A Reflectance Model for Computer Graphics", 1982, with the GGX distribution of Walter et al.,
- * "Microfacet Models for Refraction through Rough Surfaces", 2007, and Karis's "Real Shading in Unreal Engine 4", 2013, for G
- * and F), for unit l toward the light and v toward the camera, h = (l + v) / |l + v|:
- *     f = (1 - s) d / pi + D G F / 4
- *     D = alpha^2 / (pi (alpha^2 (n.h)^2 + |n x h|^2)^2)          = the usual ((n.h)^2 (alpha^2 - 1) + 1)^2, without its cancellation
- *     G = 1 / ((n.l (1 - k) + k) (n.v (1 - k) + k)), k = alpha / 2   the cosines above cancel 4 n.l n.v below: no 0/0 at grazing angles
- *     F = s + (1 - s) 2^((-5.55473 v.h - 6.98316) v.h)
- *     f = 0 where n.l <= 0 or n.v <= 0
- * Radiance = f n.l times the light's strength at the pixel (rd_kind in render/scene.h). */
+ *     normal n: (x, y, sqrt(max(1 - x^2 - y^2, guards.nz2))), divided by its length (which differs from 1 only in the
+ * guard) BRDF (Cook and Torrance, "A Reflectance Model for Computer Graphics", 1982, with the GGX distribution of
+ * Walter et al., "Microfacet Models for Refraction through Rough Surfaces", 2007, and Karis's "Real Shading in Unreal
+ * Engine 4", 2013, for G and F), for unit l toward the light and v toward the camera, h = (l + v) / |l + v|: f = (1 -
+ * s) d / pi + D G F / 4 D = alpha^2 / (pi (alpha^2 (n.h)^2 + |n x h|^2)^2)          = the usual ((n.h)^2 (alpha^2 - 1)
+ * + 1)^2, without its cancellation G = 1 / ((n.l (1 - k) + k) (n.v (1 - k) + k)), k = alpha / 2   the cosines above
+ * cancel 4 n.l n.v below: no 0/0 at grazing angles F = s + (1 - s) 2^((-5.55473 v.h - 6.98316) v.h) f = 0 where n.l <=
+ * 0 or n.v <= 0 Radiance = f n.l times the light's strength at the pixel (rd_kind in render/scene.h). */
 #ifndef RD_BRDF_H
 #define RD_BRDF_H
 #include "render/scene.h"
-#include "tensor/kernels/shade.h"
+#include "render/kernels/shade.h"
 #include "tensor/maps.h"
 
-/* Every bound that keeps shading finite. Both the reference and the kernels read them from here and from nowhere else. */
+/* Every bound that keeps shading finite. Both the reference and the kernels read them from here and from nowhere else.
+ */
 extern const ts_shade_guards rd_guards;
 
 /* GGX's width (TS_ALPHA). */
@@ -42,13 +41,14 @@ void rd_decode_double(const double maps[MAP_CHANNELS], rd_surface *s);
 /* f for unit l and v: f[3], and the specular part alone when specular is not NULL. */
 void rd_brdf(const rd_surface *s, const double l[3], const double v[3], double f[3], double specular[3]);
 
-/* The light's strength E (radiance = f max(n.l, 0) E) at a point of the sample, and the unit directions there. A light or
- * camera at the very point has direction 0 and so is not seen. */
+/* The light's strength E (radiance = f max(n.l, 0) E) at a point of the sample, and the unit directions there. A light
+ * or camera at the very point has direction 0 and so is not seen. */
 double rd_light(const rd_view *view, const double point[2], double l[3], double v[3]);
 
 /* Centre of the grid's pixel (column, row). */
 void rd_centre(rd_grid grid, int column, int row, double point[2]);
 
 /* Radiance of one pixel, and d radiance[c] / d maps[m] when gradient is not NULL. */
-void rd_radiance(const double maps[MAP_CHANNELS], const double point[2], const rd_view *view, double radiance[3], double gradient[3][MAP_CHANNELS]);
+void rd_radiance(const double maps[MAP_CHANNELS], const double point[2], const rd_view *view, double radiance[3],
+                 double gradient[3][MAP_CHANNELS]);
 #endif

@@ -14,7 +14,8 @@ static float limit(float x)
     return x > 1 ? 1 : x;
 }
 
-/* Sum of squared differences of the images, which are gamma-encoded in place; row sums in index order make it independent of the threads. */
+/* Sum of squared differences of the images, which are gamma-encoded in place; row sums in index order make it
+ * independent of the threads. */
 static double gamma_difference(int h, int w, float *a, float *b, double *rows)
 {
 #pragma omp parallel for num_threads(ts_threads()) schedule(static)
@@ -34,7 +35,8 @@ static double gamma_difference(int h, int w, float *a, float *b, double *rows)
     return sum;
 }
 
-double rd_render_rmse(rd_grid grid, const float *maps_a, int channels_a, const float *maps_b, int channels_b, const rd_view *views, int count)
+double rd_render_rmse(rd_grid grid, const float *maps_a, int channels_a, const float *maps_b, int channels_b,
+                      const rd_view *views, int count)
 {
     if (count < 1) return NAN;
     const size_t values = (size_t)grid.h * (size_t)grid.w * 3;
@@ -91,7 +93,8 @@ static rd_map_error map_sums(int64_t count, const float *maps_a, int channels_a,
             sum += (na[k] + nb[k]) * (na[k] + nb[k]);
         }
         e.normal += chord;
-        e.angle += 2 * atan2(sqrt(chord), sqrt(sum)); /* Kahan: as accurate for equal vectors as for others, where acos is not */
+        e.angle += 2 *
+            atan2(sqrt(chord), sqrt(sum)); /* Kahan: as accurate for equal vectors as for others, where acos is not */
         e.diffuse += colour_difference(a + MAP_DIFFUSE, b + MAP_DIFFUSE);
         e.specular += colour_difference(a + MAP_SPECULAR, b + MAP_SPECULAR);
         const double r = ((double)limit(a[MAP_ROUGHNESS]) - (double)limit(b[MAP_ROUGHNESS])) / 2;
@@ -105,7 +108,8 @@ rd_map_error rd_map_rmse(int64_t count, const float *maps_a, int channels_a, con
     enum { BLOCK = 4096 }; /* sums of sums: the rounding of one sum grows with its length, to 1e-12 at 4096^2 pixels */
     rd_map_error e = {0};
     for (int64_t i = 0; i < count; i += BLOCK) {
-        const rd_map_error s = map_sums(count - i < BLOCK ? count - i : BLOCK, maps_a + i * channels_a, channels_a, maps_b + i * channels_b, channels_b);
+        const rd_map_error s = map_sums(count - i < BLOCK ? count - i : BLOCK, maps_a + i * channels_a, channels_a,
+                                        maps_b + i * channels_b, channels_b);
         e.diffuse += s.diffuse;
         e.specular += s.specular;
         e.normal += s.normal;

@@ -5,11 +5,13 @@
 #include "render/scene.h"
 
 /* mean over images, pixels, rgb and views of |log(a + 0.01) - log(b + 0.01)|, a and b the renderings of maps and target
- * ([N, S, S, 9], whole patches). views: N * views_per_image, image-major, copied. Value and gradient are made in one pass. */
+ * ([N, S, S, 9], whole patches). views: N * views_per_image, image-major, copied. Value and gradient are made in one
+ * pass. */
 ag_value *ag_render_loss(ag_tape *tape, ag_value *maps, ag_value *target, const rd_view *views, int views_per_image);
 
-/* The mean over the photographs of the RMSE (all pixels, rgb) between photograph and rendering under view, clamped to [0, 1]: what a photograph
- * alone tells. maps [N, S, S, 9 or more], image [N, S, S, 3] linear, whole patches. The gradient at a perfect fit is 0 (render/render.h). */
+/* The mean over the photographs of the RMSE (all pixels, rgb) between photograph and rendering under view, clamped to
+ * [0, 1]: what a photograph alone tells. maps [N, S, S, 9 or more], image [N, S, S, 3] linear, whole patches. The
+ * gradient at a perfect fit is 0 (render/render.h). */
 ag_value *ag_flash_loss(ag_tape *tape, ag_value *maps, ag_value *image, const rd_view *view);
 
 /* mean |maps - target| over all values, the map L1 of DESIGN section 4. Channel groups weighted equally by channel. */

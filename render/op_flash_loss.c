@@ -1,4 +1,5 @@
-/* The reconstruction loss as an op (render/losses.h): what is minimised at test time by the methods that optimise weights or codes. */
+/* The reconstruction loss as an op (render/losses.h): what is minimised at test time by the methods that optimise
+ * weights or codes. */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "render/brdf.h"
@@ -16,9 +17,11 @@ ag_value *ag_flash_loss(ag_tape *tape, ag_value *maps, ag_value *image, const rd
     const ts_shape s = maps->t.shape;
     char text[2][AG_SHAPE_TEXT];
     if (s.h != s.w || s.c < MAP_CHANNELS || !ts_same(image->t.shape, (ts_shape){s.n, s.h, s.w, 3}))
-        return ag_fail(tape, TS_INVALID, "flash_loss: maps %s must be [N,S,S,9] or more and the photographs %s [N,S,S,3]", ag_shape_text(text[0], s),
-                       ag_shape_text(text[1], image->t.shape));
-    if (image->needs_grad) return ag_fail(tape, TS_INVALID, "flash_loss: the photographs have no gradient here; detach them");
+        return ag_fail(tape, TS_INVALID,
+                       "flash_loss: maps %s must be [N,S,S,9] or more and the photographs %s [N,S,S,3]",
+                       ag_shape_text(text[0], s), ag_shape_text(text[1], image->t.shape));
+    if (image->needs_grad)
+        return ag_fail(tape, TS_INVALID, "flash_loss: the photographs have no gradient here; detach them");
     return ag_apply(tape, &op_flash_loss, 2, in, (ts_shape){1, 1, 1, 1}, view, sizeof *view);
 }
 
@@ -32,7 +35,8 @@ static void forward(ag_tape *tape, ag_node *node)
         return;
     }
     for (int n = 0; n < s.n; n++) {
-        rd_flash_rmse(rd_grid_full(s.h), maps->data + n * maps->stride_n, s.c, node->attr, image->data + n * image->stride_n, &rmse[n]);
+        rd_flash_rmse(rd_grid_full(s.h), maps->data + n * maps->stride_n, s.c, node->attr,
+                      image->data + n * image->stride_n, &rmse[n]);
         sum += rmse[n];
     }
     node->out->t.data[0] = (float)(sum / s.n);
@@ -55,7 +59,8 @@ static void backward(ag_tape *tape, ag_node *node)
     /* rd_flash_gradient's scale is that of 1e5 RMSE at 256 x 256. */
     const float scale = (float)((double)node->out->grad[0] / s.n * 256.0 * 256.0 / (1e5 * s.h * s.w));
     for (int n = 0; n < s.n; n++) {
-        rd_flash_gradient(rd_grid_full(s.h), maps->data + n * count, s.c, node->attr, image->data + n * image->stride_n, rmse[n], gradient, NULL);
+        rd_flash_gradient(rd_grid_full(s.h), maps->data + n * count, s.c, node->attr, image->data + n * image->stride_n,
+                          rmse[n], gradient, NULL);
         float *sum = to + n * count;
 #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (count > AG_CHUNK)
         for (int64_t i = 0; i < count; i++) sum[i] += scale * gradient[i];
@@ -105,7 +110,8 @@ static bool kink(const double *const *in, int input, int64_t i, double step, con
         for (int c = 0; c < 3; c++) side[t] = 3 * side[t] + (radiance[c] < 1) + (radiance[c] > 0);
     }
     const double nx = x[MAP_NORMAL], ny = x[MAP_NORMAL + 1];
-    return side[0] != side[1] || side[1] != side[2] || ((m == MAP_NORMAL || m == MAP_NORMAL + 1) && fabs(1 - nx * nx - ny * ny) < 0.01);
+    return side[0] != side[1] || side[1] != side[2] ||
+        ((m == MAP_NORMAL || m == MAP_NORMAL + 1) && fabs(1 - nx * nx - ny * ny) < 0.01);
 }
 
 static void prepare(float *const *in, const void *user)
@@ -114,7 +120,8 @@ static void prepare(float *const *in, const void *user)
     for (int64_t i = 0; i < ts_count(s); i++) {
         const int64_t m = i % s.c;
         if (m == MAP_NORMAL || m == MAP_NORMAL + 1) in[0][i] *= 0.5f;
-        if (m == MAP_ROUGHNESS && in[0][i] < -0.6f) in[0][i] = -0.6f; /* a narrower highlight is not linear over a difference's step */
+        if (m == MAP_ROUGHNESS && in[0][i] < -0.6f)
+            in[0][i] = -0.6f; /* a narrower highlight is not linear over a difference's step */
     }
 }
 
@@ -130,10 +137,21 @@ static void cases(ag_gradcheck *g)
     static const ts_shape shapes[] = {{1, 1, 1, 9}, {2, 5, 5, 9}, {1, 17, 17, 9}, {2, 4, 4, 10}};
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
         const ts_shape s = shapes[i];
-        ag_case c = {.label = s.h == 1 ? "one pixel" : s.c == 10 ? "ten channels" : "images", .inputs = 2, .shape = {s, {s.n, s.h, s.w, 3}}, .fixed = {false, true},
-                     .lo = -0.95f, .hi = 0.95f, .kink = kink, .prepare = prepare, .build = build, .user = &shapes[i]};
+        ag_case c = {.label = s.h == 1 ? "one pixel"
+                         : s.c == 10   ? "ten channels"
+                                       : "images",
+                     .inputs = 2,
+                     .shape = {s, {s.n, s.h, s.w, 3}},
+                     .fixed = {false, true},
+                     .lo = -0.95f,
+                     .hi = 0.95f,
+                     .kink = kink,
+                     .prepare = prepare,
+                     .build = build,
+                     .user = &shapes[i]};
         if (ag_gradcheck_run(g, &c) != TS_OK) return;
     }
 }
 
-const ag_op op_flash_loss = {.name = "flash_loss", .forward = forward, .backward = backward, .reference = reference, .cases = cases};
+const ag_op op_flash_loss = {
+    .name = "flash_loss", .forward = forward, .backward = backward, .reference = reference, .cases = cases};

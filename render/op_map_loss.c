@@ -12,8 +12,8 @@ ag_value *ag_map_loss(ag_tape *tape, ag_value *maps, ag_value *target)
     if (!ag_ready(tape, "map_loss", 2, in)) return NULL;
     char text[2][AG_SHAPE_TEXT];
     if (!ts_same(maps->t.shape, target->t.shape))
-        return ag_fail(tape, TS_INVALID, "map_loss: maps %s and target %s differ in shape", ag_shape_text(text[0], maps->t.shape),
-                       ag_shape_text(text[1], target->t.shape));
+        return ag_fail(tape, TS_INVALID, "map_loss: maps %s and target %s differ in shape",
+                       ag_shape_text(text[0], maps->t.shape), ag_shape_text(text[1], target->t.shape));
     if (target->needs_grad) return ag_fail(tape, TS_INVALID, "map_loss: target has no gradient here; detach it");
     return ag_apply(tape, &op_map_loss, 2, in, (ts_shape){1, 1, 1, 1}, NULL, 0);
 }
@@ -77,10 +77,17 @@ static void cases(ag_gradcheck *g)
 {
     static const ts_shape shapes[] = {{1, 1, 1, 1}, {2, 3, 5, 9}, {1, 64, 33, 9}};
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
-        ag_case c = {.label = i ? "images" : "one value", .inputs = 2, .shape = {shapes[i], shapes[i]}, .fixed = {false, true},
-                     .lo = -1.5f, .hi = 1.5f, .kink = kink, .build = build};
+        ag_case c = {.label = i ? "images" : "one value",
+                     .inputs = 2,
+                     .shape = {shapes[i], shapes[i]},
+                     .fixed = {false, true},
+                     .lo = -1.5f,
+                     .hi = 1.5f,
+                     .kink = kink,
+                     .build = build};
         if (ag_gradcheck_run(g, &c) != TS_OK) return;
     }
 }
 
-const ag_op op_map_loss = {.name = "map_loss", .forward = forward, .backward = backward, .reference = reference, .cases = cases};
+const ag_op op_map_loss = {
+    .name = "map_loss", .forward = forward, .backward = backward, .reference = reference, .cases = cases};

@@ -1,5 +1,5 @@
-/* Mean |log(a + 0.01) - log(b + 0.01)| over the renderings a of maps and b of target (render/losses.h). Rendering, loss and gradient
- * are one pass over the pixels, in forward; backward only multiplies. */
+/* Mean |log(a + 0.01) - log(b + 0.01)| over the renderings a of maps and b of target (render/losses.h). Rendering, loss
+ * and gradient are one pass over the pixels, in forward; backward only multiplies. */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "render/brdf.h"
@@ -22,9 +22,11 @@ ag_value *ag_render_loss(ag_tape *tape, ag_value *maps, ag_value *target, const 
     ts_shape s = maps->t.shape;
     char text[2][AG_SHAPE_TEXT];
     if (s.h != s.w || s.c != MAP_CHANNELS || !ts_same(s, target->t.shape))
-        return ag_fail(tape, TS_INVALID, "render_loss: maps %s and target %s must both be [N,S,S,9]", ag_shape_text(text[0], s),
-                       ag_shape_text(text[1], target->t.shape));
-    if (views_per_image < 1) return ag_fail(tape, TS_INVALID, "render_loss: %d views for each image, at least one is needed", views_per_image);
+        return ag_fail(tape, TS_INVALID, "render_loss: maps %s and target %s must both be [N,S,S,9]",
+                       ag_shape_text(text[0], s), ag_shape_text(text[1], target->t.shape));
+    if (views_per_image < 1)
+        return ag_fail(tape, TS_INVALID, "render_loss: %d views for each image, at least one is needed",
+                       views_per_image);
     if (target->needs_grad) return ag_fail(tape, TS_INVALID, "render_loss: target has no gradient here; detach it");
     size_t bytes = (size_t)s.n * (size_t)views_per_image * sizeof *views;
     rd_view *copy = ts_arena_alloc(ag_arena(tape), bytes);
@@ -165,7 +167,11 @@ static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
 
 static void cases(ag_gradcheck *g)
 {
-    static const struct { const char *label; ts_shape shape; float tilt, spread; } list[] = {
+    static const struct {
+        const char *label;
+        ts_shape shape;
+        float tilt, spread;
+    } list[] = {
         {"flat 3x3", {1, 3, 3, 9}, 0.3f, 0.95f},
         {"steep 2x5x5", {2, 5, 5, 9}, 0.75f, 0.95f},
         {"beyond the range 2x4x4", {2, 4, 4, 9}, 1, 1.3f},
@@ -174,15 +180,28 @@ static void cases(ag_gradcheck *g)
     };
     for (size_t i = 0; i < sizeof list / sizeof *list; i++) {
         rd_view views[2 * (RD_LOSS_VIEWS + 1)];
-        check k = {.shape = list[i].shape, .views = views, .per_image = RD_LOSS_VIEWS + 1, .tilt = list[i].tilt, .spread = list[i].spread};
+        check k = {.shape = list[i].shape,
+                   .views = views,
+                   .per_image = RD_LOSS_VIEWS + 1,
+                   .tilt = list[i].tilt,
+                   .spread = list[i].spread};
         for (int n = 0; n < k.shape.n; n++) {
             rd_loss_views(ag_gradcheck_rng(g), views + n * k.per_image);
             views[n * k.per_image + RD_LOSS_VIEWS] = rd_flash();
         }
-        ag_case c = {.label = list[i].label, .inputs = 2, .shape = {k.shape, k.shape}, .fixed = {false, true}, .lo = -1, .hi = 1,
-                     .kink = kink, .prepare = prepare, .build = build, .user = &k};
+        ag_case c = {.label = list[i].label,
+                     .inputs = 2,
+                     .shape = {k.shape, k.shape},
+                     .fixed = {false, true},
+                     .lo = -1,
+                     .hi = 1,
+                     .kink = kink,
+                     .prepare = prepare,
+                     .build = build,
+                     .user = &k};
         if (ag_gradcheck_run(g, &c) != TS_OK) return;
     }
 }
 
-const ag_op op_render_loss = {.name = "render_loss", .forward = forward, .backward = backward, .reference = reference, .cases = cases};
+const ag_op op_render_loss = {
+    .name = "render_loss", .forward = forward, .backward = backward, .reference = reference, .cases = cases};

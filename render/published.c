@@ -6,7 +6,13 @@ const rd_published_constants rd_published = {
     .gamma = 2.2,
     .gradient = 1e5,
     .rmse = 1e-30,
-    .guards = {.roughness = 1e-6, .nz2 = 1e-6, .distance2 = 1e-8 /* never met */, .lz = 0.001 /* not used */, .distribution = 1e-6, .k = 1e-6, .cosines = 1e-6},
+    .guards = {.roughness = 1e-6,
+               .nz2 = 1e-6,
+               .distance2 = 1e-8 /* never met */,
+               .lz = 0.001 /* not used */,
+               .distribution = 1e-6,
+               .k = 1e-6,
+               .cosines = 1e-6},
 };
 
 rd_view rd_published_flash(void)

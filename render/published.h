@@ -1,11 +1,11 @@
-/* Everything about light and colour in which the published code (Luo et al. 2024) differs from this project, in one place: what a model with
- * `compat = published` is run with. Its flash renderer is the one of render/brdf.h, with other guards against 0/0: roughness >= 1e-6 and, with
- * e = 1e-6 for each,
- *     D = alpha^2 / (pi (…)^2 + e),   G = g(n.l) g(n.v) with g(c) = c / (c (1 - k) + k), k = alpha / 2 + e,   f = … + D G F / (4 n.l n.v + e). */
+/* Everything about light and colour in which the published code (Luo et al. 2024) differs from this project, in one
+ * place: what a model with `compat = published` is run with. Its flash renderer is the one of render/brdf.h, with other
+ * guards against 0/0: roughness >= 1e-6 and, with e = 1e-6 for each, D = alpha^2 / (pi (...)^2 + e), G = g(n.l) g(n.v)
+ * with g(c) = c / (c (1 - k) + k), k = alpha / 2 + e,   f = ... + D G F / (4 n.l n.v + e). */
 #ifndef RD_PUBLISHED_H
 #define RD_PUBLISHED_H
 #include "render/scene.h"
-#include "tensor/kernels/shade.h"
+#include "render/kernels/shade.h"
 
 typedef struct rd_published_constants {
     double distance; /* of camera and light from the sample, in patch widths */

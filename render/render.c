@@ -2,14 +2,16 @@
 #include "render/brdf.h"
 #include "render/published.h"
 #include "render/rows.h"
-#include "tensor/kernels/newton.h"
+#include "render/kernels/newton.h"
 #include "tensor/threads.h"
 #include <math.h>
 
 ts_shade_view rd_shade_view(const rd_view *view)
 {
     const bool published = view->kind == RD_PUBLISHED, falloff = published || view->kind == RD_POINT;
-    ts_shade_view s = {.guards = published ? &rd_published.guards : &rd_guards, .falloff = falloff, .power = falloff ? view->power : 3.14159265f};
+    ts_shade_view s = {.guards = published ? &rd_published.guards : &rd_guards,
+                       .falloff = falloff,
+                       .power = falloff ? view->power : 3.14159265f};
     if (view->kind == RD_DIRECTIONS) {
         s.kind = TS_SHADE_DIRECTIONS;
         s.power = (float)rd_light(view, (double[2]){0}, s.light, s.camera);
@@ -31,7 +33,11 @@ ts_shade_row rd_shade_row(rd_grid grid, int y, const float *maps, int channels)
 {
     double centre[2];
     rd_centre(grid, 0, y, centre);
-    return (ts_shade_row){.y = centre[1], .step = 1.0 / grid.side, .column = grid.x0, .count = grid.w, .channels = channels,
+    return (ts_shade_row){.y = centre[1],
+                          .step = 1.0 / grid.side,
+                          .column = grid.x0,
+                          .count = grid.w,
+                          .channels = channels,
                           .maps = maps + (int64_t)y * grid.w * channels};
 }
 
@@ -45,8 +51,10 @@ void rd_render(rd_grid grid, const float *maps, int channels, const rd_view *vie
     }
 }
 
-/* The RMSE, and the gradient scaled by scale unless it is NULL. A sum a row, added in order: the same for any number of threads. */
-static double flash(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image, double scale, float *gradient)
+/* The RMSE, and the gradient scaled by scale unless it is NULL. A sum a row, added in order: the same for any number of
+ * threads. */
+static double flash(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image,
+                    double scale, float *gradient)
 {
     ts_shade_view v = rd_shade_view(view);
     double *sums = ts_scratch(0, (size_t)grid.h * sizeof(double)), sum = 0;
@@ -54,7 +62,8 @@ static double flash(rd_grid grid, const float *maps, int channels, const rd_view
     for (int y = 0; y < grid.h; y++) {
         int64_t at = (int64_t)y * grid.w;
         ts_shade_row row = rd_shade_row(grid, y, maps, channels);
-        sums[y] = ts_shade_k()->flash(&v, &row, image + at * 3, (float)scale, gradient ? gradient + at * channels : NULL);
+        sums[y] = ts_shade_k()->flash(&v, &row, image + at * 3, (float)scale,
+                                      gradient ? gradient + at * channels : NULL);
     }
     for (int y = 0; y < grid.h; y++) sum += sums[y];
     return sqrt(sum / (3.0 * grid.h * grid.w));
@@ -65,17 +74,19 @@ void rd_flash_rmse(rd_grid grid, const float *maps, int channels, const rd_view 
     *rmse = flash(grid, maps, channels, view, image, 0, NULL);
 }
 
-void rd_flash_gradient(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image, double rmse0,
-                       float *gradient, double *rmse)
+void rd_flash_gradient(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image,
+                       double rmse0, float *gradient, double *rmse)
 {
     const bool published = view->kind == RD_PUBLISHED;
-    const double least = published ? rd_published.rmse : RD_RMSE_FLOOR, factor = published ? rd_published.gradient : 1e5;
+    const double least = published ? rd_published.rmse : RD_RMSE_FLOOR,
+                 factor = published ? rd_published.gradient : 1e5;
     double floored = rmse0 > least ? rmse0 : least;
     double now = flash(grid, maps, channels, view, image, factor / (3.0 * 256 * 256) / floored, gradient);
     if (rmse) *rmse = now;
 }
 
-void rd_newton_step(rd_grid grid, const float *maps, int channels, const rd_view *views, const float *const *image, int count, const float *damping, float *step)
+void rd_newton_step(rd_grid grid, const float *maps, int channels, const rd_view *views, const float *const *image,
+                    int count, const float *damping, float *step)
 {
     ts_shade_view v[RD_CAPTURE_VIEWS];
     for (int k = 0; k < count; k++) v[k] = rd_shade_view(&views[k]);

@@ -2,7 +2,7 @@
 #ifndef RD_ROWS_H
 #define RD_ROWS_H
 #include "render/scene.h"
-#include "tensor/kernels/shade.h"
+#include "render/kernels/shade.h"
 
 ts_shade_view rd_shade_view(const rd_view *view);
 /* Row y of a grid; maps [h, w, channels]. */

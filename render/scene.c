@@ -4,10 +4,7 @@
 
 #define TAU 6.28318530717958647692
 
-rd_grid rd_grid_full(int side)
-{
-    return (rd_grid){.h = side, .w = side, .side = side};
-}
+rd_grid rd_grid_full(int side) { return (rd_grid){.h = side, .w = side, .side = side}; }
 
 rd_view rd_flash(void)
 {
@@ -33,7 +30,8 @@ void rd_loss_views(ts_rng *rng, rd_view views[RD_LOSS_VIEWS])
             double sx = ts_rng_range(rng, -1, 1), sy = ts_rng_range(rng, -1, 1), shift[3] = {sx, sy, 1e-4};
             double dv = exp(0.5 + 0.75 * ts_rng_normal(rng)), dl = exp(0.5 + 0.75 * ts_rng_normal(rng));
             for (int k = 0; k < 3; k++) {
-                l[k] = 0.5 * (dl * (k < 2 ? -v[k] : v[k]) + shift[k]); /* half: from half patch widths to patch widths */
+                l[k] = 0.5 *
+                    (dl * (k < 2 ? -v[k] : v[k]) + shift[k]); /* half: from half patch widths to patch widths */
                 v[k] = 0.5 * (dv * v[k] + shift[k]);
             }
         }
@@ -59,7 +57,8 @@ rd_view rd_preview_view(int index, int count)
 {
     rd_view view = rd_flash();
     double phi = TAU * (index + 0.5) / count;
-    /* low beside the sample: the highlight leaves the middle and relief throws its shading, which a light near the camera hides */
+    /* low beside the sample: the highlight leaves the middle and relief throws its shading, which a light near the
+     * camera hides */
     view.light[0] = (float)(0.75 * cos(phi));
     view.light[1] = (float)(0.75 * sin(phi));
     view.light[2] = 0.6f;
@@ -68,7 +67,8 @@ rd_view rd_preview_view(int index, int count)
 
 rd_view rd_capture_view(int index)
 {
-    static const signed char place[RD_CAPTURE_VIEWS][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
+    static const signed char place[RD_CAPTURE_VIEWS][2] = {{0, 0},  {1, 0},   {1, 1},  {0, 1}, {-1, 1},
+                                                           {-1, 0}, {-1, -1}, {0, -1}, {1, -1}};
     rd_view view = rd_flash();
     for (int k = 0; k < 2; k++) view.light[k] = RD_CAPTURE_SPACING * (float)place[index][k];
     return view;
@@ -80,7 +80,8 @@ static bool before(const rd_view *a, const rd_view *b)
     double distance[2], angle[2];
     const rd_view *v[2] = {a, b};
     for (int i = 0; i < 2; i++) {
-        const double x = (double)v[i]->light[0] - (double)v[i]->camera[0], y = (double)v[i]->light[1] - (double)v[i]->camera[1];
+        const double x = (double)v[i]->light[0] - (double)v[i]->camera[0],
+                     y = (double)v[i]->light[1] - (double)v[i]->camera[1];
         const double z = (double)v[i]->light[2] - (double)v[i]->camera[2];
         distance[i] = sqrt(x * x + y * y + z * z);
         angle[i] = distance[i] < 1e-5 ? 0 : atan2(y, x);

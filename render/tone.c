@@ -1,5 +1,5 @@
 #include "render/tone.h"
-#include "tensor/kernels/shade.h"
+#include "render/kernels/shade.h"
 #include "tensor/threads.h"
 #include <math.h>
 
@@ -16,7 +16,4 @@ void rd_log_encode(int64_t count, const float *in, float *out)
     }
 }
 
-float rd_gamma(float v)
-{
-    return v > 0 ? v < 1 ? powf(v, 1 / 2.2f) : 1 : 0;
-}
+float rd_gamma(float v) { return v > 0 ? v < 1 ? powf(v, 1 / 2.2f) : 1 : 0; }

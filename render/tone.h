@@ -7,7 +7,7 @@
  * I is clamped to [0, 1] first, as a photograph is (NaN becomes 0). in may be out. Threaded. */
 void rd_log_encode(int64_t count, const float *in, float *out);
 
-/* What evaluation compares: clamp(v, 0, 1)^(1/2.2), and not the sRGB curve, since the figures that others publish are in this space.
- * NaN becomes 0. */
+/* What evaluation compares: clamp(v, 0, 1)^(1/2.2), and not the sRGB curve, since the figures that others publish are
+ * in this space. NaN becomes 0. */
 float rd_gamma(float v);
 #endif

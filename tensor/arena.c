@@ -1,10 +1,11 @@
 #include "tensor/arena.h"
-#include "tensor/block.h"
+#include "tensor/memory.h"
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Chunks are whole huge pages, which tensor/block.c asks for: a page's first touch costs two and a half times as much in small ones. */
+/* Chunks are whole huge pages, which tensor/memory.c asks for: a page's first touch costs two and a half times as much
+ * in small ones. */
 enum { ALIGN = 64, MIN_CHUNK = 4 << 20, CHUNK_STEP = 2 << 20, MAX_CHUNKS = 64 };
 
 struct ts_arena {
@@ -50,7 +51,8 @@ void ts_arena_destroy(ts_arena **arena)
     *arena = NULL;
 }
 
-/* A chunk of at least bytes as chunk number a->chunks; sizes double so that MAX_CHUNKS never ends before memory does. */
+/* A chunk of at least bytes as chunk number a->chunks; sizes double so that MAX_CHUNKS never ends before memory does.
+ */
 static int add_chunk(ts_arena *a, size_t bytes)
 {
     if (a->chunks == MAX_CHUNKS) return 0;
@@ -96,10 +98,7 @@ void *ts_arena_zalloc(ts_arena *a, size_t count, size_t size)
     return p;
 }
 
-ts_mark ts_arena_mark(const ts_arena *a)
-{
-    return (ts_mark){a->at, a->used, a->total};
-}
+ts_mark ts_arena_mark(const ts_arena *a) { return (ts_mark){a->at, a->used, a->total}; }
 
 void ts_arena_release(ts_arena *a, ts_mark mark)
 {

@@ -16,7 +16,8 @@ ts_arena *ts_arena_create(size_t initial, ts_status *st);
 /* Frees everything and nulls the pointer; a NULL pointer is left alone. */
 void ts_arena_destroy(ts_arena **arena);
 
-/* bytes of memory, valid until the arena is reset, destroyed or released to an earlier mark; NULL when there is none. */
+/* bytes of memory, valid until the arena is reset, destroyed or released to an earlier mark; NULL when there is none.
+ */
 void *ts_arena_alloc(ts_arena *arena, size_t bytes);
 
 /* The same for count items of size bytes, NULL when the product overflows, and filled with zeros. */

@@ -22,11 +22,15 @@ static unsigned xcr0(void)
     return lo;
 }
 
-/* Linux saves the 8 KiB of a thread's tiles only for processes that ask for it (Documentation/arch/x86/xstate.rst). Holds for all threads. */
+/* Linux saves the 8 KiB of a thread's tiles only for processes that ask for it (Documentation/arch/x86/xstate.rst).
+ * Holds for all threads. */
 static bool may_use_tiles(void)
 {
 #if defined(__linux__)
-    enum { REQUEST_PERMISSION = 0x1023, TILE_DATA = 18 }; /* ARCH_REQ_XCOMP_PERM, which older headers lack, and XFEATURE_XTILEDATA */
+    enum {
+        REQUEST_PERMISSION = 0x1023,
+        TILE_DATA = 18
+    }; /* ARCH_REQ_XCOMP_PERM, which older headers lack, and XFEATURE_XTILEDATA */
     return syscall(SYS_arch_prctl, REQUEST_PERMISSION, TILE_DATA) == 0;
 #else
     return false;
@@ -49,7 +53,8 @@ static ts_isa detect(void)
     if ((saved & 0xe6) != 0xe6) return TS_AVX2; /* mask registers and zmm */
     const unsigned bf16 = 1u << 5, tiles_bf16 = 1u << 22, tiles = 1u << 24, matrix = d;
     if (!__get_cpuid_count(7, 1, &a, &b, &c, &d) || !(a & bf16)) return TS_AVX512;
-    if ((matrix & (tiles_bf16 | tiles)) != (tiles_bf16 | tiles) || (saved & 0x60000) != 0x60000 || !may_use_tiles()) return TS_AVX512BF16;
+    if ((matrix & (tiles_bf16 | tiles)) != (tiles_bf16 | tiles) || (saved & 0x60000) != 0x60000 || !may_use_tiles())
+        return TS_AVX512BF16;
     return TS_AMX;
 }
 #else
@@ -89,9 +94,12 @@ ts_code ts_isa_init(ts_status *st)
     for (int i = 0; i < TS_ISA_COUNT; i++)
         if (!strcmp(want, names[i])) {
             if (i > (int)ts_isa_best())
-                return ts_fail(st, TS_INVALID, "LGD_ISA=%s: this CPU or its system has no more than %s; unset it or use that", want, names[ts_isa_best()]);
+                return ts_fail(st, TS_INVALID,
+                               "LGD_ISA=%s: this CPU or its system has no more than %s; unset it or use that", want,
+                               names[ts_isa_best()]);
             ts_isa_use((ts_isa)i);
             return TS_OK;
         }
-    return ts_fail(st, TS_INVALID, "LGD_ISA=%s is not an instruction set; use base, avx2, avx512, avx512bf16 or amx", want);
+    return ts_fail(st, TS_INVALID, "LGD_ISA=%s is not an instruction set; use base, avx2, avx512, avx512bf16 or amx",
+                   want);
 }

@@ -33,7 +33,8 @@ static void selu(int64_t n, const float *x, float *y)
 
 static void selu_backward(int64_t n, const float *y, const float *dy, float *dx, bool accumulate)
 {
-    for (int64_t i = 0; i < n; i++) put(dx + i, dy[i] * (y[i] > 0 ? TS_SELU_SCALE : y[i] + TS_SELU_SCALE * TS_SELU_ALPHA), accumulate);
+    for (int64_t i = 0; i < n; i++)
+        put(dx + i, dy[i] * (y[i] > 0 ? TS_SELU_SCALE : y[i] + TS_SELU_SCALE * TS_SELU_ALPHA), accumulate);
 }
 
 static void asinh_scaled(int64_t n, float s, const float *x, float *y)
@@ -59,7 +60,8 @@ static void add_leaky(int64_t pixels, int c, const float *x, const float *g, flo
     }
 }
 
-static void add_leaky_backward(int64_t pixels, int c, const float *y, const float *dy, float leak, float *dx, bool accumulate, double *sum)
+static void add_leaky_backward(int64_t pixels, int c, const float *y, const float *dy, float leak, float *dx,
+                               bool accumulate, double *sum)
 {
     for (int64_t i = 0; i < pixels * c; i++) {
         double d = y[i] > 0 ? dy[i] : (double)leak * dy[i];
@@ -73,13 +75,15 @@ static void broadcast(int64_t pixels, int c, const float *g, float *y, bool accu
     for (int64_t i = 0; i < pixels * c; i++) put(y + i, g[i % c], accumulate);
 }
 
-static void copy(int64_t pixels, int c, const float *src, int64_t src_stride, float *dst, int64_t dst_stride, bool accumulate)
+static void copy(int64_t pixels, int c, const float *src, int64_t src_stride, float *dst, int64_t dst_stride,
+                 bool accumulate)
 {
     for (int64_t p = 0; p < pixels; p++)
         for (int i = 0; i < c; i++) put(dst + p * dst_stride + i, src[p * src_stride + i], accumulate);
 }
 
-static void gru(int64_t pixels, int c, const float *ih, const float *hh, int64_t hh_stride, const float *old, float *y, float *saved)
+static void gru(int64_t pixels, int c, const float *ih, const float *hh, int64_t hh_stride, const float *old, float *y,
+                float *saved)
 {
     for (int64_t p = 0; p < pixels; p++) {
         const float *a = ih + p * 3 * c, *b = hh + p * hh_stride;
@@ -95,14 +99,15 @@ static void gru(int64_t pixels, int c, const float *ih, const float *hh, int64_t
     }
 }
 
-static void gru_backward(int64_t pixels, int c, const float *saved, const float *old, const float *dy, float *d, float *dold, bool accumulate,
-                         double *sum)
+static void gru_backward(int64_t pixels, int c, const float *saved, const float *old, const float *dy, float *d,
+                         float *dold, bool accumulate, double *sum)
 {
     for (int64_t p = 0; p < pixels; p++) {
         for (int i = 0; i < c; i++) {
             const float *s = saved + p * 4 * c + i;
             const double z = s[0], r = s[c], n = s[2 * c], v = dy[p * c + i], m = v * z * (1 - n * n);
-            const double all[4] = {m, v * (n - (old ? old[p * c + i] : 0)) * z * (1 - z), m * s[3 * c] * r * (1 - r), m * r};
+            const double all[4] = {m, v * (n - (old ? old[p * c + i] : 0)) * z * (1 - z), m * s[3 * c] * r * (1 - r),
+                                   m * r};
             for (int k = 0; k < 4; k++) {
                 d[(p * 4 + k) * c + i] = (float)all[k];
                 if (sum) sum[k * c + i] += all[k];
@@ -116,13 +121,28 @@ static void from_half(int64_t n, const uint16_t *x, float *y)
 {
     for (int64_t i = 0; i < n; i++) {
         const int exponent = x[i] >> 10 & 31, fraction = x[i] & 0x3ff;
-        const double size = exponent == 31 ? fraction ? NAN : INFINITY : exponent ? ldexp(1024 + fraction, exponent - 25) : ldexp(fraction, -24);
+        const double size = exponent == 31 ? fraction ? NAN : INFINITY
+            : exponent                     ? ldexp(1024 + fraction, exponent - 25)
+                                           : ldexp(fraction, -24);
         y[i] = (float)copysign(size, x[i] & 0x8000 ? -1 : 1);
     }
 }
 
 const struct ts_elementwise_kernels ts_elementwise_naive = {
-    .leaky = leaky, .leaky_backward = leaky_backward, .tanh = tanh_forward, .tanh_backward = tanh_backward, .selu = selu,
-    .selu_backward = selu_backward, .asinh = asinh_scaled, .from_half = from_half, .add = add, .scale = scale, .add_leaky = add_leaky, .add_leaky_backward = add_leaky_backward,
-    .broadcast = broadcast, .copy = copy, .gru = gru, .gru_backward = gru_backward,
+    .leaky = leaky,
+    .leaky_backward = leaky_backward,
+    .tanh = tanh_forward,
+    .tanh_backward = tanh_backward,
+    .selu = selu,
+    .selu_backward = selu_backward,
+    .asinh = asinh_scaled,
+    .from_half = from_half,
+    .add = add,
+    .scale = scale,
+    .add_leaky = add_leaky,
+    .add_leaky_backward = add_leaky_backward,
+    .broadcast = broadcast,
+    .copy = copy,
+    .gru = gru,
+    .gru_backward = gru_backward,
 };

@@ -1,6 +1,6 @@
 /* Matrix products with the tiles of the convolutions: rows of A are the pixels, B is packed as the weights. */
 #include "tensor/gemm.h"
-#include "tensor/conv_plan.h"
+#include "tensor/conv/conv_internal.h"
 #include "tensor/threads.h"
 
 enum {
@@ -21,7 +21,8 @@ static void pack_b(bool tb, int n, int k, float alpha, const float *b, float *pa
 #pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
     for (int panel = 0; panel < panels; panel++)
         for (int part = 0; part < parts; part++) {
-            const int j0 = panel * 2 * lanes, width = conv_vectors(n, panel) * lanes, count = n - j0 < width ? n - j0 : width;
+            const int j0 = panel * 2 * lanes, width = conv_vectors(n, panel) * lanes,
+                      count = n - j0 < width ? n - j0 : width;
             int begin, end;
             conv_part(k, parts, part, &begin, &end);
             for (int i = begin; i < end; i++) {
@@ -55,11 +56,19 @@ static void run_block(const product *p, int row, int rows, int k0, int k1, int p
     for (int panel = panel0; panel < panel1; panel++) {
         const int j0 = panel * 2 * kernels->lanes, vectors = conv_vectors(p->n, panel);
         const ts_segment segment = {0, k0, k1 - k0};
-        ts_tile t = {.segment = &segment, .segments = 1, .a_stride = stride, .y_stride = p->n, .w = p->packed + (ptrdiff_t)j0 * p->k,
-                     .leak = 1, .channels = p->n - j0, .fetch = {p->packed, p->packed}, .add = k0 > 0 || p->beta != 0};
+        ts_tile t = {.segment = &segment,
+                     .segments = 1,
+                     .a_stride = stride,
+                     .y_stride = p->n,
+                     .w = p->packed + (ptrdiff_t)j0 * p->k,
+                     .leak = 1,
+                     .channels = p->n - j0,
+                     .fetch = {p->packed, p->packed},
+                     .add = k0 > 0 || p->beta != 0};
         if (k0 == 0 && p->scale)
             for (int r = 0; r < rows; r++)
-                for (int j = j0; j < p->n && j < j0 + 2 * kernels->lanes; j++) p->c[(ptrdiff_t)(row + r) * p->n + j] *= p->beta;
+                for (int j = j0; j < p->n && j < j0 + 2 * kernels->lanes; j++)
+                    p->c[(ptrdiff_t)(row + r) * p->n + j] *= p->beta;
         for (int r = 0; r < rows; r += kernels->pixels) {
             const int count = rows - r < kernels->pixels ? rows - r : kernels->pixels;
             for (int g = 0; g < 3; g++) {
@@ -77,7 +86,15 @@ void ts_gemm(bool ta, bool tb, int m, int n, int k, float alpha, const float *a,
     const int lanes = conv_lanes(), panels = conv_panels(n), units = (m + ROWS - 1) / ROWS;
     float *packed = ts_scratch(2, sizeof(float) * (size_t)k * (size_t)((n + lanes - 1) / lanes * lanes));
     pack_b(tb, n, k, alpha, b, packed);
-    const product p = {.ta = ta, .scale = beta != 0 && beta != 1, .m = m, .n = n, .k = k, .a = a, .packed = packed, .beta = beta, .c = c};
+    const product p = {.ta = ta,
+                       .scale = beta != 0 && beta != 1,
+                       .m = m,
+                       .n = n,
+                       .k = k,
+                       .a = a,
+                       .packed = packed,
+                       .beta = beta,
+                       .c = c};
     int groups = units < 8 ? (8 + units - 1) / units : 1;
     if (groups > panels) groups = panels;
 #pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads())
@@ -86,11 +103,13 @@ void ts_gemm(bool ta, bool tb, int m, int n, int k, float alpha, const float *a,
             int panel0, panel1;
             conv_part(panels, groups, g, &panel0, &panel1);
             const int row = i * ROWS, rows = m - row < ROWS ? m - row : ROWS;
-            for (int k0 = 0; k0 < k; k0 += DEPTH) run_block(&p, row, rows, k0, k - k0 < DEPTH ? k : k0 + DEPTH, panel0, panel1);
+            for (int k0 = 0; k0 < k; k0 += DEPTH)
+                run_block(&p, row, rows, k0, k - k0 < DEPTH ? k : k0 + DEPTH, panel0, panel1);
         }
 }
 
-void ts_gemm_naive(bool ta, bool tb, int m, int n, int k, float alpha, const float *a, const float *b, float beta, float *c)
+void ts_gemm_naive(bool ta, bool tb, int m, int n, int k, float alpha, const float *a, const float *b, float beta,
+                   float *c)
 {
     for (int i = 0; i < m; i++)
         for (int j = 0; j < n; j++) {

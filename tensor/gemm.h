@@ -5,5 +5,6 @@
 
 /* a: [m][k] (or [k][m] when ta), b: [k][n] (or [n][k] when tb), c: [m][n]; all contiguous. beta = 0 never reads c. */
 void ts_gemm(bool ta, bool tb, int m, int n, int k, float alpha, const float *a, const float *b, float beta, float *c);
-void ts_gemm_naive(bool ta, bool tb, int m, int n, int k, float alpha, const float *a, const float *b, float beta, float *c);
+void ts_gemm_naive(bool ta, bool tb, int m, int n, int k, float alpha, const float *a, const float *b, float beta,
+                   float *c);
 #endif

@@ -1,11 +1,11 @@
-#include "tensor/gru_parts.h"
+#include "tensor/gru_internal.h"
 #include "tensor/kernels/elementwise.h"
 #include "tensor/threads.h"
 #include <string.h>
 
 enum {
-    PART_PIXELS = 1024,        /* weight gradients: private sums for so many pixels at least, */
-    PARTS = 16                 /* and no more of them, by shape alone */
+    PART_PIXELS = 1024, /* weight gradients: private sums for so many pixels at least, */
+    PARTS = 16          /* and no more of them, by shape alone */
 };
 
 ts_conv ts_gru_input(const ts_gru *g) { return (ts_conv){1, 1, 1, g->ic, 3 * g->c, 1, 1, TS_PAD_ZERO, 0}; }
@@ -13,8 +13,14 @@ ts_conv ts_gru_hidden(const ts_gru *g) { return (ts_conv){1, 1, 1, g->c, 3 * g->
 
 static conv_plan gates_of(const ts_gru *g, int channels, const float *packed, const float *bias)
 {
-    return (conv_plan){.ic = g->bf16 ? conv_bf16_depth(channels) : channels, .channels = channels, .oc = 3 * g->c, .k = 1, .packed = packed, .bias = bias,
-                       .leak = 1, .bf16 = g->bf16};
+    return (conv_plan){.ic = g->bf16 ? conv_bf16_depth(channels) : channels,
+                       .channels = channels,
+                       .oc = 3 * g->c,
+                       .k = 1,
+                       .packed = packed,
+                       .bias = bias,
+                       .leak = 1,
+                       .bf16 = g->bf16};
 }
 
 /* y [count][3c] = the gates of x [count][channels] */
@@ -36,8 +42,8 @@ static void gates_forward(conv_plan p, const float *x, int count, float *y)
     conv_run_pixels(&p, 0, count, 0, conv_panels(p.oc));
 }
 
-void ts_gru_forward(const ts_gru *g, const float *x, const float *old, const float *ih_packed, const float *ih_bias, const float *hh_packed,
-                    const float *hh_bias, float *y, float *saved)
+void ts_gru_forward(const ts_gru *g, const float *x, const float *old, const float *ih_packed, const float *ih_bias,
+                    const float *hh_packed, const float *hh_bias, float *y, float *saved)
 {
     const struct ts_elementwise_kernels *k = ts_elementwise_k();
     const int gates = 3 * g->c;
@@ -45,17 +51,19 @@ void ts_gru_forward(const ts_gru *g, const float *x, const float *old, const flo
 #pragma omp parallel for schedule(dynamic, 4) num_threads(ts_threads())
     for (int64_t p = 0; p < g->pixels; p += GRU_BAND) {
         const int count = (int)(g->pixels - p < GRU_BAND ? g->pixels - p : GRU_BAND);
-        float *ih = ts_scratch(0, sizeof(float) * (size_t)(GRU_BAND * gates)), *hh = ts_scratch(1, sizeof(float) * (size_t)(GRU_BAND * gates));
+        float *ih = ts_scratch(0, sizeof(float) * (size_t)(GRU_BAND * gates)),
+              *hh = ts_scratch(1, sizeof(float) * (size_t)(GRU_BAND * gates));
         gates_forward(input, x + p * g->ic, count, ih);
         if (old) gates_forward(hidden, old + p * g->c, count, hh);
         /* A zero state leaves of the hidden gates their bias. */
-        k->gru(count, g->c, ih, old ? hh : hh_bias, old ? gates : 0, old ? old + p * g->c : NULL, y + p * g->c, saved ? saved + p * 4 * g->c : NULL);
+        k->gru(count, g->c, ih, old ? hh : hh_bias, old ? gates : 0, old ? old + p * g->c : NULL, y + p * g->c,
+               saved ? saved + p * 4 * g->c : NULL);
     }
 }
 
 /* y[p] (+)= the sum over runs of channels of a[p]: a band's data gradient. */
-static void product(const float *a, ptrdiff_t a_stride, const ts_segment *segment, int segments, int depth, const float *packed, int oc, float *y,
-                    bool add, int count)
+static void product(const float *a, ptrdiff_t a_stride, const ts_segment *segment, int segments, int depth,
+                    const float *packed, int oc, float *y, bool add, int count)
 {
     const struct ts_conv_kernels *k = ts_conv_k();
     const conv_plan plan = {.ic = depth, .oc = oc, .k = 1, .packed = packed, .leak = 1, .add = add};
@@ -65,15 +73,15 @@ static void product(const float *a, ptrdiff_t a_stride, const ts_segment *segmen
         t.segments = segments;
         t.a_stride = a_stride;
         for (int p = 0; p < count; p += k->pixels)
-            conv_run_tile(&t, conv_vectors(oc, panel), a + p * a_stride, y + (ptrdiff_t)p * oc + panel * 2 * k->lanes, count - p < k->pixels ? count - p : k->pixels,
-                          false);
+            conv_run_tile(&t, conv_vectors(oc, panel), a + p * a_stride, y + (ptrdiff_t)p * oc + panel * 2 * k->lanes,
+                          count - p < k->pixels ? count - p : k->pixels, false);
     }
 }
 
 static int padded(int channels) { return (channels + conv_lanes() - 1) / conv_lanes() * conv_lanes(); }
 
-/* Private sums of a part: [3c][padded ic], [3c][padded c], and in double [4c]. The 4c gradients of a pixel before the activations come as
- * n, z, r, n' (n' that of hh_n), so that both ih's and hh's three are neighbours. */
+/* Private sums of a part: [3c][padded ic], [3c][padded c], and in double [4c]. The 4c gradients of a pixel before the
+ * activations come as n, z, r, n' (n' that of hh_n), so that both ih's and hh's three are neighbours. */
 typedef struct sums {
     float *input, *hidden;
     double *bias;
@@ -99,19 +107,29 @@ static void add_products(const float *d, int c, const float *b, int channels, in
         for (int i = 0; i < tiles; i++) {
             int begin, end;
             conv_part(3 * c, tiles, i, &begin, &end);
-            const ts_sum t = {.a = d + begin, .b = b + panel * 2 * k->lanes, .a_row = &zero, .b_row = &zero, .rows = 1, .count = count, .a_stride = 4 * c,
-                              .b_stride = b_stride, .c = sum + (ptrdiff_t)begin * width + panel * 2 * k->lanes, .c_stride = width, .fetch = (const char *)d};
+            const ts_sum t = {.a = d + begin,
+                              .b = b + panel * 2 * k->lanes,
+                              .a_row = &zero,
+                              .b_row = &zero,
+                              .rows = 1,
+                              .count = count,
+                              .a_stride = 4 * c,
+                              .b_stride = b_stride,
+                              .c = sum + (ptrdiff_t)begin * width + panel * 2 * k->lanes,
+                              .c_stride = width,
+                              .fetch = (const char *)d};
             k->sum[conv_vectors(channels, panel) - 1][end - begin](&t);
         }
 }
 
-static void run_band(const ts_gru *g, int64_t p, int count, const float *x, const float *old, const float *ih_packed, const float *hh_packed,
-                     const float *saved, const float *dy, const ts_gru_gradients *to, sums s)
+static void run_band(const ts_gru *g, int64_t p, int count, const float *x, const float *old, const float *ih_packed,
+                     const float *hh_packed, const float *saved, const float *dy, const ts_gru_gradients *to, sums s)
 {
     const int c = g->c;
     const ts_segment input[2] = {{c, 0, 2 * c}, {0, 2 * c, c}}, hidden = {c, 0, 3 * c};
     float *d = ts_scratch(0, sizeof(float) * (size_t)(GRU_BAND * 4 * c)), *dold = to->dold ? to->dold + p * c : NULL;
-    ts_elementwise_k()->gru_backward(count, c, saved + p * 4 * c, old ? old + p * c : NULL, dy + p * c, d, dold, to->dold_add, s.bias);
+    ts_elementwise_k()->gru_backward(count, c, saved + p * 4 * c, old ? old + p * c : NULL, dy + p * c, d, dold,
+                                     to->dold_add, s.bias);
     if (ts_gru_backward_bf16(g)) {
         const gru_rounded r = gru_round(g, d, count);
         if (dold) gru_matrix_product(&r, true, hh_packed, c, dold, true);
@@ -147,8 +165,8 @@ static void reduce_bias(const double *first, ptrdiff_t part, int parts, int c, c
     }
 }
 
-void ts_gru_backward(const ts_gru *g, const float *x, const float *old, const float *ih_packed, const float *hh_packed, const float *saved,
-                     const float *dy, const ts_gru_gradients *to)
+void ts_gru_backward(const ts_gru *g, const float *x, const float *old, const float *ih_packed, const float *hh_packed,
+                     const float *saved, const float *dy, const ts_gru_gradients *to)
 {
     const int c = g->c, gates = 3 * c;
     const int64_t most = g->pixels / PART_PIXELS;
@@ -166,13 +184,18 @@ void ts_gru_backward(const ts_gru *g, const float *x, const float *old, const fl
             const sums s = {weights, weights + input, to->ih_bias || to->hh_bias ? own : NULL};
             const int64_t begin = g->pixels * part / parts, end = g->pixels * (part + 1) / parts;
             for (int64_t p = begin; p < end; p += GRU_BAND)
-                run_band(g, p, (int)(end - p < GRU_BAND ? end - p : GRU_BAND), x, old, ih_packed, hh_packed, saved, dy, to, s);
+                run_band(g, p, (int)(end - p < GRU_BAND ? end - p : GRU_BAND), x, old, ih_packed, hh_packed, saved, dy,
+                         to, s);
         }
 #pragma omp for schedule(static)
         for (int m = 0; m < gates; m++) {
             const float *first = (const float *)(const void *)(memory + doubles);
-            if (to->ih_weight) reduce_row(first + (ptrdiff_t)m * padded(g->ic), 2 * size, parts, g->ic, to->ih_weight + (ptrdiff_t)((m + 2 * c) % gates) * g->ic);
-            if (to->hh_weight && old) reduce_row(first + input + (ptrdiff_t)m * padded(c), 2 * size, parts, c, to->hh_weight + (ptrdiff_t)m * c);
+            if (to->ih_weight)
+                reduce_row(first + (ptrdiff_t)m * padded(g->ic), 2 * size, parts, g->ic,
+                           to->ih_weight + (ptrdiff_t)((m + 2 * c) % gates) * g->ic);
+            if (to->hh_weight && old)
+                reduce_row(first + input + (ptrdiff_t)m * padded(c), 2 * size, parts, c,
+                           to->hh_weight + (ptrdiff_t)m * c);
         }
     }
     if (to->ih_bias || to->hh_bias) reduce_bias(memory, size, parts, c, to);

@@ -11,8 +11,8 @@ static double gate(const float *weight, const float *bias, int row, int channels
     return sum;
 }
 
-void ts_gru_forward_naive(const ts_gru *g, const float *x, const float *old, const float *ih_weight, const float *ih_bias, const float *hh_weight,
-                          const float *hh_bias, float *y, float *saved)
+void ts_gru_forward_naive(const ts_gru *g, const float *x, const float *old, const float *ih_weight,
+                          const float *ih_bias, const float *hh_weight, const float *hh_bias, float *y, float *saved)
 {
     const int c = g->c;
     for (int64_t p = 0; p < g->pixels; p++)
@@ -20,7 +20,8 @@ void ts_gru_forward_naive(const ts_gru *g, const float *x, const float *old, con
             const float *a = x + p * g->ic, *b = old ? old + p * c : NULL;
             const double z = sigmoid(gate(ih_weight, ih_bias, i, g->ic, a) + gate(hh_weight, hh_bias, i, c, b));
             const double r = sigmoid(gate(ih_weight, ih_bias, c + i, g->ic, a) + gate(hh_weight, hh_bias, c + i, c, b));
-            const double hidden = gate(hh_weight, hh_bias, 2 * c + i, c, b), n = tanh(gate(ih_weight, ih_bias, 2 * c + i, g->ic, a) + r * hidden);
+            const double hidden = gate(hh_weight, hh_bias, 2 * c + i, c, b),
+                         n = tanh(gate(ih_weight, ih_bias, 2 * c + i, g->ic, a) + r * hidden);
             y[p * c + i] = (float)((b ? (1 - z) * b[i] : 0) + z * n);
             if (!saved) continue;
             float *s = saved + p * 4 * c + i;
@@ -34,7 +35,8 @@ void ts_gru_forward_naive(const ts_gru *g, const float *x, const float *old, con
 static void put(float *to, double value, bool add) { *to = (float)(add ? *to + value : value); }
 
 /* Gradient d of one row of a product: to its weights, its bias, and through its weights to the input's gradient. */
-static void spread(double d, int row, int channels, const float *weight, const float *x, float *dweight, float *dbias, double *dx)
+static void spread(double d, int row, int channels, const float *weight, const float *x, float *dweight, float *dbias,
+                   double *dx)
 {
     if (dbias) dbias[row] += (float)d;
     for (int i = 0; i < channels; i++) {
@@ -43,8 +45,8 @@ static void spread(double d, int row, int channels, const float *weight, const f
     }
 }
 
-void ts_gru_backward_naive(const ts_gru *g, const float *x, const float *old, const float *ih_weight, const float *hh_weight, const float *saved,
-                           const float *dy, const ts_gru_gradients *to)
+void ts_gru_backward_naive(const ts_gru *g, const float *x, const float *old, const float *ih_weight,
+                           const float *hh_weight, const float *saved, const float *dy, const ts_gru_gradients *to)
 {
     enum { CHANNELS_MAX = 1024 };
     const int c = g->c;

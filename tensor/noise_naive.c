@@ -1,4 +1,5 @@
-/* The naive twin of tensor/kernels/noise.c: a point at a time. The same operations in the same order, since the bytes must be the same. */
+/* The naive twin of tensor/kernels/noise.c: a point at a time. The same operations in the same order, since the bytes
+ * must be the same. */
 #include "tensor/kernels/noise.h"
 #include "tensor/rng.h"
 #include <math.h>
@@ -15,8 +16,8 @@ static float gradient(int32_t x, int32_t y, uint32_t seed, float dx, float dy)
 
 static float fade(float t) { return t * t * t * (t * (t * 6 - 15) + 10); }
 
-static void octave(int n, const float *u, const float *v, float frequency, float shift_u, float shift_v, uint32_t seed, bool folded,
-                   float amplitude, float *out)
+static void octave(int n, const float *u, const float *v, float frequency, float shift_u, float shift_v, uint32_t seed,
+                   bool folded, float amplitude, float *out)
 {
     for (int i = 0; i < n; i++) {
         const float px = u[i] * frequency + shift_u, py = v[i] * frequency + shift_v;
@@ -33,7 +34,8 @@ static void octave(int n, const float *u, const float *v, float frequency, float
 
 static float unit(uint32_t h) { return (float)(h >> 8) * 0x1p-24f; }
 
-static void cell(int n, const float *u, const float *v, ts_noise_cells c, float *near, float *edge, float *id, float *x_out, float *y_out)
+static void cell(int n, const float *u, const float *v, ts_noise_cells c, float *near, float *edge, float *id,
+                 float *x_out, float *y_out)
 {
     for (int i = 0; i < n; i++) {
         const float x = u[i] * c.frequency, y = v[i] * c.frequency;

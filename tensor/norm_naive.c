@@ -15,7 +15,8 @@ static void moments(int64_t pixels, int c, const float *x, double *mean, double 
     }
 }
 
-static void normalise(int64_t pixels, int c, const float *x, const float *high, const float *low, const float *scale, float *y)
+static void normalise(int64_t pixels, int c, const float *x, const float *high, const float *low, const float *scale,
+                      float *y)
 {
     for (int64_t i = 0; i < pixels * c; i++) y[i] = (float)(((double)x[i] - high[i % c] - low[i % c]) * scale[i % c]);
 }
@@ -28,7 +29,8 @@ static void gradient_sums(int64_t pixels, int c, const float *y, const float *dy
     }
 }
 
-static void gradient(int64_t pixels, int c, const float *y, const float *dy, const float *a, const float *b, const float *scale, float *dx, bool accumulate)
+static void gradient(int64_t pixels, int c, const float *y, const float *dy, const float *a, const float *b,
+                     const float *scale, float *dx, bool accumulate)
 {
     for (int64_t i = 0; i < pixels * c; i++) {
         double d = scale[i % c] * ((double)dy[i] - a[i % c] - (double)b[i % c] * y[i]);
@@ -37,5 +39,9 @@ static void gradient(int64_t pixels, int c, const float *y, const float *dy, con
 }
 
 const struct ts_norm_kernels ts_norm_naive = {
-    .sums = sums, .moments = moments, .normalise = normalise, .gradient_sums = gradient_sums, .gradient = gradient,
+    .sums = sums,
+    .moments = moments,
+    .normalise = normalise,
+    .gradient_sums = gradient_sums,
+    .gradient = gradient,
 };

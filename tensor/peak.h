@@ -2,7 +2,7 @@
 #ifndef TS_PEAK_H
 #define TS_PEAK_H
 
-/* FLOP/s of independent FMAs in registers on all threads in use, now: the best of a few short runs (about 20 ms in all), since a peak is what the
- * machine can do and not what its neighbours leave at this moment. */
+/* FLOP/s of independent FMAs in registers on all threads in use, now: the best of a few short runs (about 20 ms in
+ * all), since a peak is what the machine can do and not what its neighbours leave at this moment. */
 double ts_fma_peak(void);
 #endif

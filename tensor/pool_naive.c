@@ -18,7 +18,8 @@ static void max(int w, int c, const float *row0, const float *row1, float *y)
     for (int i = 0; i < w * c; i++) winner(c, i, row0, row1, y + i);
 }
 
-static void max_backward(int w, int c, const float *row0, const float *row1, const float *dy, float *drow0, float *drow1, bool accumulate)
+static void max_backward(int w, int c, const float *row0, const float *row1, const float *dy, float *drow0,
+                         float *drow1, bool accumulate)
 {
     for (int i = 0; i < w * c; i++) {
         float best, *d = i % c + i / c * 2 * c + drow0, *e = i % c + i / c * 2 * c + drow1;

@@ -49,7 +49,8 @@ static ts_taps make_filter(ts_arena *arena, int in, int out, double scale, doubl
     if (!t.weight) return t;
     for (int j = 0, at = 0; j < out; j++) {
         const double centre = (j + 0.5) * step - 0.5;
-        const int lo = (int)floor(centre - radius) + 1, hi = (int)ceil(centre + radius) - 1; /* where there is a weight */
+        const int lo = (int)floor(centre - radius) + 1,
+                  hi = (int)ceil(centre + radius) - 1; /* where there is a weight */
         const int from = lo < 0 ? 0 : lo, to = hi > in - 1 ? in - 1 : hi;
         double sum = 0;
         for (int i = lo; i <= hi; i++) sum += weight(fabs(i - centre) / scale);
@@ -68,9 +69,15 @@ static ts_taps make_filter(ts_arena *arena, int in, int out, double scale, doubl
     return t;
 }
 
-ts_taps ts_taps_triangle(ts_arena *arena, int in, int out) { return make_filter(arena, in, out, in > out ? (double)in / out : 1, 1, triangle); }
+ts_taps ts_taps_triangle(ts_arena *arena, int in, int out)
+{
+    return make_filter(arena, in, out, in > out ? (double)in / out : 1, 1, triangle);
+}
 
-ts_taps ts_taps_smooth(ts_arena *arena, int in, int out) { return out > in ? make_filter(arena, in, out, 1, 2, cubic) : ts_taps_triangle(arena, in, out); }
+ts_taps ts_taps_smooth(ts_arena *arena, int in, int out)
+{
+    return out > in ? make_filter(arena, in, out, 1, 2, cubic) : ts_taps_triangle(arena, in, out);
+}
 
 ts_taps ts_taps_transpose(ts_arena *arena, const ts_taps *t)
 {
@@ -97,7 +104,7 @@ void ts_resample(int n, int c, const ts_taps *rows, const ts_taps *columns, cons
 {
     const struct ts_resample_kernels *k = ts_resample_k();
     const int64_t row = (int64_t)columns->in * c, image = row * rows->in, lines = (int64_t)n * rows->out;
-    #pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
     for (int64_t line = 0; line < lines; line++) {
         const int j = (int)(line % rows->out), at = rows->offset[j], count = rows->offset[j + 1] - at;
         const float *from = x + line / rows->out * image + rows->first[j] * row;
@@ -106,6 +113,7 @@ void ts_resample(int n, int c, const ts_taps *rows, const ts_taps *columns, cons
             k->rows(row, count, rows->weight + at, from, row, mixed);
             from = mixed;
         }
-        k->pixels(columns->out, c, columns->first, columns->offset, columns->weight, from, y + line * columns->out * c, accumulate);
+        k->pixels(columns->out, c, columns->first, columns->offset, columns->weight, from, y + line * columns->out * c,
+                  accumulate);
     }
 }

@@ -10,12 +10,14 @@ static void rows(int64_t n, int count, const float *weight, const float *x, int6
     }
 }
 
-static void pixels(int w, int c, const int *first, const int *offset, const float *weight, const float *x, float *y, bool accumulate)
+static void pixels(int w, int c, const int *first, const int *offset, const float *weight, const float *x, float *y,
+                   bool accumulate)
 {
     for (int j = 0; j < w; j++)
         for (int i = 0; i < c; i++) {
             double s = accumulate ? y[j * c + i] : 0;
-            for (int k = offset[j]; k < offset[j + 1]; k++) s += (double)weight[k] * x[(first[j] + k - offset[j]) * c + i];
+            for (int k = offset[j]; k < offset[j + 1]; k++)
+                s += (double)weight[k] * x[(first[j] + k - offset[j]) * c + i];
             y[j * c + i] = (float)s;
         }
 }

@@ -5,8 +5,10 @@ ts_code ts_resize(ts_tensor *dst, const ts_tensor *src, ts_arena *arena, ts_stat
 {
     const ts_shape d = dst->shape, s = src->shape;
     if (d.n != s.n || d.c != s.c)
-        return ts_fail(st, TS_INVALID, "resize: %d images of %d channels into %d images of %d channels", s.n, s.c, d.n, d.c);
-    if (!ts_contiguous(dst) || !ts_contiguous(src)) return ts_fail(st, TS_INVALID, "resize: both images must be contiguous");
+        return ts_fail(st, TS_INVALID, "resize: %d images of %d channels into %d images of %d channels", s.n, s.c, d.n,
+                       d.c);
+    if (!ts_contiguous(dst) || !ts_contiguous(src))
+        return ts_fail(st, TS_INVALID, "resize: both images must be contiguous");
     const ts_mark mark = ts_arena_mark(arena);
     const ts_taps rows = ts_taps_triangle(arena, s.h, d.h), columns = ts_taps_triangle(arena, s.w, d.w);
     ts_code code = TS_OK;

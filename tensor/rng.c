@@ -23,7 +23,8 @@ static void philox(const uint32_t key[2], const uint32_t counter[4], uint32_t ou
 
 ts_rng ts_rng_make(uint64_t seed, uint32_t stream, uint64_t index)
 {
-    ts_rng r = {.key = {(uint32_t)seed, (uint32_t)(seed >> 32)}, .counter = {0, stream, (uint32_t)index, (uint32_t)(index >> 32)}};
+    ts_rng r = {.key = {(uint32_t)seed, (uint32_t)(seed >> 32)},
+                .counter = {0, stream, (uint32_t)index, (uint32_t)(index >> 32)}};
     return r;
 }
 
@@ -56,7 +57,8 @@ float ts_rng_normal(ts_rng *r)
 void ts_rng_normals(ts_rng *r, int64_t n, float *out)
 {
     int64_t i = 0;
-    for (; i < n && r->left > 0; i++) out[i] = ts_rng_normal(r); /* to the next block, or never there where one number of a block is left */
+    for (; i < n && r->left > 0; i++)
+        out[i] = ts_rng_normal(r); /* to the next block, or never there where one number of a block is left */
     const int64_t blocks = (n - i) / 2;
     ts_noise_k()->normal(blocks, r->key, r->counter, out + i);
     r->counter[0] += (uint32_t)blocks;

@@ -26,9 +26,10 @@ enum {
 };
 
 uint32_t ts_rng_u32(ts_rng *r);
-float ts_rng_uniform(ts_rng *r);                    /* [0, 1), 24 bits */
-float ts_rng_range(ts_rng *r, float lo, float hi);  /* [lo, hi) */
-int ts_rng_int(ts_rng *r, int n);                   /* 0 .. n-1, n >= 1, unbiased to 2^-32 */
-float ts_rng_normal(ts_rng *r);                     /* mean 0, standard deviation 1 (Box-Muller in double) */
-void ts_rng_normals(ts_rng *r, int64_t n, float *out); /* the next n of them, within 3e-4 and several times as fast; the same bytes on every instruction set */
+float ts_rng_uniform(ts_rng *r);                       /* [0, 1), 24 bits */
+float ts_rng_range(ts_rng *r, float lo, float hi);     /* [lo, hi) */
+int ts_rng_int(ts_rng *r, int n);                      /* 0 .. n-1, n >= 1, unbiased to 2^-32 */
+float ts_rng_normal(ts_rng *r);                        /* mean 0, standard deviation 1 (Box-Muller in double) */
+void ts_rng_normals(ts_rng *r, int64_t n, float *out); /* the next n of them, within 3e-4 and several times as fast; the
+                                                          same bytes on every instruction set */
 #endif

@@ -60,6 +60,7 @@ void ts_copy(ts_tensor *dst, const ts_tensor *src)
         for (int y = 0; y < s.h; y++) {
             float *d = dst->data + n * dst->stride_n + y * dst->stride_h;
             const float *p = src->data + n * src->stride_n + y * src->stride_h;
-            for (int x = 0; x < s.w; x++, d += dst->stride_w, p += src->stride_w) memcpy(d, p, (size_t)s.c * sizeof(float));
+            for (int x = 0; x < s.w; x++, d += dst->stride_w, p += src->stride_w)
+                memcpy(d, p, (size_t)s.c * sizeof(float));
         }
 }

@@ -16,8 +16,8 @@ typedef struct ts_tensor {
     int64_t stride_n, stride_h, stride_w; /* in floats; the channel stride is 1 */
 } ts_tensor;
 
-int64_t ts_count(ts_shape s);              /* number of values */
-int64_t ts_pixels(ts_shape s);             /* n * h * w */
+int64_t ts_count(ts_shape s);  /* number of values */
+int64_t ts_pixels(ts_shape s); /* n * h * w */
 bool ts_same(ts_shape a, ts_shape b);
 bool ts_contiguous(const ts_tensor *t);
 
@@ -27,7 +27,8 @@ ts_tensor ts_view(float *data, ts_shape shape);
 /* Contiguous, from the arena, uninitialised (data is NULL when there is no memory or a dimension is < 1). */
 ts_tensor ts_new(ts_arena *arena, ts_shape shape);
 
-/* Views without a copy: images n0 .. n0+n-1; channels c0 .. c0+c-1; the rectangle of h rows and w columns from (y, x). */
+/* Views without a copy: images n0 .. n0+n-1; channels c0 .. c0+c-1; the rectangle of h rows and w columns from (y, x).
+ */
 ts_tensor ts_images(const ts_tensor *t, int n0, int n);
 ts_tensor ts_channels(const ts_tensor *t, int c0, int c);
 ts_tensor ts_window(const ts_tensor *t, int y, int x, int h, int w);

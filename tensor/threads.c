@@ -1,5 +1,5 @@
 #include "tensor/threads.h"
-#include "tensor/block.h"
+#include "tensor/memory.h"
 #include <omp.h>
 #include <pthread.h>
 #include <sched.h>
@@ -75,7 +75,8 @@ int ts_threads_allowed(void)
     int n = 1;
     cpu_set_t set;
     if (sched_getaffinity(0, sizeof set, &set) == 0) n = CPU_COUNT(&set);
-    const int root = quota_in("/sys/fs/cgroup/cpu.max", "/sys/fs/cgroup/cpu/cpu.cfs_quota_us", "/sys/fs/cgroup/cpu/cpu.cfs_period_us");
+    const int root = quota_in("/sys/fs/cgroup/cpu.max", "/sys/fs/cgroup/cpu/cpu.cfs_quota_us",
+                              "/sys/fs/cgroup/cpu/cpu.cfs_period_us");
     const int self = quota_of_self();
     if (root && root < n) n = root;
     if (self && self < n) n = self;
@@ -154,7 +155,7 @@ void *ts_scratch(int slot, size_t bytes)
 
 void ts_scratch_level(void)
 {
-    #pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads())
     {
         scratch *s = own_scratch();
         for (int i = 0; i < TS_SCRATCH_SLOTS; i++) grow(s, i, atomic_load(&most[i]));

@@ -8,21 +8,23 @@
 void ts_threads_set(int n);
 int ts_threads_allowed(void); /* what 0 stands for */
 
-/* For loops that the calling thread begins: n threads whatever the process uses, n >= 1, or 0 for the process's again. Returns what it was. */
+/* For loops that the calling thread begins: n threads whatever the process uses, n >= 1, or 0 for the process's again.
+ * Returns what it was. */
 int ts_threads_own(int n);
 int ts_threads(void); /* of the calling thread's loops */
 
-/* Binds each of the threads in use to a CPU of its own, in the order of the process's affinity mask, so that times do not depend on where the system
- * moves them. False, with nothing changed, when there are fewer CPUs than threads. Call after ts_threads_set. */
+/* Binds each of the threads in use to a CPU of its own, in the order of the process's affinity mask, so that times do
+ * not depend on where the system moves them. False, with nothing changed, when there are fewer CPUs than threads. Call
+ * after ts_threads_set. */
 bool ts_threads_pin(void);
 
-/* At least bytes of 64-byte aligned memory that belong to the calling thread and slot (0 .. TS_SCRATCH_SLOTS-1) until the
- * next call with that slot on that thread. Grows only, never shrinks, so a repeated workload stops allocating. Never NULL:
- * when memory is out it prints nothing and aborts, since no kernel can go on. */
+/* At least bytes of 64-byte aligned memory that belong to the calling thread and slot (0 .. TS_SCRATCH_SLOTS-1) until
+ * the next call with that slot on that thread. Grows only, never shrinks, so a repeated workload stops allocating.
+ * Never NULL: when memory is out it prints nothing and aborts, since no kernel can go on. */
 enum { TS_SCRATCH_SLOTS = 4 };
 void *ts_scratch(int slot, size_t bytes);
 
-/* Between steps, while no scratch is in use: every thread grows its slots to the largest size that any thread has asked for.
- * Under a dynamic schedule a thread may meet its largest task late; after this it finds the memory there. */
+/* Between steps, while no scratch is in use: every thread grows its slots to the largest size that any thread has asked
+ * for. Under a dynamic schedule a thread may meet its largest task late; after this it finds the memory there. */
 void ts_scratch_level(void);
 #endif

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Every test: the C runner, then each tests/cli_*.sh. Prints a line a test and "N passed, N failed" last.
+# Every test: the C runner, then each script of tests/cli. Prints a line a test and "N passed, N failed" last.
 # Environment: BUILD, TESTDATA, FIXTURES.
 set -u
 : "${BUILD:=build}" "${TESTDATA:=../shared/testdata}" "${FIXTURES:=../shared/fixtures}"
@@ -14,7 +14,8 @@ cat "$results.part" | tee -a "$results"
 # A runner that died says nothing of the tests it did not reach.
 if [ $code -ne 0 ] && ! grep -q '^FAIL ' "$results.part"; then echo "FAIL lgd-test: exit status $code" | tee -a "$results"; fi
 rm -f "$results.part"
-for script in tests/cli_*.sh; do
+for script in tests/cli/*.sh; do
+    case $script in */lib*.sh) continue ;; esac
     sh "$script" >"$results.part" 2>&1
     code=$?
     cat "$results.part" | tee -a "$results"

@@ -93,10 +93,7 @@ const char *test_folder(void)
     return folder;
 }
 
-static int by_name(const void *a, const void *b)
-{
-    return strcmp(*(const char *const *)a, *(const char *const *)b);
-}
+static int by_name(const void *a, const void *b) { return strcmp(*(const char *const *)a, *(const char *const *)b); }
 
 /* 0 ok, 1 failed, 2 skipped */
 static int run(int i)
@@ -123,8 +120,11 @@ static int run(int i)
     waitpid(child, &status, 0);
     const int failed_exit = !(WIFEXITED(status) && WEXITSTATUS(status) == 0);
     if (text[0] == 'F') printf("FAIL %s: %s\n", tests[i].name, text + 1);
-    else if (WIFSIGNALED(status)) printf("FAIL %s: killed by signal %d (%s)\n", tests[i].name, WTERMSIG(status), strsignal(WTERMSIG(status)));
-    else if (failed_exit || (text[0] != 'O' && text[0] != 'S')) printf("FAIL %s: ended with status %d without a report\n", tests[i].name, WIFEXITED(status) ? WEXITSTATUS(status) : -1);
+    else if (WIFSIGNALED(status))
+        printf("FAIL %s: killed by signal %d (%s)\n", tests[i].name, WTERMSIG(status), strsignal(WTERMSIG(status)));
+    else if (failed_exit || (text[0] != 'O' && text[0] != 'S'))
+        printf("FAIL %s: ended with status %d without a report\n", tests[i].name,
+               WIFEXITED(status) ? WEXITSTATUS(status) : -1);
     else if (text[0] == 'S') printf("skip %s: %s\n", tests[i].name, text + 1);
     else printf("ok %s\n", tests[i].name);
     fflush(stdout);

@@ -1,8 +1,9 @@
-/* The run's state on disk: checkpoint.safetensors holds the parameters, Adam's moments and the moving average as whole blocks (padding
- * included, so that they come back bit by bit), and in its metadata the counters and the configuration. */
-#include "nn/weights.h"
+/* The run's state on disk: checkpoint.safetensors holds the parameters, Adam's moments and the moving average as whole
+ * blocks (padding included, so that they come back bit by bit), and in its metadata the counters and the configuration.
+ */
+#include "nn/weights/weights.h"
 #include "data/ini.h"
-#include "train/parts.h"
+#include "train/trainer_internal.h"
 #include <errno.h>
 #include <inttypes.h>
 #include <math.h>
@@ -18,7 +19,8 @@ static bool all_finite(const float *x, size_t n)
     return fine;
 }
 
-/* The configuration without neutral keys, so that weights do not differ with the folder or the threads. Freed by the caller. */
+/* The configuration without neutral keys, so that weights do not differ with the folder or the threads. Freed by the
+ * caller. */
 static char *config_text(const tr_config *c, ts_status *st)
 {
     char *text = NULL;
@@ -53,7 +55,8 @@ static int blocks(const tr_trainer *t, nn_block out[4])
     const float *const data[] = {t->model->value, t->adam.m, t->adam.v, t->adam.ema};
     int n = 0;
     for (int i = 0; i < 4; i++)
-        if (data[i]) out[n++] = (nn_block){.name = name[i], .rank = 1, .dim = {(int64_t)t->model->count}, .data = data[i]};
+        if (data[i])
+            out[n++] = (nn_block){.name = name[i], .rank = 1, .dim = {(int64_t)t->model->count}, .data = data[i]};
     return n;
 }
 
@@ -64,7 +67,8 @@ ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
     const int n = blocks(t, block);
     for (int i = 0; i < n; i++)
         if (!all_finite(block[i].data, t->model->count))
-            return ts_fail(st, TS_NUMERIC, "%s are not finite after step %" PRId64 ", the checkpoint before is kept", block[i].name, t->step);
+            return ts_fail(st, TS_NUMERIC, "%s are not finite after step %" PRId64 ", the checkpoint before is kept",
+                           block[i].name, t->step);
     if (tr_log_flush(t, st) != TS_OK || tr_save_weights(t, "last.safetensors", st) != TS_OK) return st->code;
     char *text = config_text(&t->config, st);
     if (!text) return st->code;
@@ -76,8 +80,15 @@ ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
     snprintf(number[4], sizeof number[4], "%.17g", t->best);
     snprintf(number[5], sizeof number[5], "%" PRId64, t->best_step);
     snprintf(number[6], sizeof number[6], "%.17g", t->usual_norm);
-    const nn_meta meta[] = {{"format", format_name},         {"step", number[0]}, {"adam_step", number[1]}, {"skipped", number[2]},
-                            {"skipped_in_a_row", number[3]}, {"best", number[4]}, {"best_step", number[5]}, {"usual_norm", number[6]}, {"config", text}};
+    const nn_meta meta[] = {{"format", format_name},
+                            {"step", number[0]},
+                            {"adam_step", number[1]},
+                            {"skipped", number[2]},
+                            {"skipped_in_a_row", number[3]},
+                            {"best", number[4]},
+                            {"best_step", number[5]},
+                            {"usual_norm", number[6]},
+                            {"config", text}};
     const ts_code code = nn_safetensors_write(path, block, n, meta, (int)(sizeof meta / sizeof *meta), st);
     free(text);
     return code;
@@ -89,7 +100,8 @@ static ts_code read_count(const nn_file *file, const char *path, const char *key
     char *end = NULL;
     errno = 0;
     const long long v = text ? strtoll(text, &end, 10) : -1;
-    if (!text || end == text || *end || errno || v < 0) return ts_fail(st, TS_FORMAT, "%s: %s is missing or no count", path, key);
+    if (!text || end == text || *end || errno || v < 0)
+        return ts_fail(st, TS_FORMAT, "%s: %s is missing or no count", path, key);
     *value = v;
     return TS_OK;
 }
@@ -116,14 +128,18 @@ static ts_code restore(tr_trainer *t, const nn_file *file, const char *path, ts_
     const int64_t dim[1] = {(int64_t)t->model->count};
     int64_t in_a_row = 0;
     nn_block block[4];
-    if (!format || strcmp(format, format_name) != 0) return ts_fail(st, TS_FORMAT, "%s: is not a checkpoint of lgd-train", path);
+    if (!format || strcmp(format, format_name) != 0)
+        return ts_fail(st, TS_FORMAT, "%s: is not a checkpoint of lgd-train", path);
     if (check_config(t, file, path, st) != TS_OK) return st->code;
-    if (read_count(file, path, "step", &t->step, st) != TS_OK || read_count(file, path, "adam_step", &t->adam.step, st) != TS_OK ||
-        read_count(file, path, "skipped", &t->skipped, st) != TS_OK || read_count(file, path, "skipped_in_a_row", &in_a_row, st) != TS_OK ||
+    if (read_count(file, path, "step", &t->step, st) != TS_OK ||
+        read_count(file, path, "adam_step", &t->adam.step, st) != TS_OK ||
+        read_count(file, path, "skipped", &t->skipped, st) != TS_OK ||
+        read_count(file, path, "skipped_in_a_row", &in_a_row, st) != TS_OK ||
         read_count(file, path, "best_step", &t->best_step, st) != TS_OK)
         return st->code;
     if (!best || !usual) return ts_fail(st, TS_FORMAT, "%s: %s is missing", path, best ? "usual_norm" : "best");
-    if (t->step > tr_total(&t->config)) return ts_fail(st, TS_FORMAT, "%s: step %" PRId64 " is beyond the end of the run", path, t->step);
+    if (t->step > tr_total(&t->config))
+        return ts_fail(st, TS_FORMAT, "%s: step %" PRId64 " is beyond the end of the run", path, t->step);
     t->best = strtod(best, NULL);
     t->usual_norm = strtod(usual, NULL);
     t->in_a_row = (int)(in_a_row < 1000000 ? in_a_row : 1000000);
@@ -131,7 +147,8 @@ static ts_code restore(tr_trainer *t, const nn_file *file, const char *path, ts_
     for (int i = 0; i < n; i++) {
         float *to = (float *)(uintptr_t)block[i].data;
         if (nn_file_read(file, block[i].name, 1, dim, to, st) != TS_OK) return ts_context(st, "%s", path);
-        if (!all_finite(to, t->model->count)) return ts_fail(st, TS_NUMERIC, "%s: %s holds values that are not finite", path, block[i].name);
+        if (!all_finite(to, t->model->count))
+            return ts_fail(st, TS_NUMERIC, "%s: %s holds values that are not finite", path, block[i].name);
     }
     return TS_OK;
 }

@@ -92,12 +92,11 @@ static ts_code parse_families(const char *where, const char *text, uint64_t *mas
             int best = 0;
             for (int i = 1; i < count; i++)
                 if (distance(name, io_family_name(i)) < distance(name, io_family_name(best))) best = i;
-            return ts_fail(st, TS_INVALID, "%s: data.families: there is no family %s, did you mean %s?", where, name, io_family_name(best));
+            return ts_fail(st, TS_INVALID, "%s: data.families: there is no family %s, did you mean %s?", where, name,
+                           io_family_name(best));
         }
-        if (remove)
-            bits &= ~(UINT64_C(1) << f);
-        else
-            bits |= UINT64_C(1) << f;
+        if (remove) bits &= ~(UINT64_C(1) << f);
+        else bits |= UINT64_C(1) << f;
     }
     if (!bits) return ts_fail(st, TS_INVALID, "%s: data.families names no family that may be drawn", where);
     *mask = bits == all ? 0 : bits;
@@ -109,11 +108,13 @@ static ts_code bad_value(const char *where, const tr_key *k, const char *value, 
     switch (k->type) {
     case TR_INT:
     case TR_INT64:
-        return ts_fail(st, TS_INVALID, "%s: %s.%s must be an integer from %.0f to %.0f, not \"%.60s\"", where, k->section, k->key, k->lo, k->hi,
-                       value);
+        return ts_fail(st, TS_INVALID, "%s: %s.%s must be an integer from %.0f to %.0f, not \"%.60s\"", where,
+                       k->section, k->key, k->lo, k->hi, value);
     case TR_REAL:
-        return ts_fail(st, TS_INVALID, "%s: %s.%s must be a number from %g to %g, not \"%.60s\"", where, k->section, k->key, k->lo, k->hi, value);
-    case TR_BOOL: return ts_fail(st, TS_INVALID, "%s: %s.%s must be yes or no, not \"%.60s\"", where, k->section, k->key, value);
+        return ts_fail(st, TS_INVALID, "%s: %s.%s must be a number from %g to %g, not \"%.60s\"", where, k->section,
+                       k->key, k->lo, k->hi, value);
+    case TR_BOOL:
+        return ts_fail(st, TS_INVALID, "%s: %s.%s must be yes or no, not \"%.60s\"", where, k->section, k->key, value);
     default: break;
     }
     char names[256] = "";
@@ -121,15 +122,18 @@ static ts_code bad_value(const char *where, const tr_key *k, const char *value, 
         const size_t n = strlen(names);
         snprintf(names + n, sizeof names - n, "%s%s", i ? ", " : "", k->choice[i]);
     }
-    return ts_fail(st, TS_INVALID, "%s: %s.%s must be one of %s, not \"%.60s\"", where, k->section, k->key, names, value);
+    return ts_fail(st, TS_INVALID, "%s: %s.%s must be one of %s, not \"%.60s\"", where, k->section, k->key, names,
+                   value);
 }
 
 static ts_code set_text(char *to, const char *where, const tr_key *k, const char *value, ts_status *st)
 {
-    if (strlen(value) >= (size_t)k->hi) return ts_fail(st, TS_INVALID, "%s: %s.%s is longer than %.0f bytes", where, k->section, k->key, k->hi - 1);
+    if (strlen(value) >= (size_t)k->hi)
+        return ts_fail(st, TS_INVALID, "%s: %s.%s is longer than %.0f bytes", where, k->section, k->key, k->hi - 1);
     /* What an INI file could not say again must not get in by --set. */
     if (strpbrk(value, "\r\n") || strstr(value, " #") || strstr(value, " ;") || value[0] == '#' || value[0] == ';')
-        return ts_fail(st, TS_INVALID, "%s: %s.%s must not contain a line break or the start of a comment", where, k->section, k->key);
+        return ts_fail(st, TS_INVALID, "%s: %s.%s must not contain a line break or the start of a comment", where,
+                       k->section, k->key);
     strcpy(to, value);
     return TS_OK;
 }
@@ -143,10 +147,8 @@ static ts_code set_value(tr_config *c, const char *where, const tr_key *k, const
     case TR_INT:
     case TR_INT64:
         if (!parse_integer(value, &i) || (double)i < k->lo || (double)i > k->hi) return bad_value(where, k, value, st);
-        if (k->type == TR_INT)
-            *(int *)(void *)at = (int)i;
-        else
-            *(int64_t *)(void *)at = i;
+        if (k->type == TR_INT) *(int *)(void *)at = (int)i;
+        else *(int64_t *)(void *)at = i;
         return TS_OK;
     case TR_REAL:
         if (!parse_real(value, &r) || !(r >= k->lo && r <= k->hi)) return bad_value(where, k, value, st);
@@ -185,17 +187,21 @@ static ts_code unknown(const char *where, const char *section, const char *key, 
         const tr_key *k = &tr_keys[i];
         known |= !strcmp(k->section, section);
         /* The right key in the wrong section comes before a similar key. */
-        const int d = 2 * distance(key, k->key) + (strcmp(k->section, section) ? 1 + (distance(section, k->section) > 2) : 0);
+        const int d = 2 * distance(key, k->key) +
+            (strcmp(k->section, section) ? 1 + (distance(section, k->section) > 2) : 0);
         if (!near || d < least) near = k, least = d;
     }
-    return ts_fail(st, TS_INVALID, "%s: there is no %s %.60s%s%.60s, did you mean %s.%s? (lgd-train --help-config lists all keys)", where,
-                   known ? "key" : "section", section, known ? "." : " with a key ", key, near->section, near->key);
+    return ts_fail(
+        st, TS_INVALID, "%s: there is no %s %.60s%s%.60s, did you mean %s.%s? (lgd-train --help-config lists all keys)",
+        where, known ? "key" : "section", section, known ? "." : " with a key ", key, near->section, near->key);
 }
 
-ts_code tr_config_set(tr_config *c, const char *where, const char *section, const char *key, const char *value, ts_status *st)
+ts_code tr_config_set(tr_config *c, const char *where, const char *section, const char *key, const char *value,
+                      ts_status *st)
 {
     for (int i = 0; i < tr_key_count; i++)
-        if (!strcmp(tr_keys[i].section, section) && !strcmp(tr_keys[i].key, key)) return set_value(c, where, &tr_keys[i], value, st);
+        if (!strcmp(tr_keys[i].section, section) && !strcmp(tr_keys[i].key, key))
+            return set_value(c, where, &tr_keys[i], value, st);
     return unknown(where, section, key, st);
 }
 
@@ -203,7 +209,8 @@ ts_code tr_config_set_assignment(tr_config *c, const char *assignment, ts_status
 {
     char section[64], key[64];
     const char *dot = strchr(assignment, '.'), *equals = strchr(assignment, '=');
-    if (!dot || !equals || dot > equals || dot - assignment >= (ptrdiff_t)sizeof section || equals - dot - 1 >= (ptrdiff_t)sizeof key)
+    if (!dot || !equals || dot > equals || dot - assignment >= (ptrdiff_t)sizeof section ||
+        equals - dot - 1 >= (ptrdiff_t)sizeof key)
         return ts_fail(st, TS_INVALID, "--set %.80s: expected section.key=value", assignment);
     snprintf(section, sizeof section, "%.*s", (int)(dot - assignment), assignment);
     snprintf(key, sizeof key, "%.*s", (int)(equals - dot - 1), dot + 1);
@@ -226,24 +233,37 @@ ts_code tr_config_read(tr_config *c, const char *path, ts_status *st)
 ts_code tr_config_check(const tr_config *c, ts_status *st)
 {
     const int t = c->arch.iterations;
-    const int lo = c->train.iterations_min ? c->train.iterations_min : t, hi = c->train.iterations_max ? c->train.iterations_max : t;
+    const int lo = c->train.iterations_min ? c->train.iterations_min : t,
+              hi = c->train.iterations_max ? c->train.iterations_max : t;
     if (nn_arch_check(&c->arch, st) != TS_OK) return ts_context(st, "[model]");
     if (c->train.steps + c->train.pretrain_steps < 1)
         return ts_fail(st, TS_INVALID, "train.steps and train.pretrain_steps are both 0, there is nothing to do");
     if (c->arch.latent > 0) {
         const int unit = 1 << c->arch.g_levels;
         if (c->data.patch % unit || (c->validate.every && c->validate.size % unit))
-            return ts_fail(st, TS_INVALID, "data.patch is %d and validate.size %d: with %d model.g_levels an auto-encoder needs multiples of %d", c->data.patch, c->validate.size,
-                           c->arch.g_levels, unit);
-        if (c->train.pretrain_steps || c->train.window) return ts_fail(st, TS_INVALID, "an auto-encoder (model.latent) has one phase and whole patches: train.pretrain_steps and train.window must be 0");
+            return ts_fail(
+                st, TS_INVALID,
+                "data.patch is %d and validate.size %d: with %d model.g_levels an auto-encoder needs multiples of %d",
+                c->data.patch, c->validate.size, c->arch.g_levels, unit);
+        if (c->train.pretrain_steps || c->train.window)
+            return ts_fail(st, TS_INVALID,
+                           "an auto-encoder (model.latent) has one phase and whole patches: train.pretrain_steps and "
+                           "train.window must be 0");
     }
-    if (c->train.steps && c->train.g_rate == 0 && !(c->arch.coarse_steps > 0 && c->train.coarse_rate > 0) && !nn_arch_refines_full(&c->arch)) return ts_fail(st, TS_INVALID, "train.g_rate is 0 and there is no refiner (model.h_width): nothing would be trained");
+    if (c->train.steps && c->train.g_rate == 0 && !(c->arch.coarse_steps > 0 && c->train.coarse_rate > 0) &&
+        !nn_arch_refines_full(&c->arch))
+        return ts_fail(st, TS_INVALID,
+                       "train.g_rate is 0 and there is no refiner (model.h_width): nothing would be trained");
     if (c->train.window && (c->train.window < 8 || c->train.window > c->data.patch))
-        return ts_fail(st, TS_INVALID, "train.window is %d: use 8 to data.patch, which is %d, or 0", c->train.window, c->data.patch);
+        return ts_fail(st, TS_INVALID, "train.window is %d: use 8 to data.patch, which is %d, or 0", c->train.window,
+                       c->data.patch);
     if (c->train.given_min > c->arch.images)
-        return ts_fail(st, TS_INVALID, "train.given_min is %d, more than the %d of model.images", c->train.given_min, c->arch.images);
-    if (lo > hi) return ts_fail(st, TS_INVALID, "train.iterations_min is %d, more than the %d of train.iterations_max", lo, hi);
+        return ts_fail(st, TS_INVALID, "train.given_min is %d, more than the %d of model.images", c->train.given_min,
+                       c->arch.images);
+    if (lo > hi)
+        return ts_fail(st, TS_INVALID, "train.iterations_min is %d, more than the %d of train.iterations_max", lo, hi);
     if (c->validate.every && c->validate.seed == c->data.seed)
-        return ts_fail(st, TS_INVALID, "validate.seed equals data.seed: the validation materials would be those that are trained on");
+        return ts_fail(st, TS_INVALID,
+                       "validate.seed equals data.seed: the validation materials would be those that are trained on");
     return TS_OK;
 }

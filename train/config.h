@@ -1,9 +1,10 @@
-/* What a training run is, as plain data, and the one table of keys (train/keys.c) that parses, prints and documents it. */
+/* What a training run is, as plain data, and the one table of keys (train/keys.c) that parses, prints and documents it.
+ */
 #ifndef TR_CONFIG_H
 #define TR_CONFIG_H
-#include "data/procedural.h"
+#include "data/materials/procedural.h"
 #include "nn/model.h"
-#include "tensor/conv.h"
+#include "tensor/conv/conv.h"
 #include <stdio.h>
 
 typedef struct tr_config {
@@ -15,7 +16,7 @@ typedef struct tr_config {
         bool quantise;
         int jpeg, patch, prefetch, threads;
     } data;
-    struct { /* [train] */
+    struct {               /* [train] */
         int batch, window; /* window 0: whole patches */
         int64_t pretrain_steps, steps, warmup;
         double pretrain_rate, pretrain_floor, rate, g_rate, coarse_rate, rate_floor;
@@ -56,8 +57,10 @@ extern const int tr_key_count;
 
 tr_config tr_config_default(void);
 
-/* Sets one key from text; where ("file.ini:12" or "--set") begins the message. An unknown section or key is answered with the nearest. */
-ts_code tr_config_set(tr_config *c, const char *where, const char *section, const char *key, const char *value, ts_status *st);
+/* Sets one key from text; where ("file.ini:12" or "--set") begins the message. An unknown section or key is answered
+ * with the nearest. */
+ts_code tr_config_set(tr_config *c, const char *where, const char *section, const char *key, const char *value,
+                      ts_status *st);
 /* The same from "section.key=value". */
 ts_code tr_config_set_assignment(tr_config *c, const char *assignment, ts_status *st);
 /* Every entry of the file; what it does not name stays as it is. */
@@ -69,7 +72,8 @@ ts_code tr_config_check(const tr_config *c, ts_status *st);
 /* The text of one value as an INI file has it. */
 void tr_config_format(const tr_config *c, const tr_key *key, char *text, size_t size);
 
-/* The whole configuration as an INI file that reads back to the same values. neutral: with the keys that change no weights. */
+/* The whole configuration as an INI file that reads back to the same values. neutral: with the keys that change no
+ * weights. */
 void tr_config_print(const tr_config *c, bool neutral, FILE *f);
 /* Every key with type, range, default and meaning. */
 void tr_config_help(FILE *f);

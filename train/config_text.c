@@ -100,8 +100,10 @@ ts_code tr_config_same(const tr_config *then, const tr_config *now, const char *
         tr_config_format(then, k, a, sizeof a);
         tr_config_format(now, k, b, sizeof b);
         if (strcmp(a, b))
-            return ts_fail(st, TS_INVALID, "%s.%s is %.100s, but %.200s was made with %.100s: set it back, or start another run (output.folder)",
-                           k->section, k->key, b, origin, a);
+            return ts_fail(
+                st, TS_INVALID,
+                "%s.%s is %.100s, but %.200s was made with %.100s: set it back, or start another run (output.folder)",
+                k->section, k->key, b, origin, a);
     }
     return TS_OK;
 }

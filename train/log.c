@@ -1,12 +1,13 @@
 /* log.csv and val.csv. Rows that a resumed run will make again are cut off first. */
-#include "train/parts.h"
+#include "train/trainer_internal.h"
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-static const char log_header[] = "step,phase,loss,render_0,map_0,render_T,map_T,iterations,gradient_norm,rate,samples_per_s,skipped\n";
+static const char log_header[] =
+    "step,phase,loss,render_0,map_0,render_T,map_T,iterations,gradient_norm,rate,samples_per_s,skipped\n";
 
 static void validation_header(const tr_trainer *t, char *text, size_t size)
 {
@@ -15,7 +16,8 @@ static void validation_header(const tr_trainer *t, char *text, size_t size)
     snprintf(text + n, size - (size_t)n, "diffuse,specular,roughness,normal,best\n");
 }
 
-/* Where the first row with a step beyond last begins, or a row that was not written to its end; -1 when the header is not ours. */
+/* Where the first row with a step beyond last begins, or a row that was not written to its end; -1 when the header is
+ * not ours. */
 static long cut_at(FILE *f, const char *header, int64_t last)
 {
     char line[2048];
@@ -67,10 +69,8 @@ ts_code tr_log_open(tr_trainer *t, ts_status *st)
 /* An absent value is an empty field. The sign of a NaN says nothing and differs between CPUs. */
 static void put(FILE *f, double v, bool absent_if_nan)
 {
-    if (isnan(v))
-        fputs(absent_if_nan ? "," : "nan,", f);
-    else
-        fprintf(f, "%.9g,", v);
+    if (isnan(v)) fputs(absent_if_nan ? "," : "nan,", f);
+    else fprintf(f, "%.9g,", v);
 }
 
 ts_code tr_log_row(tr_trainer *t, const tr_row *row, ts_status *st)

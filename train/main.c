@@ -8,22 +8,25 @@
 #include <string.h>
 #include <unistd.h>
 
-static const char usage[] = "Usage: lgd-train CONFIG.ini [options]\n"
-                            "Trains a model on procedural materials as CONFIG.ini says. The run's folder (output.folder, by default runs/CONFIG)\n"
-                            "gets the weights best.safetensors and last.safetensors, a checkpoint, log.csv and val.csv.\n"
-                            "\n"
-                            "  --set SECTION.KEY=VALUE  set a key after the file was read; may be given several times\n"
-                            "  --resume                 go on from the folder's checkpoint, exactly as if the run had not stopped\n"
-                            "  --init WEIGHTS           begin with the parameters of a weights file (the same as --set train.init=WEIGHTS); given twice, the\n"
-                            "                           second file gives what the first does not have (train.init_rest)\n"
-                            "  --initial FILE           write the weights that the run would begin with, and end\n"
-                            "  --threads N              threads to compute with (default: all that the process may use)\n"
-                            "  --help-config            print every key with its range, default and meaning\n"
-                            "  --print-config           print the configuration as it would run\n"
-                            "  --help                   print this\n"
-                            "  --version                print the version\n"
-                            "\n"
-                            "Ctrl-C finishes the step, saves a checkpoint and ends with exit status 1.\n";
+static const char usage[] =
+    "Usage: lgd-train CONFIG.ini [options]\n"
+    "Trains a model on procedural materials as CONFIG.ini says. The run's folder (output.folder, by default "
+    "runs/CONFIG)\n"
+    "gets the weights best.safetensors and last.safetensors, a checkpoint, log.csv and val.csv.\n"
+    "\n"
+    "  --set SECTION.KEY=VALUE  set a key after the file was read; may be given several times\n"
+    "  --resume                 go on from the folder's checkpoint, exactly as if the run had not stopped\n"
+    "  --init WEIGHTS           begin with the parameters of a weights file (the same as --set train.init=WEIGHTS); "
+    "given twice, the\n"
+    "                           second file gives what the first does not have (train.init_rest)\n"
+    "  --initial FILE           write the weights that the run would begin with, and end\n"
+    "  --threads N              threads to compute with (default: all that the process may use)\n"
+    "  --help-config            print every key with its range, default and meaning\n"
+    "  --print-config           print the configuration as it would run\n"
+    "  --help                   print this\n"
+    "  --version                print the version\n"
+    "\n"
+    "Ctrl-C finishes the step, saves a checkpoint and ends with exit status 1.\n";
 
 typedef struct shown {
     cl_progress progress;
@@ -44,14 +47,15 @@ static void show_step(const tr_row *row, void *user)
     const bool line = row->step % s->log_every == 0 || row->step == row->total;
     const double mean = s->steps ? s->loss / s->steps : NAN, speed = s->seconds > 0 ? s->samples / s->seconds : 0;
     if (s->progress.terminal) {
-        snprintf(extra, sizeof extra, "%s  step %lld  loss %.4f  %.1f samples/s", row->pretraining ? "g alone" : "g and h", (long long)row->step,
-                 mean, speed);
+        snprintf(extra, sizeof extra, "%s  step %lld  loss %.4f  %.1f samples/s",
+                 row->pretraining ? "g alone" : "g and h", (long long)row->step, mean, speed);
         cl_progress_show(&s->progress, done, extra);
     } else if (line) {
         /* From the last lines' speed: a step of the second phase takes several times as long as one of the first. */
         const long left = s->steps ? lround(s->seconds / s->steps * (double)(row->total - row->step)) : 0;
-        cl_note("step %lld/%lld  %s  loss %.4f  rate %.2e  %.1f samples/s  ETA %ld:%02ld:%02ld", (long long)row->step, (long long)row->total,
-                row->pretraining ? "g alone" : "g and h", mean, row->rate, speed, left / 3600, left / 60 % 60, left % 60);
+        cl_note("step %lld/%lld  %s  loss %.4f  rate %.2e  %.1f samples/s  ETA %ld:%02ld:%02ld", (long long)row->step,
+                (long long)row->total, row->pretraining ? "g alone" : "g and h", mean, row->rate, speed, left / 3600,
+                left / 60 % 60, left % 60);
     }
     if (line) s->loss = s->seconds = 0, s->steps = s->samples = 0;
 }
@@ -63,8 +67,8 @@ static void show_validation(const tr_validation *v, void *user)
     cl_progress_end(&s->progress);
     printf("validation at step %lld: render RMSE", (long long)v->step);
     for (int k = 0; k <= v->iterations; k++) printf(" %.4f", v->render[k]);
-    printf("  diffuse %.4f specular %.4f roughness %.4f normal %.4f%s\n", v->diffuse, v->specular, v->roughness, v->normal,
-           v->best ? "  (best)" : "");
+    printf("  diffuse %.4f specular %.4f roughness %.4f normal %.4f%s\n", v->diffuse, v->specular, v->roughness,
+           v->normal, v->best ? "  (best)" : "");
     fflush(stdout);
 }
 
@@ -85,7 +89,8 @@ static int train(const tr_config *config, const char *folder, bool resume)
 {
     ts_status st = {0};
     shown s = {.log_every = config->train.log_every};
-    const tr_listener listener = {.step = show_step, .validated = show_validation, .note = show_note, .stop = stop, .user = &s};
+    const tr_listener listener = {
+        .step = show_step, .validated = show_validation, .note = show_note, .stop = stop, .user = &s};
     if (resume && access(folder, F_OK) != 0) return cl_failed("%s: there is no run to resume", folder);
     if (!resume && cl_make_folder(folder, &st) != TS_OK) return cl_failed("%s", st.message);
     cl_catch_interrupt();
@@ -94,7 +99,9 @@ static int train(const tr_config *config, const char *folder, bool resume)
     const int64_t total = config->train.pretrain_steps + config->train.steps;
     s.first = tr_step_now(t);
     s.progress = cl_progress_start("train", total - s.first);
-    if (resume) cl_note("%s: %s step %lld of %lld", folder, s.first < total ? "going on from" : "complete at", (long long)s.first, (long long)total);
+    if (resume)
+        cl_note("%s: %s step %lld of %lld", folder, s.first < total ? "going on from" : "complete at",
+                (long long)s.first, (long long)total);
     const ts_code code = tr_run(t, &st);
     cl_progress_end(&s.progress);
     tr_destroy(&t);
@@ -103,13 +110,14 @@ static int train(const tr_config *config, const char *folder, bool resume)
     return CL_OK;
 }
 
-/* libgomp's threads spin for about 10 ms at every barrier before they sleep, which starves the loader's thread and, on a machine that does
- * anything else, the very threads that they wait for (measured: a tenth of the speed). It reads its settings before main, so the program
- * begins again with another one; the user's own setting stays. */
+/* libgomp's threads spin for about 10 ms at every barrier before they sleep, which starves the loader's thread and, on
+ * a machine that does anything else, the very threads that they wait for (measured: a tenth of the speed). It reads its
+ * settings before main, so the program begins again with another one; the user's own setting stays. */
 static void spin_briefly(char **argv)
 {
     if (ts_threads() < 2 || getenv("GOMP_SPINCOUNT") || getenv("OMP_WAIT_POLICY")) return;
-    if (setenv("GOMP_SPINCOUNT", "2000", 1) == 0) execv("/proc/self/exe", argv); /* where that fails the run is only slower */
+    if (setenv("GOMP_SPINCOUNT", "2000", 1) == 0)
+        execv("/proc/self/exe", argv); /* where that fails the run is only slower */
 }
 
 enum { SET = 256, RESUME, INIT, INITIAL, THREADS, HELP_CONFIG, PRINT_CONFIG, HELP, VERSION };
@@ -173,7 +181,8 @@ int main(int argc, char **argv)
     }
     const int files = argc - optind;
     if (files > 1 || (files == 0 && !print)) {
-        code = cl_usage(files ? "one configuration file is expected, not %d" : "a configuration file is expected, for example configs/single.ini",
+        code = cl_usage(files ? "one configuration file is expected, not %d"
+                              : "a configuration file is expected, for example configs/single.ini",
                         files);
         goto end;
     }
@@ -208,10 +217,8 @@ int main(int argc, char **argv)
         goto end;
     }
     spin_briefly(argv);
-    if (*config.output.folder)
-        snprintf(folder, sizeof folder, "%s", config.output.folder);
-    else
-        tr_default_folder(argv[optind], folder, sizeof folder);
+    if (*config.output.folder) snprintf(folder, sizeof folder, "%s", config.output.folder);
+    else tr_default_folder(argv[optind], folder, sizeof folder);
     code = cl_finish(train(&config, folder, resume));
 end:
     free(set);

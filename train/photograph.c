@@ -3,7 +3,7 @@
 #include "render/render.h"
 #include "tensor/maps.h"
 #include "tensor/threads.h"
-#include "train/parts.h"
+#include "train/trainer_internal.h"
 
 static io_camera camera_of(const tr_config *c)
 {
@@ -19,8 +19,8 @@ static io_camera camera_of(const tr_config *c)
                        .off_centre = (float)c->data.off_centre};
 }
 
-void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, const rd_view *views, int number,
-                    float *images)
+void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
+                    const rd_view *views, int number, float *images)
 {
     const io_camera camera = camera_of(c);
     const size_t pixels = (size_t)size * (size_t)size;
@@ -38,7 +38,8 @@ void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count
         rd_render(rd_grid_full(size), material, MAP_CHANNELS, &view, false, images + (size_t)i * pixels * 3);
     }
 #pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int i = 0; i < count * number; i++) io_camera_apply(&camera, seed, first + (uint64_t)i, size, images + (size_t)i * pixels * 3);
+    for (int i = 0; i < count * number; i++)
+        io_camera_apply(&camera, seed, first + (uint64_t)i, size, images + (size_t)i * pixels * 3);
 }
 
 void tr_capture_views(uint64_t seed, uint64_t index, int count, int number, rd_view *views)

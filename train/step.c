@@ -4,16 +4,18 @@
 #include "render/render.h"
 #include "tensor/maps.h"
 #include "tensor/threads.h"
-#include "train/parts.h"
+#include "train/trainer_internal.h"
 #include <math.h>
 #include <string.h>
 
 /* Adds weight * (rendering loss + map_weight * map loss) of maps to sum (NULL: none yet). */
-static ag_value *add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value *target, double weight, double *render, double *map)
+static ag_value *add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value *target, double weight, double *render,
+                          double *map)
 {
     ag_tape *tape = t->tape;
     const double map_weight = t->config.train.map_weight;
-    if (maps && maps->t.shape.c > MAP_CHANNELS) maps = ag_channels(tape, maps, MAP_CHANNELS); /* a material has no light intensity */
+    if (maps && maps->t.shape.c > MAP_CHANNELS)
+        maps = ag_channels(tape, maps, MAP_CHANNELS); /* a material has no light intensity */
     ag_value *loss = ag_render_loss(tape, maps, target, t->views, RD_LOSS_VIEWS);
     if (loss) *render = (double)loss->t.data[0];
     if (map_weight > 0) {
@@ -67,7 +69,10 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
     const int batch = c->train.batch, size = c->data.patch;
     ag_value *maps[TR_MOST_ITERATIONS + 1];
     ts_tensor goals = ts_view((float *)(uintptr_t)target, (ts_shape){batch, size, size, MAP_CHANNELS});
-    nn_input in = {.image = ts_view(t->images, (ts_shape){batch * given, size, size, 3}), .grid = rd_grid_full(size), .views = t->captures, .given = given,
+    nn_input in = {.image = ts_view(t->images, (ts_shape){batch * given, size, size, 3}),
+                   .grid = rd_grid_full(size),
+                   .views = t->captures,
+                   .given = given,
                    .recompute = c->train.checkpoint_steps};
     if (row->pretraining) {
         maps[0] = nn_predict(t->tape, t->model, &in);
@@ -75,7 +80,8 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
     }
     if (c->arch.latent > 0) {
         ag_value *goal = ag_constant(t->tape, goals);
-        return add_loss(t, NULL, nn_decode(t->tape, t->model, nn_encode(t->tape, t->model, goal)), goal, 1, &row->render_end, &row->map_end);
+        return add_loss(t, NULL, nn_decode(t->tape, t->model, nn_encode(t->tape, t->model, goal)), goal, 1,
+                        &row->render_end, &row->map_end);
     }
     const rd_grid window = draw_window(c, t->step);
     if (window.w < size) {
@@ -97,7 +103,8 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
 static double rate_now(const tr_config *c, int64_t step)
 {
     const bool pre = tr_pretraining(c, step);
-    const int64_t length = pre ? c->train.pretrain_steps : c->train.steps, at = pre ? step : step - c->train.pretrain_steps;
+    const int64_t length = pre ? c->train.pretrain_steps : c->train.steps,
+                  at = pre ? step : step - c->train.pretrain_steps;
     const int64_t warmup = c->train.warmup < length / 2 ? c->train.warmup : length / 2;
     return (double)nn_learning_rate((float)(pre ? c->train.pretrain_rate : c->train.rate),
                                     (float)(pre ? c->train.pretrain_floor : c->train.rate_floor), at, warmup, length);
@@ -115,8 +122,9 @@ static void begin_phase(tr_trainer *t)
 
 #define USUAL_DECAY 0.98
 
-/* A gradient of 0 is that of saturated outputs, from which there is no way back; one far beyond the usual norm would, after clipping, still
- * move by a whole step each of the many weights whose second moment is small, and has ended runs so. */
+/* A gradient of 0 is that of saturated outputs, from which there is no way back; one far beyond the usual norm would,
+ * after clipping, still move by a whole step each of the many weights whose second moment is small, and has ended runs
+ * so. */
 static const char *why_skip(const tr_trainer *t, const tr_row *row)
 {
     enum { SETTLED = 100 }; /* steps before which norms change fast for good reasons */
@@ -124,7 +132,8 @@ static const char *why_skip(const tr_trainer *t, const tr_row *row)
     if (!isfinite(row->loss)) return "loss is not finite";
     if (!isfinite(row->norm)) return "gradient is not finite";
     if (row->norm == 0) return "gradient is zero";
-    if (spike > 0 && t->adam.step >= SETTLED && row->norm > spike * t->usual_norm) return "gradient is far longer than usual (train.spike)";
+    if (spike > 0 && t->adam.step >= SETTLED && row->norm > spike * t->usual_norm)
+        return "gradient is far longer than usual (train.spike)";
     return NULL;
 }
 
@@ -202,7 +211,8 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
         for (int part = NN_G; part <= NN_COARSE; part++) {
             size_t first, last;
             nn_model_range(t->model, (nn_part)part, &first, &last);
-            if (!t->model->fixed[part] && last > first) nn_adam_step(&t->adam, t->model, first, last, (float)(row->rate * factor[part]), scale);
+            if (!t->model->fixed[part] && last > first)
+                nn_adam_step(&t->adam, t->model, first, last, (float)(row->rate * factor[part]), scale);
         }
         t->usual_norm = t->adam.step == 1 ? row->norm : USUAL_DECAY * t->usual_norm + (1 - USUAL_DECAY) * row->norm;
         t->in_a_row = 0;

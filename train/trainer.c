@@ -1,7 +1,7 @@
 /* The run: what it owns, its folder, the loop over steps. */
-#include "nn/weights.h"
+#include "nn/weights/weights.h"
 #include "tensor/maps.h"
-#include "train/parts.h"
+#include "train/trainer_internal.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -13,7 +13,10 @@
 #include <time.h>
 #include <unistd.h>
 
-void tr_path(const tr_trainer *t, const char *name, char path[TR_PATH]) { snprintf(path, TR_PATH, "%s/%s", t->folder, name); }
+void tr_path(const tr_trainer *t, const char *name, char path[TR_PATH])
+{
+    snprintf(path, TR_PATH, "%s/%s", t->folder, name);
+}
 
 void tr_note(const tr_trainer *t, const char *format, ...)
 {
@@ -56,7 +59,8 @@ static ts_code lock_folder(tr_trainer *t, ts_status *st)
     if (t->lock < 0) return ts_fail(st, TS_IO, "%s: %s", path, strerror(errno));
     if (flock(t->lock, LOCK_EX | LOCK_NB) == 0) return TS_OK;
     if (errno == EWOULDBLOCK)
-        return ts_fail(st, TS_INVALID, "%s: another lgd-train is at work in this folder (output.folder chooses another)", t->folder);
+        return ts_fail(st, TS_INVALID,
+                       "%s: another lgd-train is at work in this folder (output.folder chooses another)", t->folder);
     return ts_fail(st, TS_IO, "%s: %s", path, strerror(errno));
 }
 
@@ -68,8 +72,10 @@ static ts_code check_empty(const tr_trainer *t, ts_status *st)
         char path[TR_PATH];
         tr_path(t, names[i], path);
         if (access(path, F_OK) == 0)
-            return ts_fail(st, TS_INVALID, "%s: there is a run already (%s): --resume goes on with it, output.folder chooses another folder",
-                           t->folder, names[i]);
+            return ts_fail(
+                st, TS_INVALID,
+                "%s: there is a run already (%s): --resume goes on with it, output.folder chooses another folder",
+                t->folder, names[i]);
     }
     return TS_OK;
 }
@@ -121,19 +127,24 @@ static ts_code build(tr_trainer *t, bool resume, ts_status *st)
     t->images = malloc(photographs * pixels * 3 * sizeof(float));
     t->captures = malloc(photographs * sizeof *t->captures);
     t->views = malloc(batch * RD_LOSS_VIEWS * sizeof *t->views);
-    if (!t->images || !t->captures || !t->views) return ts_fail(st, TS_NOMEM, "no memory for %zu photographs", photographs);
+    if (!t->images || !t->captures || !t->views)
+        return ts_fail(st, TS_NOMEM, "no memory for %zu photographs", photographs);
     t->model = nn_model_create(&c->arch, st);
-    if (!t->model || nn_model_train(t->model, st) != TS_OK || (!resume && init_weights(t->model, c, t, st) != TS_OK)) return st->code;
-    if (nn_adam_create(&t->adam, t->model, (float)c->train.ema, st) != TS_OK || (resume && tr_resume(t, st) != TS_OK)) return st->code;
+    if (!t->model || nn_model_train(t->model, st) != TS_OK || (!resume && init_weights(t->model, c, t, st) != TS_OK))
+        return st->code;
+    if (nn_adam_create(&t->adam, t->model, (float)c->train.ema, st) != TS_OK || (resume && tr_resume(t, st) != TS_OK))
+        return st->code;
     t->tape = ag_tape_create(true, st);
     if (!t->tape || (c->validate.every && tr_validator_create(t, st) != TS_OK)) return st->code;
     const io_procedural source = {.seed = (uint64_t)c->data.seed, .families = c->data.families};
-    t->loader = io_loader_create(&source, c->data.patch, c->train.batch, (uint64_t)t->step, c->data.prefetch, c->data.threads, st);
+    t->loader = io_loader_create(&source, c->data.patch, c->train.batch, (uint64_t)t->step, c->data.prefetch,
+                                 c->data.threads, st);
     if (!t->loader || tr_log_open(t, st) != TS_OK) return st->code;
     return write_config(t, st);
 }
 
-tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, const tr_listener *listener, ts_status *st)
+tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, const tr_listener *listener,
+                      ts_status *st)
 {
     tr_trainer *t = calloc(1, sizeof *t);
     if (!t) {
@@ -147,8 +158,7 @@ tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, 
     ts_code code = TS_OK;
     if (strlen(folder) >= sizeof t->folder)
         code = ts_fail(st, TS_INVALID, "the folder's name is longer than %zu bytes", sizeof t->folder - 1);
-    else
-        strcpy(t->folder, folder);
+    else strcpy(t->folder, folder);
     if (code == TS_OK) code = tr_config_check(config, st);
     if (code == TS_OK) code = build(t, resume, st);
     if (code != TS_OK) tr_destroy(&t);
@@ -181,8 +191,7 @@ static ts_code after_step(tr_trainer *t, const tr_row *row, bool *saved, ts_stat
     *saved = false;
     if (tr_log_row(t, row, st) != TS_OK) return st->code;
     if (t->listener.step) t->listener.step(row, t->listener.user);
-    if (row->skip)
-        tr_note(t, "step %" PRId64 " is skipped: its %s (%d in a row)", t->step, row->skip, t->in_a_row);
+    if (row->skip) tr_note(t, "step %" PRId64 " is skipped: its %s (%d in a row)", t->step, row->skip, t->in_a_row);
     if (t->in_a_row > c->train.max_skipped) {
         tr_log_flush(t, st);
         return ts_fail(st, TS_NUMERIC,

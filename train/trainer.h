@@ -1,12 +1,13 @@
-/* A training run in a folder: steps, validation, checkpoints and the log. Everything random is a function of (seed, step), so that a
- * resumed run makes the same bytes as one that was not interrupted, for any number of threads.
+/* A training run in a folder: steps, validation, checkpoints and the log. Everything random is a function of (seed,
+ * step), so that a resumed run makes the same bytes as one that was not interrupted, for any number of threads.
  *
- * Two phases. The first, pretrain_steps long, trains g alone on R_0's loss; the second trains g and h on R_T's and R_0's. Each has its
- * own warm-up, cosine and Adam moments (g's moments from the first phase say nothing about the second loss).
+ * Two phases. The first, pretrain_steps long, trains g alone on R_0's loss; the second trains g and h on R_T's and
+ * R_0's. Each has its own warm-up, cosine and Adam moments (g's moments from the first phase say nothing about the
+ * second loss).
  *
- * The folder's files: config.ini (as it runs), log.csv (a row a step), val.csv (a row a validation), best.safetensors (weights with the
- * least validated error in the phase), last.safetensors (weights at the last checkpoint), checkpoint.safetensors (what --resume reads),
- * lock. */
+ * The folder's files: config.ini (as it runs), log.csv (a row a step), val.csv (a row a validation), best.safetensors
+ * (weights with the least validated error in the phase), last.safetensors (weights at the last checkpoint),
+ * checkpoint.safetensors (what --resume reads), lock. */
 #ifndef TR_TRAINER_H
 #define TR_TRAINER_H
 #include "train/config.h"
@@ -15,11 +16,11 @@
 typedef struct tr_row {
     int64_t step, total; /* steps made so far, this one included, and to make */
     bool pretraining;
-    const char *skip; /* why the step made no update; NULL: it made one */
-    int iterations;      /* refinement steps that were drawn */
+    const char *skip;                                          /* why the step made no update; NULL: it made one */
+    int iterations;                                            /* refinement steps that were drawn */
     double loss, render_start, map_start, render_end, map_end; /* of R_0 and R_T */
     double norm, rate;
-    double seconds;      /* that the step took */
+    double seconds; /* that the step took */
     int batch;
     int64_t skipped_total;
 } tr_row;
@@ -31,7 +32,7 @@ typedef struct tr_validation {
     int iterations;                        /* 0 while g is trained alone */
     double render[TR_MOST_ITERATIONS + 1]; /* mean RMSE of 20 renderings of R_0 … R_iterations, see render/error.h */
     double diffuse, specular, roughness, normal; /* mean RMSE of the last maps */
-    bool best;                             /* the least so far in this phase, and therefore saved */
+    bool best;                                   /* the least so far in this phase, and therefore saved */
     double seconds;
 } tr_validation;
 
@@ -46,9 +47,10 @@ typedef struct tr_listener {
 
 typedef struct tr_trainer tr_trainer;
 
-/* Takes the folder (which exists) for this run; another trainer in it, a run in it without resume, and a checkpoint of another
- * configuration with resume are errors. NULL and st set on failure. */
-tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, const tr_listener *listener, ts_status *st);
+/* Takes the folder (which exists) for this run; another trainer in it, a run in it without resume, and a checkpoint of
+ * another configuration with resume are errors. NULL and st set on failure. */
+tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, const tr_listener *listener,
+                      ts_status *st);
 
 /* The weights that a run of this configuration begins with, as a file. */
 ts_code tr_initial(const tr_config *config, const char *path, ts_status *st);

@@ -2,7 +2,7 @@
 #include "render/error.h"
 #include "tensor/maps.h"
 #include "tensor/threads.h"
-#include "train/parts.h"
+#include "train/trainer_internal.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -40,12 +40,14 @@ ts_code tr_validator_create(tr_trainer *t, ts_status *st)
     v->images = malloc(count * given * pixels * 3 * sizeof(float));
     v->captures = malloc(count * given * sizeof *v->captures);
     v->views = malloc(count * RD_EVAL_VIEWS * sizeof *v->views);
-    if (!v->maps || !v->images || !v->captures || !v->views || !make_materials(c, v->maps)) return ts_fail(st, TS_NOMEM, "no memory for the validation materials");
+    if (!v->maps || !v->images || !v->captures || !v->views || !make_materials(c, v->maps))
+        return ts_fail(st, TS_NOMEM, "no memory for the validation materials");
     v->model = nn_model_create(&c->arch, st);
     v->tape = v->model ? ag_tape_create(false, st) : NULL;
     if (!v->tape) return st->code;
     tr_capture_views((uint64_t)c->validate.seed, 0, c->validate.count, c->arch.images, v->captures);
-    tr_photographs(c, (uint64_t)c->validate.seed, 0, c->validate.count, c->validate.size, v->maps, v->captures, c->arch.images, v->images);
+    tr_photographs(c, (uint64_t)c->validate.seed, 0, c->validate.count, c->validate.size, v->maps, v->captures,
+                   c->arch.images, v->images);
     for (int i = 0; i < c->validate.count; i++) {
         ts_rng rng = ts_rng_make((uint64_t)c->validate.seed, TS_STREAM_EVAL, (uint64_t)i);
         rd_eval_views(&rng, RD_EVAL_VIEWS, v->views + (size_t)i * RD_EVAL_VIEWS);
@@ -72,15 +74,18 @@ static ts_code add_errors(tr_trainer *t, int first, int n, tr_validation *out, t
     const size_t pixels = (size_t)size * (size_t)size;
     const rd_grid grid = rd_grid_full(size);
     const size_t given = (size_t)t->config.arch.images, photograph = (size_t)first * given;
-    const nn_input in = {.image = ts_view(v->images + photograph * pixels * 3, (ts_shape){n * (int)given, size, size, 3}),
-                         .grid = grid,
-                         .views = v->captures + photograph,
-                         .given = (int)given};
+    const nn_input in = {
+        .image = ts_view(v->images + photograph * pixels * 3, (ts_shape){n * (int)given, size, size, 3}),
+        .grid = grid,
+        .views = v->captures + photograph,
+        .given = (int)given};
     ag_value *maps[TR_MOST_ITERATIONS + 1];
     ag_reset(v->tape);
     if (v->model->arch.latent > 0) { /* how well the maps themselves come back */
         float *truth = v->maps + (size_t)first * pixels * MAP_CHANNELS;
-        maps[0] = nn_decode(v->tape, v->model, nn_encode(v->tape, v->model, ag_constant(v->tape, ts_view(truth, (ts_shape){n, size, size, MAP_CHANNELS}))));
+        maps[0] = nn_decode(v->tape, v->model,
+                            nn_encode(v->tape, v->model,
+                                      ag_constant(v->tape, ts_view(truth, (ts_shape){n, size, size, MAP_CHANNELS}))));
     } else nn_lgd(v->tape, v->model, &in, out->iterations, true, maps, NULL);
     if (ag_status(v->tape)->code != TS_OK) {
         *st = *ag_status(v->tape);
@@ -92,7 +97,8 @@ static ts_code add_errors(tr_trainer *t, int first, int n, tr_validation *out, t
         for (int k = 0; k <= out->iterations; k++)
             out->render[k] += rd_render_rmse(grid, maps[k]->t.data + at, channels, target, MAP_CHANNELS,
                                              v->views + (size_t)(first + i) * RD_EVAL_VIEWS, RD_EVAL_VIEWS);
-        const rd_map_error e = rd_map_rmse((int64_t)pixels, maps[out->iterations]->t.data + at, channels, target, MAP_CHANNELS);
+        const rd_map_error e = rd_map_rmse((int64_t)pixels, maps[out->iterations]->t.data + at, channels, target,
+                                           MAP_CHANNELS);
         out->diffuse += e.diffuse;
         out->specular += e.specular;
         out->roughness += e.roughness;

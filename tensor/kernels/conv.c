@@ -1,7 +1,7 @@
-/* See conv.h. Each size is a function of its own, so that all accumulators live in registers: with 32 registers 14 x 2 of
- * them leave room for two weights and one broadcast value. */
+/* See conv.h. Each size is a function of its own, so that all accumulators live in registers: with 32 registers 14 x 2
+ * of them leave room for two weights and one broadcast value. */
 #include "tensor/kernels/conv.h"
-#include "tensor/kernels/turn.h"
+#include "tensor/kernels/transpose.h"
 #include "tensor/kernels/vec.h"
 
 #if VL == 16
@@ -18,7 +18,8 @@
 #define UNROLL _Pragma("GCC unroll 16")
 typedef int32_t pair __attribute__((may_alias)); /* two bf16 values, kept where a float would be */
 
-/* A panel's channels that exist, to and from memory. Vectors with a tail need a mask, or a detour where there are no masks. */
+/* A panel's channels that exist, to and from memory. Vectors with a tail need a mask, or a detour where there are no
+ * masks. */
 #if VL == 16
 typedef __mmask16 lanes;
 INLINE lanes lanes_of(int n) { return (lanes)(n >= VL ? 0xffff : n > 0 ? (1 << n) - 1 : 0); }
@@ -50,8 +51,8 @@ INLINE void store_lanes(float *p, vf v, lanes n)
 }
 #endif
 
-/* Sums over more k than this are made of parts: the rounding of a float sum grows with its length, a published convolution has 25,600
- * terms, and a part of 96 cost a fiftieth of its time to put away. */
+/* Sums over more k than this are made of parts: the rounding of a float sum grows with its length, a published
+ * convolution has 25,600 terms, and a part of 96 cost a fiftieth of its time to put away. */
 enum { PART = 192 };
 
 /* acc + the products of both halves of x and b. A bf16 value is the upper half of the float that it stands for. */
@@ -66,25 +67,26 @@ INLINE vf dot2(vf acc, vf x, vf b)
 }
 
 /* One k, or pair of them: pixels x vectors multiplications. */
-#define STEP(u)                                                                                               \
-    {                                                                                                         \
-        vf b[2];                                                                                              \
-        UNROLL for (int v = 0; v < vectors; v++) b[v] = v_load(w + ((u) * vectors + v) * VL);                 \
-        UNROLL for (int p = 0; p < pixels; p++) {                                                             \
-            const char *at = a[p / TS_TILE_GROUP] + stride[p % TS_TILE_GROUP];                                \
-            if (bf16) {                                                                                       \
-                const vf x = (vf)v_seti(((const pair *)(const void *)at)[u]);                                 \
-                UNROLL for (int v = 0; v < vectors; v++) acc[p][v] = dot2(acc[p][v], x, b[v]);                \
-            } else {                                                                                          \
-                const vf x = v_set(((const float *)(const void *)at)[u]);                                     \
-                UNROLL for (int v = 0; v < vectors; v++) acc[p][v] += x * b[v];                               \
-            }                                                                                                 \
-        }                                                                                                     \
+#define STEP(u)                                                                                \
+    {                                                                                          \
+        vf b[2];                                                                               \
+        UNROLL for (int v = 0; v < vectors; v++) b[v] = v_load(w + ((u)*vectors + v) * VL);    \
+        UNROLL for (int p = 0; p < pixels; p++)                                                \
+        {                                                                                      \
+            const char *at = a[p / TS_TILE_GROUP] + stride[p % TS_TILE_GROUP];                 \
+            if (bf16) {                                                                        \
+                const vf x = (vf)v_seti(((const pair *)(const void *)at)[u]);                  \
+                UNROLL for (int v = 0; v < vectors; v++) acc[p][v] = dot2(acc[p][v], x, b[v]); \
+            } else {                                                                           \
+                const vf x = v_set(((const float *)(const void *)at)[u]);                      \
+                UNROLL for (int v = 0; v < vectors; v++) acc[p][v] += x * b[v];                \
+            }                                                                                  \
+        }                                                                                      \
     }
-/* Base pointers and strides stay as they are, in registers: left alone, the compiler makes an address for each pixel and k,
- * which do not fit. */
-#define KEEP_ADDRESSES                                                                                        \
-    __asm__("" : "+r"(a[0]), "+r"(a[1]), "+r"(a[2]));                                                         \
+/* Base pointers and strides stay as they are, in registers: left alone, the compiler makes an address for each pixel
+ * and k, which do not fit. */
+#define KEEP_ADDRESSES                                \
+    __asm__("" : "+r"(a[0]), "+r"(a[1]), "+r"(a[2])); \
     __asm__("" : "+r"(stride[1]), "+r"(stride[2]), "+r"(stride[3]), "+r"(stride[4]));
 
 INLINE void tile(const ts_tile *t, const int pixels, const int vectors, const bool bf16)
@@ -93,15 +95,19 @@ INLINE void tile(const ts_tile *t, const int pixels, const int vectors, const bo
     const ptrdiff_t ys = t->y_stride;
     lanes mask[2];
     bool parts = t->add; /* whole holds the sum of the parts before acc's */
-    __asm__("" : "=m"(whole)); /* says that it is set: the compiler cannot see that parts guards it, and clearing it takes as long as 1 k */
+    __asm__(""
+            : "=m"(whole)); /* says that it is set: the compiler cannot see that parts guards it, and clearing it takes
+                               as long as 1 k */
     UNROLL for (int v = 0; v < vectors; v++) mask[v] = lanes_of(t->channels - v * VL);
     if (t->add) {
-        UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) {
+        UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++)
+        {
             whole[p][v] = load_lanes(t->y[p / TS_TILE_GROUP] + p % TS_TILE_GROUP * ys + v * VL, mask[v]);
             acc[p][v] = (vf){0};
         }
     } else {
-        UNROLL for (int v = 0; v < vectors; v++) {
+        UNROLL for (int v = 0; v < vectors; v++)
+        {
             vf b = t->bias ? load_lanes(t->bias + v * VL, mask[v]) : (vf){0};
             UNROLL for (int p = 0; p < pixels; p++) acc[p][v] = b;
         }
@@ -119,8 +125,12 @@ INLINE void tile(const ts_tile *t, const int pixels, const int vectors, const bo
             left = t->segment[g++].count;
         }
         if (room == 0) {
-            if (!parts) UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) whole[p][v] = acc[p][v];
-            else UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) whole[p][v] += acc[p][v];
+            if (!parts)
+                UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++)
+                    whole[p][v] = acc[p][v];
+            else
+                UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++)
+                    whole[p][v] += acc[p][v];
             UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) acc[p][v] = (vf){0};
             parts = true;
             room = PART;
@@ -146,34 +156,39 @@ INLINE void tile(const ts_tile *t, const int pixels, const int vectors, const bo
             KEEP_ADDRESSES
         }
     }
-    if (parts) UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) acc[p][v] += whole[p][v];
+    if (parts)
+        UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) acc[p][v] += whole[p][v];
     if (t->leak != 1) {
         const vf leak = v_set(t->leak);
-        UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) acc[p][v] = v_max(leak * acc[p][v], acc[p][v]);
+        UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++)
+            acc[p][v] = v_max(leak * acc[p][v], acc[p][v]);
     }
     UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++)
         store_lanes(t->y[p / TS_TILE_GROUP] + p % TS_TILE_GROUP * ys + v * VL, acc[p][v], mask[v]);
 }
 
 /* One pixel: rows x vectors multiplications. */
-#define PIXEL                                                                                                 \
-    {                                                                                                         \
-        vf y[2];                                                                                              \
-        UNROLL for (int v = 0; v < vectors; v++) y[v] = v_load(b + v * VL);                                   \
-        UNROLL for (int m = 0; m < rows; m++) {                                                               \
-            vf x = v_set(a[m]);                                                                               \
-            UNROLL for (int v = 0; v < vectors; v++) acc[m][v] += x * y[v];                                   \
-        }                                                                                                     \
-        if (!near) __builtin_prefetch(b + ahead), __builtin_prefetch(b + ahead + VL);                         \
-        a += as;                                                                                              \
-        b += bs;                                                                                              \
+#define PIXEL                                                                         \
+    {                                                                                 \
+        vf y[2];                                                                      \
+        UNROLL for (int v = 0; v < vectors; v++) y[v] = v_load(b + v * VL);           \
+        UNROLL for (int m = 0; m < rows; m++)                                         \
+        {                                                                             \
+            vf x = v_set(a[m]);                                                       \
+            UNROLL for (int v = 0; v < vectors; v++) acc[m][v] += x * y[v];           \
+        }                                                                             \
+        if (!near) __builtin_prefetch(b + ahead), __builtin_prefetch(b + ahead + VL); \
+        a += as;                                                                      \
+        b += bs;                                                                      \
     }
 
 INLINE void sum(const ts_sum *t, const int rows, const int vectors, const bool near)
 {
     vf acc[ROWS][2];
     if (t->begin) UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++) acc[m][v] = (vf){0};
-    else UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++) acc[m][v] = v_load(t->c + m * t->c_stride + v * VL);
+    else
+        UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++)
+            acc[m][v] = v_load(t->c + m * t->c_stride + v * VL);
     const ptrdiff_t as = t->a_stride, bs = t->b_stride, ahead = 8 * bs, step = t->fetch_step;
     const char *fetch = t->fetch;
     for (int r = 0; r < t->rows; r++) {
@@ -186,12 +201,14 @@ INLINE void sum(const ts_sum *t, const int rows, const int vectors, const bool n
         }
         if (p) PIXEL
     }
-    UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++) v_store(t->c + m * t->c_stride + v * VL, acc[m][v]);
+    UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++)
+        v_store(t->c + m * t->c_stride + v * VL, acc[m][v]);
 }
 
 #if VL == 16
-#define EVERY_OTHER(first) first, first + 2, first + 4, first + 6, first + 8, first + 10, first + 12, first + 14, first + 16, first + 18, first + 20, \
-    first + 22, first + 24, first + 26, first + 28, first + 30
+#define EVERY_OTHER(first)                                                                                         \
+    first, first + 2, first + 4, first + 6, first + 8, first + 10, first + 12, first + 14, first + 16, first + 18, \
+        first + 20, first + 22, first + 24, first + 26, first + 28, first + 30
 #elif VL == 8
 #define EVERY_OTHER(first) first, first + 2, first + 4, first + 6, first + 8, first + 10, first + 12, first + 14
 #else
@@ -205,8 +222,10 @@ static void pairs(const float *x, int64_t pixels, int channels, float *to, ptrdi
     for (; pixels > 0; pixels--, x += run, to += stride)
         for (int64_t i = 0; i < run; i += 2 * VL) {
             const int64_t left = run - i;
-            const vu a = v_bf16(v_load_part(x + i, left)), b = left > VL ? v_bf16(v_load_part(x + i + VL, left - VL)) : (vu){0};
-            const vu even = __builtin_shufflevector(a, b, EVERY_OTHER(0)), odd = __builtin_shufflevector(a, b, EVERY_OTHER(1));
+            const vu a = v_bf16(v_load_part(x + i, left)),
+                     b = left > VL ? v_bf16(v_load_part(x + i + VL, left - VL)) : (vu){0};
+            const vu even = __builtin_shufflevector(a, b, EVERY_OTHER(0)),
+                     odd = __builtin_shufflevector(a, b, EVERY_OTHER(1));
             v_store_part(to + i / 2, (vf)(even >> 16 | (odd & 0xffff0000)), (left + 1) / 2);
         }
 }
@@ -246,7 +265,8 @@ static void transpose(const float *x, int pixels, int channels, float *to, ptrdi
         for (int c = 0; c < channels; c++) to[c * plane + p] = x[(ptrdiff_t)p * channels + c];
 }
 
-static void collect(const float *x, ptrdiff_t plane, int pixels, int channels, bool add, float leak, float *y, ptrdiff_t stride)
+static void collect(const float *x, ptrdiff_t plane, int pixels, int channels, bool add, float leak, float *y,
+                    ptrdiff_t stride)
 {
     const int whole = pixels / VL * VL;
     for (int p = 0; p < whole; p += VL)
@@ -268,12 +288,14 @@ static void collect(const float *x, ptrdiff_t plane, int pixels, int channels, b
         }
 }
 
-INLINE void gather_vectors(const float *x, ptrdiff_t step, const int taps, ptrdiff_t next, int pixels, const int vectors, float *to)
+INLINE void gather_vectors(const float *x, ptrdiff_t step, const int taps, ptrdiff_t next, int pixels,
+                           const int vectors, float *to)
 {
     for (int p = 0; p < pixels; p++, x += step, to += vectors * VL) {
         vf sum[2];
         UNROLL for (int v = 0; v < vectors; v++) sum[v] = v_load(to + v * VL);
-        UNROLL for (int t = 0; t < taps; t++) UNROLL for (int v = 0; v < vectors; v++) sum[v] += v_load(x + t * next + v * VL);
+        UNROLL for (int t = 0; t < taps; t++) UNROLL for (int v = 0; v < vectors; v++)
+            sum[v] += v_load(x + t * next + v * VL);
         UNROLL for (int v = 0; v < vectors; v++) v_store(to + v * VL, sum[v]);
     }
 }
@@ -288,7 +310,8 @@ static void gather(const float *x, ptrdiff_t step, int taps, ptrdiff_t next, int
 static void finish(float *x, int64_t pixels, int channels, bool add, float leak, float *y)
 {
     const int vectors = (channels + VL - 1) / VL;
-    /* Each vector's end is written over by the next pixel's; what was just stored is not read, which would have to be waited for. */
+    /* Each vector's end is written over by the next pixel's; what was just stored is not read, which would have to be
+     * waited for. */
     for (int64_t p = 0; p < pixels; p++)
         for (int v = 0; v < vectors; v++) v_store(x + p * channels + v * VL, v_load(x + (p * vectors + v) * VL));
     const int64_t count = pixels * channels;
@@ -307,14 +330,14 @@ static void finish(float *x, int64_t pixels, int channels, bool add, float leak,
 #else
 #define FOR_ALL(DO) FOR_5(DO)
 #endif
-#define FUNCTIONS(n)                                                       \
-    static void tile_##n##_1(const ts_tile *t) { tile(t, n, 1, false); }   \
-    static void tile_##n##_2(const ts_tile *t) { tile(t, n, 2, false); }   \
-    static void bf16_##n##_1(const ts_tile *t) { tile(t, n, 1, true); }    \
-    static void bf16_##n##_2(const ts_tile *t) { tile(t, n, 2, true); }    \
-    static void sum_##n##_1(const ts_sum *t) { sum(t, n, 1, false); }      \
-    static void sum_##n##_2(const ts_sum *t) { sum(t, n, 2, false); }      \
-    static void near_##n##_1(const ts_sum *t) { sum(t, n, 1, true); }      \
+#define FUNCTIONS(n)                                                     \
+    static void tile_##n##_1(const ts_tile *t) { tile(t, n, 1, false); } \
+    static void tile_##n##_2(const ts_tile *t) { tile(t, n, 2, false); } \
+    static void bf16_##n##_1(const ts_tile *t) { tile(t, n, 1, true); }  \
+    static void bf16_##n##_2(const ts_tile *t) { tile(t, n, 2, true); }  \
+    static void sum_##n##_1(const ts_sum *t) { sum(t, n, 1, false); }    \
+    static void sum_##n##_2(const ts_sum *t) { sum(t, n, 2, false); }    \
+    static void near_##n##_1(const ts_sum *t) { sum(t, n, 1, true); }    \
     static void near_##n##_2(const ts_sum *t) { sum(t, n, 2, true); }
 FOR_ALL(FUNCTIONS)
 

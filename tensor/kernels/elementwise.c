@@ -22,7 +22,8 @@ static void leaky(int64_t n, const float *x, float leak, float *y)
 static void leaky_backward(int64_t n, const float *y, const float *dy, float leak, float *dx, bool accumulate)
 {
     const vf l = v_set(leak);
-    for (int64_t i = 0; i < n; i += VL) put(dx + i, slope(v_load_part(y + i, n - i), v_load_part(dy + i, n - i), l), n - i, accumulate);
+    for (int64_t i = 0; i < n; i += VL)
+        put(dx + i, slope(v_load_part(y + i, n - i), v_load_part(dy + i, n - i), l), n - i, accumulate);
 }
 
 static void tanh_forward(int64_t n, const float *x, float *y)
@@ -56,7 +57,8 @@ static void selu_backward(int64_t n, const float *y, const float *dy, float *dx,
     }
 }
 
-/* The logarithm's argument is rounded near 1, where the series (next term 3/40 x^5) takes over. Beyond 1e18 the square would overflow. */
+/* The logarithm's argument is rounded near 1, where the series (next term 3/40 x^5) takes over. Beyond 1e18 the square
+ * would overflow. */
 static inline vf asinh_of(vf x)
 {
     const vf a = v_abs(x), small = a * (1.0f - a * a * (1.0f / 6));
@@ -87,13 +89,16 @@ static void add_leaky(int64_t pixels, int c, const float *x, const float *g, flo
 {
     const vf l = v_set(leak);
     for (int64_t p = 0; p < pixels; p++, x += c, y += c)
-        for (int i = 0; i < c; i += VL) v_store_part(y + i, leaky_of(v_load_part(x + i, c - i) + v_load_part(g + i, c - i), l), c - i);
+        for (int i = 0; i < c; i += VL)
+            v_store_part(y + i, leaky_of(v_load_part(x + i, c - i) + v_load_part(g + i, c - i), l), c - i);
 }
 
-/* Pixels in one float partial sum: its error stays below 64 half ulps of the largest partial sum before it goes into a double. */
+/* Pixels in one float partial sum: its error stays below 64 half ulps of the largest partial sum before it goes into a
+ * double. */
 enum { RUN = 64 };
 
-static void add_leaky_backward(int64_t pixels, int c, const float *y, const float *dy, float leak, float *dx, bool accumulate, double *sum)
+static void add_leaky_backward(int64_t pixels, int c, const float *y, const float *dy, float leak, float *dx,
+                               bool accumulate, double *sum)
 {
     const vf l = v_set(leak);
     for (int64_t p0 = 0; p0 < pixels; p0 += RUN) {
@@ -117,13 +122,15 @@ static void broadcast(int64_t pixels, int c, const float *g, float *y, bool accu
         for (int i = 0; i < c; i += VL) put(y + i, v_load_part(g + i, c - i), c - i, accumulate);
 }
 
-static void copy(int64_t pixels, int c, const float *src, int64_t src_stride, float *dst, int64_t dst_stride, bool accumulate)
+static void copy(int64_t pixels, int c, const float *src, int64_t src_stride, float *dst, int64_t dst_stride,
+                 bool accumulate)
 {
     for (int64_t p = 0; p < pixels; p++, src += src_stride, dst += dst_stride)
         for (int i = 0; i < c; i += VL) put(dst + i, v_load_part(src + i, c - i), c - i, accumulate);
 }
 
-static void gru(int64_t pixels, int c, const float *ih, const float *hh, int64_t hh_stride, const float *old, float *y, float *saved)
+static void gru(int64_t pixels, int c, const float *ih, const float *hh, int64_t hh_stride, const float *old, float *y,
+                float *saved)
 {
     for (int64_t p = 0; p < pixels; p++, ih += 3 * (int64_t)c, hh += hh_stride, y += c) {
         for (int i = 0; i < c; i += VL) {
@@ -148,8 +155,8 @@ static void gru(int64_t pixels, int c, const float *ih, const float *hh, int64_t
     }
 }
 
-static void gru_backward(int64_t pixels, int c, const float *saved, const float *old, const float *dy, float *d, float *dold, bool accumulate,
-                         double *sum)
+static void gru_backward(int64_t pixels, int c, const float *saved, const float *old, const float *dy, float *d,
+                         float *dold, bool accumulate, double *sum)
 {
     for (int64_t p0 = 0; p0 < pixels; p0 += RUN) {
         int64_t p1 = p0 + RUN < pixels ? p0 + RUN : pixels;
@@ -159,7 +166,8 @@ static void gru_backward(int64_t pixels, int c, const float *saved, const float 
             for (int64_t p = p0; p < p1; p++) {
                 const float *s = saved + p * 4 * c + i;
                 float *to = d + p * 4 * c + i;
-                const vf z = v_load_part(s, left), r = v_load_part(s + c, left), n = v_load_part(s + 2 * c, left), dv = v_load_part(dy + p * c + i, left);
+                const vf z = v_load_part(s, left), r = v_load_part(s + c, left), n = v_load_part(s + 2 * c, left),
+                         dv = v_load_part(dy + p * c + i, left);
                 const vf o = old ? v_load_part(old + p * c + i, left) : (vf){0};
                 const vf m = dv * z * (1.0f - n * n), az = dv * (n - o) * z * (1.0f - z);
                 const vf ar = m * v_load_part(s + 3 * c, left) * r * (1.0f - r), hn = m * r;
@@ -191,14 +199,28 @@ static void from_half(int64_t n, const uint16_t *restrict x, float *restrict y)
 {
     for (int64_t i = 0; i < n; i++) {
         const uint32_t h = x[i], sign = (h & 0x8000) << 16, exponent = h >> 10 & 31, fraction = h & 0x3ff;
-        const uint32_t usual = (exponent == 31 ? 255u : exponent + 112) << 23 | fraction << 13, subnormal = bits_of((float)(int32_t)fraction * 0x1p-24f);
+        const uint32_t usual = (exponent == 31 ? 255u : exponent + 112) << 23 | fraction << 13,
+                       subnormal = bits_of((float)(int32_t)fraction * 0x1p-24f);
         const uint32_t bits = sign | (exponent ? usual : subnormal);
         memcpy(&y[i], &bits, sizeof bits);
     }
 }
 
 const struct ts_elementwise_kernels TS_TABLE(elementwise) = {
-    .leaky = leaky, .leaky_backward = leaky_backward, .tanh = tanh_forward, .tanh_backward = tanh_backward, .selu = selu,
-    .selu_backward = selu_backward, .asinh = asinh_scaled, .from_half = from_half, .add = add, .scale = scale, .add_leaky = add_leaky, .add_leaky_backward = add_leaky_backward,
-    .broadcast = broadcast, .copy = copy, .gru = gru, .gru_backward = gru_backward,
+    .leaky = leaky,
+    .leaky_backward = leaky_backward,
+    .tanh = tanh_forward,
+    .tanh_backward = tanh_backward,
+    .selu = selu,
+    .selu_backward = selu_backward,
+    .asinh = asinh_scaled,
+    .from_half = from_half,
+    .add = add,
+    .scale = scale,
+    .add_leaky = add_leaky,
+    .add_leaky_backward = add_leaky_backward,
+    .broadcast = broadcast,
+    .copy = copy,
+    .gru = gru,
+    .gru_backward = gru_backward,
 };

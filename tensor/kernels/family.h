@@ -15,22 +15,22 @@
 #define TS_TABLE(name) TS_PASTE(ts_, name, _, TS_ISA_SUFFIX)
 
 #if defined(__x86_64__)
-#define TS_FAMILY(name)                                                                                              \
-    extern const struct ts_##name##_kernels ts_##name##_base, ts_##name##_avx2, ts_##name##_avx512,                 \
-        ts_##name##_avx512bf16, ts_##name##_amx;                                                                     \
-    static inline const struct ts_##name##_kernels *ts_##name##_k(void)                                              \
-    {                                                                                                                \
-        switch (ts_isa_now()) {                                                                                      \
-        case TS_AMX: return &ts_##name##_amx;                                                                        \
-        case TS_AVX512BF16: return &ts_##name##_avx512bf16;                                                          \
-        case TS_AVX512: return &ts_##name##_avx512;                                                                  \
-        case TS_AVX2: return &ts_##name##_avx2;                                                                      \
-        default: return &ts_##name##_base;                                                                           \
-        }                                                                                                            \
+#define TS_FAMILY(name)                                                                             \
+    extern const struct ts_##name##_kernels ts_##name##_base, ts_##name##_avx2, ts_##name##_avx512, \
+        ts_##name##_avx512bf16, ts_##name##_amx;                                                    \
+    static inline const struct ts_##name##_kernels *ts_##name##_k(void)                             \
+    {                                                                                               \
+        switch (ts_isa_now()) {                                                                     \
+        case TS_AMX: return &ts_##name##_amx;                                                       \
+        case TS_AVX512BF16: return &ts_##name##_avx512bf16;                                         \
+        case TS_AVX512: return &ts_##name##_avx512;                                                 \
+        case TS_AVX2: return &ts_##name##_avx2;                                                     \
+        default: return &ts_##name##_base;                                                          \
+        }                                                                                           \
     }
 #else
-#define TS_FAMILY(name)                                                                                              \
-    extern const struct ts_##name##_kernels ts_##name##_base;                                                        \
+#define TS_FAMILY(name)                                       \
+    extern const struct ts_##name##_kernels ts_##name##_base; \
     static inline const struct ts_##name##_kernels *ts_##name##_k(void) { return &ts_##name##_base; }
 #endif
 #endif

@@ -1,4 +1,5 @@
-/* Loops without branches over arrays, which the compiler turns into vectors of whatever width the instruction set has. */
+/* Loops without branches over arrays, which the compiler turns into vectors of whatever width the instruction set has.
+ */
 #include "tensor/kernels/noise.h"
 #include "tensor/kernels/vmath.h"
 
@@ -22,8 +23,9 @@ static inline float corner(uint32_t key, float dx, float dy)
     return ((float)(int32_t)(key & 0xffff) - 32767.5f) * dx + ((float)(int32_t)(key >> 16) - 32767.5f) * dy;
 }
 
-static inline __attribute__((always_inline)) void sum(int n, const float *u, const float *v, float frequency, float shift_u, float shift_v,
-                                                      uint32_t seed, bool folded, float amplitude, float *restrict out)
+static inline __attribute__((always_inline)) void sum(int n, const float *u, const float *v, float frequency,
+                                                      float shift_u, float shift_v, uint32_t seed, bool folded,
+                                                      float amplitude, float *restrict out)
 {
     for (int i = 0; i < n; i++) {
         float x = u[i] * frequency + shift_u, y = v[i] * frequency + shift_v;
@@ -38,14 +40,15 @@ static inline __attribute__((always_inline)) void sum(int n, const float *u, con
     }
 }
 
-static void octave(int n, const float *u, const float *v, float frequency, float shift_u, float shift_v, uint32_t seed, bool folded,
-                   float amplitude, float *out)
+static void octave(int n, const float *u, const float *v, float frequency, float shift_u, float shift_v, uint32_t seed,
+                   bool folded, float amplitude, float *out)
 {
     if (folded) sum(n, u, v, frequency, shift_u, shift_v, seed, true, amplitude, out);
     else sum(n, u, v, frequency, shift_u, shift_v, seed, false, amplitude, out);
 }
 
-static void cell(int count, const float *u, const float *v, ts_noise_cells c, float *near, float *edge, float *id, float *x_out, float *y_out)
+static void cell(int count, const float *u, const float *v, ts_noise_cells c, float *near, float *edge, float *id,
+                 float *x_out, float *y_out)
 {
     float first[BLOCK], second[BLOCK], ax[BLOCK], ay[BLOCK], bx[BLOCK], by[BLOCK], lx[BLOCK], ly[BLOCK];
     int32_t cx[BLOCK], cy[BLOCK];
@@ -69,7 +72,8 @@ static void cell(int count, const float *u, const float *v, ts_noise_cells c, fl
                 int32_t row = cy[i] + oy;
                 uint32_t h = ts_noise_hash(cx[i] + ox, row, c.seed), h2 = h * 0x9e3779b1u;
                 float odd = (row & 1) ? c.stagger : 0.0f;
-                float px = (float)ox + odd * 0.5f - (1 - (odd != 0)) * c.stagger * 0.5f + 0.5f + c.jitter * (unit(h) - 0.5f) - lx[i];
+                float px = (float)ox + odd * 0.5f - (1 - (odd != 0)) * c.stagger * 0.5f + 0.5f +
+                    c.jitter * (unit(h) - 0.5f) - lx[i];
                 float py = (float)oy + 0.5f + c.jitter * (unit(h2) - 0.5f) - ly[i];
                 float d = px * px + py * py;
                 int closest = d < first[i], next = d < second[i];
@@ -83,7 +87,8 @@ static void cell(int count, const float *u, const float *v, ts_noise_cells c, fl
             }
         }
         for (int i = 0; i < n; i++) {
-            float ex = bx[i] - ax[i], ey = by[i] - ay[i], length = __builtin_sqrtf(ex * ex + ey * ey) + 1e-6f; /* two points may coincide */
+            float ex = bx[i] - ax[i], ey = by[i] - ay[i],
+                  length = __builtin_sqrtf(ex * ex + ey * ey) + 1e-6f; /* two points may coincide */
             if (near) near[begin + i] = __builtin_sqrtf(first[i]);
             if (edge) edge[begin + i] = (0.5f * (ax[i] + bx[i]) * ex + 0.5f * (ay[i] + by[i]) * ey) / length;
             if (id) id[begin + i] = unit(key[i] * 0x85ebca6bu);
@@ -96,7 +101,8 @@ static void cell(int count, const float *u, const float *v, ts_noise_cells c, fl
 /* cos(2 pi x), 0 <= x < 1: its Taylor series on a quarter of a turn, 1e-7 */
 static inline vf cos_turns(vf x)
 {
-    const vf a = v_abs(x - 0.5f), folded = v_min(a, 0.5f - a), t = folded * folded; /* cos(2 pi x) = -cos(2 pi |x - 1/2|) */
+    const vf a = v_abs(x - 0.5f), folded = v_min(a, 0.5f - a),
+             t = folded * folded; /* cos(2 pi x) = -cos(2 pi |x - 1/2|) */
     vf p = v_set(7.9035364f);
     p = p * t - 26.426257f;
     p = p * t + 60.244641f;

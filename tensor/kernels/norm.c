@@ -51,7 +51,8 @@ static void moments(int64_t pixels, int c, const float *x, double *mean, double 
     }
 }
 
-static void normalise(int64_t pixels, int c, const float *x, const float *high, const float *low, const float *scale, float *y)
+static void normalise(int64_t pixels, int c, const float *x, const float *high, const float *low, const float *scale,
+                      float *y)
 {
     for (int64_t p = 0; p < pixels; p++, x += c, y += c)
         for (int i = 0; i < c; i += VL) {
@@ -78,17 +79,23 @@ static void gradient_sums(int64_t pixels, int c, const float *y, const float *dy
     }
 }
 
-static void gradient(int64_t pixels, int c, const float *y, const float *dy, const float *a, const float *b, const float *scale, float *dx, bool accumulate)
+static void gradient(int64_t pixels, int c, const float *y, const float *dy, const float *a, const float *b,
+                     const float *scale, float *dx, bool accumulate)
 {
     for (int64_t p = 0; p < pixels; p++, y += c, dy += c, dx += c)
         for (int i = 0; i < c; i += VL) {
             const int left = c - i;
-            vf d = v_load_part(dy + i, left) - v_load_part(a + i, left) - v_load_part(b + i, left) * v_load_part(y + i, left);
+            vf d = v_load_part(dy + i, left) - v_load_part(a + i, left) -
+                v_load_part(b + i, left) * v_load_part(y + i, left);
             d = d * v_load_part(scale + i, left);
             v_store_part(dx + i, accumulate ? v_load_part(dx + i, left) + d : d, left);
         }
 }
 
 const struct ts_norm_kernels TS_TABLE(norm) = {
-    .sums = sums, .moments = moments, .normalise = normalise, .gradient_sums = gradient_sums, .gradient = gradient,
+    .sums = sums,
+    .moments = moments,
+    .normalise = normalise,
+    .gradient_sums = gradient_sums,
+    .gradient = gradient,
 };

@@ -3,8 +3,8 @@
 
 static double run(long rounds)
 {
-    /* Twelve chains: enough to hide the latency of two units, few enough for 16 registers. Each starts with a value of its own
-     * that the compiler cannot know, or it would run one chain for all. */
+    /* Twelve chains: enough to hide the latency of two units, few enough for 16 registers. Each starts with a value of
+     * its own that the compiler cannot know, or it would run one chain for all. */
     volatile float seed = 1;
     vf a0 = v_set(seed), a1 = v_set(seed), a2 = v_set(seed), a3 = v_set(seed), a4 = v_set(seed), a5 = v_set(seed);
     vf a6 = v_set(seed), a7 = v_set(seed), a8 = v_set(seed), a9 = v_set(seed), a10 = v_set(seed), a11 = v_set(seed);
@@ -20,7 +20,7 @@ static double run(long rounds)
 }
 
 #if defined(__AMX_BF16__)
-#include "tensor/kernels/tiles.h"
+#include "tensor/kernels/amx.h"
 
 static double run_bf16(long rounds)
 {
@@ -42,7 +42,8 @@ static double run_bf16(long rounds)
     vf a[CHAINS];
     const __m512bh one = (__m512bh)v_set(seed);
     _Pragma("GCC unroll 12") for (int c = 0; c < CHAINS; c++) a[c] = v_set(seed);
-    for (long i = 0; i < rounds; i++) _Pragma("GCC unroll 12") for (int c = 0; c < CHAINS; c++) a[c] = (vf)_mm512_dpbf16_ps((__m512)a[c], one, one);
+    for (long i = 0; i < rounds; i++)
+        _Pragma("GCC unroll 12") for (int c = 0; c < CHAINS; c++) a[c] = (vf)_mm512_dpbf16_ps((__m512)a[c], one, one);
     vf all = a[0];
     _Pragma("GCC unroll 12") for (int c = 1; c < CHAINS; c++) all += a[c];
     volatile float keep = v_sum(all);

@@ -23,13 +23,15 @@ static inline void put(float *p, vi mask, vf dy, int left, bool accumulate)
     v_store_part(p, accumulate ? v_load_part(p, left) + d : d, left);
 }
 
-static void max_backward(int w, int c, const float *row0, const float *row1, const float *dy, float *drow0, float *drow1, bool accumulate)
+static void max_backward(int w, int c, const float *row0, const float *row1, const float *dy, float *drow0,
+                         float *drow1, bool accumulate)
 {
     for (int j = 0; j < w; j++, row0 += 2 * c, row1 += 2 * c, drow0 += 2 * c, drow1 += 2 * c, dy += c)
         for (int i = 0; i < c; i += VL) {
             const int left = c - i;
             vf best = v_load_part(row0 + i, left), d = v_load_part(dy + i, left);
-            vf x1 = v_load_part(row0 + c + i, left), x2 = v_load_part(row1 + i, left), x3 = v_load_part(row1 + c + i, left);
+            vf x1 = v_load_part(row0 + c + i, left), x2 = v_load_part(row1 + i, left),
+               x3 = v_load_part(row1 + c + i, left);
             vi m1 = wins(x1, best);
             best = v_select(m1, x1, best);
             vi m2 = wins(x2, best);

@@ -9,7 +9,8 @@ struct ts_pool_kernels {
     /* row0, row1: [2 w][c], y: [w][c] */
     void (*max)(int w, int c, const float *row0, const float *row1, float *y);
     /* dy goes to the largest of the four, the first of equal ones in reading order; the others get 0. */
-    void (*max_backward)(int w, int c, const float *row0, const float *row1, const float *dy, float *drow0, float *drow1, bool accumulate);
+    void (*max_backward)(int w, int c, const float *row0, const float *row1, const float *dy, float *drow0,
+                         float *drow1, bool accumulate);
 };
 TS_FAMILY(pool)
 

@@ -25,7 +25,8 @@ static void rows(int64_t n, int count, const float *weight, const float *x, int6
     }
 }
 
-static void pixels(int w, int c, const int *first, const int *offset, const float *weight, const float *x, float *y, bool accumulate)
+static void pixels(int w, int c, const int *first, const int *offset, const float *weight, const float *x, float *y,
+                   bool accumulate)
 {
     for (int j = 0; j < w; j++, y += c) {
         const float *p = x + (int64_t)first[j] * c, *q = weight + offset[j];

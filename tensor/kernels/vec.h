@@ -19,14 +19,16 @@
 
 typedef float vf __attribute__((vector_size(VL * 4)));
 typedef int32_t vi __attribute__((vector_size(VL * 4)));
-typedef float vf_u __attribute__((vector_size(VL * 4), aligned(4), may_alias)); /* an unaligned view for loads and stores */
+typedef float vf_u
+    __attribute__((vector_size(VL * 4), aligned(4), may_alias)); /* an unaligned view for loads and stores */
 
 static inline vf v_load(const float *p) { return *(const vf_u *)p; }
 static inline void v_store(float *p, vf x) { *(vf_u *)p = x; }
 static inline vf v_set(float x) { return x - (vf){0}; }
 static inline vi v_seti(int32_t x) { return x - (vi){0}; }
 static inline vf v_select(vi mask, vf a, vf b) { return (vf)((mask & (vi)a) | (~mask & (vi)b)); }
-/* a > b ? a : b and a < b ? a : b, so b where either is NaN. The instructions mean exactly that, but gcc does not find them. */
+/* a > b ? a : b and a < b ? a : b, so b where either is NaN. The instructions mean exactly that, but gcc does not find
+ * them. */
 #if defined(__AVX512F__)
 static inline vf v_max(vf a, vf b) { return (vf)_mm512_max_ps((__m512)a, (__m512)b); }
 static inline vf v_min(vf a, vf b) { return (vf)_mm512_min_ps((__m512)a, (__m512)b); }
@@ -39,7 +41,8 @@ static inline vf v_min(vf a, vf b) { return v_select(a < b, a, b); }
 #endif
 static inline vf v_abs(vf a) { return (vf)((vi)a & v_seti(0x7fffffff)); }
 
-/* a b + c. Where c is a product too, the compiler would fuse either of them, in one function this and in the next the other. */
+/* a b + c. Where c is a product too, the compiler would fuse either of them, in one function this and in the next the
+ * other. */
 static inline vf v_fma(vf a, vf b, vf c)
 {
 #if defined(__AVX512F__)
@@ -53,7 +56,8 @@ static inline vf v_fma(vf a, vf b, vf c)
 
 typedef uint32_t vu __attribute__((vector_size(VL * 4)));
 
-/* The upper half of each lane becomes the nearest bf16: 0x7fff carries into it from above the middle, and 1 more in the middle where it is odd. */
+/* The upper half of each lane becomes the nearest bf16: 0x7fff carries into it from above the middle, and 1 more in the
+ * middle where it is odd. */
 static inline vu v_bf16(vf x)
 {
     const vu bits = (vu)x;

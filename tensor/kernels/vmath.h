@@ -1,24 +1,28 @@
-/* Vector exp, exp2, expm1, log, tanh, sigmoid, gamma. Largest error over all floats, in units in the last place of the double result
- * rounded to float: exp, exp2, expm1, log 2; tanh, sigmoid 3; gamma below (tests/test_elementwise.c measures them).
- * Everywhere: NaN gives NaN; results below FLT_MIN are rounded denormals, never flushed; results above FLT_MAX are infinity.
- * Polynomials are minimax fits (Remez) of the expression that each comment names; only files in this folder include this. */
+/* Vector exp, exp2, expm1, log, tanh, sigmoid, gamma. Largest error over all floats, in units in the last place of the
+ * double result rounded to float: exp, exp2, expm1, log 2; tanh, sigmoid 3; gamma below
+ * (tests/tensor/test_elementwise.c measures them). Everywhere: NaN gives NaN; results below FLT_MIN are rounded
+ * denormals, never flushed; results above FLT_MAX are infinity. Polynomials are minimax fits (Remez) of the expression
+ * that each comment names; only files in this folder include this. */
 #ifndef TS_VMATH_H
 #define TS_VMATH_H
 #include "tensor/kernels/vec.h"
 
-typedef uint32_t vu __attribute__((vector_size(VL * 4))); /* unsigned, so that a NaN's garbage exponent cannot overflow */
+typedef uint32_t vu
+    __attribute__((vector_size(VL * 4))); /* unsigned, so that a NaN's garbage exponent cannot overflow */
 
 /* 2^n for -126 <= n <= 127 */
 static inline vf v_power2(vi n) { return (vf)(((vu)n + 127u) << 23); }
 
-/* p 2^n for -252 <= n <= 254, rounded once: two factors, for one alone would overflow or lose a denormal's bits twice */
+/* p 2^n for -252 <= n <= 254, rounded once: two factors, for one alone would overflow or lose a denormal's bits twice
+ */
 static inline vf v_scale2(vf p, vi n)
 {
     vi half = n >> 1;
     return p * v_power2(half) * v_power2(n - half);
 }
 
-/* Adding 1.5 2^23 leaves the integer nearest to |x| < 2^22 in the low bits (NaN leaves garbage, which callers multiply by NaN). */
+/* Adding 1.5 2^23 leaves the integer nearest to |x| < 2^22 in the low bits (NaN leaves garbage, which callers multiply
+ * by NaN). */
 #define V_ROUND_MAGIC 12582912.0f
 
 /* 2^x. Saturates: 0 from x < -150, infinity from x >= 128. */
@@ -38,7 +42,8 @@ static inline vf v_exp2(vf x)
     return v_scale2(q * f + 1.0f, n);
 }
 
-/* x = n ln 2 + r, |r| <= ln 2 / 2; ln 2 in two parts, the first short enough for n times it to be exact (Cody and Waite 1980) */
+/* x = n ln 2 + r, |r| <= ln 2 / 2; ln 2 in two parts, the first short enough for n times it to be exact (Cody and Waite
+ * 1980) */
 static inline vf v_reduce_ln2(vf x, vi *n)
 {
     vf t = x * 1.44269504f + V_ROUND_MAGIC;

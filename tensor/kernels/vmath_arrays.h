@@ -1,4 +1,5 @@
-/* The functions of vmath.h on arrays: y[i] = f(x[i]). x and y may be the same. For errors and special values see there. */
+/* The functions of vmath.h on arrays: y[i] = f(x[i]). x and y may be the same. For errors and special values see there.
+ */
 #ifndef TS_VMATH_ARRAYS_H
 #define TS_VMATH_ARRAYS_H
 #include "tensor/kernels/family.h"

@@ -32,15 +32,16 @@ static void input(const float *const pixel[36], const float *const next[36], int
 {
     for (int c = 0; c < channels; c += VL) {
         vf half[6][6]; /* [column][row of B' d] */
-        UNROLL for (int j = 0; j < 6; j++) {
+        UNROLL for (int j = 0; j < 6; j++)
+        {
             vf d[6];
             UNROLL for (int i = 0; i < 6; i++) d[i] = v_load_part(pixel[6 * i + j] + c, channels - c);
             /* The two left columns are the right ones of this tile, as a rule. */
-            if (j >= 2)
-                UNROLL for (int i = 0; i < 6; i++) __builtin_prefetch(next[6 * i + j] + c);
+            if (j >= 2) UNROLL for (int i = 0; i < 6; i++) __builtin_prefetch(next[6 * i + j] + c);
             six(d, half[j]);
         }
-        UNROLL for (int i = 0; i < 6; i++) {
+        UNROLL for (int i = 0; i < 6; i++)
+        {
             vf d[6], to[6];
             UNROLL for (int j = 0; j < 6; j++) d[j] = half[j][i];
             six(d, to);
@@ -49,21 +50,25 @@ static void input(const float *const pixel[36], const float *const next[36], int
     }
 }
 
-static void output(const float *m, ptrdiff_t plane, int channels, const float *bias, float leak, bool add, float *const y[16], float *const next[16])
+static void output(const float *m, ptrdiff_t plane, int channels, const float *bias, float leak, bool add,
+                   float *const y[16], float *const next[16])
 {
     for (int c = 0; c < channels; c += VL) {
         vf half[6][4];
         const vf init = bias ? v_load_part(bias + c, channels - c) : (vf){0};
-        UNROLL for (int j = 0; j < 6; j++) {
+        UNROLL for (int j = 0; j < 6; j++)
+        {
             vf d[6];
             UNROLL for (int i = 0; i < 6; i++) d[i] = v_load_part(m + (6 * i + j) * plane + c, channels - c);
             four(d, half[j]);
         }
-        UNROLL for (int i = 0; i < 4; i++) {
+        UNROLL for (int i = 0; i < 4; i++)
+        {
             vf d[6], to[4];
             UNROLL for (int j = 0; j < 6; j++) d[j] = half[j][i];
             four(d, to);
-            UNROLL for (int j = 0; j < 4; j++) {
+            UNROLL for (int j = 0; j < 4; j++)
+            {
                 if (next[4 * i + j]) __builtin_prefetch(next[4 * i + j] + c, 1);
                 if (!y[4 * i + j]) continue;
                 const vf u = add ? to[j] + init + v_load_part(y[4 * i + j] + c, channels - c) : to[j] + init;
@@ -76,7 +81,8 @@ static void output(const float *m, ptrdiff_t plane, int channels, const float *b
 /* to = G w */
 INLINE void from_three(const vf w[3], vf to[6])
 {
-    const vf a = v_set(1.0f / 6) * (w[0] + w[2]), b = v_set(1.0f / 6) * w[1], c = v_set(1.0f / 24) * w[0] + v_set(1.0f / 6) * w[2], d = v_set(1.0f / 12) * w[1];
+    const vf a = v_set(1.0f / 6) * (w[0] + w[2]), b = v_set(1.0f / 6) * w[1],
+             c = v_set(1.0f / 24) * w[0] + v_set(1.0f / 6) * w[2], d = v_set(1.0f / 12) * w[1];
     to[0] = v_set(0.25f) * w[0];
     to[1] = -(a + b);
     to[2] = b - a;
@@ -89,12 +95,14 @@ static void weights(const float *tap, int vectors, float *u, ptrdiff_t plane)
 {
     for (int o = 0; o < vectors * VL; o += VL) {
         vf half[3][6]; /* [column][row of G g] */
-        UNROLL for (int j = 0; j < 3; j++) {
+        UNROLL for (int j = 0; j < 3; j++)
+        {
             vf w[3];
             UNROLL for (int i = 0; i < 3; i++) w[i] = v_load(tap + (3 * i + j) * vectors * VL + o);
             from_three(w, half[j]);
         }
-        UNROLL for (int i = 0; i < 6; i++) {
+        UNROLL for (int i = 0; i < 6; i++)
+        {
             vf w[3], to[6];
             UNROLL for (int j = 0; j < 3; j++) w[j] = half[j][i];
             from_three(w, to);
@@ -115,19 +123,23 @@ INLINE void from_four(const vf y[4], vf to[6])
     to[5] = y[3];
 }
 
-static void output_gradient(const float *const dy[16], const float *const next[16], int channels, float *m, ptrdiff_t plane)
+static void output_gradient(const float *const dy[16], const float *const next[16], int channels, float *m,
+                            ptrdiff_t plane)
 {
     for (int c = 0; c < channels; c += VL) {
         vf half[4][6]; /* [column][row of A dy] */
-        UNROLL for (int j = 0; j < 4; j++) {
+        UNROLL for (int j = 0; j < 4; j++)
+        {
             vf d[4];
-            UNROLL for (int i = 0; i < 4; i++) {
+            UNROLL for (int i = 0; i < 4; i++)
+            {
                 d[i] = v_load_part(dy[4 * i + j] + c, channels - c);
                 __builtin_prefetch(next[4 * i + j] + c);
             }
             from_four(d, half[j]);
         }
-        UNROLL for (int i = 0; i < 6; i++) {
+        UNROLL for (int i = 0; i < 6; i++)
+        {
             vf d[4], to[6];
             UNROLL for (int j = 0; j < 4; j++) d[j] = half[j][i];
             from_four(d, to);
@@ -148,15 +160,18 @@ INLINE void three(const vf u[6], vf to[3])
 static void weights_gradient(const float *u, ptrdiff_t plane, int sums, ptrdiff_t sum, float *tap)
 {
     vf half[6][3]; /* [column][row of G' u] */
-    UNROLL for (int j = 0; j < 6; j++) {
+    UNROLL for (int j = 0; j < 6; j++)
+    {
         vf d[6];
-        UNROLL for (int i = 0; i < 6; i++) {
+        UNROLL for (int i = 0; i < 6; i++)
+        {
             d[i] = v_load(u + (6 * i + j) * plane);
             for (int s = 1; s < sums; s++) d[i] += v_load(u + s * sum + (6 * i + j) * plane);
         }
         three(d, half[j]);
     }
-    UNROLL for (int i = 0; i < 3; i++) {
+    UNROLL for (int i = 0; i < 3; i++)
+    {
         vf d[6], to[3];
         UNROLL for (int j = 0; j < 6; j++) d[j] = half[j][i];
         three(d, to);
@@ -164,5 +179,8 @@ static void weights_gradient(const float *u, ptrdiff_t plane, int sums, ptrdiff_
     }
 }
 
-const struct ts_winograd_kernels TS_TABLE(winograd) = {.input = input, .output = output, .weights = weights, .output_gradient = output_gradient,
+const struct ts_winograd_kernels TS_TABLE(winograd) = {.input = input,
+                                                       .output = output,
+                                                       .weights = weights,
+                                                       .output_gradient = output_gradient,
                                                        .weights_gradient = weights_gradient};

@@ -1,6 +1,6 @@
-#include "data/common_read.h"
-#include "data/image.h"
-#include "data/png_file.h"
+#include "data/image/common_read.h"
+#include "data/image/image.h"
+#include "data/image/png_file.h"
 #include "tests/fuzz/fuzz.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,7 +9,10 @@
 
 enum { MOST_PIXELS = 1 << 16 };
 
-static uint32_t take32(const uint8_t *p) { return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3]; }
+static uint32_t take32(const uint8_t *p)
+{
+    return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3];
+}
 
 /* Otherwise hardly a changed PNG would get past the checksums. */
 static void mend_png(uint8_t *data, size_t size)
@@ -33,7 +36,8 @@ void fuzz_photo(const uint8_t *data, size_t size)
     oi_image raw;
     io_image image;
     ts_status st = {0};
-    if (!io_check_png(path, &st) && (io_read_png_file(path, MOST_PIXELS, &raw) || io_read_jpeg_file(path, MOST_PIXELS, &raw))) {
+    if (!io_check_png(path, &st) &&
+        (io_read_png_file(path, MOST_PIXELS, &raw) || io_read_jpeg_file(path, MOST_PIXELS, &raw))) {
         oi_free(&raw); /* what these do not take goes to OpenImageIO, which is not meant here */
         if (io_read_photo(path, MOST_PIXELS, &image, &st)) abort();
         for (int i = 0; i < image.width * image.height * image.channels; i++)

@@ -25,7 +25,8 @@ void fuzz_config(const uint8_t *data, size_t size)
     tr_config_print(&c, true, f);
     fclose(f);
     st = (ts_status){0};
-    if (tr_config_read(&again, fuzz_file((const uint8_t *)text, length), &st) || tr_config_same(&c, &again, "print", &st)) {
+    if (tr_config_read(&again, fuzz_file((const uint8_t *)text, length), &st) ||
+        tr_config_same(&c, &again, "print", &st)) {
         fprintf(stderr, "%s\n%s", st.message, text);
         abort();
     }
@@ -34,13 +35,15 @@ void fuzz_config(const uint8_t *data, size_t size)
 
 void fuzz_folder(const uint8_t *data, size_t size)
 {
-    static const char *const name[] = {"set.ini", "meta.txt", "image_size.txt", "light_power.txt", "camera_pos.txt", "light_pos.txt", "capture.ini"};
+    static const char *const name[] = {"set.ini",        "meta.txt",      "image_size.txt", "light_power.txt",
+                                       "camera_pos.txt", "light_pos.txt", "capture.ini"};
     static const char *const sound[] = {"10\n", "1,1,1\n", "0,0,10\n", "0,0,10\n"};
     if (size < 1) return;
     const int kind = data[0] % 7;
     ts_status st = {0};
     for (int i = 2; i < 6; i++)
-        if (kind >= 2 && kind < 6 && i != kind) fuzz_named(name[i], (const uint8_t *)sound[i - 2], strlen(sound[i - 2]));
+        if (kind >= 2 && kind < 6 && i != kind)
+            fuzz_named(name[i], (const uint8_t *)sound[i - 2], strlen(sound[i - 2]));
     const char *path = fuzz_named(name[kind], data + 1, size - 1);
     ts_code code = TS_OK;
     if (kind == 0) {

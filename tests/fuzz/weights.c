@@ -1,4 +1,4 @@
-#include "nn/weights.h"
+#include "nn/weights/weights.h"
 #include "tests/fuzz/fuzz.h"
 #include <stdlib.h>
 #include <string.h>

@@ -8,11 +8,14 @@
 static const struct {
     const char *name;
     bool (*run)(const stress *);
-} parts[] = {{"shading", stress_shading}, {"newton", stress_newton}, {"threads", stress_threads}, {"sums", stress_sums}, {"unrolled", stress_unrolled}, {"refinement", stress_refinement}, {"training", stress_training}};
+} parts[] = {{"shading", stress_shading},  {"newton", stress_newton},     {"threads", stress_threads},
+             {"sums", stress_sums},        {"unrolled", stress_unrolled}, {"refinement", stress_refinement},
+             {"training", stress_training}};
 
 static int help(void)
 {
-    puts("usage: lgd-stress [PART]\nRuns the parts that PART names, all of them without it: what was measured beside its bound. Exit status 1 where one is broken. Parts:");
+    puts("usage: lgd-stress [PART]\nRuns the parts that PART names, all of them without it: what was measured beside "
+         "its bound. Exit status 1 where one is broken. Parts:");
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) printf("  %s\n", parts[i].name);
     return 0;
 }
@@ -20,7 +23,8 @@ static int help(void)
 int main(int argc, char **argv)
 {
     if (argc > 1 && !strcmp(argv[1], "--help")) return help();
-    if (argc > 2 || (argc > 1 && argv[1][0] == '-')) return fprintf(stderr, "lgd-stress: one part at most, no options but --help\n"), 2;
+    if (argc > 2 || (argc > 1 && argv[1][0] == '-'))
+        return fprintf(stderr, "lgd-stress: one part at most, no options but --help\n"), 2;
     char folder[] = "/tmp/lgd-stress-XXXXXX", command[64];
     ts_status st = {0};
     if (ts_isa_init(&st) != TS_OK) return fprintf(stderr, "lgd-stress: %s\n", st.message), 2;

@@ -1,8 +1,9 @@
-/* The step of Gauss and Newton's method in float, with the damping of the shipped models, against the same equations in double, from one photograph and from
- * several, by the equations' steepness, the largest of their diagonal: it is what multiplies rounding where the equations are summed first. */
+/* The step of Gauss and Newton's method in float, with the damping of the shipped models, against the same equations in
+ * double, from one photograph and from several, by the equations' steepness, the largest of their diagonal: it is what
+ * multiplies rounding where the equations are summed first. */
 #include "nn/layers.h"
 #include "tensor/cpu.h"
-#include "tests/normal_equations.h"
+#include "tests/support/normal_equations.h"
 #include "tests/stress/stress.h"
 #include <math.h>
 #include <string.h>
@@ -16,14 +17,19 @@ typedef struct worst {
     long pixels[REGIONS], broken;
 } worst;
 
-static double log_uniform(ts_rng *rng, double from, double to) { return from * pow(to / from, (double)ts_rng_uniform(rng)); }
+static double log_uniform(ts_rng *rng, double from, double to)
+{
+    return from * pow(to / from, (double)ts_rng_uniform(rng));
+}
 
 /* Roughness 1e-4 .. 1, normals up to the horizon, albedos and F0 0 .. 1, each also exactly at an end. */
 static void draw_maps(ts_rng *rng, float maps[C])
 {
-    for (int i = 0; i < C; i++) maps[i] = ts_rng_int(rng, 8) ? ts_rng_range(rng, -1, 1) : (float)(2 * ts_rng_int(rng, 2) - 1);
+    for (int i = 0; i < C; i++)
+        maps[i] = ts_rng_int(rng, 8) ? ts_rng_range(rng, -1, 1) : (float)(2 * ts_rng_int(rng, 2) - 1);
     maps[MAP_ROUGHNESS] = (float)(2 * log_uniform(rng, 1e-4, 1) - 1);
-    const double tilt = ts_rng_int(rng, 2) ? log_uniform(rng, 1e-4, 1) : 1 - log_uniform(rng, 1e-4, 1), phi = 6.2831853 * (double)ts_rng_uniform(rng);
+    const double tilt = ts_rng_int(rng, 2) ? log_uniform(rng, 1e-4, 1) : 1 - log_uniform(rng, 1e-4, 1),
+                 phi = 6.2831853 * (double)ts_rng_uniform(rng);
     maps[MAP_NORMAL] = (float)(tilt * cos(phi));
     maps[MAP_NORMAL + 1] = (float)(tilt * sin(phi));
 }
@@ -66,7 +72,8 @@ static void pixel(ts_rng *rng, int count, worst *w)
     const int region = steepest <= 100 ? 0 : steepest <= 1e4 ? 1 : 2;
     w->pixels[region]++;
     w->step[region] = fmax(w->step[region], error);
-    /* What is missing of the fall of the quadratic that the step minimises; its minimum is known where nothing is clamped. Falls that are rounding are not told. */
+    /* What is missing of the fall of the quadratic that the step minimises; its minimum is known where nothing is
+     * clamped. Falls that are rounding are not told. */
     if (inside && best > 1e-6) w->loss[region] = fmax(w->loss[region], 1 - reached / best);
 }
 
@@ -82,9 +89,11 @@ bool stress_newton(const stress *s)
             ts_isa_use((ts_isa)isa);
             for (int n = 0; n < (s->full ? 400000 : 20000); n++) pixel(&rng, count, &w);
             for (int r = 0; r < REGIONS; r++) {
-                snprintf(what, sizeof what, "%s: %d photographs, %s: step (%ld)", ts_isa_name((ts_isa)isa), count, region_name[r], w.pixels[r]);
+                snprintf(what, sizeof what, "%s: %d photographs, %s: step (%ld)", ts_isa_name((ts_isa)isa), count,
+                         region_name[r], w.pixels[r]);
                 ok = stress_row(what, w.step[r], step_bound[r]) && ok;
-                snprintf(what, sizeof what, "%s: %d photographs, %s: missing fall", ts_isa_name((ts_isa)isa), count, region_name[r]);
+                snprintf(what, sizeof what, "%s: %d photographs, %s: missing fall", ts_isa_name((ts_isa)isa), count,
+                         region_name[r]);
                 ok = stress_row(what, w.loss[r], loss_bound[r]) && ok;
                 ok = ok && w.pixels[r] > 50; /* a region that nobody met says nothing */
             }

@@ -1,6 +1,6 @@
 /* Many more refinement steps than anybody trained, from pictures that are none. */
-#include "data/procedural.h"
-#include "nn/weights.h"
+#include "data/materials/procedural.h"
+#include "nn/weights/weights.h"
 #include "render/error.h"
 #include "render/render.h"
 #include "tests/stress/stress.h"
@@ -27,7 +27,9 @@ static bool after(int step, const ag_value *maps, void *user)
         w->finite = w->finite && isfinite(maps->t.data[i]);
         w->largest = fmax(w->largest, fabs((double)maps->t.data[i]));
     }
-    w->rmse[step] = w->truth ? rd_render_rmse(rd_grid_full(w->size), maps->t.data, maps->t.shape.c, w->truth, C, w->views, RD_EVAL_VIEWS) : 0;
+    w->rmse[step] = w->truth
+        ? rd_render_rmse(rd_grid_full(w->size), maps->t.data, maps->t.shape.c, w->truth, C, w->views, RD_EVAL_VIEWS)
+        : 0;
     return true;
 }
 
@@ -38,16 +40,27 @@ static void picture(int kind, int size, float *p)
         for (int x = 0; x < size; x++)
             for (int c = 0; c < 3; c++) {
                 const float u = ts_rng_uniform(&r);
-                const float v[] = {u, 0, 1, 0.5f, (float)((x + y) % 2), x == size / 2 && y == size / 2, (float)(c == 0), u < 0.5f ? 0 : 1, 1e-40f, x < size / 2 ? 0 : 1};
+                const float v[] = {u,
+                                   0,
+                                   1,
+                                   0.5f,
+                                   (float)((x + y) % 2),
+                                   x == size / 2 && y == size / 2,
+                                   (float)(c == 0),
+                                   u < 0.5f ? 0 : 1,
+                                   1e-40f,
+                                   x < size / 2 ? 0 : 1};
                 p[(y * size + x) * 3 + c] = v[kind];
             }
 }
-static const char *const picture_name[] = {"random", "black", "saturated", "constant", "chequered", "one bright pixel", "pure red", "0 or 1 at random", "denormal", "half"};
+static const char *const picture_name[] = {"random",           "black",    "saturated",        "constant", "chequered",
+                                           "one bright pixel", "pure red", "0 or 1 at random", "denormal", "half"};
 enum { PICTURES = sizeof picture_name / sizeof *picture_name };
 
 static bool run(ag_tape *tape, const nn_model *model, float *image, watch *w)
 {
-    const nn_input in = {.image = ts_view(image, (ts_shape){1, w->size, w->size, 3}), .grid = rd_grid_full(w->size), .view = rd_flash()};
+    const nn_input in = {
+        .image = ts_view(image, (ts_shape){1, w->size, w->size, 3}), .grid = rd_grid_full(w->size), .view = rd_flash()};
     ag_value *maps = NULL;
     ag_reset(tape);
     w->finite = true;
@@ -66,7 +79,8 @@ static void provoke(ag_tape *tape, const nn_model *model, int tries, float *imag
     double most = 0;
     for (int n = 0; best && n < tries; n++) {
         memcpy(best, image, bytes);
-        const int y0 = ts_rng_int(&r, size), x0 = ts_rng_int(&r, size), y1 = y0 + 1 + ts_rng_int(&r, size - y0), x1 = x0 + 1 + ts_rng_int(&r, size - x0), colour = ts_rng_int(&r, 8);
+        const int y0 = ts_rng_int(&r, size), x0 = ts_rng_int(&r, size), y1 = y0 + 1 + ts_rng_int(&r, size - y0),
+                  x1 = x0 + 1 + ts_rng_int(&r, size - x0), colour = ts_rng_int(&r, 8);
         for (int y = n ? y0 : size; y < y1; y++)
             for (int x = x0; x < x1; x++)
                 for (int c = 0; c < 3; c++) image[(y * size + x) * 3 + c] = (float)(colour >> c & 1);
@@ -127,7 +141,8 @@ bool stress_refinement(const stress *s)
             if (k < PICTURES) picture(k, size, image);
             else provoke(tape, model, s->full ? 100 : 10, image, w);
             const bool finite = run(tape, model, image, w);
-            snprintf(what, sizeof what, "%d steps from a %s picture: largest |value|", w->steps, k < PICTURES ? picture_name[k] : "hostile");
+            snprintf(what, sizeof what, "%d steps from a %s picture: largest |value|", w->steps,
+                     k < PICTURES ? picture_name[k] : "hostile");
             ok = stress_row(what, finite ? w->largest : NAN, 100) && ok;
         }
         mean_material(mean);

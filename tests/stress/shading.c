@@ -8,7 +8,8 @@
 #include <string.h>
 
 enum { C = MAP_CHANNELS, REGIONS = 4 };
-static const char *const region_name[REGIONS] = {"roughness >= 0.02, |n_xy| <= 0.999, angles <= 89", "roughness < 0.02", "|n_xy| > 0.999", "angles > 89"};
+static const char *const region_name[REGIONS] = {"roughness >= 0.02, |n_xy| <= 0.999, angles <= 89", "roughness < 0.02",
+                                                 "|n_xy| > 0.999", "angles > 89"};
 
 typedef struct worst {
     double value[REGIONS], gradient[REGIONS];
@@ -25,9 +26,10 @@ static int region_of(const double m[C], const rd_surface *s, const double l[3], 
     return dot3(s->n, l) < least || dot3(s->n, v) < least ? 3 : 0;
 }
 
-/* The largest difference in each kind of map, relative to that kind's largest derivative, or, since those by roughness and F0 pass through
- * zero while their terms do not, to a tenth of the terms: value, and for roughness value times 2 / roughness (D's derivative is the difference of two
- * such, equal where the normal is about alpha off the half vector). */
+/* The largest difference in each kind of map, relative to that kind's largest derivative, or, since those by roughness
+ * and F0 pass through zero while their terms do not, to a tenth of the terms: value, and for roughness value times 2 /
+ * roughness (D's derivative is the difference of two such, equal where the normal is about alpha off the half vector).
+ */
 static double gradient_error(const float *a, const double *b, double value, double roughness)
 {
     static const int first[] = {MAP_DIFFUSE, MAP_NORMAL, MAP_ROUGHNESS, MAP_SPECULAR, C};
@@ -54,7 +56,8 @@ static void pixel(const float *maps, const rd_view *view, rd_grid grid, worst *w
     rd_decode_double(m, &s);
     rd_radiance(m, point, view, value, by);
     rd_render(grid, maps, C, view, false, image);
-    /* A weak light, so that nothing is clamped, and a photograph that is darker by one in green: the gradient is then radiance's own. */
+    /* A weak light, so that nothing is clamped, and a photograph that is darker by one in green: the gradient is then
+     * radiance's own. */
     rd_view weak = *view;
     weak.power *= 1e-12f; /* radiance reaches 1e9 */
     rd_render(grid, maps, C, &weak, false, base);
@@ -90,12 +93,15 @@ static void grid_of(bool full, worst *w)
             for (size_t b = 0; b < sizeof angle / sizeof *angle; b++)
                 for (size_t n = 0; n < sizeof tilt / sizeof *tilt; n++)
                     for (int turn = 0; turn < 6; turn += stride) {
-                        /* the light at angle a from the sample's normal, the camera at b, the normal tilted, all in other directions */
-                        const double pl = 0.3 + turn, pv = turn < 3 ? pl + 180 * degree : pl + 1.1 * turn, pn = pl + 0.9 * turn;
+                        /* the light at angle a from the sample's normal, the camera at b, the normal tilted, all in
+                         * other directions */
+                        const double pl = 0.3 + turn, pv = turn < 3 ? pl + 180 * degree : pl + 1.1 * turn,
+                                     pn = pl + 0.9 * turn;
                         const size_t k = (r + a + b + n + (size_t)turn) % (sizeof albedo / sizeof *albedo);
                         rd_view view = {.kind = RD_POINT, .power = 3};
                         const double tl = angle[a] * degree, tv = angle[b] * degree;
-                        const double l[3] = {sin(tl) * cos(pl), sin(tl) * sin(pl), cos(tl)}, v[3] = {sin(tv) * cos(pv), sin(tv) * sin(pv), cos(tv)};
+                        const double l[3] = {sin(tl) * cos(pl), sin(tl) * sin(pl), cos(tl)},
+                                     v[3] = {sin(tv) * cos(pv), sin(tv) * sin(pv), cos(tv)};
                         for (int i = 0; i < 3; i++) {
                             view.light[i] = (float)(l[i] + (i < 2 ? point[i] : 0));
                             view.camera[i] = (float)(v[i] + (i < 2 ? point[i] : 0));
@@ -110,7 +116,8 @@ static void grid_of(bool full, worst *w)
                         maps[MAP_NORMAL + 1] = (float)(tilt[n] * sin(pn));
                         pixel(maps, &view, grid, w);
                         /* and a normal within a few widths of the highlight, which the grid would hardly meet */
-                        const double alpha = roughness[r] * roughness[r], h[3] = {l[0] + v[0], l[1] + v[1], l[2] + v[2]}, length = sqrt(dot3(h, h));
+                        const double alpha = roughness[r] * roughness[r],
+                                     h[3] = {l[0] + v[0], l[1] + v[1], l[2] + v[2]}, length = sqrt(dot3(h, h));
                         maps[MAP_NORMAL] = (float)(h[0] / length + alpha * tilt[n] * cos(pn));
                         maps[MAP_NORMAL + 1] = (float)(h[1] / length + alpha * tilt[n] * sin(pn));
                         pixel(maps, &view, grid, w);

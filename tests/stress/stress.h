@@ -1,5 +1,5 @@
-/* Stress of the numerics: each part prints rows "what | measured | bound" and says whether every bound held. lgd-stress runs them in full
- * (minutes), the test runner a short form. */
+/* Stress of the numerics: each part prints rows "what | measured | bound" and says whether every bound held. lgd-stress
+ * runs them in full (minutes), the test runner a short form. */
 #ifndef STRESS_H
 #define STRESS_H
 #include <stdbool.h>

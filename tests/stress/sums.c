@@ -14,11 +14,13 @@ static bool long_sums(bool full)
 {
     const int side = full ? 4096 : 512;
     const size_t pixels = (size_t)side * (size_t)side;
-    float *maps = malloc(pixels * C * sizeof *maps), *image = malloc(pixels * 3 * sizeof *image), *row = malloc((size_t)side * 3 * sizeof *row);
+    float *maps = malloc(pixels * C * sizeof *maps), *image = malloc(pixels * 3 * sizeof *image),
+          *row = malloc((size_t)side * 3 * sizeof *row);
     bool ok = maps && image && row;
     if (!ok) printf("no memory for %d x %d pixels\n", side, side);
     ts_rng r = ts_rng_make(6, TS_STREAM_TEST, 0);
-    for (size_t i = 0; ok && i < pixels * C; i++) maps[i] = i % C == MAP_ROUGHNESS ? ts_rng_range(&r, -0.5f, 1) : ts_rng_range(&r, -0.7f, 0.7f);
+    for (size_t i = 0; ok && i < pixels * C; i++)
+        maps[i] = i % C == MAP_ROUGHNESS ? ts_rng_range(&r, -0.5f, 1) : ts_rng_range(&r, -0.7f, 0.7f);
     const rd_view flash = rd_flash();
     long double sum = 0, rough = 0;
     for (int y = 0; ok && y < side; y++) {
@@ -45,7 +47,12 @@ static bool long_sums(bool full)
         float *zero = calloc(pixels, C * sizeof *zero);
         if (zero) {
             snprintf(what, sizeof what, "RMSE of roughness of %d^2 against long double, relative", side);
-            ok = stress_row(what, fabs(rd_map_rmse((int64_t)pixels, maps, C, zero, C).roughness / (double)sqrtl(rough / (long double)pixels) - 1), 1e-12) && ok;
+            ok = stress_row(what,
+                            fabs(rd_map_rmse((int64_t)pixels, maps, C, zero, C).roughness /
+                                     (double)sqrtl(rough / (long double)pixels) -
+                                 1),
+                            1e-12) &&
+                ok;
         }
         free(zero);
     }
@@ -66,7 +73,8 @@ static bool adam(bool full)
     if (!m || nn_model_train(m, &st) || nn_adam_create(&adam, m, 0.999f, &st)) return printf("%s\n", st.message), false;
     const long steps = full ? 1000000 : 50000;
     float gradient[LANES];
-    for (int i = 0; i < LANES; i++) gradient[i] = i == 0 ? 0 : (float)((i % 2 ? 1 : -1) * pow(10, -30 + i / 2.0)); /* 1e-30 .. 1e1 */
+    for (int i = 0; i < LANES; i++)
+        gradient[i] = i == 0 ? 0 : (float)((i % 2 ? 1 : -1) * pow(10, -30 + i / 2.0)); /* 1e-30 .. 1e1 */
     for (long n = 0; n < steps; n++) {
         memcpy(m->grad, gradient, sizeof gradient);
         nn_adam_next(&adam);

@@ -22,7 +22,9 @@ static bool work(const nn_model *start, const float *truth, const float *image, 
     bool ok = tape && !nn_adam_create(&adam, m, 0.9f, st);
     if (ok) memcpy(m->value, start->value, m->count * sizeof *m->value);
     for (int n = 0; ok && n < UPDATES; n++) {
-        const nn_input in = {.image = ts_view((float *)(uintptr_t)image, (ts_shape){2, SIDE, SIDE, 3}), .grid = rd_grid_full(SIDE), .view = rd_flash()};
+        const nn_input in = {.image = ts_view((float *)(uintptr_t)image, (ts_shape){2, SIDE, SIDE, 3}),
+                             .grid = rd_grid_full(SIDE),
+                             .view = rd_flash()};
         ag_value *maps[STEPS + 1];
         rd_view views[2 * RD_LOSS_VIEWS];
         ts_rng rng = ts_rng_make(3, TS_STREAM_TEST, (uint64_t)n);
@@ -53,7 +55,8 @@ bool stress_threads(const stress *s)
     ts_status st = {0};
     nn_model *m = nn_model_create(&a, &st);
     const size_t pixels = (size_t)2 * SIDE * SIDE, values = m ? m->count + pixels * C : 0;
-    float *truth = malloc(pixels * C * sizeof *truth), *image = malloc(pixels * 3 * sizeof *image), *first = malloc(values * sizeof *first), *other = malloc(values * sizeof *other);
+    float *truth = malloc(pixels * C * sizeof *truth), *image = malloc(pixels * 3 * sizeof *image),
+          *first = malloc(values * sizeof *first), *other = malloc(values * sizeof *other);
     bool ok = m && truth && image && first && other;
     double different = 0;
     const int before = ts_threads();
@@ -62,11 +65,14 @@ bool stress_threads(const stress *s)
         ts_rng r = ts_rng_make(2, TS_STREAM_TEST, 0);
         for (size_t i = 0; i < pixels * C; i++) truth[i] = ts_rng_range(&r, -0.6f, 0.6f);
         const rd_view flash = rd_flash();
-        for (int i = 0; i < 2; i++) rd_render(rd_grid_full(SIDE), truth + (size_t)i * SIDE * SIDE * C, C, &flash, true, image + (size_t)i * SIDE * SIDE * 3);
+        for (int i = 0; i < 2; i++)
+            rd_render(rd_grid_full(SIDE), truth + (size_t)i * SIDE * SIDE * C, C, &flash, true,
+                      image + (size_t)i * SIDE * SIDE * 3);
         for (int n = 0; n < 4 && ok; n++) {
             ts_threads_set(threads[n]);
             ok = work(m, truth, image, n ? other : first, &st);
-            for (size_t i = 0; ok && n && i < values; i++) different += memcmp(&first[i], &other[i], sizeof *first) != 0;
+            for (size_t i = 0; ok && n && i < values; i++)
+                different += memcmp(&first[i], &other[i], sizeof *first) != 0;
         }
         ts_threads_set(before);
     }

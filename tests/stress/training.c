@@ -1,8 +1,8 @@
-/* A training run whose rate is thirty times too high and whose inputs are spoilt now and then. The linker puts the two functions below between
- * the trainer and its data (--wrap), so that the product needs no door for it. */
-#include "nn/weights.h"
+/* A training run whose rate is thirty times too high and whose inputs are spoilt now and then. The linker puts the two
+ * functions below between the trainer and its data (--wrap), so that the product needs no door for it. */
+#include "nn/weights/weights.h"
 #include "tests/stress/stress.h"
-#include "train/parts.h"
+#include "train/trainer_internal.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,8 +18,10 @@ static struct {
 
 const float *__real_io_loader_next(io_loader *loader, ts_status *st);
 const float *__wrap_io_loader_next(io_loader *loader, ts_status *st);
-void __real_tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, const rd_view *views, int number, float *images);
-void __wrap_tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, const rd_view *views, int number, float *images);
+void __real_tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
+                           const rd_view *views, int number, float *images);
+void __wrap_tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
+                           const rd_view *views, int number, float *images);
 
 /* One in two hundred: with maps and photographs, one in a hundred inputs. */
 static void spoil(float *values, int count, size_t each)
@@ -44,10 +46,12 @@ const float *__wrap_io_loader_next(io_loader *loader, ts_status *st)
     return poison.maps;
 }
 
-void __wrap_tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps, const rd_view *views, int number, float *images)
+void __wrap_tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
+                           const rd_view *views, int number, float *images)
 {
     __real_tr_photographs(c, seed, index, count, size, maps, views, number, images);
-    if (poison.on && count == poison.batch && size == poison.size) spoil(images, count, (size_t)size * (size_t)size * 3);
+    if (poison.on && count == poison.batch && size == poison.size)
+        spoil(images, count, (size_t)size * (size_t)size * 3);
 }
 
 static bool finite_weights(const char *folder, const char *name)
@@ -83,8 +87,10 @@ static bool bound(ts_precision p, const char *what, double measured)
 
 static bool train(const stress *s, ts_precision precision)
 {
-    static const char *const keys[] = {"model.g_width=4", "model.g_width_max=8", "model.g_levels=2", "model.g_size=16", "model.h_width=8", "model.h_gru=4", "model.iterations=2",
-                                       "data.patch=16", "data.threads=1", "train.batch=2", "train.warmup=10", "train.ema=0.99", "validate.count=4", "validate.size=16"};
+    static const char *const keys[] = {
+        "model.g_width=4", "model.g_width_max=8", "model.g_levels=2", "model.g_size=16", "model.h_width=8",
+        "model.h_gru=4",   "model.iterations=2",  "data.patch=16",    "data.threads=1",  "train.batch=2",
+        "train.warmup=10", "train.ema=0.99",      "validate.count=4", "validate.size=16"};
     tr_config c = tr_config_default();
     ts_status st = {0};
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
@@ -100,7 +106,8 @@ static bool train(const stress *s, ts_precision precision)
     poison.size = c.data.patch;
     poison.rng = ts_rng_make(5, TS_STREAM_TEST, 1);
     poison.spoilt = 0;
-    poison.maps = malloc((size_t)poison.batch * (size_t)poison.size * (size_t)poison.size * MAP_CHANNELS * sizeof *poison.maps);
+    poison.maps = malloc((size_t)poison.batch * (size_t)poison.size * (size_t)poison.size * MAP_CHANNELS *
+                         sizeof *poison.maps);
     told seen = {0, 0};
     const tr_listener listener = {.step = step, .user = &seen};
     char folder[1200];
@@ -117,7 +124,8 @@ static bool train(const stress *s, ts_precision precision)
     tr_destroy(&t);
     free(poison.maps);
     const long all = c.train.pretrain_steps + c.train.steps;
-    printf("training, %s: %ld of %ld steps, %ld inputs spoilt, %ld steps skipped; %s\n", ts_precision_name(precision), seen.steps, all, poison.spoilt, seen.skipped, code ? st.message : "to its end");
+    printf("training, %s: %ld of %ld steps, %ld inputs spoilt, %ld steps skipped; %s\n", ts_precision_name(precision),
+           seen.steps, all, poison.spoilt, seen.skipped, code ? st.message : "to its end");
     bool ok = bound(precision, "stopped early without a reason", code ? !st.message[0] : seen.steps != all);
     ok = bound(precision, "no input was spoilt", poison.spoilt == 0) && ok;
     ok = bound(precision, "weights on disk that are not finite", !finite_weights(folder, "last.safetensors")) && ok;

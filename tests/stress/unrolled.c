@@ -1,5 +1,5 @@
-/* The gradient of the whole unrolled loop against central differences in double: the recorded operations are run again with their double
- * references, so that the differences have no rounding to speak of. */
+/* The gradient of the whole unrolled loop against central differences in double: the recorded operations are run again
+ * with their double references, so that the differences have no rounding to speak of. */
 #include "autograd/op.h"
 #include "ops.h"
 #include "render/losses.h"
@@ -37,7 +37,8 @@ static double *numbers(replay *r, const ag_value *v)
     } else {
         const float *data = v->t.data, *block = r->model->value;
         const bool parameter = data >= block && data < block + r->model->count;
-        for (size_t i = 0; i < count; i++) out[i] = (double)data[i] + (parameter ? r->step * r->direction[(size_t)(data - block) + i] : 0);
+        for (size_t i = 0; i < count; i++)
+            out[i] = (double)data[i] + (parameter ? r->step * r->direction[(size_t)(data - block) + i] : 0);
     }
     r->value[r->count] = v;
     r->number[r->count++] = out;
@@ -83,13 +84,15 @@ bool stress_unrolled(const stress *s)
     rd_view views[RD_LOSS_VIEWS];
     rd_loss_views(&rng, views);
     for (int steps = 1; ok && steps <= MOST; steps += s->full || steps < 3 ? 1 : 3) {
-        const nn_input in = {.image = ts_view(image, (ts_shape){1, SIDE, SIDE, 3}), .grid = rd_grid_full(SIDE), .view = flash};
+        const nn_input in = {
+            .image = ts_view(image, (ts_shape){1, SIDE, SIDE, 3}), .grid = rd_grid_full(SIDE), .view = flash};
         ag_value *maps[MOST + 1];
         ag_reset(tape);
         for (size_t i = 0; i < m->count; i++) m->grad[i] = 0;
         nn_lgd(tape, m, &in, steps, true, maps, NULL);
         ag_value *goal = ag_constant(tape, ts_view(truth, (ts_shape){1, SIDE, SIDE, C}));
-        ag_value *loss = ag_add(tape, ag_render_loss(tape, maps[steps], goal, views, RD_LOSS_VIEWS), ag_map_loss(tape, maps[steps], goal));
+        ag_value *loss = ag_add(tape, ag_render_loss(tape, maps[steps], goal, views, RD_LOSS_VIEWS),
+                                ag_map_loss(tape, maps[steps], goal));
         if (ag_backward(tape, loss)) {
             printf("%s\n", ag_status(tape)->message);
             ok = false;
@@ -103,14 +106,17 @@ bool stress_unrolled(const stress *s)
         *r = (replay){.tape = tape, .model = m, .direction = direction};
         for (int d = 0; d < directions; d++) {
             double slope = 0, length = 0;
-            for (size_t i = 0; i < m->count; i++) direction[i] = (double)ts_rng_normal(&rng), length += direction[i] * direction[i];
-            for (size_t i = 0; i < m->count; i++) direction[i] /= sqrt(length), slope += direction[i] * (double)m->grad[i];
+            for (size_t i = 0; i < m->count; i++)
+                direction[i] = (double)ts_rng_normal(&rng), length += direction[i] * direction[i];
+            for (size_t i = 0; i < m->count; i++)
+                direction[i] /= sqrt(length), slope += direction[i] * (double)m->grad[i];
             const double h = 1e-6, difference = (loss_at(r, loss, h) - loss_at(r, loss, -h)) / (2 * h);
             /* what a random direction sees of a gradient of this length */
             worst = fmax(worst, fabs(slope - difference) / (norm / sqrt((double)m->count)));
         }
         char what[96];
-        snprintf(what, sizeof what, "unrolled loop, T = %d: |gradient| %.4g, worst of %d slopes", steps, norm, directions);
+        snprintf(what, sizeof what, "unrolled loop, T = %d: |gradient| %.4g, worst of %d slopes", steps, norm,
+                 directions);
         ok = stress_row(what, worst, 1e-3) && ok;
     }
     if (ok) ok = stress_row("unrolled loop: growth of the gradient from T = 1 to the last", last / first, INFINITY);

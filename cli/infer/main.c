@@ -1,0 +1,236 @@
+/* lgd-infer: maps from flash photographs. */
+#include "cli/cli.h"
+#include "data/material.h"
+#include "infer/capture.h"
+#include "infer/encode.h"
+#include "infer/lgd.h"
+#include "infer/model_path.h"
+#include "cli/infer/options.h"
+#include "infer/output.h"
+#include "infer/photograph.h"
+#include "cli/infer/pipeline.h"
+#include "tensor/threads.h"
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+typedef struct run {
+    const lgd_command *command;
+    lgd_model *model;
+    pthread_mutex_t lock; /* of the bar and of what is printed */
+    cl_progress bar;
+    double shown;           /* photographs that the bar has, and parts of such */
+    int jobs, done, failed; /* photographs: all, with complete files, without */
+    int steps;              /* refinement steps of each */
+} run;
+
+/* What the library's calls get as their user. */
+typedef struct task {
+    run *r;
+    lgd_item *item;
+} task;
+
+/* done: of the item, 0 .. 1. */
+static void show(run *r, lgd_item *item, double done)
+{
+    pthread_mutex_lock(&r->lock);
+    r->shown += done - item->shown;
+    item->shown = done;
+    if (!r->command->quiet) cl_progress_show(&r->bar, (int64_t)(r->shown * (r->steps + 1) + 0.5), item->job->photo);
+    pthread_mutex_unlock(&r->lock);
+}
+
+static int after_step(int step, double rmse, void *user)
+{
+    const task *t = user;
+    if (step == 0) t->item->first = rmse;
+    t->item->last = rmse;
+    t->item->steps = step;
+    show(t->r, t->item, (step + 1.0) / (t->r->steps + 1));
+    return cl_interrupted();
+}
+
+/* Of a photograph that is refined in tiles. */
+static int before_tile(double done, void *user)
+{
+    const task *t = user;
+    show(t->r, t->item, done);
+    return cl_interrupted();
+}
+
+/* Says what makes a photograph a poor one: the maps will be guesses. */
+static void look_at(const lgd_item *item)
+{
+    const char *name = item->job->photo;
+    const int size = item->square.width;
+    const int64_t values = (int64_t)size * size * 3;
+    int64_t dark = 0, full = 0, over = 0;
+    for (int64_t i = 0; i < values; i++) {
+        const float v = item->square.data[i];
+        dark += v < 1e-3f; /* three of 255 sRGB levels */
+        full += v > 0.999f;
+        over += v > 1.001f; /* more than resampling rounds to */
+    }
+    if (size > item->photo_side)
+        cl_note("%s: note: upsampled: its square has %d pixels a side and --size is %d", name, item->photo_side, size);
+    if (dark == values) cl_note("%s: warning: the photograph is black: its maps mean nothing", name);
+    else if (full * 10 > values * 9)
+        cl_note("%s: warning: the photograph is overexposed (%.0f%% of the values): its maps mean little", name,
+                100.0 * (double)full / (double)values);
+    else if (over > 0)
+        cl_note("%s: note: %.1f%% of the values are above 1 and count as 1", name,
+                100.0 * (double)over / (double)values);
+}
+
+static void compute(lgd_item *item, void *user)
+{
+    run *r = user;
+    const int size = item->square.width;
+    task t = {r, item};
+    const lgd_options options = {.iterations = r->command->iterations,
+                                 .threads = item->threads,
+                                 .progress = after_step,
+                                 .user = &t,
+                                 .power = r->command->power > 0 ? NULL : &item->power,
+                                 .exact = r->command->exact,
+                                 .precision = r->command->bf16 ? LGD_BF16 : LGD_F32,
+                                 .orientations = r->command->orientations,
+                                 .mask = item->mask,
+                                 .tolerance = r->command->tolerance,
+                                 .tile = before_tile};
+    lgd_error error;
+    lgd_photo photo[IO_CAPTURE_IMAGES] = {lgd_flash_photo(item->square.data)};
+    int photos = 1;
+    if (item->capture.images) {
+        photos = lgd_capture_photos(&item->capture, lgd_most_photos(r->model), photo);
+        if (photos < item->capture.images)
+            cl_note("%s: note: the first %d of its %d photographs are used: these weights read no more",
+                    item->job->photo, photos, item->capture.images);
+    }
+    item->power = r->command->power > 0 ? r->command->power : 1;
+    for (int k = 0; k < photos; k++) photo[k].power *= (float)item->power;
+    if (io_material_create(&item->m, size, &item->st) != TS_OK) ts_context(&item->st, "%s", item->job->photo);
+    else if (lgd_estimate_photos(r->model, photo, photos, size, &options, item->m.maps, &error) && !cl_interrupted())
+        ts_fail(&item->st, (ts_code)error.code, "%s: %s", item->job->photo, error.message);
+    else if (cl_interrupted()) ts_fail(&item->st, TS_INTERRUPTED, "interrupted");
+    else lgd_encode(item->m.maps, size, item->m.maps);
+}
+
+#define FAR                                                                                                         \
+    0.01 /* reconstruction RMSE after the trained steps from which a highlight may be seen where the photograph has \
+            none */
+
+static void tell(run *r, const lgd_item *item)
+{
+    cl_progress_end(&r->bar);
+    if (item->square.data) look_at(item);
+    if (item->st.code) {
+        cl_failed("%s", item->st.message);
+        r->failed++;
+        return;
+    }
+    r->done++;
+    if (r->command->outputs & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC) && !r->command->quiet)
+        cl_note("%s: base colour and metalness miss diffuse by %.4f and F0 by %.4f (RMS, linear)", item->job->photo,
+                item->lost.diffuse, item->lost.specular);
+    printf("%s\n", item->job->folder);
+    fflush(stdout); /* a reader at the other end of a pipe gets each folder when it is there */
+    if (r->command->quiet) return;
+    if (fabs(item->power - 1) >= 0.005)
+        cl_note("%s: light power %.2f of the %s", item->job->photo, item->power,
+                item->capture.images ? "capture's" : "usual");
+    const char *hint = r->command->iterations == -1 && item->last > FAR ? "; --iterations auto may come nearer"
+                                                                        : ""; /* each step halves what is left */
+    if (item->steps > 0)
+        cl_note("%s: reconstruction RMSE %.4f (R_0) -> %.4f (R_%d)%s", item->job->photo, item->first, item->last,
+                item->steps, hint);
+    else cl_note("%s: reconstruction RMSE %.4f (R_0)", item->job->photo, item->first);
+}
+
+static void finished(const lgd_item *item, void *user)
+{
+    run *r = user;
+    if (item->st.code == TS_INTERRUPTED) return;
+    pthread_mutex_lock(&r->lock);
+    r->shown += 1 - item->shown; /* of one that failed or ended early too */
+    tell(r, item);
+    pthread_mutex_unlock(&r->lock);
+}
+
+static int all(run *r, lgd_pipeline *pipeline)
+{
+    r->bar = cl_progress_start("step", (int64_t)r->jobs * (r->steps + 1));
+    lgd_pipeline_run(pipeline, compute, finished, cl_interrupted, r);
+    cl_progress_end(&r->bar);
+    if (cl_interrupted() && r->done + r->failed < r->jobs)
+        return cl_failed("interrupted: %d of %d photographs are done", r->done, r->jobs);
+    if (r->failed > 0 && r->jobs > 1) return cl_failed("%d of %d photographs failed", r->failed, r->jobs);
+    return r->failed > 0 ? CL_FAILED : CL_OK;
+}
+
+static void print_help(void)
+{
+    puts("Usage: lgd-infer [options] PHOTO... -o DIR\n"
+         "       lgd-infer [options] --capture WHERE -o DIR\n"
+         "Estimates the material of a flat surface from a photograph taken straight on with a flash beside the lens.\n"
+         "The largest centred square is used.\n");
+    lgd_argument_help(lgd_infer_arguments, stdout);
+    puts("\n"
+         "DIR/STEM/ gets diffuse.png, specular.png (sRGB), roughness.png, normal.png (linear), maps.exr (all channels, "
+         "linear\n"
+         "float), meta.txt (what these mean), render.png (the photograph beside the re-rendered one) and preview.png "
+         "(four light\n"
+         "positions). A photograph's files appear together when they are complete. Each finished folder is printed on "
+         "standard\n"
+         "output; the reconstruction RMSE before and after refinement goes to standard error. Two photographs with the "
+         "same STEM\n"
+         "are refused before any work.\n"
+         "Exit status: 0 done, 1 a photograph failed (the others are done), 2 wrong usage.");
+}
+
+static int work(const lgd_command *c)
+{
+    ts_status st = {0};
+    lgd_error error;
+    lgd_plan plan;
+    char weights[LGD_PATH_MAX];
+    if (lgd_plan_make(c->photo, c->photos, c->out, &plan, &st) != TS_OK) return cl_usage("%s", st.message);
+    ts_threads_set(c->threads);
+    run r = {.command = c, .jobs = plan.jobs, .lock = PTHREAD_MUTEX_INITIALIZER};
+    int code = CL_FAILED;
+    bool published = false;
+    lgd_pipeline *pipeline = NULL;
+    if (lgd_model_path(c->model, *c->capture ? "multi" : "single", weights, &st) != TS_OK) cl_failed("%s", st.message);
+    else if (lgd_weights_published(weights, &published, &st) != TS_OK) cl_failed("%s", st.message);
+    else if (!(pipeline = lgd_pipeline_start(&plan, c, published, &st)))
+        cl_failed("%s", st.message); /* decodes while the weights are read */
+    else if (!(r.model = lgd_load(weights, &error))) cl_failed("%s", error.message);
+    else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK)
+        cl_failed("%s", st.message);
+    else {
+        r.steps = c->iterations == LGD_AUTO ? LGD_AUTO_MOST
+            : c->iterations < 0             ? lgd_trained_iterations(r.model)
+                                            : c->iterations;
+        code = all(&r, pipeline);
+    }
+    lgd_pipeline_end(&pipeline);
+    lgd_free(&r.model);
+    lgd_plan_free(&plan);
+    return code;
+}
+
+int main(int argc, char **argv)
+{
+    lgd_command c;
+    ts_status st = {0};
+    const int bad = cl_init("lgd-infer");
+    if (bad) return bad;
+    if (lgd_command_parse(argc, argv, &c, &st) != TS_OK) return cl_usage("%s", st.message);
+    cl_catch_interrupt();
+    int code = CL_OK;
+    if (c.help) print_help();
+    else if (c.version) cl_print_version();
+    else code = work(&c);
+    return cl_finish(code);
+}

@@ -1,0 +1,192 @@
+#include "cli/infer/options.h"
+#include "cli/cli.h"
+#include "data/image/image.h"
+#include "infer/lgd.h"
+#include "infer/output.h"
+#include <string.h>
+
+enum {
+    NORMAL = 256,
+    CAPTURE,
+    POWER,
+    MAPS,
+    WORKFLOW,
+    MASK,
+    TOLERANCE,
+    ORIENTATIONS,
+    EXACT,
+    PRECISION,
+    MAX_PIXELS,
+    HELP = 'h',
+    VERSION = 'V'
+};
+
+const lgd_argument lgd_infer_arguments[] = {
+    {'o', "output", "DIR", "write DIR/STEM/ for each photograph, STEM = its file name without extension (required)"},
+    {'s', "size", "N", "pixels of a side of the maps, 1 .. 8192 (default 256)"},
+    {'i', "iterations", "N|auto",
+     "refinement steps, 0 .. 1000; 0 = the first estimate alone; auto = as long as the reconstruction improves,\n"
+     "24 at most (default: as trained)"},
+    {ORIENTATIONS, "orientations", "N",
+     "the first estimate is the mean over so many of the photograph's orientations: 1 (as it is), 2 (and turned by a "
+     "quarter;\n"
+     "the default), 4 (all quarter turns) or 8 (and their mirror images)"},
+    {EXACT, "exact", NULL,
+     "compute all convolutions directly; the default, Winograd's way where it is faster, differs by less than 1e-4"},
+    {PRECISION, "precision", "f32|bf16",
+     "what convolutions multiply (default f32); bf16 is for CPUs with AMX, or AMD's with AVX512-BF16, slower on "
+     "others, and its maps differ by less than 0.005 (RMS)"},
+    {CAPTURE, "capture", "WHERE",
+     "in place of PHOTO: several photographs of one sample under known lights, listed in an INI file\n"
+     "or a folder in MaterialGAN's layout; by default with the weights named multi"},
+    {POWER, "light-power", "P",
+     "how strong the light is, in usual ones (of a capture: in those that it names): a number in 0.01 .. 100, or\n"
+     "auto, estimated from the photograph and reported (the default; of a capture 1)"},
+    {MASK, "mask", "FILE",
+     "an image of the photographs' shape: only where it is brighter than black are the maps sure to be refined,\n"
+     "as they would be without it; elsewhere they may be those of an earlier step"},
+    {TOLERANCE, "tolerance", "X",
+     "0 .. 1: the photograph (over 512 pixels: a tile of it) is refined no further once a step changes its maps by "
+     "less than X (RMS,\n"
+     "of values in -1 .. 1); 0: never (default: 0.003 for models with a network at that size, which the shipped ones "
+     "have not; 0 for others,\n"
+     "with --iterations, with --exact and with published weights)"},
+    {'m', "model", "FILE",
+     "weights: a file, or the name of a model that ships with the program: single (default) or multi (default: "
+     "$LGD_MODEL)"},
+    {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},
+    {NORMAL, "normal", "gl|dx", "normal.png with y up (OpenGL, default) or y down (DirectX)"},
+    {MAPS, "maps", "LIST",
+     "write only these, of diffuse, specular, roughness, normal, exr, render, preview (the default: all\n"
+     "so far), basecolor, metallic, height, gltf, materialx; what is not asked for is not computed"},
+    {WORKFLOW, "workflow", "W",
+     "specular (default), or metallic: base colour and metalness in place of diffuse and specular,\n"
+     "with the error that this makes"},
+    {MAX_PIXELS, "max-pixels", "N", "refuse photographs with more pixels, before memory is taken (default 268435456)"},
+    {'q', "quiet", NULL, "no progress and no figures, only warnings and errors"},
+    {HELP, "help", NULL, "print this help"},
+    {VERSION, "version", NULL, "print the version"},
+    {0, NULL, NULL, NULL}};
+
+static ts_code whole(const char *name, const char *text, int64_t lo, int64_t hi, int64_t *value, ts_status *st)
+{
+    if (cl_parse_int(text, lo, hi, value)) return TS_OK;
+    return ts_fail(st, TS_INVALID, "--%s: '%s' is not a whole number in %lld .. %lld", name, text, (long long)lo,
+                   (long long)hi);
+}
+
+static ts_code take_capture(const char *value, lgd_command *c, ts_status *st)
+{
+    size_t n = strlen(value);
+    while (n > 1 && value[n - 1] == '/') n--;
+    if (n == 0 || n >= sizeof c->capture)
+        return ts_fail(st, TS_INVALID, "--capture: the name is %s", n ? "too long" : "empty");
+    memcpy(c->capture, value, n);
+    c->capture[n] = 0;
+    return TS_OK;
+}
+
+ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
+{
+    *c = (lgd_command){.size = 256,
+                       .iterations = -1,
+                       .orientations = LGD_ORIENTATIONS_USUAL,
+                       .tolerance = LGD_TOLERANCE_USUAL,
+                       .max_pixels = IO_MAX_PIXELS_DEFAULT};
+    const char *value = NULL;
+    int key, operands = argc;
+    int64_t n = 0;
+    ts_code code = TS_OK;
+    bool power_given = false;
+    while (!code && !c->help && !c->version &&
+           (key = lgd_argument_next(argc, argv, lgd_infer_arguments, &value, &operands, st)) != LGD_ARGUMENT_END) {
+        switch (key) {
+        case 'o': c->out = value; break;
+        case 'm': c->model = value; break;
+        case 'q': c->quiet = true; break;
+        case HELP: c->help = true; break;
+        case VERSION: c->version = true; break;
+        case MAX_PIXELS: code = whole("max-pixels", value, 1, INT64_C(1) << 40, &c->max_pixels, st); break;
+        case 's':
+            code = whole("size", value, 1, 8192, &n, st);
+            c->size = (int)n;
+            break;
+        case 'i':
+            if (strcmp(value, "auto") == 0) n = LGD_AUTO;
+            else code = whole("iterations", value, 0, 1000, &n, st);
+            c->iterations = (int)n;
+            break;
+        case 't':
+            code = whole("threads", value, 0, 1024, &n, st);
+            c->threads = (int)n;
+            break;
+        case ORIENTATIONS:
+            c->orientations = strlen(value) == 1 ? value[0] - '0' : 0;
+            if (c->orientations < 1 || !strchr("1248", value[0]))
+                code = ts_fail(st, TS_INVALID, "--orientations: '%s' is not 1, 2, 4 or 8", value);
+            break;
+        case EXACT: c->exact = true; break;
+        case PRECISION:
+            c->bf16 = strcmp(value, "bf16") == 0;
+            if (!c->bf16 && strcmp(value, "f32") != 0)
+                code = ts_fail(st, TS_INVALID, "--precision: '%s' is neither f32 nor bf16", value);
+            break;
+        case POWER:
+            power_given = true;
+            c->power = 0;
+            if (strcmp(value, "auto") != 0 && !cl_parse_real(value, 0.01, 100, &c->power))
+                code = ts_fail(st, TS_INVALID, "--light-power: '%s' is neither auto nor a number in 0.01 .. 100",
+                               value);
+            break;
+        case MASK: c->mask = value; break;
+        case CAPTURE: code = take_capture(value, c, st); break;
+        case TOLERANCE:
+            if (!cl_parse_real(value, 0, 1, &c->tolerance))
+                code = ts_fail(st, TS_INVALID, "--tolerance: '%s' is not a number in 0 .. 1", value);
+            break;
+        case MAPS:
+            code = lgd_output_parse(value, &c->outputs, st);
+            if (code) ts_context(st, "--maps");
+            break;
+        case WORKFLOW:
+            c->metallic = strcmp(value, "metallic") == 0;
+            if (!c->metallic && strcmp(value, "specular") != 0)
+                code = ts_fail(st, TS_INVALID, "--workflow: '%s' is neither specular nor metallic", value);
+            break;
+        case NORMAL:
+            c->directx = strcmp(value, "dx") == 0;
+            if (!c->directx && strcmp(value, "gl") != 0)
+                code = ts_fail(st, TS_INVALID, "--normal: '%s' is neither gl nor dx", value);
+            break;
+        default: code = st->code;
+        }
+    }
+    if (code || c->help || c->version) return code;
+    const unsigned documents = LGD_OUT_GLTF | LGD_OUT_MATERIALX;
+    if (c->outputs & documents && c->directx)
+        return ts_fail(st, TS_INVALID, "--normal dx: glTF and MaterialX need OpenGL normals");
+    if (c->outputs & documents && c->metallic)
+        return ts_fail(st, TS_INVALID, "--workflow metallic: the glTF and MaterialX documents refer to F0");
+    if (!c->outputs) c->outputs = LGD_OUT_DEFAULT;
+    if (c->metallic) { /* what was asked of the one workflow is given in the other */
+        const unsigned f0 = c->outputs & (LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR);
+        c->outputs = (c->outputs & ~f0) | (f0 & LGD_OUT_DIFFUSE ? LGD_OUT_BASECOLOR : 0) |
+            (f0 & LGD_OUT_SPECULAR ? LGD_OUT_METALLIC : 0);
+    }
+    c->photo = argv + operands;
+    c->photos = argc - operands;
+    if (*c->capture && c->photos > 0)
+        return ts_fail(st, TS_INVALID, "--capture lists its photographs: '%s' is one more", c->photo[0]);
+    if (*c->capture && c->mask)
+        return ts_fail(st, TS_INVALID, "--mask needs the shape of a photograph: not with --capture");
+    if (*c->capture) {
+        if (!power_given) c->power = 1;
+        c->only[0] = c->capture;
+        c->photo = c->only;
+        c->photos = 1;
+    }
+    if (c->photos == 0) return ts_fail(st, TS_INVALID, "no photograph is given");
+    if (!c->out) return ts_fail(st, TS_INVALID, "no output folder is given: -o DIR");
+    if (!*c->out) return ts_fail(st, TS_INVALID, "-o: the name of the output folder is empty");
+    return TS_OK;
+}

@@ -1,0 +1,27 @@
+/* The command line of lgd-infer. */
+#ifndef LGD_OPTIONS_H
+#define LGD_OPTIONS_H
+#include "cli/arguments.h"
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct lgd_command {
+    const char *out, *model, *mask;
+    char capture[4096]; /* what is read in place of a photograph, without slashes at its end; or empty */
+    int size, iterations /* -1: as trained; LGD_AUTO */, threads;
+    int64_t max_pixels;
+    double tolerance;
+    int orientations; /* 1, 2, 4 or 8 */
+    double power;     /* of the light, in usual ones; 0: estimated */
+    unsigned outputs; /* LGD_OUT_... */
+    bool directx, metallic, exact, bf16, quiet, help, version;
+    char **photo; /* into argv; with a capture, that alone */
+    char *only[1];
+    int photos;
+} lgd_command;
+
+extern const lgd_argument lgd_infer_arguments[];
+
+/* TS_INVALID and st on wrong usage. With help or version set nothing else is checked. */
+ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st);
+#endif

@@ -1,0 +1,123 @@
+#include "cli/infer/plan.h"
+#include "infer/output.h"
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+static bool no_name(const char *s) { return !*s || strcmp(s, ".") == 0 || strcmp(s, "..") == 0; }
+
+/* A copy of the stem, or NULL. *bad: the path has no usable name. */
+static char *stem_of(const char *path, bool *bad)
+{
+    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+    char *stem = strdup(name);
+    *bad = no_name(name);
+    if (!stem || *bad) return stem;
+    char *dot = strrchr(stem, '.');
+    if (dot) *dot = 0;
+    if (no_name(stem)) strcpy(stem, name);
+    return stem;
+}
+
+static int by_stem(const void *a, const void *b)
+{
+    const lgd_job *x = *(const lgd_job *const *)a, *y = *(const lgd_job *const *)b;
+    const int order = strcmp(x->stem, y->stem);
+    return order ? order : (x > y) - (x < y);
+}
+
+static ts_code check_stems(const lgd_plan *plan, ts_status *st)
+{
+    const lgd_job **sorted = malloc((size_t)plan->jobs * sizeof *sorted);
+    if (!sorted) return ts_fail(st, TS_NOMEM, "out of memory for %d photographs", plan->jobs);
+    for (int i = 0; i < plan->jobs; i++) sorted[i] = &plan->job[i];
+    qsort(sorted, (size_t)plan->jobs, sizeof *sorted, by_stem);
+    ts_code code = TS_OK;
+    for (int i = 1; i < plan->jobs && !code; i++)
+        if (strcmp(sorted[i - 1]->stem, sorted[i]->stem) == 0)
+            code = ts_fail(st, TS_INVALID,
+                           "%s and %s would both be written to %s: rename one or use two calls with different folders",
+                           sorted[i - 1]->photo, sorted[i]->photo, sorted[i]->folder);
+    free(sorted);
+    return code;
+}
+
+/* A file's identity, so that links and relative names cannot hide that an output is an input. */
+typedef struct identity {
+    dev_t device;
+    ino_t inode;
+    const char *photo;
+} identity;
+
+static int by_identity(const void *a, const void *b)
+{
+    const identity *x = a, *y = b;
+    if (x->device != y->device) return x->device < y->device ? -1 : 1;
+    return (x->inode > y->inode) - (x->inode < y->inode);
+}
+
+static ts_code check_overwriting(const lgd_plan *plan, ts_status *st)
+{
+    identity *id = malloc((size_t)plan->jobs * sizeof *id);
+    if (!id) return ts_fail(st, TS_NOMEM, "out of memory for %d photographs", plan->jobs);
+    int known = 0;
+    for (int i = 0; i < plan->jobs; i++) {
+        struct stat info;
+        if (stat(plan->job[i].photo, &info) == 0)
+            id[known++] = (identity){info.st_dev, info.st_ino, plan->job[i].photo};
+    }
+    qsort(id, (size_t)known, sizeof *id, by_identity);
+    ts_code code = TS_OK;
+    for (int i = 0; i < plan->jobs && !code; i++) {
+        for (int k = -1; k < LGD_FILES && !code;
+             k++) { /* -1: the folder itself, which a photograph without extension may be */
+            char path[4096];
+            if (snprintf(path, sizeof path, "%s%s%s", plan->job[i].folder, k < 0 ? "" : "/",
+                         k < 0 ? "" : lgd_files[k]) >= (int)sizeof path)
+                code = ts_fail(st, TS_INVALID, "%s: the name of the output folder is too long", plan->job[i].photo);
+            struct stat info;
+            if (code || stat(path, &info) != 0) continue;
+            const identity key = {info.st_dev, info.st_ino, NULL},
+                           *hit = bsearch(&key, id, (size_t)known, sizeof *id, by_identity);
+            if (hit && !S_ISDIR(info.st_mode))
+                code = ts_fail(st, TS_INVALID, "%s would replace the photograph %s: use another output folder", path,
+                               hit->photo);
+        }
+    }
+    free(id);
+    return code;
+}
+
+ts_code lgd_plan_make(char *const *photos, int count, const char *out, lgd_plan *plan, ts_status *st)
+{
+    ts_code code = TS_OK;
+    *plan = (lgd_plan){.job = calloc((size_t)count, sizeof(lgd_job)), .jobs = count};
+    if (!plan->job) code = ts_fail(st, TS_NOMEM, "out of memory for %d photographs", count);
+    for (int i = 0; i < count && !code; i++) {
+        lgd_job *job = &plan->job[i];
+        bool bad;
+        job->photo = photos[i];
+        job->stem = stem_of(photos[i], &bad);
+        if (bad) code = ts_fail(st, TS_INVALID, "'%s' is not the name of a photograph's file", photos[i]);
+        else if (!job->stem || asprintf(&job->folder, "%s/%s", out, job->stem) < 0) {
+            job->folder = NULL; /* undefined after a failure */
+            code = ts_fail(st, TS_NOMEM, "out of memory for %d photographs", count);
+        }
+    }
+    if (!code) code = check_stems(plan, st);
+    if (!code) code = check_overwriting(plan, st);
+    if (code) lgd_plan_free(plan);
+    return code;
+}
+
+void lgd_plan_free(lgd_plan *plan)
+{
+    for (int i = 0; plan->job && i < plan->jobs; i++) {
+        free(plan->job[i].stem);
+        free(plan->job[i].folder);
+    }
+    free(plan->job);
+    *plan = (lgd_plan){0};
+}

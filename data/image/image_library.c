@@ -1,0 +1,97 @@
+/* Loads the shared object that has OpenImageIO behind it, once, when the first call needs it. */
+#include "data/image/oiio.h"
+#include "tensor/threads.h"
+#include <dlfcn.h>
+#include <limits.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <unistd.h>
+
+#define FILE_NAME "liblgd_image.so"
+
+static pthread_once_t once = PTHREAD_ONCE_INIT;
+static const oi_library *library;
+static ts_status failure;
+
+/* ../lib/lgd beside the folder of the program: so it is after make and after make install; false where there is none.
+ */
+static bool beside_program(char *path, size_t size)
+{
+    char program[PATH_MAX - 64];
+    const ssize_t length = readlink("/proc/self/exe", program, sizeof program - 1);
+    if (length <= 0) return false;
+    program[length] = 0;
+    char *slash = strrchr(program, '/');
+    if (slash) *slash = 0;
+    return snprintf(path, size, "%s/../lib/lgd/" FILE_NAME, program) < (int)size && access(path, F_OK) == 0;
+}
+
+static void load(void)
+{
+    char path[PATH_MAX];
+    if (!beside_program(path, sizeof path)) snprintf(path, sizeof path, "%s/lgd/" FILE_NAME, LGD_LIBDIR);
+    if (access(path, F_OK) != 0) {
+        ts_fail(&failure, TS_IO,
+                "this image needs " FILE_NAME ", which is neither in ../lib/lgd beside the program nor in " LGD_LIBDIR
+                "/lgd: install it again");
+        return;
+    }
+    void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+    if (!handle) {
+        ts_fail(&failure, TS_IO, "%s", dlerror());
+        return;
+    }
+    const oi_library *found = dlsym(handle, OI_LIBRARY);
+    if (!found || strcmp(found->build, OI_BUILD) != 0) {
+        ts_fail(&failure, TS_UNSUPPORTED, "%s: belongs to another version of this program", path);
+        return;
+    }
+    found->start(ts_threads());
+    library = found;
+}
+
+/* NULL with st, which names what it was needed for. */
+static const oi_library *loaded(const char *name, ts_status *st)
+{
+    pthread_once(&once, load);
+    if (!library) ts_fail(st, failure.code, "%s: %s", name, failure.message);
+    return library;
+}
+
+ts_code oi_read(const char *path, int64_t max_pixels, oi_image *image, ts_status *st)
+{
+    memset(image, 0, sizeof *image);
+    const oi_library *l = loaded(path, st);
+    if (!l) return failure.code;
+    const ts_code code = l->read(path, max_pixels, image, st);
+    if (code != TS_OK) oi_free(image);
+    return code;
+}
+
+void oi_free(oi_image *image)
+{
+    free(image->data);
+    free(image->icc);
+    memset(image, 0, sizeof *image);
+}
+
+ts_code oi_encode_jpeg(const char *name, const oi_encoding *e, const uint8_t *pixels, unsigned char **bytes,
+                       size_t *size, ts_status *st)
+{
+    const oi_library *l = loaded(name, st);
+    return l ? l->encode_jpeg(name, e, pixels, bytes, size, st) : failure.code;
+}
+
+bool oi_knows_extension(const char *extension)
+{
+    /* The usual ones need no look into the library. */
+    static const char *const usual[] = {"png", "jpg", "jpeg", "tif", "tiff", "exr", "hdr"};
+    for (size_t i = 0; i < sizeof usual / sizeof *usual; i++)
+        if (strcasecmp(extension, usual[i]) == 0) return true;
+    if (strcasecmp(extension, "txt") == 0) return false;
+    const oi_library *l = loaded(extension, NULL);
+    return l && l->knows_extension(extension);
+}

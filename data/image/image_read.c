@@ -1,0 +1,70 @@
+#include "data/image/image_read.h"
+#include "data/image/image.h"
+#include "data/image/photo_rows.h"
+#include "tensor/threads.h"
+#include <math.h>
+
+static ts_code read_colour(const char *path, int64_t max_pixels, bool upright, io_image *image, ts_status *st)
+{
+    io_photo_rows p;
+    *image = (io_image){0};
+    ts_code code = io_photo_open(path, max_pixels, upright, &p, st);
+    if (code) return code;
+    code = io_image_create(image, p.width, p.height, 3, st);
+    if (code) ts_context(st, "%s", path);
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int y = 0; y < (code ? 0 : p.height); y++)
+        io_photo_row(&p, 0, y, p.width, image->data + (size_t)y * (size_t)p.width * 3);
+    io_photo_close(&p);
+    return code;
+}
+
+ts_code io_read_photo(const char *path, int64_t max_pixels, io_image *image, ts_status *st)
+{
+    return read_colour(path, max_pixels, true, image, st);
+}
+
+ts_code io_read_colour_map(const char *path, int64_t max_pixels, io_image *image, ts_status *st)
+{
+    return read_colour(path, max_pixels, false, image, st);
+}
+
+ts_code io_read_stored(const char *path, int64_t max_pixels, double gamma, io_image *image, ts_status *st)
+{
+    oi_image raw;
+    *image = (io_image){0};
+    ts_code code = io_read_raw(path, max_pixels, &raw, st);
+    if (code != TS_OK) return code;
+    const bool swap = raw.orientation >= 5;
+    code = io_image_create(image, swap ? raw.height : raw.width, swap ? raw.width : raw.height, 3, st);
+    float *out = image->data;
+    for (int y = 0; code == TS_OK && y < image->height; y++)
+        for (int x = 0; x < image->width; x++, out += 3) {
+            const size_t at = io_stored_at(raw.orientation, x, y, raw.width, raw.height) * (size_t)raw.channels;
+            for (int c = 0; c < 3; c++) {
+                const float v = oi_value(&raw, at + (size_t)raw.colour[c]);
+                out[c] = !(v > 0) ? 0 : raw.floating ? powf(v, (float)(1 / gamma)) : v;
+            }
+        }
+    oi_free(&raw);
+    return code == TS_OK ? code : ts_context(st, "%s", path);
+}
+
+ts_code io_read_data(const char *path, int channels, int64_t max_pixels, io_image *image, ts_status *st)
+{
+    oi_image raw;
+    *image = (io_image){0};
+    if (channels != 1 && channels != 3) return ts_fail(st, TS_INVALID, "%s: %d channels asked for", path, channels);
+    ts_code code = io_read_raw(path, max_pixels, &raw, st);
+    if (code != TS_OK) return code;
+    code = io_image_create(image, raw.width, raw.height, channels, st);
+    for (size_t i = 0, n = code == TS_OK ? (size_t)raw.width * (size_t)raw.height : 0; i < n; i++) {
+        float *out = image->data + i * (size_t)channels, in[3];
+        for (int c = 0; c < 3; c++) in[c] = oi_value(&raw, i * (size_t)raw.channels + (size_t)raw.colour[c]);
+        if (channels == 1) *out = raw.grey ? in[0] : (in[0] + in[1] + in[2]) / 3;
+        else
+            for (int c = 0; c < 3; c++) out[c] = in[c];
+    }
+    oi_free(&raw);
+    return code == TS_OK ? code : ts_context(st, "%s", path);
+}

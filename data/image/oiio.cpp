@@ -1,0 +1,187 @@
+/* See data/image/oiio.h. The shared object's only source besides tensor/status.c. Each function catches everything: its
+ * callers are C. */
+#include "data/image/oiio.h"
+#include <OpenImageIO/filesystem.h>
+#include <OpenImageIO/imageio.h>
+#include <cstdlib>
+#include <cstring>
+#include <new>
+
+using namespace OIIO;
+
+/* The library's message as the one line that we promise. */
+static std::string one_line(std::string text)
+{
+    while (!text.empty() && isspace((unsigned char)text.back())) text.pop_back();
+    for (char &c : text)
+        if ((unsigned char)c < 32) c = ' ';
+    return text.empty() ? "no reason given by the image library" : text.substr(0, 300);
+}
+
+template <class F> static ts_code guarded(const char *name, ts_status *st, F f)
+{
+    try {
+        return f();
+    } catch (const std::bad_alloc &) {
+        return ts_fail(st, TS_NOMEM, "%s: out of memory", name);
+    } catch (const std::exception &e) {
+        return ts_fail(st, TS_FORMAT, "%s: %s", name, one_line(e.what()).c_str());
+    } catch (...) {
+        return ts_fail(st, TS_FORMAT, "%s: the image library failed", name);
+    }
+}
+
+static int channel(const ImageSpec &spec, const char *name)
+{
+    for (int c = 0; c < spec.nchannels; c++)
+        if (Strutil::iequals(spec.channelnames[c], name)) return c;
+    return -1;
+}
+
+/* Which channels are the colours: R, G, B by name, or the first ones that are not alpha. */
+static void choose_channels(const ImageSpec &spec, oi_image *image)
+{
+    int n = spec.nchannels, r = channel(spec, "R"), g = channel(spec, "G"), b = channel(spec, "B");
+    image->alpha = spec.alpha_channel >= 0 && spec.alpha_channel < n && n > 1 ? spec.alpha_channel : -1;
+    if (r < 0 || g < 0 || b < 0) {
+        int others[3], found = 0;
+        for (int c = 0; c < n && found < 3; c++)
+            if (c != image->alpha) others[found++] = c;
+        r = others[0];
+        g = found == 3 ? others[1] : r; /* two channels that are no colour: the first is taken as grey */
+        b = found == 3 ? others[2] : r;
+    }
+    image->colour[0] = r;
+    image->colour[1] = g;
+    image->colour[2] = b;
+    image->grey = r == g && g == b;
+}
+
+static void describe(const ImageSpec &spec, oi_image *image)
+{
+    TypeDesc type = spec.format;
+    image->floating = type.is_floating_point();
+    image->levels = type.size() == 1 ? 256 : 65536;
+    image->associated = spec.get_int_attribute("oiio:UnassociatedAlpha", 0) == 0;
+    image->orientation = spec.get_int_attribute("Orientation", 1);
+    if (image->orientation < 1 || image->orientation > 8) image->orientation = 1;
+    string_view space = spec.get_string_attribute("oiio:ColorSpace");
+    image->linear = Strutil::iequals(space, "linear") || Strutil::iequals(space, "scene_linear") ||
+        Strutil::istarts_with(space, "lin_");
+    image->adobe = Strutil::starts_with(spec.get_string_attribute("Exif:InteroperabilityIndex"), "R03");
+    const ParamValue *p = spec.find_attribute("chromaticities");
+    if (p && p->type().basetype == TypeDesc::FLOAT && p->type().basevalues() * (size_t)p->nvalues() == 8) {
+        image->primaries = true;
+        memcpy(image->chromaticities, p->data(), sizeof image->chromaticities);
+    }
+    p = spec.find_attribute("ICCProfile");
+    if (p && p->type().basetype == TypeDesc::UINT8 && p->type().size() > 128) {
+        image->icc_size = p->type().size();
+        image->icc = (unsigned char *)malloc(image->icc_size);
+        if (!image->icc) throw std::bad_alloc();
+        memcpy(image->icc, p->data(), image->icc_size);
+    }
+}
+
+static ts_code read_file(const char *path, int64_t max_pixels, oi_image *image, ts_status *st)
+{
+    ImageSpec config;
+    config.attribute("oiio:UnassociatedAlpha", 1); /* the library would multiply encoded values by alpha */
+    auto in = ImageInput::open(path, &config);
+    if (!in) return ts_fail(st, TS_FORMAT, "%s: %s", path, one_line(OIIO::geterror()).c_str());
+    ImageSpec spec = in->spec();
+    if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1)
+        return ts_fail(st, TS_FORMAT, "%s: claims %d x %d pixels of %d channels", path, spec.width, spec.height,
+                       spec.nchannels);
+    if ((int64_t)spec.width * spec.height > max_pixels)
+        return ts_fail(st, TS_UNSUPPORTED, "%s: %d x %d pixels are more than the limit of %lld (--max-pixels)", path,
+                       spec.width, spec.height, (long long)max_pixels);
+    if (spec.depth > 1) return ts_fail(st, TS_UNSUPPORTED, "%s: a volume, not an image", path);
+    if (spec.deep) return ts_fail(st, TS_UNSUPPORTED, "%s: a deep image; flatten it first", path);
+    choose_channels(spec, image);
+    describe(spec, image);
+
+    /* Only the channels that are wanted: a file may hold hundreds. */
+    int first = image->colour[0], last = first;
+    for (int c : {image->colour[1], image->colour[2], image->alpha})
+        if (c >= 0) first = std::min(first, c), last = std::max(last, c);
+    if (last - first >= 16) /* colours far apart among many layers: not worth the memory between them */
+        return ts_fail(st, TS_UNSUPPORTED, "%s: its colour channels are not stored side by side (%d channels in all)",
+                       path, spec.nchannels);
+    for (int &c : image->colour) c -= first;
+    if (image->alpha >= 0) image->alpha -= first;
+    image->width = spec.width;
+    image->height = spec.height;
+    image->channels = last - first + 1;
+    image->type = OI_F32;
+    image->data = calloc((size_t)spec.width * spec.height * image->channels, sizeof(float));
+    if (!image->data) return ts_fail(st, TS_NOMEM, "%s: no memory for %d x %d pixels", path, spec.width, spec.height);
+    if (!in->read_image(0, 0, first, last + 1, TypeDesc::FLOAT, image->data))
+        return ts_fail(st, TS_FORMAT, "%s: damaged or cut short: %s", path, one_line(in->geterror()).c_str());
+    /* Some readers note a problem and go on with what they have. */
+    if (in->has_error())
+        return ts_fail(st, TS_FORMAT, "%s: damaged or cut short: %s", path, one_line(in->geterror()).c_str());
+    return TS_OK;
+}
+
+static ts_code read(const char *path, int64_t max_pixels, oi_image *image, ts_status *st)
+{
+    return guarded(path, st, [&] { return read_file(path, max_pixels, image, st); });
+}
+
+static ts_code encode(const char *name, const oi_encoding *e, const uint8_t *pixels, unsigned char **bytes,
+                      size_t *size, ts_status *st)
+{
+    auto out = ImageOutput::create("jpeg");
+    if (!out) return ts_fail(st, TS_UNSUPPORTED, "%s: this OpenImageIO cannot write JPEG", name);
+    ImageSpec spec(e->width, e->height, e->channels, TypeDesc::UINT8);
+    spec.attribute("oiio:ColorSpace", "sRGB");
+    spec.attribute("Compression", "jpeg:" + std::to_string(e->quality));
+    Filesystem::IOVecOutput memory;
+    if (!out->supports("ioproxy") || !out->set_ioproxy(&memory))
+        return ts_fail(st, TS_UNSUPPORTED, "%s: this OpenImageIO cannot write JPEG to memory", name);
+    if (!out->open("image.jpg", spec) || !out->write_image(TypeDesc::UINT8, pixels) || !out->close())
+        return ts_fail(st, TS_IO, "%s: %s", name, one_line(out->geterror()).c_str());
+    std::vector<unsigned char> &buffer = memory.buffer();
+    *bytes = (unsigned char *)malloc(buffer.size() + 1);
+    if (!*bytes) throw std::bad_alloc();
+    memcpy(*bytes, buffer.data(), buffer.size());
+    *size = buffer.size();
+    return TS_OK;
+}
+
+static ts_code encode_jpeg(const char *name, const oi_encoding *e, const uint8_t *pixels, unsigned char **bytes,
+                           size_t *size, ts_status *st)
+{
+    return guarded(name, st, [&] { return encode(name, e, pixels, bytes, size, st); });
+}
+
+static bool knows_extension(const char *extension)
+{
+    bool known = false;
+    guarded("extension", nullptr, [&] {
+        /* "tiff:tif,tiff,tx;jpeg:jpg,jpe,..." */
+        for (string_view format : Strutil::splitsv(OIIO::get_string_attribute("extension_list"), ";")) {
+            size_t colon = format.find(':');
+            if (colon == string_view::npos) continue;
+            for (string_view e : Strutil::splitsv(format.substr(colon + 1), ","))
+                if (Strutil::iequals(e, extension)) known = true;
+        }
+        return TS_OK;
+    });
+    return known;
+}
+
+static void start(int threads)
+{
+    guarded("start", nullptr, [&] {
+        OIIO::attribute("threads", threads);
+        OIIO::attribute("limits:imagesize_MB", 0); /* ours counts pixels and says how to raise it */
+        return TS_OK;
+    });
+}
+
+extern "C" {
+__attribute__((visibility("default"))) extern const oi_library lgd_image_library;
+const oi_library lgd_image_library = {OI_BUILD, start, read, encode_jpeg, knows_extension};
+}

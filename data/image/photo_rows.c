@@ -1,0 +1,123 @@
+#include "data/image/photo_rows.h"
+#include "data/image/common_read.h"
+#include "data/file.h"
+#include "data/image/png_file.h"
+#include <math.h>
+#include <stdlib.h>
+
+ts_code io_read_raw(const char *path, int64_t max_pixels, oi_image *raw, ts_status *st)
+{
+    ts_code code = io_check_file(path, st);
+    if (code == TS_OK) code = io_check_png(path, st);
+    if (code != TS_OK || io_read_png_file(path, max_pixels, raw) || io_read_jpeg_file(path, max_pixels, raw))
+        return code;
+    return oi_read(path, max_pixels, raw, st);
+}
+
+size_t io_stored_at(int orientation, int x, int y, int w, int h)
+{
+    int column = x, row = y;
+    switch (orientation) {
+    case 2: column = w - 1 - x; break;
+    case 3: column = w - 1 - x, row = h - 1 - y; break;
+    case 4: row = h - 1 - y; break;
+    case 5: column = y, row = x; break;
+    case 6: column = y, row = h - 1 - x; break;
+    case 7: column = w - 1 - y, row = h - 1 - x; break;
+    case 8: column = w - 1 - y, row = x; break;
+    default: break;
+    }
+    return (size_t)row * (size_t)w + (size_t)column;
+}
+
+static io_space space_of(const char *path, const oi_image *image)
+{
+    io_space space;
+    if (io_space_png(path, &space)) return space;
+    if (io_space_icc(image->icc, image->icc_size, &space)) return space;
+    if (image->primaries && io_space_primaries(image->chromaticities, image->floating ? 1 : 0, &space)) return space;
+    if (image->floating || image->linear) return io_space_linear();
+    return image->adobe ? io_space_adobe_rgb() : io_space_srgb();
+}
+
+static bool shows_through(const oi_image *raw) { return raw->alpha >= 0 && !raw->associated; }
+
+/* Integers have few different values: the curve is evaluated once for each. */
+static bool build_tables(io_photo_rows *p)
+{
+    const int levels = p->raw.levels;
+    p->tables = malloc(3 * (size_t)levels * sizeof(float));
+    if (!p->tables) return false;
+    p->plain = p->space.identity && !shows_through(&p->raw);
+    for (int i = 0; i < levels; i++) {
+        float rgb[3];
+        for (int c = 0; c < 3; c++) rgb[c] = io_curve_value(&p->space.curve[c], (float)i / (float)(levels - 1));
+        if (p->plain) io_space_matrix(&p->space, rgb);
+        for (int c = 0; c < 3; c++) p->tables[c * levels + i] = rgb[c];
+    }
+    return true;
+}
+
+ts_code io_photo_open(const char *path, int64_t max_pixels, bool upright, io_photo_rows *p, ts_status *st)
+{
+    *p = (io_photo_rows){0};
+    const ts_code code = io_read_raw(path, max_pixels, &p->raw, st);
+    if (code) return code;
+    p->space = space_of(path, &p->raw);
+    p->orientation = upright ? p->raw.orientation : 1;
+    const bool swap = p->orientation >= 5;
+    p->width = swap ? p->raw.height : p->raw.width;
+    p->height = swap ? p->raw.width : p->raw.height;
+    if (p->raw.floating || build_tables(p)) return TS_OK;
+    io_photo_close(p);
+    return ts_fail(st, TS_NOMEM, "%s: out of memory", path);
+}
+
+void io_photo_close(io_photo_rows *p)
+{
+    free(p->tables);
+    oi_free(&p->raw);
+    *p = (io_photo_rows){0};
+}
+
+static float lookup(const float *table, int levels, float v)
+{
+    int i = v > 0 ? (int)(v * (float)(levels - 1) + 0.5f) : 0;
+    return table[i < levels ? i : levels - 1];
+}
+
+/* at: of its first channel. */
+static void convert_pixel(const io_photo_rows *p, size_t at, float *out)
+{
+    const oi_image *raw = &p->raw;
+    for (int c = 0; c < 3; c++) {
+        const float v = oi_value(raw, at + (size_t)raw->colour[c]);
+        out[c] = p->tables ? lookup(p->tables + c * raw->levels, raw->levels, v)
+                           : io_curve_value(&p->space.curve[c], v);
+    }
+    if (p->plain) return;
+    if (shows_through(raw))
+        for (int c = 0; c < 3; c++) out[c] *= oi_value(raw, at + (size_t)raw->alpha); /* over black, in linear light */
+    io_space_matrix(&p->space, out);
+}
+
+void io_photo_row(const io_photo_rows *p, int x, int y, int count, float *out)
+{
+    const oi_image *raw = &p->raw;
+    const size_t first = io_stored_at(p->orientation, x, y, raw->width, raw->height);
+    const ptrdiff_t step = count > 1
+        ? (ptrdiff_t)io_stored_at(p->orientation, x + 1, y, raw->width, raw->height) - (ptrdiff_t)first
+        : 0;
+    const ptrdiff_t at = (ptrdiff_t)first * raw->channels, jump = step * raw->channels;
+    if (p->plain && raw->type == OI_U8) { /* as nearly all are */
+        const uint8_t *in = (const uint8_t *)raw->data + at;
+        const float *red = p->tables, *green = red + raw->levels, *blue = green + raw->levels;
+        const int r = raw->colour[0], g = raw->colour[1], b = raw->colour[2];
+        for (int i = 0; i < count; i++, out += 3) {
+            const uint8_t *pixel = in + i * jump;
+            out[0] = red[pixel[r]], out[1] = green[pixel[g]], out[2] = blue[pixel[b]];
+        }
+        return;
+    }
+    for (int i = 0; i < count; i++) convert_pixel(p, (size_t)(at + i * jump), out + 3 * i);
+}

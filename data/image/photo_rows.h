@@ -1,0 +1,31 @@
+/* A photograph's pixels, upright and in linear light, row by row: what is read from its file stays as it is stored, a
+ * quarter of what floats would take. */
+#ifndef IO_PHOTO_ROWS_H
+#define IO_PHOTO_ROWS_H
+#include "data/image/colour.h"
+#include "data/image/oiio.h"
+
+typedef struct io_photo_rows {
+    int width, height; /* upright */
+    oi_image raw;
+    io_space space;
+    int orientation;
+    float *tables; /* [3][raw.levels]: the curve of every value that an integer file tells apart, of colours that need
+                      no more (plain) the whole conversion */
+    bool plain;
+} io_photo_rows;
+
+/* As io_read_photo; upright: turned by the file's orientation. On success the caller calls io_photo_close. */
+ts_code io_photo_open(const char *path, int64_t max_pixels, bool upright, io_photo_rows *p, ts_status *st);
+void io_photo_close(io_photo_rows *p);
+
+/* Pixels x .. x + count - 1 of row y, [count][3]. Any threads may ask at once. */
+void io_photo_row(const io_photo_rows *p, int x, int y, int count, float *out);
+
+/* The file as it is stored, whatever its format; the caller calls oi_free. */
+ts_code io_read_raw(const char *path, int64_t max_pixels, oi_image *raw, ts_status *st);
+
+/* Where the pixel at column x, row y of the upright image lies in the stored one of w x h pixels (Exif 2.3, 4.6.4 A,
+ * Orientation). */
+size_t io_stored_at(int orientation, int x, int y, int w, int h);
+#endif

@@ -1,0 +1,105 @@
+/* Chunks of a PNG file (PNG specification, third edition, 5.3 and 11.3.2). */
+#include "data/image/png_file.h"
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+static uint32_t be32(const uint8_t *p)
+{
+    return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3];
+}
+
+/* NULL where the file is no PNG (or cannot be opened, which the caller has checked). */
+static FILE *open_png(const char *path)
+{
+    uint8_t head[8];
+    FILE *f = fopen(path, "rbe");
+    if (f && (fread(head, 1, 8, f) != 8 || memcmp(head, "\x89PNG\r\n\x1a\n", 8))) {
+        fclose(f);
+        f = NULL;
+    }
+    return f;
+}
+
+static uint32_t crc_more(uint32_t crc, const uint8_t *p, size_t n, const uint32_t table[256])
+{
+    while (n--) crc = table[(crc ^ *p++) & 255] ^ crc >> 8;
+    return crc;
+}
+
+ts_code io_check_png(const char *path, ts_status *st)
+{
+    FILE *f = open_png(path);
+    if (!f) return TS_OK;
+    uint32_t table[256];
+    for (uint32_t i = 0; i < 256; i++) {
+        table[i] = i;
+        for (int k = 0; k < 8; k++) table[i] = table[i] & 1 ? table[i] >> 1 ^ 0xedb88320u : table[i] >> 1;
+    }
+    uint8_t head[8], block[16384];
+    const char *fault = NULL;
+    for (bool end = false; !end && !fault;) {
+        if (fread(head, 1, 8, f) != 8) {
+            fault = "cut short";
+            break;
+        }
+        uint32_t left = be32(head), crc = crc_more(0xffffffffu, head + 4, 4, table);
+        if (left > 0x7fffffff) fault = "a chunk has no valid length";
+        while (left && !fault) {
+            size_t n = left < sizeof block ? left : sizeof block;
+            if (fread(block, 1, n, f) != n) fault = "cut short";
+            else crc = crc_more(crc, block, n, table);
+            left -= (uint32_t)n;
+        }
+        if (!fault && fread(block, 1, 4, f) != 4) fault = "cut short";
+        else if (!fault && be32(block) != ~crc) fault = "a checksum is wrong";
+        end = !memcmp(head + 4, "IEND", 4);
+    }
+    bool failed = ferror(f);
+    fclose(f);
+    if (failed) return ts_fail(st, TS_IO, "%s: %s", path, strerror(EIO));
+    return fault ? ts_fail(st, TS_FORMAT, "%s: damaged PNG file: %s", path, fault) : TS_OK;
+}
+
+static const float bt2020[8] = {.708f, .292f, .17f, .797f, .131f, .046f, .3127f, .329f};
+static const float bt709[8] = {.64f, .33f, .3f, .6f, .15f, .06f, .3127f, .329f};
+static const float p3[8] = {.68f, .32f, .265f, .69f, .15f, .06f, .3127f, .329f};
+
+/* Coding-independent code points (ITU-T H.273): primaries 1, 9, 12; transfer 8 linear, 13 sRGB, 1 and 6 taken as
+ * sRGB's. HDR transfers are not. */
+static bool from_cicp(const uint8_t *d, io_space *space)
+{
+    const float *xy = d[0] == 9 ? bt2020 : d[0] == 12 ? p3 : d[0] == 1 ? bt709 : NULL;
+    if (!xy || (d[1] != 8 && d[1] != 13 && d[1] != 1 && d[1] != 6)) return false;
+    return io_space_primaries(xy, d[1] == 8 ? 1 : 0, space);
+}
+
+bool io_space_png(const char *path, io_space *space)
+{
+    FILE *f = open_png(path);
+    if (!f) return false;
+    uint8_t head[8], d[32];
+    bool cicp = false, named = false, primaries = false;
+    float xy[8] = {0}, gamma = -1;
+    while (fread(head, 1, 8, f) == 8 && memcmp(head + 4, "IDAT", 4)) {
+        uint32_t length = be32(head);
+        size_t take = length < sizeof d ? length : sizeof d;
+        if (length > 0x7fffffff || fread(d, 1, take, f) != take) break;
+        if (!memcmp(head + 4, "cICP", 4) && length == 4 && from_cicp(d, space)) cicp = true;
+        else if (!memcmp(head + 4, "sRGB", 4) || !memcmp(head + 4, "iCCP", 4)) named = true;
+        else if (!memcmp(head + 4, "gAMA", 4) && length == 4 && be32(d) > 0) gamma = (float)(100000.0 / be32(d));
+        else if (!memcmp(head + 4, "cHRM", 4) && length == 32) {
+            primaries = true;
+            for (int i = 0; i < 8; i++) xy[(i + 6) % 8] = (float)(be32(d + 4 * i) / 100000.0); /* stored white first */
+        }
+        if (fseek(f, (long)(length - take) + 4, SEEK_CUR)) break;
+    }
+    fclose(f);
+    if (cicp) return true;
+    if (named || (gamma < 0 && !primaries)) return false;
+    /* 1/2.2 is how a PNG without an sRGB chunk says sRGB. */
+    if (gamma < 0 || (gamma > 2.15f && gamma < 2.25f)) gamma = 0;
+    if (gamma > 0.98f && gamma < 1.02f) gamma = 1;
+    if (gamma > 5 || (gamma > 0 && gamma < 0.2f)) return false; /* no picture is encoded so */
+    return io_space_primaries(primaries ? xy : bt709, gamma, space);
+}

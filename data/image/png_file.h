@@ -1,0 +1,14 @@
+/* What has to be known of a PNG file beyond what OpenImageIO tells. */
+#ifndef IO_PNG_FILE_H
+#define IO_PNG_FILE_H
+#include "data/image/colour.h"
+#include "tensor/status.h"
+
+/* Walks the chunks to the end. A file that is no PNG passes. One that is cut short or whose checksums are wrong is
+ * refused here, because libpng would print its own line about it to stderr. */
+ts_code io_check_png(const char *path, ts_status *st);
+
+/* From the colour chunks (cICP, gAMA, cHRM; a profile or sRGB chunk goes before the last two); false when it is no PNG
+ * or they say nothing. */
+bool io_space_png(const char *path, io_space *space);
+#endif

@@ -1,0 +1,126 @@
+/* Ordinary PNG files, without the image library (data/image/common_read.h). */
+#include "data/image/common_read.h"
+#include "tensor/memory.h"
+#include <png.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+typedef struct reading {
+    FILE *file;
+    png_structp png;
+    png_infop info;
+    oi_image *image;
+    int64_t max_pixels;
+    int bits;
+    volatile bool odd; /* set by what libpng warns about */
+} reading;
+
+static void on_error(png_structp png, png_const_charp message)
+{
+    (void)message;
+    png_longjmp(png, 1);
+}
+
+static void on_warning(png_structp png, png_const_charp message)
+{
+    (void)message;
+    ((reading *)png_get_error_ptr(png))->odd = true;
+}
+
+/* Texts may carry EXIF or XMP, with an orientation in it: only those that are known to be words are passed over. */
+static bool plain_texts(reading *r)
+{
+    static const char *const plain[] = {"Software",    "Comment",     "Title",         "Author",
+                                        "Description", "Copyright",   "Source",        "Creation Time",
+                                        "date:create", "date:modify", "date:timestamp"};
+    png_textp text;
+    const int count = png_get_text(r->png, r->info, &text, NULL);
+    for (int i = 0; i < count; i++) {
+        bool known = false;
+        for (size_t k = 0; k < sizeof plain / sizeof *plain; k++) known |= strcmp(text[i].key, plain[k]) == 0;
+        if (!known) return false;
+    }
+    return true;
+}
+
+static bool usual(reading *r)
+{
+    png_bytep exif;
+    png_uint_32 exif_size;
+    const int64_t pixels = (int64_t)png_get_image_width(r->png, r->info) * png_get_image_height(r->png, r->info);
+    const bool profile = png_get_valid(r->png, r->info, PNG_INFO_iCCP),
+               other = png_get_valid(r->png, r->info, PNG_INFO_gAMA | PNG_INFO_cHRM | PNG_INFO_sRGB);
+    return pixels <= r->max_pixels && r->bits >= 8 && png_get_color_type(r->png, r->info) != PNG_COLOR_TYPE_PALETTE &&
+        !png_get_valid(r->png, r->info, PNG_INFO_tRNS) &&
+        png_get_interlace_type(r->png, r->info) == PNG_INTERLACE_NONE &&
+        !png_get_eXIf_1(r->png, r->info, &exif_size, &exif) && !(profile && other) && plain_texts(r);
+}
+
+static bool profile(reading *r)
+{
+    png_charp name;
+    png_bytep bytes;
+    png_uint_32 size;
+    int method;
+    if (!png_get_iCCP(r->png, r->info, &name, &method, &bytes, &size) || size <= 128) return true;
+    if (!(r->image->icc = malloc(size))) return false;
+    memcpy(r->image->icc, bytes, size);
+    r->image->icc_size = size;
+    return true;
+}
+
+static bool pixels(reading *r)
+{
+    oi_image *image = r->image;
+    const size_t row = (size_t)image->width * (size_t)image->channels * (size_t)(r->bits / 8);
+    image->type = r->bits == 8 ? OI_U8 : OI_U16;
+    image->data = ts_block(row * (size_t)image->height);
+    if (!image->data) return false;
+    const uint16_t one = 1;
+    if (r->bits == 16 && *(const uint8_t *)&one) png_set_swap(r->png); /* the file's are big endian */
+    for (int y = 0; y < image->height; y++) png_read_row(r->png, (png_bytep)image->data + (size_t)y * row, NULL);
+    return true;
+}
+
+/* In a function of its own, so that nothing that changes lives in the frame that setjmp returns to. */
+static bool work(reading *r)
+{
+    if (setjmp(png_jmpbuf(r->png))) return false;
+    png_init_io(r->png, r->file);
+    png_read_info(r->png, r->info);
+    oi_image *image = r->image;
+    r->bits = png_get_bit_depth(r->png, r->info);
+    if (!usual(r)) return false;
+    image->width = (int)png_get_image_width(r->png, r->info);
+    image->height = (int)png_get_image_height(r->png, r->info);
+    image->channels = png_get_channels(r->png, r->info);
+    image->levels = r->bits == 8 ? 256 : 65536;
+    image->orientation = 1;
+    image->grey = image->channels < 3;
+    image->alpha = image->channels % 2 == 0 ? image->channels - 1 : -1;
+    for (int c = 0; c < 3; c++) image->colour[c] = image->grey ? 0 : c;
+    if (!profile(r) || !pixels(r)) return false;
+    png_read_end(r->png, r->info);
+    return plain_texts(r) && !r->odd; /* texts may stand behind the pixels too */
+}
+
+bool io_read_png_file(const char *path, int64_t max_pixels, oi_image *image)
+{
+    reading r = {.image = image, .max_pixels = max_pixels};
+    memset(image, 0, sizeof *image);
+    r.file = fopen(path, "rbe");
+    png_byte head[8];
+    const bool png = r.file && fread(head, 1, sizeof head, r.file) == sizeof head &&
+        png_sig_cmp(head, 0, sizeof head) == 0;
+    bool done = false;
+    if (png && fseek(r.file, 0, SEEK_SET) == 0 &&
+        (r.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &r, on_error, on_warning))) {
+        r.info = png_create_info_struct(r.png);
+        done = r.info && work(&r);
+        png_destroy_read_struct(&r.png, &r.info, NULL);
+    }
+    if (r.file) fclose(r.file);
+    if (!done) oi_free(image);
+    return done;
+}

@@ -1,0 +1,25 @@
+/* The families of procedural materials: each function paints a cleared canvas (height 0) from its random numbers alone.
+ */
+#ifndef IO_FAMILY_H
+#define IO_FAMILY_H
+#include "data/materials/palette.h"
+#include "data/materials/weathering.h"
+
+void io_family_stone(io_canvas *c);    /* natural rock: layered, cracked, pitted, with lichen */
+void io_family_marble(io_canvas *c);   /* polished marble, onyx, granite, terrazzo */
+void io_family_brick(io_canvas *c);    /* brick walls */
+void io_family_paving(io_canvas *c);   /* cobbles, rubble walls, flagstones */
+void io_family_tile(io_canvas *c);     /* glazed, stone, glass and metal tiles, squares and hexagons, grout */
+void io_family_wood(io_canvas *c);     /* planks and boards, raw, oiled, varnished; bark */
+void io_family_cloth(io_canvas *c);    /* plain, twill, satin and basket weaves, knits */
+void io_family_leather(io_canvas *c);  /* grained, creased, quilted, patchwork */
+void io_family_brushed(io_canvas *c);  /* bare metal: brushed, turned, sanded, cast, polished */
+void io_family_rust(io_canvas *c);     /* corroded metal: rust, verdigris, tarnish */
+void io_family_plaster(io_canvas *c);  /* plaster, stucco, painted walls */
+void io_family_concrete(io_canvas *c); /* cast, rough, with aggregate, holes, form marks */
+void io_family_ground(io_canvas *c);   /* soil, gravel, sand, mud, moss, puddles */
+void io_family_paint(io_canvas *c);    /* painted and worn layers over metal, wood and wall; stripes and decals */
+void io_family_panels(io_canvas *c);   /* metal and plastic panels: seams, rivets, screws, slots */
+void io_family_embossed(io_canvas *c); /* tread plate, studs, scales, hammered and perforated sheet */
+void io_family_plastic(io_canvas *c);  /* plastic, rubber, lacquer, paper: grained, ribbed, smooth */
+#endif

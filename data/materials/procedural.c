@@ -1,0 +1,130 @@
+#include "data/materials/procedural.h"
+#include "data/materials/family.h"
+#include "tensor/threads.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+/* Every family: its key, how often it is drawn beside the others, and what it paints. */
+static const struct {
+    const char *name;
+    float weight;
+    void (*paint)(io_canvas *c);
+} families[] = {
+    {"stone", 1, io_family_stone},       {"marble", 0.8f, io_family_marble},   {"brick", 0.8f, io_family_brick},
+    {"paving", 0.8f, io_family_paving},  {"tile", 1, io_family_tile},          {"wood", 1, io_family_wood},
+    {"cloth", 0.8f, io_family_cloth},    {"leather", 0.8f, io_family_leather}, {"brushed", 1, io_family_brushed},
+    {"rust", 1, io_family_rust},         {"plaster", 0.7f, io_family_plaster}, {"concrete", 0.7f, io_family_concrete},
+    {"ground", 0.8f, io_family_ground},  {"paint", 1, io_family_paint},        {"panels", 1.2f, io_family_panels},
+    {"embossed", 1, io_family_embossed}, {"plastic", 0.7f, io_family_plastic},
+};
+
+int io_family_count(void) { return (int)(sizeof families / sizeof *families); }
+
+const char *io_family_name(int family)
+{
+    return family >= 0 && family < io_family_count() ? families[family].name : "none";
+}
+
+int io_family_find(const char *name)
+{
+    for (int i = 0; i < io_family_count(); i++)
+        if (!strcmp(families[i].name, name)) return i;
+    return -1;
+}
+
+static int draw_family(ts_rng *rng, uint64_t allowed)
+{
+    float total = 0;
+    int last = 0;
+    for (int i = 0; i < io_family_count(); i++)
+        if (allowed >> i & 1) total += families[i].weight;
+    float u = ts_rng_uniform(rng) * total;
+    for (int i = 0; i < io_family_count(); i++) {
+        if (!(allowed >> i & 1)) continue;
+        last = i;
+        u -= families[i].weight;
+        if (u < 0) break;
+    }
+    return last;
+}
+
+/* Points c at the eight painted planes that begin at base. */
+static void painted_at(io_canvas *c, float *base)
+{
+    size_t n = (size_t)c->count;
+    c->height = base;
+    for (int k = 0; k < 3; k++) {
+        c->diffuse[k] = base + (size_t)(1 + k) * n;
+        c->specular[k] = base + (size_t)(4 + k) * n;
+    }
+    c->roughness = base + 7 * n;
+}
+
+/* Two materials of one patch: side by side with a ragged border, one showing through where it lies higher, the colours
+ * or the gloss of one on the relief of the other, or laid over each other faintly. base holds the first, c's painted
+ * planes the second; the result goes to c. */
+static void mix(io_canvas *c, const float *base)
+{
+    enum { BESIDE, BY_HEIGHT, COLOURS, GLOSS, FAINT } how;
+    int mark = c->used;
+    float *mask = cv_plane(c);
+    size_t n = (size_t)c->count;
+    int dice = ts_rng_int(&c->rng, 12);
+    how = dice < 4 ? BESIDE : dice < 7 ? BY_HEIGHT : dice < 9 ? COLOURS : dice < 11 ? GLOSS : FAINT;
+    nz_frame f = cv_bend(c, cv_frame(c, 1, 1, 0), 3, 3, 0.015f);
+    uint32_t seed = cv_seed(c);
+    float gain = cv_range(c, 0.35f, 0.6f), frequency = cv_log_range(c, 0.5f, 3);
+    nz_fbm(f, NZ_SMOOTH, frequency, 6, gain, seed, mask);
+    if (how == BY_HEIGHT) { /* by height, as sand between stones */
+        float *smooth = cv_cavity(c, 0.08f);
+        for (int i = 0; i < c->count; i++) mask[i] = 0.4f * mask[i] - 1.6f * smooth[i];
+    }
+    float blur = cv_log_range(c, 0.03f, 0.5f), coverage = cv_range(c, 0.25f, 0.75f);
+    cv_threshold(c, mask, cv_level(coverage), blur);
+    float share = how == FAINT ? cv_range(c, 0.3f, 0.7f) : 1;
+    for (int i = 0; i < c->count; i++) {
+        float t = how == FAINT ? share : mask[i], relief = how <= BY_HEIGHT ? t : 0;
+        float colour = how == COLOURS ? 1 : how == GLOSS ? 0 : t, gloss = how == COLOURS || how == GLOSS ? 1 : t;
+        c->height[i] = nz_mix(base[i], c->height[i], relief);
+        for (int k = 0; k < 3; k++) {
+            c->diffuse[k][i] = nz_mix(base[(size_t)(1 + k) * n + (size_t)i], c->diffuse[k][i], colour);
+            c->specular[k][i] = nz_mix(base[(size_t)(4 + k) * n + (size_t)i], c->specular[k][i], colour);
+        }
+        c->roughness[i] = nz_mix(base[7 * n + (size_t)i], c->roughness[i], gloss);
+    }
+    cv_drop(c, mark);
+}
+
+void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
+{
+    io_canvas c = {.size = m->size, .count = m->size * m->size, .pixel = 1.0f / (float)m->size};
+    size_t n = (size_t)c.count;
+    float *memory = ts_scratch(TS_SCRATCH_SLOTS - 1, (CANVAS_ALL + CANVAS_PAINTED) * n * sizeof *memory);
+    c.x = memory;
+    c.y = memory + n;
+    float *first = memory + 2 * n, *second = first + CANVAS_PAINTED * n;
+    c.planes = second + CANVAS_PAINTED * n;
+    for (int i = 0; i < c.count; i++) {
+        c.x[i] = ((float)(i % c.size) + 0.5f) * c.pixel - 0.5f;
+        c.y[i] = 0.5f - ((float)(i / c.size) + 0.5f) * c.pixel;
+    }
+    c.rng = ts_rng_make(p->seed, TS_STREAM_MATERIAL, index);
+    uint64_t all = (UINT64_C(1) << io_family_count()) - 1, allowed = p->families & all ? p->families & all : all;
+    int a = draw_family(&c.rng, allowed), b = draw_family(&c.rng, allowed);
+    bool mixed = cv_chance(&c, 0.27f);
+    painted_at(&c, first);
+    families[a].paint(&c);
+    if (mixed) {
+        c.used = 0;
+        painted_at(&c, second);
+        families[b].paint(&c);
+        c.used = 0;
+        mix(&c, first);
+    }
+    c.used = 0;
+    wear_calm(&c);
+    cv_write(&c, m->maps);
+    snprintf(m->name, sizeof m->name, mixed ? "%05llu_%s_%s" : "%05llu_%s", (unsigned long long)index, families[a].name,
+             families[b].name);
+}

@@ -1,0 +1,21 @@
+/* Procedural SVBRDFs, streamed by (seed, index): the same bytes for any thread count, in any order, from gcc as from
+ * clang (plain IEEE arithmetic:
+ * -ffp-contract=off, no -ffast-math), as long as the C library's expf, logf, atan2f and so on are the same: another
+ * version of it, or another CPU, for which it may choose other code, may round them differently. */
+#ifndef IO_PROCEDURAL_H
+#define IO_PROCEDURAL_H
+#include "data/material.h"
+
+/* The families, each a key that can be turned off. io_family_name(i) for i in 0 .. io_family_count()-1. */
+int io_family_count(void);
+const char *io_family_name(int family);
+int io_family_find(const char *name); /* -1: none */
+
+typedef struct io_procedural {
+    uint64_t seed;
+    uint64_t families; /* bit i: family i may be drawn; 0 = all */
+} io_procedural;
+
+/* Material number index. m->size and m->maps are the caller's (io_material_create). Serial, thread safe. */
+void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m);
+#endif

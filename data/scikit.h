@@ -1,8 +1,0 @@
-/* Inside data only: the filter of scikit-image's transform.resize along one axis (data/image.h). */
-#ifndef IO_SCIKIT_H
-#define IO_SCIKIT_H
-#include "tensor/resample.h"
-
-/* Lives in the arena; weight is NULL where memory was out. */
-ts_taps io_taps_scikit(ts_arena *arena, int in, int out);
-#endif

@@ -1,0 +1,285 @@
+#include "eval/methods/method.h"
+#include "cli/cli.h"
+#include "nn/weights/weights.h"
+#include "tensor/memory.h"
+#include <stdlib.h>
+#include <string.h>
+
+extern const ev_method ev_method_mean, ev_method_unet, ev_method_unet_joint, ev_method_lgd, ev_method_lgd_nograd,
+    ev_method_frozen, ev_method_descent, ev_method_newton, ev_method_finetune, ev_method_latent;
+const ev_method *const ev_methods[] = {&ev_method_mean,
+                                       &ev_method_unet,
+                                       &ev_method_unet_joint,
+                                       &ev_method_lgd,
+                                       &ev_method_lgd_nograd,
+                                       &ev_method_frozen,
+                                       &ev_method_descent,
+                                       &ev_method_newton,
+                                       &ev_method_finetune,
+                                       &ev_method_latent,
+                                       NULL};
+
+static int find(const ev_method *m, const char *key)
+{
+    for (int i = 0; m->settings[i].key; i++)
+        if (!strcmp(m->settings[i].key, key)) return i;
+    return -1;
+}
+
+/* The index of a word among words separated by blanks, -1: none. */
+static int word_index(const char *words, const char *word)
+{
+    const size_t n = strlen(word);
+    for (int i = 0; *words; i++) {
+        const size_t length = strcspn(words, " ");
+        if (length == n && !strncmp(words, word, n)) return i;
+        words += length + strspn(words + length, " ");
+    }
+    return -1;
+}
+
+static ts_code check(const char *spec, const ev_setting *s, const char *value, ts_status *st)
+{
+    int64_t whole;
+    double real;
+    switch (s->type) {
+    case EV_WHOLE:
+        if (cl_parse_int(value, (int64_t)s->lo, (int64_t)s->hi, &whole)) return TS_OK;
+        return ts_fail(st, TS_INVALID, "--method %s: %s is a whole number in %.0f .. %.0f, not '%s'", spec, s->key,
+                       s->lo, s->hi, value);
+    case EV_REAL:
+        if (cl_parse_real(value, s->lo, s->hi, &real)) return TS_OK;
+        return ts_fail(st, TS_INVALID, "--method %s: %s is a number in %g .. %g, not '%s'", spec, s->key, s->lo, s->hi,
+                       value);
+    case EV_WORD:
+        if (word_index(s->words, value) >= 0) return TS_OK;
+        return ts_fail(st, TS_INVALID, "--method %s: %s is one of: %s; not '%s'", spec, s->key, s->words, value);
+    case EV_WEIGHTS: break;
+    }
+    return *value ? TS_OK : ts_fail(st, TS_INVALID, "--method %s: %s names no file", spec, s->key);
+}
+
+static ts_code unknown(const char *spec, const ev_method *m, const char *what, ts_status *st)
+{
+    char names[400] = "";
+    for (int i = 0; m ? m->settings[i].key != NULL : ev_methods[i] != NULL; i++) {
+        const size_t n = strlen(names);
+        snprintf(names + n, sizeof names - n, "%s%s", i ? ", " : "", m ? m->settings[i].key : ev_methods[i]->name);
+    }
+    if (m)
+        return ts_fail(st, TS_INVALID, "--method %s: there is no setting '%s'; %s has: %s%slabel", spec, what, m->name,
+                       names, *names ? ", " : "");
+    return ts_fail(st, TS_INVALID, "--method %s: there is no method '%s'; there are: %s", spec, what, names);
+}
+
+ts_code ev_method_parse(const char *spec, const char *model, int iterations, ev_estimator *e, ts_status *st)
+{
+    memset(e, 0, sizeof *e);
+    e->weights = model;
+    if (strlen(spec) + 16 >= sizeof e->text) return ts_fail(st, TS_INVALID, "--method %.60s...: is too long", spec);
+    strcpy(e->text, spec);
+    char *rest = strchr(e->text, ':');
+    if (rest) *rest++ = 0;
+    for (int i = 0; ev_methods[i] && !e->method; i++)
+        if (!strcmp(ev_methods[i]->name, e->text)) e->method = ev_methods[i];
+    if (!e->method) return unknown(spec, NULL, e->text, st);
+    snprintf(e->label, sizeof e->label, "%s",
+             strlen(spec) < sizeof e->label && !strchr(spec, '/') ? spec : e->method->name); /* a path says little */
+    for (char *pair = rest; pair && *pair; pair = rest) {
+        rest = strchr(pair, ',');
+        if (rest) *rest++ = 0;
+        char *equals = strchr(pair, '=');
+        if (!equals) return ts_fail(st, TS_INVALID, "--method %s: '%s' is not key=value", spec, pair);
+        *equals++ = 0;
+        if (!strcmp(pair, "label")) {
+            if (!*equals || strlen(equals) >= sizeof e->label || strchr(equals, '/'))
+                return ts_fail(st, TS_INVALID, "--method %s: label has 1 to %zu characters and no '/'", spec,
+                               sizeof e->label - 1);
+            strcpy(e->label, equals);
+            continue;
+        }
+        const int i = find(e->method, pair);
+        if (i < 0) return unknown(spec, e->method, pair, st);
+        if (e->value[i]) return ts_fail(st, TS_INVALID, "--method %s: %s is given twice", spec, pair);
+        if (check(spec, &e->method->settings[i], equals, st) != TS_OK) return st->code;
+        e->value[i] = equals;
+    }
+    for (int i = 0; e->method->settings[i].key; i++) {
+        const ev_setting *s = &e->method->settings[i];
+        if (e->value[i]) continue;
+        e->value[i] = s->initial;
+        if (s->type == EV_WEIGHTS && s->initial) e->value[i] = model;
+        else if (s->type == EV_WEIGHTS)
+            return ts_fail(st, TS_INVALID, "--method %s: needs weights: %s:%s=FILE (%s)", spec, e->method->name, s->key,
+                           s->help);
+        if (!strcmp(s->key, "iterations") && iterations >= 0) {
+            char *at = e->text + sizeof e->text - 12; /* behind the text, which is shorter */
+            snprintf(at, 12, "%d", iterations);
+            e->value[i] = at;
+        }
+    }
+    return TS_OK;
+}
+
+void ev_method_help(FILE *f)
+{
+    for (int i = 0; ev_methods[i]; i++) {
+        fprintf(f, "  %-12s %s\n", ev_methods[i]->name, ev_methods[i]->help);
+        for (const ev_setting *s = ev_methods[i]->settings; s->key; s++) {
+            fprintf(f, "    %-10s ", s->key);
+            if (s->type == EV_WEIGHTS) fputs("FILE; ", f);
+            else if (s->type == EV_WORD) fprintf(f, "%s; ", s->words);
+            else fprintf(f, "%g .. %g; ", s->lo, s->hi);
+            fputs(s->help, f);
+            if (s->initial && *s->initial) fprintf(f, " (default %s)", s->initial);
+            fputc('\n', f);
+        }
+    }
+}
+
+const char *ev_text(const ev_estimator *e, const char *key)
+{
+    const int i = find(e->method, key);
+    return i < 0 ? NULL : e->value[i];
+}
+
+bool ev_given(const ev_estimator *e, const char *key) { return ev_text(e, key) != NULL; }
+
+double ev_number(const ev_estimator *e, const char *key)
+{
+    const char *text = ev_text(e, key);
+    const ev_setting *s = &e->method->settings[find(e->method, key)];
+    double v = 0;
+    if (!text) return -1;
+    if (s->type == EV_WORD) return word_index(s->words, text);
+    cl_parse_real(text, s->lo, s->hi, &v);
+    return v;
+}
+
+int ev_orientations(const ev_estimator *e)
+{
+    return find(e->method, "orientations") >= 0 ? 1 << (int)ev_number(e, "orientations") : 1;
+}
+
+ts_code ev_open(ev_estimator *e, ts_status *st)
+{
+    ts_code code = e->method->open ? e->method->open(e, st) : TS_OK;
+    if (code && !strstr(st->message, e->method->name)) ts_context(st, "%s", e->label);
+    if (code) ev_close(e);
+    return code;
+}
+
+void ev_close(ev_estimator *e)
+{
+    nn_model_free(&e->net);
+    nn_model_free(&e->coder);
+    ag_tape_destroy(&e->tape);
+    ag_tape_destroy(&e->train);
+    nn_adam_free(&e->adam);
+    free(e->kept);
+    free(e->x);
+    free(e->gradient);
+    e->kept = e->x = e->gradient = NULL;
+    e->bytes = e->count = 0;
+}
+
+int ev_points(const ev_estimator *e, int step[EV_POINTS])
+{
+    const int steps = e->method->steps ? e->method->steps(e) : 0;
+    int n = 0;
+    if (e->last_alone) step[n++] = steps;
+    else if (e->tried)
+        for (const char *p = e->tried; *p && n < EV_POINTS; p += strspn(p, " ")) {
+            char *end;
+            const int t = (int)strtol(p, &end, 10);
+            if (t <= steps) step[n++] = t;
+            p = end;
+        }
+    else if (!e->method->few)
+        for (int i = 0; i <= steps && n < EV_POINTS; i++) step[n++] = i;
+    else {
+        static const int leading[] = {1, 2, 5};
+        step[n++] = 0;
+        for (int64_t ten = 1; ten < steps; ten *= 10)
+            for (int i = 0; i < 3; i++)
+                if (leading[i] * ten < steps) step[n++] = (int)(leading[i] * ten);
+        if (steps > 0) step[n++] = steps;
+    }
+    return n;
+}
+
+static size_t model_bytes(const nn_model *m) { return m ? m->count * sizeof(float) * (m->grad ? 2 : 1) : 0; }
+
+size_t ev_bytes(const ev_estimator *e)
+{
+    size_t sum = e->bytes + model_bytes(e->net) + model_bytes(e->coder) + e->adam.count * 2 * sizeof(float);
+    if (e->tape) sum += ts_arena_peak(ag_arena(e->tape));
+    if (e->train) sum += ts_arena_peak(ag_arena(e->train));
+    return sum;
+}
+
+ts_code ev_open_net(ev_estimator *e, const char *key, ts_status *st)
+{
+    e->net = nn_model_load(ev_text(e, key), st);
+    if (e->net && e->net->arch.latent > 0)
+        return ts_fail(st, TS_UNSUPPORTED, "%s: is an auto-encoder of maps, not a network that reads a photograph",
+                       ev_text(e, key));
+    if (e->net) e->tape = ag_tape_create(false, st);
+    if (!e->tape) return st->code;
+    ag_freeze(e->tape, true);
+    return TS_OK;
+}
+
+ts_code ev_open_train(ev_estimator *e, ts_status *st)
+{
+    e->train = ag_tape_create(true, st);
+    return e->train ? TS_OK : st->code;
+}
+
+ts_code ev_start_r0(ev_estimator *e, const ev_case *c, float *maps, ts_status *st)
+{
+    const int64_t pixels = (int64_t)c->size * c->size;
+    ag_reset(e->tape);
+    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){1, c->size, c->size, 3}),
+                         .grid = rd_grid_full(c->size),
+                         .view = c->view,
+                         .orientations = ev_orientations(e)};
+    const ag_value *out = nn_predict(e->tape, e->net, &in);
+    if (!out) {
+        *st = *ag_status(e->tape);
+        return st->code;
+    }
+    for (int64_t i = 0; i < pixels; i++)
+        memcpy(maps + i * MAP_CHANNELS, out->t.data + i * out->t.shape.c, MAP_CHANNELS * sizeof *maps);
+    return TS_OK;
+}
+
+ts_code ev_block(ev_estimator *e, size_t count, ts_status *st)
+{
+    count = (count + 15) / 16 * 16;
+    if (e->count != count) {
+        free(e->x);
+        free(e->gradient);
+        nn_adam_free(&e->adam);
+        e->x = ts_block(count * sizeof *e->x);
+        e->gradient = ts_block(count * sizeof *e->gradient);
+        const nn_model numbers = {.count = count, .value = e->x}; /* all that Adam looks at */
+        if (!e->x || !e->gradient || nn_adam_create(&e->adam, &numbers, 0, st) != TS_OK)
+            return ts_fail(st, TS_NOMEM, "out of memory for %zu numbers", count);
+        e->count = count;
+        e->bytes = 2 * count * sizeof *e->x;
+    }
+    memset(e->gradient, 0, count * sizeof *e->gradient);
+    memset(e->x, 0, count * sizeof *e->x);
+    memset(e->adam.m, 0, count * sizeof *e->x);
+    memset(e->adam.v, 0, count * sizeof *e->x);
+    e->adam.step = 0;
+    return TS_OK;
+}
+
+void ev_block_step(ev_estimator *e, float rate)
+{
+    nn_model numbers = {.count = e->count, .value = e->x, .grad = e->gradient};
+    nn_adam_next(&e->adam);
+    nn_adam_step(&e->adam, &numbers, 0, e->count, rate, 1);
+}

@@ -1,0 +1,85 @@
+/* descent: Adam on the maps themselves, minimising the squared error between the photographs and their re-renderings
+ * (the paper's equation 3). */
+#include "eval/methods/method.h"
+#include "render/render.h"
+#include <stdlib.h>
+
+static int steps(const ev_estimator *e) { return (int)ev_number(e, "steps"); }
+static int photos(const ev_estimator *e) { return (int)ev_number(e, "photos"); }
+
+static ts_code open(ev_estimator *e, ts_status *st)
+{
+    return ev_number(e, "start") == 0 ? ev_open_net(e, "model", st) : TS_OK;
+}
+
+/* The sum over the photographs of d (error^2 / 2) / d maps, but for a factor that is the same for all: Adam does not
+ * see it. part: room for one's. */
+static void gradient(ev_estimator *e, const ev_case *c, float *part)
+{
+    const int64_t pixels = (int64_t)c->size * c->size, count = pixels * MAP_CHANNELS;
+    for (int k = 0; k < photos(e); k++) {
+        float *to = k ? part : e->gradient;
+        rd_flash_gradient(rd_grid_full(c->size), e->x, MAP_CHANNELS, &c->input[k], c->image + k * pixels * 3, 1, to,
+                          NULL);
+        for (int64_t i = 0; k && i < count; i++) e->gradient[i] += part[i];
+    }
+}
+
+static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
+{
+    const int64_t count = (int64_t)c->size * c->size * MAP_CHANNELS;
+    const float rate = (float)ev_number(e, "rate");
+    if (ev_block(e, (size_t)count, st) != TS_OK) return st->code;
+    if ((e->net ? ev_start_r0(e, c, e->x, st) : ev_start_mean(c, e->x, st)) != TS_OK) return st->code;
+    float *part = photos(e) > 1 ? malloc((size_t)count * sizeof *part) : NULL;
+    if (photos(e) > 1 && !part)
+        return ts_fail(st, TS_NOMEM, "no memory for the gradient of %d x %d pixels", c->size, c->size);
+    for (int t = 0; seen(t, e->x, MAP_CHANNELS, user) && t < steps(e); t++) {
+        gradient(e, c, part);
+        ev_block_step(e, rate);
+        /* Beyond its range a value has no gradient that would bring it back. */
+        for (int64_t i = 0; i < count; i++) e->x[i] = e->x[i] < -1 ? -1 : e->x[i] > 1 ? 1 : e->x[i];
+    }
+    free(part);
+    return TS_OK;
+}
+
+static const ev_setting settings[] = {
+    {.key = "start",
+     .type = EV_WORD,
+     .words = "r0 constant",
+     .initial = "r0",
+     .grid = "r0 constant",
+     .help = "R_0 of the model, or the mean of procedural materials"},
+    {.key = "rate",
+     .type = EV_REAL,
+     .lo = 0,
+     .hi = 10,
+     .initial = "0.01",
+     .grid = "0.001 0.003 0.01 0.03 0.1",
+     .help = "Adam's rate"},
+    {.key = "steps",
+     .type = EV_WHOLE,
+     .lo = 0,
+     .hi = 100000,
+     .initial = "100",
+     .grid = "0 1 2 5 10 20 50 100 200 500",
+     .steps = true,
+     .help = "of Adam"},
+    {.key = "photos",
+     .type = EV_WHOLE,
+     .lo = 1,
+     .hi = RD_CAPTURE_VIEWS,
+     .initial = "1",
+     .help = "photographs that are given"},
+    EV_ORIENTATIONS,
+    {.key = "model", .type = EV_WEIGHTS, .initial = "", .help = "whose R_0, by default the program's"},
+    {0}};
+const ev_method ev_method_descent = {.name = "descent",
+                                     .help = "Adam on the maps (equation 3)",
+                                     .settings = settings,
+                                     .few = true,
+                                     .steps = steps,
+                                     .photos = photos,
+                                     .open = open,
+                                     .run = run};

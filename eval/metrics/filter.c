@@ -1,0 +1,56 @@
+#include "eval/metrics/filter.h"
+#include "tensor/threads.h"
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+ev_taps ev_gauss_taps(double sigma, int radius)
+{
+    ev_taps t = {.radius = radius};
+    double sum = 0;
+    for (int i = -radius; i <= radius; i++) sum += t.tap[i + radius] = exp(-i * i / (2 * sigma * sigma));
+    for (int i = 0; i <= 2 * radius; i++) t.tap[i] /= sum;
+    return t;
+}
+
+static int nearest(int i, int n) { return i < 0 ? 0 : i >= n ? n - 1 : i; }
+
+/* out[x] = sum_i tap[i] from[i][x]: a block of sums stays in registers over all taps. */
+enum { BLOCK = 8 };
+static void weigh(int w, int taps, const double *tap, const double *const *from, double *out)
+{
+    int x = 0;
+    for (; x + BLOCK <= w; x += BLOCK) {
+        double sum[BLOCK] = {0};
+        for (int i = 0; i < taps; i++) {
+            const double k = tap[i], *p = from[i] + x;
+            for (int j = 0; j < BLOCK; j++) sum[j] += k * p[j];
+        }
+        memcpy(out + x, sum, sizeof sum);
+    }
+    for (; x < w; x++) {
+        double sum = 0;
+        for (int i = 0; i < taps; i++) sum += tap[i] * from[i][x];
+        out[x] = sum;
+    }
+}
+
+void ev_filter(int h, int w, const double *in, const ev_taps *across, const ev_taps *down, double *work, double *out)
+{
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int y = 0; y < h; y++) {
+        const int r = across->radius;
+        const double *row = in + (int64_t)y * w, *from[2 * EV_TAPS_MAX + 1];
+        double *padded = ts_scratch(0, ((size_t)w + 2 * EV_TAPS_MAX) * sizeof *padded);
+        for (int x = 0; x < r; x++) padded[x] = row[0], padded[r + w + x] = row[w - 1];
+        memcpy(padded + r, row, (size_t)w * sizeof *row);
+        for (int i = 0; i <= 2 * r; i++) from[i] = padded + i;
+        weigh(w, 2 * r + 1, across->tap, from, work + (int64_t)y * w);
+    }
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int y = 0; y < h; y++) {
+        const double *from[2 * EV_TAPS_MAX + 1];
+        for (int j = 0; j <= 2 * down->radius; j++) from[j] = work + (int64_t)nearest(y + j - down->radius, h) * w;
+        weigh(w, 2 * down->radius + 1, down->tap, from, out + (int64_t)y * w);
+    }
+}

@@ -1,0 +1,107 @@
+/* The safetensors container (github.com/huggingface/safetensors, README, "Format"): u64 header size, JSON header,
+ * values, little endian. */
+#include "nn/weights/file_internal.h"
+#include "nn/weights/json.h"
+#include "nn/weights/text.h"
+#include "nn/weights/weights.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* false: s is not UTF-8. */
+static bool put_string(nn_text *t, const char *s)
+{
+    int64_t n = json_escape(s, NULL);
+    if (n < 0) return false;
+    nn_text_put(t, "\"");
+    char *to = nn_text_room(t, (size_t)n);
+    if (to) json_escape(s, to);
+    nn_text_put(t, "\"");
+    return true;
+}
+
+/* order: the tensors as their values follow each other in the file. */
+static ts_code make_header(nn_text *t, const char *path, const nn_entry *entry, const int *order, int entries,
+                           nn_dtype real, const nn_meta *meta, int metas, ts_status *st)
+{
+    int64_t at = 0;
+    char number[64];
+    nn_text_number(t, 0, 8); /* the header's size, at the end */
+    nn_text_put(t, "{");
+    if (metas > 0) nn_text_put(t, "\"__metadata__\":{");
+    for (int i = 0; i < metas; i++) {
+        if (i) nn_text_put(t, ",");
+        bool good = put_string(t, meta[i].key);
+        nn_text_put(t, ":");
+        if (!good || !put_string(t, meta[i].value))
+            return ts_fail(st, TS_INVALID, "%s: metadata \"%.80s\" is not UTF-8", path, meta[i].key);
+    }
+    if (metas > 0) nn_text_put(t, entries ? "}," : "}");
+    for (int i = 0; i < entries; i++) {
+        const nn_entry *e = &entry[order[i]];
+        const nn_dtype to = nn_dtype_out(e->dtype, real);
+        if (i) nn_text_put(t, ",");
+        if (!put_string(t, e->name))
+            return ts_fail(st, TS_INVALID, "%s: the tensor name \"%.80s\" is not UTF-8", path, e->name);
+        nn_text_put(t, ":{\"dtype\":\"");
+        nn_text_put(t, nn_dtype_name(to));
+        nn_text_put(t, "\",\"shape\":[");
+        for (int j = 0; j < e->rank; j++) {
+            snprintf(number, sizeof number, "%s%lld", j ? "," : "", (long long)e->dim[j]);
+            nn_text_put(t, number);
+        }
+        int64_t end = at + nn_dtype_size(to) * e->count;
+        snprintf(number, sizeof number, "],\"data_offsets\":[%lld,%lld]}", (long long)at, (long long)end);
+        nn_text_put(t, number);
+        at = end;
+    }
+    nn_text_put(t, "}");
+    while (!t->failed && t->used % 64) nn_text_put(t, " "); /* the values begin at a cache line of the mapped file */
+    if (t->failed) return ts_fail(st, TS_NOMEM, "%s: no memory for the header", path);
+    uint64_t size = t->used - 8;
+    memcpy(t->data, &size, 8);
+    return TS_OK;
+}
+
+ts_code nn_safetensors_put(nn_out *o, const nn_entry *entry, int entries, nn_dtype real, const nn_meta *meta, int metas,
+                           ts_status *st)
+{
+    nn_text t = {0};
+    int *order = malloc(((size_t)entries + 1) * sizeof *order), n = 0;
+    void *work = NULL;
+    size_t work_size = 0;
+    ts_code code = TS_OK;
+    if (!order) code = ts_fail(st, TS_NOMEM, "%s: no memory to write it", o->path);
+    for (int size = 8; !code && size; size /= 2) /* the widest first, so that every number is aligned to its size */
+        for (int i = 0; i < entries; i++)
+            if (nn_dtype_size(nn_dtype_out(entry[i].dtype, real)) == size) order[n++] = i;
+    if (!code) code = make_header(&t, o->path, entry, order, entries, real, meta, metas, st);
+    if (!code) nn_out_put(o, t.data, t.used);
+    for (int i = 0; i < entries && !code && !o->error; i++) {
+        const nn_entry *e = &entry[order[i]];
+        const nn_dtype to = nn_dtype_out(e->dtype, real);
+        const void *bytes = nn_entry_bytes(e, to, o->path, &work, &work_size, st);
+        if (!bytes) code = st ? st->code : TS_FORMAT;
+        else nn_out_put(o, bytes, (size_t)e->count * (size_t)nn_dtype_size(to));
+    }
+    free(work);
+    free(order);
+    free(t.data);
+    return code;
+}
+
+ts_code nn_safetensors_write(const char *path, const nn_block *blocks, int count, const nn_meta *meta, int metas,
+                             ts_status *st)
+{
+    nn_entry *entry = malloc(((size_t)count + 1) * sizeof *entry);
+    if (!entry) return ts_fail(st, TS_NOMEM, "%s: no memory to write it", path);
+    for (int i = 0; i < count; i++) {
+        entry[i] = (nn_entry){
+            .name = blocks[i].name, .rank = blocks[i].rank, .data = (const unsigned char *)blocks[i].data};
+        for (int j = 0; j < blocks[i].rank; j++) entry[i].dim[j] = blocks[i].dim[j];
+        nn_entry_shape(&entry[i]);
+    }
+    ts_code code = nn_file_write(path, NN_FORM_SAFETENSORS, entry, count, NN_DTYPES, meta, metas, st);
+    free(entry);
+    return code;
+}

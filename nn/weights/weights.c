@@ -1,0 +1,103 @@
+/* A model to a file and back. */
+#include "nn/weights/weights.h"
+#include "nn/layers.h"
+#include "nn/weights/published.h"
+#include "tensor/threads.h"
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+void nn_param_dims(const nn_param *p, int64_t dim[4])
+{
+    for (int i = 0; i < 4; i++) dim[i] = p->dim[i];
+}
+
+bool nn_all_finite(const float *v, size_t count)
+{
+    int bad = 0;
+#pragma omp parallel for simd num_threads(ts_threads()) schedule(static) reduction(|                   \
+                                                                                   : bad) if (parallel \
+                                                                                              : count > 1 << 16)
+    for (size_t i = 0; i < count; i++) bad |= !(fabsf(v[i]) <= FLT_MAX);
+    return !bad;
+}
+
+static bool of_network(const char *name)
+{
+    return !strncmp(name, "g.", 2) || !strncmp(name, "h.", 2) || !strncmp(name, "coarse.", 7) ||
+        !strncmp(name, "a.", 2) || nn_published_tensor(name);
+}
+
+/* A tensor by each thread at a time: they wait for each other once, not at every tensor, while another thread may be
+ * decoding. Of several that fail st names the first. */
+static ts_code read_values(const nn_file *f, nn_model *m, ts_status *st)
+{
+    int failed = m->params;
+#pragma omp parallel for num_threads(ts_threads()) schedule(dynamic)
+    for (int i = 0; i < m->params; i++) {
+        const nn_param *p = &m->param[i];
+        ts_status own = {0};
+        int64_t dim[4];
+        nn_param_dims(p, dim);
+        if (nn_file_read_finite(f, p->name, p->rank, dim, m->value + p->offset, &own) == TS_OK) continue;
+#pragma omp critical(nn_read_values)
+        if (i < failed) {
+            failed = i;
+            *st = own;
+        }
+    }
+    return failed < m->params ? st->code : TS_OK;
+}
+
+nn_model *nn_model_load(const char *path, ts_status *st)
+{
+    nn_arch arch;
+    nn_model *m = NULL;
+    nn_file *f = nn_file_open(path, st);
+    if (f && !nn_arch_from_file(f, &arch, st)) {
+        m = nn_model_plan(&arch, st); /* before memory is taken: is the file what its metadata says? */
+        for (int i = 0; m && i < nn_file_count(f); i++) {
+            const char *name = nn_file_name(f, i);
+            if (of_network(name) && !nn_model_find(m, name)) {
+                ts_fail(st, TS_FORMAT, "%s: tensor \"%.200s\" does not belong to the architecture that the file states",
+                        path, name);
+                nn_model_free(&m);
+            }
+        }
+        for (int i = 0; m && i < m->params; i++)
+            if (!nn_file_has(f, m->param[i].name)) {
+                ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" is missing", path, m->param[i].name);
+                nn_model_free(&m);
+            }
+        if (m && (nn_model_room(m, st) || read_values(f, m, st))) nn_model_free(&m);
+    }
+    nn_file_close(&f);
+    return m;
+}
+
+ts_code nn_model_save(const nn_model *model, const float *values, const char *path, const nn_meta *extra, int extras,
+                      ts_status *st)
+{
+    char text[NN_ARCH_TEXT];
+    nn_block *block = malloc((size_t)model->params * sizeof *block);
+    nn_meta *meta = malloc((NN_ARCH_META + (size_t)extras) * sizeof *meta);
+    ts_code code = TS_OK;
+    if (!block || !meta) code = ts_fail(st, TS_NOMEM, "%s: no memory to write it", path);
+    for (int i = 0; !code && i < model->params; i++) {
+        const nn_param *p = &model->param[i];
+        block[i] = (nn_block){.name = p->name, .rank = p->rank, .data = values + p->offset};
+        nn_param_dims(p, block[i].dim);
+        if (!nn_all_finite(values + p->offset, p->count))
+            code = ts_fail(st, TS_NUMERIC, "%s: not written: parameter \"%s\" holds a value that is not finite", path,
+                           p->name);
+    }
+    if (!code) {
+        int metas = nn_arch_to_meta(&model->arch, meta, NN_ARCH_META, text, sizeof text);
+        for (int i = 0; i < extras; i++) meta[metas++] = extra[i];
+        code = nn_safetensors_write(path, block, model->params, meta, metas, st);
+    }
+    free(block);
+    free(meta);
+    return code;
+}

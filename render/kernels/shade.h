@@ -1,0 +1,62 @@
+/* Shading of rows of pixels, and the losses on top of it. The equations stand in render/brdf.h; here is only how they
+ * are made fast. Geometry (normals, directions, the sine between normal and half vector) is done in double lanes,
+ * because a highlight of roughness 0.02 is 4e-4 wide and single precision knows directions to 1e-7; colours are in
+ * float. */
+#ifndef TS_SHADE_H
+#define TS_SHADE_H
+#include "tensor/kernels/family.h"
+#include <stdbool.h>
+
+/* The one place where roughness becomes GGX's width, for doubles and vectors alike. */
+#define TS_ALPHA(roughness) ((roughness) * (roughness))
+
+typedef struct ts_shade_guards {
+    double roughness;                /* smallest roughness */
+    double nz2;                      /* smallest n_z^2 before normalisation */
+    double distance2;                /* smallest squared distance that the falloff sees */
+    double lz;                       /* smallest l_z that irradiance is divided by */
+    double distribution, k, cosines; /* TS_SHADE_PUBLISHED: added to pi (…)^2 below D, to G's k, and to 4 n.l n.v;
+                                        elsewhere 0 and not looked at */
+} ts_shade_guards;
+
+typedef enum ts_shade_kind {
+    TS_SHADE_POSITIONS,
+    TS_SHADE_COLLOCATED, /* the light's position is the camera's: l = v = h */
+    TS_SHADE_DIRECTIONS, /* unit l, v and h are the same for every pixel */
+    TS_SHADE_PUBLISHED   /* collocated, with the published renderer's guards (render/published.h) */
+} ts_shade_kind;
+
+typedef struct ts_shade_view {
+    const ts_shade_guards *guards;
+    ts_shade_kind kind;
+    bool falloff; /* the light's strength is power / |light - x|^2; else power / max(l_z, guards->lz) */
+    double light[3], camera[3], half[3]; /* half: TS_SHADE_DIRECTIONS only */
+    float power;                         /* TS_SHADE_DIRECTIONS: the strength itself */
+    float fresnel; /* 2^(...), where v.h is the same for every pixel: not for TS_SHADE_POSITIONS */
+} ts_shade_view;
+
+/* count pixels, pixel i with its centre at ((column + i + 1/2) step - 1/2, y); maps [count, channels], channels >= 9. A
+ * pixel gets the same bytes in whatever row it is computed. */
+typedef struct ts_shade_row {
+    double y, step;
+    int column, count, channels;
+    const float *maps;
+} ts_shade_row;
+
+struct ts_shade_kernels {
+    /* image[count, 3] = min(radiance, limit). */
+    void (*render)(const ts_shade_view *view, const ts_shade_row *row, float limit, float *image);
+    /* With e = min(radiance, 1) - image: returns the sum of e^2; gradient[count, channels] (may be NULL) = scale * sum
+     * over rgb of e d min(radiance, 1) / d maps. */
+    double (*flash)(const ts_shade_view *view, const ts_shade_row *row, const float *image, float scale,
+                    float *gradient);
+    /* The sum over views, pixels and rgb of |log(a + 0.01) - log(b + 0.01)| for the radiances a of row and b of target
+     * (whose place and count are row's); gradient[count, channels] (may be NULL) = scale * its derivative by row's
+     * maps. */
+    double (*log_loss)(const ts_shade_view *views, int count, const ts_shade_row *row, const ts_shade_row *target,
+                       float scale, float *gradient);
+    /* out = a log(clamp(in, 0, 1) + 0.01) + b. in may be out. */
+    void (*log_encode)(int count, const float *in, float a, float b, float *out);
+};
+TS_FAMILY(shade)
+#endif

@@ -1,0 +1,137 @@
+/* Convolution: checks, packed weights, and which way a shape is computed. */
+#include "tensor/conv/conv.h"
+#include "tensor/conv/conv_internal.h"
+#include "tensor/threads.h"
+
+ts_code ts_conv_check(const ts_conv *c, ts_status *st)
+{
+    if (c->n < 1 || c->h < 1 || c->w < 1 || c->ic < 1 || c->oc < 1)
+        return ts_fail(st, TS_INVALID,
+                       "convolution of %d x %d x %d x %d to %d channels: every dimension must be at least 1", c->n,
+                       c->h, c->w, c->ic, c->oc);
+    if (c->k < 1 || c->k > 15 || c->k % 2 == 0)
+        return ts_fail(st, TS_INVALID, "convolution kernel of side %d: use an odd side from 1 to 15", c->k);
+    if (c->dilation != 1 && c->dilation != 2)
+        return ts_fail(st, TS_INVALID, "convolution dilation %d: use 1 or 2", c->dilation);
+    if (c->pad != TS_PAD_ZERO && c->pad != TS_PAD_REPLICATE)
+        return ts_fail(st, TS_INVALID, "convolution padding %d: use TS_PAD_ZERO or TS_PAD_REPLICATE", (int)c->pad);
+    if (c->constants < 0 || c->constants >= c->ic)
+        return ts_fail(st, TS_INVALID, "convolution of %d channels of which %d are constants: there must be others",
+                       c->ic, c->constants);
+    const int64_t limit = INT64_C(1) << 40; /* floats: offsets stay far from overflow */
+    const int64_t pixels = (int64_t)c->h * c->w, channels = c->ic > c->oc ? c->ic : c->oc;
+    if (pixels > limit / c->n || pixels * c->n > limit / channels ||
+        (int64_t)c->ic * c->oc > (INT64_C(1) << 31) / (c->k * c->k))
+        return ts_fail(st, TS_INVALID, "convolution of %d x %d x %d x %d to %d channels with side %d is too large",
+                       c->n, c->h, c->w, c->ic, c->oc, c->k);
+    return TS_OK;
+}
+
+ptrdiff_t conv_panels_count(int ic, int oc, int k)
+{
+    const int lanes = conv_lanes();
+    return (ptrdiff_t)((oc + lanes - 1) / lanes * lanes) * ic * k * k;
+}
+
+size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
+{
+    if (use == TS_CONV_WINOGRAD) return conv_winograd_count(c->ic, c->oc);
+    if (use == TS_CONV_DATA_GRADIENT_WINOGRAD) return conv_winograd_count(c->oc, ts_conv_variables(c));
+    if (use == TS_CONV_FORWARD_BF16) return conv_bf16_count(c, c->ic, c->oc);
+    if (use == TS_CONV_DATA_GRADIENT_BF16) return conv_bf16_count(c, c->oc, ts_conv_variables(c));
+    const int ic = use == TS_CONV_FORWARD ? c->ic : c->oc, oc = use == TS_CONV_FORWARD ? c->oc : ts_conv_variables(c);
+    const size_t panels = (size_t)conv_panels_count(ic, oc, c->k);
+    if (conv_by_col2im(ic, oc, c->k)) return panels + (size_t)conv_col2im_count(ic, oc, c->k);
+    return panels + (conv_few_channels(oc, c->k) ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
+}
+
+/* packed: [panel][ky][kx][input][channel of the panel, zeros where there is none] */
+void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float *packed)
+{
+    if (use == TS_CONV_WINOGRAD || use == TS_CONV_DATA_GRADIENT_WINOGRAD) {
+        conv_winograd_pack(c, use == TS_CONV_WINOGRAD, weight, packed);
+        return;
+    }
+    if (use == TS_CONV_FORWARD_BF16 || use == TS_CONV_DATA_GRADIENT_BF16) {
+        conv_pack_bf16(c, use == TS_CONV_FORWARD_BF16, weight, packed);
+        return;
+    }
+    const bool forward = use == TS_CONV_FORWARD;
+    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), taps = c->k * c->k;
+    const int panel_width = 2 * conv_lanes(), panels = conv_panels(oc);
+    /* weight[o][c][tap]: strides of the packed input and output channel */
+    const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * taps : taps,
+                    i_step = forward ? taps : (ptrdiff_t)c->ic * taps;
+    const int parts = ic > 16 ? 16 : ic;
+    float *few = packed + conv_panels_count(ic, oc, c->k);
+    if (conv_by_col2im(ic, oc, c->k)) conv_pack_col2im(ic, oc, c->k, !forward, weight, i_step, o_step, few);
+    else if (conv_few_channels(oc, c->k)) conv_pack_lanes(ic, oc, c->k, !forward, weight, i_step, o_step, few);
+#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
+    for (int panel = 0; panel < panels; panel++)
+        for (int part = 0; part < parts; part++) {
+            const int width = conv_vectors(oc, panel) * panel_width / 2, o0 = panel * panel_width,
+                      count = oc - o0 < width ? oc - o0 : width;
+            float *to = packed + (ptrdiff_t)o0 * ic * taps;
+            int begin, end;
+            conv_part(ic, parts, part, &begin, &end);
+            for (int i = begin; i < end; i++)
+                for (int t = 0; t < taps; t++) {
+                    const float *from = weight + i * i_step + o0 * o_step + (forward ? t : taps - 1 - t);
+                    float *row = to + ((ptrdiff_t)t * ic + i) * width;
+                    for (int o = 0; o < count; o++) row[o] = from[o * o_step];
+                    for (int o = count; o < width; o++) row[o] = 0;
+                }
+        }
+}
+
+ts_tile conv_panel_tile(const conv_plan *p, int panel)
+{
+    const int o0 = panel * 2 * conv_lanes();
+    return (ts_tile){.w = p->packed + (ptrdiff_t)o0 * p->ic * p->k * p->k,
+                     .bias = p->bias ? p->bias + o0 : NULL,
+                     .channels = p->oc - o0,
+                     .add = p->add,
+                     .leak = p->leak,
+                     .y_stride = p->oc,
+                     .fetch = {p->packed, p->packed}};
+}
+
+void conv_run_tile(ts_tile *t, int vectors, const float *a, float *y, int pixels, bool bf16)
+{
+    for (int g = 0; g < 3; g++) {
+        const int at = g * TS_TILE_GROUP < pixels ? g * TS_TILE_GROUP : 0;
+        t->a[g] = a + at * t->a_stride;
+        t->y[g] = y + at * t->y_stride;
+    }
+    (bf16 ? ts_conv_k()->tile_bf16 : ts_conv_k()->tile)[vectors - 1][pixels](t);
+}
+
+void conv_run(const conv_plan *p)
+{
+    if (p->bf16 && conv_by_matrix()) conv_run_matrix(p);
+    else if (p->k == 1) conv_run_pointwise(p);
+    else if (conv_by_position(p->n, p->h, p->w)) conv_run_positions(p);
+    else if (!p->bf16 && conv_by_col2im(p->ic, p->oc, p->k)) conv_run_col2im(p);
+    else if (conv_by_lanes(p)) conv_run_lanes(p);
+    else conv_run_rows(p);
+}
+
+void ts_conv_forward(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y)
+{
+    const conv_plan p = {.n = c->n,
+                         .h = c->h,
+                         .w = c->w,
+                         .ic = c->ic,
+                         .channels = c->ic,
+                         .oc = c->oc,
+                         .k = c->k,
+                         .dilation = c->dilation,
+                         .first = -c->dilation * (c->k / 2),
+                         .replicate = c->pad == TS_PAD_REPLICATE,
+                         .x = x,
+                         .packed = packed,
+                         .bias = bias,
+                         .y = y,
+                         .leak = leak};
+    conv_run(&p);
+}

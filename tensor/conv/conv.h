@@ -1,0 +1,94 @@
+/* 2-D convolution on [N, H, W, C] images: stride 1, odd square kernels, dilation 1 or 2, same-size output, and its
+ * gradients. Threaded with OpenMP over fixed chunks: the same bytes for any number of threads. Weights are [OC, IC, K,
+ * K] in files and in parameter blocks and are packed for the kernels by ts_conv_pack. Every function trusts its shape
+ * (validated by ts_conv_check). */
+#ifndef TS_CONV_H
+#define TS_CONV_H
+#include "tensor/tensor.h"
+
+typedef enum ts_pad { TS_PAD_ZERO, TS_PAD_REPLICATE } ts_pad;
+
+typedef struct ts_conv {
+    int n, h, w;   /* images, rows, columns of input and output */
+    int ic, oc;    /* input and output channels */
+    int k;         /* kernel side: odd, 1 .. 15 */
+    int dilation;  /* 1 or 2 */
+    ts_pad pad;    /* padding of dilation * (k - 1) / 2 on each side */
+    int constants; /* of the input's channels, the last: the data gradient is that of the others alone */
+} ts_conv;
+
+/* Which order the packed weights are in: for the output and for the gradient of the input; both by Winograd's way; both
+ * as pairs of bf16 values. */
+typedef enum ts_conv_use {
+    TS_CONV_FORWARD,
+    TS_CONV_DATA_GRADIENT,
+    TS_CONV_WINOGRAD,
+    TS_CONV_DATA_GRADIENT_WINOGRAD,
+    TS_CONV_FORWARD_BF16,
+    TS_CONV_DATA_GRADIENT_BF16
+} ts_conv_use;
+
+static inline int ts_conv_variables(const ts_conv *c) { return c->ic - c->constants; }
+
+ts_code ts_conv_check(const ts_conv *c, ts_status *st);
+
+/* floats; does not depend on n, h, w. Packed weights are for the ISA in use (tensor/cpu.h). */
+size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use);
+void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight /* [oc][ic][k][k] */, float *packed);
+
+/* y[n,i,j,o] = act(bias[o] + sum_{ky,kx,c} x[n, i + d(ky-k/2), j + d(kx-k/2), c] weight[o,c,ky,kx]),
+ * act(v) = v > 0 ? v : leak v (0 <= leak <= 1; 1: the identity, 0: ReLU). bias may be NULL. x and y contiguous, not
+ * overlapping. */
+void ts_conv_forward(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y);
+
+/* The same y, and the gradients below, by Winograd's F(4 x 4, 3 x 3) with weights packed for the use of that name; c->k
+ * must be 3. Its products are a quarter of the direct way's, its rounding errors about ten times as large (1e-5 of the
+ * largest value, not 1e-6). ts_conv_winograd: whether it pays for this shape, use being one of the two; _weights: for
+ * the gradient of its weights. */
+bool ts_conv_winograd(const ts_conv *c, ts_conv_use use);
+bool ts_conv_winograd_weights(const ts_conv *c);
+void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
+                              float *y);
+void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
+void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const float *dy, float *dweight);
+
+/* Of the calling thread: whether ag_conv computes directly wherever it can (true: the default, and what comparisons
+ * with other programs want) or by Winograd's way where ts_conv_winograd says so. Set before what is to be computed so;
+ * weights that a tape has packed for one way are packed anew for the other. */
+void ts_conv_exact_set(bool exact);
+bool ts_conv_exact(void);
+
+/* dx [n,h,w,ts_conv_variables] (+)= the gradient of the input given dy = the gradient before the activation. */
+void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
+
+/* Both with x, dy and the weights rounded to bf16 (the nearest, ties to even), products and sums in f32, weights packed
+ * for the use of that name: vdpbf16ps where the CPU has it, the same sum from floats elsewhere. Bias, activation and
+ * results are f32. */
+void ts_conv_forward_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
+                          float *y);
+void ts_conv_data_gradient_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
+
+/* dweight[oc][ic][k][k] += with x and dy rounded so, for CPUs with a matrix unit alone (Intel AMX): where
+ * ts_conv_bf16_weights says that this is one. */
+bool ts_conv_bf16_weights(void);
+void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight);
+
+/* Of the calling thread, f32 unless said otherwise: how ag_conv and ag_gru multiply in forward and ag_conv for the
+ * gradient of its input. Gradients of weights, and whatever else is summed, stay f32. Set between tapes, or at least
+ * between a tape's forward and the next. */
+typedef enum ts_precision { TS_F32, TS_BF16, TS_PRECISION_COUNT } ts_precision;
+void ts_conv_precision_set(ts_precision p);
+ts_precision ts_conv_precision(void);
+const char *ts_precision_name(ts_precision p); /* f32, bf16 */
+
+/* dweight[oc][ic][k][k] += , dbias[oc] += (either may be NULL). */
+void ts_conv_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias);
+
+/* Naive twins: loop nests, sums in double; the same arguments with unpacked weights. Those of bf16 are the same on
+ * rounded arguments. */
+float ts_bf16_naive(float x); /* the bf16 value nearest to x */
+void ts_conv_forward_naive(const ts_conv *c, const float *x, const float *weight, const float *bias, float leak,
+                           float *y);
+void ts_conv_data_gradient_naive(const ts_conv *c, const float *dy, const float *weight, float *dx, bool accumulate);
+void ts_conv_weight_gradient_naive(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias);
+#endif

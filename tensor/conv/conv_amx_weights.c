@@ -1,0 +1,177 @@
+/* The gradient of weights by the matrix unit: for each tap the product of x, channel by channel, and dy, pixel by
+ * pixel, over the pixels of a band. Both are staged as lines (tensor/conv/conv_amx.c) with dy zero on the halo's
+ * columns, so that a tap is but another place to begin at in x. */
+#include "tensor/conv/conv_internal.h"
+#include "tensor/kernels/amx_conv.h"
+#include "tensor/threads.h"
+#include <string.h>
+
+enum {
+    STEP_PIXELS = 2 * TS_MATRIX_PAIRS,
+    STAGE_BYTES = 640 << 10, /* x and dy of a band: they stay in the second cache for all taps */
+    CHUNK_PIXELS = 4096,     /* so many that clearing and adding a chunk's sums is little beside making them */
+    CHUNKS = 8,
+    UNITS = 8, /* of work, at least, where the shape allows */
+    REDUCE_INPUTS = 16
+};
+
+typedef struct job {
+    const ts_conv *c;
+    const float *x, *dy;
+    int reach, columns;  /* columns of a line: even, so that pairs of pixels do not straddle rows */
+    int ic, oc;          /* whole tiles */
+    int chunks, groups;  /* of rows over all images; of input blocks */
+    const ptrdiff_t *at; /* of steps, in x */
+    float *sums;         /* [chunk][tap][ic][oc] */
+    ptrdiff_t size;      /* of a chunk's */
+} job;
+
+bool ts_conv_bf16_weights(void) { return conv_by_matrix(); }
+
+static int round_up(int n, int to) { return (n + to - 1) / to * to; }
+
+/* Pixels of a line of so many rows of dy, in whole steps. */
+static int line_pixels(const job *g, int rows) { return round_up(rows * g->columns, STEP_PIXELS); }
+
+/* bf16 values of a channel's plane: what the last tap reads of the last step exists. Planes a multiple of 4 KiB apart
+ * would share few sets of the first cache. */
+static ptrdiff_t plane_of(const job *g, int rows)
+{
+    const int line = round_up(line_pixels(g, rows) + g->reach * (g->columns + 1), 32);
+    return line / 32 % 2 ? line : line + 32;
+}
+
+static int band_rows(const job *g, int inputs)
+{
+    const ptrdiff_t row = (ptrdiff_t)g->columns * 2 * (inputs + g->oc),
+                    halo = (ptrdiff_t)g->columns * 2 * inputs * g->reach;
+    const ptrdiff_t rows = (STAGE_BYTES - halo) / row;
+    return rows < 4 ? 4 : rows < g->c->h ? (int)rows : g->c->h;
+}
+
+/* Rows [begin, end) of dy and what their taps read of channels [c0, c1). */
+static void stage_band(const job *g, int image, int begin, int end, int c0, int c1, uint16_t *x, ptrdiff_t plane,
+                       float *dy)
+{
+    const ts_conv *c = g->c;
+    const struct ts_matrix_kernels *k = ts_matrix_k();
+    const int half = g->reach / 2, rows = end - begin, exist = (c1 < c->ic ? c1 : c->ic) - c0;
+    memset(x, 0, (size_t)plane * (size_t)(c1 - c0) * sizeof *x);
+    for (int r = 0; r < rows + g->reach; r++) {
+        const int at = begin + r - half, source = conv_clamp(at, c->h);
+        if (source != at && c->pad == TS_PAD_ZERO) continue;
+        const float *from = g->x + ((ptrdiff_t)image * c->h + source) * c->w * c->ic + c0;
+        uint16_t *to = x + (ptrdiff_t)r * g->columns + half;
+        k->planes(from, c->ic, c->w, exist, to, plane);
+        if (c->pad == TS_PAD_ZERO) continue;
+        for (int i = 0; i < exist; i++, to += plane)
+            for (int j = 1; j <= half; j++) to[-j] = to[0], to[c->w - 1 + j] = to[c->w - 1];
+    }
+    const int pairs = line_pixels(g, rows) / 2, in_row = (c->w + 1) / 2;
+    for (int r = 0; r < rows; r++) {
+        float *to = dy + (ptrdiff_t)r * (g->columns / 2) * g->oc;
+        k->pixel_pairs(g->dy + ((ptrdiff_t)image * c->h + begin + r) * c->w * c->oc, c->oc, c->w, c->oc, to, g->oc);
+        memset(to + (ptrdiff_t)in_row * g->oc, 0, sizeof(float) * (size_t)(g->columns / 2 - in_row) * (size_t)g->oc);
+    }
+    const int done = rows * (g->columns / 2);
+    memset(dy + (ptrdiff_t)done * g->oc, 0, sizeof(float) * (size_t)(pairs - done) * (size_t)g->oc);
+}
+
+/* All taps, channels [c0, c1) and outputs, of a staged band. */
+static void add_band(const job *g, int rows, int c0, int c1, const uint16_t *x, ptrdiff_t plane, const float *dy,
+                     float *sums)
+{
+    const ts_conv *c = g->c;
+    const struct ts_matrix_kernels *k = ts_matrix_k();
+    for (int o = 0; o < g->oc; o += TS_MATRIX_BLOCK)
+        for (int i = c0; i < c1; i += TS_MATRIX_BLOCK)
+            for (int tap = 0; tap < c->k * c->k; tap++) {
+                const ptrdiff_t shift = ((ptrdiff_t)(tap / c->k) * g->columns + tap % c->k) * c->dilation;
+                const ts_matrix m = {.a = x + (i - c0) * plane + shift,
+                                     .b = dy + o,
+                                     .a_at = g->at,
+                                     .a_row = plane * (ptrdiff_t)sizeof *x,
+                                     .b_row = g->oc,
+                                     .steps = line_pixels(g, rows) / STEP_PIXELS,
+                                     .c = sums + ((ptrdiff_t)tap * g->ic + i) * g->oc + o,
+                                     .c_row = g->oc,
+                                     .add = true};
+                k->product[c1 - i > TS_MATRIX_SIDE][g->oc - o > TS_MATRIX_SIDE](&m);
+            }
+}
+
+static void run_chunk(const job *g, int chunk, int group)
+{
+    const ts_conv *c = g->c;
+    int begin, end, block0, block1;
+    conv_part(c->n * c->h, g->chunks, chunk, &begin, &end);
+    conv_part((g->ic + TS_MATRIX_BLOCK - 1) / TS_MATRIX_BLOCK, g->groups, group, &block0, &block1);
+    const int c0 = block0 * TS_MATRIX_BLOCK, c1 = block1 * TS_MATRIX_BLOCK < g->ic ? block1 * TS_MATRIX_BLOCK : g->ic,
+              rows = band_rows(g, c1 - c0);
+    float *sums = g->sums + chunk * g->size;
+    for (int tap = 0; tap < c->k * c->k; tap++)
+        memset(sums + ((ptrdiff_t)tap * g->ic + c0) * g->oc, 0, sizeof(float) * (size_t)(c1 - c0) * (size_t)g->oc);
+    const ptrdiff_t plane = plane_of(g, rows);
+    uint16_t *x = ts_scratch(0, sizeof *x * (size_t)plane * (size_t)(c1 - c0));
+    float *dy = ts_scratch(1, sizeof(float) * (size_t)(line_pixels(g, rows) / 2) * (size_t)g->oc);
+    ts_matrix_k()->begin();
+    for (int row = begin, next; row < end; row = next) {
+        const int image = row / c->h, first = row % c->h;
+        int last = first + rows;
+        if (last > c->h) last = c->h;
+        if (last - first > end - row) last = first + end - row;
+        next = row + last - first;
+        stage_band(g, image, first, last, c0, c1, x, plane, dy);
+        add_band(g, last - first, c0, c1, x, plane, dy, sums);
+    }
+    ts_matrix_k()->end();
+}
+
+/* Inputs [c0, c1) of outputs [o0, o1): so few that the places they go to, taps fastest, stay in cache. */
+static void reduce_block(const job *g, int o0, int o1, int c0, int c1, float *dweight)
+{
+    const int taps = g->c->k * g->c->k;
+    for (int tap = 0; tap < taps; tap++)
+        for (int i = c0; i < c1; i++) {
+            const float *from = g->sums + ((ptrdiff_t)tap * g->ic + i) * g->oc;
+            float sum[TS_MATRIX_BLOCK], *to = dweight + (ptrdiff_t)i * taps + tap;
+            for (int o = o0; o < o1; o++) sum[o - o0] = from[o];
+            for (int chunk = 1; chunk < g->chunks; chunk++)
+                for (int o = o0; o < o1; o++) sum[o - o0] += from[chunk * g->size + o];
+            for (int o = o0; o < o1; o++) to[(ptrdiff_t)o * g->c->ic * taps] += sum[o - o0];
+        }
+}
+
+void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight)
+{
+    job g = {.c = c,
+             .x = x,
+             .dy = dy,
+             .reach = (c->k - 1) * c->dilation,
+             .ic = round_up(c->ic, TS_MATRIX_SIDE),
+             .oc = round_up(c->oc, TS_MATRIX_SIDE)};
+    g.columns = round_up(c->w + g.reach, 2);
+    g.size = (ptrdiff_t)c->k * c->k * g.ic * g.oc;
+    /* By shape alone, so that the sums do not depend on the number of threads. */
+    const ptrdiff_t rows = (ptrdiff_t)c->n * c->h, chunks = rows * c->w / CHUNK_PIXELS,
+                    most = CHUNKS < rows ? CHUNKS : rows;
+    g.chunks = (int)(chunks < 1 ? 1 : chunks < most ? chunks : most);
+    const int blocks = (g.ic + TS_MATRIX_BLOCK - 1) / TS_MATRIX_BLOCK, groups = (UNITS + g.chunks - 1) / g.chunks;
+    g.groups = groups < blocks ? groups : blocks;
+    const int steps = line_pixels(&g, band_rows(&g, TS_MATRIX_BLOCK)) / STEP_PIXELS; /* of the longest line */
+    ptrdiff_t *at = ts_scratch(3, sizeof *at * (size_t)steps);
+    for (int s = 0; s < steps; s++) at[s] = s * (ptrdiff_t)(STEP_PIXELS * sizeof(uint16_t));
+    g.at = at;
+    g.sums = ts_scratch(2, sizeof(float) * (size_t)(g.size * g.chunks));
+#pragma omp parallel num_threads(ts_threads())
+    {
+#pragma omp for collapse(2) schedule(dynamic)
+        for (int chunk = 0; chunk < g.chunks; chunk++)
+            for (int group = 0; group < g.groups; group++) run_chunk(&g, chunk, group);
+#pragma omp for collapse(2) schedule(static)
+        for (int o = 0; o < c->oc; o += TS_MATRIX_BLOCK)
+            for (int i = 0; i < c->ic; i += REDUCE_INPUTS)
+                reduce_block(&g, o, o + TS_MATRIX_BLOCK < c->oc ? o + TS_MATRIX_BLOCK : c->oc, i,
+                             i + REDUCE_INPUTS < c->ic ? i + REDUCE_INPUTS : c->ic, dweight);
+    }
+}

@@ -1,0 +1,310 @@
+/* Gradients of a convolution. The data gradient is a convolution of dy with mirrored, transposed weights
+ * (tensor/conv/conv.c). The weight gradient is a matrix product over pixels: blocks of (tap, input) x output stay in
+ * registers while pixels pass by. */
+#include "tensor/conv/conv_internal.h"
+#include "tensor/threads.h"
+#include <string.h>
+
+enum {
+    PASS_PIXELS = 512,    /* a pass's inputs stay in the second cache for all panels of dy, */
+    PASS_POINTWISE = 128, /* and, where they have no neighbours to share, in the first with the panel */
+    CHUNK_PIXELS = 1024,  /* so many that clearing and adding the sums of a chunk is little beside making them */
+    CHUNKS = 16,
+    UNITS = 16 /* of work, at least, where the shape allows */
+};
+
+void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
+{
+    const int reach = c->dilation * (c->k / 2), fold = c->pad == TS_PAD_REPLICATE ? reach : 0;
+    const conv_plan p = {.n = c->n,
+                         .h = c->h,
+                         .w = c->w,
+                         .ic = c->oc,
+                         .channels = c->oc,
+                         .oc = ts_conv_variables(c),
+                         .k = c->k,
+                         .dilation = c->dilation,
+                         .first = -reach - fold,
+                         .fold = fold,
+                         .x = dy,
+                         .packed = packed,
+                         .y = dx,
+                         .leak = 1,
+                         .add = accumulate};
+    conv_run(&p);
+}
+
+/* The sums of a chunk are [line][m][n]: a line is a run of contiguous inputs (a kernel row, or a tap), and m, n are the
+ * position in the line and the output channel, or the other way round where that leaves fewer lanes empty. n is padded.
+ */
+typedef struct job {
+    const ts_conv *c;
+    conv_plan plan; /* how x is staged */
+    const float *x, *dy;
+    bool swapped;            /* n is the position in the line */
+    bool direct_dy;          /* dy's panels are read where they are */
+    int lines, taps, length; /* lines, lines per kernel row, inputs per line */
+    int m, n, padded;
+    ptrdiff_t pixel, size; /* floats per staged pixel and per chunk */
+    float *sums, *bias_sums;
+    int chunks, groups; /* groups of (panel of n, line) share a chunk's pixels */
+} job;
+
+/* FMAs per pixel of an m x n block, counting what tails and short chains leave idle. */
+static int64_t block_cost(int m, int n)
+{
+    const int rows = ts_conv_k()->rows, tiles = (m + rows - 1) / rows, vectors = (n + conv_lanes() - 1) / conv_lanes();
+    const int64_t cost = (int64_t)m * vectors, least = 8 * (int64_t)tiles * ((vectors + 1) / 2);
+    return cost > least ? cost : least;
+}
+
+static job make_job(const ts_conv *c, const float *x, const float *dy)
+{
+    job g = {.c = c, .x = x, .dy = dy};
+    g.plan = (conv_plan){.n = c->n,
+                         .h = c->h,
+                         .w = c->w,
+                         .ic = c->ic,
+                         .channels = c->ic,
+                         .oc = c->oc,
+                         .k = c->k,
+                         .dilation = c->dilation,
+                         .first = -c->dilation * (c->k / 2),
+                         .replicate = c->pad == TS_PAD_REPLICATE,
+                         .x = x};
+    g.pixel = c->k == 1 ? c->ic : conv_stage_make(&g.plan, 1, 0, 1).pixel;
+    g.taps = c->dilation == 1 && g.pixel == c->ic ? 1 : c->k;
+    g.lines = c->k * g.taps;
+    g.length = g.taps == 1 ? c->k * c->ic : c->ic;
+    /* Read where it is, x has no room behind its last pixel for a whole vector. */
+    const bool whole = c->k > 1 || c->ic % conv_lanes() == 0;
+    g.swapped = whole && block_cost(c->oc, g.length) < block_cost(g.length, c->oc);
+    g.m = g.swapped ? c->oc : g.length;
+    g.n = g.swapped ? g.length : c->oc;
+    const int lanes = conv_lanes();
+    g.padded = (g.n + lanes - 1) / lanes * lanes;
+    g.size = (ptrdiff_t)g.lines * g.m * g.padded;
+    g.direct_dy = g.swapped || (c->oc % lanes == 0 && c->oc <= 8 * lanes);
+    /* By shape alone, so that the sums do not depend on the number of threads. */
+    const ptrdiff_t rows = (ptrdiff_t)c->n * c->h;
+    ptrdiff_t chunks = rows * c->w / CHUNK_PIXELS;
+    if (chunks > CHUNKS) chunks = CHUNKS;
+    if (chunks > rows) chunks = rows;
+    g.chunks = chunks < 1 ? 1 : (int)chunks;
+    g.groups = (UNITS + g.chunks - 1) / g.chunks;
+    if (g.groups > conv_panels(g.n) * g.lines) g.groups = conv_panels(g.n) * g.lines;
+    return g;
+}
+
+/* One pass: rows [begin, end) of image n, columns [left, right), items [item, item_end) of (panel, line). */
+typedef struct pass {
+    int image, begin, end, left, right, item, item_end;
+    bool first; /* of the chunk */
+    /* What the next pass reads, fetched a little with each block. */
+    const char *next[2];
+    ptrdiff_t next_bytes[2], fetched, fetch_each;
+} pass;
+
+/* dy of a pass as [pixel][lane of the panel], zeros in the lanes that do not exist. */
+static void stage_dy(const job *g, const pass *s, int panel, float *to)
+{
+    const int lanes = conv_lanes(), oc = g->c->oc;
+    const int width = conv_vectors(oc, panel) * lanes, o0 = panel * 2 * lanes, count = s->right - s->left;
+    for (int i = s->begin; i < s->end; i++, to += (ptrdiff_t)count * width)
+        ts_conv_k()->panel(g->dy + (((ptrdiff_t)s->image * g->c->h + i) * g->c->w + s->left) * oc + o0, oc, count,
+                           oc - o0 < width ? oc - o0 : width, to);
+}
+
+/* All blocks of m of one line and one panel of n. */
+static void sum_line(const job *g, ts_sum *t, pass *s, int panel, float *c)
+{
+    const struct ts_conv_kernels *kernels = ts_conv_k();
+    const int tiles = (g->m + kernels->rows - 1) / kernels->rows, vectors = conv_vectors(g->n, panel);
+    const float *a = t->a;
+    t->c_stride = g->padded;
+    for (int i = 0; i < tiles; i++) {
+        int begin, end;
+        conv_part(g->m, tiles, i, &begin, &end);
+        /* The next block's sums, which are in memory where there are many weights. */
+        const float *next = c + (ptrdiff_t)end * g->padded + panel * 2 * kernels->lanes;
+        for (int m = end; m < g->m && m < end + kernels->rows; m++, next += g->padded)
+            __builtin_prefetch(next, 1), __builtin_prefetch(next + 16, 1);
+        t->a = a + begin;
+        t->c = c + (ptrdiff_t)begin * g->padded + panel * 2 * kernels->lanes;
+        t->fetch = s->fetched < s->next_bytes[0] ? s->next[0] + s->fetched
+                                                 : s->next[1] + (s->fetched - s->next_bytes[0]);
+        s->fetched += s->fetch_each;
+        kernels->sum[vectors - 1][end - begin](t);
+    }
+    t->a = a;
+}
+
+static void run_pass(const job *g, pass *s, const conv_stage *stage, float *sums)
+{
+    const ts_conv *c = g->c;
+    const int lanes = conv_lanes(), count = s->right - s->left;
+    float *staged_dy = g->direct_dy
+        ? NULL
+        : ts_scratch(1, sizeof(float) * (size_t)(s->end - s->begin) * (size_t)(count * 2 * lanes));
+    ptrdiff_t x_row[PASS_PIXELS], dy_row[PASS_PIXELS];
+    const float *x = c->k == 1 ? g->x : stage->memory, *dy = g->direct_dy ? g->dy : staged_dy;
+    for (int item = s->item, panel_before = -1; item < s->item_end; item++) {
+        const int panel = item / g->lines, line = item % g->lines, ky = line / g->taps, kx = line % g->taps;
+        const int width = conv_vectors(g->n, panel) * lanes;
+        if (staged_dy && panel != panel_before) stage_dy(g, s, panel, staged_dy);
+        panel_before = panel;
+        int rows = 0;
+        for (int i = s->begin; i < s->end; i++) {
+            int r = i + g->plan.first + ky * c->dilation;
+            if (g->plan.replicate) r = conv_clamp(r, c->h);
+            else if (r < 0 || r >= c->h) continue;
+            const ptrdiff_t at = ((ptrdiff_t)s->image * c->h + i) * c->w + s->left;
+            x_row[rows] = c->k == 1 ? at * c->ic
+                                    : conv_stage_row(stage, r) - x + (s->left + kx * c->dilation) * stage->pixel;
+            dy_row[rows++] = g->direct_dy ? at * c->oc : (ptrdiff_t)(i - s->begin) * count * width;
+        }
+        const ptrdiff_t dy_stride = g->direct_dy ? c->oc : width;
+        ts_sum t = {
+            .rows = rows, .count = count, .begin = s->first, .fetch_step = s->fetch_each / (rows * (count / 2) + 1)};
+        if (g->swapped) {
+            t.a = dy, t.a_row = dy_row, t.a_stride = dy_stride;
+            t.b = x + panel * 2 * lanes, t.b_row = x_row, t.b_stride = g->pixel;
+        } else {
+            t.a = x, t.a_row = x_row, t.a_stride = g->pixel;
+            t.b = g->direct_dy ? dy + panel * 2 * lanes : dy, t.b_row = dy_row, t.b_stride = dy_stride;
+        }
+        sum_line(g, &t, s, panel, sums + (ptrdiff_t)line * g->m * g->padded);
+    }
+}
+
+/* What the pass after rows up to row_end (counted over all images) will read. */
+static void plan_fetch(const job *g, pass *s, int row_end, int rows, int blocks)
+{
+    const ts_conv *c = g->c;
+    const int all = c->n * c->h, m_tiles = (g->m + ts_conv_k()->rows - 1) / ts_conv_k()->rows;
+    int x_row = row_end + c->dilation * (c->k / 2), dy_row = row_end;
+    if (x_row > all - rows) x_row = all > rows ? all - rows : 0;
+    if (dy_row > all - rows) dy_row = all > rows ? all - rows : 0;
+    s->next[0] = (const char *)(g->x + (ptrdiff_t)x_row * c->w * c->ic);
+    s->next[1] = (const char *)(g->dy + (ptrdiff_t)dy_row * c->w * c->oc);
+    s->next_bytes[0] = (ptrdiff_t)sizeof(float) * rows * c->w * c->ic;
+    s->next_bytes[1] = (ptrdiff_t)sizeof(float) * rows * c->w * c->oc;
+    s->fetched = 0;
+    s->fetch_each = (s->next_bytes[0] + s->next_bytes[1]) / ((ptrdiff_t)blocks * (s->item_end - s->item) * m_tiles);
+}
+
+/* A chunk's rows (counted over all images) into its sums, for one group of (panel, line); group 0 also makes the bias.
+ */
+static void run_chunk(const job *g, int chunk, int group, bool weights)
+{
+    const ts_conv *c = g->c;
+    const int most = c->k == 1 ? PASS_POINTWISE : PASS_PIXELS, rows_pass = c->w < most ? most / c->w : 1,
+              blocks = (c->w + most - 1) / most;
+    const int reach = (c->k - 1) * c->dilation;
+    const bool staged = weights && c->k > 1;
+    pass s = {0};
+    int begin, end;
+    conv_part(c->n * c->h, g->chunks, chunk, &begin, &end);
+    conv_part(conv_panels(g->n) * g->lines, g->groups, group, &s.item, &s.item_end);
+    float *sums = g->sums + chunk * g->size,
+          *bias = g->bias_sums && group == 0 ? g->bias_sums + (ptrdiff_t)chunk * c->oc : NULL;
+    if (bias) memset(bias, 0, sizeof(float) * (size_t)c->oc);
+    conv_stage stage = {0};
+    if (staged) {
+        stage = conv_stage_make(&g->plan, rows_pass + reach, g->plan.first, c->w + reach);
+        stage.memory = ts_scratch(0, conv_stage_size(&stage) * sizeof(float));
+    }
+    for (int row = begin, image_before = -1; row < end; row += s.end - s.begin) {
+        s.image = row / c->h;
+        s.begin = row % c->h;
+        s.end = s.begin + rows_pass;
+        if (s.end > c->h) s.end = c->h;
+        if (s.end - s.begin > end - row) s.end = s.begin + end - row;
+        if (s.image != image_before) stage.next = 0;
+        image_before = s.image;
+        if (staged) {
+            const int low = s.begin + g->plan.first, high = s.end - 1 + g->plan.first + reach;
+            conv_stage_fill(&stage, &g->plan, s.image, conv_clamp(low, c->h), conv_clamp(high, c->h));
+        }
+        if (weights) plan_fetch(g, &s, row + s.end - s.begin, s.end - s.begin, blocks);
+        for (int b = 0; weights && b < blocks; b++) {
+            conv_part(c->w, blocks, b, &s.left, &s.right);
+            s.first = row == begin && b == 0;
+            run_pass(g, &s, &stage, sums);
+        }
+        if (bias)
+            ts_conv_k()->columns(g->dy + (ptrdiff_t)row * c->w * c->oc, (int64_t)(s.end - s.begin) * c->w, c->oc, bias);
+    }
+}
+
+/* Adds n values of all chunks, in order. */
+static void add_chunks(const job *g, ptrdiff_t at, int n, float *sum)
+{
+    memcpy(sum, g->sums + at, sizeof(float) * (size_t)n);
+    for (int i = 1; i < g->chunks; i++) {
+        const float *other = g->sums + i * g->size + at;
+        for (int j = 0; j < n; j++) sum[j] += other[j];
+    }
+}
+
+enum { REDUCE_OUTPUTS = 32, REDUCE_INPUTS = 16 };
+
+/* Outputs [o0, o1) and inputs [c0, c1): together small enough that the places they go to, taps fastest, stay in cache.
+ */
+static void reduce_block(const job *g, int o0, int o1, int c0, int c1, float *dweight)
+{
+    const ts_conv *c = g->c;
+    const ptrdiff_t taps = (ptrdiff_t)c->k * c->k;
+    float sum[REDUCE_OUTPUTS > REDUCE_INPUTS ? REDUCE_OUTPUTS : REDUCE_INPUTS];
+    for (int tap = 0; tap < taps; tap++) {
+        const int line = g->taps == 1 ? tap / c->k : tap, q0 = g->taps == 1 ? tap % c->k * c->ic : 0;
+        const ptrdiff_t at = (ptrdiff_t)line * g->m * g->padded;
+        if (g->swapped)
+            for (int o = o0; o < o1; o++) {
+                add_chunks(g, at + (ptrdiff_t)o * g->padded + q0 + c0, c1 - c0, sum);
+                float *to = dweight + ((ptrdiff_t)o * c->ic + c0) * taps + tap;
+                for (int i = 0; i < c1 - c0; i++) to[i * taps] += sum[i];
+            }
+        else
+            for (int i = c0; i < c1; i++) {
+                add_chunks(g, at + (ptrdiff_t)(q0 + i) * g->padded + o0, o1 - o0, sum);
+                float *to = dweight + ((ptrdiff_t)o0 * c->ic + i) * taps + tap;
+                for (int o = 0; o < o1 - o0; o++) to[o * c->ic * taps] += sum[o];
+            }
+    }
+}
+
+static void run_rows(job *g, float *dweight, float *dbias)
+{
+    const ts_conv *c = g->c;
+    const size_t count = (size_t)(g->size * g->chunks) + (size_t)(c->oc * g->chunks);
+    g->sums = ts_scratch(2, sizeof(float) * count);
+    g->bias_sums = dbias ? g->sums + g->size * g->chunks : NULL;
+    const int groups = dweight ? g->groups : 1, o_blocks = dweight ? (c->oc + REDUCE_OUTPUTS - 1) / REDUCE_OUTPUTS : 0;
+    const int c_blocks = (c->ic + REDUCE_INPUTS - 1) / REDUCE_INPUTS;
+#pragma omp parallel num_threads(ts_threads())
+    {
+#pragma omp for collapse(2) schedule(dynamic)
+        for (int chunk = 0; chunk < g->chunks; chunk++)
+            for (int group = 0; group < groups; group++) run_chunk(g, chunk, group, dweight != NULL);
+#pragma omp for collapse(2) schedule(static)
+        for (int o = 0; o < o_blocks; o++)
+            for (int i = 0; i < c_blocks; i++)
+                reduce_block(g, o * REDUCE_OUTPUTS, (o + 1) * REDUCE_OUTPUTS < c->oc ? (o + 1) * REDUCE_OUTPUTS : c->oc,
+                             i * REDUCE_INPUTS, (i + 1) * REDUCE_INPUTS < c->ic ? (i + 1) * REDUCE_INPUTS : c->ic,
+                             dweight);
+    }
+    for (int i = 0; dbias && i < g->chunks; i++)
+        for (int o = 0; o < c->oc; o++) dbias[o] += g->bias_sums[(ptrdiff_t)i * c->oc + o];
+}
+
+void ts_conv_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
+{
+    if (dweight && c->k > 1 && c->h * c->w <= CONV_POSITIONS) {
+        conv_weight_positions(c, x, dy, dweight);
+        dweight = NULL;
+    }
+    if (!dweight && !dbias) return;
+    job g = make_job(c, x, dy);
+    run_rows(&g, dweight, dbias);
+}

@@ -1,0 +1,128 @@
+/* Internal to tensor/conv*.c: what forward and the data gradient have in common. */
+#ifndef TS_CONV_PLAN_H
+#define TS_CONV_PLAN_H
+#include "tensor/conv/conv.h"
+#include "tensor/kernels/conv.h"
+
+/* y[n, i, j, o] (+)= act(bias[o] + sum x[n, i + first + d ky, j + first + d kx, c] w[ky, kx, c, o]).
+ * The gradient under replicate padding is computed on a domain that is larger by fold on each side, and what falls
+ * outside is added to the nearest border pixel: that is exactly the transpose of replicating it. */
+typedef struct conv_plan {
+    int n, h, w, ic; /* input; of bf16: pairs of channels */
+    int oc, k, dilation;
+    int first;      /* coordinate that tap 0 reads for output 0 */
+    bool replicate; /* else zeros */
+    int fold;       /* output domain [-fold, h + fold) x [-fold, w + fold), folded into [0, h) x [0, w) */
+    const float *x, *packed, *bias;
+    float *y;
+    float leak;
+    bool add;
+    bool bf16;    /* weights, and x as tiles read it, are pairs of bf16 values, each where a float would be; */
+    int channels; /* x itself is floats, so many a pixel */
+} conv_plan;
+
+enum {
+    CONV_BLOCK_BYTES = 640 << 10, /* weights that stay in the second cache while pixels pass by */
+    CONV_STAGE_SLACK = 64         /* the weight gradient reads whole vectors past the last pixel */
+};
+
+/* n consecutive pixels of x as tiles read them, stride floats apart. */
+void conv_put_pixels(const conv_plan *p, const float *from, ptrdiff_t n, float *to, ptrdiff_t stride);
+
+/* A window of input rows with their padding columns, of which a row is made when first needed. */
+typedef struct conv_stage {
+    float *memory;
+    ptrdiff_t pixel, row; /* strides in floats */
+    int rows, left, columns;
+    int next; /* first source row that is not there yet */
+} conv_stage;
+
+/* The layout of a window of rows and columns, the first column being input column left (may be negative). No memory
+ * yet: the caller puts conv_stage_size floats into memory. */
+conv_stage conv_stage_make(const conv_plan *p, int rows, int left, int columns);
+static inline size_t conv_stage_size(const conv_stage *s) { return (size_t)(s->row * s->rows) + CONV_STAGE_SLACK; }
+/* Makes source rows first to last of image n that are not there yet. */
+void conv_stage_fill(conv_stage *s, const conv_plan *p, int n, int first, int last);
+static inline const float *conv_stage_row(const conv_stage *s, int row) { return s->memory + row % s->rows * s->row; }
+
+/* For output coordinate i: the source coordinates and taps that meet there, in order of the tap. Returns how many;
+ * at most conv_pairs_max. */
+typedef struct conv_pair {
+    int source, tap;
+} conv_pair;
+int conv_pairs(const conv_plan *p, int i, int size, conv_pair *pair);
+static inline int conv_pairs_max(const conv_plan *p) { return p->k * (p->fold + 1) + p->k * p->fold; }
+
+/* Panels of 2 vectors of output channels; the last has one vector where that is enough. */
+static inline int conv_lanes(void) { return ts_conv_k()->lanes; }
+static inline int conv_panels(int oc) { return (oc + 2 * conv_lanes() - 1) / (2 * conv_lanes()); }
+static inline int conv_vectors(int oc, int panel) { return oc - panel * 2 * conv_lanes() > conv_lanes() ? 2 : 1; }
+
+/* Few pixels in an image and several images: tiles run over the images at one position, which needs no padding at all.
+ * A tile of four is slower than a row of eight. */
+enum { CONV_POSITIONS = 64, CONV_POSITIONS_OF_FEW = 16 };
+static inline bool conv_by_position(int n, int h, int w)
+{
+    return n >= 4 && h * w <= (n < 8 ? CONV_POSITIONS_OF_FEW : CONV_POSITIONS);
+}
+
+static inline int conv_clamp(int i, int size) { return i < 0 ? 0 : i >= size ? size - 1 : i; }
+
+/* Part i of n parts of total, as even as can be: [*begin, *end). */
+static inline void conv_part(int total, int parts, int i, int *begin, int *end)
+{
+    const int each = total / parts, larger = total % parts;
+    *begin = i * each + (i < larger ? i : larger);
+    *end = *begin + each + (i < larger);
+}
+
+/* A tile of the panel without its pixels; and one run on pixels from a to y. */
+ts_tile conv_panel_tile(const conv_plan *p, int panel);
+void conv_run_tile(ts_tile *t, int vectors, const float *a, float *y, int pixels, bool bf16);
+
+/* Side 1, serial: pixels [first, first + count) of panels [panel0, panel1); p->x is as tiles read it. */
+void conv_run_pixels(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, int panel0, int panel1);
+
+void conv_run_rows(const conv_plan *p);
+void conv_run_pointwise(const conv_plan *p);
+void conv_run_positions(const conv_plan *p);
+void conv_run_lanes(const conv_plan *p);
+void conv_run_col2im(const conv_plan *p);
+/* Whichever of them suits. */
+void conv_run(const conv_plan *p);
+
+/* bf16 where the CPU has a matrix unit: weights are packed for it alone. */
+bool conv_by_matrix(void);
+size_t conv_matrix_count(int ic, int oc, int k, int dilation);
+void conv_matrix_pack(const ts_conv *c, bool forward, const float *weight, float *packed);
+void conv_run_matrix(const conv_plan *p);
+/* Side 1, serial: count pixels of pairs p->x, behind which CONV_MATRIX_SLACK pixels and 32 more values can be read and
+ * are finite. */
+enum { CONV_MATRIX_SLACK = 32 };
+void conv_matrix_pixels(const conv_plan *p, int count);
+/* The same of steps of 32 channels that begin at bytes from a pixel, which are p->ic pairs apart. */
+void conv_matrix_steps(const conv_plan *p, const ptrdiff_t *at, int steps, int count);
+
+static inline int conv_bf16_depth(int channels) { return (channels + 1) / 2; }
+size_t conv_bf16_count(const ts_conv *c, int ic, int oc);
+void conv_pack_bf16(const ts_conv *c, bool forward, const float *weight, float *packed);
+
+ptrdiff_t conv_panels_count(int ic, int oc, int k);
+/* To few channels weights are packed behind the panels once more: for conv_run_col2im, or else for conv_run_lanes,
+ * which leaves narrow images to the panels. */
+bool conv_by_col2im(int ic, int oc, int k);
+ptrdiff_t conv_col2im_count(int ic, int oc, int k);
+bool conv_few_channels(int oc, int k);
+bool conv_by_lanes(const conv_plan *p);
+/* weight[i * i_step + o * o_step + tap] */
+void conv_pack_col2im(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step,
+                      float *packed);
+void conv_pack_lanes(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step,
+                     float *packed);
+
+size_t conv_winograd_count(int ic, int oc);
+void conv_winograd_pack(const ts_conv *c, bool forward, const float *weight, float *packed);
+
+/* dweight += for at most CONV_POSITIONS pixels an image. */
+void conv_weight_positions(const ts_conv *c, const float *x, const float *dy, float *dweight);
+#endif

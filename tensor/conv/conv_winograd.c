@@ -1,0 +1,248 @@
+/* Winograd's convolution F(4 x 4, 3 x 3): 36 products in place of 144 for 4 x 4 pixels (Lavin and Gray 2016). Some
+ * tiles at a time are transformed, multiplied as 36 small matrix products, and transformed back. The gradient of the
+ * input is a convolution too (conv_gradient.c). */
+#include "tensor/conv/conv_winograd.h"
+#include "tensor/kernels/elementwise.h"
+#include "tensor/kernels/winograd.h"
+#include "tensor/threads.h"
+#include <string.h>
+
+enum {
+    TILES = 28, /* two full register tiles; their 36 inputs and outputs stay in the second cache beside the weights */
+    TILES_LEAST = 64 /* fewer save less than the transformation of the weights costs */
+};
+
+static _Thread_local bool exact = true;
+
+void ts_conv_exact_set(bool on) { exact = on; }
+bool ts_conv_exact(void) { return exact; }
+
+/* Tiles along a side of the interleaved images, the largest of which has ceil(size / dilation) pixels. */
+static int tiles_along(int size, int dilation)
+{
+    return ((size + dilation - 1) / dilation + WINOGRAD_SIDE - 1) / WINOGRAD_SIDE;
+}
+
+static winograd_grid with_tiles(winograd_grid g)
+{
+    g.rows = tiles_along(g.out_h, g.dilation);
+    g.columns = tiles_along(g.out_w, g.dilation);
+    g.tiles = (int64_t)g.n * g.dilation * g.dilation * g.rows * g.columns;
+    return g;
+}
+
+winograd_grid winograd_grid_forward(const ts_conv *c)
+{
+    return with_tiles((winograd_grid){.n = c->n,
+                                      .h = c->h,
+                                      .w = c->w,
+                                      .ic = c->ic,
+                                      .out_h = c->h,
+                                      .out_w = c->w,
+                                      .oc = c->oc,
+                                      .dilation = c->dilation,
+                                      .first = -c->dilation,
+                                      .replicate = c->pad == TS_PAD_REPLICATE});
+}
+
+winograd_grid winograd_grid_gradient(const ts_conv *c, int fold)
+{
+    return with_tiles((winograd_grid){.n = c->n,
+                                      .h = c->h,
+                                      .w = c->w,
+                                      .ic = c->oc,
+                                      .out_h = c->h + 2 * fold,
+                                      .out_w = c->w + 2 * fold,
+                                      .oc = ts_conv_variables(c),
+                                      .dilation = c->dilation,
+                                      .first = -c->dilation - fold});
+}
+
+bool ts_conv_winograd(const ts_conv *c, ts_conv_use use)
+{
+    const bool forward = use == TS_CONV_WINOGRAD;
+    if (c->k != 3 || (forward ? c->ic : c->oc) < 16 || (forward ? c->oc : ts_conv_variables(c)) < 24) return false;
+    const winograd_grid g = winograd_grid_forward(c); /* tiles that are mostly outside cost what fewer products save */
+    return g.tiles >= TILES_LEAST && 2 * g.tiles * WINOGRAD_SIDE * WINOGRAD_SIDE <= 3 * (int64_t)c->n * c->h * c->w;
+}
+
+size_t conv_winograd_count(int ic, int oc) { return (size_t)conv_panels_count(ic, oc, 1) * WINOGRAD_AREA; }
+
+/* packed: [36][panel][input][channel of the panel] = G g G' */
+void conv_winograd_pack(const ts_conv *c, bool forward, const float *weight, float *packed)
+{
+    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), panels = conv_panels(oc),
+              lanes = conv_lanes();
+    const ptrdiff_t plane = conv_panels_count(ic, oc, 1);
+    /* weight[o][c][tap]: strides of the packed input and output channel */
+    const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * 9 : 9, i_step = forward ? 9 : (ptrdiff_t)c->ic * 9;
+#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
+    for (int panel = 0; panel < panels; panel++)
+        for (int i = 0; i < ic; i++) {
+            const int vectors = conv_vectors(oc, panel), width = vectors * lanes, o0 = panel * 2 * lanes;
+            float tap[9 * 2 * 16] = {0}; /* no vector has more than 16 lanes */
+            for (int o = 0; o < width && o0 + o < oc; o++) {
+                const float *from = weight + i * i_step + (o0 + o) * o_step;
+                for (int t = 0; t < 9; t++) tap[t * width + o] = from[forward ? t : 8 - t];
+            }
+            ts_winograd_k()->weights(tap, vectors, packed + (ptrdiff_t)o0 * ic + (ptrdiff_t)i * width, plane);
+        }
+}
+
+void winograd_locate(const winograd_grid *g, int64_t first, int count, winograd_place *place)
+{
+    const int d = g->dilation;
+    int x = (int)(first % g->columns), y = (int)(first / g->columns % g->rows);
+    const int64_t phase = first / g->columns / g->rows;
+    int image = (int)(phase / (d * d)), row = (int)(phase / d % d),
+        column = (int)(phase % d);    /* of the interleaved image */
+    for (int i = 0; i < count; i++) { /* without divisions, which would take a tenth of a small tile's time */
+        place[i] = (winograd_place){image, y * WINOGRAD_SIDE * d + row, x * WINOGRAD_SIDE * d + column};
+        if (++x < g->columns) continue;
+        x = 0;
+        if (++y < g->rows) continue;
+        y = 0;
+        if (++column < d) continue;
+        column = 0;
+        if (++row < d) continue;
+        row = 0;
+        image++;
+    }
+}
+
+void winograd_sources(const winograd_grid *g, const float *x, const float *nothing, winograd_place at,
+                      const float *pixel[WINOGRAD_AREA])
+{
+    ptrdiff_t row[WINOGRAD_REACH], column[WINOGRAD_REACH]; /* offsets; -1: outside */
+    for (int a = 0; a < WINOGRAD_REACH; a++) {
+        const int r = at.i + g->first + a * g->dilation, i = conv_clamp(r, g->h), s = at.j + g->first + a * g->dilation,
+                  j = conv_clamp(s, g->w);
+        row[a] = !g->replicate && i != r ? -1 : ((ptrdiff_t)at.image * g->h + i) * g->w * g->ic;
+        column[a] = !g->replicate && j != s ? -1 : (ptrdiff_t)j * g->ic;
+    }
+    for (int a = 0; a < WINOGRAD_REACH; a++)
+        for (int b = 0; b < WINOGRAD_REACH; b++)
+            pixel[WINOGRAD_REACH * a + b] = row[a] < 0 || column[b] < 0 ? nothing : x + row[a] + column[b];
+}
+
+void winograd_targets(const winograd_grid *g, winograd_place at, ptrdiff_t pixel[WINOGRAD_SIDE * WINOGRAD_SIDE])
+{
+    for (int a = 0; a < WINOGRAD_SIDE; a++) {
+        const int i = at.i + a * g->dilation;
+        for (int b = 0; b < WINOGRAD_SIDE; b++) {
+            const int j = at.j + b * g->dilation;
+            pixel[WINOGRAD_SIDE * a + b] = i < g->out_h && j < g->out_w
+                ? (((ptrdiff_t)at.image * g->out_h + i) * g->out_w + j) * g->oc
+                : -1;
+        }
+    }
+}
+
+/* m[36][tile][output] = v[36][tile][input] u[36][input][output] */
+static void multiply(const winograd_grid *g, const float *u, const float *v, int count, float *m)
+{
+    const int panels = conv_panels(g->oc), step = ts_conv_k()->pixels, groups = (count + step - 1) / step;
+    const ptrdiff_t weights = conv_panels_count(g->ic, g->oc, 1), in = winograd_plane(TILES, g->ic),
+                    out = winograd_plane(TILES, g->oc);
+    const ts_segment segment = {0, 0, g->ic};
+    ts_tile t = {.segment = &segment, .segments = 1, .a_stride = g->ic, .y_stride = g->oc, .leak = 1};
+    for (int q = 0; q < WINOGRAD_AREA; q++)
+        for (int panel = 0; panel < panels; panel++) {
+            const int o0 = panel * 2 * conv_lanes(), vectors = conv_vectors(g->oc, panel);
+            const ptrdiff_t size = (ptrdiff_t)g->ic * vectors * conv_lanes();
+            t.w = u + q * weights + (ptrdiff_t)o0 * g->ic;
+            t.channels = g->oc - o0;
+            /* Each group fetches its part of the next panel, a half of it by each of two. */
+            const float *next = q == WINOGRAD_AREA - 1 && panel == panels - 1 ? u : t.w + size;
+            t.fetch_step[0] = t.fetch_step[1] = size * (ptrdiff_t)sizeof(float) / groups / 2 / ((g->ic + 3) / 4);
+            for (int i = 0; i < groups; i++) {
+                int begin, end;
+                conv_part(count, groups, i, &begin, &end);
+                t.fetch[0] = next + i * (size / groups);
+                t.fetch[1] = t.fetch[0] + size / groups / 2;
+                conv_run_tile(&t, vectors, v + q * in + (ptrdiff_t)begin * g->ic,
+                              m + q * out + o0 + (ptrdiff_t)begin * g->oc, end - begin, false);
+            }
+        }
+}
+
+static void put_targets(const winograd_grid *g, winograd_place tile, float *y,
+                        float *pixel[WINOGRAD_SIDE * WINOGRAD_SIDE])
+{
+    ptrdiff_t at[WINOGRAD_SIDE * WINOGRAD_SIDE];
+    winograd_targets(g, tile, at);
+    for (int i = 0; i < WINOGRAD_SIDE * WINOGRAD_SIDE; i++) pixel[i] = at[i] < 0 ? NULL : y + at[i];
+}
+
+static void run(const winograd_grid *g, const float *x, const float *packed, const float *bias, float leak, bool add,
+                float *y)
+{
+    const ptrdiff_t in = winograd_plane(TILES, g->ic), out = winograd_plane(TILES, g->oc);
+    const struct ts_winograd_kernels *kernels = ts_winograd_k();
+#pragma omp parallel for schedule(dynamic) num_threads(ts_threads())
+    for (int64_t first = 0; first < g->tiles; first += TILES) {
+        const int count = (int)(g->tiles - first < TILES ? g->tiles - first : TILES);
+        float *v = ts_scratch(0, sizeof(float) * (size_t)(in * WINOGRAD_AREA)),
+              *m = ts_scratch(1, sizeof(float) * (size_t)(out * WINOGRAD_AREA));
+        float *nothing = ts_scratch(2, sizeof(float) * (size_t)g->ic);
+        memset(nothing, 0, sizeof(float) * (size_t)g->ic);
+        const float *from[2][WINOGRAD_AREA];
+        winograd_place place[TILES + 1];
+        winograd_locate(g, first, count, place);
+        place[count] = place[count - 1];
+        winograd_sources(g, x, nothing, place[0], from[0]);
+        for (int i = 0; i < count; i++) {
+            winograd_sources(g, x, nothing, place[i + 1], from[(i + 1) & 1]);
+            kernels->input(from[i & 1], from[(i + 1) & 1], g->ic, v + (ptrdiff_t)i * g->ic, in);
+        }
+        multiply(g, packed, v, count, m);
+        float *to[2][WINOGRAD_SIDE * WINOGRAD_SIDE];
+        put_targets(g, place[0], y, to[0]);
+        for (int i = 0; i < count; i++) {
+            put_targets(g, place[i + 1], y, to[(i + 1) & 1]);
+            kernels->output(m + (ptrdiff_t)i * g->oc, out, g->oc, bias, leak, add, to[i & 1], to[(i + 1) & 1]);
+        }
+    }
+}
+
+void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
+                              float *y)
+{
+    const winograd_grid g = winograd_grid_forward(c);
+    run(&g, x, packed, bias, leak, false, y);
+}
+
+/* Row i of dx (+)= the rows of the larger domain that padding folds onto it. */
+static void fold_row(const ts_conv *c, int fold, int channels, const float *larger, int i, bool add, float *dx)
+{
+    const int width = c->w + 2 * fold, begin = i == 0 ? 0 : i + fold,
+              end = i == c->h - 1 ? c->h + 2 * fold : i + fold + 1;
+    const struct ts_elementwise_kernels *k = ts_elementwise_k();
+    for (int e = begin; e < end; e++, add = true) {
+        const float *row = larger + (ptrdiff_t)e * width * channels;
+        k->copy(c->w, channels, row + fold * channels, channels, dx, channels, add);
+        for (int j = 0; j < fold; j++) {
+            k->copy(1, channels, row + j * channels, channels, dx, channels, true);
+            k->copy(1, channels, row + (width - 1 - j) * channels, channels, dx + (ptrdiff_t)(c->w - 1) * channels,
+                    channels, true);
+        }
+    }
+}
+
+void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
+{
+    const int fold = c->pad == TS_PAD_REPLICATE ? c->dilation : 0, channels = ts_conv_variables(c);
+    winograd_grid g = winograd_grid_gradient(c, fold);
+    if (!fold) {
+        run(&g, dy, packed, NULL, 1, accumulate, dx);
+        return;
+    }
+    const ptrdiff_t image = (ptrdiff_t)g.out_h * g.out_w * channels;
+    float *larger = ts_scratch(3, sizeof(float) * (size_t)(image * c->n));
+    run(&g, dy, packed, NULL, 1, false, larger);
+#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
+    for (int n = 0; n < c->n; n++)
+        for (int i = 0; i < c->h; i++)
+            fold_row(c, fold, channels, larger + n * image, i, accumulate,
+                     dx + ((ptrdiff_t)n * c->h + i) * c->w * channels);
+}

@@ -1,0 +1,45 @@
+/* Internal to tensor/conv_winograd*.c: which pixels the tiles of F(4 x 4, 3 x 3) read and make. */
+#ifndef TS_CONV_WINOGRAD_H
+#define TS_CONV_WINOGRAD_H
+#include "tensor/conv/conv_internal.h"
+
+enum {
+    WINOGRAD_SIDE = 4,  /* of a tile's outputs */
+    WINOGRAD_REACH = 6, /* of its inputs */
+    WINOGRAD_AREA = WINOGRAD_REACH * WINOGRAD_REACH
+};
+
+/* Outputs [0, out_h) x [0, out_w); tap 0 of output 0 reads coordinate first. Dilation 2 is four interleaved images. */
+typedef struct winograd_grid {
+    int n, h, w, ic; /* input */
+    int out_h, out_w, oc;
+    int dilation, first;
+    bool replicate;
+    int rows, columns; /* tiles of one interleaved image */
+    int64_t tiles;     /* of all */
+} winograd_grid;
+
+/* Of a convolution; of the gradient of its input on the domain that is larger by fold on each side. */
+winograd_grid winograd_grid_forward(const ts_conv *c);
+winograd_grid winograd_grid_gradient(const ts_conv *c, int fold);
+
+typedef struct winograd_place {
+    int image, i, j; /* first output pixel; the others are dilation apart */
+} winograd_place;
+void winograd_locate(const winograd_grid *g, int64_t first, int count,
+                     winograd_place *place); /* of tiles first, first + 1, ... */
+
+/* The 6 x 6 pixels of x that a tile reads; nothing, a pixel of zeros, for those outside. */
+void winograd_sources(const winograd_grid *g, const float *x, const float *nothing, winograd_place at,
+                      const float *pixel[WINOGRAD_AREA]);
+
+/* Offsets of a tile's 4 x 4 outputs; -1: no such pixel. */
+void winograd_targets(const winograd_grid *g, winograd_place at, ptrdiff_t pixel[WINOGRAD_SIDE * WINOGRAD_SIDE]);
+
+/* Floats of one of 36 planes: whole lines and an odd number of them, or the planes would meet in a few sets of the
+ * first cache. */
+static inline ptrdiff_t winograd_plane(int tiles, int channels)
+{
+    return (((ptrdiff_t)tiles * channels + 15) / 16 | 1) * 16;
+}
+#endif

@@ -1,0 +1,138 @@
+/* The gradient of the weights by Winograd's way: with V = B' x B and M = A dy A' of each tile it is G' (sum of V M over
+ * the tiles) G, 36 small matrix products over tiles in place of 9 over pixels. Chunks of tiles have sums of their own,
+ * so that threads do not change them. */
+#include "tensor/conv/conv_winograd.h"
+#include "tensor/kernels/winograd.h"
+#include "tensor/threads.h"
+#include <string.h>
+
+enum {
+    CHUNK_TILES = 128, /* at least: clearing and adding a chunk's sums is little beside making them */
+    CHUNKS = 8,
+    GROUP_TILES = 64,        /* transformed together: long runs for the sums, */
+    GROUP_BYTES = 896 << 10, /* as many as stay in the second cache */
+    GROUP_TILES_LEAST = 28
+};
+
+bool ts_conv_winograd_weights(const ts_conv *c)
+{
+    return ts_conv_winograd(c, TS_CONV_WINOGRAD) && winograd_grid_forward(c).tiles >= 4 * CHUNK_TILES;
+}
+
+typedef struct job {
+    winograd_grid g;
+    const float *x, *dy;
+    int padded; /* output channels in whole vectors */
+    int group, chunks;
+    ptrdiff_t in, out, plane, size; /* planes of V and of M; of the sums; and all those of a chunk */
+    float *sums;                    /* [chunk][36][input][padded] */
+} job;
+
+static job make_job(const ts_conv *c, const float *x, const float *dy)
+{
+    job j = {.g = winograd_grid_forward(c), .x = x, .dy = dy};
+    const int lanes = conv_lanes();
+    j.padded = (c->oc + lanes - 1) / lanes * lanes;
+    j.group = GROUP_BYTES / (WINOGRAD_AREA * (int)sizeof(float) * (c->ic + j.padded));
+    if (j.group > GROUP_TILES) j.group = GROUP_TILES;
+    if (j.group < GROUP_TILES_LEAST) j.group = GROUP_TILES_LEAST;
+    const int64_t chunks = j.g.tiles / CHUNK_TILES;
+    j.chunks = chunks > CHUNKS ? CHUNKS : chunks < 1 ? 1 : (int)chunks;
+    j.in = winograd_plane(j.group, c->ic);
+    j.out = winograd_plane(j.group, j.padded);
+    j.plane = (ptrdiff_t)c->ic * j.padded;
+    j.size = j.plane * WINOGRAD_AREA;
+    return j;
+}
+
+static void put_sources(const job *j, winograd_place tile, const float *nothing,
+                        const float *pixel[WINOGRAD_SIDE * WINOGRAD_SIDE])
+{
+    ptrdiff_t at[WINOGRAD_SIDE * WINOGRAD_SIDE];
+    winograd_targets(&j->g, tile, at);
+    for (int i = 0; i < WINOGRAD_SIDE * WINOGRAD_SIDE; i++) pixel[i] = at[i] < 0 ? nothing : j->dy + at[i];
+}
+
+/* V and M of some tiles. */
+static void transform(const job *j, int64_t first, int count, const float *nothing, float *v, float *m)
+{
+    const struct ts_winograd_kernels *k = ts_winograd_k();
+    const winograd_grid *g = &j->g;
+    const float *x[2][WINOGRAD_AREA], *dy[2][WINOGRAD_SIDE * WINOGRAD_SIDE];
+    winograd_place place[GROUP_TILES + 1];
+    winograd_locate(g, first, count, place);
+    place[count] = place[count - 1];
+    winograd_sources(g, j->x, nothing, place[0], x[0]);
+    put_sources(j, place[0], nothing, dy[0]);
+    for (int i = 0; i < count; i++) {
+        winograd_sources(g, j->x, nothing, place[i + 1], x[(i + 1) & 1]);
+        put_sources(j, place[i + 1], nothing, dy[(i + 1) & 1]);
+        k->input(x[i & 1], x[(i + 1) & 1], g->ic, v + (ptrdiff_t)i * g->ic, j->in);
+        k->output_gradient(dy[i & 1], dy[(i + 1) & 1], g->oc, m + (ptrdiff_t)i * j->padded, j->out);
+    }
+}
+
+static void add_products(const job *j, int count, const float *v, const float *m, float *sums)
+{
+    const struct ts_conv_kernels *k = ts_conv_k();
+    const int ic = j->g.ic, blocks = (ic + k->rows - 1) / k->rows, panels = conv_panels(j->g.oc);
+    const ptrdiff_t start = 0;
+    for (int q = 0; q < WINOGRAD_AREA; q++)
+        for (int panel = 0; panel < panels; panel++) {
+            const int o0 = panel * 2 * k->lanes, vectors = conv_vectors(j->g.oc, panel);
+            for (int b = 0; b < blocks; b++) {
+                int begin, end;
+                conv_part(ic, blocks, b, &begin, &end);
+                const ts_sum t = {.a = v + q * j->in + begin,
+                                  .b = m + q * j->out + o0,
+                                  .a_row = &start,
+                                  .b_row = &start,
+                                  .rows = 1,
+                                  .count = count,
+                                  .a_stride = ic,
+                                  .b_stride = j->padded,
+                                  .c = sums + q * j->plane + (ptrdiff_t)begin * j->padded + o0,
+                                  .c_stride = j->padded};
+                k->sum_near[vectors - 1][end - begin](&t);
+            }
+        }
+}
+
+static void run_chunk(const job *j, int chunk)
+{
+    const int64_t begin = j->g.tiles * chunk / j->chunks, end = j->g.tiles * (chunk + 1) / j->chunks;
+    const int channels = j->g.ic > j->g.oc ? j->g.ic : j->g.oc;
+    float *v = ts_scratch(0, sizeof(float) * (size_t)(j->in * WINOGRAD_AREA)),
+          *m = ts_scratch(1, sizeof(float) * (size_t)(j->out * WINOGRAD_AREA));
+    float *nothing = ts_scratch(3, sizeof(float) * (size_t)channels), *sums = j->sums + chunk * j->size;
+    memset(nothing, 0, sizeof(float) * (size_t)channels);
+    memset(sums, 0, sizeof(float) * (size_t)j->size);
+    for (int64_t first = begin; first < end; first += j->group) {
+        const int count = (int)(end - first < j->group ? end - first : j->group);
+        transform(j, first, count, nothing, v, m);
+        add_products(j, count, v, m, sums);
+    }
+}
+
+void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const float *dy, float *dweight)
+{
+    job j = make_job(c, x, dy);
+    const int lanes = conv_lanes();
+    j.sums = ts_scratch(2, sizeof(float) * (size_t)(j.size * j.chunks));
+#pragma omp parallel num_threads(ts_threads())
+    {
+#pragma omp for schedule(dynamic)
+        for (int chunk = 0; chunk < j.chunks; chunk++) run_chunk(&j, chunk);
+#pragma omp for collapse(2) schedule(static)
+        for (int o0 = 0; o0 < j.padded; o0 += lanes)
+            for (int i = 0; i < c->ic; i++) {
+                float tap[9 * 16]; /* no vector has more than 16 lanes */
+                ts_winograd_k()->weights_gradient(j.sums + (ptrdiff_t)i * j.padded + o0, j.plane, j.chunks, j.size,
+                                                  tap);
+                for (int o = 0; o < lanes && o0 + o < c->oc; o++) {
+                    float *to = dweight + ((ptrdiff_t)(o0 + o) * c->ic + i) * 9;
+                    for (int t = 0; t < 9; t++) to[t] += tap[t * lanes + o];
+                }
+            }
+    }
+}

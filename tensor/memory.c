@@ -1,0 +1,34 @@
+#define _DEFAULT_SOURCE /* madvise */
+#include "tensor/memory.h"
+#include "tensor/threads.h"
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+
+void *ts_block(size_t bytes)
+{
+    const size_t line = 64, huge = (size_t)2 << 20, align = bytes >= 2 * huge ? huge : line;
+    if (bytes > SIZE_MAX - align) return NULL;
+    void *p = aligned_alloc(align, (bytes + align - 1) / align * align);
+#ifdef MADV_HUGEPAGE
+    if (p && align == huge)
+        (void)madvise(p, bytes / huge * huge, MADV_HUGEPAGE); /* a hint: without it the block is only slower */
+#endif
+    return p;
+}
+
+enum { PART = 128 << 10 };
+
+void ts_block_copy(void *to, const void *from, size_t bytes)
+{
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (bytes > 2 * PART)
+    for (size_t i = 0; i < bytes; i += PART)
+        memcpy((char *)to + i, (const char *)from + i, bytes - i < PART ? bytes - i : PART);
+}
+
+void ts_block_clear(void *to, size_t bytes)
+{
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (bytes > 2 * PART)
+    for (size_t i = 0; i < bytes; i += PART) memset((char *)to + i, 0, bytes - i < PART ? bytes - i : PART);
+}

@@ -1,0 +1,99 @@
+# lgd-infer on several photographs of one sample under known lights.
+. tests/cli/lib.sh
+
+# Weights of a small network of three photographs, hardly trained.
+several() {
+    cat >"$T/several.ini" <<'END'
+[model]
+images = 3
+g_width = 4
+g_levels = 2
+g_size = 16
+h_width = 8
+h_gru = 4
+iterations = 2
+[data]
+patch = 16
+[train]
+batch = 1
+steps = 2
+[validate]
+every = 0
+END
+    expect 0 "$BIN/lgd-train" "$T/several.ini" --set "output.folder=$T/run"
+    LGD_MODEL=$T/run/last.safetensors
+    export LGD_MODEL
+}
+
+infer() { "$BIN/lgd-infer" --size 16 --threads 1 "$@"; }
+
+folder() {
+    several
+    expect 0 "$BIN/lgd-data" --format captures --count 1 --size 16 -o "$T/c"
+    one=$(ls -d "$T"/c/*)
+    expect 0 infer --capture "$one/" -o "$T/o"
+    says "$T/out" "$T/o/$(basename "$one")"
+    says "$T/err" "the first 3 of its 9"
+    for f in diffuse.png maps.exr render.png; do [ -s "$T/o/$(basename "$one")/$f" ] || fail "$f is absent"; done
+    LGD_MODEL=$ROOT/models/single.safetensors expect 0 infer --capture "$one" -o "$T/single"
+    says "$T/err" "the first 1 of its 9"
+}
+
+# Pictures of a capture, listed in an INI file with other units, give the same maps as the folder.
+list() {
+    several
+    expect 0 "$BIN/lgd-data" --format captures --count 1 --size 16 -o "$T/c"
+    one=$(ls -d "$T"/c/*)
+    side=$(cat "$one/image_size.txt")
+    power=$(cut -d, -f1 "$one/light_power.txt")
+    for k in 0 1 2; do
+        printf '[photo_%d]\nfile = %s/0%d.png\nlight = %s\ncamera = %s\n' $k "$(basename "$one")" $k "$(sed -n "$((k + 1))p" "$one/light_pos.txt")" "$(sed -n "$((k + 1))p" "$one/camera_pos.txt")"
+    done >"$T/photos"
+    { printf '[capture]\nside = %s ; centimetres\npower = %s\n' "$side" "$power"; cat "$T/photos"; } >"$T/c/three.ini"
+    expect 0 infer --capture "$T/c/three.ini" -o "$T/o"
+    [ -s "$T/o/three/diffuse.png" ] || fail "no maps of three.ini"
+    { printf '[capture]\nside = %s\npower = %s\n' "$side" "$power"; sed -n 5,8p "$T/photos"; sed -n 1,4p "$T/photos"; } >"$T/c/two.ini"
+    expect 0 infer --capture "$T/c/two.ini" -o "$T/o"
+    if cmp -s "$T/o/two/maps.exr" "$T/o/three/maps.exr"; then fail "the order and number of photographs change nothing"; fi
+    expect 0 infer "$one/00.png" -o "$T/o"
+    if cmp -s "$T/o/00/maps.exr" "$T/o/three/maps.exr"; then fail "one photograph gives what three give"; fi
+}
+
+# A message with the file and the line for each mistake.
+mistakes() {
+    several
+    good='[capture]
+side = 2
+[a]
+file = a.ppm
+light = 0, 0, 2
+camera = 0, 0, 2'
+    printf 'P6\n2 2\n255\n............' >"$T/a.ppm"
+    printf '%s\n' "$good" >"$T/c.ini"
+    expect 0 infer --capture "$T/c.ini" -o "$T/o"
+    while IFS='|' read -r edit word; do
+        printf '%s\n' "$good" | sed "$edit" >"$T/c.ini"
+        expect 1 infer --capture "$T/c.ini" -o "$T/bad"
+        says "$T/err" "$word"
+        [ ! -e "$T/bad/c" ] || fail "maps in spite of $edit"
+    done <<'END'
+s/side = 2/side = 0/|c.ini:2: capture.side
+s/side = 2/size = 2/|c.ini:2: [capture] has the keys side and power, not size
+s/light = .*/light = 0, 0/|c.ini:5: a.light
+s/light = .*/light = 0, 0, -2/|above the sample
+s/camera = .*/camera = 0, 0, nan/|c.ini:6: a.camera
+/camera/d|[a] has no camera
+s/file = .*/file = b.ppm/|b.ppm
+s/file = .*/name = a.ppm/|c.ini:4
+3,6d|lists no photograph
+END
+    expect 1 infer --capture "$T/absent.ini" -o "$T/bad"
+    says "$T/err" absent.ini
+    expect 2 infer --capture "$T/c.ini" "$T/a.ppm" -o "$T/bad"
+    says "$T/err" --capture
+    expect 2 infer --capture "" -o "$T/bad"
+}
+
+check capture_folder folder
+check capture_list list
+check capture_mistakes mistakes

@@ -1,0 +1,126 @@
+#!/bin/sh
+# lgd-data: what it writes, that it writes the same bytes however it runs, and what it says when it cannot.
+. tests/cli/lib.sh
+DATA=$BIN/lgd-data
+
+# How many entries of a folder match a pattern.
+entries() { find "$1" -mindepth 1 -maxdepth 1 -name "$2" | wc -l; }
+
+data_folders() {
+    expect 0 "$DATA" -o "$T/o/deep" --count 3 --size 32
+    [ "$(entries "$T/o/deep" '0000[012]_*')" -eq 3 ] || fail "not three folders: $(ls "$T/o/deep")"
+    for d in "$T"/o/deep/*; do
+        for f in diffuse.png specular.png roughness.png normal.png maps.exr; do [ -s "$d/$f" ] || fail "$d/$f is missing"; done
+    done
+    [ -s "$T/out" ] && fail "writes to stdout"
+    return 0
+}
+check data_folders data_folders
+
+data_same_bytes_for_any_threads_and_range() {
+    expect 0 "$DATA" -o "$T/a" --count 6 --size 24 --threads 1 --format strips --photographs --seed 9
+    expect 0 "$DATA" -o "$T/b" --count 6 --size 24 --threads 4 --format strips --photographs --seed 9
+    expect 0 diff -r "$T/a" "$T/b"
+    expect 0 "$DATA" -o "$T/c" --first 4 --count 1 --size 24 --format strips --seed 9
+    strip=$(cd "$T/c" && ls)
+    expect 0 cmp "$T/a/$strip" "$T/c/$strip"
+    expect 0 "$DATA" -o "$T/d" --first 4 --count 1 --size 24 --format strips --seed 10
+    cmp -s "$T/d/$(ls "$T/d")" "$T/c/$strip" && fail "two seeds give the same strip"
+    [ "$(entries "$T/a" '*.png')" -eq 6 ] && [ "$(entries "$T/a" '*.jpg')" -eq 6 ] || fail "not six strips and photographs: $(ls "$T/a")"
+}
+check data_same_bytes_for_any_threads_and_range data_same_bytes_for_any_threads_and_range
+
+data_families() {
+    expect 0 "$DATA" -o "$T/o" --count 8 --size 8 --photographs --families wood,rust
+    [ "$(find "$T/o" -name '*wood*.jpg' -o -name '*rust*.jpg' | wc -l)" -eq 8 ] || fail "other families: $(ls "$T/o")"
+    expect 2 "$DATA" -o "$T/o" --families wood,velociraptor
+    says "$T/err" "velociraptor"
+    expect 2 "$DATA" -o "$T/o" --families ,
+}
+check data_families data_families
+
+data_contact_sheet() {
+    expect 0 "$DATA" -o "$T" --contact-sheet --size 16 --count 20
+    [ -s "$T/contact-sheet.png" ] || fail "no contact sheet"
+    [ "$(entries "$T" '0*')" -eq 0 ] || fail "materials were written that nobody asked for"
+    expect 1 "$DATA" -o "$T" --contact-sheet --size 2048 --count 900
+    says "$T/err" "too large"
+}
+check data_contact_sheet data_contact_sheet
+
+data_wrong_usage() {
+    expect 2 "$DATA"
+    says "$T/err" "-o DIR"
+    for bad in "--count 0" "--tilt 31" "--vignette 1" "--off-centre -1" "--exposure nan" "--count x" "--size 4" "--size 1e3" "--format exe" "--noise 2" "--noise nan" "--seed -1" "--quality 0" "--threads 0" "stray" "--statistics" "--testdata ."; do
+        # shellcheck disable=SC2086
+        expect 2 "$DATA" -o "$T/o" $bad
+        [ -e "$T/o" ] && fail "$bad made the folder"
+    done
+    return 0
+}
+check data_wrong_usage data_wrong_usage
+
+data_cannot_write() {
+    : >"$T/file"
+    for what in "" --contact-sheet --photographs "--format strips"; do
+        # shellcheck disable=SC2086
+        expect 1 "$DATA" -o "$T/file/o" --count 2 --size 8 $what
+        lines "$T/err" 1
+        says "$T/err" "$T/file"
+    done
+    mkdir -p "$T/o/contact-sheet.png/x"
+    expect 1 "$DATA" -o "$T/o" --contact-sheet --count 1 --size 8
+    says "$T/err" "contact-sheet.png"
+}
+check data_cannot_write data_cannot_write
+
+data_interrupted() {
+    "$DATA" -o "$T/o" --count 100000 --size 64 --photographs >"$T/out" 2>"$T/err" &
+    pid=$!
+    while [ "$(find "$T/o" -name '*.jpg' 2>/dev/null | wc -l)" -lt 2 ]; do kill -0 $pid 2>/dev/null || fail "it ended: $(cat "$T/err")"; done
+    kill -TERM $pid
+    wait $pid
+    [ $? -eq 1 ] || fail "does not exit with 1"
+    says "$T/err" "interrupted"
+    [ "$(find "$T/o" ! -name '*.jpg' -type f | wc -l)" -eq 0 ] || fail "temporary files are left: $(ls "$T/o")"
+}
+check data_interrupted data_interrupted
+
+data_statistics() {
+    expect 1 "$DATA" --statistics --testdata "$T/none"
+    says "$T/err" "$T/none"
+    mkdir -p "$T/own"
+    expect 0 "$DATA" -o "$T/own/maps" --count 24 --size 32
+    expect 0 "$DATA" -o "$T/own/strips" --first 24 --count 24 --size 32 --format strips
+    expect 0 "$DATA" --statistics --testdata "$T/own" --count 48 --size 32
+    says "$T/out" "distance of 48 procedural materials from 48"
+    # The same materials through files: only 8 and 16 bits lie between.
+    awk '/^distance of/ { if ($NF > 0.1) exit 1 }' "$T/out" || fail "$(grep '^distance of' "$T/out")"
+    [ -w /dev/full ] || return 0
+    "$DATA" --statistics --testdata "$T/own" --count 4 --size 32 >/dev/full 2>"$T/err"
+    [ $? -eq 1 ] || fail "a full disk goes unnoticed"
+}
+check data_statistics data_statistics
+
+data_histograms() {
+    expect 2 "$DATA" --histograms --testdata "$T/own"
+    expect 2 "$DATA" --histograms -o "$T/h"
+    mkdir -p "$T/own" "$T/empty"
+    expect 1 "$DATA" --histograms --testdata "$T/empty" -o "$T/h"
+    says "$T/err" "$T/empty"
+    expect 0 "$DATA" -o "$T/own/maps" --count 8 --size 32
+    expect 0 "$DATA" --histograms --testdata "$T/own" --count 8 --size 32 -o "$T/h"
+    # The same materials through files: nearly all is in common; every column adds up to one for each map.
+    awk '/in common/ { n++; if ($2 + 0 < 93) exit 1 } END { exit n != 5 }' "$T/out" || fail "$(cat "$T/out")"
+    awk -F, 'NR > 1 { a[$1] += $4; b[$1] += $5; n++ } END { for (k in a) if ((a[k] - 1)^2 + (b[k] - 1)^2 > 1e-6) exit 1; exit n != 160 }' \
+        "$T/h/histograms.csv" || fail "$(head -40 "$T/h/histograms.csv")"
+    grep -q '</svg>' "$T/h/histograms.svg" || fail "the picture is cut short"
+}
+check data_histograms data_histograms
+
+data_resembles_artists_maps() {
+    [ -d "$TESTDATA/maps" ] || skip "no $TESTDATA"
+    expect 0 "$DATA" --statistics --testdata "$TESTDATA" --count 200 --size 64
+    awk '/^distance of/ { d = $NF } /^distance between/ { sub(/.*halvings: /, ""); h = $1 } END { exit !(d > 0 && h > 0 && d <= 2 * h) }' "$T/out" || fail "$(tail -n 2 "$T/out" | tr '\n' ' ')"
+}
+check data_resembles_artists_maps data_resembles_artists_maps

@@ -1,0 +1,287 @@
+# lgd-eval as people use it.
+. tests/cli/lib.sh
+MODEL=${LGD_TEST_MODEL:-$ROOT/models/single.safetensors}
+export LGD_MODEL="$MODEL"
+
+model() { [ -f "$MODEL" ] || fail "$MODEL is absent: the weights that the project ships"; }
+# One thread: at these sizes more only wait for each other when the machine is busy.
+evaluate() { "$BIN/lgd-eval" --size 32 --iterations 2 --threads 1 "$@"; }
+
+help_names_the_options() {
+    expect 0 "$BIN/lgd-eval" --help
+    for o in method repeat pin tune figure pareto descent finetune fast set iterations model threads seed noise images size output procedural strips maps; do says "$T/out" "$o"; done
+}
+
+wrong_usage() {
+    for o in --size=0 --iterations=-1 --threads=x --noise=2 --noise=0,5 --seed=-1 --repeat=0 --nonsense --set=procedural:1 --set=pictures:x; do
+        expect 2 "$BIN/lgd-eval" --set procedural:1,1 "$o" -o "$T/o"
+        says "$T/err" "${o%%=*}"
+    done
+    expect 2 "$BIN/lgd-eval" -o "$T/o"
+    expect 2 "$BIN/lgd-eval" --set procedural:1,1
+    expect 2 "$BIN/lgd-eval" procedural:1,1 -o "$T/o"
+    says "$T/err" "--set"
+    expect 1 "$BIN/lgd-eval" --set "maps:$T/absent" -o "$T/o"
+    says "$T/err" "$T/absent"
+    expect 1 "$BIN/lgd-eval" --set "strips:$T" -o "$T/o"
+    says "$T/err" "$T"
+}
+
+procedural() {
+    model
+    expect 0 evaluate --set procedural:3,3 -o "$T/o"
+    lines "$T/out" 5
+    says "$T/out" "3 materials"
+    for t in 0 1 2; do grep -q "^R_$t  *0\.[0-9]* +- 0\." "$T/out" || fail "no line for R_$t"; done
+    lines "$T/o/results.csv" 10
+    lines "$T/o/summary.csv" 4
+    [ "$(ls -A "$T/o" | tr '\n' ' ')" = "report.html results.csv results.json summary.csv times.csv " ] || fail "other files: $(ls -A "$T/o")"
+    # the summary is the mean of the results
+    for t in 0 2; do
+        mean=$(awk -F, -v t=$t 'NR > 1 && $5 == t { s += $10; n++ } END { printf "%.4f", s / n }' "$T/o/results.csv")
+        told=$(awk -F, -v t=$t 'NR > 1 && $5 == t { printf "%.4f", $14 }' "$T/o/summary.csv")
+        [ "$mean" = "$told" ] || fail "step $t: mean $mean, summary $told"
+    done
+}
+
+same_numbers() {
+    model
+    expect 0 evaluate --set procedural:5,2 --threads 1 --noise 0.5 -o "$T/a"
+    for n in 2 3; do
+        expect 0 evaluate --set procedural:5,2 --threads $n --noise 0.5 -o "$T/b"
+        cmp -s "$T/a/results.csv" "$T/b/results.csv" || fail "$n threads give other numbers"
+    done
+    # a material's numbers do not depend on what else is evaluated
+    expect 0 evaluate --set procedural:8,1 --set procedural:5,2 --noise 0.5 -o "$T/b"
+    grep '^"procedural:5,2"' "$T/a/results.csv" >"$T/one"
+    grep '^"procedural:5,2"' "$T/b/results.csv" >"$T/two"
+    cmp -s "$T/one" "$T/two" || fail "another set changes the numbers"
+    says "$T/out" "all sets"
+    expect 0 evaluate --set procedural:5,2 --seed 2 --noise 0.5 -o "$T/c"
+    if cmp -s "$T/a/results.csv" "$T/c/results.csv"; then fail "another seed gives the same numbers"; fi
+}
+
+real_sets() {
+    [ -d "$TESTDATA/maps" ] && [ -d "$TESTDATA/strips" ] || skip "$TESTDATA/maps or strips is absent"
+    model
+    expect 0 evaluate --set "maps:$TESTDATA/maps" --set "strips:$TESTDATA/strips" -o "$T/o"
+    maps=$(ls "$TESTDATA/maps" | wc -l)
+    strips=$(ls "$TESTDATA/strips" | wc -l)
+    lines "$T/o/results.csv" $((1 + 3 * (maps + strips)))
+    says "$T/out" "$maps materials"
+    says "$T/out" "$((maps + strips)) materials"
+    # set,material,method,step, five errors, angle, then ssim and flip of the first and the last step
+    awk -F, 'NR > 1 { for (i = 5; i <= 9; i++) if (!($i >= 0 && $i < 2)) exit 1
+        if (!($10 > 0 && $10 < 90) || $4 != 1 && !($11 < 1 && $11 > -1 && $12 > 0 && $12 < 1)) exit 1 }' "$T/o/results.csv" || fail "an error is out of range"
+}
+
+images() {
+    model
+    expect 0 evaluate --set procedural:3,2 --images -o "$T/o"
+    [ "$(ls "$T/o/images" | tr '\n' ' ')" = "1-000000.png 1-000001.png " ] || fail "images: $(ls "$T/o/images")"
+    for f in "$T"/o/images/*; do [ -s "$f" ] || fail "$f is empty"; done
+}
+
+bad_material() {
+    [ -d "$TESTDATA/strips" ] || skip "$TESTDATA/strips is absent"
+    model
+    mkdir "$T/s"
+    cp "$(ls "$TESTDATA"/strips/*.png | head -n 1)" "$T/s/good.png"
+    echo "no strip" >"$T/s/bad.png"
+    expect 1 evaluate --set "strips:$T/s" -o "$T/o"
+    says "$T/err" "bad.png"
+    lines "$T/o/results.csv" 4
+    rm "$T/s/good.png"
+    expect 1 evaluate --set "strips:$T/s" -o "$T/none"
+    [ ! -e "$T/none/results.csv" ] || fail "results of nothing"
+}
+
+unwritable() {
+    model
+    echo file >"$T/file"
+    expect 1 evaluate --set procedural:1,1 -o "$T/file"
+    says "$T/err" "$T/file"
+    mkdir "$T/o"
+    ( trap '' XFSZ
+      ulimit -f 0
+      "$BIN/lgd-eval" --size 8 -i 0 --set procedural:1,1 -o "$T/o" >/dev/null 2>/dev/null )
+    [ $? -eq 1 ] || fail "a full disk is no failure"
+    [ -z "$(ls -A "$T/o")" ] || fail "left over: $(ls -A "$T/o")"
+    { sleep 1; evaluate --set procedural:1,1 -o "$T/o" 2>"$T/err"; echo $? >"$T/code"; } | true
+    [ "$(cat "$T/code")" = 1 ] || fail "a closed pipe: exit status $(cat "$T/code")"
+    says "$T/err" "standard output"
+    lines "$T/o/results.csv" 4
+}
+
+interrupted() {
+    model
+    "$BIN/lgd-eval" --size 32 --threads 1 --set procedural:1,100000 -o "$T/o" --images >"$T/out" 2>"$T/err" &
+    pid=$!
+    n=0
+    while [ -z "$(ls "$T/o/images" 2>/dev/null)" ] && [ $n -lt 600 ]; do sleep 0.1; n=$((n + 1)); done
+    kill -INT $pid
+    wait $pid
+    [ $? -eq 1 ] || fail "exit status is not 1"
+    says "$T/err" "interrupted"
+    [ "$(ls -A "$T/o")" = images ] || fail "half a result: $(ls -A "$T/o")"
+}
+
+# What the project promises of its weights: on 64 materials that nobody trained on, at the size that people use, refinement takes at least
+# 15% off the renderings' error.
+refinement_helps() {
+    model
+    case ${MAKEFLAGS:-} in *fsanitize*) skip "64 materials at 256 x 256 take too long with sanitizers" ;; esac
+    expect 0 "$BIN/lgd-eval" --fast --set procedural:1000003,64 -o "$T/o"
+    awk -F, 'NR == 2 { first = $14 } { last = $14 } END { exit !(last < 0.85 * first) }' "$T/o/summary.csv" ||
+        fail "$(awk -F, 'NR == 2 { first = $14 } { last = $14 } END { print "render RMSE", first, "->", last }' "$T/o/summary.csv")"
+}
+
+check eval_help_names_the_options help_names_the_options
+check eval_wrong_usage wrong_usage
+check eval_procedural procedural
+check eval_same_numbers_for_any_threads same_numbers
+check eval_real_sets real_sets
+check eval_images images
+check eval_bad_material_is_reported bad_material
+check eval_unwritable_output unwritable
+captures() {
+    model
+    expect 0 "$BIN/lgd-data" --format captures --count 2 --size 32 -o "$T/c"
+    [ "$(ls "$T"/c/*/ | grep -c 'png$')" = 18 ] || fail "pictures: $(ls "$T"/c/*)"
+    expect 0 evaluate --set "multiview:$T/c" --images -o "$T/o"
+    says "$T/out" exposure
+    lines "$T/o/results.csv" 7
+    awk -F, 'NR > 1 && !($5 == "" && $9 > 0 && $9 < 0.5 && $13 > 0.3 && $13 < 3) { exit 1 }' "$T/o/results.csv" || fail "$(cat "$T/o/results.csv")"
+    [ "$(ls "$T/o/images" | wc -l)" = 2 ] || fail "images: $(ls "$T/o/images")"
+    one=$(ls -d "$T"/c/* | head -n 1)
+    expect 0 evaluate --set "multiview:$one" -o "$T/p"
+    rm "$one/light_pos.txt"
+    expect 1 evaluate --set "multiview:$T/c" -o "$T/q"
+    says "$T/err" light_pos.txt
+    lines "$T/q/results.csv" 4
+}
+
+told() {
+    for o in --normal=up --workflow=mixed --colour=p3; do
+        expect 2 "$BIN/lgd-eval" --set "maps:$T" $o -o "$T/o"
+        says "$T/err" "${o%%=*}"
+    done
+    model
+    expect 0 "$BIN/lgd-data" --count 1 --size 32 -o "$T/m"
+    expect 0 evaluate --set "maps:$T/m" -o "$T/gl"
+    echo 'normal = directx' >"$T/m/set.ini"
+    expect 0 evaluate --set "maps:$T/m" -o "$T/dx"
+    if cmp -s "$T/gl/results.csv" "$T/dx/results.csv"; then fail "set.ini is not read"; fi
+    expect 0 evaluate --set "maps:$T/m" --normal opengl -o "$T/again"
+    cmp -s "$T/gl/results.csv" "$T/again/results.csv" || fail "the option does not win"
+    echo 'normals = directx' >"$T/m/set.ini"
+    expect 1 evaluate --set "maps:$T/m" -o "$T/bad"
+    says "$T/err" set.ini:1
+}
+
+# LPIPS with weights that are not trained, but have the names and shapes: a program to make them is the test of the library.
+lpips() {
+    model
+    expect 2 "$BIN/lgd-eval" --set procedural:1,1 -o "$T/o" --lpips-weights a.pth
+    says "$T/err" "lpips-weights"
+    expect 1 evaluate --set procedural:1,1 -o "$T/o" --lpips-weights "$T/none.pth" "$T/none.safetensors"
+    says "$T/err" "none.pth"
+    LPIPS_OUT=$T "$BIN/lgd-test" eval_lpips_is >/dev/null || fail "the weights cannot be made"
+    expect 0 "$BIN/lgd-eval" -i 1 --fast --size 48 --set procedural:1,3 -o "$T/p" --lpips-weights "$T/alexnet.pth" "$T/alex.safetensors"
+    says "$T/out" "lpips"
+    awk -F, 'NR == 1 && $14 != "lpips" || NR > 1 && !($15 > 0 && $14 < 5) { exit 1 }' "$T/p/results.csv" || fail "$(cat "$T/p/results.csv")"
+    says "$T/p/summary.csv" "lpips_mean,lpips_deviation"
+    says "$T/p/results.json" '"lpips": 0.'
+    says "$T/p/report.html" 'data-key="lpips"'
+    expect 0 "$BIN/lgd-eval" -i 0 --fast --size 48 --set procedural:1,1 -o "$T/q"
+    if grep -q 'data-key="lpips"' "$T/q/report.html"; then fail "LPIPS without weights"; fi
+}
+
+methods() {
+    model
+    for m in nothing lgd:steps=3 lgd:iterations=x descent:start=here descent:rate descent:rate= descent:rate=1,rate=2 unet latent lgd-nograd mean:label=; do
+        expect 2 "$BIN/lgd-eval" --set procedural:1,1 --method "$m" -o "$T/o"
+        says "$T/err" "--method $m"
+    done
+    expect 2 "$BIN/lgd-eval" --set procedural:1,1 --method mean --method mean -o "$T/o"
+    says "$T/err" label=
+    for m in "unet:model=$T/none" "latent:model=$MODEL" "lgd-nograd:model=$MODEL"; do
+        expect 1 "$BIN/lgd-eval" --set procedural:1,1 --method "$m" -o "$T/o"
+        says "$T/err" "${m#*=}"
+        lines "$T/err" 1
+    done
+    expect 0 evaluate --set procedural:3,2 --method lgd --method mean --method descent:steps=3 --method "unet:label=g alone,model=$MODEL" --images -o "$T/o"
+    lines "$T/out" 6
+    grep -q '^descent:steps=3  *0\.' "$T/out" || fail "no line for descent: $(cat "$T/out")"
+    lines "$T/o/summary.csv" 10 # three of lgd, one of mean, four of descent (0, 1, 2, 3), one of unet
+    lines "$T/o/times.csv" 10
+    says "$T/o/results.csv" ',g alone,0,'
+    [ "$(ls "$T/o/images" | wc -l)" = 8 ] || fail "images: $(ls "$T/o/images")"
+    # the default is lgd
+    expect 0 evaluate --set procedural:3,2 -o "$T/p"
+    expect 0 evaluate --set procedural:3,2 --method lgd --pin -o "$T/q"
+    says "$T/out" "1 thread, pinned"
+    expect 1 "$BIN/lgd-eval" --set procedural:3,2 --pin --threads 1024 -o "$T/x"
+    says "$T/err" "--pin"
+    cmp -s "$T/p/results.csv" "$T/q/results.csv" || fail "the default is not lgd"
+    # a method's numbers depend neither on the others nor on the threads
+    expect 0 "$BIN/lgd-eval" --size 32 --threads 2 --repeat 2 --set procedural:3,2 --method descent:steps=3 -o "$T/r"
+    grep descent "$T/o/results.csv" >"$T/one"
+    grep descent "$T/r/results.csv" | cmp -s - "$T/one" || fail "descent gives other numbers"
+}
+
+searches_and_figures() {
+    model
+    for o in "--tune --pareto" "--tune --figure methods" "--pareto --method mean" "--figure pie" "--tune --images"; do
+        expect 2 "$BIN/lgd-eval" --set procedural:1,1 $o -o "$T/o"
+        lines "$T/err" 2
+    done
+    expect 0 "$BIN/lgd-eval" --size 16 --threads 1 --set procedural:1000001,2 --tune --method mean --method descent:rate=0.01,start=r0 -o "$T/t"
+    lines "$T/out" 3
+    says "$T/out" "mean            2 tried"
+    says "$T/out" "descent        10 tried"
+    lines "$T/t/tune.csv" 13
+    [ "$(ls -A "$T/t")" = tune.csv ] || fail "$(ls -A "$T/t")"
+    # the best is the least of its method's
+    best=$(awk '/^descent/ { print $(NF - 3) }' "$T/out")
+    least=$(grep descent "$T/t/tune.csv" | awk -F, '{ v = $(NF - 2); if (!n++ || v < m) m = v } END { printf "%.4f", m }')
+    [ "$best" = "$least" ] || fail "the best is $best, the least $least"
+    expect 0 "$BIN/lgd-eval" --fast --size 16 --threads 1 --set procedural:1,2 --figure iterations --figure methods --method lgd --method mean -o "$T/f"
+    lines "$T/f/iterations.csv" 27 # T = 0 .. 24 and mean
+    lines "$T/f/methods.csv" 27
+    for f in iterations methods; do
+        says "$T/f/$f.svg" "</svg>"
+        says "$T/f/$f.svg" ">mean</text>"
+    done
+}
+
+check eval_captures captures
+check eval_lpips lpips
+check eval_maps_options told
+check eval_methods methods
+check eval_searches_and_figures searches_and_figures
+check eval_interrupted interrupted
+check eval_refinement_helps refinement_helps
+
+# Photographs under a stronger light: what is told of it is not known to the method, and the comparison fits one factor.
+light() {
+    model
+    for o in --exposure=0 --exposure=x --light=1 --light=a,b --light=9,0; do
+        expect 2 "$BIN/lgd-eval" --set procedural:1,1 "$o" -o "$T/o"
+        says "$T/err" "${o%%=*}"
+    done
+    expect 0 evaluate --set procedural:3,2 --exposure 1 -o "$T/one"
+    expect 0 evaluate --set procedural:3,2 --exposure 2 -o "$T/two"
+    expect 0 evaluate --set procedural:3,2 --exposure 2 --method lgd:power=known -o "$T/known"
+    expect 0 evaluate --set procedural:3,2 --exposure 2 --method lgd:power=auto -o "$T/auto"
+    for a in one two known auto; do
+        sed 's/"[^"]*"/set/' "$T/$a/results.csv" | awk -F, 'NR == 1 { while ($++k != "exposure" && k < NF); } NR > 1 && !($k > 0.1 && $k < 10) { exit 1 }' || fail "$a: no factor is fitted"
+        for b in one two known auto; do
+            [ "$a" = "$b" ] || ! cmp -s "$T/$a/results.csv" "$T/$b/results.csv" || fail "$a and $b give the same numbers"
+        done
+    done
+    expect 0 evaluate --set procedural:3,2 --light 0.5,0 -o "$T/side"
+    expect 0 evaluate --set procedural:3,2 -o "$T/middle"
+    if cmp -s "$T/side/results.csv" "$T/middle/results.csv"; then fail "--light changes nothing"; fi
+}
+check eval_light light

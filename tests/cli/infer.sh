@@ -1,0 +1,289 @@
+# lgd-infer as people use it: the shipped weights, real photographs, sizes, masks, what is written.
+. tests/cli/lib_infer.sh
+
+help_names_the_options() {
+    expect 0 "$BIN/lgd-infer" --help
+    for o in size iterations model threads maps normal max-pixels quiet output; do says "$T/out" "--$o"; done
+}
+
+wrong_usage() {
+    photo "$T/p.ppm" 8 8
+    for o in --size=0 --iterations=-1 --nonsense; do # tests/infer/test_infer_files.c has the others
+        expect 2 "$BIN/lgd-infer" "$o" "$T/p.ppm" -o "$T/o"
+        says "$T/err" "${o%%=*}"
+        [ ! -e "$T/o" ] || fail "$o makes a folder"
+    done
+    expect 2 "$BIN/lgd-infer" "$T/p.ppm"
+    expect 2 "$BIN/lgd-infer" -o "$T/o"
+    says "$T/err" "--help"
+}
+
+whole_run() {
+    model
+    photo "$T/wall.ppm" 48 40
+    expect 0 "$BIN/lgd-infer" --size 32 "$T/wall.ppm" -o "$T/a/b"
+    complete "$T/a/b/wall"
+    [ "$(cat "$T/out")" = "$T/a/b/wall" ] || fail "standard output is: $(cat "$T/out")"
+    grep -Eq 'wall.ppm: reconstruction RMSE 0\.[0-9]+ \(R_0\) -> 0\.[0-9]+ \(R_[0-9]+\)' "$T/err" || fail "no RMSE: $(cat "$T/err")"
+    expect 0 "$BIN/lgd-infer" --size 32 --iterations 0 -q "$T/wall.ppm" -o "$T/c"
+    [ ! -s "$T/err" ] || fail "--quiet says: $(cat "$T/err")"
+    expect 0 "$BIN/lgd-infer" --size 32 --iterations 0 "$T/wall.ppm" -o "$T/c"
+    says "$T/err" "(R_0)"
+    if cmp -s "$T/a/b/wall/maps.exr" "$T/c/wall/maps.exr"; then fail "refinement changes nothing"; fi
+}
+
+# What the trained steps leave far from the photograph is said, with what may help, and that helps.
+far_from_the_photograph() {
+    model
+    { printf 'P3 64 64 255\n'; awk 'BEGIN { for (i = 0; i < 64 * 64; i++) print int(i / 64 / 8) % 2 == int(i % 64 / 8) % 2 ? "255 20 20" : "3 3 3" }'; } > "$T/chequer.ppm"
+    expect 0 "$BIN/lgd-infer" -s 64 --maps diffuse "$T/chequer.ppm" -o "$T/o"
+    says "$T/err" "; --iterations auto may come nearer"
+    left=$(sed -n 's/.*-> \([0-9.]*\) .*/\1/p' "$T/err")
+    expect 0 "$BIN/lgd-infer" -s 64 --maps diffuse -i auto "$T/chequer.ppm" -o "$T/o"
+    if grep -q "may come nearer" "$T/err"; then fail "it is said of --iterations auto itself"; fi
+    awk -v a="$left" -v b="$(sed -n 's/.*-> \([0-9.]*\) .*/\1/p' "$T/err")" 'BEGIN { exit !(b < a && a > 0.01) }' || fail "$left before, after: $(cat "$T/err")"
+}
+
+threads_agree() {
+    model
+    photo "$T/p.ppm" 33 33
+    expect 0 infer --threads 1 "$T/p.ppm" -o "$T/1"
+    for n in 0 2 3; do
+        expect 0 infer --threads $n "$T/p.ppm" -o "$T/$n"
+        for f in $FILES; do cmp -s "$T/1/p/$f" "$T/$n/p/$f" || fail "$f differs with $n threads"; done
+    done
+}
+
+only_what_is_asked_for() {
+    model
+    photo "$T/p.ppm" 32 32
+    expect 0 infer "$T/p.ppm" -o "$T/all"
+    for list in diffuse specular roughness normal exr render preview; do
+        expect 0 infer --maps $list "$T/p.ppm" -o "$T/$list"
+        for f in "$T/$list/p"/*.[pe]*; do cmp -s "$f" "$T/all/p/${f##*/}" || fail "--maps $list: ${f##*/} differs"; done
+        case $list in render|preview) want="$list.png " ;; exr) want="maps.exr meta.txt " ;; *) want=$(printf '%s\n' "$list.png" meta.txt | sort | tr '\n' ' ') ;; esac
+        [ "$(ls -A "$T/$list/p" | tr '\n' ' ')" = "$want" ] || fail "--maps $list writes $(ls -A "$T/$list/p" | tr '\n' ' ')"
+    done
+    expect 0 infer --maps render,normal "$T/p.ppm" -o "$T/all"
+    complete "$T/all/p"
+}
+
+# Photographs in the same order, with the same words and the same bytes, whether several are computed at once or they come one at a time.
+overlap_changes_nothing() {
+    model
+    list=
+    for i in 1 2 3 4 5 6 7; do
+        photo "$T/$i.ppm" $((20 + i)) 33
+        list="$list $T/$i.ppm"
+    done
+    echo bad >"$T/4.ppm"
+    : >"$T/one_names"
+    : >"$T/one_words"
+    for p in $list; do
+        infer "$p" -o "$T/one" >>"$T/one_names" 2>>"$T/one_words"
+    done
+    for n in 1 2 3 5 20; do
+        # shellcheck disable=SC2086
+        expect 1 infer --threads $n $list -o "$T/o"
+        sed "s|$T/one/|$T/o/|" "$T/one_names" | cmp -s - "$T/out" || fail "$n threads: other folders, or in another order"
+        grep -v "1 of 7 photographs failed" "$T/err" | cmp -s - "$T/one_words" || fail "$n threads: other words: $(grep -v photographs "$T/err" | diff - "$T/one_words" | head -n 3)"
+        diff -r "$T/o" "$T/one" >/dev/null || fail "$n threads: other files"
+        rm -r "$T/o"
+    done
+}
+
+old_results() {
+    model
+    photo "$T/p.ppm" 32 32
+    expect 0 infer "$T/p.ppm" -o "$T/o"
+    cp "$T/o/p/maps.exr" "$T/first"
+    echo old >"$T/o/p/maps.exr"
+    echo mine >"$T/o/p/notes.txt"
+    expect 0 infer "$T/p.ppm" -o "$T/o"
+    cmp -s "$T/first" "$T/o/p/maps.exr" || fail "the old file is still there"
+    [ "$(cat "$T/o/p/notes.txt")" = mine ] || fail "somebody's file is gone"
+    rm "$T/o/p/notes.txt"
+    complete "$T/o/p"
+}
+
+poor_photographs() {
+    model
+    photo "$T/black.ppm" 32 32 0
+    photo "$T/white.ppm" 32 32 255
+    expect 0 infer "$T/black.ppm" -o "$T/o"
+    complete "$T/o/black"
+    says "$T/err" "black.ppm: warning"
+    # the writer tints: a white that is white in all channels
+    { printf 'P6\n32 32\n255\n'; head -c 3072 /dev/zero | tr '\000' '\377'; } >"$T/white.ppm"
+    expect 0 infer "$T/white.ppm" -o "$T/o"
+    complete "$T/o/white"
+    says "$T/err" "overexposed"
+    # a little-endian float image, two thirds of it 4.0
+    { printf 'PF\n12 1\n-1.0\n'; for v in 1 2 3 4 5 6 7 8 9 10 11 12; do printf '\000\000\200\100\000\000\200\100\000\000\000\077'; done; } >"$T/bright.pfm"
+    expect 0 infer --size 1 "$T/bright.pfm" -o "$T/o"
+    says "$T/err" "66.7% of the values are above 1"
+}
+
+sizes() {
+    model
+    photo "$T/p.ppm" 20 31
+    for n in 1 2 3 17; do
+        expect 0 infer --size $n "$T/p.ppm" -o "$T/$n"
+        complete "$T/$n/p"
+    done
+    expect 0 "$BIN/lgd-infer" --size 255 -i 1 "$T/p.ppm" -o "$T/255"
+    complete "$T/255/p"
+    says "$T/err" "upsampled"
+    photo "$T/line.ppm" 1 40
+    photo "$T/dot.ppm" 1 1
+    expect 0 infer "$T/line.ppm" "$T/dot.ppm" -o "$T/o"
+    complete "$T/o/line"
+    complete "$T/o/dot"
+}
+
+mask_and_tolerance() {
+    model
+    photo "$T/p.ppm" 40 40
+    photo "$T/black.ppm" 40 40 0
+    photo "$T/white.ppm" 20 20 255
+    photo "$T/long.ppm" 40 20 255
+    expect 0 infer --iterations 3 "$T/p.ppm" -o "$T/plain"
+    expect 0 infer --iterations 2 "$T/p.ppm" -o "$T/first" # the coarse steps are always those of the whole
+    expect 0 infer --iterations 3 --mask "$T/white.ppm" "$T/p.ppm" -o "$T/all"
+    expect 0 infer --iterations 3 --mask "$T/black.ppm" "$T/p.ppm" -o "$T/none"
+    cmp -s "$T/all/p/normal.png" "$T/plain/p/normal.png" || fail "a mask that wants everything changes the maps"
+    cmp -s "$T/none/p/normal.png" "$T/first/p/normal.png" || fail "a mask that wants nothing does not give what the coarse steps leave"
+    expect 1 infer --mask "$T/long.ppm" "$T/p.ppm" -o "$T/o"
+    says "$T/err" "long.ppm is 40 x 20"
+    expect 1 infer --mask "$T/absent.png" "$T/p.ppm" -o "$T/o"
+    says "$T/err" "absent.png"
+    expect 2 infer --orientations 3 "$T/p.ppm" -o "$T/o"
+    says "$T/err" "--orientations"
+    for x in -1 2 x 0,5; do
+        expect 2 infer --tolerance $x "$T/p.ppm" -o "$T/o"
+        says "$T/err" "--tolerance"
+    done
+    one="$BIN/lgd-infer --size 32 --threads 1 --model models/ablation/t6.safetensors $T/p.ppm"
+    expect 0 $one --iterations 1 -o "$T/step"
+    expect 0 $one --tolerance 1 -o "$T/one"
+    cmp -s "$T/one/p/normal.png" "$T/step/p/normal.png" || fail "with a tolerance above every change it is not the first step that counts"
+    expect 0 infer --size 520 "$T/p.ppm" -o "$T/large" # in tiles
+    complete "$T/large/p"
+    says "$T/err" "(R_1)"
+}
+
+usual_tolerance() {
+    photo "$T/p.ppm" 64 64 120
+    run="$BIN/lgd-infer --size 64 --threads 1 --maps normal,exr --model models/ablation/t6.safetensors $T/p.ppm"
+    expect 0 $run -o "$T/usual"
+    expect 0 $run --tolerance 0.003 -o "$T/same"
+    expect 0 $run --tolerance 0 -o "$T/all"
+    expect 0 $run --iterations 6 -o "$T/six"
+    expect 0 $run --exact -o "$T/exact"
+    expect 0 $run --exact --tolerance 0 -o "$T/exact_all"
+    cmp -s "$T/usual/p/maps.exr" "$T/same/p/maps.exr" || fail "the usual tolerance is not 0.003"
+    cmp -s "$T/usual/p/maps.exr" "$T/all/p/maps.exr" && fail "it ends nothing early"
+    cmp -s "$T/six/p/maps.exr" "$T/all/p/maps.exr" || fail "there is a tolerance where the number of steps is given"
+    cmp -s "$T/exact/p/maps.exr" "$T/exact_all/p/maps.exr" || fail "there is a tolerance with --exact"
+    run="$BIN/lgd-infer --size 64 --threads 1 --maps normal,exr $T/p.ppm" # no network refines at the photograph's size
+    expect 0 $run -o "$T/usual"
+    expect 0 $run --tolerance 0 -o "$T/all"
+    cmp -s "$T/usual/p/maps.exr" "$T/all/p/maps.exr" || fail "there is a tolerance where it saves nothing"
+}
+
+comma_locale() {
+    model
+    if ! locale -a 2>/dev/null | grep -qi '^de_DE.utf-\?8$'; then
+        localedef -i de_DE -f UTF-8 "$T/de_DE.UTF-8" 2>/dev/null || skip "there is no comma-decimal locale and none can be made"
+        export LOCPATH="$T" ASAN_OPTIONS="${ASAN_OPTIONS-}:detect_leaks=0" # the C library never frees what it makes of LOCPATH
+    fi
+    photo "$T/p.ppm" 24 24
+    expect 0 infer "$T/p.ppm" -o "$T/c"
+    cp "$T/err" "$T/plain"
+    expect 0 env LC_ALL=de_DE.UTF-8 "$BIN/lgd-infer" --size 32 --iterations 1 "$T/p.ppm" -o "$T/de"
+    cmp -s "$T/err" "$T/plain" || fail "other words: $(cat "$T/err")"
+    for f in $FILES; do cmp -s "$T/c/p/$f" "$T/de/p/$f" || fail "$f differs"; done
+}
+
+directx_normals() {
+    model
+    photo "$T/p.ppm" 16 16
+    expect 0 infer "$T/p.ppm" -o "$T/gl"
+    expect 0 infer --normal dx "$T/p.ppm" -o "$T/dx"
+    if cmp -s "$T/gl/p/normal.png" "$T/dx/p/normal.png"; then fail "the normals are the same"; fi
+    for f in diffuse.png specular.png roughness.png render.png preview.png; do cmp -s "$T/gl/p/$f" "$T/dx/p/$f" || fail "$f differs"; done
+}
+
+precision() {
+    model
+    photo "$T/p.ppm" 33 33
+    expect 2 infer --precision f16 "$T/p.ppm" -o "$T/o"
+    says "$T/err" "--precision"
+    for p in f32 bf16; do expect 0 infer --precision $p --maps normal,exr "$T/p.ppm" -o "$T/$p"; done
+    expect 0 infer --maps normal,exr "$T/p.ppm" -o "$T/usual"
+    cmp -s "$T/usual/p/maps.exr" "$T/f32/p/maps.exr" || fail "f32 is not the default"
+    cmp -s "$T/bf16/p/maps.exr" "$T/f32/p/maps.exr" && fail "bf16 gives the maps of f32" # how near they are: tests/nn/test_precision.c
+    for isa in base avx2 avx512 avx512bf16 amx; do
+        if LGD_ISA=$isa infer --help >/dev/null 2>&1; then expect 0 env LGD_ISA=$isa "$BIN/lgd-infer" --size 32 --threads 1 --precision bf16 "$T/p.ppm" -o "$T/$isa"
+        else expect 2 env LGD_ISA=$isa "$BIN/lgd-infer" --precision bf16 "$T/p.ppm" -o "$T/$isa"; fi
+    done
+}
+
+instruction_sets() {
+    photo "$T/p.ppm" 8 8
+    expect 2 env LGD_ISA=mmx "$BIN/lgd-infer" "$T/p.ppm" -o "$T/o"
+    says "$T/err" "mmx"
+    model
+    expect 0 env LGD_ISA=base "$BIN/lgd-infer" -s 8 "$T/p.ppm" -o "$T/o"
+    complete "$T/o/p"
+}
+
+all_photographs() {
+    [ -d "$TESTDATA/photos" ] || skip "$TESTDATA/photos is absent"
+    model
+    n=$(ls "$TESTDATA/photos" | wc -l)
+    expect 0 "$BIN/lgd-infer" --size 64 --threads 1 "$TESTDATA"/photos/* -o "$T/o"
+    lines "$T/out" "$n"
+    [ "$(ls -A "$T/o" | wc -l)" -eq "$n" ] || fail "$n photographs, $(ls -A "$T/o" | wc -l) folders"
+    while read -r folder; do complete "$folder"; done <"$T/out"
+    [ "$(grep -c 'reconstruction RMSE' "$T/err")" -eq "$n" ] || fail "not every photograph has its figures"
+    awk '/reconstruction RMSE/ { for (i = 1; i <= NF; i++) if ($i == "RMSE") { a += $(i + 1); b += $(i + 4) } } END { exit !(b < a && a > 0) }' "$T/err" ||
+        fail "refinement does not bring the renderings nearer to the photographs"
+}
+
+# The power of the light is reported when it is not the usual one, and changes the maps; the wrong ones are refused.
+light_power() {
+    model
+    photo "$T/p.ppm" 16 16
+    expect 0 infer --light-power 1 "$T/p.ppm" -o "$T/one"
+    if grep -q 'light power' "$T/err"; then fail "the usual power is reported"; fi
+    expect 0 infer --light-power 2.5 "$T/p.ppm" -o "$T/more"
+    says "$T/err" "light power 2.50"
+    if cmp -s "$T/one/p/maps.exr" "$T/more/p/maps.exr"; then fail "the power changes nothing"; fi
+    expect 0 infer "$T/p.ppm" -o "$T/default"
+    expect 0 infer --light-power auto "$T/p.ppm" -o "$T/auto"
+    cmp -s "$T/default/p/maps.exr" "$T/auto/p/maps.exr" || fail "auto is not the default"
+    for power in 0 -1 1e9 bright; do
+        expect 2 infer --light-power=$power "$T/p.ppm" -o "$T/bad"
+        says "$T/err" --light-power
+    done
+}
+
+check infer_help_names_the_options help_names_the_options
+check infer_wrong_usage wrong_usage
+check infer_whole_run whole_run
+check infer_far_from_the_photograph far_from_the_photograph
+check infer_threads_agree threads_agree
+check infer_writes_only_what_is_asked_for only_what_is_asked_for
+check infer_overlap_changes_nothing overlap_changes_nothing
+check infer_old_results_are_replaced old_results
+check infer_poor_photographs poor_photographs
+check infer_light_power light_power
+check infer_sizes sizes
+check infer_mask_and_tolerance mask_and_tolerance
+check infer_usual_tolerance usual_tolerance
+check infer_comma_locale comma_locale
+check infer_directx_normals directx_normals
+check infer_precision precision
+check infer_instruction_sets instruction_sets
+check infer_all_photographs all_photographs

@@ -1,0 +1,59 @@
+/* What the programs share. */
+#include "cli/cli.h"
+#include "tests/test.h"
+#include <locale.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+TEST(cli_numbers_are_whole_strings_in_range)
+{
+    int64_t i = -1;
+    double d = -1;
+    CHECK(cl_parse_int("42", 0, 100, &i) && i == 42, "42");
+    const char *const bad[] = {"", " 1", "1 ", "1x", "0x10", "101", "-1", "99999999999999999999", "1.0", "1e2"};
+    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++)
+        CHECK(!cl_parse_int(bad[k], 0, 100, &i), "'%s' must be refused", bad[k]);
+    CHECK(cl_parse_real("1e-3", 0, 1, &d) && d == 1e-3, "1e-3");
+    CHECK(cl_parse_real("1e-310", 0, 1, &d) && d > 0, "a denormal is a number");
+    const char *const bad_real[] = {"", "nan", "inf", "1,5", "0.5x", "2", "-0.1", " 0.5"};
+    for (size_t k = 0; k < sizeof bad_real / sizeof *bad_real; k++)
+        CHECK(!cl_parse_real(bad_real[k], 0, 1, &d), "'%s' must be refused", bad_real[k]);
+}
+
+TEST(cli_numbers_ignore_the_locale)
+{
+    if (setenv("LC_ALL", "de_DE.UTF-8", 1) != 0) test_skip("setenv");
+    CHECK(cl_init("test") == CL_OK, "init");
+    double d = 0;
+    CHECK(cl_parse_real("0.25", 0, 1, &d) && d == 0.25, "0.25 is %g", d);
+    char text[32];
+    snprintf(text, sizeof text, "%.2f", 0.25);
+    CHECK(!strcmp(text, "0.25"), "printed as %s", text);
+}
+
+TEST(cli_folders)
+{
+    char path[300];
+    ts_status st = {0};
+    snprintf(path, sizeof path, "%s/a/b/c", test_folder());
+    CHECK(cl_make_folder(path, &st) == TS_OK && cl_make_folder(path, &st) == TS_OK, "%s", st.message);
+    struct stat info;
+    CHECK(stat(path, &info) == 0 && S_ISDIR(info.st_mode), "not made");
+    snprintf(path, sizeof path, "%s/file", test_folder());
+    FILE *f = fopen(path, "w");
+    CHECK(f && fclose(f) == 0, "file");
+    CHECK(cl_make_folder(path, &st) == TS_IO && strstr(st.message, "file"), "a file is not a folder: '%s'", st.message);
+    CHECK(cl_make_folder("", &st) == TS_INVALID, "empty");
+}
+
+TEST(cli_progress_is_silent_without_a_terminal)
+{
+    cl_progress p = cl_progress_start("work", 10);
+    CHECK(!p.terminal || p.total == 10, "start");
+    p.terminal = false;
+    cl_progress_show(&p, 5, NULL);
+    CHECK(p.last == 0, "nothing is shown without a terminal");
+    cl_progress_end(&p);
+}

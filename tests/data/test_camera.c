@@ -1,0 +1,232 @@
+/* What the camera does to a photograph. */
+#include "data/camera.h"
+#include "data/image/image.h"
+#include "tensor/rng.h"
+#include "tests/test.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIZE = 37, N = SIZE * SIZE * 3 };
+static const io_camera every = {.noise = 1,
+                                .noise_spread = 1,
+                                .blur = 8,
+                                .quantise = true,
+                                .exposure = 1,
+                                .vignette = 0.5f,
+                                .white_balance = 0.2f,
+                                .jpeg = 40};
+
+static void fill(float *image, float largest)
+{
+    ts_rng r = ts_rng_make(5, TS_STREAM_TEST, 0);
+    for (int i = 0; i < N; i++) image[i] = largest * ts_rng_uniform(&r);
+}
+
+TEST(camera_without_faults_only_clips)
+{
+    static float clean[N], a[N];
+    io_camera none = {0};
+    float position[3];
+    fill(clean, 1.5f);
+    memcpy(a, clean, sizeof a);
+    io_camera_apply(&none, 1, 2, SIZE, a);
+    for (int i = 0; i < N; i++) CHECK(a[i] == fminf(clean[i], 1), "value %d: %g became %g", i, clean[i], a[i]);
+    io_camera_place(&none, 1, 2, 0.75f, position);
+    CHECK(position[0] == 0 && position[1] == 0 && position[2] == 0.75f, "stands at %g %g %g", position[0], position[1],
+          position[2]);
+    CHECK(io_camera_exposure(&none, 1, 2) == 1, "exposure %g", io_camera_exposure(&none, 1, 2));
+}
+
+/* The noise, blur and rounding of a camera without the other faults, written down plainly. */
+TEST(camera_noise_blur_and_rounding_are_what_they_were)
+{
+    static float clean[N], a[N], b[N], c[N];
+    const io_camera camera = {.noise = 0.8f, .blur = 12, .quantise = true};
+    for (uint64_t index = 0; index < 6; index++) {
+        fill(clean, 1.2f);
+        memcpy(a, clean, sizeof a);
+        io_camera_apply(&camera, 3, index, SIZE, a);
+        ts_rng r = ts_rng_make(3, TS_STREAM_CAMERA, index);
+        const float sigma = camera.blur * ts_rng_uniform(&r) * SIZE / 256, strength = camera.noise * ts_rng_uniform(&r);
+        const int reach = fminf(ceilf(3 * sigma), 12);
+        float tap[25], total = 0;
+        for (int k = -reach; k <= reach; k++) total += tap[k + reach] = expf(-0.5f * (float)(k * k) / (sigma * sigma));
+        for (int i = 0; i < N; i++) b[i] = fminf(clean[i], 1);
+        for (int pass = 0; pass < 2 && sigma > 0.15f; pass++) {
+            for (int i = 0; i < N; i++) {
+                const int at = pass ? i / (3 * SIZE) : i / 3 % SIZE, step = pass ? 3 * SIZE : 3;
+                c[i] = 0;
+                for (int k = -reach; k <= reach; k++) {
+                    const int to = at + k < 0 ? 0 : at + k >= SIZE ? SIZE - 1 : at + k;
+                    c[i] += tap[k + reach] / total * b[i + (to - at) * step];
+                }
+            }
+            memcpy(b, c, sizeof b);
+        }
+        for (int i = 0; i < N; i++) {
+            float v = fminf(b[i], 1);
+            v += sqrtf(0.0001f * strength * strength + 0.002f * strength * v) * ts_rng_normal(&r);
+            const float level = io_linear_to_srgb(fminf(fmaxf(v, 0), 1)) * 255, given = io_linear_to_srgb(a[i]) * 255;
+            CHECK(fabsf(given - level) < 0.502f && fabsf(given - roundf(given)) < 0.01f,
+                  "photograph %d, value %d: %g, not %g rounded", (int)index, i, given, level);
+        }
+    }
+}
+
+TEST(camera_is_a_function_of_seed_and_index)
+{
+    static float clean[N], a[N], b[N];
+    fill(clean, 1.2f);
+    for (uint64_t index = 0; index < 8; index++) {
+        memcpy(a, clean, sizeof a);
+        memcpy(b, clean, sizeof b);
+        io_camera_apply(&every, 1, index, SIZE, a);
+        io_camera_apply(&every, 1, index, SIZE, b);
+        CHECK(!memcmp(a, b, sizeof a), "photograph %d differs from itself", (int)index);
+        for (int i = 0; i < N; i++) {
+            const float level = io_linear_to_srgb(a[i]) * 255;
+            CHECK(a[i] >= 0 && a[i] <= 1 && fabsf(level - roundf(level)) < 0.01f, "value %g is not one of 256 levels",
+                  a[i]);
+        }
+        memcpy(b, clean, sizeof b);
+        io_camera_apply(&every, 1, index + 100, SIZE, b);
+        CHECK(memcmp(a, b, sizeof a), "photographs %d and %d have the same faults", (int)index, (int)index + 100);
+        memcpy(b, clean, sizeof b);
+        io_camera_apply(&every, 2, index, SIZE, b);
+        CHECK(memcmp(a, b, sizeof a), "seeds 1 and 2 give the same faults");
+    }
+}
+
+TEST(camera_light_stays_within_its_ranges)
+{
+    static float a[N];
+    float least = 9, most = 0, redder = 9, bluer = 0, darkest = 1;
+    for (uint64_t index = 0; index < 200; index++) {
+        const io_camera exposure = {.exposure = 1.5f}, balance = {.white_balance = 0.2f}, vignette = {.vignette = 0.4f};
+        for (int i = 0; i < N; i++) a[i] = 0.3f;
+        io_camera_apply(&exposure, 1, index, SIZE, a);
+        const float factor = io_camera_exposure(&exposure, 1, index);
+        for (int i = 0; i < N; i++)
+            CHECK(fabsf(a[i] - fminf(0.3f * factor, 1)) < 1e-6f, "exposure %g makes %g of 0.3", factor, a[i]);
+        CHECK(fabsf(log2f(factor)) <= 1.5f, "exposure %g", factor);
+        least = fminf(least, factor);
+        most = fmaxf(most, factor);
+
+        for (int i = 0; i < N; i++) a[i] = 0.3f;
+        io_camera_apply(&balance, 1, index, SIZE, a);
+        CHECK(a[1] == 0.3f && fabsf(a[0] / 0.3f - 1) < 0.2001f && fabsf(a[2] / 0.3f - 1) < 0.2001f,
+              "white balance %g %g %g", a[0], a[1], a[2]);
+        redder = fminf(redder, a[0] / a[2]);
+        bluer = fmaxf(bluer, a[0] / a[2]);
+
+        for (int i = 0; i < N; i++) a[i] = 0.3f;
+        io_camera_apply(&vignette, 1, index, SIZE, a);
+        const int middle = 3 * (SIZE / 2 * SIZE + SIZE / 2);
+        CHECK(fabsf(a[middle] - 0.3f) < 1e-6f && a[0] <= a[3 * (SIZE / 2)] && a[0] >= 0.3f * 0.599f && a[0] == a[N - 3],
+              "vignette: corner %g", a[0]);
+        darkest = fminf(darkest, a[0]);
+    }
+    CHECK(least < 0.4f && most > 2.5f && redder < 0.75f && bluer > 1.3f && darkest < 0.2f,
+          "ranges are not used: %g %g, %g %g, %g", least, most, redder, bluer, darkest);
+}
+
+TEST(camera_stands_at_its_distance_within_tilt_and_offset)
+{
+    const io_camera tilted = {.tilt = 5}, off = {.off_centre = 0.1f}, both = {.tilt = 5, .off_centre = 0.1f};
+    float p[3], steepest = 0, farthest = 0, mean[2] = {0};
+    for (uint64_t index = 0; index < 500; index++) {
+        io_camera_place(&tilted, 1, index, 2, p);
+        const float across = hypotf(p[0], p[1]), angle = atan2f(across, p[2]) * 57.29578f;
+        CHECK(fabsf(across * across + p[2] * p[2] - 4) < 1e-4f && angle <= 5.001f, "tilt %g at distance %g", angle,
+              hypotf(across, p[2]));
+        steepest = fmaxf(steepest, angle);
+        mean[0] += p[0] / 500, mean[1] += p[1] / 500;
+        float q[3];
+        io_camera_place(&off, 1, index, 2, q);
+        CHECK(hypotf(q[0], q[1]) <= 0.1001f && q[2] == 2, "off centre by %g", hypotf(q[0], q[1]));
+        farthest = fmaxf(farthest, hypotf(q[0], q[1]));
+        float r[3];
+        io_camera_place(&both, 1, index, 2, r);
+        CHECK(fabsf(r[0] - p[0] - q[0]) < 1e-6f && fabsf(r[1] - p[1] - q[1]) < 1e-6f && r[2] == p[2],
+              "tilt and offset do not add");
+    }
+    CHECK(steepest > 4.8f && farthest > 0.098f && hypotf(mean[0], mean[1]) < 0.02f,
+          "ranges are not used: %g %g, mean %g %g", steepest, farthest, mean[0], mean[1]);
+}
+
+static double psnr(const uint8_t *a, const uint8_t *b, int n)
+{
+    double sum = 1e-9;
+    for (int i = 0; i < n; i++) sum += (a[i] - b[i]) * (a[i] - b[i]);
+    return 10 * log10(255 * 255 * n / sum);
+}
+
+TEST(jpeg_keeps_what_a_jpeg_keeps)
+{
+    static const int sizes[] = {1, 2, 7, 8, 9, 16, 33, 64};
+    static uint8_t picture[64 * 64 * 3], a[sizeof picture], b[sizeof picture];
+    for (int s = 0; s < 8; s++)
+        for (int halved = 0; halved < 2; halved++) {
+            const int size = sizes[s], n = size * size * 3;
+            for (int grey = 0; grey < 256;
+                 grey += 15) { /* a flat grey has only a mean, in steps of two levels at most */
+                memset(a, grey, (size_t)n);
+                io_jpeg_codes(size, 90, halved, a);
+                for (int i = 0; i < n; i++) CHECK(abs(a[i] - grey) <= 1, "%d^2: grey %d became %d", size, grey, a[i]);
+            }
+            for (int i = 0; i < n; i++)
+                picture[i] = (uint8_t)(128 + 60 * sin(i / 3 % size * 0.21) + 40 * cos(i / 3 / size * 0.3 + i % 3));
+            double before = 0;
+            for (int quality = 10; quality <= 100; quality += 30) {
+                memcpy(a, picture, (size_t)n);
+                memcpy(b, picture, (size_t)n);
+                io_jpeg_codes(size, quality, halved, a);
+                io_jpeg_codes(size, quality, halved, b);
+                CHECK(!memcmp(a, b, (size_t)n), "two results of one picture");
+                const double now = psnr(a, picture, n);
+                CHECK(size < 16 || now > before - 0.1, "%d^2: quality %d is worse (%.1f dB) than less (%.1f dB)", size,
+                      quality, now, before);
+                before = now;
+            }
+            CHECK(before > (halved ? 25 : 40), "%d^2: quality 100 keeps %.1f dB", size, before);
+        }
+}
+
+/* Against a decoder and an encoder that are not ours: the file that io_write_jpeg makes, read back. */
+TEST(jpeg_matches_the_library)
+{
+    enum { SIDE = 64, VALUES = SIDE * SIDE * 3 };
+    static uint8_t picture[VALUES], ours[VALUES], theirs[VALUES];
+    char path[4096];
+    io_image image = {0}, back = {0};
+    ts_status st = {0};
+    snprintf(path, sizeof path, "%s/picture.jpg", test_folder());
+    CHECK(io_image_create(&image, SIDE, SIDE, 3, &st) == TS_OK, "%s", st.message);
+    ts_rng r = ts_rng_make(1, TS_STREAM_TEST, 1);
+    for (int i = 0; i < VALUES; i++) {
+        picture[i] = (uint8_t)(120 + 60 * sin(i / 3 % SIDE * 0.31) + 40 * cos(i / 3 / SIDE * 0.23 + i % 3) +
+                               30 * ts_rng_uniform(&r));
+        image.data[i] = io_srgb_to_linear((float)picture[i] / 255);
+    }
+    for (int quality = 40; quality <= 95; quality += 11) {
+        CHECK(io_write_jpeg(path, &image, quality, &st) == TS_OK, "%s", st.message);
+        CHECK(io_read_photo(path, IO_MAX_PIXELS_DEFAULT, &back, &st) == TS_OK, "%s", st.message);
+        double loss = 0, apart = 0;
+        for (int i = 0; i < VALUES; i++) theirs[i] = (uint8_t)(io_linear_to_srgb(back.data[i]) * 255 + 0.5f);
+        double best = 0;
+        for (int halved = 0; halved < 2; halved++) {
+            memcpy(ours, picture, sizeof ours);
+            io_jpeg_codes(SIDE, quality, halved, ours);
+            const double same = psnr(ours, theirs, VALUES);
+            if (same > best) {
+                best = apart = same;
+                loss = psnr(theirs, picture, VALUES);
+            }
+        }
+        CHECK(apart > loss + 10, "quality %d: %.1f dB from the library's picture, which is %.1f dB from the original",
+              quality, apart, loss);
+        io_image_free(&back);
+    }
+    io_image_free(&image);
+}

@@ -1,0 +1,204 @@
+/* The image library is loaded when it is needed and not before, and what is read without it is what it would have read.
+ */
+#include "data/image/common_read.h"
+#include "data/image/image.h"
+#include "tests/support/make_images.h"
+#include "tests/test.h"
+#include <dirent.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static bool library_is_loaded(void)
+{
+    char line[512];
+    bool found = false;
+    FILE *f = fopen("/proc/self/maps", "r");
+    CHECK(f, "no /proc/self/maps");
+    while (fgets(line, sizeof line, f)) found |= strstr(line, "OpenImageIO") != NULL;
+    fclose(f);
+    return found;
+}
+
+static io_image ramp(int width, int height, int channels)
+{
+    ts_status st = {0};
+    io_image image;
+    CHECK(io_image_create(&image, width, height, channels, &st) == TS_OK, "%s", st.message);
+    for (int i = 0; i < width * height * channels; i++) image.data[i] = (float)(i * 7919 % 4099) / 4098;
+    return image;
+}
+
+/* Read both ways, every field and every value the same. False: the quick way passes it on. */
+static bool check_same(const char *path)
+{
+    oi_image quick, slow;
+    ts_status st = {0};
+    if (!io_read_png_file(path, IO_MAX_PIXELS_DEFAULT, &quick) &&
+        !io_read_jpeg_file(path, IO_MAX_PIXELS_DEFAULT, &quick)) {
+        CHECK(!quick.data && !quick.icc, "%s: something is left", path);
+        return false;
+    }
+    CHECK(oi_read(path, IO_MAX_PIXELS_DEFAULT, &slow, &st) == TS_OK, "%s", st.message);
+    CHECK(quick.width == slow.width && quick.height == slow.height && quick.channels == slow.channels &&
+              quick.levels == slow.levels,
+          "%s: %d x %d x %d, not %d x %d x %d", path, quick.width, quick.height, quick.channels, slow.width,
+          slow.height, slow.channels);
+    CHECK(memcmp(quick.colour, slow.colour, sizeof quick.colour) == 0 && quick.alpha == slow.alpha &&
+              quick.grey == slow.grey,
+          "%s: channels", path);
+    CHECK(quick.orientation == slow.orientation && quick.adobe == slow.adobe && quick.linear == slow.linear &&
+              (quick.alpha < 0 || quick.associated == slow.associated) && quick.primaries == slow.primaries &&
+              quick.floating == slow.floating,
+          "%s: orientation %d and %d, Adobe %d and %d, linear %d and %d, primaries %d and %d", path, quick.orientation,
+          slow.orientation, quick.adobe, slow.adobe, quick.linear, slow.linear, quick.primaries, slow.primaries);
+    CHECK(quick.icc_size == slow.icc_size && (!quick.icc_size || memcmp(quick.icc, slow.icc, quick.icc_size) == 0),
+          "%s: profiles", path);
+    const size_t values = (size_t)quick.width * (size_t)quick.height * (size_t)quick.channels;
+    for (size_t i = 0; i < values; i++)
+        CHECK(oi_value(&quick, i) == oi_value(&slow, i), "%s: value %zu is %.9g, not %.9g", path, i,
+              (double)oi_value(&quick, i), (double)oi_value(&slow, i));
+    oi_free(&quick);
+    oi_free(&slow);
+    return true;
+}
+
+TEST(png_and_jpeg_load_no_image_library)
+{
+    char path[512];
+    ts_status st = {0};
+    io_image image = ramp(31, 17, 3), back;
+    snprintf(path, sizeof path, "%s/a.png", test_folder());
+    CHECK(io_write_png(path, &image, 16, true, &st) == TS_OK && io_read_photo(path, 1000, &back, &st) == TS_OK, "%s",
+          st.message);
+    CHECK(!library_is_loaded(), "a PNG needs the image library");
+    snprintf(path, sizeof path, "%s/a.jpg", test_folder());
+    CHECK(io_write_jpeg(path, &image, 90, &st) == TS_OK, "%s", st.message);
+    CHECK(library_is_loaded(), "the image library is not seen in /proc/self/maps");
+}
+
+TEST(quick_readers_read_what_the_library_reads)
+{
+    char path[512];
+    ts_status st = {0};
+    for (int k = 0; k < 8; k++) {
+        io_image image = ramp(37, 5, k % 4 + 1);
+        snprintf(path, sizeof path, "%s/%d.png", test_folder(), k);
+        const io_rows none = {0};
+        CHECK(io_write_png_rows(path, &none, 8, true, &st) == TS_INVALID, "a picture of nothing");
+        st = (ts_status){0};
+        CHECK(io_write_png(path, &image, k < 4 ? 8 : 16, k % 3 > 0, &st) == TS_OK, "%s", st.message);
+        CHECK(check_same(path), "%s is passed on", path);
+    }
+    bytes profile = icc_profile(icc_display_p3, 0);
+    for (int grey = 0; grey < 2; grey++) {
+        io_image image = ramp(41, 23, grey ? 1 : 3);
+        snprintf(path, sizeof path, "%s/a.jpg", test_folder());
+        CHECK(io_write_jpeg(path, &image, 93, &st) == TS_OK, "%s", st.message);
+        CHECK(check_same(path), "%s is passed on", path);
+        for (int k = 1; k <= 8; k++) {
+            bytes b = bytes_load(path);
+            uint8_t *own = memmem(b.data, b.size, "Exif", 4); /* the writer's: two are unusual */
+            if (own) memcpy(own, "none", 4);
+            jpeg_profile(&b, &profile);
+            jpeg_orientation(&b, k);
+            CHECK(check_same(bytes_save(&b, test_folder(), "turned.jpg")), "orientation %d is passed on", k);
+        }
+    }
+    bytes b = {0};
+    const uint8_t rgb[6] = {1, 2, 3, 200, 150, 100};
+    png_begin(&b, 2, 1, 8, 2), png_chunk(&b, "tEXt", "Software\0none", 13), png_pixels(&b, rgb, 6, 1), png_end(&b);
+    CHECK(check_same(bytes_save(&b, test_folder(), "words.png")), "a PNG with a word about its software is passed on");
+}
+
+/* Whatever may change how a picture is seen is left to the library. */
+TEST(quick_readers_pass_on_what_is_unusual)
+{
+    const uint8_t four[4] = {0, 128, 255, 64}, palette[6] = {255, 0, 0, 0, 128, 255};
+    bytes b = {0};
+    png_begin(&b, 4, 1, 8, 0), png_chunk(&b, "tRNS", "\0\200", 2), png_pixels(&b, four, 4, 1), png_end(&b);
+    CHECK(!check_same(bytes_save(&b, test_folder(), "a.png")), "a transparent colour");
+    png_begin(&b, 4, 1, 8, 0), png_chunk(&b, "tEXt", "Orientation\0006", 13), png_pixels(&b, four, 4, 1), png_end(&b);
+    CHECK(!check_same(bytes_save(&b, test_folder(), "b.png")), "an orientation as text");
+    png_begin(&b, 4, 1, 8, 0), png_pixels(&b, four, 4, 1), png_chunk(&b, "tEXt", "Raw profile type exif\0", 22),
+        png_end(&b);
+    CHECK(!check_same(bytes_save(&b, test_folder(), "c.png")), "a profile as text behind the pixels");
+    png_begin(&b, 2, 1, 8, 3), png_chunk(&b, "PLTE", palette, 6), png_pixels(&b, "\1\0", 2, 1), png_end(&b);
+    CHECK(!check_same(bytes_save(&b, test_folder(), "d.png")), "a palette");
+    png_begin(&b, 8, 1, 1, 0), png_pixels(&b, four, 1, 1), png_end(&b);
+    CHECK(!check_same(bytes_save(&b, test_folder(), "e.png")), "one bit");
+    b = jpeg_cmyk(four);
+    CHECK(!check_same(bytes_save(&b, test_folder(), "f.jpg")), "CMYK");
+    char path[512];
+    ts_status st = {0};
+    io_image image = ramp(64, 64, 3);
+    snprintf(path, sizeof path, "%s/g.jpg", test_folder());
+    CHECK(io_write_jpeg(path, &image, 93, &st) == TS_OK, "%s", st.message);
+    static const struct {
+        int marker;
+        const char *text;
+    } segments[] = {{0xe1, "http://ns.adobe.com/xap/1.0/ <x tiff:Orientation='6'>"},
+                    {0xed, "Photoshop 3.0"},
+                    {0xfe, "Orientation:6"},
+                    {0xe1, "Exif"}};
+    for (size_t i = 0; i < sizeof segments / sizeof *segments; i++) {
+        b = bytes_load(path);
+        char text[64] = {0};
+        strcpy(text, segments[i].text);
+        jpeg_insert(&b, segments[i].marker, text, i == 3 ? 8 : strlen(text) + 1);
+        const char *name = bytes_save(&b, test_folder(), "h.jpg");
+        oi_image quick;
+        CHECK(!io_read_jpeg_file(name, 1 << 20, &quick) && !quick.data, "segment %zu is passed over", i);
+    }
+    b = bytes_load(path);
+    b.size -= b.size / 3;
+    oi_image quick;
+    CHECK(!io_read_jpeg_file(bytes_save(&b, test_folder(), "i.jpg"), 1 << 20, &quick) && !quick.data,
+          "a file cut short");
+    CHECK(!io_read_jpeg_file(path, 64 * 64 - 1, &quick) && io_read_jpeg_file(path, 64 * 64, &quick), "the limit");
+    oi_free(&quick);
+}
+
+/* No byte of a damaged Exif segment leads outside of it (a checker sees the end). */
+TEST(damaged_exif)
+{
+    uint8_t good[] = "Exif\0\0II*\0\10\0\0\0\2\0\22\1\3\0\1\0\0\0\6\0\0\0\151\207\4\0\1\0\0\0\46\0\0\0\0\0\0\0"
+                     "\1\0\5\240\4\0\1\0\0\0\70\0\0\0\0\0\0\0\1\0\1\0\2\0\4\0\0\0R03\0\0\0\0\0";
+    int orientation;
+    bool adobe;
+    const size_t size = sizeof good - 1;
+    CHECK(io_exif(good, size, &orientation, &adobe) && orientation == 6 && adobe, "orientation %d, Adobe %d",
+          orientation, adobe);
+    unsigned state = 1;
+    for (int round = 0; round < 50000; round++) {
+        state = state * 1664525 + 1013904223;
+        const size_t n = round % 3 ? size : (state >> 8) % size + 1;
+        uint8_t *copy = malloc(n);
+        memcpy(copy, good, n);
+        for (int k = 0; k < 2; k++) {
+            state = state * 1664525 + 1013904223;
+            copy[(state >> 8) % n] = (uint8_t)(state >> 24);
+        }
+        io_exif(copy, n, &orientation, &adobe);
+        CHECK(orientation >= 1 && orientation <= 8, "orientation %d", orientation);
+        free(copy);
+    }
+}
+
+TEST(quick_readers_on_real_photographs)
+{
+    char folder[512], path[1024];
+    snprintf(folder, sizeof folder, "%s/photos", test_data());
+    DIR *d = opendir(folder);
+    if (!d) test_skip("%s is absent", folder);
+    int quick = 0, all = 0;
+    for (struct dirent *e; (e = readdir(d));) {
+        if (e->d_name[0] == '.') continue;
+        snprintf(path, sizeof path, "%s/%s", folder, e->d_name);
+        quick += check_same(path);
+        all++;
+    }
+    closedir(d);
+    CHECK(quick >= all - 1, "%d of %d photographs need the library", all - quick,
+          all); /* one has its EXIF as compressed text */
+}

@@ -1,0 +1,110 @@
+/* What time and use do to a plain sheet. */
+#include "data/materials/palette.h"
+#include "data/materials/weathering.h"
+#include "tests/test.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIZE = 128, COUNT = SIZE * SIZE };
+
+/* A grey sheet of roughness 0.5. */
+static io_canvas sheet(uint64_t index)
+{
+    static float *memory;
+    if (!memory) memory = malloc((size_t)CANVAS_ALL * COUNT * sizeof *memory);
+    io_canvas c = {.size = SIZE,
+                   .count = COUNT,
+                   .pixel = 1.0f / SIZE,
+                   .rng = ts_rng_make(1, TS_STREAM_TEST, index),
+                   .x = memory,
+                   .y = memory + COUNT};
+    float *plane = memory + 2 * COUNT;
+    c.height = plane;
+    for (int k = 0; k < 3; k++) {
+        c.diffuse[k] = plane + (1 + k) * COUNT;
+        c.specular[k] = plane + (4 + k) * COUNT;
+    }
+    c.roughness = plane + 7 * COUNT;
+    c.planes = plane + CANVAS_PAINTED * COUNT;
+    for (int i = 0; i < COUNT; i++) {
+        c.x[i] = ((float)(i % SIZE) + 0.5f) / SIZE - 0.5f;
+        c.y[i] = 0.5f - ((float)(i / SIZE) + 0.5f) / SIZE;
+    }
+    const io_substance grey = {{0.3f, 0.3f, 0.3f}, {0.04f, 0.04f, 0.04f}, 0.5f};
+    cv_fill(&c, &grey);
+    return c;
+}
+
+TEST(decals_cover_a_part_with_crisp_borders)
+{
+    int some = 0, inked = 0, border = 0;
+    for (uint64_t index = 0; index < 60; index++) {
+        io_canvas c = sheet(index);
+        wear_decals(&c);
+        CHECK(c.used == 0, "%d planes are still held", c.used);
+        int changed = 0;
+        for (int i = 0; i < COUNT; i++) {
+            const bool here = c.diffuse[0][i] != 0.3f || c.roughness[i] != 0.5f;
+            for (int k = 0; k < 3; k++)
+                CHECK(c.diffuse[k][i] >= 0.0039f && c.diffuse[k][i] <= 0.9001f && c.specular[k][i] > 0.01f &&
+                          c.specular[k][i] < 0.07f,
+                      "decal %d is of no pigment: diffuse %g, specular %g", (int)index, c.diffuse[k][i],
+                      c.specular[k][i]);
+            CHECK(c.height[i] >= 0 && c.height[i] < 0.003f && (here || c.height[i] == 0), "decal %d is %g thick",
+                  (int)index, c.height[i]);
+            changed += here;
+        }
+        /* Ink meets sheet within a pixel or two: next to most covered pixels lies another of nearly the same coverage.
+         */
+        for (int i = 0; i + 1 < COUNT; i++) {
+            const float a = fabsf(c.roughness[i] - 0.5f), b = fabsf(c.roughness[i + 1] - 0.5f);
+            inked += a > 0.02f;
+            border += a > 0.02f && fabsf(a - b) > 0.01f;
+        }
+        some += changed > 20 && changed < 0.7 * COUNT;
+    }
+    CHECK(some > 45, "only %d of 60 sheets have decals on a part of them", some);
+    CHECK(border < 0.5 * inked, "%d of %d covered pixels differ from the next", border, inked);
+}
+
+TEST(texture_has_about_the_slope_that_was_asked_for)
+{
+    static const float frequency[] = {4, 8}, slope[] = {0.01f, 0.1f};
+    for (int f = 0; f < 2; f++)
+        for (int s = 0; s < 2; s++) {
+            double sum = 0;
+            for (uint64_t index = 0; index < 10; index++) {
+                io_canvas c = sheet(index);
+                wear_texture(&c, frequency[f], slope[s]);
+                for (int i = 0; i + 1 < COUNT; i++)
+                    if (i % SIZE != SIZE - 1) sum += pow((c.height[i + 1] - c.height[i]) * SIZE, 2);
+            }
+            const double rms = sqrt(sum / (10.0 * SIZE * (SIZE - 1)));
+            CHECK(rms > 0.4 * slope[s] && rms < 2.5 * slope[s], "%g cycles, slope %g: an RMS of %g", frequency[f],
+                  slope[s], rms);
+        }
+}
+
+TEST(streaks_run)
+{
+    double along = 0, across = 0;
+    int streaked = 0;
+    for (uint64_t index = 0; index < 30; index++) {
+        io_canvas c = sheet(index);
+        wear_streaks(&c, 0.7f);
+        CHECK(c.used == 0, "%d planes are still held", c.used);
+        double down = 0, right = 0;
+        for (int y = 0; y + 1 < SIZE; y++)
+            for (int x = 0; x + 1 < SIZE; x++) {
+                const int i = y * SIZE + x;
+                down += fabsf(c.roughness[i + SIZE] - c.roughness[i]);
+                right += fabsf(c.roughness[i + 1] - c.roughness[i]);
+            }
+        along += fmin(down, right);
+        across += fmax(down, right);
+        streaked += down + right > 0;
+    }
+    CHECK(streaked > 25 && across > 2.5 * along, "%d of 30 sheets are streaked; %g along, %g across", streaked, along,
+          across);
+}

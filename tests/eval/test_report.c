@@ -1,0 +1,232 @@
+/* The report's files: what they say and that they are what they claim to be. */
+#include "eval/html.h"
+#include "eval/plot.h"
+#include "tests/test.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static char *written(void (*write_to)(const ev_report *, FILE *), const ev_report *r)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    CHECK(f, "open_memstream");
+    write_to(r, f);
+    CHECK(fclose(f) == 0 && strlen(text) == size, "a zero byte in the text");
+    return text;
+}
+
+static int count(const char *text, const char *what)
+{
+    int n = 0;
+    for (const char *p = text; (p = strstr(p, what)); p += strlen(what)) n++;
+    return n;
+}
+
+/* Two sets, three materials, hostile names, and numbers that were not measured. One method with two steps, or two
+ * methods with one each. */
+static void make(ev_report *r, int methods)
+{
+    static const char *const sets[] = {"maps:<a> & \"b\"", "procedural:1,1"},
+                             *const materials[] = {"</article><script>x</script>", "back\\slash\"quote", "tab\there"};
+    static const char png[] = "any bytes"; /* the page does not look into them */
+    static ev_subject method[2];
+    static int step[2];
+    ts_status st = {0};
+    step[0] = 0, step[1] = methods == 1;
+    method[0] = (ev_subject){.label = "lgd<1>", .points = 3 - methods, .bytes = 2000000};
+    method[1] = (ev_subject){.label = "descent:steps=2", .first = 1, .points = 1};
+    *r = (ev_report){.sets = 2,
+                     .size = 8,
+                     .threads = 1,
+                     .repeat = 1,
+                     .set_name = sets,
+                     .model = "m<1>.safetensors",
+                     .isa = "base",
+                     .method = method,
+                     .methods = methods,
+                     .step = step,
+                     .columns = 2};
+    for (int i = 0; i < 3; i++) {
+        CHECK(ev_report_add(r, i / 2, materials[i], &st) == i, "%s", st.message);
+        ev_result *to = &r->result[i];
+        for (int k = 0; k < EV_METRICS; k++) {
+            to->row[0].value[k] = k == EV_EXPOSURE || (k == EV_SSIM && i == 0) ? NAN : 0.25 * (i + 1);
+            to->row[1].value[k] = to->row[0].value[k] / 2;
+        }
+        to->seconds[0] = 0.5;
+        to->seconds[1] = 1.5;
+        to->peak[0] = 5e11;
+        if (i != 1) continue;
+        to->png[0] = (unsigned char *)strdup(png);
+        to->png_size[0] = strlen(png);
+    }
+}
+
+TEST(report_html)
+{
+    ev_report r;
+    make(&r, 1);
+    char *text = written(ev_html_write, &r);
+    CHECK(count(text, "<article ") == 3 && count(text, "</article>") == 3, "%d materials", count(text, "<article "));
+    CHECK(count(text, "<script>") == 1 && strstr(text, "&lt;script&gt;x"), "a name is markup");
+    CHECK(strstr(text, "maps:&lt;a&gt; &amp; &quot;b&quot;") && strstr(text, "m&lt;1&gt;"), "names are not escaped");
+    CHECK(strstr(text, "data:image/png;base64,YW55IGJ5dGVz\""), "the picture is not there");
+    CHECK(count(text, "http://") == 1 && count(text, "https://") == 0, "something is loaded"); /* SVG's namespace */
+    CHECK(!strstr(text, "nan") && !strstr(text, "inf"), "a number is none");
+    CHECK(count(text, "data-ssim=\"\"") == 1 && count(text, "data-exposure=\"\"") == 3 &&
+              strstr(text, "data-render=\"0.250000\""),
+          "the sort keys");
+    CHECK(count(text, "<circle") == 2 * 2 + 2, "%d points in the plot", count(text, "<circle"));
+    free(text);
+    ev_report_free(&r);
+}
+
+/* A reader of JSON that knows no more than the grammar (RFC 8259). */
+static const char *value(const char *p);
+static const char *blank(const char *p) { return p + strspn(p, " \n\t\r"); }
+static const char *string(const char *p)
+{
+    CHECK(*p == '"', "no string: %.20s", p);
+    for (p++; *p != '"'; p++) {
+        CHECK((unsigned char)*p >= 0x20, "a control character in a string");
+        if (*p == '\\') p++;
+    }
+    return p + 1;
+}
+static const char *list(const char *p, char end)
+{
+    for (p = blank(p + 1); *p != end; p = blank(p)) {
+        if (end == '}') {
+            p = blank(string(p));
+            CHECK(*p == ':', "no colon: %.20s", p);
+            p++;
+        }
+        p = blank(value(blank(p)));
+        CHECK(*p == ',' || *p == end, "neither a comma nor an end: %.20s", p);
+        if (*p == ',') {
+            p = blank(p + 1);
+            CHECK(*p != end, "a comma before the end");
+        }
+    }
+    return p + 1;
+}
+static const char *value(const char *p)
+{
+    char *end;
+    if (*p == '{') return list(p, '}');
+    if (*p == '[') return list(p, ']');
+    if (*p == '"') return string(p);
+    if (!strncmp(p, "null", 4) || !strncmp(p, "true", 4)) return p + 4;
+    if (!strncmp(p, "false", 5)) return p + 5;
+    CHECK(*p == '-' || (*p >= '0' && *p <= '9'), "no value: %.20s", p);
+    strtod(p, &end);
+    return end;
+}
+
+TEST(report_json)
+{
+    ev_report r;
+    make(&r, 1);
+    char *text = written(ev_json_write, &r);
+    CHECK(*blank(value(blank(text))) == 0, "something after the end");
+    CHECK(count(text, "\"name\"") == 5 && count(text, "\"seconds\": 1.5") == 5, "%d names", count(text, "\"name\""));
+    CHECK(strstr(text, "{\"label\": \"lgd<1>\", \"bytes\": 2000000, \"peak_flops\": 5e+11}"), "the method");
+    CHECK(count(text, "\"ssim\": null") == 2 && strstr(text, "\"ssim\": 0.25"), "what was not measured");
+    CHECK(strstr(text, "back\\\\slash\\\"quote") && strstr(text, "tab\\u0009here"), "names are not escaped");
+    free(text);
+    ev_report_free(&r);
+}
+
+TEST(report_of_several_methods)
+{
+    ev_report r;
+    make(&r, 2);
+    char *text = written(ev_html_write, &r), *json = written(ev_json_write, &r);
+    CHECK(count(text, "<th>lgd&lt;1&gt;</th><th>descent:steps=2</th>") == 3, "a column for each method");
+    CHECK(count(text, "<option ") == 2 && count(text, "data-render-1=\"0.125000\"") == 1 &&
+              count(text, "data-render=\"0.250000\"") == 1,
+          "the sort keys");
+    CHECK(count(text, "<circle") == 2 + 2, "%d points in the plot", count(text, "<circle"));
+    CHECK(!strstr(text, "nan") && !strstr(text, "inf") && *blank(value(blank(json))) == 0, "a number is none");
+    char *table = NULL;
+    size_t size;
+    FILE *f = open_memstream(&table, &size);
+    CHECK(f, "open_memstream");
+    ev_report_print(&r, f);
+    fclose(f);
+    CHECK(count(table, "\nlgd<1>  ") == 3 && count(table, "\ndescent:steps=2  ") == 3 && count(table, "-50.0%") == 3,
+          "%s", table);
+    free(text);
+    free(json);
+    free(table);
+    ev_report_free(&r);
+}
+
+TEST(report_plot)
+{
+    const ev_point some[] = {
+        {0.1, 0.2, 0, "a"}, {1, 0.1, 0, ""}, {0, 0.1, 0, "zero"}, {1, NAN, 0, "none"}, {INFINITY, 1, 0, ""}};
+    const ev_series series[] = {{"s", some, 5, false}, {"one", some, 1, false}, {"none", some + 3, 1, false}};
+    for (int n = 0; n <= 3; n++) {
+        char *text = NULL;
+        size_t size;
+        FILE *f = open_memstream(&text, &size);
+        CHECK(f, "open_memstream");
+        ev_plot_write(f, &(ev_axes){"x <", "y", true}, n == 3 ? series + 1 : series, n == 3 ? 1 : n);
+        fclose(f);
+        CHECK(!strstr(text, "nan") && !strstr(text, "inf") && !strstr(text, "zero"), "%s", text);
+        CHECK(strstr(text, "nothing was measured") ? n == 0
+                                                   : count(text, "<circle") ==
+                      (n == 3       ? 2
+                           : n == 2 ? 5
+                                    : 3),
+              "%d series: %d circles", n, count(text, "<circle"));
+        free(text);
+    }
+}
+
+TEST(report_plot_has_a_linear_axis_too)
+{
+    const ev_point some[] = {{-1, 0.2, 0, ""}, {0, 0.1, 0, "zero"}, {24, 0.3, 0, ""}};
+    const ev_series series[] = {{"s", some, 3, false}, {"level", some, 1, true}};
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    CHECK(f, "open_memstream");
+    ev_plot_write(f, &(ev_axes){"T", "y", false}, series, 2);
+    fclose(f);
+    CHECK(strstr(text, " 70,195.0 550,195.0"), "a level goes from side to side: %s", text);
+    CHECK(count(text, "<circle") == 6 && strstr(text, "zero") && strstr(text, ">10</text>") &&
+              strstr(text, ">20</text>"),
+          "%s", text);
+    free(text);
+}
+
+TEST(report_plot_labels_keep_apart)
+{
+    const ev_point near[] = {{0.2, 0.2, 0, "label 0"},  {0.2, 0.2, 0, "label 1"}, {0.2, 0.2, 0, "label 2"},
+                             {0.21, 0.2, 0, "label 3"}, {0.2, 0.2, 0, "label 4"}, {0.9, 0.9, 0, ""},
+                             {-0.9, 0, 0, ""}};
+    const ev_series series[] = {{"s", near, 7, false}};
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    CHECK(f, "open_memstream");
+    ev_plot_write(f, &(ev_axes){"x", "y", false}, series, 1);
+    fclose(f);
+    double x[6], y[6];
+    int labels = 0;
+    for (const char *p = text; (p = strstr(p, "font-size=\"10\">label")); p++) {
+        const char *begin = p;
+        while (strncmp(begin, "<text", 5)) begin--;
+        CHECK(sscanf(begin, "<text x=\"%lf\" y=\"%lf\"", &x[labels], &y[labels]) == 2, "%.60s", begin);
+        for (int i = 0; i < labels; i++)
+            CHECK(fabs(x[i] - x[labels]) >= 42 || fabs(y[i] - y[labels]) >= 11, "labels %d and %d are on one another",
+                  i, labels);
+        labels++;
+    }
+    CHECK(labels == 4, "%d of 5 labels, for which there are four places", labels);
+    free(text);
+}

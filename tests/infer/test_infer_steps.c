@@ -1,0 +1,105 @@
+/* How many steps lgd_estimate makes, and what it tells of them. */
+#include "tests/support/inference.h"
+
+/* The automatic number of steps ends at the first that does not pay, and gives the maps of the one before. */
+TEST(infer_auto_stops_where_the_loss_no_longer_falls)
+{
+    lgd_model *m = load(tiny());
+    static float image[SIDE * SIDE * 3], chosen[VALUES], fixed[VALUES];
+    lgd_error e;
+    make_image(image, SIDE);
+    trace t = {.stop_at = -1}, all = {.stop_at = -1};
+    run(m, image, SIDE, LGD_AUTO, 1, &t, chosen);
+    CHECK(t.calls >= 1 && t.calls < 16, "%d steps", t.calls);
+    run(m, image, SIDE, t.calls, 1, &all, fixed); /* one more than was chosen */
+    for (int i = 0; i < t.calls; i++)
+        CHECK(t.step[i] == i && t.rmse[i] == all.rmse[i], "step %d: %g and %g", i, t.rmse[i], all.rmse[i]);
+    for (int i = 1; i < t.calls; i++) CHECK(t.rmse[i] < t.rmse[i - 1] * 0.999, "step %d does not pay", i);
+    CHECK(all.rmse[t.calls] >= t.rmse[t.calls - 1] * 0.999, "step %d would have paid: %g after %g", t.calls,
+          all.rmse[t.calls], t.rmse[t.calls - 1]);
+    run(m, image, SIDE, t.calls - 1, 1, NULL, fixed);
+    CHECK(!memcmp(chosen, fixed, sizeof chosen), "the maps are not those of step %d", t.calls - 1);
+    unsigned char *mask = malloc(SIDE * SIDE); /* the same number where tiles are refined */
+    memset(mask, 1, SIDE * SIDE);
+    const lgd_options o = {.iterations = LGD_AUTO, .mask = mask};
+    CHECK(!lgd_estimate(m, image, SIDE, &o, chosen, &e), "%s", e.message);
+    for (int i = 0; i < VALUES; i++)
+        CHECK(fabs((double)chosen[i] - fixed[i]) < 1e-4, "value %d: %g and %g", i, chosen[i], fixed[i]);
+    free(mask);
+    lgd_free(&m);
+}
+
+TEST(infer_progress_sees_every_step)
+{
+    static float image[SIDE * SIDE * 3], maps[VALUES];
+    lgd_model *m = load(tiny());
+    make_image(image, SIDE);
+    CHECK(lgd_trained_iterations(m) == T, "trained for %d", lgd_trained_iterations(m));
+    for (int n = -1; n <= 5; n++) {
+        trace t = {.stop_at = -1};
+        run(m, image, SIDE, n, 1, &t, maps);
+        CHECK(t.calls == (n < 0 ? T : n) + 1, "%d calls for %d iterations", t.calls, n);
+        for (int i = 0; i < t.calls; i++)
+            CHECK(t.step[i] == i && t.rmse[i] > 0 && t.rmse[i] < 1, "call %d: step %d, rmse %g", i, t.step[i],
+                  t.rmse[i]);
+    }
+    lgd_free(&m);
+    CHECK(!m, "lgd_free leaves the pointer");
+    lgd_free(&m);
+    lgd_free(NULL);
+}
+
+/* Nobody pays for the RMSE of the steps between unless he wants it: the ends' are the same, and so are the maps, and
+ * those of a stop between. */
+TEST(infer_rmse_of_the_ends_alone)
+{
+    static float image[SIDE * SIDE * 3], maps[VALUES], other[VALUES];
+    static unsigned char mask[SIDE * SIDE];
+    nn_arch coarse = tiny();
+    coarse.coarse_steps = 2, coarse.coarse_size = 16, coarse.coarse_width = 6, coarse.coarse_gru = 3;
+    lgd_model *const model[2] = {load(tiny()), load(coarse)};
+    lgd_error e;
+    make_image(image, SIDE);
+    memset(mask, 1, sizeof mask);
+    for (int way = 0; way < 4; way++) {
+        lgd_model *m = model[way / 2];
+        const int tiles = way % 2;
+        for (int stop = -1; stop < T; stop++) {
+            trace all = {.stop_at = stop}, ends = all;
+            const lgd_options every = {.iterations = T,
+                                       .progress = record,
+                                       .user = &all,
+                                       .every_rmse = 1,
+                                       .mask = tiles ? mask : NULL},
+                              few = {.iterations = T, .progress = record, .user = &ends, .mask = every.mask};
+            CHECK(!lgd_estimate(m, image, SIDE, &every, maps, &e) && !lgd_estimate(m, image, SIDE, &few, other, &e),
+                  "%s", e.message);
+            CHECK(!memcmp(maps, other, sizeof maps), "tiles %d, stopped at %d: other maps", tiles, stop);
+            CHECK(all.calls == ends.calls && ends.calls == (stop < 0 ? T : stop) + 1,
+                  "tiles %d, stopped at %d: %d calls", tiles, stop, ends.calls);
+            for (int i = 0; i < ends.calls; i++) {
+                const bool end = i == 0 || i == T;
+                CHECK(end ? ends.rmse[i] == all.rmse[i] : isnan(ends.rmse[i]), "tiles %d, step %d: %g, not %g", tiles,
+                      i, ends.rmse[i], all.rmse[i]);
+            }
+        }
+    }
+    for (int i = 0; i < 2; i++) lgd_free(&(lgd_model *){model[i]});
+}
+
+TEST(infer_stopping_at_a_step_is_asking_for_that_many)
+{
+    static float image[SIDE * SIDE * 3], stopped[VALUES], asked[VALUES], previous[VALUES];
+    lgd_model *m = load(tiny());
+    make_image(image, SIDE);
+    for (int n = 0; n < T; n++) {
+        trace t = {.stop_at = n};
+        run(m, image, SIDE, T, 1, &t, stopped);
+        CHECK(t.calls == n + 1, "%d calls after a stop at %d", t.calls, n);
+        run(m, image, SIDE, n, 1, NULL, asked);
+        CHECK(memcmp(stopped, asked, sizeof asked) == 0, "stopped at %d differs from %d iterations", n, n);
+        CHECK(n == 0 || memcmp(asked, previous, sizeof asked) != 0, "step %d changes nothing", n);
+        memcpy(previous, asked, sizeof asked);
+    }
+    lgd_free(&m);
+}

@@ -1,0 +1,204 @@
+#include "autograd/tape.h"
+#include "ops.h"
+#include "tensor/conv/conv.h"
+#include "tensor/cpu.h"
+#include "tensor/rng.h"
+#include "tensor/threads.h"
+#include "tests/test.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static float *values(size_t count, ts_rng *r)
+{
+    float *p = malloc(count * sizeof(float));
+    CHECK(p, "no memory");
+    for (size_t i = 0; i < count; i++) p[i] = r ? ts_rng_range(r, -1, 1) : NAN;
+    return p;
+}
+
+static size_t count_y(const ts_conv *c) { return (size_t)c->n * (size_t)c->h * (size_t)c->w * (size_t)c->oc; }
+static size_t count_x(const ts_conv *c) { return (size_t)c->n * (size_t)c->h * (size_t)c->w * (size_t)c->ic; }
+
+static float *run(const ts_conv *c, const float *x, const float *weight, const float *bias, float leak)
+{
+    enum { GUARD = 64 };
+    float *packed = values(ts_conv_packed_count(c, TS_CONV_WINOGRAD), NULL), *y = values(count_y(c) + 2 * GUARD, NULL);
+    ts_conv_pack(c, TS_CONV_WINOGRAD, weight, packed);
+    ts_conv_forward_winograd(c, x, packed, bias, leak, y + GUARD);
+    for (int i = 0; i < GUARD; i++)
+        CHECK(isnan(y[i]) && isnan(y[GUARD + count_y(c) + (size_t)i]), "written %d floats outside y", i);
+    memmove(y, y + GUARD, count_y(c) * sizeof(float));
+    free(packed);
+    return y;
+}
+
+/* Errors relative to the sum of the sizes of all products, which is what rounding is in proportion to. */
+static void against_naive(ts_conv c, ts_rng *r)
+{
+    static const float leaks[] = {1, 0.2f, 0};
+    const float leak = leaks[ts_rng_int(r, 3)];
+    float *x = values(count_x(&c), r), *weight = values((size_t)c.ic * (size_t)c.oc * 9, r),
+          *bias = values((size_t)c.oc, r), *naive = values(count_y(&c), NULL);
+    for (int b = 0; b < 2; b++) {
+        float *y = run(&c, x, weight, b ? bias : NULL, leak);
+        ts_conv_forward_naive(&c, x, weight, b ? bias : NULL, leak, naive);
+        double error = 0, size = 0;
+        for (size_t i = 0; i < count_y(&c); i++) {
+            CHECK(fabs((double)y[i] - naive[i]) <= 2e-6 * (4 + 9.0 * c.ic),
+                  "%s: n %d, %d x %d, %d to %d, dilation %d, %s: value %zu is %.9g, naive %.9g",
+                  ts_isa_name(ts_isa_now()), c.n, c.h, c.w, c.ic, c.oc, c.dilation,
+                  c.pad == TS_PAD_ZERO ? "zero" : "replicate", i, y[i], naive[i]);
+            error += ((double)y[i] - naive[i]) * ((double)y[i] - naive[i]);
+            size += (double)naive[i] * naive[i];
+        }
+        CHECK(error <= 1e-10 * size, "relative error %.3g", sqrt(error / size));
+        free(y);
+    }
+    free(x), free(weight), free(bias), free(naive);
+}
+
+/* Relative to the largest, a sum of count products of values in [-1, 1]; and over all. */
+static void close_to(const float *a, const float *naive, size_t n, double count, const char *what, const ts_conv *c)
+{
+    double error = 0, size = 0;
+    for (size_t i = 0; i < n; i++) {
+        CHECK(fabs((double)a[i] - naive[i]) <= 2e-6 * (4 + count),
+              "%s: %s, n %d, %d x %d, %d to %d, %d constants, dilation %d, %s: value %zu is %.9g, naive %.9g",
+              ts_isa_name(ts_isa_now()), what, c->n, c->h, c->w, c->ic, c->oc, c->constants, c->dilation,
+              c->pad == TS_PAD_ZERO ? "zero" : "replicate", i, a[i], naive[i]);
+        error += ((double)a[i] - naive[i]) * ((double)a[i] - naive[i]);
+        size += (double)naive[i] * naive[i];
+    }
+    CHECK(error <= 1e-10 * size, "%s: relative error %.3g", what, sqrt(error / size));
+}
+
+static float *data_gradient(const ts_conv *c, const float *dy, const float *weight, const float *start)
+{
+    enum { GUARD = 64 };
+    const size_t count = count_x(c) / (size_t)c->ic * (size_t)ts_conv_variables(c);
+    float *packed = values(ts_conv_packed_count(c, TS_CONV_DATA_GRADIENT_WINOGRAD), NULL),
+          *dx = values(count + 2 * GUARD, NULL);
+    if (start) memcpy(dx + GUARD, start, count * sizeof(float));
+    ts_conv_pack(c, TS_CONV_DATA_GRADIENT_WINOGRAD, weight, packed);
+    ts_conv_data_gradient_winograd(c, dy, packed, dx + GUARD, start != NULL);
+    for (int i = 0; i < GUARD; i++)
+        CHECK(isnan(dx[i]) && isnan(dx[GUARD + count + (size_t)i]), "written %d floats outside dx", i);
+    memmove(dx, dx + GUARD, count * sizeof(float));
+    free(packed);
+    return dx;
+}
+
+static void gradients_against_naive(ts_conv c, ts_rng *r)
+{
+    const size_t weights = (size_t)c.ic * (size_t)c.oc * 9;
+    float *x = values(count_x(&c), r), *weight = values(weights, r), *dy = values(count_y(&c), r),
+          *naive = values(count_x(&c), NULL);
+    for (int i = 0; i < 4; i++) {
+        ts_conv now = c;
+        now.constants = i / 2 ? c.ic / 2 : 0; /* of a single channel none */
+        float *dx = data_gradient(&now, dy, weight, i % 2 ? x : NULL);
+        memcpy(naive, x, count_x(&c) * sizeof(float));
+        ts_conv_data_gradient_naive(&now, dy, weight, naive, i % 2);
+        close_to(dx, naive, count_x(&c) / (size_t)c.ic * (size_t)ts_conv_variables(&now), 9.0 * 9 * c.oc,
+                 i % 2 ? "added data gradient" : "data gradient", &now);
+        free(dx);
+    }
+    float *dweight = values(weights, NULL), *expected = values(weights, NULL);
+    memcpy(dweight, weight, weights * sizeof(float)); /* added to what is there */
+    memcpy(expected, weight, weights * sizeof(float));
+    ts_conv_weight_gradient_winograd(&c, x, dy, dweight);
+    ts_conv_weight_gradient_naive(&c, x, dy, expected, NULL);
+    close_to(dweight, expected, weights, (double)c.n * c.h * c.w, "weight gradient", &c);
+    free(x), free(weight), free(dy), free(naive), free(dweight), free(expected);
+}
+
+static void over_shapes(void (*check)(ts_conv c, ts_rng *r), uint64_t seed)
+{
+    static const int channels[] = {1, 3, 15, 16, 17, 20, 33, 40}, sizes[] = {1, 2, 3, 4, 5, 7, 9, 12, 13, 18, 23};
+    ts_rng r = ts_rng_make(seed, TS_STREAM_TEST, 0);
+    for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
+        ts_isa_use((ts_isa)isa);
+        for (int i = 0; i < 80; i++)
+            check((ts_conv){1 + ts_rng_int(&r, 2), sizes[ts_rng_int(&r, 11)], sizes[ts_rng_int(&r, 11)],
+                            channels[ts_rng_int(&r, 8)], channels[ts_rng_int(&r, 8)], 3, 1 + ts_rng_int(&r, 2),
+                            ts_rng_int(&r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE, 0},
+                  &r);
+        check((ts_conv){1, 43, 29, 64, 64, 3, 1, TS_PAD_ZERO, 0}, &r);
+        check((ts_conv){1, 24, 37, 32, 70, 3, 2, TS_PAD_REPLICATE, 0}, &r);
+    }
+}
+
+TEST(winograd_naive) { over_shapes(against_naive, 11); }
+TEST(winograd_gradients_naive) { over_shapes(gradients_against_naive, 14); }
+
+TEST(winograd_same_bytes_for_any_threads)
+{
+    static const int threads[] = {1, 2, 3};
+    const ts_conv c = {2, 37, 31, 33, 40, 3, 2, TS_PAD_REPLICATE, 0};
+    ts_rng r = ts_rng_make(12, TS_STREAM_TEST, 0);
+    const size_t weights = (size_t)c.ic * (size_t)c.oc * 9, count[3] = {count_y(&c), count_x(&c), weights};
+    float *x = values(count_x(&c), &r), *weight = values(weights, &r), *dy = values(count_y(&c), &r), *first[3] = {0};
+    for (int t = 0; t < 3; t++) {
+        ts_threads_set(threads[t]);
+        float *dweight = calloc(weights, sizeof *dweight);
+        ts_conv_weight_gradient_winograd(&c, x, dy, dweight);
+        float *now[3] = {run(&c, x, weight, NULL, 1), data_gradient(&c, dy, weight, NULL), dweight};
+        for (int i = 0; i < 3; i++) {
+            CHECK(!first[i] || memcmp(first[i], now[i], count[i] * sizeof(float)) == 0,
+                  "%d: other bytes with %d threads", i, threads[t]);
+            if (first[i]) free(now[i]);
+            else first[i] = now[i];
+        }
+    }
+    for (int i = 0; i < 3; i++) free(first[i]);
+    free(x), free(weight), free(dy);
+}
+
+/* ag_conv takes Winograd's way only when it was allowed; and its gradients do. */
+TEST(winograd_in_ag_conv)
+{
+    enum { Y, DX, DWEIGHT, RESULTS };
+    const ts_conv c = {1, 128, 68, 24, 32, 3, 1, TS_PAD_REPLICATE, 0};
+    const size_t weights = (size_t)c.ic * (size_t)c.oc * 9, count[RESULTS] = {count_y(&c), count_x(&c), weights};
+    static const char *const names[] = {"y", "dx", "dweight"};
+    ts_rng r = ts_rng_make(13, TS_STREAM_TEST, 0);
+    float *x = values(count_x(&c), &r), *weight = values(weights, &r), *mix = values((size_t)c.oc, &r),
+          *result[3][RESULTS];
+    CHECK(ts_conv_exact(), "direct is not the default");
+    CHECK(ts_conv_winograd(&c, TS_CONV_WINOGRAD) && ts_conv_winograd(&c, TS_CONV_DATA_GRADIENT_WINOGRAD) &&
+              ts_conv_winograd_weights(&c),
+          "this shape should pay");
+    for (int i = 0; i < 3; i++) {
+        ts_status st = {0};
+        ag_tape *tape = ag_tape_create(true, &st);
+        CHECK(tape, "%s", st.message);
+        ts_conv_exact_set(i != 1);
+        float *dx = calloc(count[DX], sizeof *dx), *dweight = calloc(weights, sizeof *dweight);
+        ag_value *in = ag_parameter(tape, ts_view(x, (ts_shape){c.n, c.h, c.w, c.ic}), dx);
+        ag_value *y = ag_conv(tape, in, ag_parameter(tape, ts_view(weight, (ts_shape){c.oc, c.ic, 3, 3}), dweight),
+                              NULL, c.dilation, c.pad, 1);
+        CHECK(y, "%s", ag_status(tape)->message);
+        ag_value *loss = ag_linear(tape, ag_channel_mean(tape, ag_tanh(tape, y)),
+                                   ag_constant(tape, ts_view(mix, (ts_shape){1, 1, 1, c.oc})), NULL);
+        CHECK(ag_backward(tape, loss) == TS_OK, "%s", ag_status(tape)->message);
+        result[i][Y] = values(count[Y], NULL), result[i][DX] = dx, result[i][DWEIGHT] = dweight;
+        memcpy(result[i][Y], y->t.data, count[Y] * sizeof(float));
+        ag_tape_destroy(&tape);
+    }
+    ts_conv_exact_set(true);
+    for (int k = 0; k < RESULTS; k++) {
+        CHECK(memcmp(result[0][k], result[2][k], count[k] * sizeof(float)) == 0, "%s: direct again, but other bytes",
+              names[k]);
+        CHECK(memcmp(result[0][k], result[1][k], count[k] * sizeof(float)) != 0, "%s: allowed, but not used", names[k]);
+        double size = 0, error = 0;
+        for (size_t i = 0; i < count[k]; i++) {
+            const double e = fabs((double)result[0][k][i] - result[1][k][i]), s = fabs((double)result[0][k][i]);
+            error = e > error ? e : error, size = s > size ? s : size;
+        }
+        printf("  %s: largest difference over largest value %.2g\n", names[k], error / size);
+        CHECK(error <= 1e-4 * size, "%s: %g off, the largest value is %g", names[k], error, size);
+        for (int i = 0; i < 3; i++) free(result[i][k]);
+    }
+    free(x), free(weight), free(mix);
+}

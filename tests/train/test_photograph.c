@@ -1,0 +1,173 @@
+/* The photographs that training sees: one under the flash, or several under the configurations of a capture. */
+#include "data/camera.h"
+#include "render/render.h"
+#include "tensor/maps.h"
+#include "tensor/threads.h"
+#include "tests/test.h"
+#include "train/trainer_internal.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIZE = 24, COUNT = 3, NUMBER = 5, PIXELS = SIZE * SIZE };
+static float maps[COUNT][PIXELS * MAP_CHANNELS], one[COUNT][PIXELS * 3], many[COUNT][NUMBER][PIXELS * 3],
+    again[COUNT][NUMBER][PIXELS * 3];
+
+static void make(void)
+{
+    io_procedural p = {.seed = 2};
+    for (int i = 0; i < COUNT; i++) {
+        io_material m = {.size = SIZE, .maps = maps[i]};
+        io_procedural_make(&p, (uint64_t)i, &m);
+    }
+}
+
+static tr_config without_faults(void)
+{
+    tr_config c = tr_config_default();
+    c.data.noise = c.data.noise_spread = c.data.blur = c.data.exposure = c.data.vignette = c.data.white_balance =
+        c.data.tilt = c.data.off_centre = 0;
+    c.data.quantise = false;
+    c.data.jpeg = 0;
+    return c;
+}
+
+TEST(capture_has_nine_different_lights_and_begins_with_the_flash)
+{
+    const rd_view flash = rd_flash(), first = rd_capture_view(0);
+    CHECK(!memcmp(first.light, flash.light, sizeof flash.light) && first.power == flash.power,
+          "configuration 0 is not the flash");
+    float sum[2] = {0};
+    for (int i = 0; i < RD_CAPTURE_VIEWS; i++) {
+        const rd_view a = rd_capture_view(i);
+        CHECK(a.kind == RD_POINT && a.light[2] == RD_FLASH_DISTANCE && !memcmp(a.camera, flash.camera, sizeof a.camera),
+              "configuration %d", i);
+        for (int k = 0; k < 2; k++) sum[k] += a.light[k];
+        for (int j = 0; j < i; j++) {
+            const rd_view b = rd_capture_view(j);
+            CHECK(hypotf(a.light[0] - b.light[0], a.light[1] - b.light[1]) > 0.59f,
+                  "configurations %d and %d have one light", i, j);
+        }
+    }
+    CHECK(sum[0] == 0 && sum[1] == 0 && rd_capture_view(1).light[0] > 0 && rd_capture_view(3).light[1] > 0,
+          "they are not around the centre");
+}
+
+/* Its number, by its light. */
+static int configuration(const rd_view *v)
+{
+    for (int i = 0; i < RD_CAPTURE_VIEWS; i++) {
+        const rd_view c = rd_capture_view(i);
+        if (!memcmp(c.light, v->light, sizeof c.light)) return i;
+    }
+    CHECK(false, "a light at %g, %g", (double)v->light[0], (double)v->light[1]);
+    return 0;
+}
+
+TEST(capture_draws_the_flash_and_every_subset_of_the_others_alike)
+{
+    ts_rng r = ts_rng_make(1, TS_STREAM_TEST, 0);
+    int seen[RD_CAPTURE_VIEWS] = {0};
+    for (int trial = 0; trial < 3600; trial++) {
+        rd_view views[RD_CAPTURE_VIEWS];
+        int mask = 0;
+        const int count = 1 + trial % RD_CAPTURE_VIEWS;
+        rd_capture_draw(&r, count, views);
+        for (int i = 0; i < count; i++) {
+            const int c = configuration(&views[i]);
+            CHECK(!(mask >> c & 1) && (c == 0) == (i == 0), "configuration %d comes as number %d", c, i);
+            mask |= 1 << c;
+            seen[c]++;
+        }
+    }
+    for (int i = 1; i < RD_CAPTURE_VIEWS; i++)
+        CHECK(abs(seen[i] - 1800) < 150, "configuration %d was drawn %d times", i, seen[i]);
+}
+
+TEST(photographs_are_the_clamped_renderings_without_faults)
+{
+    make();
+    const tr_config c = without_faults();
+    rd_view views[COUNT][NUMBER];
+    for (int i = 0; i < COUNT; i++)
+        for (int k = 0; k < NUMBER; k++) views[i][k] = rd_capture_view((3 * i + 2 * k) % RD_CAPTURE_VIEWS);
+    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, many[0][0]);
+    for (int i = 0; i < COUNT; i++)
+        for (int k = 0; k < NUMBER; k++) {
+            rd_render(rd_grid_full(SIZE), maps[i], MAP_CHANNELS, &views[i][k], true, one[0]);
+            CHECK(!memcmp(one[0], many[i][k], sizeof one[0]), "photograph %d of material %d is another", k, i);
+        }
+}
+
+TEST(photographs_under_the_flash_are_the_single_ones)
+{
+    make();
+    const tr_config c = tr_config_default();
+    rd_view flash[COUNT];
+    for (int i = 0; i < COUNT; i++) flash[i] = rd_flash();
+    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], NULL, 1, one[0]);
+    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], flash, 1, many[0][0]);
+    CHECK(!memcmp(one, many[0], sizeof one), "one flash photograph of each differs from the flash's own");
+    tr_photographs(&c, 1, 9, 1, SIZE, maps[2], NULL, 1, many[0][0]);
+    CHECK(!memcmp(one[2], many[0][0], sizeof one[2]), "a photograph depends on the batch that it comes in");
+}
+
+TEST(capture_order_is_that_of_the_views)
+{
+    ts_rng r = ts_rng_make(4, TS_STREAM_TEST, 0);
+    for (int trial = 0; trial < 50; trial++) {
+        const int count = 1 + trial % RD_CAPTURE_VIEWS;
+        rd_view views[RD_CAPTURE_VIEWS], shuffled[RD_CAPTURE_VIEWS];
+        int order[RD_CAPTURE_VIEWS];
+        rd_capture_draw(&r, count, views);
+        for (int i = 0; i < count; i++) {
+            const int to = ts_rng_int(&r, i + 1);
+            shuffled[i] = shuffled[to];
+            shuffled[to] = views[i];
+        }
+        rd_capture_order(shuffled, count, order);
+        for (int i = 0; i < count; i++)
+            CHECK(!memcmp(views[i].light, shuffled[order[i]].light, sizeof views[i].light),
+                  "view %d of %d depends on the order that is given", i, count);
+    }
+}
+
+TEST(capture_views_are_the_flash_or_different_configurations)
+{
+    rd_view flash = rd_flash(), views[COUNT][NUMBER], alone[NUMBER];
+    tr_capture_views(1, 7, COUNT, 1, views[0]);
+    CHECK(!memcmp(views[0][0].light, flash.light, sizeof flash.light) &&
+              !memcmp(views[0][2].light, flash.light, sizeof flash.light),
+          "one photograph is not the flash's");
+    tr_capture_views(1, 7, COUNT, NUMBER, views[0]);
+    tr_capture_views(1, 9, 1, NUMBER, alone);
+    bool differ = false;
+    for (int k = 0; k < NUMBER; k++) {
+        CHECK(!memcmp(alone[k].light, views[2][k].light, sizeof alone[k].light),
+              "a material's configurations depend on its batch");
+        differ = differ || memcmp(views[0][k].light, views[1][k].light, sizeof alone[k].light);
+        for (int j = 0; j < k; j++)
+            CHECK(memcmp(views[0][j].light, views[0][k].light, sizeof alone[k].light),
+                  "configurations %d and %d are one", j, k);
+    }
+    CHECK(differ, "two materials have the same configurations");
+}
+
+TEST(photographs_have_their_own_faults_for_any_number_of_threads)
+{
+    make();
+    const tr_config c = tr_config_default();
+    rd_view views[COUNT][NUMBER];
+    for (int i = 0; i < COUNT; i++)
+        for (int k = 0; k < NUMBER; k++) views[i][k] = rd_flash();
+    for (int threads = 1; threads <= 3; threads++) {
+        ts_threads_set(threads);
+        tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, threads == 1 ? many[0][0] : again[0][0]);
+        CHECK(threads == 1 || !memcmp(many, again, sizeof many), "%d threads make other bytes", threads);
+    }
+    ts_threads_set(0);
+    for (int i = 0; i < COUNT; i++)
+        for (int k = 1; k < NUMBER; k++)
+            CHECK(memcmp(many[i][0], many[i][k], sizeof many[i][0]),
+                  "photographs 0 and %d of material %d have the same faults", k, i);
+}

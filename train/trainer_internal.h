@@ -1,0 +1,78 @@
+/* What the trainer's files share. */
+#ifndef TR_PARTS_H
+#define TR_PARTS_H
+#include "data/loader.h"
+#include "nn/adam.h"
+#include "train/trainer.h"
+
+enum { TR_PATH = 1200 }; /* a folder and one of our names */
+
+/* The fixed materials of validation. */
+typedef struct tr_validator {
+    float *maps;       /* [count][size][size][9], owned */
+    float *images;     /* [count][arch.images][size][size][3], owned */
+    rd_view *captures; /* [count][arch.images], owned */
+    rd_view *views;    /* [count][RD_EVAL_VIEWS], owned */
+    nn_model *model;   /* holds what is validated: the moving average, or a copy of the weights */
+    ag_tape *tape;     /* without gradients */
+} tr_validator;
+
+struct tr_trainer {
+    tr_config config;
+    char folder[1024];
+    tr_listener listener;
+    int lock; /* descriptor, -1: none */
+    nn_model *model;
+    nn_adam adam;
+    ag_tape *tape;
+    io_loader *loader;
+    float *images;     /* [batch][given][patch][patch][3], given <= arch.images */
+    rd_view *captures; /* [batch][given] */
+    rd_view *views;    /* [batch][RD_LOSS_VIEWS] */
+    tr_validator validator;
+    FILE *log, *validation_log;
+    int64_t step;      /* steps made */
+    int64_t skipped;   /* of them without an update */
+    int in_a_row;      /* of those, the latest without one that worked */
+    double usual_norm; /* of the gradient, a moving average */
+    double best;       /* least validated error in this phase; infinity: none yet */
+    int64_t best_step;
+};
+
+void tr_path(const tr_trainer *t, const char *name, char path[TR_PATH]);
+void tr_note(const tr_trainer *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
+int64_t tr_total(const tr_config *c);
+bool tr_pretraining(const tr_config *c, int64_t step); /* whether the step after that many belongs to the first phase */
+double tr_seconds(void);
+const float *tr_weights(const tr_trainer *t); /* what is validated and saved */
+
+/* photograph.c: number photographs of each material [count][size][size][9] as [data] says, images
+ * [count][number][size][size][3], under views [count][number] of kind RD_POINT whose camera looks straight down (NULL:
+ * the flash for all); index: of the first material, for the camera's faults, of which every photograph has its own. */
+void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
+                    const rd_view *views, int number, float *images);
+/* The views of number photographs of each of count materials, [count][number], drawn for each material
+ * (rd_capture_draw): one is the flash. */
+void tr_capture_views(uint64_t seed, uint64_t index, int count, int number, rd_view *views);
+
+/* step.c. One step; t->step counts it. Returns an error only where the run cannot go on (a skipped step is none). */
+ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st);
+
+/* validate.c */
+ts_code tr_validator_create(tr_trainer *t, ts_status *st);
+void tr_validator_free(tr_validator *v);
+ts_code tr_validate(tr_trainer *t, tr_validation *out, ts_status *st);
+
+/* checkpoint.c: the trainer's state in the folder. tr_resume fails with TS_INVALID naming the key when the
+ * configuration differs. */
+ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st);
+ts_code tr_save_weights(tr_trainer *t, const char *name, ts_status *st);
+ts_code tr_resume(tr_trainer *t, ts_status *st);
+
+/* log.c: opens both logs, without the rows after t->step. */
+ts_code tr_log_open(tr_trainer *t, ts_status *st);
+ts_code tr_log_row(tr_trainer *t, const tr_row *row, ts_status *st);
+ts_code tr_log_validation(tr_trainer *t, const tr_validation *v, ts_status *st);
+ts_code tr_log_flush(tr_trainer *t, ts_status *st);
+void tr_log_close(tr_trainer *t);
+#endif
