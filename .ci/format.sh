@@ -4,11 +4,11 @@
 # asked (Debian 12; elsewhere `pip install clang-format==14.0.6`); without it that half is skipped by name.
 cd "$(dirname "$0")/.." || exit 1
 sources=$(git ls-files '*.c' '*.h' '*.cpp')
-long=$(awk 'length > 120 { print FILENAME ":" FNR ": " length " columns, the most are 120" }' $sources)
-[ -z "$long" ] || { echo "$long" >&2; exit 1; }
 for format in clang-format-14 clang-format none; do
     case $("$format" --version 2>/dev/null) in *" version 14."*) break ;; esac
 done
+[ "${1:-}" = fix ] && [ "$format" != none ] && "$format" -i $sources
+long=$(awk 'length > 120 { print FILENAME ":" FNR ": " length " columns, the most are 120" }' $sources)
+[ -z "$long" ] || { echo "$long" >&2; exit 1; }
 [ "$format" = none ] && { echo "skip format: clang-format 14 is not installed" >&2; exit 0; }
-[ "${1:-}" = fix ] && exec "$format" -i $sources
 "$format" --dry-run --Werror $sources

@@ -1,4 +1,4 @@
-/* y[p,:] = x[p, 0 .. C'-1];   dx = dy in those channels, 0 in the others
+/* y[p,:] = x[p, first .. first + C'-1];   dx = dy in those channels, 0 in the others
  * x: [N,H,W,C], y: [N,H,W,C'] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
@@ -6,23 +6,27 @@
 #include <string.h>
 
 #ifdef AG_API
-/* The first count channels of x [N,H,W,C]: [N,H,W,count]. */
-ag_value *ag_channels(ag_tape *tape, ag_value *x, int count);
+/* count channels of x [N,H,W,C] from first on: [N,H,W,count]. */
+ag_value *ag_channels(ag_tape *tape, ag_value *x, int first, int count);
 #endif
+
+static int first_of(const ag_node *node) { return *(const int *)node->attr; }
 
 static void forward(ag_tape *tape, ag_node *node)
 {
     (void)tape;
+    const int first = first_of(node);
     const int c = node->in[0]->t.shape.c, d = node->out->t.shape.c;
     const int64_t pixels = ts_pixels(node->out->t.shape);
     const float *x = node->in[0]->t.data;
     float *y = node->out->t.data;
 #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels * d > AG_CHUNK)
-    for (int64_t p = 0; p < pixels; p++) memcpy(y + p * d, x + p * c, (size_t)d * sizeof *y);
+    for (int64_t p = 0; p < pixels; p++) memcpy(y + p * d, x + p * c + first, (size_t)d * sizeof *y);
 }
 
 static void backward(ag_tape *tape, ag_node *node)
 {
+    const int first = first_of(node);
     const int c = node->in[0]->t.shape.c, d = node->out->t.shape.c;
     const int64_t pixels = ts_pixels(node->out->t.shape);
     const float *dy = node->out->grad;
@@ -32,7 +36,7 @@ static void backward(ag_tape *tape, ag_node *node)
 #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels * d > AG_CHUNK)
     for (int64_t p = 0; p < pixels; p++)
         for (int i = 0; i < c; i++) {
-            const float g = i < d ? dy[p * d + i] : 0;
+            const float g = i >= first && i < first + d ? dy[p * d + i - first] : 0;
             dx[p * c + i] = accumulate ? dx[p * c + i] + g : g;
         }
 }
@@ -40,12 +44,13 @@ static void backward(ag_tape *tape, ag_node *node)
 static void reference(const ag_node *node, const double *const *in, double *out)
 {
     const int c = node->in[0]->t.shape.c, d = node->out->t.shape.c;
-    for (int64_t q = 0; q < ts_count(node->out->t.shape); q++) out[q] = in[0][q / d * c + q % d];
+    for (int64_t q = 0; q < ts_count(node->out->t.shape); q++) out[q] = in[0][q / d * c + first_of(node) + q % d];
 }
 
 static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
 {
-    return ag_channels(tape, in[0], *(const int *)user);
+    const int *range = user;
+    return ag_channels(tape, in[0], range[0], range[1]);
 }
 
 static void cases(ag_gradcheck *check)
@@ -53,27 +58,23 @@ static void cases(ag_gradcheck *check)
     ts_rng *r = ag_gradcheck_rng(check);
     for (int i = 0; i < 5; i++) {
         const ts_shape s = {1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 6), 1 + ts_rng_int(r, 6), 1 + ts_rng_int(r, 12)};
-        const int count = i ? 1 + ts_rng_int(r, s.c) : s.c;
-        ag_case c = {.label = i ? "random" : "all",
-                     .inputs = 1,
-                     .shape = {s},
-                     .lo = -1,
-                     .hi = 1,
-                     .build = build,
-                     .user = &count};
+        const int first = i ? ts_rng_int(r, s.c) : 0, range[2] = {first, i ? 1 + ts_rng_int(r, s.c - first) : s.c};
+        ag_case c = {
+            .label = i ? "random" : "all", .inputs = 1, .shape = {s}, .lo = -1, .hi = 1, .build = build, .user = range};
         ag_gradcheck_run(check, &c);
     }
 }
 
 const ag_op op_channels = {"channels", forward, backward, reference, cases};
 
-ag_value *ag_channels(ag_tape *tape, ag_value *x, int count)
+ag_value *ag_channels(ag_tape *tape, ag_value *x, int first, int count)
 {
     char text[AG_SHAPE_TEXT];
     if (!ag_ready(tape, "channels", 1, &x)) return NULL;
     ts_shape s = x->t.shape;
-    if (count < 1 || count > s.c)
-        return ag_fail(tape, TS_INVALID, "channels: %s has no %d channels", ag_shape_text(text, s), count);
+    if (first < 0 || count < 1 || count > s.c - first)
+        return ag_fail(tape, TS_INVALID, "channels: %s has no channels %d to %d", ag_shape_text(text, s), first,
+                       first + count - 1);
     s.c = count;
-    return ag_apply(tape, &op_channels, 1, &x, s, NULL, 0);
+    return ag_apply(tape, &op_channels, 1, &x, s, &first, sizeof first);
 }

@@ -257,7 +257,7 @@ ts_code lgd_estimator_run(const lgd_estimator *e, const lgd_photo *photo, int ph
     float *proposed = NULL;
     ts_code code = TS_OK;
     if (o->power && e->net->arch.compat == NN_COMPAT_NONE) {
-        const size_t size = (size_t)e->net->arch.g_size;
+        const size_t size = (size_t)nn_arch_side(&e->net->arch);
         proposed = malloc(size * size * (size_t)e->net->arch.channels * sizeof *proposed);
         if (!proposed) return ts_fail(st, TS_NOMEM, "out of memory");
         code = lgd_fit_power(e->tape, e->net, image, views, photos, side, o->orientations, proposed, o->power, st);

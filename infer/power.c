@@ -46,7 +46,7 @@ static double nearest(size_t values, const float *log_photo, const float *render
 static ts_code fit(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given,
                    int side, int orientations, float *proposed, double *factor, ts_status *st)
 {
-    const int size = model->arch.g_size;
+    const int size = nn_arch_side(&model->arch);
     const rd_grid grid = rd_grid_full(size);
     const size_t values = (size_t)size * (size_t)size * 3, whole = (size_t)side * (size_t)side * 3;
     *factor = 1;

@@ -36,6 +36,8 @@ typedef struct nn_layers {
     nn_layer input_conv, input_global;
     nn_unet_block down[NN_MAX_LEVELS], up[NN_MAX_LEVELS];
     nn_layer output_conv1, output_conv2, output_add;
+    nn_layer detail[5], trunk[NN_MAX_LEVELS][2]; /* nn/detail.c */
+    nn_layer scene[2];                           /* of the deepest global vector */
     nn_refiner h, coarse;
     nn_layer encoder[NN_MAX_LEVELS + 1], code, decoder[NN_MAX_LEVELS + 1][2],
         decoded;   /* the deepest decoder level has one convolution */
@@ -67,12 +69,32 @@ ag_value *nn_conv_beside(ag_tape *tape, const nn_model *model, nn_layer layer, a
                          int dilation, ts_pad pad, float leak);
 ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x);
 
-/* g on its own input: x [N, g_size, g_size, 3 images] log-encoded -> [N, g_size, g_size, channels] in [-1, 1]. */
-ag_value *nn_unet(ag_tape *tape, const nn_model *model, ag_value *x);
+/* Channels of what is known of a photograph, for each pixel: the view direction's x and y and 1, or three zeros where
+ * the camera's place is not known; the same of the light; the light's power over the square of its height, in stops
+ * above the default flash's, and 1, or two zeros. */
+enum { NN_CONDITIONS = 8, NN_COORDINATES = 2 };
 
-/* The mean of g's maps of x [1, ...] in 2, 4 or 8 of its orientations, each turned back: of a photograph that the light
- * and the camera above its centre show alike in all of them. On a tape without gradients. */
-ag_value *nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *x, int count);
+/* Channels that g's first layers read, and that the last of nn_detail writes: the maps', two of the shading's frame
+ * (render/op_shading_frame.c), and the spreads. */
+int nn_g_reads(const nn_arch *a);
+int nn_detail_writes(const nn_arch *a);
+
+/* Every pixel's place, across and down, in -1 .. 1: [n, side, side, NN_COORDINATES]. */
+ag_value *nn_coordinates(ag_tape *tape, int n, int side);
+
+/* g on its own input: photo [N, side, side, 3 images] log-encoded, side = nn_arch_side; conditions [N or 1, g_size,
+ * g_size, NN_CONDITIONS images], or NULL where the architecture has none. */
+bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, nn_guess *guess);
+
+/* What R_0 has at the photograph's size beyond the U-Net's coarse maps [N, g_size, g_size, channels], before the tanh:
+ * features [N, g_size, g_size, g_width] of the U-Net, seen: what it read. */
+bool nn_detail(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *seen, ag_value *features,
+               ag_value *coarse, nn_guess *guess);
+
+/* The mean of g's guesses of photo [1, ...] in 2, 4 or 8 of its orientations, each turned back: of a photograph that
+ * the light and the camera above its centre show alike in all of them. On a tape without gradients. */
+bool nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *photo, ag_value *conditions, int count,
+                      nn_guess *guess);
 
 /* h: R_t [N, H, W, channels], its encoded gradients [N, H, W, images channels] (constants) and the states (updated;
  * NULL = zero) -> the change of the maps. to: NULL, or for each new state the value to write it into, which may be the

@@ -9,7 +9,7 @@
 #include <string.h>
 
 /* Parameters of the largest model: 8 levels, two blocks of 11 each, and what lies before and after them. */
-enum { MAX_PARAMS = 4 + 2 * 11 * NN_MAX_LEVELS + 6 + 2 * 14 };
+enum { MAX_PARAMS = 4 + 2 * 11 * NN_MAX_LEVELS + 6 + 2 * 14 + 10 + 4 * NN_MAX_LEVELS + 4 };
 
 static nn_layers *layers_of(const nn_model *m) { return m->layers; }
 
@@ -92,13 +92,41 @@ int nn_level_width(const nn_arch *a, int level)
     return w < a->g_width_max ? (int)w : a->g_width_max;
 }
 
+int nn_g_reads(const nn_arch *a)
+{
+    const int squares = a->g_unshuffle * a->g_unshuffle;
+    return 3 * a->images * squares + (squares > 1 ? NN_COORDINATES : 0) +
+        (a->conditions ? NN_CONDITIONS * a->images : 0);
+}
+
+/* The U-Net's features and what it read, to squares of FINE channels, and these to what is added at the full size. */
+static void plan_detail(nn_model *m)
+{
+    enum { FINE = 12, FINER = 16 };
+    const nn_arch *a = &m->arch;
+    nn_layers *l = m->layers;
+    const double gain = leaky_gain(NN_LEAK_G);
+    l->detail[0] = conv(m, "g.detail.conv1", a->g_detail, nn_g_reads(a), 3, true, gain);
+    l->detail[1] = conv(m, "g.detail.conv2", a->g_detail, a->g_detail + nn_level_width(a, 0), 3, true, gain);
+    l->detail[2] = conv(m, "g.detail.conv3", FINE * a->g_unshuffle * a->g_unshuffle, a->g_detail, 1, true, gain);
+    for (int i = 0; i < a->g_trunk; i++) {
+        char name[64];
+        snprintf(name, sizeof name, "g.trunk%d.conv1", i + 1);
+        l->trunk[i][0] = conv(m, name, a->g_detail, a->g_detail, 3, true, gain);
+        snprintf(name, sizeof name, "g.trunk%d.conv2", i + 1);
+        l->trunk[i][1] = conv(m, name, a->g_detail, a->g_detail, 3, false, 0); /* nothing at first */
+    }
+    l->detail[3] = conv(m, "g.detail.conv4", FINER, FINE + 3 + NN_COORDINATES, 3, true, gain);
+    l->detail[4] = conv(m, "g.detail.conv5", nn_detail_writes(a), FINER, 3, true, 0);
+}
+
 static void plan_g(nn_model *m)
 {
     const nn_arch *a = &m->arch;
     nn_layers *l = m->layers;
     int levels = a->g_levels, w0 = nn_level_width(a, 0);
-    l->input_conv = conv(m, "g.input.conv", w0, 3 * a->images, 3, true, leaky_gain(NN_LEAK_G));
-    l->input_global = linear(m, "g.input.global", w0, 3 * a->images, 1);
+    l->input_conv = conv(m, "g.input.conv", w0, nn_g_reads(a), 3, true, leaky_gain(NN_LEAK_G));
+    l->input_global = linear(m, "g.input.global", w0, nn_g_reads(a), 1);
     for (int i = 1; i <= levels; i++) {
         int in = nn_level_width(a, i - 1), out = nn_level_width(a, i);
         l->down[i - 1] = unet_block(m, "down", i, in, out, out, in, i == 1 ? a->g_kernel_first : a->g_kernel);
@@ -112,6 +140,11 @@ static void plan_g(nn_model *m)
     l->output_conv1 = conv(m, "g.output.conv1", a->channels, w0, 3, true, 1);
     l->output_conv2 = conv(m, "g.output.conv2", a->channels, a->channels, 3, true, 0.25);
     l->output_add = linear(m, "g.output.add", a->channels, w0, 0.25);
+    if (a->g_unshuffle > 1) plan_detail(m);
+    if (!a->scene) return;
+    enum { HIDDEN = 64 };
+    l->scene[0] = linear(m, "g.scene.hidden", HIDDEN, nn_level_width(a, levels), 1);
+    l->scene[1] = linear(m, "g.scene.numbers", 2 * RD_SCENE_NUMBERS, HIDDEN, 0);
 }
 
 /* name: what the parameters' names begin with. */

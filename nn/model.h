@@ -42,6 +42,13 @@ typedef struct nn_arch {
     int g_levels;       /* down blocks, 1 .. 8 */
     int g_kernel_first; /* of the first down block: odd */
     int g_kernel;       /* of all others */
+    int g_unshuffle;    /* r: g reads photographs of r g_size pixels a side, squares of r x r pixels as channels of one,
+                         * and    writes R_0 at that size with what nn/detail.c adds; 1: R_0 has g_size pixels a side */
+    int g_detail;       /* channels of what adds the detail, where g_unshuffle is above 1 */
+    int g_trunk;        /* its residual blocks */
+    bool conditions;    /* g reads what is known of each photograph's camera, light and exposure (nn_known) */
+    bool spread;        /* g says how far each map may be off (nn_guess) */
+    bool scene;         /* g guesses what is not known of camera and light (nn_guess) */
     int g_size;  /* side in pixels that g works at (a multiple of 2^g_levels); a photograph of another size is resampled
                     for g */
     int h_width; /* of h's convolutions; 0: h is what descent lets past it, or, where iterations is 0 or descent none,
@@ -66,6 +73,7 @@ typedef struct nn_arch {
 } nn_arch;
 
 nn_arch nn_arch_default(void);
+int nn_arch_side(const nn_arch *a); /* pixels a side of R_0 */
 ts_code nn_arch_check(const nn_arch *a, ts_status *st);
 bool nn_arch_refines(const nn_arch *a);      /* there is something to do steps with */
 bool nn_arch_refines_full(const nn_arch *a); /* at the photograph's size */
@@ -117,6 +125,14 @@ const nn_param *nn_model_find(const nn_model *model, const char *name);
 /* The parameters of a part alone: [first, last) in floats of the block. */
 void nn_model_range(const nn_model *model, nn_part part, size_t *first, size_t *last);
 
+/* What is known of a photograph's scene: a model with arch.conditions reads it, others assume all of it. */
+typedef enum nn_known {
+    NN_KNOWN_CAMERA = 1, /* its place */
+    NN_KNOWN_LIGHT = 2,  /* its place */
+    NN_KNOWN_POWER = 4,  /* the light's */
+    NN_KNOWN_ALL = 7
+} nn_known;
+
 /* A batch of N materials, each in `given` photographs, one material's after the other's; linear, clamped to [0, 1]. g
  * sees whole photographs, h refines any window of them. */
 typedef struct nn_input {
@@ -125,8 +141,9 @@ typedef struct nn_input {
     rd_view view;    /* of every photograph where views is NULL: the flash */
     ts_tensor whole; /* [N * given, side, side, 3]: the photographs of which image is the window; no data: image is the
                         whole */
-    const rd_view *views; /* [N * given], or NULL */
-    int given;            /* 1 .. arch.images; 0 stands for 1 */
+    const rd_view *views;       /* [N * given], or NULL */
+    const unsigned char *known; /* [N * given] of nn_known: what of views is true; NULL: all of it */
+    int given;                  /* 1 .. arch.images; 0 stands for 1 */
     int orientations; /* 2, 4, 8: R_0 is the mean of g's maps of the photograph in so many orientations (as it is and
                        * turned by a quarter, all quarter turns, and their mirror images), where nn_orients says that
                        * they are alike; on a tape without gradients. 0, 1: as it is */
@@ -135,6 +152,21 @@ typedef struct nn_input {
     bool recompute; /* on a tape with gradients: of each step only R_t and h's states are kept, the rest is computed
                        again for the gradient */
 } nn_input;
+
+/* What g makes of photographs. spread and scene are NULL where the architecture does not have them. */
+typedef struct nn_guess {
+    ag_value *maps;   /* R_0, [N, side, side, channels], side = nn_arch_side */
+    ag_value *spread; /* [N, side, side, NN_SPREADS]: the logarithm of the expected absolute error of diffuse, normal,
+                       * roughness and F0, in the encoding of tensor/maps.h, over NN_SPREAD_UNIT */
+    ag_value *scene;  /* [N, 1, 1, 2 RD_SCENE_NUMBERS]: render/scene.h's numbers of the photograph, then the logarithms
+                       * of their expected absolute errors */
+} nn_guess;
+enum { NN_SPREADS = 4 };
+#define NN_SPREAD_UNIT 0.1f
+extern const signed char nn_spread_of[]; /* of each of MAP_CHANNELS channels */
+
+/* False after an error, which the tape has. */
+bool nn_guess_from(ag_tape *tape, const nn_model *model, const nn_input *in, nn_guess *guess);
 
 /* R_0 by g of the whole: [N, S, S, channels]. Photographs that are not given are black. The log encoding, the
  * resampling to g_size and back are in here. */

@@ -26,36 +26,69 @@ static void normal_back(int k, const float *from, float to[2])
     to[1] = k & 4 ? -x : y;
 }
 
-ag_value *nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *x, int count)
+/* [1, S, S, channels]: the mean over orientations of from [count, S, S, channels], turned back; the vector in two
+ * channels from vector on (-1: there is none) turns with it. */
+static ag_value *mean_back(ag_tape *tape, const ag_value *from, int vector)
 {
-    if (!x) return NULL;
-    const int side = x->t.shape.h, read = x->t.shape.c, channels = model->arch.channels;
+    const int count = from->t.shape.n, side = from->t.shape.h, channels = from->t.shape.c;
     const size_t pixels = (size_t)side * (size_t)side;
     ag_value *mean = ag_empty(tape, (ts_shape){1, side, side, channels});
-    const ts_mark mark = ag_scope_begin(tape);
-    ag_value *all = ag_empty(tape, (ts_shape){count, side, side, read});
-    if (!all || !mean) return NULL;
-    int sy, sx;
-    for (int k = 0; k < count; k++)
-        for (int i = 0; i < side * side; i++) {
-            source(orientations[k], side, i / side, i % side, &sy, &sx);
-            memcpy(all->t.data + ((size_t)k * pixels + (size_t)i) * (size_t)read,
-                   x->t.data + (size_t)(sy * side + sx) * (size_t)read, (size_t)read * sizeof(float));
-        }
-    const ag_value *maps = nn_unet(tape, model, all);
-    if (!maps) return NULL;
+    if (!mean) return NULL;
     memset(mean->t.data, 0, (size_t)ts_count(mean->t.shape) * sizeof(float));
     for (int k = 0; k < count; k++)
         for (int i = 0; i < side * side; i++) {
+            int sy, sx;
             source(orientations[k], side, i / side, i % side, &sy, &sx);
-            const float *from = maps->t.data + ((size_t)k * pixels + (size_t)i) * (size_t)channels;
-            float *to = mean->t.data + (size_t)(sy * side + sx) * (size_t)channels, normal[2];
-            normal_back(orientations[k], from + MAP_NORMAL, normal);
+            const float *x = from->t.data + ((size_t)k * pixels + (size_t)i) * (size_t)channels;
+            float *to = mean->t.data + (size_t)(sy * side + sx) * (size_t)channels, turned[2];
+            if (vector >= 0) normal_back(orientations[k], x + vector, turned);
             for (int c = 0; c < channels; c++) {
-                const bool turns = c == MAP_NORMAL || c == MAP_NORMAL + 1;
-                to[c] += (turns ? normal[c - MAP_NORMAL] : from[c]) / (float)count;
+                const bool turns = vector >= 0 && (c == vector || c == vector + 1);
+                to[c] += (turns ? turned[c - vector] : x[c]) / (float)count;
             }
         }
-    ag_scope_end(tape, mark, NULL, 0);
     return mean;
+}
+
+/* The same of the scene's numbers, of which two pairs are vectors. */
+static ag_value *mean_scene(ag_tape *tape, const ag_value *from)
+{
+    ag_value *mean = ag_empty(tape, (ts_shape){1, 1, 1, from->t.shape.c});
+    if (!mean) return NULL;
+    memset(mean->t.data, 0, (size_t)from->t.shape.c * sizeof(float));
+    for (int k = 0; k < from->t.shape.n; k++) {
+        float x[2 * RD_SCENE_NUMBERS];
+        memcpy(x, from->t.data + (size_t)k * 2 * RD_SCENE_NUMBERS, sizeof x);
+        for (int v = RD_SCENE_LIGHT_X; v <= RD_SCENE_CAMERA_X; v += 2) {
+            const float vector[2] = {x[v], x[v + 1]};
+            normal_back(orientations[k], vector, x + v);
+        }
+        for (int c = 0; c < 2 * RD_SCENE_NUMBERS; c++) mean->t.data[c] += x[c] / (float)from->t.shape.n;
+    }
+    return mean;
+}
+
+bool nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *photo, ag_value *conditions, int count,
+                      nn_guess *guess)
+{
+    if (!photo) return false;
+    const int side = photo->t.shape.h, read = photo->t.shape.c;
+    const size_t pixels = (size_t)side * (size_t)side;
+    const ts_mark mark = ag_scope_begin(tape);
+    ag_value *all = ag_empty(tape, (ts_shape){count, side, side, read});
+    if (!all) return false;
+    for (int k = 0; k < count; k++)
+        for (int i = 0; i < side * side; i++) {
+            int sy, sx;
+            source(orientations[k], side, i / side, i % side, &sy, &sx);
+            memcpy(all->t.data + ((size_t)k * pixels + (size_t)i) * (size_t)read,
+                   photo->t.data + (size_t)(sy * side + sx) * (size_t)read, (size_t)read * sizeof(float));
+        }
+    if (!nn_unet(tape, model, all, conditions, guess)) return false;
+    ag_value *keep[3] = {mean_back(tape, guess->maps, MAP_NORMAL),
+                         guess->spread ? mean_back(tape, guess->spread, -1) : NULL,
+                         guess->scene ? mean_scene(tape, guess->scene) : NULL};
+    ag_scope_end(tape, mark, keep, 3);
+    *guess = (nn_guess){keep[0], keep[1], keep[2]};
+    return !ag_status(tape)->code;
 }

@@ -67,7 +67,7 @@ static bool reduce(ag_tape *tape, const nn_model *model, const nn_input *in, nn_
 {
     if (!nn_input_check(tape, model, in)) return false;
     const ts_tensor *whole = in->whole.data ? &in->whole : &in->image;
-    const int size = model->arch.g_size;
+    const int size = nn_arch_side(&model->arch);
     if (whole->shape.h != whole->shape.w)
         return ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels: g needs a square", whole->shape.w,
                        whole->shape.h),
@@ -90,38 +90,49 @@ bool nn_orients(const nn_model *model, const nn_input *in)
         central(view.light);
 }
 
-/* R_0 of reduced photographs: [N, g_size, g_size, channels]. */
-static ag_value *propose(ag_tape *tape, const nn_model *model, const nn_input *small)
+/* g of reduced photographs. */
+static bool propose(ag_tape *tape, const nn_model *model, const nn_input *small, nn_guess *guess)
 {
     const ts_shape s = small->image.shape;
     const int images = model->arch.images, count = nn_given(small);
     const ts_mark mark = ag_scope_begin(tape);
+    *guess = (nn_guess){0};
     ag_value *x = ag_empty(tape, (ts_shape){s.n / count, s.h, s.w, 3 * images}),
              *each = images == 1 ? x : ag_empty(tape, s);
-    if (!x || !each) return NULL;
+    if (!x || !each) return false;
     rd_log_encode(ts_count(s), small->image.data, each->t.data);
     if (images > 1) side_by_side(&each->t, count, images, x->t.data);
-    ag_value *maps = small->orientations > 1 && !ag_gradients(tape) && nn_orients(model, small)
-        ? nn_unet_oriented(tape, model, x, small->orientations)
-        : nn_unet(tape, model, x);
-    ag_scope_end(tape, mark, &maps, 1);
-    return maps;
+    ag_value *conditions = model->arch.conditions ? nn_conditions(tape, model, small) : NULL;
+    if (model->arch.conditions && !conditions) return false;
+    if (small->orientations > 1 && !ag_gradients(tape) && nn_orients(model, small))
+        nn_unet_oriented(tape, model, x, conditions, small->orientations, guess);
+    else nn_unet(tape, model, x, conditions, guess);
+    ag_value *keep[3] = {guess->maps, guess->spread, guess->scene};
+    ag_scope_end(tape, mark, keep, 3);
+    *guess = (nn_guess){keep[0], keep[1], keep[2]};
+    return !ag_status(tape)->code;
+}
+
+bool nn_guess_from(ag_tape *tape, const nn_model *model, const nn_input *in, nn_guess *guess)
+{
+    nn_input small;
+    return reduce(tape, model, in, &small) && propose(tape, model, &small, guess);
 }
 
 bool nn_coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, nn_coarse *c)
 {
-    nn_input small;
     *c = (nn_coarse){0};
     const ts_mark mark = ag_scope_begin(tape);
     if (in->proposed) {
-        const int size = model->arch.g_size;
+        const int size = nn_arch_side(&model->arch);
         if (!nn_input_check(tape, model, in)) return false;
         c->maps = ag_constant(
             tape,
             ts_view((float *)(uintptr_t)in->proposed, (ts_shape){nn_materials(in), size, size, model->arch.channels}));
     } else {
-        if (!reduce(tape, model, in, &small)) return false;
-        c->maps = propose(tape, model, &small);
+        nn_guess guess;
+        if (!nn_guess_from(tape, model, in, &guess)) return false;
+        c->maps = guess.maps;
     }
     ag_scope_end(tape, mark, &c->maps, 1);
     if (!c->maps) return false;
@@ -131,6 +142,7 @@ bool nn_coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, n
                        .grid = rd_grid_full(whole.shape.h),
                        .view = in->view,
                        .views = in->views,
+                       .known = in->known,
                        .given = in->given,
                        .recompute = in->recompute};
     return true;
@@ -143,7 +155,7 @@ ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in)
     if (!nn_coarse_begin(tape, model, in, &c)) return NULL;
     ag_value *maps = c.maps;
     const int side = c.side;
-    if (side != model->arch.g_size) maps = ag_resize_smooth(tape, maps, side, side);
+    if (side != nn_arch_side(&model->arch)) maps = ag_resize_smooth(tape, maps, side, side);
     ag_scope_end(tape, mark, &maps, 1);
     return maps;
 }

@@ -1,6 +1,7 @@
 /* g: a U-Net with a global track (Deschaintre et al. 2018, as changed by Luo et al. 2024). */
 #include "nn/layers.h"
 #include "ops.h"
+#include <string.h>
 
 #define NORM_EPSILON 1e-5f /* as published; a constant channel becomes zero instead of 0/0 */
 
@@ -17,13 +18,40 @@ static void block(ag_tape *tape, const nn_model *model, const nn_unet_block *b, 
     *global = ag_selu(tape, nn_linear(tape, model, b->global, ag_concat(tape, mean, *global)));
 }
 
-ag_value *nn_unet(ag_tape *tape, const nn_model *model, ag_value *x)
+/* The same for each of n images. */
+static ag_value *repeated(ag_tape *tape, ag_value *x, int n)
+{
+    if (!x || x->t.shape.n == n) return x;
+    ts_shape s = x->t.shape;
+    const size_t one = (size_t)(ts_count(s) / s.n);
+    s.n = n;
+    ag_value *all = ag_empty(tape, s);
+    for (int i = 0; all && i < n; i++) memcpy(all->t.data + (size_t)i * one, x->t.data, one * sizeof(float));
+    return all;
+}
+
+/* What the first layers read: the photograph's pixels at g_size, where they are squares their place, and what is known.
+ */
+static ag_value *seen_by(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions)
+{
+    const int r = model->arch.g_unshuffle, n = photo ? photo->t.shape.n : 0;
+    ag_value *x = photo;
+    if (r > 1) {
+        x = ag_space_to_depth(tape, x, r);
+        x = x ? ag_concat(tape, x, nn_coordinates(tape, n, x->t.shape.h)) : NULL;
+    }
+    return conditions ? ag_concat(tape, x, repeated(tape, conditions, n)) : x;
+}
+
+bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, nn_guess *guess)
 {
     const nn_layers *l = model->layers;
-    int levels = model->arch.g_levels;
+    const int levels = model->arch.g_levels;
+    *guess = (nn_guess){0};
+    ag_value *seen = seen_by(tape, model, photo, conditions);
     ag_value *skip[NN_MAX_LEVELS],
-        *global = ag_selu(tape, nn_linear(tape, model, l->input_global, ag_channel_mean(tape, x)));
-    x = nn_conv(tape, model, l->input_conv, x, 1, TS_PAD_ZERO, NN_LEAK_G);
+        *global = ag_selu(tape, nn_linear(tape, model, l->input_global, ag_channel_mean(tape, seen)));
+    ag_value *x = nn_conv(tape, model, l->input_conv, seen, 1, TS_PAD_ZERO, NN_LEAK_G);
     for (int i = 0; i < levels; i++) {
         skip[i] = x;
         ts_mark mark = ag_scope_begin(tape);
@@ -33,6 +61,8 @@ ag_value *nn_unet(ag_tape *tape, const nn_model *model, ag_value *x)
         x = keep[0];
         global = keep[1];
     }
+    if (model->arch.scene)
+        guess->scene = nn_linear(tape, model, l->scene[1], ag_selu(tape, nn_linear(tape, model, l->scene[0], global)));
     for (int i = 0; i < levels; i++) {
         ts_mark mark = ag_scope_begin(tape);
         ag_value *keep[2] = {ag_concat(tape, skip[levels - 1 - i], ag_upsample(tape, x)), global};
@@ -41,8 +71,11 @@ ag_value *nn_unet(ag_tape *tape, const nn_model *model, ag_value *x)
         x = keep[0];
         global = keep[1];
     }
+    ag_value *features = x;
     x = nn_conv(tape, model, l->output_conv1, x, 1, TS_PAD_ZERO, 1);
     x = nn_conv(tape, model, l->output_conv2, x, 1, TS_PAD_ZERO, 1);
     x = ag_add_leaky(tape, x, nn_linear(tape, model, l->output_add, global), 1);
-    return ag_tanh(tape, x);
+    if (model->arch.g_unshuffle > 1) return nn_detail(tape, model, photo, seen, features, x, guess);
+    guess->maps = ag_tanh(tape, x);
+    return guess->maps != NULL;
 }

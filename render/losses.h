@@ -14,6 +14,12 @@ ag_value *ag_render_loss(ag_tape *tape, ag_value *maps, ag_value *target, const 
  * gradient at a perfect fit is 0 (render/render.h). */
 ag_value *ag_flash_loss(ag_tape *tape, ag_value *maps, ag_value *image, const rd_view *view);
 
+/* The maps [N, S, S, C] from x [N, S, S, C+2], whose last two channels are parts of the normal along and across the
+ * direction from the centre (render/op_shading_frame.c has the equation). */
+ag_value *ag_shading_frame(ag_tape *tape, ag_value *x);
+
 /* mean |maps - target| over all values, the map L1 of DESIGN section 4. Channel groups weighted equally by channel. */
+/* The same with a weight for each of the nine channels. */
+ag_value *ag_map_loss_weighted(ag_tape *tape, ag_value *maps, ag_value *target, const float *weight);
 ag_value *ag_map_loss(ag_tape *tape, ag_value *maps, ag_value *target);
 #endif

@@ -1,12 +1,20 @@
-/* Mean |maps - target| over all values (render/losses.h). */
+/* Mean of w_c |maps - target| over all values, c their channel (render/losses.h). */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "render/losses.h"
+#include "tensor/maps.h"
 #include <math.h>
+#include <string.h>
 
 extern const ag_op op_map_loss;
 
-ag_value *ag_map_loss(ag_tape *tape, ag_value *maps, ag_value *target)
+/* One weight for all of a value's channels, or one for each. */
+typedef struct weights {
+    bool given;
+    float of[MAP_CHANNELS];
+} weights;
+
+static ag_value *apply(ag_tape *tape, ag_value *maps, ag_value *target, const weights *w)
 {
     ag_value *in[2] = {maps, target};
     if (!ag_ready(tape, "map_loss", 2, in)) return NULL;
@@ -15,7 +23,28 @@ ag_value *ag_map_loss(ag_tape *tape, ag_value *maps, ag_value *target)
         return ag_fail(tape, TS_INVALID, "map_loss: maps %s and target %s differ in shape",
                        ag_shape_text(text[0], maps->t.shape), ag_shape_text(text[1], target->t.shape));
     if (target->needs_grad) return ag_fail(tape, TS_INVALID, "map_loss: target has no gradient here; detach it");
-    return ag_apply(tape, &op_map_loss, 2, in, (ts_shape){1, 1, 1, 1}, NULL, 0);
+    if (w->given && maps->t.shape.c != MAP_CHANNELS)
+        return ag_fail(tape, TS_INVALID, "map_loss: maps %s: the weights are of nine channels",
+                       ag_shape_text(text[0], maps->t.shape));
+    return ag_apply(tape, &op_map_loss, 2, in, (ts_shape){1, 1, 1, 1}, w, sizeof *w);
+}
+
+ag_value *ag_map_loss(ag_tape *tape, ag_value *maps, ag_value *target)
+{
+    return apply(tape, maps, target, &(weights){.given = false});
+}
+
+ag_value *ag_map_loss_weighted(ag_tape *tape, ag_value *maps, ag_value *target, const float *weight)
+{
+    weights w = {.given = true};
+    memcpy(w.of, weight, sizeof w.of);
+    return apply(tape, maps, target, &w);
+}
+
+static float weight_of(const ag_node *node, int64_t i)
+{
+    const weights *w = node->attr;
+    return w->given ? w->of[i % MAP_CHANNELS] : 1;
 }
 
 static void forward(ag_tape *tape, ag_node *node)
@@ -31,7 +60,7 @@ static void forward(ag_tape *tape, ag_node *node)
     for (int64_t k = 0; k < chunks; k++) {
         int64_t first = k * AG_CHUNK, last = first + ag_part(count, first, AG_CHUNK);
         double part = 0;
-        for (int64_t i = first; i < last; i++) part += fabs((double)a[i] - (double)b[i]);
+        for (int64_t i = first; i < last; i++) part += (double)weight_of(node, i) * fabs((double)a[i] - (double)b[i]);
         sums[k] = part;
     }
     for (int64_t k = 0; k < chunks; k++) sum += sums[k];
@@ -48,7 +77,7 @@ static void backward(ag_tape *tape, ag_node *node)
     float up = (float)((double)node->out->grad[0] / (double)count);
 #pragma omp parallel for num_threads(ts_threads()) schedule(static) if (count > AG_CHUNK)
     for (int64_t i = 0; i < count; i++) {
-        float g = a[i] > b[i] ? up : a[i] < b[i] ? -up : 0;
+        const float w = up * weight_of(node, i), g = a[i] > b[i] ? w : a[i] < b[i] ? -w : 0;
         to[i] = add ? to[i] + g : g;
     }
 }
@@ -57,7 +86,7 @@ static void reference(const ag_node *node, const double *const *in, double *out)
 {
     int64_t count = ts_count(node->in[0]->t.shape);
     double sum = 0;
-    for (int64_t i = 0; i < count; i++) sum += fabs(in[0][i] - in[1][i]);
+    for (int64_t i = 0; i < count; i++) sum += (double)weight_of(node, i) * fabs(in[0][i] - in[1][i]);
     out[0] = sum / (double)count;
 }
 
@@ -69,13 +98,14 @@ static bool kink(const double *const *in, int input, int64_t i, double step, con
 
 static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
 {
-    (void)user;
-    return ag_map_loss(tape, in[0], in[1]);
+    static const float weight[MAP_CHANNELS] = {1, 0.5f, 1, 3, 3, 1, 2, 0, 2};
+    return *(const bool *)user ? ag_map_loss_weighted(tape, in[0], in[1], weight) : ag_map_loss(tape, in[0], in[1]);
 }
 
 static void cases(ag_gradcheck *g)
 {
-    static const ts_shape shapes[] = {{1, 1, 1, 1}, {2, 3, 5, 9}, {1, 64, 33, 9}};
+    static const ts_shape shapes[] = {{1, 1, 1, 1}, {2, 3, 5, 9}, {1, 64, 33, 9}, {2, 3, 5, 9}};
+    static const bool weighted[] = {false, false, false, true};
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
         ag_case c = {.label = i ? "images" : "one value",
                      .inputs = 2,
@@ -84,7 +114,8 @@ static void cases(ag_gradcheck *g)
                      .lo = -1.5f,
                      .hi = 1.5f,
                      .kink = kink,
-                     .build = build};
+                     .build = build,
+                     .user = &weighted[i]};
         if (ag_gradcheck_run(g, &c) != TS_OK) return;
     }
 }

@@ -7,7 +7,7 @@
 #include <unistd.h>
 
 static const char log_header[] =
-    "step,phase,loss,render_0,map_0,render_T,map_T,iterations,gradient_norm,rate,samples_per_s,skipped\n";
+    "step,phase,loss,render_0,map_0,render_T,map_T,spread,scene,iterations,gradient_norm,rate,samples_per_s,skipped\n";
 
 static void validation_header(const tr_trainer *t, char *text, size_t size)
 {
@@ -82,6 +82,8 @@ ts_code tr_log_row(tr_trainer *t, const tr_row *row, ts_status *st)
     put(f, row->map_start, true);
     put(f, row->render_end, true);
     put(f, row->map_end, true);
+    put(f, row->spread, true);
+    put(f, row->scene, true);
     fprintf(f, "%d,", row->iterations);
     put(f, row->norm, false);
     fprintf(f, "%.6g,%.2f,%lld\n", row->rate, row->batch / row->seconds, (long long)row->skipped_total);

@@ -15,16 +15,54 @@ static ag_value *add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value
     ag_tape *tape = t->tape;
     const double map_weight = t->config.train.map_weight;
     if (maps && maps->t.shape.c > MAP_CHANNELS)
-        maps = ag_channels(tape, maps, MAP_CHANNELS); /* a material has no light intensity */
+        maps = ag_channels(tape, maps, 0, MAP_CHANNELS); /* a material has no light intensity */
     ag_value *loss = ag_render_loss(tape, maps, target, t->views, RD_LOSS_VIEWS);
     if (loss) *render = (double)loss->t.data[0];
     if (map_weight > 0) {
-        ag_value *l1 = ag_map_loss(tape, maps, target);
+        const float normal = (float)t->config.train.normal_weight, f0 = (float)t->config.train.specular_weight;
+        const float of[MAP_CHANNELS] = {1, 1, 1, normal, normal, 1, f0, f0, f0};
+        ag_value *l1 = ag_map_loss_weighted(tape, maps, target, of);
         if (l1) *map = (double)l1->t.data[0];
         loss = ag_add(tape, loss, map_weight == 1 ? l1 : ag_scale(tape, l1, (float)map_weight));
     }
     if (weight != 1) loss = ag_scale(tape, loss, (float)weight);
     return sum ? ag_add(tape, sum, loss) : loss;
+}
+
+/* Adds weight * loss to sum. */
+static ag_value *add_weighted(ag_tape *tape, ag_value *sum, ag_value *loss, double weight, double *value)
+{
+    if (loss) *value = (double)loss->t.data[0];
+    return ag_add(tape, sum, ag_scale(tape, loss, (float)weight));
+}
+
+/* The loss of all that g says: R_0, how far that may be off (which moves R_0 nowhere), and the scene. */
+static ag_value *guess_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr_row *row)
+{
+    const tr_config *c = &t->config;
+    ag_tape *tape = t->tape;
+    const int size = c->data.patch;
+    nn_guess guess;
+    if (!nn_guess_from(tape, t->model, in, &guess)) return NULL;
+    ag_value *maps = guess.maps, *spread = guess.spread;
+    if (maps->t.shape.h != size) {
+        maps = ag_resize_smooth(tape, maps, size, size);
+        if (spread) spread = ag_resize_smooth(tape, spread, size, size);
+    }
+    ag_value *loss = add_loss(t, NULL, maps, target, 1, &row->render_start, &row->map_start);
+    if (spread && maps && c->train.spread_weight > 0)
+        loss = add_weighted(tape, loss,
+                            ag_laplace(tape, ag_constant(tape, maps->t), spread, target, nn_spread_of, NN_SPREAD_UNIT),
+                            c->train.spread_weight, &row->spread);
+    if (guess.scene && c->train.scene_weight > 0) {
+        static const signed char own[RD_SCENE_NUMBERS] = {0, 1, 2, 3, 4, 5, 6, 7};
+        ag_value *truth = ag_constant(tape, ts_view(t->scenes, (ts_shape){c->train.batch, 1, 1, RD_SCENE_NUMBERS}));
+        ag_value *numbers = ag_channels(tape, guess.scene, 0, RD_SCENE_NUMBERS),
+                 *scale = ag_channels(tape, guess.scene, RD_SCENE_NUMBERS, RD_SCENE_NUMBERS);
+        loss = add_weighted(tape, loss, ag_laplace(tape, numbers, scale, truth, own, 1), c->train.scene_weight,
+                            &row->scene);
+    }
+    return loss;
 }
 
 /* The refinement steps of this step. */
@@ -75,8 +113,7 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
                    .given = given,
                    .recompute = c->train.checkpoint_steps};
     if (row->pretraining) {
-        maps[0] = nn_predict(t->tape, t->model, &in);
-        return add_loss(t, NULL, maps[0], ag_constant(t->tape, goals), 1, &row->render_start, &row->map_start);
+        return guess_loss(t, &in, ag_constant(t->tape, goals), row);
     }
     if (c->arch.latent > 0) {
         ag_value *goal = ag_constant(t->tape, goals);
@@ -170,6 +207,8 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
                     .norm = NAN,
                     .render_start = NAN,
                     .map_start = NAN,
+                    .spread = NAN,
+                    .scene = NAN,
                     .render_end = NAN,
                     .map_end = NAN};
     begin_phase(t);

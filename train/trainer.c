@@ -126,8 +126,10 @@ static ts_code build(tr_trainer *t, bool resume, ts_status *st)
     const size_t photographs = batch * (size_t)c->arch.images;
     t->images = malloc(photographs * pixels * 3 * sizeof(float));
     t->captures = malloc(photographs * sizeof *t->captures);
+    t->scenes = malloc(photographs * RD_SCENE_NUMBERS * sizeof *t->scenes);
+    t->known = malloc(photographs);
     t->views = malloc(batch * RD_LOSS_VIEWS * sizeof *t->views);
-    if (!t->images || !t->captures || !t->views)
+    if (!t->images || !t->captures || !t->scenes || !t->known || !t->views)
         return ts_fail(st, TS_NOMEM, "no memory for %zu photographs", photographs);
     t->model = nn_model_create(&c->arch, st);
     if (!t->model || nn_model_train(t->model, st) != TS_OK || (!resume && init_weights(t->model, c, t, st) != TS_OK))
@@ -177,6 +179,8 @@ void tr_destroy(tr_trainer **trainer)
     nn_model_free(&t->model);
     free(t->images);
     free(t->captures);
+    free(t->scenes);
+    free(t->known);
     free(t->views);
     if (t->lock >= 0) close(t->lock);
     free(t);

@@ -26,9 +26,11 @@ struct tr_trainer {
     nn_adam adam;
     ag_tape *tape;
     io_loader *loader;
-    float *images;     /* [batch][given][patch][patch][3], given <= arch.images */
-    rd_view *captures; /* [batch][given] */
-    rd_view *views;    /* [batch][RD_LOSS_VIEWS] */
+    float *images;        /* [batch][given][patch][patch][3], given <= arch.images */
+    rd_view *captures;    /* [batch][given] */
+    float *scenes;        /* [batch][given][RD_SCENE_NUMBERS] */
+    unsigned char *known; /* [batch][given] of nn_known */
+    rd_view *views;       /* [batch][RD_LOSS_VIEWS] */
     tr_validator validator;
     FILE *log, *validation_log;
     int64_t step;      /* steps made */

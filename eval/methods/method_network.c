@@ -85,7 +85,7 @@ static ts_code inputs(ev_estimator *e, const ev_case *c, const float *image[NN_M
         view[k] = c->input[k];
     }
     if ((int)ev_number(e, "power") == POWER_AUTO) {
-        const size_t size = (size_t)e->net->arch.g_size;
+        const size_t size = (size_t)nn_arch_side(&e->net->arch);
         *proposed = malloc(size * size * (size_t)e->net->arch.channels * sizeof **proposed);
         if (!*proposed) return ts_fail(st, TS_NOMEM, "out of memory");
         if (lgd_fit_power(e->tape, e->net, image, view, count, c->size, ev_orientations(e), *proposed, &factor, st) !=

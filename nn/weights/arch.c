@@ -2,6 +2,7 @@
 #include "nn/weights/weights.h"
 #include "nn/layers.h"
 #include "nn/weights/published.h"
+#include "tensor/maps.h"
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -46,6 +47,12 @@ static const field fields[] = {
     {"encoding", FIELD_WORD, AT(encoding), NN_GRADIENT_RAW, NN_GRADIENT_ASINH, NN_GRADIENT_ASINH, encoding_words,
      false},
     {.key = "images", .kind = FIELD_INT, .at = AT(images), .lo = 1, .hi = NN_MAX_IMAGES, .start = 1, .late = true},
+    {.key = "unshuffle", .kind = FIELD_INT, .at = AT(g_unshuffle), .lo = 1, .hi = 8, .start = 1, .late = true},
+    {.key = "g_detail", .kind = FIELD_INT, .at = AT(g_detail), .lo = 1, .hi = 1024, .start = 64, .late = true},
+    {.key = "g_trunk", .kind = FIELD_INT, .at = AT(g_trunk), .lo = 0, .hi = NN_MAX_LEVELS, .late = true},
+    {.key = "conditions", .kind = FIELD_BOOL, .at = AT(conditions), .hi = 1, .late = true},
+    {.key = "spread", .kind = FIELD_BOOL, .at = AT(spread), .hi = 1, .late = true},
+    {.key = "scene", .kind = FIELD_BOOL, .at = AT(scene), .hi = 1, .late = true},
     {.key = "compat",
      .kind = FIELD_WORD,
      .at = AT(compat),
@@ -86,6 +93,8 @@ nn_arch nn_arch_default(void)
     return a;
 }
 
+int nn_arch_side(const nn_arch *a) { return a->g_unshuffle * a->g_size; }
+
 bool nn_arch_refines(const nn_arch *a) { return a->coarse_steps > 0 || nn_arch_refines_full(a); }
 
 bool nn_arch_refines_full(const nn_arch *a)
@@ -116,6 +125,14 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
                        a->g_levels, 1 << a->g_levels);
     if (a->latent > 0 && a->h_width > 0)
         return ts_fail(st, TS_INVALID, "latent is %d: an auto-encoder has no refiner, so h_width must be 0", a->latent);
+    const bool extended = a->g_unshuffle > 1 || a->conditions || a->spread || a->scene;
+    if (extended && (a->latent > 0 || a->compat == NN_COMPAT_PUBLISHED || a->channels != MAP_CHANNELS))
+        return ts_fail(st, TS_INVALID,
+                       "unshuffle, conditions, spread or scene is set: that needs channels 9, latent 0, compat = none");
+    if (a->g_unshuffle > 1 && a->images > 1)
+        return ts_fail(st, TS_INVALID, "unshuffle is %d: that needs images 1", a->g_unshuffle);
+    if (a->spread && a->g_unshuffle == 1) return ts_fail(st, TS_INVALID, "spread is set: that needs unshuffle above 1");
+    if (a->scene && a->images > 1) return ts_fail(st, TS_INVALID, "scene is set: that needs images 1");
     if (a->images > 1 && a->rmse == NN_RMSE_BATCH)
         return ts_fail(st, TS_INVALID, "images is %d: with rmse = batch it must be 1", a->images);
     if (a->compat == NN_COMPAT_PUBLISHED &&

@@ -38,6 +38,40 @@ static bool with_more_photographs(const nn_model *model, int index, nn_file *f)
     return fine;
 }
 
+/* A first layer that reads squares of pixels begins as a model that reads their mean has it; one that reads further
+ * channels begins blind to them, and one that writes further ones begins with zeros there. stated: the list of
+ * parameters that the file states. False where the file has no such tensor. */
+static bool with_more_channels(const nn_model *model, const nn_model *stated, int index, nn_file *f)
+{
+    const nn_layers *l = model->layers;
+    const nn_param *p = &model->param[index], *q = nn_model_find(stated, p->name);
+    const bool reads = index == l->input_conv.weight || index == l->input_global.weight || index == l->detail[0].weight;
+    const bool writes = model->arch.g_unshuffle > 1 && (index == l->detail[4].weight || index == l->detail[4].bias);
+    if (!q || (!reads && !writes) || q->dim[0] > p->dim[0] || q->dim[1] > p->dim[1] ||
+        (reads && q->dim[0] != p->dim[0]))
+        return false;
+    const int colours = 3 * model->arch.images, squares = model->arch.g_unshuffle * model->arch.g_unshuffle;
+    const bool mean = reads && squares > 1 && stated->arch.g_unshuffle == 1;
+    const size_t kernel = p->rank == 4 ? (size_t)p->dim[2] * (size_t)p->dim[3] : 1;
+    const int read = p->rank > 1 ? p->dim[1] : 1, had = p->rank > 1 ? q->dim[1] : 1;
+    int64_t dim[4];
+    nn_param_dims(q, dim);
+    float *old = malloc(q->count * sizeof *old), *v = model->value + p->offset;
+    const bool fine = old && !nn_file_read(f, q->name, q->rank, dim, old, NULL);
+    for (int o = 0; fine && o < p->dim[0]; o++)
+        for (int c = 0; c < read; c++)
+            for (size_t k = 0; k < kernel; k++) {
+                const int from = mean ? c < colours * squares ? c % colours : had : c;
+                const bool has = o < q->dim[0] && from < had;
+                const float share = mean ? 1.0f / (float)squares : 1;
+                v[((size_t)o * (size_t)read + (size_t)c) * kernel + k] = has
+                    ? share * old[((size_t)o * (size_t)had + (size_t)from) * kernel + k]
+                    : 0;
+            }
+    free(old);
+    return fine;
+}
+
 /* Channels that a layer reads: one after the other those of one or two others, in the file and in the model. */
 typedef struct inputs {
     int parts, from[2], to[2];
@@ -120,7 +154,8 @@ ts_code nn_model_init_from(nn_model *model, const char *path, bool *begun, int *
         if (begun && begun[i]) continue;
         nn_param_dims(p, dim);
         if (nn_file_read(f, p->name, p->rank, dim, model->value + p->offset, NULL) &&
-            !with_more_photographs(model, i, f) && !(narrow && grown(model, narrow, i, f)))
+            !with_more_photographs(model, i, f) && !(narrow && with_more_channels(model, narrow, i, f)) &&
+            !(narrow && grown(model, narrow, i, f)))
             ++*left;
         else if (!nn_all_finite(model->value + p->offset, p->count))
             code = ts_fail(st, TS_NUMERIC, "%s: tensor \"%s\" holds a value that is not finite", path, p->name);

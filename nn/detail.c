@@ -1,0 +1,58 @@
+/* What g adds at the photograph's size: convolutions of squares of pixels that no normalisation follows, so that they
+ * keep how strong relief and gloss are, and two at the full size. */
+#include "nn/layers.h"
+#include "ops.h"
+#include "render/losses.h"
+
+enum { FRAME = 2 };
+
+int nn_detail_writes(const nn_arch *a) { return a->channels + FRAME + (a->spread ? NN_SPREADS : 0); }
+
+const signed char nn_spread_of[] = {0, 0, 0, 1, 1, 2, 3, 3, 3};
+
+ag_value *nn_coordinates(ag_tape *tape, int n, int side)
+{
+    ag_value *v = ag_empty(tape, (ts_shape){n, side, side, NN_COORDINATES});
+    for (int64_t i = 0; v && i < (int64_t)n * side * side; i++) {
+        v->t.data[2 * i] = (2 * (float)(i % side) + 1) / (float)side - 1;
+        v->t.data[2 * i + 1] = (2 * (float)(i / side % side) + 1) / (float)side - 1;
+    }
+    return v;
+}
+
+/* [N, g_size, g_size, ...] to FINE channels at the photograph's size. */
+static ag_value *squares(ag_tape *tape, const nn_model *model, ag_value *seen, ag_value *features)
+{
+    const nn_layers *l = model->layers;
+    ag_value *y = nn_conv(tape, model, l->detail[0], seen, 1, TS_PAD_ZERO, NN_LEAK_G);
+    y = nn_conv(tape, model, l->detail[1], ag_concat(tape, y, features), 1, TS_PAD_ZERO, NN_LEAK_G);
+    for (int i = 0; i < model->arch.g_trunk; i++) {
+        ag_value *change = nn_conv(tape, model, l->trunk[i][0], y, 2, TS_PAD_ZERO, NN_LEAK_G);
+        y = ag_add(tape, y, nn_conv(tape, model, l->trunk[i][1], change, 1, TS_PAD_ZERO, 1));
+    }
+    y = nn_conv(tape, model, l->detail[2], y, 1, TS_PAD_ZERO, NN_LEAK_G);
+    return ag_depth_to_space(tape, y, model->arch.g_unshuffle);
+}
+
+bool nn_detail(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *seen, ag_value *features,
+               ag_value *coarse, nn_guess *guess)
+{
+    const nn_layers *l = model->layers;
+    const int framed = model->arch.channels + FRAME;
+    ts_mark mark = ag_scope_begin(tape);
+    ag_value *y = squares(tape, model, seen, features);
+    ag_scope_end(tape, mark, &y, 1);
+    if (!y || !coarse) return false;
+    const int n = y->t.shape.n, side = y->t.shape.h;
+    mark = ag_scope_begin(tape);
+    y = nn_conv_beside(tape, model, l->detail[3], y, ag_concat(tape, photo, nn_coordinates(tape, n, side)), 1,
+                       TS_PAD_REPLICATE, NN_LEAK_G);
+    y = nn_conv(tape, model, l->detail[4], y, 1, TS_PAD_REPLICATE, 1);
+    ag_value *added = ag_shading_frame(tape, ag_channels(tape, y, 0, framed));
+    ag_value *keep[2] = {ag_tanh(tape, ag_add(tape, ag_resize_smooth(tape, coarse, side, side), added)), NULL};
+    if (model->arch.spread) keep[1] = ag_channels(tape, y, framed, NN_SPREADS);
+    ag_scope_end(tape, mark, keep, model->arch.spread ? 2 : 1);
+    guess->maps = keep[0];
+    guess->spread = keep[1];
+    return keep[0] && (keep[1] || !model->arch.spread);
+}

@@ -1,0 +1,107 @@
+/* y = x's first C channels, and (y_3, y_4) += s f - t (f turned by a quarter), f = p / (p.p + 0.05), where p is the
+ * pixel's place (x right, y up) in half widths from the centre and (s, t) are x's channels C and C + 1;   dx = dy, ds =
+ * f.(dy_3, dy_4), dt likewise. Under a flash near the camera a photograph shows of the normal what it has along p, and
+ * shows p.n: f, p's regularised inverse, is what leads from there to the normal, so that layers that know no places can.
+ * x: [N,S,S,C+2], y: [N,S,S,C] */
+#include "autograd/gradcheck.h"
+#include "autograd/op.h"
+#include "render/losses.h"
+#include "tensor/maps.h"
+#include <string.h>
+
+extern const ag_op op_shading_frame;
+
+#define REGULAR 0.05
+
+static void frame(int64_t pixel, int side, double f[2])
+{
+    const double x = (2 * (double)(pixel % side) + 1) / side - 1, y = 1 - (2 * (double)(pixel / side % side) + 1) / side;
+    const double inverse = 1 / (x * x + y * y + REGULAR);
+    f[0] = x * inverse;
+    f[1] = y * inverse;
+}
+
+static void forward(ag_tape *tape, ag_node *node)
+{
+    (void)tape;
+    const ts_shape s = node->out->t.shape;
+    const int64_t pixels = ts_pixels(s);
+    const float *x = node->in[0]->t.data;
+    float *y = node->out->t.data;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels * s.c > AG_CHUNK)
+    for (int64_t p = 0; p < pixels; p++) {
+        const float *from = x + p * (s.c + 2);
+        double f[2];
+        frame(p, s.w, f);
+        memcpy(y + p * s.c, from, (size_t)s.c * sizeof *y);
+        y[p * s.c + MAP_NORMAL] += from[s.c] * (float)f[0] - from[s.c + 1] * (float)f[1];
+        y[p * s.c + MAP_NORMAL + 1] += from[s.c] * (float)f[1] + from[s.c + 1] * (float)f[0];
+    }
+}
+
+static void backward(ag_tape *tape, ag_node *node)
+{
+    const ts_shape s = node->out->t.shape;
+    const int64_t pixels = ts_pixels(s);
+    const float *dy = node->out->grad;
+    float *dx = ag_grad_add(tape, node->in[0]);
+    if (!dx) return;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels * s.c > AG_CHUNK)
+    for (int64_t p = 0; p < pixels; p++) {
+        const float *from = dy + p * s.c;
+        float *to = dx + p * (s.c + 2);
+        double f[2];
+        frame(p, s.w, f);
+        for (int i = 0; i < s.c; i++) to[i] += from[i];
+        to[s.c] += from[MAP_NORMAL] * (float)f[0] + from[MAP_NORMAL + 1] * (float)f[1];
+        to[s.c + 1] += from[MAP_NORMAL + 1] * (float)f[0] - from[MAP_NORMAL] * (float)f[1];
+    }
+}
+
+static void reference(const ag_node *node, const double *const *in, double *out)
+{
+    const ts_shape s = node->out->t.shape;
+    for (int64_t p = 0; p < ts_pixels(s); p++) {
+        const double *from = in[0] + p * (s.c + 2);
+        double f[2];
+        frame(p, s.w, f);
+        for (int i = 0; i < s.c; i++) out[p * s.c + i] = from[i];
+        out[p * s.c + MAP_NORMAL] += from[s.c] * f[0] - from[s.c + 1] * f[1];
+        out[p * s.c + MAP_NORMAL + 1] += from[s.c] * f[1] + from[s.c + 1] * f[0];
+    }
+}
+
+static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
+{
+    (void)user;
+    return ag_shading_frame(tape, in[0]);
+}
+
+static void cases(ag_gradcheck *check)
+{
+    static const ts_shape shapes[] = {{1, 1, 1, 11}, {2, 5, 5, 11}, {1, 8, 8, 12}};
+    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
+        ag_case c = {.label = i ? "images" : "the centre alone",
+                     .inputs = 1,
+                     .shape = {shapes[i]},
+                     .lo = -1,
+                     .hi = 1,
+                     .build = build};
+        ag_gradcheck_run(check, &c);
+    }
+}
+
+const ag_op op_shading_frame = {
+    .name = "shading_frame", .forward = forward, .backward = backward, .reference = reference, .cases = cases};
+
+ag_value *ag_shading_frame(ag_tape *tape, ag_value *x)
+{
+    char text[AG_SHAPE_TEXT];
+    if (!ag_ready(tape, "shading_frame", 1, &x)) return NULL;
+    ts_shape s = x->t.shape;
+    if (s.h != s.w || s.c < MAP_CHANNELS + 2)
+        return ag_fail(tape, TS_INVALID, "shading_frame: %s is not [N,S,S,C+2] with at least nine maps",
+                       ag_shape_text(text, s));
+    s.c -= 2;
+    return ag_apply(tape, &op_shading_frame, 1, &x, s, NULL, 0);
+}
