@@ -22,7 +22,8 @@ enum {
     TS_STREAM_TRAIN,
     TS_STREAM_WINDOW,
     TS_STREAM_PHOTOGRAPH,
-    TS_STREAM_CAPTURE
+    TS_STREAM_CAPTURE,
+    TS_STREAM_PHONE
 };
 
 uint32_t ts_rng_u32(ts_rng *r);

@@ -178,7 +178,8 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
     const int given = draw_given(c, t->step);
     const uint64_t index = (uint64_t)t->step * (uint64_t)batch;
     tr_capture_views((uint64_t)c->data.seed, index, batch, given, t->captures);
-    tr_photographs(c, (uint64_t)c->data.seed, index, batch, c->data.patch, target, t->captures, given, t->images);
+    tr_photographs(c, (uint64_t)c->data.seed, index, batch, c->data.patch, target, t->captures, given, t->images,
+                   t->shots);
     ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_SCENE, (uint64_t)t->step);
     for (int i = 0; i < batch; i++) rd_loss_views(&rng, t->views + i * RD_LOSS_VIEWS);
 

@@ -126,8 +126,9 @@ static ts_code build(tr_trainer *t, bool resume, ts_status *st)
     const size_t photographs = batch * (size_t)c->arch.images;
     t->images = malloc(photographs * pixels * 3 * sizeof(float));
     t->captures = malloc(photographs * sizeof *t->captures);
+    t->shots = malloc(photographs * sizeof *t->shots);
     t->views = malloc(batch * RD_LOSS_VIEWS * sizeof *t->views);
-    if (!t->images || !t->captures || !t->views)
+    if (!t->images || !t->captures || !t->shots || !t->views)
         return ts_fail(st, TS_NOMEM, "no memory for %zu photographs", photographs);
     t->model = nn_model_create(&c->arch, st);
     if (!t->model || nn_model_train(t->model, st) != TS_OK || (!resume && init_weights(t->model, c, t, st) != TS_OK))
@@ -177,6 +178,7 @@ void tr_destroy(tr_trainer **trainer)
     nn_model_free(&t->model);
     free(t->images);
     free(t->captures);
+    free(t->shots);
     free(t->views);
     if (t->lock >= 0) close(t->lock);
     free(t);

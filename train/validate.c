@@ -47,7 +47,7 @@ ts_code tr_validator_create(tr_trainer *t, ts_status *st)
     if (!v->tape) return st->code;
     tr_capture_views((uint64_t)c->validate.seed, 0, c->validate.count, c->arch.images, v->captures);
     tr_photographs(c, (uint64_t)c->validate.seed, 0, c->validate.count, c->validate.size, v->maps, v->captures,
-                   c->arch.images, v->images);
+                   c->arch.images, v->images, NULL);
     for (int i = 0; i < c->validate.count; i++) {
         ts_rng rng = ts_rng_make((uint64_t)c->validate.seed, TS_STREAM_EVAL, (uint64_t)i);
         rd_eval_views(&rng, RD_EVAL_VIEWS, v->views + (size_t)i * RD_EVAL_VIEWS);
