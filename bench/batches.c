@@ -36,7 +36,7 @@ ts_code bench_batches(const char *path, ts_status *st)
         if (!maps) break;
         const uint64_t index = (uint64_t)step * (uint64_t)batch;
         tr_capture_views((uint64_t)c.data.seed, index, batch, 1, captures);
-        tr_photographs(&c, (uint64_t)c.data.seed, index, batch, patch, maps, captures, 1, images);
+        tr_photographs(&c, (uint64_t)c.data.seed, index, batch, patch, maps, captures, 1, images, NULL);
         ts_rng rng = ts_rng_make((uint64_t)c.train.seed, TS_STREAM_SCENE, (uint64_t)step);
         for (int i = 0; i < batch; i++) rd_loss_views(&rng, views + i * RD_LOSS_VIEWS);
         if (!put(images, pixels * 3) || !put(maps, pixels * MAP_CHANNELS) || !put_views(views, batch * RD_LOSS_VIEWS))

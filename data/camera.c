@@ -33,13 +33,53 @@ static faults draw(uint64_t seed, uint64_t index)
     return f;
 }
 
-void io_camera_place(const io_camera *c, uint64_t seed, uint64_t index, float distance, float position[3])
+/* What came after them, from a stream of its own. */
+typedef struct phone {
+    float fov, flash, flash_turn, told_view, told_power;
+} phone;
+
+static phone draw_phone(uint64_t seed, uint64_t index)
+{
+    ts_rng r = ts_rng_make(seed, TS_STREAM_PHONE, index);
+    phone p;
+    p.fov = ts_rng_uniform(&r);
+    p.flash = ts_rng_uniform(&r);
+    p.flash_turn = ts_rng_range(&r, 0, 6.2831853f);
+    p.told_view = ts_rng_uniform(&r);
+    p.told_power = ts_rng_uniform(&r);
+    return p;
+}
+
+static float distance_at(float degrees) { return 0.5f / tanf(degrees * 0.0087266463f); }
+
+void io_camera_rig(const io_camera *c, uint64_t seed, uint64_t index, io_rig *rig)
 {
     const faults f = draw(seed, index);
+    const phone p = draw_phone(seed, index);
+    const float planned = rig->camera[2];
+    float distance = planned;
+    if (c->fov_max > 0) {
+        const float nearest = distance_at(c->fov_max);
+        distance = nearest * powf(distance_at(c->fov_min) / nearest, p.fov);
+        rig->power *= distance * distance / (planned * planned);
+    }
     const float angle = c->tilt * f.tilt * 0.017453293f, away = c->off_centre * f.away, across = distance * sinf(angle);
-    position[0] = away * cosf(f.away_turn) + across * cosf(f.tilt_turn);
-    position[1] = away * sinf(f.away_turn) + across * sinf(f.tilt_turn);
-    position[2] = distance * cosf(angle);
+    const float by[3] = {away * cosf(f.away_turn) + across * cosf(f.tilt_turn),
+                         away * sinf(f.away_turn) + across * sinf(f.tilt_turn), distance * cosf(angle) - planned};
+    for (int k = 0; k < 3; k++) {
+        rig->camera[k] += by[k];
+        rig->light[k] += by[k];
+    }
+    const float aside = c->flash * sqrtf(p.flash); /* uniform over the disk */
+    rig->light[0] += aside * cosf(p.flash_turn);
+    rig->light[1] += aside * sinf(p.flash_turn);
+}
+
+void io_camera_told(const io_camera *c, uint64_t seed, uint64_t index, bool *view, bool *power)
+{
+    const phone p = draw_phone(seed, index);
+    *view = p.told_view < c->told_view;
+    *power = p.told_power < c->told_power;
 }
 
 float io_camera_exposure(const io_camera *c, uint64_t seed, uint64_t index)

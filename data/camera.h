@@ -13,16 +13,29 @@ typedef struct io_camera {
     float exposure;     /* up to this many stops brighter or darker */
     float
         vignette; /* largest share of the light lost in the corners, with the square of the distance from the centre */
-    float white_balance; /* red and blue are each up to this share stronger or weaker */
-    int jpeg;            /* lowest JPEG quality (to 98), in half of the photographs with halved chroma; 0: none */
-    float tilt;          /* largest angle of the axis with the normal, degrees */
-    float off_centre;    /* farthest that the axis meets the patch from its centre, patch widths */
+    float white_balance;    /* red and blue are each up to this share stronger or weaker */
+    int jpeg;               /* lowest JPEG quality (to 98), in half of the photographs with halved chroma; 0: none */
+    float tilt;             /* largest angle of the axis with the normal, degrees */
+    float off_centre;       /* farthest that the axis meets the patch from its centre, patch widths */
+    float fov_min, fov_max; /* field of view across the square, degrees; both 0: the distance that is given */
+    float flash;            /* largest offset of the light from the camera parallel to the sample, patch widths */
+    float told_view, told_power; /* share of the photographs whose field of view or power a model is told */
 } io_camera;
 
-/* Where camera and light stand, in patch widths: (0, 0, distance) turned by the tilt about the point where the axis
- * meets the patch. The photograph is thought of as resampled to the frontal square, so that its maps stay registered:
- * render from there, nothing else changes. */
-void io_camera_place(const io_camera *c, uint64_t seed, uint64_t index, float distance, float position[3]);
+/* Where camera and light stand, in patch widths, and the light's power. */
+typedef struct io_rig {
+    float camera[3], light[3], power;
+} io_rig;
+
+/* From the rig that is planned, its camera straight above the centre, to the one of this photograph. The field of view
+ * gives the distance 0.5 / tan(fov / 2), uniform in its logarithm; the power grows with its square, as of a phone that
+ * exposes for the sample. The camera is turned by the tilt about the point where the axis meets the patch, and the
+ * light goes with it; then the light moves aside. The photograph is thought of as resampled to the frontal square, so
+ * that its maps stay registered: render from there, nothing else changes. */
+void io_camera_rig(const io_camera *c, uint64_t seed, uint64_t index, io_rig *rig);
+
+/* Whether a model is told this photograph's field of view, and its power. */
+void io_camera_told(const io_camera *c, uint64_t seed, uint64_t index, bool *view, bool *power);
 
 /* The factor of the light that the exposure stands for, which io_camera_apply multiplies in: for a loss that is to know
  * it. */

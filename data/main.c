@@ -42,6 +42,9 @@ enum {
     OPT_WHITE_BALANCE,
     OPT_TILT,
     OPT_OFF_CENTRE,
+    OPT_FOV_MIN,
+    OPT_FOV_MAX,
+    OPT_FLASH,
     OPT_QUALITY,
     OPT_STATISTICS,
     OPT_HISTOGRAMS,
@@ -67,6 +70,9 @@ static const struct option long_options[] = {{"output", required_argument, NULL,
                                              {"white-balance", required_argument, NULL, OPT_WHITE_BALANCE},
                                              {"tilt", required_argument, NULL, OPT_TILT},
                                              {"off-centre", required_argument, NULL, OPT_OFF_CENTRE},
+                                             {"fov-min", required_argument, NULL, OPT_FOV_MIN},
+                                             {"fov-max", required_argument, NULL, OPT_FOV_MAX},
+                                             {"flash", required_argument, NULL, OPT_FLASH},
                                              {"quality", required_argument, NULL, OPT_QUALITY},
                                              {"statistics", no_argument, NULL, OPT_STATISTICS},
                                              {"histograms", no_argument, NULL, OPT_HISTOGRAMS},
@@ -110,6 +116,9 @@ static void print_help(void)
            "(default 0)\n"
            "      --tilt X          of photographs, largest angle of the camera in degrees, 0 .. 30 (default 0)\n"
            "      --off-centre X    of photographs, how far the camera may be off the centre in patch widths, 0 .. 0.4 "
+           "(default 0)\n"
+           "      --fov-min X --fov-max X  of photographs, degrees across the square, 5 .. 120 (default: 54.2)\n"
+           "      --flash X         of photographs, how far the flash may be beside the lens in patch widths, 0 .. 0.5 "
            "(default 0)\n"
            "      --quality N       of photographs' JPEG, 1 .. 100 (default 90)\n"
            "      --testdata DIR    a folder with maps/ (map folders) and strips/ to compare with\n"
@@ -171,6 +180,9 @@ static int parse_options(int argc, char **argv, options *o)
         case OPT_WHITE_BALANCE: code = parse_share("white-balance", optarg, 0.9, &o->camera.white_balance); break;
         case OPT_TILT: code = parse_share("tilt", optarg, 30, &o->camera.tilt); break;
         case OPT_OFF_CENTRE: code = parse_share("off-centre", optarg, 0.4, &o->camera.off_centre); break;
+        case OPT_FOV_MIN: code = parse_share("fov-min", optarg, 120, &o->camera.fov_min); break;
+        case OPT_FOV_MAX: code = parse_share("fov-max", optarg, 120, &o->camera.fov_max); break;
+        case OPT_FLASH: code = parse_share("flash", optarg, 0.5, &o->camera.flash); break;
         case OPT_QUALITY: code = parse_number("quality", optarg, 1, 100, &o->quality); break;
         case OPT_STATISTICS: o->statistics = true; break;
         case OPT_HISTOGRAMS: o->histograms = true; break;
@@ -190,6 +202,9 @@ static int parse_options(int argc, char **argv, options *o)
     if (compares && !o->testdata)
         return cl_usage("%s needs --testdata DIR", o->statistics ? "--statistics" : "--histograms");
     if (o->testdata && !compares) return cl_usage("--testdata is for --statistics and --histograms");
+    const float narrow = o->camera.fov_min, wide = o->camera.fov_max;
+    if ((narrow != 0 || wide != 0) && (narrow < 5 || wide < narrow))
+        return cl_usage("--fov-min and --fov-max go together: 5 <= fov-min <= fov-max");
     o->procedural.seed = (uint64_t)seed;
     return CL_OK;
 }
@@ -249,8 +264,11 @@ static ts_code write_material(const options *o, uint64_t index, io_material *m, 
     }
     if (!code && o->format == FORMAT_CAPTURES) code = write_capture(o, m, st);
     if (!code && o->photographs) {
-        io_camera_place(&o->camera, o->procedural.seed, index, RD_FLASH_DISTANCE, flash.camera);
-        memcpy(flash.light, flash.camera, sizeof flash.light);
+        io_rig rig = {{0, 0, RD_FLASH_DISTANCE}, {0, 0, RD_FLASH_DISTANCE}, RD_FLASH_POWER};
+        io_camera_rig(&o->camera, o->procedural.seed, index, &rig);
+        memcpy(flash.camera, rig.camera, sizeof flash.camera);
+        memcpy(flash.light, rig.light, sizeof flash.light);
+        flash.power = rig.power;
         rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &flash, false, photo->data);
         io_camera_apply(&o->camera, o->procedural.seed, index, m->size, photo->data);
         code = make_path(path, o, m->name, ".jpg", st);

@@ -22,7 +22,9 @@ enum {
     TS_STREAM_TRAIN,
     TS_STREAM_WINDOW,
     TS_STREAM_PHOTOGRAPH,
-    TS_STREAM_CAPTURE
+    TS_STREAM_CAPTURE,
+    TS_STREAM_PHONE,
+    TS_STREAM_KNOWN
 };
 
 uint32_t ts_rng_u32(ts_rng *r);

@@ -254,6 +254,11 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
         !nn_arch_refines_full(&c->arch))
         return ts_fail(st, TS_INVALID,
                        "train.g_rate is 0 and there is no refiner (model.h_width): nothing would be trained");
+    const double narrow = c->data.fov_min, wide = c->data.fov_max;
+    if ((narrow != 0 || wide != 0) && (narrow < 5 || wide < narrow))
+        return ts_fail(st, TS_INVALID,
+                       "data.fov_min is %g and data.fov_max %g: use 5 <= fov_min <= fov_max, or 0 for both", narrow,
+                       wide);
     if (c->train.window && (c->train.window < 8 || c->train.window > c->data.patch))
         return ts_fail(st, TS_INVALID, "train.window is %d: use 8 to data.patch, which is %d, or 0", c->train.window,
                        c->data.patch);

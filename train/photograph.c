@@ -4,6 +4,7 @@
 #include "tensor/maps.h"
 #include "tensor/threads.h"
 #include "train/trainer_internal.h"
+#include <string.h>
 
 static io_camera camera_of(const tr_config *c)
 {
@@ -16,26 +17,42 @@ static io_camera camera_of(const tr_config *c)
                        .white_balance = (float)c->data.white_balance,
                        .jpeg = c->data.jpeg,
                        .tilt = (float)c->data.tilt,
-                       .off_centre = (float)c->data.off_centre};
+                       .off_centre = (float)c->data.off_centre,
+                       .fov_min = (float)c->data.fov_min,
+                       .fov_max = (float)c->data.fov_max,
+                       .flash = (float)c->data.flash,
+                       .told_view = (float)c->data.told_view,
+                       .told_power = (float)c->data.told_power};
+}
+
+static tr_shot shoot(const io_camera *camera, uint64_t seed, uint64_t index, const rd_view *planned)
+{
+    tr_shot shot = {.view = *planned};
+    io_rig rig = {.power = planned->power};
+    memcpy(rig.camera, planned->camera, sizeof rig.camera);
+    memcpy(rig.light, planned->light, sizeof rig.light);
+    io_camera_rig(camera, seed, index, &rig);
+    memcpy(shot.view.camera, rig.camera, sizeof rig.camera);
+    memcpy(shot.view.light, rig.light, sizeof rig.light);
+    shot.view.power = rig.power;
+    io_camera_told(camera, seed, index, &shot.told_view, &shot.told_power);
+    return shot;
 }
 
 void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
-                    const rd_view *views, int number, float *images)
+                    const rd_view *views, int number, float *images, tr_shot *shots)
 {
     const io_camera camera = camera_of(c);
+    const rd_view flash = rd_flash();
     const size_t pixels = (size_t)size * (size_t)size;
     const uint64_t first = index * (uint64_t)number;
     for (int i = 0; i < count * number; i++) {
-        rd_view view = views ? views[i] : rd_flash();
-        float moved[3]; /* the whole rig: a tilt or an offset that nobody measured moves camera and light alike */
-        io_camera_place(&camera, seed, first + (uint64_t)i, view.camera[2], moved);
-        for (int k = 0; k < 3; k++) {
-            const float by = moved[k] - (k == 2 ? view.camera[2] : 0);
-            view.camera[k] += by;
-            view.light[k] += by;
-        }
+        tr_shot shot = shoot(&camera, seed, first + (uint64_t)i, views ? &views[i] : &flash);
         const float *material = maps + (size_t)(i / number) * pixels * MAP_CHANNELS;
-        rd_render(rd_grid_full(size), material, MAP_CHANNELS, &view, false, images + (size_t)i * pixels * 3);
+        rd_render(rd_grid_full(size), material, MAP_CHANNELS, &shot.view, false, images + (size_t)i * pixels * 3);
+        if (!shots) continue;
+        shot.view.power *= io_camera_exposure(&camera, seed, first + (uint64_t)i);
+        shots[i] = shot;
     }
 #pragma omp parallel for num_threads(ts_threads()) schedule(static)
     for (int i = 0; i < count * number; i++)

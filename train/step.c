@@ -101,6 +101,22 @@ static ts_tensor cut(tr_trainer *t, const ts_tensor *whole, rd_grid g)
     return copy;
 }
 
+/* What g may read of each photograph, and what it is to guess. The place of a light is known where the camera's is, in
+ * half of the photographs; a camera whose field of view alone is known stands above the centre. */
+static void describe(tr_trainer *t, int photographs)
+{
+    ts_rng rng = ts_rng_make((uint64_t)t->config.train.seed, TS_STREAM_KNOWN, (uint64_t)t->step);
+    for (int i = 0; i < photographs; i++) {
+        const tr_shot *s = &t->shots[i];
+        const bool light = ts_rng_uniform(&rng) < 0.5f && s->told_view;
+        rd_scene_numbers(&s->view, 0, 0, t->scenes + (size_t)i * RD_SCENE_NUMBERS);
+        t->known[i] = (unsigned char)((s->told_view ? NN_KNOWN_CAMERA : 0) | (light ? NN_KNOWN_LIGHT : 0) |
+                                      (s->told_power ? NN_KNOWN_POWER : 0));
+        t->captures[i] = s->view;
+        if (s->told_view && !light) t->captures[i].camera[0] = t->captures[i].camera[1] = 0;
+    }
+}
+
 static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *row)
 {
     const tr_config *c = &t->config;
@@ -110,6 +126,7 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
     nn_input in = {.image = ts_view(t->images, (ts_shape){batch * given, size, size, 3}),
                    .grid = rd_grid_full(size),
                    .views = t->captures,
+                   .known = c->arch.conditions ? t->known : NULL,
                    .given = given,
                    .recompute = c->train.checkpoint_steps};
     if (row->pretraining) {
@@ -217,7 +234,9 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
     const int given = draw_given(c, t->step);
     const uint64_t index = (uint64_t)t->step * (uint64_t)batch;
     tr_capture_views((uint64_t)c->data.seed, index, batch, given, t->captures);
-    tr_photographs(c, (uint64_t)c->data.seed, index, batch, c->data.patch, target, t->captures, given, t->images);
+    tr_photographs(c, (uint64_t)c->data.seed, index, batch, c->data.patch, target, t->captures, given, t->images,
+                   t->shots);
+    if (c->arch.conditions || c->arch.scene) describe(t, batch * given);
     ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_SCENE, (uint64_t)t->step);
     for (int i = 0; i < batch; i++) rd_loss_views(&rng, t->views + i * RD_LOSS_VIEWS);
 

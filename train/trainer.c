@@ -128,8 +128,9 @@ static ts_code build(tr_trainer *t, bool resume, ts_status *st)
     t->captures = malloc(photographs * sizeof *t->captures);
     t->scenes = malloc(photographs * RD_SCENE_NUMBERS * sizeof *t->scenes);
     t->known = malloc(photographs);
+    t->shots = malloc(photographs * sizeof *t->shots);
     t->views = malloc(batch * RD_LOSS_VIEWS * sizeof *t->views);
-    if (!t->images || !t->captures || !t->scenes || !t->known || !t->views)
+    if (!t->images || !t->captures || !t->scenes || !t->known || !t->shots || !t->views)
         return ts_fail(st, TS_NOMEM, "no memory for %zu photographs", photographs);
     t->model = nn_model_create(&c->arch, st);
     if (!t->model || nn_model_train(t->model, st) != TS_OK || (!resume && init_weights(t->model, c, t, st) != TS_OK))
@@ -181,6 +182,7 @@ void tr_destroy(tr_trainer **trainer)
     free(t->captures);
     free(t->scenes);
     free(t->known);
+    free(t->shots);
     free(t->views);
     if (t->lock >= 0) close(t->lock);
     free(t);

@@ -7,6 +7,12 @@
 
 enum { TR_PATH = 1200 }; /* a folder and one of our names */
 
+/* What is true of a photograph. */
+typedef struct tr_shot {
+    rd_view view;               /* power with the exposure: its radiance, clipped, is what the file shows */
+    bool told_view, told_power; /* whether the model is told them */
+} tr_shot;
+
 /* The fixed materials of validation. */
 typedef struct tr_validator {
     float *maps;       /* [count][size][size][9], owned */
@@ -28,6 +34,7 @@ struct tr_trainer {
     io_loader *loader;
     float *images;        /* [batch][given][patch][patch][3], given <= arch.images */
     rd_view *captures;    /* [batch][given] */
+    tr_shot *shots;       /* [batch][given] */
     float *scenes;        /* [batch][given][RD_SCENE_NUMBERS] */
     unsigned char *known; /* [batch][given] of nn_known */
     rd_view *views;       /* [batch][RD_LOSS_VIEWS] */
@@ -50,9 +57,10 @@ const float *tr_weights(const tr_trainer *t); /* what is validated and saved */
 
 /* photograph.c: number photographs of each material [count][size][size][9] as [data] says, images
  * [count][number][size][size][3], under views [count][number] of kind RD_POINT whose camera looks straight down (NULL:
- * the flash for all); index: of the first material, for the camera's faults, of which every photograph has its own. */
+ * the flash for all); index: of the first material, for the camera's faults, of which every photograph has its own.
+ * shots [count][number]: the truth of each; NULL: not wanted. */
 void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
-                    const rd_view *views, int number, float *images);
+                    const rd_view *views, int number, float *images, tr_shot *shots);
 /* The views of number photographs of each of count materials, [count][number], drawn for each material
  * (rd_capture_draw): one is the flash. */
 void tr_capture_views(uint64_t seed, uint64_t index, int count, int number, rd_view *views);

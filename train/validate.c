@@ -47,7 +47,7 @@ ts_code tr_validator_create(tr_trainer *t, ts_status *st)
     if (!v->tape) return st->code;
     tr_capture_views((uint64_t)c->validate.seed, 0, c->validate.count, c->arch.images, v->captures);
     tr_photographs(c, (uint64_t)c->validate.seed, 0, c->validate.count, c->validate.size, v->maps, v->captures,
-                   c->arch.images, v->images);
+                   c->arch.images, v->images, NULL);
     for (int i = 0; i < c->validate.count; i++) {
         ts_rng rng = ts_rng_make((uint64_t)c->validate.seed, TS_STREAM_EVAL, (uint64_t)i);
         rd_eval_views(&rng, RD_EVAL_VIEWS, v->views + (size_t)i * RD_EVAL_VIEWS);
@@ -66,6 +66,9 @@ void tr_validator_free(tr_validator *v)
     *v = (tr_validator){0};
 }
 
+/* Of a photograph that comes from anywhere. */
+static const unsigned char nothing[TOGETHER * NN_MAX_IMAGES];
+
 /* Adds the errors of n materials from number first on to out. */
 static ts_code add_errors(tr_trainer *t, int first, int n, tr_validation *out, ts_status *st)
 {
@@ -78,6 +81,7 @@ static ts_code add_errors(tr_trainer *t, int first, int n, tr_validation *out, t
         .image = ts_view(v->images + photograph * pixels * 3, (ts_shape){n * (int)given, size, size, 3}),
         .grid = grid,
         .views = v->captures + photograph,
+        .known = t->config.arch.conditions ? nothing : NULL,
         .given = (int)given};
     ag_value *maps[TR_MOST_ITERATIONS + 1];
     ag_reset(v->tape);

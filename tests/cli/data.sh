@@ -51,7 +51,7 @@ check data_contact_sheet data_contact_sheet
 data_wrong_usage() {
     expect 2 "$DATA"
     says "$T/err" "-o DIR"
-    for bad in "--count 0" "--tilt 31" "--vignette 1" "--off-centre -1" "--exposure nan" "--count x" "--size 4" "--size 1e3" "--format exe" "--noise 2" "--noise nan" "--seed -1" "--quality 0" "--threads 0" "stray" "--statistics" "--testdata ."; do
+    for bad in "--count 0" "--tilt 31" "--fov-min 20" "--fov-min 40 --fov-max 30" "--flash 0.6" "--vignette 1" "--off-centre -1" "--exposure nan" "--count x" "--size 4" "--size 1e3" "--format exe" "--noise 2" "--noise nan" "--seed -1" "--quality 0" "--threads 0" "stray" "--statistics" "--testdata ."; do
         # shellcheck disable=SC2086
         expect 2 "$DATA" -o "$T/o" $bad
         [ -e "$T/o" ] && fail "$bad made the folder"

@@ -17,6 +17,13 @@ static const io_camera every = {.noise = 1,
                                 .white_balance = 0.2f,
                                 .jpeg = 40};
 
+static io_rig place(const io_camera *c, uint64_t seed, uint64_t index, float distance)
+{
+    io_rig rig = {{0, 0, distance}, {0, 0, distance}, 1};
+    io_camera_rig(c, seed, index, &rig);
+    return rig;
+}
+
 static void fill(float *image, float largest)
 {
     ts_rng r = ts_rng_make(5, TS_STREAM_TEST, 0);
@@ -27,14 +34,13 @@ TEST(camera_without_faults_only_clips)
 {
     static float clean[N], a[N];
     io_camera none = {0};
-    float position[3];
+    const io_rig rig = place(&none, 1, 2, 0.75f);
     fill(clean, 1.5f);
     memcpy(a, clean, sizeof a);
     io_camera_apply(&none, 1, 2, SIZE, a);
     for (int i = 0; i < N; i++) CHECK(a[i] == fminf(clean[i], 1), "value %d: %g became %g", i, clean[i], a[i]);
-    io_camera_place(&none, 1, 2, 0.75f, position);
-    CHECK(position[0] == 0 && position[1] == 0 && position[2] == 0.75f, "stands at %g %g %g", position[0], position[1],
-          position[2]);
+    CHECK(rig.camera[0] == 0 && rig.camera[1] == 0 && rig.camera[2] == 0.75f && rig.power == 1, "stands at %g %g %g",
+          rig.camera[0], rig.camera[1], rig.camera[2]);
     CHECK(io_camera_exposure(&none, 1, 2) == 1, "exposure %g", io_camera_exposure(&none, 1, 2));
 }
 
@@ -134,25 +140,80 @@ TEST(camera_light_stays_within_its_ranges)
 TEST(camera_stands_at_its_distance_within_tilt_and_offset)
 {
     const io_camera tilted = {.tilt = 5}, off = {.off_centre = 0.1f}, both = {.tilt = 5, .off_centre = 0.1f};
-    float p[3], steepest = 0, farthest = 0, mean[2] = {0};
+    float steepest = 0, farthest = 0, mean[2] = {0};
     for (uint64_t index = 0; index < 500; index++) {
-        io_camera_place(&tilted, 1, index, 2, p);
+        const io_rig turned = place(&tilted, 1, index, 2), moved = place(&off, 1, index, 2),
+                     rig = place(&both, 1, index, 2);
+        const float *p = turned.camera, *q = moved.camera, *r = rig.camera;
         const float across = hypotf(p[0], p[1]), angle = atan2f(across, p[2]) * 57.29578f;
         CHECK(fabsf(across * across + p[2] * p[2] - 4) < 1e-4f && angle <= 5.001f, "tilt %g at distance %g", angle,
               hypotf(across, p[2]));
         steepest = fmaxf(steepest, angle);
         mean[0] += p[0] / 500, mean[1] += p[1] / 500;
-        float q[3];
-        io_camera_place(&off, 1, index, 2, q);
         CHECK(hypotf(q[0], q[1]) <= 0.1001f && q[2] == 2, "off centre by %g", hypotf(q[0], q[1]));
         farthest = fmaxf(farthest, hypotf(q[0], q[1]));
-        float r[3];
-        io_camera_place(&both, 1, index, 2, r);
         CHECK(fabsf(r[0] - p[0] - q[0]) < 1e-6f && fabsf(r[1] - p[1] - q[1]) < 1e-6f && r[2] == p[2],
               "tilt and offset do not add");
+        CHECK(!memcmp(rig.light, r, sizeof rig.light) && rig.power == 1, "the light leaves the camera");
     }
     CHECK(steepest > 4.8f && farthest > 0.098f && hypotf(mean[0], mean[1]) < 0.02f,
           "ranges are not used: %g %g, mean %g %g", steepest, farthest, mean[0], mean[1]);
+}
+
+TEST(camera_flash_is_beside_the_lens)
+{
+    const io_camera camera = {.flash = 0.2f, .tilt = 10, .off_centre = 0.1f, .fov_min = 20, .fov_max = 75};
+    float farthest = 0, mean[2] = {0}, logarithm = 0;
+    for (uint64_t index = 0; index < 1000; index++) {
+        const io_rig rig = place(&camera, 1, index, 1);
+        const float x = rig.light[0] - rig.camera[0], y = rig.light[1] - rig.camera[1];
+        CHECK(rig.light[2] == rig.camera[2] && hypotf(x, y) < 0.20001f, "the flash is %g %g %g from the lens", x, y,
+              rig.light[2] - rig.camera[2]);
+        farthest = fmaxf(farthest, hypotf(x, y));
+        mean[0] += x / 1000, mean[1] += y / 1000;
+        logarithm += logf(rig.power) / 2000;
+    }
+    CHECK(farthest > 0.195f && hypotf(mean[0], mean[1]) < 0.015f, "largest offset %g, mean %g %g", farthest, mean[0],
+          mean[1]);
+    const float ends = logf(0.5f / tanf(0.17453293f)) + logf(0.5f / tanf(0.65449847f));
+    CHECK(fabsf(logarithm - ends / 2) < 0.05f, "mean logarithm of the distance %g, not %g", logarithm, ends / 2);
+}
+
+TEST(camera_tells_the_share_that_is_asked_for)
+{
+    const io_camera camera = {.told_view = 0.3f, .told_power = 0.8f}, all = {.told_view = 1};
+    int views = 0, powers = 0, both = 0;
+    bool view, power;
+    for (uint64_t index = 0; index < 2000; index++) {
+        io_camera_told(&camera, 1, index, &view, &power);
+        views += view, powers += power, both += view && power;
+        io_camera_told(&all, 1, index, &view, &power);
+        CHECK(view && !power, "shares of 1 and 0 give %d and %d", view, power);
+    }
+    CHECK(abs(views - 600) < 80 && abs(powers - 1600) < 70 && abs(both - 480) < 80, "told %d %d, both %d of 2000",
+          views, powers, both);
+}
+
+static uint64_t fnv(uint64_t hash, const void *bytes, size_t count)
+{
+    for (size_t i = 0; i < count; i++) hash = (hash ^ ((const uint8_t *)bytes)[i]) * UINT64_C(1099511628211);
+    return hash;
+}
+
+/* A key that is off leaves the bytes of photographs as they are, whatever keys there are. */
+TEST(camera_photographs_keep_their_bytes)
+{
+    static float a[N];
+    uint64_t hash = UINT64_C(14695981039346656037);
+    for (uint64_t index = 0; index < 20; index++) {
+        io_camera c = every;
+        c.tilt = 10, c.off_centre = 0.2f;
+        for (int i = 0; i < N; i++) a[i] = (float)((i * 37 + (int)index) % 101) * 0.012f;
+        io_camera_apply(&c, 5, index, SIZE, a);
+        const io_rig rig = place(&c, 5, index, 0.9765625f);
+        hash = fnv(fnv(hash, a, sizeof a), rig.camera, sizeof rig.camera);
+    }
+    CHECK(hash == UINT64_C(0x6970392e942fc8b2), "hash 0x%016llx", (unsigned long long)hash);
 }
 
 static double psnr(const uint8_t *a, const uint8_t *b, int n)

@@ -46,7 +46,7 @@ TEST(precision_bf16_maps_of_the_shipped_model)
     for (int i = 0; i < COUNT; i++) {
         io_material material = {.size = SIDE, .maps = truth};
         io_procedural_make(&p, (uint64_t)i, &material);
-        tr_photographs(&c, 77, (uint64_t)i, 1, SIDE, truth, NULL, 1, image);
+        tr_photographs(&c, 77, (uint64_t)i, 1, SIDE, truth, NULL, 1, image, NULL);
         for (int precision = LGD_F32; precision <= LGD_BF16; precision++) {
             lgd_options o = lgd_options_default();
             lgd_error e;

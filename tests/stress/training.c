@@ -19,9 +19,9 @@ static struct {
 const float *__real_io_loader_next(io_loader *loader, ts_status *st);
 const float *__wrap_io_loader_next(io_loader *loader, ts_status *st);
 void __real_tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
-                           const rd_view *views, int number, float *images);
+                           const rd_view *views, int number, float *images, tr_shot *shots);
 void __wrap_tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
-                           const rd_view *views, int number, float *images);
+                           const rd_view *views, int number, float *images, tr_shot *shots);
 
 /* One in two hundred: with maps and photographs, one in a hundred inputs. */
 static void spoil(float *values, int count, size_t each)
@@ -47,9 +47,9 @@ const float *__wrap_io_loader_next(io_loader *loader, ts_status *st)
 }
 
 void __wrap_tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
-                           const rd_view *views, int number, float *images)
+                           const rd_view *views, int number, float *images, tr_shot *shots)
 {
-    __real_tr_photographs(c, seed, index, count, size, maps, views, number, images);
+    __real_tr_photographs(c, seed, index, count, size, maps, views, number, images, shots);
     if (poison.on && count == poison.batch && size == poison.size)
         spoil(images, count, (size_t)size * (size_t)size * 3);
 }

@@ -91,7 +91,7 @@ TEST(photographs_are_the_clamped_renderings_without_faults)
     rd_view views[COUNT][NUMBER];
     for (int i = 0; i < COUNT; i++)
         for (int k = 0; k < NUMBER; k++) views[i][k] = rd_capture_view((3 * i + 2 * k) % RD_CAPTURE_VIEWS);
-    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, many[0][0]);
+    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, many[0][0], NULL);
     for (int i = 0; i < COUNT; i++)
         for (int k = 0; k < NUMBER; k++) {
             rd_render(rd_grid_full(SIZE), maps[i], MAP_CHANNELS, &views[i][k], true, one[0]);
@@ -105,10 +105,10 @@ TEST(photographs_under_the_flash_are_the_single_ones)
     const tr_config c = tr_config_default();
     rd_view flash[COUNT];
     for (int i = 0; i < COUNT; i++) flash[i] = rd_flash();
-    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], NULL, 1, one[0]);
-    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], flash, 1, many[0][0]);
+    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], NULL, 1, one[0], NULL);
+    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], flash, 1, many[0][0], NULL);
     CHECK(!memcmp(one, many[0], sizeof one), "one flash photograph of each differs from the flash's own");
-    tr_photographs(&c, 1, 9, 1, SIZE, maps[2], NULL, 1, many[0][0]);
+    tr_photographs(&c, 1, 9, 1, SIZE, maps[2], NULL, 1, many[0][0], NULL);
     CHECK(!memcmp(one[2], many[0][0], sizeof one[2]), "a photograph depends on the batch that it comes in");
 }
 
@@ -162,7 +162,7 @@ TEST(photographs_have_their_own_faults_for_any_number_of_threads)
         for (int k = 0; k < NUMBER; k++) views[i][k] = rd_flash();
     for (int threads = 1; threads <= 3; threads++) {
         ts_threads_set(threads);
-        tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, threads == 1 ? many[0][0] : again[0][0]);
+        tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, threads == 1 ? many[0][0] : again[0][0], NULL);
         CHECK(threads == 1 || !memcmp(many, again, sizeof many), "%d threads make other bytes", threads);
     }
     ts_threads_set(0);
@@ -170,4 +170,64 @@ TEST(photographs_have_their_own_faults_for_any_number_of_threads)
         for (int k = 1; k < NUMBER; k++)
             CHECK(memcmp(many[i][0], many[i][k], sizeof many[i][0]),
                   "photographs 0 and %d of material %d have the same faults", k, i);
+}
+
+TEST(photographs_are_the_renderings_of_their_shots)
+{
+    make();
+    tr_config c = without_faults();
+    c.data.fov_min = 20, c.data.fov_max = 75, c.data.flash = 0.2, c.data.tilt = 10, c.data.off_centre = 0.1;
+    c.data.told_view = 0.5;
+    rd_view views[COUNT][NUMBER];
+    tr_shot shots[COUNT][NUMBER];
+    int told = 0;
+    tr_capture_views(1, 7, COUNT, NUMBER, views[0]);
+    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, many[0][0], shots[0]);
+    for (int i = 0; i < COUNT; i++)
+        for (int k = 0; k < NUMBER; k++) {
+            rd_render(rd_grid_full(SIZE), maps[i], MAP_CHANNELS, &shots[i][k].view, true, one[0]);
+            CHECK(!memcmp(one[0], many[i][k], sizeof one[0]), "photograph %d of material %d is another", k, i);
+            told += shots[i][k].told_view;
+            CHECK(shots[i][k].told_power, "a share of 1 leaves a photograph untold");
+        }
+    CHECK(told > 0 && told < COUNT * NUMBER, "%d of %d are told", told, COUNT * NUMBER);
+
+    c.data.exposure = 2;
+    bool differ = false;
+    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, many[0][0], shots[0]);
+    for (int i = 0; i < COUNT; i++)
+        for (int k = 0; k < NUMBER; k++) {
+            rd_render(rd_grid_full(SIZE), maps[i], MAP_CHANNELS, &shots[i][k].view, true, one[0]);
+            for (int p = 0; p < PIXELS * 3; p++) {
+                CHECK(fabsf(one[0][p] - many[i][k][p]) < 1e-6f, "photograph %d of material %d: %g, its shot %g", k, i,
+                      many[i][k][p], one[0][p]);
+            }
+            differ = differ || memcmp(&shots[i][k].view, &shots[0][0].view, sizeof(rd_view));
+        }
+    CHECK(differ, "all photographs have one view");
+}
+
+/* A phone exposes for the sample: from any distance a flat grey shows the same value at its centre. */
+TEST(photographs_are_exposed_alike_at_any_field_of_view)
+{
+    enum { SIDE = 25, MIDDLE = SIDE * SIDE / 2 };
+    static float grey[SIDE * SIDE][MAP_CHANNELS], image[SIDE * SIDE][3];
+    tr_config c = without_faults();
+    for (int p = 0; p < SIDE * SIDE; p++) /* diffuse .5, flat, rough, specular 0 */
+        memcpy(grey[p], (const float[MAP_CHANNELS]){0, 0, 0, 0, 0, 1, -1, -1, -1}, sizeof grey[p]);
+    const rd_view flash = rd_flash();
+    rd_render(rd_grid_full(SIDE), grey[0], MAP_CHANNELS, &flash, true, image[0]);
+    const float usual = image[MIDDLE][1];
+    double nearest = 9, farthest = 0;
+    c.data.fov_min = 20, c.data.fov_max = 75;
+    for (uint64_t index = 0; index < 60; index++) {
+        tr_shot shot;
+        tr_photographs(&c, 1, index, 1, SIDE, grey[0], NULL, 1, image[0], &shot);
+        const double d = shot.view.camera[2], fov = 2 * atan(0.5 / d) * 57.29577951308232;
+        CHECK(fabsf(image[MIDDLE][1] / usual - 1) < 0.01f, "%g at %g degrees, %g usually", image[MIDDLE][1], fov,
+              usual);
+        CHECK(fov > 19.99 && fov < 75.01, "field of view %g", fov);
+        nearest = fmin(nearest, d), farthest = fmax(farthest, d);
+    }
+    CHECK(nearest < 0.75 && farthest > 2.4, "distances from %g to %g", nearest, farthest);
 }
