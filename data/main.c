@@ -104,9 +104,9 @@ static void print_help(void)
         "      --first N         default 0\n"
         "      --count N         default 16; contact sheet 3 for each family; statistics and histograms 512\n"
         "      --size N          8 .. 2048 pixels, default 256; contact sheet, statistics and histograms 128\n"
-        "      --families LIST   some of: ");
+        "      --families LIST   all (the default), classic (the first seventeen), or some of: ");
     for (int i = 0; i < io_family_count(); i++)
-        printf("%s%s%s", i ? "," : "", i && i % 9 == 0 ? "\n                        " : "", io_family_name(i));
+        printf("%s%s%s", i ? "," : "", i % 9 == 0 ? "\n                        " : "", io_family_name(i));
     printf("\n\nHow:\n"
            "      --noise X         of photographs, 0 none .. 1 a phone at night (default 0.5)\n"
            "      --blur X          of photographs, largest sigma in pixels at 256 (default 0.6)\n"
@@ -131,9 +131,9 @@ static int parse_families(char *list, uint64_t *families)
     *families = 0;
     char *rest = NULL;
     for (char *name = strtok_r(list, ",", &rest); name; name = strtok_r(NULL, ",", &rest)) {
-        int family = io_family_find(name);
-        if (family < 0) return cl_usage("--families: no family is called '%s' (--help lists them)", name);
-        *families |= UINT64_C(1) << family;
+        const uint64_t bits = io_family_mask(name);
+        if (!bits) return cl_usage("--families: no family is called '%s' (--help lists them)", name);
+        *families |= bits;
     }
     return *families ? CL_OK : cl_usage("--families: the list is empty");
 }

@@ -38,7 +38,10 @@ enum {
 static const lgd_argument arguments[] = {
     {'o', "output", "DIR", "write results.csv, summary.csv, times.csv, results.json and report.html there (required)"},
     {'d', "set", "KIND:WHERE",
-     "what to evaluate (required, may be repeated):\nprocedural:SEED,COUNT  generated materials\n"
+     "what to evaluate (required, may be repeated):\n"
+     "procedural:SEED,COUNT[,FAMILY...]  generated materials: of families as lgd-data --help lists them,\nof all, or "
+     "of "
+     "classic, the first seventeen (the default)\n"
      "strips:FOLDER  images of five panels: input, normal, diffuse, roughness, specular\nmaps:FOLDER  a folder of map "
      "folders\nmultiview:FOLDER  a capture, or a folder of them: 00.png, 01.png ..., camera_pos.txt,\nlight_pos.txt, "
      "image_size.txt, light_power.txt; 00.png is the input"},

@@ -69,10 +69,22 @@ static ts_code parse_procedural(ev_set *set, ts_status *st)
     set->seed = strtoull(set->where, &end, 10);
     const bool seed = digit && !errno && end[0] == ',' && end[1] >= '0' && end[1] <= '9';
     const long count = seed ? strtol(end + 1, &end, 10) : 0;
-    if (!seed || errno || *end || count < 1 || count > COUNT_MAX)
+    if (!seed || errno || (*end && *end != ',') || count < 1 || count > COUNT_MAX)
         return ts_fail(st, TS_INVALID, "--set %s: should be procedural:SEED,COUNT with COUNT in 1 .. %d", set->spec,
                        COUNT_MAX);
     set->count = (int)count;
+    set->families = *end ? 0 : io_family_mask("classic");
+    while (*end) {
+        char name[64];
+        const size_t n = strcspn(++end, ",");
+        snprintf(name, sizeof name, "%.*s", (int)n, end);
+        const uint64_t bits = n < sizeof name ? io_family_mask(name) : 0;
+        if (!bits)
+            return ts_fail(st, TS_INVALID, "--set %s: there is no family \"%s\" (lgd-data --help lists them)",
+                           set->spec, name);
+        set->families |= bits;
+        end += n;
+    }
     return TS_OK;
 }
 
@@ -148,7 +160,7 @@ ts_code ev_set_load(const ev_set *set, int i, int size, io_material *m, ts_statu
 {
     io_material_free(m);
     if (set->kind == EV_PROCEDURAL) {
-        const io_procedural p = {.seed = set->seed};
+        const io_procedural p = {.seed = set->seed, .families = set->families};
         const ts_code code = io_material_create(m, size, st);
         if (code) return code;
         io_procedural_make(&p, (uint64_t)i, m);

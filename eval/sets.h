@@ -9,18 +9,18 @@ typedef enum ev_kind { EV_PROCEDURAL, EV_STRIPS, EV_MAPS, EV_MULTIVIEW, EV_KINDS
 typedef struct ev_set {
     char *spec; /* as given: KIND:WHERE */
     ev_kind kind;
-    const char *where; /* into spec */
-    uint64_t seed;     /* EV_PROCEDURAL */
+    const char *where;       /* into spec */
+    uint64_t seed, families; /* EV_PROCEDURAL; families as in io_procedural */
     int count;
     io_map_convention option, told; /* EV_MAPS: what the options say, and with set.ini */
     char **entry;                   /* the names in the folder, sorted; NULL for EV_PROCEDURAL */
 } ev_set;
 
-/* procedural:SEED,COUNT, strips:FOLDER (a folder of strip images), maps:FOLDER (a folder of map folders) or
- * multiview:FOLDER (a capture, or a folder of them). A file set.ini in a map folder says (eval/set_ini.h) what the
- * options (told, may be NULL), which win, leave open, and one in the folder of all of them what is still open then. The
- * caller closes it after success. TS_INVALID for a wrong spec, TS_IO for a folder that cannot be read or has nothing of
- * that kind. */
+/* procedural:SEED,COUNT[,FAMILY...] (classic families without a list: io_family_mask), strips:FOLDER (a folder of strip
+ * images), maps:FOLDER (a folder of map folders) or multiview:FOLDER (a capture, or a folder of them). A file set.ini
+ * in a map folder says (eval/set_ini.h) what the options (told, may be NULL), which win, leave open, and one in the
+ * folder of all of them what is still open then. The caller closes it after success. TS_INVALID for a wrong spec, TS_IO
+ * for a folder that cannot be read or has nothing of that kind. */
 ts_code ev_set_open(const char *spec, const io_map_convention *told, ev_set *set, ts_status *st);
 void ev_set_close(ev_set *set);
 

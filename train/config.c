@@ -66,11 +66,10 @@ static int distance(const char *a, const char *b)
     return row[m];
 }
 
-/* Names or "all", removed by "-name", in any order after it. */
+/* Names or groups, removed by "-name", in any order after it. */
 static ts_code parse_families(const char *where, const char *text, uint64_t *mask, ts_status *st)
 {
     const int count = io_family_count();
-    const uint64_t all = count < 64 ? (UINT64_C(1) << count) - 1 : ~UINT64_C(0);
     uint64_t bits = 0;
     for (const char *p = text; *p;) {
         char word[64];
@@ -83,23 +82,18 @@ static ts_code parse_families(const char *where, const char *text, uint64_t *mas
         p += n;
         const bool remove = word[0] == '-';
         const char *name = word + remove;
-        if (!remove && !strcmp(name, "all")) {
-            bits = all;
-            continue;
-        }
-        const int f = io_family_find(name);
-        if (f < 0) {
+        const uint64_t named = io_family_mask(name);
+        if (!named) {
             int best = 0;
             for (int i = 1; i < count; i++)
                 if (distance(name, io_family_name(i)) < distance(name, io_family_name(best))) best = i;
             return ts_fail(st, TS_INVALID, "%s: data.families: there is no family %s, did you mean %s?", where, name,
                            io_family_name(best));
         }
-        if (remove) bits &= ~(UINT64_C(1) << f);
-        else bits |= UINT64_C(1) << f;
+        bits = remove ? bits & ~named : bits | named;
     }
     if (!bits) return ts_fail(st, TS_INVALID, "%s: data.families names no family that may be drawn", where);
-    *mask = bits == all ? 0 : bits;
+    *mask = bits == io_family_mask("all") ? 0 : bits;
     return TS_OK;
 }
 

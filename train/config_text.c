@@ -16,8 +16,9 @@ static void format_real(double v, char *text, size_t size)
 
 static void format_families(uint64_t mask, char *text, size_t size)
 {
-    snprintf(text, size, "%s", mask ? "" : "all");
-    for (int f = 0; mask && f < io_family_count(); f++)
+    const bool group = !mask || mask == io_family_mask("classic");
+    snprintf(text, size, "%s", !group ? "" : mask ? "classic" : "all");
+    for (int f = 0; !group && f < io_family_count(); f++)
         if (mask >> f & 1) {
             const size_t n = strlen(text);
             snprintf(text + n, size - n, "%s%s", n ? ", " : "", io_family_name(f));
@@ -70,7 +71,8 @@ static void print_range(const tr_key *k, FILE *f)
         break;
     case TR_TEXT: fprintf(f, "path"); break;
     case TR_FAMILIES:
-        for (int i = 0; i < io_family_count(); i++) fprintf(f, "%s%s", i ? ", " : "list of ", io_family_name(i));
+        fprintf(f, "list of all, classic");
+        for (int i = 0; i < io_family_count(); i++) fprintf(f, ", %s", io_family_name(i));
         break;
     }
 }

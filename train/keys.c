@@ -76,7 +76,7 @@ const tr_key tr_keys[] = {
     {"data", "seed", TR_INT64, AT(data.seed), 0, 1e15, "1", NULL, false,
      "seed of the materials and of the camera's noise"},
     {"data", "families", TR_FAMILIES, AT(data.families), 0, 0, "all", NULL, false,
-     "procedural families to draw from: names, or all, or all with some removed (all, -wood)"},
+     "procedural families to draw from: names, all, classic (the first seventeen), or less some (all, -wood)"},
     {"data", "noise", TR_REAL, AT(data.noise), 0, 1, "0.3", NULL, false,
      "most sensor noise: 0 none, 1 a phone at night"},
     {"data", "noise_spread", TR_REAL, AT(data.noise_spread), 0, 3, "1", NULL, false,

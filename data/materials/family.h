@@ -22,4 +22,16 @@ void io_family_paint(io_canvas *c);    /* painted and worn layers over metal, wo
 void io_family_panels(io_canvas *c);   /* metal and plastic panels: seams, rivets, screws, slots */
 void io_family_embossed(io_canvas *c); /* tread plate, studs, scales, hammered and perforated sheet */
 void io_family_plastic(io_canvas *c);  /* plastic, rubber, lacquer, paper: grained, ribbed, smooth */
+
+/* Those whose relief, colour and gloss are joined by data/materials/finish.h. */
+void io_family_masonry(io_canvas *c);  /* uneven bricks with deep joints and chipped edges */
+void io_family_cobbles(io_canvas *c);  /* domed stones and setts */
+void io_family_woven(io_canvas *c);    /* weaves with real crossings, dyed by the thread */
+void io_family_knitted(io_canvas *c);  /* rows of loops */
+void io_family_hide(io_canvas *c);     /* leather of fine cells and creases */
+void io_family_scales(io_canvas *c);   /* overlapping scales and shingles */
+void io_family_rough(io_canvas *c);    /* rough stone and plaster, markings apart from the relief */
+void io_family_foam(io_canvas *c);     /* foam, sponge, pumice */
+void io_family_polished(io_canvas *c); /* polished stone and glazed tile, F0 up to .2 */
+void io_family_alloy(io_canvas *c);    /* all common metals, bare, corroded, painted, inlaid */
 #endif

@@ -5,18 +5,28 @@
 #include <stdio.h>
 #include <string.h>
 
+enum { CLASSIC = 17 }; /* the first so many ask wear_calm for their last touch; the others end by fin_any */
+
 /* Every family: its key, how often it is drawn beside the others, and what it paints. */
 static const struct {
     const char *name;
     float weight;
     void (*paint)(io_canvas *c);
 } families[] = {
-    {"stone", 1, io_family_stone},       {"marble", 0.8f, io_family_marble},   {"brick", 0.8f, io_family_brick},
-    {"paving", 0.8f, io_family_paving},  {"tile", 1, io_family_tile},          {"wood", 1, io_family_wood},
-    {"cloth", 0.8f, io_family_cloth},    {"leather", 0.8f, io_family_leather}, {"brushed", 1, io_family_brushed},
-    {"rust", 1, io_family_rust},         {"plaster", 0.7f, io_family_plaster}, {"concrete", 0.7f, io_family_concrete},
-    {"ground", 0.8f, io_family_ground},  {"paint", 1, io_family_paint},        {"panels", 1.2f, io_family_panels},
-    {"embossed", 1, io_family_embossed}, {"plastic", 0.7f, io_family_plastic},
+    {"stone", 1, io_family_stone},        {"marble", 0.8f, io_family_marble},
+    {"brick", 0.8f, io_family_brick},     {"paving", 0.8f, io_family_paving},
+    {"tile", 1, io_family_tile},          {"wood", 1, io_family_wood},
+    {"cloth", 0.8f, io_family_cloth},     {"leather", 0.8f, io_family_leather},
+    {"brushed", 1, io_family_brushed},    {"rust", 1, io_family_rust},
+    {"plaster", 0.7f, io_family_plaster}, {"concrete", 0.7f, io_family_concrete},
+    {"ground", 0.8f, io_family_ground},   {"paint", 1, io_family_paint},
+    {"panels", 1.2f, io_family_panels},   {"embossed", 1, io_family_embossed},
+    {"plastic", 0.7f, io_family_plastic}, {"masonry", 1, io_family_masonry},
+    {"cobbles", 1, io_family_cobbles},    {"woven", 1.2f, io_family_woven},
+    {"knitted", 0.7f, io_family_knitted}, {"hide", 1.2f, io_family_hide},
+    {"scales", 0.7f, io_family_scales},   {"rough", 2, io_family_rough},
+    {"foam", 0.7f, io_family_foam},       {"polished", 1.5f, io_family_polished},
+    {"alloy", 1.8f, io_family_alloy},
 };
 
 int io_family_count(void) { return (int)(sizeof families / sizeof *families); }
@@ -31,6 +41,14 @@ int io_family_find(const char *name)
     for (int i = 0; i < io_family_count(); i++)
         if (!strcmp(families[i].name, name)) return i;
     return -1;
+}
+
+uint64_t io_family_mask(const char *name)
+{
+    if (!strcmp(name, "all")) return (UINT64_C(1) << io_family_count()) - 1;
+    if (!strcmp(name, "classic")) return (UINT64_C(1) << CLASSIC) - 1;
+    const int family = io_family_find(name);
+    return family < 0 ? 0 : UINT64_C(1) << family;
 }
 
 static int draw_family(ts_rng *rng, uint64_t allowed)
@@ -110,7 +128,7 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
         c.y[i] = 0.5f - ((float)(i / c.size) + 0.5f) * c.pixel;
     }
     c.rng = ts_rng_make(p->seed, TS_STREAM_MATERIAL, index);
-    uint64_t all = (UINT64_C(1) << io_family_count()) - 1, allowed = p->families & all ? p->families & all : all;
+    uint64_t all = io_family_mask("all"), allowed = p->families & all ? p->families & all : all;
     int a = draw_family(&c.rng, allowed), b = draw_family(&c.rng, allowed);
     bool mixed = cv_chance(&c, 0.27f);
     painted_at(&c, first);
@@ -123,7 +141,7 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
         mix(&c, first);
     }
     c.used = 0;
-    wear_calm(&c);
+    if (a < CLASSIC) wear_calm(&c);
     cv_write(&c, m->maps);
     snprintf(m->name, sizeof m->name, mixed ? "%05llu_%s_%s" : "%05llu_%s", (unsigned long long)index, families[a].name,
              families[b].name);

@@ -10,6 +10,9 @@
 int io_family_count(void);
 const char *io_family_name(int family);
 int io_family_find(const char *name); /* -1: none */
+/* Bits of the families that a word names: a family's name, "all", or "classic", the first seventeen, whose materials
+ * stay the same as others are added. 0: none. */
+uint64_t io_family_mask(const char *name);
 
 typedef struct io_procedural {
     uint64_t seed;

@@ -242,7 +242,7 @@ TEST(eval_procedural_set_is_the_generator)
     io_material a = {0}, b = {0};
     CHECK(ev_set_open("procedural:21,5", NULL, &set, &st) == TS_OK && set.count == 5, "%s", st.message);
     CHECK(ev_set_open("procedural:21,2", NULL, &other, &st) == TS_OK, "%s", st.message);
-    const io_procedural p = {.seed = 21};
+    const io_procedural p = {.seed = 21, .families = io_family_mask("classic")};
     CHECK(io_material_create(&b, SIZE, &st) == TS_OK, "%s", st.message);
     for (int i = 0; i < 2; i++) {
         CHECK(ev_set_load(&set, i, SIZE, &a, &st) == TS_OK, "%s", st.message);
@@ -253,6 +253,13 @@ TEST(eval_procedural_set_is_the_generator)
     CHECK(ev_set_identity(&set, 0) != ev_set_identity(&set, 1), "two materials have the same views");
     ev_set_close(&set);
     ev_set_close(&other);
+    CHECK(ev_set_open("procedural:21,5,wood,rust", NULL, &set, &st) == TS_OK && set.count == 5, "%s", st.message);
+    CHECK(set.families == (io_family_mask("wood") | io_family_mask("rust")), "mask %llx",
+          (unsigned long long)set.families);
+    ev_set_close(&set);
+    CHECK(ev_set_open("procedural:21,5,wood,rusty", NULL, &set, &st) == TS_INVALID, "a family that is none");
+    CHECK(strstr(st.message, "\"rusty\""), "%s", st.message);
+    CHECK(ev_set_open("procedural:21,5,", NULL, &set, &st) == TS_INVALID, "an empty list was accepted");
     io_material_free(&a);
     io_material_free(&b);
 }

@@ -197,6 +197,11 @@ TEST(config_families_are_listed_and_removed)
     CHECK(tr_config_set(&c, "t", "data", "families", text, &st) == TS_OK, "%s", st.message);
     CHECK(c.data.families == ((UINT64_C(1) << (last + 1)) - 2), "mask %llx", (unsigned long long)c.data.families);
     CHECK(tr_config_set(&c, "t", "data", "families", "all", &st) == TS_OK && c.data.families == 0, "all is not 0");
+    CHECK(tr_config_set(&c, "t", "data", "families", "classic", &st) == TS_OK && c.data.families == (1u << 17) - 1,
+          "classic is not the first seventeen");
+    CHECK(tr_config_set(&c, "t", "data", "families", "all, -classic", &st) == TS_OK &&
+              c.data.families == ((UINT64_C(1) << (last + 1)) - (1u << 17)),
+          "mask %llx", (unsigned long long)c.data.families);
 }
 
 TEST(config_assignments)
