@@ -9,8 +9,9 @@
 #include <string.h>
 
 #ifdef AG_API
-/* How unlikely target [N,H,W,C] is where x [N,H,W,C] is expected and off by u e^spread. spread: [N,H,W,G]; group: for each
- * of the C <= 32 channels its channel of spread; x and spread may be constants, target is one. The mean over all values. */
+/* How unlikely target [N,H,W,C] is where x [N,H,W,C] is expected and off by u e^spread. spread: [N,H,W,G]; group: for
+ * each of the C <= 32 channels its channel of spread; x and spread may be constants, target is one. The mean over all
+ * values. */
 ag_value *ag_laplace(ag_tape *tape, ag_value *x, ag_value *spread, ag_value *target, const signed char *group,
                      float unit);
 #endif

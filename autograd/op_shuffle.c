@@ -1,5 +1,5 @@
-/* y[n,i,j,(a r + b) C + c] = x[n, i r + a, j r + b, c] (space to depth), or its inverse (depth to space);   dx: the other of the two on dy
- * x: [N,H,W,C], y: [N,H/r,W/r,C r r], or the other way round */
+/* y[n,i,j,(a r + b) C + c] = x[n, i r + a, j r + b, c] (space to depth), or its inverse (depth to space);   dx: the
+ * other of the two on dy x: [N,H,W,C], y: [N,H/r,W/r,C r r], or the other way round */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
@@ -7,7 +7,8 @@
 #include <string.h>
 
 #ifdef AG_API
-/* Squares of r x r pixels of x [N,H,W,C] become one with their channels side by side: [N,H/r,W/r,C r r]. H and W are multiples of r. */
+/* Squares of r x r pixels of x [N,H,W,C] become one with their channels side by side: [N,H/r,W/r,C r r]. H and W are
+ * multiples of r. */
 ag_value *ag_space_to_depth(ag_tape *tape, ag_value *x, int r);
 /* The inverse: [N,H,W,C r r] to [N,H r,W r,C]. */
 ag_value *ag_depth_to_space(ag_tape *tape, ag_value *x, int r);
@@ -41,7 +42,8 @@ static void forward(ag_tape *tape, ag_node *node)
 {
     (void)tape;
     const shuffle_attr *a = node->attr;
-    move(a->deep ? node->in[0]->t.shape : node->out->t.shape, a->r, a->deep, node->in[0]->t.data, node->out->t.data, false);
+    move(a->deep ? node->in[0]->t.shape : node->out->t.shape, a->r, a->deep, node->in[0]->t.data, node->out->t.data,
+         false);
 }
 
 static void backward(ag_tape *tape, ag_node *node)
@@ -55,7 +57,8 @@ static void backward(ag_tape *tape, ag_node *node)
 static void reference(const ag_node *node, const double *const *in, double *out)
 {
     const shuffle_attr *a = node->attr;
-    const ts_shape s = a->deep ? node->in[0]->t.shape : node->out->t.shape, d = a->deep ? node->out->t.shape : node->in[0]->t.shape;
+    const ts_shape s = a->deep ? node->in[0]->t.shape : node->out->t.shape,
+                   d = a->deep ? node->out->t.shape : node->in[0]->t.shape;
     for (int64_t q = 0; q < ts_count(s); q++) {
         const int64_t c = q % s.c, j = q / s.c % s.w, i = q / s.c / s.w % s.h, n = q / s.c / s.w / s.h;
         const int64_t p = ((n * d.h + i / a->r) * d.w + j / a->r) * d.c + (i % a->r * a->r + j % a->r) * s.c + c;
@@ -78,7 +81,13 @@ static void cases(ag_gradcheck *check)
         ts_shape s = {1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 4), 1 + ts_rng_int(r, 4), 1 + ts_rng_int(r, 5)};
         if (a.deep) s.h *= a.r, s.w *= a.r;
         else s.c *= a.r * a.r;
-        ag_case c = {.label = a.deep ? "space to depth" : "depth to space", .inputs = 1, .shape = {s}, .lo = -1, .hi = 1, .build = build, .user = &a};
+        ag_case c = {.label = a.deep ? "space to depth" : "depth to space",
+                     .inputs = 1,
+                     .shape = {s},
+                     .lo = -1,
+                     .hi = 1,
+                     .build = build,
+                     .user = &a};
         ag_gradcheck_run(check, &c);
     }
 }
@@ -90,7 +99,8 @@ ag_value *ag_space_to_depth(ag_tape *tape, ag_value *x, int r)
     char text[AG_SHAPE_TEXT];
     if (!ag_ready(tape, "space_to_depth", 1, &x)) return NULL;
     const ts_shape s = x->t.shape;
-    if (r < 1 || s.h % r || s.w % r) return ag_fail(tape, TS_INVALID, "space_to_depth: %s is not of squares of %d", ag_shape_text(text, s), r);
+    if (r < 1 || s.h % r || s.w % r)
+        return ag_fail(tape, TS_INVALID, "space_to_depth: %s is not of squares of %d", ag_shape_text(text, s), r);
     const shuffle_attr a = {r, true};
     return ag_apply(tape, &op_shuffle, 1, &x, (ts_shape){s.n, s.h / r, s.w / r, s.c * r * r}, &a, sizeof a);
 }
@@ -100,7 +110,9 @@ ag_value *ag_depth_to_space(ag_tape *tape, ag_value *x, int r)
     char text[AG_SHAPE_TEXT];
     if (!ag_ready(tape, "depth_to_space", 1, &x)) return NULL;
     const ts_shape s = x->t.shape;
-    if (r < 1 || s.c % (r * r)) return ag_fail(tape, TS_INVALID, "depth_to_space: %s has not a multiple of %d channels", ag_shape_text(text, s), r * r);
+    if (r < 1 || s.c % (r * r))
+        return ag_fail(tape, TS_INVALID, "depth_to_space: %s has not a multiple of %d channels", ag_shape_text(text, s),
+                       r * r);
     const shuffle_attr a = {r, false};
     return ag_apply(tape, &op_shuffle, 1, &x, (ts_shape){s.n, s.h * r, s.w * r, s.c / (r * r)}, &a, sizeof a);
 }

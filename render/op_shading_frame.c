@@ -1,8 +1,8 @@
 /* y = x's first C channels, and (y_3, y_4) += s f - t (f turned by a quarter), f = p / (p.p + 0.05), where p is the
  * pixel's place (x right, y up) in half widths from the centre and (s, t) are x's channels C and C + 1;   dx = dy, ds =
  * f.(dy_3, dy_4), dt likewise. Under a flash near the camera a photograph shows of the normal what it has along p, and
- * shows p.n: f, p's regularised inverse, is what leads from there to the normal, so that layers that know no places can.
- * x: [N,S,S,C+2], y: [N,S,S,C] */
+ * shows p.n: f, p's regularised inverse, is what leads from there to the normal, so that layers that know no places
+ * can. x: [N,S,S,C+2], y: [N,S,S,C] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "render/losses.h"
@@ -15,7 +15,8 @@ extern const ag_op op_shading_frame;
 
 static void frame(int64_t pixel, int side, double f[2])
 {
-    const double x = (2 * (double)(pixel % side) + 1) / side - 1, y = 1 - (2 * (double)(pixel / side % side) + 1) / side;
+    const double x = (2 * (double)(pixel % side) + 1) / side - 1,
+                 y = 1 - (2 * (double)(pixel / side % side) + 1) / side;
     const double inverse = 1 / (x * x + y * y + REGULAR);
     f[0] = x * inverse;
     f[1] = y * inverse;

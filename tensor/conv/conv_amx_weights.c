@@ -158,7 +158,8 @@ void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float 
     g.chunks = (int)(chunks < 1 ? 1 : chunks < most ? chunks : most);
     const int blocks = (g.ic + TS_MATRIX_BLOCK - 1) / TS_MATRIX_BLOCK, groups = (UNITS + g.chunks - 1) / g.chunks;
     g.groups = groups < blocks ? groups : blocks;
-    const int steps = line_pixels(&g, band_rows(&g, TS_MATRIX_BLOCK)) / STEP_PIXELS; /* of the longest line */
+    /* of the longest line: the fewer inputs, the more rows a band has */
+    const int steps = line_pixels(&g, band_rows(&g, TS_MATRIX_SIDE)) / STEP_PIXELS;
     ptrdiff_t *at = ts_scratch(3, sizeof *at * (size_t)steps);
     for (int s = 0; s < steps; s++) at[s] = s * (ptrdiff_t)(STEP_PIXELS * sizeof(uint16_t));
     g.at = at;
