@@ -6,11 +6,13 @@
 #include "data/materials/histogram.h"
 #include "data/sheet.h"
 #include "data/materials/statistics.h"
+#include "render/ambient.h"
 #include "render/render.h"
 #include "tensor/threads.h"
 #include <errno.h>
 #include <getopt.h>
 #include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -35,52 +37,64 @@ enum {
     OPT_FORMAT,
     OPT_SHEET,
     OPT_PHOTOGRAPHS,
-    OPT_NOISE,
-    OPT_BLUR,
-    OPT_EXPOSURE,
-    OPT_VIGNETTE,
-    OPT_WHITE_BALANCE,
-    OPT_TILT,
-    OPT_OFF_CENTRE,
-    OPT_FOV_MIN,
-    OPT_FOV_MAX,
-    OPT_FLASH,
     OPT_QUALITY,
     OPT_STATISTICS,
     OPT_HISTOGRAMS,
     OPT_TESTDATA,
     OPT_THREADS,
     OPT_HELP,
-    OPT_VERSION
+    OPT_VERSION,
+    OPT_CAMERA /* and more: camera_options */
 };
 
-static const struct option long_options[] = {{"output", required_argument, NULL, 'o'},
-                                             {"seed", required_argument, NULL, OPT_SEED},
-                                             {"first", required_argument, NULL, OPT_FIRST},
-                                             {"count", required_argument, NULL, OPT_COUNT},
-                                             {"size", required_argument, NULL, OPT_SIZE},
-                                             {"families", required_argument, NULL, OPT_FAMILIES},
-                                             {"format", required_argument, NULL, OPT_FORMAT},
-                                             {"contact-sheet", no_argument, NULL, OPT_SHEET},
-                                             {"photographs", no_argument, NULL, OPT_PHOTOGRAPHS},
-                                             {"noise", required_argument, NULL, OPT_NOISE},
-                                             {"blur", required_argument, NULL, OPT_BLUR},
-                                             {"exposure", required_argument, NULL, OPT_EXPOSURE},
-                                             {"vignette", required_argument, NULL, OPT_VIGNETTE},
-                                             {"white-balance", required_argument, NULL, OPT_WHITE_BALANCE},
-                                             {"tilt", required_argument, NULL, OPT_TILT},
-                                             {"off-centre", required_argument, NULL, OPT_OFF_CENTRE},
-                                             {"fov-min", required_argument, NULL, OPT_FOV_MIN},
-                                             {"fov-max", required_argument, NULL, OPT_FOV_MAX},
-                                             {"flash", required_argument, NULL, OPT_FLASH},
-                                             {"quality", required_argument, NULL, OPT_QUALITY},
-                                             {"statistics", no_argument, NULL, OPT_STATISTICS},
-                                             {"histograms", no_argument, NULL, OPT_HISTOGRAMS},
-                                             {"testdata", required_argument, NULL, OPT_TESTDATA},
-                                             {"threads", required_argument, NULL, OPT_THREADS},
-                                             {"help", no_argument, NULL, OPT_HELP},
-                                             {"version", no_argument, NULL, OPT_VERSION},
-                                             {NULL, 0, NULL, 0}};
+/* The camera's faults, each a range from 0. */
+#define AT(field) offsetof(io_camera, field)
+static const struct camera_option {
+    const char *name;
+    double most;
+    size_t at; /* of a float in io_camera */
+    const char *help;
+} camera_options[] = {
+    {"noise", 1, AT(noise), "0 none .. 1 a phone at night"},
+    {"noise-spread", 3, AT(noise_spread), "read and shot noise each up to this many stops stronger or weaker"},
+    {"blur", 4, AT(blur), "largest sigma in pixels at 256"},
+    {"exposure", 3, AT(exposure), "up to this many stops brighter or darker"},
+    {"vignette", 0.9, AT(vignette), "largest share of light lost in the corners"},
+    {"white-balance", 0.9, AT(white_balance), "red and blue up to this share stronger or weaker"},
+    {"tilt", 30, AT(tilt), "largest angle of the camera in degrees"},
+    {"off-centre", 0.4, AT(off_centre), "how far the camera may be off the centre in patch widths"},
+    {"fov-min", 120, AT(fov_min), "narrowest field of view in degrees, from 5 on; 0: 54.2 for all"},
+    {"fov-max", 120, AT(fov_max), "widest field of view"},
+    {"flash", 0.5, AT(flash), "how far the flash may be beside the lens in patch widths"},
+    {"ambient", 1, AT(ambient), "largest share of other light"},
+    {"tone", 1, AT(tone), "largest strength of a tone curve"},
+    {"sharpen", 3, AT(sharpen), "largest amount of sharpening"},
+};
+enum { CAMERA_OPTIONS = sizeof camera_options / sizeof *camera_options };
+static const io_camera usual_camera = {.noise = 0.5f, .blur = 0.6f, .quantise = true};
+
+static float *camera_value(io_camera *camera, int option)
+{
+    return (float *)(void *)((char *)camera + camera_options[option].at);
+}
+
+static const struct option plain_options[] = {{"output", required_argument, NULL, 'o'},
+                                              {"seed", required_argument, NULL, OPT_SEED},
+                                              {"first", required_argument, NULL, OPT_FIRST},
+                                              {"count", required_argument, NULL, OPT_COUNT},
+                                              {"size", required_argument, NULL, OPT_SIZE},
+                                              {"families", required_argument, NULL, OPT_FAMILIES},
+                                              {"format", required_argument, NULL, OPT_FORMAT},
+                                              {"contact-sheet", no_argument, NULL, OPT_SHEET},
+                                              {"photographs", no_argument, NULL, OPT_PHOTOGRAPHS},
+                                              {"quality", required_argument, NULL, OPT_QUALITY},
+                                              {"statistics", no_argument, NULL, OPT_STATISTICS},
+                                              {"histograms", no_argument, NULL, OPT_HISTOGRAMS},
+                                              {"testdata", required_argument, NULL, OPT_TESTDATA},
+                                              {"threads", required_argument, NULL, OPT_THREADS},
+                                              {"help", no_argument, NULL, OPT_HELP},
+                                              {"version", no_argument, NULL, OPT_VERSION},
+                                              {NULL, 0, NULL, 0}};
 
 static void print_help(void)
 {
@@ -107,19 +121,13 @@ static void print_help(void)
         "      --families LIST   some of: ");
     for (int i = 0; i < io_family_count(); i++)
         printf("%s%s%s", i ? "," : "", i && i % 9 == 0 ? "\n                        " : "", io_family_name(i));
-    printf("\n\nHow:\n"
-           "      --noise X         of photographs, 0 none .. 1 a phone at night (default 0.5)\n"
-           "      --blur X          of photographs, largest sigma in pixels at 256 (default 0.6)\n"
-           "      --exposure X      of photographs, up to this many stops brighter or darker (default 0)\n"
-           "      --vignette X      of photographs, largest share of light lost in the corners, 0 .. 0.9 (default 0)\n"
-           "      --white-balance X of photographs, red and blue up to this share stronger or weaker, 0 .. 0.9 "
-           "(default 0)\n"
-           "      --tilt X          of photographs, largest angle of the camera in degrees, 0 .. 30 (default 0)\n"
-           "      --off-centre X    of photographs, how far the camera may be off the centre in patch widths, 0 .. 0.4 "
-           "(default 0)\n"
-           "      --fov-min X --fov-max X  of photographs, degrees across the square, 5 .. 120 (default: 54.2)\n"
-           "      --flash X         of photographs, how far the flash may be beside the lens in patch widths, 0 .. 0.5 "
-           "(default 0)\n"
+    printf("\n\nCamera of the photographs, largest values of what each draws:\n");
+    for (int i = 0; i < CAMERA_OPTIONS; i++) {
+        io_camera usual = usual_camera;
+        printf("      --%-13s X  %s, 0 .. %g (default %g)\n", camera_options[i].name, camera_options[i].help,
+               camera_options[i].most, (double)*camera_value(&usual, i));
+    }
+    printf("\nHow:\n"
            "      --quality N       of photographs' JPEG, 1 .. 100 (default 90)\n"
            "      --testdata DIR    a folder with maps/ (map folders) and strips/ to compare with\n"
            "      --threads N       default: as many as the process may use\n"
@@ -157,6 +165,11 @@ static int parse_options(int argc, char **argv, options *o)
 {
     int code = CL_OK, c;
     int64_t seed = 1;
+    enum { PLAIN = sizeof plain_options / sizeof *plain_options };
+    struct option long_options[PLAIN + CAMERA_OPTIONS];
+    for (int i = 0; i < CAMERA_OPTIONS; i++)
+        long_options[i] = (struct option){camera_options[i].name, required_argument, NULL, OPT_CAMERA + i};
+    memcpy(long_options + CAMERA_OPTIONS, plain_options, sizeof plain_options);
     opterr = 0;
     while (code == CL_OK && (c = getopt_long(argc, argv, ":o:", long_options, NULL)) != -1) switch (c) {
         case 'o': o->output = optarg; break;
@@ -173,16 +186,6 @@ static int parse_options(int argc, char **argv, options *o)
             break;
         case OPT_SHEET: o->sheet = true; break;
         case OPT_PHOTOGRAPHS: o->photographs = true; break;
-        case OPT_NOISE: code = parse_share("noise", optarg, 1, &o->camera.noise); break;
-        case OPT_BLUR: code = parse_share("blur", optarg, 4, &o->camera.blur); break;
-        case OPT_EXPOSURE: code = parse_share("exposure", optarg, 3, &o->camera.exposure); break;
-        case OPT_VIGNETTE: code = parse_share("vignette", optarg, 0.9, &o->camera.vignette); break;
-        case OPT_WHITE_BALANCE: code = parse_share("white-balance", optarg, 0.9, &o->camera.white_balance); break;
-        case OPT_TILT: code = parse_share("tilt", optarg, 30, &o->camera.tilt); break;
-        case OPT_OFF_CENTRE: code = parse_share("off-centre", optarg, 0.4, &o->camera.off_centre); break;
-        case OPT_FOV_MIN: code = parse_share("fov-min", optarg, 120, &o->camera.fov_min); break;
-        case OPT_FOV_MAX: code = parse_share("fov-max", optarg, 120, &o->camera.fov_max); break;
-        case OPT_FLASH: code = parse_share("flash", optarg, 0.5, &o->camera.flash); break;
         case OPT_QUALITY: code = parse_number("quality", optarg, 1, 100, &o->quality); break;
         case OPT_STATISTICS: o->statistics = true; break;
         case OPT_HISTOGRAMS: o->histograms = true; break;
@@ -191,7 +194,11 @@ static int parse_options(int argc, char **argv, options *o)
         case OPT_HELP: print_help(); exit(cl_finish(CL_OK));
         case OPT_VERSION: cl_print_version(); exit(cl_finish(CL_OK));
         case ':': code = cl_usage("%s needs a value", argv[optind - 1]); break;
-        default: code = cl_usage("no option is called '%s'", argv[optind - 1]);
+        default:
+            if (c >= OPT_CAMERA) {
+                const struct camera_option *k = &camera_options[c - OPT_CAMERA];
+                code = parse_share(k->name, optarg, k->most, camera_value(&o->camera, c - OPT_CAMERA));
+            } else code = cl_usage("no option is called '%s'", argv[optind - 1]);
         }
     if (code) return code;
     if (optind < argc) return cl_usage("'%s' is not an option", argv[optind]);
@@ -245,6 +252,28 @@ static ts_code write_capture(const options *o, const io_material *m, ts_status *
     return code;
 }
 
+static void take_photograph(const options *o, uint64_t index, const io_material *m, float *image)
+{
+    const uint64_t seed = o->procedural.seed;
+    const rd_grid grid = rd_grid_full(m->size);
+    io_rig rig = {{0, 0, RD_FLASH_DISTANCE}, {0, 0, RD_FLASH_DISTANCE}, RD_FLASH_POWER};
+    rd_view view = rd_flash();
+    io_camera_rig(&o->camera, seed, index, &rig);
+    memcpy(view.camera, rig.camera, sizeof view.camera);
+    memcpy(view.light, rig.light, sizeof view.light);
+    view.power = rig.power;
+    rd_render(grid, m->maps, MAP_CHANNELS, &view, false, image);
+    if (o->camera.ambient > 0) {
+        const io_ambient light = io_camera_ambient(&o->camera, seed, index);
+        rd_ambient ambient;
+        memcpy(ambient.uniform, light.uniform, sizeof ambient.uniform);
+        memcpy(ambient.side, light.side, sizeof ambient.side);
+        memcpy(ambient.direction, light.direction, sizeof ambient.direction);
+        rd_ambient_add(grid, m->maps, MAP_CHANNELS, &view, &ambient, image);
+    }
+    io_camera_apply(&o->camera, seed, index, m->size, image);
+}
+
 /* One material and its photograph, to the files that were asked for. */
 static ts_code write_material(const options *o, uint64_t index, io_material *m, io_image *photo, ts_status *st)
 {
@@ -264,13 +293,7 @@ static ts_code write_material(const options *o, uint64_t index, io_material *m, 
     }
     if (!code && o->format == FORMAT_CAPTURES) code = write_capture(o, m, st);
     if (!code && o->photographs) {
-        io_rig rig = {{0, 0, RD_FLASH_DISTANCE}, {0, 0, RD_FLASH_DISTANCE}, RD_FLASH_POWER};
-        io_camera_rig(&o->camera, o->procedural.seed, index, &rig);
-        memcpy(flash.camera, rig.camera, sizeof flash.camera);
-        memcpy(flash.light, rig.light, sizeof flash.light);
-        flash.power = rig.power;
-        rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &flash, false, photo->data);
-        io_camera_apply(&o->camera, o->procedural.seed, index, m->size, photo->data);
+        take_photograph(o, index, m, photo->data);
         code = make_path(path, o, m->name, ".jpg", st);
         if (!code) code = io_write_jpeg(path, photo, (int)o->quality, st);
     }
@@ -412,7 +435,7 @@ static ts_code make_histograms(const options *o, ts_status *st)
 
 int main(int argc, char **argv)
 {
-    options o = {.quality = 90, .camera = {.noise = 0.5f, .blur = 0.6f, .quantise = true}};
+    options o = {.quality = 90, .camera = usual_camera};
     ts_status st = {0};
     int code = cl_init("lgd-data");
     if (!code) code = parse_options(argc, argv, &o);

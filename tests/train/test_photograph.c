@@ -156,7 +156,8 @@ TEST(capture_views_are_the_flash_or_different_configurations)
 TEST(photographs_have_their_own_faults_for_any_number_of_threads)
 {
     make();
-    const tr_config c = tr_config_default();
+    tr_config c = tr_config_default();
+    c.data.ambient = 0.2, c.data.tone = 1, c.data.sharpen = 1, c.data.flash = 0.1;
     rd_view views[COUNT][NUMBER];
     for (int i = 0; i < COUNT; i++)
         for (int k = 0; k < NUMBER; k++) views[i][k] = rd_flash();
@@ -230,4 +231,25 @@ TEST(photographs_are_exposed_alike_at_any_field_of_view)
         nearest = fmin(nearest, d), farthest = fmax(farthest, d);
     }
     CHECK(nearest < 0.75 && farthest > 2.4, "distances from %g to %g", nearest, farthest);
+}
+
+/* On a flat matt sample ambient light adds the same to every pixel, its share of what the flash gives the centre. */
+TEST(photographs_have_their_share_of_ambient_light)
+{
+    enum { SIDE = 25, MIDDLE = SIDE * SIDE / 2 };
+    static float grey[SIDE * SIDE][MAP_CHANNELS], lit[SIDE * SIDE][3], flash[SIDE * SIDE][3];
+    tr_config c = without_faults();
+    for (int p = 0; p < SIDE * SIDE; p++) /* diffuse .25, flat, rough, specular 0: what F gives beside it is small */
+        memcpy(grey[p], (const float[MAP_CHANNELS]){-0.5f, -0.5f, -0.5f, 0, 0, 1, -1, -1, -1}, sizeof grey[p]);
+    c.data.fov_min = 20, c.data.fov_max = 75, c.data.ambient = 0.4;
+    for (uint64_t index = 0; index < 20; index++) {
+        tr_shot shot;
+        tr_photographs(&c, 1, index, 1, SIDE, grey[0], NULL, 1, lit[0], &shot);
+        rd_render(rd_grid_full(SIDE), grey[0], MAP_CHANNELS, &shot.view, false, flash[0]);
+        for (int p = 0; p < SIDE * SIDE; p++) {
+            const float share = (lit[p][1] - flash[p][1]) / flash[MIDDLE][1];
+            CHECK(fabsf(share - shot.ambient) < 0.02f * shot.ambient + 1e-5f, "pixel %d: %g in place of %g", p, share,
+                  shot.ambient);
+        }
+    }
 }
