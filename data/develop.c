@@ -57,7 +57,8 @@ void io_blur(int size, int channels, float sigma, float *image)
     for (int k = -reach; k <= reach; k++) total += tap[k + reach] = expf(-0.5f * (float)(k * k) / (sigma * sigma));
     for (int k = 0; k <= 2 * reach; k++) tap[k] /= total;
     const size_t row = (size_t)size * (size_t)channels;
-    float *work = ts_scratch(TS_SCRATCH_SLOTS - 1, ((size_t)size * row + row + 2 * REACH * (size_t)channels) * sizeof *work);
+    const size_t values = (size_t)size * row + row + 2 * REACH * (size_t)channels;
+    float *work = ts_scratch(TS_SCRATCH_SLOTS - 1, values * sizeof *work);
     float *padded = work + (size_t)size * row;
     for (int y = 0; y < size; y++) { /* along rows */
         const float *in = image + (size_t)y * row;

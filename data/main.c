@@ -1,18 +1,15 @@
 /* lgd-data: procedural materials as map folders, strips, photographs or a contact sheet, and how they compare with
  * others' materials. */
 #include "cli/cli.h"
-#include "data/capture.h"
-#include "data/camera.h"
+#include "cli/data/pictures.h"
 #include "data/materials/histogram.h"
 #include "data/sheet.h"
 #include "data/materials/statistics.h"
-#include "render/ambient.h"
 #include "render/render.h"
 #include "tensor/threads.h"
 #include <errno.h>
 #include <getopt.h>
 #include <math.h>
-#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -44,39 +41,8 @@ enum {
     OPT_THREADS,
     OPT_HELP,
     OPT_VERSION,
-    OPT_CAMERA /* and more: camera_options */
+    OPT_CAMERA /* and more: lgd_camera_options */
 };
-
-/* The camera's faults, each a range from 0. */
-#define AT(field) offsetof(io_camera, field)
-static const struct camera_option {
-    const char *name;
-    double most;
-    size_t at; /* of a float in io_camera */
-    const char *help;
-} camera_options[] = {
-    {"noise", 1, AT(noise), "0 none .. 1 a phone at night"},
-    {"noise-spread", 3, AT(noise_spread), "read and shot noise each up to this many stops stronger or weaker"},
-    {"blur", 4, AT(blur), "largest sigma in pixels at 256"},
-    {"exposure", 3, AT(exposure), "up to this many stops brighter or darker"},
-    {"vignette", 0.9, AT(vignette), "largest share of light lost in the corners"},
-    {"white-balance", 0.9, AT(white_balance), "red and blue up to this share stronger or weaker"},
-    {"tilt", 30, AT(tilt), "largest angle of the camera in degrees"},
-    {"off-centre", 0.4, AT(off_centre), "how far the camera may be off the centre in patch widths"},
-    {"fov-min", 120, AT(fov_min), "narrowest field of view in degrees, from 5 on; 0: 54.2 for all"},
-    {"fov-max", 120, AT(fov_max), "widest field of view"},
-    {"flash", 0.5, AT(flash), "how far the flash may be beside the lens in patch widths"},
-    {"ambient", 1, AT(ambient), "largest share of other light"},
-    {"tone", 1, AT(tone), "largest strength of a tone curve"},
-    {"sharpen", 3, AT(sharpen), "largest amount of sharpening"},
-};
-enum { CAMERA_OPTIONS = sizeof camera_options / sizeof *camera_options };
-static const io_camera usual_camera = {.noise = 0.5f, .blur = 0.6f, .quantise = true};
-
-static float *camera_value(io_camera *camera, int option)
-{
-    return (float *)(void *)((char *)camera + camera_options[option].at);
-}
 
 static const struct option plain_options[] = {{"output", required_argument, NULL, 'o'},
                                               {"seed", required_argument, NULL, OPT_SEED},
@@ -122,10 +88,11 @@ static void print_help(void)
     for (int i = 0; i < io_family_count(); i++)
         printf("%s%s%s", i ? "," : "", i && i % 9 == 0 ? "\n                        " : "", io_family_name(i));
     printf("\n\nCamera of the photographs, largest values of what each draws:\n");
-    for (int i = 0; i < CAMERA_OPTIONS; i++) {
-        io_camera usual = usual_camera;
-        printf("      --%-13s X  %s, 0 .. %g (default %g)\n", camera_options[i].name, camera_options[i].help,
-               camera_options[i].most, (double)*camera_value(&usual, i));
+    for (int i = 0; i < LGD_CAMERA_OPTIONS; i++) {
+        io_camera usual = lgd_usual_camera;
+        const lgd_camera_option *k = &lgd_camera_options[i];
+        printf("      --%s X%*s%s, 0 .. %g (default %g)\n", k->name, 15 - (int)strlen(k->name), "", k->help, k->most,
+               (double)*lgd_camera_value(&usual, i));
     }
     printf("\nHow:\n"
            "      --quality N       of photographs' JPEG, 1 .. 100 (default 90)\n"
@@ -166,10 +133,10 @@ static int parse_options(int argc, char **argv, options *o)
     int code = CL_OK, c;
     int64_t seed = 1;
     enum { PLAIN = sizeof plain_options / sizeof *plain_options };
-    struct option long_options[PLAIN + CAMERA_OPTIONS];
-    for (int i = 0; i < CAMERA_OPTIONS; i++)
-        long_options[i] = (struct option){camera_options[i].name, required_argument, NULL, OPT_CAMERA + i};
-    memcpy(long_options + CAMERA_OPTIONS, plain_options, sizeof plain_options);
+    struct option long_options[PLAIN + LGD_CAMERA_OPTIONS];
+    for (int i = 0; i < LGD_CAMERA_OPTIONS; i++)
+        long_options[i] = (struct option){lgd_camera_options[i].name, required_argument, NULL, OPT_CAMERA + i};
+    memcpy(long_options + LGD_CAMERA_OPTIONS, plain_options, sizeof plain_options);
     opterr = 0;
     while (code == CL_OK && (c = getopt_long(argc, argv, ":o:", long_options, NULL)) != -1) switch (c) {
         case 'o': o->output = optarg; break;
@@ -196,8 +163,8 @@ static int parse_options(int argc, char **argv, options *o)
         case ':': code = cl_usage("%s needs a value", argv[optind - 1]); break;
         default:
             if (c >= OPT_CAMERA) {
-                const struct camera_option *k = &camera_options[c - OPT_CAMERA];
-                code = parse_share(k->name, optarg, k->most, camera_value(&o->camera, c - OPT_CAMERA));
+                const lgd_camera_option *k = &lgd_camera_options[c - OPT_CAMERA];
+                code = parse_share(k->name, optarg, k->most, lgd_camera_value(&o->camera, c - OPT_CAMERA));
             } else code = cl_usage("no option is called '%s'", argv[optind - 1]);
         }
     if (code) return code;
@@ -223,57 +190,6 @@ static ts_code make_path(char path[4096], const options *o, const char *name, co
     return TS_OK;
 }
 
-/* A hand-held phone: the first picture is the flash photograph, the others are taken around it with the flash beside
- * the lens. */
-static ts_code write_capture(const options *o, const io_material *m, ts_status *st)
-{
-    enum { PICTURES = 9 };
-    const size_t values = (size_t)m->size * (size_t)m->size * 3;
-    char path[4096];
-    io_capture c;
-    ts_code code = io_capture_create(&c, PICTURES, m->size, st);
-    c.side = 20;
-    for (int i = 0; i < PICTURES && !code; i++) {
-        rd_view view = rd_flash();
-        const double phi = 6.28318530717958647692 * (i - 1) / (PICTURES - 1);
-        if (i > 0) {
-            view.camera[0] = (float)(0.45 * cos(phi)), view.camera[1] = (float)(0.45 * sin(phi));
-            view.light[0] = view.camera[0] + 0.06f, view.light[1] = view.camera[1];
-        }
-        memcpy(c.camera[i], view.camera, sizeof view.camera);
-        memcpy(c.light[i], view.light, sizeof view.light);
-        rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &view, true, c.image + (size_t)i * values);
-    }
-    for (int k = 0; k < 3; k++) c.power[k] = RD_FLASH_POWER;
-    if (!code) code = make_path(path, o, m->name, "", st);
-    if (!code) code = cl_make_folder(path, st);
-    if (!code) code = io_write_capture(path, &c, st);
-    io_capture_free(&c);
-    return code;
-}
-
-static void take_photograph(const options *o, uint64_t index, const io_material *m, float *image)
-{
-    const uint64_t seed = o->procedural.seed;
-    const rd_grid grid = rd_grid_full(m->size);
-    io_rig rig = {{0, 0, RD_FLASH_DISTANCE}, {0, 0, RD_FLASH_DISTANCE}, RD_FLASH_POWER};
-    rd_view view = rd_flash();
-    io_camera_rig(&o->camera, seed, index, &rig);
-    memcpy(view.camera, rig.camera, sizeof view.camera);
-    memcpy(view.light, rig.light, sizeof view.light);
-    view.power = rig.power;
-    rd_render(grid, m->maps, MAP_CHANNELS, &view, false, image);
-    if (o->camera.ambient > 0) {
-        const io_ambient light = io_camera_ambient(&o->camera, seed, index);
-        rd_ambient ambient;
-        memcpy(ambient.uniform, light.uniform, sizeof ambient.uniform);
-        memcpy(ambient.side, light.side, sizeof ambient.side);
-        memcpy(ambient.direction, light.direction, sizeof ambient.direction);
-        rd_ambient_add(grid, m->maps, MAP_CHANNELS, &view, &ambient, image);
-    }
-    io_camera_apply(&o->camera, seed, index, m->size, image);
-}
-
 /* One material and its photograph, to the files that were asked for. */
 static ts_code write_material(const options *o, uint64_t index, io_material *m, io_image *photo, ts_status *st)
 {
@@ -291,9 +207,13 @@ static ts_code write_material(const options *o, uint64_t index, io_material *m, 
         code = make_path(path, o, m->name, ".png", st);
         if (!code) code = io_write_strip(path, m, photo, st);
     }
-    if (!code && o->format == FORMAT_CAPTURES) code = write_capture(o, m, st);
+    if (!code && o->format == FORMAT_CAPTURES) {
+        code = make_path(path, o, m->name, "", st);
+        if (!code) code = cl_make_folder(path, st);
+        if (!code) code = lgd_write_capture(path, m, st);
+    }
     if (!code && o->photographs) {
-        take_photograph(o, index, m, photo->data);
+        lgd_take_photograph(&o->camera, o->procedural.seed, index, m, photo->data);
         code = make_path(path, o, m->name, ".jpg", st);
         if (!code) code = io_write_jpeg(path, photo, (int)o->quality, st);
     }
@@ -435,7 +355,7 @@ static ts_code make_histograms(const options *o, ts_status *st)
 
 int main(int argc, char **argv)
 {
-    options o = {.quality = 90, .camera = usual_camera};
+    options o = {.quality = 90, .camera = lgd_usual_camera};
     ts_status st = {0};
     int code = cl_init("lgd-data");
     if (!code) code = parse_options(argc, argv, &o);
