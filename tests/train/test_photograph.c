@@ -253,3 +253,24 @@ TEST(photographs_have_their_share_of_ambient_light)
         }
     }
 }
+
+TEST(photographs_of_validation_have_the_camera_that_is_asked_for)
+{
+    enum { SIDE = 16, VALUES = SIDE * SIDE * 3 };
+    static float usual[VALUES];
+    tr_config c = tr_config_default();
+    c.arch.g_width = c.arch.h_width = c.arch.h_gru = 4;
+    c.validate.count = 1, c.validate.size = SIDE;
+    for (int i = 0; i < 3; i++) { /* the default camera; another in [data], by which validation goes or not */
+        if (i > 0) c.data.fov_min = c.data.fov_max = 25, c.data.exposure = 0;
+        c.validate.camera = i == 1 ? TR_CAMERA_DEFAULT : TR_CAMERA_DATA;
+        static tr_trainer t;
+        ts_status st = {0};
+        t = (tr_trainer){.config = c};
+        CHECK(tr_validator_create(&t, &st) == TS_OK, "%s", st.message);
+        if (i == 0) memcpy(usual, t.validator.images, sizeof usual);
+        CHECK((memcmp(usual, t.validator.images, sizeof usual) == 0) == (i < 2), "validation %d", i);
+        CHECK(i < 2 || t.validator.shots[0].view.camera[2] > 2, "distance %g", t.validator.shots[0].view.camera[2]);
+        tr_validator_free(&t.validator);
+    }
+}
