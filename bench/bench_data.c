@@ -84,6 +84,9 @@ BENCH(data)
         for (int k = 0; k < 3 * PIXELS; k++) s.maps[k] = (float)(k % 255) / 200;
         bench_time t = bench_measure(photograph, &s);
         bench_row_unit("camera 256^2", t, 1 / t.seconds, "photographs/s");
+        s.camera.tone = s.camera.sharpen = 1;
+        t = bench_measure(photograph, &s);
+        bench_row_unit("camera 256^2, tone curve and sharpening", t, 1 / t.seconds, "photographs/s");
     }
     free(s.maps);
     free(s.image);

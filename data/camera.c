@@ -1,4 +1,5 @@
 #include "data/camera.h"
+#include "data/develop.h"
 #include "data/image/image.h"
 #include "data/materials/noise.h"
 #include "tensor/rng.h"
@@ -36,6 +37,8 @@ static faults draw(uint64_t seed, uint64_t index)
 /* What came after them, from a stream of its own. */
 typedef struct phone {
     float fov, flash, flash_turn, told_view, told_power;
+    float ambient, side, side_turn, side_height, warmth;
+    float contrast, pivot, bend, knee, sharpen, radius;
 } phone;
 
 static phone draw_phone(uint64_t seed, uint64_t index)
@@ -47,6 +50,17 @@ static phone draw_phone(uint64_t seed, uint64_t index)
     p.flash_turn = ts_rng_range(&r, 0, 6.2831853f);
     p.told_view = ts_rng_uniform(&r);
     p.told_power = ts_rng_uniform(&r);
+    p.ambient = ts_rng_uniform(&r);
+    p.side = ts_rng_uniform(&r);
+    p.side_turn = ts_rng_range(&r, 0, 6.2831853f);
+    p.side_height = ts_rng_range(&r, 0.35f, 1.2f); /* radians above the sample: 20 to 70 degrees */
+    p.warmth = ts_rng_range(&r, -1, 1);
+    p.contrast = ts_rng_range(&r, -0.25f, 1.2f);
+    p.pivot = ts_rng_range(&r, 0.4f, 0.6f);
+    p.bend = ts_rng_range(&r, -0.25f, 0.25f);
+    p.knee = ts_rng_range(&r, -1, 1); /* every other photograph clips */
+    p.sharpen = ts_rng_uniform(&r);
+    p.radius = ts_rng_range(&r, 0.5f, 2);
     return p;
 }
 
@@ -82,43 +96,32 @@ void io_camera_told(const io_camera *c, uint64_t seed, uint64_t index, bool *vie
     *power = p.told_power < c->told_power;
 }
 
+io_ambient io_camera_ambient(const io_camera *c, uint64_t seed, uint64_t index)
+{
+    const phone p = draw_phone(seed, index);
+    const float share = c->ambient * p.ambient, tint = exp2f(0.3f * p.warmth), across = cosf(p.side_height);
+    const float colour[3] = {tint, 1, 1 / tint};
+    io_ambient a = {.share = share,
+                    .direction = {across * cosf(p.side_turn), across * sinf(p.side_turn), sinf(p.side_height)}};
+    for (int k = 0; k < 3; k++) {
+        a.side[k] = share * p.side * colour[k];
+        a.uniform[k] = share * (1 - p.side) * colour[k];
+    }
+    return a;
+}
+
+io_tone io_camera_tone(const io_camera *c, uint64_t seed, uint64_t index)
+{
+    const phone p = draw_phone(seed, index);
+    return (io_tone){.contrast = c->tone * p.contrast,
+                     .pivot = p.pivot,
+                     .bend = c->tone * p.bend,
+                     .knee = 1 - 0.6f * c->tone * (p.knee > 0 ? p.knee : 0)};
+}
+
 float io_camera_exposure(const io_camera *c, uint64_t seed, uint64_t index)
 {
     return c->exposure > 0 ? exp2f(c->exposure * draw(seed, index).exposure) : 1;
-}
-
-/* Gaussian blur in both directions by a kernel of at most 2 reach + 1 taps; edges repeated. */
-static void blur(int size, float sigma, float *image)
-{
-    enum { REACH = 12 };
-    int reach = (int)ceilf(3 * sigma);
-    if (reach > REACH) reach = REACH;
-    float tap[2 * REACH + 1], total = 0;
-    for (int k = -reach; k <= reach; k++) total += tap[k + reach] = expf(-0.5f * (float)(k * k) / (sigma * sigma));
-    for (int k = 0; k <= 2 * reach; k++) tap[k] /= total;
-    const size_t row = (size_t)size * 3;
-    float *work = ts_scratch(TS_SCRATCH_SLOTS - 1, ((size_t)size * row + row + 6 * REACH) * sizeof *work);
-    float *padded = work + (size_t)size * row;
-    for (int y = 0; y < size; y++) { /* along rows */
-        const float *in = image + (size_t)y * row;
-        float *out = work + (size_t)y * row;
-        memcpy(padded + 3 * reach, in, row * sizeof *in);
-        for (int t = 0; t < 3 * reach; t++) {
-            padded[t] = in[t % 3];
-            padded[(size_t)(3 * reach + t) + row] = in[row - 3 + (size_t)(t % 3)];
-        }
-        memset(out, 0, row * sizeof *out);
-        for (int t = 0; t <= 2 * reach; t++)
-            for (size_t i = 0; i < row; i++) out[i] += tap[t] * padded[i + 3 * (size_t)t];
-    }
-    memset(image, 0, (size_t)size * row * sizeof *image);
-    for (int y = 0; y < size; y++) /* down columns */
-        for (int t = -reach; t <= reach; t++) {
-            const int at = y + t < 0 ? 0 : y + t >= size ? size - 1 : y + t;
-            const float *in = work + (size_t)at * row;
-            float *out = image + (size_t)y * row;
-            for (size_t i = 0; i < row; i++) out[i] += tap[t + reach] * in[i];
-        }
 }
 
 /* The 8-bit codes of io_linear_to_srgb without its powf for every value: guess[] by the linear value's leading 12 bits,
@@ -180,6 +183,14 @@ static void add_noise(ts_rng *rng, float read, float gain, size_t count, float *
     }
 }
 
+/* From linear light in [0, 1] to encoded values. */
+static void develop(const io_camera *c, const io_tone *tone, uint64_t seed, uint64_t index, int size, float *image)
+{
+    const phone p = draw_phone(seed, index);
+    io_tone_encode(tone, (size_t)size * (size_t)size * 3, image);
+    if (c->sharpen > 0) io_sharpen(size, c->sharpen * p.sharpen, p.radius * (float)size / 256, image);
+}
+
 void io_camera_apply(const io_camera *c, uint64_t seed, uint64_t index, int size, float *image)
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
@@ -196,13 +207,22 @@ void io_camera_apply(const io_camera *c, uint64_t seed, uint64_t index, int size
     }
     size_t count = (size_t)size * (size_t)size * 3;
     if (c->exposure > 0 || c->vignette > 0 || c->white_balance > 0) expose(c, &f, seed, index, size, image);
+    const io_tone tone = io_camera_tone(c, seed, index);
+    if (tone.knee < 1) io_tone_roll_off(&tone, count, image);
     for (size_t i = 0; i < count; i++) image[i] = nz_clamp(image[i], 0, 1);
-    if (sigma > 0.15f) blur(size, sigma, image); /* a narrower one changes nothing that 8 bits show */
+    if (sigma > 0.15f) io_blur(size, 3, sigma, image); /* a narrower one changes nothing that 8 bits show */
     if (strength > 0) add_noise(&rng, read, gain, count, image);
-    if (!c->quantise && !c->jpeg) return;
+    const bool developed = c->tone > 0 || c->sharpen > 0, coded = c->quantise || c->jpeg;
+    if (developed) develop(c, &tone, seed, index, size, image);
+    if (developed && !coded)
+        for (size_t i = 0; i < count; i++) image[i] = io_srgb_to_linear(image[i]);
+    if (!coded) return;
     pthread_once(&once, make_codes);
     uint8_t *codes = ts_scratch(TS_SCRATCH_SLOTS - 1, count); /* the blur's: it is done */
-    for (size_t i = 0; i < count; i++) codes[i] = (uint8_t)srgb_code(nz_clamp(image[i], 0, 1));
+    if (developed)
+        for (size_t i = 0; i < count; i++) codes[i] = (uint8_t)(image[i] * 255 + 0.5f);
+    else
+        for (size_t i = 0; i < count; i++) codes[i] = (uint8_t)srgb_code(nz_clamp(image[i], 0, 1));
     if (c->jpeg) io_jpeg_codes(size, c->jpeg + (int)(f.jpeg * (float)(99 - c->jpeg)), f.halved, codes);
     for (size_t i = 0; i < count; i++) image[i] = linear[codes[i]];
 }

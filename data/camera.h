@@ -2,23 +2,26 @@
  * drawn from (seed, index) alone, and each that is 0 leaves every byte as it was. */
 #ifndef IO_CAMERA_H
 #define IO_CAMERA_H
+#include "data/develop.h"
 #include <stdbool.h>
 #include <stdint.h>
 
 typedef struct io_camera {
-    float noise;        /* largest sensor noise, 0 none .. 1 a phone at night: read and shot noise together */
-    float noise_spread; /* read and shot noise each have a factor of their own, up to this many stops up or down */
-    float blur;         /* largest sigma in pixels at 256^2 */
-    bool quantise;      /* 8 bits sRGB, as a file has */
-    float exposure;     /* up to this many stops brighter or darker */
-    float
-        vignette; /* largest share of the light lost in the corners, with the square of the distance from the centre */
-    float white_balance;    /* red and blue are each up to this share stronger or weaker */
-    int jpeg;               /* lowest JPEG quality (to 98), in half of the photographs with halved chroma; 0: none */
-    float tilt;             /* largest angle of the axis with the normal, degrees */
-    float off_centre;       /* farthest that the axis meets the patch from its centre, patch widths */
-    float fov_min, fov_max; /* field of view across the square, degrees; both 0: the distance that is given */
-    float flash;            /* largest offset of the light from the camera parallel to the sample, patch widths */
+    float noise;         /* largest sensor noise, 0 none .. 1 a phone at night: read and shot noise together */
+    float noise_spread;  /* read and shot noise each have a factor of their own, up to this many stops up or down */
+    float blur;          /* largest sigma in pixels at 256^2 */
+    bool quantise;       /* 8 bits sRGB, as a file has */
+    float exposure;      /* up to this many stops brighter or darker */
+    float vignette;      /* largest share of the light lost in the corners, with the squared distance from the centre */
+    float white_balance; /* red and blue are each up to this share stronger or weaker */
+    int jpeg;            /* lowest JPEG quality (to 98), in half of the photographs with halved chroma; 0: none */
+    float tilt;          /* largest angle of the axis with the normal, degrees */
+    float off_centre;    /* farthest that the axis meets the patch from its centre, patch widths */
+    float fov_min, fov_max;      /* field of view across the square, degrees; both 0: the distance that is given */
+    float flash;                 /* largest offset of the light from the camera parallel to the sample, patch widths */
+    float ambient;               /* largest other light, as a share of the flash's at the centre of a matt sample */
+    float tone;                  /* largest strength of the tone curve; half of the photographs roll off highlights */
+    float sharpen;               /* largest amount of the unsharp mask */
     float told_view, told_power; /* share of the photographs whose field of view or power a model is told */
 } io_camera;
 
@@ -34,6 +37,17 @@ typedef struct io_rig {
  * that its maps stay registered: render from there, nothing else changes. */
 void io_camera_rig(const io_camera *c, uint64_t seed, uint64_t index, io_rig *rig);
 
+/* Weak light beside the flash, in shares of the flash's radiance at the centre of a flat matt sample: one part from
+ * everywhere, one from far away in a direction. Whoever renders adds it before io_camera_apply. */
+typedef struct io_ambient {
+    float share; /* of both together, in green */
+    float uniform[3], side[3], direction[3];
+} io_ambient;
+io_ambient io_camera_ambient(const io_camera *c, uint64_t seed, uint64_t index);
+
+/* The tone curve and the shoulder that io_camera_apply puts in. */
+io_tone io_camera_tone(const io_camera *c, uint64_t seed, uint64_t index);
+
 /* Whether a model is told this photograph's field of view, and its power. */
 void io_camera_told(const io_camera *c, uint64_t seed, uint64_t index, bool *view, bool *power);
 
@@ -42,8 +56,8 @@ void io_camera_told(const io_camera *c, uint64_t seed, uint64_t index, bool *vie
 float io_camera_exposure(const io_camera *c, uint64_t seed, uint64_t index);
 
 /* image: a linear rendering that is NOT clamped, [size][size][3], in place. In this order: exposure, vignette and white
- * balance; highlights clip at 1; blur; noise; JPEG or rounding to 8 bits. The result lies in [0, 1]. Serial, thread
- * safe. */
+ * balance; highlights roll off or clip at 1; blur; noise; tone curve; sharpening; JPEG or rounding to 8 bits. The
+ * result lies in [0, 1]. Serial, thread safe. */
 void io_camera_apply(const io_camera *c, uint64_t seed, uint64_t index, int size, float *image);
 
 /* What a baseline JPEG of this quality (1 .. 100, the tables of ITU-T T.81 annex K scaled as the Independent JPEG

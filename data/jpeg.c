@@ -29,13 +29,25 @@ static void make_cosine(void)
         }
 }
 
-static inline void multiply(const float *restrict a, const float *restrict b, float *restrict out)
+typedef float lanes __attribute__((vector_size(16), aligned(4), may_alias));
+
+/* out = a b, 8 x 8; b in registers. */
+static inline void multiply(const float *a, const float *b, float *out)
 {
+    lanes left[8], right[8];
+    for (int k = 0; k < 8; k++) {
+        left[k] = *(const lanes *)(b + 8 * k);
+        right[k] = *(const lanes *)(b + 8 * k + 4);
+    }
     for (int i = 0; i < 8; i++) {
-        float row[8] = {0};
-        for (int k = 0; k < 8; k++)
-            for (int j = 0; j < 8; j++) row[j] += a[i * 8 + k] * b[k * 8 + j];
-        for (int j = 0; j < 8; j++) out[i * 8 + j] = row[j];
+        lanes p = {0}, q = {0};
+        for (int k = 0; k < 8; k++) {
+            const float s = a[i * 8 + k];
+            p += s * left[k];
+            q += s * right[k];
+        }
+        *(lanes *)(out + 8 * i) = p;
+        *(lanes *)(out + 8 * i + 4) = q;
     }
 }
 

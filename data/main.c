@@ -1,8 +1,7 @@
 /* lgd-data: procedural materials as map folders, strips, photographs or a contact sheet, and how they compare with
  * others' materials. */
 #include "cli/cli.h"
-#include "data/capture.h"
-#include "data/camera.h"
+#include "cli/data/pictures.h"
 #include "data/materials/histogram.h"
 #include "data/sheet.h"
 #include "data/materials/statistics.h"
@@ -35,52 +34,33 @@ enum {
     OPT_FORMAT,
     OPT_SHEET,
     OPT_PHOTOGRAPHS,
-    OPT_NOISE,
-    OPT_BLUR,
-    OPT_EXPOSURE,
-    OPT_VIGNETTE,
-    OPT_WHITE_BALANCE,
-    OPT_TILT,
-    OPT_OFF_CENTRE,
-    OPT_FOV_MIN,
-    OPT_FOV_MAX,
-    OPT_FLASH,
     OPT_QUALITY,
     OPT_STATISTICS,
     OPT_HISTOGRAMS,
     OPT_TESTDATA,
     OPT_THREADS,
     OPT_HELP,
-    OPT_VERSION
+    OPT_VERSION,
+    OPT_CAMERA /* and more: lgd_camera_options */
 };
 
-static const struct option long_options[] = {{"output", required_argument, NULL, 'o'},
-                                             {"seed", required_argument, NULL, OPT_SEED},
-                                             {"first", required_argument, NULL, OPT_FIRST},
-                                             {"count", required_argument, NULL, OPT_COUNT},
-                                             {"size", required_argument, NULL, OPT_SIZE},
-                                             {"families", required_argument, NULL, OPT_FAMILIES},
-                                             {"format", required_argument, NULL, OPT_FORMAT},
-                                             {"contact-sheet", no_argument, NULL, OPT_SHEET},
-                                             {"photographs", no_argument, NULL, OPT_PHOTOGRAPHS},
-                                             {"noise", required_argument, NULL, OPT_NOISE},
-                                             {"blur", required_argument, NULL, OPT_BLUR},
-                                             {"exposure", required_argument, NULL, OPT_EXPOSURE},
-                                             {"vignette", required_argument, NULL, OPT_VIGNETTE},
-                                             {"white-balance", required_argument, NULL, OPT_WHITE_BALANCE},
-                                             {"tilt", required_argument, NULL, OPT_TILT},
-                                             {"off-centre", required_argument, NULL, OPT_OFF_CENTRE},
-                                             {"fov-min", required_argument, NULL, OPT_FOV_MIN},
-                                             {"fov-max", required_argument, NULL, OPT_FOV_MAX},
-                                             {"flash", required_argument, NULL, OPT_FLASH},
-                                             {"quality", required_argument, NULL, OPT_QUALITY},
-                                             {"statistics", no_argument, NULL, OPT_STATISTICS},
-                                             {"histograms", no_argument, NULL, OPT_HISTOGRAMS},
-                                             {"testdata", required_argument, NULL, OPT_TESTDATA},
-                                             {"threads", required_argument, NULL, OPT_THREADS},
-                                             {"help", no_argument, NULL, OPT_HELP},
-                                             {"version", no_argument, NULL, OPT_VERSION},
-                                             {NULL, 0, NULL, 0}};
+static const struct option plain_options[] = {{"output", required_argument, NULL, 'o'},
+                                              {"seed", required_argument, NULL, OPT_SEED},
+                                              {"first", required_argument, NULL, OPT_FIRST},
+                                              {"count", required_argument, NULL, OPT_COUNT},
+                                              {"size", required_argument, NULL, OPT_SIZE},
+                                              {"families", required_argument, NULL, OPT_FAMILIES},
+                                              {"format", required_argument, NULL, OPT_FORMAT},
+                                              {"contact-sheet", no_argument, NULL, OPT_SHEET},
+                                              {"photographs", no_argument, NULL, OPT_PHOTOGRAPHS},
+                                              {"quality", required_argument, NULL, OPT_QUALITY},
+                                              {"statistics", no_argument, NULL, OPT_STATISTICS},
+                                              {"histograms", no_argument, NULL, OPT_HISTOGRAMS},
+                                              {"testdata", required_argument, NULL, OPT_TESTDATA},
+                                              {"threads", required_argument, NULL, OPT_THREADS},
+                                              {"help", no_argument, NULL, OPT_HELP},
+                                              {"version", no_argument, NULL, OPT_VERSION},
+                                              {NULL, 0, NULL, 0}};
 
 static void print_help(void)
 {
@@ -107,19 +87,14 @@ static void print_help(void)
         "      --families LIST   all (the default), classic (the first seventeen), or some of: ");
     for (int i = 0; i < io_family_count(); i++)
         printf("%s%s%s", i ? "," : "", i % 9 == 0 ? "\n                        " : "", io_family_name(i));
-    printf("\n\nHow:\n"
-           "      --noise X         of photographs, 0 none .. 1 a phone at night (default 0.5)\n"
-           "      --blur X          of photographs, largest sigma in pixels at 256 (default 0.6)\n"
-           "      --exposure X      of photographs, up to this many stops brighter or darker (default 0)\n"
-           "      --vignette X      of photographs, largest share of light lost in the corners, 0 .. 0.9 (default 0)\n"
-           "      --white-balance X of photographs, red and blue up to this share stronger or weaker, 0 .. 0.9 "
-           "(default 0)\n"
-           "      --tilt X          of photographs, largest angle of the camera in degrees, 0 .. 30 (default 0)\n"
-           "      --off-centre X    of photographs, how far the camera may be off the centre in patch widths, 0 .. 0.4 "
-           "(default 0)\n"
-           "      --fov-min X --fov-max X  of photographs, degrees across the square, 5 .. 120 (default: 54.2)\n"
-           "      --flash X         of photographs, how far the flash may be beside the lens in patch widths, 0 .. 0.5 "
-           "(default 0)\n"
+    printf("\n\nCamera of the photographs, largest values of what each draws:\n");
+    for (int i = 0; i < LGD_CAMERA_OPTIONS; i++) {
+        io_camera usual = lgd_usual_camera;
+        const lgd_camera_option *k = &lgd_camera_options[i];
+        printf("      --%s X%*s%s, 0 .. %g (default %g)\n", k->name, 15 - (int)strlen(k->name), "", k->help, k->most,
+               (double)*lgd_camera_value(&usual, i));
+    }
+    printf("\nHow:\n"
            "      --quality N       of photographs' JPEG, 1 .. 100 (default 90)\n"
            "      --testdata DIR    a folder with maps/ (map folders) and strips/ to compare with\n"
            "      --threads N       default: as many as the process may use\n"
@@ -157,6 +132,11 @@ static int parse_options(int argc, char **argv, options *o)
 {
     int code = CL_OK, c;
     int64_t seed = 1;
+    enum { PLAIN = sizeof plain_options / sizeof *plain_options };
+    struct option long_options[PLAIN + LGD_CAMERA_OPTIONS];
+    for (int i = 0; i < LGD_CAMERA_OPTIONS; i++)
+        long_options[i] = (struct option){lgd_camera_options[i].name, required_argument, NULL, OPT_CAMERA + i};
+    memcpy(long_options + LGD_CAMERA_OPTIONS, plain_options, sizeof plain_options);
     opterr = 0;
     while (code == CL_OK && (c = getopt_long(argc, argv, ":o:", long_options, NULL)) != -1) switch (c) {
         case 'o': o->output = optarg; break;
@@ -173,16 +153,6 @@ static int parse_options(int argc, char **argv, options *o)
             break;
         case OPT_SHEET: o->sheet = true; break;
         case OPT_PHOTOGRAPHS: o->photographs = true; break;
-        case OPT_NOISE: code = parse_share("noise", optarg, 1, &o->camera.noise); break;
-        case OPT_BLUR: code = parse_share("blur", optarg, 4, &o->camera.blur); break;
-        case OPT_EXPOSURE: code = parse_share("exposure", optarg, 3, &o->camera.exposure); break;
-        case OPT_VIGNETTE: code = parse_share("vignette", optarg, 0.9, &o->camera.vignette); break;
-        case OPT_WHITE_BALANCE: code = parse_share("white-balance", optarg, 0.9, &o->camera.white_balance); break;
-        case OPT_TILT: code = parse_share("tilt", optarg, 30, &o->camera.tilt); break;
-        case OPT_OFF_CENTRE: code = parse_share("off-centre", optarg, 0.4, &o->camera.off_centre); break;
-        case OPT_FOV_MIN: code = parse_share("fov-min", optarg, 120, &o->camera.fov_min); break;
-        case OPT_FOV_MAX: code = parse_share("fov-max", optarg, 120, &o->camera.fov_max); break;
-        case OPT_FLASH: code = parse_share("flash", optarg, 0.5, &o->camera.flash); break;
         case OPT_QUALITY: code = parse_number("quality", optarg, 1, 100, &o->quality); break;
         case OPT_STATISTICS: o->statistics = true; break;
         case OPT_HISTOGRAMS: o->histograms = true; break;
@@ -191,7 +161,11 @@ static int parse_options(int argc, char **argv, options *o)
         case OPT_HELP: print_help(); exit(cl_finish(CL_OK));
         case OPT_VERSION: cl_print_version(); exit(cl_finish(CL_OK));
         case ':': code = cl_usage("%s needs a value", argv[optind - 1]); break;
-        default: code = cl_usage("no option is called '%s'", argv[optind - 1]);
+        default:
+            if (c >= OPT_CAMERA) {
+                const lgd_camera_option *k = &lgd_camera_options[c - OPT_CAMERA];
+                code = parse_share(k->name, optarg, k->most, lgd_camera_value(&o->camera, c - OPT_CAMERA));
+            } else code = cl_usage("no option is called '%s'", argv[optind - 1]);
         }
     if (code) return code;
     if (optind < argc) return cl_usage("'%s' is not an option", argv[optind]);
@@ -216,35 +190,6 @@ static ts_code make_path(char path[4096], const options *o, const char *name, co
     return TS_OK;
 }
 
-/* A hand-held phone: the first picture is the flash photograph, the others are taken around it with the flash beside
- * the lens. */
-static ts_code write_capture(const options *o, const io_material *m, ts_status *st)
-{
-    enum { PICTURES = 9 };
-    const size_t values = (size_t)m->size * (size_t)m->size * 3;
-    char path[4096];
-    io_capture c;
-    ts_code code = io_capture_create(&c, PICTURES, m->size, st);
-    c.side = 20;
-    for (int i = 0; i < PICTURES && !code; i++) {
-        rd_view view = rd_flash();
-        const double phi = 6.28318530717958647692 * (i - 1) / (PICTURES - 1);
-        if (i > 0) {
-            view.camera[0] = (float)(0.45 * cos(phi)), view.camera[1] = (float)(0.45 * sin(phi));
-            view.light[0] = view.camera[0] + 0.06f, view.light[1] = view.camera[1];
-        }
-        memcpy(c.camera[i], view.camera, sizeof view.camera);
-        memcpy(c.light[i], view.light, sizeof view.light);
-        rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &view, true, c.image + (size_t)i * values);
-    }
-    for (int k = 0; k < 3; k++) c.power[k] = RD_FLASH_POWER;
-    if (!code) code = make_path(path, o, m->name, "", st);
-    if (!code) code = cl_make_folder(path, st);
-    if (!code) code = io_write_capture(path, &c, st);
-    io_capture_free(&c);
-    return code;
-}
-
 /* One material and its photograph, to the files that were asked for. */
 static ts_code write_material(const options *o, uint64_t index, io_material *m, io_image *photo, ts_status *st)
 {
@@ -262,15 +207,13 @@ static ts_code write_material(const options *o, uint64_t index, io_material *m, 
         code = make_path(path, o, m->name, ".png", st);
         if (!code) code = io_write_strip(path, m, photo, st);
     }
-    if (!code && o->format == FORMAT_CAPTURES) code = write_capture(o, m, st);
+    if (!code && o->format == FORMAT_CAPTURES) {
+        code = make_path(path, o, m->name, "", st);
+        if (!code) code = cl_make_folder(path, st);
+        if (!code) code = lgd_write_capture(path, m, st);
+    }
     if (!code && o->photographs) {
-        io_rig rig = {{0, 0, RD_FLASH_DISTANCE}, {0, 0, RD_FLASH_DISTANCE}, RD_FLASH_POWER};
-        io_camera_rig(&o->camera, o->procedural.seed, index, &rig);
-        memcpy(flash.camera, rig.camera, sizeof flash.camera);
-        memcpy(flash.light, rig.light, sizeof flash.light);
-        flash.power = rig.power;
-        rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &flash, false, photo->data);
-        io_camera_apply(&o->camera, o->procedural.seed, index, m->size, photo->data);
+        lgd_take_photograph(&o->camera, o->procedural.seed, index, m, photo->data);
         code = make_path(path, o, m->name, ".jpg", st);
         if (!code) code = io_write_jpeg(path, photo, (int)o->quality, st);
     }
@@ -412,7 +355,7 @@ static ts_code make_histograms(const options *o, ts_status *st)
 
 int main(int argc, char **argv)
 {
-    options o = {.quality = 90, .camera = {.noise = 0.5f, .blur = 0.6f, .quantise = true}};
+    options o = {.quality = 90, .camera = lgd_usual_camera};
     ts_status st = {0};
     int code = cl_init("lgd-data");
     if (!code) code = parse_options(argc, argv, &o);

@@ -7,13 +7,16 @@
 #include "tensor/conv/conv.h"
 #include <stdio.h>
 
+/* The camera of the validation's photographs: [data]'s, or that of its keys' defaults. */
+typedef enum tr_camera { TR_CAMERA_DATA, TR_CAMERA_DEFAULT } tr_camera;
+
 typedef struct tr_config {
     nn_arch arch; /* [model] */
     struct {      /* [data] */
         int64_t seed;
         uint64_t families; /* bits as in io_procedural; 0: all */
         double noise, noise_spread, blur, exposure, vignette, white_balance, tilt, off_centre; /* as in io_camera */
-        double fov_min, fov_max, flash, told_view, told_power;
+        double fov_min, fov_max, flash, ambient, tone, sharpen, told_view, told_power;
         bool quantise;
         int jpeg, patch, prefetch, threads;
     } data;
@@ -34,6 +37,7 @@ typedef struct tr_config {
     struct { /* [validate] */
         int64_t every, seed;
         int count, size;
+        tr_camera camera;
     } validate;
     struct { /* [output] */
         char folder[1024];

@@ -7,6 +7,7 @@ static const char *const compat_names[] = {"none", "published", NULL};          
 static const char *const descent_names[] = {"none", "gradient", "newton", NULL}; /* as nn_descent */
 static const char *const precision_names[] = {"f32", "bf16", NULL};              /* as ts_precision */
 static const char *const rmse_names[] = {"start", "batch", NULL};                /* as nn_rmse */
+static const char *const camera_names[] = {"data", "default", NULL};             /* as tr_camera */
 
 #define AT(field) offsetof(tr_config, field)
 
@@ -99,6 +100,13 @@ const tr_key tr_keys[] = {
     {"data", "fov_max", TR_REAL, AT(data.fov_max), 0, 120, "0", NULL, false, "widest field of view"},
     {"data", "flash", TR_REAL, AT(data.flash), 0, 0.5, "0", NULL, false,
      "largest offset of the light from the camera, parallel to the sample, in patch widths"},
+    {"data", "ambient", TR_REAL, AT(data.ambient), 0, 1, "0", NULL, false,
+     "most other light, from everywhere and from one side, as a share of the flash's at the centre of a matt sample"},
+    {"data", "tone", TR_REAL, AT(data.tone), 0, 1, "0", NULL, false,
+     "largest strength of a tone curve on the encoded picture, 1: as strong as phones have it; half of the photographs "
+     "roll off their highlights too"},
+    {"data", "sharpen", TR_REAL, AT(data.sharpen), 0, 3, "0", NULL, false,
+     "largest amount of a phone's sharpening, an unsharp mask"},
     {"data", "told_view", TR_REAL, AT(data.told_view), 0, 1, "1", NULL, false,
      "share of the photographs whose field of view the model is told"},
     {"data", "told_power", TR_REAL, AT(data.told_power), 0, 1, "1", NULL, false,
@@ -187,6 +195,9 @@ const tr_key tr_keys[] = {
      "seed of the validation materials, another than data.seed"},
     {"validate", "count", TR_INT, AT(validate.count), 1, 4096, "32", NULL, false, "validation materials"},
     {"validate", "size", TR_INT, AT(validate.size), 8, 2048, "64", NULL, false, "their side in pixels"},
+    {"validate", "camera", TR_CHOICE, AT(validate.camera), 0, TR_CAMERA_DEFAULT, "data", camera_names, false,
+     "their photographs' camera: as [data] says (data), or with the defaults of its keys (default), by which runs with "
+     "different cameras compare"},
 
     {"output", "folder", TR_TEXT, AT(output.folder), 0, sizeof((tr_config *)0)->output.folder, "", NULL, true,
      "where the run's files go; empty: runs/NAME, from the configuration NAME.ini"},

@@ -1,5 +1,6 @@
 /* What the camera sees of materials: the networks' input. */
 #include "data/camera.h"
+#include "render/ambient.h"
 #include "render/render.h"
 #include "tensor/maps.h"
 #include "tensor/threads.h"
@@ -21,8 +22,23 @@ static io_camera camera_of(const tr_config *c)
                        .fov_min = (float)c->data.fov_min,
                        .fov_max = (float)c->data.fov_max,
                        .flash = (float)c->data.flash,
+                       .ambient = (float)c->data.ambient,
+                       .tone = (float)c->data.tone,
+                       .sharpen = (float)c->data.sharpen,
                        .told_view = (float)c->data.told_view,
                        .told_power = (float)c->data.told_power};
+}
+
+static void add_ambient(const io_camera *camera, uint64_t seed, uint64_t index, int size, const float *material,
+                        tr_shot *shot, float *image)
+{
+    const io_ambient light = io_camera_ambient(camera, seed, index);
+    rd_ambient ambient;
+    memcpy(ambient.uniform, light.uniform, sizeof ambient.uniform);
+    memcpy(ambient.side, light.side, sizeof ambient.side);
+    memcpy(ambient.direction, light.direction, sizeof ambient.direction);
+    shot->ambient = light.share;
+    rd_ambient_add(rd_grid_full(size), material, MAP_CHANNELS, &shot->view, &ambient, image);
 }
 
 static tr_shot shoot(const io_camera *camera, uint64_t seed, uint64_t index, const rd_view *planned)
@@ -35,6 +51,7 @@ static tr_shot shoot(const io_camera *camera, uint64_t seed, uint64_t index, con
     memcpy(shot.view.camera, rig.camera, sizeof rig.camera);
     memcpy(shot.view.light, rig.light, sizeof rig.light);
     shot.view.power = rig.power;
+    shot.tone = io_camera_tone(camera, seed, index).contrast;
     io_camera_told(camera, seed, index, &shot.told_view, &shot.told_power);
     return shot;
 }
@@ -49,7 +66,9 @@ void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count
     for (int i = 0; i < count * number; i++) {
         tr_shot shot = shoot(&camera, seed, first + (uint64_t)i, views ? &views[i] : &flash);
         const float *material = maps + (size_t)(i / number) * pixels * MAP_CHANNELS;
-        rd_render(rd_grid_full(size), material, MAP_CHANNELS, &shot.view, false, images + (size_t)i * pixels * 3);
+        float *image = images + (size_t)i * pixels * 3;
+        rd_render(rd_grid_full(size), material, MAP_CHANNELS, &shot.view, false, image);
+        if (camera.ambient > 0) add_ambient(&camera, seed, first + (uint64_t)i, size, material, &shot, image);
         if (!shots) continue;
         shot.view.power *= io_camera_exposure(&camera, seed, first + (uint64_t)i);
         shots[i] = shot;

@@ -7,9 +7,12 @@
 
 enum { TR_PATH = 1200 }; /* a folder and one of our names */
 
-/* What is true of a photograph. */
+/* What is true of a photograph: the radiance under view, with the ambient light, is what the camera saw before its
+ * other faults, tone curve and clipping. */
 typedef struct tr_shot {
-    rd_view view;               /* power with the exposure: its radiance, clipped, is what the file shows */
+    rd_view view;               /* the light's power has the exposure in it */
+    float ambient;              /* as a share of the light at the centre of a flat matt sample */
+    float tone;                 /* contrast of the tone curve, 0: none */
     bool told_view, told_power; /* whether the model is told them */
 } tr_shot;
 
@@ -18,6 +21,7 @@ typedef struct tr_validator {
     float *maps;       /* [count][size][size][9], owned */
     float *images;     /* [count][arch.images][size][size][3], owned */
     rd_view *captures; /* [count][arch.images], owned */
+    tr_shot *shots;    /* [count][arch.images], owned */
     rd_view *views;    /* [count][RD_EVAL_VIEWS], owned */
     nn_model *model;   /* holds what is validated: the moving average, or a copy of the weights */
     ag_tape *tape;     /* without gradients */

@@ -39,15 +39,18 @@ ts_code tr_validator_create(tr_trainer *t, ts_status *st)
     const size_t given = (size_t)c->arch.images;
     v->images = malloc(count * given * pixels * 3 * sizeof(float));
     v->captures = malloc(count * given * sizeof *v->captures);
+    v->shots = malloc(count * given * sizeof *v->shots);
     v->views = malloc(count * RD_EVAL_VIEWS * sizeof *v->views);
-    if (!v->maps || !v->images || !v->captures || !v->views || !make_materials(c, v->maps))
+    if (!v->maps || !v->images || !v->captures || !v->shots || !v->views || !make_materials(c, v->maps))
         return ts_fail(st, TS_NOMEM, "no memory for the validation materials");
     v->model = nn_model_create(&c->arch, st);
     v->tape = v->model ? ag_tape_create(false, st) : NULL;
     if (!v->tape) return st->code;
     tr_capture_views((uint64_t)c->validate.seed, 0, c->validate.count, c->arch.images, v->captures);
-    tr_photographs(c, (uint64_t)c->validate.seed, 0, c->validate.count, c->validate.size, v->maps, v->captures,
-                   c->arch.images, v->images, NULL);
+    tr_config camera = *c;
+    if (c->validate.camera == TR_CAMERA_DEFAULT) camera.data = tr_config_default().data;
+    tr_photographs(&camera, (uint64_t)c->validate.seed, 0, c->validate.count, c->validate.size, v->maps, v->captures,
+                   c->arch.images, v->images, v->shots);
     for (int i = 0; i < c->validate.count; i++) {
         ts_rng rng = ts_rng_make((uint64_t)c->validate.seed, TS_STREAM_EVAL, (uint64_t)i);
         rd_eval_views(&rng, RD_EVAL_VIEWS, v->views + (size_t)i * RD_EVAL_VIEWS);
@@ -60,6 +63,7 @@ void tr_validator_free(tr_validator *v)
     free(v->maps);
     free(v->images);
     free(v->captures);
+    free(v->shots);
     free(v->views);
     nn_model_free(&v->model);
     ag_tape_destroy(&v->tape);

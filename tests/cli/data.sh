@@ -30,6 +30,17 @@ data_same_bytes_for_any_threads_and_range() {
 }
 check data_same_bytes_for_any_threads_and_range data_same_bytes_for_any_threads_and_range
 
+data_camera() {
+    expect 0 "$DATA" -o "$T/a" --count 2 --size 96 --photographs
+    for fault in "--fov-min 20 --fov-max 40" "--flash 0.2" "--ambient 0.5" "--tone 1" "--sharpen 3" "--noise-spread 2" "--exposure 2"; do
+        # shellcheck disable=SC2086
+        expect 0 "$DATA" -o "$T/b" --count 2 --size 96 --photographs $fault
+        diff -r "$T/a" "$T/b" >/dev/null && fail "$fault changes nothing"
+    done
+    return 0
+}
+check data_camera data_camera
+
 data_families() {
     expect 0 "$DATA" -o "$T/o" --count 8 --size 8 --photographs --families wood,rust
     [ "$(find "$T/o" -name '*wood*.jpg' -o -name '*rust*.jpg' | wc -l)" -eq 8 ] || fail "other families: $(ls "$T/o")"
@@ -51,7 +62,7 @@ check data_contact_sheet data_contact_sheet
 data_wrong_usage() {
     expect 2 "$DATA"
     says "$T/err" "-o DIR"
-    for bad in "--count 0" "--tilt 31" "--fov-min 20" "--fov-min 40 --fov-max 30" "--flash 0.6" "--vignette 1" "--off-centre -1" "--exposure nan" "--count x" "--size 4" "--size 1e3" "--format exe" "--noise 2" "--noise nan" "--seed -1" "--quality 0" "--threads 0" "stray" "--statistics" "--testdata ."; do
+    for bad in "--count 0" "--tilt 31" "--fov-min 20" "--fov-min 40 --fov-max 30" "--flash 0.6" "--tone 2" "--ambient x" "--vignette 1" "--off-centre -1" "--exposure nan" "--count x" "--size 4" "--size 1e3" "--format exe" "--noise 2" "--noise nan" "--seed -1" "--quality 0" "--threads 0" "stray" "--statistics" "--testdata ."; do
         # shellcheck disable=SC2086
         expect 2 "$DATA" -o "$T/o" $bad
         [ -e "$T/o" ] && fail "$bad made the folder"

@@ -1,5 +1,6 @@
 /* What the camera does to a photograph. */
 #include "data/camera.h"
+#include "data/develop.h"
 #include "data/image/image.h"
 #include "tensor/rng.h"
 #include "tests/test.h"
@@ -192,6 +193,98 @@ TEST(camera_tells_the_share_that_is_asked_for)
     }
     CHECK(abs(views - 600) < 80 && abs(powers - 1600) < 70 && abs(both - 480) < 80, "told %d %d, both %d of 2000",
           views, powers, both);
+}
+
+TEST(camera_tone_curve_rises_from_0_to_1)
+{
+    const io_camera strong = {.tone = 1}, none = {0};
+    float steepest = 0, darkest = 1, brightest = 0, lowest = 1;
+    int clips = 0;
+    for (uint64_t index = 0; index < 300; index++) {
+        const io_tone t = io_camera_tone(&strong, 1, index), identity = io_camera_tone(&none, 1, index);
+        CHECK(io_tone_curve(&t, 0) == 0 && io_tone_curve(&t, 1) == 1, "curve %d ends at %g and %g", (int)index,
+              io_tone_curve(&t, 0), io_tone_curve(&t, 1));
+        CHECK(io_tone_shoulder(&t, 0) == 0 && io_tone_shoulder(&t, 9) == 1, "shoulder %d ends at %g", (int)index,
+              io_tone_shoulder(&t, 9));
+        for (int k = 0; k < 1000; k++) {
+            const float v = (float)k / 1000, after = v + 0.001f;
+            const float rise = (io_tone_curve(&t, after) - io_tone_curve(&t, v)) / 0.001f;
+            CHECK(rise > 0, "curve %d falls at %g", (int)index, v);
+            CHECK(io_tone_curve(&identity, v) == v && io_tone_shoulder(&identity, v) == v, "no tone changes %g", v);
+            const float w = 3 * v, rolled = io_tone_shoulder(&t, w), more = io_tone_shoulder(&t, w + 0.003f);
+            CHECK(rolled <= more + 1e-6f && more - rolled < 0.00301f && rolled <= w + 1e-6f,
+                  "shoulder %d goes from %g to %g at %g", (int)index, rolled, more, w);
+            steepest = fmaxf(steepest, rise);
+        }
+        clips += t.knee == 1;
+        lowest = fminf(lowest, t.knee);
+        darkest = fminf(darkest, io_tone_curve(&t, 0.5f));
+        brightest = fmaxf(brightest, io_tone_curve(&t, 0.5f));
+    }
+    CHECK(steepest > 1.25f && darkest < 0.44f && brightest > 0.57f && lowest < 0.45f && abs(clips - 150) < 40,
+          "ranges are not used: %g, %g %g, %g, %d", steepest, darkest, brightest, lowest, clips);
+}
+
+/* The table between two powf is the curve itself, as close as no 8 bits show. */
+TEST(camera_tone_is_its_curve_on_the_encoded_picture)
+{
+    static float clean[N], a[N];
+    const io_camera camera = {.tone = 1};
+    fill(clean, 1.5f);
+    for (uint64_t index = 0; index < 20; index++) {
+        const io_tone t = io_camera_tone(&camera, 2, index);
+        memcpy(a, clean, sizeof a);
+        io_camera_apply(&camera, 2, index, SIZE, a);
+        for (int i = 0; i < N; i++) {
+            const float want = io_tone_curve(&t, io_linear_to_srgb(fminf(io_tone_shoulder(&t, clean[i]), 1)));
+            CHECK(fabsf(io_linear_to_srgb(a[i]) - want) < 1e-4f, "photograph %d: %g became %g, not %g", (int)index,
+                  clean[i], io_linear_to_srgb(a[i]), want);
+        }
+    }
+}
+
+TEST(camera_sharpening_keeps_constants_and_raises_edges)
+{
+    enum { SIDE = 128, VALUES = SIDE * SIDE * 3 };
+    static float a[VALUES];
+    const io_camera camera = {.sharpen = 2, .quantise = true};
+    float most = 0;
+    for (uint64_t index = 0; index < 40; index++) {
+        for (int i = 0; i < VALUES; i++) a[i] = io_srgb_to_linear((float)(40 + 60 * (i % 3)) / 255);
+        io_camera_apply(&camera, 1, index, SIDE, a);
+        for (int i = 0; i < VALUES; i++)
+            CHECK(fabsf(io_linear_to_srgb(a[i]) * 255 - (float)(40 + 60 * (i % 3))) < 0.01f, "a constant became %g",
+                  io_linear_to_srgb(a[i]) * 255);
+        for (int i = 0; i < VALUES; i++) a[i] = io_srgb_to_linear(i / 3 % SIDE < SIDE / 2 ? 0.2f : 0.6f);
+        io_camera_apply(&camera, 1, index, SIDE, a);
+        float least = 1;
+        for (int i = 0; i < VALUES; i++) {
+            least = fminf(least, io_linear_to_srgb(a[i]));
+            most = fmaxf(most, io_linear_to_srgb(a[i]));
+        }
+        CHECK(least < 0.201f && fabsf(io_linear_to_srgb(a[0]) - 0.2f) < 0.01f, "away from the edge %g",
+              io_linear_to_srgb(a[0]));
+    }
+    CHECK(most > 0.75f && most < 1, "the edge rises to %g", most);
+}
+
+TEST(camera_ambient_light_has_its_share)
+{
+    const io_camera camera = {.ambient = 0.4f}, none = {0};
+    float most = 0, steepest = 0, flattest = 1, bluest = 1;
+    CHECK(io_camera_ambient(&none, 1, 1).share == 0 && io_camera_ambient(&none, 1, 1).side[1] == 0, "light from none");
+    for (uint64_t index = 0; index < 500; index++) {
+        const io_ambient a = io_camera_ambient(&camera, 1, index);
+        const float *d = a.direction;
+        CHECK(fabsf(a.uniform[1] + a.side[1] - a.share) < 1e-6f && a.share >= 0 && a.share <= 0.4f, "%g + %g of %g",
+              a.uniform[1], a.side[1], a.share);
+        CHECK(fabsf(d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - 1) < 1e-5f, "direction %g %g %g", d[0], d[1], d[2]);
+        most = fmaxf(most, a.share);
+        steepest = fmaxf(steepest, d[2]), flattest = fminf(flattest, d[2]);
+        bluest = fminf(bluest, a.uniform[0] / a.uniform[2]);
+    }
+    CHECK(most > 0.39f && steepest > 0.9f && flattest < 0.4f && bluest < 0.7f, "ranges are not used: %g, %g %g, %g",
+          most, flattest, steepest, bluest);
 }
 
 static uint64_t fnv(uint64_t hash, const void *bytes, size_t count)

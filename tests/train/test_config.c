@@ -277,6 +277,8 @@ TEST(config_checks_keys_against_each_other)
     static const char *const bad[][2] = {{"train.iterations_min=7", "iterations_min"},
                                          {"train.steps=0", "nothing to do"},
                                          {"validate.seed=1", "data.seed"},
+                                         {"data.fov_min=30", "fov_max"},
+                                         {"data.fov_max=30", "fov_min"},
                                          {"model.g_size=50", "g_size"},
                                          {"model.g_kernel=4", "g_kernel"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {

@@ -156,7 +156,8 @@ TEST(capture_views_are_the_flash_or_different_configurations)
 TEST(photographs_have_their_own_faults_for_any_number_of_threads)
 {
     make();
-    const tr_config c = tr_config_default();
+    tr_config c = tr_config_default();
+    c.data.ambient = 0.2, c.data.tone = 1, c.data.sharpen = 1, c.data.flash = 0.1;
     rd_view views[COUNT][NUMBER];
     for (int i = 0; i < COUNT; i++)
         for (int k = 0; k < NUMBER; k++) views[i][k] = rd_flash();
@@ -230,4 +231,46 @@ TEST(photographs_are_exposed_alike_at_any_field_of_view)
         nearest = fmin(nearest, d), farthest = fmax(farthest, d);
     }
     CHECK(nearest < 0.75 && farthest > 2.4, "distances from %g to %g", nearest, farthest);
+}
+
+/* On a flat matt sample ambient light adds the same to every pixel, its share of what the flash gives the centre. */
+TEST(photographs_have_their_share_of_ambient_light)
+{
+    enum { SIDE = 25, MIDDLE = SIDE * SIDE / 2 };
+    static float grey[SIDE * SIDE][MAP_CHANNELS], lit[SIDE * SIDE][3], flash[SIDE * SIDE][3];
+    tr_config c = without_faults();
+    for (int p = 0; p < SIDE * SIDE; p++) /* diffuse .25, flat, rough, specular 0: what F gives beside it is small */
+        memcpy(grey[p], (const float[MAP_CHANNELS]){-0.5f, -0.5f, -0.5f, 0, 0, 1, -1, -1, -1}, sizeof grey[p]);
+    c.data.fov_min = 20, c.data.fov_max = 75, c.data.ambient = 0.4;
+    for (uint64_t index = 0; index < 20; index++) {
+        tr_shot shot;
+        tr_photographs(&c, 1, index, 1, SIDE, grey[0], NULL, 1, lit[0], &shot);
+        rd_render(rd_grid_full(SIDE), grey[0], MAP_CHANNELS, &shot.view, false, flash[0]);
+        for (int p = 0; p < SIDE * SIDE; p++) {
+            const float share = (lit[p][1] - flash[p][1]) / flash[MIDDLE][1];
+            CHECK(fabsf(share - shot.ambient) < 0.02f * shot.ambient + 1e-5f, "pixel %d: %g in place of %g", p, share,
+                  shot.ambient);
+        }
+    }
+}
+
+TEST(photographs_of_validation_have_the_camera_that_is_asked_for)
+{
+    enum { SIDE = 16, VALUES = SIDE * SIDE * 3 };
+    static float usual[VALUES];
+    tr_config c = tr_config_default();
+    c.arch.g_width = c.arch.h_width = c.arch.h_gru = 4;
+    c.validate.count = 1, c.validate.size = SIDE;
+    for (int i = 0; i < 3; i++) { /* the default camera; another in [data], by which validation goes or not */
+        if (i > 0) c.data.fov_min = c.data.fov_max = 25, c.data.exposure = 0;
+        c.validate.camera = i == 1 ? TR_CAMERA_DEFAULT : TR_CAMERA_DATA;
+        static tr_trainer t;
+        ts_status st = {0};
+        t = (tr_trainer){.config = c};
+        CHECK(tr_validator_create(&t, &st) == TS_OK, "%s", st.message);
+        if (i == 0) memcpy(usual, t.validator.images, sizeof usual);
+        CHECK((memcmp(usual, t.validator.images, sizeof usual) == 0) == (i < 2), "validation %d", i);
+        CHECK(i < 2 || t.validator.shots[0].view.camera[2] > 2, "distance %g", t.validator.shots[0].view.camera[2]);
+        tr_validator_free(&t.validator);
+    }
 }
