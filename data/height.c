@@ -35,9 +35,8 @@ static void divergence(int n, const float *p, const float *q, float *out)
         }
 }
 
-/* Row k: the orthonormal cosine sqrt(2/n) cos(pi k (j + 1/2) / n), an eigenvector of D^T D with the eigenvalue 2 - 2
- * cos(pi k / n). */
-static void cosines(int n, float *c)
+/* Each row is an eigenvector of D^T D with the eigenvalue 2 - 2 cos(pi k / n). */
+void io_cosines(int n, float *c)
 {
     for (int k = 0; k < n; k++)
         for (int j = 0; j < n; j++) {
@@ -64,7 +63,7 @@ ts_code io_height(const io_material *m, float *height, ts_status *st)
     float *a = memory, *b = a + pixels, *c = b + pixels;
     slopes(m, a, b);
     divergence(n, a, b, height);
-    cosines(n, c);
+    io_cosines(n, c);
     ts_gemm(false, false, n, n, n, 1, c, height, 0, a);
     ts_gemm(false, true, n, n, n, 1, a, c, 0, b);
     for (int i = 0; i < n; i++)

@@ -9,4 +9,6 @@
  * Normals flatter than 3 degrees over the horizon count as 3: beyond, a slope says more about the estimate's error than
  * about the surface. TS_NOMEM. */
 ts_code io_height(const io_material *m, float *height, ts_status *st);
+/* c: [n][n], row k the orthonormal cosine sqrt(2/n) cos(pi k (j + 1/2) / n), k / 2 cycles over the patch. */
+void io_cosines(int n, float *c);
 #endif

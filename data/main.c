@@ -2,9 +2,9 @@
  * others' materials. */
 #include "cli/cli.h"
 #include "cli/data/pictures.h"
+#include "data/materials/compare.h"
 #include "data/materials/histogram.h"
 #include "data/sheet.h"
-#include "data/materials/statistics.h"
 #include "render/render.h"
 #include "tensor/threads.h"
 #include <errno.h>
@@ -306,28 +306,8 @@ static ts_code make_sheet(const options *o, ts_status *st)
 
 static ts_code compare(const options *o, ts_status *st)
 {
-    int count = o->count ? (int)o->count : 512, size = o->size ? (int)o->size : 128;
-    io_feature_set ours = {0}, theirs = {0};
-    ts_code code = io_features_folder(o->testdata, size, &theirs, st);
-    if (!code) code = io_features_procedural(&o->procedural, count, size, &ours, st);
-    if (!code) {
-        double each[IO_FEATURES], distance = io_feature_distance(&ours, &theirs, each),
-                                  halves = io_feature_halves(&theirs, 200, 1);
-        printf("%-20s %15s %20s %10s\n", "", "testdata", "procedural", "distance");
-        for (int i = 0; i < IO_FEATURES; i++) {
-            double m, s, n, t;
-            io_feature_summary(&theirs, i, &m, &s);
-            io_feature_summary(&ours, i, &n, &t);
-            printf("%-20s %8.3f +- %5.3f %10.3f +- %5.3f %10.2f\n", io_feature_name(i), m, s, n, t, each[i]);
-        }
-        printf("distance of %d procedural materials from %d in %s: %.3f\n", ours.count, theirs.count, o->testdata,
-               distance);
-        printf("distance between two halves of the latter, mean of 200 halvings: %.3f (ratio %.2f)\n", halves,
-               distance / halves);
-    }
-    io_feature_set_free(&ours);
-    io_feature_set_free(&theirs);
-    return code;
+    const int count = o->count ? (int)o->count : 512, size = o->size ? (int)o->size : 128;
+    return io_compare(&o->procedural, count, o->testdata, size, stdout, st);
 }
 
 static ts_code make_histograms(const options *o, ts_status *st)

@@ -34,4 +34,8 @@ void io_family_rough(io_canvas *c);    /* rough stone and plaster, markings apar
 void io_family_foam(io_canvas *c);     /* foam, sponge, pumice */
 void io_family_polished(io_canvas *c); /* polished stone and glazed tile, F0 up to .2 */
 void io_family_alloy(io_canvas *c);    /* all common metals, bare, corroded, painted, inlaid */
+void io_family_bark(io_canvas *c);     /* furrows and plates, moss */
+void io_family_pebbles(io_canvas *c);  /* rounded stones of several sizes on sand */
+void io_family_creased(io_canvas *c);  /* crumpled foil, paper, film */
+void io_family_stamped(io_canvas *c);  /* metal and other sheet stamped with a pattern */
 #endif

@@ -7,18 +7,20 @@ void fin_slope(io_canvas *c, float slope)
 {
     const int size = c->size, step = size >= 128 ? size / 128 : 1, reach = 2 * step;
     if (size <= reach) return;
-    float sum = 0, count = 0;
+    float sum = 0, count = 0, mean = 0;
     for (int y = 0; y + reach < size; y += step)
         for (int x = 0; x + reach < size; x += step) {
             const float *h = c->height + (size_t)y * (size_t)size + (size_t)x;
             const float p = h[reach] - h[0], q = h[(size_t)reach * (size_t)size] - h[0];
             sum += p * p + q * q;
+            mean += h[0];
             count += 1;
         }
     const float per = (float)size / (float)reach, rms = sqrtf(sum / count) * per;
     if (rms < 1e-6f) return;
     const float scale = slope / rms;
-    for (int i = 0; i < c->count; i++) c->height[i] *= scale;
+    mean /= count;
+    for (int i = 0; i < c->count; i++) c->height[i] = scale * (c->height[i] - mean);
 }
 
 void fin_relief(io_canvas *c, float lo, float hi) { fin_slope(c, cv_log_range(c, lo, hi)); }
@@ -42,13 +44,25 @@ static float *grain(io_canvas *c, float *cycles)
 void fin_grain(io_canvas *c, float steep)
 {
     const int mark = c->used;
-    const bool relief = cv_chance(c, 0.85f), colour = cv_chance(c, 0.6f), apart = cv_chance(c, 0.25f);
+    const bool relief = cv_chance(c, 0.85f), colour = cv_chance(c, 0.65f), apart = cv_chance(c, 0.6f);
     float cycles;
     float *shape = grain(c, &cycles);
-    if (relief) cv_raise(c, shape, cv_log_range(c, 0.15f, 1) * steep / (6.2831853f * cycles));
+    if (relief) cv_raise(c, shape, cv_log_range(c, 0.08f, 0.9f) * steep / (6.2831853f * cycles));
     if (apart) shape = grain(c, &cycles);
-    if (colour) cv_shade(c, shape, cv_chance(c, 0.75f) ? cv_log_range(c, 0.02f, 0.25f) : -cv_range(c, 0.02f, 0.12f));
+    if (colour) cv_shade(c, shape, cv_chance(c, 0.7f) ? cv_log_range(c, 0.02f, 0.25f) : -cv_range(c, 0.02f, 0.2f));
     if (cv_chance(c, 0.5f)) cv_roughen(c, shape, cv_range(c, -0.06f, 0.06f));
+    cv_drop(c, mark);
+}
+
+void fin_swell(io_canvas *c)
+{
+    const float cycles = cv_log_range(c, 1, 5), steep = cv_log_range(c, 0.02f, 0.25f), gain = cv_range(c, 0.3f, 0.5f),
+                stretch = cv_range(c, 1, 2.5f), turns = cv_range(c, 0, 1);
+    const int mark = c->used;
+    const nz_kind kind = cv_chance(c, 0.6f) ? NZ_SMOOTH : cv_chance(c, 0.5f) ? NZ_RIDGED : NZ_BILLOW;
+    const nz_frame f = cv_bend(c, cv_frame(c, cycles, stretch, turns), 0.7f, 2, 0.1f);
+    float *wave = cv_noise(c, f, kind, 1, 2, gain);
+    cv_raise(c, wave, steep / (6.2831853f * cycles));
     cv_drop(c, mark);
 }
 
@@ -58,15 +72,18 @@ void fin_crevices(io_canvas *c)
     const int mark = c->used;
     const float near = cv_log_range(c, 0.006f, 0.025f), far = near * cv_range(c, 2, 4), wide = cv_range(c, 0, 0.7f),
                 u = cv_range(c, 0, 1);
-    const float dark = u < 0.2f ? 0 : u < 0.9f ? cv_log_range(c, 0.15f, 1) : -cv_range(c, 0.05f, 0.4f);
-    const float rough = cv_chance(c, 0.55f) ? cv_range(c, 0.02f, 0.3f) : cv_chance(c, 0.3f) ? -0.12f : 0;
-    const float worn = cv_chance(c, 0.45f) ? cv_range(c, 0.1f, 0.7f) : 0, shine = cv_range(c, 0, 0.3f);
+    const float dark = u < 0.35f ? 0 : u < 0.8f ? cv_log_range(c, 0.1f, 0.9f) : -cv_range(c, 0.05f, 0.6f);
+    const float v = cv_range(c, 0, 1),
+                rough = v < 0.35f ? 0
+        : v < 0.7f                ? cv_range(c, 0.02f, 0.25f)
+                                  : -cv_range(c, 0.02f, 0.2f);
+    const float worn = cv_chance(c, 0.35f) ? cv_range(c, 0.1f, 0.7f) : 0, shine = cv_range(c, 0, 0.3f);
     float *deep = cv_cavity(c, near), *broad = cv_cavity(c, far);
     for (int i = 0; i < c->count; i++) deep[i] = nz_mix(deep[i], broad[i], wide);
     for (int i = 0; i < c->count; i++) broad[i] = nz_max(0, deep[i]);
     if (dark != 0) cv_shade(c, broad, -dark);
     if (rough != 0) cv_roughen(c, broad, rough);
-    if (cv_chance(c, 0.3f)) { /* something has settled there */
+    if (cv_chance(c, 0.25f)) { /* something has settled there */
         io_rgb colour;
         pal_pick(c, dust, PAL_COUNT(dust), 0.6f, colour);
         const io_substance dirt = pal_dielectric(c, colour, cv_range(c, 0.6f, 1));
@@ -166,12 +183,13 @@ void fin_coat(io_canvas *c)
 void fin_any(io_canvas *c, float steep, float coat)
 {
     cv_drop(c, 0);
+    if (cv_chance(c, 0.45f)) fin_swell(c);
     if (cv_chance(c, 0.75f)) fin_grain(c, steep);
     if (cv_chance(c, 0.25f)) wear_stains(c, cv_range(c, 0.2f, 0.8f));
     fin_crevices(c);
     fin_gloss(c);
     if (cv_chance(c, 0.1f)) wear_scratches(c, 2 + ts_rng_int(&c->rng, 12), 0.4f, NULL);
-    fin_level(c, 0.06f);
+    fin_level(c, 0.12f);
     if (cv_chance(c, coat)) fin_coat(c);
 }
 

@@ -5,13 +5,16 @@
 #define IO_FINISH_H
 #include "data/materials/canvas.h"
 
-/* Scales the height so that slopes over a 64th of the patch have this root mean square in both directions together. */
+/* Scales the height, less its mean, so that slopes over a 64th of the patch have this root mean square in both
+ * directions together. */
 void fin_slope(io_canvas *c, float slope);
 /* The same with a slope between lo and hi, uniform in the logarithm. */
 void fin_relief(io_canvas *c, float lo, float hi);
 /* Grain at 8 to 64 cycles a patch: relief of slopes up to steep, colour, gloss, or some of them; of the same shape or
  * of two. */
 void fin_grain(io_canvas *c, float steep);
+/* Broad waves of 1 to 10 cycles a patch in the height. */
+void fin_swell(io_canvas *c);
 /* The depths: darker by occlusion, dusty or as light as the rest; rougher or not; the heights: worn lighter and
  * smoother, or not. */
 void fin_crevices(io_canvas *c);

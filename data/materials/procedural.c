@@ -26,7 +26,9 @@ static const struct {
     {"knitted", 0.7f, io_family_knitted}, {"hide", 1.2f, io_family_hide},
     {"scales", 0.7f, io_family_scales},   {"rough", 2, io_family_rough},
     {"foam", 0.7f, io_family_foam},       {"polished", 1.5f, io_family_polished},
-    {"alloy", 1.8f, io_family_alloy},
+    {"alloy", 1.8f, io_family_alloy},     {"bark", 1, io_family_bark},
+    {"pebbles", 1.2f, io_family_pebbles}, {"creased", 1.2f, io_family_creased},
+    {"stamped", 1, io_family_stamped},
 };
 
 int io_family_count(void) { return (int)(sizeof families / sizeof *families); }
