@@ -1,6 +1,6 @@
 /* The most probable maps, given photographs and a Gaussian prior on each pixel's nine values. With the maps R where the
- * rendering is linearised (encoded, tensor/maps.h), the prior's mean M and covariance Sigma, the residual r = I - seen(R)
- * and J = d seen / d maps, the step is the delta for which
+ * rendering is linearised (encoded, tensor/maps.h), the prior's mean M and covariance Sigma, the residual
+ * r = I - seen(R) and J = d seen / d maps, the step is the delta for which
  *     |r - J delta|^2 / S + (R + delta - M)' Sigma^-1 (R + delta - M)
  * is least, which is
  *     delta = M - R + Sigma J' (J Sigma J' + S)^-1 (r - J (M - R)).

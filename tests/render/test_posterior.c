@@ -71,7 +71,7 @@ static void expect(const job *j, int p, double mean[C], double covariance[C][C])
     rd_posterior_pixel(maps, point, j->views, (const float(*)[3])image, j->count, &j->scale, mean, covariance);
 }
 
-/* Some of everything that is an edge: no deviation, clamped maps, the horizon, burnt out photographs, no hue, all hue. */
+/* Some of everything that is an edge: no deviation, clamped maps, burnt out photographs, no hue, all hue. */
 static void sharpen(job *j, ts_rng *rng)
 {
     static const float hues[] = {0, 1e-3f, 0.3f, 1};
@@ -360,8 +360,8 @@ TEST(posterior_is_finite_everywhere)
             for (int k = 0; k < part.count; k++)
                 for (int i = 0; i < 3; i++) {
                     part.views[k].light[i] = places[ts_rng_int(&rng, PLACES)];
-                    part.views[k].camera[i] =
-                        ts_rng_int(&rng, 3) ? places[ts_rng_int(&rng, PLACES)] : part.views[k].light[i];
+                    part.views[k].camera[i] = ts_rng_int(&rng, 3) ? places[ts_rng_int(&rng, PLACES)]
+                                                                  : part.views[k].light[i];
                 }
             run(&part);
             for (int i = 0; i < PIXELS * C; i++) {
