@@ -26,12 +26,37 @@ typedef struct rd_view {
     rd_kind kind;
     float camera[3], light[3];
     float power; /* RD_POINT and RD_PUBLISHED only */
+    /* Radiance of uniform surroundings: a pixel's radiance is ambient (F0 + (1 - F0) diffuse) more, which is what a
+     * surface without roughness, and one without gloss, make of them. */
+    float ambient;
 } rd_view;
 
 /* The flash photograph: camera and light at (0, 0, RD_FLASH_DISTANCE), power RD_FLASH_POWER. */
 #define RD_FLASH_DISTANCE (250.0f / 256.0f)
 #define RD_FLASH_POWER (329288.0f / 65536.0f)
 rd_view rd_flash(void);
+
+/* What is global about a photograph, as numbers of about the size of 1: the logarithm of the camera's height over
+ * RD_FLASH_DISTANCE; the light's place beside the camera, x and y, in RD_SCENE_OFFSET patch widths; the camera's place
+ * beside the centre, x and y, in the same; the light's power over the square of its height in stops above the default
+ * flash's; the ambient light in RD_SCENE_AMBIENTS of the flash's at the centre of the sample; the strength of the tone
+ * curve. The light is as high as the camera. */
+typedef enum rd_scene_number {
+    RD_SCENE_DISTANCE,
+    RD_SCENE_LIGHT_X,
+    RD_SCENE_LIGHT_Y,
+    RD_SCENE_CAMERA_X,
+    RD_SCENE_CAMERA_Y,
+    RD_SCENE_EXPOSURE,
+    RD_SCENE_AMBIENT,
+    RD_SCENE_TONE,
+    RD_SCENE_NUMBERS
+} rd_scene_number;
+#define RD_SCENE_OFFSET 0.1f
+#define RD_SCENE_AMBIENTS 0.1f
+void rd_scene_numbers(const rd_view *view, float ambient, float tone, float number[RD_SCENE_NUMBERS]);
+/* A point light's view from them. */
+rd_view rd_scene_view(const float number[RD_SCENE_NUMBERS]);
 
 /* The training loss's views: the first diffuse ones with directions r = sqrt(0.94 u + 0.01), phi uniform on the
  * hemisphere for both; the rest specular: view so, light its mirror image about z, distances exp(N(0.5, 0.75)) from one

@@ -82,7 +82,7 @@ V_INLINE bool look(const ts_shade_view *view, ts_shade_kind kind, const ts_shade
     vf across[2][3];
     light(view, kind, row, first, &t->e);
     measure(s, &t->e, kind, &t->g);
-    vi tells = t->g.seen;
+    vi tells = lit(view, &t->g);
     if (!v_any(tells)) return false;
     shade(view, kind, s, &t->e, &t->g, &t->r);
     v_load_pixels(image + (int64_t)first * 3, 3, n, 3, t->target);

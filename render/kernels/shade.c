@@ -13,7 +13,7 @@ V_INLINE void render_kind(const ts_shade_view *view, ts_shade_kind kind, const t
         decode(view->guards, row->maps + (int64_t)i * row->channels, row->channels, n, &s);
         light(view, kind, row, i, &e);
         measure(&s, &e, kind, &g);
-        if (v_any(g.seen)) shade(view, kind, &s, &e, &g, &r);
+        if (v_any(lit(view, &g))) shade(view, kind, &s, &e, &g, &r);
         else r = (radiance){0};
         for (int c = 0; c < 3; c++) r.value[c] = v_min(r.value[c], v_set(limit));
         v_store_pixels(image + (int64_t)i * 3, 3, n, 3, r.value);
@@ -47,7 +47,7 @@ V_INLINE double flash_kind(const ts_shade_view *view, ts_shade_kind kind, const 
         }
         sum += (double)v_sum(v_select(live, squares, v_set(0)));
         if (!gradient) continue;
-        if (v_any(moves & g.seen)) {
+        if (v_any(moves & lit(view, &g))) {
             slopes d = {0};
             derive(kind, &s, &e, &g, &r, u, &d);
             encode(&s, &d, out);
@@ -89,7 +89,7 @@ V_INLINE vf log_view(const ts_shade_view *view, ts_shade_kind kind, const ts_sha
     light(view, kind, row, first, &e);
     measure(s, &e, kind, &g);
     measure(target, &e, kind, &gt);
-    if (!v_any(g.seen | gt.seen)) return total; /* both black */
+    if (!v_any(lit(view, &g) | lit(view, &gt))) return total; /* both black */
     shade(view, kind, s, &e, &g, &r);
     shade(view, kind, target, &e, &gt, &rt);
     for (int c = 0; c < 3; c++) {
