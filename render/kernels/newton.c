@@ -34,7 +34,7 @@ V_INLINE void add_view(const ts_shade_view *view, ts_shade_kind kind, bool first
                        const ts_shade_row *row, int first, int n, const float *image, const surface *s, equations *q)
 {
     sight t;
-    if (!look(view, kind, row, first, n, image, s, &t)) {
+    if (!look(view, kind, row, first, n, false, image, s, &t)) {
         if (first_view) begin(damping, q);
         return;
     }

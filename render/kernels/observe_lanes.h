@@ -75,16 +75,18 @@ typedef struct sight {
     vf target[3], normal[2][2];
 } sight;
 
-/* False where none of the pixels tells anything: then only what does not depend on the maps is set. */
-V_INLINE bool look(const ts_shade_view *view, ts_shade_kind kind, const ts_shade_row *row, int first, int n,
+/* False where none of the pixels tells anything: then only what does not depend on the maps is set. dark: those without
+ * light do. */
+V_INLINE bool look(const ts_shade_view *view, ts_shade_kind kind, const ts_shade_row *row, int first, int n, bool dark,
                    const float *image, const surface *s, sight *t)
 {
+    const bool surrounded = view->ambient != 0;
     vf across[2][3];
     light(view, kind, row, first, &t->e);
     measure(s, &t->e, kind, &t->g);
-    vi tells = lit(view, &t->g);
+    vi tells = dark ? v_seti(-1) : lit(surrounded, &t->g);
     if (!v_any(tells)) return false;
-    shade(view, kind, s, &t->e, &t->g, &t->r);
+    shade(view, kind, surrounded, s, &t->e, &t->g, &t->r);
     v_load_pixels(image + (int64_t)first * 3, 3, n, 3, t->target);
     tells &= ~(burnt_out(t->r.value[0], t->target[0]) & burnt_out(t->r.value[1], t->target[1]) &
                burnt_out(t->r.value[2], t->target[2]));

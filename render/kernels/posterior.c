@@ -129,8 +129,8 @@ V_INLINE void widen(const spread *a, const vf z[MAP_CHANNELS], vf x[MAP_CHANNELS
 V_INLINE bool look_at(const ts_shade_view *view, const ts_shade_row *row, int first, int n, const float *image,
                       const surface *s, sight *t)
 {
-    return view->kind == TS_SHADE_COLLOCATED ? look(view, TS_SHADE_COLLOCATED, row, first, n, image, s, t)
-                                             : look(view, TS_SHADE_POSITIONS, row, first, n, image, s, t);
+    return view->kind == TS_SHADE_COLLOCATED ? look(view, TS_SHADE_COLLOCATED, row, first, n, false, image, s, t)
+                                             : look(view, TS_SHADE_POSITIONS, row, first, n, false, image, s, t);
 }
 
 /* False where no photograph tells anything. */
