@@ -1,6 +1,7 @@
 /* Shading: pixels times views a second. */
 #include "bench/bench.h"
 #include "render/losses.h"
+#include "render/posterior.h"
 #include "render/render.h"
 #include "tensor/maps.h"
 #include <stdlib.h>
@@ -9,7 +10,7 @@
 enum { SIDE = 256, PART = 128, N = 8, S = 64 };
 
 typedef struct job {
-    float *maps, *target, *gradient, *image;
+    float *maps, *target, *gradient, *image, *deviation, *after;
     double rmse;
     rd_view views[N * RD_LOSS_VIEWS];
     ag_tape *tape;
@@ -46,6 +47,17 @@ static void newton(void *user)
     for (int k = 0; k < j->photographs; k++) views[k] = rd_capture_view(k), image[k] = j->image;
     for (int i = 0; i < MAP_CHANNELS; i++) damping[i] = 0.1f;
     rd_newton_step(rd_grid_full(j->side), j->maps, MAP_CHANNELS, views, image, j->photographs, damping, j->gradient);
+}
+
+static void posterior(void *user)
+{
+    job *j = user;
+    rd_view views[RD_CAPTURE_VIEWS];
+    const float *image[RD_CAPTURE_VIEWS];
+    const rd_prior prior = {j->target, j->deviation, {{0.1f, 0.1f}, 0.1f, 0.5f}};
+    for (int k = 0; k < j->photographs; k++) views[k] = rd_capture_view(k), image[k] = j->image;
+    rd_posterior_step(rd_grid_full(j->side), j->maps, MAP_CHANNELS, views, image, j->photographs, &prior, j->gradient,
+                      j->after);
 }
 
 static void loss(void *user)
@@ -93,8 +105,11 @@ BENCH(render)
     j.target = malloc(pixels * MAP_CHANNELS * sizeof(float));
     j.gradient = calloc(pixels * MAP_CHANNELS, sizeof(float));
     j.image = malloc(pixels * 3 * sizeof(float));
+    float *const deviation = j.deviation = malloc(pixels * MAP_GROUPS * sizeof(float)),
+                 *const after = malloc(pixels * MAP_GROUPS * sizeof(float));
     j.tape = ag_tape_create(true, NULL);
-    if (!j.maps || !j.target || !j.gradient || !j.image || !j.tape) abort();
+    if (!j.maps || !j.target || !j.gradient || !j.image || !deviation || !after || !j.tape) abort();
+    for (size_t i = 0; i < pixels * MAP_GROUPS; i++) deviation[i] = 0.2f;
     for (size_t i = 0; i < pixels * MAP_CHANNELS; i++) {
         bool normal = i % MAP_CHANNELS == MAP_NORMAL || i % MAP_CHANNELS == MAP_NORMAL + 1;
         j.maps[i] = ts_rng_range(&rng, -1, 1) * (normal ? 0.4f : 1);
@@ -112,11 +127,19 @@ BENCH(render)
         bench_row_unit(j.photographs == 1 ? "Newton step, 1 photograph, 256^2" : "Newton step, 5 photographs, 256^2", t,
                        (double)pixels * j.photographs / t.seconds * 1e-6, "Mpixel/s");
     }
+    for (int k = 0; k < 4; k++) {
+        static const char *const name[] = {"most probable maps, 1 photograph, 256^2", "  and how sure they are",
+                                           "most probable maps, 5 photographs, 256^2", "  and how sure they are"};
+        j.photographs = k < 2 ? 1 : 5;
+        j.after = k % 2 ? after : NULL;
+        t = bench_measure(posterior, &j);
+        bench_row_unit(name[k], t, (double)pixels * j.photographs / t.seconds * 1e-6, "Mpixel/s");
+    }
     skipped(&j);
     t = bench_measure(loss, &j);
     /* prediction and target are both rendered, and counted once */
     bench_row_unit("render_loss with gradient, 8 x 64^2, 9 views", t,
                    (double)N * S * S * RD_LOSS_VIEWS / t.seconds * 1e-6, "Mpixel/s");
     ag_tape_destroy(&j.tape);
-    free(j.maps), free(j.target), free(j.gradient), free(j.image);
+    free(j.maps), free(j.target), free(j.gradient), free(j.image), free(deviation), free(after);
 }

@@ -157,16 +157,21 @@ void rd_radiance(const double maps[MAP_CHANNELS], const double point[2], const r
     decode(guards_of(view), maps, &s);
     lobe b = evaluate(guards_of(view), &s, l, v);
     for (int c = 0; c < 3; c++) {
-        radiance[c] = 0;
+        const double spec = s.specular[c], ambient = view->ambient;
+        radiance[c] = ambient * (spec + (1 - spec) * s.diffuse[c]);
         for (int i = 0; gradient && i < MAP_CHANNELS; i++) gradient[c][i] = 0;
+        if (gradient) {
+            gradient[c][MAP_DIFFUSE + c] = ambient * (1 - spec) * s.slope[MAP_DIFFUSE + c];
+            gradient[c][MAP_SPECULAR + c] = ambient * (1 - s.diffuse[c]) * s.slope[MAP_SPECULAR + c];
+        }
         if (!b.seen) continue;
-        double spec = s.specular[c], fresnel = spec + (1 - spec) * b.fresnel;
+        double fresnel = spec + (1 - spec) * b.fresnel;
         double f = (1 - spec) * s.diffuse[c] / PI + b.specular * fresnel;
-        radiance[c] = f * b.nl * strength;
+        radiance[c] += f * b.nl * strength;
         if (!gradient) continue;
         double *g = gradient[c], e = b.nl * strength;
-        g[MAP_DIFFUSE + c] = e * (1 - spec) / PI * s.slope[MAP_DIFFUSE + c];
-        g[MAP_SPECULAR + c] = e * (b.specular * (1 - b.fresnel) - s.diffuse[c] / PI) * s.slope[MAP_SPECULAR + c];
+        g[MAP_DIFFUSE + c] += e * (1 - spec) / PI * s.slope[MAP_DIFFUSE + c];
+        g[MAP_SPECULAR + c] += e * (b.specular * (1 - b.fresnel) - s.diffuse[c] / PI) * s.slope[MAP_SPECULAR + c];
         g[MAP_ROUGHNESS] = e * fresnel * b.by_alpha * 2 * s.roughness * s.slope[MAP_ROUGHNESS];
         for (int j = 0; j < 2; j++) {
             double dl = dot3(s.dn[j], l), dv = dot3(s.dn[j], v), dh = dot3(s.dn[j], b.h);

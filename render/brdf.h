@@ -9,7 +9,8 @@
  * s) d / pi + D G F / 4 D = alpha^2 / (pi (alpha^2 (n.h)^2 + |n x h|^2)^2)          = the usual ((n.h)^2 (alpha^2 - 1)
  * + 1)^2, without its cancellation G = 1 / ((n.l (1 - k) + k) (n.v (1 - k) + k)), k = alpha / 2   the cosines above
  * cancel 4 n.l n.v below: no 0/0 at grazing angles F = s + (1 - s) 2^((-5.55473 v.h - 6.98316) v.h) f = 0 where n.l <=
- * 0 or n.v <= 0 Radiance = f n.l times the light's strength at the pixel (rd_kind in render/scene.h). */
+ * 0 or n.v <= 0 Radiance = f n.l times the light's strength at the pixel (rd_kind in render/scene.h), and
+ * ambient (s + (1 - s) d) under surroundings of that radiance (rd_view). */
 #ifndef RD_BRDF_H
 #define RD_BRDF_H
 #include "render/scene.h"

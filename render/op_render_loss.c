@@ -188,6 +188,7 @@ static void cases(ag_gradcheck *g)
         for (int n = 0; n < k.shape.n; n++) {
             rd_loss_views(ag_gradcheck_rng(g), views + n * k.per_image);
             views[n * k.per_image + RD_LOSS_VIEWS] = rd_flash();
+            views[n * k.per_image + RD_LOSS_VIEWS].ambient = n ? 0.1f : 0;
         }
         ag_case c = {.label = list[i].label,
                      .inputs = 2,

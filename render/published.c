@@ -18,5 +18,5 @@ const rd_published_constants rd_published = {
 rd_view rd_published_flash(void)
 {
     const float d = (float)rd_published.distance;
-    return (rd_view){RD_PUBLISHED, {0, 0, d}, {0, 0, d}, (float)rd_published.power};
+    return (rd_view){.kind = RD_PUBLISHED, .camera = {0, 0, d}, .light = {0, 0, d}, .power = (float)rd_published.power};
 }

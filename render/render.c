@@ -11,7 +11,8 @@ ts_shade_view rd_shade_view(const rd_view *view)
     const bool published = view->kind == RD_PUBLISHED, falloff = published || view->kind == RD_POINT;
     ts_shade_view s = {.guards = published ? &rd_published.guards : &rd_guards,
                        .falloff = falloff,
-                       .power = falloff ? view->power : 3.14159265f};
+                       .power = falloff ? view->power : 3.14159265f,
+                       .ambient = view->ambient};
     if (view->kind == RD_DIRECTIONS) {
         s.kind = TS_SHADE_DIRECTIONS;
         s.power = (float)rd_light(view, (double[2]){0}, s.light, s.camera);

@@ -3,12 +3,48 @@
 #include <stdbool.h>
 
 #define TAU 6.28318530717958647692
+#define PI 3.14159265f
 
 rd_grid rd_grid_full(int side) { return (rd_grid){.h = side, .w = side, .side = side}; }
 
 rd_view rd_flash(void)
 {
-    return (rd_view){RD_POINT, {0, 0, RD_FLASH_DISTANCE}, {0, 0, RD_FLASH_DISTANCE}, RD_FLASH_POWER};
+    return (rd_view){.kind = RD_POINT,
+                     .camera = {0, 0, RD_FLASH_DISTANCE},
+                     .light = {0, 0, RD_FLASH_DISTANCE},
+                     .power = RD_FLASH_POWER};
+}
+
+static float stops(const rd_view *view)
+{
+    const float usual = RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE);
+    return log2f(view->power / (view->light[2] * view->light[2]) / usual);
+}
+
+void rd_scene_numbers(const rd_view *view, float ambient, float tone, float number[RD_SCENE_NUMBERS])
+{
+    number[RD_SCENE_DISTANCE] = logf(view->camera[2] / RD_FLASH_DISTANCE);
+    for (int i = 0; i < 2; i++) {
+        number[RD_SCENE_LIGHT_X + i] = (view->light[i] - view->camera[i]) / RD_SCENE_OFFSET;
+        number[RD_SCENE_CAMERA_X + i] = view->camera[i] / RD_SCENE_OFFSET;
+    }
+    number[RD_SCENE_EXPOSURE] = stops(view);
+    number[RD_SCENE_AMBIENT] = ambient / RD_SCENE_AMBIENTS;
+    number[RD_SCENE_TONE] = tone;
+}
+
+rd_view rd_scene_view(const float number[RD_SCENE_NUMBERS])
+{
+    rd_view view = rd_flash();
+    const float farther = expf(number[RD_SCENE_DISTANCE]);
+    view.camera[2] = view.light[2] = RD_FLASH_DISTANCE * farther;
+    for (int i = 0; i < 2; i++) {
+        view.camera[i] = RD_SCENE_OFFSET * number[RD_SCENE_CAMERA_X + i];
+        view.light[i] = view.camera[i] + RD_SCENE_OFFSET * number[RD_SCENE_LIGHT_X + i];
+    }
+    view.power = RD_FLASH_POWER * farther * farther * exp2f(number[RD_SCENE_EXPOSURE]);
+    view.ambient = RD_SCENE_AMBIENTS * number[RD_SCENE_AMBIENT] * view.power / (view.light[2] * view.light[2]) / PI;
+    return view;
 }
 
 static float stops(const rd_view *view)
@@ -68,6 +104,7 @@ void rd_loss_views(ts_rng *rng, rd_view views[RD_LOSS_VIEWS])
         }
         views[i].kind = i < RD_LOSS_DIFFUSE ? RD_DIRECTIONS : RD_NEAR;
         views[i].power = 1;
+        views[i].ambient = 0;
         for (int k = 0; k < 3; k++) {
             views[i].camera[k] = (float)v[k];
             views[i].light[k] = (float)l[k];

@@ -26,6 +26,9 @@ typedef struct rd_view {
     rd_kind kind;
     float camera[3], light[3];
     float power; /* RD_POINT and RD_PUBLISHED only */
+    /* Radiance of uniform surroundings: a pixel's radiance is ambient (F0 + (1 - F0) diffuse) more, which is what a
+     * surface without roughness, and one without gloss, make of them. */
+    float ambient;
 } rd_view;
 
 /* The flash photograph: camera and light at (0, 0, RD_FLASH_DISTANCE), power RD_FLASH_POWER. */

@@ -10,4 +10,6 @@ enum {
     MAP_SPECULAR = 6,  /* 3 channels: F0 red, green, blue */
     MAP_CHANNELS = 9
 };
+/* The four maps that these channels are, for what is said of each as a whole. */
+enum { GROUP_DIFFUSE, GROUP_NORMAL, GROUP_ROUGHNESS, GROUP_SPECULAR, MAP_GROUPS };
 #endif

@@ -1,8 +1,8 @@
 /* Rows of pixels through render/kernels/shade_lanes.h. */
 #include "render/kernels/shade_lanes.h"
 
-V_INLINE void render_kind(const ts_shade_view *view, ts_shade_kind kind, const ts_shade_row *row, float limit,
-                          float *image)
+V_INLINE void render_kind(const ts_shade_view *view, ts_shade_kind kind, bool surrounded, const ts_shade_row *row,
+                          float limit, float *image)
 {
     for (int i = 0; i < row->count; i += VL) {
         int n = lanes_left(row, i);
@@ -13,15 +13,15 @@ V_INLINE void render_kind(const ts_shade_view *view, ts_shade_kind kind, const t
         decode(view->guards, row->maps + (int64_t)i * row->channels, row->channels, n, &s);
         light(view, kind, row, i, &e);
         measure(&s, &e, kind, &g);
-        if (v_any(g.seen)) shade(view, kind, &s, &e, &g, &r);
+        if (v_any(lit(surrounded, &g))) shade(view, kind, surrounded, &s, &e, &g, &r);
         else r = (radiance){0};
         for (int c = 0; c < 3; c++) r.value[c] = v_min(r.value[c], v_set(limit));
         v_store_pixels(image + (int64_t)i * 3, 3, n, 3, r.value);
     }
 }
 
-V_INLINE double flash_kind(const ts_shade_view *view, ts_shade_kind kind, const ts_shade_row *row, const float *image,
-                           float scale, float *gradient)
+V_INLINE double flash_kind(const ts_shade_view *view, ts_shade_kind kind, bool surrounded, const ts_shade_row *row,
+                           const float *image, float scale, float *gradient)
 {
     double sum = 0;
     for (int i = 0; i < row->count; i += VL) {
@@ -36,7 +36,7 @@ V_INLINE double flash_kind(const ts_shade_view *view, ts_shade_kind kind, const 
         decode(view->guards, row->maps + (int64_t)i * row->channels, row->channels, n, &s);
         light(view, kind, row, i, &e);
         measure(&s, &e, kind, &g);
-        shade(view, kind, &s, &e, &g, &r);
+        shade(view, kind, surrounded, &s, &e, &g, &r);
         v_load_pixels(image + (int64_t)i * 3, 3, n, 3, target);
         for (int c = 0; c < 3; c++) {
             const vf error = v_min(r.value[c], v_set(1)) - target[c];
@@ -47,7 +47,7 @@ V_INLINE double flash_kind(const ts_shade_view *view, ts_shade_kind kind, const 
         }
         sum += (double)v_sum(v_select(live, squares, v_set(0)));
         if (!gradient) continue;
-        if (v_any(moves & g.seen)) {
+        if (v_any(moves & lit(surrounded, &g))) {
             slopes d = {0};
             derive(kind, &s, &e, &g, &r, u, &d);
             encode(&s, &d, out);
@@ -57,29 +57,30 @@ V_INLINE double flash_kind(const ts_shade_view *view, ts_shade_kind kind, const 
     return sum;
 }
 
-/* The loops once for each kind of view, so that what a kind has in common for all pixels is not computed for each. */
+/* The loops once for each kind of view, and for views with and without ambient light, so that what a kind has in common
+ * for all pixels is not computed for each. */
+#define KINDS(of, surrounded, ...)                                                           \
+    switch (view->kind) {                                                                    \
+    case TS_SHADE_PUBLISHED: return of(view, TS_SHADE_PUBLISHED, surrounded, __VA_ARGS__);   \
+    case TS_SHADE_COLLOCATED: return of(view, TS_SHADE_COLLOCATED, surrounded, __VA_ARGS__); \
+    case TS_SHADE_DIRECTIONS: return of(view, TS_SHADE_DIRECTIONS, surrounded, __VA_ARGS__); \
+    default: return of(view, TS_SHADE_POSITIONS, surrounded, __VA_ARGS__);                   \
+    }
+
 static void render(const ts_shade_view *view, const ts_shade_row *row, float limit, float *image)
 {
-    switch (view->kind) {
-    case TS_SHADE_PUBLISHED: render_kind(view, TS_SHADE_PUBLISHED, row, limit, image); return;
-    case TS_SHADE_COLLOCATED: render_kind(view, TS_SHADE_COLLOCATED, row, limit, image); return;
-    case TS_SHADE_DIRECTIONS: render_kind(view, TS_SHADE_DIRECTIONS, row, limit, image); return;
-    default: render_kind(view, TS_SHADE_POSITIONS, row, limit, image); return;
-    }
+    if (view->ambient != 0) KINDS(render_kind, true, row, limit, image)
+    KINDS(render_kind, false, row, limit, image)
 }
 
 static double flash(const ts_shade_view *view, const ts_shade_row *row, const float *image, float scale,
                     float *gradient)
 {
-    switch (view->kind) {
-    case TS_SHADE_PUBLISHED: return flash_kind(view, TS_SHADE_PUBLISHED, row, image, scale, gradient);
-    case TS_SHADE_COLLOCATED: return flash_kind(view, TS_SHADE_COLLOCATED, row, image, scale, gradient);
-    case TS_SHADE_DIRECTIONS: return flash_kind(view, TS_SHADE_DIRECTIONS, row, image, scale, gradient);
-    default: return flash_kind(view, TS_SHADE_POSITIONS, row, image, scale, gradient);
-    }
+    if (view->ambient != 0) KINDS(flash_kind, true, row, image, scale, gradient)
+    KINDS(flash_kind, false, row, image, scale, gradient)
 }
 
-V_INLINE vf log_view(const ts_shade_view *view, ts_shade_kind kind, const ts_shade_row *row, int first,
+V_INLINE vf log_view(const ts_shade_view *view, ts_shade_kind kind, bool surrounded, const ts_shade_row *row, int first,
                      const surface *s, const surface *target, float scale, bool wanted, slopes *d)
 {
     lighting e;
@@ -89,9 +90,9 @@ V_INLINE vf log_view(const ts_shade_view *view, ts_shade_kind kind, const ts_sha
     light(view, kind, row, first, &e);
     measure(s, &e, kind, &g);
     measure(target, &e, kind, &gt);
-    if (!v_any(g.seen | gt.seen)) return total; /* both black */
-    shade(view, kind, s, &e, &g, &r);
-    shade(view, kind, target, &e, &gt, &rt);
+    if (!v_any(lit(surrounded, &g) | lit(surrounded, &gt))) return total; /* both black */
+    shade(view, kind, surrounded, s, &e, &g, &r);
+    shade(view, kind, surrounded, target, &e, &gt, &rt);
     for (int c = 0; c < 3; c++) {
         vf a = r.value[c] + 0.01f, b = rt.value[c] + 0.01f, inverse = 1.0f / a;
         total += v_abs(v_log(v_select(a == b, v_set(1), b * inverse))); /* equal ones give 0 and not a rounding */
@@ -101,8 +102,8 @@ V_INLINE vf log_view(const ts_shade_view *view, ts_shade_kind kind, const ts_sha
     return total;
 }
 
-static double log_loss(const ts_shade_view *views, int count, const ts_shade_row *row, const ts_shade_row *target,
-                       float scale, float *gradient)
+V_INLINE double log_views(const ts_shade_view *views, int count, bool surrounded, const ts_shade_row *row,
+                          const ts_shade_row *target, float scale, float *gradient)
 {
     double sum = 0;
     for (int i = 0; i < row->count; i += VL) {
@@ -114,9 +115,10 @@ static double log_loss(const ts_shade_view *views, int count, const ts_shade_row
         decode(views->guards, row->maps + (int64_t)i * row->channels, row->channels, n, &s);
         decode(views->guards, target->maps + (int64_t)i * target->channels, target->channels, n, &st);
         for (int j = 0; j < count; j++) {
+            const bool wanted = gradient != NULL;
             if (views[j].kind == TS_SHADE_DIRECTIONS)
-                total += log_view(&views[j], TS_SHADE_DIRECTIONS, row, i, &s, &st, scale, gradient != NULL, &d);
-            else total += log_view(&views[j], TS_SHADE_POSITIONS, row, i, &s, &st, scale, gradient != NULL, &d);
+                total += log_view(&views[j], TS_SHADE_DIRECTIONS, surrounded, row, i, &s, &st, scale, wanted, &d);
+            else total += log_view(&views[j], TS_SHADE_POSITIONS, surrounded, row, i, &s, &st, scale, wanted, &d);
         }
         sum += (double)v_sum(v_select(live, total, v_set(0)));
         if (!gradient) continue;
@@ -124,6 +126,15 @@ static double log_loss(const ts_shade_view *views, int count, const ts_shade_row
         v_store_pixels(gradient + (int64_t)i * row->channels, row->channels, n, MAP_CHANNELS, out);
     }
     return sum;
+}
+
+static double log_loss(const ts_shade_view *views, int count, const ts_shade_row *row, const ts_shade_row *target,
+                       float scale, float *gradient)
+{
+    bool surrounded = false;
+    for (int j = 0; j < count; j++) surrounded = surrounded || views[j].ambient != 0;
+    return surrounded ? log_views(views, count, true, row, target, scale, gradient)
+                      : log_views(views, count, false, row, target, scale, gradient);
 }
 
 static void log_encode(int count, const float *in, float a, float b, float *out)

@@ -32,6 +32,7 @@ typedef struct ts_shade_view {
     bool falloff; /* the light's strength is power / |light - x|^2; else power / max(l_z, guards->lz) */
     double light[3], camera[3], half[3]; /* half: TS_SHADE_DIRECTIONS only */
     float power;                         /* TS_SHADE_DIRECTIONS: the strength itself */
+    float ambient;                       /* of uniform surroundings (rd_view) */
     float fresnel; /* 2^(...), where v.h is the same for every pixel: not for TS_SHADE_POSITIONS */
 } ts_shade_view;
 

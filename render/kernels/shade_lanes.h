@@ -173,16 +173,22 @@ V_INLINE void measure(const surface *s, const lighting *e, ts_shade_kind kind, a
     cross_lanes(s, e->v, a->v);
 }
 
+/* Where there is radiance. surrounded, here and below: view->ambient is not 0. Where it is a constant, what it does not
+ * need is not compiled. */
+V_INLINE vi lit(bool surrounded, const angles *g) { return surrounded ? v_seti(-1) : g->seen; }
+
 /* Radiance, and what its derivatives are made of. */
 typedef struct radiance {
-    vf value[3], fresnel[3], scale; /* value = f scale */
+    vf value[3], fresnel[3], scale; /* value = f scale, and what ambient light adds */
     vf lobe, a, k, i, il, iv; /* lobe = D G / 4; alpha; G's k; 1 / (alpha^2 (n.h)^2 + |n x h|^2); 1 / G's factors */
+    bool surrounded;
+    float ambient;
     vf guarded,
         cosine; /* what TS_SHADE_PUBLISHED adds to the derivatives of log lobe by log alpha / 2 and by each cosine */
 } radiance;
 
-V_INLINE void shade(const ts_shade_view *view, ts_shade_kind kind, const surface *s, const lighting *e, const angles *g,
-                    radiance *r)
+V_INLINE void shade(const ts_shade_view *view, ts_shade_kind kind, bool surrounded, const surface *s, const lighting *e,
+                    const angles *g, radiance *r)
 {
     const bool published = kind == TS_SHADE_PUBLISHED;
     r->a = TS_ALPHA(s->roughness);
@@ -203,9 +209,12 @@ V_INLINE void shade(const ts_shade_view *view, ts_shade_kind kind, const surface
         r->lobe = (a2 * r->i) * r->i * (r->il * r->iv) * (0.25f * INV_PI);
     }
     r->scale = v_select(g->seen, e->strength * g->nl, v_set(0));
+    r->surrounded = surrounded;
+    r->ambient = view->ambient;
     for (int c = 0; c < 3; c++) {
         r->fresnel[c] = s->specular[c] + (1.0f - s->specular[c]) * e->fresnel;
         r->value[c] = v_fma(r->lobe, r->fresnel[c], (1.0f - s->specular[c]) * s->diffuse[c] * INV_PI) * r->scale;
+        if (surrounded) r->value[c] += view->ambient * (s->specular[c] + (1.0f - s->specular[c]) * s->diffuse[c]);
     }
 }
 
@@ -236,11 +245,13 @@ V_INLINE void couple(ts_shade_kind kind, const surface *s, const lighting *e, co
 
 V_INLINE vf by_diffuse(const surface *s, const radiance *r, int c)
 {
-    return r->scale * (1.0f - s->specular[c]) * INV_PI;
+    const vf by = r->scale * (1.0f - s->specular[c]) * INV_PI;
+    return r->surrounded ? by + r->ambient * (1.0f - s->specular[c]) : by;
 }
 V_INLINE vf by_specular(const surface *s, const lighting *e, const radiance *r, int c)
 {
-    return r->scale * (r->lobe * (1.0f - e->fresnel) - s->diffuse[c] * INV_PI);
+    const vf by = r->scale * (r->lobe * (1.0f - e->fresnel) - s->diffuse[c] * INV_PI);
+    return r->surrounded ? by + r->ambient * (1.0f - s->diffuse[c]) : by;
 }
 V_INLINE vf diffuse_part(const surface *s, int c) { return (1.0f - s->specular[c]) * s->diffuse[c] * INV_PI; }
 

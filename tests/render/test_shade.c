@@ -77,7 +77,7 @@ TEST(render_kernels_match_reference)
             rd_render(grid, maps, C, &view, false, image);
             /* A weak light, so that nothing is clamped, and a photograph that is darker by one in one colour: e is
              * exactly that. */
-            view.power *= 1e-9f;
+            view.power *= 1e-9f, view.ambient *= 1e-9f;
             int colour = round % 3;
             rd_render(grid, maps, C, &view, false, base);
             for (int i = colour; i < SIDE * SIDE * 3; i += 3) base[i] -= 1;
@@ -87,7 +87,7 @@ TEST(render_kernels_match_reference)
                 ts_shade_k()->flash(&sv, &row, base + y * SIDE * 3, 1e9f, gradient + y * SIDE * C);
             }
             bool flash = view.kind == RD_POINT;
-            view.power *= 1e9f;
+            view.power *= 1e9f, view.ambient *= 1e9f;
             float black[C] = {-1, -1, -1, 0, 0, 1, -1, -1, -1};
             for (int p = 0; p < SIDE * SIDE; p++) {
                 double m[C], point[2], value[3], by[3][C];

@@ -17,13 +17,15 @@ static inline float *floats(size_t count)
     return p;
 }
 
-/* The i-th of eleven views: the nine of the training loss, the flash, and one of evaluation. */
+/* The i-th of eleven views: the nine of the training loss, the flash, and one of evaluation, which has
+ * ambient light. */
 static inline rd_view any_view(ts_rng *rng, int i)
 {
     rd_view views[RD_LOSS_VIEWS + 2];
     rd_loss_views(rng, views);
     views[RD_LOSS_VIEWS] = rd_flash();
     rd_eval_views(rng, 1, views + RD_LOSS_VIEWS + 1);
+    views[RD_LOSS_VIEWS + 1].ambient = 0.2f;
     return views[i % (RD_LOSS_VIEWS + 2)];
 }
 

@@ -1,0 +1,23 @@
+/* The most probable maps of rows of pixels, given photographs and a Gaussian prior. render/posterior.h has the
+ * equations. */
+#ifndef TS_POSTERIOR_H
+#define TS_POSTERIOR_H
+#include "render/kernels/shade.h"
+
+typedef struct ts_prior {
+    float hue[2];       /* of the diffuse values and of F0's, in [0, 1] */
+    float model, noise; /* the variance of a photograph's value I is model^2 + noise max(I, 0) */
+} ts_prior;
+/* Standard deviations of the prior are taken as TS_PRIOR_WIDEST where they are larger, and as 0 where they are not
+ * above 0; variances of a photograph's value as TS_PRIOR_FINEST where they are smaller. */
+#define TS_PRIOR_WIDEST 1e3f
+#define TS_PRIOR_FINEST 1e-10f
+
+struct ts_posterior_kernels {
+    /* step[count, channels]; mean[count, channels]; deviation[count, MAP_GROUPS]; after[count, MAP_GROUPS] may be NULL.
+     * images[v][count, 3] belongs to views[v]. Channels of step beyond the maps' are not written. */
+    void (*step)(const ts_shade_view *views, const float *const *images, int count, const ts_shade_row *row,
+                 const ts_prior *prior, const float *mean, const float *deviation, float *step, float *after);
+};
+TS_FAMILY(posterior)
+#endif

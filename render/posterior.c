@@ -1,0 +1,78 @@
+#include "render/posterior.h"
+#include "render/brdf.h"
+#include "render/rows.h"
+#include "render/kernels/newton.h"
+#include "tensor/threads.h"
+#include <math.h>
+
+void rd_posterior_step(rd_grid grid, const float *maps, int channels, const rd_view *views, const float *const *image,
+                       int count, const rd_prior *prior, float *step, float *after)
+{
+    ts_shade_view v[RD_CAPTURE_VIEWS];
+    for (int k = 0; k < count; k++) v[k] = rd_shade_view(&views[k]);
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int y = 0; y < grid.h; y++) {
+        const int64_t at = (int64_t)y * grid.w;
+        const ts_shade_row row = rd_shade_row(grid, y, maps, channels);
+        const float *part[RD_CAPTURE_VIEWS];
+        for (int k = 0; k < count; k++) part[k] = image[k] + at * 3;
+        ts_posterior_k()->step(v, part, count, &row, &prior->scale, prior->mean + at * channels,
+                               prior->deviation + at * MAP_GROUPS, step + at * channels,
+                               after ? after + at * MAP_GROUPS : NULL);
+    }
+}
+
+void rd_prior_covariance(const double deviation[MAP_GROUPS], const ts_prior *prior,
+                         double covariance[MAP_CHANNELS][MAP_CHANNELS])
+{
+    for (int i = 0; i < MAP_CHANNELS; i++)
+        for (int j = 0; j < MAP_CHANNELS; j++) covariance[i][j] = 0;
+    for (int a = 0; a < 3; a++)
+        for (int b = 0; b < 3; b++) {
+            const double d = deviation[GROUP_DIFFUSE], s = deviation[GROUP_SPECULAR];
+            covariance[MAP_DIFFUSE + a][MAP_DIFFUSE + b] = d * d * (a == b ? 1 : 1 - (double)prior->hue[0]);
+            covariance[MAP_SPECULAR + a][MAP_SPECULAR + b] = s * s * (a == b ? 1 : 1 - (double)prior->hue[1]);
+        }
+    for (int i = 0; i < 2; i++)
+        covariance[MAP_NORMAL + i][MAP_NORMAL + i] = deviation[GROUP_NORMAL] * deviation[GROUP_NORMAL];
+    covariance[MAP_ROUGHNESS][MAP_ROUGHNESS] = deviation[GROUP_ROUGHNESS] * deviation[GROUP_ROUGHNESS];
+}
+
+void rd_observe(const double maps[MAP_CHANNELS], const double point[2], const rd_view *view, const float image[3],
+                const ts_prior *prior, rd_observation observation[3])
+{
+    double value[3], by[3][MAP_CHANNELS];
+    rd_radiance(maps, point, view, value, by);
+    for (int c = 0; c < 3; c++) {
+        rd_observation *o = &observation[c];
+        const double target = (double)image[c], model = (double)prior->model;
+        const bool burnt = value[c] > 1 && image[c] >= TS_NEWTON_BURNT;
+        o->residual = target - (value[c] > 1 ? 1 + log(value[c]) : value[c]);
+        o->variance = model * model + (double)prior->noise * fmax(target, 0);
+        for (int i = 0; i < MAP_CHANNELS; i++) o->by[i] = burnt ? 0 : by[c][i] / fmax(value[c], 1);
+    }
+}
+
+void rd_posterior_pixel(const double maps[MAP_CHANNELS], const double point[2], const rd_view *views,
+                        const float (*image)[3], int count, const ts_prior *prior, double mean[MAP_CHANNELS],
+                        double covariance[MAP_CHANNELS][MAP_CHANNELS])
+{
+    for (int k = 0; k < 3 * count; k++) {
+        rd_observation all[3], *o = &all[k % 3];
+        double across[MAP_CHANNELS], total, error;
+        rd_observe(maps, point, &views[k / 3], image[k / 3], prior, all);
+        total = o->variance, error = o->residual;
+        for (int i = 0; i < MAP_CHANNELS; i++) {
+            across[i] = 0;
+            for (int j = 0; j < MAP_CHANNELS; j++) across[i] += covariance[i][j] * o->by[j];
+        }
+        for (int i = 0; i < MAP_CHANNELS; i++) {
+            total += o->by[i] * across[i];
+            error -= o->by[i] * (mean[i] - maps[i]);
+        }
+        for (int i = 0; i < MAP_CHANNELS; i++) {
+            mean[i] += across[i] * error / total;
+            for (int j = 0; j < MAP_CHANNELS; j++) covariance[i][j] -= across[i] * across[j] / total;
+        }
+    }
+}

@@ -1,0 +1,50 @@
+/* The most probable maps, given photographs and a Gaussian prior on each pixel's nine values. With the maps R where the
+ * rendering is linearised (encoded, tensor/maps.h), the prior's mean M and covariance Sigma, the residual
+ * r = I - seen(R) and J = d seen / d maps, the step is the delta for which
+ *     |r - J delta|^2 / S + (R + delta - M)' Sigma^-1 (R + delta - M)
+ * is least, which is
+ *     delta = M - R + Sigma J' (J Sigma J' + S)^-1 (r - J (M - R)).
+ * What is left of the prior's uncertainty afterwards is
+ *     Sigma - Sigma J' (J Sigma J' + S)^-1 J Sigma.
+ * Sigma has a standard deviation s for each of the four maps. The values of different maps are independent, and so are
+ * the normal's x and y; the three values of the diffuse map and the three of F0 have the covariance
+ *     s^2 ((1 - q) 1 1' + q I),
+ * so that with a small q they only move together and keep their hue.
+ * S is diagonal: a value I of a photograph has the variance model^2 + noise max(I, 0). seen is the radiance up to 1 and
+ * 1 + log(radiance) above; where it is above 1 and the photograph is TS_NEWTON_BURNT at least, nothing is learned. */
+#ifndef RD_POSTERIOR_H
+#define RD_POSTERIOR_H
+#include "render/scene.h"
+#include "render/kernels/posterior.h"
+#include "tensor/maps.h"
+
+typedef struct rd_prior {
+    const float *mean;      /* [h, w, channels], as the maps */
+    const float *deviation; /* [h, w, MAP_GROUPS], of encoded values, >= 0 */
+    ts_prior scale;         /* q of both colours, model and noise */
+} rd_prior;
+
+/* step: [h, w, channels], channels beyond the ninth are not written; where maps + step would leave [-1, 1] it ends
+ * there. after (may be NULL): [h, w, MAP_GROUPS], what is left of the prior's standard deviations, of several values
+ * the root of their mean variance. Views are RD_POINT, 1 <= count <= RD_CAPTURE_VIEWS; image[k] [h, w, 3] belongs to
+ * views[k]. Finite for finite maps. Threaded; the same bytes for any number of threads. */
+void rd_posterior_step(rd_grid grid, const float *maps, int channels, const rd_view *views, const float *const *image,
+                       int count, const rd_prior *prior, float *step, float *after);
+
+/* The prior's covariance. */
+void rd_prior_covariance(const double deviation[MAP_GROUPS], const ts_prior *prior,
+                         double covariance[MAP_CHANNELS][MAP_CHANNELS]);
+
+/* What a photograph's value says of a pixel's maps: the residual, its variance, and d seen / d maps. */
+typedef struct rd_observation {
+    double residual, variance, by[MAP_CHANNELS];
+} rd_observation;
+void rd_observe(const double maps[MAP_CHANNELS], const double point[2], const rd_view *view, const float image[3],
+                const ts_prior *prior, rd_observation observation[3]);
+
+/* The same step and covariance of one pixel in double, not clamped, one observation after the other (Kalman 1960): what
+ * the kernel is tested against. mean and covariance are the prior's and become the posterior's. */
+void rd_posterior_pixel(const double maps[MAP_CHANNELS], const double point[2], const rd_view *views,
+                        const float (*image)[3], int count, const ts_prior *prior, double mean[MAP_CHANNELS],
+                        double covariance[MAP_CHANNELS][MAP_CHANNELS]);
+#endif

@@ -1,0 +1,66 @@
+/* A photograph as a function of the maps and of what is global about its scene, the numbers t of rd_scene_number.
+ * With o = RD_SCENE_OFFSET and the default flash's height D and irradiance P / D^2,
+ *     height             d = D exp(t_distance)
+ *     camera             c = (o t_camera_x, o t_camera_y, d)
+ *     light              p = (o (t_camera_x + t_light_x), o (t_camera_y + t_light_y), d)
+ *     irradiance         E = P / D^2 2^t_exposure
+ *     ambient radiance   A = RD_SCENE_AMBIENTS t_ambient E / pi
+ *     radiance           L = f(n, l, v) max(n.l, 0) E d^2 / |p - x|^2 + A (F0 + (1 - F0) diffuse)
+ *     tone curve         value = w^2, w = y + t_tone y (1 - y) (y - 1/2), y = sqrt(L) up to L = 1; value = L above.
+ * y stands for the encoding of a photograph, where 0, 1/2 and 1 stay where they are; w rises for -4 < t_tone < 2.
+ * Derivatives by the places, with r = |p - x|, u = n.l and so on, h = (l + v) / |l + v|:
+ *     dL/dp = ((I - l l') (L_u n + (I - h h') L_nh n / |l + v| + L_vh h / 2) - 2 L l) / r
+ * of the light's part of L, and the same by c without the last term; by d: of both along z, and 2 L / d. */
+#ifndef RD_SCENE_MODEL_H
+#define RD_SCENE_MODEL_H
+#include "autograd/tape.h"
+#include "render/kernels/scene.h"
+#include "render/posterior.h"
+
+/* The values of one pixel in double, not clamped. */
+void rd_scene_value(const double maps[MAP_CHANNELS], const double point[2], const double number[RD_SCENE_NUMBERS],
+                    double value[3]);
+
+/* The same of a whole photograph [h, w, 3]; clamp: at 1. Threaded; the same bytes for any number of threads. */
+void rd_scene_photograph(rd_grid grid, const float *maps, int channels, const float number[RD_SCENE_NUMBERS],
+                         bool clamp, float *image);
+
+/* The tone curve undone: values in [0, 1] of a photograph become those that the curve was applied to. Others stay. in
+ * may be out. */
+void rd_scene_untone(int64_t count, const float *in, float tone, float *out);
+
+/* The photographs [N, S, S, 3] of maps [N, S, S, 9 or more], whole patches, in the scenes numbers [N, 1, 1,
+ * RD_SCENE_NUMBERS]; clamp: at 1, without a gradient there. Either input may have a gradient (render/op_scene_render.c). */
+ag_value *ag_scene_render(ag_tape *tape, ag_value *maps, ag_value *numbers, bool clamp);
+
+/* What is known of a scene beforehand: independent numbers with Gaussian errors. A deviation of 0 keeps a number. */
+typedef struct rd_scene_prior {
+    float mean[RD_SCENE_NUMBERS], deviation[RD_SCENE_NUMBERS];
+} rd_scene_prior;
+
+typedef struct rd_scene_how {
+    int steps;
+    int every;        /* rows: the first one read is every / 2; 1 reads all */
+    float correlated; /* so many pixels are worth one: the maps' errors of neighbours are alike */
+    ts_prior scale;   /* of the maps' prior, and of a photograph's noise */
+} rd_scene_how;
+
+/* Gauss and Newton's method on the numbers of a photograph's scene, for maps that are uncertain. e = image - seen (render/
+ * posterior.h: its logarithm above 1, nothing where both are burnt out), J_t = d seen / d t, J = d seen / d maps and the
+ * maps' covariance Sigma of a pixel give, summed over the pixels that are read,
+ *     V = (J Sigma J' + S)^-1,   A = w sum J_t' V J_t,   b = w sum J_t' V e,
+ * where w = min(every / correlated, 1). With the prior's mean m and deviations in the diagonal matrix Q a step goes to
+ *     t = m + Q z,   (I + Q A Q) z = Q (b + A (t_before - m)),
+ * at most RD_SCENE_STRIDE in any number; the ambient light is not let below 0, nor the tone curve out of
+ * +-RD_SCENE_TONE_MOST. number begins with the caller's values; after (may be NULL): the square roots of the diagonal
+ * of Q (I + Q A Q)^-1 Q at the last step. deviation [h, w, MAP_GROUPS] of the maps; image [h, w, 3]. Threaded; the same
+ * bytes for any number of threads. */
+#define RD_SCENE_STRIDE 1.0
+#define RD_SCENE_TONE_MOST 1.5f
+void rd_scene_fit(rd_grid grid, const float *maps, int channels, const float *deviation, const float *image,
+                  const rd_scene_prior *prior, const rd_scene_how *how, float number[RD_SCENE_NUMBERS],
+                  float after[RD_SCENE_NUMBERS]);
+
+/* For the op. */
+ts_scene rd_scene_of(const float number[RD_SCENE_NUMBERS]);
+#endif
