@@ -47,37 +47,6 @@ rd_view rd_scene_view(const float number[RD_SCENE_NUMBERS])
     return view;
 }
 
-static float stops(const rd_view *view)
-{
-    const float usual = RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE);
-    return log2f(view->power / (view->light[2] * view->light[2]) / usual);
-}
-
-void rd_scene_numbers(const rd_view *view, float ambient, float tone, float number[RD_SCENE_NUMBERS])
-{
-    number[RD_SCENE_DISTANCE] = logf(view->camera[2] / RD_FLASH_DISTANCE);
-    for (int i = 0; i < 2; i++) {
-        number[RD_SCENE_LIGHT_X + i] = (view->light[i] - view->camera[i]) / RD_SCENE_OFFSET;
-        number[RD_SCENE_CAMERA_X + i] = view->camera[i] / RD_SCENE_OFFSET;
-    }
-    number[RD_SCENE_EXPOSURE] = stops(view);
-    number[RD_SCENE_AMBIENT] = ambient / RD_SCENE_AMBIENTS;
-    number[RD_SCENE_TONE] = tone;
-}
-
-rd_view rd_scene_view(const float number[RD_SCENE_NUMBERS])
-{
-    rd_view view = rd_flash();
-    const float farther = expf(number[RD_SCENE_DISTANCE]);
-    view.camera[2] = view.light[2] = RD_FLASH_DISTANCE * farther;
-    for (int i = 0; i < 2; i++) {
-        view.camera[i] = RD_SCENE_OFFSET * number[RD_SCENE_CAMERA_X + i];
-        view.light[i] = view.camera[i] + RD_SCENE_OFFSET * number[RD_SCENE_LIGHT_X + i];
-    }
-    view.power = RD_FLASH_POWER * farther * farther * exp2f(number[RD_SCENE_EXPOSURE]);
-    return view;
-}
-
 static void hemisphere(ts_rng *rng, double d[3])
 {
     double r = sqrt(0.94 * ts_rng_uniform(rng) + 0.01), phi = TAU * ts_rng_uniform(rng);

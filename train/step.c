@@ -109,7 +109,7 @@ static void describe(tr_trainer *t, int photographs)
     for (int i = 0; i < photographs; i++) {
         const tr_shot *s = &t->shots[i];
         const bool light = ts_rng_uniform(&rng) < 0.5f && s->told_view;
-        rd_scene_numbers(&s->view, 0, 0, t->scenes + (size_t)i * RD_SCENE_NUMBERS);
+        rd_scene_numbers(&s->view, s->ambient, s->tone, t->scenes + (size_t)i * RD_SCENE_NUMBERS);
         t->known[i] = (unsigned char)((s->told_view ? NN_KNOWN_CAMERA : 0) | (light ? NN_KNOWN_LIGHT : 0) |
                                       (s->told_power ? NN_KNOWN_POWER : 0));
         t->captures[i] = s->view;
