@@ -56,6 +56,13 @@ ts_code io_write_strip(const char *path, const io_material *m, const io_image *i
 /* maps.exr back; whichever way its normals' y points, the maps' points up. */
 ts_code io_read_maps_exr(const char *path, io_material *m, ts_status *st);
 
+/* An encoded value of [-1, 1] as one of [0, 1]; NaN to 0. */
+static inline float io_unit(float x)
+{
+    const float v = x * 0.5f + 0.5f;
+    return v > 0 ? v < 1 ? v : 1 : 0;
+}
+
 /* The reconstructed normal and physical values of one pixel, for writers and statistics. */
 typedef struct io_texel {
     float diffuse[3], normal[3], roughness, specular[3];

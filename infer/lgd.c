@@ -17,7 +17,9 @@
 enum {
     SIDE_MAX = 16384,      /* 9.7 GB of maps: a larger number is a mistake */
     ITERATIONS_MAX = 1000, /* the same: nothing changes after some ten */
-    THREADS_MAX = 1024
+    THREADS_MAX = 1024,
+    OPTIONS_LEAST = offsetof(lgd_options, iterations) + sizeof(int), /* a size below has no option at all */
+    OPTIONS_MOST = 4096                                              /* a larger one is a field that nobody set */
 };
 
 /* What a call computes in. */
@@ -47,9 +49,31 @@ _Static_assert(sizeof((lgd_error *)0)->message == sizeof((ts_status *)0)->messag
 
 const char *lgd_version(void) { return LGD_VERSION; }
 
-lgd_options lgd_options_default(void)
+void lgd_options_init(lgd_options *options, size_t size)
 {
-    return (lgd_options){.iterations = -1, .orientations = LGD_ORIENTATIONS_USUAL, .tolerance = LGD_TOLERANCE_USUAL};
+    const lgd_options o = {
+        .size = size, .iterations = -1, .orientations = LGD_ORIENTATIONS_USUAL, .tolerance = LGD_TOLERANCE_USUAL};
+    memset(options, 0, size);
+    memcpy(options, &o, size < sizeof o ? size : sizeof o);
+}
+
+/* The caller's options, of the lgd.h that it was compiled with, as those of this one. */
+static ts_code take_options(const lgd_options *given, lgd_options *o, ts_status *st)
+{
+    lgd_options_init(o, sizeof *o);
+    if (!given) return TS_OK;
+    const size_t size = given->size;
+    if (size < OPTIONS_LEAST || size > OPTIONS_MOST)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: options.size is %zu: begin with lgd_options_default()", size);
+    for (size_t i = sizeof *o; i < size; i++)
+        if (((const unsigned char *)given)[i])
+            return ts_fail(st, TS_UNSUPPORTED,
+                           "lgd_estimate: the options (%zu bytes) set a field that lgd %s (%zu bytes) does not have: "
+                           "link with a newer liblgd or leave the field zero",
+                           size, LGD_VERSION, sizeof *o);
+    memcpy(o, given, size < sizeof *o ? size : sizeof *o);
+    o->size = sizeof *o;
+    return TS_OK;
 }
 
 int lgd_trained_iterations(const lgd_model *model) { return model->net->arch.iterations; }
@@ -193,8 +217,10 @@ int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, in
                         float *maps, lgd_error *error)
 {
     ts_status st = {0};
-    lgd_options o = options ? *options : lgd_options_default();
-    workspace *w = check_arguments(model, photo, photos, side, &o, maps, &st) == TS_OK ? take(model, &st) : NULL;
+    lgd_options o;
+    workspace *w = NULL;
+    if (take_options(options, &o, &st) == TS_OK && check_arguments(model, photo, photos, side, &o, maps, &st) == TS_OK)
+        w = take(model, &st);
     if (w) {
         const lgd_estimator e = {model->net, w->tape};
         if (o.tolerance == LGD_TOLERANCE_USUAL)

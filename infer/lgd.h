@@ -3,6 +3,12 @@
 #define LGD_H
 #include <stddef.h>
 
+#if defined(__GNUC__)
+#define LGD_API __attribute__((visibility("default")))
+#else
+#define LGD_API
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -18,11 +24,12 @@ typedef struct lgd_error {
 /* Reads weights (safetensors). NULL and error on failure. The caller frees, when no call uses it. Any number of threads
  * may call lgd_estimate with one model at once: each such call has memory of its own (30 MB at 256 x 256 pixels), which
  * the model keeps for later calls, but for what photographs over 512 pixels a side took. */
-lgd_model *lgd_load(const char *weights, lgd_error *error);
-void lgd_free(lgd_model **model);
+LGD_API lgd_model *lgd_load(const char *weights, lgd_error *error);
+LGD_API void lgd_free(lgd_model **model);
 
-int lgd_trained_iterations(const lgd_model *model); /* the T that the model was trained for */
-int lgd_most_photos(const lgd_model *model); /* photographs that it reads at once: 1, or those of a multi-image model */
+LGD_API int lgd_trained_iterations(const lgd_model *model); /* the T that the model was trained for */
+LGD_API int lgd_most_photos(
+    const lgd_model *model); /* photographs that it reads at once: 1, or those of a multi-image model */
 
 /* As many steps as the reconstruction RMSE falls by, at least a thousandth each, LGD_AUTO_MOST at most; R_t is that of
  * the last such step. Of photographs that are refined tile by tile the steps are counted on the photograph at 256 x 256
@@ -40,7 +47,9 @@ enum { LGD_AUTO = -2, LGD_AUTO_MOST = 24 };
 
 enum { LGD_F32, LGD_BF16 };
 
+/* New fields are added at the end. Begin with lgd_options_default(). */
 typedef struct lgd_options {
+    size_t size;    /* sizeof(lgd_options) where the caller was compiled: fields beyond it have their defaults */
     int iterations; /* refinement steps; 0: R_0 alone, -1: as trained, LGD_AUTO */
     int exact; /* 0: 3 x 3 convolutions by Winograd's way where that is faster, with maps that differ by less than 1e-4;
                 * else directly, as weights of the published network always are */
@@ -78,13 +87,20 @@ typedef struct lgd_options {
      * fixed. */
     double *power;
 } lgd_options;
-lgd_options lgd_options_default(void);
+/* Fills size bytes with the defaults, whichever version the library has. */
+LGD_API void lgd_options_init(lgd_options *options, size_t size);
+static inline lgd_options lgd_options_default(void)
+{
+    lgd_options options;
+    lgd_options_init(&options, sizeof options);
+    return options;
+}
 
 /* image: side x side x 3 linear values (clamped to [0, 1] here), top row first. maps: side x side x 9, in [0, 1] where
  * not said otherwise: diffuse rgb, normal x and y in [-1, 1] (OpenGL, z = sqrt(1 - x^2 - y^2)), roughness, specular F0
  * rgb. Returns 0, or nonzero with error set and maps unspecified. */
-int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps,
-                 lgd_error *error);
+LGD_API int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps,
+                         lgd_error *error);
 
 /* A photograph of the sample, rectified to it. Positions in patch widths (the sample is [-1/2, 1/2]^2 at z = 0, x
  * right, y up), both above the sample; radiance = BRDF max(n.l, 0) power / distance^2. */
@@ -94,18 +110,18 @@ typedef struct lgd_photo {
 } lgd_photo;
 
 /* The photograph that lgd_estimate assumes: light and camera at one place above the centre, of the usual power. */
-lgd_photo lgd_flash_photo(const float *image);
+LGD_API lgd_photo lgd_flash_photo(const float *image);
 
 /* lgd_estimate from 1 .. lgd_most_photos photographs under known lights, in any order. */
-int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,
-                        float *maps, lgd_error *error);
+LGD_API int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side,
+                                const lgd_options *options, float *maps, lgd_error *error);
 
 /* Renders maps as returned by lgd_estimate under a point light and a camera (positions in patch widths, the sample is
  * [-1/2, 1/2]^2 at z = 0, y up): image is side x side x 3, linear. */
-int lgd_render(const float *maps, int side, const float light[3], const float camera[3], float power, float *image,
-               lgd_error *error);
+LGD_API int lgd_render(const float *maps, int side, const float light[3], const float camera[3], float power,
+                       float *image, lgd_error *error);
 
-const char *lgd_version(void);
+LGD_API const char *lgd_version(void);
 
 #ifdef __cplusplus
 }

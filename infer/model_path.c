@@ -1,4 +1,5 @@
 #include "infer/model_path.h"
+#include "data/folders.h"
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -29,7 +30,7 @@ static bool shipped(const char *name, char path[LGD_PATH_MAX])
             if (access(path, F_OK) == 0) return true;
         }
     }
-    snprintf(path, LGD_PATH_MAX, "%s/%s.safetensors", LGD_DATADIR, name);
+    snprintf(path, LGD_PATH_MAX, "%s/%s.safetensors", io_data_folder, name);
     return access(path, F_OK) == 0;
 }
 
@@ -48,5 +49,5 @@ ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_
     return ts_fail(st, TS_IO,
                    "no %s.safetensors found in ../share/lgd or ../../models beside the program or in %s: name a file "
                    "with --model or LGD_MODEL",
-                   name, LGD_DATADIR);
+                   name, io_data_folder);
 }

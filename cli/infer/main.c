@@ -88,7 +88,8 @@ static void compute(lgd_item *item, void *user)
     run *r = user;
     const int size = item->square.width;
     task t = {r, item};
-    const lgd_options options = {.iterations = r->command->iterations,
+    const lgd_options options = {.size = sizeof options,
+                                 .iterations = r->command->iterations,
                                  .threads = item->threads,
                                  .progress = after_step,
                                  .user = &t,

@@ -41,7 +41,7 @@ static ts_code read_values(const nn_file *f, nn_model *m, ts_status *st)
         int64_t dim[4];
         nn_param_dims(p, dim);
         if (nn_file_read_finite(f, p->name, p->rank, dim, m->value + p->offset, &own) == TS_OK) continue;
-#pragma omp critical(nn_read_values)
+#pragma omp critical
         if (i < failed) {
             failed = i;
             *st = own;
