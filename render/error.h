@@ -1,5 +1,5 @@
-/* How far maps are from other maps, as results are compared (DESIGN section 5): training's validation and lgd-eval use
- * the same code. */
+/* How far maps are from other maps, as results are compared (docs/conventions.md, "Evaluation"): training's validation
+ * and lgd-eval use the same code. */
 #ifndef RD_ERROR_H
 #define RD_ERROR_H
 #include "render/scene.h"

@@ -14,6 +14,7 @@ ag_value *ag_render_loss(ag_tape *tape, ag_value *maps, ag_value *target, const 
  * gradient at a perfect fit is 0 (render/render.h). */
 ag_value *ag_flash_loss(ag_tape *tape, ag_value *maps, ag_value *image, const rd_view *view);
 
-/* mean |maps - target| over all values, the map L1 of DESIGN section 4. Channel groups weighted equally by channel. */
+/* mean |maps - target| over all values, the L1 of the maps (docs/math.md). Channel groups weighted equally by channel.
+ */
 ag_value *ag_map_loss(ag_tape *tape, ag_value *maps, ag_value *target);
 #endif

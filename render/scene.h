@@ -1,5 +1,5 @@
-/* Where the sample, the cameras and the lights are (DESIGN: the sample is the square [-1/2, 1/2]^2 at z = 0 in patch
- * widths; x right, y up, z toward the camera). */
+/* Where the sample, the cameras and the lights are (docs/conventions.md, "Geometry": the sample is the square [-1/2,
+ * 1/2]^2 at z = 0 in patch widths; x right, y up, z toward the camera). */
 #ifndef RD_SCENE_H
 #define RD_SCENE_H
 #include "tensor/rng.h"
@@ -40,8 +40,8 @@ rd_view rd_flash(void);
 enum { RD_LOSS_DIFFUSE = 3, RD_LOSS_SPECULAR = 6, RD_LOSS_VIEWS = 9 };
 void rd_loss_views(ts_rng *rng, rd_view views[RD_LOSS_VIEWS]);
 
-/* Evaluation (DESIGN section 5): camera and light each uniform over the square [-1/2, 1/2]^2 at z = RD_FLASH_DISTANCE,
- * power RD_FLASH_POWER. */
+/* Evaluation (docs/conventions.md): camera and light each uniform over the square [-1/2, 1/2]^2 at z =
+ * RD_FLASH_DISTANCE, power RD_FLASH_POWER. */
 void rd_eval_views(ts_rng *rng, int count, rd_view *views);
 
 /* The preview's light positions: index 0 .. count-1 around the sample, camera at the flash's place. */

@@ -1,4 +1,4 @@
-/* How good maps are (DESIGN section 5). */
+/* How good maps are (docs/conventions.md, "Evaluation"). */
 #ifndef EV_METRICS_H
 #define EV_METRICS_H
 #include "data/capture.h"
