@@ -65,8 +65,8 @@ static ts_code resample(const io_photo_rows *photo, const cut *c, ts_arena *aren
     return TS_OK;
 }
 
-ts_code io_read_square(const char *path, int64_t max_pixels, int size, io_image *square, int *width, int *height,
-                       ts_status *st)
+ts_code io_read_photo_square(const char *path, int64_t max_pixels, int size, io_image *square, int *width, int *height,
+                             ts_status *st)
 {
     io_photo_rows photo;
     *square = (io_image){0};

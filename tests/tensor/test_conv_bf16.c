@@ -46,7 +46,7 @@ static float *rounded(const float *x, size_t count)
 
 /* What sits between two floats that have 16 bits less: near the middle, at the edges of exponents, denormal, infinite,
  * and no number. */
-static float awkward(ts_rng *r)
+static float hard_to_round(ts_rng *r)
 {
     static const uint32_t tails[] = {0, 1, 0x7fff, 0x8000, 0x8001, 0xffff},
                           heads[] = {0, 1, 0x7f, 0x80, 0x3f80, 0x7f7f, 0x7f80, 0x7fbf, 0x7fc0, 0x7fff};
@@ -82,7 +82,7 @@ TEST(bf16_pairs_naive)
             float *x = malloc(sizeof(float) * (size_t)(pixels * channels)),
                   *to = malloc(count * sizeof(float)); /* exact: the sanitizer sees a read past it */
             CHECK(x && to, "no memory");
-            for (int i = 0; i < pixels * channels; i++) x[i] = awkward(&r);
+            for (int i = 0; i < pixels * channels; i++) x[i] = hard_to_round(&r);
             memset(to, 0x5a, count * sizeof(float));
             ts_conv_k()->pairs(x, pixels, channels, to, depth + gap);
             for (size_t i = 0; i < count; i++) {
