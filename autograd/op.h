@@ -7,8 +7,11 @@
 /* No error so far and all inputs are there. Sets the error "op: input i is missing" otherwise. */
 bool ag_ready(ag_tape *tape, const char *op, int count, ag_value *const *in);
 
+/* Threads of a loop of an operation on the tape. */
+static inline int ag_threads(const ag_tape *tape) { return ts_threads_of(ag_compute(tape)->threads); }
+
 /* to[n,h,w,:] = a[n,h,w,:] followed by b[n,h,w,:] (op_concat.c). */
-void ag_join(const ag_value *a, const ag_value *b, float *to);
+void ag_join(ag_tape *tape, const ag_value *a, const ag_value *b, float *to);
 
 /* The recorded operation that made v, or NULL. */
 const ag_node *ag_node_of(const ag_tape *tape, const ag_value *v);

@@ -32,17 +32,17 @@ static const float *input(ag_tape *tape, const ag_node *node)
     ts_shape s = x->t.shape;
     s.c += constants->t.shape.c;
     float *both = ts_new(ag_arena(tape), s).data;
-    if (both) ag_join(x, constants, both);
+    if (both) ag_join(tape, x, constants, both);
     else ag_fail(tape, TS_NOMEM, "conv: no memory for %lld values", (long long)ts_count(s));
     return both;
 }
 
-static bool winograd(const ts_conv *c, ts_conv_use use) { return !ts_conv_exact() && ts_conv_winograd(c, use); }
+static bool winograd(const ts_conv *c, ts_conv_use use) { return !c->compute.exact && ts_conv_winograd(c, use); }
 
 static void weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
 {
-    const bool rounded = dweight && ts_conv_precision() == TS_BF16 && ts_conv_bf16_weights(),
-               other = dweight && !rounded && !ts_conv_exact() && ts_conv_winograd_weights(c);
+    const bool rounded = dweight && c->compute.precision == TS_BF16 && ts_conv_bf16_weights(),
+               other = dweight && !rounded && !c->compute.exact && ts_conv_winograd_weights(c);
     if (rounded) ts_conv_weight_gradient_bf16(c, x, dy, dweight);
     if (other) ts_conv_weight_gradient_winograd(c, x, dy, dweight);
     ts_conv_weight_gradient(c, x, dy, rounded || other ? NULL : dweight, dbias);
@@ -51,9 +51,9 @@ static void weight_gradient(const ts_conv *c, const float *x, const float *dy, f
 static void forward(ag_tape *tape, ag_node *node)
 {
     const conv_attr *a = node->attr;
-    const ts_conv_use use = ts_conv_precision() == TS_BF16 ? TS_CONV_FORWARD_BF16
-        : winograd(&a->conv, TS_CONV_WINOGRAD)             ? TS_CONV_WINOGRAD
-                                                           : TS_CONV_FORWARD;
+    const ts_conv_use use = a->conv.compute.precision == TS_BF16 ? TS_CONV_FORWARD_BF16
+        : winograd(&a->conv, TS_CONV_WINOGRAD)                   ? TS_CONV_WINOGRAD
+                                                                 : TS_CONV_FORWARD;
     const float *packed = ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data);
     if (!packed) return;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
@@ -74,7 +74,7 @@ static void backward(ag_tape *tape, ag_node *node)
         const struct ts_elementwise_kernels *k = ts_elementwise_k();
         const float *y = node->out->t.data;
         const int64_t n = ts_count(node->out->t.shape);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (n > AG_CHUNK)
         for (int64_t i = 0; i < n; i += AG_CHUNK)
             k->leaky_backward(ag_part(n, i, AG_CHUNK), y + i, dy + i, a->leak, dy + i, false);
     }
@@ -85,9 +85,9 @@ static void backward(ag_tape *tape, ag_node *node)
     ts_arena_release(ag_arena(tape), mark);
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[X], &accumulate);
-    const ts_conv_use use = ts_conv_precision() == TS_BF16   ? TS_CONV_DATA_GRADIENT_BF16
-        : winograd(&a->conv, TS_CONV_DATA_GRADIENT_WINOGRAD) ? TS_CONV_DATA_GRADIENT_WINOGRAD
-                                                             : TS_CONV_DATA_GRADIENT;
+    const ts_conv_use use = a->conv.compute.precision == TS_BF16 ? TS_CONV_DATA_GRADIENT_BF16
+        : winograd(&a->conv, TS_CONV_DATA_GRADIENT_WINOGRAD)     ? TS_CONV_DATA_GRADIENT_WINOGRAD
+                                                                 : TS_CONV_DATA_GRADIENT;
     const float *packed = dx ? ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data) : NULL;
     if (packed)
         (use == TS_CONV_DATA_GRADIENT_BF16  ? ts_conv_data_gradient_bf16
@@ -246,7 +246,7 @@ ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_val
         return ag_fail(tape, TS_INVALID, "conv: bias %s is not [1,1,1,%d]", ag_shape_text(text, bias->t.shape), w.n);
     if (!(leak > 0 && leak <= 1))
         return ag_fail(tape, TS_INVALID, "conv: leak is %g, it must lie in (0, 1]", (double)leak);
-    const conv_attr a = {{s.n, s.h, s.w, s.c, w.n, w.c, dilation, pad, s.c - x->t.shape.c}, leak};
+    const conv_attr a = {{s.n, s.h, s.w, s.c, w.n, w.c, dilation, pad, s.c - x->t.shape.c, *ag_compute(tape)}, leak};
     ts_status st = {0};
     if (ts_conv_check(&a.conv, &st) != TS_OK) return ag_fail(tape, st.code, "%s", st.message);
     return ag_apply(tape, &op_conv, INPUTS, in, (ts_shape){s.n, s.h, s.w, w.n}, &a, sizeof a);

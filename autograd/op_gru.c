@@ -17,10 +17,10 @@ ag_value *ag_gru(ag_tape *tape, ag_value *x, ag_value *old, ag_value *ih, ag_val
 
 enum { X, IH, IH_BIAS, HH, HH_BIAS, OLD, INPUTS };
 
-static ts_gru shape(const ag_node *node)
+static ts_gru shape(ts_compute how, const ag_node *node)
 {
     return (ts_gru){ts_pixels(node->out->t.shape), node->in[X]->t.shape.c, node->out->t.shape.c,
-                    ts_conv_precision() == TS_BF16};
+                    how.precision == TS_BF16, how.threads};
 }
 
 static const float *packed(ag_tape *tape, ts_conv c, ts_conv_use use, const ag_value *weight)
@@ -30,7 +30,7 @@ static const float *packed(ag_tape *tape, ts_conv c, ts_conv_use use, const ag_v
 
 static void forward(ag_tape *tape, ag_node *node)
 {
-    const ts_gru g = shape(node);
+    const ts_gru g = shape(*ag_compute(tape), node);
     const ts_conv_use use = g.bf16 ? TS_CONV_FORWARD_BF16 : TS_CONV_FORWARD;
     const float *ih = packed(tape, ts_gru_input(&g), use, node->in[IH]),
                 *old = node->in[OLD] ? node->in[OLD]->t.data : NULL;
@@ -49,7 +49,7 @@ static void forward(ag_tape *tape, ag_node *node)
 
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const ts_gru g = shape(node);
+    const ts_gru g = shape(*ag_compute(tape), node);
     const float *old = node->in[OLD] ? node->in[OLD]->t.data : NULL;
     ts_gru_gradients to = {0};
     /* The state first: it may be x itself. */
@@ -75,7 +75,7 @@ static double gate(const double *weight, const double *bias, int row, int channe
 
 static void reference(const ag_node *node, const double *const *in, double *out)
 {
-    const ts_gru g = shape(node);
+    const ts_gru g = shape((ts_compute){0}, node);
     for (int64_t p = 0; p < g.pixels; p++)
         for (int i = 0; i < g.c; i++) {
             const double *x = in[X] + p * g.ic, *old = in[OLD] ? in[OLD] + p * g.c : NULL;

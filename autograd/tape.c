@@ -17,6 +17,7 @@ static ag_tape *create(bool gradients, ag_packs *packs, ts_status *st)
         return NULL;
     }
     tape->gradients = gradients;
+    tape->compute.exact = true;
     tape->packs = packs;
     tape->arena = ts_arena_create(0, st);
     tape->moving = tape->arena ? ts_arena_create(0, st) : NULL;
@@ -51,7 +52,7 @@ void ag_tape_destroy(ag_tape **tape)
 void ag_reset(ag_tape *tape)
 {
     ts_arena_reset(tape->arena);
-    ts_scratch_level();
+    ts_scratch_level(tape->compute.threads);
     tape->nodes = 0;
     tape->into = NULL;
     tape->status = (ts_status){0};
@@ -68,6 +69,8 @@ void ag_drop(ag_tape *tape)
 const ts_status *ag_status(const ag_tape *tape) { return &tape->status; }
 ts_arena *ag_arena(ag_tape *tape) { return tape->arena; }
 bool ag_gradients(const ag_tape *tape) { return tape->gradients; }
+void ag_compute_set(ag_tape *tape, ts_compute compute) { tape->compute = compute; }
+const ts_compute *ag_compute(const ag_tape *tape) { return &tape->compute; }
 void ag_freeze(ag_tape *tape, bool frozen) { tape->frozen = frozen; }
 
 ag_value *ag_fail(ag_tape *tape, ts_code code, const char *format, ...)
@@ -272,7 +275,7 @@ void ag_scope_end(ag_tape *tape, ts_mark mark, ag_value **keep, int count)
             kept = NULL;
             break;
         }
-        ts_block_copy(kept[i].data, keep[i]->t.data, bytes);
+        ts_block_copy(kept[i].data, keep[i]->t.data, bytes, tape->compute.threads);
     }
     if (!kept) { /* nothing is lost: the memory stays taken */
         no_memory(tape, "the values that a scope keeps");
@@ -283,7 +286,9 @@ void ag_scope_end(ag_tape *tape, ts_mark mark, ag_value **keep, int count)
     for (int i = 0; i < count; i++) {
         if (!kept[i].data) continue;
         keep[i] = ag_empty(tape, kept[i].shape);
-        if (keep[i]) ts_block_copy(keep[i]->t.data, kept[i].data, (size_t)ts_count(kept[i].shape) * sizeof(float));
+        if (keep[i])
+            ts_block_copy(keep[i]->t.data, kept[i].data, (size_t)ts_count(kept[i].shape) * sizeof(float),
+                          tape->compute.threads);
     }
     ts_arena_release(tape->moving, moving);
     if (ts_arena_used(tape->moving) == 0) ts_arena_reset(tape->moving); /* several chunks become one */

@@ -67,6 +67,10 @@ void ag_drop(ag_tape *tape);
 const ts_status *ag_status(const ag_tape *tape); /* the first error, or code TS_OK */
 ts_arena *ag_arena(ag_tape *tape);
 bool ag_gradients(const ag_tape *tape);
+/* How the operations from now on are computed, and their gradients. A new tape's: exact, TS_F32, the process's threads.
+ */
+void ag_compute_set(ag_tape *tape, ts_compute compute);
+const ts_compute *ag_compute(const ag_tape *tape);
 /* Sets the sticky error (the first one stays). Returns NULL for convenience. */
 ag_value *ag_fail(ag_tape *tape, ts_code code, const char *format, ...) __attribute__((format(printf, 3, 4)));
 

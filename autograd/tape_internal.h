@@ -14,6 +14,7 @@ struct ag_tape {
     ts_arena *arena, *moving; /* moving: what a scope keeps, while the arena is released */
     ag_packs *packs;
     bool gradients, frozen;
+    ts_compute compute;
     ag_value *into; /* of the next operation */
     ag_node **node; /* grown by doubling and never shrunk */
     size_t nodes, node_room;

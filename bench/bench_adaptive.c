@@ -68,7 +68,7 @@ static void run(lgd_model *model, const setting *k, sample *s, int count, double
         *time_mean += (seconds() - begin) / count;
         io_material truth = {.size = SIDE, .maps = s[i].truth};
         const ev_case c = ev_case_of_maps(&truth, s[i].image, s[i].views, false);
-        lgd_encode(maps, SIDE, maps);
+        lgd_encode(maps, SIDE, maps, 0);
         *error_mean += ev_score(&c, maps, MAP_CHANNELS).value[EV_RENDER] / count;
     }
 }

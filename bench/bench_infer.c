@@ -94,21 +94,19 @@ static void measure(nn_arch arch, const char *heading)
     snprintf(job + strlen(job), sizeof job - strlen(job), " %d", SIDE);
     double peer = NAN;
     for (int exact = 1; exact >= 0; exact--) {
-        ts_conv_exact_set(exact);
+        ag_compute_set(s.tape, (ts_compute){.exact = exact});
         snprintf(label, sizeof label, "g and %d steps, %s", s.steps, exact ? "direct" : "Winograd where it wins");
         t = bench_measure(whole, &s);
         bench_row(label, t, flop);
         if (!exact) bench_row_peer(t, flop, peer = bench_peer(job));
         if (exact) bench_row_threads(whole, &s);
     }
-    ts_conv_exact_set(true);
-    ts_conv_precision_set(TS_BF16);
+    ag_compute_set(s.tape, (ts_compute){.exact = true, .precision = TS_BF16});
     t = bench_measure(whole, &s);
     snprintf(label, sizeof label, "g and %d steps, bf16%s", s.steps, bench_bf16(&t) ? "" : ", emulated");
     bench_row(label, t, flop);
     bench_row_peer(t, flop, peer);
     bench_row_peer_bf16(t, job);
-    ts_conv_precision_set(TS_F32);
     if (ag_status(s.tape)->code) printf("  %s\n", ag_status(s.tape)->message);
     ag_tape_destroy(&s.tape);
     nn_model_free(&s.model);

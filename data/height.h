@@ -7,6 +7,6 @@
  * differences of neighbouring pixels with free borders: Frankot and Chellappa, "A Method for Enforcing Integrability in
  * Shape from Shading Algorithms", PAMI 10(4), 1988, with cosines for their Fourier basis, so that nothing wraps around.
  * Normals flatter than 3 degrees over the horizon count as 3: beyond, a slope says more about the estimate's error than
- * about the surface. TS_NOMEM. */
-ts_code io_height(const io_material *m, float *height, ts_status *st);
+ * about the surface. threads 0: the process's number. TS_NOMEM. */
+ts_code io_height(const io_material *m, float *height, int threads, ts_status *st);
 #endif

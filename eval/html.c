@@ -232,7 +232,7 @@ void ev_html_write(const ev_report *r, FILE *f)
     fputs(head, f);
     fprintf(f, "</head><body>\n<h1>lgd-eval</h1>\n<p>%d &#215; %d pixels, %d thread%s%s, %s, %s convolutions; model ",
             r->size, r->size, r->threads, r->threads == 1 ? "" : "s", r->pinned ? ", pinned" : "", r->isa,
-            ts_conv_exact() ? "direct" : "Winograd");
+            r->exact ? "direct" : "Winograd");
     ev_put_text(f, r->model);
     fprintf(f,
             ". Mean and standard deviation over the materials; seconds: median over them, of %d run%s each; peak: "

@@ -334,7 +334,7 @@ static int evaluate(work *w, ts_status *st)
     r->flash = rd_flash();
     for (int k = 0; k < 2; k++) r->flash.light[k] = (float)c->light[k];
     r->perceptual = !c->fast && !c->tune;
-    ts_conv_exact_set(c->exact);
+    r->exact = c->exact;
     r->pictures = !c->tune;
     r->pinned = c->pin;
     r->model = slash ? slash + 1 : w->model;

@@ -23,7 +23,7 @@ typedef struct ev_result {
 
 typedef struct ev_report {
     int sets, size, threads, repeat;
-    bool pinned;
+    bool pinned, exact;
     const char *const *set_name; /* the caller's, as the other names */
     const char *model, *isa;
     ev_subject *method; /* the caller's */

@@ -144,6 +144,7 @@ static ts_code plan(ev_run *r, ts_status *st)
     r->subject = calloc((size_t)r->methods, sizeof *r->subject);
     if (!r->subject) code = ts_fail(st, TS_NOMEM, "out of memory");
     for (int m = 0, columns = 0; m < r->methods && !code; m++) {
+        r->method[m].exact = r->exact;
         code = ev_open(&r->method[m], st);
         if (code) break;
         const int points = ev_points(&r->method[m], step),
@@ -198,6 +199,7 @@ ts_code ev_run_all(ev_run *r, ts_status *st)
                             .threads = ts_threads(),
                             .repeat = r->repeat,
                             .pinned = r->pinned,
+                            .exact = r->exact,
                             .set_name = r->set_name,
                             .model = r->model,
                             .isa = ts_isa_name(ts_isa_now()),
@@ -208,6 +210,7 @@ ts_code ev_run_all(ev_run *r, ts_status *st)
     if (!code && !make(r, &b, total))
         code = ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", r->size, r->size);
     for (int m = 0; m < r->methods && !code; m++) {
+        r->method[m].exact = r->exact;
         code = ev_open(&r->method[m], st);
         if (!code) code = all_materials(r, &b, m, total, st);
         r->subject[m].bytes = ev_bytes(&r->method[m]);

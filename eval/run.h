@@ -18,6 +18,7 @@ typedef struct ev_run {
     rd_view flash;          /* of the first input, as the methods are told; not of captures */
     bool fit;               /* compare renderings after one factor is fitted */
     bool perceptual, pictures, pinned; /* SSIM and FLIP; pictures for the report; whether the threads are pinned */
+    bool exact;                        /* of every method (ev_estimator) */
     ev_lpips *lpips;                   /* LPIPS too, where it is not NULL */
     const char *model;                 /* its name for the report */
     const char *images;                /* a folder for sheets, or NULL */

@@ -76,7 +76,7 @@ static ts_code shrink(io_image *sheet, int width, int height, ts_status *st)
     if (!code) {
         const ts_tensor from = ts_view(sheet->data, (ts_shape){1, sheet->height, sheet->width, 3});
         ts_tensor to = ts_view(small.data, (ts_shape){1, height, width, 3});
-        code = ts_resize(&to, &from, arena, st);
+        code = ts_resize(&to, &from, arena, 0, st);
     }
     ts_arena_destroy(&arena);
     io_image_free(code ? &small : sheet);

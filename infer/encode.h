@@ -3,5 +3,5 @@
 #define LGD_ENCODE_H
 
 /* maps as in infer/lgd.h, [side, side, 9], to the encoding of tensor/maps.h, the same shape; encoded may be maps. */
-void lgd_encode(const float *maps, int side, float *encoded);
+void lgd_encode(const float *maps, int side, float *encoded, int threads);
 #endif

@@ -57,10 +57,10 @@ static bool after_step(int step, const ag_value *maps, void *user)
 }
 
 /* The network's encoding to the header's values. False when one is not finite. */
-static bool decode(const float *from, int channels, int64_t pixels, float *maps)
+static bool decode(const ag_tape *tape, const float *from, int channels, int64_t pixels, float *maps)
 {
     bool finite = true;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) reduction(&& : finite)
+#pragma omp parallel for num_threads(ts_threads_of(ag_compute(tape)->threads)) schedule(static) reduction(&& : finite)
     for (int64_t i = 0; i < pixels; i++) {
         const float *x = from + i * channels;
         float *m = maps + i * MAP_CHANNELS;
@@ -105,7 +105,7 @@ static ts_code run_loop(const lgd_estimator *e, const given_photos *p, int steps
         (double)ts_arena_peak(ag_arena(e->tape)); /* than earlier calls left */
     if (more > 0 && lgd_memory_check(more, st) != TS_OK) return ts_context(st, "%d x %d pixels", side, side);
     nn_input in = {.image = ts_new(ag_arena(e->tape), (ts_shape){given, side, side, 3}),
-                   .grid = rd_grid_full(side),
+                   .grid = rd_grid_on(rd_grid_full(side), ag_compute(e->tape)->threads),
                    .views = p->views,
                    .given = given,
                    .orientations = o->orientations,
@@ -128,7 +128,8 @@ static ts_code run_loop(const lgd_estimator *e, const given_photos *p, int steps
         return st->code ? st->code : ts_fail(st, TS_NUMERIC, "the network gave no result");
     }
     if (taken) *taken = w.steps;
-    return decode(w.best ? w.best : out->t.data, out->t.shape.c, (int64_t)side * side, maps) ? TS_OK : not_finite(st);
+    return decode(e->tape, w.best ? w.best : out->t.data, out->t.shape.c, (int64_t)side * side, maps) ? TS_OK
+                                                                                                      : not_finite(st);
 }
 
 /* taken: NULL, or gets the number of steps that were made. */
@@ -164,7 +165,7 @@ static ts_code count_steps(const lgd_estimator *e, const given_photos *p, int mo
         ts_tensor to = ts_view(photo + (size_t)k * pixels * 3, (ts_shape){1, small, small, 3});
         const ts_tensor from = ts_view((float *)(uintptr_t)p->image[k], (ts_shape){1, side, side, 3});
         if (small == side) memcpy(to.data, p->image[k], pixels * 3 * sizeof *photo);
-        else code = ts_resize(&to, &from, arena, st);
+        else code = ts_resize(&to, &from, arena, ag_compute(e->tape)->threads, st);
         each[k] = to.data;
     }
     if (!code) code = run_whole(e, &(given_photos){each, p->views, given, small, NULL}, most, &o, maps, steps, st);
@@ -225,7 +226,7 @@ static ts_code estimate_tiles(const lgd_estimator *e, const given_photos *p, int
         t.steps = stop;
         code = lgd_tiles_run(e->tape, e->net, &t, raw, st);
     }
-    if (!code && !decode(raw, arch->channels, pixels, maps)) code = not_finite(st);
+    if (!code && !decode(e->tape, raw, arch->channels, pixels, maps)) code = not_finite(st);
     if (raw != maps) free(raw);
     free(rmse);
     return code;

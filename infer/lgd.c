@@ -199,10 +199,10 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
     return TS_OK;
 }
 
-void lgd_encode(const float *maps, int side, float *encoded)
+void lgd_encode(const float *maps, int side, float *encoded, int threads)
 {
     const int64_t pixels = (int64_t)side * side;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static)
     for (int64_t i = 0; i < pixels; i++) {
         const float *m = maps + i * MAP_CHANNELS;
         const float x = m[MAP_NORMAL], y = m[MAP_NORMAL + 1];
@@ -228,16 +228,12 @@ int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, in
                     lgd_tiles_exact(&model->net->arch)
                 ? LGD_TOLERANCE
                 : 0;
-        const bool exact = ts_conv_exact();
-        const ts_precision precision = ts_conv_precision();
-        const int threads = ts_threads_own(o.threads > 0 ? o.threads : ts_threads_allowed());
-        ts_conv_exact_set(o.exact ||
-                          model->net->arch.compat == NN_COMPAT_PUBLISHED); /* whoever runs that wants its numbers */
-        ts_conv_precision_set(o.precision == LGD_BF16 ? TS_BF16 : TS_F32);
+        ag_compute_set(w->tape,
+                       (ts_compute){/* whoever runs the published network wants its numbers */
+                                    .exact = o.exact || model->net->arch.compat == NN_COMPAT_PUBLISHED,
+                                    .precision = o.precision == LGD_BF16 ? TS_BF16 : TS_F32,
+                                    .threads = o.threads > 0 ? o.threads : ts_threads_allowed()});
         lgd_estimator_run(&e, photo, photos, side, &o, maps, &st);
-        ts_conv_precision_set(precision);
-        ts_conv_exact_set(exact);
-        ts_threads_own(threads);
         give_back(model, w);
     }
     return report(error, &st);
@@ -277,7 +273,7 @@ int lgd_render(const float *maps, int side, const float light[3], const float ca
         ts_fail(&st, TS_NOMEM, "lgd_render: out of memory for %d x %d pixels", side, side);
         return report(error, &st);
     }
-    lgd_encode(maps, side, encoded);
+    lgd_encode(maps, side, encoded, 0);
     rd_render(rd_grid_full(side), encoded, MAP_CHANNELS, &view, false, image);
     free(encoded);
     return report(error, &st);

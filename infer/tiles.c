@@ -41,14 +41,14 @@ static void start(const work *w, int t, area a, float *maps)
 {
     const ts_taps down = ts_taps_part(&w->taps[t > 0], a.y0, rows(a)),
                   across = ts_taps_part(&w->taps[t > 0], a.x0, columns(a));
-    ts_resample(1, w->channels, &down, &across, w->coarse[t]->t.data, maps, false);
+    ts_resample(1, w->channels, &down, &across, w->coarse[t]->t.data, maps, false, ag_compute(w->tape)->threads);
 }
 
 /* The given photographs in an area, one after the other. */
 static void photographs(const work *w, area a, float *to)
 {
     const int64_t row = 3 * (int64_t)columns(a);
-#pragma omp parallel for collapse(2) num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for collapse(2) num_threads(ts_threads_of(ag_compute(w->tape)->threads)) schedule(static)
     for (int k = 0; k < w->t->given; k++)
         for (int y = 0; y < rows(a); y++)
             lgd_clip(row, w->t->image[k] + ((size_t)(a.y0 + y) * (size_t)w->t->side + (size_t)a.x0) * 3,
@@ -57,18 +57,21 @@ static void photographs(const work *w, area a, float *to)
 
 /* to (area b) = the part of from (area a) that it shows; b lies in a. Where they are the same memory rows move one
  * after the other. */
-static void crop(area a, area b, int channels, const float *from, float *to)
+static void crop(const work *w, area a, area b, int channels, const float *from, float *to)
 {
     const size_t row = (size_t)columns(b) * (size_t)channels;
     if (from == to && same(a, b)) return;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (from != to)
+#pragma omp parallel for num_threads(ts_threads_of(ag_compute(w->tape)->threads)) schedule(static) if (from != to)
     for (int y = 0; y < rows(b); y++)
         memmove(to + (size_t)y * row,
                 from + ((size_t)(b.y0 + y - a.y0) * (size_t)columns(a) + (size_t)(b.x0 - a.x0)) * (size_t)channels,
                 row * sizeof *to);
 }
 
-static rd_grid grid_of(area a, int side) { return (rd_grid){rows(a), columns(a), a.y0, a.x0, side}; }
+static rd_grid grid_of(const work *w, area a)
+{
+    return (rd_grid){rows(a), columns(a), a.y0, a.x0, w->t->side, ag_compute(w->tape)->threads};
+}
 
 /* Sum of squared differences between each photograph (of area a, as photographs has it) and the rendering of the maps
  * (of a too) in core, added to sum [given]. */
@@ -85,16 +88,15 @@ static void add_squares(const work *w, area a, area core, const float *photo, co
         return;
     }
     if (cut) {
-        crop(a, core, w->channels, maps, cut);
+        crop(w, a, core, w->channels, maps, cut);
         for (int k = 0; k < given; k++)
-            crop(a, core, 3, photo + (size_t)k * all * 3, cut + pixels * (size_t)(w->channels + 3 * k));
+            crop(w, a, core, 3, photo + (size_t)k * all * 3, cut + pixels * (size_t)(w->channels + 3 * k));
         maps = cut;
         photo = cut + pixels * (size_t)w->channels;
     }
     for (int k = 0; k < given; k++) {
         double rmse;
-        rd_flash_rmse(grid_of(core, w->t->side), maps, w->channels, &w->t->views[k], photo + (size_t)k * pixels * 3,
-                      &rmse);
+        rd_flash_rmse(grid_of(w, core), maps, w->channels, &w->t->views[k], photo + (size_t)k * pixels * 3, &rmse);
         sum[k] += rmse * rmse * (double)pixels;
     }
     ts_arena_release(ag_arena(w->tape), mark);
@@ -150,7 +152,7 @@ static void refine(work *w, area core, float *to)
         const ts_mark mark = ag_scope_begin(tape);
         const ts_shape shape = {1, rows(now), columns(now), w->channels};
         const nn_input in = {.image = ts_view(photo, (ts_shape){t->given, shape.h, shape.w, 3}),
-                             .grid = grid_of(now, t->side),
+                             .grid = grid_of(w, now),
                              .views = t->views,
                              .given = t->given};
         for (int i = 0; i < carried; i++) {
@@ -162,8 +164,8 @@ static void refine(work *w, area core, float *to)
         ag_value *out = nn_refine(tape, w->model, &in, before, &state);
         if (!out) return;
         on = !(t->tolerance > 0) || change(buffer, out->t.data, (size_t)ts_count(shape)) >= t->tolerance;
-        crop(now, next, w->channels, out->t.data, buffer);
-        for (int i = 0; i < carried; i++) crop(now, next, gru, states[i]->t.data, states[i]->t.data);
+        crop(w, now, next, w->channels, out->t.data, buffer);
+        for (int i = 0; i < carried; i++) crop(w, now, next, gru, states[i]->t.data, states[i]->t.data);
         state.gru[0] = state.gru[1] = NULL;
         ag_scope_end(tape, mark, NULL, 0);
         if (!same(now, next)) photographs(w, now = next, photo);
@@ -175,7 +177,7 @@ static void refine(work *w, area core, float *to)
         for (int i = step + 1; i <= t->steps; i++) w->squares[i] += last;
     }
     t->refined += (int64_t)rows(core) * columns(core) * (step - begin);
-    crop(now, core, w->channels, buffer, to);
+    crop(w, now, core, w->channels, buffer, to);
 }
 
 /* The smallest area of a that holds its wanted pixels; empty (y1 = y0) when there are none. */
@@ -197,7 +199,7 @@ static area wanted(const lgd_tiles *t, area a)
 static void put(const work *w, area b, const float *from, float *maps)
 {
     const size_t channels = (size_t)w->channels, row = (size_t)columns(b) * channels;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(ag_compute(w->tape)->threads)) schedule(static)
     for (int y = 0; y < rows(b); y++)
         memcpy(maps + ((size_t)(b.y0 + y) * (size_t)w->t->side + (size_t)b.x0) * channels, from + (size_t)y * row,
                row * sizeof *from);
@@ -234,7 +236,7 @@ static ts_code prepare(work *w)
     if (!w->coarse) return ag_fail(w->tape, TS_NOMEM, "out of memory"), TS_NOMEM;
     const ts_mark mark = ag_scope_begin(w->tape);
     ts_tensor photo = ts_view((float *)(uintptr_t)w->t->image[0], (ts_shape){given, side, side, 3});
-    if (given > 1 || !lgd_clipped(ts_count(photo.shape), w->t->image[0])) {
+    if (given > 1 || !lgd_clipped(ts_count(photo.shape), w->t->image[0], ag_compute(w->tape)->threads)) {
         const ag_value *whole = ag_empty(w->tape, photo.shape);
         if (!whole) return ag_status(w->tape)->code;
         photographs(w, all, whole->t.data);

@@ -8,11 +8,12 @@
 enum { BAND = 1 << 17 }; /* pixels of the photograph that are read at a time, about */
 
 /* Maps of material n in rows y0 .. y0 + rows - 1 of its photographs. */
-static void upsampled(const nn_coarse *c, int n, int y0, int rows, float *to)
+static void upsampled(const ag_tape *tape, const nn_coarse *c, int n, int y0, int rows, float *to)
 {
     const ts_shape s = c->maps->t.shape;
     const ts_taps own = ts_taps_part(&c->up, y0, rows);
-    ts_resample(1, s.c, &own, &c->up, c->maps->t.data + (int64_t)n * s.h * s.w * s.c, to, false);
+    ts_resample(1, s.c, &own, &c->up, c->maps->t.data + (int64_t)n * s.h * s.w * s.c, to, false,
+                ag_compute(tape)->threads);
 }
 
 /* RMSE(R_0) at the photographs' size, in bands. */
@@ -32,9 +33,9 @@ static bool measure(ag_tape *tape, const nn_model *model, nn_coarse *c)
         for (int y = 0; y < side; y += most) {
             const int rows = y + most < side ? most : side - y;
             double rmse;
-            upsampled(c, i / count, y, rows, maps);
-            rd_flash_rmse((rd_grid){.h = rows, .w = side, .y0 = y, .side = side}, maps, channels, &view,
-                          c->in.image.data + ((int64_t)i * side + y) * side * 3, &rmse);
+            upsampled(tape, c, i / count, y, rows, maps);
+            rd_flash_rmse((rd_grid){.h = rows, .w = side, .y0 = y, .side = side, .threads = ag_compute(tape)->threads},
+                          maps, channels, &view, c->in.image.data + ((int64_t)i * side + y) * side * 3, &rmse);
             squares += rmse * rmse * rows;
         }
         c->state.rmse0[i] = sqrt(squares / side);
@@ -72,7 +73,7 @@ static bool read_band(ag_tape *tape, const nn_model *model, const nn_coarse *c, 
                              .view = c->in.view,
                              .views = c->in.views ? c->in.views + n * count : NULL,
                              .given = count};
-        upsampled(c, n, y0, rows, maps.data);
+        upsampled(tape, c, n, y0, rows, maps.data);
         fine = nn_read(tape, model, &in, &maps, c->state.rmse0 ? c->state.rmse0 + n * count : NULL, g, d);
     }
     if (fine) {
@@ -81,8 +82,10 @@ static bool read_band(ag_tape *tape, const nn_model *model, const nn_coarse *c, 
         own.in = rows;
         own.first = from;
         const int64_t row = (int64_t)c->down.out;
-        ts_resample(1, read, &own, &c->down, g, gradient + first * row * read, false);
-        if (newton) ts_resample(1, channels, &own, &c->down, d, newton + first * row * channels, false);
+        ts_resample(1, read, &own, &c->down, g, gradient + first * row * read, false, ag_compute(tape)->threads);
+        if (newton)
+            ts_resample(1, channels, &own, &c->down, d, newton + first * row * channels, false,
+                        ag_compute(tape)->threads);
     }
     ts_arena_release(arena, mark);
     return fine;

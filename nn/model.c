@@ -211,7 +211,7 @@ static float *block(size_t count, const char *what, ts_status *st)
 static float *zero_block(size_t count, const char *what, ts_status *st)
 {
     float *p = block(count, what, st);
-    if (p) ts_block_clear(p, count * sizeof *p);
+    if (p) ts_block_clear(p, count * sizeof *p, 0);
     return p;
 }
 

@@ -56,7 +56,8 @@ bool nn_resized(ag_tape *tape, const ts_tensor *photographs, int size, ts_tensor
 {
     ts_status st = {0};
     ag_value *v = ag_empty(tape, (ts_shape){photographs->shape.n, size, size, 3});
-    if (v && ts_resize(&v->t, photographs, ag_arena(tape), &st)) ag_fail(tape, st.code, "%s", st.message);
+    if (v && ts_resize(&v->t, photographs, ag_arena(tape), ag_compute(tape)->threads, &st))
+        ag_fail(tape, st.code, "%s", st.message);
     if (!v || ag_status(tape)->code) return false;
     *to = v->t;
     return true;
@@ -99,7 +100,7 @@ static ag_value *propose(ag_tape *tape, const nn_model *model, const nn_input *s
     ag_value *x = ag_empty(tape, (ts_shape){s.n / count, s.h, s.w, 3 * images}),
              *each = images == 1 ? x : ag_empty(tape, s);
     if (!x || !each) return NULL;
-    rd_log_encode(ts_count(s), small->image.data, each->t.data);
+    rd_log_encode(ts_count(s), small->image.data, each->t.data, ag_compute(tape)->threads);
     if (images > 1) side_by_side(&each->t, count, images, x->t.data);
     ag_value *maps = small->orientations > 1 && !ag_gradients(tape) && nn_orients(model, small)
         ? nn_unet_oriented(tape, model, x, small->orientations)

@@ -15,7 +15,7 @@ bool nn_measure_start(ag_tape *tape, const nn_model *model, const nn_input *in, 
 {
     if (!maps || !model->arch.gradient) return maps != NULL;
     const ts_tensor *image = in->whole.data ? &in->whole : &in->image;
-    const rd_grid grid = in->whole.data ? rd_grid_full(in->grid.side) : in->grid;
+    const rd_grid grid = rd_grid_on(in->whole.data ? rd_grid_full(in->grid.side) : in->grid, ag_compute(tape)->threads);
     const ts_shape s = maps->t.shape;
     const int64_t one = (int64_t)s.h * s.w;
     const int photographs = image->shape.n;
@@ -30,9 +30,9 @@ bool nn_measure_start(ag_tape *tape, const nn_model *model, const nn_input *in, 
 }
 
 /* to [pixels, images channels] = from [pixels, channels] at photograph k's place. */
-static void place(int64_t pixels, int channels, int images, int k, const float *from, float *to)
+static void place(int64_t pixels, int channels, int images, int k, const float *from, float *to, int threads)
 {
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static)
     for (int64_t i = 0; i < pixels; i++)
         memcpy(to + (i * images + k) * channels, from + i * channels, (size_t)channels * sizeof *to);
 }
@@ -44,6 +44,7 @@ static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, 
     const ts_shape s = maps->shape;
     const int64_t pixels = (int64_t)s.h * s.w;
     const int count = nn_given(in), images = model->arch.images;
+    const rd_grid grid = rd_grid_on(in->grid, ag_compute(tape)->threads);
     const bool batch = model->arch.rmse == NN_RMSE_BATCH;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
     float *apart = images > 1 ? ts_arena_alloc(ag_arena(tape), (size_t)(pixels * s.c) * sizeof *apart) : NULL;
@@ -54,7 +55,7 @@ static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, 
     for (int i = 0; batch && i < s.n; i++) {
         double rmse;
         const rd_view view = nn_view_of(model, in, i);
-        rd_flash_rmse(in->grid, maps->data + i * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, &rmse);
+        rd_flash_rmse(grid, maps->data + i * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, &rmse);
         common += rmse * rmse / s.n;
     }
     for (int i = 0; i < s.n * count; i++) {
@@ -62,22 +63,23 @@ static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, 
         const double rmse = batch ? sqrt(common) : rmse0[i];
         const rd_view view = nn_view_of(model, in, i);
         float *own = to + n * pixels * images * s.c;
-        rd_flash_gradient(in->grid, maps->data + n * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, rmse,
+        rd_flash_gradient(grid, maps->data + n * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, rmse,
                           apart ? apart : own, NULL);
-        if (apart) place(pixels, s.c, images, k, apart, own);
+        if (apart) place(pixels, s.c, images, k, apart, own, grid.threads);
     }
     ts_arena_release(ag_arena(tape), mark);
     if (batch) { /* d RMSE of the whole batch has 1 / (3 N H W) where rd_flash_gradient has 1 / (3 256^2) */
         const float scale = (float)(256.0 * 256.0 / ((double)s.n * s.h * s.w));
         const int64_t values = s.n * pixels * images * s.c;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(ag_compute(tape)->threads)) schedule(static)
         for (int64_t i = 0; i < values; i++) to[i] *= scale;
     }
     return true;
 }
 
 /* Where Gauss and Newton's method would go: to is [N, H, W, channels]. */
-static void newton_step(const nn_model *model, const nn_input *in, const ts_tensor *maps, float *to)
+static void newton_step(const ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps,
+                        float *to)
 {
     float damping[MAP_CHANNELS];
     for (int i = 0; i < MAP_CHANNELS; i++)
@@ -93,8 +95,8 @@ static void newton_step(const nn_model *model, const nn_input *in, const ts_tens
             view[k] = nn_view_of(model, in, n * count + k);
             image[k] = in->image.data + (n * count + k) * pixels * 3;
         }
-        rd_newton_step(in->grid, maps->data + n * pixels * s.c, s.c, view, image, count, damping,
-                       to + n * pixels * s.c);
+        rd_newton_step(rd_grid_on(in->grid, ag_compute(tape)->threads), maps->data + n * pixels * s.c, s.c, view, image,
+                       count, damping, to + n * pixels * s.c);
     }
 }
 
@@ -103,7 +105,7 @@ bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_
 {
     const ts_shape s = maps->shape;
     const int64_t rows = (int64_t)s.n * s.h, row = (int64_t)s.w * s.c * model->arch.images;
-    if (newton) newton_step(model, in, maps, newton);
+    if (newton) newton_step(tape, model, in, maps, newton);
     if (!gradient) return true;
     if (!model->arch.gradient) {
         memset(gradient, 0, (size_t)(rows * row) * sizeof *gradient);
@@ -112,7 +114,7 @@ bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_
     if (!gradients(tape, model, in, maps, rmse0, gradient)) return false;
     if (model->arch.encoding != NN_GRADIENT_ASINH) return true;
     const struct ts_elementwise_kernels *k = ts_elementwise_k();
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(ag_compute(tape)->threads)) schedule(static)
     for (int64_t y = 0; y < rows; y++) k->asinh(row, NN_GRADIENT_SCALE, gradient + y * row, gradient + y * row);
     return true;
 }

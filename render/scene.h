@@ -9,9 +9,11 @@
  * pixels. Pixel (column i, row j) has its centre at ((i + 1/2) / side - 1/2, 1/2 - (j + 1/2) / side). */
 typedef struct rd_grid {
     int h, w, y0, x0, side;
+    int threads; /* that renderings of it run on; 0: the process's number */
 } rd_grid;
 
 rd_grid rd_grid_full(int side);
+rd_grid rd_grid_on(rd_grid grid, int threads); /* the same pixels on so many threads */
 
 typedef enum rd_kind {
     RD_POINT,      /* positions; radiance = f max(n.l, 0) power / |light - x|^2, not clamped */

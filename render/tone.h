@@ -5,7 +5,7 @@
 
 /* What g reads: out = 2 (log(I + 0.01) - log 0.01) / (log 1.01 - log 0.01) - 1, so that [0, 1] becomes [-1, 1].
  * I is clamped to [0, 1] first, as a photograph is (NaN becomes 0). in may be out. Threaded. */
-void rd_log_encode(int64_t count, const float *in, float *out);
+void rd_log_encode(int64_t count, const float *in, float *out, int threads);
 
 /* What evaluation compares: clamp(v, 0, 1)^(1/2.2), and not the sRGB curve, since the figures that others publish are
  * in this space. NaN becomes 0. */

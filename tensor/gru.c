@@ -8,8 +8,14 @@ enum {
     PARTS = 16          /* and no more of them, by shape alone */
 };
 
-ts_conv ts_gru_input(const ts_gru *g) { return (ts_conv){1, 1, 1, g->ic, 3 * g->c, 1, 1, TS_PAD_ZERO, 0}; }
-ts_conv ts_gru_hidden(const ts_gru *g) { return (ts_conv){1, 1, 1, g->c, 3 * g->c, 1, 1, TS_PAD_ZERO, 0}; }
+static ts_conv product_of(const ts_gru *g, int ic)
+{
+    return (ts_conv){
+        .n = 1, .h = 1, .w = 1, .ic = ic, .oc = 3 * g->c, .k = 1, .dilation = 1, .compute.threads = g->threads};
+}
+
+ts_conv ts_gru_input(const ts_gru *g) { return product_of(g, g->ic); }
+ts_conv ts_gru_hidden(const ts_gru *g) { return product_of(g, g->c); }
 
 static conv_plan gates_of(const ts_gru *g, int channels, const float *packed, const float *bias)
 {
@@ -48,7 +54,7 @@ void ts_gru_forward(const ts_gru *g, const float *x, const float *old, const flo
     const struct ts_elementwise_kernels *k = ts_elementwise_k();
     const int gates = 3 * g->c;
     const conv_plan input = gates_of(g, g->ic, ih_packed, ih_bias), hidden = gates_of(g, g->c, hh_packed, hh_bias);
-#pragma omp parallel for schedule(dynamic, 4) num_threads(ts_threads())
+#pragma omp parallel for schedule(dynamic, 4) num_threads(ts_threads_of(g->threads))
     for (int64_t p = 0; p < g->pixels; p += GRU_BAND) {
         const int count = (int)(g->pixels - p < GRU_BAND ? g->pixels - p : GRU_BAND);
         float *ih = ts_scratch(0, sizeof(float) * (size_t)(GRU_BAND * gates)),
@@ -174,7 +180,7 @@ void ts_gru_backward(const ts_gru *g, const float *x, const float *old, const fl
     const ptrdiff_t input = (ptrdiff_t)gates * padded(g->ic), hidden = (ptrdiff_t)gates * padded(c);
     const ptrdiff_t doubles = 4 * c, size = doubles + (input + hidden + 1) / 2; /* of a part, in doubles */
     double *memory = ts_scratch(2, sizeof(double) * (size_t)(size * parts));
-#pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads_of(g->threads))
     {
 #pragma omp for schedule(dynamic)
         for (int part = 0; part < parts; part++) {

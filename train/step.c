@@ -186,14 +186,10 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
     rate_factors(c, row->pretraining, factor);
     for (int part = NN_G; part <= NN_COARSE; part++) t->model->fixed[part] = factor[part] == 0;
     ag_reset(t->tape);
-    const bool exact = ts_conv_exact();
-    ts_conv_exact_set(c->train.exact);
-    ts_conv_precision_set(c->train.precision);
+    ag_compute_set(t->tape, (ts_compute){.exact = c->train.exact, .precision = c->train.precision});
     ag_value *loss = forward(t, target, given, row);
     if (loss) row->loss = (double)loss->t.data[0];
     if (loss && isfinite(row->loss) && ag_backward(t->tape, loss) == TS_OK) row->norm = gradient_norm(t->model);
-    ts_conv_precision_set(TS_F32);
-    ts_conv_exact_set(exact);
     if (ag_status(t->tape)->code) {
         *st = *ag_status(t->tape);
         return st->code;

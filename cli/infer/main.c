@@ -115,7 +115,7 @@ static void compute(lgd_item *item, void *user)
     else if (lgd_estimate_photos(r->model, photo, photos, size, &options, item->m.maps, &error) && !cl_interrupted())
         ts_fail(&item->st, (ts_code)error.code, "%s: %s", item->job->photo, error.message);
     else if (cl_interrupted()) ts_fail(&item->st, TS_INTERRUPTED, "interrupted");
-    else lgd_encode(item->m.maps, size, item->m.maps);
+    else lgd_encode(item->m.maps, size, item->m.maps, item->threads);
 }
 
 #define FAR                                                                                                         \

@@ -59,15 +59,15 @@ static void decode_capture(const lgd_command *c, lgd_item *item)
     else memcpy(item->square.data, item->capture.image, (size_t)c->size * (size_t)c->size * 3 * sizeof(float));
 }
 
-static void decode(const lgd_command *c, bool published, lgd_item *item)
+static void decode(const lgd_command *c, bool published, int threads, lgd_item *item)
 {
     if (*c->capture) {
         decode_capture(c, item);
         return;
     }
     int width, height;
-    if (lgd_photograph_square(item->job->photo, published, c->max_pixels, c->size, &item->square, &width, &height,
-                              &item->st))
+    if (lgd_photograph_square(item->job->photo, published, c->max_pixels, c->size, threads, &item->square, &width,
+                              &height, &item->st))
         return;
     item->photo_side = width < height ? width : height;
     if (c->mask && read_mask(c, width, height, &item->mask, &item->st)) ts_context(&item->st, "%s", item->job->photo);
@@ -120,9 +120,8 @@ static void *decode_all(void *user)
 {
     lgd_pipeline *p = user;
     lgd_item *item;
-    if (p->plan->jobs > 1) ts_threads_own(1); /* the others have work */
     while ((item = begin_decoding(p))) {
-        decode(p->command, p->published, item);
+        decode(p->command, p->published, p->plan->jobs > 1 ? 1 : 0, item); /* of several the others have work */
         move(p, item, DECODED);
     }
     return NULL;
@@ -149,14 +148,12 @@ static void write_files(const lgd_command *c, lgd_item *item)
 static void work_on(lgd_pipeline *p, lgd_item *item)
 {
     item->threads = threads_for(p, item->index);
-    const int threads = ts_threads_own(item->threads);
     if (p->stop()) {
         end_early(p);
         ts_fail(&item->st, TS_INTERRUPTED, "interrupted");
     }
     if (!item->st.code) p->compute(item, p->user);
     if (!item->st.code) write_files(p->command, item);
-    ts_threads_own(threads);
     move(p, item, FINISHED);
 }
 

@@ -75,6 +75,7 @@ static ts_code unknown(const char *spec, const ev_method *m, const char *what, t
 ts_code ev_method_parse(const char *spec, const char *model, int iterations, ev_estimator *e, ts_status *st)
 {
     memset(e, 0, sizeof *e);
+    e->exact = true;
     e->weights = model;
     if (strlen(spec) + 16 >= sizeof e->text) return ts_fail(st, TS_INVALID, "--method %.60s...: is too long", spec);
     strcpy(e->text, spec);
@@ -226,6 +227,7 @@ ts_code ev_open_net(ev_estimator *e, const char *key, ts_status *st)
                        ev_text(e, key));
     if (e->net) e->tape = ag_tape_create(false, st);
     if (!e->tape) return st->code;
+    ag_compute_set(e->tape, (ts_compute){.exact = e->exact});
     ag_freeze(e->tape, true);
     return TS_OK;
 }
@@ -233,7 +235,9 @@ ts_code ev_open_net(ev_estimator *e, const char *key, ts_status *st)
 ts_code ev_open_train(ev_estimator *e, ts_status *st)
 {
     e->train = ag_tape_create(true, st);
-    return e->train ? TS_OK : st->code;
+    if (!e->train) return st->code;
+    ag_compute_set(e->train, (ts_compute){.exact = e->exact});
+    return TS_OK;
 }
 
 ts_code ev_start_r0(ev_estimator *e, const ev_case *c, float *maps, ts_status *st)

@@ -50,6 +50,7 @@ struct ev_estimator {
     const char *weights;            /* the program's model, for weights that are not given */
     const char *tried;              /* the steps to score, separated by blanks; NULL: the method's own */
     bool last_alone;                /* only the last step can be seen */
+    bool exact;                     /* convolutions, as in tensor/compute.h; true until it is set */
     nn_model *net, *coder;          /* g (and h); an auto-encoder */
     ag_tape *tape, *train;          /* without and with gradients */
     nn_adam adam;

@@ -148,10 +148,8 @@ static ts_code refine(ev_estimator *e, const ev_case *c, ev_seen seen, void *use
 
 static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
 {
-    ts_conv_precision_set((ts_precision)ev_number(e, "precision"));
-    const ts_code code = refine(e, c, seen, user, st);
-    ts_conv_precision_set(TS_F32);
-    return code;
+    ag_compute_set(e->tape, (ts_compute){.exact = e->exact, .precision = (ts_precision)ev_number(e, "precision")});
+    return refine(e, c, seen, user, st);
 }
 
 #define MODEL_GIVEN(text)                                \

@@ -66,7 +66,7 @@ void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float 
     float *few = packed + conv_panels_count(ic, oc, c->k);
     if (conv_by_col2im(ic, oc, c->k)) conv_pack_col2im(ic, oc, c->k, !forward, weight, i_step, o_step, few);
     else if (conv_few_channels(oc, c->k)) conv_pack_lanes(ic, oc, c->k, !forward, weight, i_step, o_step, few);
-#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
+#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(c->compute.threads))
     for (int panel = 0; panel < panels; panel++)
         for (int part = 0; part < parts; part++) {
             const int width = conv_vectors(oc, panel) * panel_width / 2, o0 = panel * panel_width,
@@ -118,7 +118,8 @@ void conv_run(const conv_plan *p)
 
 void ts_conv_forward(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y)
 {
-    const conv_plan p = {.n = c->n,
+    const conv_plan p = {.threads = c->compute.threads,
+                         .n = c->n,
                          .h = c->h,
                          .w = c->w,
                          .ic = c->ic,

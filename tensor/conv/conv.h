@@ -4,6 +4,7 @@
  * (validated by ts_conv_check). */
 #ifndef TS_CONV_H
 #define TS_CONV_H
+#include "tensor/compute.h"
 #include "tensor/tensor.h"
 
 typedef enum ts_pad { TS_PAD_ZERO, TS_PAD_REPLICATE } ts_pad;
@@ -15,6 +16,7 @@ typedef struct ts_conv {
     int dilation;  /* 1 or 2 */
     ts_pad pad;    /* padding of dilation * (k - 1) / 2 on each side */
     int constants; /* of the input's channels, the last: the data gradient is that of the others alone */
+    ts_compute compute;
 } ts_conv;
 
 /* Which order the packed weights are in: for the output and for the gradient of the input; both by Winograd's way; both
@@ -52,12 +54,6 @@ void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *pac
 void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
 void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const float *dy, float *dweight);
 
-/* Of the calling thread: whether ag_conv computes directly wherever it can (true: the default, and what comparisons
- * with other programs want) or by Winograd's way where ts_conv_winograd says so. Set before what is to be computed so;
- * weights that a tape has packed for one way are packed anew for the other. */
-void ts_conv_exact_set(bool exact);
-bool ts_conv_exact(void);
-
 /* dx [n,h,w,ts_conv_variables] (+)= the gradient of the input given dy = the gradient before the activation. */
 void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
 
@@ -72,14 +68,6 @@ void ts_conv_data_gradient_bf16(const ts_conv *c, const float *dy, const float *
  * ts_conv_bf16_weights says that this is one. */
 bool ts_conv_bf16_weights(void);
 void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight);
-
-/* Of the calling thread, f32 unless said otherwise: how ag_conv and ag_gru multiply in forward and ag_conv for the
- * gradient of its input. Gradients of weights, and whatever else is summed, stay f32. Set between tapes, or at least
- * between a tape's forward and the next. */
-typedef enum ts_precision { TS_F32, TS_BF16, TS_PRECISION_COUNT } ts_precision;
-void ts_conv_precision_set(ts_precision p);
-ts_precision ts_conv_precision(void);
-const char *ts_precision_name(ts_precision p); /* f32, bf16 */
 
 /* dweight[oc][ic][k][k] += , dbias[oc] += (either may be NULL). */
 void ts_conv_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias);

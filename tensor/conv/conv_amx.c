@@ -44,7 +44,7 @@ void conv_matrix_pack(const ts_conv *c, bool forward, const float *weight, float
     const int steps = row_steps(depth, k, c->dilation), panels = panels_of(oc);
     const int run = merged(c->dilation) ? k * depth : depth,
               run_steps = (run + TS_MATRIX_PAIRS - 1) / TS_MATRIX_PAIRS; /* pairs without a gap, and their steps */
-#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
+#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(c->compute.threads))
     for (int panel = 0; panel < panels; panel++)
         for (int row = 0; row < k * steps; row++) {
             float pair[2 * STEP_FLOATS] = {0};
@@ -217,7 +217,7 @@ void conv_run_matrix(const conv_plan *p)
     if (bands > (p->h + least - 1) / least) bands = (p->h + least - 1) / least;
     int groups = p->n * bands < UNITS ? (UNITS + p->n * bands - 1) / (p->n * bands) : 1;
     if (groups > panels) groups = panels;
-#pragma omp parallel for collapse(3) schedule(dynamic) num_threads(ts_threads())
+#pragma omp parallel for collapse(3) schedule(dynamic) num_threads(ts_threads_of(p->threads))
     for (int n = 0; n < p->n; n++)
         for (int i = 0; i < bands; i++)
             for (int g = 0; g < groups; g++) {

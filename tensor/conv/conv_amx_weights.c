@@ -163,7 +163,7 @@ void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float 
     for (int s = 0; s < steps; s++) at[s] = s * (ptrdiff_t)(STEP_PIXELS * sizeof(uint16_t));
     g.at = at;
     g.sums = ts_scratch(2, sizeof(float) * (size_t)(g.size * g.chunks));
-#pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads_of(c->compute.threads))
     {
 #pragma omp for collapse(2) schedule(dynamic)
         for (int chunk = 0; chunk < g.chunks; chunk++)

@@ -78,7 +78,7 @@ void conv_weight_positions(const ts_conv *c, const float *x, const float *dy, fl
     const int piece = (panels * blocks + PIECES - 1) /
         PIECES; /* of neighbouring blocks, which share lines of dweight */
     const ptrdiff_t pixels = (ptrdiff_t)c->h * c->w * c->n, row = (ptrdiff_t)c->ic * taps;
-#pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads_of(c->compute.threads))
     {
         const staged s = stage(c, x, dy);
         float *sums = ts_scratch(2, sizeof(float) * (size_t)(taps * kernels->rows * lanes2)); /* [input][tap][lane] */

@@ -3,10 +3,6 @@
 #include "tensor/conv/conv_internal.h"
 #include "tensor/threads.h"
 
-static _Thread_local ts_precision precision = TS_F32;
-
-void ts_conv_precision_set(ts_precision p) { precision = p; }
-ts_precision ts_conv_precision(void) { return precision; }
 const char *ts_precision_name(ts_precision p) { return p == TS_BF16 ? "bf16" : "f32"; }
 
 size_t conv_bf16_count(const ts_conv *c, int ic, int oc)
@@ -28,7 +24,7 @@ void conv_pack_bf16(const ts_conv *c, bool forward, const float *weight, float *
     /* weight[o][c][tap]: strides of the packed input and output channel */
     const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * taps : taps,
                     i_step = forward ? taps : (ptrdiff_t)c->ic * taps;
-#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
+#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(c->compute.threads))
     for (int panel = 0; panel < panels; panel++)
         for (int i = 0; i < depth; i++) {
             const int width = conv_vectors(oc, panel) * lanes, o0 = panel * 2 * lanes;
@@ -47,7 +43,8 @@ void conv_pack_bf16(const ts_conv *c, bool forward, const float *weight, float *
 void ts_conv_forward_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
                           float *y)
 {
-    const conv_plan p = {.n = c->n,
+    const conv_plan p = {.threads = c->compute.threads,
+                         .n = c->n,
                          .h = c->h,
                          .w = c->w,
                          .ic = conv_bf16_depth(c->ic),
@@ -69,7 +66,8 @@ void ts_conv_forward_bf16(const ts_conv *c, const float *x, const float *packed,
 void ts_conv_data_gradient_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
 {
     const int reach = c->dilation * (c->k / 2), fold = c->pad == TS_PAD_REPLICATE ? reach : 0;
-    const conv_plan p = {.n = c->n,
+    const conv_plan p = {.threads = c->compute.threads,
+                         .n = c->n,
                          .h = c->h,
                          .w = c->w,
                          .ic = conv_bf16_depth(c->oc),

@@ -172,7 +172,7 @@ void conv_run_col2im(const conv_plan *p)
         memcpy(bias + p->k * p->k / 2 * p->oc, p->bias, sizeof(float) * (size_t)p->oc);
         g.products.bias = bias;
     }
-#pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads_of(p->threads))
     {
 #pragma omp for collapse(2) schedule(dynamic)
         for (int n = 0; n < p->n; n++)

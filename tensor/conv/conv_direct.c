@@ -225,12 +225,12 @@ void conv_run_rows(const conv_plan *p)
     int groups = p->n * bands < 8 ? (8 + p->n * bands - 1) / (p->n * bands) : 1;
     /* More weights than values: a block of them stays in the second cache while all images pass by, and where it is a
      * panel those who come to it next have it fetched. */
-    const int blocks = (panels + block.panels - 1) / block.panels, ahead = ts_threads();
+    const int blocks = (panels + block.panels - 1) / block.panels, ahead = ts_threads_of(p->threads);
     const bool weighty = (ptrdiff_t)p->k * p->k * p->oc > (ptrdiff_t)p->n * p->h * p->w;
     if (weighty && groups < blocks) groups = blocks;
     if (groups > panels) groups = panels;
     if (weighty && p->h <= WHOLE_ROWS && groups * p->n >= 8) bands = 1;
-#pragma omp parallel for collapse(3) schedule(dynamic) num_threads(ts_threads())
+#pragma omp parallel for collapse(3) schedule(dynamic) num_threads(ts_threads_of(p->threads))
     for (int g = 0; g < groups; g++)
         for (int n = 0; n < p->n; n++)
             for (int i = 0; i < bands; i++) {

@@ -16,7 +16,8 @@ enum {
 void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
 {
     const int reach = c->dilation * (c->k / 2), fold = c->pad == TS_PAD_REPLICATE ? reach : 0;
-    const conv_plan p = {.n = c->n,
+    const conv_plan p = {.threads = c->compute.threads,
+                         .n = c->n,
                          .h = c->h,
                          .w = c->w,
                          .ic = c->oc,
@@ -282,7 +283,7 @@ static void run_rows(job *g, float *dweight, float *dbias)
     g->bias_sums = dbias ? g->sums + g->size * g->chunks : NULL;
     const int groups = dweight ? g->groups : 1, o_blocks = dweight ? (c->oc + REDUCE_OUTPUTS - 1) / REDUCE_OUTPUTS : 0;
     const int c_blocks = (c->ic + REDUCE_INPUTS - 1) / REDUCE_INPUTS;
-#pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads_of(c->compute.threads))
     {
 #pragma omp for collapse(2) schedule(dynamic)
         for (int chunk = 0; chunk < g->chunks; chunk++)

@@ -19,6 +19,7 @@ typedef struct conv_plan {
     bool add;
     bool bf16;    /* weights, and x as tiles read it, are pairs of bf16 values, each where a float would be; */
     int channels; /* x itself is floats, so many a pixel */
+    int threads;
 } conv_plan;
 
 enum {

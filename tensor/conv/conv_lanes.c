@@ -174,9 +174,9 @@ static void run_band(const conv_plan *p, int image, int begin, int end)
 
 void conv_run_lanes(const conv_plan *p)
 {
-    int bands = (4 * ts_threads() + p->n - 1) / p->n; /* each makes the rows around it anew */
+    int bands = (4 * ts_threads_of(p->threads) + p->n - 1) / p->n; /* each makes the rows around it anew */
     if (bands > (p->h + 7) / 8) bands = (p->h + 7) / 8;
-#pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads())
+#pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads_of(p->threads))
     for (int n = 0; n < p->n; n++)
         for (int i = 0; i < bands; i++) {
             int begin, end;

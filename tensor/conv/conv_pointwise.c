@@ -51,7 +51,7 @@ void conv_run_pointwise(const conv_plan *p)
     const int chunks = (int)((pixels + chunk - 1) / chunk);
     int groups = chunks < 8 ? (8 + chunks - 1) / chunks : 1;
     if (groups > panels) groups = panels;
-#pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads())
+#pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads_of(p->threads))
     for (int g = 0; g < groups; g++)
         for (int i = 0; i < chunks; i++) {
             int panel0, panel1;
@@ -77,7 +77,7 @@ void conv_run_positions(const conv_plan *p)
     const ptrdiff_t pixel = p->ic % 512 ? p->ic : p->ic + 16;
     const ptrdiff_t image = (ptrdiff_t)positions * p->channels;
     const int tiles = (p->n + ts_conv_k()->pixels - 1) / ts_conv_k()->pixels;
-#pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads_of(p->threads))
     {
         /* x as [position][image][channel] */
         float *staged = ts_scratch(0, sizeof(float) * (size_t)(positions * pixel) * (size_t)p->n);

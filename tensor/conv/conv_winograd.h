@@ -17,6 +17,7 @@ typedef struct winograd_grid {
     bool replicate;
     int rows, columns; /* tiles of one interleaved image */
     int64_t tiles;     /* of all */
+    int threads;
 } winograd_grid;
 
 /* Of a convolution; of the gradient of its input on the domain that is larger by fold on each side. */

@@ -119,7 +119,7 @@ void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const fl
     job j = make_job(c, x, dy);
     const int lanes = conv_lanes();
     j.sums = ts_scratch(2, sizeof(float) * (size_t)(j.size * j.chunks));
-#pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads_of(c->compute.threads))
     {
 #pragma omp for schedule(dynamic)
         for (int chunk = 0; chunk < j.chunks; chunk++) run_chunk(&j, chunk);

@@ -108,7 +108,7 @@ static void same_square(const char *path, int size)
     CHECK(!io_read_photo(path, 1 << 20, &whole, &st) && !io_centre_square(&whole, size, &cut, &st), "%s", st.message);
     for (int threads = 1; threads <= 3; threads++) {
         ts_threads_set(threads);
-        CHECK(!io_read_photo_square(path, 1 << 20, size, &square, &width, &height, &st), "%s", st.message);
+        CHECK(!io_read_photo_square(path, 1 << 20, size, 0, &square, &width, &height, &st), "%s", st.message);
         CHECK(width == whole.width && height == whole.height && square.width == size && square.height == size &&
                   square.channels == 3,
               "%s: %d x %d", path, width, height);
@@ -152,15 +152,14 @@ TEST(photo_square_of_a_file_is_that_of_the_whole)
     snprintf(path, sizeof path, "%s/none.png", test_folder());
     io_image square = {0};
     int width, height;
-    CHECK(io_read_photo_square(path, 1 << 20, 8, &square, &width, &height, &st) == TS_IO && !square.data,
+    CHECK(io_read_photo_square(path, 1 << 20, 8, 0, &square, &width, &height, &st) == TS_IO && !square.data,
           "a missing file");
     st = (ts_status){0};
     snprintf(path, sizeof path, "%s/upright.jpg", test_folder());
-    CHECK(io_read_photo_square(path, 97 * 61 - 1, 8, &square, &width, &height, &st) == TS_UNSUPPORTED && !square.data &&
+    CHECK(io_read_photo_square(path, 97 * 61 - 1, 8, 0, &square, &width, &height, &st) == TS_UNSUPPORTED && !square.data &&
               strstr(st.message, "97 x 61"),
           "the limit: %s", st.message);
     st = (ts_status){0};
-    CHECK(io_read_photo_square(path, 1 << 20, 0, &square, &width, &height, &st) == TS_INVALID && !square.data,
-          "size 0");
+    CHECK(io_read_photo_square(path, 1 << 20, 0, 0, &square, &width, &height, &st) == TS_INVALID && !square.data, "size 0");
     io_image_free(&in);
 }
