@@ -10,23 +10,21 @@
 
 static const char usage[] =
     "Usage: lgd-train CONFIG.ini [options]\n"
-    "Trains a model on procedural materials as CONFIG.ini says. The run's folder (output.folder, by default "
-    "runs/CONFIG)\n"
-    "gets the weights best.safetensors and last.safetensors, a checkpoint, log.csv and val.csv.\n"
+    "Trains a model on procedural materials with the configuration CONFIG.ini. The run's folder (output.folder,\n"
+    "default runs/CONFIG) gets best.safetensors, last.safetensors, a checkpoint, log.csv and val.csv.\n"
     "\n"
-    "  --set SECTION.KEY=VALUE  set a key after the file was read; may be given several times\n"
-    "  --resume                 go on from the folder's checkpoint, exactly as if the run had not stopped\n"
-    "  --init WEIGHTS           begin with the parameters of a weights file (the same as --set train.init=WEIGHTS); "
-    "given twice, the\n"
-    "                           second file gives what the first does not have (train.init_rest)\n"
-    "  --initial FILE           write the weights that the run would begin with, and end\n"
-    "  --threads N              threads to compute with (default: all that the process may use)\n"
+    "  --set SECTION.KEY=VALUE  change a key of the file; may be repeated\n"
+    "  --resume                 continue from the folder's checkpoint, exactly as if the run had not stopped\n"
+    "  --init WEIGHTS           start from a weights file (the same as --set train.init=WEIGHTS); given twice, the\n"
+    "                           second file has the parameters that the first lacks (train.init_rest)\n"
+    "  --initial FILE           write the weights that the run would start from, and exit\n"
+    "  --threads N              number of threads (default: all that the process may use)\n"
     "  --help-config            print every key with its range, default and meaning\n"
-    "  --print-config           print the configuration as it would run\n"
+    "  --print-config           print the configuration of the run\n"
     "  --help                   print this\n"
     "  --version                print the version\n"
     "\n"
-    "Ctrl-C finishes the step, saves a checkpoint and ends with exit status 1.\n";
+    "Ctrl-C finishes the step, saves a checkpoint and exits with status 1.\n";
 
 typedef struct shown {
     cl_progress progress;
