@@ -1,10 +1,10 @@
 /* What is in a map folder: files are recognised by their names, conventions by meta.txt.
  *
- * meta.txt holds lines "key: text" (or "key = text"); '#' begins a comment, unknown keys are left alone:
- *   workflow: metallic | specular ...        needed only where both a metallic and a specular map exist
+ * meta.txt holds lines "key: text" (or "key = text"); '#' begins a comment, unknown keys are ignored:
+ *   workflow: metallic | specular ...        needed when both a metallic and a specular map exist
  *   basecolor, diffuse, specular: sRGB | linear ...
  *   normal: ... OpenGL ... | ... DirectX ...  (y up or y down)
- *   file.MAP: NAME                           where names do not say it; MAP as in io_map_kind_name */
+ *   file.MAP: NAME                           when its name does not say so; MAP as in io_map_kind_name */
 #include "data/file.h"
 #include "data/map_folder.h"
 #include "data/image/oiio.h"
