@@ -1,5 +1,4 @@
-/* The network: its architecture as plain data, its parameters in one block, and the ONE definition of the unrolled
- * loop. */
+/* The method: the architecture as plain data, the parameters in one block, and the unrolled loop. */
 #ifndef NN_MODEL_H
 #define NN_MODEL_H
 #include "autograd/tape.h"
@@ -23,19 +22,19 @@ typedef enum nn_compat {
                          * renderer (render/published.h), its photographs (infer/photograph.h) */
 } nn_compat;
 
-/* What reaches the maps past h. */
+/* What is added to the maps beside h, through a learned matrix (docs/math.md, S4). */
 typedef enum nn_descent {
     NN_DESCENT_NONE,     /* nothing (published) */
-    NN_DESCENT_GRADIENT, /* the encoded gradients, by a learned matrix over their channels */
+    NN_DESCENT_GRADIENT, /* the encoded gradients */
     NN_DESCENT_NEWTON /* the step of Gauss and Newton's method that fits each pixel to its photographs (rd_newton_step),
                          by a learned 9 x 9 matrix */
 } nn_descent;
 
-/* Everything that a weights file must say about itself (its metadata, one key each). */
+/* The architecture, in the metadata of a weights file with one key each. */
 enum { NN_MAX_IMAGES = 9 };
 typedef struct nn_arch {
-    int images;   /* most photographs of a material that are read at once, each under a light and view of its own (fewer
-                     may be given) */
+    int images;   /* photographs of a material that are read at once, each with its own light and view; fewer may be
+                     given */
     int channels; /* of the maps: 9, or 10 (published) */
     int g_width;  /* of g's first convolution; level i has min(g_width * 2^i, g_width_max) */
     int g_width_max;
@@ -55,7 +54,7 @@ typedef struct nn_arch {
     int coarse_gru;        /* of its states */
     int iterations;        /* T that it was trained for */
     bool recurrent;        /* h carries its states from step to step */
-    bool gradient;         /* h reads the gradient (false: zeros, the ablation) */
+    bool gradient;         /* h reads the gradient (false: zeros, an ablation) */
     bool mean_before_norm; /* the global track's mean: before (ours) or after (published) the normalisation */
     nn_rmse rmse;
     nn_gradient encoding; /* of the gradient for h */
@@ -89,7 +88,7 @@ typedef struct nn_model {
     void *layers;  /* nn's own */
 } nn_model;
 
-/* The parameter list alone: value is NULL. The caller frees. NULL and st on failure. */
+/* The list of parameters, without values: value is NULL. The caller frees. NULL and st on failure. */
 nn_model *nn_model_plan(const nn_arch *arch, ts_status *st);
 
 /* Parameters are allocated and zero. The caller frees. NULL and st on failure. */

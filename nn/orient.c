@@ -1,11 +1,10 @@
-/* g of a photograph in its orientations. */
+/* g of a photograph in its orientations (docs/math.md, S1). */
 #include "nn/layers.h"
 #include "tensor/maps.h"
 #include <string.h>
 
-/* As it is, turned by a quarter, the other turns, and all these mirrored. The first 1, 4 and 8 are groups, so that
- * their mean turns with the photograph; of two the quarter turn, which is none, gave less error in renderings than what
- * would be (a half turn, a mirror image, the transpose). */
+/* As it is, a quarter turn, the other turns, and all of these mirrored. The first 1, 4 and 8 are groups, so that their
+ * mean turns with the photograph; the first 2 are not (docs/training.md, Orientations). */
 static const int orientations[8] = {0, 5, 3, 6, 1, 2, 4, 7};
 
 /* Orientation k of a picture has at (y, x) what the picture has at (*from_y, *from_x): mirrored in x, in y, and
