@@ -12,10 +12,10 @@
 typedef struct ts_shade_guards {
     double roughness;                /* smallest roughness */
     double nz2;                      /* smallest n_z^2 before normalisation */
-    double distance2;                /* smallest squared distance that the falloff sees */
+    double distance2;                /* smallest squared distance in the falloff */
     double lz;                       /* smallest l_z that irradiance is divided by */
     double distribution, k, cosines; /* TS_SHADE_PUBLISHED: added to pi (…)^2 below D, to G's k, and to 4 n.l n.v;
-                                        elsewhere 0 and not looked at */
+                                        elsewhere 0 and ignored */
 } ts_shade_guards;
 
 typedef enum ts_shade_kind {
