@@ -109,13 +109,12 @@ static int train(const tr_config *config, const char *folder, bool resume)
 }
 
 /* libgomp's threads spin for about 10 ms at every barrier before they sleep, which starves the loader's thread and, on
- * a machine that does anything else, the very threads that they wait for (measured: a tenth of the speed). It reads its
- * settings before main, so the program begins again with another one; the user's own setting stays. */
+ * a machine with other work, the threads that they wait for (a tenth of the speed). libgomp reads its settings before
+ * main, so the program sets one and starts itself again. The user's own setting is kept. */
 static void spin_briefly(char **argv)
 {
     if (ts_threads() < 2 || getenv("GOMP_SPINCOUNT") || getenv("OMP_WAIT_POLICY")) return;
-    if (setenv("GOMP_SPINCOUNT", "2000", 1) == 0)
-        execv("/proc/self/exe", argv); /* where that fails the run is only slower */
+    if (setenv("GOMP_SPINCOUNT", "2000", 1) == 0) execv("/proc/self/exe", argv); /* on failure the run is only slower */
 }
 
 enum { SET = 256, RESUME, INIT, INITIAL, THREADS, HELP_CONFIG, PRINT_CONFIG, HELP, VERSION };
