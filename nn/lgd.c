@@ -82,14 +82,14 @@ static bool goes_on(const nn_watch *watch, int t, int steps, const ag_value *map
     return !watch || watch->after(t, looks(watch, t, steps) ? maps : NULL, watch->user);
 }
 
-/* R_t of the coarse steps as others see it; the whole photographs' too. */
+/* R_t of the coarse steps for the caller: the window's, and in *whole that of the whole photographs. */
 static ag_value *show(ag_tape *tape, const nn_input *in, const nn_coarse *c, ag_value **whole)
 {
     *whole = resampled(tape, c->side, c->maps);
     return *whole ? window(tape, in, *whole) : NULL;
 }
 
-/* R_0 and those that the first steps leave, into maps as nn_lgd has it. Returns the last, of the whole photographs, and
+/* R_0 and the maps of the coarse steps, into maps as in nn_lgd. Returns the last, of the whole photographs, and
  * in *t its step; *on: to go on. */
 static ag_value *first_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all,
                              ag_value **maps, const nn_watch *watch, int *t, bool *on)
