@@ -190,7 +190,7 @@ static void cases(ag_gradcheck *check)
         k.attr.leak = t % 2 ? 0.2f : 1.0f;
         if (t < edges)
             k.attr.conv = (ts_conv){1 + t % 2, edge[t].h,        edge[t].w,   edge[t].ic, edge[t].oc,
-                                    edge[t].k, edge[t].dilation, edge[t].pad, 0};
+                                    edge[t].k, edge[t].dilation, edge[t].pad, 0,          {0}};
         else
             k.attr.conv = (ts_conv){1 + ts_rng_int(r, 2),
                                     1 + ts_rng_int(r, 5),
@@ -200,7 +200,8 @@ static void cases(ag_gradcheck *check)
                                     1 + 2 * ts_rng_int(r, 3),
                                     1 + ts_rng_int(r, 2),
                                     ts_rng_int(r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE,
-                                    0};
+                                    0,
+                                    {0}};
         ts_conv *v = &k.attr.conv;
         v->constants = t % 4 == 1 ? v->ic / 2 : 0;
         ag_case c = {.label = t < edges ? edge[t].label : "random",

@@ -1,7 +1,6 @@
-/* What refinement costs where it is not all wanted: tolerances, a mask, the automatic number of steps, each beside the
- * fixed number of steps of the whole. Processor seconds of all threads, which a busy machine changes less than wall
- * time. The error is that of renderings under 20 views (lgd-eval's), over procedural materials and the map sets of
- * TESTDATA. */
+/* Refinement with early stop: tolerances, a mask, the automatic number of steps, each beside all steps of the whole.
+ * Processor seconds of all threads, which depend less on other work than wall time. The error is that of renderings
+ * under 20 views (lgd-eval's), over procedural materials and the map sets of TESTDATA. */
 #include "bench/bench.h"
 #include "eval/metrics/metrics.h"
 #include "eval/sets.h"

@@ -59,7 +59,7 @@ typedef struct command {
 
 enum { WIDE = 4032, TALL = 3024 };
 
-/* The photograph in as many pixels as a telephone's has, with noise, and with as many bytes. */
+/* A photograph with the pixels, the noise and the bytes of a telephone's. */
 static bool make_large(const char *path)
 {
     io_image square = {0}, large = {0};
@@ -109,7 +109,7 @@ static void estimate(void *user)
     if (lgd_estimate(c->model, c->image.data, SIDE, &o, c->maps, &e)) abort();
 }
 
-/* The median of what the library's call takes; 0 where it cannot be made. */
+/* The median time of the library's call; 0 when it fails. */
 static double computing(void)
 {
     char path[PATH_MAX];

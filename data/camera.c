@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Every fault has its draws whether it is switched on or not, so that one key changes one thing. */
+/* Every fault is drawn, whether it is switched on or not, so that one key changes one fault. */
 typedef struct faults {
     float exposure, read, shot, vignette, red, blue, tilt, tilt_turn, away, away_turn, jpeg;
     bool halved;
@@ -157,7 +157,7 @@ void io_camera_apply(const io_camera *c, uint64_t seed, uint64_t index, int size
     size_t count = (size_t)size * (size_t)size * 3;
     if (c->exposure > 0 || c->vignette > 0 || c->white_balance > 0) expose(c, &f, seed, index, size, image);
     for (size_t i = 0; i < count; i++) image[i] = nz_clamp(image[i], 0, 1);
-    if (sigma > 0.15f) blur(size, sigma, image); /* a narrower one changes nothing that 8 bits show */
+    if (sigma > 0.15f) blur(size, sigma, image); /* a narrower one is invisible in 8 bits */
     if (strength > 0) add_noise(&rng, read, gain, count, image);
     if (!c->quantise && !c->jpeg) return;
     pthread_once(&once, make_codes);

@@ -6,7 +6,7 @@
 /* height: [size][size], in patch widths, mean 0, up is toward the camera. The least-squares solution over all
  * differences of neighbouring pixels with free borders: Frankot and Chellappa, "A Method for Enforcing Integrability in
  * Shape from Shading Algorithms", PAMI 10(4), 1988, with cosines for their Fourier basis, so that nothing wraps around.
- * Normals flatter than 3 degrees over the horizon count as 3: beyond, a slope says more about the estimate's error than
- * about the surface. threads 0: the process's number. TS_NOMEM. */
+ * Normals less than 3 degrees above the horizon count as 3: steeper slopes are mostly errors of the estimate. threads
+ * 0: the process's number. TS_NOMEM. */
 ts_code io_height(const io_material *m, float *height, int threads, ts_status *st);
 #endif

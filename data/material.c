@@ -71,13 +71,13 @@ static ts_code write_map(const char *folder, const char *file, const io_material
     return io_write_png_rows(path, &rows, colour ? 8 : 16, colour, st);
 }
 
-/* What the files mean, for whoever reads them next (io_read_map_folder does). */
+/* The conventions of the files, for io_read_map_folder. */
 ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_status *st)
 {
     char path[PATH_MAX], text[512];
     if (snprintf(path, sizeof path, "%s/meta.txt", folder) >= (int)sizeof path)
         return ts_fail(st, TS_INVALID, "%s: name too long", folder);
-    /* Beside a base colour and a metallic map the reader is not to look for F0. */
+    /* With a base colour and a metallic map the reader must not look for F0. */
     int length = snprintf(
         text, sizeof text,
         "%sroughness: linear value, perceptual (alpha = roughness^2)\nnormal: tangent space, %s y\n%s",

@@ -106,7 +106,7 @@ static void table(const ev_report *r, const shown *s, int set, FILE *f)
     fputs("</table>\n", f);
 }
 
-/* Of a lone method a line for each set, of several a line for each method over all sets. */
+/* With one method a line for each set, with several a line for each method over all sets. */
 static void plot(const ev_report *r, FILE *f)
 {
     const int lines = r->methods > 1 ? r->methods : r->sets;

@@ -38,46 +38,47 @@ enum {
 static const lgd_argument arguments[] = {
     {'o', "output", "DIR", "write results.csv, summary.csv, times.csv, results.json and report.html there (required)"},
     {'d', "set", "KIND:WHERE",
-     "what to evaluate (required, may be repeated):\nprocedural:SEED,COUNT  generated materials\n"
+     "materials to evaluate (required, may be repeated):\nprocedural:SEED,COUNT  generated materials\n"
      "strips:FOLDER  images of five panels: input, normal, diffuse, roughness, specular\nmaps:FOLDER  a folder of map "
      "folders\nmultiview:FOLDER  a capture, or a folder of them: 00.png, 01.png ..., camera_pos.txt,\nlight_pos.txt, "
      "image_size.txt, light_power.txt; 00.png is the input"},
-    {NORMAL, "normal", "Y", "of map folders: opengl or directx (default: as set.ini, meta.txt or the file name says)"},
-    {WORKFLOW, "workflow", "W", "of map folders: metallic or specular (default: likewise, or as the files are)"},
-    {COLOUR, "colour", "C", "of map folders: srgb or linear (default: likewise, or sRGB)"},
+    {NORMAL, "normal", "Y",
+     "y of map folders' normals: opengl or directx (default: from set.ini, meta.txt or the file name)"},
+    {WORKFLOW, "workflow", "W",
+     "workflow of map folders: metallic or specular (default: from set.ini, meta.txt or the files)"},
+    {COLOUR, "colour", "C",
+     "encoding of map folders' colours: srgb or linear (default: from set.ini or meta.txt, else sRGB)"},
     {METHOD, "method", "NAME[:KEY=VALUE,...]",
-     "a method to compare (may be repeated; default: lgd, every step); below are their keys"},
+     "a method to compare (may be repeated; default: lgd, every step); their keys are listed below"},
     {'i', "iterations", "N", "refinement steps, 0 .. 1000 (default: as trained)"},
-    {'m', "model", "FILE", "weights (default: $LGD_MODEL, or those installed or built with the program)"},
-    {SIZE, "size", "N", "pixels of a side, 1 .. 4096 (default 256)"},
-    {SEED, "seed", "N", "draws the renderings' lights and cameras, and the noise (default 1)"},
+    {'m', "model", "FILE", "weights (default: $LGD_MODEL, else those installed or built with the program)"},
+    {SIZE, "size", "N", "side of the photographs and maps in pixels, 1 .. 4096 (default 256)"},
+    {SEED, "seed", "N", "seed of the renderings' lights and cameras and of the noise (default 1)"},
     {NOISE, "noise", "X", "sensor noise of the input picture, 0 = none .. 1 = a phone at night (default 0)"},
     {EXPOSURE, "exposure", "S",
-     "photographs under a light S times as strong as the methods are told, 0.01 .. 100; renderings are then compared "
-     "after one\n"
-     "factor on the estimate's is fitted (default 1, and no fit)"},
+     "the photographs' light is S times the power that the methods assume, 0.01 .. 100; renderings are then\n"
+     "compared after fitting one factor to the estimate's (default 1, without a fit)"},
     {LIGHT, "light", "X,Y",
-     "place the flash X, Y patch widths from the centre, -4 .. 4 each; the methods are told (default 0,0)"},
+     "position of the flash, X, Y patch widths from the centre, -4 .. 4 each, known to the methods (default 0,0)"},
     {IMAGES, "images", NULL,
-     "also write DIR/images/SET-MATERIAL.png: truth, first and last estimate in three rows;\nof several methods a file "
-     "each"},
+     "also write DIR/images/SET-MATERIAL.png: truth, first and last estimate in three rows; one file for each method"},
     {LPIPS, "lpips-weights", "TRUNK LINEAR",
-     "measure LPIPS 0.1 too: torchvision's AlexNet and the lpips package's linear heads, two files (.pth or "
-     "safetensors)"},
-    {FAST, "fast", NULL, "no SSIM and FLIP, which take most of the time"},
-    {REPEAT, "repeat", "N", "estimate each photograph N times, 1 .. 1000, and take the median time (default 1)"},
+     "also measure LPIPS 0.1, with two files of weights (.pth or safetensors): torchvision's AlexNet and the lpips\n"
+     "package's linear heads"},
+    {FAST, "fast", NULL, "leave out SSIM and FLIP, which take most of the time"},
+    {REPEAT, "repeat", "N", "estimate each photograph N times, 1 .. 1000, and report the median time (default 1)"},
     {PIN, "pin", NULL, "bind every thread to a CPU of its own"},
     {EXACT, "exact", NULL,
-     "compute all convolutions directly, not by Winograd's way where it is faster, as lgd-infer does"},
+     "compute convolutions directly, as lgd-infer --exact; default: Winograd's algorithm where it is faster"},
     {FIGURE, "figure", "NAME",
-     "also write DIR/NAME.svg and .csv: iterations (error over T, 0 .. 24 unless told) or methods (error over time)"},
+     "also write DIR/NAME.svg and .csv: iterations (error over T, by default 0 .. 24) or methods (error over time)"},
     {PARETO, "pareto", NULL,
-     "instead: DIR/pareto.svg and .csv, lgd's time against error at 128, 256, 512 pixels, T = 0 .. 24, f32 and bf16, "
-     "and tolerances"},
+     "write only DIR/pareto.svg and .csv: lgd's time against error at 128, 256, 512 pixels, for T = 0 .. 24, f32 and\n"
+     "bf16, and tolerances"},
     {TUNE, "tune", NULL,
-     "instead: search the grids of the methods' settings (default: of those that need no weights), DIR/tune.csv"},
-    {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},
-    {'q', "quiet", NULL, "no progress"},
+     "write only DIR/tune.csv: search the methods' settings (default: of those that need no weights)"},
+    {'t', "threads", "N", "number of threads, 1 .. 1024; 0 = all that are allowed (default 0)"},
+    {'q', "quiet", NULL, "print no progress"},
     {'h', "help", NULL, "print this help"},
     {'V', "version", NULL, "print the version"},
     {0, NULL, NULL, NULL}};
@@ -211,16 +212,15 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
 static void print_help(void)
 {
     puts("Usage: lgd-eval [options] --set KIND:WHERE... -o DIR\n"
-         "Renders each known material under a flash (of a capture: takes its first picture), estimates its maps from "
-         "that, and prints the RMSE of the maps (diffuse and\n"
-         "specular in gamma space, roughness and normal as they are) and of renderings under other lights and cameras, "
-         "the mean angle\n"
-         "between the normals in degrees, and SSIM and FLIP (and LPIPS) of the renderings, for R_0 and after every "
-         "refinement step (these\n"
-         "three: for R_0 and the last), or for each method that is named. The same seed gives the same numbers, for "
-         "any number of threads.\n");
+         "Renders each known material under a flash (of a capture: takes its first picture) and estimates its maps "
+         "from\n"
+         "that photograph. Prints, for R_0 and after every refinement step, or for each method:\n"
+         "  the RMSE of the maps (diffuse and specular in gamma space, roughness and normal linear), the RMSE of\n"
+         "  renderings under other lights and cameras, the mean angle between the normals in degrees,\n"
+         "  and SSIM, FLIP (and LPIPS) of the renderings, for R_0 and the last step.\n"
+         "The same seed gives the same numbers for any number of threads.\n");
     lgd_argument_help(arguments, stdout);
-    puts("\nMethods (values have no commas; every method also takes label=TEXT):");
+    puts("\nMethods (values contain no commas; every method also has label=TEXT):");
     ev_method_help(stdout);
     puts("\nExit status: 0 done, 1 a material failed (the others are in the results) or nothing could be written, 2 "
          "wrong usage.");

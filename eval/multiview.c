@@ -62,8 +62,8 @@ static double difference(size_t values, const float *photo, const float *scene, 
     return sqrt(sum / (double)values);
 }
 
-/* The exposure of least difference: the best of a coarse row of stops, then golden section between its neighbours.
- * Clamping makes the difference flat far away, so that a descent from anywhere would not do. */
+/* The exposure of least difference: the best of a coarse grid of stops, then golden section between its neighbours. A
+ * descent would fail far away, where clamping makes the difference constant. */
 static double fit(size_t values, const float *photo, const float *scene)
 {
     const double golden = 0.6180339887498949;

@@ -17,10 +17,10 @@ typedef struct ev_set {
 } ev_set;
 
 /* procedural:SEED,COUNT, strips:FOLDER (a folder of strip images), maps:FOLDER (a folder of map folders) or
- * multiview:FOLDER (a capture, or a folder of them). A file set.ini in a map folder says (eval/set_ini.h) what the
- * options (told, may be NULL), which win, leave open, and one in the folder of all of them what is still open then. The
- * caller closes it after success. TS_INVALID for a wrong spec, TS_IO for a folder that cannot be read or has nothing of
- * that kind. */
+ * multiview:FOLDER (a capture, or a folder of them). Conventions of map folders come from told (the
+ * options, may be NULL), else from set.ini (eval/set_ini.h) in the map folder, else from set.ini in FOLDER. The caller
+ * closes it after success. TS_INVALID for a wrong spec, TS_IO for a folder that cannot be read or holds
+ * nothing of that kind. */
 ts_code ev_set_open(const char *spec, const io_map_convention *told, ev_set *set, ts_status *st);
 void ev_set_close(ev_set *set);
 
@@ -30,6 +30,6 @@ ts_code ev_set_load(const ev_set *set, int i, int size, io_material *m, ts_statu
 /* The same of an EV_MULTIVIEW set. */
 ts_code ev_set_load_capture(const ev_set *set, int i, int size, io_capture *c, ts_status *st);
 
-/* A number that belongs to the material and not to its place among others: what its evaluation views are drawn with. */
+/* A number of the material, independent of its place in the set: the seed of its evaluation views. */
 uint64_t ev_set_identity(const ev_set *set, int i);
 #endif

@@ -9,7 +9,7 @@
 ts_code ev_sheet_write(const char *path, const ev_case *c, const float *first, const float *last, ts_status *st);
 
 /* The same columns for the report, panels of at most EV_SHEET_PANEL pixels: truth, estimate, and four times the
- * difference of what these two show. bytes of a PNG, malloced and the caller's. */
+ * difference of the two. bytes of a PNG, malloced and the caller's. */
 enum { EV_SHEET_PANEL = 96 };
 ts_code ev_sheet_png(const ev_case *c, const float *maps, unsigned char **bytes, size_t *size, ts_status *st);
 #endif

@@ -1,4 +1,4 @@
-/* The coarse steps. */
+/* The coarse steps (docs/math.md, S13). */
 #include "nn/lgd_internal.h"
 #include "ops.h"
 #include "render/render.h"
@@ -44,8 +44,7 @@ static bool measure(ag_tape *tape, const nn_model *model, nn_coarse *c)
     return true;
 }
 
-/* Rows first .. last - 1 of what the photographs of material n say: gradient and newton (or NULL) are the material's.
- */
+/* Rows first .. last - 1 of the averaged gradient and Newton step (or NULL) of material n. */
 static bool read_band(ag_tape *tape, const nn_model *model, const nn_coarse *c, int n, int first, int last,
                       float *gradient, float *newton)
 {
@@ -91,7 +90,7 @@ static bool read_band(ag_tape *tape, const nn_model *model, const nn_coarse *c, 
     return fine;
 }
 
-/* Reads what the photographs say of R_t and makes R_{t+1} and its states of it. */
+/* R_{t+1} and its states from the averages. */
 static bool step(ag_tape *tape, const nn_model *model, nn_coarse *c)
 {
     const nn_refiner *h = &((const nn_layers *)model->layers)->coarse;
@@ -152,7 +151,7 @@ static bool step_and_forget(ag_tape *tape, const nn_model *model, nn_coarse *c)
     return true;
 }
 
-/* What the steps read: the photographs, or smaller ones. */
+/* The photographs that the steps read, resampled when they are large. */
 static bool reduce(ag_tape *tape, const nn_model *model, nn_coarse *c)
 {
     const int64_t most = (int64_t)model->arch.coarse_size * NN_COARSE_READS;

@@ -1,4 +1,4 @@
-/* The auto-encoder of maps: a plain convolutional one, without skips, so that everything passes through the code. */
+/* The auto-encoder of maps, of the compared method `latent`: convolutional, without skips. */
 #include "nn/layers.h"
 #include "ops.h"
 

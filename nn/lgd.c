@@ -1,5 +1,6 @@
-/* Learned gradient descent (Luo, Scandolo, Bousseau, Eisemann: "Single-Image SVBRDF Estimation with Learned Gradient
- * Descent", CGF 43(2), 2024): R_0 = g(image), R_{t+1} = R_t + h(R_t, dL/dR_t). */
+/* The unrolled loop (docs/math.md, M8): R_0 = g(image), then the coarse steps (nn/coarse.c), then the steps at the
+ * photograph's size (nn/step.c). Luo, Scandolo, Bousseau, Eisemann, "Single-Image SVBRDF Estimation with Learned
+ * Gradient Descent", CGF 43(2), 2024. */
 #include "nn/lgd_internal.h"
 #include "ops.h"
 #include <string.h>
@@ -53,8 +54,7 @@ static ag_value *step_and_forget(ag_tape *tape, const nn_model *model, const nn_
     return to[0];
 }
 
-/* On a tape without gradients a step gives back all that it took: R_t lives in a buffer that was made before, as the
- * states do. */
+/* On a tape without gradients a step gives back its memory: R_t and the states are in buffers made before. */
 static ag_value *step_and_release(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps,
                                   nn_state *state, ag_value *to)
 {
@@ -66,7 +66,7 @@ static ag_value *step_and_release(ag_tape *tape, const nn_model *model, const nn
     return to;
 }
 
-/* Of the whole, at its own size. */
+/* Maps at the size of the whole photograph. */
 static ag_value *resampled(ag_tape *tape, int side, ag_value *maps)
 {
     return maps->t.shape.h == side ? maps : ag_resize_smooth(tape, maps, side, side);
@@ -82,14 +82,14 @@ static bool goes_on(const nn_watch *watch, int t, int steps, const ag_value *map
     return !watch || watch->after(t, looks(watch, t, steps) ? maps : NULL, watch->user);
 }
 
-/* R_t of the coarse steps as others see it; the whole photographs' too. */
+/* R_t of the coarse steps for the caller: the window's, and in *whole that of the whole photographs. */
 static ag_value *show(ag_tape *tape, const nn_input *in, const nn_coarse *c, ag_value **whole)
 {
     *whole = resampled(tape, c->side, c->maps);
     return *whole ? window(tape, in, *whole) : NULL;
 }
 
-/* R_0 and those that the first steps leave, into maps as nn_lgd has it. Returns the last, of the whole photographs, and
+/* R_0 and the maps of the coarse steps, into maps as in nn_lgd. Returns the last, of the whole photographs, and
  * in *t its step; *on: to go on. */
 static ag_value *first_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all,
                              ag_value **maps, const nn_watch *watch, int *t, bool *on)
@@ -107,7 +107,7 @@ static ag_value *first_steps(ag_tape *tape, const nn_model *model, const nn_inpu
         if (!*on && !seen && !(seen = show(tape, in, &c, &whole))) return NULL;
         if (seen) maps[keep_all ? *t : 0] = seen;
         if (*t == most || !*on) break;
-        if (!keep_all) ag_scope_end(tape, mark, NULL, 0); /* nobody looks at it again */
+        if (!keep_all) ag_scope_end(tape, mark, NULL, 0); /* not read again */
         *on = nn_coarse_step(tape, model, &c);
     }
     return whole;

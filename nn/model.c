@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Parameters of the largest model: 8 levels, two blocks of 11 each, and what lies before and after them. */
+/* Parameters of the largest model: 8 levels, two blocks of 11 each, and the layers before and after them. */
 enum { MAX_PARAMS = 4 + 2 * 11 * NN_MAX_LEVELS + 6 + 2 * 14 };
 
 static nn_layers *layers_of(const nn_model *m) { return m->layers; }
@@ -149,7 +149,7 @@ static void plan_refiner(nn_model *m, const char *name, int width, int gru, nn_r
     l->start[h->path.weight] = newton ? NN_NEWTON_START : NN_DESCENT_START;
 }
 
-/* The encoder pools between its convolutions; the decoder has two a level, since it alone has to make the detail. */
+/* The encoder pools between its convolutions; the decoder, which makes the detail, has two convolutions a level. */
 static void plan_latent(nn_model *m)
 {
     const nn_arch *a = &m->arch;

@@ -1,5 +1,4 @@
-/* The network: its architecture as plain data, its parameters in one block, and the ONE definition of the unrolled
- * loop. */
+/* The method: the architecture as plain data, the parameters in one block, and the unrolled loop. */
 #ifndef NN_MODEL_H
 #define NN_MODEL_H
 #include "autograd/tape.h"
@@ -23,19 +22,19 @@ typedef enum nn_compat {
                          * renderer (render/published.h), its photographs (infer/photograph.h) */
 } nn_compat;
 
-/* What reaches the maps past h. */
+/* What is added to the maps beside h, through a learned matrix (docs/math.md, S4). */
 typedef enum nn_descent {
     NN_DESCENT_NONE,     /* nothing (published) */
-    NN_DESCENT_GRADIENT, /* the encoded gradients, by a learned matrix over their channels */
+    NN_DESCENT_GRADIENT, /* the encoded gradients */
     NN_DESCENT_NEWTON /* the step of Gauss and Newton's method that fits each pixel to its photographs (rd_newton_step),
                          by a learned 9 x 9 matrix */
 } nn_descent;
 
-/* Everything that a weights file must say about itself (its metadata, one key each). */
+/* The architecture, in the metadata of a weights file with one key each. */
 enum { NN_MAX_IMAGES = 9 };
 typedef struct nn_arch {
-    int images;   /* most photographs of a material that are read at once, each under a light and view of its own (fewer
-                     may be given) */
+    int images;   /* photographs of a material that are read at once, each with its own light and view; fewer may be
+                     given */
     int channels; /* of the maps: 9, or 10 (published) */
     int g_width;  /* of g's first convolution; level i has min(g_width * 2^i, g_width_max) */
     int g_width_max;
@@ -55,7 +54,7 @@ typedef struct nn_arch {
     int coarse_gru;        /* of its states */
     int iterations;        /* T that it was trained for */
     bool recurrent;        /* h carries its states from step to step */
-    bool gradient;         /* h reads the gradient (false: zeros, the ablation) */
+    bool gradient;         /* h reads the gradient (false: zeros, an ablation) */
     bool mean_before_norm; /* the global track's mean: before (ours) or after (published) the normalisation */
     nn_rmse rmse;
     nn_gradient encoding; /* of the gradient for h */
@@ -89,7 +88,7 @@ typedef struct nn_model {
     void *layers;  /* nn's own */
 } nn_model;
 
-/* The parameter list alone: value is NULL. The caller frees. NULL and st on failure. */
+/* The list of parameters, without values: value is NULL. The caller frees. NULL and st on failure. */
 nn_model *nn_model_plan(const nn_arch *arch, ts_status *st);
 
 /* Parameters are allocated and zero. The caller frees. NULL and st on failure. */
@@ -117,27 +116,27 @@ const nn_param *nn_model_find(const nn_model *model, const char *name);
 /* The parameters of a part alone: [first, last) in floats of the block. */
 void nn_model_range(const nn_model *model, nn_part part, size_t *first, size_t *last);
 
-/* A batch of N materials, each in `given` photographs, one material's after the other's; linear, clamped to [0, 1]. g
- * sees whole photographs, h refines any window of them. */
+/* A batch of N materials with `given` photographs each, material by material; linear, clamped to [0, 1]. g reads whole
+ * photographs; the steps refine any window of them. */
 typedef struct nn_input {
-    ts_tensor image; /* [N * given, h, w, 3]: what is refined, the grid's pixels */
+    ts_tensor image; /* [N * given, h, w, 3]: the part that is refined, the grid's pixels */
     rd_grid grid;    /* of every photograph */
     rd_view view;    /* of every photograph where views is NULL: the flash */
-    ts_tensor whole; /* [N * given, side, side, 3]: the photographs of which image is the window; no data: image is the
+    ts_tensor whole; /* [N * given, side, side, 3]: the photographs of which image is a window; no data: image is the
                         whole */
     const rd_view *views; /* [N * given], or NULL */
     int given;            /* 1 .. arch.images; 0 stands for 1 */
-    int orientations; /* 2, 4, 8: R_0 is the mean of g's maps of the photograph in so many orientations (as it is and
-                       * turned by a quarter, all quarter turns, and their mirror images), where nn_orients says that
-                       * they are alike; on a tape without gradients. 0, 1: as it is */
+    int orientations; /* 2, 4, 8: R_0 is the mean of g's maps over so many orientations of the photograph (as it is and
+                       * a quarter turn, all quarter turns, and their mirror images), if nn_orients; on a tape without
+                       * gradients. 0, 1: as it is */
     const float *proposed; /* R_0 of these photographs in these orientations, [N, g_size, g_size, channels] as
                               nn_coarse_steps gives it; NULL: g is run */
-    bool recompute; /* on a tape with gradients: of each step only R_t and h's states are kept, the rest is computed
-                       again for the gradient */
+    bool recompute; /* on a tape with gradients: keep only R_t and h's states of each step, and compute the rest again
+                       for the gradient */
 } nn_input;
 
-/* R_0 by g of the whole: [N, S, S, channels]. Photographs that are not given are black. The log encoding, the
- * resampling to g_size and back are in here. */
+/* R_0 of the whole photographs: [N, S, S, channels]. Missing photographs are black. Includes the log encoding and the
+ * resampling to g_size and back. */
 ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in);
 
 /* R_0 at g_size and R_1 … R_steps at coarse_size or the photographs' size, by g and the coarse steps: steps <=
@@ -156,34 +155,33 @@ ag_value *nn_decode(ag_tape *tape, const nn_model *model, ag_value *code);
 /* How many pixels away from an output pixel h reads, in one step. */
 int nn_refiner_reach(const nn_model *model);
 
-/* What h keeps from step to step, and the loss's scale; zero-initialise it. */
+/* What is carried from step to step; zero-initialise it. */
 typedef struct nn_state {
     ag_value *gru[2],
         *to[2];     /* to: NULL, or where the new states are written (a tape without gradients); to[i] may be gru[i] */
     ag_value *into; /* NULL, or where nn_refine writes R_{t+1} (a tape without gradients); may be R_t */
-    double *rmse0;  /* of each of the whole photographs by R_0, in the tape's arena; NULL: nn_refine measures it on the
-                       maps that it is given */
-    int step; /* how many were done: those beyond arch.iterations are shortened, the t-th to (T / t)^2 of its length
-                 (not where compat is published) */
+    double *rmse0;  /* of each whole photograph by R_0, in the tape's arena; NULL: nn_refine measures it on its maps */
+    int step;       /* steps done; those beyond arch.iterations are shortened (docs/math.md, S7), but if compat is
+                       published */
 } nn_state;
 
-/* A step at the photograph's size: R_{t+1} = R_t + h(R_t, e) + D p, e being dL/dR_t as arch.encoding has it, one for
- * each photograph (zero where none is given). D is a learned matrix over the channels, and arch.descent says of what: p
- * = e and D begins as -0.003 times the identity, so that an untrained loop is plain descent; or p is the step of Gauss
- * and Newton's method, damped by 0.1 beside the photographs' variance and by 1 in F0, and D begins as half the
- * identity; or, as published, D is 0. */
+/* A step at the photograph's size (docs/math.md, S4): R_{t+1} = R_t + h(R_t, e) + D p. e is dL/dR_t, encoded
+ * (arch.encoding), one for each photograph (zero for a missing one). D is a learned matrix over the channels, and p
+ * depends on arch.descent:
+ *     NN_DESCENT_NEWTON    the Newton step, damped by 0.1, in F0 by 1; D begins as half the identity
+ *     NN_DESCENT_GRADIENT  e; D begins as -0.003 times the identity: an untrained loop is plain descent
+ *     NN_DESCENT_NONE      0, as published */
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
-/* The unrolled loop on the grid's window. The first arch.coarse_steps steps refine R_t at coarse_size, as nn_refine
- * does but with NN_COARSE's parameters and the averages of what the photographs say at twice that size, or their own
- * where it is less, and give it resampled; the others begin with what these leave. maps[0] = R_0 … maps[steps] = R_T
- * when keep_all; otherwise only maps[0] = R_T is given and intermediate memory is released on a tape without gradients.
- */
+/* The unrolled loop on the grid's window. The first arch.coarse_steps steps refine R_t at coarse_size with the
+ * parameters of NN_COARSE (nn/coarse.c); their result is resampled, and the others go on from it with nn_refine.
+ * keep_all: maps[0] = R_0 … maps[steps] = R_T. Otherwise maps[0] = R_T, and on a tape without gradients intermediate
+ * memory is released. */
 typedef struct nn_watch {
     bool (*after)(int step, const ag_value *maps,
-                  void *user); /* is told of every R_t; false: stop here, what is left of maps is filled with it */
+                  void *user); /* called for every R_t; false: stop, and fill the rest of maps with it */
     void *user;
-    bool ends_alone; /* after gets the maps of R_0 and R_steps alone, which saves resampling, and NULL between */
+    bool ends_alone; /* after gets only the maps of R_0 and R_steps, which saves resampling, and NULL between */
 } nn_watch;
 ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps,
                const nn_watch *watch);

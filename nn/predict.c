@@ -8,7 +8,7 @@
 int nn_given(const nn_input *in) { return in->given > 0 ? in->given : 1; }
 int nn_materials(const nn_input *in) { return in->image.shape.n / nn_given(in); }
 
-/* Under which a photograph was taken, as the model's renderer has it. */
+/* The view of a photograph, for the model's renderer. */
 rd_view nn_view_of(const nn_model *model, const nn_input *in, int photograph)
 {
     rd_view view = in->views ? in->views[photograph] : in->view;

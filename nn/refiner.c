@@ -1,4 +1,4 @@
-/* h: two convolutional gated recurrent units. */
+/* h: two convolutional gated recurrent units (docs/math.md, M10), and the step that adds its change (S4). */
 #include "nn/layers.h"
 #include "ops.h"
 

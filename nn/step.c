@@ -1,4 +1,4 @@
-/* A refinement step: what the renderer says about R_t, and what is made of it. */
+/* A refinement step: the gradient and the Newton step of R_t, and R_{t+1} from them (docs/math.md, S4 to S11). */
 #include "nn/lgd_internal.h"
 #include "ops.h"
 #include "render/published.h"
@@ -37,7 +37,7 @@ static void place(int64_t pixels, int channels, int images, int k, const float *
         memcpy(to + (i * images + k) * channels, from + i * channels, (size_t)channels * sizeof *to);
 }
 
-/* dL/dR_t of every photograph, as the renderer gives it: to is [N, H, W, images channels]. */
+/* dL/dR_t of every photograph, not encoded: to is [N, H, W, images channels]. */
 static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps,
                       const double *rmse0, float *to)
 {
@@ -77,7 +77,7 @@ static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, 
     return true;
 }
 
-/* Where Gauss and Newton's method would go: to is [N, H, W, channels]. */
+/* The Newton step: to is [N, H, W, channels]. */
 static void newton_step(const ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps,
                         float *to)
 {
@@ -119,9 +119,8 @@ bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_
     return true;
 }
 
-/* Nothing taught h that its steps must come to rest: beyond those it was trained for, what is left of them adds up to a
- * drift. So step t > T goes (T / t)^2 of its way, and all those together less than T whole steps. The published loop
- * has no such rule. */
+/* S7: h is not trained to come to rest, and beyond T what is left of its steps adds up to a drift. Step t > T has the
+ * length (T / t)^2; all of them together are less than T whole steps. The published loop keeps 1. */
 static float length(const nn_arch *a, int t)
 {
     if (t <= a->iterations || a->compat == NN_COMPAT_PUBLISHED) return 1;

@@ -1,5 +1,4 @@
-/* The reconstruction loss as an op (render/losses.h): what is minimised at test time by the methods that optimise
- * weights or codes. */
+/* The reconstruction error as an op (render/losses.h), for the compared methods that optimise weights or codes. */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "render/brdf.h"

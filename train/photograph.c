@@ -1,4 +1,4 @@
-/* What the camera sees of materials: the networks' input. */
+/* Photographs of materials, with the camera's faults: the networks' input. */
 #include "data/camera.h"
 #include "render/render.h"
 #include "tensor/maps.h"
@@ -27,7 +27,7 @@ void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count
     const uint64_t first = index * (uint64_t)number;
     for (int i = 0; i < count * number; i++) {
         rd_view view = views ? views[i] : rd_flash();
-        float moved[3]; /* the whole rig: a tilt or an offset that nobody measured moves camera and light alike */
+        float moved[3]; /* camera and light together: the tilt or offset of the rig */
         io_camera_place(&camera, seed, first + (uint64_t)i, view.camera[2], moved);
         for (int k = 0; k < 3; k++) {
             const float by = moved[k] - (k == 2 ? view.camera[2] : 0);

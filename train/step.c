@@ -110,7 +110,7 @@ static double rate_now(const tr_config *c, int64_t step)
                                     (float)(pre ? c->train.pretrain_floor : c->train.rate_floor), at, warmup, length);
 }
 
-/* The second phase has another loss: Adam begins anew. */
+/* The second phase has another loss: Adam restarts. */
 static void begin_phase(tr_trainer *t)
 {
     if (t->step == 0 || t->step != t->config.train.pretrain_steps) return;
@@ -122,9 +122,8 @@ static void begin_phase(tr_trainer *t)
 
 #define USUAL_DECAY 0.98
 
-/* A gradient of 0 is that of saturated outputs, from which there is no way back; one far beyond the usual norm would,
- * after clipping, still move by a whole step each of the many weights whose second moment is small, and has ended runs
- * so. */
+/* A gradient of 0 comes from saturated outputs, which do not recover. One far above the recent norm, even clipped,
+ * moves every weight with a small second moment by a whole step, and can end a run. */
 static const char *why_skip(const tr_trainer *t, const tr_row *row)
 {
     enum { SETTLED = 100 }; /* steps before which norms change fast for good reasons */

@@ -91,7 +91,7 @@ static ts_code write_config(const tr_trainer *t, ts_status *st)
     return TS_OK;
 }
 
-/* The parameters that a run begins with. t: may be NULL, who is told. */
+/* The parameters that a run starts from. t: NULL, or the trainer that notes are reported to. */
 static ts_code init_weights(nn_model *model, const tr_config *c, tr_trainer *t, ts_status *st)
 {
     const char *const path[] = {c->train.init, c->train.init_rest};

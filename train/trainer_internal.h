@@ -1,4 +1,4 @@
-/* What the trainer's files share. */
+/* Shared by the trainer's files. */
 #ifndef TR_PARTS_H
 #define TR_PARTS_H
 #include "data/loader.h"
@@ -46,7 +46,7 @@ bool tr_pretraining(const tr_config *c, int64_t step); /* whether the step after
 double tr_seconds(void);
 const float *tr_weights(const tr_trainer *t); /* what is validated and saved */
 
-/* photograph.c: number photographs of each material [count][size][size][9] as [data] says, images
+/* photograph.c: number photographs of each material [count][size][size][9], with the faults of [data]; images
  * [count][number][size][size][3], under views [count][number] of kind RD_POINT whose camera looks straight down (NULL:
  * the flash for all); index: of the first material, for the camera's faults, of which every photograph has its own. */
 void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,

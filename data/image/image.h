@@ -26,7 +26,7 @@ ts_code io_read_photo(const char *path, int64_t max_pixels, io_image *image, ts_
  * rows as floats alone. threads: that it is resampled on; 0: the process's number. width, height: of the whole,
  * upright. */
 ts_code io_read_photo_square(const char *path, int64_t max_pixels, int size, int threads, io_image *square, int *width,
-                       int *height, ts_status *st);
+                             int *height, ts_status *st);
 
 /* A photograph with its values as stored, integers / their maximum: upright, three channels, alpha ignored, no colour
  * transform. Float formats, which are linear, are raised to 1 / gamma, so that all come in one encoding. */

@@ -65,7 +65,7 @@ static ts_code resample(const io_photo_rows *photo, const cut *c, int most_threa
 }
 
 ts_code io_read_photo_square(const char *path, int64_t max_pixels, int size, int threads, io_image *square, int *width,
-                       int *height, ts_status *st)
+                             int *height, ts_status *st)
 {
     io_photo_rows photo;
     *square = (io_image){0};

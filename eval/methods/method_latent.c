@@ -84,9 +84,9 @@ static const ev_setting settings[] = {
      .initial = "50",
      .grid = "0 1 2 5 10 20 50 100 200",
      .steps = true,
-     .help = "of Adam"},
-    {.key = "model", .type = EV_WEIGHTS, .help = "of an auto-encoder, trained with configs/ablation/latent.ini"},
-    {.key = "g", .type = EV_WEIGHTS, .initial = "", .help = "whose R_0, by default the program's"},
+     .help = "number of steps"},
+    {.key = "model", .type = EV_WEIGHTS, .help = "weights of an auto-encoder (configs/ablation/latent.ini trains one)"},
+    {.key = "g", .type = EV_WEIGHTS, .initial = "", .help = "weights for R_0 (default: the program's)"},
     {0}};
 const ev_method ev_method_latent = {.name = "latent",
                                     .help = "Adam in an auto-encoder's code (equation 5)",

@@ -166,34 +166,33 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
         .grid = "0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24", .steps = true, \
         .help = "refinement steps T (default: as trained)"                                         \
     }
-#define TOLERANCE                                                                   \
-    {                                                                               \
-        .key = "tolerance", .type = EV_REAL, .lo = 0, .hi = 1, .initial = "0",      \
-        .help = "tiles end when a step changes them less, as lgd-infer --tolerance" \
+#define TOLERANCE                                                              \
+    {                                                                          \
+        .key = "tolerance", .type = EV_REAL, .lo = 0, .hi = 1, .initial = "0", \
+        .help = "early stop of a tile, as lgd-infer --tolerance"               \
     }
 
 static const ev_setting unet[] = {MODEL_GIVEN("weights of a g that was trained alone"), {0}};
-static const ev_setting joint[] = {MODEL("weights of g and h, by default the program's"), EV_ORIENTATIONS, {0}};
-#define PHOTOS                                                                      \
-    {                                                                               \
-        .key = "photos", .type = EV_WHOLE, .lo = 1, .hi = NN_MAX_IMAGES,            \
-        .help = "photographs that are given (default: as many as the weights read)" \
+static const ev_setting joint[] = {MODEL("weights of g and h (default: the program's)"), EV_ORIENTATIONS, {0}};
+#define PHOTOS                                                                \
+    {                                                                         \
+        .key = "photos", .type = EV_WHOLE, .lo = 1, .hi = NN_MAX_IMAGES,      \
+        .help = "number of photographs (default: as many as the model reads)" \
     }
-#define POWER                                                                                                       \
-    {                                                                                                               \
-        .key = "power", .type = EV_WORD, .words = "told auto known", .initial = "told",                             \
-        .help =                                                                                                     \
-            "of the light: the usual one, estimated as lgd-infer --light-power auto, or what --exposure made of it" \
+#define POWER                                                                                                          \
+    {                                                                                                                  \
+        .key = "power", .type = EV_WORD, .words = "told auto known", .initial = "told",                                \
+        .help = "of the light: told = the default, auto = as lgd-infer --light-power auto, known = that of --exposure" \
     }
 #define PRECISION                                                                   \
     {                                                                               \
         .key = "precision", .type = EV_WORD, .words = "f32 bf16", .initial = "f32", \
-        .help = "of what convolutions multiply, as lgd-infer --precision"           \
+        .help = "of the products in convolutions, as lgd-infer --precision"         \
     }
 #define REFINER \
     ITERATIONS, TOLERANCE, EV_ORIENTATIONS, PHOTOS, POWER, PRECISION, { 0 }
 
-static const ev_setting lgd[] = {MODEL("weights of g and h, by default the program's"), REFINER};
+static const ev_setting lgd[] = {MODEL("weights of g and h (default: the program's)"), REFINER};
 static const ev_setting nograd[] = {MODEL_GIVEN("weights trained with model.gradient = no"), REFINER};
 static const ev_setting frozen[] = {MODEL_GIVEN("weights trained with train.g_rate = 0"), REFINER};
 
@@ -205,21 +204,21 @@ const ev_method ev_method_unet_joint = {.name = "unet-joint",
                                         .open = open_g,
                                         .run = run_g};
 const ev_method ev_method_lgd = {.name = "lgd",
-                                 .help = "g and h, which reads the gradient",
+                                 .help = "g, then refinement steps that read the gradient",
                                  .settings = lgd,
                                  .steps = steps,
                                  .photos = photos,
                                  .open = open_lgd,
                                  .run = run_lgd};
 const ev_method ev_method_lgd_nograd = {.name = "lgd-nograd",
-                                        .help = "g and h that was trained without the gradient",
+                                        .help = "g and an h that was trained without the gradient",
                                         .settings = nograd,
                                         .steps = steps,
                                         .photos = photos,
                                         .open = open_nograd,
                                         .run = run_lgd};
 const ev_method ev_method_frozen = {.name = "frozen",
-                                    .help = "h that was trained on a fixed g",
+                                    .help = "g and an h that was trained over a fixed g",
                                     .settings = frozen,
                                     .steps = steps,
                                     .photos = photos,

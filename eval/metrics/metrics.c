@@ -25,7 +25,7 @@ void ev_input_views(const rd_view *told, int count, uint64_t seed, uint64_t iden
 {
     ts_rng rng = ts_rng_make(seed, TS_STREAM_CAPTURE, identity);
     rd_capture_draw(&rng, count, input);
-    input[0] = *told; /* in place of the flash */
+    input[0] = *told; /* instead of the flash */
 }
 
 /* SSIM and LPIPS as RMSE in gamma space; FLIP takes linear values. */

@@ -25,7 +25,7 @@ _Static_assert(sizeof(nn_rmse) == sizeof(int) && sizeof(nn_compat) == sizeof(int
                    sizeof(nn_gradient) == sizeof(int) && sizeof(nn_descent) == sizeof(int),
                "a word's field is read and written as an int");
 
-/* The upper ends only keep products of sizes far from overflow. The defaults are the model that two cores can train. */
+/* The upper bounds keep products of sizes far from overflow. The defaults are a model that two cores can train. */
 #define AT(member) offsetof(nn_arch, member)
 static const field fields[] = {
     {"channels", FIELD_INT, AT(channels), 9, 10, 9, NULL, false},

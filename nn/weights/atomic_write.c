@@ -1,4 +1,4 @@
-/* Putting a file in the place of another one only when all of it is on the disk. */
+/* A file replaces another one only when all of it is on the disk. */
 #include "nn/weights/file_internal.h"
 #include <errno.h>
 #include <fcntl.h>

@@ -1,4 +1,4 @@
-/* Opening a file of tensors, finding one in it, and what all forms must keep: names that are unique. */
+/* Opens a file of tensors, finds a tensor in it, and checks that names are unique. */
 #include "nn/weights/file_internal.h"
 #include <errno.h>
 #include <fcntl.h>

@@ -1,4 +1,4 @@
-/* A file of named tensors, whatever its form: one interface for everything that reads or writes weights. */
+/* A file of named tensors in any of the formats: the interface for everything that reads or writes weights. */
 #ifndef NN_FILE_H
 #define NN_FILE_H
 #include "tensor/status.h"
@@ -6,8 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Types of numbers by safetensors' names. The first four are what weights can be; the others may lie in a file beside
- * them. */
+/* Types of numbers by safetensors' names. Weights can have the first four; the others may be in a file beside them. */
 typedef enum nn_dtype {
     NN_F32,
     NN_F16,
@@ -48,10 +47,10 @@ typedef struct nn_tensor {
 typedef enum nn_form { NN_FORM_SAFETENSORS, NN_FORM_TORCH_ZIP, NN_FORM_TORCH_OLD } nn_form;
 
 /* A mapped, validated file: every tensor's numbers lie inside it, or in memory that it owns where they were compressed.
- * Nothing in a file is believed. nn_file_open takes every form and tells them apart by their first bytes;
+ * Everything in a file is checked. nn_file_open takes every form, recognised by its first bytes;
  * nn_safetensors_open takes that form alone, whose header has at most 16 MiB and whose tensors fill the rest of the
- * file without holes or overlap. NULL and st on failure; closing nulls the pointer. What the functions below return
- * lives until then. */
+ * file without holes or overlap. NULL and st on failure; closing nulls the pointer. The functions below return
+ * memory that lives until then. */
 typedef struct nn_file nn_file;
 nn_file *nn_file_open(const char *path, ts_status *st);
 nn_file *nn_safetensors_open(const char *path, ts_status *st);

@@ -1,4 +1,4 @@
-/* What the readers and writers of nn/weights/file.h share among themselves. */
+/* Shared by the readers and writers of nn/weights/file.h. */
 #ifndef NN_FILE_INTERNAL_H
 #define NN_FILE_INTERNAL_H
 #include "nn/weights/file.h"
@@ -30,8 +30,8 @@ ts_code nn_torch_parse(nn_file *f, ts_status *st);
 bool nn_torch_is_zip(const nn_file *f);
 bool nn_torch_is_old(const nn_file *f); /* not a ZIP archive: PyTorch before 1.6 */
 
-/* A file on its way: put as often as needed (errors stay), then end, which puts it in path's place, or removes it after
- * an error or where code says that the caller has one. path must live until then. */
+/* A file that is being written: put as often as needed (the first error stays), then end, which renames it to path, or
+ * removes it after an error or when code is one. path must live until then. */
 typedef struct nn_atomic_file {
     const char *path;
     char *temporary;

@@ -1,4 +1,4 @@
-/* The published network's names (the table of which ours are the left column), and how its files are recognised. */
+/* The table of our names and the published ones, and how published files are recognised. */
 #include "nn/weights/published.h"
 #include "nn/layers.h"
 #include <limits.h>

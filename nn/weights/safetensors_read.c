@@ -1,4 +1,4 @@
-/* Checks a safetensors file. Nothing in it is believed: afterwards every tensor's bytes are inside the file. */
+/* Reads and checks a safetensors file: afterwards every tensor's bytes are inside the file. */
 #include "nn/weights/file_internal.h"
 #include "nn/weights/json.h"
 #include <stdio.h>
@@ -7,7 +7,7 @@
 
 enum { MAX_HEADER = 16 << 20 };
 
-/* What the header says of a tensor beside its shape and type, and where its values end. */
+/* A tensor of the header beside its entry, and the end of its values. */
 typedef struct place {
     int64_t begin, end;
     bool type;

@@ -90,7 +90,7 @@ static ts_code pickle_all(nn_text *t, const char *path, const nn_tensor *tensor,
     return t->failed ? ts_fail(st, TS_NOMEM, "%s: no memory for its list of tensors", path) : TS_OK;
 }
 
-/* The archive's directory grows beside it. Sizes and places always stand in the 64-bit fields: one form for small and
+/* The archive's directory grows beside it. Sizes and offsets are always in the 64-bit fields: one form for small and
  * for large files. */
 typedef struct archive {
     nn_atomic_file *o;

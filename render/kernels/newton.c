@@ -1,7 +1,6 @@
-/* Of nine unknowns a colour's rendering sees five: its own diffuse and specular, and roughness and normal, which the
- * colours share. The equations are never summed: their factor L D L' begins as the damping and takes up one row of J
- * after the other (Gill, Golub, Murray, Saunders 1974, method C1), which, like Givens rotations, loses half of the
- * digits that J' W J would. */
+/* A colour's rendering depends on five of the nine unknowns: its own diffuse and specular, and roughness and normal,
+ * which the colours share. J' W J is never formed. Its factor L D L' begins as the damping and takes up one row of J
+ * after the other (Gill, Golub, Murray, Saunders 1974, method C1), which loses half as many digits. */
 #include "render/kernels/newton.h"
 #include "render/kernels/shade_lanes.h"
 #include "tensor/kernels/vmath.h"
@@ -49,11 +48,11 @@ V_INLINE void take_first(float damping, pivot *p, const vf *row, int count, vf e
 
 V_INLINE vi above_one(vf value) { return ~(value <= v_set(1)); }
 
-/* Where the photograph is burnt out as well, its value may stand for more: nothing follows from it. */
+/* Saturated: rendering and photograph both. The photograph's true value is unknown. */
 V_INLINE vi burnt_out(vf value, vf photograph) { return above_one(value) & (photograph >= v_set(TS_NEWTON_BURNT)); }
 
-/* The radiance as the equations see it, and its slope: above 1 its logarithm, which leads back from a highlight of
- * thousands in a few steps, where the clamp has no slope; none where both are burnt out. */
+/* S10: the radiance, above 1 as 1 + log, and its slope: 0 where both are saturated. A clamp at 1 would have no slope
+ * either, and no way back from an over-bright highlight. */
 V_INLINE vf exposed(vf value, vf photograph, vf *slope)
 {
     const vi bright = above_one(value);

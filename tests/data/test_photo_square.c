@@ -156,10 +156,11 @@ TEST(photo_square_of_a_file_is_that_of_the_whole)
           "a missing file");
     st = (ts_status){0};
     snprintf(path, sizeof path, "%s/upright.jpg", test_folder());
-    CHECK(io_read_photo_square(path, 97 * 61 - 1, 8, 0, &square, &width, &height, &st) == TS_UNSUPPORTED && !square.data &&
-              strstr(st.message, "97 x 61"),
+    CHECK(io_read_photo_square(path, 97 * 61 - 1, 8, 0, &square, &width, &height, &st) == TS_UNSUPPORTED &&
+              !square.data && strstr(st.message, "97 x 61"),
           "the limit: %s", st.message);
     st = (ts_status){0};
-    CHECK(io_read_photo_square(path, 1 << 20, 0, 0, &square, &width, &height, &st) == TS_INVALID && !square.data, "size 0");
+    CHECK(io_read_photo_square(path, 1 << 20, 0, 0, &square, &width, &height, &st) == TS_INVALID && !square.data,
+          "size 0");
     io_image_free(&in);
 }
