@@ -38,7 +38,7 @@ typedef struct nn_layers {
     nn_layer output_conv1, output_conv2, output_add;
     nn_refiner h, coarse;
     nn_layer encoder[NN_MAX_LEVELS + 1], code, decoder[NN_MAX_LEVELS + 1][2],
-        decoded;   /* the deepest decoder level has one convolution */
+        decoded;   /* of an auto-encoder; the deepest decoder level has one convolution */
     int first[4];  /* index of each nn_part's first parameter, and their number */
     double *start; /* per parameter: standard deviation of the first values, 0 for zeros, or one of these: */
 } nn_layers;
@@ -84,6 +84,14 @@ ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, a
  * for the whole. into: NULL, or the value to write it into, which may be R_t's. */
 ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path,
                   ag_value *gradient, ag_value *gru[2], ag_value *const to[2], float length, ag_value *into);
+
+/* A model without parameters, a 3 x 3 convolution with bias that is added to it (gain: standard deviation of its output
+ * for an input of standard deviation 1), and the plan with memory for its parameters, all zero; NULL and st on failure.
+ */
+nn_model *nn_model_empty(ts_status *st);
+nn_model *nn_coder_plan(const nn_coder *c, ts_status *st);
+nn_layer nn_plan_conv(nn_model *m, const char *name, int oc, int ic, double gain);
+nn_model *nn_model_zero(nn_model *plan, ts_status *st);
 
 /* Memory for the parameters of a plan (nn_model_plan), zero only between them: the caller writes all of them. */
 ts_code nn_model_room(nn_model *model, ts_status *st);

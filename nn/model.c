@@ -40,6 +40,11 @@ static nn_layer conv(nn_model *m, const char *name, int oc, int ic, int k, bool 
     return l;
 }
 
+nn_layer nn_plan_conv(nn_model *m, const char *name, int oc, int ic, double gain)
+{
+    return conv(m, name, oc, ic, 3, true, gain);
+}
+
 static nn_layer linear(nn_model *m, const char *name, int out, int in, double gain)
 {
     nn_layer l;
@@ -149,34 +154,8 @@ static void plan_refiner(nn_model *m, const char *name, int width, int gru, nn_r
     l->start[h->path.weight] = newton ? NN_NEWTON_START : NN_DESCENT_START;
 }
 
-/* The encoder pools between its convolutions; the decoder, which makes the detail, has two convolutions a level. */
-static void plan_latent(nn_model *m)
+nn_model *nn_model_empty(ts_status *st)
 {
-    const nn_arch *a = &m->arch;
-    nn_layers *l = m->layers;
-    const int levels = a->g_levels;
-    const double gain = leaky_gain(NN_LEAK_G);
-    char name[64];
-    for (int i = 0; i <= levels; i++) {
-        snprintf(name, sizeof name, "a.encoder%d", i);
-        l->encoder[i] = conv(m, name, nn_level_width(a, i), i ? nn_level_width(a, i - 1) : a->channels, 3, true, gain);
-    }
-    l->code = conv(m, "a.code", a->latent, nn_level_width(a, levels), 3, true, 1);
-    for (int i = levels; i >= 0; i--)
-        for (int j = 0; j < (i < levels ? 2 : 1); j++) {
-            snprintf(name, sizeof name, "a.decoder%d.conv%d", i, j + 1);
-            l->decoder[i][j] = conv(m, name, nn_level_width(a, i),
-                                    j                 ? nn_level_width(a, i)
-                                        : i == levels ? a->latent
-                                                      : nn_level_width(a, i + 1),
-                                    3, true, gain);
-        }
-    l->decoded = conv(m, "a.output", a->channels, nn_level_width(a, 0), 3, true, 0.25);
-}
-
-nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
-{
-    if (nn_arch_check(arch, st)) return NULL;
     nn_model *m = calloc(1, sizeof *m);
     nn_layers *l = m ? m->layers = calloc(1, sizeof *l) : NULL;
     if (l) {
@@ -186,11 +165,17 @@ nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
     if (!l || !m->param || !l->start) {
         nn_model_free(&m);
         ts_fail(st, TS_NOMEM, "no memory for the list of parameters");
-        return NULL;
     }
+    return m;
+}
+
+nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
+{
+    nn_model *m = nn_arch_check(arch, st) == TS_OK ? nn_model_empty(st) : NULL;
+    if (!m) return NULL;
+    nn_layers *l = m->layers;
     m->arch = *arch;
-    if (arch->latent > 0) plan_latent(m);
-    else plan_g(m);
+    plan_g(m);
     l->first[NN_H] = m->params;
     if (nn_arch_refines_full(arch)) plan_refiner(m, "h", arch->h_width, arch->h_gru, &l->h);
     l->first[NN_COARSE] = m->params;
@@ -215,12 +200,13 @@ static float *zero_block(size_t count, const char *what, ts_status *st)
     return p;
 }
 
-nn_model *nn_model_create(const nn_arch *arch, ts_status *st)
+nn_model *nn_model_zero(nn_model *plan, ts_status *st)
 {
-    nn_model *m = nn_model_plan(arch, st);
-    if (m && !(m->value = zero_block(m->count, "parameters", st))) nn_model_free(&m);
-    return m;
+    if (plan && !(plan->value = zero_block(plan->count, "parameters", st))) nn_model_free(&plan);
+    return plan;
 }
+
+nn_model *nn_model_create(const nn_arch *arch, ts_status *st) { return nn_model_zero(nn_model_plan(arch, st), st); }
 
 ts_code nn_model_room(nn_model *m, ts_status *st)
 {

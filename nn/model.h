@@ -2,6 +2,7 @@
 #ifndef NN_MODEL_H
 #define NN_MODEL_H
 #include "autograd/tape.h"
+#include "nn/coder.h"
 #include "render/scene.h"
 
 typedef enum nn_rmse {
@@ -60,8 +61,6 @@ typedef struct nn_arch {
     nn_gradient encoding; /* of the gradient for h */
     nn_descent descent;
     nn_compat compat;
-    int latent; /* channels of an auto-encoder's code: the model then is one of maps (nn_encode), shaped by g_width,
-                 * g_width_max and g_levels, and has neither g nor h; 0: g and h */
 } nn_arch;
 
 nn_arch nn_arch_default(void);
@@ -79,6 +78,7 @@ typedef struct nn_param {
 
 typedef struct nn_model {
     nn_arch arch;
+    nn_coder coder; /* code is not 0: an auto-encoder (nn/coder.h), and arch says nothing */
     nn_param *param;
     int params;
     size_t count;  /* floats in a block (each parameter starts at a multiple of 16) */
@@ -145,12 +145,6 @@ ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in
 
 /* One photograph is given, its light and camera are above the centre, and the weights are not published ones. */
 bool nn_orients(const nn_model *model, const nn_input *in);
-
-/* An auto-encoder of maps (arch.latent): [N, S, S, channels] to its code [N, S / 2^g_levels, S / 2^g_levels, latent],
- * and back to maps in
- * [-1, 1]. Convolutional: any S that is a multiple of 2^g_levels. */
-ag_value *nn_encode(ag_tape *tape, const nn_model *model, ag_value *maps);
-ag_value *nn_decode(ag_tape *tape, const nn_model *model, ag_value *code);
 
 /* How many pixels away from an output pixel h reads, in one step. */
 int nn_refiner_reach(const nn_model *model);

@@ -21,7 +21,7 @@ bool nn_input_check(ag_tape *tape, const nn_model *model, const nn_input *in)
     ts_shape s = in->image.shape;
     if (ag_status(tape)->code) return false;
     if (!model->value) ag_fail(tape, TS_INVALID, "the model has no parameters");
-    else if (model->arch.latent > 0)
+    else if (model->coder.code > 0)
         ag_fail(tape, TS_INVALID, "the model is an auto-encoder of maps: it cannot read a photograph");
     else if (!in->image.data || s.c != 3)
         ag_fail(tape, TS_INVALID, "the photograph has %d channels: 3 are needed", s.c);

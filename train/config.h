@@ -7,8 +7,9 @@
 #include <stdio.h>
 
 typedef struct tr_config {
-    nn_arch arch; /* [model] */
-    struct {      /* [data] */
+    nn_arch arch;   /* [model] */
+    nn_coder coder; /* [coder] */
+    struct {        /* [data] */
         int64_t seed;
         uint64_t families; /* bits as in io_procedural; 0: all */
         double noise, noise_spread, blur, exposure, vignette, white_balance, tilt, off_centre; /* as in io_camera */

@@ -58,10 +58,15 @@ const tr_key tr_keys[] = {
      "photographs"},
     {"model", "encoding", TR_CHOICE, AT(arch.encoding), 0, 1, NULL, encoding_names, false,
      "how h reads the gradient: as it is (raw, published), or asinh of ten times it"},
-    {"model", "latent", TR_INT, AT(arch.latent), 0, 1024, NULL, NULL, false,
-     "0: the model is g and h; else it is an auto-encoder of maps with this many channels in its code (shaped by "
-     "g_width, "
-     "g_width_max and g_levels; h_width and iterations must be 0)"},
+
+    {"coder", "code", TR_INT, AT(coder.code), 0, 1024, "0", NULL, false,
+     "channels of the code of an auto-encoder of maps, which is then what is trained (train.steps; model.h_width and "
+     "model.iterations are 0); 0: g and h"},
+    {"coder", "width", TR_INT, AT(coder.width), 1, 1024, "32", NULL, false,
+     "channels of its first level; level i has width * 2^i"},
+    {"coder", "width_max", TR_INT, AT(coder.width_max), 1, 4096, "128", NULL, false, "most channels that a level has"},
+    {"coder", "levels", TR_INT, AT(coder.levels), 1, 8, "3", NULL, false,
+     "levels: the code has a 2^levels-th of the maps' side"},
 
     {"data", "seed", TR_INT64, AT(data.seed), 0, 1e15, "1", NULL, false,
      "seed of the materials and of the camera's noise"},

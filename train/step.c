@@ -78,7 +78,7 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
         maps[0] = nn_predict(t->tape, t->model, &in);
         return add_loss(t, NULL, maps[0], ag_constant(t->tape, goals), 1, &row->render_start, &row->map_start);
     }
-    if (c->arch.latent > 0) {
+    if (c->coder.code > 0) {
         ag_value *goal = ag_constant(t->tape, goals);
         return add_loss(t, NULL, nn_decode(t->tape, t->model, nn_encode(t->tape, t->model, goal)), goal, 1,
                         &row->render_end, &row->map_end);

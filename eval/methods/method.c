@@ -222,9 +222,6 @@ size_t ev_bytes(const ev_estimator *e)
 ts_code ev_open_net(ev_estimator *e, const char *key, ts_status *st)
 {
     e->net = nn_model_load(ev_text(e, key), st);
-    if (e->net && e->net->arch.latent > 0)
-        return ts_fail(st, TS_UNSUPPORTED, "%s: is an auto-encoder of maps, not a network that reads a photograph",
-                       ev_text(e, key));
     if (e->net) e->tape = ag_tape_create(false, st);
     if (!e->tape) return st->code;
     ag_compute_set(e->tape, (ts_compute){.exact = e->exact});

@@ -47,8 +47,8 @@ static bool may_grow(const nn_arch *narrow, const nn_arch *wide)
 {
     return narrow->g_width <= wide->g_width && narrow->g_width_max <= wide->g_width_max &&
         narrow->g_levels == wide->g_levels && narrow->g_kernel == wide->g_kernel &&
-        narrow->g_kernel_first == wide->g_kernel_first && narrow->images == wide->images && narrow->latent == 0 &&
-        wide->latent == 0 && narrow->compat == NN_COMPAT_NONE && wide->compat == NN_COMPAT_NONE;
+        narrow->g_kernel_first == wide->g_kernel_first && narrow->images == wide->images &&
+        narrow->compat == NN_COMPAT_NONE && wide->compat == NN_COMPAT_NONE;
 }
 
 static inputs inputs_of(const nn_model *model, const nn_arch *narrow, int index, const int *from, const int *to)

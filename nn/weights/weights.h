@@ -29,6 +29,11 @@ ts_code nn_model_save(const nn_model *model, const float *values, const char *pa
  * (model->params of them, or NULL): marked parameters keep their values and are not counted; those taken are marked, so
  * that another file can supply the rest. TS_FORMAT when none was taken. */
 ts_code nn_model_init_from(nn_model *model, const char *path, bool *begun, int *taken, int *left, ts_status *st);
+/* The same of an auto-encoder ("format" = NN_CODER_FORMAT and one key "coder.FIELD" each). */
+#define NN_CODER_FORMAT "lgd-coder"
+int nn_coder_to_meta(const nn_coder *c, nn_meta *meta, int capacity, char *text, size_t text_size);
+ts_code nn_coder_from_file(const nn_file *file, nn_coder *c, ts_status *st);
+
 /* The architecture to metadata ("format" = "lgd" and one key "arch.FIELD" each: NN_ARCH_META entries, NN_ARCH_TEXT
  * bytes of text are enough) and back. A field that not every file has is written only when it is not the default.
  * Returns the number of entries, -1 when capacity or text_size is too small. Keys that do not begin with "arch." are
