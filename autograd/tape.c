@@ -27,7 +27,7 @@ static ag_tape *create(bool gradients, ag_packs *packs, ts_status *st)
 
 ag_tape *ag_tape_create(bool gradients, ts_status *st) { return create(gradients, ag_packs_create(st), st); }
 
-ag_tape *ag_tape_beside(const ag_tape *other, ts_status *st)
+ag_tape *ag_tape_sharing(const ag_tape *other, ts_status *st)
 {
     if (!other->frozen) {
         ts_fail(st, TS_INVALID, "a tape beside one that is not frozen");

@@ -55,7 +55,7 @@ struct ag_node {
 ag_tape *ag_tape_create(bool gradients, ts_status *st);
 /* One without gradients, frozen, with the packed weights of other, which is frozen too and stays so while both exist:
  * the two may be used by two threads at once, and destroyed in any order. NULL and st set on failure. */
-ag_tape *ag_tape_beside(const ag_tape *other, ts_status *st);
+ag_tape *ag_tape_sharing(const ag_tape *other, ts_status *st);
 void ag_tape_destroy(ag_tape **tape);
 
 /* Forgets all values and the error, keeps the memory. Packed weights are forgotten too unless ag_freeze was called. */

@@ -20,7 +20,7 @@ typedef struct gru_rounded {
 /* d [count][4c] = n, z, r, n' (tensor/gru.c). */
 gru_rounded gru_round(const ts_gru *g, const float *d, int count);
 /* y [count][oc] (+)= the input's n, z, r or the hidden z, r, n' times weights packed for TS_CONV_DATA_GRADIENT_BF16. */
-void gru_matrix_product(const gru_rounded *r, bool hidden, const float *packed, int oc, float *y, bool add);
+void gru_amx_product(const gru_rounded *r, bool hidden, const float *packed, int oc, float *y, bool add);
 /* sum [3c][channels, whole vectors] += the same, of each pixel, times x [count][channels] */
-void gru_matrix_weights(const gru_rounded *r, bool hidden, const float *x, int channels, float *sum);
+void gru_amx_weights(const gru_rounded *r, bool hidden, const float *x, int channels, float *sum);
 #endif
