@@ -14,7 +14,7 @@ allowed() {
     data/image) echo "data/image data tensor" ;;
     data/materials) echo "data/materials data data/image tensor tensor/kernels" ;;
     data) echo "data data/image data/materials tensor" ;;
-    cli) echo "cli tensor" ;;
+    cli) echo "cli autograd tensor" ;;
     cli/infer|cli/convert) echo "cli cli/infer infer nn nn/weights render data data/image autograd tensor tensor/conv" ;;
     train) echo "train cli nn nn/weights render data data/image data/materials autograd tensor tensor/conv" ;;
     infer) echo "infer nn nn/weights render data data/image autograd tensor tensor/conv" ;;

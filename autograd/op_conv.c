@@ -50,6 +50,7 @@ static void forward(ag_tape *tape, ag_node *node)
 {
     const conv_attr *a = node->attr;
     const ts_conv_use use = ts_conv_packing(&a->conv, TS_CONV_OUTPUT);
+    if (ag_traced()) ag_trace_way(tape, ts_conv_way_name(ts_conv_choose(&a->conv, TS_CONV_OUTPUT)));
     const float *packed = ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data);
     if (!packed) return;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
@@ -82,6 +83,7 @@ static void backward(ag_tape *tape, ag_node *node)
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[X], &accumulate);
     const ts_conv_use use = ts_conv_packing(&a->conv, TS_CONV_INPUT);
+    if (ag_traced()) ag_trace_way(tape, ts_conv_way_name(ts_conv_choose(&a->conv, TS_CONV_INPUT)));
     const float *packed = dx ? ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data) : NULL;
     if (packed)
         (use == TS_CONV_DATA_GRADIENT_BF16  ? ts_conv_data_gradient_bf16

@@ -195,7 +195,8 @@ ag_value *ag_apply(ag_tape *tape, const ag_op *op, int inputs, ag_value *const *
         node->in[i] = in[i];
         if (in[i] && in[i]->needs_grad) v->needs_grad = true;
     }
-    op->forward(tape, node);
+    if (ag_traced()) ag_run_traced(tape, node, false);
+    else op->forward(tape, node);
     if (tape->status.code != TS_OK) return NULL;
     return v->needs_grad && !ag_record(tape, node) ? NULL : v;
 }
@@ -228,7 +229,8 @@ void ag_walk(ag_tape *tape, size_t first)
     for (size_t i = tape->nodes; i-- > first;) {
         ag_node *node = tape->node[i];
         if (!node->out->grad_ready) continue; /* the loss does not depend on it */
-        node->op->backward(tape, node);
+        if (ag_traced()) ag_run_traced(tape, node, true);
+        else node->op->backward(tape, node);
         if (tape->status.code != TS_OK) break;
         node->out->grad_ready = false; /* passed on; a second backward starts it anew */
     }

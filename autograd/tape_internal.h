@@ -16,6 +16,7 @@ struct ag_tape {
     bool gradients, frozen;
     ts_compute compute;
     ag_value *into; /* of the next operation */
+    const char *way; /* of the convolution that runs, while it is traced */
     ag_node **node; /* grown by doubling and never shrunk */
     size_t nodes, node_room;
     ts_status status;
@@ -23,6 +24,8 @@ struct ag_tape {
 
 /* A leaf; grad (NULL: none is wanted) is where its gradient goes. */
 ag_value *ag_new_value(ag_tape *tape, ts_tensor t, float *grad);
+/* Forward or backward of a node, with a record for the sink of autograd/trace.h. */
+void ag_run_traced(ag_tape *tape, ag_node *node, bool backward);
 /* Puts the node at the end of the tape. */
 bool ag_record(ag_tape *tape, ag_node *node);
 /* Backward of the nodes from number first on, last first. */
