@@ -234,7 +234,7 @@ ag_value *ag_conv_with_constants(ag_tape *tape, ag_value *x, ag_value *constants
             return ag_fail(tape, TS_INVALID, "conv: %s and %s differ in more than the channels", ag_shape_text(text, s),
                            ag_shape_text(more, q));
         if (constants->needs_grad)
-            return ag_fail(tape, TS_INVALID, "conv: what stands beside the input is a constant and has no gradient");
+            return ag_fail(tape, TS_INVALID, "conv: the constants behind the input have no gradient");
         s.c += q.c;
     }
     if (w.w != w.c) return ag_fail(tape, TS_INVALID, "conv: weight %s is not {oc,ic,k,k}", ag_shape_text(text, w));

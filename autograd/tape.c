@@ -30,7 +30,7 @@ ag_tape *ag_tape_create(bool gradients, ts_status *st) { return create(gradients
 ag_tape *ag_tape_sharing(const ag_tape *other, ts_status *st)
 {
     if (!other->frozen) {
-        ts_fail(st, TS_INVALID, "a tape beside one that is not frozen");
+        ts_fail(st, TS_INVALID, "a tape that shares the packed weights of one that is not frozen");
         return NULL;
     }
     ag_tape *tape = create(false, ag_packs_hold(other->packs), st);
@@ -152,12 +152,12 @@ ag_value *ag_detach(ag_tape *tape, ag_value *v)
 
 bool ag_record(ag_tape *tape, ag_node *node)
 {
-    if (tape->nodes == tape->node_room) {
-        const size_t more = tape->node_room ? 2 * tape->node_room : 256;
+    if (tape->nodes == tape->node_capacity) {
+        const size_t more = tape->node_capacity ? 2 * tape->node_capacity : 256;
         ag_node **grown = realloc(tape->node, more * sizeof *grown);
         if (!grown) return no_memory(tape, "the list of operations");
         tape->node = grown;
-        tape->node_room = more;
+        tape->node_capacity = more;
     }
     tape->node[tape->nodes++] = node;
     return true;

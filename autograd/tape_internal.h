@@ -1,6 +1,6 @@
 /* What the tape is made of: for autograd/tape.c and autograd/checkpoint.c alone. */
-#ifndef AG_TAPE_INSIDE_H
-#define AG_TAPE_INSIDE_H
+#ifndef AG_TAPE_INTERNAL_H
+#define AG_TAPE_INTERNAL_H
 #include "autograd/packs.h"
 #include "autograd/tape.h"
 
@@ -15,10 +15,10 @@ struct ag_tape {
     ag_packs *packs;
     bool gradients, frozen;
     ts_compute compute;
-    ag_value *into; /* of the next operation */
+    ag_value *into;  /* of the next operation */
     const char *way; /* of the convolution that runs, while it is traced */
-    ag_node **node; /* grown by doubling and never shrunk */
-    size_t nodes, node_room;
+    ag_node **node;  /* grown by doubling and never shrunk */
+    size_t nodes, node_capacity;
     ts_status status;
 };
 

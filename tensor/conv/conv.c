@@ -58,7 +58,7 @@ void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float 
     const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * taps : taps,
                     i_step = forward ? taps : (ptrdiff_t)c->ic * taps;
     const int parts = ic > 16 ? 16 : ic;
-    /* Behind the panels once more, for the way of few outputs. */
+    /* Behind the panels once more, for the ways of few output channels. */
     const ts_conv_way narrow = conv_choose_narrow(ic, oc, c->k);
     float *behind = packed + conv_panels_count(ic, oc, c->k);
     if (narrow == TS_CONV_BY_COL2IM) conv_pack_col2im(ic, oc, c->k, !forward, weight, i_step, o_step, behind);

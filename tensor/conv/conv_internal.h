@@ -1,6 +1,28 @@
-/* Internal to tensor/conv*.c: what forward and the data gradient have in common. */
-#ifndef TS_CONV_PLAN_H
-#define TS_CONV_PLAN_H
+/* Internal to tensor/conv/: the layouts that the ways share, and the plan of a forward or a data gradient.
+ *
+ * Padded window (conv_window): rows of input with their padding columns, made when first needed, in a ring.
+ *
+ *      left                          columns
+ *       | pad | x[r][0] x[r][1] ... x[r][w-1] | pad |      source row r      at memory + r % rows * row
+ *       | pad | x[r+1][0] ...                 | pad |      source row r + 1
+ *                      ^ one pixel: ic floats (of bf16: pairs of channels), pixel floats apart
+ *
+ * Panel: the weights of two vectors of output channels (the last of one, where that is enough).
+ *
+ *      packed: [panel][ky][kx][input channel][2 lanes outputs]          lanes = 16 with AVX-512, 8 with AVX2
+ *
+ * Register tile (ts_tile): sums that stay in registers over all taps and input channels.
+ *
+ *                        panel's outputs
+ *                    +---------+---------+
+ *      pixel 0       | vector  | vector  |     y[p][o] = act(bias[o] + sum_k a[p][k] w[k][o])
+ *      pixel 1       |         |         |     k runs through segments: stretches of a and w that both are contiguous,
+ *      ...           |         |         |     such as the taps of a kernel row
+ *      pixel < TS_TILE_PIXELS            |
+ *                    +---------+---------+
+ */
+#ifndef TS_CONV_INTERNAL_H
+#define TS_CONV_INTERNAL_H
 #include "tensor/conv/conv.h"
 #include "tensor/kernels/conv.h"
 

@@ -2,7 +2,7 @@
 #include "ops.h"
 #include "tensor/conv/conv.h"
 #include "tensor/cpu.h"
-#include "tensor/gru.h"
+#include "tensor/conv/gru.h"
 #include "tensor/kernels/conv.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"

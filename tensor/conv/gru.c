@@ -1,4 +1,4 @@
-#include "tensor/gru_internal.h"
+#include "tensor/conv/gru_internal.h"
 #include "tensor/kernels/elementwise.h"
 #include "tensor/threads.h"
 #include <string.h>
