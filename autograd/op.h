@@ -25,6 +25,10 @@ static inline int64_t ag_part(int64_t n, int64_t first, int64_t chunk) { return 
 /* The same in pixels of c channels. */
 static inline int64_t ag_pixel_chunk(int c) { return c < AG_CHUNK ? AG_CHUNK / c : 1; }
 
+/* Whether a program watches (autograd/trace.h); and what it is told of the convolution that runs. */
+bool ag_traced(void);
+void ag_trace_way(ag_tape *tape, const char *way);
+
 /* "[n,h,w,c]" for messages; the text lives in the caller's buffer. */
 enum { AG_SHAPE_TEXT = 64 };
 const char *ag_shape_text(char text[AG_SHAPE_TEXT], ts_shape s);

@@ -13,8 +13,8 @@
 ag_value *ag_conv(ag_tape *tape, ag_value *x, ag_value *weight, ag_value *bias, int dilation, ts_pad pad, float leak);
 /* The same of x [N,H,W,i] and, behind its channels, constants [N,H,W,ic-i], which get no gradient, and for which none
  * is computed: an error if they want one. NULL: of x alone. */
-ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias,
-                         int dilation, ts_pad pad, float leak);
+ag_value *ag_conv_with_constants(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias,
+                                 int dilation, ts_pad pad, float leak);
 #endif
 
 enum { X, WEIGHT, BIAS, CONSTANTS, INPUTS };
@@ -37,23 +37,20 @@ static const float *input(ag_tape *tape, const ag_node *node)
     return both;
 }
 
-static bool winograd(const ts_conv *c, ts_conv_use use) { return !c->compute.exact && ts_conv_winograd(c, use); }
-
 static void weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
 {
-    const bool rounded = dweight && c->compute.precision == TS_BF16 && ts_conv_bf16_weights(),
-               other = dweight && !rounded && !c->compute.exact && ts_conv_winograd_weights(c);
-    if (rounded) ts_conv_weight_gradient_bf16(c, x, dy, dweight);
-    if (other) ts_conv_weight_gradient_winograd(c, x, dy, dweight);
-    ts_conv_weight_gradient(c, x, dy, rounded || other ? NULL : dweight, dbias);
+    const ts_conv_way way = dweight ? ts_conv_choose(c, TS_CONV_WEIGHTS) : TS_CONV_DIRECTLY;
+    const bool amx = way == TS_CONV_BY_AMX, winograd = way == TS_CONV_BY_WINOGRAD;
+    if (amx) ts_conv_weight_gradient_bf16(c, x, dy, dweight);
+    if (winograd) ts_conv_weight_gradient_winograd(c, x, dy, dweight);
+    ts_conv_weight_gradient(c, x, dy, amx || winograd ? NULL : dweight, dbias);
 }
 
 static void forward(ag_tape *tape, ag_node *node)
 {
     const conv_attr *a = node->attr;
-    const ts_conv_use use = a->conv.compute.precision == TS_BF16 ? TS_CONV_FORWARD_BF16
-        : winograd(&a->conv, TS_CONV_WINOGRAD)                   ? TS_CONV_WINOGRAD
-                                                                 : TS_CONV_FORWARD;
+    const ts_conv_use use = ts_conv_packing(&a->conv, TS_CONV_OUTPUT);
+    if (ag_traced()) ag_trace_way(tape, ts_conv_way_name(ts_conv_choose(&a->conv, TS_CONV_OUTPUT)));
     const float *packed = ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data);
     if (!packed) return;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
@@ -85,9 +82,8 @@ static void backward(ag_tape *tape, ag_node *node)
     ts_arena_release(ag_arena(tape), mark);
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[X], &accumulate);
-    const ts_conv_use use = a->conv.compute.precision == TS_BF16 ? TS_CONV_DATA_GRADIENT_BF16
-        : winograd(&a->conv, TS_CONV_DATA_GRADIENT_WINOGRAD)     ? TS_CONV_DATA_GRADIENT_WINOGRAD
-                                                                 : TS_CONV_DATA_GRADIENT;
+    const ts_conv_use use = ts_conv_packing(&a->conv, TS_CONV_INPUT);
+    if (ag_traced()) ag_trace_way(tape, ts_conv_way_name(ts_conv_choose(&a->conv, TS_CONV_INPUT)));
     const float *packed = dx ? ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data) : NULL;
     if (packed)
         (use == TS_CONV_DATA_GRADIENT_BF16  ? ts_conv_data_gradient_bf16
@@ -143,8 +139,8 @@ static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
 {
     const conv_case *c = user;
     const ts_conv *v = &c->attr.conv;
-    return ag_conv_beside(tape, in[X], v->constants ? in[CONSTANTS] : NULL, in[WEIGHT], c->bias ? in[BIAS] : NULL,
-                          v->dilation, v->pad, c->attr.leak);
+    return ag_conv_with_constants(tape, in[X], v->constants ? in[CONSTANTS] : NULL, in[WEIGHT],
+                                  c->bias ? in[BIAS] : NULL, v->dilation, v->pad, c->attr.leak);
 }
 
 /* u is linear in each value alone: it crosses 0 within the step when its signs at both ends differ. */
@@ -225,8 +221,8 @@ static void cases(ag_gradcheck *check)
 
 const ag_op op_conv = {"conv", forward, backward, reference, cases};
 
-ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias,
-                         int dilation, ts_pad pad, float leak)
+ag_value *ag_conv_with_constants(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias,
+                                 int dilation, ts_pad pad, float leak)
 {
     ag_value *in[INPUTS] = {x, weight, bias, constants};
     char text[AG_SHAPE_TEXT], more[AG_SHAPE_TEXT];
@@ -238,7 +234,7 @@ ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_val
             return ag_fail(tape, TS_INVALID, "conv: %s and %s differ in more than the channels", ag_shape_text(text, s),
                            ag_shape_text(more, q));
         if (constants->needs_grad)
-            return ag_fail(tape, TS_INVALID, "conv: what stands beside the input is a constant and has no gradient");
+            return ag_fail(tape, TS_INVALID, "conv: the constants behind the input have no gradient");
         s.c += q.c;
     }
     if (w.w != w.c) return ag_fail(tape, TS_INVALID, "conv: weight %s is not {oc,ic,k,k}", ag_shape_text(text, w));
@@ -255,5 +251,5 @@ ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_val
 
 ag_value *ag_conv(ag_tape *tape, ag_value *x, ag_value *weight, ag_value *bias, int dilation, ts_pad pad, float leak)
 {
-    return ag_conv_beside(tape, x, NULL, weight, bias, dilation, pad, leak);
+    return ag_conv_with_constants(tape, x, NULL, weight, bias, dilation, pad, leak);
 }

@@ -1,11 +1,11 @@
 /* ih = x W_ih' + b_ih,  hh = old W_hh' + b_hh,  z = sigmoid(ih_z + hh_z),  r = sigmoid(ih_r + hh_r),  m = tanh(ih_n + r
- * hh_n), y = (1 - z) old + z m; its gradients as in tensor/kernels/elementwise.h and tensor/gru.h, where the source is
- * named x: [N,H,W,I], old: [N,H,W,C] or NULL = 0, W_ih: {3C,I,1,1}, W_hh: {3C,C,1,1} in chunks z, r, n, biases:
- * [1,1,1,3C], y: [N,H,W,C] */
+ * hh_n), y = (1 - z) old + z m; its gradients as in tensor/kernels/elementwise.h and tensor/conv/gru.h, where the
+ * source is named x: [N,H,W,I], old: [N,H,W,C] or NULL = 0, W_ih: {3C,I,1,1}, W_hh: {3C,C,1,1} in chunks z, r, n,
+ * biases: [1,1,1,3C], y: [N,H,W,C] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
-#include "tensor/gru.h"
+#include "tensor/conv/gru.h"
 #include <math.h>
 
 #ifdef AG_API

@@ -4,7 +4,7 @@
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
-#include "tensor/gemm.h"
+#include "tensor/conv/gemm.h"
 #include <string.h>
 
 #ifdef AG_API

@@ -27,10 +27,10 @@ static ag_tape *create(bool gradients, ag_packs *packs, ts_status *st)
 
 ag_tape *ag_tape_create(bool gradients, ts_status *st) { return create(gradients, ag_packs_create(st), st); }
 
-ag_tape *ag_tape_beside(const ag_tape *other, ts_status *st)
+ag_tape *ag_tape_sharing(const ag_tape *other, ts_status *st)
 {
     if (!other->frozen) {
-        ts_fail(st, TS_INVALID, "a tape beside one that is not frozen");
+        ts_fail(st, TS_INVALID, "a tape that shares the packed weights of one that is not frozen");
         return NULL;
     }
     ag_tape *tape = create(false, ag_packs_hold(other->packs), st);
@@ -152,12 +152,12 @@ ag_value *ag_detach(ag_tape *tape, ag_value *v)
 
 bool ag_record(ag_tape *tape, ag_node *node)
 {
-    if (tape->nodes == tape->node_room) {
-        const size_t more = tape->node_room ? 2 * tape->node_room : 256;
+    if (tape->nodes == tape->node_capacity) {
+        const size_t more = tape->node_capacity ? 2 * tape->node_capacity : 256;
         ag_node **grown = realloc(tape->node, more * sizeof *grown);
         if (!grown) return no_memory(tape, "the list of operations");
         tape->node = grown;
-        tape->node_room = more;
+        tape->node_capacity = more;
     }
     tape->node[tape->nodes++] = node;
     return true;
@@ -195,7 +195,8 @@ ag_value *ag_apply(ag_tape *tape, const ag_op *op, int inputs, ag_value *const *
         node->in[i] = in[i];
         if (in[i] && in[i]->needs_grad) v->needs_grad = true;
     }
-    op->forward(tape, node);
+    if (ag_traced()) ag_run_traced(tape, node, false);
+    else op->forward(tape, node);
     if (tape->status.code != TS_OK) return NULL;
     return v->needs_grad && !ag_record(tape, node) ? NULL : v;
 }
@@ -228,7 +229,8 @@ void ag_walk(ag_tape *tape, size_t first)
     for (size_t i = tape->nodes; i-- > first;) {
         ag_node *node = tape->node[i];
         if (!node->out->grad_ready) continue; /* the loss does not depend on it */
-        node->op->backward(tape, node);
+        if (ag_traced()) ag_run_traced(tape, node, true);
+        else node->op->backward(tape, node);
         if (tape->status.code != TS_OK) break;
         node->out->grad_ready = false; /* passed on; a second backward starts it anew */
     }

@@ -238,7 +238,9 @@ BENCH(conv_bf16)
         row("bf16 forward", published[i], forward_bf16);
         row("data gradient", published[i], data_gradient);
         row("bf16 data gradient", published[i], data_gradient_bf16);
-        if (!ts_conv_bf16_weights()) continue;
+        ts_conv rounded = published[i];
+        rounded.compute.precision = TS_BF16;
+        if (ts_conv_choose(&rounded, TS_CONV_WEIGHTS) != TS_CONV_BY_AMX) continue;
         row("weight gradient", published[i], weight_gradient);
         row("bf16 weight gradient", published[i], weight_gradient_bf16);
     }
@@ -253,7 +255,8 @@ BENCH(peer_conv)
     bench_heading("single convolutions beside their floor (the peak) and the peer");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
         peer_row("forward", "conv", shape[i], forward, 1);
-        if (ts_conv_winograd(&shape[i], TS_CONV_WINOGRAD)) peer_row("Winograd forward", "conv", shape[i], winograd, 1);
+        if (ts_conv_choose(&shape[i], TS_CONV_OUTPUT) == TS_CONV_BY_WINOGRAD)
+            peer_row("Winograd forward", "conv", shape[i], winograd, 1);
         peer_row("both gradients", "gradient", shape[i], both_gradients, 2);
     }
 }
@@ -269,7 +272,7 @@ BENCH(two_threads)
     bench_heading("all threads beside one, and what the peak gains");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++)
         for (int k = 0; k < 4; k++) {
-            if (k == 3 && !ts_conv_winograd(&shape[i], TS_CONV_WINOGRAD)) continue;
+            if (k == 3 && ts_conv_choose(&shape[i], TS_CONV_OUTPUT) != TS_CONV_BY_WINOGRAD) continue;
             work w = make(shape[i]);
             ts_threads_set(1);
             const bench_time one = bench_measure(f[k], &w);

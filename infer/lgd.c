@@ -107,7 +107,7 @@ static workspace *take(lgd_model *model, ts_status *st)
     workspace *w = model->idle;
     if (w) model->idle = w->next;
     pthread_mutex_unlock(&model->lock);
-    return w ? w : make_workspace(ag_tape_beside(model->first, st), st);
+    return w ? w : make_workspace(ag_tape_sharing(model->first, st), st);
 }
 
 static void give_back(lgd_model *model, workspace *w)

@@ -62,7 +62,7 @@ bool nn_all_finite(const float *v, size_t count);
 ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index);
 ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad,
                   float leak);
-/* constants: NULL, or further channels of the input, as ag_conv_beside has them. */
+/* constants: NULL, or further channels of the input, as ag_conv_with_constants has them. */
 ag_value *nn_conv_beside(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants,
                          int dilation, ts_pad pad, float leak);
 ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x);

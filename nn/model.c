@@ -274,8 +274,8 @@ ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index)
 ag_value *nn_conv_beside(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants,
                          int dilation, ts_pad pad, float leak)
 {
-    return ag_conv_beside(tape, x, constants, nn_parameter(tape, model, layer.weight),
-                          nn_parameter(tape, model, layer.bias), dilation, pad, leak);
+    return ag_conv_with_constants(tape, x, constants, nn_parameter(tape, model, layer.weight),
+                                  nn_parameter(tape, model, layer.bias), dilation, pad, leak);
 }
 
 ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad,

@@ -1,6 +1,6 @@
 /* Memory for numbers: where arenas, scratch and parameters come from. */
-#ifndef TS_BLOCK_H
-#define TS_BLOCK_H
+#ifndef TS_MEMORY_H
+#define TS_MEMORY_H
 #include <stddef.h>
 
 /* bytes, aligned to 64, contents undefined; NULL when there is none. The caller frees with free(). A large block is

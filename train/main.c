@@ -140,6 +140,7 @@ int main(int argc, char **argv)
     ts_status st = {0};
     char folder[1100];
     if (!set || code != CL_OK) goto end;
+    cl_trace();
     while ((option = getopt_long(argc, argv, "", options, NULL)) != -1) {
         int64_t threads;
         switch (option) {

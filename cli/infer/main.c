@@ -229,6 +229,7 @@ int main(int argc, char **argv)
     if (bad) return bad;
     if (lgd_command_parse(argc, argv, &c, &st) != TS_OK) return cl_usage("%s", st.message);
     cl_catch_interrupt();
+    cl_trace();
     int code = CL_OK;
     if (c.help) print_help();
     else if (c.version) cl_print_version();

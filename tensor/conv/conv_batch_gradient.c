@@ -39,7 +39,7 @@ static staged stage(const ts_conv *c, const float *x, const float *dy)
 /* The pairs of positions that a tap joins, as rows of count pixels of a sum. */
 typedef struct joined {
     int rows, count;
-    ptrdiff_t x[CONV_POSITIONS], dy[CONV_POSITIONS];
+    ptrdiff_t x[CONV_BATCH_PIXELS], dy[CONV_BATCH_PIXELS];
 } joined;
 
 /* Neighbours stay neighbours unless they are replicated. */
@@ -70,7 +70,7 @@ static void fetch(const float *dweight, ptrdiff_t row, int begin, int end, int l
         for (int i = 0; i < length; i += 16) __builtin_prefetch(dweight + o * row + i, 1, 2);
 }
 
-void conv_weight_positions(const ts_conv *c, const float *x, const float *dy, float *dweight)
+void conv_batch_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight)
 {
     const struct ts_conv_kernels *kernels = ts_conv_k();
     const int lanes2 = 2 * kernels->lanes, panels = conv_panels(c->oc), taps = c->k * c->k;

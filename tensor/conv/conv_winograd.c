@@ -8,8 +8,7 @@
 #include <string.h>
 
 enum {
-    TILES = 28, /* two full register tiles; their 36 inputs and outputs stay in the second cache beside the weights */
-    TILES_LEAST = 64 /* fewer save less than the transformation of the weights costs */
+    TILES = 28 /* two full register tiles; their 36 inputs and outputs stay in the second cache beside the weights */
 };
 
 /* Tiles along a side of the interleaved images, the largest of which has ceil(size / dilation) pixels. */
@@ -53,14 +52,6 @@ winograd_grid winograd_grid_gradient(const ts_conv *c, int fold)
                                       .oc = ts_conv_variables(c),
                                       .dilation = c->dilation,
                                       .first = -c->dilation - fold});
-}
-
-bool ts_conv_winograd(const ts_conv *c, ts_conv_use use)
-{
-    const bool forward = use == TS_CONV_WINOGRAD;
-    if (c->k != 3 || (forward ? c->ic : c->oc) < 16 || (forward ? c->oc : ts_conv_variables(c)) < 24) return false;
-    const winograd_grid g = winograd_grid_forward(c); /* tiles that are mostly outside cost what fewer products save */
-    return g.tiles >= TILES_LEAST && 2 * g.tiles * WINOGRAD_SIDE * WINOGRAD_SIDE <= 3 * (int64_t)c->n * c->h * c->w;
 }
 
 size_t conv_winograd_count(int ic, int oc) { return (size_t)conv_panels_count(ic, oc, 1) * WINOGRAD_AREA; }

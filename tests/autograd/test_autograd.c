@@ -343,9 +343,9 @@ TEST(tape_beside_another_shares_its_packed_weights)
     const ts_conv c = {1, 8, 8, 3, 4, 3, 1, TS_PAD_ZERO, 0, {0}};
     ag_tape *tape = prepared(false);
     ag_freeze(tape, false);
-    CHECK(!ag_tape_beside(tape, &st) && st.code == TS_INVALID, "beside one whose weights change");
+    CHECK(!ag_tape_sharing(tape, &st) && st.code == TS_INVALID, "beside one whose weights change");
     ag_freeze(tape, true);
-    ag_tape *other = ag_tape_beside(tape, &st);
+    ag_tape *other = ag_tape_sharing(tape, &st);
     CHECK(other, "%s", st.message);
     const float *packed = ag_packed(other, &c, TS_CONV_FORWARD, w), first = packed[0];
     ag_reset(other);

@@ -54,6 +54,18 @@ threads_agree() {
     done
 }
 
+# LGD_TRACE=1 shows every operation and changes no byte; without it nothing is shown.
+trace() {
+    model
+    photo "$T/p.ppm" 32 32
+    expect 0 infer -q "$T/p.ppm" -o "$T/0"
+    [ ! -s "$T/err" ] || fail "untraced says: $(cat "$T/err")"
+    expect 0 env LGD_TRACE=1 "$BIN/lgd-infer" --size 32 --iterations 1 --threads 1 -q "$T/p.ppm" -o "$T/1"
+    grep -Eq '^trace: conv +forward +1x[0-9x]+ -> 1x[0-9x]+, with [0-9x]+, [A-Za-z0-9]+, [0-9.]+ ms$' "$T/err" || fail "no convolution: $(head -3 "$T/err")"
+    if grep -v '^trace: ' "$T/err"; then fail "other lines"; fi
+    for f in $FILES; do cmp -s "$T/0/p/$f" "$T/1/p/$f" || fail "$f differs when traced"; done
+}
+
 only_what_is_asked_for() {
     model
     photo "$T/p.ppm" 32 32
@@ -276,6 +288,7 @@ check infer_wrong_usage wrong_usage
 check infer_whole_run whole_run
 check infer_far_from_the_photograph far_from_the_photograph
 check infer_threads_agree threads_agree
+check infer_trace trace
 check infer_writes_only_what_is_asked_for only_what_is_asked_for
 check infer_overlap_changes_nothing overlap_changes_nothing
 check infer_old_results_are_replaced old_results

@@ -2,7 +2,7 @@
 #include "ops.h"
 #include "tensor/conv/conv.h"
 #include "tensor/cpu.h"
-#include "tensor/gru.h"
+#include "tensor/conv/gru.h"
 #include "tensor/kernels/conv.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"
@@ -13,6 +13,12 @@
 #include <string.h>
 
 enum { GUARD = 64 };
+
+static bool amx(void)
+{
+    const ts_conv c = {1, 1, 1, 1, 1, 1, 1, TS_PAD_ZERO, 0, {.precision = TS_BF16}};
+    return ts_conv_choose(&c, TS_CONV_WEIGHTS) == TS_CONV_BY_AMX;
+}
 
 static float from_bits(uint32_t bits)
 {
@@ -182,7 +188,7 @@ static void against_naive(ts_conv c, ts_rng *r)
         same(dx, naive_dx, count, (double)c.oc * pow(c.k, 4), b ? "added data gradient" : "data gradient", &c);
         free(dx), free(naive_dx);
     }
-    if (ts_conv_bf16_weights()) {
+    if (amx()) {
         float *dweight = gradient_of_weights(&p), *naive = values(weight_count(&c), NULL);
         memcpy(naive, p.weight, weight_count(&c) * sizeof(float));
         ts_conv_weight_gradient_naive(&c, x, dy, naive, NULL);
@@ -227,7 +233,7 @@ TEST(bf16_conv_same_bytes_for_any_threads)
                 ts_threads_set(threads[t]);
                 float *y_now = run(&p, TS_CONV_FORWARD_BF16, p.bias, NULL),
                       *dx_now = run(&p, TS_CONV_DATA_GRADIENT_BF16, NULL, NULL);
-                float *dweight_now = ts_conv_bf16_weights() ? gradient_of_weights(&p) : NULL;
+                float *dweight_now = amx() ? gradient_of_weights(&p) : NULL;
                 CHECK(!y ||
                           (!memcmp(y, y_now, out_count(&p.c) * sizeof(float)) &&
                            !memcmp(dx, dx_now, in_count(&p.c) * sizeof(float))),
@@ -320,7 +326,7 @@ TEST(bf16_in_ag_conv)
     same(dx[1], dx[2], in_count(c), 9. * c->oc / 512, "data gradient", c);
     CHECK(memcmp(y[0], y[1], out_count(c) * sizeof(float)) && memcmp(dx[0], dx[1], in_count(c) * sizeof(float)),
           "bf16 gives what f32 gives");
-    if (ts_conv_bf16_weights()) {
+    if (amx()) {
         memset(dweight[2], 0, weight_count(c) * sizeof(float));
         ts_conv_weight_gradient_naive(c, x, p.dy, dweight[2], NULL);
         same(dweight[1], dweight[2], weight_count(c), (double)c->h * c->w / 512, "weight gradient", c);

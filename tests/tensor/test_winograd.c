@@ -172,9 +172,8 @@ TEST(winograd_in_ag_conv)
     ts_rng r = ts_rng_make(13, TS_STREAM_TEST, 0);
     float *x = values(count_x(&c), &r), *weight = values(weights, &r), *mix = values((size_t)c.oc, &r),
           *result[3][RESULTS];
-    CHECK(ts_conv_winograd(&c, TS_CONV_WINOGRAD) && ts_conv_winograd(&c, TS_CONV_DATA_GRADIENT_WINOGRAD) &&
-              ts_conv_winograd_weights(&c),
-          "this shape should pay");
+    for (int d = TS_CONV_OUTPUT; d <= TS_CONV_WEIGHTS; d++)
+        CHECK(ts_conv_choose(&c, (ts_conv_direction)d) == TS_CONV_BY_WINOGRAD, "this shape should pay");
     for (int i = 0; i < 3; i++) {
         ts_status st = {0};
         ag_tape *tape = ag_tape_create(true, &st);

@@ -1,5 +1,5 @@
 /* Matrix products with the tiles of the convolutions: rows of A are the pixels, B is packed as the weights. */
-#include "tensor/gemm.h"
+#include "tensor/conv/gemm.h"
 #include "tensor/conv/conv_internal.h"
 #include "tensor/threads.h"
 

@@ -1,4 +1,4 @@
-#include "tensor/gru_internal.h"
+#include "tensor/conv/gru_internal.h"
 #include "tensor/kernels/elementwise.h"
 #include "tensor/threads.h"
 #include <string.h>
@@ -35,13 +35,13 @@ static void gates_forward(conv_plan p, const float *x, int count, float *y)
     p.x = x;
     p.y = y;
     if (p.bf16) {
-        const size_t behind = (size_t)(CONV_MATRIX_SLACK * (p.ic + 1));
+        const size_t behind = (size_t)(CONV_AMX_SLACK * (p.ic + 1));
         float *rounded = ts_scratch(2, sizeof(float) * ((size_t)(GRU_BAND * p.ic) + behind));
         conv_put_pixels(&p, x, count, rounded, p.ic);
         p.x = rounded;
-        if (conv_by_matrix()) {
+        if (conv_amx_present()) {
             memset(rounded + count * p.ic, 0, behind * sizeof(float));
-            conv_matrix_pixels(&p, count);
+            conv_amx_pixels(&p, count);
             return;
         }
     }
@@ -138,10 +138,10 @@ static void run_band(const ts_gru *g, int64_t p, int count, const float *x, cons
                                      to->dold_add, s.bias);
     if (ts_gru_backward_bf16(g)) {
         const gru_rounded r = gru_round(g, d, count);
-        if (dold) gru_matrix_product(&r, true, hh_packed, c, dold, true);
-        if (to->dx) gru_matrix_product(&r, false, ih_packed, g->ic, to->dx + p * g->ic, to->dx_add);
-        if (to->ih_weight) gru_matrix_weights(&r, false, x + p * g->ic, g->ic, s.input);
-        if (to->hh_weight && old) gru_matrix_weights(&r, true, old + p * c, c, s.hidden);
+        if (dold) gru_amx_product(&r, true, hh_packed, c, dold, true);
+        if (to->dx) gru_amx_product(&r, false, ih_packed, g->ic, to->dx + p * g->ic, to->dx_add);
+        if (to->ih_weight) gru_amx_weights(&r, false, x + p * g->ic, g->ic, s.input);
+        if (to->hh_weight && old) gru_amx_weights(&r, true, old + p * c, c, s.hidden);
         return;
     }
     if (dold) product(d, 4 * c, &hidden, 1, 3 * c, hh_packed, c, dold, true, count);
