@@ -33,10 +33,10 @@ enum { LGD_AUTO = -2, LGD_AUTO_MOST = 24 };
  * photograph's size have a network; where they have none they cost so little that ending them early saves nothing
  * (docs/performance.md). */
 #define LGD_TOLERANCE 0.003
-#define LGD_ORIENTATIONS_USUAL                                                             \
+#define LGD_ORIENTATIONS_DEFAULT                                                           \
     2 /* as little error in renderings as 8 in a quarter of g's time (docs/performance.md) \
        */
-#define LGD_TOLERANCE_USUAL (-1.0)
+#define LGD_TOLERANCE_DEFAULT (-1.0)
 
 enum { LGD_F32, LGD_BF16 };
 
@@ -63,8 +63,8 @@ typedef struct lgd_options {
     const unsigned char *mask;
     /* The photograph (over 512 pixels a side: each of its tiles of 256 x 256, with a mask of 128 x 128) is refined no
      * further once the RMS of a step's change of its maps (in their encoding, [-1, 1]), over it and all that it reads,
-     * is below this: its maps are then exactly those of that step. 0: never. LGD_TOLERANCE_USUAL: LGD_TOLERANCE where a
-     * network refines at the photograph's size, iterations is -1, exact 0 and the weights are not the published ones,
+     * is below this: its maps are then exactly those of that step. 0: never. LGD_TOLERANCE_DEFAULT: LGD_TOLERANCE where
+     * a network refines at the photograph's size, iterations is -1, exact 0 and the weights are not the published ones,
      * whose steps couple all pixels; else 0. */
     double tolerance;
     /* Photographs over 512 pixels a side, and those with mask or tolerance, are refined tile by tile, all steps of a

@@ -23,9 +23,9 @@ static bool shipped(const char *name, char path[LGD_PATH_MAX])
         folder[length] = 0;
         char *slash = strrchr(folder, '/');
         if (slash) *slash = 0;
-        static const char *const beside[] = {"../share/lgd", "../../models"};
+        static const char *const folders[] = {"../share/lgd", "../../models"};
         for (int i = 0; i < 2; i++) {
-            snprintf(path, LGD_PATH_MAX, "%s/%s/%s.safetensors", folder, beside[i], name);
+            snprintf(path, LGD_PATH_MAX, "%s/%s/%s.safetensors", folder, folders[i], name);
             if (access(path, F_OK) == 0) return true;
         }
     }
@@ -46,7 +46,7 @@ ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_
     if (option) name = option;
     if (shipped(name, path)) return TS_OK;
     return ts_fail(st, TS_IO,
-                   "no %s.safetensors found in ../share/lgd or ../../models beside the program or in %s: name a file "
+                   "no %s.safetensors found in ../share/lgd or ../../models folders the program or in %s: name a file "
                    "with --model or LGD_MODEL",
                    name, LGD_DATADIR);
 }

@@ -70,7 +70,7 @@ nn_model *nn_model_load(const char *path, ts_status *st)
                 ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" is missing", path, m->param[i].name);
                 nn_model_free(&m);
             }
-        if (m && (nn_model_room(m, st) || read_values(f, m, st))) nn_model_free(&m);
+        if (m && (nn_model_allocate(m, st) || read_values(f, m, st))) nn_model_free(&m);
     }
     nn_file_close(&f);
     return m;
