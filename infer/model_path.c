@@ -17,7 +17,7 @@ static ts_code take(const char *from, char path[LGD_PATH_MAX], ts_status *st)
 /* The file of a model that ships with the program. */
 static bool shipped(const char *name, char path[LGD_PATH_MAX])
 {
-    char folder[LGD_PATH_MAX - 64 - LGD_NAME_MAX]; /* room for what is appended */
+    char folder[LGD_PATH_MAX - 64 - LGD_NAME_MAX]; /* the rest is appended */
     const ssize_t length = readlink("/proc/self/exe", folder, sizeof folder - 1);
     if (length > 0) {
         folder[length] = 0;

@@ -39,7 +39,7 @@ const cl_argument lgd_infer_arguments[] = {
      "in place of PHOTO: several photographs of one sample under known lights, listed in an INI file\n"
      "or a folder in MaterialGAN's layout; by default with the weights named multi"},
     {POWER, "light-power", "P",
-     "how strong the light is, in usual ones (of a capture: in those that it names): a number in 0.01 .. 100, or\n"
+     "how strong the light is, times the default one (of a capture: times those that it names): 0.01 .. 100, or\n"
      "auto, estimated from the photograph and reported (the default; of a capture 1)"},
     {MASK, "mask", "FILE",
      "an image of the photographs' shape: only where it is brighter than black are the maps sure to be refined,\n"
