@@ -4,8 +4,7 @@
 #include "bench/bench.h"
 #include "eval/metrics/metrics.h"
 #include "eval/sets.h"
-#include "infer/encode.h"
-#include "infer/lgd.h"
+#include "infer/estimate.h"
 #include "infer/model_path.h"
 #include "render/error.h"
 #include <stdio.h>
@@ -59,15 +58,15 @@ static double seconds(void)
 static void run(lgd_model *model, const setting *k, sample *s, int count, double *time_mean, double *error_mean)
 {
     static float maps[PIXELS * MAP_CHANNELS];
-    lgd_error e;
+    ts_status st = {0};
     *time_mean = *error_mean = 0;
     for (int i = 0; i < count; i++) {
         const double begin = seconds();
-        if (lgd_estimate(model, s[i].image, SIDE, &k->options, maps, &e)) abort();
+        const lgd_photo photo = lgd_flash_photo(s[i].image);
+        if (lgd_model_estimate(model, &photo, 1, SIDE, &k->options, true, maps, &st)) abort();
         *time_mean += (seconds() - begin) / count;
         io_material truth = {.size = SIDE, .maps = s[i].truth};
         const ev_case c = ev_case_of_maps(&truth, s[i].image, s[i].views, false);
-        lgd_encode(maps, SIDE, maps, 0);
         *error_mean += ev_score(&c, maps, MAP_CHANNELS).value[EV_RENDER] / count;
     }
 }

@@ -35,7 +35,7 @@ enum {
     PATH_LENGTH = 4096
 };
 
-static const lgd_argument arguments[] = {
+static const cl_argument arguments[] = {
     {'o', "output", "DIR", "write results.csv, summary.csv, times.csv, results.json and report.html there (required)"},
     {'d', "set", "KIND:WHERE",
      "materials to evaluate (required, may be repeated):\nprocedural:SEED,COUNT  generated materials\n"
@@ -120,7 +120,7 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
     int64_t n = 0;
     ts_code code = TS_OK;
     while (!code && !c->help && !c->version &&
-           (key = lgd_argument_next(argc, argv, arguments, &value, &operands, st)) != LGD_ARGUMENT_END) {
+           (key = cl_argument_next(argc, argv, arguments, &value, &operands, st)) != CL_ARGUMENT_END) {
         switch (key) {
         case 'o': c->out = value; break;
         case 'm': c->model = value; break;
@@ -154,7 +154,7 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
         case FAST: c->fast = true; break;
         case LPIPS:
             c->lpips[0] = value;
-            if (!(c->lpips[1] = lgd_argument_second(argc, argv)))
+            if (!(c->lpips[1] = cl_argument_second(argc, argv)))
                 code = ts_fail(st, TS_INVALID, "--lpips-weights needs two files: TRUNK LINEAR");
             break;
         case SEED: code = whole("seed", value, 0, INT64_MAX, &c->seed, st); break;
@@ -219,7 +219,7 @@ static void print_help(void)
          "  renderings under other lights and cameras, the mean angle between the normals in degrees,\n"
          "  and SSIM, FLIP (and LPIPS) of the renderings, for R_0 and the last step.\n"
          "The same seed gives the same numbers for any number of threads.\n");
-    lgd_argument_help(arguments, stdout);
+    cl_argument_help(arguments, stdout);
     puts("\nMethods (values contain no commas; every method also has label=TEXT):");
     ev_method_help(stdout);
     puts("\nExit status: 0 done, 1 a material failed (the others are in the results) or nothing could be written, 2 "

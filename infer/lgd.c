@@ -1,7 +1,6 @@
 /* The public C API (infer/lgd.h): models and who computes with them, and what a caller may get wrong. */
 #include "infer/lgd.h"
 #include "data/material.h"
-#include "infer/encode.h"
 #include "infer/estimate.h"
 #include "infer/tiles.h"
 #include "nn/weights/weights.h"
@@ -52,7 +51,7 @@ const char *lgd_version(void) { return LGD_VERSION; }
 void lgd_options_init(lgd_options *options, size_t size)
 {
     const lgd_options o = {
-        .size = size, .iterations = -1, .orientations = LGD_ORIENTATIONS_USUAL, .tolerance = LGD_TOLERANCE_USUAL};
+        .size = size, .iterations = -1, .orientations = LGD_ORIENTATIONS_DEFAULT, .tolerance = LGD_TOLERANCE_DEFAULT};
     memset(options, 0, size);
     memcpy(options, &o, size < sizeof o ? size : sizeof o);
 }
@@ -179,10 +178,9 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
     if (o->threads < 0 || o->threads > THREADS_MAX)
         return ts_fail(st, TS_INVALID, "lgd_estimate: threads is %d and must lie in 1 .. %d, or be 0 for all",
                        o->threads, THREADS_MAX);
-    if (!(o->tolerance >= 0 && o->tolerance <= 1) && o->tolerance != LGD_TOLERANCE_USUAL)
-        return ts_fail(st, TS_INVALID,
-                       "lgd_estimate: tolerance is %g and must lie in 0 .. 1, or be %g for the usual one", o->tolerance,
-                       LGD_TOLERANCE_USUAL);
+    if (!(o->tolerance >= 0 && o->tolerance <= 1) && o->tolerance != LGD_TOLERANCE_DEFAULT)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: tolerance is %g and must lie in 0 .. 1, or be %g for the default",
+                       o->tolerance, LGD_TOLERANCE_DEFAULT);
     if (o->precision != LGD_F32 && o->precision != LGD_BF16)
         return ts_fail(st, TS_INVALID, "lgd_estimate: precision is %d and must be %d for f32 or %d for bf16",
                        o->precision, LGD_F32, LGD_BF16);
@@ -199,43 +197,25 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
     return TS_OK;
 }
 
-void lgd_encode(const float *maps, int side, float *encoded, int threads)
+ts_code lgd_model_estimate(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,
+                           bool encoded, float *maps, ts_status *st)
 {
-    const int64_t pixels = (int64_t)side * side;
-#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static)
-    for (int64_t i = 0; i < pixels; i++) {
-        const float *m = maps + i * MAP_CHANNELS;
-        const float x = m[MAP_NORMAL], y = m[MAP_NORMAL + 1];
-        io_texel t = {.normal = {x, y, sqrtf(fmaxf(1 - x * x - y * y, 0))}, .roughness = m[MAP_ROUGHNESS]};
-        memcpy(t.diffuse, m + MAP_DIFFUSE, sizeof t.diffuse);
-        memcpy(t.specular, m + MAP_SPECULAR, sizeof t.specular);
-        io_texel_put(encoded + i * MAP_CHANNELS, &t);
-    }
+    lgd_options o;
+    if (take_options(options, &o, st) != TS_OK || check_arguments(model, photo, photos, side, &o, maps, st) != TS_OK)
+        return st->code;
+    workspace *w = take(model, st);
+    if (!w) return st->code;
+    const lgd_estimator e = {.net = model->net, .tape = w->tape, .encoded = encoded};
+    lgd_estimator_run(&e, photo, photos, side, &o, maps, st);
+    give_back(model, w);
+    return st->code;
 }
 
 int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,
                         float *maps, lgd_error *error)
 {
     ts_status st = {0};
-    lgd_options o;
-    workspace *w = NULL;
-    if (take_options(options, &o, &st) == TS_OK && check_arguments(model, photo, photos, side, &o, maps, &st) == TS_OK)
-        w = take(model, &st);
-    if (w) {
-        const lgd_estimator e = {model->net, w->tape};
-        if (o.tolerance == LGD_TOLERANCE_USUAL)
-            o.tolerance = o.iterations == -1 && !o.exact && model->net->arch.h_width > 0 &&
-                    lgd_tiles_exact(&model->net->arch)
-                ? LGD_TOLERANCE
-                : 0;
-        ag_compute_set(w->tape,
-                       (ts_compute){/* whoever runs the published network wants its numbers */
-                                    .exact = o.exact || model->net->arch.compat == NN_COMPAT_PUBLISHED,
-                                    .precision = o.precision == LGD_BF16 ? TS_BF16 : TS_F32,
-                                    .threads = o.threads > 0 ? o.threads : ts_threads_allowed()});
-        lgd_estimator_run(&e, photo, photos, side, &o, maps, &st);
-        give_back(model, w);
-    }
+    lgd_model_estimate(model, photo, photos, side, options, false, maps, &st);
     return report(error, &st);
 }
 
@@ -244,6 +224,21 @@ int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_optio
 {
     const lgd_photo photo = lgd_flash_photo(image);
     return lgd_estimate_photos(model, &photo, 1, side, options, maps, error);
+}
+
+/* maps as in infer/lgd.h, [side, side, 9], to the encoding of tensor/maps.h, the same shape. */
+static void encode(const float *maps, int side, float *encoded)
+{
+    const int64_t pixels = (int64_t)side * side;
+#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+    for (int64_t i = 0; i < pixels; i++) {
+        const float *m = maps + i * MAP_CHANNELS;
+        const float x = m[MAP_NORMAL], y = m[MAP_NORMAL + 1];
+        io_texel t = {.normal = {x, y, sqrtf(fmaxf(1 - x * x - y * y, 0))}, .roughness = m[MAP_ROUGHNESS]};
+        memcpy(t.diffuse, m + MAP_DIFFUSE, sizeof t.diffuse);
+        memcpy(t.specular, m + MAP_SPECULAR, sizeof t.specular);
+        io_texel_put(encoded + i * MAP_CHANNELS, &t);
+    }
 }
 
 int lgd_render(const float *maps, int side, const float light[3], const float camera[3], float power, float *image,
@@ -273,7 +268,7 @@ int lgd_render(const float *maps, int side, const float light[3], const float ca
         ts_fail(&st, TS_NOMEM, "lgd_render: out of memory for %d x %d pixels", side, side);
         return report(error, &st);
     }
-    lgd_encode(maps, side, encoded, 0);
+    encode(maps, side, encoded);
     rd_render(rd_grid_full(side), encoded, MAP_CHANNELS, &view, false, image);
     free(encoded);
     return report(error, &st);

@@ -210,7 +210,7 @@ static ts_code write_portion(const char *folder, const io_material *m, const lgd
     }
 }
 
-/* Of several failures the first portion's is told. */
+/* Of several failures the first portion's is reported. */
 static ts_code write_all(const char *folder, const io_material *m, const lgd_photo *photo, unsigned which, bool directx,
                          int threads, io_metallic_error *lost, ts_status *st)
 {

@@ -7,9 +7,9 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Stops by which R_0's brightness errs where nothing is amiss: the estimate is that much nearer to 1, so that usual
- * photographs keep the usual light. */
-#define USUAL_STOPS 0.2
+/* Stops by which R_0's brightness errs under the default light: the estimate is brought that much nearer to 1, so that
+ * photographs under that light keep it. */
+#define TOLERATED_STOPS 0.2
 #define MOST_STOPS 3.0
 #define COARSE_STOPS \
     0.4 /* first these, then the finer ones around the best of them, a quarter of what is left out anyway */
@@ -44,7 +44,7 @@ static double nearest(size_t values, const float *log_photo, const float *render
 }
 
 static ts_code fit(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given,
-                   int side, int orientations, float *proposed, double *factor, ts_status *st)
+                   int side, int orientations, float *r0, double *factor, ts_status *st)
 {
     const int size = model->arch.g_size;
     const rd_grid grid = rd_grid_on(rd_grid_full(size), ag_compute(tape)->threads);
@@ -67,29 +67,30 @@ static ts_code fit(ag_tape *tape, const nn_model *model, const float *const *ima
         *st = *ag_status(tape);
         return st->code;
     }
-    memcpy(proposed, maps->t.data, (size_t)ts_count(maps->t.shape) * sizeof(float));
+    memcpy(r0, maps->t.data, (size_t)ts_count(maps->t.shape) * sizeof(float));
     for (int k = 0; k < given; k++)
         rd_render(grid, maps->t.data, maps->t.shape.c, &views[k], false, rendered->t.data + (size_t)k * values);
-    bool tells = false; /* black: any light would be too strong; clipped: none would be */
-    for (size_t i = 0; i < (size_t)given * values && !tells; i++) tells = small->t.data[i] > 0 && small->t.data[i] < 1;
-    if (!tells) return TS_OK;
+    bool informative = false; /* black: any light would be too strong; clipped: none would be */
+    for (size_t i = 0; i < (size_t)given * values && !informative; i++)
+        informative = small->t.data[i] > 0 && small->t.data[i] < 1;
+    if (!informative) return TS_OK;
     float *log_photo = small->t.data;
     for (size_t i = 0; i < (size_t)given * values; i++)
         log_photo[i] = logf((log_photo[i] < 1 ? log_photo[i] : 1) + 0.01f);
-    const double middle = nearest((size_t)given * values, log_photo, rendered->t.data, 0, MOST_STOPS + USUAL_STOPS,
+    const double middle = nearest((size_t)given * values, log_photo, rendered->t.data, 0, MOST_STOPS + TOLERATED_STOPS,
                                   COARSE_STOPS, grid.threads);
     const double found = nearest((size_t)given * values, log_photo, rendered->t.data, middle, COARSE_STOPS, STEP_STOPS,
                                  grid.threads);
-    const double beyond = fmin(fmax(fabs(found) - USUAL_STOPS, 0), MOST_STOPS);
+    const double beyond = fmin(fmax(fabs(found) - TOLERATED_STOPS, 0), MOST_STOPS);
     *factor = exp2(found < 0 ? -beyond : beyond);
     return TS_OK;
 }
 
 ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given,
-                      int side, int orientations, float *proposed, double *factor, ts_status *st)
+                      int side, int orientations, float *r0, double *factor, ts_status *st)
 {
     const ts_mark mark = ag_scope_begin(tape);
-    const ts_code code = fit(tape, model, image, views, given, side, orientations, proposed, factor, st);
+    const ts_code code = fit(tape, model, image, views, given, side, orientations, r0, factor, st);
     ag_scope_end(tape, mark, NULL, 0);
     return code;
 }

@@ -1,8 +1,6 @@
 /* The coarse steps (docs/math.md, S13). */
 #include "nn/lgd_internal.h"
 #include "ops.h"
-#include "render/render.h"
-#include <math.h>
 #include <string.h>
 
 enum { BAND = 1 << 17 }; /* pixels of the photograph that are read at a time, about */
@@ -28,17 +26,18 @@ static bool measure(ag_tape *tape, const nn_model *model, nn_coarse *c)
     if (!c->state.rmse0 || !maps)
         return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d x %d pixels", side, side), false;
     for (int i = 0; i < c->in.image.shape.n; i++) {
-        const rd_view view = nn_view_of(model, &c->in, i);
         double squares = 0;
         for (int y = 0; y < side; y += most) {
             const int rows = y + most < side ? most : side - y;
-            double rmse;
+            const nn_input band = {
+                .image = ts_view(c->in.image.data + ((int64_t)i * side + y) * side * 3, (ts_shape){1, rows, side, 3}),
+                .grid = {.h = rows, .w = side, .y0 = y, .side = side, .threads = ag_compute(tape)->threads},
+                .view = c->in.view,
+                .views = c->in.views ? c->in.views + i : NULL};
             upsampled(tape, c, i / count, y, rows, maps);
-            rd_flash_rmse((rd_grid){.h = rows, .w = side, .y0 = y, .side = side, .threads = ag_compute(tape)->threads},
-                          maps, channels, &view, c->in.image.data + ((int64_t)i * side + y) * side * 3, &rmse);
-            squares += rmse * rmse * rows;
+            nn_add_squares(model, &band, maps, channels, &squares);
         }
-        c->state.rmse0[i] = sqrt(squares / side);
+        c->state.rmse0[i] = nn_rmse_of(&squares, 1, (double)side * side);
     }
     ts_arena_release(ag_arena(tape), mark);
     return true;
@@ -142,7 +141,7 @@ static bool step_and_forget(ag_tape *tape, const nn_model *model, nn_coarse *c)
     const step_of of = {model, *c};
     ag_value *const from[3] = {c->maps, c->state.gru[0], c->state.gru[1]};
     ag_value *to[3] = {0};
-    if (!ag_checkpoint(tape, step_again, &of, sizeof of, 3, from, c->room[c->state.step % 2],
+    if (!ag_checkpoint(tape, step_again, &of, sizeof of, 3, from, c->buffer[c->state.step % 2],
                        model->arch.recurrent ? 3 : 1, to))
         return false;
     c->maps = to[0];
@@ -176,17 +175,18 @@ bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c)
     }
     if (model->arch.gradient && !c->state.rmse0 && !measure(tape, model, c)) return false;
     if (!c->in.recompute || !ag_gradients(tape)) return step(tape, model, c);
-    return (c->room[0][0] || nn_gradient_rooms(tape, c->maps, model->arch.coarse_gru, c->room)) &&
+    return (c->buffer[0][0] || nn_gradient_buffers(tape, c->maps, model->arch.coarse_gru, c->buffer)) &&
         step_and_forget(tape, model, c);
 }
 
-ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps)
+ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps,
+                        bool (*after)(int t, void *user), void *user)
 {
     nn_coarse c;
     bool on = nn_coarse_begin(tape, model, in, &c);
-    for (int t = 0; on; on = nn_coarse_step(tape, model, &c)) {
+    for (int t = 0; on; t++) {
         maps[t] = c.maps;
-        if (t++ == steps) break;
+        on = (!after || after(t, user)) && t < steps && nn_coarse_step(tape, model, &c);
     }
     return ag_status(tape)->code;
 }

@@ -63,8 +63,8 @@ ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index);
 ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad,
                   float leak);
 /* constants: NULL, or further channels of the input, as ag_conv_with_constants has them. */
-ag_value *nn_conv_beside(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants,
-                         int dilation, ts_pad pad, float leak);
+ag_value *nn_conv_with_constants(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants,
+                                 int dilation, ts_pad pad, float leak);
 ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x);
 
 /* g on its own input: x [N, g_size, g_size, 3 images] log-encoded -> [N, g_size, g_size, channels] in [-1, 1]. */
@@ -94,5 +94,5 @@ nn_layer nn_plan_conv(nn_model *m, const char *name, int oc, int ic, double gain
 nn_model *nn_model_zero(nn_model *plan, ts_status *st);
 
 /* Memory for the parameters of a plan (nn_model_plan), zero only between them: the caller writes all of them. */
-ts_code nn_model_room(nn_model *model, ts_status *st);
+ts_code nn_model_allocate(nn_model *model, ts_status *st);
 #endif

@@ -26,7 +26,7 @@ bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_
 
 /* Memory for the gradients of R_t (given) and of two states of gru channels, twice: those of a step and of the next
  * take turns. False after an error, which the tape has. */
-bool nn_gradient_rooms(ag_tape *tape, const ag_value *maps, int gru, float *room[2][3]);
+bool nn_gradient_buffers(ag_tape *tape, const ag_value *maps, int gru, float *buffer[2][3]);
 
 /* R_{t+1} by h from what was read, gradient and newton being constants (or NULL where they are not needed). */
 ag_value *nn_apply(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient,
@@ -43,7 +43,7 @@ typedef struct nn_coarse {
     ts_taps up, down; /* between the coarse size and theirs */
     ag_value *maps;
     nn_state state;
-    float *room[2][3]; /* nn_gradient_rooms, where steps are computed again for the gradient */
+    float *buffer[2][3]; /* nn_gradient_buffers, where steps are computed again for the gradient */
 } nn_coarse;
 
 /* R_0. False after an error, which the tape has. */

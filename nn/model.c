@@ -208,7 +208,7 @@ nn_model *nn_model_zero(nn_model *plan, ts_status *st)
 
 nn_model *nn_model_create(const nn_arch *arch, ts_status *st) { return nn_model_zero(nn_model_plan(arch, st), st); }
 
-ts_code nn_model_room(nn_model *m, ts_status *st)
+ts_code nn_model_allocate(nn_model *m, ts_status *st)
 {
     m->value = block(m->count, "parameters", st);
     for (int i = 0; m->value && i < m->params; i++) {
@@ -271,8 +271,8 @@ ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index)
     return ag_parameter(tape, ts_view(model->value + p->offset, s), grad);
 }
 
-ag_value *nn_conv_beside(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants,
-                         int dilation, ts_pad pad, float leak)
+ag_value *nn_conv_with_constants(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants,
+                                 int dilation, ts_pad pad, float leak)
 {
     return ag_conv_with_constants(tape, x, constants, nn_parameter(tape, model, layer.weight),
                                   nn_parameter(tape, model, layer.bias), dilation, pad, leak);
@@ -281,7 +281,7 @@ ag_value *nn_conv_beside(ag_tape *tape, const nn_model *model, nn_layer layer, a
 ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad,
                   float leak)
 {
-    return nn_conv_beside(tape, model, layer, x, NULL, dilation, pad, leak);
+    return nn_conv_with_constants(tape, model, layer, x, NULL, dilation, pad, leak);
 }
 
 ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x)

@@ -129,19 +129,28 @@ typedef struct nn_input {
     int orientations; /* 2, 4, 8: R_0 is the mean of g's maps over so many orientations of the photograph (as it is and
                        * a quarter turn, all quarter turns, and their mirror images), if nn_orients; on a tape without
                        * gradients. 0, 1: as it is */
-    const float *proposed; /* R_0 of these photographs in these orientations, [N, g_size, g_size, channels] as
-                              nn_coarse_steps gives it; NULL: g is run */
-    bool recompute; /* on a tape with gradients: keep only R_t and h's states of each step, and compute the rest again
-                       for the gradient */
+    const float *r0;  /* R_0 of these photographs in these orientations, [N, g_size, g_size, channels] as
+                       * nn_coarse_steps gives it; NULL: g is run */
+    bool recompute;   /* on a tape with gradients: keep only R_t and h's states of each step, and compute the rest again
+                         for the gradient */
 } nn_input;
 
 /* R_0 of the whole photographs: [N, S, S, channels]. Missing photographs are black. Includes the log encoding and the
  * resampling to g_size and back. */
 ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in);
 
-/* R_0 at g_size and R_1 … R_steps at coarse_size or the photographs' size, by g and the coarse steps: steps <=
- * arch.coarse_steps. */
-ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps);
+/* What looks at the steps. */
+typedef struct nn_watch {
+    bool (*after)(int step, const ag_value *maps,
+                  void *user); /* called with every R_t; false: stop here, the rest of maps is filled with it */
+    void *user;
+    bool ends_alone; /* after gets only the maps of R_0 and R_steps, which saves resampling, and NULL between */
+} nn_watch;
+
+/* maps[0] = R_0 at g_size, maps[1] … maps[steps] at coarse_size or the photographs' size, by g and the coarse steps:
+ * steps <= arch.coarse_steps. after (may be NULL): called with t when maps[t] is there; false: stop. */
+ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps,
+                        bool (*after)(int t, void *user), void *user);
 
 /* One photograph is given, its light and camera are above the centre, and the weights are not published ones. */
 bool nn_orients(const nn_model *model, const nn_input *in);
@@ -167,16 +176,35 @@ typedef struct nn_state {
  *     NN_DESCENT_NONE      0, as published */
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
+/* RMSE(R_t) = nn_rmse_of what nn_add_squares leaves: squares[i] += the squared differences between photograph i of in
+ * [N given] and the rendering of its material's maps [N, h, w, channels], summed over the grid's pixels and averaged
+ * over red, green and blue. Windows of a photograph add up. */
+void nn_add_squares(const nn_model *model, const nn_input *in, const float *maps, int channels, double *squares);
+double nn_rmse_of(const double *squares, int photographs, double pixels);
+
+/* Steps at the photograph's size, of a window. */
+typedef struct nn_loop {
+    nn_input in;      /* image and grid: the window of R_t. On a tape without gradients the image is overwritten where
+                         the window shrinks */
+    rd_grid core;     /* what of R_steps is wanted: the window shrinks towards it by h's reach at every step. The grid
+                         itself: the window stays as it is */
+    int steps;        /* up to R_steps */
+    nn_state state;   /* step: how many are done */
+    bool keep_all;    /* as in nn_lgd */
+    double tolerance; /* on a tape without gradients: the maps change no more after a step that changes them by less
+                         (RMS over the window); 0: they always do */
+    const nn_watch *watch; /* or NULL; sees in */
+    int made;              /* out: steps that changed the maps */
+} nn_loop;
+
+/* The loop. maps: as nn_lgd leaves them, of which R_{state.step} is given. On a tape without gradients R_t overwrites
+ * it, but for keep_all. */
+ts_code nn_steps(ag_tape *tape, const nn_model *model, nn_loop *loop, ag_value **maps);
+
 /* The unrolled loop on the grid's window. The first arch.coarse_steps steps refine R_t at coarse_size with the
- * parameters of NN_COARSE (nn/coarse.c); their result is resampled, and the others go on from it with nn_refine.
+ * parameters of NN_COARSE (nn/coarse.c); their result is resampled, and the others go on from it with nn_steps.
  * keep_all: maps[0] = R_0 … maps[steps] = R_T. Otherwise maps[0] = R_T, and on a tape without gradients intermediate
  * memory is released. */
-typedef struct nn_watch {
-    bool (*after)(int step, const ag_value *maps,
-                  void *user); /* called for every R_t; false: stop, and fill the rest of maps with it */
-    void *user;
-    bool ends_alone; /* after gets only the maps of R_0 and R_steps, which saves resampling, and NULL between */
-} nn_watch;
 ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps,
                const nn_watch *watch);
 #endif

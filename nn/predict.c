@@ -114,12 +114,11 @@ bool nn_coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, n
     nn_input small;
     *c = (nn_coarse){0};
     const ts_mark mark = ag_scope_begin(tape);
-    if (in->proposed) {
+    if (in->r0) {
         const int size = model->arch.g_size;
         if (!nn_input_check(tape, model, in)) return false;
         c->maps = ag_constant(
-            tape,
-            ts_view((float *)(uintptr_t)in->proposed, (ts_shape){nn_materials(in), size, size, model->arch.channels}));
+            tape, ts_view((float *)(uintptr_t)in->r0, (ts_shape){nn_materials(in), size, size, model->arch.channels}));
     } else {
         if (!reduce(tape, model, in, &small)) return false;
         c->maps = propose(tape, model, &small);

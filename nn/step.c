@@ -6,26 +6,23 @@
 #include "tensor/kernels/elementwise.h"
 #include "tensor/maps.h"
 #include "tensor/threads.h"
-#include <math.h>
 #include <string.h>
 
-/* The RMSE of R_0, which scales all later gradients: of the whole photographs where they are given, maps then being
- * theirs. */
 bool nn_measure_start(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, nn_state *state)
 {
     if (!maps || !model->arch.gradient) return maps != NULL;
-    const ts_tensor *image = in->whole.data ? &in->whole : &in->image;
-    const rd_grid grid = rd_grid_on(in->whole.data ? rd_grid_full(in->grid.side) : in->grid, ag_compute(tape)->threads);
-    const ts_shape s = maps->t.shape;
-    const int64_t one = (int64_t)s.h * s.w;
-    const int photographs = image->shape.n;
-    state->rmse0 = ts_arena_alloc(ag_arena(tape), (size_t)photographs * sizeof *state->rmse0);
-    if (!state->rmse0) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", photographs), false;
-    for (int i = 0; i < photographs; i++) {
-        const rd_view view = nn_view_of(model, in, i);
-        rd_flash_rmse(grid, maps->t.data + i / nn_given(in) * one * s.c, s.c, &view, image->data + i * one * 3,
-                      &state->rmse0[i]);
+    nn_input all = *in;
+    all.grid = rd_grid_on(in->grid, ag_compute(tape)->threads);
+    if (in->whole.data) {
+        all.image = in->whole;
+        all.grid = rd_grid_on(rd_grid_full(in->grid.side), all.grid.threads);
     }
+    const int photographs = all.image.shape.n;
+    state->rmse0 = ts_arena_zalloc(ag_arena(tape), (size_t)photographs, sizeof *state->rmse0);
+    if (!state->rmse0) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", photographs), false;
+    nn_add_squares(model, &all, maps->t.data, maps->t.shape.c, state->rmse0);
+    for (int i = 0; i < photographs; i++)
+        state->rmse0[i] = nn_rmse_of(&state->rmse0[i], 1, (double)all.grid.h * all.grid.w);
     return true;
 }
 
@@ -51,16 +48,15 @@ static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, 
     if (images > 1 && !apart)
         return ag_fail(tape, TS_NOMEM, "no memory for the gradient of %d x %d pixels", s.w, s.h), false;
     if (count < images) memset(to, 0, (size_t)(s.n * pixels * images * s.c) * sizeof *to);
-    double common = 0;
-    for (int i = 0; batch && i < s.n; i++) {
-        double rmse;
-        const rd_view view = nn_view_of(model, in, i);
-        rd_flash_rmse(grid, maps->data + i * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, &rmse);
-        common += rmse * rmse / s.n;
-    }
+    double *squares = batch ? ts_arena_zalloc(ag_arena(tape), (size_t)(s.n * count), sizeof *squares) : NULL;
+    if (batch && !squares) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", s.n * count), false;
+    nn_input all = *in;
+    all.grid = grid;
+    if (batch) nn_add_squares(model, &all, maps->data, s.c, squares);
+    const double common = batch ? nn_rmse_of(squares, s.n * count, (double)pixels) : 0;
     for (int i = 0; i < s.n * count; i++) {
         const int n = i / count, k = i % count;
-        const double rmse = batch ? sqrt(common) : rmse0[i];
+        const double rmse = batch ? common : rmse0[i];
         const rd_view view = nn_view_of(model, in, i);
         float *own = to + n * pixels * images * s.c;
         rd_flash_gradient(grid, maps->data + n * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, rmse,

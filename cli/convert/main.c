@@ -8,7 +8,7 @@
 
 enum { PREFIX = 256 };
 
-static const lgd_argument arguments[] = {
+static const cl_argument arguments[] = {
     {'l', "list", NULL, "print name, type and shape of every tensor of IN, and write nothing"},
     {'d', "dtype", "TYPE", "f32, f16 or bf16 for all floating-point tensors (default: each keeps its own)"},
     {PREFIX, "prefix", "TEXT", "only tensors whose names begin with TEXT, without it (as in: model. or module.)"},
@@ -36,7 +36,7 @@ static void print_help(void)
          "In nested dictionaries a tensor's name is the keys from the outermost on, joined by dots; a \"state_dict\" "
          "or \"model_state_dict\" outermost\n"
          "is left out. Integer tensors are kept as they are; tensors that share memory become separate ones.\n");
-    lgd_argument_help(arguments, stdout);
+    cl_argument_help(arguments, stdout);
     puts("\nExit status: 0 done, 1 IN cannot be read or OUT cannot be written, 2 wrong usage.");
 }
 
@@ -52,7 +52,7 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
     const char *value = NULL;
     int key, operands = argc;
     while (!c->help && !c->version &&
-           (key = lgd_argument_next(argc, argv, arguments, &value, &operands, st)) != LGD_ARGUMENT_END) {
+           (key = cl_argument_next(argc, argv, arguments, &value, &operands, st)) != CL_ARGUMENT_END) {
         switch (key) {
         case 'l': c->list = true; break;
         case 'h': c->help = true; break;

@@ -1,7 +1,6 @@
 #include "cli/infer/options.h"
 #include "cli/cli.h"
 #include "data/image/image.h"
-#include "infer/lgd.h"
 #include "infer/output.h"
 #include <string.h>
 
@@ -21,7 +20,7 @@ enum {
     VERSION = 'V'
 };
 
-const lgd_argument lgd_infer_arguments[] = {
+const cl_argument lgd_infer_arguments[] = {
     {'o', "output", "DIR",
      "output folder (required); each photograph gets DIR/STEM/, STEM = its file name without extension"},
     {'s', "size", "N", "side of the maps in pixels, 1 .. 8192 (default 256)"},
@@ -87,8 +86,8 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
 {
     *c = (lgd_command){.size = 256,
                        .iterations = -1,
-                       .orientations = LGD_ORIENTATIONS_USUAL,
-                       .tolerance = LGD_TOLERANCE_USUAL,
+                       .orientations = LGD_ORIENTATIONS_DEFAULT,
+                       .tolerance = LGD_TOLERANCE_DEFAULT,
                        .max_pixels = IO_MAX_PIXELS_DEFAULT};
     const char *value = NULL;
     int key, operands = argc;
@@ -96,7 +95,7 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
     ts_code code = TS_OK;
     bool power_given = false;
     while (!code && !c->help && !c->version &&
-           (key = lgd_argument_next(argc, argv, lgd_infer_arguments, &value, &operands, st)) != LGD_ARGUMENT_END) {
+           (key = cl_argument_next(argc, argv, lgd_infer_arguments, &value, &operands, st)) != CL_ARGUMENT_END) {
         switch (key) {
         case 'o': c->out = value; break;
         case 'm': c->model = value; break;
@@ -186,4 +185,10 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
     if (!c->out) return ts_fail(st, TS_INVALID, "no output folder is given: -o DIR");
     if (!*c->out) return ts_fail(st, TS_INVALID, "-o: the name of the output folder is empty");
     return TS_OK;
+}
+
+int lgd_command_steps(const lgd_command *c, const lgd_model *model)
+{
+    if (c->iterations == LGD_AUTO) return LGD_AUTO_MOST;
+    return c->iterations < 0 ? lgd_trained_iterations(model) : c->iterations;
 }

@@ -24,7 +24,8 @@ enum { EV_SETTINGS = 8, EV_POINTS = 1024, EV_METHOD_TEXT = 4096 };
 
 typedef struct ev_estimator ev_estimator;
 
-/* Told R_step: maps [size, size, channels] in the encoding of tensor/maps.h, valid during the call. false: stop. */
+/* Called with R_step: maps [size, size, channels] in the encoding of tensor/maps.h, valid during the call. false: stop.
+ */
 typedef bool (*ev_seen)(int step, const float *maps, int channels, void *user);
 
 typedef struct ev_method {

@@ -13,7 +13,7 @@ static ts_code open(ev_estimator *e, ts_status *st)
 }
 
 /* The sum over the photographs of d (error^2 / 2) / d maps, but for a factor that is the same for all: Adam does not
- * see it. part: room for one's. */
+ * see it. part: a buffer for one's. */
 static void gradient(ev_estimator *e, const ev_case *c, float *part)
 {
     const int64_t pixels = (int64_t)c->size * c->size, count = pixels * MAP_CHANNELS;

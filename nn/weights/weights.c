@@ -67,7 +67,7 @@ static nn_model *fill(nn_model *m, const nn_file *f, ts_status *st)
             ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" is missing", nn_file_path(f), m->param[i].name);
             nn_model_free(&m);
         }
-    if (m && (nn_model_room(m, st) || read_values(f, m, st))) nn_model_free(&m);
+    if (m && (nn_model_allocate(m, st) || read_values(f, m, st))) nn_model_free(&m);
     return m;
 }
 
