@@ -32,6 +32,9 @@ enum {
     PARETO,
     EXPOSURE,
     LIGHT,
+    TOLD,
+    UNTOLD,
+    PEER_MAPS,
     PATH_LENGTH = 4096
 };
 
@@ -41,7 +44,15 @@ static const lgd_argument arguments[] = {
      "what to evaluate (required, may be repeated):\nprocedural:SEED,COUNT  generated materials\n"
      "strips:FOLDER  images of five panels: input, normal, diffuse, roughness, specular\nmaps:FOLDER  a folder of map "
      "folders\nmultiview:FOLDER  a capture, or a folder of them: 00.png, 01.png ..., camera_pos.txt,\nlight_pos.txt, "
-     "image_size.txt, light_power.txt; 00.png is the input"},
+     "image_size.txt, light_power.txt; the input is the picture nearest to the sample's axis\n"
+     "photos:FOLDER  photographs without known maps: what the flash leaves in theirs\n"
+     "peers:FOLDER  images of nine panels: input, normal, diffuse, roughness, specular, then a peer's four maps"},
+    {TOLD, "told", NULL, "of captures: tell the methods light and camera (default: nothing is told)"},
+    {UNTOLD, "untold", NULL,
+     "of generated materials, strips and map folders: do not tell the light's power; renderings are compared after one "
+     "factor on\nthe estimate's"},
+    {PEER_MAPS, "peer-maps", "FOLDER",
+     "of photos: a peer's maps of some of them, images of four panels: normal, diffuse, roughness, specular"},
     {NORMAL, "normal", "Y", "of map folders: opengl or directx (default: as set.ini, meta.txt or the file name says)"},
     {WORKFLOW, "workflow", "W", "of map folders: metallic or specular (default: likewise, or as the files are)"},
     {COLOUR, "colour", "C", "of map folders: srgb or linear (default: likewise, or sRGB)"},
@@ -86,9 +97,10 @@ typedef struct command {
     const char *out, *model, *lpips[2], *spec[SETS_MAX], *method[METHODS_MAX];
     int sets, methods, iterations, threads, size, repeat;
     int64_t seed;
+    const char *peer_maps;
     double noise, exposure, light[2]; /* exposure 0: not given */
     io_map_convention told;
-    bool images, fast, exact, pin, tune, pareto, iterations_figure, methods_figure, quiet, help, version;
+    bool told_all, untold, images, fast, exact, pin, tune, pareto, iterations_figure, methods_figure, quiet, help, version;
 } command;
 
 static ts_code whole(const char *name, const char *text, int64_t lo, int64_t hi, int64_t *value, ts_status *st)
@@ -149,6 +161,9 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
                 code = ts_fail(st, TS_INVALID, "--exposure: '%s' is not a number in 0.01 .. 100", value);
             break;
         case LIGHT: code = parse_light(value, c->light, st); break;
+        case TOLD: c->told_all = true; break;
+        case UNTOLD: c->untold = true; break;
+        case PEER_MAPS: c->peer_maps = value; break;
         case IMAGES: c->images = true; break;
         case FAST: c->fast = true; break;
         case LPIPS:
@@ -255,15 +270,37 @@ static void show_progress(int64_t done, int64_t total, const char *name, void *u
     if (!w->c->quiet) cl_progress_show(&w->bar, done, name);
 }
 
+/* Whether the methods are told the light of a set's photographs. */
+static bool is_told(const command *c, const ev_set *set)
+{
+    if (set->kind == EV_PHOTOS || set->kind == EV_PEERS) return false;
+    return set->kind == EV_MULTIVIEW ? c->told_all : !c->untold;
+}
+
+/* The method where none is named: as lgd-infer estimates where nothing is told. */
+static ts_code parse_usual(const work *w, const char **spec, ts_status *st)
+{
+    const bool told = is_told(w->c, &w->set[0]);
+    for (int s = 1; s < w->c->sets; s++)
+        if (is_told(w->c, &w->set[s]) != told)
+            return ts_fail(st, TS_INVALID,
+                           "--set %s: its light is %s, unlike that of %s: give --method, --told or --untold",
+                           w->set[s].spec, told ? "not told" : "told", w->set[0].spec);
+    *spec = told ? "lgd" : "lgd:power=auto,orientations=2,label=lgd";
+    return TS_OK;
+}
+
 /* The methods; a name or key that does not exist is wrong usage. */
 static ts_code parse_methods(work *w, ts_status *st)
 {
     const command *c = w->c;
     w->run.methods = c->methods ? c->methods : 1;
+    const char *usual = "lgd";
+    if (!c->methods && parse_usual(w, &usual, st) != TS_OK) return st->code;
     w->method = calloc((size_t)w->run.methods, sizeof *w->method);
     if (!w->method) return ts_fail(st, TS_NOMEM, "out of memory");
     for (int i = 0; i < w->run.methods; i++) {
-        if (ev_method_parse(c->methods ? c->method[i] : "lgd", w->model, c->iterations, &w->method[i], st) != TS_OK)
+        if (ev_method_parse(c->methods ? c->method[i] : usual, w->model, c->iterations, &w->method[i], st) != TS_OK)
             return st->code;
         for (int j = 0; j < i; j++)
             if (!strcmp(w->method[i].label, w->method[j].label))
@@ -330,7 +367,8 @@ static int evaluate(work *w, ts_status *st)
     r->seed = (uint64_t)c->seed;
     r->noise = c->noise;
     r->exposure = c->exposure > 0 ? c->exposure : 1;
-    r->fit = c->exposure > 0;
+    r->fit = c->exposure > 0 || c->untold;
+    r->told = c->told_all;
     r->flash = rd_flash();
     for (int k = 0; k < 2; k++) r->flash.light[k] = (float)c->light[k];
     r->perceptual = !c->fast && !c->tune;
@@ -363,6 +401,7 @@ static int start(const command *c)
     for (int s = 0; s < c->sets && code == CL_OK; s++)
         if (ev_set_open(c->spec[s], &c->told, &w->set[s], &st) != TS_OK)
             code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
+        else w->set[s].peers = c->peer_maps;
     ts_threads_set(c->threads);
     if (code == CL_OK && lgd_model_path(c->model, "single", w->model, &st) != TS_OK) code = cl_failed("%s", st.message);
     if (code == CL_OK && (c->tune ? parse_tuning(w, &st) : c->pareto ? TS_OK : parse_methods(w, &st)) != TS_OK)

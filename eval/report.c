@@ -93,6 +93,7 @@ int ev_report_summary(const ev_report *r, int set, int column, ev_row *mean, ev_
         mean->value[k] = measured ? sum / measured : NAN;
         deviation->value[k] = measured > 1 ? sqrt(squares / (measured - 1)) : measured ? 0 : NAN;
     }
+    mean->value[EV_OVER_FLAT] = mean->value[EV_NORMAL] / mean->value[EV_FLAT]; /* smooth materials do not decide it */
     return n;
 }
 

@@ -12,10 +12,10 @@ enum { PATH_LENGTH = 4096, PICTURES = 256 /* in a report: some 80 MB */ };
 
 /* What one material needs. */
 typedef struct bench {
-    io_material truth;
+    io_material truth, peer;
     io_capture capture;
     rd_view views[RD_EVAL_VIEWS];
-    float *image, *first, *last;
+    float *image, *photo, *first, *last;
     ev_row *row;
     double *seconds;
     const char *name;
@@ -24,11 +24,31 @@ typedef struct bench {
     bool *bad; /* it cannot be read */
 } bench;
 
+/* What is known of a picture that was not rendered here. */
+static ts_code load_photo(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, ts_status *st)
+{
+    free(b->photo);
+    if (ev_set_load_photo(set, i, r->size, &b->photo, &b->truth, &b->peer, st) != TS_OK) return st->code;
+    b->name = b->truth.name;
+    *c = ev_case_of_photo(b->photo, r->size);
+    if (b->peer.size) c->peer = &b->peer;
+    if (!b->truth.size) return TS_OK;
+    ts_rng rng = ts_rng_make(r->seed, TS_STREAM_EVAL, ev_set_identity(set, i));
+    rd_eval_views(&rng, RD_EVAL_VIEWS, b->views);
+    c->truth = &b->truth;
+    c->views = b->views;
+    c->fit = true;
+    c->perceptual = r->perceptual;
+    c->lpips = r->lpips;
+    return TS_OK;
+}
+
 static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, ts_status *st)
 {
     const uint64_t identity = ev_set_identity(set, i);
     const bool capture = set->kind == EV_MULTIVIEW;
     b->name = "";
+    if (set->kind == EV_PHOTOS || set->kind == EV_PEERS) return load_photo(r, b, set, i, c, st);
     if ((capture ? ev_set_load_capture(set, i, r->size, &b->capture, st)
                  : ev_set_load(set, i, r->size, &b->truth, st)) != TS_OK)
         return st->code;
@@ -37,8 +57,9 @@ static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, t
         if (b->capture.images <= r->inputs)
             return ts_fail(st, TS_FORMAT, "%s: has %d pictures: %d are the input, and one more at least is compared",
                            b->name, b->capture.images, r->inputs);
-        ev_capture_input(&b->capture, r->inputs, b->image);
-        *c = ev_case_of_capture(&b->capture, b->image, r->inputs, r->perceptual);
+        ev_capture_nearest_first(&b->capture);
+        if (r->told) ev_capture_input(&b->capture, r->inputs, b->image);
+        *c = ev_case_of_capture(&b->capture, r->told ? b->image : b->capture.image, r->inputs, r->told, r->perceptual);
         c->lpips = r->lpips;
         return TS_OK;
     }
@@ -117,6 +138,7 @@ static ts_code all_materials(ev_run *r, bench *b, int m, int64_t total, ts_statu
             if (b->bad[number]) continue;
             *st = (ts_status){0};
             b->bad[number] = load(r, b, &r->set[s], i, &c, st) != TS_OK;
+            if (!st->code && r->method[m].method->peer && !c.peer) continue;
             if (!st->code && !warm) {
                 r->method[m].method->run(&r->method[m], &c, begin, NULL, st);
                 warm = true;
@@ -178,6 +200,8 @@ static bool make(ev_run *r, bench *b, int64_t total)
 static void clear(bench *b)
 {
     io_material_free(&b->truth);
+    io_material_free(&b->peer);
+    free(b->photo);
     io_capture_free(&b->capture);
     free(b->image);
     free(b->first);

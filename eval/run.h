@@ -17,6 +17,7 @@ typedef struct ev_run {
                                compared after one factor is fitted */
     rd_view flash;          /* of the first input, as the methods are told; not of captures */
     bool fit;               /* compare renderings after one factor is fitted */
+    bool told;              /* of captures: the methods are told their lights and cameras */
     bool perceptual, pictures, pinned; /* SSIM and FLIP; pictures for the report; whether the threads are pinned */
     ev_lpips *lpips;                   /* LPIPS too, where it is not NULL */
     const char *model;                 /* its name for the report */
