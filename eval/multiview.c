@@ -19,8 +19,10 @@ void ev_capture_nearest_first(io_capture *c)
 {
     const size_t bytes = (size_t)c->size * (size_t)c->size * 3 * sizeof *c->image;
     int nearest = 0;
-    for (int i = 1; i < c->images; i++)
-        if (hypotf(c->camera[i][0], c->camera[i][1]) < hypotf(c->camera[nearest][0], c->camera[nearest][1])) nearest = i;
+    for (int i = 1; i < c->images; i++) {
+        const float *now = c->camera[i], *best = c->camera[nearest];
+        if (hypotf(now[0], now[1]) < hypotf(best[0], best[1])) nearest = i;
+    }
     for (int i = nearest; i > 0; i--) {
         swap((char *)c->image + (size_t)i * bytes, (char *)c->image + (size_t)(i - 1) * bytes, bytes);
         swap(c->camera[i], c->camera[i - 1], sizeof c->camera[i]);

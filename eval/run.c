@@ -1,4 +1,5 @@
 #include "eval/run.h"
+#include "eval/contact.h"
 #include "eval/multiview.h"
 #include "eval/sheet.h"
 #include "render/error.h"
@@ -18,6 +19,7 @@ typedef struct bench {
     float *image, *photo, *first, *last;
     ev_row *row;
     double *seconds;
+    ev_contact contact; /* of the method that runs */
     const char *name;
     int pictures;
     int *at;   /* of each material: its result, or -1: none yet */
@@ -97,6 +99,20 @@ static ts_code sheet(const ev_run *r, const bench *b, const ev_case *c, int set,
     return ev_sheet_write(path, c, b->first, b->last, st);
 }
 
+/* The method's photographs in one picture. */
+static ts_code contact_sheet(const ev_run *r, bench *b, int method, ts_status *st)
+{
+    char path[PATH_LENGTH];
+    const char *label = r->methods > 1 ? r->method[method].label : "";
+    ts_code code = TS_OK;
+    if (r->images &&
+        snprintf(path, sizeof path, "%s/contact%s%s.png", r->images, *label ? "-" : "", label) >= (int)sizeof path)
+        code = ts_fail(st, TS_INVALID, "%s: the name is too long", r->images);
+    if (r->images && !code) code = ev_contact_write(&b->contact, path, st);
+    ev_contact_free(&b->contact);
+    return code;
+}
+
 /* A material by an open method; into the report only when all went well. */
 static ts_code one(ev_run *r, bench *b, int set, int m, int64_t number, const ev_case *c, ts_status *st)
 {
@@ -107,6 +123,7 @@ static ts_code one(ev_run *r, bench *b, int set, int m, int64_t number, const ev
     ts_code code = ev_estimate(e, c, r->step + s->first, s->points, r->repeat, b->row, b->seconds, b->first, b->last,
                                st);
     if (!code && r->images) code = sheet(r, b, c, set, m, st);
+    if (!code && r->images) code = ev_contact_add(&b->contact, c, b->last, st);
     if (!code && r->pictures && b->pictures < PICTURES) {
         code = ev_sheet_png(c, b->last, &png, &png_size, st);
         b->pictures++;
@@ -201,6 +218,7 @@ static void clear(bench *b)
 {
     io_material_free(&b->truth);
     io_material_free(&b->peer);
+    ev_contact_free(&b->contact);
     free(b->photo);
     io_capture_free(&b->capture);
     free(b->image);
@@ -234,6 +252,7 @@ ts_code ev_run_all(ev_run *r, ts_status *st)
     for (int m = 0; m < r->methods && !code; m++) {
         code = ev_open(&r->method[m], st);
         if (!code) code = all_materials(r, &b, m, total, st);
+        if (!code) code = contact_sheet(r, &b, m, st);
         r->subject[m].bytes = ev_bytes(&r->method[m]);
         ev_close(&r->method[m]);
     }

@@ -103,8 +103,8 @@ ts_code ev_set_open(const char *spec, const io_map_convention *told, ev_set *set
     ts_code code = TS_OK;
     if (set->kind == EV_KINDS || !colon[1])
         code = ts_fail(st, TS_INVALID,
-                       "--set %s: should be procedural:SEED,COUNT, strips:FOLDER, maps:FOLDER, multiview:FOLDER, photos:FOLDER "
-                       "or peers:FOLDER",
+                       "--set %s: should be procedural:SEED,COUNT, strips:FOLDER, maps:FOLDER, multiview:FOLDER, "
+                       "photos:FOLDER or peers:FOLDER",
                        spec);
     else {
         set->where = colon + 1;

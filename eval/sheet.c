@@ -60,9 +60,7 @@ static ts_code make(const ev_case *c, const float *const *maps, int rows, int sh
     ts_code code = io_image_create(sheet, columns_of(c) * c->size, sheet_rows * c->size, 3, st);
     if (!code) code = io_image_create(&picture, c->size, c->size, 3, st);
     for (int row = 0; row < rows && !code; row++)
-        (c->capture          ? capture_row
-             : only_photo(c) ? photo_row
-                             : maps_row)(sheet, c, row, maps[row], picture.data);
+        (c->capture ? capture_row : only_photo(c) ? photo_row : maps_row)(sheet, c, row, maps[row], picture.data);
     io_image_free(&picture);
     return code;
 }

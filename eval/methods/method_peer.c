@@ -11,5 +11,8 @@ static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, 
 }
 
 static const ev_setting settings[] = {{0}};
-const ev_method ev_method_peer = {
-    .name = "peer", .help = "another program's maps, of sets that have them", .settings = settings, .peer = true, .run = run};
+const ev_method ev_method_peer = {.name = "peer",
+                                  .help = "another program's maps, of sets that have them",
+                                  .settings = settings,
+                                  .peer = true,
+                                  .run = run};

@@ -30,8 +30,7 @@ static void transform(int n, const complex_t *in, size_t stride, complex_t *out,
         for (int q = 0; q < p; q++) scratch[q] = out[q * m + k];
         for (int j = 0; j < p; j++) {
             complex_t sum = 0;
-            for (int q = 0; q < p; q++)
-                sum += scratch[q] * root[(int64_t)q * (k + (int64_t)j * m) % n * step];
+            for (int q = 0; q < p; q++) sum += scratch[q] * root[(int64_t)q * (k + (int64_t)j * m) % n * step];
             out[j * m + k] = sum;
         }
     }

@@ -10,9 +10,27 @@
 #include <math.h>
 #include <stdlib.h>
 
-const char *const ev_metric_name[EV_METRICS] = {"diffuse", "specular", "roughness", "normal",   "render",
-                                                "angle",   "ssim",     "flip",      "exposure", "lpips",
- "flat", "over_flat", "band_2_8", "band_8_32", "band_32_64", "band_64_128", "residue_diffuse", "residue_specular", "residue_roughness", "residue_hue", "relief"};
+const char *const ev_metric_name[EV_METRICS] = {"diffuse",
+                                                "specular",
+                                                "roughness",
+                                                "normal",
+                                                "render",
+                                                "angle",
+                                                "ssim",
+                                                "flip",
+                                                "exposure",
+                                                "lpips",
+                                                "flat",
+                                                "over_flat",
+                                                "band_2_8",
+                                                "band_8_32",
+                                                "band_32_64",
+                                                "band_64_128",
+                                                "residue_diffuse",
+                                                "residue_specular",
+                                                "residue_roughness",
+                                                "residue_hue",
+                                                "relief"};
 
 void ev_photograph(const io_material *truth, const ev_photo *photo, float *image)
 {

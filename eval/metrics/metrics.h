@@ -45,11 +45,11 @@ typedef struct ev_case {
     int inputs;                   /* 1 .. NN_MAX_IMAGES; all but the first are for methods that read several */
     rd_view input[NN_MAX_IMAGES]; /* their views, the first being view */
     double exposure;              /* what the lights of the inputs really are, in those that the methods are told */
-    const io_material *truth; /* NULL: nobody knows the maps */
-    const io_material *peer;  /* another program's maps of it, or NULL */
-    const rd_view *views;      /* RD_EVAL_VIEWS of them; not of a capture */
-    const io_capture *capture; /* where it is not NULL, truth is: eval/multiview.h compares */
-    bool perceptual;           /* SSIM and FLIP too, which take many times as long as the rest */
+    const io_material *truth;     /* NULL: nobody knows the maps */
+    const io_material *peer;      /* another program's maps of it, or NULL */
+    const rd_view *views;         /* RD_EVAL_VIEWS of them; not of a capture */
+    const io_capture *capture;    /* where it is not NULL, truth is: eval/multiview.h compares */
+    bool perceptual;              /* SSIM and FLIP too, which take many times as long as the rest */
     bool fit; /* EV_RENDER after the one factor on the estimate's renderings that makes them most like the truth's:
                  EV_EXPOSURE */
     ev_lpips *lpips; /* LPIPS too, where it is not NULL */

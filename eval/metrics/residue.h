@@ -3,8 +3,8 @@
 #define EV_RESIDUE_H
 
 /* What a flash at the centre leaves in maps: how far each map's mean over a disk at the centre is from that over a ring
- * around it (radii EV_DISK, and EV_RING_INNER to EV_RING_OUTER, in patch widths). Of a material that is alike everywhere all
- * are 0. */
+ * around it (radii EV_DISK, and EV_RING_INNER to EV_RING_OUTER, in patch widths). Of a material that is alike
+ * everywhere all are 0. */
 #define EV_DISK 0.12
 #define EV_RING_INNER 0.3
 #define EV_RING_OUTER 0.5
