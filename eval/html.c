@@ -249,7 +249,9 @@ void ev_html_write(const ev_report *r, FILE *f)
             fprintf(f, " <button data-key=\"%s\">%s</button>", ev_metric_name[k], ev_metric_name[k]);
     fputs("</p>\n<p>Pictures: the truth; the estimate; four times their difference. Columns: input and its "
           "re-rendering, diffuse, specular, roughness, normal, renderings"
-          " under other lights and cameras (of a capture: its photographs and their re-renderings).</p>\n<div "
+          " under other lights and cameras (of a capture: its photographs and their re-renderings). Of a photograph "
+          "without known maps: itself, diffuse, specular, roughness, normal, and its re-rendering as bright as it is; "
+          "below, a peer's maps where there are any.</p>\n<div "
           "id=\"materials\">\n",
           f);
     for (int i = 0; i < r->results; i++) material(r, &s, &r->result[i], f);

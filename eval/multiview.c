@@ -6,6 +6,30 @@
 #include <math.h>
 #include <stdlib.h>
 
+static void swap(void *a, void *b, size_t size)
+{
+    unsigned char *x = a, *y = b;
+    for (size_t i = 0; i < size; i++) {
+        const unsigned char t = x[i];
+        x[i] = y[i], y[i] = t;
+    }
+}
+
+void ev_capture_nearest_first(io_capture *c)
+{
+    const size_t bytes = (size_t)c->size * (size_t)c->size * 3 * sizeof *c->image;
+    int nearest = 0;
+    for (int i = 1; i < c->images; i++) {
+        const float *now = c->camera[i], *best = c->camera[nearest];
+        if (hypotf(now[0], now[1]) < hypotf(best[0], best[1])) nearest = i;
+    }
+    for (int i = nearest; i > 0; i--) {
+        swap((char *)c->image + (size_t)i * bytes, (char *)c->image + (size_t)(i - 1) * bytes, bytes);
+        swap(c->camera[i], c->camera[i - 1], sizeof c->camera[i]);
+        swap(c->light[i], c->light[i - 1], sizeof c->light[i]);
+    }
+}
+
 /* What picture 0's colours are multiplied by. */
 static void input_gain(const io_capture *c, float gain[3])
 {

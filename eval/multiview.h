@@ -5,6 +5,9 @@
 #include "data/capture.h"
 #include "eval/metrics/metrics.h"
 
+/* Makes the picture whose camera is nearest to the sample's axis the first; the others keep their order. */
+void ev_capture_nearest_first(io_capture *c);
+
 /* Light and camera of a picture. Its power is that of the input picture as ev_capture_input gives it. */
 rd_view ev_capture_view(const io_capture *c, int picture);
 

@@ -6,18 +6,11 @@
 #include <string.h>
 
 extern const ev_method ev_method_mean, ev_method_unet, ev_method_unet_joint, ev_method_lgd, ev_method_lgd_nograd,
-    ev_method_frozen, ev_method_descent, ev_method_newton, ev_method_finetune, ev_method_latent;
-const ev_method *const ev_methods[] = {&ev_method_mean,
-                                       &ev_method_unet,
-                                       &ev_method_unet_joint,
-                                       &ev_method_lgd,
-                                       &ev_method_lgd_nograd,
-                                       &ev_method_frozen,
-                                       &ev_method_descent,
-                                       &ev_method_newton,
-                                       &ev_method_finetune,
-                                       &ev_method_latent,
-                                       NULL};
+    ev_method_frozen, ev_method_descent, ev_method_newton, ev_method_finetune, ev_method_latent, ev_method_peer;
+const ev_method *const ev_methods[] = {&ev_method_mean,    &ev_method_unet,       &ev_method_unet_joint,
+                                       &ev_method_lgd,     &ev_method_lgd_nograd, &ev_method_frozen,
+                                       &ev_method_descent, &ev_method_newton,     &ev_method_finetune,
+                                       &ev_method_latent,  &ev_method_peer,       NULL};
 
 static int find(const ev_method *m, const char *key)
 {

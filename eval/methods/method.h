@@ -31,6 +31,7 @@ typedef bool (*ev_seen)(int step, const float *maps, int channels, void *user);
 typedef struct ev_method {
     const char *name, *help;
     const ev_setting *settings;
+    bool peer;                                       /* only of what has a peer's maps */
     bool few;                                        /* of many steps some are scored: 1, 2, 5, 10 ... (false: all) */
     int (*steps)(const ev_estimator *e);             /* after open; NULL: 0 */
     int (*photos)(const ev_estimator *e);            /* photographs that it reads, after open; NULL: 1 */
