@@ -1,4 +1,17 @@
-# lgd: make deps | make | make demo | make test | make bench | make stress | make fuzz | make install PREFIX= DESTDIR= | make asan
+# `make help` prints the lines that begin with "#:".
+#: make              the programs, liblgd.a and liblgd.so, in build/
+#: make demo         the same, then demo/flash.jpg to maps in build/demo/
+#: make test         the same, then every test
+#: make deps         installs what the build needs (Debian, Ubuntu); the three above do so first
+#: make install      into PREFIX (/usr/local), below DESTDIR when given; make uninstall takes it away again
+#: make bench        times; BENCH="conv_ infer" runs the benchmarks whose names contain these words
+#: make bench-deps   PyTorch, for the comparison in make bench
+#: make stress       the numerics far from ordinary input; STRESS=shading runs one part
+#: make fuzz         the readers under libFuzzer; FUZZ=torch for one of them, FUZZ_SECONDS=600 for each
+#: make asan         make test with the address and undefined-behaviour sanitizers, in build-asan/
+#: make clean        deletes what make has built
+#: Variables: V=1 prints the commands, YES=1 installs packages without asking, -j1 is one job (default: one a CPU),
+#: BUILD= another folder, CC= CXX= CFLAGS= CPPFLAGS= LDLIBS= as usual, TESTDATA= FIXTURES= data for tests.
 CC ?= cc
 ifeq ($(origin CC),default)
 CC := gcc
@@ -6,6 +19,7 @@ endif
 ifeq ($(origin CXX),default)
 CXX := g++
 endif
+OBJCOPY ?= objcopy
 PREFIX ?= /usr/local
 TESTDATA ?= ../shared/testdata
 FIXTURES ?= ../shared/fixtures
@@ -13,19 +27,37 @@ BUILD ?= build
 OPT ?= -O3 -g
 SANITIZE ?=
 
-VERSION := 0.1.0
+VERSION := 0.2.0
+# The number of the shared library's binary interface: it grows when a program that is linked with it has to be again.
+SONAME := liblgd.so.0
+
+# A line for a step; V=1 prints the commands instead.
+ifeq ($(V),1)
+step = @:
+else
+Q := @
+step = @printf '  %-5s %s\n' '$(1)' '$(2)'
+endif
+ifeq (,$(filter -j% --jobserver%,$(MAKEFLAGS)))
+MAKEFLAGS += -j$(shell nproc 2>/dev/null || echo 2)
+endif
+
 # What the programs read and write themselves, and what only the shared object needs that reads all other image formats.
 PKG := OpenEXR libpng libjpeg zlib
 PKG_IMAGE := OpenImageIO
 WARN := -Wall -Wextra -Wshadow
-CPPFLAGS_ALL = -I. -I$(BUILD)/gen -D_GNU_SOURCE -DLGD_VERSION='"$(VERSION)"' -DLGD_DATADIR='"$(PREFIX)/share/lgd"' -DLGD_LIBDIR='"$(PREFIX)/lib"' $(CPPFLAGS)
-CFLAGS_ALL = -std=c11 $(OPT) $(WARN) -Wmissing-prototypes -fopenmp -fno-math-errno -fno-trapping-math -ffp-contract=off -fPIC $(SANITIZE) $(CFLAGS)
+CPPFLAGS_ALL = -I. -I$(BUILD)/gen -D_GNU_SOURCE -DLGD_VERSION='"$(VERSION)"' $(CPPFLAGS)
+CFLAGS_ALL = -std=c11 $(OPT) $(WARN) -Wmissing-prototypes -fopenmp -fno-math-errno -fno-trapping-math \
+  -ffp-contract=off -fPIC -fvisibility=hidden $(SANITIZE) $(CFLAGS)
 CXXFLAGS_ALL = -std=c++17 $(OPT) $(WARN) -fPIC $(SANITIZE) $(CXXFLAGS)
 # Looked up only when something is compiled or linked with them, so that `make deps` and `make help` work without.
 PKG_CFLAGS = $(shell pkg-config --cflags $(PKG))
 # OpenEXR's C core alone: the rest of it is C++.
-PKG_LIBS = $(filter-out -lOpenEXR-% -lOpenEXRUtil% -lIex% -lIlmThread% -lImath% -lOpenEXR -lIex -lImath -lIlmThread,$(shell pkg-config --libs $(PKG)))
+PKG_LIBS = $(filter-out -lOpenEXR-% -lOpenEXRUtil% -lIex% -lIlmThread% -lImath% -lOpenEXR -lIex -lImath -lIlmThread,\
+  $(shell pkg-config --libs $(PKG)))
 LDLIBS_ALL = $(PKG_LIBS) -fopenmp -lpthread -ldl -lm $(SANITIZE) $(LDLIBS)
+# What liblgd needs: it reads weights, but no images.
+LIB_LIBS := -lz -fopenmp -lpthread -lm
 
 MACHINE := $(shell $(CC) -dumpmachine)
 ifneq (,$(filter x86_64%,$(MACHINE)))
@@ -33,7 +65,8 @@ ISAS := base avx2 avx512 avx512bf16 amx
 else
 ISAS := base
 endif
-# Intel's Skylake family does not keep decoded a jump that touches a 32-byte boundary (erratum SKX102): inner loops lose 6% where one falls so.
+# Intel's Skylake family does not keep decoded a jump that touches a 32-byte boundary (erratum SKX102): inner loops lose
+# 6% where one falls so.
 ifneq (,$(filter x86_64%,$(MACHINE)))
 WHOLE_JUMPS := $(shell for f in -mbranches-within-32B-boundaries -Wa,-mbranches-within-32B-boundaries; do \
   echo 'int x;' | $(CC) $$f -xc -c -o /dev/null - 2>/dev/null && { echo $$f; break; }; done)
@@ -45,19 +78,23 @@ ISA_FLAGS_avx512bf16 := $(ISA_FLAGS_avx512) -mavx512bf16
 ISA_FLAGS_amx := $(ISA_FLAGS_avx512bf16) -mamx-tile -mamx-bf16
 
 PROGRAMS := train infer eval data convert
-ROOMS := tensor tensor/conv autograd render nn nn/weights data data/image data/materials train infer eval eval/methods eval/metrics cli cli/data cli/infer
+ROOMS := tensor tensor/conv autograd render nn nn/weights data data/image data/materials train infer eval eval/methods \
+  eval/metrics cli cli/data cli/infer
 LIB_C := $(filter-out %main.c,$(wildcard $(ROOMS:%=%/*.c)))
 KERNELS := $(wildcard tensor/kernels/*.c render/kernels/*.c)
 OPS := $(sort $(wildcard autograd/op_*.c render/op_*.c))
 OBJ := $(BUILD)/obj
 LIB_OBJ := $(LIB_C:%.c=$(OBJ)/%.o) $(OBJ)/gen/op_list.o \
   $(foreach isa,$(ISAS),$(KERNELS:%.c=$(OBJ)/%.$(isa).o))
+# Everything but the programs' main functions: what the programs are linked with.
+INTERNAL := $(OBJ)/internal.a
 LIB := $(BUILD)/liblgd.a
+SHARED := $(BUILD)/liblgd.so.$(VERSION)
 IMAGE_LIB := $(BUILD)/lib/lgd/liblgd_image.so
 BIN := $(PROGRAMS:%=$(BUILD)/bin/lgd-%)
 STRESS_C := $(filter-out %main.c,$(wildcard tests/stress/*.c))
 FUZZ_C := $(filter-out %main.c,$(wildcard tests/fuzz/*.c))
-TEST_C := $(wildcard tests/*.c $(filter-out tests/stress/%.c tests/fuzz/%.c,$(wildcard tests/*/*.c))) $(STRESS_C) $(FUZZ_C)
+TEST_C := $(wildcard tests/*.c) $(filter-out tests/stress/%.c tests/fuzz/%.c,$(wildcard tests/*/*.c)) $(STRESS_C) $(FUZZ_C)
 BENCH_C := $(wildcard bench/*.c)
 TEST_BIN := $(BUILD)/bin/lgd-test
 BENCH_BIN := $(BUILD)/bin/lgd-bench
@@ -65,83 +102,126 @@ STRESS_BIN := $(BUILD)/bin/lgd-stress
 # tests/stress/training.c stands between the trainer and its data.
 WRAP := -Wl,--wrap=io_loader_next -Wl,--wrap=tr_photographs
 
-all: $(BIN) $(LIB) $(IMAGE_LIB)
+all: deps
+	@$(MAKE) --no-print-directory programs
 
-$(BUILD)/bin/lgd-%: $(OBJ)/%/main.o $(LIB)
+programs: $(BIN) $(LIB) $(SHARED) $(IMAGE_LIB)
+
+help:
+	@sed -n 's/^#: //p' Makefile
+
+$(BUILD)/bin/lgd-%: $(OBJ)/%/main.o $(INTERNAL)
+	$(call step,LD,$@)
 	@mkdir -p $(@D)
-	$(CC) -o $@ $< $(LIB) $(LDLIBS_ALL)
+	$(Q)$(CC) -o $@ $< $(INTERNAL) $(LDLIBS_ALL)
 
-$(BUILD)/bin/lgd-infer $(BUILD)/bin/lgd-convert: $(BUILD)/bin/lgd-%: $(OBJ)/cli/%/main.o $(LIB)
+$(BUILD)/bin/lgd-infer $(BUILD)/bin/lgd-convert: $(BUILD)/bin/lgd-%: $(OBJ)/cli/%/main.o $(INTERNAL)
+	$(call step,LD,$@)
 	@mkdir -p $(@D)
-	$(CC) -o $@ $< $(LIB) $(LDLIBS_ALL)
+	$(Q)$(CC) -o $@ $< $(INTERNAL) $(LDLIBS_ALL)
 
-$(TEST_BIN): $(TEST_C:%.c=$(OBJ)/%.o) $(LIB) | $(IMAGE_LIB)
+$(TEST_BIN): $(TEST_C:%.c=$(OBJ)/%.o) $(INTERNAL) | $(IMAGE_LIB)
+	$(call step,LD,$@)
 	@mkdir -p $(@D)
-	$(CC) -o $@ $(filter %.o %.a,$^) $(WRAP) $(LDLIBS_ALL)
+	$(Q)$(CC) -o $@ $(filter %.o %.a,$^) $(WRAP) $(LDLIBS_ALL)
 
-$(STRESS_BIN): $(OBJ)/tests/stress/main.o $(STRESS_C:%.c=$(OBJ)/%.o) $(LIB)
+$(STRESS_BIN): $(OBJ)/tests/stress/main.o $(STRESS_C:%.c=$(OBJ)/%.o) $(INTERNAL)
+	$(call step,LD,$@)
 	@mkdir -p $(@D)
-	$(CC) -o $@ $(filter %.o %.a,$^) $(WRAP) $(LDLIBS_ALL)
+	$(Q)$(CC) -o $@ $(filter %.o %.a,$^) $(WRAP) $(LDLIBS_ALL)
 
-$(BENCH_BIN): $(BENCH_C:%.c=$(OBJ)/%.o) $(LIB)
+$(BENCH_BIN): $(BENCH_C:%.c=$(OBJ)/%.o) $(INTERNAL)
+	$(call step,LD,$@)
 	@mkdir -p $(@D)
-	$(CC) -o $@ $(filter %.o %.a,$^) $(LDLIBS_ALL)
+	$(Q)$(CC) -o $@ $(filter %.o %.a,$^) $(LDLIBS_ALL)
 
-$(LIB): $(LIB_OBJ)
+$(INTERNAL): $(LIB_OBJ)
+	$(call step,AR,$@)
 	@rm -f $@
-	$(AR) rcs $@ $^
+	$(Q)$(AR) rcs $@ $^
+
+# The library: infer/lgd.o and what it uses, in one object whose only global symbols are those that lgd.h marks LGD_API.
+$(OBJ)/liblgd.o: $(INTERNAL)
+	$(call step,LD,$@)
+	$(Q)$(CC) -r -nostdlib -o $@ $(OBJ)/infer/lgd.o $(INTERNAL)
+	$(Q)$(OBJCOPY) --localize-hidden $@
+
+$(LIB): $(OBJ)/liblgd.o
+	$(call step,AR,$@)
+	@rm -f $@
+	$(Q)$(AR) rcs $@ $<
+
+$(SHARED): $(OBJ)/liblgd.o
+	$(call step,LD,$@)
+	$(Q)$(CC) -shared -Wl,-soname,$(SONAME) -Wl,--no-undefined -o $@ $< $(LIB_LIBS) $(SANITIZE) $(LDLIBS)
+	@ln -sf $(@F) $(BUILD)/$(SONAME) && ln -sf $(SONAME) $(BUILD)/liblgd.so
 
 # OpenImageIO, behind the table in data/image/oiio.h. Loaded when an image needs it, never linked.
 $(IMAGE_LIB): $(OBJ)/data/image/oiio.o $(OBJ)/tensor/status.o
+	$(call step,LD,$@)
 	@mkdir -p $(@D)
-	$(CXX) -shared -Wl,-Bsymbolic -o $@ $^ $(shell pkg-config --libs $(PKG_IMAGE)) $(SANITIZE) $(LDLIBS)
+	$(Q)$(CXX) -shared -Wl,-Bsymbolic -o $@ $^ $(shell pkg-config --libs $(PKG_IMAGE)) $(SANITIZE) $(LDLIBS)
 
-# Every object is rebuilt when the flags change.
-FLAGS_NOW := $(CC) $(CXX) $(WHOLE_JUMPS) $(OPT) $(SANITIZE) $(CFLAGS) $(CPPFLAGS) $(PREFIX) $(VERSION)
-$(shell mkdir -p $(BUILD)/gen; echo '$(FLAGS_NOW)' | cmp -s - $(BUILD)/gen/flags || echo '$(FLAGS_NOW)' > $(BUILD)/gen/flags)
+# Every object is rebuilt when the flags change, and data/folders.o when PREFIX does.
+FLAGS_NOW := $(CC) $(CXX) $(WHOLE_JUMPS) $(OPT) $(SANITIZE) $(CFLAGS) $(CPPFLAGS) $(VERSION)
+changed = $(shell mkdir -p $(BUILD)/gen; echo '$(2)' | cmp -s - $(BUILD)/gen/$(1) || echo '$(2)' > $(BUILD)/gen/$(1))
+$(call changed,flags,$(FLAGS_NOW))
+$(call changed,prefix,$(PREFIX))
+$(OBJ)/data/folders.o: $(BUILD)/gen/prefix
+$(OBJ)/data/folders.o: CPPFLAGS_ALL += -DLGD_PREFIX='"$(PREFIX)"'
 
 $(OBJ)/%.o: %.c $(BUILD)/gen/flags | $(BUILD)/gen/ops.h
+	$(call step,CC,$<)
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS_ALL) $(if $(filter data/image/% nn/weights/%,$<),$(PKG_CFLAGS)) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
+	$(Q)$(CC) $(CPPFLAGS_ALL) $(if $(filter data/image/% nn/weights/%,$<),$(PKG_CFLAGS)) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
 
 $(OBJ)/gen/%.o: $(BUILD)/gen/%.c $(BUILD)/gen/flags
+	$(call step,CC,$<)
 	@mkdir -p $(@D)
-	$(CC) $(CPPFLAGS_ALL) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
+	$(Q)$(CC) $(CPPFLAGS_ALL) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
 
 $(OBJ)/%.o: %.cpp $(BUILD)/gen/flags
+	$(call step,CXX,$<)
 	@mkdir -p $(@D)
-	$(CXX) $(CPPFLAGS_ALL) $(shell pkg-config --cflags $(PKG_IMAGE)) $(CXXFLAGS_ALL) -MMD -MP -c -o $@ $<
+	$(Q)$(CXX) $(CPPFLAGS_ALL) $(shell pkg-config --cflags $(PKG_IMAGE)) $(CXXFLAGS_ALL) -MMD -MP -c -o $@ $<
 
-# One kernel source, once per instruction set. Contraction to FMA is part of what a kernel is, but for those whose bytes must not depend on the machine.
+# One kernel source, once per instruction set. Contraction to FMA is part of what a kernel is, but for those whose bytes
+# must not depend on the machine.
 CONTRACT_noise := off
 define KERNEL_RULE
 $(OBJ)/%.$(1).o: %.c $(BUILD)/gen/flags
+	$$(call step,CC,$$< [$(1)])
 	@mkdir -p $$(@D)
-	$$(CC) $$(CPPFLAGS_ALL) $$(CFLAGS_ALL) $$(ISA_FLAGS_$(1)) $$(WHOLE_JUMPS) -ffp-contract=$$(or $$(CONTRACT_$$(*F)),fast) -DTS_ISA_SUFFIX=$(1) -MMD -MP -c -o $$@ $$<
+	$$(Q)$$(CC) $$(CPPFLAGS_ALL) $$(CFLAGS_ALL) $$(ISA_FLAGS_$(1)) $$(WHOLE_JUMPS) \
+	  -ffp-contract=$$(or $$(CONTRACT_$$(*F)),fast) -DTS_ISA_SUFFIX=$(1) -MMD -MP -c -o $$@ $$<
 endef
 $(foreach isa,$(ISAS),$(eval $(call KERNEL_RULE,$(isa))))
 
-# The prototypes of all ops (the text between "#ifdef AG_API" and "#endif" in each autograd/op_*.c) and the list of their descriptors.
+# The prototypes of all ops (the text between "#ifdef AG_API" and "#endif" in each autograd/op_*.c) and the list of
+# their descriptors.
 $(BUILD)/gen/ops.h: $(filter autograd/%,$(OPS)) Makefile
 	@mkdir -p $(@D)
 	@{ echo '/* Made by make from autograd/op_*.c. */'; echo '#ifndef AG_OPS_H'; echo '#define AG_OPS_H'; \
 	  echo '#include "autograd/tape.h"'; \
-	  for f in $(sort $(filter autograd/%,$(OPS))); do sed -n '/^#ifdef AG_API$$/,/^#endif$$/{/^#/d;p}' $$f; done; echo '#endif'; } > $@.new
+	  for f in $(sort $(filter autograd/%,$(OPS))); do \
+	    sed -n '/^#ifdef AG_API$$/,/^#endif$$/{/^#/d;p}' $$f; done; echo '#endif'; } > $@.new
 	@cmp -s $@.new $@ && rm $@.new || mv $@.new $@
 $(BUILD)/gen/op_list.c: $(OPS) Makefile
 	@mkdir -p $(@D)
-	@{ echo '#include "autograd/op_list.h"'; for f in $(basename $(notdir $(OPS))); do echo "extern const ag_op $$f;"; done; \
-	  echo 'const ag_op *const ag_op_list[] = {'; for f in $(basename $(notdir $(OPS))); do echo "    &$$f,"; done; echo '    0};'; } > $@
+	@{ echo '#include "autograd/op_list.h"'; \
+	  for f in $(basename $(notdir $(OPS))); do echo "extern const ag_op $$f;"; done; \
+	  echo 'const ag_op *const ag_op_list[] = {'; \
+	  for f in $(basename $(notdir $(OPS))); do echo "    &$$f,"; done; echo '    0};'; } > $@
 
 deps:
 	@sh .ci/deps.sh $(PKG) $(PKG_IMAGE)
 
 test: deps
-	@$(MAKE) --no-print-directory all $(TEST_BIN)
+	@$(MAKE) --no-print-directory programs $(TEST_BIN)
 	@BUILD=$(BUILD) TESTDATA=$(TESTDATA) FIXTURES=$(FIXTURES) sh tests/run.sh
 
-# BENCH="conv_ infer" runs the benchmarks whose names contain these words.
-bench: all $(BENCH_BIN)
+bench: deps
+	@$(MAKE) --no-print-directory programs $(BENCH_BIN)
 	@TESTDATA=$(TESTDATA) $(BENCH_BIN) $(BENCH)
 
 # PyTorch for the peer's column: bench/peer_torch.py
@@ -151,13 +231,15 @@ bench-deps:
 stress: $(STRESS_BIN)
 	@OMP_WAIT_POLICY=passive $(STRESS_BIN) $(STRESS)
 
-# clang's libFuzzer with the address and undefined sanitizers, FUZZ_SECONDS for each target. The readers are compiled for it; what else they need comes
-# from the library as it is. OpenImageIO's libraries take seconds to load, and its PNG reader leaks a name where libpng jumps out of it.
+# clang's libFuzzer with the address and undefined sanitizers, FUZZ_SECONDS for each target. The readers are compiled for
+# it; what else they need comes from the library as it is. OpenImageIO's libraries take seconds to load, and its PNG
+# reader leaks a name where libpng jumps out of it.
 # New inputs go to $(BUILD)/fuzz/NAME, one that breaks something to $(BUILD)/fuzz/NAME.crash-….
 FUZZ ?= safetensors torch photo image config folder
 FUZZ_SECONDS ?= 600
 FUZZ_CC ?= clang
-FUZZED := $(addprefix nn/weights/,file.c tensor_convert.c json.c safetensors_read.c zip.c pickle.c torch_objects.c torch_read.c) \
+FUZZED := $(addprefix nn/weights/,file.c tensor_convert.c json.c safetensors_read.c zip.c pickle.c torch_objects.c \
+    torch_read.c) \
   $(addprefix data/image/,png_file.c png_read.c jpeg_read.c exif.c colour.c image.c image_read.c image_library.c) \
   $(addprefix data/,capture.c capture_ini.c ini.c file.c name.c map_folder.c map_names.c material.c) \
   train/config.c train/config_text.c train/keys.c eval/set_ini.c $(FUZZ_C)
@@ -165,48 +247,61 @@ FUZZ_FLAGS := -O1 -g -fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-r
 FUZZ_OBJ := $(FUZZED:%.c=$(BUILD)/fuzz/obj/%.o)
 
 $(BUILD)/fuzz/obj/%.o: %.c $(BUILD)/gen/flags | $(BUILD)/gen/ops.h
+	$(call step,CC,$< [fuzz])
 	@mkdir -p $(@D)
-	$(FUZZ_CC) $(CPPFLAGS_ALL) $(PKG_CFLAGS) -std=c11 $(WARN) $(FUZZ_FLAGS) -MMD -MP -c -o $@ $<
+	$(Q)$(FUZZ_CC) $(CPPFLAGS_ALL) $(PKG_CFLAGS) -std=c11 $(WARN) $(FUZZ_FLAGS) -MMD -MP -c -o $@ $<
 
-$(BUILD)/fuzz/bin/%: tests/fuzz/main.c $(FUZZ_OBJ) $(LIB)
+$(BUILD)/fuzz/bin/%: tests/fuzz/main.c $(FUZZ_OBJ) $(INTERNAL)
+	$(call step,LD,$@)
 	@mkdir -p $(@D)
-	$(FUZZ_CC) $(CPPFLAGS_ALL) -std=c11 $(WARN) $(FUZZ_FLAGS) -fsanitize=fuzzer -DFUZZ_TARGET=fuzz_$* -o $@ $(filter %.c %.o %.a,$^) -rdynamic $(PKG_LIBS) -lgomp -lpthread -ldl -lm
+	$(Q)$(FUZZ_CC) $(CPPFLAGS_ALL) -std=c11 $(WARN) $(FUZZ_FLAGS) -fsanitize=fuzzer -DFUZZ_TARGET=fuzz_$* -o $@ \
+	  $(filter %.c %.o %.a,$^) -rdynamic $(PKG_LIBS) -lgomp -lpthread -ldl -lm
 
 fuzz: $(FUZZ:%=$(BUILD)/fuzz/bin/%) $(IMAGE_LIB)
 	@mkdir -p $(BUILD)/fuzz/lib/lgd && cp $(IMAGE_LIB) $(BUILD)/fuzz/lib/lgd
 	@for t in $(FUZZ); do mkdir -p $(BUILD)/fuzz/$$t && echo "fuzz: $$t, $(FUZZ_SECONDS) s" && \
 	  leaks=1 && limit=10 && if [ $$t = image ]; then leaks=0 && limit=300; fi && ASAN_OPTIONS=detect_leaks=$$leaks \
-	  $(BUILD)/fuzz/bin/$$t -max_total_time=$(FUZZ_SECONDS) -timeout=$$limit -rss_limit_mb=2048 -max_len=16384 -print_final_stats=1 \
-	  -artifact_prefix=$(BUILD)/fuzz/$$t. $(BUILD)/fuzz/$$t tests/corpus/$$t >$(BUILD)/fuzz/$$t.log 2>&1 || { tail -n 40 $(BUILD)/fuzz/$$t.log; exit 1; }; \
+	  $(BUILD)/fuzz/bin/$$t -max_total_time=$(FUZZ_SECONDS) -timeout=$$limit -rss_limit_mb=2048 -max_len=16384 \
+	  -print_final_stats=1 -artifact_prefix=$(BUILD)/fuzz/$$t. $(BUILD)/fuzz/$$t tests/corpus/$$t \
+	  >$(BUILD)/fuzz/$$t.log 2>&1 || { tail -n 40 $(BUILD)/fuzz/$$t.log; exit 1; }; \
 	  sed -n 's/^stat::number_of_executed_units: */fuzz: clean, inputs: /p' $(BUILD)/fuzz/$$t.log; done
 
 # The sanitizers' build lives beside the ordinary one.
 asan:
-	@ASAN_OPTIONS=allocator_may_return_null=1 $(MAKE) --no-print-directory BUILD=$(BUILD)-asan OPT='-O1 -g -fno-omit-frame-pointer' SANITIZE='-fsanitize=address,undefined -fno-sanitize-recover=all' test
+	@ASAN_OPTIONS=allocator_may_return_null=1 $(MAKE) --no-print-directory BUILD=$(BUILD)-asan \
+	  OPT='-O1 -g -fno-omit-frame-pointer' SANITIZE='-fsanitize=address,undefined -fno-sanitize-recover=all' test
 
 demo: deps
-	@$(MAKE) --no-print-directory all
+	@$(MAKE) --no-print-directory programs
 	@BUILD=$(BUILD) sh .ci/demo.sh
 
+# Where make install puts things.
+TO := $(DESTDIR)$(PREFIX)
+MODELS := $(wildcard models/*.safetensors)
+
 install: all
-	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/include $(DESTDIR)$(PREFIX)/share/lgd
-	install -m 755 $(BIN) $(DESTDIR)$(PREFIX)/bin
-	install -m 644 $(LIB) $(DESTDIR)$(PREFIX)/lib
-	install -d $(DESTDIR)$(PREFIX)/lib/lgd
-	install -m 755 $(IMAGE_LIB) $(DESTDIR)$(PREFIX)/lib/lgd
-	install -m 644 infer/lgd.h $(DESTDIR)$(PREFIX)/include
-	install -m 644 $(wildcard models/*.safetensors) $(DESTDIR)$(PREFIX)/share/lgd
-	@printf 'prefix=%s\nName: lgd\nDescription: material of a surface from one flash photograph\nVersion: %s\nCflags: -I$${prefix}/include\nLibs: -L$${prefix}/lib -llgd %s -fopenmp -lpthread -ldl -lm\n' \
-	  '$(PREFIX)' '$(VERSION)' '$(PKG_LIBS)' > $(DESTDIR)$(PREFIX)/lib/pkgconfig/lgd.pc
+	install -d $(TO)/bin $(TO)/lib/pkgconfig $(TO)/lib/lgd $(TO)/include $(TO)/share/lgd
+	install -m 755 $(BIN) $(TO)/bin
+	install -m 644 $(LIB) $(TO)/lib
+	install -m 755 $(SHARED) $(TO)/lib
+	ln -sf $(notdir $(SHARED)) $(TO)/lib/$(SONAME)
+	ln -sf $(SONAME) $(TO)/lib/liblgd.so
+	install -m 755 $(IMAGE_LIB) $(TO)/lib/lgd
+	install -m 644 infer/lgd.h $(TO)/include
+	install -m 644 $(MODELS) $(TO)/share/lgd
+	@printf '%s\n' 'prefix=$(PREFIX)' 'Name: lgd' 'Description: material of a surface from one flash photograph' \
+	  'Version: $(VERSION)' 'Cflags: -I$${prefix}/include' 'Libs: -L$${prefix}/lib -llgd' 'Libs.private: $(LIB_LIBS)' \
+	  > $(TO)/lib/pkgconfig/lgd.pc
+	@[ -n "$(DESTDIR)" ] || ldconfig 2>/dev/null || true # the loader's list of libraries, where we may write it
 
 uninstall:
-	rm -f $(PROGRAMS:%=$(DESTDIR)$(PREFIX)/bin/lgd-%) $(DESTDIR)$(PREFIX)/lib/liblgd.a $(DESTDIR)$(PREFIX)/lib/lgd/liblgd_image.so $(DESTDIR)$(PREFIX)/lib/pkgconfig/lgd.pc \
-	  $(DESTDIR)$(PREFIX)/include/lgd.h $(patsubst models/%,$(DESTDIR)$(PREFIX)/share/lgd/%,$(wildcard models/*.safetensors))
-	-rmdir $(DESTDIR)$(PREFIX)/share/lgd $(DESTDIR)$(PREFIX)/lib/lgd
+	rm -f $(PROGRAMS:%=$(TO)/bin/lgd-%) $(TO)/lib/liblgd.a $(TO)/lib/liblgd.so* $(TO)/lib/lgd/liblgd_image.so \
+	  $(TO)/lib/pkgconfig/lgd.pc $(TO)/include/lgd.h $(MODELS:models/%=$(TO)/share/lgd/%)
+	-rmdir $(TO)/share/lgd $(TO)/lib/lgd
 
 clean:
 	rm -rf $(BUILD) $(BUILD)-asan
 
-.PHONY: all deps test bench bench-deps stress fuzz asan demo install uninstall clean
+.PHONY: all programs help deps test bench bench-deps stress fuzz asan demo install uninstall clean
 .SECONDARY:
 -include $(shell find $(OBJ) $(BUILD)/fuzz/obj -name '*.d' 2>/dev/null)

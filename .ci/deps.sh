@@ -1,6 +1,7 @@
 #!/bin/sh
 # Installs what the build needs with the system's package manager, as root or through sudo; where that is not possible it
-# prints the names of what is missing and ends with 1. Arguments: the pkg-config modules.
+# prints the names of what is missing and ends with 1. On a terminal it asks first, unless YES or CI is set.
+# Arguments: the pkg-config modules.
 missing=
 have() { command -v "$1" >/dev/null 2>&1; }
 have "${CC:-gcc}" || missing="$missing gcc"
@@ -29,7 +30,11 @@ else
     echo "deps: missing:$missing; as root: apt-get install$missing" >&2
     exit 1
 fi
-echo "deps: installing$missing" >&2
+echo "deps: the build needs these packages, which apt-get installs${run:+ through $run}:$missing" >&2
+if [ -t 0 ] && [ -t 2 ] && [ -z "${YES:-}${CI:-}" ]; then
+    printf 'deps: Enter installs them, Ctrl-C ends (make YES=1 does not ask) ' >&2
+    read -r _ || exit 1
+fi
 export DEBIAN_FRONTEND=noninteractive
 if $run apt-get update -qq >&2 && $run apt-get install -y -qq --no-install-recommends $missing >&2; then exit 0; fi
 echo "deps: could not install$missing (no network?); install them and run make again" >&2

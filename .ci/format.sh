@@ -1,7 +1,8 @@
 #!/bin/sh
-# The style of the sources: prints each file that clang-format would change and each line over 120 columns, and ends
-# with 1; `.ci/format.sh fix` formats in place. Releases of clang-format differ in detail, so that only release 14 is
-# asked (Debian 12; elsewhere `pip install clang-format==14.0.6`); without it that half is skipped by name.
+# The style of the sources: prints each file that clang-format would change and each line over 120 columns, of Markdown
+# over 100 (rows of tables cannot be broken and may be longer), and ends with 1; `.ci/format.sh fix` formats in place.
+# Releases of clang-format differ in detail, so that only release 14 is asked (Debian 12; elsewhere
+# `pip install clang-format==14.0.6`); without it that half is skipped by name.
 cd "$(dirname "$0")/.." || exit 1
 sources=$(git ls-files '*.c' '*.h' '*.cpp')
 for format in clang-format-14 clang-format none; do
@@ -9,6 +10,10 @@ for format in clang-format-14 clang-format none; do
 done
 [ "${1:-}" = fix ] && [ "$format" != none ] && "$format" -i $sources
 long=$(awk 'length > 120 { print FILENAME ":" FNR ": " length " columns, the most are 120" }' $sources)
+[ -z "$long" ] || { echo "$long" >&2; exit 1; }
+# Bytes 200 to 277 continue a character of UTF-8: columns are characters.
+long=$(git ls-files '*.md' | LC_ALL=C xargs awk '{ text = $0; gsub(/[\200-\277]/, "", text) }
+    length(text) > 100 && !/^\|/ { print FILENAME ":" FNR ": " length(text) " columns, the most are 100" }')
 [ -z "$long" ] || { echo "$long" >&2; exit 1; }
 [ "$format" = none ] && { echo "skip format: clang-format 14 is not installed" >&2; exit 0; }
 "$format" --dry-run --Werror $sources

@@ -5,16 +5,16 @@ allowed() {
     case $1 in
     tensor/kernels) echo "tensor tensor/kernels" ;;
     tensor/conv) echo "tensor tensor/kernels tensor/conv" ;;
-    tensor) echo "tensor tensor/kernels tensor/conv" ;;
+    tensor) echo "tensor tensor/kernels" ;;
     autograd) echo "autograd tensor tensor/conv tensor/kernels" ;;
     render/kernels) echo "render/kernels tensor tensor/kernels" ;;
     render) echo "render render/kernels autograd tensor tensor/kernels" ;;
     nn/weights) echo "nn/weights nn tensor tensor/kernels" ;;
     nn) echo "nn nn/weights render autograd tensor tensor/conv tensor/kernels" ;;
     data/image) echo "data/image data tensor" ;;
-    data/materials) echo "data/materials data data/image tensor tensor/kernels" ;;
-    data) echo "data data/image data/materials tensor" ;;
-    cli) echo "cli tensor" ;;
+    data/materials) echo "data/materials data data/image tensor tensor/conv tensor/kernels" ;;
+    data) echo "data data/image data/materials tensor tensor/conv" ;;
+    cli) echo "cli autograd tensor" ;;
     cli/data) echo "cli cli/data render data data/image autograd tensor" ;;
     cli/infer|cli/convert) echo "cli cli/infer infer nn nn/weights render data data/image autograd tensor tensor/conv" ;;
     train) echo "train cli nn nn/weights render data data/image data/materials autograd tensor tensor/conv" ;;

@@ -9,7 +9,7 @@ typedef struct part {
     void *user;
     int ins, outs;
     ag_value *in[AG_PART_MOST], *out[AG_PART_MOST], *token;
-    float *room[AG_PART_MOST];
+    float *buffer[AG_PART_MOST];
     bool arrived[AG_PART_MOST]; /* a gradient at the result */
 } part;
 
@@ -34,7 +34,7 @@ static void again(ag_tape *tape, ag_node *node)
     target to[AG_PART_MOST] = {{0}};
     ag_value *in[AG_PART_MOST] = {0}, *out[AG_PART_MOST] = {0};
     for (int i = 0; i < p->ins; i++) {
-        if (p->in[i] && p->in[i]->needs_grad && !p->in[i]->grad) p->in[i]->grad = p->room[i];
+        if (p->in[i] && p->in[i]->needs_grad && !p->in[i]->grad) p->in[i]->grad = p->buffer[i];
         to[i].grad = ag_grad_target(tape, p->in[i], &to[i].add);
     }
     const ts_mark mark = ts_arena_mark(tape->arena);
@@ -70,7 +70,7 @@ static bool put(ag_tape *tape, part *p, const ag_op *op, ag_value *out)
 }
 
 bool ag_checkpoint(ag_tape *tape, ag_body body, const void *user, size_t size, int ins, ag_value *const *in,
-                   float *const *room, int outs, ag_value **out)
+                   float *const *buffer, int outs, ag_value **out)
 {
     if (!ag_ready(tape, "checkpoint", 0, in)) return false;
     if (!tape->gradients) {
@@ -89,7 +89,7 @@ bool ag_checkpoint(ag_tape *tape, ag_body body, const void *user, size_t size, i
     memcpy(p->user, user, size);
     for (int i = 0; i < ins; i++) {
         p->in[i] = in[i];
-        p->room[i] = room[i];
+        p->buffer[i] = buffer[i];
         plain[i] = in[i] ? ag_detach(tape, in[i]) : NULL;
     }
     tape->gradients = false;

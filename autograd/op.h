@@ -7,8 +7,11 @@
 /* No error so far and all inputs are there. Sets the error "op: input i is missing" otherwise. */
 bool ag_ready(ag_tape *tape, const char *op, int count, ag_value *const *in);
 
+/* Threads of a loop of an operation on the tape. */
+static inline int ag_threads(const ag_tape *tape) { return ts_threads_of(ag_compute(tape)->threads); }
+
 /* to[n,h,w,:] = a[n,h,w,:] followed by b[n,h,w,:] (op_concat.c). */
-void ag_join(const ag_value *a, const ag_value *b, float *to);
+void ag_join(ag_tape *tape, const ag_value *a, const ag_value *b, float *to);
 
 /* The recorded operation that made v, or NULL. */
 const ag_node *ag_node_of(const ag_tape *tape, const ag_value *v);
@@ -21,6 +24,10 @@ enum { AG_CHUNK = 1 << 14 };
 static inline int64_t ag_part(int64_t n, int64_t first, int64_t chunk) { return n - first < chunk ? n - first : chunk; }
 /* The same in pixels of c channels. */
 static inline int64_t ag_pixel_chunk(int c) { return c < AG_CHUNK ? AG_CHUNK / c : 1; }
+
+/* Whether a program watches (autograd/trace.h); and what it is told of the convolution that runs. */
+bool ag_traced(void);
+void ag_trace_way(ag_tape *tape, const char *way);
 
 /* "[n,h,w,c]" for messages; the text lives in the caller's buffer. */
 enum { AG_SHAPE_TEXT = 64 };

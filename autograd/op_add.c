@@ -16,7 +16,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const float *a = node->in[0]->t.data, *b = node->in[1]->t.data;
     float *y = node->out->t.data;
     const int64_t n = ts_count(node->out->t.shape);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (n > AG_CHUNK)
     for (int64_t i = 0; i < n; i += AG_CHUNK) k->add(ag_part(n, i, AG_CHUNK), a + i, b + i, y + i);
 }
 
@@ -29,7 +29,7 @@ static void backward(ag_tape *tape, ag_node *node)
         bool accumulate;
         float *dx = ag_grad_target(tape, node->in[j], &accumulate);
         if (!dx) continue;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (n > AG_CHUNK)
         for (int64_t i = 0; i < n; i += AG_CHUNK) k->scale(ag_part(n, i, AG_CHUNK), 1.0f, dy + i, dx + i, accumulate);
     }
 }

@@ -23,7 +23,7 @@ static void forward(ag_tape *tape, ag_node *node)
     float *y = node->out->t.data;
     const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_pixel_chunk(c), parts = (pixels + chunk - 1) / chunk,
                   tasks = parts * s.n;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t n = t / parts, p = t % parts * chunk, at = (n * pixels + p) * c;
         k->add_leaky(ag_part(pixels, p, chunk), c, x + at, g + n * c, leak, y + at);
@@ -47,7 +47,7 @@ static void backward(ag_tape *tape, ag_node *node)
         ag_fail(tape, TS_NOMEM, "add_leaky: no memory for the sums");
         return;
     }
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t p = t % parts * chunk, at = (t / parts * pixels + p) * c;
         k->add_leaky_backward(ag_part(pixels, p, chunk), c, y + at, dy + at, leak, dx ? dx + at : NULL, accumulate,

@@ -26,7 +26,7 @@ static void forward(ag_tape *tape, ag_node *node)
         ag_fail(tape, TS_NOMEM, "channel_mean: no memory for the sums");
         return;
     }
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t p = t % parts * chunk;
         k->sums(ag_part(pixels, p, chunk), c, x + (t / parts * pixels + p) * c, part + t * c);
@@ -57,7 +57,7 @@ static void backward(ag_tape *tape, ag_node *node)
         return;
     }
     k->scale((int64_t)s.n * c, (float)(1.0 / (double)pixels), dy, each, false);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t n = t / parts, p = t % parts * chunk;
         k->broadcast(ag_part(pixels, p, chunk), c, each + n * c, dx + (n * pixels + p) * c, accumulate);

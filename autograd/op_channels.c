@@ -20,7 +20,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const int64_t pixels = ts_pixels(node->out->t.shape);
     const float *x = node->in[0]->t.data;
     float *y = node->out->t.data;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels * d > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels * d > AG_CHUNK)
     for (int64_t p = 0; p < pixels; p++) memcpy(y + p * d, x + p * c + first, (size_t)d * sizeof *y);
 }
 
@@ -33,7 +33,7 @@ static void backward(ag_tape *tape, ag_node *node)
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
     if (!dx) return;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels * d > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels * d > AG_CHUNK)
     for (int64_t p = 0; p < pixels; p++)
         for (int i = 0; i < c; i++) {
             const float g = i >= first && i < first + d ? dy[p * d + i - first] : 0;

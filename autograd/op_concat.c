@@ -10,12 +10,12 @@
 ag_value *ag_concat(ag_tape *tape, ag_value *a, ag_value *b);
 #endif
 
-void ag_join(const ag_value *a, const ag_value *b, float *to)
+void ag_join(ag_tape *tape, const ag_value *a, const ag_value *b, float *to)
 {
     const struct ts_elementwise_kernels *k = ts_elementwise_k();
     const int ca = a->t.shape.c, cb = b->t.shape.c, c = ca + cb;
     const int64_t pixels = ts_pixels(a->t.shape), chunk = ag_pixel_chunk(c);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels > chunk)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels > chunk)
     for (int64_t p = 0; p < pixels; p += chunk) {
         k->copy(ag_part(pixels, p, chunk), ca, a->t.data + p * ca, ca, to + p * c, c, false);
         k->copy(ag_part(pixels, p, chunk), cb, b->t.data + p * cb, cb, to + p * c + ca, c, false);
@@ -25,7 +25,7 @@ void ag_join(const ag_value *a, const ag_value *b, float *to)
 static void forward(ag_tape *tape, ag_node *node)
 {
     (void)tape;
-    ag_join(node->in[0], node->in[1], node->out->t.data);
+    ag_join(tape, node->in[0], node->in[1], node->out->t.data);
 }
 
 static void backward(ag_tape *tape, ag_node *node)
@@ -39,7 +39,7 @@ static void backward(ag_tape *tape, ag_node *node)
         bool accumulate;
         float *dx = ag_grad_target(tape, node->in[j], &accumulate);
         if (!dx) continue;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels > chunk)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels > chunk)
         for (int64_t p = 0; p < pixels; p += chunk)
             k->copy(ag_part(pixels, p, chunk), m, dy + p * c, c, dx + p * m, m, accumulate);
     }

@@ -13,8 +13,8 @@
 ag_value *ag_conv(ag_tape *tape, ag_value *x, ag_value *weight, ag_value *bias, int dilation, ts_pad pad, float leak);
 /* The same of x [N,H,W,i] and, behind its channels, constants [N,H,W,ic-i], which get no gradient, and for which none
  * is computed: an error if they want one. NULL: of x alone. */
-ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias,
-                         int dilation, ts_pad pad, float leak);
+ag_value *ag_conv_with_constants(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias,
+                                 int dilation, ts_pad pad, float leak);
 #endif
 
 enum { X, WEIGHT, BIAS, CONSTANTS, INPUTS };
@@ -32,28 +32,25 @@ static const float *input(ag_tape *tape, const ag_node *node)
     ts_shape s = x->t.shape;
     s.c += constants->t.shape.c;
     float *both = ts_new(ag_arena(tape), s).data;
-    if (both) ag_join(x, constants, both);
+    if (both) ag_join(tape, x, constants, both);
     else ag_fail(tape, TS_NOMEM, "conv: no memory for %lld values", (long long)ts_count(s));
     return both;
 }
 
-static bool winograd(const ts_conv *c, ts_conv_use use) { return !ts_conv_exact() && ts_conv_winograd(c, use); }
-
 static void weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
 {
-    const bool rounded = dweight && ts_conv_precision() == TS_BF16 && ts_conv_bf16_weights(),
-               other = dweight && !rounded && !ts_conv_exact() && ts_conv_winograd_weights(c);
-    if (rounded) ts_conv_weight_gradient_bf16(c, x, dy, dweight);
-    if (other) ts_conv_weight_gradient_winograd(c, x, dy, dweight);
-    ts_conv_weight_gradient(c, x, dy, rounded || other ? NULL : dweight, dbias);
+    const ts_conv_way way = dweight ? ts_conv_choose(c, TS_CONV_WEIGHTS) : TS_CONV_DIRECTLY;
+    const bool amx = way == TS_CONV_BY_AMX, winograd = way == TS_CONV_BY_WINOGRAD;
+    if (amx) ts_conv_weight_gradient_bf16(c, x, dy, dweight);
+    if (winograd) ts_conv_weight_gradient_winograd(c, x, dy, dweight);
+    ts_conv_weight_gradient(c, x, dy, amx || winograd ? NULL : dweight, dbias);
 }
 
 static void forward(ag_tape *tape, ag_node *node)
 {
     const conv_attr *a = node->attr;
-    const ts_conv_use use = ts_conv_precision() == TS_BF16 ? TS_CONV_FORWARD_BF16
-        : winograd(&a->conv, TS_CONV_WINOGRAD)             ? TS_CONV_WINOGRAD
-                                                           : TS_CONV_FORWARD;
+    const ts_conv_use use = ts_conv_packing(&a->conv, TS_CONV_OUTPUT);
+    if (ag_traced()) ag_trace_way(tape, ts_conv_way_name(ts_conv_choose(&a->conv, TS_CONV_OUTPUT)));
     const float *packed = ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data);
     if (!packed) return;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
@@ -74,7 +71,7 @@ static void backward(ag_tape *tape, ag_node *node)
         const struct ts_elementwise_kernels *k = ts_elementwise_k();
         const float *y = node->out->t.data;
         const int64_t n = ts_count(node->out->t.shape);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (n > AG_CHUNK)
         for (int64_t i = 0; i < n; i += AG_CHUNK)
             k->leaky_backward(ag_part(n, i, AG_CHUNK), y + i, dy + i, a->leak, dy + i, false);
     }
@@ -85,9 +82,8 @@ static void backward(ag_tape *tape, ag_node *node)
     ts_arena_release(ag_arena(tape), mark);
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[X], &accumulate);
-    const ts_conv_use use = ts_conv_precision() == TS_BF16   ? TS_CONV_DATA_GRADIENT_BF16
-        : winograd(&a->conv, TS_CONV_DATA_GRADIENT_WINOGRAD) ? TS_CONV_DATA_GRADIENT_WINOGRAD
-                                                             : TS_CONV_DATA_GRADIENT;
+    const ts_conv_use use = ts_conv_packing(&a->conv, TS_CONV_INPUT);
+    if (ag_traced()) ag_trace_way(tape, ts_conv_way_name(ts_conv_choose(&a->conv, TS_CONV_INPUT)));
     const float *packed = dx ? ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data) : NULL;
     if (packed)
         (use == TS_CONV_DATA_GRADIENT_BF16  ? ts_conv_data_gradient_bf16
@@ -143,8 +139,8 @@ static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
 {
     const conv_case *c = user;
     const ts_conv *v = &c->attr.conv;
-    return ag_conv_beside(tape, in[X], v->constants ? in[CONSTANTS] : NULL, in[WEIGHT], c->bias ? in[BIAS] : NULL,
-                          v->dilation, v->pad, c->attr.leak);
+    return ag_conv_with_constants(tape, in[X], v->constants ? in[CONSTANTS] : NULL, in[WEIGHT],
+                                  c->bias ? in[BIAS] : NULL, v->dilation, v->pad, c->attr.leak);
 }
 
 /* u is linear in each value alone: it crosses 0 within the step when its signs at both ends differ. */
@@ -190,7 +186,7 @@ static void cases(ag_gradcheck *check)
         k.attr.leak = t % 2 ? 0.2f : 1.0f;
         if (t < edges)
             k.attr.conv = (ts_conv){1 + t % 2, edge[t].h,        edge[t].w,   edge[t].ic, edge[t].oc,
-                                    edge[t].k, edge[t].dilation, edge[t].pad, 0};
+                                    edge[t].k, edge[t].dilation, edge[t].pad, 0,          {0}};
         else
             k.attr.conv = (ts_conv){1 + ts_rng_int(r, 2),
                                     1 + ts_rng_int(r, 5),
@@ -200,7 +196,8 @@ static void cases(ag_gradcheck *check)
                                     1 + 2 * ts_rng_int(r, 3),
                                     1 + ts_rng_int(r, 2),
                                     ts_rng_int(r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE,
-                                    0};
+                                    0,
+                                    {0}};
         ts_conv *v = &k.attr.conv;
         v->constants = t % 4 == 1 ? v->ic / 2 : 0;
         ag_case c = {.label = t < edges ? edge[t].label : "random",
@@ -224,8 +221,8 @@ static void cases(ag_gradcheck *check)
 
 const ag_op op_conv = {"conv", forward, backward, reference, cases};
 
-ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias,
-                         int dilation, ts_pad pad, float leak)
+ag_value *ag_conv_with_constants(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias,
+                                 int dilation, ts_pad pad, float leak)
 {
     ag_value *in[INPUTS] = {x, weight, bias, constants};
     char text[AG_SHAPE_TEXT], more[AG_SHAPE_TEXT];
@@ -237,7 +234,7 @@ ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_val
             return ag_fail(tape, TS_INVALID, "conv: %s and %s differ in more than the channels", ag_shape_text(text, s),
                            ag_shape_text(more, q));
         if (constants->needs_grad)
-            return ag_fail(tape, TS_INVALID, "conv: what stands beside the input is a constant and has no gradient");
+            return ag_fail(tape, TS_INVALID, "conv: the constants behind the input have no gradient");
         s.c += q.c;
     }
     if (w.w != w.c) return ag_fail(tape, TS_INVALID, "conv: weight %s is not {oc,ic,k,k}", ag_shape_text(text, w));
@@ -246,7 +243,7 @@ ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_val
         return ag_fail(tape, TS_INVALID, "conv: bias %s is not [1,1,1,%d]", ag_shape_text(text, bias->t.shape), w.n);
     if (!(leak > 0 && leak <= 1))
         return ag_fail(tape, TS_INVALID, "conv: leak is %g, it must lie in (0, 1]", (double)leak);
-    const conv_attr a = {{s.n, s.h, s.w, s.c, w.n, w.c, dilation, pad, s.c - x->t.shape.c}, leak};
+    const conv_attr a = {{s.n, s.h, s.w, s.c, w.n, w.c, dilation, pad, s.c - x->t.shape.c, *ag_compute(tape)}, leak};
     ts_status st = {0};
     if (ts_conv_check(&a.conv, &st) != TS_OK) return ag_fail(tape, st.code, "%s", st.message);
     return ag_apply(tape, &op_conv, INPUTS, in, (ts_shape){s.n, s.h, s.w, w.n}, &a, sizeof a);
@@ -254,5 +251,5 @@ ag_value *ag_conv_beside(ag_tape *tape, ag_value *x, ag_value *constants, ag_val
 
 ag_value *ag_conv(ag_tape *tape, ag_value *x, ag_value *weight, ag_value *bias, int dilation, ts_pad pad, float leak)
 {
-    return ag_conv_beside(tape, x, NULL, weight, bias, dilation, pad, leak);
+    return ag_conv_with_constants(tape, x, NULL, weight, bias, dilation, pad, leak);
 }

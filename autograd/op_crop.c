@@ -23,7 +23,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const int64_t row = (int64_t)d.w * d.c;
     const float *x = node->in[0]->t.data + ((int64_t)a->y0 * s.w + a->x0) * s.c;
     float *y = node->out->t.data;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (ts_count(d) > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (ts_count(d) > AG_CHUNK)
     for (int i = 0; i < d.n * d.h; i++)
         memcpy(y + i * row, x + ((int64_t)(i / d.h) * s.h + i % d.h) * s.w * s.c, (size_t)row * sizeof(float));
 }
@@ -37,7 +37,7 @@ static void backward(ag_tape *tape, ag_node *node)
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
     if (!dx) return;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (ts_count(s) > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (ts_count(s) > AG_CHUNK)
     for (int i = 0; i < s.n * s.h; i++) {
         const int y = i % s.h - a->y0;
         float *to = dx + i * row;

@@ -1,11 +1,11 @@
 /* ih = x W_ih' + b_ih,  hh = old W_hh' + b_hh,  z = sigmoid(ih_z + hh_z),  r = sigmoid(ih_r + hh_r),  m = tanh(ih_n + r
- * hh_n), y = (1 - z) old + z m; its gradients as in tensor/kernels/elementwise.h and tensor/gru.h, where the source is
- * named x: [N,H,W,I], old: [N,H,W,C] or NULL = 0, W_ih: {3C,I,1,1}, W_hh: {3C,C,1,1} in chunks z, r, n, biases:
- * [1,1,1,3C], y: [N,H,W,C] */
+ * hh_n), y = (1 - z) old + z m; its gradients as in tensor/kernels/elementwise.h and tensor/conv/gru.h, where the
+ * source is named x: [N,H,W,I], old: [N,H,W,C] or NULL = 0, W_ih: {3C,I,1,1}, W_hh: {3C,C,1,1} in chunks z, r, n,
+ * biases: [1,1,1,3C], y: [N,H,W,C] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
-#include "tensor/gru.h"
+#include "tensor/conv/gru.h"
 #include <math.h>
 
 #ifdef AG_API
@@ -17,10 +17,10 @@ ag_value *ag_gru(ag_tape *tape, ag_value *x, ag_value *old, ag_value *ih, ag_val
 
 enum { X, IH, IH_BIAS, HH, HH_BIAS, OLD, INPUTS };
 
-static ts_gru shape(const ag_node *node)
+static ts_gru shape(ts_compute how, const ag_node *node)
 {
     return (ts_gru){ts_pixels(node->out->t.shape), node->in[X]->t.shape.c, node->out->t.shape.c,
-                    ts_conv_precision() == TS_BF16};
+                    how.precision == TS_BF16, how.threads};
 }
 
 static const float *packed(ag_tape *tape, ts_conv c, ts_conv_use use, const ag_value *weight)
@@ -30,7 +30,7 @@ static const float *packed(ag_tape *tape, ts_conv c, ts_conv_use use, const ag_v
 
 static void forward(ag_tape *tape, ag_node *node)
 {
-    const ts_gru g = shape(node);
+    const ts_gru g = shape(*ag_compute(tape), node);
     const ts_conv_use use = g.bf16 ? TS_CONV_FORWARD_BF16 : TS_CONV_FORWARD;
     const float *ih = packed(tape, ts_gru_input(&g), use, node->in[IH]),
                 *old = node->in[OLD] ? node->in[OLD]->t.data : NULL;
@@ -49,7 +49,7 @@ static void forward(ag_tape *tape, ag_node *node)
 
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const ts_gru g = shape(node);
+    const ts_gru g = shape(*ag_compute(tape), node);
     const float *old = node->in[OLD] ? node->in[OLD]->t.data : NULL;
     ts_gru_gradients to = {0};
     /* The state first: it may be x itself. */
@@ -75,7 +75,7 @@ static double gate(const double *weight, const double *bias, int row, int channe
 
 static void reference(const ag_node *node, const double *const *in, double *out)
 {
-    const ts_gru g = shape(node);
+    const ts_gru g = shape((ts_compute){0}, node);
     for (int64_t p = 0; p < g.pixels; p++)
         for (int i = 0; i < g.c; i++) {
             const double *x = in[X] + p * g.ic, *old = in[OLD] ? in[OLD] + p * g.c : NULL;

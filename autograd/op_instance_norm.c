@@ -33,7 +33,7 @@ static void forward(ag_tape *tape, ag_node *node)
         ag_fail(tape, TS_NOMEM, "instance_norm: no memory for the sums");
         return;
     }
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t n = t / parts, p = t % parts * chunk;
         k->moments(ag_part(pixels, p, chunk), c, x + (n * pixels + p) * c, part + t * 2 * c, part + t * 2 * c + c);
@@ -54,7 +54,7 @@ static void forward(ag_tape *tape, ag_node *node)
         to[2 * c] = (float)(1 / sqrt(m2 / (double)pixels + epsilon));
         if (q) q[i] = to[2 * c];
     }
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t n = t / parts, p = t % parts * chunk, at = (n * pixels + p) * c;
         k->normalise(ag_part(pixels, p, chunk), c, x + at, stat + n * 3 * c, stat + n * 3 * c + c,
@@ -83,7 +83,7 @@ static void backward(ag_tape *tape, ag_node *node)
         ag_fail(tape, TS_NOMEM, "instance_norm: no memory for the sums");
         return;
     }
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t p = t % parts * chunk, at = (t / parts * pixels + p) * c;
         k->gradient_sums(ag_part(pixels, p, chunk), c, y + at, dy + at, part + t * 2 * c, part + t * 2 * c + c);
@@ -93,7 +93,7 @@ static void backward(ag_tape *tape, ag_node *node)
         for (int64_t t = 0; t < parts; t++) sum += part[(i / (2 * c) * parts + t) * 2 * c + i % (2 * c)];
         mean[i] = (float)(sum / (double)pixels);
     }
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (tasks > 1)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
     for (int64_t t = 0; t < tasks; t++) {
         const int64_t n = t / parts, p = t % parts * chunk, at = (n * pixels + p) * c;
         k->gradient(ag_part(pixels, p, chunk), c, y + at, dy + at, mean + n * 2 * c, mean + n * 2 * c + c, q + n * c,

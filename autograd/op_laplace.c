@@ -39,7 +39,7 @@ static void forward(ag_tape *tape, ag_node *node)
         ag_fail(tape, TS_NOMEM, "laplace: no memory for %lld sums", (long long)chunks);
         return;
     }
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (chunks > 1)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (chunks > 1)
     for (int64_t k = 0; k < chunks; k++) {
         double part = 0;
         for (int64_t p = k * chunk; p < k * chunk + ag_part(pixels, k * chunk, chunk); p++) {
@@ -63,7 +63,7 @@ static void backward(ag_tape *tape, ag_node *node)
     const int64_t pixels = ts_pixels(node->in[0]->t.shape), chunk = ag_pixel_chunk(c);
     const float up = node->out->grad[0] / (float)(pixels * c);
     float *dx = ag_grad_add(tape, node->in[0]), *ds = ag_grad_add(tape, node->in[1]);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels > chunk)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels > chunk)
     for (int64_t p = 0; p < pixels; p++) {
         float inverse[MOST];
         for (int i = 0; i < g; i++) inverse[i] = expf(-held(s[p * g + i])) / a->unit;

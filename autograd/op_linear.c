@@ -4,7 +4,7 @@
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
-#include "tensor/gemm.h"
+#include "tensor/conv/gemm.h"
 #include <string.h>
 
 #ifdef AG_API
@@ -19,7 +19,8 @@ static void forward(ag_tape *tape, ag_node *node)
     float *y = node->out->t.data;
     for (int j = 0; node->in[2] && j < n; j++)
         memcpy(y + (size_t)j * (size_t)o, node->in[2]->t.data, (size_t)o * sizeof(float));
-    ts_gemm(false, true, n, o, i, 1.0f, node->in[0]->t.data, node->in[1]->t.data, node->in[2] ? 1.0f : 0.0f, y);
+    ts_gemm(false, true, n, o, i, 1.0f, node->in[0]->t.data, node->in[1]->t.data, node->in[2] ? 1.0f : 0.0f, y,
+            ag_threads(tape));
 }
 
 static void backward(ag_tape *tape, ag_node *node)
@@ -28,9 +29,11 @@ static void backward(ag_tape *tape, ag_node *node)
     const float *dy = node->out->grad;
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
-    if (dx) ts_gemm(false, false, n, i, o, 1.0f, dy, node->in[1]->t.data, accumulate ? 1.0f : 0.0f, dx);
+    if (dx)
+        ts_gemm(false, false, n, i, o, 1.0f, dy, node->in[1]->t.data, accumulate ? 1.0f : 0.0f, dx, ag_threads(tape));
     float *dw = ag_grad_target(tape, node->in[1], &accumulate);
-    if (dw) ts_gemm(true, false, o, i, n, 1.0f, dy, node->in[0]->t.data, accumulate ? 1.0f : 0.0f, dw);
+    if (dw)
+        ts_gemm(true, false, o, i, n, 1.0f, dy, node->in[0]->t.data, accumulate ? 1.0f : 0.0f, dw, ag_threads(tape));
     float *db = ag_grad_add(tape, node->in[2]);
     for (int j = 0; db && j < n; j++)
         for (int q = 0; q < o; q++) db[q] += dy[(size_t)j * (size_t)o + (size_t)q];

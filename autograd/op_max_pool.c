@@ -18,7 +18,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const float *x = node->in[0]->t.data;
     float *y = node->out->t.data;
     const int64_t lines = (int64_t)s.n * s.h, row = 2 * (int64_t)s.w * s.c;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static)
     for (int64_t i = 0; i < lines; i++) k->max(s.w, s.c, x + 2 * i * row, x + (2 * i + 1) * row, y + i * s.w * s.c);
 }
 
@@ -31,7 +31,7 @@ static void backward(ag_tape *tape, ag_node *node)
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
     if (!dx) return;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static)
     for (int64_t i = 0; i < lines; i++)
         k->max_backward(s.w, s.c, x + 2 * i * row, x + (2 * i + 1) * row, dy + i * s.w * s.c, dx + 2 * i * row,
                         dx + (2 * i + 1) * row, accumulate);

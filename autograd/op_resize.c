@@ -29,7 +29,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
     const ts_taps rows = taps(tape, node, s.h, d.h), columns = taps(tape, node, s.w, d.w);
     if (rows.weight && columns.weight)
-        ts_resample(s.n, s.c, &rows, &columns, node->in[0]->t.data, node->out->t.data, false);
+        ts_resample(s.n, s.c, &rows, &columns, node->in[0]->t.data, node->out->t.data, false, ag_threads(tape));
     else ag_fail(tape, TS_NOMEM, "resize: no memory for the filter");
     ts_arena_release(ag_arena(tape), mark);
 }
@@ -47,7 +47,7 @@ static void backward(ag_tape *tape, ag_node *node)
         up = ts_taps_transpose(ag_arena(tape), &rows);
         left = ts_taps_transpose(ag_arena(tape), &columns);
     }
-    if (up.weight && left.weight) ts_resample(s.n, s.c, &up, &left, node->out->grad, dx, accumulate);
+    if (up.weight && left.weight) ts_resample(s.n, s.c, &up, &left, node->out->grad, dx, accumulate, ag_threads(tape));
     else ag_fail(tape, TS_NOMEM, "resize: no memory for the filter");
     ts_arena_release(ag_arena(tape), mark);
 }

@@ -18,7 +18,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const float *x = node->in[0]->t.data;
     float *y = node->out->t.data;
     const int64_t n = ts_count(node->out->t.shape);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (n > AG_CHUNK)
     for (int64_t i = 0; i < n; i += AG_CHUNK) k->selu(ag_part(n, i, AG_CHUNK), x + i, y + i);
 }
 
@@ -30,7 +30,7 @@ static void backward(ag_tape *tape, ag_node *node)
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
     if (!dx) return;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (n > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (n > AG_CHUNK)
     for (int64_t i = 0; i < n; i += AG_CHUNK)
         k->selu_backward(ag_part(n, i, AG_CHUNK), y + i, dy + i, dx + i, accumulate);
 }

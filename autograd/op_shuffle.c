@@ -20,11 +20,11 @@ typedef struct shuffle_attr {
 } shuffle_attr;
 
 /* large: [N,H,W,C]; deep: its pixels are those of small [N,H/r,W/r,C r r]. */
-static void move(ts_shape large, int r, bool to_deep, const float *from, float *to, bool accumulate)
+static void move(int threads, ts_shape large, int r, bool to_deep, const float *from, float *to, bool accumulate)
 {
     const int64_t run = (int64_t)r * large.c, row = (int64_t)large.w * large.c;
     const int across = large.w / r;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (ts_count(large) > AG_CHUNK)
+#pragma omp parallel for num_threads(threads) schedule(static) if (ts_count(large) > AG_CHUNK)
     for (int y = 0; y < large.n * large.h; y++) {
         const int64_t deep = (int64_t)(y / r) * across * run * r + y % r * run;
         for (int x = 0; x < across; x++) {
@@ -40,9 +40,8 @@ static void move(ts_shape large, int r, bool to_deep, const float *from, float *
 
 static void forward(ag_tape *tape, ag_node *node)
 {
-    (void)tape;
     const shuffle_attr *a = node->attr;
-    move(a->deep ? node->in[0]->t.shape : node->out->t.shape, a->r, a->deep, node->in[0]->t.data, node->out->t.data,
+    move(ag_threads(tape), a->deep ? node->in[0]->t.shape : node->out->t.shape, a->r, a->deep, node->in[0]->t.data, node->out->t.data,
          false);
 }
 
@@ -51,7 +50,7 @@ static void backward(ag_tape *tape, ag_node *node)
     const shuffle_attr *a = node->attr;
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
-    if (dx) move(a->deep ? node->in[0]->t.shape : node->out->t.shape, a->r, !a->deep, node->out->grad, dx, accumulate);
+    if (dx) move(ag_threads(tape), a->deep ? node->in[0]->t.shape : node->out->t.shape, a->r, !a->deep, node->out->grad, dx, accumulate);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)

@@ -18,7 +18,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const ts_taps rows = ts_taps_aligned(ag_arena(tape), s.h, 2 * s.h),
                   columns = ts_taps_aligned(ag_arena(tape), s.w, 2 * s.w);
     if (rows.weight && columns.weight)
-        ts_resample(s.n, s.c, &rows, &columns, node->in[0]->t.data, node->out->t.data, false);
+        ts_resample(s.n, s.c, &rows, &columns, node->in[0]->t.data, node->out->t.data, false, ag_threads(tape));
     else ag_fail(tape, TS_NOMEM, "upsample: no memory for the weights");
     ts_arena_release(ag_arena(tape), mark);
 }
@@ -37,7 +37,7 @@ static void backward(ag_tape *tape, ag_node *node)
         up = ts_taps_transpose(ag_arena(tape), &rows);
         left = ts_taps_transpose(ag_arena(tape), &columns);
     }
-    if (up.weight && left.weight) ts_resample(s.n, s.c, &up, &left, node->out->grad, dx, accumulate);
+    if (up.weight && left.weight) ts_resample(s.n, s.c, &up, &left, node->out->grad, dx, accumulate, ag_threads(tape));
     else ag_fail(tape, TS_NOMEM, "upsample: no memory for the weights");
     ts_arena_release(ag_arena(tape), mark);
 }

@@ -14,7 +14,7 @@ struct ag_packs {
     pthread_mutex_t lock;
     ts_arena *arena;
     pack *pack; /* grown by doubling and never shrunk */
-    size_t count, room;
+    size_t count, capacity;
     int holders;
 };
 
@@ -69,14 +69,14 @@ static bool is(const pack *p, const ts_conv *c, ts_conv_use use, const float *we
         has->dilation == c->dilation && has->pad == c->pad && has->constants == c->constants;
 }
 
-static bool room_for_one(ag_packs *p)
+static bool grow(ag_packs *p)
 {
-    if (p->count < p->room) return true;
-    const size_t more = p->room ? 2 * p->room : 256;
+    if (p->count < p->capacity) return true;
+    const size_t more = p->capacity ? 2 * p->capacity : 256;
     pack *grown = realloc(p->pack, more * sizeof *grown);
     if (!grown) return false;
     p->pack = grown;
-    p->room = more;
+    p->capacity = more;
     return true;
 }
 
@@ -85,7 +85,7 @@ static const float *find(ag_packs *p, const ts_conv *c, ts_conv_use use, const f
     for (size_t i = 0; i < p->count; i++)
         if (is(&p->pack[i], c, use, weight)) return p->pack[i].packed;
     float *packed = ts_arena_alloc(p->arena, ts_conv_packed_count(c, use) * sizeof(float));
-    if (!packed || !room_for_one(p)) return NULL;
+    if (!packed || !grow(p)) return NULL;
     ts_conv_pack(c, use, weight, packed);
     p->pack[p->count++] = (pack){weight, use, *c, packed};
     return packed;

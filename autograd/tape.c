@@ -17,6 +17,7 @@ static ag_tape *create(bool gradients, ag_packs *packs, ts_status *st)
         return NULL;
     }
     tape->gradients = gradients;
+    tape->compute.exact = true;
     tape->packs = packs;
     tape->arena = ts_arena_create(0, st);
     tape->moving = tape->arena ? ts_arena_create(0, st) : NULL;
@@ -26,10 +27,10 @@ static ag_tape *create(bool gradients, ag_packs *packs, ts_status *st)
 
 ag_tape *ag_tape_create(bool gradients, ts_status *st) { return create(gradients, ag_packs_create(st), st); }
 
-ag_tape *ag_tape_beside(const ag_tape *other, ts_status *st)
+ag_tape *ag_tape_sharing(const ag_tape *other, ts_status *st)
 {
     if (!other->frozen) {
-        ts_fail(st, TS_INVALID, "a tape beside one that is not frozen");
+        ts_fail(st, TS_INVALID, "a tape that shares the packed weights of one that is not frozen");
         return NULL;
     }
     ag_tape *tape = create(false, ag_packs_hold(other->packs), st);
@@ -51,7 +52,7 @@ void ag_tape_destroy(ag_tape **tape)
 void ag_reset(ag_tape *tape)
 {
     ts_arena_reset(tape->arena);
-    ts_scratch_level();
+    ts_scratch_level(tape->compute.threads);
     tape->nodes = 0;
     tape->into = NULL;
     tape->status = (ts_status){0};
@@ -68,6 +69,8 @@ void ag_drop(ag_tape *tape)
 const ts_status *ag_status(const ag_tape *tape) { return &tape->status; }
 ts_arena *ag_arena(ag_tape *tape) { return tape->arena; }
 bool ag_gradients(const ag_tape *tape) { return tape->gradients; }
+void ag_compute_set(ag_tape *tape, ts_compute compute) { tape->compute = compute; }
+const ts_compute *ag_compute(const ag_tape *tape) { return &tape->compute; }
 void ag_freeze(ag_tape *tape, bool frozen) { tape->frozen = frozen; }
 
 ag_value *ag_fail(ag_tape *tape, ts_code code, const char *format, ...)
@@ -149,12 +152,12 @@ ag_value *ag_detach(ag_tape *tape, ag_value *v)
 
 bool ag_record(ag_tape *tape, ag_node *node)
 {
-    if (tape->nodes == tape->node_room) {
-        const size_t more = tape->node_room ? 2 * tape->node_room : 256;
+    if (tape->nodes == tape->node_capacity) {
+        const size_t more = tape->node_capacity ? 2 * tape->node_capacity : 256;
         ag_node **grown = realloc(tape->node, more * sizeof *grown);
         if (!grown) return no_memory(tape, "the list of operations");
         tape->node = grown;
-        tape->node_room = more;
+        tape->node_capacity = more;
     }
     tape->node[tape->nodes++] = node;
     return true;
@@ -192,7 +195,8 @@ ag_value *ag_apply(ag_tape *tape, const ag_op *op, int inputs, ag_value *const *
         node->in[i] = in[i];
         if (in[i] && in[i]->needs_grad) v->needs_grad = true;
     }
-    op->forward(tape, node);
+    if (ag_traced()) ag_run_traced(tape, node, false);
+    else op->forward(tape, node);
     if (tape->status.code != TS_OK) return NULL;
     return v->needs_grad && !ag_record(tape, node) ? NULL : v;
 }
@@ -225,7 +229,8 @@ void ag_walk(ag_tape *tape, size_t first)
     for (size_t i = tape->nodes; i-- > first;) {
         ag_node *node = tape->node[i];
         if (!node->out->grad_ready) continue; /* the loss does not depend on it */
-        node->op->backward(tape, node);
+        if (ag_traced()) ag_run_traced(tape, node, true);
+        else node->op->backward(tape, node);
         if (tape->status.code != TS_OK) break;
         node->out->grad_ready = false; /* passed on; a second backward starts it anew */
     }
@@ -272,7 +277,7 @@ void ag_scope_end(ag_tape *tape, ts_mark mark, ag_value **keep, int count)
             kept = NULL;
             break;
         }
-        ts_block_copy(kept[i].data, keep[i]->t.data, bytes);
+        ts_block_copy(kept[i].data, keep[i]->t.data, bytes, tape->compute.threads);
     }
     if (!kept) { /* nothing is lost: the memory stays taken */
         no_memory(tape, "the values that a scope keeps");
@@ -283,7 +288,9 @@ void ag_scope_end(ag_tape *tape, ts_mark mark, ag_value **keep, int count)
     for (int i = 0; i < count; i++) {
         if (!kept[i].data) continue;
         keep[i] = ag_empty(tape, kept[i].shape);
-        if (keep[i]) ts_block_copy(keep[i]->t.data, kept[i].data, (size_t)ts_count(kept[i].shape) * sizeof(float));
+        if (keep[i])
+            ts_block_copy(keep[i]->t.data, kept[i].data, (size_t)ts_count(kept[i].shape) * sizeof(float),
+                          tape->compute.threads);
     }
     ts_arena_release(tape->moving, moving);
     if (ts_arena_used(tape->moving) == 0) ts_arena_reset(tape->moving); /* several chunks become one */

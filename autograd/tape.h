@@ -55,7 +55,7 @@ struct ag_node {
 ag_tape *ag_tape_create(bool gradients, ts_status *st);
 /* One without gradients, frozen, with the packed weights of other, which is frozen too and stays so while both exist:
  * the two may be used by two threads at once, and destroyed in any order. NULL and st set on failure. */
-ag_tape *ag_tape_beside(const ag_tape *other, ts_status *st);
+ag_tape *ag_tape_sharing(const ag_tape *other, ts_status *st);
 void ag_tape_destroy(ag_tape **tape);
 
 /* Forgets all values and the error, keeps the memory. Packed weights are forgotten too unless ag_freeze was called. */
@@ -67,6 +67,10 @@ void ag_drop(ag_tape *tape);
 const ts_status *ag_status(const ag_tape *tape); /* the first error, or code TS_OK */
 ts_arena *ag_arena(ag_tape *tape);
 bool ag_gradients(const ag_tape *tape);
+/* How the operations from now on are computed, and their gradients. A new tape's: exact, TS_F32, the process's threads.
+ */
+void ag_compute_set(ag_tape *tape, ts_compute compute);
+const ts_compute *ag_compute(const ag_tape *tape);
 /* Sets the sticky error (the first one stays). Returns NULL for convenience. */
 ag_value *ag_fail(ag_tape *tape, ts_code code, const char *format, ...) __attribute__((format(printf, 3, 4)));
 
@@ -103,13 +107,13 @@ ts_code ag_backward(ag_tape *tape, ag_value *loss);
  * called once for the results, without recording, and once more in ag_backward for the gradient (Chen et al., "Training
  * Deep Nets with Sublinear Memory Cost", 2016). The same numbers as without. in[i] may be NULL and reaches body so,
  * with gradients otherwise as it has them; body sets out[0 .. outs - 1] to values that its own operations made, and
- * must do the same each time. user (size bytes) is copied. room[i]: NULL, or memory for the gradient of in[i], which is
- * of use from the end of the backward of what follows this part to the end of its own: neighbours in a chain of parts
- * take turns with two. On a tape without gradients body is simply called. False after an error. */
+ * must do the same each time. user (size bytes) is copied. buffer[i]: NULL, or memory for the gradient of in[i], which
+ * is of use from the end of the backward of what follows this part to the end of its own: neighbours in a chain of
+ * parts take turns with two. On a tape without gradients body is simply called. False after an error. */
 enum { AG_PART_MOST = 4 }; /* ins and outs */
 typedef void (*ag_body)(ag_tape *tape, ag_value *const *in, ag_value **out, const void *user);
 bool ag_checkpoint(ag_tape *tape, ag_body body, const void *user, size_t size, int ins, ag_value *const *in,
-                   float *const *room, int outs, ag_value **out);
+                   float *const *buffer, int outs, ag_value **out);
 
 /* Packed weights of a convolution, made once per reset (or once for all after ag_freeze(tape, true)). Keyed by weight
  * address, use and shape. */

@@ -1,6 +1,6 @@
 /* What the tape is made of: for autograd/tape.c and autograd/checkpoint.c alone. */
-#ifndef AG_TAPE_INSIDE_H
-#define AG_TAPE_INSIDE_H
+#ifndef AG_TAPE_INTERNAL_H
+#define AG_TAPE_INTERNAL_H
 #include "autograd/packs.h"
 #include "autograd/tape.h"
 
@@ -14,14 +14,18 @@ struct ag_tape {
     ts_arena *arena, *moving; /* moving: what a scope keeps, while the arena is released */
     ag_packs *packs;
     bool gradients, frozen;
-    ag_value *into; /* of the next operation */
-    ag_node **node; /* grown by doubling and never shrunk */
-    size_t nodes, node_room;
+    ts_compute compute;
+    ag_value *into;  /* of the next operation */
+    const char *way; /* of the convolution that runs, while it is traced */
+    ag_node **node;  /* grown by doubling and never shrunk */
+    size_t nodes, node_capacity;
     ts_status status;
 };
 
 /* A leaf; grad (NULL: none is wanted) is where its gradient goes. */
 ag_value *ag_new_value(ag_tape *tape, ts_tensor t, float *grad);
+/* Forward or backward of a node, with a record for the sink of autograd/trace.h. */
+void ag_run_traced(ag_tape *tape, ag_node *node, bool backward);
 /* Puts the node at the end of the tape. */
 bool ag_record(ag_tape *tape, ag_node *node);
 /* Backward of the nodes from number first on, last first. */

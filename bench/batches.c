@@ -1,4 +1,4 @@
-/* The training batches of a configuration as bytes, for a peer that shall train on the same ones
+/* The training batches of a configuration as bytes, for a peer that trains on the same ones
  * (bench/curve_torch.py). */
 #include "bench/batches.h"
 #include "render/losses.h"

@@ -12,13 +12,12 @@ void bench_register(const char *name, bench_function f);
     static void bench_##name(void)
 
 /* Median seconds of one call of f(user), after a warm-up, for about a third of a second in all. The FMA peak is
- * measured before and after, so that a row's fraction refers to the machine's speed at that moment. The peak's FMAs
- * need half of what a core can issue, the convolutions' inner loop nearly all of it: where another program has the
- * core's other half (simultaneous multithreading), the one stays as it was and the other falls to two thirds, so that
- * both are measured. */
+ * measured before and after, so that a row's fraction refers to the machine's speed at that moment. The
+ * convolutions' inner loop is measured too: it needs nearly all of a core's issue slots, the FMA peak half of them, so
+ * that another program on the same core (simultaneous multithreading) slows only the first. */
 typedef struct bench_time {
     double seconds; /* median of one call */
-    double best;    /* the shortest: what the code can do where neighbours hold up the others */
+    double best;    /* the shortest: without disturbance by other programs */
     double peak;    /* FLOP/s of the FMA peak with the threads in use, the mean of before and after */
     double loop; /* FLOP/s of the convolutions' inner loop on data in the first cache, the median of before, between and
                     after; 0: does not apply */
@@ -26,8 +25,8 @@ typedef struct bench_time {
 } bench_time;
 bench_time bench_measure(void (*f)(void *user), void *user);
 
-/* Makes the peak of bf16 (the matrix unit's, or vdpbf16ps'), measured now, the time's. False, with nothing changed,
- * where the instruction set in use has none. */
+/* Sets the time's peak to that of bf16 (matrix unit or vdpbf16ps), measured now. False, with nothing changed, when the
+ * instruction set in use has none. */
 bool bench_bf16(bench_time *t);
 
 /* Times are processor time (lgd-bench --cpu). */
@@ -43,9 +42,9 @@ void bench_heading(const char *text);
  * peak. Wall time only. */
 void bench_row_threads(void (*f)(void *user), void *user);
 
-/* Median seconds that the peer (bench/peer_torch.py, whose head lists the jobs) takes for a job; NaN where there is no
- * peer or it fails, which is said once. bench_row_peer: below a row, its floor (flop at the peak) and the peer's time;
- * bench_row_peer_bf16: the peer's time for the same in bf16, with its own autocast. */
+/* Median seconds that the peer (bench/peer_torch.py, whose head lists the jobs) takes for a job; NaN without a
+ * peer or when it fails, which is reported once. bench_row_peer: below a row, its floor (flop at the peak) and the
+ * peer's time; bench_row_peer_bf16: the peer's time for the same in bf16, with its own autocast. */
 double bench_peer(const char *job);
 const char *bench_peer_name(void);
 void bench_row_peer(bench_time t, double flop, double peer);

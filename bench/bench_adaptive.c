@@ -1,12 +1,10 @@
-/* What refinement costs where it is not all wanted: tolerances, a mask, the automatic number of steps, each beside the
- * fixed number of steps of the whole. Processor seconds of all threads, which a busy machine changes less than wall
- * time. The error is that of renderings under 20 views (lgd-eval's), over procedural materials and the map sets of
- * TESTDATA. */
+/* Refinement with early stop: tolerances, a mask, the automatic number of steps, each beside all steps of the whole.
+ * Processor seconds of all threads, which depend less on other work than wall time. The error is that of renderings
+ * under 20 views (lgd-eval's), over procedural materials and the map sets of TESTDATA. */
 #include "bench/bench.h"
 #include "eval/metrics/metrics.h"
 #include "eval/sets.h"
-#include "infer/encode.h"
-#include "infer/lgd.h"
+#include "infer/estimate.h"
 #include "infer/model_path.h"
 #include "render/error.h"
 #include <stdio.h>
@@ -60,15 +58,15 @@ static double seconds(void)
 static void run(lgd_model *model, const setting *k, sample *s, int count, double *time_mean, double *error_mean)
 {
     static float maps[PIXELS * MAP_CHANNELS];
-    lgd_error e;
+    ts_status st = {0};
     *time_mean = *error_mean = 0;
     for (int i = 0; i < count; i++) {
         const double begin = seconds();
-        if (lgd_estimate(model, s[i].image, SIDE, &k->options, maps, &e)) abort();
+        const lgd_photo photo = lgd_flash_photo(s[i].image);
+        if (lgd_model_estimate(model, &photo, 1, SIDE, &k->options, true, maps, &st)) abort();
         *time_mean += (seconds() - begin) / count;
         io_material truth = {.size = SIDE, .maps = s[i].truth};
         const ev_case c = ev_case_of_maps(&truth, s[i].image, s[i].views, false);
-        lgd_encode(maps, SIDE, maps);
         *error_mean += ev_score(&c, maps, MAP_CHANNELS).value[EV_RENDER] / count;
     }
 }
@@ -114,6 +112,7 @@ BENCH(adaptive)
                    {"--iterations auto", {.iterations = LGD_AUTO}},
                    {"--mask, an eighth wanted", {.iterations = -1, .mask = mask}}};
     const int settings = sizeof k / sizeof *k;
+    for (int i = 0; i < settings; i++) k[i].options.size = sizeof k[i].options;
     const int procedural = load("procedural:1000003,8", 1, s, MOST);
     snprintf(path, sizeof path, "maps:%s/maps", data ? data : "../shared/testdata");
     const int maps = load(path, EVERY, s + procedural, MOST);

@@ -152,29 +152,29 @@ static void both_gradients(void *user)
 }
 
 static const ts_conv published[] = {
-    {1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0},       {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 10},
-    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0}, {1, 256, 256, 256, 192, 1, 1, TS_PAD_REPLICATE, 0},
-    {1, 256, 256, 64, 192, 1, 1, TS_PAD_REPLICATE, 0}, {1, 256, 256, 64, 10, 3, 1, TS_PAD_REPLICATE, 0},
-    {1, 64, 64, 512, 512, 5, 1, TS_PAD_ZERO, 0},       {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO, 0},
-    {1, 4, 4, 512, 512, 5, 1, TS_PAD_ZERO, 0},
+    {1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}},       {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 10, {0}},
+    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0, {0}}, {1, 256, 256, 256, 192, 1, 1, TS_PAD_REPLICATE, 0, {0}},
+    {1, 256, 256, 64, 192, 1, 1, TS_PAD_REPLICATE, 0, {0}}, {1, 256, 256, 64, 10, 3, 1, TS_PAD_REPLICATE, 0, {0}},
+    {1, 64, 64, 512, 512, 5, 1, TS_PAD_ZERO, 0, {0}},       {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO, 0, {0}},
+    {1, 4, 4, 512, 512, 5, 1, TS_PAD_ZERO, 0, {0}},
 };
 
 /* h of the shipped model's coarse steps. */
 static const ts_conv refiner[] = {
-    {8, 64, 64, 18, 128, 5, 1, TS_PAD_REPLICATE, 9}, {8, 64, 64, 128, 192, 1, 1, TS_PAD_REPLICATE, 0},
-    {8, 64, 64, 64, 192, 1, 1, TS_PAD_REPLICATE, 0}, {8, 64, 64, 64, 128, 3, 2, TS_PAD_REPLICATE, 0},
-    {8, 64, 64, 64, 9, 3, 1, TS_PAD_REPLICATE, 0},
+    {8, 64, 64, 18, 128, 5, 1, TS_PAD_REPLICATE, 9, {0}}, {8, 64, 64, 128, 192, 1, 1, TS_PAD_REPLICATE, 0, {0}},
+    {8, 64, 64, 64, 192, 1, 1, TS_PAD_REPLICATE, 0, {0}}, {8, 64, 64, 64, 128, 3, 2, TS_PAD_REPLICATE, 0, {0}},
+    {8, 64, 64, 64, 9, 3, 1, TS_PAD_REPLICATE, 0, {0}},
 };
 
 /* Its g, some layers of each size; and larger kernels. */
 static const ts_conv unet[] = {
-    {8, 64, 64, 3, 24, 3, 1, TS_PAD_ZERO, 0},  {8, 32, 32, 24, 48, 3, 1, TS_PAD_ZERO, 0},
-    {8, 16, 16, 96, 96, 3, 1, TS_PAD_ZERO, 0}, {8, 8, 8, 192, 192, 3, 1, TS_PAD_ZERO, 0},
-    {8, 4, 4, 192, 192, 3, 1, TS_PAD_ZERO, 0}, {8, 2, 2, 192, 192, 3, 1, TS_PAD_ZERO, 0},
-    {8, 8, 8, 384, 192, 3, 1, TS_PAD_ZERO, 0}, {8, 16, 16, 192, 96, 3, 1, TS_PAD_ZERO, 0},
-    {8, 32, 32, 96, 48, 3, 1, TS_PAD_ZERO, 0}, {8, 64, 64, 48, 24, 3, 1, TS_PAD_ZERO, 0},
-    {8, 64, 64, 24, 24, 3, 1, TS_PAD_ZERO, 0}, {8, 64, 64, 24, 9, 3, 1, TS_PAD_ZERO, 0},
-    {8, 8, 8, 64, 128, 5, 1, TS_PAD_ZERO, 0},  {8, 16, 16, 128, 64, 5, 1, TS_PAD_ZERO, 0},
+    {8, 64, 64, 3, 24, 3, 1, TS_PAD_ZERO, 0, {0}},  {8, 32, 32, 24, 48, 3, 1, TS_PAD_ZERO, 0, {0}},
+    {8, 16, 16, 96, 96, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 8, 8, 192, 192, 3, 1, TS_PAD_ZERO, 0, {0}},
+    {8, 4, 4, 192, 192, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 2, 2, 192, 192, 3, 1, TS_PAD_ZERO, 0, {0}},
+    {8, 8, 8, 384, 192, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 16, 16, 192, 96, 3, 1, TS_PAD_ZERO, 0, {0}},
+    {8, 32, 32, 96, 48, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 64, 64, 48, 24, 3, 1, TS_PAD_ZERO, 0, {0}},
+    {8, 64, 64, 24, 24, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 64, 64, 24, 9, 3, 1, TS_PAD_ZERO, 0, {0}},
+    {8, 8, 8, 64, 128, 5, 1, TS_PAD_ZERO, 0, {0}},  {8, 16, 16, 128, 64, 5, 1, TS_PAD_ZERO, 0, {0}},
 };
 
 static void all(const ts_conv *shape, size_t count)
@@ -205,13 +205,13 @@ BENCH(conv_unet)
 
 BENCH(conv_winograd)
 {
-    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0},
-                                    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0},
-                                    {1, 256, 256, 32, 64, 3, 2, TS_PAD_REPLICATE, 0},
-                                    {1, 28, 28, 64, 64, 3, 1, TS_PAD_ZERO, 0}};
-    static const ts_conv trained[] = {{8, 64, 64, 48, 24, 3, 1, TS_PAD_ZERO, 0},
-                                      {8, 32, 32, 96, 48, 3, 1, TS_PAD_ZERO, 0},
-                                      {8, 64, 64, 64, 128, 3, 2, TS_PAD_REPLICATE, 0}};
+    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}},
+                                    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0, {0}},
+                                    {1, 256, 256, 32, 64, 3, 2, TS_PAD_REPLICATE, 0, {0}},
+                                    {1, 28, 28, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}}};
+    static const ts_conv trained[] = {{8, 64, 64, 48, 24, 3, 1, TS_PAD_ZERO, 0, {0}},
+                                      {8, 32, 32, 96, 48, 3, 1, TS_PAD_ZERO, 0, {0}},
+                                      {8, 64, 64, 64, 128, 3, 2, TS_PAD_REPLICATE, 0, {0}}};
     bench_heading("Winograd's F(4 x 4, 3 x 3), counting the direct way's multiplications, each below the direct way");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
         row("forward", shape[i], forward);
@@ -238,7 +238,9 @@ BENCH(conv_bf16)
         row("bf16 forward", published[i], forward_bf16);
         row("data gradient", published[i], data_gradient);
         row("bf16 data gradient", published[i], data_gradient_bf16);
-        if (!ts_conv_bf16_weights()) continue;
+        ts_conv rounded = published[i];
+        rounded.compute.precision = TS_BF16;
+        if (ts_conv_choose(&rounded, TS_CONV_WEIGHTS) != TS_CONV_BY_AMX) continue;
         row("weight gradient", published[i], weight_gradient);
         row("bf16 weight gradient", published[i], weight_gradient_bf16);
     }
@@ -247,29 +249,30 @@ BENCH(conv_bf16)
 BENCH(peer_conv)
 {
     static const ts_conv shape[] = {
-        {1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0},       {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 0},
-        {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0}, {1, 256, 256, 256, 192, 1, 1, TS_PAD_ZERO, 0},
-        {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO, 0},         {4, 80, 80, 18, 64, 5, 1, TS_PAD_REPLICATE, 0}};
+        {1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}},       {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 0, {0}},
+        {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0, {0}}, {1, 256, 256, 256, 192, 1, 1, TS_PAD_ZERO, 0, {0}},
+        {1, 8, 8, 512, 512, 3, 1, TS_PAD_ZERO, 0, {0}},         {4, 80, 80, 18, 64, 5, 1, TS_PAD_REPLICATE, 0, {0}}};
     bench_heading("single convolutions beside their floor (the peak) and the peer");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
         peer_row("forward", "conv", shape[i], forward, 1);
-        if (ts_conv_winograd(&shape[i], TS_CONV_WINOGRAD)) peer_row("Winograd forward", "conv", shape[i], winograd, 1);
+        if (ts_conv_choose(&shape[i], TS_CONV_OUTPUT) == TS_CONV_BY_WINOGRAD)
+            peer_row("Winograd forward", "conv", shape[i], winograd, 1);
         peer_row("both gradients", "gradient", shape[i], both_gradients, 2);
     }
 }
 
 BENCH(two_threads)
 {
-    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0},
-                                    {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 0},
-                                    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0}};
+    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}},
+                                    {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 0, {0}},
+                                    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0, {0}}};
     static void (*const f[])(void *user) = {forward, data_gradient, weight_gradient, winograd};
     static const char *const what[] = {"forward", "data gradient", "weight gradient", "Winograd forward"};
     const int all = ts_threads();
     bench_heading("all threads beside one, and what the peak gains");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++)
         for (int k = 0; k < 4; k++) {
-            if (k == 3 && !ts_conv_winograd(&shape[i], TS_CONV_WINOGRAD)) continue;
+            if (k == 3 && ts_conv_choose(&shape[i], TS_CONV_OUTPUT) != TS_CONV_BY_WINOGRAD) continue;
             work w = make(shape[i]);
             ts_threads_set(1);
             const bench_time one = bench_measure(f[k], &w);
@@ -285,7 +288,7 @@ BENCH(two_threads)
 
 BENCH(conv_naive)
 {
-    const ts_conv c = {1, 64, 64, 64, 64, 3, 1, TS_PAD_ZERO, 0};
+    const ts_conv c = {1, 64, 64, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}};
     bench_heading("A convolution and its naive twin");
     row("forward", c, forward);
     row("naive forward", c, forward_naive);

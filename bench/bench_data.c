@@ -1,4 +1,4 @@
-/* What feeds the training: materials, their noise beside its naive twin, the camera. On one thread, as a loader's
+/* The training data: materials, their noise beside its naive twin, the camera. On one thread, as a loader's
  * thread and one photograph are. */
 #include "bench/bench.h"
 #include "data/camera.h"

@@ -3,10 +3,12 @@
  */
 #include "bench/bench.h"
 #include "bench/shape.h"
+#include "infer/estimate.h"
 #include "nn/weights/file.h"
-#include "nn/model.h"
 #include "nn/weights/weights.h"
 #include "render/render.h"
+#include "tensor/maps.h"
+#include "tensor/threads.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -15,9 +17,10 @@ enum { SIDE = 256 };
 
 typedef struct subject {
     nn_model *model;
-    ag_tape *tape;
+    ag_tape *tape, *own; /* the estimator's, and that of a single step */
     nn_input in;
-    int steps;
+    lgd_options options;
+    ts_status st;
     ag_value *maps; /* for a single step: R_t and what h carried so far */
     nn_state state;
 } subject;
@@ -25,52 +28,57 @@ typedef struct subject {
 static void whole(void *user)
 {
     subject *s = user;
-    ag_value *maps;
-    const ts_mark mark = ag_scope_begin(s->tape);
-    nn_lgd(s->tape, s->model, &s->in, s->steps, false, &maps, NULL);
-    ag_scope_end(s->tape, mark, NULL, 0);
+    const lgd_estimator e = {.net = s->model, .tape = s->tape, .encoded = true};
+    const lgd_photo photo = lgd_flash_photo(s->in.image.data);
+    static float maps[SIDE * SIDE * MAP_CHANNELS];
+    s->options.threads = ts_threads();
+    lgd_estimator_run(&e, &photo, 1, SIDE, &s->options, maps, &s->st);
 }
 
 static void step(void *user)
 {
     subject *s = user;
     nn_state state = s->state;
-    const ts_mark mark = ag_scope_begin(s->tape);
-    nn_refine(s->tape, s->model, &s->in, s->maps, &state);
-    ag_scope_end(s->tape, mark, NULL, 0);
+    const ts_mark mark = ag_scope_begin(s->own);
+    nn_refine(s->own, s->model, &s->in, s->maps, &state);
+    ag_scope_end(s->own, mark, NULL, 0);
 }
 
 static void gradient(void *user)
 {
     subject *s = user;
-    const ts_mark mark = ag_scope_begin(s->tape);
-    float *to = ts_arena_alloc(ag_arena(s->tape), (size_t)SIDE * SIDE * (size_t)s->maps->t.shape.c * sizeof *to);
+    const ts_mark mark = ag_scope_begin(s->own);
+    float *to = ts_arena_alloc(ag_arena(s->own), (size_t)SIDE * SIDE * (size_t)s->maps->t.shape.c * sizeof *to);
     if (to)
         rd_flash_gradient(s->in.grid, s->maps->t.data, s->maps->t.shape.c, &s->in.view, s->in.image.data, 0.1, to,
                           NULL);
-    ag_scope_end(s->tape, mark, NULL, 0);
+    ag_scope_end(s->own, mark, NULL, 0);
 }
 
 static void measure(nn_arch arch, const char *heading)
 {
-    ts_status st = {0};
     char label[128], job[256];
-    subject s = {.model = nn_model_create(&arch, &st), .tape = ag_tape_create(false, &st)};
+    subject s = {.options = {.size = sizeof(lgd_options), .exact = 1}};
+    s.model = nn_model_create(&arch, &s.st);
+    s.tape = ag_tape_create(false, &s.st);
+    s.own = ag_tape_create(false, &s.st);
     bench_heading(heading);
-    if (!s.model || !s.tape) {
-        printf("  %s\n", st.message);
+    if (!s.model || !s.tape || !s.own) {
+        printf("  %s\n", s.st.message);
         nn_model_free(&s.model);
         ag_tape_destroy(&s.tape);
+        ag_tape_destroy(&s.own);
         return;
     }
     nn_model_init(s.model, 1);
     ag_freeze(s.tape, true);
+    ag_freeze(s.own, true);
     static float image[SIDE * SIDE * 3];
     for (int i = 0; i < SIDE * SIDE * 3; i++) image[i] = (float)(i % 97) / 97;
     s.in = (nn_input){
         .image = ts_view(image, (ts_shape){1, SIDE, SIDE, 3}), .grid = rd_grid_full(SIDE), .view = rd_flash()};
-    s.maps = nn_predict(s.tape, s.model, &s.in);
-    s.maps = nn_refine(s.tape, s.model, &s.in, s.maps, &s.state);
+    s.maps = nn_predict(s.own, s.model, &s.in);
+    s.maps = nn_refine(s.own, s.model, &s.in, s.maps, &s.state);
 
     const double g = bench_network_flop(s.model, "g.", SIDE), h = bench_network_flop(s.model, "h.", SIDE);
     const double unused = bench_network_flop(s.model, "h.gru1.hh", SIDE) +
@@ -80,37 +88,37 @@ static void measure(nn_arch arch, const char *heading)
     snprintf(label, sizeof label, "g at %d x %d and its maps resampled", arch.g_size, arch.g_size);
     bench_row(label, bench_measure(whole, &s), g);
     if (arch.coarse_steps > 0) {
-        s.steps = arch.coarse_steps;
-        snprintf(label, sizeof label, "g and %d coarse steps", s.steps);
+        s.options.iterations = arch.coarse_steps;
+        snprintf(label, sizeof label, "g and %d coarse steps", arch.coarse_steps);
         bench_row(label, bench_measure(whole, &s), g + coarse);
     }
     bench_row(arch.h_width ? "one step of h with its gradient" : "one step at the photograph's size",
               bench_measure(step, &s), step_flop);
     bench_time t = bench_measure(gradient, &s);
     bench_row_unit("  of which the renderer's gradient", t, SIDE * SIDE / t.seconds * 1e-6, "Mpixel/s");
-    s.steps = arch.iterations;
-    const double flop = g + coarse + (s.steps - arch.coarse_steps) * h - (arch.recurrent ? 1 : s.steps) * unused;
-    bench_peer_network("infer", &arch, s.steps, job, sizeof job);
+    const int steps = s.options.iterations = arch.iterations;
+    const double flop = g + coarse + (steps - arch.coarse_steps) * h - (arch.recurrent ? 1 : steps) * unused;
+    bench_peer_network("infer", &arch, steps, job, sizeof job);
     snprintf(job + strlen(job), sizeof job - strlen(job), " %d", SIDE);
     double peer = NAN;
     for (int exact = 1; exact >= 0; exact--) {
-        ts_conv_exact_set(exact);
-        snprintf(label, sizeof label, "g and %d steps, %s", s.steps, exact ? "direct" : "Winograd where it wins");
+        s.options.exact = exact;
+        snprintf(label, sizeof label, "g and %d steps, %s", steps, exact ? "direct" : "Winograd where it wins");
         t = bench_measure(whole, &s);
         bench_row(label, t, flop);
         if (!exact) bench_row_peer(t, flop, peer = bench_peer(job));
         if (exact) bench_row_threads(whole, &s);
     }
-    ts_conv_exact_set(true);
-    ts_conv_precision_set(TS_BF16);
+    s.options.exact = 1;
+    s.options.precision = LGD_BF16;
     t = bench_measure(whole, &s);
-    snprintf(label, sizeof label, "g and %d steps, bf16%s", s.steps, bench_bf16(&t) ? "" : ", emulated");
+    snprintf(label, sizeof label, "g and %d steps, bf16%s", steps, bench_bf16(&t) ? "" : ", emulated");
     bench_row(label, t, flop);
     bench_row_peer(t, flop, peer);
     bench_row_peer_bf16(t, job);
-    ts_conv_precision_set(TS_F32);
-    if (ag_status(s.tape)->code) printf("  %s\n", ag_status(s.tape)->message);
+    if (s.st.code) printf("  %s\n", s.st.message);
     ag_tape_destroy(&s.tape);
+    ag_tape_destroy(&s.own);
     nn_model_free(&s.model);
 }
 

@@ -46,7 +46,7 @@ static ag_value *random_value(ag_tape *tape, ts_rng *r, ts_shape s)
     return ag_parameter(tape, t, grad);
 }
 
-/* read: of what backward reads beside the output's gradient, in floats */
+/* read: what backward reads beside the output's gradient, in floats */
 static void rows(ag_tape *tape, ag_value *out, double read)
 {
     if (!out) {

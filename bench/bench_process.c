@@ -59,14 +59,14 @@ typedef struct command {
 
 enum { WIDE = 4032, TALL = 3024 };
 
-/* The photograph in as many pixels as a telephone's has, with noise, and with as many bytes. */
+/* A photograph with the pixels, the noise and the bytes of a telephone's. */
 static bool make_large(const char *path)
 {
     io_image square = {0}, large = {0};
     ts_status st = {0};
     int width, height;
     ts_rng rng = ts_rng_make(1, TS_STREAM_TEST, 0);
-    bool fine = !io_read_square(photograph, 1 << 24, TALL, &square, &width, &height, &st) &&
+    bool fine = !io_read_photo_square(photograph, 1 << 24, TALL, 0, &square, &width, &height, &st) &&
         !io_image_create(&large, WIDE, TALL, 3, &st);
     for (int y = 0; y < TALL && fine; y++)
         for (int x = 0; x < WIDE; x++)
@@ -109,7 +109,7 @@ static void estimate(void *user)
     if (lgd_estimate(c->model, c->image.data, SIDE, &o, c->maps, &e)) abort();
 }
 
-/* The median of what the library's call takes; 0 where it cannot be made. */
+/* The median time of the library's call; 0 when it fails. */
 static double computing(void)
 {
     char path[PATH_MAX];
@@ -119,7 +119,7 @@ static double computing(void)
     double t = 0;
     int width, height;
     if (!c.maps || lgd_model_path(NULL, "single", path, &st) || !(c.model = lgd_load(path, &e)) ||
-        io_read_square(photograph, 1 << 24, SIDE, &c.image, &width, &height, &st))
+        io_read_photo_square(photograph, 1 << 24, SIDE, 0, &c.image, &width, &height, &st))
         printf("  the computing was not measured: %s\n", st.code ? st.message : e.message);
     else {
         const bench_time time = bench_measure(estimate, &c);

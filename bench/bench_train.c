@@ -116,9 +116,9 @@ static void measure(subject *s)
     const double flop = batch * ((fixed[NN_G] ? 1 : 3) * g + of_coarse + of_h);
     snprintf(label, sizeof label, "%d patches of %d^2, window %d, T = %d%s", batch, s->c.data.patch, side, s->steps,
              fixed[NN_G] ? ", g fixed" : "");
-    ts_conv_exact_set(true);
+    ag_compute_set(s->tape, (ts_compute){.exact = true});
     bench_row("  all convolutions computed directly", bench_measure(step, s), flop);
-    ts_conv_exact_set(false);
+    ag_compute_set(s->tape, (ts_compute){0});
     const bench_time t = bench_measure(step, s);
     bench_row(label, t, flop);
     char job[256];
@@ -126,12 +126,12 @@ static void measure(subject *s)
     const double peer = bench_peer(job);
     bench_row_peer(t, flop, peer);
     bench_row_threads(step, s);
-    ts_conv_precision_set(TS_BF16);
+    ag_compute_set(s->tape, (ts_compute){.precision = TS_BF16});
     bench_time rounded = bench_measure(step, s);
     bench_row(bench_bf16(&rounded) ? "  in bf16" : "  in bf16, emulated", rounded, flop);
     bench_row_peer(rounded, flop, peer);
     bench_row_peer_bf16(rounded, job);
-    ts_conv_precision_set(TS_F32);
+    ag_compute_set(s->tape, (ts_compute){0});
     bench_time part = bench_measure(losses, s);
     bench_row_unit(s->steps > 0 ? "  of which both losses, 9 renderings each" : "  of which the loss, 9 renderings",
                    part, 100 * part.seconds / t.seconds, "% of the step");
@@ -184,7 +184,6 @@ static void train(const char *config, const char *heading)
                       .view = rd_flash()};
     if (side < patch) s.in.whole = ts_view(s.images, (ts_shape){(int)batch, patch, patch, 3});
     measure(&s);
-    ts_conv_exact_set(true);
     if (ag_status(s.tape)->code) printf("  %s\n", ag_status(s.tape)->message);
     ag_tape_destroy(&s.tape);
     nn_model_free(&s.model);

@@ -20,7 +20,7 @@ static void load(void *user)
     subject *s = user;
     nn_file *f = nn_file_open(s->path, &s->st);
     for (int i = 0; f && i < nn_file_count(f); i++) {
-        const nn_entry *e = nn_file_entry(f, i);
+        const nn_tensor *e = nn_file_tensor(f, i);
         nn_file_read(f, e->name, e->rank, e->dim, s->block + (size_t)i * SIDE * SIDE, &s->st);
     }
     nn_file_close(&f);
@@ -31,19 +31,19 @@ BENCH(weights)
     static char names[TENSORS][8];
     const char *folder = getenv("TMPDIR");
     subject s = {.block = ts_block((size_t)TENSORS * SIDE * SIDE * sizeof(float))};
-    nn_entry entry[TENSORS];
+    nn_tensor entry[TENSORS];
     bench_heading("Weights files of 160 million numbers, from the page cache");
     for (int i = 0; s.block && i < TENSORS * SIDE * SIDE; i++) s.block[i] = (float)(i % 1000) * 1e-3f;
     for (int i = 0; i < TENSORS; i++) {
         snprintf(names[i], sizeof names[i], "w%d", i);
-        entry[i] = (nn_entry){names[i],
-                              NN_F32,
-                              false,
-                              2,
-                              {SIDE, SIDE},
-                              {SIDE, 1},
-                              (int64_t)SIDE * SIDE,
-                              (const unsigned char *)(s.block + (size_t)i * SIDE * SIDE)};
+        entry[i] = (nn_tensor){names[i],
+                               NN_F32,
+                               false,
+                               2,
+                               {SIDE, SIDE},
+                               {SIDE, 1},
+                               (int64_t)SIDE * SIDE,
+                               (const unsigned char *)(s.block + (size_t)i * SIDE * SIDE)};
     }
     static const nn_dtype type[] = {NN_F32, NN_F16, NN_BF16};
     for (int k = 0; s.block && k < 3; k++) {

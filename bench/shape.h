@@ -1,4 +1,4 @@
-/* What networks cost, and how to ask the peer for them. */
+/* The cost of networks, and their names for the peer. */
 #ifndef BENCH_SHAPE_H
 #define BENCH_SHAPE_H
 #include "nn/model.h"

@@ -4,8 +4,7 @@
 
 enum { OPTIONS_MAX = 32 };
 
-int lgd_argument_next(int argc, char **argv, const lgd_argument *table, const char **value, int *operands,
-                      ts_status *st)
+int cl_argument_next(int argc, char **argv, const cl_argument *table, const char **value, int *operands, ts_status *st)
 {
     struct option longs[OPTIONS_MAX + 1] = {0};
     char shorts[2 * OPTIONS_MAX + 2] = ":"; /* a leading colon tells a missing value from an unknown option */
@@ -22,7 +21,7 @@ int lgd_argument_next(int argc, char **argv, const lgd_argument *table, const ch
     const int key = getopt_long(argc, argv, shorts, longs, NULL);
     if (key == -1) {
         *operands = optind;
-        return LGD_ARGUMENT_END;
+        return CL_ARGUMENT_END;
     }
     if (key == '?' || key == ':') {
         /* getopt moved past the word that it did not like, unless that is one of several letters in one word */
@@ -34,18 +33,18 @@ int lgd_argument_next(int argc, char **argv, const lgd_argument *table, const ch
                     key == ':' ? "option %s needs a value"
                                : "there is no option %s, or it takes no value, or it is ambiguous",
                     word);
-        return LGD_ARGUMENT_BAD;
+        return CL_ARGUMENT_BAD;
     }
     *value = optarg;
     return key;
 }
 
-const char *lgd_argument_second(int argc, char **argv)
+const char *cl_argument_second(int argc, char **argv)
 {
     return optind < argc && argv[optind][0] != '-' ? argv[optind++] : NULL;
 }
 
-void lgd_argument_help(const lgd_argument *table, FILE *out)
+void cl_argument_help(const cl_argument *table, FILE *out)
 {
     for (int i = 0; table[i].key; i++) {
         char letter[8] = "", left[64];

@@ -1,27 +1,26 @@
 /* A program's options as one table, which parses them and prints the help. */
-#ifndef LGD_ARGUMENTS_H
-#define LGD_ARGUMENTS_H
+#ifndef CL_ARGUMENTS_H
+#define CL_ARGUMENTS_H
 #include "tensor/status.h"
 #include <stdio.h>
 
-typedef struct lgd_argument {
+typedef struct cl_argument {
     int key;           /* a letter: also the short option; above 255: long only; 0 ends the table */
     const char *name;  /* without the dashes */
     const char *value; /* what stands after it in the help, or NULL for a switch */
     const char *help;
-} lgd_argument;
+} cl_argument;
 
-enum { LGD_ARGUMENT_END = -1, LGD_ARGUMENT_BAD = -2 };
+enum { CL_ARGUMENT_END = -1, CL_ARGUMENT_BAD = -2 };
 
 /* The key of the next option and its value through the pointer; at the end the operands are argv[*operands] …
- * argv[argc-1] (GNU order: options may stand behind operands, "--" ends them). LGD_ARGUMENT_BAD with st for what the
+ * argv[argc-1] (GNU order: options may stand behind operands, "--" ends them). CL_ARGUMENT_BAD with st for what the
  * table does not have. */
-int lgd_argument_next(int argc, char **argv, const lgd_argument *table, const char **value, int *operands,
-                      ts_status *st);
+int cl_argument_next(int argc, char **argv, const cl_argument *table, const char **value, int *operands, ts_status *st);
 
 /* The word behind that value, for an option that has two; NULL when there is none. */
-const char *lgd_argument_second(int argc, char **argv);
+const char *cl_argument_second(int argc, char **argv);
 
 /* A line (or more) for each option. */
-void lgd_argument_help(const lgd_argument *table, FILE *out);
+void cl_argument_help(const cl_argument *table, FILE *out);
 #endif

@@ -42,6 +42,9 @@ void cl_progress_end(cl_progress *p);
 
 double cl_seconds(void); /* monotonic */
 
+/* With LGD_TRACE=1 in the environment: a line on stderr for each operation, with its shapes, way and time. */
+void cl_trace(void);
+
 /* Ctrl-C and SIGTERM set a flag; a second one ends the program at once. */
 void cl_catch_interrupt(void);
 bool cl_interrupted(void);

@@ -9,7 +9,7 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Every fault has its draws whether it is switched on or not, so that one key changes one thing. */
+/* Every fault is drawn, whether it is switched on or not, so that one key changes one fault. */
 typedef struct faults {
     float exposure, read, shot, vignette, red, blue, tilt, tilt_turn, away, away_turn, jpeg;
     bool halved;
@@ -210,7 +210,7 @@ void io_camera_apply(const io_camera *c, uint64_t seed, uint64_t index, int size
     const io_tone tone = io_camera_tone(c, seed, index);
     if (tone.knee < 1) io_tone_roll_off(&tone, count, image);
     for (size_t i = 0; i < count; i++) image[i] = nz_clamp(image[i], 0, 1);
-    if (sigma > 0.15f) io_blur(size, 3, sigma, image); /* a narrower one changes nothing that 8 bits show */
+    if (sigma > 0.15f) io_blur(size, 3, sigma, image); /* a narrower one is invisible in 8 bits */
     if (strength > 0) add_noise(&rng, read, gain, count, image);
     const bool developed = c->tone > 0 || c->sharpen > 0, coded = c->quantise || c->jpeg;
     if (developed) develop(c, &tone, seed, index, size, image);

@@ -1,5 +1,5 @@
-/* Photographs as cameras take them: what happens to a clean rendering between the surface and the file. Every fault is
- * drawn from (seed, index) alone, and each that is 0 leaves every byte as it was. */
+/* A camera's faults, added to a clean rendering. Each is drawn from (seed, index) alone; one that is 0 changes no byte.
+ */
 #ifndef IO_CAMERA_H
 #define IO_CAMERA_H
 #include "data/develop.h"

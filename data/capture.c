@@ -42,7 +42,7 @@ bool io_is_capture(const char *folder)
     return join(path, folder, camera_file, &st) == TS_OK && access(path, F_OK) == 0;
 }
 
-/* Lines of `columns` finite numbers between commas or blanks; empty lines count for nothing. The number of lines, or -1
+/* Lines of `columns` finite numbers between commas or blanks; empty lines are ignored. The number of lines, or -1
  * with st. */
 static int read_table(const char *folder, const char *name, int columns, int most, float *value, ts_status *st)
 {

@@ -1,9 +1,13 @@
 /* Photographs of one flat sample under known lights and cameras, in the folder layout of MaterialGAN (Guo et al.,
- * "MaterialGAN: Reflectance Capture using a Generative SVBRDF Model", 2020): 00.png, 01.png, ...   gamma 2.2,
- * rectified: the sample fills each picture camera_pos.txt        one "x,y,z" a picture, in centimetres; origin at the
- * sample's centre, x right, y up, z its normal light_pos.txt         the same of the light image_size.txt        the
- * sample's side in centimetres light_power.txt       "r,g,b": radiance = BRDF max(n.l, 0) power / distance^2, distance
- * in centimetres */
+ * "MaterialGAN: Reflectance Capture using a Generative SVBRDF Model", 2020):
+ *
+ *   00.png, 01.png, ...   gamma 2.2, rectified: the sample fills each picture
+ *   camera_pos.txt        one "x,y,z" a picture, in centimetres; origin at the sample's centre, x right, y up, z the
+ *                         sample's normal
+ *   light_pos.txt         the same of the light
+ *   image_size.txt        the sample's side in centimetres
+ *   light_power.txt       "r,g,b": radiance = BRDF max(n.l, 0) power / distance^2, distance in centimetres
+ */
 #ifndef IO_CAPTURE_H
 #define IO_CAPTURE_H
 #include "data/image/image.h"
@@ -23,10 +27,11 @@ typedef struct io_capture {
 ts_code io_capture_create(io_capture *c, int images, int size, ts_status *st);
 void io_capture_free(io_capture *c); /* and zeroes the struct */
 
-/* Pictures are brought to size x size in linear light (0: as the first is). What is missing, not square, has too few or
- * too many lines, or is not above the sample is an error that names the file. c is empty after a failure. */
+/* Pictures are resampled to size x size in linear light (0: the size of the first). A file that is missing, not square
+ * or has the wrong number of lines, and a position not above the sample, are errors that name the file. c is empty
+ * after a failure. */
 ts_code io_read_capture(const char *folder, int size, io_capture *c, ts_status *st);
-/* Whether the folder looks like one: it has a camera_pos.txt. */
+/* Whether the folder has a camera_pos.txt. */
 bool io_is_capture(const char *folder);
 
 /* Into an existing folder, 8-bit PNG. */

@@ -98,7 +98,7 @@ static ts_code read_square(const char *path, const photo *p, int64_t max_pixels,
         return ts_fail(st, TS_INVALID, "%s:%d: the file's name is too long", path, p->line);
     io_image square;
     int width, height;
-    const ts_code code = io_read_square(name, max_pixels, c->size, &square, &width, &height, st);
+    const ts_code code = io_read_photo_square(name, max_pixels, c->size, 0, &square, &width, &height, st);
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
     if (!code) memcpy(c->image + (size_t)k * values, square.data, values * sizeof(float));
     io_image_free(&square);

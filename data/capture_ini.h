@@ -1,17 +1,19 @@
 /* Photographs of one flat sample under known lights and cameras, listed in an INI file:
  *
  *   [capture]
- *   side = 20            ; of the sample, in the unit of the positions; without it positions are in patch widths
- *   power = 480          ; radiance = BRDF max(n.l, 0) power / distance^2 in that unit; without it the power that the
- * models assume for a flash [photo_1]            ; a section for each photograph, in any order, of any name file =
- * left.jpg      ; beside the INI file or from the root light = -5, 0, 20    ; x right, y up, z toward the camera, from
- * the sample's centre camera = 0, 0, 20 */
+ *   side = 20            ; of the sample, in the unit of the positions; default: positions are in patch widths
+ *   power = 480          ; radiance = BRDF max(n.l, 0) power / distance^2 in that unit; default: the default light's
+ *   [photo_1]            ; a section for each photograph, in any order, with any name
+ *   file = left.jpg      ; relative to the INI file, or absolute
+ *   light = -5, 0, 20    ; x right, y up, z toward the camera, from the sample's centre
+ *   camera = 0, 0, 20
+ */
 #ifndef IO_CAPTURE_INI_H
 #define IO_CAPTURE_INI_H
 #include "data/capture.h"
 
 /* The largest centred square of each photograph, as io_read_photo reads it, brought to size x size. usual: the power
- * taken where the file says none, in patch widths. The caller frees after success; c is empty after a failure, which
- * names the file and the line or key. */
+ * when the file has none, for distances in patch widths. The caller frees after success; c is empty after a failure,
+ * which names the file and the line or key. */
 ts_code io_read_capture_ini(const char *path, int size, float usual, int64_t max_pixels, io_capture *c, ts_status *st);
 #endif

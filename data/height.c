@@ -1,6 +1,6 @@
 #include "data/height.h"
 #include "tensor/memory.h"
-#include "tensor/gemm.h"
+#include "tensor/conv/gemm.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -54,7 +54,7 @@ static double eigenvalue(int k, int n)
     return 4 * s * s;
 }
 
-ts_code io_height(const io_material *m, float *height, ts_status *st)
+ts_code io_height(const io_material *m, float *height, int threads, ts_status *st)
 {
     const int n = m->size;
     const size_t pixels = (size_t)n * (size_t)n;
@@ -64,16 +64,16 @@ ts_code io_height(const io_material *m, float *height, ts_status *st)
     slopes(m, a, b);
     divergence(n, a, b, height);
     io_cosines(n, c);
-    ts_gemm(false, false, n, n, n, 1, c, height, 0, a);
-    ts_gemm(false, true, n, n, n, 1, a, c, 0, b);
+    ts_gemm(false, false, n, n, n, 1, c, height, 0, a, threads);
+    ts_gemm(false, true, n, n, n, 1, a, c, 0, b, threads);
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++) {
             const double e = eigenvalue(i, n) + eigenvalue(j, n);
             float *v = b + (size_t)i * (size_t)n + (size_t)j;
             *v = i || j ? (float)((double)*v / e) : 0;
         }
-    ts_gemm(true, false, n, n, n, 1, c, b, 0, a);
-    ts_gemm(false, false, n, n, n, 1, a, c, 0, height);
+    ts_gemm(true, false, n, n, n, 1, c, b, 0, a, threads);
+    ts_gemm(false, false, n, n, n, 1, a, c, 0, height, threads);
     free(memory);
     return TS_OK;
 }

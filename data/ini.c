@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { LARGEST = 1 << 20 }; /* a configuration is a page; a megabyte is some other file given by mistake */
+enum { LARGEST = 1 << 20 }; /* bytes; more is not a configuration */
 
 static bool blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 

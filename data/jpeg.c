@@ -1,4 +1,4 @@
-/* What baseline JPEG does to a picture: colour transform, chroma at half the resolution, 8x8 cosine transform,
+/* The losses of baseline JPEG: colour transform, chroma at half the resolution, 8x8 cosine transform,
  * quantisation, and back. The entropy coder loses nothing and is left out. A library would write and read a file for
  * every photograph, and its bytes depend on its build. */
 #include "data/camera.h"

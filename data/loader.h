@@ -1,4 +1,4 @@
-/* Materials made ahead of time by background threads. Order and bytes depend on the seed alone. */
+/* Materials made in advance by background threads. Order and bytes depend on the seed alone. */
 #ifndef IO_LOADER_H
 #define IO_LOADER_H
 #include "data/materials/procedural.h"

@@ -67,18 +67,18 @@ static void print_help(void)
     printf(
         "Usage: lgd-data [options] -o DIR\n"
         "       lgd-data --statistics --testdata DIR [options]\n"
-        "Writes procedural materials: numbers FIRST .. FIRST+COUNT-1 of the endless sequence that SEED names.\n\n"
+        "Writes procedural materials number FIRST .. FIRST+COUNT-1 of the sequence of SEED.\n\n"
         "What to write (the default is --format folders):\n"
-        "  -o, --output DIR      where to; made when absent\n"
+        "  -o, --output DIR      output folder; created when absent\n"
         "      --format FORMAT   folders: DIR/NAME/ with diffuse.png, specular.png, roughness.png, normal.png, "
         "maps.exr;\n"
         "                        strips: DIR/NAME.png, five panels: photograph, normal, diffuse, roughness, specular;\n"
         "                        captures: DIR/NAME/ with nine photographs 00.png .. 08.png and their lights and "
         "cameras\n"
-        "      --photographs     DIR/NAME.jpg, rendered under the flash, with sensor noise, blur and JPEG\n"
-        "      --contact-sheet   DIR/contact-sheet.png, a row for each family\n"
-        "      --statistics      compare maps with those of TESTDATA: a table on stdout\n"
-        "      --histograms      of each map beside those of TESTDATA: DIR/histograms.svg and DIR/histograms.csv\n\n"
+        "      --photographs     DIR/NAME.jpg: renderings under the flash, with sensor noise, blur and JPEG\n"
+        "      --contact-sheet   DIR/contact-sheet.png: a row for each family\n"
+        "      --statistics      print a table that compares the maps with those of --testdata\n"
+        "      --histograms      DIR/histograms.svg and .csv: histograms of the maps and of those of --testdata\n\n"
         "Which materials:\n"
         "      --seed N          default 1\n"
         "      --first N         default 0\n"
@@ -87,17 +87,17 @@ static void print_help(void)
         "      --families LIST   all (the default), classic (the first seventeen), or some of: ");
     for (int i = 0; i < io_family_count(); i++)
         printf("%s%s%s", i ? "," : "", i % 9 == 0 ? "\n                        " : "", io_family_name(i));
-    printf("\n\nCamera of the photographs, largest values of what each draws:\n");
+    printf("\n\nPhotographs, largest values of what each draws:\n");
     for (int i = 0; i < LGD_CAMERA_OPTIONS; i++) {
         io_camera usual = lgd_usual_camera;
         const lgd_camera_option *k = &lgd_camera_options[i];
         printf("      --%s X%*s%s, 0 .. %g (default %g)\n", k->name, 15 - (int)strlen(k->name), "", k->help, k->most,
                (double)*lgd_camera_value(&usual, i));
     }
-    printf("\nHow:\n"
+    printf("\nOther:\n"
            "      --quality N       of photographs' JPEG, 1 .. 100 (default 90)\n"
-           "      --testdata DIR    a folder with maps/ (map folders) and strips/ to compare with\n"
-           "      --threads N       default: as many as the process may use\n"
+           "      --testdata DIR    folder with maps/ (map folders) and strips/ to compare with\n"
+           "      --threads N       number of threads (default: as many as the process may use)\n"
            "      --help, --version\n");
 }
 

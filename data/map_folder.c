@@ -1,4 +1,4 @@
-/* Map folders: the images of a set, read, brought to one size and combined to our maps. */
+/* Map folders: the images of a set are read, resampled to one size and combined to maps. */
 #include "data/map_folder.h"
 #include "data/image/image_read.h"
 #include "data/name.h"
@@ -39,7 +39,7 @@ static ts_code to_square(io_image *image, int size, ts_status *st)
 }
 
 /* Metallic workflow: a dielectric's F0 of 0.04 (Burley, "Physically Based Shading at Disney", 2012; the glTF 2.0
- * specification, appendix B) gives way to the base colour. out: diffuse 3, F0 3, roughness, normal 3. */
+ * specification, appendix B) changes to the base colour. out: diffuse 3, F0 3, roughness, normal 3. */
 enum { MIXED = 10 };
 static void mix_pixel(const io_map_set *set, const io_image map[IO_MAP_KINDS], size_t i, float out[MIXED])
 {

@@ -22,6 +22,6 @@ typedef struct io_map_set {
     bool directx;                 /* the normal's y points down */
 } io_map_set;
 
-/* Looks into the folder and its meta.txt; what is told (may be NULL) wins. */
+/* Reads the folder's names and its meta.txt; told (may be NULL) holds the options, which win. */
 ts_code io_describe_map_folder(const char *path, const io_map_convention *told, io_map_set *set, ts_status *st);
 #endif

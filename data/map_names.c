@@ -1,10 +1,10 @@
 /* What is in a map folder: files are recognised by their names, conventions by meta.txt.
  *
- * meta.txt holds lines "key: text" (or "key = text"); '#' begins a comment, unknown keys are left alone:
- *   workflow: metallic | specular ...        needed only where both a metallic and a specular map exist
+ * meta.txt holds lines "key: text" (or "key = text"); '#' begins a comment, unknown keys are ignored:
+ *   workflow: metallic | specular ...        needed when both a metallic and a specular map exist
  *   basecolor, diffuse, specular: sRGB | linear ...
  *   normal: ... OpenGL ... | ... DirectX ...  (y up or y down)
- *   file.MAP: NAME                           where names do not say it; MAP as in io_map_kind_name */
+ *   file.MAP: NAME                           when its name does not say so; MAP as in io_map_kind_name */
 #include "data/file.h"
 #include "data/map_folder.h"
 #include "data/image/oiio.h"
@@ -51,7 +51,7 @@ static int split_words(const char *stem, size_t length, char word[WORDS][WORD])
 
 typedef enum side { UNKNOWN, GL, DX, BOTH } side;
 
-/* The map that a file name means, by its last telling word, or -1; *y: OpenGL or DirectX if it says so. */
+/* The map that a file name means, by its last word that names one, or -1; *y: OpenGL or DirectX if it says so. */
 static int kind_of_name(const char *name, side *y)
 {
     const char *dot = strrchr(name, '.');
@@ -101,7 +101,7 @@ static side normal_side(const char *text)
     return gl && dx ? BOTH : gl ? GL : dx ? DX : UNKNOWN;
 }
 
-/* Two normal maps that say which is which are no ambiguity: the wanted one stays (OpenGL if either will do). */
+/* Of two normal maps whose names give their y the wanted one is taken (OpenGL if both will do). */
 static bool choose_normal(io_map_set *set, side *have, const char *name, side y, side wanted)
 {
     if (*have == UNKNOWN || y == UNKNOWN || *have == y) return false;
@@ -138,7 +138,7 @@ static ts_code scan(const char *path, io_map_set *set, side wanted, side *file_s
     return code;
 }
 
-/* meta.txt's own words about files come first, so that they settle what names leave open. */
+/* Files named in meta.txt come first: they decide where names are ambiguous. */
 static bool named_files(const char *meta, io_map_set *set)
 {
     bool any = false;

@@ -2,7 +2,6 @@
 #include "data/image/exr.h"
 #include "data/file.h"
 #include <limits.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,57 +23,6 @@ void io_material_free(io_material *m)
 {
     free(m->maps);
     memset(m, 0, sizeof *m);
-}
-
-static float unit(float x)
-{
-    float v = x * 0.5f + 0.5f;
-    return v > 0 ? v < 1 ? v : 1 : 0; /* NaN to 0 */
-}
-
-static float level(float v) { return v > 0 ? v < 1 ? 2 * v - 1 : 1 : -1; }
-
-/* To [-1, 1]; NaN to -1: a value still. */
-static float clamped(float x) { return x > -1 ? x < 1 ? x : 1 : -1; }
-
-io_texel io_texel_get(const float *maps9)
-{
-    io_texel t = {.roughness = unit(maps9[MAP_ROUGHNESS])};
-    for (int c = 0; c < 3; c++) {
-        t.diffuse[c] = unit(maps9[MAP_DIFFUSE + c]);
-        t.specular[c] = unit(maps9[MAP_SPECULAR + c]);
-    }
-    float x = clamped(maps9[MAP_NORMAL]), y = clamped(maps9[MAP_NORMAL + 1]);
-    float s = x * x + y * y;
-    /* Refined maps may leave the unit circle; the renderer's rule (n_x^2 + n_y^2 at most 1 - 1e-6, then unit length)
-     * keeps z above 0. */
-    if (s > 1 - 1e-6f) {
-        float length = sqrtf(s + 1e-6f);
-        t.normal[0] = x / length;
-        t.normal[1] = y / length;
-        t.normal[2] = 1e-3f / length;
-    } else {
-        t.normal[0] = x;
-        t.normal[1] = y;
-        t.normal[2] = sqrtf(1 - s);
-    }
-    return t;
-}
-
-void io_texel_put(float *maps9, const io_texel *t)
-{
-    for (int c = 0; c < 3; c++) {
-        maps9[MAP_DIFFUSE + c] = level(t->diffuse[c]);
-        maps9[MAP_SPECULAR + c] = level(t->specular[c]);
-    }
-    maps9[MAP_ROUGHNESS] = level(t->roughness);
-    float x = t->normal[0], y = t->normal[1], z = t->normal[2], s = x * x + y * y + z * z;
-    bool usable = isfinite(s) && s > 1e-12f;
-    /* A normal that is of unit length already keeps its exact x and y, so that reading back what was written changes
-     * nothing. */
-    float scale = !usable ? 0 : fabsf(s - 1) < 1e-6f ? 1 : 1 / sqrtf(s);
-    maps9[MAP_NORMAL] = usable ? x * scale : 0;
-    maps9[MAP_NORMAL + 1] = usable ? y * scale : 0;
 }
 
 typedef struct map {
@@ -99,7 +47,7 @@ static ts_code make_rows(int y, int count, float *out, void *user, ts_status *st
             const io_texel t = io_texel_get(maps);
             for (int c = 0; c < 3; c++) out[c] = (c == 1 && q->directx ? -t.normal[c] : t.normal[c]) * 0.5f + 0.5f;
         } else {
-            for (int c = 0; c < channels; c++) out[c] = unit(maps[from + c]);
+            for (int c = 0; c < channels; c++) out[c] = io_unit(maps[from + c]);
         }
     }
     return TS_OK;
@@ -123,13 +71,13 @@ static ts_code write_map(const char *folder, const char *file, const io_material
     return io_write_png_rows(path, &rows, colour ? 8 : 16, colour, st);
 }
 
-/* What the files mean, for whoever reads them next (io_read_map_folder does). */
+/* The conventions of the files, for io_read_map_folder. */
 ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_status *st)
 {
     char path[PATH_MAX], text[512];
     if (snprintf(path, sizeof path, "%s/meta.txt", folder) >= (int)sizeof path)
         return ts_fail(st, TS_INVALID, "%s: name too long", folder);
-    /* Beside a base colour and a metallic map the reader is not to look for F0. */
+    /* With a base colour and a metallic map the reader must not look for F0. */
     int length = snprintf(
         text, sizeof text,
         "%sroughness: linear value, perceptual (alpha = roughness^2)\nnormal: tangent space, %s y\n%s",

@@ -14,7 +14,7 @@ ts_code io_material_create(io_material *m, int size, ts_status *st);
 void io_material_free(io_material *m);
 
 /* A map folder: basecolor/albedo/diffuse, normal, roughness, metallic or specular; conventions from meta.txt (see the
- * reader) or from the options; what is ambiguous is an error. Resampled to size (0: the largest map's centre square).
+ * reader) or from the options; ambiguity is an error. Resampled to size (0: the largest map's centre square).
  * The option wins over a meta.txt, which io_write_maps writes and data/map_names.c describes. */
 typedef enum io_normal { IO_NORMAL_FROM_FILE, IO_NORMAL_GL, IO_NORMAL_DX } io_normal;
 typedef enum io_workflow { IO_WORKFLOW_FROM_FILE, IO_WORKFLOW_METALLIC, IO_WORKFLOW_SPECULAR } io_workflow;
@@ -28,7 +28,7 @@ typedef struct io_map_convention {
     io_workflow workflow;
     io_encoding colour;
 } io_map_convention;
-/* told may be NULL: as the folder says. */
+/* told: conventions from options, or NULL: from the folder. */
 ts_code io_read_map_folder(const char *path, const io_map_convention *told, int size, io_material *m, ts_status *st);
 
 /* A strip: equal square panels side by side: input | normal | diffuse | roughness | specular, all linear, OpenGL y.
@@ -37,8 +37,7 @@ ts_code io_read_strip(const char *path, int size, io_material *m, io_image *inpu
 
 /* diffuse.png, specular.png (sRGB), roughness.png, normal.png (linear, 16 bit where it matters) and maps.exr (all
  * channels linear float) into the folder; with masks from IO_MAPS_... and the normal's y flipped for DirectX, in
- * maps.exr too. A meta.txt beside them says what they mean, so that io_read_map_folder reads the folder without being
- * told. */
+ * maps.exr too. A meta.txt beside them states the conventions, so that io_read_map_folder needs no options. */
 enum {
     IO_MAPS_DIFFUSE = 1,
     IO_MAPS_SPECULAR = 2,
@@ -53,8 +52,15 @@ ts_code io_write_map_files(const char *folder, const io_material *m, unsigned wh
 ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_status *st);
 /* A five-panel strip as io_read_strip reads it (16-bit PNG); input is linear, size x size. */
 ts_code io_write_strip(const char *path, const io_material *m, const io_image *input, ts_status *st);
-/* maps.exr back; whichever way its normals' y points, the maps' points up. */
+/* Reads maps.exr; the maps' normals have y up, whatever the file's have. */
 ts_code io_read_maps_exr(const char *path, io_material *m, ts_status *st);
+
+/* An encoded value of [-1, 1] as one of [0, 1]; NaN to 0. */
+static inline float io_unit(float x)
+{
+    const float v = x * 0.5f + 0.5f;
+    return v > 0 ? v < 1 ? v : 1 : 0;
+}
 
 /* The reconstructed normal and physical values of one pixel, for writers and statistics. */
 typedef struct io_texel {

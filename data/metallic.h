@@ -3,7 +3,7 @@
 #define IO_METALLIC_H
 #include "data/material.h"
 
-/* RMS over all pixels and channels, linear: what the conversion cannot express. */
+/* The error of the conversion: RMS over all pixels and channels, linear. */
 typedef struct io_metallic_error {
     double diffuse, specular;
 } io_metallic_error;

@@ -27,7 +27,8 @@ static bool seen(int step, const float *maps, int channels, void *user)
         ev_case c = *w->c;
         if (w->at != 0 && w->at != w->points - 1) c.perceptual = false, c.lpips = NULL;
         w->row[w->at] = ev_score(&c, maps, channels);
-        w->finite = isfinite(w->row[w->at].value[EV_RENDER]);
+        const bool compared = c.truth || c.capture;
+        w->finite = isfinite(w->row[w->at].value[compared ? EV_RENDER : EV_RELIEF]);
         for (int64_t i = 0; i < pixels * channels; i++)
             w->finite = w->finite && isfinite(maps[i]); /* a clamp may hide it from the scores */
         for (int copy = 0; copy < 2; copy++) {

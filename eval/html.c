@@ -106,7 +106,7 @@ static void table(const ev_report *r, const shown *s, int set, FILE *f)
     fputs("</table>\n", f);
 }
 
-/* Of a lone method a line for each set, of several a line for each method over all sets. */
+/* With one method a line for each set, with several a line for each method over all sets. */
 static void plot(const ev_report *r, FILE *f)
 {
     const int lines = r->methods > 1 ? r->methods : r->sets;
@@ -232,7 +232,7 @@ void ev_html_write(const ev_report *r, FILE *f)
     fputs(head, f);
     fprintf(f, "</head><body>\n<h1>lgd-eval</h1>\n<p>%d &#215; %d pixels, %d thread%s%s, %s, %s convolutions; model ",
             r->size, r->size, r->threads, r->threads == 1 ? "" : "s", r->pinned ? ", pinned" : "", r->isa,
-            ts_conv_exact() ? "direct" : "Winograd");
+            r->exact ? "direct" : "Winograd");
     ev_put_text(f, r->model);
     fprintf(f,
             ". Mean and standard deviation over the materials; seconds: median over them, of %d run%s each; peak: "
@@ -249,7 +249,9 @@ void ev_html_write(const ev_report *r, FILE *f)
             fprintf(f, " <button data-key=\"%s\">%s</button>", ev_metric_name[k], ev_metric_name[k]);
     fputs("</p>\n<p>Pictures: the truth; the estimate; four times their difference. Columns: input and its "
           "re-rendering, diffuse, specular, roughness, normal, renderings"
-          " under other lights and cameras (of a capture: its photographs and their re-renderings).</p>\n<div "
+          " under other lights and cameras (of a capture: its photographs and their re-renderings). Of a photograph "
+          "without known maps: itself, diffuse, specular, roughness, normal, and its re-rendering as bright as it is; "
+          "below, a peer's maps where there are any.</p>\n<div "
           "id=\"materials\">\n",
           f);
     for (int i = 0; i < r->results; i++) material(r, &s, &r->result[i], f);

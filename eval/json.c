@@ -45,8 +45,7 @@ void ev_json_write(const ev_report *r, FILE *f)
     fprintf(f,
             ",\n\"size\": %d,\n\"threads\": %d,\n\"pinned\": %s,\n\"repeat\": %d,\n\"isa\": \"%s\",\n\"convolutions\": "
             "\"%s\",\n\"methods\": [",
-            r->size, r->threads, r->pinned ? "true" : "false", r->repeat, r->isa,
-            ts_conv_exact() ? "direct" : "Winograd");
+            r->size, r->threads, r->pinned ? "true" : "false", r->repeat, r->isa, r->exact ? "direct" : "Winograd");
     for (int m = 0; m < r->methods; m++) {
         fputs(m ? ",\n{\"label\": " : "\n{\"label\": ", f);
         put_string(f, r->method[m].label);

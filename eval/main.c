@@ -1,9 +1,8 @@
 /* lgd-eval: how far estimated maps are from known ones. */
 #include "cli/cli.h"
+#include "eval/command.h"
 #include "eval/figure.h"
-#include "eval/set_ini.h"
 #include "eval/methods/tune.h"
-#include "cli/arguments.h"
 #include "infer/model_path.h"
 #include "tensor/conv/conv.h"
 #include "tensor/threads.h"
@@ -11,228 +10,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum {
-    SETS_MAX = 64,
-    METHODS_MAX = 64,
-    IMAGES = 256,
-    NOISE,
-    SIZE,
-    SEED,
-    FAST,
-    NORMAL,
-    WORKFLOW,
-    COLOUR,
-    METHOD,
-    REPEAT,
-    PIN,
-    LPIPS,
-    EXACT,
-    TUNE,
-    FIGURE,
-    PARETO,
-    EXPOSURE,
-    LIGHT,
-    PATH_LENGTH = 4096
-};
-
-static const lgd_argument arguments[] = {
-    {'o', "output", "DIR", "write results.csv, summary.csv, times.csv, results.json and report.html there (required)"},
-    {'d', "set", "KIND:WHERE",
-     "what to evaluate (required, may be repeated):\n"
-     "procedural:SEED,COUNT[,FAMILY...]  generated materials: of families as lgd-data --help lists them,\nof all, or "
-     "of "
-     "classic, the first seventeen (the default)\n"
-     "strips:FOLDER  images of five panels: input, normal, diffuse, roughness, specular\nmaps:FOLDER  a folder of map "
-     "folders\nmultiview:FOLDER  a capture, or a folder of them: 00.png, 01.png ..., camera_pos.txt,\nlight_pos.txt, "
-     "image_size.txt, light_power.txt; 00.png is the input"},
-    {NORMAL, "normal", "Y", "of map folders: opengl or directx (default: as set.ini, meta.txt or the file name says)"},
-    {WORKFLOW, "workflow", "W", "of map folders: metallic or specular (default: likewise, or as the files are)"},
-    {COLOUR, "colour", "C", "of map folders: srgb or linear (default: likewise, or sRGB)"},
-    {METHOD, "method", "NAME[:KEY=VALUE,...]",
-     "a method to compare (may be repeated; default: lgd, every step); below are their keys"},
-    {'i', "iterations", "N", "refinement steps, 0 .. 1000 (default: as trained)"},
-    {'m', "model", "FILE", "weights (default: $LGD_MODEL, or those installed or built with the program)"},
-    {SIZE, "size", "N", "pixels of a side, 1 .. 4096 (default 256)"},
-    {SEED, "seed", "N", "draws the renderings' lights and cameras, and the noise (default 1)"},
-    {NOISE, "noise", "X", "sensor noise of the input picture, 0 = none .. 1 = a phone at night (default 0)"},
-    {EXPOSURE, "exposure", "S",
-     "photographs under a light S times as strong as the methods are told, 0.01 .. 100; renderings are then compared "
-     "after one\n"
-     "factor on the estimate's is fitted (default 1, and no fit)"},
-    {LIGHT, "light", "X,Y",
-     "place the flash X, Y patch widths from the centre, -4 .. 4 each; the methods are told (default 0,0)"},
-    {IMAGES, "images", NULL,
-     "also write DIR/images/SET-MATERIAL.png: truth, first and last estimate in three rows;\nof several methods a file "
-     "each"},
-    {LPIPS, "lpips-weights", "TRUNK LINEAR",
-     "measure LPIPS 0.1 too: torchvision's AlexNet and the lpips package's linear heads, two files (.pth or "
-     "safetensors)"},
-    {FAST, "fast", NULL, "no SSIM and FLIP, which take most of the time"},
-    {REPEAT, "repeat", "N", "estimate each photograph N times, 1 .. 1000, and take the median time (default 1)"},
-    {PIN, "pin", NULL, "bind every thread to a CPU of its own"},
-    {EXACT, "exact", NULL,
-     "compute all convolutions directly, not by Winograd's way where it is faster, as lgd-infer does"},
-    {FIGURE, "figure", "NAME",
-     "also write DIR/NAME.svg and .csv: iterations (error over T, 0 .. 24 unless told) or methods (error over time)"},
-    {PARETO, "pareto", NULL,
-     "instead: DIR/pareto.svg and .csv, lgd's time against error at 128, 256, 512 pixels, T = 0 .. 24, f32 and bf16, "
-     "and tolerances"},
-    {TUNE, "tune", NULL,
-     "instead: search the grids of the methods' settings (default: of those that need no weights), DIR/tune.csv"},
-    {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},
-    {'q', "quiet", NULL, "no progress"},
-    {'h', "help", NULL, "print this help"},
-    {'V', "version", NULL, "print the version"},
-    {0, NULL, NULL, NULL}};
-
-typedef struct command {
-    const char *out, *model, *lpips[2], *spec[SETS_MAX], *method[METHODS_MAX];
-    int sets, methods, iterations, threads, size, repeat;
-    int64_t seed;
-    double noise, exposure, light[2]; /* exposure 0: not given */
-    io_map_convention told;
-    bool images, fast, exact, pin, tune, pareto, iterations_figure, methods_figure, quiet, help, version;
-} command;
-
-static ts_code whole(const char *name, const char *text, int64_t lo, int64_t hi, int64_t *value, ts_status *st)
-{
-    if (cl_parse_int(text, lo, hi, value)) return TS_OK;
-    return ts_fail(st, TS_INVALID, "--%s: '%s' is not a whole number in %lld .. %lld", name, text, (long long)lo,
-                   (long long)hi);
-}
-
-static ts_code parse_light(const char *text, double light[2], ts_status *st)
-{
-    char x[32];
-    const char *comma = strchr(text, ',');
-    const size_t n = comma ? (size_t)(comma - text) : 0;
-    if (n > 0 && n < sizeof x) {
-        memcpy(x, text, n);
-        x[n] = 0;
-        if (cl_parse_real(x, -4, 4, &light[0]) && cl_parse_real(comma + 1, -4, 4, &light[1])) return TS_OK;
-    }
-    return ts_fail(st, TS_INVALID, "--light: '%s' is not X,Y with numbers in -4 .. 4", text);
-}
-
-static ts_code parse(int argc, char **argv, command *c, ts_status *st)
-{
-    *c = (command){.iterations = -1, .size = 256, .seed = 1, .repeat = 1};
-    const char *value = NULL;
-    int key, operands = argc;
-    int64_t n = 0;
-    ts_code code = TS_OK;
-    while (!code && !c->help && !c->version &&
-           (key = lgd_argument_next(argc, argv, arguments, &value, &operands, st)) != LGD_ARGUMENT_END) {
-        switch (key) {
-        case 'o': c->out = value; break;
-        case 'm': c->model = value; break;
-        case 'q': c->quiet = true; break;
-        case 'h': c->help = true; break;
-        case 'V': c->version = true; break;
-        case PIN: c->pin = true; break;
-        case EXACT: c->exact = true; break;
-        case TUNE: c->tune = true; break;
-        case PARETO: c->pareto = true; break;
-        case FIGURE:
-            if (!strcmp(value, "iterations")) c->iterations_figure = true;
-            else if (!strcmp(value, "methods")) c->methods_figure = true;
-            else code = ts_fail(st, TS_INVALID, "--figure: '%s' is neither 'iterations' nor 'methods'", value);
-            break;
-        case METHOD:
-            if (c->methods == METHODS_MAX)
-                code = ts_fail(st, TS_INVALID, "--method: more than %d methods", METHODS_MAX);
-            else c->method[c->methods++] = value;
-            break;
-        case REPEAT:
-            code = whole("repeat", value, 1, 1000, &n, st);
-            c->repeat = (int)n;
-            break;
-        case EXPOSURE:
-            if (!cl_parse_real(value, 0.01, 100, &c->exposure))
-                code = ts_fail(st, TS_INVALID, "--exposure: '%s' is not a number in 0.01 .. 100", value);
-            break;
-        case LIGHT: code = parse_light(value, c->light, st); break;
-        case IMAGES: c->images = true; break;
-        case FAST: c->fast = true; break;
-        case LPIPS:
-            c->lpips[0] = value;
-            if (!(c->lpips[1] = lgd_argument_second(argc, argv)))
-                code = ts_fail(st, TS_INVALID, "--lpips-weights needs two files: TRUNK LINEAR");
-            break;
-        case SEED: code = whole("seed", value, 0, INT64_MAX, &c->seed, st); break;
-        case 'd':
-            if (c->sets == SETS_MAX) code = ts_fail(st, TS_INVALID, "--set: more than %d sets", SETS_MAX);
-            else c->spec[c->sets++] = value;
-            break;
-        case 'i':
-            code = whole("iterations", value, 0, 1000, &n, st);
-            c->iterations = (int)n;
-            break;
-        case SIZE:
-            code = whole("size", value, 1, 4096, &n, st);
-            c->size = (int)n;
-            break;
-        case 't':
-            code = whole("threads", value, 0, 1024, &n, st);
-            c->threads = (int)n;
-            break;
-        case NORMAL:
-            if (!ev_set_ini_key("normal", value, &c->told))
-                code = ts_fail(st, TS_INVALID, "--normal: '%s' is neither 'opengl' nor 'directx'", value);
-            break;
-        case WORKFLOW:
-            if (!ev_set_ini_key("workflow", value, &c->told))
-                code = ts_fail(st, TS_INVALID, "--workflow: '%s' is neither 'metallic' nor 'specular'", value);
-            break;
-        case COLOUR:
-            if (!ev_set_ini_key("colour", value, &c->told))
-                code = ts_fail(st, TS_INVALID, "--colour: '%s' is neither 'srgb' nor 'linear'", value);
-            break;
-        case NOISE:
-            if (!cl_parse_real(value, 0, 1, &c->noise))
-                code = ts_fail(st, TS_INVALID, "--noise: '%s' is not a number in 0 .. 1", value);
-            break;
-        default: code = st->code;
-        }
-    }
-    if (code || c->help || c->version) return code;
-    if (operands < argc)
-        return ts_fail(st, TS_INVALID, "'%s' is not an option; sets are given as --set KIND:WHERE", argv[operands]);
-    if (c->sets == 0) return ts_fail(st, TS_INVALID, "no set is given: --set KIND:WHERE");
-    if (c->tune + c->pareto + (c->iterations_figure || c->methods_figure) > 1)
-        return ts_fail(st, TS_INVALID, "--tune, --pareto and --figure are different tasks: choose one");
-    if (c->pareto && (c->methods || c->iterations >= 0))
-        return ts_fail(st, TS_INVALID,
-                       "--pareto has its own methods and iterations: --method and --iterations do not go with it");
-    if ((c->tune || c->pareto) && c->images)
-        return ts_fail(st, TS_INVALID, "--images does not go with --tune or --pareto");
-    if (c->iterations_figure && c->iterations < 0) c->iterations = 24;
-    if (!c->out || !*c->out) return ts_fail(st, TS_INVALID, "no output folder is given: -o DIR");
-    return TS_OK;
-}
-
-static void print_help(void)
-{
-    puts("Usage: lgd-eval [options] --set KIND:WHERE... -o DIR\n"
-         "Renders each known material under a flash (of a capture: takes its first picture), estimates its maps from "
-         "that, and prints the RMSE of the maps (diffuse and\n"
-         "specular in gamma space, roughness and normal as they are) and of renderings under other lights and cameras, "
-         "the mean angle\n"
-         "between the normals in degrees, and SSIM and FLIP (and LPIPS) of the renderings, for R_0 and after every "
-         "refinement step (these\n"
-         "three: for R_0 and the last), or for each method that is named. The same seed gives the same numbers, for "
-         "any number of threads.\n");
-    lgd_argument_help(arguments, stdout);
-    puts("\nMethods (values have no commas; every method also takes label=TEXT):");
-    ev_method_help(stdout);
-    puts("\nExit status: 0 done, 1 a material failed (the others are in the results) or nothing could be written, 2 "
-         "wrong usage.");
-}
+enum { PATH_LENGTH = 4096 };
 
 /* Everything that one run holds. */
 typedef struct work {
-    const command *c;
-    ev_set set[SETS_MAX];
+    const ev_command *c;
+    ev_set set[EV_SETS_MAX];
     ev_estimator *method;
     ev_tuning tuning;
     ev_lpips *lpips;
@@ -258,15 +41,37 @@ static void show_progress(int64_t done, int64_t total, const char *name, void *u
     if (!w->c->quiet) cl_progress_show(&w->bar, done, name);
 }
 
+/* Whether the methods are told the light of a set's photographs. */
+static bool is_told(const ev_command *c, const ev_set *set)
+{
+    if (set->kind == EV_PHOTOS || set->kind == EV_PEERS) return false;
+    return set->kind == EV_MULTIVIEW ? c->told_all : !c->untold;
+}
+
+/* The method where none is named: as lgd-infer estimates where nothing is told. */
+static ts_code parse_usual(const work *w, const char **spec, ts_status *st)
+{
+    const bool told = is_told(w->c, &w->set[0]);
+    for (int s = 1; s < w->c->sets; s++)
+        if (is_told(w->c, &w->set[s]) != told)
+            return ts_fail(st, TS_INVALID,
+                           "--set %s: its light is %s, unlike that of %s: give --method, --told or --untold",
+                           w->set[s].spec, told ? "not told" : "told", w->set[0].spec);
+    *spec = told ? "lgd" : "lgd:power=auto,orientations=2,label=lgd";
+    return TS_OK;
+}
+
 /* The methods; a name or key that does not exist is wrong usage. */
 static ts_code parse_methods(work *w, ts_status *st)
 {
-    const command *c = w->c;
+    const ev_command *c = w->c;
     w->run.methods = c->methods ? c->methods : 1;
+    const char *usual = "lgd";
+    if (!c->methods && parse_usual(w, &usual, st) != TS_OK) return st->code;
     w->method = calloc((size_t)w->run.methods, sizeof *w->method);
     if (!w->method) return ts_fail(st, TS_NOMEM, "out of memory");
     for (int i = 0; i < w->run.methods; i++) {
-        if (ev_method_parse(c->methods ? c->method[i] : "lgd", w->model, c->iterations, &w->method[i], st) != TS_OK)
+        if (ev_method_parse(c->methods ? c->method[i] : usual, w->model, c->iterations, &w->method[i], st) != TS_OK)
             return st->code;
         for (int j = 0; j < i; j++)
             if (!strcmp(w->method[i].label, w->method[j].label))
@@ -282,7 +87,7 @@ static ts_code parse_methods(work *w, ts_status *st)
 static ts_code parse_tuning(work *w, ts_status *st)
 {
     static const char *const some[] = {"mean", "lgd", "descent", "finetune"};
-    const command *c = w->c;
+    const ev_command *c = w->c;
     const int count = c->methods ? c->methods : (int)(sizeof some / sizeof *some);
     for (int i = 0; i < count; i++)
         if (ev_tune_add(&w->tuning, c->methods ? c->method[i] : some[i], i, w->model, st) != TS_OK) return st->code;
@@ -311,8 +116,8 @@ static int finish(work *w, ts_status *st)
 /* Folders, memory and numbers. */
 static int evaluate(work *w, ts_status *st)
 {
-    const command *c = w->c;
-    const char *name[SETS_MAX],
+    const ev_command *c = w->c;
+    const char *name[EV_SETS_MAX],
         *slash = strrchr(w->model, '/'); /* where it lay says nothing to whom the report is sent */
     for (int s = 0; s < c->sets; s++) name[s] = c->spec[s];
     if (cl_make_folder(c->out, st) != TS_OK) return cl_failed("%s", st->message);
@@ -333,11 +138,12 @@ static int evaluate(work *w, ts_status *st)
     r->seed = (uint64_t)c->seed;
     r->noise = c->noise;
     r->exposure = c->exposure > 0 ? c->exposure : 1;
-    r->fit = c->exposure > 0;
+    r->fit = c->exposure > 0 || c->untold;
+    r->told = c->told_all;
     r->flash = rd_flash();
     for (int k = 0; k < 2; k++) r->flash.light[k] = (float)c->light[k];
     r->perceptual = !c->fast && !c->tune;
-    ts_conv_exact_set(c->exact);
+    r->exact = c->exact;
     r->pictures = !c->tune;
     r->pinned = c->pin;
     r->model = slash ? slash + 1 : w->model;
@@ -356,7 +162,7 @@ static int evaluate(work *w, ts_status *st)
     return c->pareto ? CL_OK : finish(w, st);
 }
 
-static int start(const command *c)
+static int start(const ev_command *c)
 {
     work *w = calloc(1, sizeof *w);
     if (!w) return cl_failed("out of memory");
@@ -366,6 +172,7 @@ static int start(const command *c)
     for (int s = 0; s < c->sets && code == CL_OK; s++)
         if (ev_set_open(c->spec[s], &c->told, &w->set[s], &st) != TS_OK)
             code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
+        else w->set[s].peers = c->peer_maps;
     ts_threads_set(c->threads);
     if (code == CL_OK && lgd_model_path(c->model, "single", w->model, &st) != TS_OK) code = cl_failed("%s", st.message);
     if (code == CL_OK && (c->tune ? parse_tuning(w, &st) : c->pareto ? TS_OK : parse_methods(w, &st)) != TS_OK)
@@ -382,14 +189,15 @@ static int start(const command *c)
 
 int main(int argc, char **argv)
 {
-    command c;
+    ev_command c;
     ts_status st = {0};
     const int bad = cl_init("lgd-eval");
     if (bad) return bad;
-    if (parse(argc, argv, &c, &st) != TS_OK) return cl_usage("%s", st.message);
+    if (ev_command_parse(argc, argv, &c, &st) != TS_OK) return cl_usage("%s", st.message);
     cl_catch_interrupt();
+    cl_trace();
     int code = CL_OK;
-    if (c.help) print_help();
+    if (c.help) ev_command_help();
     else if (c.version) cl_print_version();
     else code = start(&c);
     return cl_finish(code);

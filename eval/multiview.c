@@ -6,6 +6,30 @@
 #include <math.h>
 #include <stdlib.h>
 
+static void swap(void *a, void *b, size_t size)
+{
+    unsigned char *x = a, *y = b;
+    for (size_t i = 0; i < size; i++) {
+        const unsigned char t = x[i];
+        x[i] = y[i], y[i] = t;
+    }
+}
+
+void ev_capture_nearest_first(io_capture *c)
+{
+    const size_t bytes = (size_t)c->size * (size_t)c->size * 3 * sizeof *c->image;
+    int nearest = 0;
+    for (int i = 1; i < c->images; i++) {
+        const float *now = c->camera[i], *best = c->camera[nearest];
+        if (hypotf(now[0], now[1]) < hypotf(best[0], best[1])) nearest = i;
+    }
+    for (int i = nearest; i > 0; i--) {
+        swap((char *)c->image + (size_t)i * bytes, (char *)c->image + (size_t)(i - 1) * bytes, bytes);
+        swap(c->camera[i], c->camera[i - 1], sizeof c->camera[i]);
+        swap(c->light[i], c->light[i - 1], sizeof c->light[i]);
+    }
+}
+
 /* What picture 0's colours are multiplied by. */
 static void input_gain(const io_capture *c, float gain[3])
 {
@@ -62,8 +86,8 @@ static double difference(size_t values, const float *photo, const float *scene, 
     return sqrt(sum / (double)values);
 }
 
-/* The exposure of least difference: the best of a coarse row of stops, then golden section between its neighbours.
- * Clamping makes the difference flat far away, so that a descent from anywhere would not do. */
+/* The exposure of least difference: the best of a coarse grid of stops, then golden section between its neighbours. A
+ * descent would fail far away, where clamping makes the difference constant. */
 static double fit(size_t values, const float *photo, const float *scene)
 {
     const double golden = 0.6180339887498949;

@@ -5,19 +5,22 @@
 #include "data/capture.h"
 #include "eval/metrics/metrics.h"
 
+/* Makes the picture whose camera is nearest to the sample's axis the first; the others keep their order. */
+void ev_capture_nearest_first(io_capture *c);
+
 /* Light and camera of a picture. Its power is that of the input picture as ev_capture_input gives it. */
 rd_view ev_capture_view(const io_capture *c, int picture);
 
-/* The first `inputs` pictures as the estimators know photographs: each colour scaled, in all alike, so that picture 0's
- * light at the sample's centre is as strong as that of the flash in render/scene.h, then clamped to [0, 1]. image:
+/* The first `inputs` pictures in the brightness that the estimators expect: each colour is scaled, equally in all, so
+ * that picture 0's light at the sample's centre equals the flash of render/scene.h, then clamped to [0, 1]. image:
  * [inputs, size, size, 3]. */
 void ev_capture_input(const io_capture *c, int inputs, float *image);
 
 /* Re-renderings of maps [size, size, channels] under each picture's own light and camera, in the capture's own
  * brightness. EV_RENDER (and EV_SSIM and EV_FLIP if perceptual, EV_LPIPS if lpips is not NULL) are means over pictures
- * inputs .. images-1; EV_EXPOSURE is the factor on the light, the same for all pictures, that makes the re-rendering of
- * picture 0 most like it (least RMSE in gamma space): maps fix brightness only up to what one picture says. The rest is
- * NaN: nobody knows the maps. NaN throughout when memory cannot be had. */
+ * inputs .. images-1; EV_EXPOSURE is the factor on the light, the same for all pictures, that gives the re-rendering
+ * of picture 0 the least RMSE in gamma space: one picture fixes brightness only up to a factor. The rest is NaN: the
+ * maps are unknown. NaN throughout when memory cannot be had. */
 ev_row ev_capture_score(const io_capture *c, int inputs, const float *maps, int channels, bool perceptual,
                         ev_lpips *lpips);
 

@@ -4,7 +4,7 @@
 
 enum { WIDTH = 760, HEIGHT = 420, LEFT = 70, RIGHT = 210, TOP = 20, BOTTOM = 50, TICKS = 6 };
 
-/* Seven that people with any colour vision tell apart (Okabe and Ito, "Color Universal Design", 2008), and three more.
+/* Seven that differ for any colour vision (Okabe and Ito, "Color Universal Design", 2008), and three more.
  */
 static const char *const colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00",
                                       "#56b4e9", "#000000", "#8c564b", "#7f7f7f", "#9467bd"};

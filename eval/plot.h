@@ -14,7 +14,7 @@ typedef struct ev_series {
     const char *name;
     const ev_point *point;
     int points; /* joined by a line in this order */
-    bool level; /* one point, drawn as a line from side to side: what it tells does not depend on x */
+    bool level; /* one point, drawn as a line from side to side: it does not depend on x */
 } ev_series;
 
 /* Text for HTML and SVG: & < > " as entities. */

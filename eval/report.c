@@ -93,6 +93,7 @@ int ev_report_summary(const ev_report *r, int set, int column, ev_row *mean, ev_
         mean->value[k] = measured ? sum / measured : NAN;
         deviation->value[k] = measured > 1 ? sqrt(squares / (measured - 1)) : measured ? 0 : NAN;
     }
+    mean->value[EV_OVER_FLAT] = mean->value[EV_NORMAL] / mean->value[EV_FLAT]; /* smooth materials do not decide it */
     return n;
 }
 
@@ -138,7 +139,7 @@ static void print_table(const ev_report *r, int set, const int *column, int colu
     const double start = mean.value[EV_RENDER];
     fprintf(out, "%s%s: %d %s, %d x %d pixels", set != 0 ? "\n" : "", set < 0 ? "all sets" : r->set_name[set], n,
             n == 1 ? "material" : "materials", r->size, r->size);
-    if (isnan(any.value[EV_DIFFUSE])) fputs(", each picture but the first", out);
+    if (isnan(any.value[EV_DIFFUSE]) && !isnan(any.value[EV_RENDER])) fputs(", each picture but the first", out);
     else if (!isnan(any.value[EV_DIFFUSE])) fprintf(out, ", %d renderings each", RD_EVAL_VIEWS);
     fprintf(out,
             "; RMSE (angle: degrees; ssim, flip, exposure, lpips: themselves), mean +- standard deviation; %d "

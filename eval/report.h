@@ -23,7 +23,7 @@ typedef struct ev_result {
 
 typedef struct ev_report {
     int sets, size, threads, repeat;
-    bool pinned;
+    bool pinned, exact;
     const char *const *set_name; /* the caller's, as the other names */
     const char *model, *isa;
     ev_subject *method; /* the caller's */
@@ -47,8 +47,8 @@ int ev_report_summary(const ev_report *r, int set, int column, ev_row *mean, ev_
 double ev_report_seconds(const ev_report *r, int set, int column);
 double ev_report_peak(const ev_report *r, int set, int method);
 
-/* What tables show: every step of a lone method, of several the last each. Column numbers into column[]; how many. A
- * column's name: "R_3" or the method's label. */
+/* The columns of tables: every step of a single method, the last step of each of several. Column numbers into column[];
+ * how many. A column's name: "R_3" or the method's label. */
 enum { EV_NAME = 80 };
 int ev_report_shown(const ev_report *r, int *column);
 const char *ev_report_name(const ev_report *r, int column, char name[EV_NAME]);

@@ -1,4 +1,5 @@
 #include "eval/run.h"
+#include "eval/contact.h"
 #include "eval/multiview.h"
 #include "eval/sheet.h"
 #include "render/error.h"
@@ -12,23 +13,44 @@ enum { PATH_LENGTH = 4096, PICTURES = 256 /* in a report: some 80 MB */ };
 
 /* What one material needs. */
 typedef struct bench {
-    io_material truth;
+    io_material truth, peer;
     io_capture capture;
     rd_view views[RD_EVAL_VIEWS];
-    float *image, *first, *last;
+    float *image, *photo, *first, *last;
     ev_row *row;
     double *seconds;
+    ev_contact contact; /* of the method that runs */
     const char *name;
     int pictures;
     int *at;   /* of each material: its result, or -1: none yet */
     bool *bad; /* it cannot be read */
 } bench;
 
+/* What is known of a picture that was not rendered here. */
+static ts_code load_photo(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, ts_status *st)
+{
+    free(b->photo);
+    if (ev_set_load_photo(set, i, r->size, &b->photo, &b->truth, &b->peer, st) != TS_OK) return st->code;
+    b->name = b->truth.name;
+    *c = ev_case_of_photo(b->photo, r->size);
+    if (b->peer.size) c->peer = &b->peer;
+    if (!b->truth.size) return TS_OK;
+    ts_rng rng = ts_rng_make(r->seed, TS_STREAM_EVAL, ev_set_identity(set, i));
+    rd_eval_views(&rng, RD_EVAL_VIEWS, b->views);
+    c->truth = &b->truth;
+    c->views = b->views;
+    c->fit = true;
+    c->perceptual = r->perceptual;
+    c->lpips = r->lpips;
+    return TS_OK;
+}
+
 static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, ts_status *st)
 {
     const uint64_t identity = ev_set_identity(set, i);
     const bool capture = set->kind == EV_MULTIVIEW;
     b->name = "";
+    if (set->kind == EV_PHOTOS || set->kind == EV_PEERS) return load_photo(r, b, set, i, c, st);
     if ((capture ? ev_set_load_capture(set, i, r->size, &b->capture, st)
                  : ev_set_load(set, i, r->size, &b->truth, st)) != TS_OK)
         return st->code;
@@ -37,8 +59,9 @@ static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, t
         if (b->capture.images <= r->inputs)
             return ts_fail(st, TS_FORMAT, "%s: has %d pictures: %d are the input, and one more at least is compared",
                            b->name, b->capture.images, r->inputs);
-        ev_capture_input(&b->capture, r->inputs, b->image);
-        *c = ev_case_of_capture(&b->capture, b->image, r->inputs, r->perceptual);
+        ev_capture_nearest_first(&b->capture);
+        if (r->told) ev_capture_input(&b->capture, r->inputs, b->image);
+        *c = ev_case_of_capture(&b->capture, r->told ? b->image : b->capture.image, r->inputs, r->told, r->perceptual);
         c->lpips = r->lpips;
         return TS_OK;
     }
@@ -76,6 +99,20 @@ static ts_code sheet(const ev_run *r, const bench *b, const ev_case *c, int set,
     return ev_sheet_write(path, c, b->first, b->last, st);
 }
 
+/* The method's photographs in one picture. */
+static ts_code contact_sheet(const ev_run *r, bench *b, int method, ts_status *st)
+{
+    char path[PATH_LENGTH];
+    const char *label = r->methods > 1 ? r->method[method].label : "";
+    ts_code code = TS_OK;
+    if (r->images &&
+        snprintf(path, sizeof path, "%s/contact%s%s.png", r->images, *label ? "-" : "", label) >= (int)sizeof path)
+        code = ts_fail(st, TS_INVALID, "%s: the name is too long", r->images);
+    if (r->images && !code) code = ev_contact_write(&b->contact, path, st);
+    ev_contact_free(&b->contact);
+    return code;
+}
+
 /* A material by an open method; into the report only when all went well. */
 static ts_code one(ev_run *r, bench *b, int set, int m, int64_t number, const ev_case *c, ts_status *st)
 {
@@ -86,6 +123,7 @@ static ts_code one(ev_run *r, bench *b, int set, int m, int64_t number, const ev
     ts_code code = ev_estimate(e, c, r->step + s->first, s->points, r->repeat, b->row, b->seconds, b->first, b->last,
                                st);
     if (!code && r->images) code = sheet(r, b, c, set, m, st);
+    if (!code && r->images) code = ev_contact_add(&b->contact, c, b->last, st);
     if (!code && r->pictures && b->pictures < PICTURES) {
         code = ev_sheet_png(c, b->last, &png, &png_size, st);
         b->pictures++;
@@ -117,6 +155,7 @@ static ts_code all_materials(ev_run *r, bench *b, int m, int64_t total, ts_statu
             if (b->bad[number]) continue;
             *st = (ts_status){0};
             b->bad[number] = load(r, b, &r->set[s], i, &c, st) != TS_OK;
+            if (!st->code && r->method[m].method->peer && !c.peer) continue;
             if (!st->code && !warm) {
                 r->method[m].method->run(&r->method[m], &c, begin, NULL, st);
                 warm = true;
@@ -144,6 +183,7 @@ static ts_code plan(ev_run *r, ts_status *st)
     r->subject = calloc((size_t)r->methods, sizeof *r->subject);
     if (!r->subject) code = ts_fail(st, TS_NOMEM, "out of memory");
     for (int m = 0, columns = 0; m < r->methods && !code; m++) {
+        r->method[m].exact = r->exact;
         code = ev_open(&r->method[m], st);
         if (code) break;
         const int points = ev_points(&r->method[m], step),
@@ -178,6 +218,9 @@ static bool make(ev_run *r, bench *b, int64_t total)
 static void clear(bench *b)
 {
     io_material_free(&b->truth);
+    io_material_free(&b->peer);
+    ev_contact_free(&b->contact);
+    free(b->photo);
     io_capture_free(&b->capture);
     free(b->image);
     free(b->first);
@@ -198,6 +241,7 @@ ts_code ev_run_all(ev_run *r, ts_status *st)
                             .threads = ts_threads(),
                             .repeat = r->repeat,
                             .pinned = r->pinned,
+                            .exact = r->exact,
                             .set_name = r->set_name,
                             .model = r->model,
                             .isa = ts_isa_name(ts_isa_now()),
@@ -208,8 +252,10 @@ ts_code ev_run_all(ev_run *r, ts_status *st)
     if (!code && !make(r, &b, total))
         code = ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", r->size, r->size);
     for (int m = 0; m < r->methods && !code; m++) {
+        r->method[m].exact = r->exact;
         code = ev_open(&r->method[m], st);
         if (!code) code = all_materials(r, &b, m, total, st);
+        if (!code) code = contact_sheet(r, &b, m, st);
         r->subject[m].bytes = ev_bytes(&r->method[m]);
         ev_close(&r->method[m]);
     }

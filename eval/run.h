@@ -13,12 +13,13 @@ typedef struct ev_run {
     int methods;
     int size, repeat;
     uint64_t seed;          /* of the renderings' views and the noise */
-    double noise, exposure; /* exposure: the inputs' lights, in those that the methods are told; not 1: renderings are
-                               compared after one factor is fitted */
-    rd_view flash;          /* of the first input, as the methods are told; not of captures */
+    double noise, exposure; /* exposure: true power of the inputs' lights over the power that the methods know */
+    rd_view flash;          /* of the first input, as the methods know it; not of captures */
     bool fit;               /* compare renderings after one factor is fitted */
+    bool told;              /* of captures: the methods are told their lights and cameras */
     bool perceptual, pictures, pinned; /* SSIM and FLIP; pictures for the report; whether the threads are pinned */
-    ev_lpips *lpips;                   /* LPIPS too, where it is not NULL */
+    bool exact;                        /* of every method (ev_estimator) */
+    ev_lpips *lpips;                   /* also LPIPS, unless NULL */
     const char *model;                 /* its name for the report */
     const char *images;                /* a folder for sheets, or NULL */
     void (*failed)(const char *message, void *user); /* of a material; the others go on */
@@ -33,8 +34,8 @@ typedef struct ev_run {
     int inputs; /* pictures of each material: the most that a method reads */
 } ev_run;
 
-/* Opens each method to learn of its weights' errors before any work, then one after the other, so that its memory and
- * caches are its own; the first photograph is begun once unmeasured. TS_INTERRUPTED after Ctrl-C. The caller frees the
+/* First opens each method, so that errors in weights show before any work. Then runs one after the other, each with its
+ * own memory and caches; the first photograph runs once unmeasured. TS_INTERRUPTED after Ctrl-C. The caller frees the
  * run also after a failure. */
 ts_code ev_run_all(ev_run *r, ts_status *st);
 void ev_run_free(ev_run *r);

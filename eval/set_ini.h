@@ -1,12 +1,16 @@
-/* set.ini: what holds for a map folder, or, in the folder of them all, for every one. Lines "key = value", '#' or ';'
- * begins a comment: workflow = metallic | specular normal = opengl | directx       which way the normal's y points
- *   colour = srgb | linear          how colour maps are stored
+/* set.ini: the conventions of a map folder, or of all map folders in the folder that it is in. Lines "key = value"; '#'
+ * or ';' begins a comment:
+ *
+ *   workflow = metallic | specular
+ *   normal = opengl | directx       whether the normal's y points up or down
+ *   colour = srgb | linear          encoding of colour maps
+ *
  * Any other line is an error that names it. */
 #ifndef EV_SET_INI_H
 #define EV_SET_INI_H
 #include "data/material.h"
 
-/* *out: what is told (may be NULL), and what folder/set.ini, if there is one, says about the rest. */
+/* *out: told (from options, may be NULL), and for what it leaves open folder/set.ini, if it exists. */
 ts_code ev_set_ini(const char *folder, const io_map_convention *told, io_map_convention *out, ts_status *st);
 
 /* One such pair into *c; false when there is no such key or value. */

@@ -1,5 +1,7 @@
 #include "eval/sets.h"
 #include "data/materials/procedural.h"
+#include "data/name.h"
+#include "eval/panels.h"
 #include "eval/set_ini.h"
 #include <dirent.h>
 #include <errno.h>
@@ -9,10 +11,11 @@
 #include <string.h>
 #include <strings.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 enum { PATH_LENGTH = 4096, COUNT_MAX = 1000000 };
 
-static const char *const kind_name[EV_KINDS] = {"procedural", "strips", "maps", "multiview"};
+static const char *const kind_name[EV_KINDS] = {"procedural", "strips", "maps", "multiview", "photos", "peers"};
 
 static int by_name(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
@@ -56,6 +59,8 @@ static ts_code list_folder(ev_set *set, ts_status *st)
         code = ts_fail(st, TS_IO, "%s: there is no %s in this folder", set->where,
                        set->kind == EV_MAPS         ? "map folder"
                            : set->kind == EV_STRIPS ? "strip image"
+                           : set->kind == EV_PHOTOS ? "photograph"
+                           : set->kind == EV_PEERS  ? "image of nine panels"
                                                     : "capture (a folder with 00.png, camera_pos.txt ...)");
     if (!code) qsort(set->entry, (size_t)set->count, sizeof *set->entry, by_name);
     return code;
@@ -110,7 +115,8 @@ ts_code ev_set_open(const char *spec, const io_map_convention *told, ev_set *set
     ts_code code = TS_OK;
     if (set->kind == EV_KINDS || !colon[1])
         code = ts_fail(st, TS_INVALID,
-                       "--set %s: should be procedural:SEED,COUNT, strips:FOLDER, maps:FOLDER or multiview:FOLDER",
+                       "--set %s: should be procedural:SEED,COUNT, strips:FOLDER, maps:FOLDER, multiview:FOLDER, "
+                       "photos:FOLDER or peers:FOLDER",
                        spec);
     else {
         set->where = colon + 1;
@@ -189,4 +195,33 @@ ts_code ev_set_load_capture(const ev_set *set, int i, int size, io_capture *c, t
     if (!code && c->images < 2)
         return ts_fail(st, TS_FORMAT, "%s: has one picture: one is the input, the others are compared", path);
     return code;
+}
+
+static ts_code entry_path(const ev_set *set, const char *folder, const char *entry, char path[PATH_LENGTH],
+                          ts_status *st)
+{
+    if (snprintf(path, PATH_LENGTH, "%s/%s", folder, entry) < PATH_LENGTH) return TS_OK;
+    return ts_fail(st, TS_INVALID, "%s: the name is too long", set->where);
+}
+
+ts_code ev_set_load_photo(const ev_set *set, int i, int size, float **image, io_material *truth, io_material *peer,
+                          ts_status *st)
+{
+    char path[PATH_LENGTH], name[sizeof truth->name + 4];
+    int width, height;
+    io_image square;
+    *image = NULL;
+    io_material_free(truth);
+    io_material_free(peer);
+    ts_code code = entry_path(set, set->where, set->entry[i], path, st);
+    if (code) return code;
+    if (set->kind == EV_PEERS) return ev_read_nine_panels(path, size, image, truth, peer, st);
+    code = io_read_photo_square(path, IO_MAX_PIXELS_DEFAULT, size, 0, &square, &width, &height, st);
+    if (code) return code;
+    *image = square.data;
+    io_name_from_path(path, truth->name, sizeof truth->name);
+    if (!set->peers) return TS_OK;
+    snprintf(name, sizeof name, "%s.png", truth->name);
+    code = entry_path(set, set->peers, name, path, st);
+    return code || access(path, F_OK) != 0 ? code : ev_read_four_panels(path, size, peer, st);
 }

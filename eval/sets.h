@@ -4,7 +4,7 @@
 #include "data/capture.h"
 #include "data/material.h"
 
-typedef enum ev_kind { EV_PROCEDURAL, EV_STRIPS, EV_MAPS, EV_MULTIVIEW, EV_KINDS } ev_kind;
+typedef enum ev_kind { EV_PROCEDURAL, EV_STRIPS, EV_MAPS, EV_MULTIVIEW, EV_PHOTOS, EV_PEERS, EV_KINDS } ev_kind;
 
 typedef struct ev_set {
     char *spec; /* as given: KIND:WHERE */
@@ -13,23 +13,30 @@ typedef struct ev_set {
     uint64_t seed, families; /* EV_PROCEDURAL; families as in io_procedural */
     int count;
     io_map_convention option, told; /* EV_MAPS: what the options say, and with set.ini */
+    const char *peers;              /* EV_PHOTOS: a folder of a peer's maps, or NULL */
     char **entry;                   /* the names in the folder, sorted; NULL for EV_PROCEDURAL */
 } ev_set;
 
 /* procedural:SEED,COUNT[,FAMILY...] (classic families without a list: io_family_mask), strips:FOLDER (a folder of strip
- * images), maps:FOLDER (a folder of map folders) or multiview:FOLDER (a capture, or a folder of them). A file set.ini
- * in a map folder says (eval/set_ini.h) what the options (told, may be NULL), which win, leave open, and one in the
- * folder of all of them what is still open then. The caller closes it after success. TS_INVALID for a wrong spec, TS_IO
- * for a folder that cannot be read or has nothing of that kind. */
+ * images), maps:FOLDER (a folder of map folders), multiview:FOLDER (a capture, or a folder of them), photos:FOLDER
+ * (photographs) or peers:FOLDER (images of nine panels, eval/panels.h). Conventions of map folders come from told (the
+ * options, may be NULL), else from set.ini (eval/set_ini.h) in the map folder, else from set.ini in FOLDER. The caller
+ * closes it after success. TS_INVALID for a wrong spec, TS_IO for a folder that cannot be read or holds nothing of that
+ * kind. */
 ts_code ev_set_open(const char *spec, const io_map_convention *told, ev_set *set, ts_status *st);
 void ev_set_close(ev_set *set);
 
 /* Material number i of 0 .. count-1, size x size pixels; m->name is its name within the set. m is zeroed or a material
- * to be reused. Not of EV_MULTIVIEW. */
+ * to be reused. Of EV_PROCEDURAL, EV_STRIPS and EV_MAPS. */
 ts_code ev_set_load(const ev_set *set, int i, int size, io_material *m, ts_status *st);
 /* The same of an EV_MULTIVIEW set. */
 ts_code ev_set_load_capture(const ev_set *set, int i, int size, io_capture *c, ts_status *st);
 
-/* A number that belongs to the material and not to its place among others: what its evaluation views are drawn with. */
+/* The same of EV_PHOTOS and EV_PEERS: image is linear, size x size x 3, malloced and the caller's. truth is empty
+ * (size 0) of a photograph, peer where nothing has its name. */
+ts_code ev_set_load_photo(const ev_set *set, int i, int size, float **image, io_material *truth, io_material *peer,
+                          ts_status *st);
+
+/* A number of the material, independent of its place in the set: the seed of its evaluation views. */
 uint64_t ev_set_identity(const ev_set *set, int i);
 #endif

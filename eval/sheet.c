@@ -1,13 +1,17 @@
 #include "eval/sheet.h"
 #include "eval/multiview.h"
 #include "infer/panels.h"
+#include "render/render.h"
 #include "tensor/resize.h"
 #include <math.h>
 
-enum { ROWS = 3, RENDERINGS = 3, COLUMNS = 1 + LGD_MAP_PANELS + RENDERINGS };
+enum { ROWS = 3, RENDERINGS = 3, COLUMNS = 1 + LGD_MAP_PANELS + RENDERINGS, PHOTO_COLUMNS = 1 + LGD_MAP_PANELS + 1 };
+
+static bool only_photo(const ev_case *c) { return !c->capture && !c->truth; }
 
 static int columns_of(const ev_case *c)
 {
+    if (only_photo(c)) return PHOTO_COLUMNS;
     return c->capture && c->capture->images < COLUMNS ? c->capture->images : COLUMNS;
 }
 
@@ -35,6 +39,19 @@ static void maps_row(io_image *sheet, const ev_case *c, int row, const float *ma
         lgd_panel_render(sheet, 1 + LGD_MAP_PANELS + i, row, &m, &c->views[i], picture);
 }
 
+/* As bright as the photograph, whose light nobody knows. */
+static void photo_row(io_image *sheet, const ev_case *c, int row, const float *maps, float *picture)
+{
+    const size_t values = (size_t)c->size * (size_t)c->size * 3;
+    const io_material m = {.size = c->size, .maps = (float *)maps}; /* only read */
+    lgd_panel_put(sheet, c->size, 0, row, c->image);
+    lgd_panel_maps(sheet, 1, row, &m, picture);
+    rd_render(rd_grid_full(c->size), maps, MAP_CHANNELS, &c->view, false, picture);
+    const float factor = (float)ev_factor(values, picture, c->image);
+    for (size_t i = 0; i < values; i++) picture[i] *= factor;
+    lgd_panel_put(sheet, c->size, 1 + LGD_MAP_PANELS, row, picture);
+}
+
 /* Row i shows maps[i]; the sheet has rows of them and is linear. */
 static ts_code make(const ev_case *c, const float *const *maps, int rows, int sheet_rows, io_image *sheet,
                     ts_status *st)
@@ -43,16 +60,27 @@ static ts_code make(const ev_case *c, const float *const *maps, int rows, int sh
     ts_code code = io_image_create(sheet, columns_of(c) * c->size, sheet_rows * c->size, 3, st);
     if (!code) code = io_image_create(&picture, c->size, c->size, 3, st);
     for (int row = 0; row < rows && !code; row++)
-        (c->capture ? capture_row : maps_row)(sheet, c, row, maps[row], picture.data);
+        (c->capture ? capture_row : only_photo(c) ? photo_row : maps_row)(sheet, c, row, maps[row], picture.data);
     io_image_free(&picture);
     return code;
 }
 
+/* The rows of a whole sheet; how many. A photograph has no truth, and its first estimate says little. */
+static int rows_of(const ev_case *c, const float *first, const float *last, const float *maps[ROWS + 1])
+{
+    int rows = 0;
+    if (!only_photo(c)) maps[rows++] = NULL, maps[rows++] = first;
+    maps[rows++] = last;
+    if (c->peer) maps[rows++] = c->peer->maps;
+    return rows;
+}
+
 ts_code ev_sheet_write(const char *path, const ev_case *c, const float *first, const float *last, ts_status *st)
 {
-    const float *const maps[ROWS] = {NULL, first, last};
+    const float *maps[ROWS + 1];
+    const int rows = rows_of(c, first, last, maps);
     io_image sheet = {0};
-    ts_code code = make(c, maps, ROWS, ROWS, &sheet, st);
+    ts_code code = make(c, maps, rows, rows, &sheet, st);
     if (!code) code = io_write_png(path, &sheet, 8, true, st);
     io_image_free(&sheet);
     return code;
@@ -76,7 +104,7 @@ static ts_code shrink(io_image *sheet, int width, int height, ts_status *st)
     if (!code) {
         const ts_tensor from = ts_view(sheet->data, (ts_shape){1, sheet->height, sheet->width, 3});
         ts_tensor to = ts_view(small.data, (ts_shape){1, height, width, 3});
-        code = ts_resize(&to, &from, arena, st);
+        code = ts_resize(&to, &from, arena, 0, st);
     }
     ts_arena_destroy(&arena);
     io_image_free(code ? &small : sheet);
@@ -84,15 +112,25 @@ static ts_code shrink(io_image *sheet, int width, int height, ts_status *st)
     return code;
 }
 
+ts_code ev_sheet_small(const ev_case *c, const float *estimate, io_image *sheet, ts_status *st)
+{
+    const float *maps[ROWS + 1] = {NULL, estimate};
+    const bool alone = only_photo(c);
+    const int filled = alone ? rows_of(c, NULL, estimate, maps) : 2, rows = alone ? filled : ROWS,
+              panel = alone ? EV_SHEET_PHOTO : EV_SHEET_PANEL;
+    *sheet = (io_image){0};
+    ts_code code = make(c, maps, filled, rows, sheet, st);
+    if (!code && !alone) difference_row(sheet);
+    if (!code && c->size > panel) code = shrink(sheet, columns_of(c) * panel, rows * panel, st);
+    if (code) io_image_free(sheet);
+    return code;
+}
+
 ts_code ev_sheet_png(const ev_case *c, const float *estimate, unsigned char **bytes, size_t *size, ts_status *st)
 {
-    const float *const maps[2] = {NULL, estimate};
-    io_image sheet = {0};
+    io_image sheet;
     *bytes = NULL;
-    ts_code code = make(c, maps, 2, ROWS, &sheet, st);
-    if (!code) difference_row(&sheet);
-    if (!code && c->size > EV_SHEET_PANEL)
-        code = shrink(&sheet, columns_of(c) * EV_SHEET_PANEL, ROWS * EV_SHEET_PANEL, st);
+    ts_code code = ev_sheet_small(c, estimate, &sheet, st);
     if (!code) code = io_png_bytes(&sheet, 8, true, bytes, size, st);
     io_image_free(&sheet);
     return code;

@@ -10,10 +10,10 @@ void lgd_clip(int64_t count, const float *from, float *to)
     }
 }
 
-bool lgd_clipped(int64_t count, const float *from)
+bool lgd_clipped(int64_t count, const float *from, int threads)
 {
     bool fine = true;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) reduction(&& : fine)
+#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static) reduction(&& : fine)
     for (int64_t i = 0; i < count; i++) fine = fine && from[i] >= 0 && from[i] <= 1;
     return fine;
 }

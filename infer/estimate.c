@@ -1,10 +1,8 @@
 #include "infer/estimate.h"
 #include "data/material.h"
-#include "infer/clip.h"
 #include "infer/memory.h"
 #include "infer/power.h"
 #include "infer/tiles.h"
-#include "render/render.h"
 #include "tensor/resize.h"
 #include "tensor/threads.h"
 #include <math.h>
@@ -12,60 +10,57 @@
 #include <string.h>
 
 enum {
-    UNTILED =
-        512,    /* pixels a side up to which a step of h is one piece: at most 0.8 GB with the default architecture */
-    TILE = 320, /* the surroundings add a fifth to its work */
-    TILE_MASK = 128, /* small enough to fit what they follow */
-    TILE_EARLY = 256 /* tiles that end early: the surroundings of smaller ones cost more than ending saves */
+    ONE_TILE = 512,   /* pixels a side up to which a photograph is one tile: at most 0.8 GB with the default
+                         architecture */
+    TILE = 320,       /* the surroundings add a fifth to its work */
+    TILE_MASK = 128,  /* small enough to fit what they follow */
+    TILE_EARLY = 256, /* tiles that end early: the surroundings of smaller ones cost more than ending saves */
+    AUTO_SIDE = 256   /* pixels a side at which automatic steps are counted, unless every step is seen anyway */
 };
-
-/* What the unrolled loop reports to: the caller's function, and what finds the end of the automatic number of steps. */
-typedef struct watch {
-    const nn_input *in;
-    const lgd_options *options;
-    float *best; /* NULL, or R_t of the last step that paid */
-    double best_rmse;
-    int steps; /* t of best */
-} watch;
-
 #define AUTO_LEAST 1e-3 /* of the RMSE: a step that lowers it by less is not worth its time */
 
-static double rmse_of(const nn_input *in, const ag_value *maps)
+/* What is estimated from; r0: R_0 where it is known, as in nn_input. */
+typedef struct given_photos {
+    const float *image[NN_MAX_IMAGES];
+    rd_view views[NN_MAX_IMAGES];
+    int count, side;
+    const float *r0;
+} given_photos;
+
+/* The photographs in the order in which models read them. */
+static given_photos in_order(const lgd_photo *photo, int photos, int side)
 {
-    const rd_grid g = in->grid;
-    double squares = 0;
-    for (int k = 0; k < in->given; k++) {
-        double one;
-        rd_flash_rmse(g, maps->t.data, maps->t.shape.c, &in->views[k],
-                      in->image.data + (size_t)k * (size_t)g.h * (size_t)g.w * 3, &one);
-        squares += one * one / in->given;
+    given_photos p = {.count = photos, .side = side};
+    rd_view view[NN_MAX_IMAGES] = {0};
+    int order[NN_MAX_IMAGES];
+    for (int k = 0; k < photos; k++) {
+        view[k] = (rd_view){.kind = RD_POINT, .power = photo[k].power};
+        memcpy(view[k].light, photo[k].light, sizeof view[k].light);
+        memcpy(view[k].camera, photo[k].camera, sizeof view[k].camera);
     }
-    return sqrt(squares);
+    rd_capture_order(view, photos, order);
+    for (int k = 0; k < photos; k++) {
+        p.image[k] = photo[order[k]].image;
+        p.views[k] = view[order[k]];
+    }
+    return p;
 }
 
-static bool after_step(int step, const ag_value *maps, void *user)
-{
-    watch *w = user;
-    const double rmse = maps ? rmse_of(w->in, maps) : NAN;
-    if (w->best) {
-        if (step > 0 && !(rmse < w->best_rmse * (1 - AUTO_LEAST))) return false;
-        memcpy(w->best, maps->t.data, (size_t)ts_count(maps->t.shape) * sizeof *w->best);
-        w->best_rmse = rmse;
-        w->steps = step;
-    }
-    return !w->options->progress || w->options->progress(step, rmse, w->options->user) == 0;
-}
-
-/* The network's encoding to the header's values. False when one is not finite. */
-static bool decode(const float *from, int channels, int64_t pixels, float *maps)
+/* The network's maps to the caller's values, one conversion for each; from may be maps. False when one is not finite.
+ */
+static bool convert(const float *from, int channels, int64_t pixels, bool encoded, int threads, float *maps)
 {
     bool finite = true;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) reduction(&& : finite)
+#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static) reduction(&& : finite)
     for (int64_t i = 0; i < pixels; i++) {
         const float *x = from + i * channels;
         float *m = maps + i * MAP_CHANNELS;
         for (int c = 0; c < MAP_CHANNELS; c++) finite = finite && isfinite(x[c]);
         const io_texel t = io_texel_get(x);
+        if (encoded) {
+            io_texel_put(m, &t);
+            continue;
+        }
         memcpy(m + MAP_DIFFUSE, t.diffuse, sizeof t.diffuse);
         m[MAP_NORMAL] = t.normal[0];
         m[MAP_NORMAL + 1] = t.normal[1];
@@ -73,6 +68,36 @@ static bool decode(const float *from, int channels, int64_t pixels, float *maps)
         memcpy(m + MAP_SPECULAR, t.specular, sizeof t.specular);
     }
     return finite;
+}
+
+/* What the steps report to: the caller's functions, and what finds the end of the automatic number of steps. */
+typedef struct watch {
+    const lgd_estimator *e;
+    const lgd_options *options;
+    float *best; /* NULL, or R_t of the last step that paid */
+    double best_rmse;
+    int best_step, channels;
+    size_t values;
+} watch;
+
+static bool after_step(int step, double rmse, const float *maps, void *user)
+{
+    watch *w = user;
+    const lgd_options *o = w->options;
+    if (w->best) {
+        if (step > 0 && !(rmse < w->best_rmse * (1 - AUTO_LEAST))) return false;
+        memcpy(w->best, maps, w->values * sizeof *w->best);
+        w->best_rmse = rmse;
+        w->best_step = step;
+    }
+    if (w->e->seen && maps && !w->e->seen(step, maps, w->channels, w->e->user)) return false;
+    return !o->progress || o->progress(step, rmse, o->user) == 0;
+}
+
+static int before_tile(double done, void *user)
+{
+    const watch *w = user;
+    return w->options->tile ? w->options->tile(done, w->options->user) : 0;
 }
 
 /* What a step of h holds at once: maps, their gradient and change, the carried states, and for each of its two cells
@@ -84,193 +109,138 @@ static double step_bytes(const nn_arch *a, int side)
     return (3.0 * a->images + (3.0 + 2.0 * a->images) * a->channels + cells) * sizeof(float) * side * side;
 }
 
-static ts_code not_finite(ts_status *st)
+/* Mask and tolerance ask for tiles of which each ends by itself. */
+static bool apart(const lgd_options *o) { return o->mask || o->tolerance > 0; }
+
+static int tile_side(const lgd_estimator *e, int side, const lgd_options *o)
 {
-    return ts_fail(st, TS_NUMERIC, "the network's maps are not finite: the weights are damaged or did not train");
+    const bool exact = lgd_tiles_exact(&e->net->arch);
+    if (exact && o->mask) return TILE_MASK;
+    if (!exact || side <= ONE_TILE || (e->seen && !apart(o))) return side;
+    return o->tolerance > 0 ? TILE_EARLY : TILE;
 }
 
-/* What is estimated from; proposed: R_0 where it is known, as in nn_input. */
-typedef struct given_photos {
-    const float *const *image;
-    const rd_view *views;
-    int count, side;
-    const float *proposed;
-} given_photos;
-
-static ts_code run_loop(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o, float *maps,
-                        int *taken, ts_status *st)
+/* choose: the number of steps that paid, of the given most, is found on the way and left in *steps. */
+static ts_code refine(const lgd_estimator *e, const given_photos *p, const lgd_options *o, bool choose, int *steps,
+                      float *maps, ts_status *st)
 {
-    const int side = p->side, given = p->count;
-    const double more = step_bytes(&e->net->arch, side) -
+    const int side = p->side, channels = e->net->arch.channels, tile = tile_side(e, side, o);
+    const int64_t pixels = (int64_t)side * side;
+    const double more = step_bytes(&e->net->arch, tile < side ? tile : side) -
         (double)ts_arena_peak(ag_arena(e->tape)); /* than earlier calls left */
     if (more > 0 && lgd_memory_check(more, st) != TS_OK) return ts_context(st, "%d x %d pixels", side, side);
-    nn_input in = {.image = ts_new(ag_arena(e->tape), (ts_shape){given, side, side, 3}),
-                   .grid = rd_grid_full(side),
+    watch w = {
+        .e = e, .options = o, .best_step = *steps, .channels = channels, .values = (size_t)pixels * (size_t)channels};
+    float *raw = channels == MAP_CHANNELS ? maps
+                                          : malloc(w.values * sizeof *raw); /* only published networks have more */
+    double *rmse = o->progress || choose ? calloc((size_t)*steps + 1, sizeof *rmse) : NULL;
+    if (choose) w.best = malloc(w.values * sizeof *w.best);
+    lgd_tiles t = {.image = p->image,
                    .views = p->views,
-                   .given = given,
+                   .given = p->count,
+                   .r0 = p->r0,
+                   .mask = o->mask,
+                   .side = side,
+                   .tile = tile,
+                   .steps = *steps,
                    .orientations = o->orientations,
-                   .proposed = p->proposed};
-    if (!in.image.data) return ts_fail(st, TS_NOMEM, "out of memory for an image of %d x %d pixels", side, side);
-    const int64_t values = (int64_t)side * side * 3;
-    for (int k = 0; k < given; k++) lgd_clip(values, p->image[k], in.image.data + k * values);
-
-    watch w = {.in = &in, .options = o, .steps = steps};
-    ag_value *out = NULL;
-    if (o->iterations == LGD_AUTO) {
-        w.best = ts_arena_alloc(ag_arena(e->tape),
-                                (size_t)side * (size_t)side * (size_t)e->net->arch.channels * sizeof *w.best);
-        if (!w.best) return ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
-    }
-    if (nn_lgd(e->tape, e->net, &in, steps, false, &out,
-               o->progress || w.best ? &(nn_watch){after_step, &w, !w.best && !o->every_rmse} : NULL) != TS_OK ||
-        !out) {
-        *st = *ag_status(e->tape);
-        return st->code ? st->code : ts_fail(st, TS_NUMERIC, "the network gave no result");
-    }
-    if (taken) *taken = w.steps;
-    return decode(w.best ? w.best : out->t.data, out->t.shape.c, (int64_t)side * side, maps) ? TS_OK : not_finite(st);
-}
-
-/* taken: NULL, or gets the number of steps that were made. */
-static ts_code run_whole(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o, float *maps,
-                         int *taken, ts_status *st)
-{
-    const ts_mark mark = ag_scope_begin(e->tape);
-    const ts_code code = run_loop(e, p, steps, o, maps, taken, st);
-    ag_scope_end(e->tape, mark, NULL, 0);
+                   .tolerance = o->tolerance,
+                   .before = before_tile,
+                   .after = o->progress || e->seen || choose ? after_step : NULL,
+                   .user = &w,
+                   .rmse = rmse,
+                   .ends_alone = !choose && !e->seen && !o->every_rmse && o->iterations != LGD_AUTO};
+    const bool memory = raw && (rmse || !(o->progress || choose)) && (w.best || !choose);
+    ts_code code = memory ? lgd_tiles_run(e->tape, e->net, &t, raw, st)
+                          : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
+    if (!code && !convert(w.best ? w.best : raw, channels, pixels, e->encoded, ag_compute(e->tape)->threads, maps))
+        code = ts_fail(st, TS_NUMERIC, "the network's maps are not finite: the weights are damaged or did not train");
+    *steps = w.best_step;
+    if (raw != maps) free(raw);
+    free(rmse);
+    free(w.best);
     return code;
 }
 
-static ts_code estimate_whole(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o,
-                              float *maps, ts_status *st)
-{
-    return run_whole(e, p, steps, o, maps, NULL, st);
-}
-
 /* The number of steps that the photographs take at AUTO_SIDE pixels. */
-static ts_code count_steps(const lgd_estimator *e, const given_photos *p, int most, int orientations, int *steps,
-                           ts_status *st)
+static ts_code count_steps(const lgd_estimator *e, const given_photos *p, int orientations, int *steps, ts_status *st)
 {
-    enum { AUTO_SIDE = 256 };
     const int side = p->side, given = p->count, small = side < AUTO_SIDE ? side : AUTO_SIDE;
     const size_t pixels = (size_t)small * (size_t)small;
-    const lgd_options o = {.iterations = LGD_AUTO, .orientations = orientations};
+    const lgd_options o = {.size = sizeof o, .iterations = LGD_AUTO, .orientations = orientations};
+    const lgd_estimator quiet = {.net = e->net, .tape = e->tape};
+    given_photos reduced = *p;
     float *photo = malloc((size_t)given * pixels * 3 * sizeof *photo),
           *maps = malloc(pixels * MAP_CHANNELS * sizeof *maps);
-    const float *each[NN_MAX_IMAGES];
     ts_arena *arena = ts_arena_create(0, st);
     ts_code code = photo && maps && arena ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory");
+    reduced.side = small;
+    reduced.r0 = NULL;
     for (int k = 0; k < given && !code; k++) {
         ts_tensor to = ts_view(photo + (size_t)k * pixels * 3, (ts_shape){1, small, small, 3});
         const ts_tensor from = ts_view((float *)(uintptr_t)p->image[k], (ts_shape){1, side, side, 3});
         if (small == side) memcpy(to.data, p->image[k], pixels * 3 * sizeof *photo);
-        else code = ts_resize(&to, &from, arena, st);
-        each[k] = to.data;
+        else code = ts_resize(&to, &from, arena, ag_compute(e->tape)->threads, st);
+        reduced.image[k] = to.data;
     }
-    if (!code) code = run_whole(e, &(given_photos){each, p->views, given, small, NULL}, most, &o, maps, steps, st);
+    if (!code) code = refine(&quiet, &reduced, &o, true, steps, maps, st);
     ts_arena_destroy(&arena);
     free(photo);
     free(maps);
     return code;
 }
 
-/* The caller's function, as tiles call it. */
-typedef struct tile_watch {
-    const lgd_options *options;
-    double tiles, begun;
-} tile_watch;
-
-static int before_tile(void *user)
+/* LGD_TOLERANCE_DEFAULT and what it stands for. */
+static double tolerance(const nn_arch *a, const lgd_options *o)
 {
-    tile_watch *w = user;
-    return w->options->tile ? w->options->tile(w->begun++ / w->tiles, w->options->user) : 0;
+    if (o->tolerance != LGD_TOLERANCE_DEFAULT) return o->tolerance;
+    return o->iterations == -1 && !o->exact && a->h_width > 0 && lgd_tiles_exact(a) ? LGD_TOLERANCE : 0;
 }
 
-static ts_code estimate_tiles(const lgd_estimator *e, const given_photos *p, int steps, const lgd_options *o,
-                              float *maps, ts_status *st)
+/* The photographs' lights as strong as they seem, and R_0, which that takes. */
+static ts_code fit_power(const lgd_estimator *e, given_photos *p, const lgd_options *o, float **r0, ts_status *st)
 {
-    const int side = p->side;
-    const nn_arch *arch = &e->net->arch;
-    const int64_t pixels = (int64_t)side * side;
-    const int early = side > UNTILED ? TILE_EARLY : side,
-              tile = o->mask ? TILE_MASK
-        : o->tolerance > 0   ? early
-                             : TILE,
-              across = (side + tile - 1) / tile;
-    tile_watch w = {o, (double)across * across, 0};
-    /* the network's channels are the caller's, but for published models */
-    float *raw = arch->channels == MAP_CHANNELS ? maps : malloc((size_t)pixels * (size_t)arch->channels * sizeof *raw);
-    double *rmse = calloc((size_t)steps + 1, sizeof *rmse);
-    ts_code code = raw && rmse ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
-    lgd_tiles t = {.image = p->image,
-                   .views = p->views,
-                   .given = p->count,
-                   .proposed = p->proposed,
-                   .mask = o->mask,
-                   .side = side,
-                   .tile = tile,
-                   .steps = steps,
-                   .orientations = o->orientations,
-                   .tolerance = o->tolerance,
-                   .rmse = o->progress ? rmse : NULL,
-                   .ends_alone = !o->every_rmse && o->iterations != LGD_AUTO,
-                   .alive = before_tile,
-                   .user = &w};
-    if (!code) code = lgd_tiles_run(e->tape, e->net, &t, raw, st);
-    int stop = steps;
-    for (int i = 0; !code && o->progress && i < stop; i++)
-        if (o->progress(i, rmse[i], o->user)) stop = i;
-    if (!code && stop == steps && o->progress) o->progress(steps, rmse[steps], o->user);
-    if (!code && stop < steps) {
-        t.steps = stop;
-        code = lgd_tiles_run(e->tape, e->net, &t, raw, st);
-    }
-    if (!code && !decode(raw, arch->channels, pixels, maps)) code = not_finite(st);
-    if (raw != maps) free(raw);
-    free(rmse);
+    const nn_arch *a = &e->net->arch;
+    *o->power = 1;
+    if (a->compat != NN_COMPAT_NONE) return TS_OK;
+    *r0 = malloc((size_t)nn_arch_side(a) * (size_t)nn_arch_side(a) * (size_t)a->channels * sizeof **r0);
+    if (!*r0) return ts_fail(st, TS_NOMEM, "out of memory");
+    const ts_code code = lgd_fit_power(e->tape, e->net, p->image, p->views, p->count, p->side, o->orientations, *r0,
+                                       o->power, st);
+    for (int k = 0; k < p->count; k++) p->views[k].power *= (float)*o->power;
+    p->r0 = *r0;
+    return code;
+}
+
+static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int photos, int side, const lgd_options *given,
+                        float *maps, ts_status *st)
+{
+    const nn_arch *a = &e->net->arch;
+    lgd_options o = *given;
+    given_photos p = in_order(photo, photos, side);
+    float *r0 = NULL;
+    o.tolerance = tolerance(a, given);
+    int steps = o.iterations == -1 ? a->iterations : o.iterations;
+    if (o.iterations == LGD_AUTO) steps = nn_arch_refines(a) ? LGD_AUTO_MOST : 0;
+    const bool choose = o.iterations == LGD_AUTO && tile_side(e, side, &o) == side && !apart(&o);
+    /* Once: memory that one stage has touched is there for the next, and touching it first costs as much as computing.
+     */
+    ag_reset(e->tape);
+    ts_code code = o.power ? fit_power(e, &p, &o, &r0, st) : TS_OK;
+    if (!code && o.iterations == LGD_AUTO && !choose) code = count_steps(e, &p, o.orientations, &steps, st);
+    if (!code) code = refine(e, &p, &o, choose, &steps, maps, st);
+    if (side > ONE_TILE) ag_drop(e->tape); /* what is done with such maps needs memory of its own */
+    free(r0);
     return code;
 }
 
 ts_code lgd_estimator_run(const lgd_estimator *e, const lgd_photo *photo, int photos, int side, const lgd_options *o,
                           float *maps, ts_status *st)
 {
-    const float *image[NN_MAX_IMAGES];
-    rd_view views[NN_MAX_IMAGES];
-    rd_view given[NN_MAX_IMAGES] = {0};
-    int order[NN_MAX_IMAGES];
-    for (int k = 0; k < photos; k++) {
-        given[k] = (rd_view){.kind = RD_POINT, .power = photo[k].power};
-        memcpy(given[k].light, photo[k].light, sizeof given[k].light);
-        memcpy(given[k].camera, photo[k].camera, sizeof given[k].camera);
-    }
-    rd_capture_order(given, photos, order);
-    for (int k = 0; k < photos; k++) {
-        image[k] = photo[order[k]].image;
-        views[k] = given[order[k]];
-    }
-    /* Once: memory that one stage has touched is there for the next, and touching it first costs as much as computing.
-     */
-    ag_reset(e->tape);
-    const bool tiles = lgd_tiles_exact(&e->net->arch) && (side > UNTILED || o->mask || o->tolerance > 0);
-    if (o->power) *o->power = 1;
-    given_photos p = {image, views, photos, side, NULL};
-    float *proposed = NULL;
-    ts_code code = TS_OK;
-    if (o->power && e->net->arch.compat == NN_COMPAT_NONE) {
-        const size_t size = (size_t)nn_arch_side(&e->net->arch);
-        proposed = malloc(size * size * (size_t)e->net->arch.channels * sizeof *proposed);
-        if (!proposed) return ts_fail(st, TS_NOMEM, "out of memory");
-        code = lgd_fit_power(e->tape, e->net, image, views, photos, side, o->orientations, proposed, o->power, st);
-        for (int k = 0; k < photos; k++) views[k].power *= (float)*o->power;
-        p.proposed = proposed;
-    }
-    int steps = o->iterations == -1 ? e->net->arch.iterations : o->iterations;
-    if (o->iterations == LGD_AUTO) {
-        steps = nn_arch_refines(&e->net->arch) ? LGD_AUTO_MOST : 0;
-        if (!code && tiles) code = count_steps(e, &p, steps, o->orientations, &steps, st);
-    }
-    if (!code) code = (tiles ? estimate_tiles : estimate_whole)(e, &p, steps, o, maps, st);
-    if (side > UNTILED) ag_drop(e->tape); /* what is done with such maps needs memory of its own */
-    free(proposed);
-    return code;
+    ag_compute_set(e->tape,
+                   (ts_compute){/* whoever runs the published network wants its numbers */
+                                .exact = o->exact || e->net->arch.compat == NN_COMPAT_PUBLISHED,
+                                .precision = o->precision == LGD_BF16 ? TS_BF16 : TS_F32,
+                                .threads = o->threads > 0 ? o->threads : ts_threads_allowed()});
+    return estimate(e, photo, photos, side, o, maps, st);
 }

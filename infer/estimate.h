@@ -1,18 +1,27 @@
-/* One estimate: g, the light's power, and the unrolled loop, whole or in tiles. */
+/* The estimator: what lgd.h, lgd-infer, lgd-eval and the bench estimate with. It decides the light's power, the number
+ * of steps, the tolerance, and whether the photograph is one tile. */
 #ifndef LGD_ESTIMATE_H
 #define LGD_ESTIMATE_H
 #include "infer/lgd.h"
 #include "nn/model.h"
 
-/* What an estimate is made with. The tape has no gradients, is frozen, and is reset. */
 typedef struct lgd_estimator {
     const nn_model *net;
-    ag_tape *tape;
+    ag_tape *tape; /* without gradients, frozen; it is reset */
+    bool encoded;  /* the result is in the encoding of tensor/maps.h, each value clamped to what a map can say; else as
+                      infer/lgd.h has it */
+    /* Called after R_0 and every step, or NULL. maps: R_t as the network has it, [side][side][channels], valid during
+     * the call; false: stop there. The photograph is then one tile, whatever its size; but where a mask or a tolerance
+     * asks for several, only R_T is seen. */
+    bool (*seen)(int step, const float *maps, int channels, void *user);
+    void *user;
 } lgd_estimator;
 
-/* As lgd_estimate_photos in infer/lgd.h, with arguments that were checked and a tolerance that is not the usual one;
- * threads, exact and precision are the calling thread's (tensor/threads.h, tensor/conv/conv.h), not those of options.
- */
+/* As lgd_estimate_photos in infer/lgd.h, with arguments that were checked. maps: [side][side][MAP_CHANNELS]. */
 ts_code lgd_estimator_run(const lgd_estimator *e, const lgd_photo *photo, int photos, int side, const lgd_options *o,
                           float *maps, ts_status *st);
+
+/* The same with a model that others may be using, arguments checked. */
+ts_code lgd_model_estimate(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,
+                           bool encoded, float *maps, ts_status *st);
 #endif

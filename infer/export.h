@@ -1,4 +1,4 @@
-/* Documents that tell other people's tools what the maps of a folder mean. All refer to diffuse.png, specular.png,
+/* Documents that say to other tools what the maps of a folder mean. All refer to diffuse.png, specular.png,
  * roughness.png and normal.png (OpenGL) beside them by name. */
 #ifndef LGD_EXPORT_H
 #define LGD_EXPORT_H

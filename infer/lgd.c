@@ -1,7 +1,6 @@
 /* The public C API (infer/lgd.h): models and who computes with them, and what a caller may get wrong. */
 #include "infer/lgd.h"
 #include "data/material.h"
-#include "infer/encode.h"
 #include "infer/estimate.h"
 #include "infer/tiles.h"
 #include "nn/weights/weights.h"
@@ -17,7 +16,9 @@
 enum {
     SIDE_MAX = 16384,      /* 9.7 GB of maps: a larger number is a mistake */
     ITERATIONS_MAX = 1000, /* the same: nothing changes after some ten */
-    THREADS_MAX = 1024
+    THREADS_MAX = 1024,
+    OPTIONS_LEAST = offsetof(lgd_options, iterations) + sizeof(int), /* a size below has no option at all */
+    OPTIONS_MOST = 4096                                              /* a larger one is a field that nobody set */
 };
 
 /* What a call computes in. */
@@ -47,9 +48,31 @@ _Static_assert(sizeof((lgd_error *)0)->message == sizeof((ts_status *)0)->messag
 
 const char *lgd_version(void) { return LGD_VERSION; }
 
-lgd_options lgd_options_default(void)
+void lgd_options_init(lgd_options *options, size_t size)
 {
-    return (lgd_options){.iterations = -1, .orientations = LGD_ORIENTATIONS_USUAL, .tolerance = LGD_TOLERANCE_USUAL};
+    const lgd_options o = {
+        .size = size, .iterations = -1, .orientations = LGD_ORIENTATIONS_DEFAULT, .tolerance = LGD_TOLERANCE_DEFAULT};
+    memset(options, 0, size);
+    memcpy(options, &o, size < sizeof o ? size : sizeof o);
+}
+
+/* The caller's options, of the lgd.h that it was compiled with, as those of this one. */
+static ts_code take_options(const lgd_options *given, lgd_options *o, ts_status *st)
+{
+    lgd_options_init(o, sizeof *o);
+    if (!given) return TS_OK;
+    const size_t size = given->size;
+    if (size < OPTIONS_LEAST || size > OPTIONS_MOST)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: options.size is %zu: begin with lgd_options_default()", size);
+    for (size_t i = sizeof *o; i < size; i++)
+        if (((const unsigned char *)given)[i])
+            return ts_fail(st, TS_UNSUPPORTED,
+                           "lgd_estimate: the options (%zu bytes) set a field that lgd %s (%zu bytes) does not have: "
+                           "link with a newer liblgd or leave the field zero",
+                           size, LGD_VERSION, sizeof *o);
+    memcpy(o, given, size < sizeof *o ? size : sizeof *o);
+    o->size = sizeof *o;
+    return TS_OK;
 }
 
 int lgd_trained_iterations(const lgd_model *model) { return model->net->arch.iterations; }
@@ -83,7 +106,7 @@ static workspace *take(lgd_model *model, ts_status *st)
     workspace *w = model->idle;
     if (w) model->idle = w->next;
     pthread_mutex_unlock(&model->lock);
-    return w ? w : make_workspace(ag_tape_beside(model->first, st), st);
+    return w ? w : make_workspace(ag_tape_sharing(model->first, st), st);
 }
 
 static void give_back(lgd_model *model, workspace *w)
@@ -155,10 +178,9 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
     if (o->threads < 0 || o->threads > THREADS_MAX)
         return ts_fail(st, TS_INVALID, "lgd_estimate: threads is %d and must lie in 1 .. %d, or be 0 for all",
                        o->threads, THREADS_MAX);
-    if (!(o->tolerance >= 0 && o->tolerance <= 1) && o->tolerance != LGD_TOLERANCE_USUAL)
-        return ts_fail(st, TS_INVALID,
-                       "lgd_estimate: tolerance is %g and must lie in 0 .. 1, or be %g for the usual one", o->tolerance,
-                       LGD_TOLERANCE_USUAL);
+    if (!(o->tolerance >= 0 && o->tolerance <= 1) && o->tolerance != LGD_TOLERANCE_DEFAULT)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: tolerance is %g and must lie in 0 .. 1, or be %g for the default",
+                       o->tolerance, LGD_TOLERANCE_DEFAULT);
     if (o->precision != LGD_F32 && o->precision != LGD_BF16)
         return ts_fail(st, TS_INVALID, "lgd_estimate: precision is %d and must be %d for f32 or %d for bf16",
                        o->precision, LGD_F32, LGD_BF16);
@@ -175,7 +197,37 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
     return TS_OK;
 }
 
-void lgd_encode(const float *maps, int side, float *encoded)
+ts_code lgd_model_estimate(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,
+                           bool encoded, float *maps, ts_status *st)
+{
+    lgd_options o;
+    if (take_options(options, &o, st) != TS_OK || check_arguments(model, photo, photos, side, &o, maps, st) != TS_OK)
+        return st->code;
+    workspace *w = take(model, st);
+    if (!w) return st->code;
+    const lgd_estimator e = {.net = model->net, .tape = w->tape, .encoded = encoded};
+    lgd_estimator_run(&e, photo, photos, side, &o, maps, st);
+    give_back(model, w);
+    return st->code;
+}
+
+int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,
+                        float *maps, lgd_error *error)
+{
+    ts_status st = {0};
+    lgd_model_estimate(model, photo, photos, side, options, false, maps, &st);
+    return report(error, &st);
+}
+
+int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps,
+                 lgd_error *error)
+{
+    const lgd_photo photo = lgd_flash_photo(image);
+    return lgd_estimate_photos(model, &photo, 1, side, options, maps, error);
+}
+
+/* maps as in infer/lgd.h, [side, side, 9], to the encoding of tensor/maps.h, the same shape. */
+static void encode(const float *maps, int side, float *encoded)
 {
     const int64_t pixels = (int64_t)side * side;
 #pragma omp parallel for num_threads(ts_threads()) schedule(static)
@@ -187,41 +239,6 @@ void lgd_encode(const float *maps, int side, float *encoded)
         memcpy(t.specular, m + MAP_SPECULAR, sizeof t.specular);
         io_texel_put(encoded + i * MAP_CHANNELS, &t);
     }
-}
-
-int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,
-                        float *maps, lgd_error *error)
-{
-    ts_status st = {0};
-    lgd_options o = options ? *options : lgd_options_default();
-    workspace *w = check_arguments(model, photo, photos, side, &o, maps, &st) == TS_OK ? take(model, &st) : NULL;
-    if (w) {
-        const lgd_estimator e = {model->net, w->tape};
-        if (o.tolerance == LGD_TOLERANCE_USUAL)
-            o.tolerance = o.iterations == -1 && !o.exact && model->net->arch.h_width > 0 &&
-                    lgd_tiles_exact(&model->net->arch)
-                ? LGD_TOLERANCE
-                : 0;
-        const bool exact = ts_conv_exact();
-        const ts_precision precision = ts_conv_precision();
-        const int threads = ts_threads_own(o.threads > 0 ? o.threads : ts_threads_allowed());
-        ts_conv_exact_set(o.exact ||
-                          model->net->arch.compat == NN_COMPAT_PUBLISHED); /* whoever runs that wants its numbers */
-        ts_conv_precision_set(o.precision == LGD_BF16 ? TS_BF16 : TS_F32);
-        lgd_estimator_run(&e, photo, photos, side, &o, maps, &st);
-        ts_conv_precision_set(precision);
-        ts_conv_exact_set(exact);
-        ts_threads_own(threads);
-        give_back(model, w);
-    }
-    return report(error, &st);
-}
-
-int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps,
-                 lgd_error *error)
-{
-    const lgd_photo photo = lgd_flash_photo(image);
-    return lgd_estimate_photos(model, &photo, 1, side, options, maps, error);
 }
 
 int lgd_render(const float *maps, int side, const float light[3], const float camera[3], float power, float *image,
@@ -251,7 +268,7 @@ int lgd_render(const float *maps, int side, const float light[3], const float ca
         ts_fail(&st, TS_NOMEM, "lgd_render: out of memory for %d x %d pixels", side, side);
         return report(error, &st);
     }
-    lgd_encode(maps, side, encoded);
+    encode(maps, side, encoded);
     rd_render(rd_grid_full(side), encoded, MAP_CHANNELS, &view, false, image);
     free(encoded);
     return report(error, &st);

@@ -3,6 +3,12 @@
 #define LGD_H
 #include <stddef.h>
 
+#if defined(__GNUC__)
+#define LGD_API __attribute__((visibility("default")))
+#else
+#define LGD_API
+#endif
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -15,76 +21,77 @@ typedef struct lgd_error {
     char message[512];
 } lgd_error;
 
-/* Reads weights (safetensors). NULL and error on failure. The caller frees, when no call uses it. Any number of threads
- * may call lgd_estimate with one model at once: each such call has memory of its own (30 MB at 256 x 256 pixels), which
- * the model keeps for later calls, but for what photographs over 512 pixels a side took. */
-lgd_model *lgd_load(const char *weights, lgd_error *error);
-void lgd_free(lgd_model **model);
+/* Reads a weights file (safetensors or PyTorch). NULL and error on failure. The caller frees the model, when no call
+ * uses it. Any number of threads may call lgd_estimate with one model at once. Each such call has memory of its own (30
+ * MB at 256 x 256 pixels), which the model keeps for later calls up to 512 pixels a side. */
+LGD_API lgd_model *lgd_load(const char *weights, lgd_error *error);
+LGD_API void lgd_free(lgd_model **model);
 
-int lgd_trained_iterations(const lgd_model *model); /* the T that the model was trained for */
-int lgd_most_photos(const lgd_model *model); /* photographs that it reads at once: 1, or those of a multi-image model */
+LGD_API int lgd_trained_iterations(const lgd_model *model); /* the number of steps T that the model was trained for */
+LGD_API int lgd_most_photos(
+    const lgd_model *model); /* photographs that it reads at once: 1, or those of a multi-image model */
 
-/* As many steps as the reconstruction RMSE falls by, at least a thousandth each, LGD_AUTO_MOST at most; R_t is that of
- * the last such step. Of photographs that are refined tile by tile the steps are counted on the photograph at 256 x 256
- * pixels. */
+/* LGD_AUTO: steps go on while each lowers the reconstruction RMSE by a thousandth or more, LGD_AUTO_MOST at most. The
+ * result is R_t of the last such step. The steps of photographs in several tiles, and of those with mask or tolerance,
+ * are counted on the photograph at 256 x 256 pixels. */
 enum { LGD_AUTO = -2, LGD_AUTO_MOST = 24 };
 
-/* What costs the least time for renderings that are at most 1% worse than those of all steps, where steps at the
- * photograph's size have a network; where they have none they cost so little that ending them early saves nothing
- * (docs/performance.md). */
+/* The tolerance of least time whose renderings are at most 1% worse than those of all steps (docs/performance.md). */
 #define LGD_TOLERANCE 0.003
-#define LGD_ORIENTATIONS_USUAL                                                             \
-    2 /* as little error in renderings as 8 in a quarter of g's time (docs/performance.md) \
-       */
-#define LGD_TOLERANCE_USUAL (-1.0)
+#define LGD_TOLERANCE_DEFAULT (-1.0)
+#define LGD_ORIENTATIONS_DEFAULT 2 /* renderings as near as of 8, in a quarter of g's time (docs/performance.md) */
 
 enum { LGD_F32, LGD_BF16 };
 
+/* New fields are added at the end. Begin with lgd_options_default(). */
 typedef struct lgd_options {
-    int iterations; /* refinement steps; 0: R_0 alone, -1: as trained, LGD_AUTO */
-    int exact; /* 0: 3 x 3 convolutions by Winograd's way where that is faster, with maps that differ by less than 1e-4;
-                * else directly, as weights of the published network always are */
-    int precision; /* LGD_F32, or LGD_BF16: inputs and weights of convolutions rounded to bf16, multiplied by the CPU's
-                    * AMX or AVX512-BF16 or, much slower, from f32; sums, renderer and maps stay f32
-                    * (docs/performance.md says how far the maps differ) */
-    int orientations; /* 2, 4, 8: the first estimate is the mean of those of so many of the photograph's orientations
-                       * (as it is and turned by a quarter, all quarter turns, and their mirror images), where it is the
-                       * only one and light and camera are above its centre (not with the published weights); 1 or 0: of
-                       * the photograph as it is */
+    size_t size;      /* sizeof(lgd_options) where the caller was compiled: fields beyond it have their defaults */
+    int iterations;   /* refinement steps; 0: R_0 alone, -1: as trained, LGD_AUTO */
+    int exact;        /* 0: 3 x 3 convolutions use Winograd's algorithm where it is faster, and maps differ by less than
+                       * 1e-4; else all are computed directly. Weights of the published network always are */
+    int precision;    /* LGD_F32; LGD_BF16: inputs and weights of convolutions are rounded to bf16, for CPUs with AMX or
+                       * AVX512-BF16 (much slower on others). Sums, renderer and maps stay f32 (docs/performance.md) */
+    int orientations; /* R_0 is the mean over so many orientations of the photograph: 1 or 0: as it is, 2: and turned by
+                       * a quarter, 4: all quarter turns, 8: and their mirror images. Only for a single photograph with
+                       * light and camera above its centre, and not with published weights */
     int threads;      /* that the call computes on; 0: as many as the process may use */
-    /* Called after R_0 (step 0) and after every refinement; return nonzero to stop there. May be NULL. rmse: the
-     * reconstruction RMSE after R_0, after the last of the iterations and, where they are LGD_AUTO or every_rmse is not
-     * 0, which takes a tenth more time, after every other; else NAN. */
+    /* Called after R_0 (step 0) and after every step; return nonzero to stop there. May be NULL. rmse: the
+     * reconstruction RMSE after R_0 and after the last step. Between them it is NAN, unless iterations is LGD_AUTO or
+     * every_rmse is not 0, which takes a tenth more time. */
     int (*progress)(int step, double rmse, void *user);
     void *user;
     int every_rmse;
-    /* side x side, or NULL: only where it is not zero are the maps sure to be refined, exactly as they would be without
-     * it; elsewhere they may be those of an earlier step. */
+    /* side x side, or NULL. Where it is not 0 the maps are refined, exactly as without a mask; elsewhere they may be
+     * those of an earlier step, which saves time. */
     const unsigned char *mask;
-    /* The photograph (over 512 pixels a side: each of its tiles of 256 x 256, with a mask of 128 x 128) is refined no
-     * further once the RMS of a step's change of its maps (in their encoding, [-1, 1]), over it and all that it reads,
-     * is below this: its maps are then exactly those of that step. 0: never. LGD_TOLERANCE_USUAL: LGD_TOLERANCE where a
-     * network refines at the photograph's size, iterations is -1, exact 0 and the weights are not the published ones,
-     * whose steps couple all pixels; else 0. */
+    /* Early stop: a tile is done when one step changes its maps by less than this (RMS over the tile and its halo, maps
+     * in [-1, 1]). Tiles are 256 px, 128 px with a mask; a photograph up to 512 px without a mask is one tile. 0 =
+     * never. LGD_TOLERANCE_DEFAULT = LGD_TOLERANCE if the model has a full-size h and iterations == -1 and !exact, else
+     * 0. */
     double tolerance;
-    /* Photographs over 512 pixels a side, and those with mask or tolerance, are refined tile by tile, all steps of a
-     * tile at a time: progress is then called for every step at the end (stopping at a step does the work again to
-     * there), and this before each tile with the fraction that is done; nonzero ends the work with an error. May be
-     * NULL. */
+    /* Called before each tile of a photograph in several tiles (over 512 px, or with a mask), with the fraction that is
+     * done; nonzero ends the work with an error. May be NULL. progress is then called for every step at the end, since
+     * a tile makes all its steps at once; stopping at a step does the work again up to there. */
     int (*tile)(double done, void *user);
-    /* NULL: the photographs' lights are as strong as they say. Else what all of them have to be multiplied by is
-     * estimated from the photographs alone (it can be told apart from the albedo only where that would have to be above
-     * 1 or outside of what the model knows), taken, and written here; 1 for the published weights, whose light is
-     * fixed. */
+    /* NULL: the lights' powers are those of the photographs. Else the factor that fits them all is estimated from the
+     * photographs, used, and written here. A stronger light and a brighter albedo look alike, so only what the model's
+     * materials cannot explain, such as an albedo above 1, counts. 1 for published weights, whose light is fixed. */
     double *power;
 } lgd_options;
-lgd_options lgd_options_default(void);
+/* Fills size bytes with the defaults, whichever version the library has. */
+LGD_API void lgd_options_init(lgd_options *options, size_t size);
+static inline lgd_options lgd_options_default(void)
+{
+    lgd_options options;
+    lgd_options_init(&options, sizeof options);
+    return options;
+}
 
 /* image: side x side x 3 linear values (clamped to [0, 1] here), top row first. maps: side x side x 9, in [0, 1] where
  * not said otherwise: diffuse rgb, normal x and y in [-1, 1] (OpenGL, z = sqrt(1 - x^2 - y^2)), roughness, specular F0
  * rgb. Returns 0, or nonzero with error set and maps unspecified. */
-int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps,
-                 lgd_error *error);
+LGD_API int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps,
+                         lgd_error *error);
 
 /* A photograph of the sample, rectified to it. Positions in patch widths (the sample is [-1/2, 1/2]^2 at z = 0, x
  * right, y up), both above the sample; radiance = BRDF max(n.l, 0) power / distance^2. */
@@ -93,19 +100,19 @@ typedef struct lgd_photo {
     float light[3], camera[3], power;
 } lgd_photo;
 
-/* The photograph that lgd_estimate assumes: light and camera at one place above the centre, of the usual power. */
-lgd_photo lgd_flash_photo(const float *image);
+/* The photograph that lgd_estimate assumes: light and camera at one place above the centre, of the default power. */
+LGD_API lgd_photo lgd_flash_photo(const float *image);
 
 /* lgd_estimate from 1 .. lgd_most_photos photographs under known lights, in any order. */
-int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,
-                        float *maps, lgd_error *error);
+LGD_API int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side,
+                                const lgd_options *options, float *maps, lgd_error *error);
 
 /* Renders maps as returned by lgd_estimate under a point light and a camera (positions in patch widths, the sample is
  * [-1/2, 1/2]^2 at z = 0, y up): image is side x side x 3, linear. */
-int lgd_render(const float *maps, int side, const float light[3], const float camera[3], float power, float *image,
-               lgd_error *error);
+LGD_API int lgd_render(const float *maps, int side, const float light[3], const float camera[3], float power,
+                       float *image, lgd_error *error);
 
-const char *lgd_version(void);
+LGD_API const char *lgd_version(void);
 
 #ifdef __cplusplus
 }

@@ -1,4 +1,5 @@
 #include "infer/model_path.h"
+#include "data/folders.h"
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,19 +18,19 @@ static ts_code take(const char *from, char path[LGD_PATH_MAX], ts_status *st)
 /* The file of a model that ships with the program. */
 static bool shipped(const char *name, char path[LGD_PATH_MAX])
 {
-    char folder[LGD_PATH_MAX - 64 - LGD_NAME_MAX]; /* room for what is appended */
+    char folder[LGD_PATH_MAX - 64 - LGD_NAME_MAX]; /* the rest is appended */
     const ssize_t length = readlink("/proc/self/exe", folder, sizeof folder - 1);
     if (length > 0) {
         folder[length] = 0;
         char *slash = strrchr(folder, '/');
         if (slash) *slash = 0;
-        static const char *const beside[] = {"../share/lgd", "../../models"};
+        static const char *const folders[] = {"../share/lgd", "../../models"};
         for (int i = 0; i < 2; i++) {
-            snprintf(path, LGD_PATH_MAX, "%s/%s/%s.safetensors", folder, beside[i], name);
+            snprintf(path, LGD_PATH_MAX, "%s/%s/%s.safetensors", folder, folders[i], name);
             if (access(path, F_OK) == 0) return true;
         }
     }
-    snprintf(path, LGD_PATH_MAX, "%s/%s.safetensors", LGD_DATADIR, name);
+    snprintf(path, LGD_PATH_MAX, "%s/%s.safetensors", io_data_folder, name);
     return access(path, F_OK) == 0;
 }
 
@@ -46,7 +47,7 @@ ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_
     if (option) name = option;
     if (shipped(name, path)) return TS_OK;
     return ts_fail(st, TS_IO,
-                   "no %s.safetensors found in ../share/lgd or ../../models beside the program or in %s: name a file "
+                   "no %s.safetensors found in ../share/lgd or ../../models folders the program or in %s: name a file "
                    "with --model or LGD_MODEL",
-                   name, LGD_DATADIR);
+                   name, io_data_folder);
 }

@@ -102,8 +102,8 @@ static ts_code make_rows(int y, int count, float *values, void *user, ts_status 
     for (int k = 0; k < s->panels; k++) {
         const float *from = k == 0 && s->photo ? s->photo->image + first * 3 : picture;
         if (from == picture)
-            rd_render((rd_grid){.h = count, .w = size, .y0 = y, .side = size}, s->m->maps + first * MAP_CHANNELS,
-                      MAP_CHANNELS, &s->view[k], true, picture);
+            rd_render((rd_grid){.h = count, .w = size, .y0 = y, .side = size, .threads = 1},
+                      s->m->maps + first * MAP_CHANNELS, MAP_CHANNELS, &s->view[k], true, picture);
         for (int i = 0; i < count; i++)
             memcpy(values + (size_t)i * row + (size_t)k * panel, from + (size_t)i * panel, panel * sizeof *values);
     }
@@ -156,7 +156,7 @@ static ts_code write_height(const char *folder, const io_material *m, ts_status 
 {
     io_image height = {0};
     ts_code code = io_image_create(&height, m->size, m->size, 1, st);
-    if (!code) code = io_height(m, height.data, st);
+    if (!code) code = io_height(m, height.data, 1, st);
     for (int64_t i = 0; i < (int64_t)m->size * m->size && !code; i++) height.data[i] += 0.5f;
     if (!code) code = write_png(folder, LGD_OUT_HEIGHT, &height, 16, false, st);
     io_image_free(&height);
@@ -210,7 +210,7 @@ static ts_code write_portion(const char *folder, const io_material *m, const lgd
     }
 }
 
-/* Of several failures the first portion's is told. */
+/* Of several failures the first portion's is reported. */
 static ts_code write_all(const char *folder, const io_material *m, const lgd_photo *photo, unsigned which, bool directx,
                          int threads, io_metallic_error *lost, ts_status *st)
 {

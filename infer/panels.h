@@ -8,7 +8,7 @@
  */
 void lgd_panel_put(io_image *sheet, int size, int column, int row, const float *picture);
 
-/* The material under a view, to column, row. picture: room for size x size x 3 values. */
+/* The material under a view, to column, row. picture: a buffer of size x size x 3 values. */
 void lgd_panel_render(io_image *sheet, int column, int row, const io_material *m, const rd_view *view, float *picture);
 
 /* Diffuse, specular, roughness, normal (half of it plus a half) to columns column .. column + LGD_MAP_PANELS - 1 of

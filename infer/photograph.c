@@ -29,8 +29,9 @@ static ts_code published_square(const char *path, int64_t max_pixels, int size, 
     return code;
 }
 
-ts_code lgd_photograph_square(const char *path, bool published, int64_t max_pixels, int size, io_image *square,
-                              int *width, int *height, ts_status *st)
+ts_code lgd_photograph_square(const char *path, bool published, int64_t max_pixels, int size, int threads,
+                              io_image *square, int *width, int *height, ts_status *st)
 {
-    return (published ? published_square : io_read_square)(path, max_pixels, size, square, width, height, st);
+    return published ? published_square(path, max_pixels, size, square, width, height, st)
+                     : io_read_photo_square(path, max_pixels, size, threads, square, width, height, st);
 }

@@ -7,9 +7,9 @@
 #include <stdint.h>
 #include <string.h>
 
-/* Stops by which R_0's brightness errs where nothing is amiss: the estimate is that much nearer to 1, so that usual
- * photographs keep the usual light. */
-#define USUAL_STOPS 0.2
+/* Stops by which R_0's brightness errs under the default light: the estimate is brought that much nearer to 1, so that
+ * photographs under that light keep it. */
+#define TOLERATED_STOPS 0.2
 #define MOST_STOPS 3.0
 #define COARSE_STOPS \
     0.4 /* first these, then the finer ones around the best of them, a quarter of what is left out anyway */
@@ -31,12 +31,12 @@ static double distance(size_t values, const float *log_photo, const float *rende
 
 /* The stops around middle at which it is least. */
 static double nearest(size_t values, const float *log_photo, const float *rendered, double middle, double reach,
-                      double step)
+                      double step, int threads)
 {
     double far[2 * MOST_TRIED + 1];
     const int most = (int)lround(reach / step);
     int best = 0;
-#pragma omp parallel for num_threads(ts_threads()) schedule(dynamic)
+#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(dynamic)
     for (int i = 0; i <= 2 * most; i++) far[i] = distance(values, log_photo, rendered, middle + (i - most) * step);
     for (int i = 1; i <= 2 * most; i++)
         if (far[i] < far[best]) best = i;
@@ -44,22 +44,22 @@ static double nearest(size_t values, const float *log_photo, const float *render
 }
 
 static ts_code fit(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given,
-                   int side, int orientations, float *proposed, double *factor, ts_status *st)
+                   int side, int orientations, float *r0, double *factor, ts_status *st)
 {
     const int size = nn_arch_side(&model->arch);
-    const rd_grid grid = rd_grid_full(size);
+    const rd_grid grid = rd_grid_on(rd_grid_full(size), ag_compute(tape)->threads);
     const size_t values = (size_t)size * (size_t)size * 3, whole = (size_t)side * (size_t)side * 3;
     *factor = 1;
     ag_value *small = ag_empty(tape, (ts_shape){given, size, size, 3}),
              *rendered = ag_empty(tape, (ts_shape){given, size, size, 3});
     const ts_mark mark = ag_scope_begin(tape);
     ts_tensor full = ts_view((float *)(uintptr_t)image[0], (ts_shape){given, side, side, 3});
-    if (given > 1 || !lgd_clipped((int64_t)whole, image[0])) full = ts_new(ag_arena(tape), full.shape);
+    if (given > 1 || !lgd_clipped((int64_t)whole, image[0], grid.threads)) full = ts_new(ag_arena(tape), full.shape);
     if (!small || !rendered || !full.data) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
     for (int k = 0; k < given && full.data != image[0]; k++)
         lgd_clip((int64_t)whole, image[k], full.data + (size_t)k * whole);
     if (side == size) memcpy(small->t.data, full.data, (size_t)given * values * sizeof(float));
-    else if (ts_resize(&small->t, &full, ag_arena(tape), st)) return st->code;
+    else if (ts_resize(&small->t, &full, ag_arena(tape), grid.threads, st)) return st->code;
     ag_scope_end(tape, mark, NULL, 0);
     const nn_input in = {.image = small->t, .grid = grid, .views = views, .given = given, .orientations = orientations};
     const ag_value *maps = nn_predict(tape, model, &in);
@@ -67,28 +67,30 @@ static ts_code fit(ag_tape *tape, const nn_model *model, const float *const *ima
         *st = *ag_status(tape);
         return st->code;
     }
-    memcpy(proposed, maps->t.data, (size_t)ts_count(maps->t.shape) * sizeof(float));
+    memcpy(r0, maps->t.data, (size_t)ts_count(maps->t.shape) * sizeof(float));
     for (int k = 0; k < given; k++)
         rd_render(grid, maps->t.data, maps->t.shape.c, &views[k], false, rendered->t.data + (size_t)k * values);
-    bool tells = false; /* black: any light would be too strong; clipped: none would be */
-    for (size_t i = 0; i < (size_t)given * values && !tells; i++) tells = small->t.data[i] > 0 && small->t.data[i] < 1;
-    if (!tells) return TS_OK;
+    bool informative = false; /* black: any light would be too strong; clipped: none would be */
+    for (size_t i = 0; i < (size_t)given * values && !informative; i++)
+        informative = small->t.data[i] > 0 && small->t.data[i] < 1;
+    if (!informative) return TS_OK;
     float *log_photo = small->t.data;
     for (size_t i = 0; i < (size_t)given * values; i++)
         log_photo[i] = logf((log_photo[i] < 1 ? log_photo[i] : 1) + 0.01f);
-    const double middle = nearest((size_t)given * values, log_photo, rendered->t.data, 0, MOST_STOPS + USUAL_STOPS,
-                                  COARSE_STOPS);
-    const double found = nearest((size_t)given * values, log_photo, rendered->t.data, middle, COARSE_STOPS, STEP_STOPS);
-    const double beyond = fmin(fmax(fabs(found) - USUAL_STOPS, 0), MOST_STOPS);
+    const double middle = nearest((size_t)given * values, log_photo, rendered->t.data, 0, MOST_STOPS + TOLERATED_STOPS,
+                                  COARSE_STOPS, grid.threads);
+    const double found = nearest((size_t)given * values, log_photo, rendered->t.data, middle, COARSE_STOPS, STEP_STOPS,
+                                 grid.threads);
+    const double beyond = fmin(fmax(fabs(found) - TOLERATED_STOPS, 0), MOST_STOPS);
     *factor = exp2(found < 0 ? -beyond : beyond);
     return TS_OK;
 }
 
 ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given,
-                      int side, int orientations, float *proposed, double *factor, ts_status *st)
+                      int side, int orientations, float *r0, double *factor, ts_status *st)
 {
     const ts_mark mark = ag_scope_begin(tape);
-    const ts_code code = fit(tape, model, image, views, given, side, orientations, proposed, factor, st);
+    const ts_code code = fit(tape, model, image, views, given, side, orientations, r0, factor, st);
     ag_scope_end(tape, mark, NULL, 0);
     return code;
 }

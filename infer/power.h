@@ -3,13 +3,13 @@
 #define LGD_POWER_H
 #include "nn/model.h"
 
-/* factor: by what the views' powers are to be multiplied so that renderings of R_0 are as bright as the photographs:
- * least is the mean |log| of their ratio (values at most 1, plus 0.01), brought 0.2 stops nearer to 1, for so much R_0
- * errs without a reason (Luo et al. 2024, section 6, leaves the light's intensity to the network). A light that the
- * maps can follow gives 1: albedo and power cannot be told apart; what the maps cannot follow, an albedo above 1, is
- * found. image: [given][side][side][3], linear. In 1/8 .. 8; 1 where the photographs are black, or white. The tape has
- * no gradients. R_0, of which g's light is no part, is that of so many orientations (nn_input), and is left in proposed
- * [g_size][g_size][channels] for what follows. */
+/* factor, 1/8 .. 8: what the views' powers are to be multiplied by so that renderings of R_0 are as bright as the
+ * photographs. It minimises the mean of |log (photograph + 0.01) - log (rendering + 0.01)|, both clipped at 1, and is
+ * then brought 0.2 stops nearer to 1, since R_0 errs by that much under the default light (Luo et al. 2024, section 6,
+ * leaves the light's intensity to the network). Albedo and power cannot be told apart where the maps can follow both:
+ * the factor is then 1. It is 1 too where the photographs are all black or all white.
+ * image: [given][side][side][3], linear. orientations: as in nn_input. r0 [g_size][g_size][channels] gets R_0, which
+ * does not depend on the light, for what follows. The tape has no gradients. */
 ts_code lgd_fit_power(ag_tape *tape, const nn_model *model, const float *const *image, const rd_view *views, int given,
-                      int side, int orientations, float *proposed, double *factor, ts_status *st);
+                      int side, int orientations, float *r0, double *factor, ts_status *st);
 #endif

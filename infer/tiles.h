@@ -1,5 +1,6 @@
-/* Refinement in tiles: each runs all its steps with as much of its surroundings as its last step can depend on, so its
- * result is that of the whole photograph's refinement, and no more memory is taken than for one tile. */
+/* Coarse steps of the whole photograph, then its tiles: each runs all its steps with as much of its surroundings as its
+ * last step can depend on, so its result is that of the whole photograph's refinement, and no more memory is taken than
+ * for one tile. A photograph may be one tile. */
 #ifndef LGD_TILES_H
 #define LGD_TILES_H
 #include "nn/model.h"
@@ -12,14 +13,19 @@ typedef struct lgd_tiles {
                                   (R_0), and of the others only the area that holds such is sure to be refined */
     int side, tile, steps;     /* tile: pixels of a tile's side */
     int orientations;          /* as in nn_input, */
-    const float *proposed;     /* and this too */
+    const float *r0;           /* and this too */
     double
         tolerance; /* a tile ends at R_t when the RMS of R_t - R_{t-1} over it and what it reads is below; 0: never */
-    int (*alive)(void *user); /* asked before each tile; nonzero: TS_INTERRUPTED. May be NULL */
+    /* Called before each of several tiles with the part that is done; nonzero: TS_INTERRUPTED. May be NULL. */
+    int (*before)(double done, void *user);
+    /* Called after R_0 and every step; false: stop there. May be NULL. rmse: R_t's, NAN where it is not measured. maps:
+     * R_t as lgd_tiles_run leaves it. Of several tiles it is called when all are done, with the maps of R_steps alone
+     * and NULL before; a stop then does the work again. */
+    bool (*after)(int step, double rmse, const float *maps, void *user);
     void *user;
-    double *rmse;    /* NULL, or [steps + 1]: reconstruction RMSE at R_t of what is refined (tiles that ended earlier:
-                        their last maps), */
-    bool ends_alone; /* of R_0 and R_steps alone, which saves rendering, and NAN between */
+    bool ends_alone; /* rmse and maps of R_0 and R_steps alone, which saves resampling and rendering */
+    double *rmse;    /* NULL: not measured; or [steps + 1]: reconstruction RMSE at R_t of what is refined (tiles that
+                        ended earlier: their last maps), NAN where it is not measured */
     int64_t refined; /* out: pixels times steps that were refined, surroundings not counted */
 } lgd_tiles;
 

@@ -1,18 +1,17 @@
-/* The coarse steps. */
+/* The coarse steps (docs/math.md, S13). */
 #include "nn/lgd_internal.h"
 #include "ops.h"
-#include "render/render.h"
-#include <math.h>
 #include <string.h>
 
 enum { BAND = 1 << 17 }; /* pixels of the photograph that are read at a time, about */
 
 /* Maps of material n in rows y0 .. y0 + rows - 1 of its photographs. */
-static void upsampled(const nn_coarse *c, int n, int y0, int rows, float *to)
+static void upsampled(const ag_tape *tape, const nn_coarse *c, int n, int y0, int rows, float *to)
 {
     const ts_shape s = c->maps->t.shape;
     const ts_taps own = ts_taps_part(&c->up, y0, rows);
-    ts_resample(1, s.c, &own, &c->up, c->maps->t.data + (int64_t)n * s.h * s.w * s.c, to, false);
+    ts_resample(1, s.c, &own, &c->up, c->maps->t.data + (int64_t)n * s.h * s.w * s.c, to, false,
+                ag_compute(tape)->threads);
 }
 
 /* RMSE(R_0) at the photographs' size, in bands. */
@@ -27,24 +26,24 @@ static bool measure(ag_tape *tape, const nn_model *model, nn_coarse *c)
     if (!c->state.rmse0 || !maps)
         return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d x %d pixels", side, side), false;
     for (int i = 0; i < c->in.image.shape.n; i++) {
-        const rd_view view = nn_view_of(model, &c->in, i);
         double squares = 0;
         for (int y = 0; y < side; y += most) {
             const int rows = y + most < side ? most : side - y;
-            double rmse;
-            upsampled(c, i / count, y, rows, maps);
-            rd_flash_rmse((rd_grid){.h = rows, .w = side, .y0 = y, .side = side}, maps, channels, &view,
-                          c->in.image.data + ((int64_t)i * side + y) * side * 3, &rmse);
-            squares += rmse * rmse * rows;
+            const nn_input band = {
+                .image = ts_view(c->in.image.data + ((int64_t)i * side + y) * side * 3, (ts_shape){1, rows, side, 3}),
+                .grid = {.h = rows, .w = side, .y0 = y, .side = side, .threads = ag_compute(tape)->threads},
+                .view = c->in.view,
+                .views = c->in.views ? c->in.views + i : NULL};
+            upsampled(tape, c, i / count, y, rows, maps);
+            nn_add_squares(model, &band, maps, channels, &squares);
         }
-        c->state.rmse0[i] = sqrt(squares / side);
+        c->state.rmse0[i] = nn_rmse_of(&squares, 1, (double)side * side);
     }
     ts_arena_release(ag_arena(tape), mark);
     return true;
 }
 
-/* Rows first .. last - 1 of what the photographs of material n say: gradient and newton (or NULL) are the material's.
- */
+/* Rows first .. last - 1 of the averaged gradient and Newton step (or NULL) of material n. */
 static bool read_band(ag_tape *tape, const nn_model *model, const nn_coarse *c, int n, int first, int last,
                       float *gradient, float *newton)
 {
@@ -72,7 +71,7 @@ static bool read_band(ag_tape *tape, const nn_model *model, const nn_coarse *c, 
                              .view = c->in.view,
                              .views = c->in.views ? c->in.views + n * count : NULL,
                              .given = count};
-        upsampled(c, n, y0, rows, maps.data);
+        upsampled(tape, c, n, y0, rows, maps.data);
         fine = nn_read(tape, model, &in, &maps, c->state.rmse0 ? c->state.rmse0 + n * count : NULL, g, d);
     }
     if (fine) {
@@ -81,14 +80,16 @@ static bool read_band(ag_tape *tape, const nn_model *model, const nn_coarse *c, 
         own.in = rows;
         own.first = from;
         const int64_t row = (int64_t)c->down.out;
-        ts_resample(1, read, &own, &c->down, g, gradient + first * row * read, false);
-        if (newton) ts_resample(1, channels, &own, &c->down, d, newton + first * row * channels, false);
+        ts_resample(1, read, &own, &c->down, g, gradient + first * row * read, false, ag_compute(tape)->threads);
+        if (newton)
+            ts_resample(1, channels, &own, &c->down, d, newton + first * row * channels, false,
+                        ag_compute(tape)->threads);
     }
     ts_arena_release(arena, mark);
     return fine;
 }
 
-/* Reads what the photographs say of R_t and makes R_{t+1} and its states of it. */
+/* R_{t+1} and its states from the averages. */
 static bool step(ag_tape *tape, const nn_model *model, nn_coarse *c)
 {
     const nn_refiner *h = &((const nn_layers *)model->layers)->coarse;
@@ -140,7 +141,7 @@ static bool step_and_forget(ag_tape *tape, const nn_model *model, nn_coarse *c)
     const step_of of = {model, *c};
     ag_value *const from[3] = {c->maps, c->state.gru[0], c->state.gru[1]};
     ag_value *to[3] = {0};
-    if (!ag_checkpoint(tape, step_again, &of, sizeof of, 3, from, c->room[c->state.step % 2],
+    if (!ag_checkpoint(tape, step_again, &of, sizeof of, 3, from, c->buffer[c->state.step % 2],
                        model->arch.recurrent ? 3 : 1, to))
         return false;
     c->maps = to[0];
@@ -149,7 +150,7 @@ static bool step_and_forget(ag_tape *tape, const nn_model *model, nn_coarse *c)
     return true;
 }
 
-/* What the steps read: the photographs, or smaller ones. */
+/* The photographs that the steps read, resampled when they are large. */
 static bool reduce(ag_tape *tape, const nn_model *model, nn_coarse *c)
 {
     const int64_t most = (int64_t)model->arch.coarse_size * NN_COARSE_READS;
@@ -174,17 +175,18 @@ bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c)
     }
     if (model->arch.gradient && !c->state.rmse0 && !measure(tape, model, c)) return false;
     if (!c->in.recompute || !ag_gradients(tape)) return step(tape, model, c);
-    return (c->room[0][0] || nn_gradient_rooms(tape, c->maps, model->arch.coarse_gru, c->room)) &&
+    return (c->buffer[0][0] || nn_gradient_buffers(tape, c->maps, model->arch.coarse_gru, c->buffer)) &&
         step_and_forget(tape, model, c);
 }
 
-ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps)
+ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps,
+                        bool (*after)(int t, void *user), void *user)
 {
     nn_coarse c;
     bool on = nn_coarse_begin(tape, model, in, &c);
-    for (int t = 0; on; on = nn_coarse_step(tape, model, &c)) {
+    for (int t = 0; on; t++) {
         maps[t] = c.maps;
-        if (t++ == steps) break;
+        on = (!after || after(t, user)) && t < steps && nn_coarse_step(tape, model, &c);
     }
     return ag_status(tape)->code;
 }

@@ -1,4 +1,4 @@
-/* Inside nn only: where each layer's parameters are in the model's list, and what they start from. */
+/* Inside nn only: each layer's parameters in the model's list, and their first values. */
 #ifndef NN_LAYERS_H
 #define NN_LAYERS_H
 #include "nn/model.h"
@@ -25,9 +25,9 @@ typedef struct nn_cell {
     nn_layer conv, input, hidden;
 } nn_cell;
 
-/* What does a step. */
+/* The network of a step. */
 typedef struct nn_refiner {
-    int width, gru; /* width 0: no network, path alone */
+    int width, gru; /* width 0: no network, only path */
     nn_cell cell[2];
     nn_layer output, path; /* path: of arch.descent, weight -1 where there is none */
 } nn_refiner;
@@ -40,7 +40,7 @@ typedef struct nn_layers {
     nn_layer scene[2];                           /* of the deepest global vector */
     nn_refiner h, coarse;
     nn_layer encoder[NN_MAX_LEVELS + 1], code, decoder[NN_MAX_LEVELS + 1][2],
-        decoded;   /* the deepest decoder level has one convolution */
+        decoded;   /* of an auto-encoder; the deepest decoder level has one convolution */
     int first[4];  /* index of each nn_part's first parameter, and their number */
     double *start; /* per parameter: standard deviation of the first values, 0 for zeros, or one of these: */
 } nn_layers;
@@ -48,7 +48,7 @@ typedef struct nn_layers {
 #define NN_NEWTON_DAMPING \
     0.1f /* 0.03 to 0.3 are within some percent of each other, from one photograph and from five */
 #define NN_NEWTON_DAMPING_SPECULAR \
-    1.0f /* one photograph cannot tell F0 from albedo: without this the detail of both goes into F0 */
+    1.0f /* one photograph cannot separate F0 from albedo; with less, the detail of both goes into F0 */
 #define NN_NEWTON_START (-3.0) /* half the identity: the equations are linear only near the maps */
 #define NN_DESCENT_START                                                                                               \
     (-2.0) /* -0.003 times the identity, shared by the photographs: six such steps lower the loss of a trained g's R_0 \
@@ -64,9 +64,9 @@ bool nn_all_finite(const float *v, size_t count);
 ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index);
 ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad,
                   float leak);
-/* constants: NULL, or further channels of the input, as ag_conv_beside has them. */
-ag_value *nn_conv_beside(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants,
-                         int dilation, ts_pad pad, float leak);
+/* constants: NULL, or further channels of the input, as ag_conv_with_constants has them. */
+ag_value *nn_conv_with_constants(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants,
+                                 int dilation, ts_pad pad, float leak);
 ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x);
 
 /* Channels of what is known of a photograph, for each pixel: the view direction's x and y and 1, or three zeros where
@@ -102,11 +102,19 @@ bool nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *phot
 ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient,
                     ag_value *gru[2], ag_value *const to[2]);
 
-/* R_{t+1} from R_t and its encoded gradients. path: what arch.descent lets past h, or NULL. length: of the step, 1 for
- * the whole. into: NULL, or the value to write it into, which may be R_t's. */
+/* R_{t+1} from R_t and its encoded gradients. path: what arch.descent adds beside h, or NULL. length: of the step, 1
+ * for the whole. into: NULL, or the value to write it into, which may be R_t's. */
 ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path,
                   ag_value *gradient, ag_value *gru[2], ag_value *const to[2], float length, ag_value *into);
 
-/* Memory for the parameters of a plan (nn_model_plan), zero only between them: for who then writes them all. */
-ts_code nn_model_room(nn_model *model, ts_status *st);
+/* A model without parameters, a 3 x 3 convolution with bias that is added to it (gain: standard deviation of its output
+ * for an input of standard deviation 1), and the plan with memory for its parameters, all zero; NULL and st on failure.
+ */
+nn_model *nn_model_empty(ts_status *st);
+nn_model *nn_coder_plan(const nn_coder *c, ts_status *st);
+nn_layer nn_plan_conv(nn_model *m, const char *name, int oc, int ic, double gain);
+nn_model *nn_model_zero(nn_model *plan, ts_status *st);
+
+/* Memory for the parameters of a plan (nn_model_plan), zero only between them: the caller writes all of them. */
+ts_code nn_model_allocate(nn_model *model, ts_status *st);
 #endif

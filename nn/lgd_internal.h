@@ -22,14 +22,14 @@ bool nn_measure_start(ag_tape *tape, const nn_model *model, const nn_input *in, 
 
 bool nn_descends(const nn_model *model, nn_descent how);
 
-/* What the photographs say about maps [N, H, W, channels] of in's grid: gradient [N, H, W, images channels] as h reads
- * it, newton [N, H, W, channels], either may be NULL. rmse0: of each photograph. False without memory. */
+/* From maps [N, H, W, channels] of in's grid and the photographs: gradient [N, H, W, images channels], encoded for h,
+ * and newton [N, H, W, channels]; either may be NULL. rmse0: of each photograph. False without memory. */
 bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps, const double *rmse0,
              float *gradient, float *newton);
 
 /* Memory for the gradients of R_t (given) and of two states of gru channels, twice: those of a step and of the next
  * take turns. False after an error, which the tape has. */
-bool nn_gradient_rooms(ag_tape *tape, const ag_value *maps, int gru, float *room[2][3]);
+bool nn_gradient_buffers(ag_tape *tape, const ag_value *maps, int gru, float *buffer[2][3]);
 
 /* R_{t+1} by h from what was read, gradient and newton being constants (or NULL where they are not needed). */
 ag_value *nn_apply(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient,
@@ -46,15 +46,14 @@ typedef struct nn_coarse {
     ts_taps up, down; /* between the coarse size and theirs */
     ag_value *maps;
     nn_state state;
-    float *room[2][3]; /* nn_gradient_rooms, where steps are computed again for the gradient */
+    float *buffer[2][3]; /* nn_gradient_buffers, where steps are computed again for the gradient */
 } nn_coarse;
 
 /* R_0. False after an error, which the tape has. */
 bool nn_coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, nn_coarse *c);
 
-/* A step. It reads photographs that are larger than the maps, and of what they say the average: detail that coarse maps
- * cannot have leaves the average alone, where a photograph that is resampled to their size is not one of resampled
- * maps. From twice their size on nothing more was gained (docs/performance.md). */
+/* A step. Gradient and Newton step are computed at up to NN_COARSE_READS times the size of the maps and averaged: a
+ * photograph that is resampled to the maps' size is not a photograph of resampled maps. */
 enum { NN_COARSE_READS = 2 };
 bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c);
 #endif

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Parameters of the largest model: 8 levels, two blocks of 11 each, and what lies before and after them. */
+/* Parameters of the largest model: 8 levels, two blocks of 11 each, and the layers before and after them. */
 enum { MAX_PARAMS = 4 + 2 * 11 * NN_MAX_LEVELS + 6 + 2 * 14 + 10 + 4 * NN_MAX_LEVELS + 4 };
 
 static nn_layers *layers_of(const nn_model *m) { return m->layers; }
@@ -38,6 +38,11 @@ static nn_layer conv(nn_model *m, const char *name, int oc, int ic, int k, bool 
     l.weight = add(m, name, "weight", 4, (int[]){oc, ic, k, k}, gain / sqrt((double)ic * k * k));
     l.bias = bias ? add(m, name, "bias", 1, &oc, 0) : -1;
     return l;
+}
+
+nn_layer nn_plan_conv(nn_model *m, const char *name, int oc, int ic, double gain)
+{
+    return conv(m, name, oc, ic, 3, true, gain);
 }
 
 static nn_layer linear(nn_model *m, const char *name, int out, int in, double gain)
@@ -182,34 +187,8 @@ static void plan_refiner(nn_model *m, const char *name, int width, int gru, nn_r
     l->start[h->path.weight] = newton ? NN_NEWTON_START : NN_DESCENT_START;
 }
 
-/* The encoder pools between its convolutions; the decoder has two a level, since it alone has to make the detail. */
-static void plan_latent(nn_model *m)
+nn_model *nn_model_empty(ts_status *st)
 {
-    const nn_arch *a = &m->arch;
-    nn_layers *l = m->layers;
-    const int levels = a->g_levels;
-    const double gain = leaky_gain(NN_LEAK_G);
-    char name[64];
-    for (int i = 0; i <= levels; i++) {
-        snprintf(name, sizeof name, "a.encoder%d", i);
-        l->encoder[i] = conv(m, name, nn_level_width(a, i), i ? nn_level_width(a, i - 1) : a->channels, 3, true, gain);
-    }
-    l->code = conv(m, "a.code", a->latent, nn_level_width(a, levels), 3, true, 1);
-    for (int i = levels; i >= 0; i--)
-        for (int j = 0; j < (i < levels ? 2 : 1); j++) {
-            snprintf(name, sizeof name, "a.decoder%d.conv%d", i, j + 1);
-            l->decoder[i][j] = conv(m, name, nn_level_width(a, i),
-                                    j                 ? nn_level_width(a, i)
-                                        : i == levels ? a->latent
-                                                      : nn_level_width(a, i + 1),
-                                    3, true, gain);
-        }
-    l->decoded = conv(m, "a.output", a->channels, nn_level_width(a, 0), 3, true, 0.25);
-}
-
-nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
-{
-    if (nn_arch_check(arch, st)) return NULL;
     nn_model *m = calloc(1, sizeof *m);
     nn_layers *l = m ? m->layers = calloc(1, sizeof *l) : NULL;
     if (l) {
@@ -219,11 +198,17 @@ nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
     if (!l || !m->param || !l->start) {
         nn_model_free(&m);
         ts_fail(st, TS_NOMEM, "no memory for the list of parameters");
-        return NULL;
     }
+    return m;
+}
+
+nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
+{
+    nn_model *m = nn_arch_check(arch, st) == TS_OK ? nn_model_empty(st) : NULL;
+    if (!m) return NULL;
+    nn_layers *l = m->layers;
     m->arch = *arch;
-    if (arch->latent > 0) plan_latent(m);
-    else plan_g(m);
+    plan_g(m);
     l->first[NN_H] = m->params;
     if (nn_arch_refines_full(arch)) plan_refiner(m, "h", arch->h_width, arch->h_gru, &l->h);
     l->first[NN_COARSE] = m->params;
@@ -244,18 +229,19 @@ static float *block(size_t count, const char *what, ts_status *st)
 static float *zero_block(size_t count, const char *what, ts_status *st)
 {
     float *p = block(count, what, st);
-    if (p) ts_block_clear(p, count * sizeof *p);
+    if (p) ts_block_clear(p, count * sizeof *p, 0);
     return p;
 }
 
-nn_model *nn_model_create(const nn_arch *arch, ts_status *st)
+nn_model *nn_model_zero(nn_model *plan, ts_status *st)
 {
-    nn_model *m = nn_model_plan(arch, st);
-    if (m && !(m->value = zero_block(m->count, "parameters", st))) nn_model_free(&m);
-    return m;
+    if (plan && !(plan->value = zero_block(plan->count, "parameters", st))) nn_model_free(&plan);
+    return plan;
 }
 
-ts_code nn_model_room(nn_model *m, ts_status *st)
+nn_model *nn_model_create(const nn_arch *arch, ts_status *st) { return nn_model_zero(nn_model_plan(arch, st), st); }
+
+ts_code nn_model_allocate(nn_model *m, ts_status *st)
 {
     m->value = block(m->count, "parameters", st);
     for (int i = 0; m->value && i < m->params; i++) {
@@ -318,17 +304,17 @@ ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index)
     return ag_parameter(tape, ts_view(model->value + p->offset, s), grad);
 }
 
-ag_value *nn_conv_beside(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants,
-                         int dilation, ts_pad pad, float leak)
+ag_value *nn_conv_with_constants(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants,
+                                 int dilation, ts_pad pad, float leak)
 {
-    return ag_conv_beside(tape, x, constants, nn_parameter(tape, model, layer.weight),
-                          nn_parameter(tape, model, layer.bias), dilation, pad, leak);
+    return ag_conv_with_constants(tape, x, constants, nn_parameter(tape, model, layer.weight),
+                                  nn_parameter(tape, model, layer.bias), dilation, pad, leak);
 }
 
 ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad,
                   float leak)
 {
-    return nn_conv_beside(tape, model, layer, x, NULL, dilation, pad, leak);
+    return nn_conv_with_constants(tape, model, layer, x, NULL, dilation, pad, leak);
 }
 
 ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x)

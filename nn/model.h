@@ -1,8 +1,8 @@
-/* The network: its architecture as plain data, its parameters in one block, and the ONE definition of the unrolled
- * loop. */
+/* The method: the architecture as plain data, the parameters in one block, and the unrolled loop. */
 #ifndef NN_MODEL_H
 #define NN_MODEL_H
 #include "autograd/tape.h"
+#include "nn/coder.h"
 #include "render/scene.h"
 
 typedef enum nn_rmse {
@@ -23,19 +23,19 @@ typedef enum nn_compat {
                          * renderer (render/published.h), its photographs (infer/photograph.h) */
 } nn_compat;
 
-/* What reaches the maps past h. */
+/* What is added to the maps beside h, through a learned matrix (docs/math.md, S4). */
 typedef enum nn_descent {
     NN_DESCENT_NONE,     /* nothing (published) */
-    NN_DESCENT_GRADIENT, /* the encoded gradients, by a learned matrix over their channels */
+    NN_DESCENT_GRADIENT, /* the encoded gradients */
     NN_DESCENT_NEWTON /* the step of Gauss and Newton's method that fits each pixel to its photographs (rd_newton_step),
                          by a learned 9 x 9 matrix */
 } nn_descent;
 
-/* Everything that a weights file must say about itself (its metadata, one key each). */
+/* The architecture, in the metadata of a weights file with one key each. */
 enum { NN_MAX_IMAGES = 9 };
 typedef struct nn_arch {
-    int images;   /* most photographs of a material that are read at once, each under a light and view of its own (fewer
-                     may be given) */
+    int images;   /* photographs of a material that are read at once, each with its own light and view; fewer may be
+                     given */
     int channels; /* of the maps: 9, or 10 (published) */
     int g_width;  /* of g's first convolution; level i has min(g_width * 2^i, g_width_max) */
     int g_width_max;
@@ -62,14 +62,12 @@ typedef struct nn_arch {
     int coarse_gru;        /* of its states */
     int iterations;        /* T that it was trained for */
     bool recurrent;        /* h carries its states from step to step */
-    bool gradient;         /* h reads the gradient (false: zeros, the ablation) */
+    bool gradient;         /* h reads the gradient (false: zeros, an ablation) */
     bool mean_before_norm; /* the global track's mean: before (ours) or after (published) the normalisation */
     nn_rmse rmse;
     nn_gradient encoding; /* of the gradient for h */
     nn_descent descent;
     nn_compat compat;
-    int latent; /* channels of an auto-encoder's code: the model then is one of maps (nn_encode), shaped by g_width,
-                 * g_width_max and g_levels, and has neither g nor h; 0: g and h */
 } nn_arch;
 
 nn_arch nn_arch_default(void);
@@ -88,6 +86,7 @@ typedef struct nn_param {
 
 typedef struct nn_model {
     nn_arch arch;
+    nn_coder coder; /* code is not 0: an auto-encoder (nn/coder.h), and arch says nothing */
     nn_param *param;
     int params;
     size_t count;  /* floats in a block (each parameter starts at a multiple of 16) */
@@ -97,7 +96,7 @@ typedef struct nn_model {
     void *layers;  /* nn's own */
 } nn_model;
 
-/* The parameter list alone: value is NULL. The caller frees. NULL and st on failure. */
+/* The list of parameters, without values: value is NULL. The caller frees. NULL and st on failure. */
 nn_model *nn_model_plan(const nn_arch *arch, ts_status *st);
 
 /* Parameters are allocated and zero. The caller frees. NULL and st on failure. */
@@ -133,24 +132,24 @@ typedef enum nn_known {
     NN_KNOWN_ALL = 7
 } nn_known;
 
-/* A batch of N materials, each in `given` photographs, one material's after the other's; linear, clamped to [0, 1]. g
- * sees whole photographs, h refines any window of them. */
+/* A batch of N materials with `given` photographs each, material by material; linear, clamped to [0, 1]. g reads whole
+ * photographs; the steps refine any window of them. */
 typedef struct nn_input {
-    ts_tensor image; /* [N * given, h, w, 3]: what is refined, the grid's pixels */
+    ts_tensor image; /* [N * given, h, w, 3]: the part that is refined, the grid's pixels */
     rd_grid grid;    /* of every photograph */
     rd_view view;    /* of every photograph where views is NULL: the flash */
-    ts_tensor whole; /* [N * given, side, side, 3]: the photographs of which image is the window; no data: image is the
+    ts_tensor whole; /* [N * given, side, side, 3]: the photographs of which image is a window; no data: image is the
                         whole */
     const rd_view *views;       /* [N * given], or NULL */
     const unsigned char *known; /* [N * given] of nn_known: what of views is true; NULL: all of it */
     int given;                  /* 1 .. arch.images; 0 stands for 1 */
-    int orientations; /* 2, 4, 8: R_0 is the mean of g's maps of the photograph in so many orientations (as it is and
-                       * turned by a quarter, all quarter turns, and their mirror images), where nn_orients says that
-                       * they are alike; on a tape without gradients. 0, 1: as it is */
-    const float *proposed; /* R_0 of these photographs in these orientations, [N, g_size, g_size, channels] as
-                              nn_coarse_steps gives it; NULL: g is run */
-    bool recompute; /* on a tape with gradients: of each step only R_t and h's states are kept, the rest is computed
-                       again for the gradient */
+    int orientations; /* 2, 4, 8: R_0 is the mean of g's maps over so many orientations of the photograph (as it is and
+                       * a quarter turn, all quarter turns, and their mirror images), if nn_orients; on a tape without
+                       * gradients. 0, 1: as it is */
+    const float *r0;  /* R_0 of these photographs in these orientations, [N, side, side, channels] as
+                       * nn_coarse_steps gives it; NULL: g is run */
+    bool recompute;   /* on a tape with gradients: keep only R_t and h's states of each step, and compute the rest again
+                         for the gradient */
 } nn_input;
 
 /* What g makes of photographs. spread and scene are NULL where the architecture does not have them. */
@@ -168,55 +167,76 @@ extern const signed char nn_spread_of[]; /* of each of MAP_CHANNELS channels */
 /* False after an error, which the tape has. */
 bool nn_guess_from(ag_tape *tape, const nn_model *model, const nn_input *in, nn_guess *guess);
 
-/* R_0 by g of the whole: [N, S, S, channels]. Photographs that are not given are black. The log encoding, the
- * resampling to g_size and back are in here. */
+/* R_0 of the whole photographs: [N, S, S, channels]. Missing photographs are black. Includes the log encoding and the
+ * resampling to g_size and back. */
 ag_value *nn_predict(ag_tape *tape, const nn_model *model, const nn_input *in);
 
-/* R_0 at g_size and R_1 … R_steps at coarse_size or the photographs' size, by g and the coarse steps: steps <=
- * arch.coarse_steps. */
-ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps);
+/* What looks at the steps. */
+typedef struct nn_watch {
+    bool (*after)(int step, const ag_value *maps,
+                  void *user); /* called with every R_t; false: stop here, the rest of maps is filled with it */
+    void *user;
+    bool ends_alone; /* after gets only the maps of R_0 and R_steps, which saves resampling, and NULL between */
+} nn_watch;
+
+/* maps[0] = R_0 at g_size, maps[1] … maps[steps] at coarse_size or the photographs' size, by g and the coarse steps:
+ * steps <= arch.coarse_steps. after (may be NULL): called with t when maps[t] is there; false: stop. */
+ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps,
+                        bool (*after)(int t, void *user), void *user);
 
 /* One photograph is given, its light and camera are above the centre, and the weights are not published ones. */
 bool nn_orients(const nn_model *model, const nn_input *in);
 
-/* An auto-encoder of maps (arch.latent): [N, S, S, channels] to its code [N, S / 2^g_levels, S / 2^g_levels, latent],
- * and back to maps in
- * [-1, 1]. Convolutional: any S that is a multiple of 2^g_levels. */
-ag_value *nn_encode(ag_tape *tape, const nn_model *model, ag_value *maps);
-ag_value *nn_decode(ag_tape *tape, const nn_model *model, ag_value *code);
-
 /* How many pixels away from an output pixel h reads, in one step. */
 int nn_refiner_reach(const nn_model *model);
 
-/* What h keeps from step to step, and the loss's scale; zero-initialise it. */
+/* What is carried from step to step; zero-initialise it. */
 typedef struct nn_state {
     ag_value *gru[2],
         *to[2];     /* to: NULL, or where the new states are written (a tape without gradients); to[i] may be gru[i] */
     ag_value *into; /* NULL, or where nn_refine writes R_{t+1} (a tape without gradients); may be R_t */
-    double *rmse0;  /* of each of the whole photographs by R_0, in the tape's arena; NULL: nn_refine measures it on the
-                       maps that it is given */
-    int step; /* how many were done: those beyond arch.iterations are shortened, the t-th to (T / t)^2 of its length
-                 (not where compat is published) */
+    double *rmse0;  /* of each whole photograph by R_0, in the tape's arena; NULL: nn_refine measures it on its maps */
+    int step;       /* steps done; those beyond arch.iterations are shortened (docs/math.md, S7), but if compat is
+                       published */
 } nn_state;
 
-/* A step at the photograph's size: R_{t+1} = R_t + h(R_t, e) + D p, e being dL/dR_t as arch.encoding has it, one for
- * each photograph (zero where none is given). D is a learned matrix over the channels, and arch.descent says of what: p
- * = e and D begins as -0.003 times the identity, so that an untrained loop is plain descent; or p is the step of Gauss
- * and Newton's method, damped by 0.1 beside the photographs' variance and by 1 in F0, and D begins as half the
- * identity; or, as published, D is 0. */
+/* A step at the photograph's size (docs/math.md, S4): R_{t+1} = R_t + h(R_t, e) + D p. e is dL/dR_t, encoded
+ * (arch.encoding), one for each photograph (zero for a missing one). D is a learned matrix over the channels, and p
+ * depends on arch.descent:
+ *     NN_DESCENT_NEWTON    the Newton step, damped by 0.1, in F0 by 1; D begins as half the identity
+ *     NN_DESCENT_GRADIENT  e; D begins as -0.003 times the identity: an untrained loop is plain descent
+ *     NN_DESCENT_NONE      0, as published */
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
-/* The unrolled loop on the grid's window. The first arch.coarse_steps steps refine R_t at coarse_size, as nn_refine
- * does but with NN_COARSE's parameters and the averages of what the photographs say at twice that size, or their own
- * where it is less, and give it resampled; the others begin with what these leave. maps[0] = R_0 … maps[steps] = R_T
- * when keep_all; otherwise only maps[0] = R_T is given and intermediate memory is released on a tape without gradients.
- */
-typedef struct nn_watch {
-    bool (*after)(int step, const ag_value *maps,
-                  void *user); /* is told of every R_t; false: stop here, what is left of maps is filled with it */
-    void *user;
-    bool ends_alone; /* after gets the maps of R_0 and R_steps alone, which saves resampling, and NULL between */
-} nn_watch;
+/* RMSE(R_t) = nn_rmse_of what nn_add_squares leaves: squares[i] += the squared differences between photograph i of in
+ * [N given] and the rendering of its material's maps [N, h, w, channels], summed over the grid's pixels and averaged
+ * over red, green and blue. Windows of a photograph add up. */
+void nn_add_squares(const nn_model *model, const nn_input *in, const float *maps, int channels, double *squares);
+double nn_rmse_of(const double *squares, int photographs, double pixels);
+
+/* Steps at the photograph's size, of a window. */
+typedef struct nn_loop {
+    nn_input in;      /* image and grid: the window of R_t. On a tape without gradients the image is overwritten where
+                         the window shrinks */
+    rd_grid core;     /* what of R_steps is wanted: the window shrinks towards it by h's reach at every step. The grid
+                         itself: the window stays as it is */
+    int steps;        /* up to R_steps */
+    nn_state state;   /* step: how many are done */
+    bool keep_all;    /* as in nn_lgd */
+    double tolerance; /* on a tape without gradients: the maps change no more after a step that changes them by less
+                         (RMS over the window); 0: they always do */
+    const nn_watch *watch; /* or NULL; sees in */
+    int made;              /* out: steps that changed the maps */
+} nn_loop;
+
+/* The loop. maps: as nn_lgd leaves them, of which R_{state.step} is given. On a tape without gradients R_t overwrites
+ * it, but for keep_all. */
+ts_code nn_steps(ag_tape *tape, const nn_model *model, nn_loop *loop, ag_value **maps);
+
+/* The unrolled loop on the grid's window. The first arch.coarse_steps steps refine R_t at coarse_size with the
+ * parameters of NN_COARSE (nn/coarse.c); their result is resampled, and the others go on from it with nn_steps.
+ * keep_all: maps[0] = R_0 … maps[steps] = R_T. Otherwise maps[0] = R_T, and on a tape without gradients intermediate
+ * memory is released. */
 ts_code nn_lgd(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, bool keep_all, ag_value **maps,
                const nn_watch *watch);
 #endif

@@ -1,14 +1,13 @@
-/* g of a photograph in its orientations. */
+/* g of a photograph in its orientations (docs/math.md, S1). */
 #include "nn/layers.h"
 #include "tensor/maps.h"
 #include <string.h>
 
-/* As it is, turned by a quarter, the other turns, and all these mirrored. The first 1, 4 and 8 are groups, so that
- * their mean turns with the photograph; of two the quarter turn, which is none, gave less error in renderings than what
- * would be (a half turn, a mirror image, the transpose). */
+/* As it is, a quarter turn, the other turns, and all of these mirrored. The first 1, 4 and 8 are groups, so that their
+ * mean turns with the photograph; the first 2 are not (docs/training.md, Orientations). */
 static const int orientations[8] = {0, 5, 3, 6, 1, 2, 4, 7};
 
-/* Orientation k of a picture has at (y, x) what the picture has at (*from_y, *from_x): mirrored in x, in y, and
+/* The pixel (*from_y, *from_x) of a picture that orientation k of it has at (y, x): mirrored in x, in y, and
  * transposed, a bit of k each. */
 static void source(int k, int side, int y, int x, int *from_y, int *from_x)
 {
@@ -18,7 +17,7 @@ static void source(int k, int side, int y, int x, int *from_y, int *from_x)
     *from_x = k & 4 ? y : x;
 }
 
-/* The normal in orientation k back to the picture's: what source does to a pixel's place, y being up here. */
+/* The normal of orientation k in the picture's axes: as source for positions, but with y up. */
 static void normal_back(int k, const float *from, float to[2])
 {
     const float x = k & 1 ? -from[0] : from[0], y = k & 2 ? -from[1] : from[1];

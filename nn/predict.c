@@ -8,7 +8,7 @@
 int nn_given(const nn_input *in) { return in->given > 0 ? in->given : 1; }
 int nn_materials(const nn_input *in) { return in->image.shape.n / nn_given(in); }
 
-/* Under which a photograph was taken, as the model's renderer has it. */
+/* The view of a photograph, for the model's renderer. */
 rd_view nn_view_of(const nn_model *model, const nn_input *in, int photograph)
 {
     rd_view view = in->views ? in->views[photograph] : in->view;
@@ -21,7 +21,7 @@ bool nn_input_check(ag_tape *tape, const nn_model *model, const nn_input *in)
     ts_shape s = in->image.shape;
     if (ag_status(tape)->code) return false;
     if (!model->value) ag_fail(tape, TS_INVALID, "the model has no parameters");
-    else if (model->arch.latent > 0)
+    else if (model->coder.code > 0)
         ag_fail(tape, TS_INVALID, "the model is an auto-encoder of maps: it cannot read a photograph");
     else if (!in->image.data || s.c != 3)
         ag_fail(tape, TS_INVALID, "the photograph has %d channels: 3 are needed", s.c);
@@ -56,7 +56,8 @@ bool nn_resized(ag_tape *tape, const ts_tensor *photographs, int size, ts_tensor
 {
     ts_status st = {0};
     ag_value *v = ag_empty(tape, (ts_shape){photographs->shape.n, size, size, 3});
-    if (v && ts_resize(&v->t, photographs, ag_arena(tape), &st)) ag_fail(tape, st.code, "%s", st.message);
+    if (v && ts_resize(&v->t, photographs, ag_arena(tape), ag_compute(tape)->threads, &st))
+        ag_fail(tape, st.code, "%s", st.message);
     if (!v || ag_status(tape)->code) return false;
     *to = v->t;
     return true;
@@ -100,7 +101,7 @@ static bool propose(ag_tape *tape, const nn_model *model, const nn_input *small,
     ag_value *x = ag_empty(tape, (ts_shape){s.n / count, s.h, s.w, 3 * images}),
              *each = images == 1 ? x : ag_empty(tape, s);
     if (!x || !each) return false;
-    rd_log_encode(ts_count(s), small->image.data, each->t.data);
+    rd_log_encode(ts_count(s), small->image.data, each->t.data, ag_compute(tape)->threads);
     if (images > 1) side_by_side(&each->t, count, images, x->t.data);
     ag_value *conditions = model->arch.conditions ? nn_conditions(tape, model, small) : NULL;
     if (model->arch.conditions && !conditions) return false;
@@ -123,12 +124,11 @@ bool nn_coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, n
 {
     *c = (nn_coarse){0};
     const ts_mark mark = ag_scope_begin(tape);
-    if (in->proposed) {
+    if (in->r0) {
         const int size = nn_arch_side(&model->arch);
         if (!nn_input_check(tape, model, in)) return false;
         c->maps = ag_constant(
-            tape,
-            ts_view((float *)(uintptr_t)in->proposed, (ts_shape){nn_materials(in), size, size, model->arch.channels}));
+            tape, ts_view((float *)(uintptr_t)in->r0, (ts_shape){nn_materials(in), size, size, model->arch.channels}));
     } else {
         nn_guess guess;
         if (!nn_guess_from(tape, model, in, &guess)) return false;

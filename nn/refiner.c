@@ -1,11 +1,11 @@
-/* h: two convolutional gated recurrent units. */
+/* h: two convolutional gated recurrent units (docs/math.md, M10), and the step that adds its change (S4). */
 #include "nn/layers.h"
 #include "ops.h"
 
 static ag_value *cell(ag_tape *tape, const nn_model *model, const nn_cell *c, ag_value *x, ag_value *constants,
                       int dilation, ag_value *old, ag_value *to)
 {
-    x = nn_conv_beside(tape, model, c->conv, x, constants, dilation, TS_PAD_REPLICATE, NN_LEAK_H);
+    x = nn_conv_with_constants(tape, model, c->conv, x, constants, dilation, TS_PAD_REPLICATE, NN_LEAK_H);
     if (to) ag_into(tape, to);
     return ag_gru(tape, x, old, nn_parameter(tape, model, c->input.weight), nn_parameter(tape, model, c->input.bias),
                   nn_parameter(tape, model, c->hidden.weight), nn_parameter(tape, model, c->hidden.bias));

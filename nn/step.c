@@ -1,4 +1,4 @@
-/* A refinement step: what the renderer says about R_t, and what is made of it. */
+/* A refinement step: the gradient and the Newton step of R_t, and R_{t+1} from them (docs/math.md, S4 to S11). */
 #include "nn/lgd_internal.h"
 #include "ops.h"
 #include "render/published.h"
@@ -6,78 +6,76 @@
 #include "tensor/kernels/elementwise.h"
 #include "tensor/maps.h"
 #include "tensor/threads.h"
-#include <math.h>
 #include <string.h>
 
-/* The RMSE of R_0, which scales all later gradients: of the whole photographs where they are given, maps then being
- * theirs. */
 bool nn_measure_start(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, nn_state *state)
 {
     if (!maps || !model->arch.gradient) return maps != NULL;
-    const ts_tensor *image = in->whole.data ? &in->whole : &in->image;
-    const rd_grid grid = in->whole.data ? rd_grid_full(in->grid.side) : in->grid;
-    const ts_shape s = maps->t.shape;
-    const int64_t one = (int64_t)s.h * s.w;
-    const int photographs = image->shape.n;
-    state->rmse0 = ts_arena_alloc(ag_arena(tape), (size_t)photographs * sizeof *state->rmse0);
-    if (!state->rmse0) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", photographs), false;
-    for (int i = 0; i < photographs; i++) {
-        const rd_view view = nn_view_of(model, in, i);
-        rd_flash_rmse(grid, maps->t.data + i / nn_given(in) * one * s.c, s.c, &view, image->data + i * one * 3,
-                      &state->rmse0[i]);
+    nn_input all = *in;
+    all.grid = rd_grid_on(in->grid, ag_compute(tape)->threads);
+    if (in->whole.data) {
+        all.image = in->whole;
+        all.grid = rd_grid_on(rd_grid_full(in->grid.side), all.grid.threads);
     }
+    const int photographs = all.image.shape.n;
+    state->rmse0 = ts_arena_zalloc(ag_arena(tape), (size_t)photographs, sizeof *state->rmse0);
+    if (!state->rmse0) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", photographs), false;
+    nn_add_squares(model, &all, maps->t.data, maps->t.shape.c, state->rmse0);
+    for (int i = 0; i < photographs; i++)
+        state->rmse0[i] = nn_rmse_of(&state->rmse0[i], 1, (double)all.grid.h * all.grid.w);
     return true;
 }
 
 /* to [pixels, images channels] = from [pixels, channels] at photograph k's place. */
-static void place(int64_t pixels, int channels, int images, int k, const float *from, float *to)
+static void place(int64_t pixels, int channels, int images, int k, const float *from, float *to, int threads)
 {
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static)
     for (int64_t i = 0; i < pixels; i++)
         memcpy(to + (i * images + k) * channels, from + i * channels, (size_t)channels * sizeof *to);
 }
 
-/* dL/dR_t of every photograph, as the renderer gives it: to is [N, H, W, images channels]. */
+/* dL/dR_t of every photograph, not encoded: to is [N, H, W, images channels]. */
 static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps,
                       const double *rmse0, float *to)
 {
     const ts_shape s = maps->shape;
     const int64_t pixels = (int64_t)s.h * s.w;
     const int count = nn_given(in), images = model->arch.images;
+    const rd_grid grid = rd_grid_on(in->grid, ag_compute(tape)->threads);
     const bool batch = model->arch.rmse == NN_RMSE_BATCH;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
     float *apart = images > 1 ? ts_arena_alloc(ag_arena(tape), (size_t)(pixels * s.c) * sizeof *apart) : NULL;
     if (images > 1 && !apart)
         return ag_fail(tape, TS_NOMEM, "no memory for the gradient of %d x %d pixels", s.w, s.h), false;
     if (count < images) memset(to, 0, (size_t)(s.n * pixels * images * s.c) * sizeof *to);
-    double common = 0;
-    for (int i = 0; batch && i < s.n; i++) {
-        double rmse;
-        const rd_view view = nn_view_of(model, in, i);
-        rd_flash_rmse(in->grid, maps->data + i * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, &rmse);
-        common += rmse * rmse / s.n;
-    }
+    double *squares = batch ? ts_arena_zalloc(ag_arena(tape), (size_t)(s.n * count), sizeof *squares) : NULL;
+    if (batch && !squares) return ag_fail(tape, TS_NOMEM, "no memory for the loss of %d images", s.n * count), false;
+    nn_input all = *in;
+    all.grid = grid;
+    if (batch) nn_add_squares(model, &all, maps->data, s.c, squares);
+    const double common = batch ? nn_rmse_of(squares, s.n * count, (double)pixels) : 0;
     for (int i = 0; i < s.n * count; i++) {
         const int n = i / count, k = i % count;
-        const double rmse = batch ? sqrt(common) : rmse0[i];
+        const double rmse = batch ? common : rmse0[i];
         const rd_view view = nn_view_of(model, in, i);
         float *own = to + n * pixels * images * s.c;
-        rd_flash_gradient(in->grid, maps->data + n * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, rmse,
+        rd_flash_gradient(grid, maps->data + n * pixels * s.c, s.c, &view, in->image.data + i * pixels * 3, rmse,
                           apart ? apart : own, NULL);
-        if (apart) place(pixels, s.c, images, k, apart, own);
+        if (apart) place(pixels, s.c, images, k, apart, own, grid.threads);
     }
     ts_arena_release(ag_arena(tape), mark);
     if (batch) { /* d RMSE of the whole batch has 1 / (3 N H W) where rd_flash_gradient has 1 / (3 256^2) */
         const float scale = (float)(256.0 * 256.0 / ((double)s.n * s.h * s.w));
         const int64_t values = s.n * pixels * images * s.c;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(ag_compute(tape)->threads)) schedule(static)
         for (int64_t i = 0; i < values; i++) to[i] *= scale;
     }
     return true;
 }
 
-/* Where Gauss and Newton's method would go: to is [N, H, W, channels]. */
-static void newton_step(const nn_model *model, const nn_input *in, const ts_tensor *maps, float *to)
+/* The Newton step: to is [N, H, W, channels]. */
+static void newton_step(const ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps,
+                        float *to)
 {
     float damping[MAP_CHANNELS];
     for (int i = 0; i < MAP_CHANNELS; i++)
@@ -93,8 +91,8 @@ static void newton_step(const nn_model *model, const nn_input *in, const ts_tens
             view[k] = nn_view_of(model, in, n * count + k);
             image[k] = in->image.data + (n * count + k) * pixels * 3;
         }
-        rd_newton_step(in->grid, maps->data + n * pixels * s.c, s.c, view, image, count, damping,
-                       to + n * pixels * s.c);
+        rd_newton_step(rd_grid_on(in->grid, ag_compute(tape)->threads), maps->data + n * pixels * s.c, s.c, view, image,
+                       count, damping, to + n * pixels * s.c);
     }
 }
 
@@ -103,7 +101,7 @@ bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_
 {
     const ts_shape s = maps->shape;
     const int64_t rows = (int64_t)s.n * s.h, row = (int64_t)s.w * s.c * model->arch.images;
-    if (newton) newton_step(model, in, maps, newton);
+    if (newton) newton_step(tape, model, in, maps, newton);
     if (!gradient) return true;
     if (!model->arch.gradient) {
         memset(gradient, 0, (size_t)(rows * row) * sizeof *gradient);
@@ -112,14 +110,13 @@ bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_
     if (!gradients(tape, model, in, maps, rmse0, gradient)) return false;
     if (model->arch.encoding != NN_GRADIENT_ASINH) return true;
     const struct ts_elementwise_kernels *k = ts_elementwise_k();
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(ag_compute(tape)->threads)) schedule(static)
     for (int64_t y = 0; y < rows; y++) k->asinh(row, NN_GRADIENT_SCALE, gradient + y * row, gradient + y * row);
     return true;
 }
 
-/* Nothing taught h that its steps must come to rest: beyond those it was trained for, what is left of them adds up to a
- * drift. So step t > T goes (T / t)^2 of its way, and all those together less than T whole steps. The published loop
- * has no such rule. */
+/* S7: h is not trained to come to rest, and beyond T what is left of its steps adds up to a drift. Step t > T has the
+ * length (T / t)^2; all of them together are less than T whole steps. The published loop keeps 1. */
 static float length(const nn_arch *a, int t)
 {
     if (t <= a->iterations || a->compat == NN_COMPAT_PUBLISHED) return 1;

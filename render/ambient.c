@@ -22,7 +22,7 @@ void rd_ambient_add(rd_grid grid, const float *maps, int channels, const rd_view
         side[k] = white * a->side[k];
     }
     const ts_shade_view shade = rd_shade_view(&from_side);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(grid.threads)) schedule(static)
     for (int y = 0; y < grid.h; y++) {
         const ts_shade_row row = rd_shade_row(grid, y, maps, channels);
         float *lit = ts_scratch(0, (size_t)grid.w * 3 * sizeof *lit), *out = image + (int64_t)y * grid.w * 3;

@@ -3,8 +3,8 @@
 #include <math.h>
 
 const ts_shade_guards rd_guards = {
-    /* alpha = 1e-4: such a highlight is 2e-4 patch widths across, less than a pixel up to 4096, so nothing sharper can
-     * be told from it; and 1 / alpha^2, which D and its derivatives contain twice, stays far inside float. */
+    /* alpha = 1e-4: such a highlight is 2e-4 patch widths across, less than a pixel up to 4096, so that nothing sharper
+     * differs from it; and 1 / alpha^2, which D and its derivatives contain twice, stays far inside float. */
     .roughness = 0.01,
     /* As published. d n_z / d n_x = -n_x / n_z is at most 1000, instead of infinite where |n_xy| reaches 1. */
     .nz2 = 1e-6,

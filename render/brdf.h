@@ -1,24 +1,32 @@
-/* The equations of shading, one pixel at a time in double, value and gradient: what every fast path is tested against.
+/* The equations of shading, one pixel at a time in double, value and gradient: the reference for every fast path.
  *
  * Maps (tensor/maps.h). Each of the nine values x is clamped to [-1, 1]; outside it has no gradient.
- *     diffuse d, specular s (F0), roughness r:  (x + 1) / 2;     r >= guards.roughness;     alpha = r^2
- *     normal n: (x, y, sqrt(max(1 - x^2 - y^2, guards.nz2))), divided by its length (which differs from 1 only in the
- * guard) BRDF (Cook and Torrance, "A Reflectance Model for Computer Graphics", 1982, with the GGX distribution of
- * Walter et al., "Microfacet Models for Refraction through Rough Surfaces", 2007, and Karis's "Real Shading in Unreal
- * Engine 4", 2013, for G and F), for unit l toward the light and v toward the camera, h = (l + v) / |l + v|: f = (1 -
- * s) d / pi + D G F / 4 D = alpha^2 / (pi (alpha^2 (n.h)^2 + |n x h|^2)^2)          = the usual ((n.h)^2 (alpha^2 - 1)
- * + 1)^2, without its cancellation G = 1 / ((n.l (1 - k) + k) (n.v (1 - k) + k)), k = alpha / 2   the cosines above
- * cancel 4 n.l n.v below: no 0/0 at grazing angles F = s + (1 - s) 2^((-5.55473 v.h - 6.98316) v.h) f = 0 where n.l <=
- * 0 or n.v <= 0 Radiance = f n.l times the light's strength at the pixel (rd_kind in render/scene.h), and
- * ambient (s + (1 - s) d) under surroundings of that radiance (rd_view). */
+ *
+ *     diffuse d, specular s (F0), roughness r:  (x + 1) / 2;  r >= guards.roughness;  alpha = r^2
+ *     normal n: (x, y, sqrt(max(1 - x^2 - y^2, guards.nz2))), divided by its length (1 outside the guard)
+ *
+ * BRDF, for unit l toward the light and v toward the camera, h = (l + v) / |l + v|:
+ *
+ *     f = (1 - s) d / pi + D G F / 4
+ *     D = alpha^2 / (pi (alpha^2 (n.h)^2 + |n x h|^2)^2)
+ *     G = 1 / ((n.l (1 - k) + k) (n.v (1 - k) + k)),  k = alpha / 2
+ *     F = s + (1 - s) 2^((-5.55473 v.h - 6.98316) v.h)
+ *     f = 0 where n.l <= 0 or n.v <= 0
+ *
+ * The sum in D is the usual (n.h)^2 (alpha^2 - 1) + 1 without its cancellation. G lacks the usual cosines above, which
+ * cancel 4 n.l n.v below: no 0/0 at grazing angles.
+ * Radiance = f n.l times the light's strength at the pixel (rd_kind in render/scene.h), and ambient (s + (1 - s) d)
+ * under surroundings of that radiance (rd_view).
+ *
+ * Cook and Torrance, "A Reflectance Model for Computer Graphics", 1982; D: Walter et al., "Microfacet Models for
+ * Refraction through Rough Surfaces", 2007; G and F: Karis, "Real Shading in Unreal Engine 4", 2013. */
 #ifndef RD_BRDF_H
 #define RD_BRDF_H
 #include "render/scene.h"
 #include "render/kernels/shade.h"
 #include "tensor/maps.h"
 
-/* Every bound that keeps shading finite. Both the reference and the kernels read them from here and from nowhere else.
- */
+/* Every bound that keeps shading finite, for the reference and the kernels. */
 extern const ts_shade_guards rd_guards;
 
 /* GGX's width (TS_ALPHA). */
@@ -43,7 +51,7 @@ void rd_decode_double(const double maps[MAP_CHANNELS], rd_surface *s);
 void rd_brdf(const rd_surface *s, const double l[3], const double v[3], double f[3], double specular[3]);
 
 /* The light's strength E (radiance = f max(n.l, 0) E) at a point of the sample, and the unit directions there. A light
- * or camera at the very point has direction 0 and so is not seen. */
+ * or camera at the point itself has direction 0 and is not seen. */
 double rd_light(const rd_view *view, const double point[2], double l[3], double v[3]);
 
 /* Centre of the grid's pixel (column, row). */

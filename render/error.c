@@ -93,8 +93,7 @@ static rd_map_error map_sums(int64_t count, const float *maps_a, int channels_a,
             sum += (na[k] + nb[k]) * (na[k] + nb[k]);
         }
         e.normal += chord;
-        e.angle += 2 *
-            atan2(sqrt(chord), sqrt(sum)); /* Kahan: as accurate for equal vectors as for others, where acos is not */
+        e.angle += 2 * atan2(sqrt(chord), sqrt(sum)); /* Kahan: accurate for nearly equal vectors, unlike acos */
         e.diffuse += colour_difference(a + MAP_DIFFUSE, b + MAP_DIFFUSE);
         e.specular += colour_difference(a + MAP_SPECULAR, b + MAP_SPECULAR);
         const double r = ((double)limit(a[MAP_ROUGHNESS]) - (double)limit(b[MAP_ROUGHNESS])) / 2;

@@ -1,5 +1,4 @@
-/* How far maps are from other maps, as results are compared (DESIGN section 5): training's validation and lgd-eval use
- * the same code. */
+/* Errors of maps against other maps (docs/math.md, M15 and M16), for training's validation and lgd-eval. */
 #ifndef RD_ERROR_H
 #define RD_ERROR_H
 #include "render/scene.h"
@@ -19,7 +18,7 @@ typedef struct rd_map_error {
     double angle;             /* not an RMSE: the mean angle between the normals, in degrees */
 } rd_map_error;
 
-/* RMSE of each map over count pixels and the map's components. Values are clamped to [-1, 1] first, as everything that
- * shows them does. */
+/* RMSE of each map over count pixels and the map's components. Values are clamped to [-1, 1] first, as in
+ * rendering and in files. */
 rd_map_error rd_map_rmse(int64_t count, const float *maps_a, int channels_a, const float *maps_b, int channels_b);
 #endif

@@ -1,16 +1,17 @@
-/* The training losses as ops (render/op_NAME.c). All return one value. */
+/* The losses as ops (render/op_NAME.c). Each returns one value. */
 #ifndef RD_LOSSES_H
 #define RD_LOSSES_H
 #include "autograd/tape.h"
 #include "render/scene.h"
 
-/* mean over images, pixels, rgb and views of |log(a + 0.01) - log(b + 0.01)|, a and b the renderings of maps and target
+/* M11 of docs/math.md: the mean over images, pixels, rgb and views of |log(a + 0.01) - log(b + 0.01)|, a and b the
+ * renderings of maps and target
  * ([N, S, S, 9], whole patches). views: N * views_per_image, image-major, copied. Value and gradient are made in one
  * pass. */
 ag_value *ag_render_loss(ag_tape *tape, ag_value *maps, ag_value *target, const rd_view *views, int views_per_image);
 
 /* The mean over the photographs of the RMSE (all pixels, rgb) between photograph and rendering under view, clamped to
- * [0, 1]: what a photograph alone tells. maps [N, S, S, 9 or more], image [N, S, S, 3] linear, whole patches. The
+ * [0, 1]: the reconstruction error. maps [N, S, S, 9 or more], image [N, S, S, 3] linear, whole patches. The
  * gradient at a perfect fit is 0 (render/render.h). */
 ag_value *ag_flash_loss(ag_tape *tape, ag_value *maps, ag_value *image, const rd_view *view);
 
@@ -18,8 +19,9 @@ ag_value *ag_flash_loss(ag_tape *tape, ag_value *maps, ag_value *image, const rd
  * direction from the centre (render/op_shading_frame.c has the equation). */
 ag_value *ag_shading_frame(ag_tape *tape, ag_value *x);
 
-/* mean |maps - target| over all values, the map L1 of DESIGN section 4. Channel groups weighted equally by channel. */
-/* The same with a weight for each of the nine channels. */
+/* ag_map_loss with a weight for each of the nine channels. */
 ag_value *ag_map_loss_weighted(ag_tape *tape, ag_value *maps, ag_value *target, const float *weight);
+
+/* mean |maps - target| over all values: the L1 of S15 in docs/math.md. Every channel weighs the same. */
 ag_value *ag_map_loss(ag_tape *tape, ag_value *maps, ag_value *target);
 #endif

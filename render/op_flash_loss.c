@@ -1,5 +1,4 @@
-/* The reconstruction loss as an op (render/losses.h): what is minimised at test time by the methods that optimise
- * weights or codes. */
+/* The reconstruction error as an op (render/losses.h), for the compared methods that optimise weights or codes. */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "render/brdf.h"
@@ -35,7 +34,7 @@ static void forward(ag_tape *tape, ag_node *node)
         return;
     }
     for (int n = 0; n < s.n; n++) {
-        rd_flash_rmse(rd_grid_full(s.h), maps->data + n * maps->stride_n, s.c, node->attr,
+        rd_flash_rmse(rd_grid_on(rd_grid_full(s.h), ag_threads(tape)), maps->data + n * maps->stride_n, s.c, node->attr,
                       image->data + n * image->stride_n, &rmse[n]);
         sum += rmse[n];
     }
@@ -59,10 +58,10 @@ static void backward(ag_tape *tape, ag_node *node)
     /* rd_flash_gradient's scale is that of 1e5 RMSE at 256 x 256. */
     const float scale = (float)((double)node->out->grad[0] / s.n * 256.0 * 256.0 / (1e5 * s.h * s.w));
     for (int n = 0; n < s.n; n++) {
-        rd_flash_gradient(rd_grid_full(s.h), maps->data + n * count, s.c, node->attr, image->data + n * image->stride_n,
-                          rmse[n], gradient, NULL);
+        rd_flash_gradient(rd_grid_on(rd_grid_full(s.h), ag_threads(tape)), maps->data + n * count, s.c, node->attr,
+                          image->data + n * image->stride_n, rmse[n], gradient, NULL);
         float *sum = to + n * count;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (count > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (count > AG_CHUNK)
         for (int64_t i = 0; i < count; i++) sum[i] += scale * gradient[i];
     }
 }

@@ -56,7 +56,7 @@ static void forward(ag_tape *tape, ag_node *node)
         ag_fail(tape, TS_NOMEM, "map_loss: no memory for %lld sums", (long long)chunks);
         return;
     }
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (chunks > 1)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (chunks > 1)
     for (int64_t k = 0; k < chunks; k++) {
         int64_t first = k * AG_CHUNK, last = first + ag_part(count, first, AG_CHUNK);
         double part = 0;
@@ -75,7 +75,7 @@ static void backward(ag_tape *tape, ag_node *node)
     const float *a = node->in[0]->t.data, *b = node->in[1]->t.data;
     int64_t count = ts_count(node->in[0]->t.shape);
     float up = (float)((double)node->out->grad[0] / (double)count);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (count > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (count > AG_CHUNK)
     for (int64_t i = 0; i < count; i++) {
         const float w = up * weight_of(node, i), g = a[i] > b[i] ? w : a[i] < b[i] ? -w : 0;
         to[i] = add ? to[i] + g : g;

@@ -53,7 +53,7 @@ static void forward(ag_tape *tape, ag_node *node)
     for (int i = 0; i < s.n * per_image; i++) views[i] = rd_shade_view(&attr->views[i]);
     double mean = 1 / (3.0 * s.n * s.h * s.w * per_image);
     rd_grid grid = rd_grid_full(s.h);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static)
     for (int i = 0; i < rows; i++) {
         int image = i / s.h, y = i % s.h;
         int64_t at = (int64_t)image * s.h * s.w * s.c;
@@ -74,7 +74,7 @@ static void backward(ag_tape *tape, ag_node *node)
     const float *from = node->saved;
     if (!to) return;
     int64_t count = ts_count(node->in[0]->t.shape);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (count > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (count > AG_CHUNK)
     for (int64_t i = 0; i < count; i++) to[i] = add ? to[i] + up * from[i] : up * from[i];
 }
 

@@ -49,7 +49,7 @@ static void backward(ag_tape *tape, ag_node *node)
     for (int n = 0; n < s.n; n++) {
         const ts_scene scene = rd_scene_of(node->in[1]->t.data + n * RD_SCENE_NUMBERS);
         memset(sums, 0, (size_t)s.h * RD_SCENE_NUMBERS * sizeof *sums);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static)
         for (int y = 0; y < s.h; y++) {
             const ts_shade_row row = rd_shade_row(grid, y, maps->data + n * maps->stride_n, s.c);
             float *gradient = to ? ts_scratch(0, count * sizeof *gradient) : NULL;

@@ -29,7 +29,7 @@ static void forward(ag_tape *tape, ag_node *node)
     const int64_t pixels = ts_pixels(s);
     const float *x = node->in[0]->t.data;
     float *y = node->out->t.data;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels * s.c > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels * s.c > AG_CHUNK)
     for (int64_t p = 0; p < pixels; p++) {
         const float *from = x + p * (s.c + 2);
         double f[2];
@@ -47,7 +47,7 @@ static void backward(ag_tape *tape, ag_node *node)
     const float *dy = node->out->grad;
     float *dx = ag_grad_add(tape, node->in[0]);
     if (!dx) return;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (pixels * s.c > AG_CHUNK)
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels * s.c > AG_CHUNK)
     for (int64_t p = 0; p < pixels; p++) {
         const float *from = dy + p * s.c;
         float *to = dx + p * (s.c + 2);

@@ -10,7 +10,7 @@ void rd_posterior_step(rd_grid grid, const float *maps, int channels, const rd_v
 {
     ts_shade_view v[RD_CAPTURE_VIEWS];
     for (int k = 0; k < count; k++) v[k] = rd_shade_view(&views[k]);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(grid.threads)) schedule(static)
     for (int y = 0; y < grid.h; y++) {
         const int64_t at = (int64_t)y * grid.w;
         const ts_shade_row row = rd_shade_row(grid, y, maps, channels);

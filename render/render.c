@@ -45,7 +45,7 @@ ts_shade_row rd_shade_row(rd_grid grid, int y, const float *maps, int channels)
 void rd_render(rd_grid grid, const float *maps, int channels, const rd_view *view, bool clamp, float *image)
 {
     ts_shade_view v = rd_shade_view(view);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(grid.threads)) schedule(static)
     for (int y = 0; y < grid.h; y++) {
         ts_shade_row row = rd_shade_row(grid, y, maps, channels);
         ts_shade_k()->render(&v, &row, clamp ? 1.0f : INFINITY, image + (int64_t)y * grid.w * 3);
@@ -59,7 +59,7 @@ static double flash(rd_grid grid, const float *maps, int channels, const rd_view
 {
     ts_shade_view v = rd_shade_view(view);
     double *sums = ts_scratch(0, (size_t)grid.h * sizeof(double)), sum = 0;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(grid.threads)) schedule(static)
     for (int y = 0; y < grid.h; y++) {
         int64_t at = (int64_t)y * grid.w;
         ts_shade_row row = rd_shade_row(grid, y, maps, channels);
@@ -91,7 +91,7 @@ void rd_newton_step(rd_grid grid, const float *maps, int channels, const rd_view
 {
     ts_shade_view v[RD_CAPTURE_VIEWS];
     for (int k = 0; k < count; k++) v[k] = rd_shade_view(&views[k]);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(grid.threads)) schedule(static)
     for (int y = 0; y < grid.h; y++) {
         const int64_t at = (int64_t)y * grid.w;
         const ts_shade_row row = rd_shade_row(grid, y, maps, channels);

@@ -15,7 +15,7 @@ void rd_render(rd_grid grid, const float *maps, int channels, const rd_view *vie
 void rd_flash_rmse(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image,
                    double *rmse);
 
-/* The gradient that the refiner reads, without a tape: for every value
+/* The gradient that h reads (S5 of docs/math.md), without a tape: for every value
  *     gradient = 1e5 / (3 * 256^2) * sum_rgb (render - image) * d render / d map / max(rmse0, RD_RMSE_FLOOR)
  * which is 1e5 dRMSE/dmap at 256^2 and does not depend on the resolution. rmse0 is the RMSE of R_0 (rd_flash_rmse),
  * fixed over the refinement; gradient is [h, w, channels], zero in channels beyond the ninth and where render is
@@ -25,9 +25,9 @@ void rd_flash_rmse(rd_grid grid, const float *maps, int channels, const rd_view 
 void rd_flash_gradient(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image,
                        double rmse0, float *gradient, double *rmse);
 
-/* Where Gauss and Newton's method would go from the maps: for each pixel by itself the step that fits it to count
- * photographs (RD_POINT views, image[k] [h, w, 3] belongs to views[k]), damped by damping[MAP_CHANNELS] > 0 as of
- * Levenberg and Marquardt (render/kernels/newton.h has the equation). step: [h, w, channels]; channels beyond the ninth
+/* The Gauss-Newton step of each pixel by itself (S8 of docs/math.md, equation in render/kernels/newton.h): toward maps
+ * that fit count photographs (RD_POINT views, image[k] [h, w, 3] belongs to views[k]), damped by
+ * damping[MAP_CHANNELS] > 0 (Levenberg and Marquardt). step: [h, w, channels]; channels beyond the ninth
  * are not written. Finite for finite maps. */
 void rd_newton_step(rd_grid grid, const float *maps, int channels, const rd_view *views, const float *const *image,
                     int count, const float *damping, float *step);

@@ -1,4 +1,4 @@
-/* From the renderer's terms to the kernels': shared by render.c and the loss op. */
+/* Views and rows as the kernels take them, for render.c and the loss op. */
 #ifndef RD_ROWS_H
 #define RD_ROWS_H
 #include "render/scene.h"

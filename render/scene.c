@@ -5,6 +5,12 @@
 #define TAU 6.28318530717958647692
 #define PI 3.14159265f
 
+rd_grid rd_grid_on(rd_grid grid, int threads)
+{
+    grid.threads = threads;
+    return grid;
+}
+
 rd_grid rd_grid_full(int side) { return (rd_grid){.h = side, .w = side, .side = side}; }
 
 rd_view rd_flash(void)

@@ -1,5 +1,5 @@
-/* Where the sample, the cameras and the lights are (DESIGN: the sample is the square [-1/2, 1/2]^2 at z = 0 in patch
- * widths; x right, y up, z toward the camera). */
+/* Sample, cameras and lights. The sample is the square [-1/2, 1/2]^2 at z = 0, in patch widths; x right, y up, z toward
+ * the camera. */
 #ifndef RD_SCENE_H
 #define RD_SCENE_H
 #include "tensor/rng.h"
@@ -9,9 +9,11 @@
  * pixels. Pixel (column i, row j) has its centre at ((i + 1/2) / side - 1/2, 1/2 - (j + 1/2) / side). */
 typedef struct rd_grid {
     int h, w, y0, x0, side;
+    int threads; /* that renderings of it run on; 0: the process's number */
 } rd_grid;
 
 rd_grid rd_grid_full(int side);
+rd_grid rd_grid_on(rd_grid grid, int threads); /* the same pixels on so many threads */
 
 typedef enum rd_kind {
     RD_POINT,      /* positions; radiance = f max(n.l, 0) power / |light - x|^2, not clamped */
@@ -58,14 +60,14 @@ void rd_scene_numbers(const rd_view *view, float ambient, float tone, float numb
 /* A point light's view from them. */
 rd_view rd_scene_view(const float number[RD_SCENE_NUMBERS]);
 
-/* The training loss's views: the first diffuse ones with directions r = sqrt(0.94 u + 0.01), phi uniform on the
- * hemisphere for both; the rest specular: view so, light its mirror image about z, distances exp(N(0.5, 0.75)) from one
- * point uniform on the patch (distances in half patch widths, lift 1e-4). Deschaintre et al., "Single-Image SVBRDF
- * Capture with a Rendering-Aware Deep Network", 2018, section 4.2. */
+/* The views of the training loss. The first RD_LOSS_DIFFUSE have view and light directions on the hemisphere, each with
+ * r = sqrt(0.94 u + 0.01), phi uniform. The others are mirror configurations: the view is drawn so, the light is its
+ * mirror image about z, at distances exp(N(0.5, 0.75)) from one point uniform on the patch (in half patch widths, lift
+ * 1e-4). Deschaintre et al., "Single-Image SVBRDF Capture with a Rendering-Aware Deep Network", 2018, section 4.2. */
 enum { RD_LOSS_DIFFUSE = 3, RD_LOSS_SPECULAR = 6, RD_LOSS_VIEWS = 9 };
 void rd_loss_views(ts_rng *rng, rd_view views[RD_LOSS_VIEWS]);
 
-/* Evaluation (DESIGN section 5): camera and light each uniform over the square [-1/2, 1/2]^2 at z = RD_FLASH_DISTANCE,
+/* Evaluation: camera and light each uniform over the square [-1/2, 1/2]^2 at z = RD_FLASH_DISTANCE,
  * power RD_FLASH_POWER. */
 void rd_eval_views(ts_rng *rng, int count, rd_view *views);
 
@@ -73,18 +75,18 @@ void rd_eval_views(ts_rng *rng, int count, rd_view *views);
 rd_view rd_preview_view(int index, int count);
 
 /* The predefined configurations of a capture in several photographs: the camera at the flash's place, the light at the
- * same height over a 3 x 3 grid, RD_CAPTURE_SPACING patch widths apart. 0 is the flash photograph; 1 .. 8 go round
+ * same height over a 3 x 3 grid, RD_CAPTURE_SPACING patch widths apart. 0 is the flash photograph; 1 .. 8 are
  * counter-clockwise from the right (1: +x, 3: +y). */
 enum { RD_CAPTURE_VIEWS = 9 };
 #define RD_CAPTURE_SPACING 0.6f
 rd_view rd_capture_view(int index);
 
 /* The views of a capture of count <= RD_CAPTURE_VIEWS photographs: the flash, and others of the configurations, every
- * subset of them alike often, in the order of rd_capture_order. */
+ * subset equally likely, in the order of rd_capture_order. */
 void rd_capture_draw(ts_rng *rng, int count, rd_view views[]);
 
 /* The order in which models read the photographs of a capture: by the light's distance from the camera, the flash
- * first; of equal ones by the light's direction from the camera, from x over y. order[0 .. count-1]: indices into
- * views. Any order of the same views gives the same photographs in turn. */
+ * first; equal ones by the light's direction from the camera, from x toward y. order[0 .. count-1]: indices into
+ * views. The result does not depend on the order of the views. */
 void rd_capture_order(const rd_view *views, int count, int order[]);
 #endif

@@ -71,7 +71,7 @@ void rd_scene_photograph(rd_grid grid, const float *maps, int channels, const fl
                          bool clamp, float *image)
 {
     const ts_scene scene = rd_scene_of(number);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(grid.threads)) schedule(static)
     for (int y = 0; y < grid.h; y++) {
         const ts_shade_row row = rd_shade_row(grid, y, maps, channels);
         ts_scene_k()->render(&scene, &row, clamp ? 1.0f : INFINITY, image + (int64_t)y * grid.w * 3);
@@ -94,9 +94,9 @@ static float untone(double tone, double value)
     return (float)(y * y);
 }
 
-void rd_scene_untone(int64_t count, const float *in, float tone, float *out)
+void rd_scene_untone(int64_t count, const float *in, float tone, int threads, float *out)
 {
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static)
     for (int64_t i = 0; i < count; i++) out[i] = tone == 0 ? in[i] : untone((double)tone, (double)in[i]);
 }
 
@@ -135,9 +135,10 @@ static ts_scene_sums sums_of(rd_grid grid, const float *maps, int channels, cons
                              const rd_scene_how *how, const float number[K])
 {
     const ts_scene scene = rd_scene_of(number);
-    const int first = how->every / 2 < grid.h ? how->every / 2 : 0, rows = (grid.h - first + how->every - 1) / how->every;
+    const int first = how->every / 2 < grid.h ? how->every / 2 : 0,
+              rows = (grid.h - first + how->every - 1) / how->every;
     ts_scene_sums *part = ts_scratch(0, (size_t)rows * sizeof *part), all = {.misfit = 0};
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(grid.threads)) schedule(static)
     for (int i = 0; i < rows; i++) {
         const int y = first + i * how->every;
         const int64_t at = (int64_t)y * grid.w;

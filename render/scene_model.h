@@ -25,12 +25,13 @@ void rd_scene_value(const double maps[MAP_CHANNELS], const double point[2], cons
 void rd_scene_photograph(rd_grid grid, const float *maps, int channels, const float number[RD_SCENE_NUMBERS],
                          bool clamp, float *image);
 
-/* The tone curve undone: values in [0, 1] of a photograph become those that the curve was applied to. Others stay. in
+/* The tone curve undone, on so many threads (0: the process's number): values in [0, 1] of a photograph become those that the curve was applied to. Others stay. in
  * may be out. */
-void rd_scene_untone(int64_t count, const float *in, float tone, float *out);
+void rd_scene_untone(int64_t count, const float *in, float tone, int threads, float *out);
 
 /* The photographs [N, S, S, 3] of maps [N, S, S, 9 or more], whole patches, in the scenes numbers [N, 1, 1,
- * RD_SCENE_NUMBERS]; clamp: at 1, without a gradient there. Either input may have a gradient (render/op_scene_render.c). */
+ * RD_SCENE_NUMBERS]; clamp: at 1, without a gradient there. Either input may have a gradient
+ * (render/op_scene_render.c). */
 ag_value *ag_scene_render(ag_tape *tape, ag_value *maps, ag_value *numbers, bool clamp);
 
 /* What is known of a scene beforehand: independent numbers with Gaussian errors. A deviation of 0 keeps a number. */
@@ -45,13 +46,12 @@ typedef struct rd_scene_how {
     ts_prior scale;   /* of the maps' prior, and of a photograph's noise */
 } rd_scene_how;
 
-/* Gauss and Newton's method on the numbers of a photograph's scene, for maps that are uncertain. e = image - seen (render/
- * posterior.h: its logarithm above 1, nothing where both are burnt out), J_t = d seen / d t, J = d seen / d maps and the
- * maps' covariance Sigma of a pixel give, summed over the pixels that are read,
- *     V = (J Sigma J' + S)^-1,   A = w sum J_t' V J_t,   b = w sum J_t' V e,
- * where w = min(every / correlated, 1). With the prior's mean m and deviations in the diagonal matrix Q a step goes to
- *     t = m + Q z,   (I + Q A Q) z = Q (b + A (t_before - m)),
- * at most RD_SCENE_STRIDE in any number; the ambient light is not let below 0, nor the tone curve out of
+/* Gauss and Newton's method on the numbers of a photograph's scene, for maps that are uncertain. e = image - seen
+ * (render/ posterior.h: its logarithm above 1, nothing where both are burnt out), J_t = d seen / d t, J = d seen / d
+ * maps and the maps' covariance Sigma of a pixel give, summed over the pixels that are read, V = (J Sigma J' + S)^-1,
+ * A = w sum J_t' V J_t,   b = w sum J_t' V e, where w = min(every / correlated, 1). With the prior's mean m and
+ * deviations in the diagonal matrix Q a step goes to t = m + Q z,   (I + Q A Q) z = Q (b + A (t_before - m)), at most
+ * RD_SCENE_STRIDE in any number; the ambient light is not let below 0, nor the tone curve out of
  * +-RD_SCENE_TONE_MOST. number begins with the caller's values; after (may be NULL): the square roots of the diagonal
  * of Q (I + Q A Q)^-1 Q at the last step. deviation [h, w, MAP_GROUPS] of the maps; image [h, w, 3]. Threaded; the same
  * bytes for any number of threads. */

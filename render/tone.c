@@ -3,13 +3,13 @@
 #include "tensor/threads.h"
 #include <math.h>
 
-void rd_log_encode(int64_t count, const float *in, float *out)
+void rd_log_encode(int64_t count, const float *in, float *out, int threads)
 {
     double range = log(1.01) - log(0.01);
     float a = (float)(2 / range), b = (float)(-2 * log(0.01) / range - 1);
     enum { CHUNK = 16384 };
     int64_t chunks = (count + CHUNK - 1) / CHUNK;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (chunks > 1)
+#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static) if (chunks > 1)
     for (int64_t i = 0; i < chunks; i++) {
         int64_t first = i * CHUNK, n = count - first < CHUNK ? count - first : CHUNK;
         ts_shade_k()->log_encode((int)n, in + first, a, b, out + first);

@@ -20,15 +20,15 @@ void *ts_block(size_t bytes)
 
 enum { PART = 128 << 10 };
 
-void ts_block_copy(void *to, const void *from, size_t bytes)
+void ts_block_copy(void *to, const void *from, size_t bytes, int threads)
 {
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (bytes > 2 * PART)
+#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static) if (bytes > 2 * PART)
     for (size_t i = 0; i < bytes; i += PART)
         memcpy((char *)to + i, (const char *)from + i, bytes - i < PART ? bytes - i : PART);
 }
 
-void ts_block_clear(void *to, size_t bytes)
+void ts_block_clear(void *to, size_t bytes, int threads)
 {
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) if (bytes > 2 * PART)
+#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static) if (bytes > 2 * PART)
     for (size_t i = 0; i < bytes; i += PART) memset((char *)to + i, 0, bytes - i < PART ? bytes - i : PART);
 }

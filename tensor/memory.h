@@ -1,12 +1,12 @@
 /* Memory for numbers: where arenas, scratch and parameters come from. */
-#ifndef TS_BLOCK_H
-#define TS_BLOCK_H
+#ifndef TS_MEMORY_H
+#define TS_MEMORY_H
 #include <stddef.h>
 
 /* bytes, aligned to 64, contents undefined; NULL when there is none. The caller frees with free(). A large block is
  * offered to the kernel for huge pages: one fault instead of 512, and convolutions miss the TLB less. */
 void *ts_block(size_t bytes);
-/* memcpy, and memset to zeros, by all threads where there is much to do. */
-void ts_block_copy(void *to, const void *from, size_t bytes);
-void ts_block_clear(void *to, size_t bytes);
+/* memcpy, and memset to zeros, by so many threads (0: the process's number) where there is much to do. */
+void ts_block_copy(void *to, const void *from, size_t bytes, int threads);
+void ts_block_clear(void *to, size_t bytes, int threads);
 #endif

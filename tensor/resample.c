@@ -100,11 +100,12 @@ ts_taps ts_taps_transpose(ts_arena *arena, const ts_taps *t)
     return r;
 }
 
-void ts_resample(int n, int c, const ts_taps *rows, const ts_taps *columns, const float *x, float *y, bool accumulate)
+void ts_resample(int n, int c, const ts_taps *rows, const ts_taps *columns, const float *x, float *y, bool accumulate,
+                 int threads)
 {
     const struct ts_resample_kernels *k = ts_resample_k();
     const int64_t row = (int64_t)columns->in * c, image = row * rows->in, lines = (int64_t)n * rows->out;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
+#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static)
     for (int64_t line = 0; line < lines; line++) {
         const int j = (int)(line % rows->out), at = rows->offset[j], count = rows->offset[j + 1] - at;
         const float *from = x + line / rows->out * image + rows->first[j] * row;

@@ -36,6 +36,8 @@ static inline ts_taps ts_taps_part(const ts_taps *t, int first, int count)
 /* The transposed matrix. */
 ts_taps ts_taps_transpose(ts_arena *arena, const ts_taps *t);
 
-/* y (+)= x filtered. x: [n, rows->in, columns->in, c], y: [n, rows->out, columns->out, c]. Threaded over rows of y. */
-void ts_resample(int n, int c, const ts_taps *rows, const ts_taps *columns, const float *x, float *y, bool accumulate);
+/* y (+)= x filtered. x: [n, rows->in, columns->in, c], y: [n, rows->out, columns->out, c]. Threaded over rows of y;
+ * threads 0: the process's number. */
+void ts_resample(int n, int c, const ts_taps *rows, const ts_taps *columns, const float *x, float *y, bool accumulate,
+                 int threads);
 #endif

@@ -6,5 +6,5 @@
 
 /* dst = src resampled; same n and c, both contiguous, no overlap. Threaded. scratch comes from the arena and is given
  * back. */
-ts_code ts_resize(ts_tensor *dst, const ts_tensor *src, ts_arena *arena, ts_status *st);
+ts_code ts_resize(ts_tensor *dst, const ts_tensor *src, ts_arena *arena, int threads, ts_status *st);
 #endif

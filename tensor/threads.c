@@ -9,7 +9,6 @@
 #include <string.h>
 
 static atomic_int wanted;
-static _Thread_local int own;
 
 bool ts_threads_pin(void)
 {
@@ -85,16 +84,8 @@ int ts_threads_allowed(void)
 
 void ts_threads_set(int n) { atomic_store(&wanted, n >= 1 ? n : ts_threads_allowed()); }
 
-int ts_threads_own(int n)
-{
-    const int before = own;
-    own = n;
-    return before;
-}
-
 int ts_threads(void)
 {
-    if (own > 0) return own;
     if (atomic_load_explicit(&wanted, memory_order_relaxed) == 0) ts_threads_set(0);
     return atomic_load_explicit(&wanted, memory_order_relaxed);
 }
@@ -153,9 +144,9 @@ void *ts_scratch(int slot, size_t bytes)
     return s->memory[slot];
 }
 
-void ts_scratch_level(void)
+void ts_scratch_level(int threads)
 {
-#pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads_of(threads))
     {
         scratch *s = own_scratch();
         for (int i = 0; i < TS_SCRATCH_SLOTS; i++) grow(s, i, atomic_load(&most[i]));

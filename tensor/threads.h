@@ -8,10 +8,9 @@
 void ts_threads_set(int n);
 int ts_threads_allowed(void); /* what 0 stands for */
 
-/* For loops that the calling thread begins: n threads whatever the process uses, n >= 1, or 0 for the process's again.
- * Returns what it was. */
-int ts_threads_own(int n);
-int ts_threads(void); /* of the calling thread's loops */
+int ts_threads(void);
+/* Of a loop that is given a number: n, or the process's where n is 0. */
+static inline int ts_threads_of(int n) { return n > 0 ? n : ts_threads(); }
 
 /* Binds each of the threads in use to a CPU of its own, in the order of the process's affinity mask, so that times do
  * not depend on where the system moves them. False, with nothing changed, when there are fewer CPUs than threads. Call
@@ -24,7 +23,8 @@ bool ts_threads_pin(void);
 enum { TS_SCRATCH_SLOTS = 4 };
 void *ts_scratch(int slot, size_t bytes);
 
-/* Between steps, while no scratch is in use: every thread grows its slots to the largest size that any thread has asked
- * for. Under a dynamic schedule a thread may meet its largest task late; after this it finds the memory there. */
-void ts_scratch_level(void);
+/* Between steps, while no scratch is in use: each of so many threads (0: the process's number) grows its slots to the
+ * largest size that any thread has asked for. Under a dynamic schedule a thread may meet its largest task late; after
+ * this it finds the memory there. */
+void ts_scratch_level(int threads);
 #endif

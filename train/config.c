@@ -232,16 +232,22 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
     if (nn_arch_check(&c->arch, st) != TS_OK) return ts_context(st, "[model]");
     if (c->train.steps + c->train.pretrain_steps < 1)
         return ts_fail(st, TS_INVALID, "train.steps and train.pretrain_steps are both 0, there is nothing to do");
-    if (c->arch.latent > 0) {
-        const int unit = 1 << c->arch.g_levels;
+    if (c->coder.code > 0) {
+        const int unit = 1 << c->coder.levels;
+        if (nn_coder_check(&c->coder, st) != TS_OK) return st->code;
+        if (c->arch.h_width || c->arch.iterations)
+            return ts_fail(st, TS_INVALID,
+                           "coder.code is %d: an auto-encoder has no refiner, so model.h_width and model.iterations "
+                           "must be 0",
+                           c->coder.code);
         if (c->data.patch % unit || (c->validate.every && c->validate.size % unit))
             return ts_fail(
                 st, TS_INVALID,
-                "data.patch is %d and validate.size %d: with %d model.g_levels an auto-encoder needs multiples of %d",
-                c->data.patch, c->validate.size, c->arch.g_levels, unit);
+                "data.patch is %d and validate.size %d: with %d coder.levels an auto-encoder needs multiples of %d",
+                c->data.patch, c->validate.size, c->coder.levels, unit);
         if (c->train.pretrain_steps || c->train.window)
             return ts_fail(st, TS_INVALID,
-                           "an auto-encoder (model.latent) has one phase and whole patches: train.pretrain_steps and "
+                           "an auto-encoder (coder.code) has one phase and whole patches: train.pretrain_steps and "
                            "train.window must be 0");
     }
     if (c->train.steps && c->train.g_rate == 0 && !(c->arch.coarse_steps > 0 && c->train.coarse_rate > 0) &&

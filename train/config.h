@@ -1,5 +1,4 @@
-/* What a training run is, as plain data, and the one table of keys (train/keys.c) that parses, prints and documents it.
- */
+/* The configuration of a training run, and the table of keys (train/keys.c) that parses, prints and documents it. */
 #ifndef TR_CONFIG_H
 #define TR_CONFIG_H
 #include "data/materials/procedural.h"
@@ -11,8 +10,9 @@
 typedef enum tr_camera { TR_CAMERA_DATA, TR_CAMERA_DEFAULT } tr_camera;
 
 typedef struct tr_config {
-    nn_arch arch; /* [model] */
-    struct {      /* [data] */
+    nn_arch arch;   /* [model] */
+    nn_coder coder; /* [coder] */
+    struct {        /* [data] */
         int64_t seed;
         uint64_t families; /* bits as in io_procedural; 0: all */
         double noise, noise_spread, blur, exposure, vignette, white_balance, tilt, off_centre; /* as in io_camera */
@@ -62,16 +62,16 @@ extern const int tr_key_count;
 
 tr_config tr_config_default(void);
 
-/* Sets one key from text; where ("file.ini:12" or "--set") begins the message. An unknown section or key is answered
- * with the nearest. */
+/* Sets one key from text; where ("file.ini:12" or "--set") begins the message. For an unknown section or key
+ * the message suggests the nearest. */
 ts_code tr_config_set(tr_config *c, const char *where, const char *section, const char *key, const char *value,
                       ts_status *st);
 /* The same from "section.key=value". */
 ts_code tr_config_set_assignment(tr_config *c, const char *assignment, ts_status *st);
-/* Every entry of the file; what it does not name stays as it is. */
+/* Every entry of the file; other keys keep their values. */
 ts_code tr_config_read(tr_config *c, const char *path, ts_status *st);
 
-/* What no key can say alone: the architecture as a whole, ranges against each other. */
+/* Conditions on several keys: the architecture as a whole, ranges against each other. */
 ts_code tr_config_check(const tr_config *c, ts_status *st);
 
 /* The text of one value as an INI file has it. */

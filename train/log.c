@@ -1,4 +1,4 @@
-/* log.csv and val.csv. Rows that a resumed run will make again are cut off first. */
+/* log.csv and val.csv. Rows that a resumed run will write again are removed first. */
 #include "train/trainer_internal.h"
 #include <errno.h>
 #include <math.h>

@@ -10,23 +10,21 @@
 
 static const char usage[] =
     "Usage: lgd-train CONFIG.ini [options]\n"
-    "Trains a model on procedural materials as CONFIG.ini says. The run's folder (output.folder, by default "
-    "runs/CONFIG)\n"
-    "gets the weights best.safetensors and last.safetensors, a checkpoint, log.csv and val.csv.\n"
+    "Trains a model on procedural materials with the configuration CONFIG.ini. The run's folder (output.folder,\n"
+    "default runs/CONFIG) gets best.safetensors, last.safetensors, a checkpoint, log.csv and val.csv.\n"
     "\n"
-    "  --set SECTION.KEY=VALUE  set a key after the file was read; may be given several times\n"
-    "  --resume                 go on from the folder's checkpoint, exactly as if the run had not stopped\n"
-    "  --init WEIGHTS           begin with the parameters of a weights file (the same as --set train.init=WEIGHTS); "
-    "given twice, the\n"
-    "                           second file gives what the first does not have (train.init_rest)\n"
-    "  --initial FILE           write the weights that the run would begin with, and end\n"
-    "  --threads N              threads to compute with (default: all that the process may use)\n"
+    "  --set SECTION.KEY=VALUE  change a key of the file; may be repeated\n"
+    "  --resume                 continue from the folder's checkpoint, exactly as if the run had not stopped\n"
+    "  --init WEIGHTS           start from a weights file (the same as --set train.init=WEIGHTS); given twice, the\n"
+    "                           second file has the parameters that the first lacks (train.init_rest)\n"
+    "  --initial FILE           write the weights that the run would start from, and exit\n"
+    "  --threads N              number of threads (default: all that the process may use)\n"
     "  --help-config            print every key with its range, default and meaning\n"
-    "  --print-config           print the configuration as it would run\n"
+    "  --print-config           print the configuration of the run\n"
     "  --help                   print this\n"
     "  --version                print the version\n"
     "\n"
-    "Ctrl-C finishes the step, saves a checkpoint and ends with exit status 1.\n";
+    "Ctrl-C finishes the step, saves a checkpoint and exits with status 1.\n";
 
 typedef struct shown {
     cl_progress progress;
@@ -111,13 +109,12 @@ static int train(const tr_config *config, const char *folder, bool resume)
 }
 
 /* libgomp's threads spin for about 10 ms at every barrier before they sleep, which starves the loader's thread and, on
- * a machine that does anything else, the very threads that they wait for (measured: a tenth of the speed). It reads its
- * settings before main, so the program begins again with another one; the user's own setting stays. */
+ * a machine with other work, the threads that they wait for (a tenth of the speed). libgomp reads its settings before
+ * main, so the program sets one and starts itself again. The user's own setting is kept. */
 static void spin_briefly(char **argv)
 {
     if (ts_threads() < 2 || getenv("GOMP_SPINCOUNT") || getenv("OMP_WAIT_POLICY")) return;
-    if (setenv("GOMP_SPINCOUNT", "2000", 1) == 0)
-        execv("/proc/self/exe", argv); /* where that fails the run is only slower */
+    if (setenv("GOMP_SPINCOUNT", "2000", 1) == 0) execv("/proc/self/exe", argv); /* on failure the run is only slower */
 }
 
 enum { SET = 256, RESUME, INIT, INITIAL, THREADS, HELP_CONFIG, PRINT_CONFIG, HELP, VERSION };
@@ -143,6 +140,7 @@ int main(int argc, char **argv)
     ts_status st = {0};
     char folder[1100];
     if (!set || code != CL_OK) goto end;
+    cl_trace();
     while ((option = getopt_long(argc, argv, "", options, NULL)) != -1) {
         int64_t threads;
         switch (option) {

@@ -1,4 +1,4 @@
-/* What the camera sees of materials: the networks' input. */
+/* Photographs of materials, with the camera's faults: the networks' input. */
 #include "data/camera.h"
 #include "render/ambient.h"
 #include "render/render.h"

@@ -132,7 +132,7 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
     if (row->pretraining) {
         return guess_loss(t, &in, ag_constant(t->tape, goals), row);
     }
-    if (c->arch.latent > 0) {
+    if (c->coder.code > 0) {
         ag_value *goal = ag_constant(t->tape, goals);
         return add_loss(t, NULL, nn_decode(t->tape, t->model, nn_encode(t->tape, t->model, goal)), goal, 1,
                         &row->render_end, &row->map_end);
@@ -164,7 +164,7 @@ static double rate_now(const tr_config *c, int64_t step)
                                     (float)(pre ? c->train.pretrain_floor : c->train.rate_floor), at, warmup, length);
 }
 
-/* The second phase has another loss: Adam begins anew. */
+/* The second phase has another loss: Adam restarts. */
 static void begin_phase(tr_trainer *t)
 {
     if (t->step == 0 || t->step != t->config.train.pretrain_steps) return;
@@ -176,9 +176,8 @@ static void begin_phase(tr_trainer *t)
 
 #define USUAL_DECAY 0.98
 
-/* A gradient of 0 is that of saturated outputs, from which there is no way back; one far beyond the usual norm would,
- * after clipping, still move by a whole step each of the many weights whose second moment is small, and has ended runs
- * so. */
+/* A gradient of 0 comes from saturated outputs, which do not recover. One far above the recent norm, even clipped,
+ * moves every weight with a small second moment by a whole step, and can end a run. */
 static const char *why_skip(const tr_trainer *t, const tr_row *row)
 {
     enum { SETTLED = 100 }; /* steps before which norms change fast for good reasons */
@@ -244,14 +243,10 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
     rate_factors(c, row->pretraining, factor);
     for (int part = NN_G; part <= NN_COARSE; part++) t->model->fixed[part] = factor[part] == 0;
     ag_reset(t->tape);
-    const bool exact = ts_conv_exact();
-    ts_conv_exact_set(c->train.exact);
-    ts_conv_precision_set(c->train.precision);
+    ag_compute_set(t->tape, (ts_compute){.exact = c->train.exact, .precision = c->train.precision});
     ag_value *loss = forward(t, target, given, row);
     if (loss) row->loss = (double)loss->t.data[0];
     if (loss && isfinite(row->loss) && ag_backward(t->tape, loss) == TS_OK) row->norm = gradient_norm(t->model);
-    ts_conv_precision_set(TS_F32);
-    ts_conv_exact_set(exact);
     if (ag_status(t->tape)->code) {
         *st = *ag_status(t->tape);
         return st->code;

@@ -91,7 +91,12 @@ static ts_code write_config(const tr_trainer *t, ts_status *st)
     return TS_OK;
 }
 
-/* The parameters that a run begins with. t: may be NULL, who is told. */
+nn_model *tr_model_create(const tr_config *c, ts_status *st)
+{
+    return c->coder.code > 0 ? nn_coder_create(&c->coder, st) : nn_model_create(&c->arch, st);
+}
+
+/* The parameters that a run starts from. t: NULL, or the trainer that notes are reported to. */
 static ts_code init_weights(nn_model *model, const tr_config *c, tr_trainer *t, ts_status *st)
 {
     const char *const path[] = {c->train.init, c->train.init_rest};
@@ -110,7 +115,7 @@ static ts_code init_weights(nn_model *model, const tr_config *c, tr_trainer *t, 
 
 ts_code tr_initial(const tr_config *config, const char *path, ts_status *st)
 {
-    nn_model *m = nn_model_create(&config->arch, st);
+    nn_model *m = tr_model_create(config, st);
     if (!m) return st->code;
     ts_code code = init_weights(m, config, NULL, st);
     if (!code) code = nn_model_save(m, m->value, path, NULL, 0, st);
@@ -132,7 +137,7 @@ static ts_code build(tr_trainer *t, bool resume, ts_status *st)
     t->views = malloc(batch * RD_LOSS_VIEWS * sizeof *t->views);
     if (!t->images || !t->captures || !t->scenes || !t->known || !t->shots || !t->views)
         return ts_fail(st, TS_NOMEM, "no memory for %zu photographs", photographs);
-    t->model = nn_model_create(&c->arch, st);
+    t->model = tr_model_create(c, st);
     if (!t->model || nn_model_train(t->model, st) != TS_OK || (!resume && init_weights(t->model, c, t, st) != TS_OK))
         return st->code;
     if (nn_adam_create(&t->adam, t->model, (float)c->train.ema, st) != TS_OK || (resume && tr_resume(t, st) != TS_OK))

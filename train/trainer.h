@@ -2,8 +2,7 @@
  * step), so that a resumed run makes the same bytes as one that was not interrupted, for any number of threads.
  *
  * Two phases. The first, pretrain_steps long, trains g alone on R_0's loss; the second trains g and h on R_T's and
- * R_0's. Each has its own warm-up, cosine and Adam moments (g's moments from the first phase say nothing about the
- * second loss).
+ * R_0's. Each has its own warm-up, cosine and Adam moments, since the two losses differ.
  *
  * The folder's files: config.ini (as it runs), log.csv (a row a step), val.csv (a row a validation), best.safetensors
  * (weights with the least validated error in the phase), last.safetensors (weights at the last checkpoint),
@@ -37,7 +36,7 @@ typedef struct tr_validation {
     double seconds;
 } tr_validation;
 
-/* What the caller is told, on the calling thread; any may be NULL. note: one line. stop: asked between steps. */
+/* Callbacks, on the calling thread; any may be NULL. note: one line. stop: asked between steps. */
 typedef struct tr_listener {
     void (*step)(const tr_row *row, void *user);
     void (*validated)(const tr_validation *v, void *user);
@@ -53,7 +52,7 @@ typedef struct tr_trainer tr_trainer;
 tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, const tr_listener *listener,
                       ts_status *st);
 
-/* The weights that a run of this configuration begins with, as a file. */
+/* Writes the weights that a run of this configuration starts from. */
 ts_code tr_initial(const tr_config *config, const char *path, ts_status *st);
 
 /* The folder of a run without output.folder: runs/NAME for .../NAME.ini. */

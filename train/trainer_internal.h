@@ -1,4 +1,4 @@
-/* What the trainer's files share. */
+/* Shared by the trainer's files. */
 #ifndef TR_PARTS_H
 #define TR_PARTS_H
 #include "data/loader.h"
@@ -59,7 +59,11 @@ bool tr_pretraining(const tr_config *c, int64_t step); /* whether the step after
 double tr_seconds(void);
 const float *tr_weights(const tr_trainer *t); /* what is validated and saved */
 
-/* photograph.c: number photographs of each material [count][size][size][9] as [data] says, images
+/* The network of the configuration, or its auto-encoder: parameters are zero. The caller frees. NULL and st on failure.
+ */
+nn_model *tr_model_create(const tr_config *c, ts_status *st);
+
+/* photograph.c: number photographs of each material [count][size][size][9], with the faults of [data]; images
  * [count][number][size][size][3], under views [count][number] of kind RD_POINT whose camera looks straight down (NULL:
  * the flash for all); index: of the first material, for the camera's faults, of which every photograph has its own.
  * shots [count][number]: the truth of each; NULL: not wanted. */

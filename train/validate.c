@@ -43,7 +43,7 @@ ts_code tr_validator_create(tr_trainer *t, ts_status *st)
     v->views = malloc(count * RD_EVAL_VIEWS * sizeof *v->views);
     if (!v->maps || !v->images || !v->captures || !v->shots || !v->views || !make_materials(c, v->maps))
         return ts_fail(st, TS_NOMEM, "no memory for the validation materials");
-    v->model = nn_model_create(&c->arch, st);
+    v->model = tr_model_create(c, st);
     v->tape = v->model ? ag_tape_create(false, st) : NULL;
     if (!v->tape) return st->code;
     tr_capture_views((uint64_t)c->validate.seed, 0, c->validate.count, c->arch.images, v->captures);
@@ -89,7 +89,7 @@ static ts_code add_errors(tr_trainer *t, int first, int n, tr_validation *out, t
         .given = (int)given};
     ag_value *maps[TR_MOST_ITERATIONS + 1];
     ag_reset(v->tape);
-    if (v->model->arch.latent > 0) { /* how well the maps themselves come back */
+    if (v->model->coder.code > 0) { /* how well the maps themselves come back */
         float *truth = v->maps + (size_t)first * pixels * MAP_CHANNELS;
         maps[0] = nn_decode(v->tape, v->model,
                             nn_encode(v->tape, v->model,

@@ -8,7 +8,7 @@
 
 enum { PREFIX = 256 };
 
-static const lgd_argument arguments[] = {
+static const cl_argument arguments[] = {
     {'l', "list", NULL, "print name, type and shape of every tensor of IN, and write nothing"},
     {'d', "dtype", "TYPE", "f32, f16 or bf16 for all floating-point tensors (default: each keeps its own)"},
     {PREFIX, "prefix", "TEXT", "only tensors whose names begin with TEXT, without it (as in: model. or module.)"},
@@ -36,7 +36,7 @@ static void print_help(void)
          "In nested dictionaries a tensor's name is the keys from the outermost on, joined by dots; a \"state_dict\" "
          "or \"model_state_dict\" outermost\n"
          "is left out. Integer tensors are kept as they are; tensors that share memory become separate ones.\n");
-    lgd_argument_help(arguments, stdout);
+    cl_argument_help(arguments, stdout);
     puts("\nExit status: 0 done, 1 IN cannot be read or OUT cannot be written, 2 wrong usage.");
 }
 
@@ -52,7 +52,7 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
     const char *value = NULL;
     int key, operands = argc;
     while (!c->help && !c->version &&
-           (key = lgd_argument_next(argc, argv, arguments, &value, &operands, st)) != LGD_ARGUMENT_END) {
+           (key = cl_argument_next(argc, argv, arguments, &value, &operands, st)) != CL_ARGUMENT_END) {
         switch (key) {
         case 'l': c->list = true; break;
         case 'h': c->help = true; break;
@@ -89,7 +89,7 @@ static void print_text(const char *s)
     for (; *s; s++) putchar((unsigned char)*s < ' ' || *s == 127 ? '?' : *s);
 }
 
-static void list(const nn_file *f, const nn_entry *entry, int entries)
+static void list(const nn_file *f, const nn_tensor *entry, int entries)
 {
     static const char *const form[] = {"safetensors", "PyTorch, ZIP archive", "PyTorch before 1.6"};
     int64_t numbers = 0;
@@ -115,7 +115,7 @@ static ts_code run(const command *c, ts_status *st)
 {
     nn_file *f = nn_file_open(c->in, st);
     if (!f) return st->code;
-    nn_entry *entry = malloc(((size_t)nn_file_count(f) + 1) * sizeof *entry);
+    nn_tensor *entry = malloc(((size_t)nn_file_count(f) + 1) * sizeof *entry);
     nn_meta *meta = NULL;
     int entries = 0, metas = 0;
     const char *key;
@@ -124,7 +124,7 @@ static ts_code run(const command *c, ts_status *st)
     ts_code code = entry && meta ? TS_OK : ts_fail(st, TS_NOMEM, "%s: no memory for the list of tensors", c->in);
     for (int i = 0; !code && (key = nn_file_meta_key(f, i)); i++) meta[i] = (nn_meta){key, nn_file_meta(f, key)};
     for (int i = 0; !code && i < nn_file_count(f); i++) {
-        const nn_entry *e = nn_file_entry(f, i);
+        const nn_tensor *e = nn_file_tensor(f, i);
         if (strncmp(e->name, c->prefix, strlen(c->prefix)) != 0) continue;
         entry[entries] = *e;
         entry[entries++].name += strlen(c->prefix);

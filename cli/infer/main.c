@@ -1,14 +1,10 @@
 /* lgd-infer: maps from flash photographs. */
 #include "cli/cli.h"
-#include "data/material.h"
-#include "infer/capture.h"
-#include "infer/encode.h"
-#include "infer/lgd.h"
-#include "infer/model_path.h"
 #include "cli/infer/options.h"
+#include "cli/infer/pipeline.h"
+#include "infer/model_path.h"
 #include "infer/output.h"
 #include "infer/photograph.h"
-#include "cli/infer/pipeline.h"
 #include "tensor/threads.h"
 #include <math.h>
 #include <pthread.h>
@@ -25,49 +21,25 @@ typedef struct run {
     int steps;              /* refinement steps of each */
 } run;
 
-/* What the library's calls get as their user. */
-typedef struct task {
-    run *r;
-    lgd_item *item;
-} task;
-
-/* done: of the item, 0 .. 1. */
-static void show(run *r, lgd_item *item, double done)
+static int show(lgd_item *item, double done, void *user)
 {
+    run *r = user;
     pthread_mutex_lock(&r->lock);
     r->shown += done - item->shown;
     item->shown = done;
     if (!r->command->quiet) cl_progress_show(&r->bar, (int64_t)(r->shown * (r->steps + 1) + 0.5), item->job->photo);
     pthread_mutex_unlock(&r->lock);
-}
-
-static int after_step(int step, double rmse, void *user)
-{
-    const task *t = user;
-    if (step == 0) t->item->first = rmse;
-    t->item->last = rmse;
-    t->item->steps = step;
-    show(t->r, t->item, (step + 1.0) / (t->r->steps + 1));
-    return cl_interrupted();
-}
-
-/* Of a photograph that is refined in tiles. */
-static int before_tile(double done, void *user)
-{
-    const task *t = user;
-    show(t->r, t->item, done);
     return cl_interrupted();
 }
 
 /* Says what makes a photograph a poor one: the maps will be guesses. */
-static void look_at(const lgd_item *item)
+static void look_at(const lgd_item *item, int size)
 {
     const char *name = item->job->photo;
-    const int size = item->square.width;
     const int64_t values = (int64_t)size * size * 3;
     int64_t dark = 0, full = 0, over = 0;
     for (int64_t i = 0; i < values; i++) {
-        const float v = item->square.data[i];
+        const float v = item->image[i];
         dark += v < 1e-3f; /* three of 255 sRGB levels */
         full += v > 0.999f;
         over += v > 1.001f; /* more than resampling rounds to */
@@ -83,48 +55,17 @@ static void look_at(const lgd_item *item)
                 100.0 * (double)over / (double)values);
 }
 
-static void compute(lgd_item *item, void *user)
-{
-    run *r = user;
-    const int size = item->square.width;
-    task t = {r, item};
-    const lgd_options options = {.iterations = r->command->iterations,
-                                 .threads = item->threads,
-                                 .progress = after_step,
-                                 .user = &t,
-                                 .power = r->command->power > 0 ? NULL : &item->power,
-                                 .exact = r->command->exact,
-                                 .precision = r->command->bf16 ? LGD_BF16 : LGD_F32,
-                                 .orientations = r->command->orientations,
-                                 .mask = item->mask,
-                                 .tolerance = r->command->tolerance,
-                                 .tile = before_tile};
-    lgd_error error;
-    lgd_photo photo[IO_CAPTURE_IMAGES] = {lgd_flash_photo(item->square.data)};
-    int photos = 1;
-    if (item->capture.images) {
-        photos = lgd_capture_photos(&item->capture, lgd_most_photos(r->model), photo);
-        if (photos < item->capture.images)
-            cl_note("%s: note: the first %d of its %d photographs are used: these weights read no more",
-                    item->job->photo, photos, item->capture.images);
-    }
-    item->power = r->command->power > 0 ? r->command->power : 1;
-    for (int k = 0; k < photos; k++) photo[k].power *= (float)item->power;
-    if (io_material_create(&item->m, size, &item->st) != TS_OK) ts_context(&item->st, "%s", item->job->photo);
-    else if (lgd_estimate_photos(r->model, photo, photos, size, &options, item->m.maps, &error) && !cl_interrupted())
-        ts_fail(&item->st, (ts_code)error.code, "%s: %s", item->job->photo, error.message);
-    else if (cl_interrupted()) ts_fail(&item->st, TS_INTERRUPTED, "interrupted");
-    else lgd_encode(item->m.maps, size, item->m.maps);
-}
-
 #define FAR                                                                                                         \
     0.01 /* reconstruction RMSE after the trained steps from which a highlight may be seen where the photograph has \
             none */
 
-static void tell(run *r, const lgd_item *item)
+static void report(run *r, const lgd_item *item)
 {
     cl_progress_end(&r->bar);
-    if (item->square.data) look_at(item);
+    if (item->photos > 0 && item->photos < item->capture.images)
+        cl_note("%s: note: the first %d of its %d photographs are used: these weights read no more", item->job->photo,
+                item->photos, item->capture.images);
+    if (item->image) look_at(item, r->command->size);
     if (item->st.code) {
         cl_failed("%s", item->st.message);
         r->failed++;
@@ -139,7 +80,7 @@ static void tell(run *r, const lgd_item *item)
     if (r->command->quiet) return;
     if (fabs(item->power - 1) >= 0.005)
         cl_note("%s: light power %.2f of the %s", item->job->photo, item->power,
-                item->capture.images ? "capture's" : "usual");
+                item->capture.images ? "capture's" : "default");
     const char *hint = r->command->iterations == -1 && item->last > FAR ? "; --iterations auto may come nearer"
                                                                         : ""; /* each step halves what is left */
     if (item->steps > 0)
@@ -154,14 +95,14 @@ static void finished(const lgd_item *item, void *user)
     if (item->st.code == TS_INTERRUPTED) return;
     pthread_mutex_lock(&r->lock);
     r->shown += 1 - item->shown; /* of one that failed or ended early too */
-    tell(r, item);
+    report(r, item);
     pthread_mutex_unlock(&r->lock);
 }
 
 static int all(run *r, lgd_pipeline *pipeline)
 {
     r->bar = cl_progress_start("step", (int64_t)r->jobs * (r->steps + 1));
-    lgd_pipeline_run(pipeline, compute, finished, cl_interrupted, r);
+    lgd_pipeline_run(pipeline, r->model, &(lgd_listener){show, finished, cl_interrupted, r});
     cl_progress_end(&r->bar);
     if (cl_interrupted() && r->done + r->failed < r->jobs)
         return cl_failed("interrupted: %d of %d photographs are done", r->done, r->jobs);
@@ -175,7 +116,7 @@ static void print_help(void)
          "       lgd-infer [options] --capture WHERE -o DIR\n"
          "Estimates the material of a flat surface from a photograph taken straight on with a flash beside the lens.\n"
          "The largest centred square is used.\n");
-    lgd_argument_help(lgd_infer_arguments, stdout);
+    cl_argument_help(lgd_infer_arguments, stdout);
     puts("\n"
          "DIR/STEM/ gets diffuse.png, specular.png (sRGB), roughness.png, normal.png (linear), maps.exr (all channels, "
          "linear\n"
@@ -209,9 +150,7 @@ static int work(const lgd_command *c)
     else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK)
         cl_failed("%s", st.message);
     else {
-        r.steps = c->iterations == LGD_AUTO ? LGD_AUTO_MOST
-            : c->iterations < 0             ? lgd_trained_iterations(r.model)
-                                            : c->iterations;
+        r.steps = lgd_command_steps(c, r.model);
         code = all(&r, pipeline);
     }
     lgd_pipeline_end(&pipeline);
@@ -228,6 +167,7 @@ int main(int argc, char **argv)
     if (bad) return bad;
     if (lgd_command_parse(argc, argv, &c, &st) != TS_OK) return cl_usage("%s", st.message);
     cl_catch_interrupt();
+    cl_trace();
     int code = CL_OK;
     if (c.help) print_help();
     else if (c.version) cl_print_version();

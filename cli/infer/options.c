@@ -1,7 +1,6 @@
 #include "cli/infer/options.h"
 #include "cli/cli.h"
 #include "data/image/image.h"
-#include "infer/lgd.h"
 #include "infer/output.h"
 #include <string.h>
 
@@ -21,49 +20,46 @@ enum {
     VERSION = 'V'
 };
 
-const lgd_argument lgd_infer_arguments[] = {
-    {'o', "output", "DIR", "write DIR/STEM/ for each photograph, STEM = its file name without extension (required)"},
-    {'s', "size", "N", "pixels of a side of the maps, 1 .. 8192 (default 256)"},
+const cl_argument lgd_infer_arguments[] = {
+    {'o', "output", "DIR",
+     "output folder (required); each photograph gets DIR/STEM/, STEM = its file name without extension"},
+    {'s', "size", "N", "side of the maps in pixels, 1 .. 8192 (default 256)"},
     {'i', "iterations", "N|auto",
-     "refinement steps, 0 .. 1000; 0 = the first estimate alone; auto = as long as the reconstruction improves,\n"
+     "refinement steps, 0 .. 1000; 0 = the first estimate only; auto = as long as the reconstruction improves,\n"
      "24 at most (default: as trained)"},
     {ORIENTATIONS, "orientations", "N",
-     "the first estimate is the mean over so many of the photograph's orientations: 1 (as it is), 2 (and turned by a "
-     "quarter;\n"
-     "the default), 4 (all quarter turns) or 8 (and their mirror images)"},
+     "the first estimate is the mean over N orientations of the photograph: 1 (as it is), 2 (and a quarter turn; the\n"
+     "default), 4 (all quarter turns) or 8 (and their mirror images)"},
     {EXACT, "exact", NULL,
-     "compute all convolutions directly; the default, Winograd's way where it is faster, differs by less than 1e-4"},
+     "compute convolutions directly; the default, Winograd's algorithm where it is faster, differs by less than 1e-4"},
     {PRECISION, "precision", "f32|bf16",
-     "what convolutions multiply (default f32); bf16 is for CPUs with AMX, or AMD's with AVX512-BF16, slower on "
-     "others, and its maps differ by less than 0.005 (RMS)"},
+     "precision of the products in convolutions (default f32); bf16 is faster on CPUs with AMX or AMD's AVX512-BF16,\n"
+     "slower on others; the maps differ by less than 0.005 (RMS)"},
     {CAPTURE, "capture", "WHERE",
-     "in place of PHOTO: several photographs of one sample under known lights, listed in an INI file\n"
-     "or a folder in MaterialGAN's layout; by default with the weights named multi"},
+     "instead of PHOTO: several photographs of one sample under known lights, listed in an INI file or in a folder\n"
+     "in MaterialGAN's layout; the default model is then multi"},
     {POWER, "light-power", "P",
-     "how strong the light is, in usual ones (of a capture: in those that it names): a number in 0.01 .. 100, or\n"
-     "auto, estimated from the photograph and reported (the default; of a capture 1)"},
+     "power of the light, relative to the default light (of a capture: to the power it states): a number in\n"
+     "0.01 .. 100, or auto = estimated from the photograph and printed (default auto; of a capture 1)"},
     {MASK, "mask", "FILE",
-     "an image of the photographs' shape: only where it is brighter than black are the maps sure to be refined,\n"
-     "as they would be without it; elsewhere they may be those of an earlier step"},
+     "an image of the photographs' shape: refine only where it is not black; there the maps are the same as without\n"
+     "it, elsewhere they may be those of an earlier step"},
     {TOLERANCE, "tolerance", "X",
-     "0 .. 1: the photograph (over 512 pixels: a tile of it) is refined no further once a step changes its maps by "
-     "less than X (RMS,\n"
-     "of values in -1 .. 1); 0: never (default: 0.003 for models with a network at that size, which the shipped ones "
-     "have not; 0 for others,\n"
-     "with --iterations, with --exact and with published weights)"},
+     "early stop, 0 .. 1: a tile is done when one step changes its maps by less than X (RMS, maps in -1 .. 1);\n"
+     "photographs up to 512 pixels are one tile; 0 = never (default: 0.003 for models whose network works at the\n"
+     "photograph's size, not with --iterations or --exact; 0 for others, such as the shipped ones)"},
     {'m', "model", "FILE",
-     "weights: a file, or the name of a model that ships with the program: single (default) or multi (default: "
-     "$LGD_MODEL)"},
-    {'t', "threads", "N", "threads to use, 1 .. 1024; 0 = all that are allowed (default 0)"},
-    {NORMAL, "normal", "gl|dx", "normal.png with y up (OpenGL, default) or y down (DirectX)"},
+     "weights: a file, or the name of a shipped model, single (default) or multi (default: $LGD_MODEL)"},
+    {'t', "threads", "N", "number of threads, 1 .. 1024; 0 = all that are allowed (default 0)"},
+    {NORMAL, "normal", "gl|dx", "y of normal.png: up (gl, OpenGL, default) or down (dx, DirectX)"},
     {MAPS, "maps", "LIST",
-     "write only these, of diffuse, specular, roughness, normal, exr, render, preview (the default: all\n"
-     "so far), basecolor, metallic, height, gltf, materialx; what is not asked for is not computed"},
+     "files to write, separated by commas: diffuse, specular, roughness, normal, exr, render, preview (default: all\n"
+     "of these), basecolor, metallic, height, gltf, materialx"},
     {WORKFLOW, "workflow", "W",
-     "specular (default), or metallic: base colour and metalness in place of diffuse and specular,\n"
-     "with the error that this makes"},
-    {MAX_PIXELS, "max-pixels", "N", "refuse photographs with more pixels, before memory is taken (default 268435456)"},
-    {'q', "quiet", NULL, "no progress and no figures, only warnings and errors"},
+     "specular (default), or metallic: base colour and metalness instead of diffuse and specular; the error of the\n"
+     "conversion is printed"},
+    {MAX_PIXELS, "max-pixels", "N", "refuse photographs with more pixels (default 268435456)"},
+    {'q', "quiet", NULL, "print warnings and errors only"},
     {HELP, "help", NULL, "print this help"},
     {VERSION, "version", NULL, "print the version"},
     {0, NULL, NULL, NULL}};
@@ -90,8 +86,8 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
 {
     *c = (lgd_command){.size = 256,
                        .iterations = -1,
-                       .orientations = LGD_ORIENTATIONS_USUAL,
-                       .tolerance = LGD_TOLERANCE_USUAL,
+                       .orientations = LGD_ORIENTATIONS_DEFAULT,
+                       .tolerance = LGD_TOLERANCE_DEFAULT,
                        .max_pixels = IO_MAX_PIXELS_DEFAULT};
     const char *value = NULL;
     int key, operands = argc;
@@ -99,7 +95,7 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
     ts_code code = TS_OK;
     bool power_given = false;
     while (!code && !c->help && !c->version &&
-           (key = lgd_argument_next(argc, argv, lgd_infer_arguments, &value, &operands, st)) != LGD_ARGUMENT_END) {
+           (key = cl_argument_next(argc, argv, lgd_infer_arguments, &value, &operands, st)) != CL_ARGUMENT_END) {
         switch (key) {
         case 'o': c->out = value; break;
         case 'm': c->model = value; break;
@@ -189,4 +185,10 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
     if (!c->out) return ts_fail(st, TS_INVALID, "no output folder is given: -o DIR");
     if (!*c->out) return ts_fail(st, TS_INVALID, "-o: the name of the output folder is empty");
     return TS_OK;
+}
+
+int lgd_command_steps(const lgd_command *c, const lgd_model *model)
+{
+    if (c->iterations == LGD_AUTO) return LGD_AUTO_MOST;
+    return c->iterations < 0 ? lgd_trained_iterations(model) : c->iterations;
 }

@@ -2,6 +2,7 @@
 #ifndef LGD_OPTIONS_H
 #define LGD_OPTIONS_H
 #include "cli/arguments.h"
+#include "infer/lgd.h"
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -12,7 +13,7 @@ typedef struct lgd_command {
     int64_t max_pixels;
     double tolerance;
     int orientations; /* 1, 2, 4 or 8 */
-    double power;     /* of the light, in usual ones; 0: estimated */
+    double power;     /* of the light, in default ones; 0: estimated */
     unsigned outputs; /* LGD_OUT_... */
     bool directx, metallic, exact, bf16, quiet, help, version;
     char **photo; /* into argv; with a capture, that alone */
@@ -20,8 +21,11 @@ typedef struct lgd_command {
     int photos;
 } lgd_command;
 
-extern const lgd_argument lgd_infer_arguments[];
+extern const cl_argument lgd_infer_arguments[];
 
 /* TS_INVALID and st on wrong usage. With help or version set nothing else is checked. */
 ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st);
+
+/* Refinement steps of each photograph, at most. */
+int lgd_command_steps(const lgd_command *c, const lgd_model *model);
 #endif

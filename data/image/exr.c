@@ -1,5 +1,5 @@
 /* maps.exr through OpenEXR's C core: channels diffuse.R .G .B, normal.X .Y .Z, roughness.Y, specular.R .G .B, 32-bit
- * float, written uncompressed: ZIP took two thirds of lgd-infer's time for a file that was a twelfth smaller. */
+ * float, written uncompressed: ZIP saves a twelfth of the file and takes longer than the estimate. */
 #include "data/image/exr.h"
 #include "data/file.h"
 #include "data/name.h"

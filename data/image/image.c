@@ -31,7 +31,7 @@ static ts_code resample(const io_image *in, io_image *out, ts_status *st)
     if (!arena) return TS_NOMEM;
     ts_tensor src = ts_view(in->data, (ts_shape){1, in->height, in->width, in->channels});
     ts_tensor dst = ts_view(out->data, (ts_shape){1, out->height, out->width, out->channels});
-    ts_code code = ts_resize(&dst, &src, arena, st);
+    ts_code code = ts_resize(&dst, &src, arena, 0, st);
     ts_arena_destroy(&arena);
     return code;
 }
@@ -43,7 +43,7 @@ static ts_code resample_scikit(const io_image *in, io_image *out, ts_status *st)
     const ts_taps rows = io_taps_scikit(arena, in->height, out->height),
                   columns = io_taps_scikit(arena, in->width, out->width);
     const bool fine = rows.weight && columns.weight;
-    if (fine) ts_resample(1, in->channels, &rows, &columns, in->data, out->data, false);
+    if (fine) ts_resample(1, in->channels, &rows, &columns, in->data, out->data, false, 0);
     ts_arena_destroy(&arena);
     return fine ? TS_OK
                 : ts_fail(st, TS_NOMEM, "no memory to resample an image of %d x %d pixels", in->width, in->height);

@@ -23,9 +23,10 @@ void io_image_free(io_image *image); /* and zeroes the struct */
 ts_code io_read_photo(const char *path, int64_t max_pixels, io_image *image, ts_status *st);
 
 /* Its largest centred square as io_centre_square has it, the same values, with memory for a few of the photograph's
- * rows as floats alone. width, height: of the whole, upright. */
-ts_code io_read_square(const char *path, int64_t max_pixels, int size, io_image *square, int *width, int *height,
-                       ts_status *st);
+ * rows as floats alone. threads: that it is resampled on; 0: the process's number. width, height: of the whole,
+ * upright. */
+ts_code io_read_photo_square(const char *path, int64_t max_pixels, int size, int threads, io_image *square, int *width,
+                             int *height, ts_status *st);
 
 /* A photograph with its values as stored, integers / their maximum: upright, three channels, alpha ignored, no colour
  * transform. Float formats, which are linear, are raised to 1 / gamma, so that all come in one encoding. */

@@ -1,4 +1,5 @@
 /* Loads the shared object that has OpenImageIO behind it, once, when the first call needs it. */
+#include "data/folders.h"
 #include "data/image/oiio.h"
 #include "tensor/threads.h"
 #include <dlfcn.h>
@@ -32,11 +33,12 @@ static bool beside_program(char *path, size_t size)
 static void load(void)
 {
     char path[PATH_MAX];
-    if (!beside_program(path, sizeof path)) snprintf(path, sizeof path, "%s/lgd/" FILE_NAME, LGD_LIBDIR);
+    if (!beside_program(path, sizeof path)) snprintf(path, sizeof path, "%s/lgd/" FILE_NAME, io_library_folder);
     if (access(path, F_OK) != 0) {
         ts_fail(&failure, TS_IO,
-                "this image needs " FILE_NAME ", which is neither in ../lib/lgd beside the program nor in " LGD_LIBDIR
-                "/lgd: install it again");
+                "this image needs " FILE_NAME
+                ", which is neither in ../lib/lgd beside the program nor in %s/lgd: install it again",
+                io_library_folder);
         return;
     }
     void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);

@@ -1,8 +1,8 @@
-/* Readers that only the other readers of data/ need. */
+/* A reader for the readers of data/. */
 #ifndef IO_IMAGE_READ_H
 #define IO_IMAGE_READ_H
 #include "data/image/image.h"
 
-/* A colour map: to linear sRGB as io_read_photo, but never turned, since the maps beside it are not. */
+/* A colour map: linear sRGB as from io_read_photo, but orientation is ignored, as for the other maps. */
 ts_code io_read_colour_map(const char *path, int64_t max_pixels, io_image *image, ts_status *st);
 #endif

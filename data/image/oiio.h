@@ -1,6 +1,6 @@
-/* The only door to OpenImageIO: plain C types, no C++ exception leaves. The library itself stands behind a shared
- * object that is loaded at the first call that needs it (data/image/image_library.c): Debian's build brings some 260
- * others, a quarter of a second before the first pixel. */
+/* The only interface to OpenImageIO: plain C types, no C++ exception leaves it. It is in a shared object that is loaded
+ * at the first call that needs it (data/image/image_library.c): Debian's build loads about 260 libraries, which takes a
+ * quarter of a second. */
 #ifndef IO_OIIO_H
 #define IO_OIIO_H
 #include <stdbool.h>
@@ -22,7 +22,7 @@ typedef struct oi_image {
     void *data;           /* [height][width][channels] */
     int colour[3], alpha; /* channel numbers of red, green, blue (all the same when grey), of alpha or -1 */
     bool grey, floating;  /* floating: stored as half, float or double */
-    int levels;           /* how many values an integer file tells apart: 256 or 65536 (more are rounded to that) */
+    int levels;           /* number of values of an integer file: 256 or 65536 (more are rounded to that) */
     bool associated;      /* the colours are multiplied by alpha already */
     int orientation;      /* EXIF, 1 to 8 */
     bool linear, adobe;   /* the file says: linear values; Adobe RGB (EXIF's interoperability index) */
@@ -54,7 +54,8 @@ typedef struct oi_encoding {
 ts_code oi_encode_jpeg(const char *name, const oi_encoding *e, const uint8_t *pixels, unsigned char **bytes,
                        size_t *size, ts_status *st);
 
-/* Whether some reader claims this file name extension (without the dot). False also where the library cannot be loaded.
+/* Whether a reader exists for this file name extension (without the dot). False also where the library cannot be
+ * loaded.
  */
 bool oi_knows_extension(const char *extension);
 

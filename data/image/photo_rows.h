@@ -1,5 +1,5 @@
-/* A photograph's pixels, upright and in linear light, row by row: what is read from its file stays as it is stored, a
- * quarter of what floats would take. */
+/* A photograph's pixels, upright and in linear light, row by row. The file's pixels are kept as stored, a quarter
+ * of the memory of floats. */
 #ifndef IO_PHOTO_ROWS_H
 #define IO_PHOTO_ROWS_H
 #include "data/image/colour.h"
@@ -10,8 +10,8 @@ typedef struct io_photo_rows {
     oi_image raw;
     io_space space;
     int orientation;
-    float *tables; /* [3][raw.levels]: the curve of every value that an integer file tells apart, of colours that need
-                      no more (plain) the whole conversion */
+    float *tables; /* [3][raw.levels]: the curve of every value of an integer file; where the colours need no matrix
+                      (plain), the whole conversion */
     bool plain;
 } io_photo_rows;
 

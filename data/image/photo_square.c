@@ -27,7 +27,6 @@ static int read_by(const ts_taps *t, int j, int count, int *first)
 static void make(const cut *c, int begin, int end, float *rows, float *to)
 {
     const size_t row = (size_t)c->side * 3;
-    const int threads = ts_threads_own(1);
     int have = 0, until = 0; /* the photograph's rows in rows */
     for (int j = begin, first; j < end; j += BAND) {
         const int count = j + BAND < end ? BAND : end - j, last = read_by(c->taps, j, count, &first);
@@ -41,15 +40,15 @@ static void make(const cut *c, int begin, int end, float *rows, float *to)
         for (int i = 0; i < count; i++) from[i] = c->taps->first[j + i] - first;
         own.in = last - first;
         own.first = from;
-        ts_resample(1, 3, &own, c->taps, rows, to + (size_t)j * (size_t)c->taps->out * 3, false);
+        ts_resample(1, 3, &own, c->taps, rows, to + (size_t)j * (size_t)c->taps->out * 3, false, 1);
     }
-    ts_threads_own(threads);
 }
 
-static ts_code resample(const io_photo_rows *photo, const cut *c, ts_arena *arena, io_image *square, ts_status *st)
+static ts_code resample(const io_photo_rows *photo, const cut *c, int most_threads, ts_arena *arena, io_image *square,
+                        ts_status *st)
 {
-    const int size = c->taps->out, most_threads = c->side < LARGE ? 1 : ts_threads(),
-              threads = most_threads < size ? most_threads : size, each = (size + threads - 1) / threads;
+    const int size = c->taps->out, useful = c->side < LARGE ? 1 : ts_threads_of(most_threads),
+              threads = useful < size ? useful : size, each = (size + threads - 1) / threads;
     size_t most = 0;
     for (int j = 0; j < size; j++) { /* wherever a band begins */
         int first;
@@ -65,8 +64,8 @@ static ts_code resample(const io_photo_rows *photo, const cut *c, ts_arena *aren
     return TS_OK;
 }
 
-ts_code io_read_square(const char *path, int64_t max_pixels, int size, io_image *square, int *width, int *height,
-                       ts_status *st)
+ts_code io_read_photo_square(const char *path, int64_t max_pixels, int size, int threads, io_image *square, int *width,
+                             int *height, ts_status *st)
 {
     io_photo_rows photo;
     *square = (io_image){0};
@@ -79,7 +78,7 @@ ts_code io_read_square(const char *path, int64_t max_pixels, int size, io_image 
     const cut c = {&photo, &taps, side, (photo.width - side) / 2, (photo.height - side) / 2};
     if (!taps.weight) code = ts_fail(st, TS_NOMEM, "no memory for the filter of %d to %d pixels", side, size);
     if (!code) code = io_image_create(square, size, size, 3, st);
-    if (!code) code = resample(&photo, &c, arena, square, st);
+    if (!code) code = resample(&photo, &c, threads, arena, square, st);
     if (code) {
         io_image_free(square);
         ts_context(st, "%s", path);

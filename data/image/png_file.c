@@ -100,6 +100,6 @@ bool io_space_png(const char *path, io_space *space)
     /* 1/2.2 is how a PNG without an sRGB chunk says sRGB. */
     if (gamma < 0 || (gamma > 2.15f && gamma < 2.25f)) gamma = 0;
     if (gamma > 0.98f && gamma < 1.02f) gamma = 1;
-    if (gamma > 5 || (gamma > 0 && gamma < 0.2f)) return false; /* no picture is encoded so */
+    if (gamma > 5 || (gamma > 0 && gamma < 0.2f)) return false; /* not a plausible encoding */
     return io_space_primaries(primaries ? xy : bt709, gamma, space);
 }

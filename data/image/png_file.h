@@ -1,10 +1,10 @@
-/* What has to be known of a PNG file beyond what OpenImageIO tells. */
+/* What OpenImageIO does not report about a PNG file. */
 #ifndef IO_PNG_FILE_H
 #define IO_PNG_FILE_H
 #include "data/image/colour.h"
 #include "tensor/status.h"
 
-/* Walks the chunks to the end. A file that is no PNG passes. One that is cut short or whose checksums are wrong is
+/* Walks the chunks to the end. A file that is not a PNG passes. One that is cut short or whose checksums are wrong is
  * refused here, because libpng would print its own line about it to stderr. */
 ts_code io_check_png(const char *path, ts_status *st);
 

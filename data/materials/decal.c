@@ -1,4 +1,4 @@
-/* What people print, stick and stencil onto surfaces: lines of letters, arrows, warning signs, rings, bar codes,
+/* Printed, stuck and stencilled signs: lines of letters, arrows, warning signs, rings, bar codes,
  * striped bands, frames, with or without a label under them. Letters are strokes drawn at random, so that nothing is
  * spelled. */
 #include "data/materials/palette.h"

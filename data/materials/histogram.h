@@ -1,5 +1,5 @@
-/* How often every value of every map occurs in a set of materials, each material weighing the same; two sets beside
- * each other as numbers and as a picture. */
+/* Histograms of every map over a set of materials, each material weighing the same; two sets compared as numbers and as
+ * a picture. */
 #ifndef IO_HISTOGRAM_H
 #define IO_HISTOGRAM_H
 #include "data/materials/statistics.h"
@@ -16,7 +16,7 @@ typedef struct io_histogram {
 void io_histogram_add(io_histogram *h, const float *maps, int size);
 /* Adds what io_visit_materials finds in the folder; TS_IO when that is nothing. */
 ts_code io_histogram_folder(const char *folder, int size, io_histogram *h, ts_status *st);
-/* What the two sets have in common of one map: the sum over the bins of the smaller share, 1 when they are the same. */
+/* The overlap of the two sets for one map: the sum over the bins of the smaller share, 1 when they are the same. */
 double io_histogram_overlap(const io_histogram *a, const io_histogram *b, int histogram);
 
 /* "map,from,to,A,B" and a line for each bin, shares that add up to 1. */

@@ -1,6 +1,6 @@
 #include "data/materials/joint.h"
 #include "data/height.h"
-#include "tensor/gemm.h"
+#include "tensor/conv/gemm.h"
 #include "tensor/memory.h"
 #include <math.h>
 #include <stdlib.h>
@@ -34,8 +34,8 @@ const char *io_joint_name(int joint) { return joint >= 0 && joint < IO_JOINTS ? 
 /* The cosine transform of plane, in place; work is as large. */
 static void transform(int n, const float *cosines, float *plane, float *work)
 {
-    ts_gemm(false, false, n, n, n, 1, cosines, plane, 0, work);
-    ts_gemm(false, true, n, n, n, 1, work, cosines, 0, plane);
+    ts_gemm(false, false, n, n, n, 1, cosines, plane, 0, work, 1);
+    ts_gemm(false, true, n, n, n, 1, work, cosines, 0, plane, 1);
 }
 
 /* sum[k][b]: over the coefficients of band b the products of planes pair[k]. */
@@ -72,7 +72,7 @@ ts_code io_joint(const io_material *m, double out[IO_JOINTS], ts_status *st)
         f0 += 0.2126 * t.specular[0] + 0.7152 * t.specular[1] + 0.0722 * t.specular[2];
         gloss += t.roughness;
     }
-    const ts_code code = io_height(m, plane[HEIGHT], st);
+    const ts_code code = io_height(m, plane[HEIGHT], 1, st);
     if (!code) {
         io_cosines(n, cosines);
         for (int k = 0; k < PLANES; k++) transform(n, cosines, plane[k], work);

@@ -10,7 +10,7 @@ void pal_pick(io_canvas *c, const uint32_t *colours, int count, float spread, io
 void pal_vary(io_canvas *c, const io_rgb in, float stops, io_rgb out);
 void pal_scale(io_rgb colour, float factor);
 
-/* Paint, glaze, dye or plastic: from white over greys to black, and the hues that people choose. */
+/* Paint, glaze, dye or plastic: from white over greys to black, and common hues. */
 void pal_paint(io_canvas *c, io_rgb out);
 
 /* A dielectric with that colour: F0 mostly 0.04, between 0.02 and 0.06. */

@@ -1,4 +1,4 @@
-/* Whether one set of materials resembles another: a few numbers for each material, compared over the sets. */
+/* How similar two sets of materials are: a few numbers for each material, compared over the sets. */
 #ifndef IO_STATISTICS_H
 #define IO_STATISTICS_H
 #include "data/material.h"

@@ -6,18 +6,11 @@
 #include <string.h>
 
 extern const ev_method ev_method_mean, ev_method_unet, ev_method_unet_joint, ev_method_lgd, ev_method_lgd_nograd,
-    ev_method_frozen, ev_method_descent, ev_method_newton, ev_method_finetune, ev_method_latent;
-const ev_method *const ev_methods[] = {&ev_method_mean,
-                                       &ev_method_unet,
-                                       &ev_method_unet_joint,
-                                       &ev_method_lgd,
-                                       &ev_method_lgd_nograd,
-                                       &ev_method_frozen,
-                                       &ev_method_descent,
-                                       &ev_method_newton,
-                                       &ev_method_finetune,
-                                       &ev_method_latent,
-                                       NULL};
+    ev_method_frozen, ev_method_descent, ev_method_newton, ev_method_finetune, ev_method_latent, ev_method_peer;
+const ev_method *const ev_methods[] = {&ev_method_mean,    &ev_method_unet,       &ev_method_unet_joint,
+                                       &ev_method_lgd,     &ev_method_lgd_nograd, &ev_method_frozen,
+                                       &ev_method_descent, &ev_method_newton,     &ev_method_finetune,
+                                       &ev_method_latent,  &ev_method_peer,       NULL};
 
 static int find(const ev_method *m, const char *key)
 {
@@ -75,6 +68,7 @@ static ts_code unknown(const char *spec, const ev_method *m, const char *what, t
 ts_code ev_method_parse(const char *spec, const char *model, int iterations, ev_estimator *e, ts_status *st)
 {
     memset(e, 0, sizeof *e);
+    e->exact = true;
     e->weights = model;
     if (strlen(spec) + 16 >= sizeof e->text) return ts_fail(st, TS_INVALID, "--method %.60s...: is too long", spec);
     strcpy(e->text, spec);
@@ -221,11 +215,9 @@ size_t ev_bytes(const ev_estimator *e)
 ts_code ev_open_net(ev_estimator *e, const char *key, ts_status *st)
 {
     e->net = nn_model_load(ev_text(e, key), st);
-    if (e->net && e->net->arch.latent > 0)
-        return ts_fail(st, TS_UNSUPPORTED, "%s: is an auto-encoder of maps, not a network that reads a photograph",
-                       ev_text(e, key));
     if (e->net) e->tape = ag_tape_create(false, st);
     if (!e->tape) return st->code;
+    ag_compute_set(e->tape, (ts_compute){.exact = e->exact});
     ag_freeze(e->tape, true);
     return TS_OK;
 }
@@ -233,7 +225,9 @@ ts_code ev_open_net(ev_estimator *e, const char *key, ts_status *st)
 ts_code ev_open_train(ev_estimator *e, ts_status *st)
 {
     e->train = ag_tape_create(true, st);
-    return e->train ? TS_OK : st->code;
+    if (!e->train) return st->code;
+    ag_compute_set(e->train, (ts_compute){.exact = e->exact});
+    return TS_OK;
 }
 
 ts_code ev_start_r0(ev_estimator *e, const ev_case *c, float *maps, ts_status *st)

@@ -24,12 +24,14 @@ enum { EV_SETTINGS = 8, EV_POINTS = 1024, EV_METHOD_TEXT = 4096 };
 
 typedef struct ev_estimator ev_estimator;
 
-/* Told R_step: maps [size, size, channels] in the encoding of tensor/maps.h, valid during the call. false: stop. */
+/* Called with R_step: maps [size, size, channels] in the encoding of tensor/maps.h, valid during the call. false: stop.
+ */
 typedef bool (*ev_seen)(int step, const float *maps, int channels, void *user);
 
 typedef struct ev_method {
     const char *name, *help;
     const ev_setting *settings;
+    bool peer;                                       /* only of what has a peer's maps */
     bool few;                                        /* of many steps some are scored: 1, 2, 5, 10 ... (false: all) */
     int (*steps)(const ev_estimator *e);             /* after open; NULL: 0 */
     int (*photos)(const ev_estimator *e);            /* photographs that it reads, after open; NULL: 1 */
@@ -50,6 +52,7 @@ struct ev_estimator {
     const char *weights;            /* the program's model, for weights that are not given */
     const char *tried;              /* the steps to score, separated by blanks; NULL: the method's own */
     bool last_alone;                /* only the last step can be seen */
+    bool exact;                     /* convolutions, as in tensor/compute.h; true until it is set */
     nn_model *net, *coder;          /* g (and h); an auto-encoder */
     ag_tape *tape, *train;          /* without and with gradients */
     nn_adam adam;

@@ -13,7 +13,7 @@ static ts_code open(ev_estimator *e, ts_status *st)
 }
 
 /* The sum over the photographs of d (error^2 / 2) / d maps, but for a factor that is the same for all: Adam does not
- * see it. part: room for one's. */
+ * see it. part: a buffer for one's. */
 static void gradient(ev_estimator *e, const ev_case *c, float *part)
 {
     const int64_t pixels = (int64_t)c->size * c->size, count = pixels * MAP_CHANNELS;
@@ -65,15 +65,15 @@ static const ev_setting settings[] = {
      .initial = "100",
      .grid = "0 1 2 5 10 20 50 100 200 500",
      .steps = true,
-     .help = "of Adam"},
+     .help = "number of steps"},
     {.key = "photos",
      .type = EV_WHOLE,
      .lo = 1,
      .hi = RD_CAPTURE_VIEWS,
      .initial = "1",
-     .help = "photographs that are given"},
+     .help = "number of photographs"},
     EV_ORIENTATIONS,
-    {.key = "model", .type = EV_WEIGHTS, .initial = "", .help = "whose R_0, by default the program's"},
+    {.key = "model", .type = EV_WEIGHTS, .initial = "", .help = "weights for R_0 (default: the program's)"},
     {0}};
 const ev_method ev_method_descent = {.name = "descent",
                                      .help = "Adam on the maps (equation 3)",

@@ -63,8 +63,8 @@ static const ev_setting settings[] = {
      .initial = "20",
      .grid = "0 1 2 5 10 20 50 100",
      .steps = true,
-     .help = "of Adam"},
-    {.key = "model", .type = EV_WEIGHTS, .initial = "", .help = "whose g is tuned, by default the program's"},
+     .help = "number of steps"},
+    {.key = "model", .type = EV_WEIGHTS, .initial = "", .help = "weights whose g is tuned (default: the program's)"},
     {0}};
 const ev_method ev_method_finetune = {.name = "finetune",
                                       .help = "Adam on g's weights at test time (equation 6)",

@@ -10,10 +10,8 @@ static int steps(const ev_estimator *e) { return (int)ev_number(e, "steps"); }
 static ts_code open(ev_estimator *e, ts_status *st)
 {
     const char *path = ev_text(e, "model");
-    e->coder = nn_model_load(path, st);
+    e->coder = nn_coder_load(path, st);
     if (!e->coder) return st->code;
-    if (e->coder->arch.latent == 0)
-        return ts_fail(st, TS_UNSUPPORTED, "%s: is no auto-encoder (configs/ablation/latent.ini trains one)", path);
     if (ev_number(e, "start") == 0 && ev_open_net(e, "g", st) != TS_OK) return st->code;
     if (ev_open_train(e, st) != TS_OK) return st->code;
     ag_freeze(e->train, true); /* only the code changes */
@@ -46,9 +44,9 @@ static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, 
                         : ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", c->size, c->size);
     ts_arena_destroy(&arena);
     if (code) return code;
-    const int side = c->size >> e->coder->arch.g_levels;
+    const int side = c->size >> e->coder->coder.levels;
     const ts_tensor image = ts_view((float *)(uintptr_t)c->image, (ts_shape){1, c->size, c->size, 3}),
-                    x = ts_view(e->x, (ts_shape){1, side, side, e->coder->arch.latent});
+                    x = ts_view(e->x, (ts_shape){1, side, side, e->coder->coder.code});
     bool on = true;
     for (int t = 0; on && t <= steps(e); t++) {
         ag_reset(e->train);
@@ -84,9 +82,9 @@ static const ev_setting settings[] = {
      .initial = "50",
      .grid = "0 1 2 5 10 20 50 100 200",
      .steps = true,
-     .help = "of Adam"},
-    {.key = "model", .type = EV_WEIGHTS, .help = "of an auto-encoder, trained with configs/ablation/latent.ini"},
-    {.key = "g", .type = EV_WEIGHTS, .initial = "", .help = "whose R_0, by default the program's"},
+     .help = "number of steps"},
+    {.key = "model", .type = EV_WEIGHTS, .help = "weights of an auto-encoder (configs/ablation/latent.ini trains one)"},
+    {.key = "g", .type = EV_WEIGHTS, .initial = "", .help = "weights for R_0 (default: the program's)"},
     {0}};
 const ev_method ev_method_latent = {.name = "latent",
                                     .help = "Adam in an auto-encoder's code (equation 5)",

@@ -24,15 +24,15 @@ static void last_word(const char *words, char *out, size_t size)
 
 static ts_code add(ev_tuning *t, const char *spec, int of, const char *model, const char *tried, ts_status *st)
 {
-    if (t->methods == t->room) {
-        const int room = t->room ? 2 * t->room : 32;
-        ev_estimator *method = malloc((size_t)room *
+    if (t->methods == t->capacity) {
+        const int capacity = t->capacity ? 2 * t->capacity : 32;
+        ev_estimator *method = malloc((size_t)capacity *
                                       sizeof *method); /* not realloc: settings point into the estimator */
-        int *more = realloc(t->of, (size_t)room * sizeof *more);
+        int *more = realloc(t->of, (size_t)capacity * sizeof *more);
         if (more) t->of = more;
         if (!method || !more) {
             free(method);
-            return ts_fail(st, TS_NOMEM, "out of memory for %d combinations", room);
+            return ts_fail(st, TS_NOMEM, "out of memory for %d combinations", capacity);
         }
         for (int i = 0; i < t->methods; i++) {
             method[i] = t->method[i];
@@ -43,7 +43,7 @@ static ts_code add(ev_tuning *t, const char *spec, int of, const char *model, co
         }
         free(t->method);
         t->method = method;
-        t->room = room;
+        t->capacity = capacity;
     }
     ev_estimator *e = &t->method[t->methods];
     if (ev_method_parse(spec, model, -1, e, st) != TS_OK) return st->code;
@@ -62,7 +62,7 @@ static ts_code expand(ev_tuning *t, const ev_estimator *given, char *spec, int i
     const char *comma = strchr(spec, ':') ? "," : ":";
     ts_code code = TS_OK;
     if (!s->key) return add(t, spec, of, model, tried, st);
-    const bool fixed = given->value[i] && given->value[i] != s->initial; /* told */
+    const bool fixed = given->value[i] && given->value[i] != s->initial; /* given by the user */
     if (!s->grid || fixed) return expand(t, given, spec, i + 1, of, model, tried, st);
     if (s->steps) {
         last_word(s->grid, value, sizeof value);
@@ -85,7 +85,7 @@ ts_code ev_tune_add(ev_tuning *t, const char *spec, int of, const char *model, t
     snprintf(all, sizeof all, "%s", spec);
     const int before = t->methods;
     const ts_code code = expand(t, &given, all, 0, of, model, NULL, st);
-    for (int i = before; i < t->methods; i++) { /* a label tells what differs; paths are not told */
+    for (int i = before; i < t->methods; i++) { /* a label says what differs; paths are left out */
         ev_estimator *e = &t->method[i];
         int n = snprintf(e->label, sizeof e->label, "%s", e->method->name);
         for (int k = 0; e->method->settings[k].key && n < (int)sizeof e->label; k++) {

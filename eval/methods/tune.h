@@ -6,7 +6,7 @@
 typedef struct ev_tuning {
     ev_estimator *method; /* owned: every combination but of steps, which one run of the most has all of */
     int *of;              /* owned: which of the specs each belongs to */
-    int methods, room;
+    int methods, capacity;
 } ev_tuning;
 
 /* Adds all combinations of the grid of spec (NAME[:key=value,...]; what is given is not searched). */

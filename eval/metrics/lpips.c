@@ -1,7 +1,7 @@
 #include "eval/metrics/lpips.h"
 #include "nn/weights/file.h"
 #include "tensor/memory.h"
-#include "tensor/gemm.h"
+#include "tensor/conv/gemm.h"
 #include "tensor/threads.h"
 #include <math.h>
 #include <stdio.h>
@@ -137,7 +137,7 @@ static bool convolve(ev_lpips *net, int l, const pair *x, pair *y, int slot)
     if (!windows || !y->data) return false;
 #pragma omp parallel for schedule(static) num_threads(ts_threads())
     for (int r = 0; r < rows; r++) window_row(x, l, out_h, out_w, r, windows + (size_t)r * row);
-    ts_gemm(false, true, rows * out_w, layer[l].out, (int)window(l), 1, windows, net->weight[l], 0, y->data);
+    ts_gemm(false, true, rows * out_w, layer[l].out, (int)window(l), 1, windows, net->weight[l], 0, y->data, 0);
 #pragma omp parallel for schedule(static) num_threads(ts_threads())
     for (int r = 0; r < rows * out_w; r++) {
         float *v = y->data + (size_t)r * out;

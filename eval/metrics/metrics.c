@@ -1,6 +1,7 @@
 #include "eval/metrics/metrics.h"
 #include "data/camera.h"
 #include "eval/metrics/flip.h"
+#include "eval/metrics/residue.h"
 #include "eval/multiview.h"
 #include "eval/ssim.h"
 #include "render/error.h"
@@ -9,8 +10,27 @@
 #include <math.h>
 #include <stdlib.h>
 
-const char *const ev_metric_name[EV_METRICS] = {"diffuse", "specular", "roughness", "normal",   "render",
-                                                "angle",   "ssim",     "flip",      "exposure", "lpips"};
+const char *const ev_metric_name[EV_METRICS] = {"diffuse",
+                                                "specular",
+                                                "roughness",
+                                                "normal",
+                                                "render",
+                                                "angle",
+                                                "ssim",
+                                                "flip",
+                                                "exposure",
+                                                "lpips",
+                                                "flat",
+                                                "over_flat",
+                                                "band_2_8",
+                                                "band_8_32",
+                                                "band_32_64",
+                                                "band_64_128",
+                                                "residue_diffuse",
+                                                "residue_specular",
+                                                "residue_roughness",
+                                                "residue_hue",
+                                                "relief"};
 
 void ev_photograph(const io_material *truth, const ev_photo *photo, float *image)
 {
@@ -25,7 +45,7 @@ void ev_input_views(const rd_view *told, int count, uint64_t seed, uint64_t iden
 {
     ts_rng rng = ts_rng_make(seed, TS_STREAM_CAPTURE, identity);
     rd_capture_draw(&rng, count, input);
-    input[0] = *told; /* in place of the flash */
+    input[0] = *told; /* instead of the flash */
 }
 
 /* SSIM and LPIPS as RMSE in gamma space; FLIP takes linear values. */
@@ -63,36 +83,59 @@ ev_case ev_case_of_maps(const io_material *truth, const float *image, const rd_v
                      .perceptual = perceptual};
 }
 
-ev_case ev_case_of_capture(const io_capture *capture, const float *image, int inputs, bool perceptual)
+ev_case ev_case_of_photo(const float *image, int size)
+{
+    const rd_view flash = rd_flash();
+    return (ev_case){.size = size, .view = flash, .image = image, .inputs = 1, .input = {flash}, .exposure = 1};
+}
+
+ev_case ev_case_of_capture(const io_capture *capture, const float *image, int inputs, bool told, bool perceptual)
 {
     ev_case c = {.size = capture->size,
-                 .view = ev_capture_view(capture, 0),
+                 .view = told ? ev_capture_view(capture, 0) : rd_flash(),
                  .image = image,
                  .inputs = inputs,
                  .exposure = 1,
                  .capture = capture,
                  .perceptual = perceptual};
-    for (int i = 0; i < inputs; i++) c.input[i] = ev_capture_view(capture, i);
+    for (int i = 0; i < inputs; i++) c.input[i] = told ? ev_capture_view(capture, i) : rd_flash();
     return c;
 }
 
-/* The factor c of least sum of (gamma(c a) - gamma(b))^2 over the values of all renderings that are not clipped:
- * gamma(c a) = c^(1/2.2) gamma(a). */
+typedef struct factor {
+    double products, squares;
+} factor;
+
+static void factor_add(factor *f, size_t values, const float *mine, const float *truth)
+{
+    for (size_t i = 0; i < values; i++) {
+        if (mine[i] > 1 || truth[i] > 1) continue;
+        const double a = (double)rd_gamma(mine[i]), b = (double)rd_gamma(truth[i]);
+        f->products += a * b;
+        f->squares += a * a;
+    }
+}
+
+static double factor_of(const factor *f) { return f->products > 0 ? pow(f->products / f->squares, 2.2) : 1; }
+
+double ev_factor(size_t values, const float *a, const float *b)
+{
+    factor f = {0};
+    factor_add(&f, values, a, b);
+    return factor_of(&f);
+}
+
+/* That of all renderings together. */
 static double fitted_exposure(const ev_case *c, const float *maps, int channels, float *mine, float *truth)
 {
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
-    double products = 0, squares = 0;
+    factor f = {0};
     for (int v = 0; v < RD_EVAL_VIEWS; v++) {
         rd_render(rd_grid_full(c->size), maps, channels, &c->views[v], false, mine);
         rd_render(rd_grid_full(c->size), c->truth->maps, MAP_CHANNELS, &c->views[v], false, truth);
-        for (size_t i = 0; i < values; i++) {
-            if (mine[i] > 1 || truth[i] > 1) continue;
-            const double a = (double)rd_gamma(mine[i]), b = (double)rd_gamma(truth[i]);
-            products += a * b;
-            squares += a * a;
-        }
+        factor_add(&f, values, mine, truth);
     }
-    return products > 0 ? pow(products / squares, 2.2) : 1;
+    return factor_of(&f);
 }
 
 /* EV_RENDER with that factor on the estimate. */
@@ -121,20 +164,48 @@ static void fit(const ev_case *c, const float *maps, int channels, ev_row *row)
     free(mine);
 }
 
+static ev_row score_photo(const ev_case *c, const float *maps, int channels)
+{
+    const ev_residue r = ev_residue_of(c->size, maps, channels);
+    ev_row row;
+    for (int k = 0; k < EV_METRICS; k++) row.value[k] = NAN;
+    row.value[EV_RESIDUE_DIFFUSE] = r.diffuse;
+    row.value[EV_RESIDUE_SPECULAR] = r.specular;
+    row.value[EV_RESIDUE_ROUGHNESS] = r.roughness;
+    row.value[EV_RESIDUE_HUE] = r.hue;
+    row.value[EV_RELIEF] = r.relief;
+    return row;
+}
+
+/* Those that compare normals alone. */
+static void score_normals(const io_material *truth, const float *maps, int channels, ev_row *row)
+{
+    const float flat[MAP_CHANNELS] = {0};
+    const int64_t pixels = (int64_t)truth->size * truth->size;
+    double squares = 0;
+    for (int64_t i = 0; i < pixels; i++) {
+        const double e = rd_map_rmse(1, flat, MAP_CHANNELS, truth->maps + i * MAP_CHANNELS, MAP_CHANNELS).normal;
+        squares += e * e / (double)pixels;
+    }
+    row->value[EV_FLAT] = sqrt(squares);
+    row->value[EV_OVER_FLAT] = squares > 0 ? row->value[EV_NORMAL] / sqrt(squares) : NAN;
+    ev_band_correlation(truth->size, maps, channels, truth->maps, MAP_CHANNELS, row->value + EV_BAND);
+}
+
 ev_row ev_score(const ev_case *c, const float *maps, int channels)
 {
     if (c->capture) return ev_capture_score(c->capture, c->inputs, maps, channels, c->perceptual, c->lpips);
+    if (!c->truth) return score_photo(c, maps, channels);
     const io_material *truth = c->truth;
     const rd_map_error e = rd_map_rmse((int64_t)truth->size * truth->size, maps, channels, truth->maps, MAP_CHANNELS);
-    ev_row row = {{[EV_DIFFUSE] = e.diffuse,
-                   [EV_SPECULAR] = e.specular,
-                   [EV_ROUGHNESS] = e.roughness,
-                   [EV_NORMAL] = e.normal,
-                   [EV_ANGLE] = e.angle,
-                   [EV_SSIM] = NAN,
-                   [EV_FLIP] = NAN,
-                   [EV_EXPOSURE] = NAN,
-                   [EV_LPIPS] = NAN}};
+    ev_row row;
+    for (int k = 0; k < EV_METRICS; k++) row.value[k] = NAN;
+    row.value[EV_DIFFUSE] = e.diffuse;
+    row.value[EV_SPECULAR] = e.specular;
+    row.value[EV_ROUGHNESS] = e.roughness;
+    row.value[EV_NORMAL] = e.normal;
+    row.value[EV_ANGLE] = e.angle;
+    score_normals(truth, maps, channels, &row);
     if (c->fit) fit(c, maps, channels, &row);
     else
         row.value[EV_RENDER] = rd_render_rmse(rd_grid_full(truth->size), maps, channels, truth->maps, MAP_CHANNELS,

@@ -1,8 +1,9 @@
-/* How good maps are (DESIGN section 5). */
+/* The measures of an estimate (docs/math.md, Evaluation). */
 #ifndef EV_METRICS_H
 #define EV_METRICS_H
 #include "data/capture.h"
 #include "data/material.h"
+#include "eval/metrics/bands.h"
 #include "eval/metrics/lpips.h"
 #include "nn/model.h"
 
@@ -17,41 +18,53 @@ enum {
     EV_FLIP,
     EV_EXPOSURE,
     EV_LPIPS,
+    EV_FLAT,
+    EV_OVER_FLAT,
+    EV_BAND,
+    EV_RESIDUE_DIFFUSE = EV_BAND + EV_BANDS,
+    EV_RESIDUE_SPECULAR,
+    EV_RESIDUE_ROUGHNESS,
+    EV_RESIDUE_HUE,
+    EV_RELIEF,
     EV_METRICS
 };
 extern const char *const ev_metric_name[EV_METRICS];
 
 typedef struct ev_row {
     double value[EV_METRICS]; /* RMSE; EV_ANGLE: degrees; EV_SSIM, EV_FLIP, EV_LPIPS: the mean over the renderings;
-                               * EV_EXPOSURE: of captures, and of a fit. NaN: not measured */
+                               * EV_EXPOSURE: of captures, and of a fit; EV_FLAT: a flat map's EV_NORMAL, EV_OVER_FLAT
+                               * the quotient of the two; EV_BAND ..: correlation of the normals (bands.h); the rest
+                               * residue.h, of photographs alone. NaN: not measured */
 } ev_row;
 
-/* What one material is evaluated with: known maps, or a capture. */
+/* What one material is evaluated with: known maps, a capture, or only a photograph. */
 typedef struct ev_case {
     int size;
-    rd_view view;                 /* of the first input picture, as the methods are told */
+    rd_view view;                 /* of the first input picture, as the methods know it */
     const float *image;           /* the input pictures, [inputs][size][size][3], linear, in [0, 1] */
     int inputs;                   /* 1 .. NN_MAX_IMAGES; all but the first are for methods that read several */
     rd_view input[NN_MAX_IMAGES]; /* their views, the first being view */
-    double exposure;              /* what the lights of the inputs really are, in those that the methods are told */
-    const io_material *truth;
-    const rd_view *views;      /* RD_EVAL_VIEWS of them; not of a capture */
-    const io_capture *capture; /* where it is not NULL, truth is: eval/multiview.h compares */
-    bool perceptual;           /* SSIM and FLIP too, which take many times as long as the rest */
-    bool fit; /* EV_RENDER after the one factor on the estimate's renderings that makes them most like the truth's:
-                 EV_EXPOSURE */
-    ev_lpips *lpips; /* LPIPS too, where it is not NULL */
+    double exposure;              /* true power of the inputs' lights over the power that the methods know */
+    const io_material *truth;     /* NULL: unknown */
+    const io_material *peer;      /* another program's maps of it, or NULL */
+    const rd_view *views;         /* RD_EVAL_VIEWS of them; not of a capture */
+    const io_capture *capture;    /* not NULL when truth is and pictures are: compared by eval/multiview.h */
+    bool perceptual;              /* also SSIM and FLIP, which take most of the time */
+    bool fit;                     /* EV_RENDER after fitting one factor, EV_EXPOSURE, on the estimate's renderings */
+    ev_lpips *lpips;              /* also LPIPS, unless NULL */
 } ev_case;
 
 /* One input, under the flash. */
 ev_case ev_case_of_maps(const io_material *truth, const float *image, const rd_view *views, bool perceptual);
-/* inputs: the first so many pictures of the capture, image being ev_capture_input's. */
-ev_case ev_case_of_capture(const io_capture *capture, const float *image, int inputs, bool perceptual);
+/* inputs: the first so many pictures of the capture, image being ev_capture_input's, told or not. */
+ev_case ev_case_of_capture(const io_capture *capture, const float *image, int inputs, bool told, bool perceptual);
+/* One picture, taken for a flash photograph. */
+ev_case ev_case_of_photo(const float *image, int size);
 
-/* What an input picture is. */
+/* An input picture. */
 typedef struct ev_photo {
-    rd_view view;    /* as the methods are told */
-    double exposure; /* the light is so many times as strong */
+    rd_view view;    /* as the methods know it */
+    double exposure; /* factor on the light's power */
     float noise;     /* > 0: sensor noise of that strength and 8-bit quantisation, drawn with (seed, identity) */
     uint64_t seed, identity;
 } ev_photo;
@@ -59,10 +72,14 @@ typedef struct ev_photo {
 /* The rendering of it, clamped. image: size x size x 3. */
 void ev_photograph(const io_material *truth, const ev_photo *photo, float *image);
 
-/* The views of count inputs: told, then others of the predefined configurations of captures (render/scene.h), drawn
- * with (seed, identity). */
+/* The views of count inputs: the view told, then others of the predefined configurations of captures (render/scene.h),
+ * drawn with (seed, identity). */
 void ev_input_views(const rd_view *told, int count, uint64_t seed, uint64_t identity, rd_view *input);
 
-/* What one estimate scores. */
+/* The factor c of least sum of (gamma(c a) - gamma(b))^2 over the values that are not clipped: gamma(c a) =
+ * c^(1/2.2) gamma(a). Both linear; 1 where all are clipped or black. */
+double ev_factor(size_t values, const float *a, const float *b);
+
+/* The scores of one estimate. */
 ev_row ev_score(const ev_case *c, const float *maps, int channels);
 #endif

@@ -26,7 +26,7 @@ _Static_assert(sizeof(nn_rmse) == sizeof(int) && sizeof(nn_compat) == sizeof(int
                    sizeof(nn_gradient) == sizeof(int) && sizeof(nn_descent) == sizeof(int),
                "a word's field is read and written as an int");
 
-/* The upper ends only keep products of sizes far from overflow. The defaults are the model that two cores can train. */
+/* The upper bounds keep products of sizes far from overflow. The defaults are a model that two cores can train. */
 #define AT(member) offsetof(nn_arch, member)
 static const field fields[] = {
     {"channels", FIELD_INT, AT(channels), 9, 10, 9, NULL, false},
@@ -63,7 +63,6 @@ static const field fields[] = {
     {.key = "coarse_size", .kind = FIELD_INT, .at = AT(coarse_size), .lo = 1, .hi = 8192, .start = 128, .late = true},
     {.key = "coarse_width", .kind = FIELD_INT, .at = AT(coarse_width), .lo = 1, .hi = 4096, .start = 128, .late = true},
     {.key = "coarse_gru", .kind = FIELD_INT, .at = AT(coarse_gru), .lo = 1, .hi = 1024, .start = 64, .late = true},
-    {.key = "latent", .kind = FIELD_INT, .at = AT(latent), .hi = 1024, .late = true},
 };
 enum { FIELDS = sizeof fields / sizeof *fields };
 _Static_assert(FIELDS + 1 <= NN_ARCH_META, "there is metadata for every field and the format");
@@ -99,7 +98,7 @@ bool nn_arch_refines(const nn_arch *a) { return a->coarse_steps > 0 || nn_arch_r
 
 bool nn_arch_refines_full(const nn_arch *a)
 {
-    return a->h_width > 0 || (a->iterations > 0 && a->latent == 0 && a->gradient && a->descent != NN_DESCENT_NONE);
+    return a->h_width > 0 || (a->iterations > 0 && a->gradient && a->descent != NN_DESCENT_NONE);
 }
 
 bool nn_arch_reads(const nn_arch *a) { return a->gradient && (a->h_width > 0 || a->descent == NN_DESCENT_GRADIENT); }
@@ -123,12 +122,10 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
     if (a->g_size % (1 << a->g_levels) != 0)
         return ts_fail(st, TS_INVALID, "g_size is %d: with %d g_levels it must be a multiple of %d", a->g_size,
                        a->g_levels, 1 << a->g_levels);
-    if (a->latent > 0 && a->h_width > 0)
-        return ts_fail(st, TS_INVALID, "latent is %d: an auto-encoder has no refiner, so h_width must be 0", a->latent);
     const bool extended = a->g_unshuffle > 1 || a->conditions || a->spread || a->scene;
-    if (extended && (a->latent > 0 || a->compat == NN_COMPAT_PUBLISHED || a->channels != MAP_CHANNELS))
+    if (extended && (a->compat == NN_COMPAT_PUBLISHED || a->channels != MAP_CHANNELS))
         return ts_fail(st, TS_INVALID,
-                       "unshuffle, conditions, spread or scene is set: that needs channels 9, latent 0, compat = none");
+                       "unshuffle, conditions, spread or scene is set: that needs channels 9 and compat = none");
     if (a->g_unshuffle > 1 && a->images > 1)
         return ts_fail(st, TS_INVALID, "unshuffle is %d: that needs images 1", a->g_unshuffle);
     if (a->spread && a->g_unshuffle == 1) return ts_fail(st, TS_INVALID, "spread is set: that needs unshuffle above 1");
@@ -136,11 +133,10 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
     if (a->images > 1 && a->rmse == NN_RMSE_BATCH)
         return ts_fail(st, TS_INVALID, "images is %d: with rmse = batch it must be 1", a->images);
     if (a->compat == NN_COMPAT_PUBLISHED &&
-        (a->descent != NN_DESCENT_NONE || a->images > 1 || a->latent > 0 || a->rmse != NN_RMSE_BATCH))
-        return ts_fail(st, TS_INVALID,
-                       "compat is published: that needs descent = none, rmse = batch, images 1 and latent 0");
-    if (a->coarse_steps > 0 && (a->compat == NN_COMPAT_PUBLISHED || a->latent > 0 || a->rmse != NN_RMSE_START))
-        return ts_fail(st, TS_INVALID, "coarse_steps is %d: that needs compat = none, rmse = start and latent 0",
+        (a->descent != NN_DESCENT_NONE || a->images > 1 || a->rmse != NN_RMSE_BATCH))
+        return ts_fail(st, TS_INVALID, "compat is published: that needs descent = none, rmse = batch and images 1");
+    if (a->coarse_steps > 0 && (a->compat == NN_COMPAT_PUBLISHED || a->rmse != NN_RMSE_START))
+        return ts_fail(st, TS_INVALID, "coarse_steps is %d: that needs compat = none and rmse = start",
                        a->coarse_steps);
     if (a->coarse_steps > a->iterations)
         return ts_fail(st, TS_INVALID, "coarse_steps is %d: at most all of the %d iterations can be coarse",
@@ -202,6 +198,9 @@ ts_code nn_arch_from_file(const nn_file *file, nn_arch *arch, ts_status *st)
 {
     const char *format = nn_file_meta(file, "format"), *key;
     memset(arch, 0, sizeof *arch);
+    if (format && strcmp(format, NN_CODER_FORMAT) == 0)
+        return ts_fail(st, TS_UNSUPPORTED, "%s: is an auto-encoder of maps, not a network that reads a photograph",
+                       nn_file_path(file));
     if (!format || strcmp(format, "lgd") != 0) {
         if (nn_published_file(file)) return nn_published_arch(file, arch, st);
         return ts_fail(st, TS_FORMAT,

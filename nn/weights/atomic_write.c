@@ -1,4 +1,4 @@
-/* Putting a file in the place of another one only when all of it is on the disk. */
+/* A file replaces another one only when all of it is on the disk. */
 #include "nn/weights/file_internal.h"
 #include <errno.h>
 #include <fcntl.h>
@@ -7,9 +7,9 @@
 #include <string.h>
 #include <unistd.h>
 
-ts_code nn_out_begin(nn_out *o, const char *path, ts_status *st)
+ts_code nn_atomic_begin(nn_atomic_file *o, const char *path, ts_status *st)
 {
-    *o = (nn_out){.path = path, .temporary = malloc(strlen(path) + 32), .fd = -1};
+    *o = (nn_atomic_file){.path = path, .temporary = malloc(strlen(path) + 32), .fd = -1};
     if (!o->temporary) return ts_fail(st, TS_NOMEM, "%s: no memory to write it", path);
     sprintf(o->temporary, "%s.%ld", path, (long)getpid()); /* two processes that write the same file do not meet */
     o->fd = open(o->temporary, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, 0666);
@@ -20,7 +20,7 @@ ts_code nn_out_begin(nn_out *o, const char *path, ts_status *st)
     return code;
 }
 
-void nn_out_put(nn_out *o, const void *data, size_t size)
+void nn_atomic_put(nn_atomic_file *o, const void *data, size_t size)
 {
     const char *p = data;
     o->written += (int64_t)size;
@@ -50,7 +50,7 @@ static bool sync_folder(const char *path, char *folder)
     return good;
 }
 
-ts_code nn_out_end(nn_out *o, ts_code code, ts_status *st)
+ts_code nn_atomic_end(nn_atomic_file *o, ts_code code, ts_status *st)
 {
     if (!o->temporary) return code;
     if (!code && !o->error && fsync(o->fd) != 0) o->error = errno;
@@ -65,14 +65,14 @@ ts_code nn_out_end(nn_out *o, ts_code code, ts_status *st)
     return code;
 }
 
-ts_code nn_file_write(const char *path, nn_form form, const nn_entry *entry, int entries, nn_dtype real,
+ts_code nn_file_write(const char *path, nn_form form, const nn_tensor *tensor, int tensors, nn_dtype real,
                       const nn_meta *meta, int metas, ts_status *st)
 {
-    nn_out o;
+    nn_atomic_file o;
     if (form == NN_FORM_TORCH_OLD) return ts_fail(st, TS_INVALID, "%s: PyTorch's old form is not written", path);
-    ts_code code = nn_out_begin(&o, path, st);
+    ts_code code = nn_atomic_begin(&o, path, st);
     if (!code)
-        code = (form == NN_FORM_TORCH_ZIP ? nn_torch_put : nn_safetensors_put)(&o, entry, entries, real, meta, metas,
+        code = (form == NN_FORM_TORCH_ZIP ? nn_torch_put : nn_safetensors_put)(&o, tensor, tensors, real, meta, metas,
                                                                                st);
-    return nn_out_end(&o, code, st);
+    return nn_atomic_end(&o, code, st);
 }

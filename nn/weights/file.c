@@ -1,4 +1,4 @@
-/* Opening a file of tensors, finding one in it, and what all forms must keep: names that are unique. */
+/* Opens a file of tensors, finds a tensor in it, and checks that names are unique. */
 #include "nn/weights/file_internal.h"
 #include <errno.h>
 #include <fcntl.h>
@@ -17,13 +17,13 @@ static void *grow(void *array, int count, size_t size)
     return realloc(array, (size_t)(count ? 2 * count : 16) * size);
 }
 
-nn_entry *nn_file_add(nn_file *f)
+nn_tensor *nn_file_add(nn_file *f)
 {
-    nn_entry *grown = f->entries < 1 << 29 ? grow(f->entry, f->entries, sizeof *f->entry) : NULL;
+    nn_tensor *grown = f->tensors < 1 << 29 ? grow(f->tensor, f->tensors, sizeof *f->tensor) : NULL;
     if (!grown) return NULL;
-    f->entry = grown;
-    f->entry[f->entries] = (nn_entry){.count = 1};
-    return &f->entry[f->entries++];
+    f->tensor = grown;
+    f->tensor[f->tensors] = (nn_tensor){.count = 1};
+    return &f->tensor[f->tensors++];
 }
 
 nn_meta *nn_file_add_meta(nn_file *f)
@@ -35,7 +35,7 @@ nn_meta *nn_file_add_meta(nn_file *f)
     return &f->meta[f->metas++];
 }
 
-bool nn_entry_shape(nn_entry *e)
+bool nn_tensor_shape(nn_tensor *e)
 {
     e->count = 1;
     for (int i = e->rank - 1; i >= 0; i--) {
@@ -47,16 +47,16 @@ bool nn_entry_shape(nn_entry *e)
 
 static int by_name(const void *a, const void *b)
 {
-    return strcmp((*(const nn_entry *const *)a)->name, (*(const nn_entry *const *)b)->name);
+    return strcmp((*(const nn_tensor *const *)a)->name, (*(const nn_tensor *const *)b)->name);
 }
 
 static ts_code sort_names(nn_file *f, ts_status *st)
 {
-    f->sorted = malloc(((size_t)f->entries + 1) * sizeof *f->sorted);
+    f->sorted = malloc(((size_t)f->tensors + 1) * sizeof *f->sorted);
     if (!f->sorted) return ts_fail(st, TS_NOMEM, "%s: no memory for the list of tensors", f->path);
-    for (int i = 0; i < f->entries; i++) f->sorted[i] = &f->entry[i];
-    if (f->entries) qsort(f->sorted, (size_t)f->entries, sizeof *f->sorted, by_name);
-    for (int i = 1; i < f->entries; i++)
+    for (int i = 0; i < f->tensors; i++) f->sorted[i] = &f->tensor[i];
+    if (f->tensors) qsort(f->sorted, (size_t)f->tensors, sizeof *f->sorted, by_name);
+    for (int i = 1; i < f->tensors; i++)
         if (!strcmp(f->sorted[i - 1]->name, f->sorted[i]->name))
             return ts_fail(st, TS_FORMAT, "%s: tensor \"%.200s\" is there twice", f->path, f->sorted[i]->name);
     if (f->metas > 1000)
@@ -117,7 +117,7 @@ void nn_file_close(nn_file **file)
     if (f->map) munmap((void *)(uintptr_t)f->map, f->size);
     for (int i = 0; i < f->inflations; i++) free(f->inflated[i]);
     free(f->inflated);
-    free(f->entry);
+    free(f->tensor);
     free(f->sorted);
     free(f->meta);
     ts_arena_destroy(&f->arena);
@@ -127,9 +127,9 @@ void nn_file_close(nn_file **file)
 }
 
 nn_form nn_file_form(const nn_file *file) { return file->form; }
-int nn_file_count(const nn_file *file) { return file->entries; }
-const nn_entry *nn_file_entry(const nn_file *file, int i) { return &file->entry[i]; }
-const char *nn_file_name(const nn_file *file, int i) { return file->entry[i].name; }
+int nn_file_count(const nn_file *file) { return file->tensors; }
+const nn_tensor *nn_file_tensor(const nn_file *file, int i) { return &file->tensor[i]; }
+const char *nn_file_name(const nn_file *file, int i) { return file->tensor[i].name; }
 const char *nn_file_path(const nn_file *file) { return file->path; }
 const char *nn_file_meta_key(const nn_file *file, int i) { return i < file->metas ? file->meta[i].key : NULL; }
 
@@ -140,11 +140,11 @@ const char *nn_file_meta(const nn_file *file, const char *key)
     return NULL;
 }
 
-const nn_entry *nn_file_find(const nn_file *file, const char *name)
+const nn_tensor *nn_file_find(const nn_file *file, const char *name)
 {
-    nn_entry wanted = {.name = name};
-    const nn_entry *key = &wanted, **found = NULL;
-    if (file->entries) found = bsearch(&key, file->sorted, (size_t)file->entries, sizeof *file->sorted, by_name);
+    nn_tensor wanted = {.name = name};
+    const nn_tensor *key = &wanted, **found = NULL;
+    if (file->tensors) found = bsearch(&key, file->sorted, (size_t)file->tensors, sizeof *file->sorted, by_name);
     return found ? *found : NULL;
 }
 
@@ -158,9 +158,9 @@ void nn_shape_text(int rank, const int64_t *dim, char *out, size_t size)
     if (at < size) snprintf(out + at, size - at, "]");
 }
 
-static const nn_entry *find_real(const nn_file *file, const char *name, int rank, const int64_t *dim, ts_status *st)
+static const nn_tensor *find_real(const nn_file *file, const char *name, int rank, const int64_t *dim, ts_status *st)
 {
-    const nn_entry *e = nn_file_find(file, name);
+    const nn_tensor *e = nn_file_find(file, name);
     if (!e) return ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" is missing", file->path, name), NULL;
     if (e->rank != rank || memcmp(e->dim, dim, (size_t)rank * sizeof *dim) != 0) {
         char has[160], needs[160];
@@ -177,18 +177,18 @@ static const nn_entry *find_real(const nn_file *file, const char *name, int rank
 
 ts_code nn_file_read(const nn_file *file, const char *name, int rank, const int64_t *dim, float *out, ts_status *st)
 {
-    const nn_entry *e = find_real(file, name, rank, dim, st);
+    const nn_tensor *e = find_real(file, name, rank, dim, st);
     if (!e) return TS_FORMAT;
-    nn_entry_copy(e, NN_F32, out);
+    nn_tensor_copy(e, NN_F32, out);
     return TS_OK;
 }
 
 ts_code nn_file_read_finite(const nn_file *file, const char *name, int rank, const int64_t *dim, float *out,
                             ts_status *st)
 {
-    const nn_entry *e = find_real(file, name, rank, dim, st);
+    const nn_tensor *e = find_real(file, name, rank, dim, st);
     if (!e) return TS_FORMAT;
-    return nn_entry_finite(e, out)
+    return nn_tensor_finite(e, out)
         ? TS_OK
         : ts_fail(st, TS_NUMERIC, "%s: tensor \"%s\" holds a value that is not finite", file->path, name);
 }

@@ -1,4 +1,4 @@
-/* A file of named tensors, whatever its form: one interface for everything that reads or writes weights. */
+/* A file of named tensors in any of the formats: the interface for everything that reads or writes weights. */
 #ifndef NN_FILE_H
 #define NN_FILE_H
 #include "tensor/status.h"
@@ -6,8 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Types of numbers by safetensors' names. The first four are what weights can be; the others may lie in a file beside
- * them. */
+/* Types of numbers by safetensors' names. Weights can have the first four; the others may be in a file beside them. */
 typedef enum nn_dtype {
     NN_F32,
     NN_F16,
@@ -35,7 +34,7 @@ enum { NN_RANK_MAX = 8 };
 
 /* One tensor: number [i, j, …] lies at data + (i stride[0] + j stride[1] + …) nn_dtype_size(dtype), which is not
  * aligned to anything. */
-typedef struct nn_entry {
+typedef struct nn_tensor {
     const char *name; /* UTF-8, unique in its file */
     nn_dtype dtype;
     bool swapped; /* the numbers are big endian */
@@ -43,15 +42,15 @@ typedef struct nn_entry {
     int64_t dim[NN_RANK_MAX], stride[NN_RANK_MAX]; /* >= 0, in numbers */
     int64_t count;                                 /* the product of dim: 1 for rank 0 */
     const unsigned char *data;
-} nn_entry;
+} nn_tensor;
 
 typedef enum nn_form { NN_FORM_SAFETENSORS, NN_FORM_TORCH_ZIP, NN_FORM_TORCH_OLD } nn_form;
 
 /* A mapped, validated file: every tensor's numbers lie inside it, or in memory that it owns where they were compressed.
- * Nothing in a file is believed. nn_file_open takes every form and tells them apart by their first bytes;
+ * Everything in a file is checked. nn_file_open takes every form, recognised by its first bytes;
  * nn_safetensors_open takes that form alone, whose header has at most 16 MiB and whose tensors fill the rest of the
- * file without holes or overlap. NULL and st on failure; closing nulls the pointer. What the functions below return
- * lives until then. */
+ * file without holes or overlap. NULL and st on failure; closing nulls the pointer. The functions below return
+ * memory that lives until then. */
 typedef struct nn_file nn_file;
 nn_file *nn_file_open(const char *path, ts_status *st);
 nn_file *nn_safetensors_open(const char *path, ts_status *st);
@@ -60,9 +59,9 @@ void nn_file_close(nn_file **file);
 nn_form nn_file_form(const nn_file *file);
 const char *nn_file_path(const nn_file *file); /* for messages */
 int nn_file_count(const nn_file *file);
-const nn_entry *nn_file_entry(const nn_file *file, int i); /* in the file's order */
+const nn_tensor *nn_file_tensor(const nn_file *file, int i); /* in the file's order */
 const char *nn_file_name(const nn_file *file, int i);
-const nn_entry *nn_file_find(const nn_file *file, const char *name); /* NULL when absent */
+const nn_tensor *nn_file_find(const nn_file *file, const char *name); /* NULL when absent */
 bool nn_file_has(const nn_file *file, const char *name);
 const char *nn_file_meta(const nn_file *file, const char *key); /* NULL when absent */
 const char *nn_file_meta_key(const nn_file *file, int i);       /* in the file's order, NULL past the last */
@@ -77,11 +76,11 @@ ts_code nn_file_read_finite(const nn_file *file, const char *name, int rank, con
 /* Copies the numbers of e, row-major and little endian, into out (count * nn_dtype_size(to) bytes, aligned to one). to
  * is e's own type, or both are real; rounds to nearest even (F64 to a half by way of F32). False: a finite number is
  * too large for F16. */
-bool nn_entry_copy(const nn_entry *e, nn_dtype to, void *out);
+bool nn_tensor_copy(const nn_tensor *e, nn_dtype to, void *out);
 /* Of real numbers, as F32. False: one is not finite. */
-bool nn_entry_finite(const nn_entry *e, float *out);
+bool nn_tensor_finite(const nn_tensor *e, float *out);
 /* Row-major without gaps, little endian: data may be used as it is. */
-bool nn_entry_plain(const nn_entry *e);
+bool nn_tensor_plain(const nn_tensor *e);
 /* "[64, 3, 3, 3]" */
 void nn_shape_text(int rank, const int64_t *dim, char *out, size_t size);
 
@@ -89,9 +88,9 @@ typedef struct nn_meta {
     const char *key, *value;
 } nn_meta;
 
-/* Writes entries in that form (not NN_FORM_TORCH_OLD) to a temporary file beside path, fsynced, renamed; nothing is
+/* Writes tensors in that form (not NN_FORM_TORCH_OLD) to a temporary file beside path, fsynced, renamed; nothing is
  * left on failure. real: the type that all tensors of real numbers get, NN_DTYPES to leave each as it is. Views of one
  * storage become tensors of their own. */
-ts_code nn_file_write(const char *path, nn_form form, const nn_entry *entry, int entries, nn_dtype real,
+ts_code nn_file_write(const char *path, nn_form form, const nn_tensor *tensor, int tensors, nn_dtype real,
                       const nn_meta *meta, int metas, ts_status *st);
 #endif

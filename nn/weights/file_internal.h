@@ -1,6 +1,6 @@
-/* What the readers and writers of nn/weights/file.h share among themselves. */
-#ifndef NN_FILE_PARTS_H
-#define NN_FILE_PARTS_H
+/* Shared by the readers and writers of nn/weights/file.h. */
+#ifndef NN_FILE_INTERNAL_H
+#define NN_FILE_INTERNAL_H
 #include "nn/weights/file.h"
 #include "tensor/arena.h"
 
@@ -9,48 +9,48 @@ struct nn_file {
     nn_form form;
     const unsigned char *map; /* the file */
     size_t size;
-    ts_arena *arena;         /* names, metadata, whatever the form needs */
-    nn_entry *entry;         /* in the file's order */
-    const nn_entry **sorted; /* by name */
+    ts_arena *arena;          /* names, metadata, whatever the form needs */
+    nn_tensor *tensor;        /* in the file's order */
+    const nn_tensor **sorted; /* by name */
     nn_meta *meta;
-    int entries, metas;
+    int tensors, metas;
     void **inflated; /* memory of compressed storages */
     int inflations;
 };
 
-/* The next free entry, zeroed, or the next pair of metadata; NULL: no memory. */
-nn_entry *nn_file_add(nn_file *f);
+/* The next free tensor, zeroed, or the next pair of metadata; NULL: no memory. */
+nn_tensor *nn_file_add(nn_file *f);
 nn_meta *nn_file_add_meta(nn_file *f);
 /* Strides of a row-major tensor, and count; false: an overflow. */
-bool nn_entry_shape(nn_entry *e);
+bool nn_tensor_shape(nn_tensor *e);
 
-/* The forms' readers: f is mapped, entries and metadata are to be filled in. */
+/* The forms' readers: f is mapped, tensors and metadata are to be filled in. */
 ts_code nn_safetensors_parse(nn_file *f, ts_status *st);
 ts_code nn_torch_parse(nn_file *f, ts_status *st);
 bool nn_torch_is_zip(const nn_file *f);
 bool nn_torch_is_old(const nn_file *f); /* not a ZIP archive: PyTorch before 1.6 */
 
-/* A file on its way: put as often as needed (errors stay), then end, which puts it in path's place, or removes it after
- * an error or where code says that the caller has one. path must live until then. */
-typedef struct nn_out {
+/* A file that is being written: put as often as needed (the first error stays), then end, which renames it to path, or
+ * removes it after an error or when code is one. path must live until then. */
+typedef struct nn_atomic_file {
     const char *path;
     char *temporary;
     int fd, error;
     int64_t written;
-} nn_out;
-ts_code nn_out_begin(nn_out *o, const char *path, ts_status *st);
-void nn_out_put(nn_out *o, const void *data, size_t size);
-ts_code nn_out_end(nn_out *o, ts_code code, ts_status *st);
+} nn_atomic_file;
+ts_code nn_atomic_begin(nn_atomic_file *o, const char *path, ts_status *st);
+void nn_atomic_put(nn_atomic_file *o, const void *data, size_t size);
+ts_code nn_atomic_end(nn_atomic_file *o, ts_code code, ts_status *st);
 
 /* What a tensor of that type is written as. */
 nn_dtype nn_dtype_out(nn_dtype has, nn_dtype real);
 /* The numbers of e as type to: e's own memory, or *work, which grows to what is needed (the caller frees it). */
-const void *nn_entry_bytes(const nn_entry *e, nn_dtype to, const char *path, void **work, size_t *work_size,
-                           ts_status *st);
+const void *nn_tensor_bytes(const nn_tensor *e, nn_dtype to, const char *path, void **work, size_t *work_size,
+                            ts_status *st);
 
 /* The forms' writers. */
-ts_code nn_safetensors_put(nn_out *o, const nn_entry *entry, int entries, nn_dtype real, const nn_meta *meta, int metas,
-                           ts_status *st);
-ts_code nn_torch_put(nn_out *o, const nn_entry *entry, int entries, nn_dtype real, const nn_meta *meta, int metas,
-                     ts_status *st);
+ts_code nn_safetensors_put(nn_atomic_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
+                           int metas, ts_status *st);
+ts_code nn_torch_put(nn_atomic_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
+                     int metas, ts_status *st);
 #endif

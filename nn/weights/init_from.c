@@ -1,4 +1,4 @@
-/* A model that begins with another's parameters, which may be of fewer photographs or of a narrower g. */
+/* A model starts from the parameters of another one, which may read fewer photographs or have a narrower g. */
 #include "nn/layers.h"
 #include "nn/weights/weights.h"
 #include "tensor/rng.h"
@@ -81,8 +81,8 @@ static bool may_grow(const nn_arch *narrow, const nn_arch *wide)
 {
     return narrow->g_width <= wide->g_width && narrow->g_width_max <= wide->g_width_max &&
         narrow->g_levels == wide->g_levels && narrow->g_kernel == wide->g_kernel &&
-        narrow->g_kernel_first == wide->g_kernel_first && narrow->images == wide->images && narrow->latent == 0 &&
-        wide->latent == 0 && narrow->compat == NN_COMPAT_NONE && wide->compat == NN_COMPAT_NONE;
+        narrow->g_kernel_first == wide->g_kernel_first && narrow->images == wide->images &&
+        narrow->compat == NN_COMPAT_NONE && wide->compat == NN_COMPAT_NONE;
 }
 
 static inputs inputs_of(const nn_model *model, const nn_arch *narrow, int index, const int *from, const int *to)
@@ -101,10 +101,10 @@ static inputs inputs_of(const nn_model *model, const nn_arch *narrow, int index,
     return (inputs){1, {from[1], 0}, {to[1], 0}};
 }
 
-/* A tensor of g begins as a narrower g has it (Chen, Goodfellow, Shlens, "Net2Net", ICLR 2016, section 2.2): channel j
- * of c is the narrow one's j mod c, and what read that channel reads its copies, each with a random share of the
- * weight, so that they do not stay copies. The network computes what the narrow one does. narrow: the list of
- * parameters that the file states. False where it has no such tensor. */
+/* A tensor of g starts from that of a narrower g (Chen, Goodfellow, Shlens, "Net2Net", ICLR 2016, section 2.2): channel
+ * j is the narrow one's j mod c, and the layers that read it read its copies, each with a random share of the weight,
+ * so that training separates them. The network computes the same as the narrow one. narrow: the list of parameters that
+ * the file states. False where it has no such tensor. */
 static bool grown(const nn_model *model, const nn_model *narrow, int index, nn_file *f)
 {
     const nn_param *p = &model->param[index];

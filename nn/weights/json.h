@@ -1,6 +1,5 @@
-/* A strict reader of JSON text (RFC 8259) for known structures: the caller says what must come next, so nothing
- * recurses and nothing is nested deeper than the caller goes. The first error stays and everything after it fails too.
- */
+/* A strict reader of JSON text (RFC 8259) for known structures: the caller names what must come next, so that nothing
+ * recurses. The first error stays, and everything after it fails. */
 #ifndef NN_JSON_H
 #define NN_JSON_H
 #include "tensor/status.h"

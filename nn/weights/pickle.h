@@ -1,6 +1,6 @@
-/* A reader of Python pickles (pickletools.py, protocols 2 to 5) that executes nothing: it knows the opcodes that a
- * state dict needs, and its caller says which globals exist and what calling them gives. An opcode or a global that is
- * not known is an error. */
+/* A reader of Python pickles (pickletools.py, protocols 2 to 5) that executes nothing: it knows the opcodes of a
+ * state dict, and its caller defines the globals and the results of calling them. An unknown opcode or global is an
+ * error. */
 #ifndef NN_PICKLE_H
 #define NN_PICKLE_H
 #include "tensor/arena.h"

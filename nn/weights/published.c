@@ -1,4 +1,4 @@
-/* The published network's names (the table of which ours are the left column), and how its files are recognised. */
+/* The table of our names and the published ones, and how published files are recognised. */
 #include "nn/weights/published.h"
 #include "nn/layers.h"
 #include <limits.h>
@@ -75,7 +75,7 @@ bool nn_published_file(const nn_file *file) { return nn_file_has(file, first_wei
 /* Dimension i of a convolution's weight; -1 where there is none. */
 static int dim_of(const nn_file *file, const char *name, int i)
 {
-    const nn_entry *e = nn_file_find(file, name);
+    const nn_tensor *e = nn_file_find(file, name);
     return e && e->rank == 4 && e->dim[i] <= INT_MAX ? (int)e->dim[i] : -1;
 }
 

@@ -1,4 +1,4 @@
-/* Checks a safetensors file. Nothing in it is believed: afterwards every tensor's bytes are inside the file. */
+/* Reads and checks a safetensors file: afterwards every tensor's bytes are inside the file. */
 #include "nn/weights/file_internal.h"
 #include "nn/weights/json.h"
 #include <stdio.h>
@@ -7,7 +7,7 @@
 
 enum { MAX_HEADER = 16 << 20 };
 
-/* What the header says of a tensor beside its entry, and where its values end. */
+/* A tensor of the header beside its entry, and the end of its values. */
 typedef struct place {
     int64_t begin, end;
     bool type;
@@ -16,7 +16,7 @@ typedef struct place {
 typedef struct header {
     nn_file *f;
     json_reader *r;
-    place *place; /* of each entry */
+    place *place; /* of each tensor */
     int places;
 } header;
 
@@ -36,7 +36,7 @@ static bool read_metadata(header *h)
     return json_take(r, '}');
 }
 
-static bool read_type(json_reader *r, nn_entry *e, place *p)
+static bool read_type(json_reader *r, nn_tensor *e, place *p)
 {
     const char *name = json_string(r);
     for (int i = 0; name && i < NN_DTYPES; i++)
@@ -52,7 +52,7 @@ static bool read_type(json_reader *r, nn_entry *e, place *p)
     return name != NULL;
 }
 
-static bool read_shape(json_reader *r, nn_entry *e)
+static bool read_shape(json_reader *r, nn_tensor *e)
 {
     if (!json_take(r, '[')) return false;
     if (json_try(r, ']')) return true;
@@ -63,7 +63,7 @@ static bool read_shape(json_reader *r, nn_entry *e)
     return json_take(r, ']');
 }
 
-static bool read_tensor(json_reader *r, nn_entry *e, place *p)
+static bool read_tensor(json_reader *r, nn_tensor *e, place *p)
 {
     bool shape = false, offsets = false;
     if (!json_take(r, '{')) return false;
@@ -107,8 +107,8 @@ static bool read_header(header *h)
             if (!read_metadata(h)) return false;
             continue;
         }
-        nn_entry *e = nn_file_add(h->f);
-        if (e && h->f->entries > h->places) {
+        nn_tensor *e = nn_file_add(h->f);
+        if (e && h->f->tensors > h->places) {
             int places = h->places ? 2 * h->places : 16;
             place *grown = realloc(h->place, (size_t)places * sizeof *grown);
             if (!grown) e = NULL;
@@ -119,7 +119,7 @@ static bool read_header(header *h)
         }
         if (!e) return json_fail(r, "no memory for the list of tensors");
         e->name = name;
-        place *p = &h->place[h->f->entries - 1];
+        place *p = &h->place[h->f->tensors - 1];
         *p = (place){0};
         if (!read_tensor(r, e, p)) return false;
     } while (json_try(r, ','));
@@ -128,7 +128,7 @@ static bool read_header(header *h)
 
 typedef struct extent {
     int64_t begin, end;
-    int entry;
+    int tensor;
 } extent;
 
 static int by_place(const void *a, const void *b)
@@ -142,10 +142,10 @@ static int by_place(const void *a, const void *b)
 static ts_code check_order(nn_file *f, extent *x, int64_t bytes, ts_status *st)
 {
     int64_t at = 0;
-    if (f->entries) qsort(x, (size_t)f->entries, sizeof *x, by_place);
-    for (int i = 0; i < f->entries; i++) {
+    if (f->tensors) qsort(x, (size_t)f->tensors, sizeof *x, by_place);
+    for (int i = 0; i < f->tensors; i++) {
         if (x[i].begin != at)
-            return ts_fail(st, TS_FORMAT, "%s: tensor \"%.200s\" %s", f->path, f->entry[x[i].entry].name,
+            return ts_fail(st, TS_FORMAT, "%s: tensor \"%.200s\" %s", f->path, f->tensor[x[i].tensor].name,
                            x[i].begin < at ? "overlaps another one" : "comes after a hole in the file");
         at = x[i].end;
     }
@@ -157,13 +157,13 @@ static ts_code check_order(nn_file *f, extent *x, int64_t bytes, ts_status *st)
 /* Every tensor has the bytes that its shape needs. */
 static ts_code check_places(nn_file *f, const place *where, const unsigned char *data, int64_t bytes, ts_status *st)
 {
-    extent *x = malloc(((size_t)f->entries + 1) * sizeof *x);
+    extent *x = malloc(((size_t)f->tensors + 1) * sizeof *x);
     if (!x) return ts_fail(st, TS_NOMEM, "%s: no memory for the list of tensors", f->path);
     ts_code code = TS_OK;
-    for (int i = 0; i < f->entries && !code; i++) {
-        nn_entry *e = &f->entry[i];
+    for (int i = 0; i < f->tensors && !code; i++) {
+        nn_tensor *e = &f->tensor[i];
         int64_t size = 0;
-        if (!nn_entry_shape(e) || __builtin_mul_overflow(e->count, nn_dtype_size(e->dtype), &size))
+        if (!nn_tensor_shape(e) || __builtin_mul_overflow(e->count, nn_dtype_size(e->dtype), &size))
             code = ts_fail(st, TS_FORMAT, "%s: tensor \"%.200s\" has an impossible shape", f->path, e->name);
         else if (where[i].begin > where[i].end || where[i].end > bytes)
             code = ts_fail(st, TS_FORMAT, "%s: tensor \"%.200s\" lies outside the file (is it truncated?)", f->path,

@@ -21,7 +21,7 @@ static bool put_string(nn_text *t, const char *s)
 }
 
 /* order: the tensors as their values follow each other in the file. */
-static ts_code make_header(nn_text *t, const char *path, const nn_entry *entry, const int *order, int entries,
+static ts_code make_header(nn_text *t, const char *path, const nn_tensor *tensor, const int *order, int tensors,
                            nn_dtype real, const nn_meta *meta, int metas, ts_status *st)
 {
     int64_t at = 0;
@@ -36,9 +36,9 @@ static ts_code make_header(nn_text *t, const char *path, const nn_entry *entry, 
         if (!good || !put_string(t, meta[i].value))
             return ts_fail(st, TS_INVALID, "%s: metadata \"%.80s\" is not UTF-8", path, meta[i].key);
     }
-    if (metas > 0) nn_text_put(t, entries ? "}," : "}");
-    for (int i = 0; i < entries; i++) {
-        const nn_entry *e = &entry[order[i]];
+    if (metas > 0) nn_text_put(t, tensors ? "}," : "}");
+    for (int i = 0; i < tensors; i++) {
+        const nn_tensor *e = &tensor[order[i]];
         const nn_dtype to = nn_dtype_out(e->dtype, real);
         if (i) nn_text_put(t, ",");
         if (!put_string(t, e->name))
@@ -63,26 +63,26 @@ static ts_code make_header(nn_text *t, const char *path, const nn_entry *entry, 
     return TS_OK;
 }
 
-ts_code nn_safetensors_put(nn_out *o, const nn_entry *entry, int entries, nn_dtype real, const nn_meta *meta, int metas,
-                           ts_status *st)
+ts_code nn_safetensors_put(nn_atomic_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
+                           int metas, ts_status *st)
 {
     nn_text t = {0};
-    int *order = malloc(((size_t)entries + 1) * sizeof *order), n = 0;
+    int *order = malloc(((size_t)tensors + 1) * sizeof *order), n = 0;
     void *work = NULL;
     size_t work_size = 0;
     ts_code code = TS_OK;
     if (!order) code = ts_fail(st, TS_NOMEM, "%s: no memory to write it", o->path);
     for (int size = 8; !code && size; size /= 2) /* the widest first, so that every number is aligned to its size */
-        for (int i = 0; i < entries; i++)
-            if (nn_dtype_size(nn_dtype_out(entry[i].dtype, real)) == size) order[n++] = i;
-    if (!code) code = make_header(&t, o->path, entry, order, entries, real, meta, metas, st);
-    if (!code) nn_out_put(o, t.data, t.used);
-    for (int i = 0; i < entries && !code && !o->error; i++) {
-        const nn_entry *e = &entry[order[i]];
+        for (int i = 0; i < tensors; i++)
+            if (nn_dtype_size(nn_dtype_out(tensor[i].dtype, real)) == size) order[n++] = i;
+    if (!code) code = make_header(&t, o->path, tensor, order, tensors, real, meta, metas, st);
+    if (!code) nn_atomic_put(o, t.data, t.used);
+    for (int i = 0; i < tensors && !code && !o->error; i++) {
+        const nn_tensor *e = &tensor[order[i]];
         const nn_dtype to = nn_dtype_out(e->dtype, real);
-        const void *bytes = nn_entry_bytes(e, to, o->path, &work, &work_size, st);
+        const void *bytes = nn_tensor_bytes(e, to, o->path, &work, &work_size, st);
         if (!bytes) code = st ? st->code : TS_FORMAT;
-        else nn_out_put(o, bytes, (size_t)e->count * (size_t)nn_dtype_size(to));
+        else nn_atomic_put(o, bytes, (size_t)e->count * (size_t)nn_dtype_size(to));
     }
     free(work);
     free(order);
@@ -93,15 +93,15 @@ ts_code nn_safetensors_put(nn_out *o, const nn_entry *entry, int entries, nn_dty
 ts_code nn_safetensors_write(const char *path, const nn_block *blocks, int count, const nn_meta *meta, int metas,
                              ts_status *st)
 {
-    nn_entry *entry = malloc(((size_t)count + 1) * sizeof *entry);
-    if (!entry) return ts_fail(st, TS_NOMEM, "%s: no memory to write it", path);
+    nn_tensor *tensor = malloc(((size_t)count + 1) * sizeof *tensor);
+    if (!tensor) return ts_fail(st, TS_NOMEM, "%s: no memory to write it", path);
     for (int i = 0; i < count; i++) {
-        entry[i] = (nn_entry){
+        tensor[i] = (nn_tensor){
             .name = blocks[i].name, .rank = blocks[i].rank, .data = (const unsigned char *)blocks[i].data};
-        for (int j = 0; j < blocks[i].rank; j++) entry[i].dim[j] = blocks[i].dim[j];
-        nn_entry_shape(&entry[i]);
+        for (int j = 0; j < blocks[i].rank; j++) tensor[i].dim[j] = blocks[i].dim[j];
+        nn_tensor_shape(&tensor[i]);
     }
-    ts_code code = nn_file_write(path, NN_FORM_SAFETENSORS, entry, count, NN_DTYPES, meta, metas, st);
-    free(entry);
+    ts_code code = nn_file_write(path, NN_FORM_SAFETENSORS, tensor, count, NN_DTYPES, meta, metas, st);
+    free(tensor);
     return code;
 }

@@ -90,7 +90,7 @@ static bool all_finite(const float *v, int n)
     return !bad;
 }
 
-static void load(const nn_entry *e, const unsigned char *p, int64_t step, int n, float *out)
+static void load(const nn_tensor *e, const unsigned char *p, int64_t step, int n, float *out)
 {
     uint16_t half[CHUNK];
     switch (e->dtype) {
@@ -130,7 +130,7 @@ static bool store(const float *in, nn_dtype to, int n, unsigned char *out)
     return !overflow;
 }
 
-static void copy_as_is(const nn_entry *e, const unsigned char *p, int64_t step, int64_t n, unsigned char *out)
+static void copy_as_is(const nn_tensor *e, const unsigned char *p, int64_t step, int64_t n, unsigned char *out)
 {
     int size = types[e->dtype].size;
     if (step == size && !e->swapped) {
@@ -144,7 +144,7 @@ static void copy_as_is(const nn_entry *e, const unsigned char *p, int64_t step, 
 
 /* Dimensions that follow each other in memory become one, those of length 1 none. Returns the rank that is left, at
  * least 1. */
-static int collapse(const nn_entry *e, int64_t *dim, int64_t *stride)
+static int collapse(const nn_tensor *e, int64_t *dim, int64_t *stride)
 {
     int n = 0;
     for (int i = 0; i < e->rank; i++) {
@@ -161,7 +161,7 @@ static int collapse(const nn_entry *e, int64_t *dim, int64_t *stride)
     return n;
 }
 
-bool nn_entry_plain(const nn_entry *e)
+bool nn_tensor_plain(const nn_tensor *e)
 {
     int64_t dim[NN_RANK_MAX], stride[NN_RANK_MAX];
     if (e->count == 0) return true;
@@ -170,7 +170,7 @@ bool nn_entry_plain(const nn_entry *e)
 }
 
 /* finite: NULL, or false where a number is not, as F32 (to). */
-static bool copy(const nn_entry *e, nn_dtype to, void *out, bool *finite)
+static bool copy(const nn_tensor *e, nn_dtype to, void *out, bool *finite)
 {
     int64_t dim[NN_RANK_MAX], stride[NN_RANK_MAX], at[NN_RANK_MAX] = {0};
     if (e->count == 0) return true;
@@ -202,20 +202,20 @@ static bool copy(const nn_entry *e, nn_dtype to, void *out, bool *finite)
     return good;
 }
 
-bool nn_entry_copy(const nn_entry *e, nn_dtype to, void *out) { return copy(e, to, out, NULL); }
+bool nn_tensor_copy(const nn_tensor *e, nn_dtype to, void *out) { return copy(e, to, out, NULL); }
 
-bool nn_entry_finite(const nn_entry *e, float *out)
+bool nn_tensor_finite(const nn_tensor *e, float *out)
 {
     bool finite = true;
     copy(e, NN_F32, out, &finite);
     return finite;
 }
 
-const void *nn_entry_bytes(const nn_entry *e, nn_dtype to, const char *path, void **work, size_t *work_size,
-                           ts_status *st)
+const void *nn_tensor_bytes(const nn_tensor *e, nn_dtype to, const char *path, void **work, size_t *work_size,
+                            ts_status *st)
 {
     int64_t bytes;
-    if (to == e->dtype && nn_entry_plain(e)) return e->count ? (const void *)e->data : "";
+    if (to == e->dtype && nn_tensor_plain(e)) return e->count ? (const void *)e->data : "";
     if (__builtin_mul_overflow(e->count, types[to].size, &bytes)) bytes = INT64_MAX;
     if ((size_t)bytes > *work_size) {
         free(*work);
@@ -226,7 +226,7 @@ const void *nn_entry_bytes(const nn_entry *e, nn_dtype to, const char *path, voi
             return NULL;
         }
     }
-    if (nn_entry_copy(e, to, *work)) return *work;
+    if (nn_tensor_copy(e, to, *work)) return *work;
     ts_fail(st, TS_NUMERIC,
             "%s: not written: tensor \"%.200s\" has numbers that are too large for F16 (65504): take BF16 or F32", path,
             e->name);

@@ -1,4 +1,4 @@
-/* Bytes that grow: headers and directories before they are written. The first failure stays. */
+/* A growing buffer for headers and directories. The first failure stays. */
 #ifndef NN_TEXT_H
 #define NN_TEXT_H
 #include <stdbool.h>

@@ -1,4 +1,4 @@
-/* The whitelist: every global that a pickle may name, and what becomes of it. Nothing is executed. */
+/* The whitelist: every global that a pickle may name, and the value that it becomes. Nothing is executed. */
 #include "nn/weights/torch.h"
 #include <string.h>
 

@@ -73,16 +73,16 @@ static const unsigned char *storage_data(reader *r, const torch_storage *s, int 
 static ts_code add_tensor(reader *r, const torch_tensor *t)
 {
     const torch_storage *s = t->storage;
-    nn_entry *e = nn_file_add(r->f);
+    nn_tensor *e = nn_file_add(r->f);
     const size_t length = strlen(r->name);
     char *name = ts_arena_alloc(r->f->arena, length + 1);
     r->names += length + 1;
     if (!e || !name || r->names > MOST_NAMES)
         return ts_fail(r->st, TS_NOMEM, "%s: no memory for the list of tensors", r->f->path);
     memcpy(name, r->name, length + 1);
-    *e = (nn_entry){.name = name, .dtype = t->dtype, .swapped = r->swapped, .rank = t->rank};
+    *e = (nn_tensor){.name = name, .dtype = t->dtype, .swapped = r->swapped, .rank = t->rank};
     memcpy(e->dim, t->dim, sizeof e->dim);
-    if (!nn_entry_shape(e))
+    if (!nn_tensor_shape(e))
         return ts_fail(r->st, TS_FORMAT, "%s: tensor \"%.200s\" has an impossible shape", r->f->path, name);
     memcpy(e->stride, t->stride, sizeof e->stride);
     const int size = nn_dtype_size(t->dtype), unit = nn_dtype_size(s->dtype);
@@ -183,7 +183,7 @@ static ts_code take_tensors(reader *r, const pk_value *root)
 {
     ts_code code = visit(r, root, 0);
     if (!code) code = take_metadata(r, root);
-    if (!code && r->f->entries == 0) code = ts_fail(r->st, TS_FORMAT, "%s: no tensor is in it", r->f->path);
+    if (!code && r->f->tensors == 0) code = ts_fail(r->st, TS_FORMAT, "%s: no tensor is in it", r->f->path);
     return code;
 }
 

@@ -41,16 +41,16 @@ static void pickle_ints(nn_text *t, const int64_t *v, int n)
 
 #define ORDERED_DICT "ccollections\nOrderedDict\n)R"
 
-static ts_code pickle_tensor(nn_text *t, const char *path, const nn_entry *e, nn_dtype to, int key, ts_status *st)
+static ts_code pickle_tensor(nn_text *t, const char *path, const nn_tensor *e, nn_dtype to, int key, ts_status *st)
 {
     char text[80];
-    nn_entry row_major = *e;
+    nn_tensor row_major = *e;
     if (!storage_of[to])
         return ts_fail(st, TS_UNSUPPORTED, "%s: tensor \"%.200s\" has dtype %s, which has no storage in PyTorch", path,
                        e->name, nn_dtype_name(to));
     if (!pickle_text(t, e->name))
         return ts_fail(st, TS_INVALID, "%s: the tensor name \"%.80s\" is not UTF-8", path, e->name);
-    nn_entry_shape(&row_major);
+    nn_tensor_shape(&row_major);
     nn_text_put(t, "ctorch._utils\n_rebuild_tensor_v2\n((");
     pickle_text(t, "storage");
     snprintf(text, sizeof text, "ctorch\n%sStorage\n", storage_of[to]);
@@ -68,12 +68,12 @@ static ts_code pickle_tensor(nn_text *t, const char *path, const nn_entry *e, nn
 }
 
 /* OrderedDict of the tensors; metadata becomes its attribute "lgd", a dict of texts. */
-static ts_code pickle_all(nn_text *t, const char *path, const nn_entry *entry, int entries, nn_dtype real,
+static ts_code pickle_all(nn_text *t, const char *path, const nn_tensor *tensor, int tensors, nn_dtype real,
                           const nn_meta *meta, int metas, ts_status *st)
 {
     nn_text_put(t, "\x80\x02" ORDERED_DICT "(");
-    for (int i = 0; i < entries; i++) {
-        ts_code code = pickle_tensor(t, path, &entry[i], nn_dtype_out(entry[i].dtype, real), i, st);
+    for (int i = 0; i < tensors; i++) {
+        ts_code code = pickle_tensor(t, path, &tensor[i], nn_dtype_out(tensor[i].dtype, real), i, st);
         if (code) return code;
     }
     nn_text_put(t, "u");
@@ -90,10 +90,10 @@ static ts_code pickle_all(nn_text *t, const char *path, const nn_entry *entry, i
     return t->failed ? ts_fail(st, TS_NOMEM, "%s: no memory for its list of tensors", path) : TS_OK;
 }
 
-/* The archive's directory grows beside it. Sizes and places always stand in the 64-bit fields: one form for small and
+/* The archive's directory grows beside it. Sizes and offsets are always in the 64-bit fields: one form for small and
  * for large files. */
 typedef struct archive {
-    nn_out *o;
+    nn_atomic_file *o;
     nn_text directory;
     int entries;
 } archive;
@@ -129,9 +129,9 @@ static void put_entry(archive *a, const char *name, const void *data, size_t siz
     nn_text_number(&local, padding, 2);
     for (uint64_t i = 0; i < padding; i++) nn_text_put(&local, "Z");
     a->directory.failed |= local.failed;
-    if (!local.failed) nn_out_put(a->o, local.data, local.used);
+    if (!local.failed) nn_atomic_put(a->o, local.data, local.used);
     free(local.data);
-    nn_out_put(a->o, data, size);
+    nn_atomic_put(a->o, data, size);
 
     nn_text *d = &a->directory;
     nn_text_put(d, "PK\1\2");
@@ -170,30 +170,30 @@ static void put_directory(archive *a)
     nn_text_number(d, UINT32_MAX, 4); /* both counts */
     nn_text_number(d, UINT64_MAX, 8); /* size and place */
     nn_text_number(d, 0, 2);
-    if (!d->failed) nn_out_put(a->o, d->data, d->used);
+    if (!d->failed) nn_atomic_put(a->o, d->data, d->used);
 }
 
-ts_code nn_torch_put(nn_out *o, const nn_entry *entry, int entries, nn_dtype real, const nn_meta *meta, int metas,
-                     ts_status *st)
+ts_code nn_torch_put(nn_atomic_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
+                     int metas, ts_status *st)
 {
     archive a = {.o = o};
     nn_text list = {0};
     void *work = NULL;
     size_t work_size = 0;
-    ts_code code = pickle_all(&list, o->path, entry, entries, real, meta, metas, st);
+    ts_code code = pickle_all(&list, o->path, tensor, tensors, real, meta, metas, st);
     if (!code && list.used > PK_MOST_BYTES)
-        code = ts_fail(st, TS_UNSUPPORTED, "%s: not written: %d tensors are more than are read back", o->path, entries);
+        code = ts_fail(st, TS_UNSUPPORTED, "%s: not written: %d tensors are more than are read back", o->path, tensors);
     if (!code) {
         put_entry(&a, "archive/data.pkl", list.data, list.used);
         put_entry(&a, "archive/byteorder", "little", 6);
     }
-    for (int i = 0; i < entries && !code && !o->error; i++) {
+    for (int i = 0; i < tensors && !code && !o->error; i++) {
         char name[40];
-        const nn_dtype to = nn_dtype_out(entry[i].dtype, real);
-        const void *bytes = nn_entry_bytes(&entry[i], to, o->path, &work, &work_size, st);
+        const nn_dtype to = nn_dtype_out(tensor[i].dtype, real);
+        const void *bytes = nn_tensor_bytes(&tensor[i], to, o->path, &work, &work_size, st);
         snprintf(name, sizeof name, "archive/data/%d", i);
         if (!bytes) code = st ? st->code : TS_FORMAT;
-        else put_entry(&a, name, bytes, (size_t)entry[i].count * (size_t)nn_dtype_size(to));
+        else put_entry(&a, name, bytes, (size_t)tensor[i].count * (size_t)nn_dtype_size(to));
     }
     if (!code) {
         put_entry(&a, "archive/version", "3\n", 2);

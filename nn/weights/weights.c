@@ -41,7 +41,7 @@ static ts_code read_values(const nn_file *f, nn_model *m, ts_status *st)
         int64_t dim[4];
         nn_param_dims(p, dim);
         if (nn_file_read_finite(f, p->name, p->rank, dim, m->value + p->offset, &own) == TS_OK) continue;
-#pragma omp critical(nn_read_values)
+#pragma omp critical
         if (i < failed) {
             failed = i;
             *st = own;
@@ -50,28 +50,43 @@ static ts_code read_values(const nn_file *f, nn_model *m, ts_status *st)
     return failed < m->params ? st->code : TS_OK;
 }
 
+/* The plan with its parameters: all that are in the file, and no other tensors of a network. Frees the plan on failure.
+ */
+static nn_model *fill(nn_model *m, const nn_file *f, ts_status *st)
+{
+    for (int i = 0; m && i < nn_file_count(f); i++) {
+        const char *name = nn_file_name(f, i);
+        if (of_network(name) && !nn_model_find(m, name)) {
+            ts_fail(st, TS_FORMAT, "%s: tensor \"%.200s\" does not belong to the architecture that the file states",
+                    nn_file_path(f), name);
+            nn_model_free(&m);
+        }
+    }
+    for (int i = 0; m && i < m->params; i++)
+        if (!nn_file_has(f, m->param[i].name)) {
+            ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" is missing", nn_file_path(f), m->param[i].name);
+            nn_model_free(&m);
+        }
+    if (m && (nn_model_allocate(m, st) || read_values(f, m, st))) nn_model_free(&m);
+    return m;
+}
+
 nn_model *nn_model_load(const char *path, ts_status *st)
 {
     nn_arch arch;
     nn_model *m = NULL;
     nn_file *f = nn_file_open(path, st);
-    if (f && !nn_arch_from_file(f, &arch, st)) {
-        m = nn_model_plan(&arch, st); /* before memory is taken: is the file what its metadata says? */
-        for (int i = 0; m && i < nn_file_count(f); i++) {
-            const char *name = nn_file_name(f, i);
-            if (of_network(name) && !nn_model_find(m, name)) {
-                ts_fail(st, TS_FORMAT, "%s: tensor \"%.200s\" does not belong to the architecture that the file states",
-                        path, name);
-                nn_model_free(&m);
-            }
-        }
-        for (int i = 0; m && i < m->params; i++)
-            if (!nn_file_has(f, m->param[i].name)) {
-                ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" is missing", path, m->param[i].name);
-                nn_model_free(&m);
-            }
-        if (m && (nn_model_room(m, st) || read_values(f, m, st))) nn_model_free(&m);
-    }
+    if (f && !nn_arch_from_file(f, &arch, st)) m = fill(nn_model_plan(&arch, st), f, st);
+    nn_file_close(&f);
+    return m;
+}
+
+nn_model *nn_coder_load(const char *path, ts_status *st)
+{
+    nn_coder coder;
+    nn_model *m = NULL;
+    nn_file *f = nn_file_open(path, st);
+    if (f && !nn_coder_from_file(f, &coder, st)) m = fill(nn_coder_plan(&coder, st), f, st);
     nn_file_close(&f);
     return m;
 }
@@ -93,7 +108,8 @@ ts_code nn_model_save(const nn_model *model, const float *values, const char *pa
                            p->name);
     }
     if (!code) {
-        int metas = nn_arch_to_meta(&model->arch, meta, NN_ARCH_META, text, sizeof text);
+        int metas = model->coder.code > 0 ? nn_coder_to_meta(&model->coder, meta, NN_ARCH_META, text, sizeof text)
+                                          : nn_arch_to_meta(&model->arch, meta, NN_ARCH_META, text, sizeof text);
         for (int i = 0; i < extras; i++) meta[metas++] = extra[i];
         code = nn_safetensors_write(path, block, model->params, meta, metas, st);
     }

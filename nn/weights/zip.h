@@ -1,5 +1,5 @@
-/* A ZIP archive in memory (PKWARE's APPNOTE 6.3.10): stored and deflated entries, with the 64-bit extensions. Nothing
- * in it is believed. */
+/* A ZIP archive in memory (PKWARE's APPNOTE 6.3.10): stored and deflated entries, with the 64-bit extensions.
+ * Everything in it is checked. */
 #ifndef NN_ZIP_H
 #define NN_ZIP_H
 #include "nn/weights/file_internal.h"
@@ -25,7 +25,7 @@ ts_code zip_open(nn_file *f, zip_archive *zip, ts_status *st);
 void zip_free(zip_archive *zip);
 zip_entry *zip_find(const zip_archive *zip, const char *name, size_t length); /* NULL when absent */
 
-/* The entry's bytes: the file's own, or memory that belongs to f. The checksum of what was deflated must agree; that of
- * stored entries is not looked at, as PyTorch does not, which can write files without. NULL and st on failure. */
+/* The entry's bytes: the file's own, or memory that belongs to f. The checksum of deflated entries must agree; that of
+ * stored entries is ignored, as by PyTorch, which can write files without. NULL and st on failure. */
 const unsigned char *zip_data(nn_file *f, zip_entry *e, ts_status *st);
 #endif

@@ -1,7 +1,6 @@
-/* Of nine unknowns a colour's rendering sees five: its own diffuse and specular, and roughness and normal, which the
- * colours share. The equations are never summed: their factor L D L' begins as the damping and takes up one row of J
- * after the other (Gill, Golub, Murray, Saunders 1974, method C1), which, like Givens rotations, loses half of the
- * digits that J' W J would. */
+/* A colour's rendering depends on five of the nine unknowns: its own diffuse and specular, and roughness and normal,
+ * which the colours share. J' W J is never formed. Its factor L D L' begins as the damping and takes up one row of J
+ * after the other (Gill, Golub, Murray, Saunders 1974, method C1), which loses half as many digits. */
 #include "render/kernels/observe_lanes.h"
 
 /* A factor in the order of elimination: a colour's diffuse, its specular, what is shared. L's columns without their 1;

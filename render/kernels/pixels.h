@@ -26,8 +26,8 @@ V_INLINE void v_transpose8(v8 r[8])
 #if VL >= 8
 #define V_MIX(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
 
-/* VL pixels of 3 channels one after the other in a, b, c: a lane is first taken from two of them, then, where it is in
- * the third, from that. (The other way this was no gain.) */
+/* VL pixels of 3 channels one after the other in a, b, c: each lane is first taken from two of them, then from the
+ * third where it lies there. */
 V_INLINE void v_apart(vf a, vf b, vf c, vf out[3])
 {
 #if VL == 16

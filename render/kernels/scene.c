@@ -62,7 +62,8 @@ V_INLINE void move(const ts_scene *scene, const lighting *e, const angles *g, mo
 V_INLINE void by_numbers(int c, const ts_scene *scene, const surface *s, const radiance *r, const couplings *k,
                          const motion *m, vf by[TS_SCENE_NUMBERS])
 {
-    const vf ud = diffuse_part(s, c), um = r->fresnel[c], white = s->specular[c] + (1.0f - s->specular[c]) * s->diffuse[c];
+    const vf ud = diffuse_part(s, c), um = r->fresnel[c],
+             white = s->specular[c] + (1.0f - s->specular[c]) * s->diffuse[c];
     const vf flash = v_fma(r->lobe, um, ud) * r->scale, mirror = r->lobe * r->scale * (1.0f - s->specular[c]);
     const vf l = ud * k->diffuse_l + um * k->mirror_l, v = um * k->mirror_v, h = um * k->mirror_h;
     for (int j = 0; j < PLACES; j++)
@@ -160,8 +161,7 @@ static void normal(const ts_scene *scene, const ts_shade_row *row, const float *
             row_of(c, &s, &t.e, &t.r, &t.k, (const vf(*)[2])t.normal, slope, maps);
             whiten(c, &a, maps, g.u[c]);
             by_numbers(c, scene, &s, &t.r, &t.k, &m, by[c]);
-            for (int j = 0; j < TONE; j++)
-                by[c][j] = v_min(v_max(slope * by[c][j], v_set(-STEEPEST)), v_set(STEEPEST));
+            for (int j = 0; j < TONE; j++) by[c][j] = v_min(v_max(slope * by[c][j], v_set(-STEEPEST)), v_set(STEEPEST));
             by[c][TONE] = above * tone;
             error[c] = v_select(burnt_out(value, t.target[c]), v_set(0), t.target[c] - seen);
             variance[c] = variance_of(t.target[c], prior);

@@ -95,7 +95,7 @@ V_INLINE vf log_view(const ts_shade_view *view, ts_shade_kind kind, bool surroun
     shade(view, kind, surrounded, target, &e, &gt, &rt);
     for (int c = 0; c < 3; c++) {
         vf a = r.value[c] + 0.01f, b = rt.value[c] + 0.01f, inverse = 1.0f / a;
-        total += v_abs(v_log(v_select(a == b, v_set(1), b * inverse))); /* equal ones give 0 and not a rounding */
+        total += v_abs(v_log(v_select(a == b, v_set(1), b * inverse))); /* exactly 0 for equal values */
         u[c] = v_select(a > b, v_set(scale), v_select(a < b, v_set(-scale), v_set(0))) * inverse;
     }
     if (wanted) derive(kind, s, &e, &g, &r, u, d);

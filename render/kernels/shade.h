@@ -1,22 +1,21 @@
-/* Shading of rows of pixels, and the losses on top of it. The equations stand in render/brdf.h; here is only how they
- * are made fast. Geometry (normals, directions, the sine between normal and half vector) is done in double lanes,
- * because a highlight of roughness 0.02 is 4e-4 wide and single precision knows directions to 1e-7; colours are in
- * float. */
+/* Shading of rows of pixels, and the losses on top of it. The equations are in render/brdf.h. Geometry (normals,
+ * directions, the sine between normal and half vector) is done in double lanes, because a highlight of roughness 0.02
+ * is 4e-4 wide and single precision knows directions to 1e-7; colours are in float. */
 #ifndef TS_SHADE_H
 #define TS_SHADE_H
 #include "tensor/kernels/family.h"
 #include <stdbool.h>
 
-/* The one place where roughness becomes GGX's width, for doubles and vectors alike. */
+/* Roughness to GGX's width, for doubles and vectors. */
 #define TS_ALPHA(roughness) ((roughness) * (roughness))
 
 typedef struct ts_shade_guards {
     double roughness;                /* smallest roughness */
     double nz2;                      /* smallest n_z^2 before normalisation */
-    double distance2;                /* smallest squared distance that the falloff sees */
+    double distance2;                /* smallest squared distance in the falloff */
     double lz;                       /* smallest l_z that irradiance is divided by */
     double distribution, k, cosines; /* TS_SHADE_PUBLISHED: added to pi (…)^2 below D, to G's k, and to 4 n.l n.v;
-                                        elsewhere 0 and not looked at */
+                                        elsewhere 0 and ignored */
 } ts_shade_guards;
 
 typedef enum ts_shade_kind {
@@ -37,7 +36,7 @@ typedef struct ts_shade_view {
 } ts_shade_view;
 
 /* count pixels, pixel i with its centre at ((column + i + 1/2) step - 1/2, y); maps [count, channels], channels >= 9. A
- * pixel gets the same bytes in whatever row it is computed. */
+ * pixel's result does not depend on the row that it is computed in. */
 typedef struct ts_shade_row {
     double y, step;
     int column, count, channels;

@@ -81,7 +81,7 @@ V_INLINE void decode(const ts_shade_guards *guards, const float *maps, int chann
     s->nx = d_join(nx), s->ny = d_join(ny), s->nz = d_join(nz), s->inverse = d_join(inverse);
 }
 
-/* What one view is for VL pixels, whatever their material. */
+/* One view at VL pixels, for any material. */
 typedef struct lighting {
     direction l[2], v[2], h[2];
     vf strength, fresnel; /* F = s + (1 - s) fresnel */
@@ -218,7 +218,7 @@ V_INLINE void shade(const ts_shade_view *view, ts_shade_kind kind, bool surround
     }
 }
 
-/* What the derivatives of the colours have in common. Of a colour with the diffuse part ud = (1 - s) diffuse / pi and
+/* Common factors of the colours' derivatives. Of a colour with the diffuse part ud = (1 - s) diffuse / pi and
  * the mirror part um = F, the one by roughness is um roughness, and by n, as n x (d / d n), ud diffuse_l n x l + um
  * (mirror_l n x l + mirror_v n x v + mirror_h n x h). */
 typedef struct couplings {

@@ -1,4 +1,4 @@
-/* Convolution: checks, packed weights, and which way a shape is computed. */
+/* Convolution: checks, packed weights, and the entries, which hand a plan to the way that conv_choose.c names. */
 #include "tensor/conv/conv.h"
 #include "tensor/conv/conv_internal.h"
 #include "tensor/threads.h"
@@ -27,12 +27,6 @@ ts_code ts_conv_check(const ts_conv *c, ts_status *st)
     return TS_OK;
 }
 
-ptrdiff_t conv_panels_count(int ic, int oc, int k)
-{
-    const int lanes = conv_lanes();
-    return (ptrdiff_t)((oc + lanes - 1) / lanes * lanes) * ic * k * k;
-}
-
 size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
 {
     if (use == TS_CONV_WINOGRAD) return conv_winograd_count(c->ic, c->oc);
@@ -41,8 +35,9 @@ size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
     if (use == TS_CONV_DATA_GRADIENT_BF16) return conv_bf16_count(c, c->oc, ts_conv_variables(c));
     const int ic = use == TS_CONV_FORWARD ? c->ic : c->oc, oc = use == TS_CONV_FORWARD ? c->oc : ts_conv_variables(c);
     const size_t panels = (size_t)conv_panels_count(ic, oc, c->k);
-    if (conv_by_col2im(ic, oc, c->k)) return panels + (size_t)conv_col2im_count(ic, oc, c->k);
-    return panels + (conv_few_channels(oc, c->k) ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
+    const ts_conv_way narrow = conv_choose_narrow(ic, oc, c->k);
+    if (narrow == TS_CONV_BY_COL2IM) return panels + (size_t)conv_col2im_count(ic, oc, c->k);
+    return panels + (narrow == TS_CONV_BY_LANES ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
 }
 
 /* packed: [panel][ky][kx][input][channel of the panel, zeros where there is none] */
@@ -63,10 +58,12 @@ void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float 
     const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * taps : taps,
                     i_step = forward ? taps : (ptrdiff_t)c->ic * taps;
     const int parts = ic > 16 ? 16 : ic;
-    float *few = packed + conv_panels_count(ic, oc, c->k);
-    if (conv_by_col2im(ic, oc, c->k)) conv_pack_col2im(ic, oc, c->k, !forward, weight, i_step, o_step, few);
-    else if (conv_few_channels(oc, c->k)) conv_pack_lanes(ic, oc, c->k, !forward, weight, i_step, o_step, few);
-#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
+    /* Behind the panels once more, for the ways of few output channels. */
+    const ts_conv_way narrow = conv_choose_narrow(ic, oc, c->k);
+    float *behind = packed + conv_panels_count(ic, oc, c->k);
+    if (narrow == TS_CONV_BY_COL2IM) conv_pack_col2im(ic, oc, c->k, !forward, weight, i_step, o_step, behind);
+    if (narrow == TS_CONV_BY_LANES) conv_pack_lanes(ic, oc, c->k, !forward, weight, i_step, o_step, behind);
+#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(c->compute.threads))
     for (int panel = 0; panel < panels; panel++)
         for (int part = 0; part < parts; part++) {
             const int width = conv_vectors(oc, panel) * panel_width / 2, o0 = panel * panel_width,
@@ -84,44 +81,31 @@ void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float 
         }
 }
 
-ts_tile conv_panel_tile(const conv_plan *p, int panel)
+static void run(const conv_plan *p, ts_conv_way way)
 {
-    const int o0 = panel * 2 * conv_lanes();
-    return (ts_tile){.w = p->packed + (ptrdiff_t)o0 * p->ic * p->k * p->k,
-                     .bias = p->bias ? p->bias + o0 : NULL,
-                     .channels = p->oc - o0,
-                     .add = p->add,
-                     .leak = p->leak,
-                     .y_stride = p->oc,
-                     .fetch = {p->packed, p->packed}};
+    static void (*const runs[])(const conv_plan *) = {
+        [TS_CONV_DIRECTLY] = conv_run_direct, [TS_CONV_BY_PIXELS] = conv_run_pointwise,
+        [TS_CONV_BY_BATCH] = conv_run_batch,  [TS_CONV_BY_COL2IM] = conv_run_col2im,
+        [TS_CONV_BY_LANES] = conv_run_lanes,  [TS_CONV_BY_AMX] = conv_run_amx};
+    runs[way](p);
 }
 
-void conv_run_tile(ts_tile *t, int vectors, const float *a, float *y, int pixels, bool bf16)
+/* Which of the ways without Winograd's. */
+static ts_conv_way choose_direct(const ts_conv *c, ts_conv_direction direction, ts_precision precision)
 {
-    for (int g = 0; g < 3; g++) {
-        const int at = g * TS_TILE_GROUP < pixels ? g * TS_TILE_GROUP : 0;
-        t->a[g] = a + at * t->a_stride;
-        t->y[g] = y + at * t->y_stride;
-    }
-    (bf16 ? ts_conv_k()->tile_bf16 : ts_conv_k()->tile)[vectors - 1][pixels](t);
+    ts_conv direct = *c;
+    direct.compute.exact = true;
+    direct.compute.precision = precision;
+    return ts_conv_choose(&direct, direction);
 }
 
-void conv_run(const conv_plan *p)
-{
-    if (p->bf16 && conv_by_matrix()) conv_run_matrix(p);
-    else if (p->k == 1) conv_run_pointwise(p);
-    else if (conv_by_position(p->n, p->h, p->w)) conv_run_positions(p);
-    else if (!p->bf16 && conv_by_col2im(p->ic, p->oc, p->k)) conv_run_col2im(p);
-    else if (conv_by_lanes(p)) conv_run_lanes(p);
-    else conv_run_rows(p);
-}
-
-void ts_conv_forward(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y)
+static void forward(const ts_conv *c, bool bf16, const float *x, const float *packed, const float *bias, float leak,
+                    float *y)
 {
     const conv_plan p = {.n = c->n,
                          .h = c->h,
                          .w = c->w,
-                         .ic = c->ic,
+                         .ic = bf16 ? conv_bf16_depth(c->ic) : c->ic,
                          .channels = c->ic,
                          .oc = c->oc,
                          .k = c->k,
@@ -132,6 +116,62 @@ void ts_conv_forward(const ts_conv *c, const float *x, const float *packed, cons
                          .packed = packed,
                          .bias = bias,
                          .y = y,
-                         .leak = leak};
-    conv_run(&p);
+                         .leak = leak,
+                         .bf16 = bf16,
+                         .threads = c->compute.threads};
+    run(&p, choose_direct(c, TS_CONV_OUTPUT, bf16 ? TS_BF16 : TS_F32));
+}
+
+void ts_conv_forward(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y)
+{
+    forward(c, false, x, packed, bias, leak, y);
+}
+
+void ts_conv_forward_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
+                          float *y)
+{
+    forward(c, true, x, packed, bias, leak, y);
+}
+
+/* A convolution of dy with mirrored, transposed weights. */
+static void data_gradient(const ts_conv *c, bool bf16, const float *dy, const float *packed, float *dx, bool accumulate)
+{
+    const int reach = c->dilation * (c->k / 2), fold = c->pad == TS_PAD_REPLICATE ? reach : 0;
+    const conv_plan p = {.n = c->n,
+                         .h = c->h,
+                         .w = c->w,
+                         .ic = bf16 ? conv_bf16_depth(c->oc) : c->oc,
+                         .channels = c->oc,
+                         .oc = ts_conv_variables(c),
+                         .k = c->k,
+                         .dilation = c->dilation,
+                         .first = -reach - fold,
+                         .fold = fold,
+                         .x = dy,
+                         .packed = packed,
+                         .y = dx,
+                         .leak = 1,
+                         .add = accumulate,
+                         .bf16 = bf16,
+                         .threads = c->compute.threads};
+    run(&p, choose_direct(c, TS_CONV_INPUT, bf16 ? TS_BF16 : TS_F32));
+}
+
+void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
+{
+    data_gradient(c, false, dy, packed, dx, accumulate);
+}
+
+void ts_conv_data_gradient_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
+{
+    data_gradient(c, true, dy, packed, dx, accumulate);
+}
+
+void ts_conv_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
+{
+    if (dweight && choose_direct(c, TS_CONV_WEIGHTS, TS_F32) == TS_CONV_BY_BATCH) {
+        conv_batch_weight_gradient(c, x, dy, dweight);
+        dweight = NULL;
+    }
+    if (dweight || dbias) conv_direct_weight_gradient(c, x, dy, dweight, dbias);
 }

@@ -4,6 +4,7 @@
  * (validated by ts_conv_check). */
 #ifndef TS_CONV_H
 #define TS_CONV_H
+#include "tensor/compute.h"
 #include "tensor/tensor.h"
 
 typedef enum ts_pad { TS_PAD_ZERO, TS_PAD_REPLICATE } ts_pad;
@@ -15,6 +16,7 @@ typedef struct ts_conv {
     int dilation;  /* 1 or 2 */
     ts_pad pad;    /* padding of dilation * (k - 1) / 2 on each side */
     int constants; /* of the input's channels, the last: the data gradient is that of the others alone */
+    ts_compute compute;
 } ts_conv;
 
 /* Which order the packed weights are in: for the output and for the gradient of the input; both by Winograd's way; both
@@ -27,6 +29,25 @@ typedef enum ts_conv_use {
     TS_CONV_FORWARD_BF16,
     TS_CONV_DATA_GRADIENT_BF16
 } ts_conv_use;
+
+typedef enum ts_conv_direction { TS_CONV_OUTPUT, TS_CONV_INPUT, TS_CONV_WEIGHTS } ts_conv_direction;
+
+/* How: by rows of a padded window; without one where k = 1; position by position of several small maps; all taps'
+ * products at once (col2im); pixels, not channels, in the lanes; Winograd's F(4 x 4, 3 x 3); the matrix unit. */
+typedef enum ts_conv_way {
+    TS_CONV_DIRECTLY,
+    TS_CONV_BY_PIXELS,
+    TS_CONV_BY_BATCH,
+    TS_CONV_BY_COL2IM,
+    TS_CONV_BY_LANES,
+    TS_CONV_BY_WINOGRAD,
+    TS_CONV_BY_AMX
+} ts_conv_way;
+/* Of the output, or of a gradient, by shape, c->compute and the ISA in use (conv_choose.c says why). */
+ts_conv_way ts_conv_choose(const ts_conv *c, ts_conv_direction direction);
+/* What its weights are packed for; not for TS_CONV_WEIGHTS. */
+ts_conv_use ts_conv_packing(const ts_conv *c, ts_conv_direction direction);
+const char *ts_conv_way_name(ts_conv_way way);
 
 static inline int ts_conv_variables(const ts_conv *c) { return c->ic - c->constants; }
 
@@ -43,20 +64,11 @@ void ts_conv_forward(const ts_conv *c, const float *x, const float *packed, cons
 
 /* The same y, and the gradients below, by Winograd's F(4 x 4, 3 x 3) with weights packed for the use of that name; c->k
  * must be 3. Its products are a quarter of the direct way's, its rounding errors about ten times as large (1e-5 of the
- * largest value, not 1e-6). ts_conv_winograd: whether it pays for this shape, use being one of the two; _weights: for
- * the gradient of its weights. */
-bool ts_conv_winograd(const ts_conv *c, ts_conv_use use);
-bool ts_conv_winograd_weights(const ts_conv *c);
+ * largest value, not 1e-6). */
 void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
                               float *y);
 void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
 void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const float *dy, float *dweight);
-
-/* Of the calling thread: whether ag_conv computes directly wherever it can (true: the default, and what comparisons
- * with other programs want) or by Winograd's way where ts_conv_winograd says so. Set before what is to be computed so;
- * weights that a tape has packed for one way are packed anew for the other. */
-void ts_conv_exact_set(bool exact);
-bool ts_conv_exact(void);
 
 /* dx [n,h,w,ts_conv_variables] (+)= the gradient of the input given dy = the gradient before the activation. */
 void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
@@ -68,18 +80,8 @@ void ts_conv_forward_bf16(const ts_conv *c, const float *x, const float *packed,
                           float *y);
 void ts_conv_data_gradient_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
 
-/* dweight[oc][ic][k][k] += with x and dy rounded so, for CPUs with a matrix unit alone (Intel AMX): where
- * ts_conv_bf16_weights says that this is one. */
-bool ts_conv_bf16_weights(void);
+/* dweight[oc][ic][k][k] += with x and dy rounded so, where ts_conv_choose says TS_CONV_BY_AMX. */
 void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight);
-
-/* Of the calling thread, f32 unless said otherwise: how ag_conv and ag_gru multiply in forward and ag_conv for the
- * gradient of its input. Gradients of weights, and whatever else is summed, stay f32. Set between tapes, or at least
- * between a tape's forward and the next. */
-typedef enum ts_precision { TS_F32, TS_BF16, TS_PRECISION_COUNT } ts_precision;
-void ts_conv_precision_set(ts_precision p);
-ts_precision ts_conv_precision(void);
-const char *ts_precision_name(ts_precision p); /* f32, bf16 */
 
 /* dweight[oc][ic][k][k] += , dbias[oc] += (either may be NULL). */
 void ts_conv_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias);

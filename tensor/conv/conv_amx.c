@@ -13,7 +13,7 @@ enum {
     UNITS = 8 /* of work, at least, where the shape allows */
 };
 
-bool conv_by_matrix(void) { return ts_matrix_k()->product[0][0] != NULL; }
+bool conv_amx_present(void) { return ts_amx_k()->product[0][0] != NULL; }
 
 /* Undilated, the taps of a kernel row are neighbours in the stage and are summed in one run. */
 static bool merged(int dilation) { return dilation == 1; }
@@ -21,21 +21,20 @@ static bool merged(int dilation) { return dilation == 1; }
 /* Steps of one kernel row. */
 static int row_steps(int ic, int k, int dilation)
 {
-    return merged(dilation) ? (k * ic + TS_MATRIX_PAIRS - 1) / TS_MATRIX_PAIRS
-                            : k * ((ic + TS_MATRIX_PAIRS - 1) / TS_MATRIX_PAIRS);
+    return merged(dilation) ? (k * ic + TS_AMX_PAIRS - 1) / TS_AMX_PAIRS : k * ((ic + TS_AMX_PAIRS - 1) / TS_AMX_PAIRS);
 }
 
-static int panels_of(int oc) { return (oc + TS_MATRIX_BLOCK - 1) / TS_MATRIX_BLOCK; }
+static int panels_of(int oc) { return (oc + TS_AMX_BLOCK - 1) / TS_AMX_BLOCK; }
 
 /* packed: [panel of 32 outputs][ky][step][pair of inputs][output], zeros where there is none */
-enum { STEP_FLOATS = TS_MATRIX_PAIRS * TS_MATRIX_BLOCK };
+enum { STEP_FLOATS = TS_AMX_PAIRS * TS_AMX_BLOCK };
 
-size_t conv_matrix_count(int ic, int oc, int k, int dilation)
+size_t conv_amx_count(int ic, int oc, int k, int dilation)
 {
     return (size_t)panels_of(oc) * (size_t)(k * row_steps(conv_bf16_depth(ic), k, dilation)) * STEP_FLOATS;
 }
 
-void conv_matrix_pack(const ts_conv *c, bool forward, const float *weight, float *packed)
+void conv_amx_pack(const ts_conv *c, bool forward, const float *weight, float *packed)
 {
     const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), k = c->k, taps = k * k,
               depth = conv_bf16_depth(ic);
@@ -43,21 +42,21 @@ void conv_matrix_pack(const ts_conv *c, bool forward, const float *weight, float
                     i_step = forward ? taps : (ptrdiff_t)c->ic * taps;
     const int steps = row_steps(depth, k, c->dilation), panels = panels_of(oc);
     const int run = merged(c->dilation) ? k * depth : depth,
-              run_steps = (run + TS_MATRIX_PAIRS - 1) / TS_MATRIX_PAIRS; /* pairs without a gap, and their steps */
-#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
+              run_steps = (run + TS_AMX_PAIRS - 1) / TS_AMX_PAIRS; /* pairs without a gap, and their steps */
+#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(c->compute.threads))
     for (int panel = 0; panel < panels; panel++)
         for (int row = 0; row < k * steps; row++) {
             float pair[2 * STEP_FLOATS] = {0};
-            const int ky = row / steps, o0 = panel * TS_MATRIX_BLOCK,
-                      count = oc - o0 < TS_MATRIX_BLOCK ? oc - o0 : TS_MATRIX_BLOCK;
-            for (int i = 0; i < TS_MATRIX_PAIRS; i++) {
-                const int at = row % steps % run_steps * TS_MATRIX_PAIRS + i, kx = row % steps / run_steps + at / depth,
+            const int ky = row / steps, o0 = panel * TS_AMX_BLOCK,
+                      count = oc - o0 < TS_AMX_BLOCK ? oc - o0 : TS_AMX_BLOCK;
+            for (int i = 0; i < TS_AMX_PAIRS; i++) {
+                const int at = row % steps % run_steps * TS_AMX_PAIRS + i, kx = row % steps / run_steps + at / depth,
                           first = 2 * (at % depth);
                 if (at >= run) break;
                 const int tap = forward ? ky * k + kx : taps - 1 - (ky * k + kx);
                 for (int half = 0; half < 2 && first + half < ic; half++) {
                     const float *from = weight + (first + half) * i_step + o0 * o_step + tap;
-                    for (int o = 0; o < count; o++) pair[2 * (i * TS_MATRIX_BLOCK + o) + half] = from[o * o_step];
+                    for (int o = 0; o < count; o++) pair[2 * (i * TS_AMX_BLOCK + o) + half] = from[o * o_step];
                 }
             }
             ts_conv_k()->pairs(pair, 1, 2 * STEP_FLOATS, packed + ((ptrdiff_t)panel * k * steps + row) * STEP_FLOATS,
@@ -78,15 +77,15 @@ typedef struct line {
 static void put(const conv_plan *p, const float *sums, int pixels, int channels, const float *bias, float *y,
                 int column)
 {
-    const struct ts_matrix_kernels *k = ts_matrix_k();
+    const struct ts_amx_kernels *k = ts_amx_k();
     if (!p->fold) {
-        k->finish(sums, TS_MATRIX_BLOCK, pixels, channels, bias, p->add, p->leak, y + (ptrdiff_t)column * p->oc, p->oc);
+        k->finish(sums, TS_AMX_BLOCK, pixels, channels, bias, p->add, p->leak, y + (ptrdiff_t)column * p->oc, p->oc);
         return;
     }
     for (int done = 0, run; done < pixels; done += run) { /* a run within the image, or one pixel beside it */
         const int at = column + done - p->fold, to = conv_clamp(at, p->w);
         run = at == to ? (pixels - done < p->w - at ? pixels - done : p->w - at) : 1;
-        k->finish(sums + (ptrdiff_t)done * TS_MATRIX_BLOCK, TS_MATRIX_BLOCK, run, channels, NULL, true, 1,
+        k->finish(sums + (ptrdiff_t)done * TS_AMX_BLOCK, TS_AMX_BLOCK, run, channels, NULL, true, 1,
                   y + (ptrdiff_t)to * p->oc, p->oc);
     }
 }
@@ -95,27 +94,27 @@ static void put(const conv_plan *p, const float *sums, int pixels, int channels,
 static void run_part(const line *l, int first, int end, int panel, float *const *y_row)
 {
     const conv_plan *p = l->p;
-    const struct ts_matrix_kernels *k = ts_matrix_k();
-    const int o0 = panel * TS_MATRIX_BLOCK, channels = p->oc - o0 < TS_MATRIX_BLOCK ? p->oc - o0 : TS_MATRIX_BLOCK;
-    float sums[TS_MATRIX_BLOCK * TS_MATRIX_BLOCK] __attribute__((aligned(64)));
-    ts_matrix m = {.b = p->packed + (ptrdiff_t)panel * l->steps * STEP_FLOATS,
-                   .b_row = TS_MATRIX_BLOCK,
-                   .a_at = l->at,
-                   .a_row = p->ic * (ptrdiff_t)sizeof(float),
-                   .steps = l->steps,
-                   .c = sums,
-                   .c_row = TS_MATRIX_BLOCK};
-    for (int q = first; q < end; q += TS_MATRIX_BLOCK) {
-        const int pixels = end - q < TS_MATRIX_BLOCK ? end - q : TS_MATRIX_BLOCK;
+    const struct ts_amx_kernels *k = ts_amx_k();
+    const int o0 = panel * TS_AMX_BLOCK, channels = p->oc - o0 < TS_AMX_BLOCK ? p->oc - o0 : TS_AMX_BLOCK;
+    float sums[TS_AMX_BLOCK * TS_AMX_BLOCK] __attribute__((aligned(64)));
+    ts_amx_product m = {.b = p->packed + (ptrdiff_t)panel * l->steps * STEP_FLOATS,
+                        .b_row = TS_AMX_BLOCK,
+                        .a_at = l->at,
+                        .a_row = p->ic * (ptrdiff_t)sizeof(float),
+                        .steps = l->steps,
+                        .c = sums,
+                        .c_row = TS_AMX_BLOCK};
+    for (int q = first; q < end; q += TS_AMX_BLOCK) {
+        const int pixels = end - q < TS_AMX_BLOCK ? end - q : TS_AMX_BLOCK;
         m.a = l->stage + (ptrdiff_t)q * p->ic;
-        k->product[pixels > TS_MATRIX_SIDE][channels > TS_MATRIX_SIDE](&m);
+        k->product[pixels > TS_AMX_SIDE][channels > TS_AMX_SIDE](&m);
         for (int i = 0, run; i < pixels; i += run) {
             const int row = (q + i) / l->columns, column = (q + i) % l->columns, left = l->columns - column,
                       exist = l->inside - column;
             run = pixels - i < left ? pixels - i : left;
             const int count = run < exist ? run : exist;
             if (count > 0)
-                put(p, sums + i * TS_MATRIX_BLOCK, count, channels, p->bias ? p->bias + o0 : NULL, y_row[row] + o0,
+                put(p, sums + i * TS_AMX_BLOCK, count, channels, p->bias ? p->bias + o0 : NULL, y_row[row] + o0,
                     column);
         }
     }
@@ -125,8 +124,8 @@ static void run_part(const line *l, int first, int end, int panel, float *const 
  * pixels. */
 static void run_line(const line *l, int panel0, int panel1, float *const *y_row)
 {
-    const int part = PART_FLOATS / (l->p->oc * TS_MATRIX_BLOCK) * TS_MATRIX_BLOCK,
-              step = part > TS_MATRIX_BLOCK ? part : TS_MATRIX_BLOCK;
+    const int part = PART_FLOATS / (l->p->oc * TS_AMX_BLOCK) * TS_AMX_BLOCK,
+              step = part > TS_AMX_BLOCK ? part : TS_AMX_BLOCK;
     for (int q = 0; q < l->count; q += step)
         for (int panel = panel0; panel < panel1; panel++)
             run_part(l, q, l->count - q < step ? l->count : q + step, panel, y_row);
@@ -164,7 +163,7 @@ static void stage_band(const frame *f, int image, int e0, int e1, float *to)
             else memset(end + (ptrdiff_t)j * p->ic, 0, pixel);
         }
     }
-    memset(to, 0, sizeof(float) * (size_t)(TS_MATRIX_BLOCK * p->ic + TS_MATRIX_PAIRS));
+    memset(to, 0, sizeof(float) * (size_t)(TS_AMX_BLOCK * p->ic + TS_AMX_PAIRS));
 }
 
 static void run_band(const frame *f, int image, int begin, int end, int panel0, int panel1)
@@ -172,22 +171,21 @@ static void run_band(const frame *f, int image, int begin, int end, int panel0, 
     const conv_plan *p = f->p;
     const int e0 = begin == 0 ? 0 : begin + p->fold, e1 = end == p->h ? p->h + 2 * p->fold : end + p->fold,
               rows = e1 - e0;
-    const size_t pixels = (size_t)(rows + f->reach) * (size_t)f->columns + TS_MATRIX_BLOCK;
-    float *stage = ts_scratch(0, sizeof(float) * (pixels * (size_t)p->ic + TS_MATRIX_PAIRS));
+    const size_t pixels = (size_t)(rows + f->reach) * (size_t)f->columns + TS_AMX_BLOCK;
+    float *stage = ts_scratch(0, sizeof(float) * (pixels * (size_t)p->ic + TS_AMX_PAIRS));
     float **y_row = ts_scratch(1, sizeof(float *) * (size_t)rows);
     stage_band(f, image, e0, e1, stage);
     for (int i = 0; i < rows; i++)
         y_row[i] = p->y + ((ptrdiff_t)image * p->h + conv_clamp(e0 + i - p->fold, p->h)) * p->w * p->oc;
     if (p->fold && !p->add) {
-        const int o0 = panel0 * TS_MATRIX_BLOCK,
-                  o1 = panel1 * TS_MATRIX_BLOCK < p->oc ? panel1 * TS_MATRIX_BLOCK : p->oc;
+        const int o0 = panel0 * TS_AMX_BLOCK, o1 = panel1 * TS_AMX_BLOCK < p->oc ? panel1 * TS_AMX_BLOCK : p->oc;
         for (ptrdiff_t q = (ptrdiff_t)begin * p->w; q < (ptrdiff_t)end * p->w; q++)
             memset(p->y + ((ptrdiff_t)image * p->h * p->w + q) * p->oc + o0, 0, sizeof(float) * (size_t)(o1 - o0));
     }
     const line l = {p, stage, f->at, f->steps, (rows - 1) * f->columns + f->out_w, f->columns, f->out_w};
-    ts_matrix_k()->begin();
+    ts_amx_k()->begin();
     run_line(&l, panel0, panel1, y_row);
-    ts_matrix_k()->end();
+    ts_amx_k()->end();
 }
 
 /* Where the steps read, from a pixel of a stage with so many columns. */
@@ -196,12 +194,11 @@ static void place_steps(const conv_plan *p, int columns, ptrdiff_t *at)
     const int steps = row_steps(p->ic, p->k, p->dilation), run_steps = merged(p->dilation) ? steps : steps / p->k;
     for (int ky = 0; ky < p->k; ky++)
         for (int s = 0; s < steps; s++)
-            *at++ = (((ptrdiff_t)ky * columns + s / run_steps) * p->dilation * p->ic +
-                     s % run_steps * TS_MATRIX_PAIRS) *
+            *at++ = (((ptrdiff_t)ky * columns + s / run_steps) * p->dilation * p->ic + s % run_steps * TS_AMX_PAIRS) *
                 (ptrdiff_t)sizeof(float);
 }
 
-void conv_run_matrix(const conv_plan *p)
+void conv_run_amx(const conv_plan *p)
 {
     frame f = {.p = p, .reach = (p->k - 1) * p->dilation, .out_w = p->w + 2 * p->fold};
     f.columns = f.out_w + f.reach;
@@ -217,7 +214,7 @@ void conv_run_matrix(const conv_plan *p)
     if (bands > (p->h + least - 1) / least) bands = (p->h + least - 1) / least;
     int groups = p->n * bands < UNITS ? (UNITS + p->n * bands - 1) / (p->n * bands) : 1;
     if (groups > panels) groups = panels;
-#pragma omp parallel for collapse(3) schedule(dynamic) num_threads(ts_threads())
+#pragma omp parallel for collapse(3) schedule(dynamic) num_threads(ts_threads_of(p->threads))
     for (int n = 0; n < p->n; n++)
         for (int i = 0; i < bands; i++)
             for (int g = 0; g < groups; g++) {
@@ -228,19 +225,19 @@ void conv_run_matrix(const conv_plan *p)
             }
 }
 
-void conv_matrix_pixels(const conv_plan *p, int count)
+void conv_amx_pixels(const conv_plan *p, int count)
 {
     const int steps = row_steps(p->ic, 1, 1);
     ptrdiff_t *at = ts_scratch(3, sizeof *at * (size_t)steps);
     place_steps(p, 1, at);
-    conv_matrix_steps(p, at, steps, count);
+    conv_amx_steps(p, at, steps, count);
 }
 
-void conv_matrix_steps(const conv_plan *p, const ptrdiff_t *at, int steps, int count)
+void conv_amx_steps(const conv_plan *p, const ptrdiff_t *at, int steps, int count)
 {
     const line l = {p, p->x, at, steps, count, count, count};
     float *y = p->y;
-    ts_matrix_k()->begin();
+    ts_amx_k()->begin();
     run_line(&l, 0, panels_of(p->oc), &y);
-    ts_matrix_k()->end();
+    ts_amx_k()->end();
 }

@@ -7,7 +7,7 @@
 #include <string.h>
 
 enum {
-    STEP_PIXELS = 2 * TS_MATRIX_PAIRS,
+    STEP_PIXELS = 2 * TS_AMX_PAIRS,
     STAGE_BYTES = 640 << 10, /* x and dy of a band: they stay in the second cache for all taps */
     CHUNK_PIXELS = 4096,     /* so many that clearing and adding a chunk's sums is little beside making them */
     CHUNKS = 8,
@@ -25,8 +25,6 @@ typedef struct job {
     float *sums;         /* [chunk][tap][ic][oc] */
     ptrdiff_t size;      /* of a chunk's */
 } job;
-
-bool ts_conv_bf16_weights(void) { return conv_by_matrix(); }
 
 static int round_up(int n, int to) { return (n + to - 1) / to * to; }
 
@@ -54,7 +52,7 @@ static void stage_band(const job *g, int image, int begin, int end, int c0, int 
                        float *dy)
 {
     const ts_conv *c = g->c;
-    const struct ts_matrix_kernels *k = ts_matrix_k();
+    const struct ts_amx_kernels *k = ts_amx_k();
     const int half = g->reach / 2, rows = end - begin, exist = (c1 < c->ic ? c1 : c->ic) - c0;
     memset(x, 0, (size_t)plane * (size_t)(c1 - c0) * sizeof *x);
     for (int r = 0; r < rows + g->reach; r++) {
@@ -82,21 +80,21 @@ static void add_band(const job *g, int rows, int c0, int c1, const uint16_t *x, 
                      float *sums)
 {
     const ts_conv *c = g->c;
-    const struct ts_matrix_kernels *k = ts_matrix_k();
-    for (int o = 0; o < g->oc; o += TS_MATRIX_BLOCK)
-        for (int i = c0; i < c1; i += TS_MATRIX_BLOCK)
+    const struct ts_amx_kernels *k = ts_amx_k();
+    for (int o = 0; o < g->oc; o += TS_AMX_BLOCK)
+        for (int i = c0; i < c1; i += TS_AMX_BLOCK)
             for (int tap = 0; tap < c->k * c->k; tap++) {
                 const ptrdiff_t shift = ((ptrdiff_t)(tap / c->k) * g->columns + tap % c->k) * c->dilation;
-                const ts_matrix m = {.a = x + (i - c0) * plane + shift,
-                                     .b = dy + o,
-                                     .a_at = g->at,
-                                     .a_row = plane * (ptrdiff_t)sizeof *x,
-                                     .b_row = g->oc,
-                                     .steps = line_pixels(g, rows) / STEP_PIXELS,
-                                     .c = sums + ((ptrdiff_t)tap * g->ic + i) * g->oc + o,
-                                     .c_row = g->oc,
-                                     .add = true};
-                k->product[c1 - i > TS_MATRIX_SIDE][g->oc - o > TS_MATRIX_SIDE](&m);
+                const ts_amx_product m = {.a = x + (i - c0) * plane + shift,
+                                          .b = dy + o,
+                                          .a_at = g->at,
+                                          .a_row = plane * (ptrdiff_t)sizeof *x,
+                                          .b_row = g->oc,
+                                          .steps = line_pixels(g, rows) / STEP_PIXELS,
+                                          .c = sums + ((ptrdiff_t)tap * g->ic + i) * g->oc + o,
+                                          .c_row = g->oc,
+                                          .add = true};
+                k->product[c1 - i > TS_AMX_SIDE][g->oc - o > TS_AMX_SIDE](&m);
             }
 }
 
@@ -105,8 +103,8 @@ static void run_chunk(const job *g, int chunk, int group)
     const ts_conv *c = g->c;
     int begin, end, block0, block1;
     conv_part(c->n * c->h, g->chunks, chunk, &begin, &end);
-    conv_part((g->ic + TS_MATRIX_BLOCK - 1) / TS_MATRIX_BLOCK, g->groups, group, &block0, &block1);
-    const int c0 = block0 * TS_MATRIX_BLOCK, c1 = block1 * TS_MATRIX_BLOCK < g->ic ? block1 * TS_MATRIX_BLOCK : g->ic,
+    conv_part((g->ic + TS_AMX_BLOCK - 1) / TS_AMX_BLOCK, g->groups, group, &block0, &block1);
+    const int c0 = block0 * TS_AMX_BLOCK, c1 = block1 * TS_AMX_BLOCK < g->ic ? block1 * TS_AMX_BLOCK : g->ic,
               rows = band_rows(g, c1 - c0);
     float *sums = g->sums + chunk * g->size;
     for (int tap = 0; tap < c->k * c->k; tap++)
@@ -114,7 +112,7 @@ static void run_chunk(const job *g, int chunk, int group)
     const ptrdiff_t plane = plane_of(g, rows);
     uint16_t *x = ts_scratch(0, sizeof *x * (size_t)plane * (size_t)(c1 - c0));
     float *dy = ts_scratch(1, sizeof(float) * (size_t)(line_pixels(g, rows) / 2) * (size_t)g->oc);
-    ts_matrix_k()->begin();
+    ts_amx_k()->begin();
     for (int row = begin, next; row < end; row = next) {
         const int image = row / c->h, first = row % c->h;
         int last = first + rows;
@@ -124,7 +122,7 @@ static void run_chunk(const job *g, int chunk, int group)
         stage_band(g, image, first, last, c0, c1, x, plane, dy);
         add_band(g, last - first, c0, c1, x, plane, dy, sums);
     }
-    ts_matrix_k()->end();
+    ts_amx_k()->end();
 }
 
 /* Inputs [c0, c1) of outputs [o0, o1): so few that the places they go to, taps fastest, stay in cache. */
@@ -134,7 +132,7 @@ static void reduce_block(const job *g, int o0, int o1, int c0, int c1, float *dw
     for (int tap = 0; tap < taps; tap++)
         for (int i = c0; i < c1; i++) {
             const float *from = g->sums + ((ptrdiff_t)tap * g->ic + i) * g->oc;
-            float sum[TS_MATRIX_BLOCK], *to = dweight + (ptrdiff_t)i * taps + tap;
+            float sum[TS_AMX_BLOCK], *to = dweight + (ptrdiff_t)i * taps + tap;
             for (int o = o0; o < o1; o++) sum[o - o0] = from[o];
             for (int chunk = 1; chunk < g->chunks; chunk++)
                 for (int o = o0; o < o1; o++) sum[o - o0] += from[chunk * g->size + o];
@@ -148,31 +146,31 @@ void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float 
              .x = x,
              .dy = dy,
              .reach = (c->k - 1) * c->dilation,
-             .ic = round_up(c->ic, TS_MATRIX_SIDE),
-             .oc = round_up(c->oc, TS_MATRIX_SIDE)};
+             .ic = round_up(c->ic, TS_AMX_SIDE),
+             .oc = round_up(c->oc, TS_AMX_SIDE)};
     g.columns = round_up(c->w + g.reach, 2);
     g.size = (ptrdiff_t)c->k * c->k * g.ic * g.oc;
     /* By shape alone, so that the sums do not depend on the number of threads. */
     const ptrdiff_t rows = (ptrdiff_t)c->n * c->h, chunks = rows * c->w / CHUNK_PIXELS,
                     most = CHUNKS < rows ? CHUNKS : rows;
     g.chunks = (int)(chunks < 1 ? 1 : chunks < most ? chunks : most);
-    const int blocks = (g.ic + TS_MATRIX_BLOCK - 1) / TS_MATRIX_BLOCK, groups = (UNITS + g.chunks - 1) / g.chunks;
+    const int blocks = (g.ic + TS_AMX_BLOCK - 1) / TS_AMX_BLOCK, groups = (UNITS + g.chunks - 1) / g.chunks;
     g.groups = groups < blocks ? groups : blocks;
     /* of the longest line: the fewer inputs, the more rows a band has */
-    const int steps = line_pixels(&g, band_rows(&g, TS_MATRIX_SIDE)) / STEP_PIXELS;
+    const int steps = line_pixels(&g, band_rows(&g, TS_AMX_SIDE)) / STEP_PIXELS;
     ptrdiff_t *at = ts_scratch(3, sizeof *at * (size_t)steps);
     for (int s = 0; s < steps; s++) at[s] = s * (ptrdiff_t)(STEP_PIXELS * sizeof(uint16_t));
     g.at = at;
     g.sums = ts_scratch(2, sizeof(float) * (size_t)(g.size * g.chunks));
-#pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads_of(c->compute.threads))
     {
 #pragma omp for collapse(2) schedule(dynamic)
         for (int chunk = 0; chunk < g.chunks; chunk++)
             for (int group = 0; group < g.groups; group++) run_chunk(&g, chunk, group);
 #pragma omp for collapse(2) schedule(static)
-        for (int o = 0; o < c->oc; o += TS_MATRIX_BLOCK)
+        for (int o = 0; o < c->oc; o += TS_AMX_BLOCK)
             for (int i = 0; i < c->ic; i += REDUCE_INPUTS)
-                reduce_block(&g, o, o + TS_MATRIX_BLOCK < c->oc ? o + TS_MATRIX_BLOCK : c->oc, i,
+                reduce_block(&g, o, o + TS_AMX_BLOCK < c->oc ? o + TS_AMX_BLOCK : c->oc, i,
                              i + REDUCE_INPUTS < c->ic ? i + REDUCE_INPUTS : c->ic, dweight);
     }
 }

@@ -39,7 +39,7 @@ static staged stage(const ts_conv *c, const float *x, const float *dy)
 /* The pairs of positions that a tap joins, as rows of count pixels of a sum. */
 typedef struct joined {
     int rows, count;
-    ptrdiff_t x[CONV_POSITIONS], dy[CONV_POSITIONS];
+    ptrdiff_t x[CONV_BATCH_PIXELS], dy[CONV_BATCH_PIXELS];
 } joined;
 
 /* Neighbours stay neighbours unless they are replicated. */
@@ -70,7 +70,7 @@ static void fetch(const float *dweight, ptrdiff_t row, int begin, int end, int l
         for (int i = 0; i < length; i += 16) __builtin_prefetch(dweight + o * row + i, 1, 2);
 }
 
-void conv_weight_positions(const ts_conv *c, const float *x, const float *dy, float *dweight)
+void conv_batch_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight)
 {
     const struct ts_conv_kernels *kernels = ts_conv_k();
     const int lanes2 = 2 * kernels->lanes, panels = conv_panels(c->oc), taps = c->k * c->k;
@@ -78,7 +78,7 @@ void conv_weight_positions(const ts_conv *c, const float *x, const float *dy, fl
     const int piece = (panels * blocks + PIECES - 1) /
         PIECES; /* of neighbouring blocks, which share lines of dweight */
     const ptrdiff_t pixels = (ptrdiff_t)c->h * c->w * c->n, row = (ptrdiff_t)c->ic * taps;
-#pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads_of(c->compute.threads))
     {
         const staged s = stage(c, x, dy);
         float *sums = ts_scratch(2, sizeof(float) * (size_t)(taps * kernels->rows * lanes2)); /* [input][tap][lane] */

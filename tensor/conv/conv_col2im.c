@@ -11,19 +11,7 @@ enum {
     BAND_ROWS = 8
 };
 
-static int padded(int channels) { return (channels + conv_lanes() - 1) / conv_lanes() * conv_lanes(); }
-
-/* In tenths of an FMA of a lane; the constants are of measured times, by AVX-512. */
-bool conv_by_col2im(int ic, int oc, int k)
-{
-    if (k == 1 || oc > 2 * conv_lanes()) return false;
-    const int64_t products = (int64_t)k * k * ic,
-                  here = (int64_t)12 * padded(k * k * oc) *
-        (ic + 25); /* to add a product costs as much as to make it of 25 inputs */
-    return here < products * 13 * padded(oc) && (!conv_few_channels(oc, k) || here < products * (13 * oc + 70));
-}
-
-ptrdiff_t conv_col2im_count(int ic, int oc, int k) { return (ptrdiff_t)padded(k * k * oc) * ic; }
+ptrdiff_t conv_col2im_count(int ic, int oc, int k) { return (ptrdiff_t)conv_whole(k * k * oc) * ic; }
 
 /* [panel][input][lane]; lanes are [tap][output] */
 void conv_pack_col2im(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step,
@@ -139,11 +127,15 @@ static void run_band(const job *g, int image, int begin, int end, float *above, 
 static job make_job(const conv_plan *p)
 {
     const int lanes = conv_lanes(), tile = ts_conv_k()->pixels, taps = p->k * p->k, reach = p->k / 2 * p->dilation;
-    job g = {.p = p, .kernels = ts_conv_k(), .reach = reach, .vectors = padded(p->oc) / lanes, .pixel = padded(p->oc)};
+    job g = {.p = p,
+             .kernels = ts_conv_k(),
+             .reach = reach,
+             .vectors = conv_whole(p->oc) / lanes,
+             .pixel = conv_whole(p->oc)};
     g.row = p->w * g.pixel;
     g.products = (conv_plan){.ic = p->ic,
                              .channels = p->ic,
-                             .oc = padded(taps * p->oc),
+                             .oc = conv_whole(taps * p->oc),
                              .k = 1,
                              .dilation = 1,
                              .packed = p->packed + conv_panels_count(p->ic, p->oc, p->k),
@@ -172,7 +164,7 @@ void conv_run_col2im(const conv_plan *p)
         memcpy(bias + p->k * p->k / 2 * p->oc, p->bias, sizeof(float) * (size_t)p->oc);
         g.products.bias = bias;
     }
-#pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads_of(p->threads))
     {
 #pragma omp for collapse(2) schedule(dynamic)
         for (int n = 0; n < p->n; n++)

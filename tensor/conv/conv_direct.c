@@ -30,7 +30,7 @@ static blocking choose_blocking(const conv_plan *p)
 /* A source of pixels for tiles [begin, end): a strip, or the image itself. */
 typedef struct source {
     int begin, end;
-    conv_stage stage;    /* rows == 0: the image */
+    conv_window stage;   /* rows == 0: the image */
     const float *pixel0; /* column that tap 0 of output column 0 reads, in memory terms */
     ptrdiff_t pixel;
     ts_segment segment[15 * 15];
@@ -86,13 +86,13 @@ static void make_sources(runner *r, int rows)
                 s->pixel = p->ic;
                 s->pixel0 = p->x + (ptrdiff_t)r->b->image * p->h * p->w * p->ic + (ptrdiff_t)p->first * p->ic;
             } else {
-                s->stage = conv_stage_make(p, rows, first + p->first, last - first + reach);
+                s->stage = conv_window_make(p, rows, first + p->first, last - first + reach);
                 s->pixel = s->stage.pixel;
                 if (pass) {
                     s->stage.memory = memory + used;
                     s->pixel0 = s->stage.memory - first * s->pixel;
                 }
-                used += conv_stage_size(&s->stage);
+                used += conv_window_size(&s->stage);
             }
         }
     }
@@ -108,7 +108,7 @@ static void make_segments(const runner *r, source *s, int e, int ky0, int ky1)
         int row = e + p->first + ky * p->dilation;
         if (p->replicate) row = conv_clamp(row, p->h);
         else if (row < 0 || row >= p->h) continue;
-        const ptrdiff_t at = s->stage.rows ? conv_stage_row(&s->stage, row) - s->stage.memory
+        const ptrdiff_t at = s->stage.rows ? conv_window_row(&s->stage, row) - s->stage.memory
                                            : (ptrdiff_t)row * p->w * p->ic;
         const ptrdiff_t w = (ptrdiff_t)ky * p->k * p->ic;
         if (merged) s->segment[s->segments++] = (ts_segment){at, w, (ptrdiff_t)p->k * p->ic};
@@ -139,8 +139,8 @@ static void run_row(runner *r, int e, int ky0, int ky1, int panel0, int panel1, 
     for (int i = 0; i < r->sources; i++) {
         source *s = &r->source[i];
         if (s->stage.rows)
-            conv_stage_fill(&s->stage, p, r->b->image, conv_clamp(e + p->first, p->h),
-                            conv_clamp(e + p->first + reach, p->h));
+            conv_window_fill(&s->stage, p, r->b->image, conv_clamp(e + p->first, p->h),
+                             conv_clamp(e + p->first + reach, p->h));
         make_segments(r, s, e, ky0, ky1);
         depth = s->segments ? s->segments * s->segment[0].count : 0;
     }
@@ -215,7 +215,7 @@ static void run_band(const conv_plan *p, blocking block, const band *b)
     }
 }
 
-void conv_run_rows(const conv_plan *p)
+void conv_run_direct(const conv_plan *p)
 {
     const blocking block = choose_blocking(p);
     const int panels = conv_panels(p->oc);
@@ -225,12 +225,12 @@ void conv_run_rows(const conv_plan *p)
     int groups = p->n * bands < 8 ? (8 + p->n * bands - 1) / (p->n * bands) : 1;
     /* More weights than values: a block of them stays in the second cache while all images pass by, and where it is a
      * panel those who come to it next have it fetched. */
-    const int blocks = (panels + block.panels - 1) / block.panels, ahead = ts_threads();
+    const int blocks = (panels + block.panels - 1) / block.panels, ahead = ts_threads_of(p->threads);
     const bool weighty = (ptrdiff_t)p->k * p->k * p->oc > (ptrdiff_t)p->n * p->h * p->w;
     if (weighty && groups < blocks) groups = blocks;
     if (groups > panels) groups = panels;
     if (weighty && p->h <= WHOLE_ROWS && groups * p->n >= 8) bands = 1;
-#pragma omp parallel for collapse(3) schedule(dynamic) num_threads(ts_threads())
+#pragma omp parallel for collapse(3) schedule(dynamic) num_threads(ts_threads_of(p->threads))
     for (int g = 0; g < groups; g++)
         for (int n = 0; n < p->n; n++)
             for (int i = 0; i < bands; i++) {

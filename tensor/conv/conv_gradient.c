@@ -1,5 +1,4 @@
-/* Gradients of a convolution. The data gradient is a convolution of dy with mirrored, transposed weights
- * (tensor/conv/conv.c). The weight gradient is a matrix product over pixels: blocks of (tap, input) x output stay in
+/* The weight gradient, directly: a matrix product over pixels. Blocks of (tap, input) x output stay in
  * registers while pixels pass by. */
 #include "tensor/conv/conv_internal.h"
 #include "tensor/threads.h"
@@ -12,27 +11,6 @@ enum {
     CHUNKS = 16,
     UNITS = 16 /* of work, at least, where the shape allows */
 };
-
-void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
-{
-    const int reach = c->dilation * (c->k / 2), fold = c->pad == TS_PAD_REPLICATE ? reach : 0;
-    const conv_plan p = {.n = c->n,
-                         .h = c->h,
-                         .w = c->w,
-                         .ic = c->oc,
-                         .channels = c->oc,
-                         .oc = ts_conv_variables(c),
-                         .k = c->k,
-                         .dilation = c->dilation,
-                         .first = -reach - fold,
-                         .fold = fold,
-                         .x = dy,
-                         .packed = packed,
-                         .y = dx,
-                         .leak = 1,
-                         .add = accumulate};
-    conv_run(&p);
-}
 
 /* The sums of a chunk are [line][m][n]: a line is a run of contiguous inputs (a kernel row, or a tap), and m, n are the
  * position in the line and the output channel, or the other way round where that leaves fewer lanes empty. n is padded.
@@ -72,7 +50,7 @@ static job make_job(const ts_conv *c, const float *x, const float *dy)
                          .first = -c->dilation * (c->k / 2),
                          .replicate = c->pad == TS_PAD_REPLICATE,
                          .x = x};
-    g.pixel = c->k == 1 ? c->ic : conv_stage_make(&g.plan, 1, 0, 1).pixel;
+    g.pixel = c->k == 1 ? c->ic : conv_window_make(&g.plan, 1, 0, 1).pixel;
     g.taps = c->dilation == 1 && g.pixel == c->ic ? 1 : c->k;
     g.lines = c->k * g.taps;
     g.length = g.taps == 1 ? c->k * c->ic : c->ic;
@@ -139,7 +117,7 @@ static void sum_line(const job *g, ts_sum *t, pass *s, int panel, float *c)
     t->a = a;
 }
 
-static void run_pass(const job *g, pass *s, const conv_stage *stage, float *sums)
+static void run_pass(const job *g, pass *s, const conv_window *stage, float *sums)
 {
     const ts_conv *c = g->c;
     const int lanes = conv_lanes(), count = s->right - s->left;
@@ -160,7 +138,7 @@ static void run_pass(const job *g, pass *s, const conv_stage *stage, float *sums
             else if (r < 0 || r >= c->h) continue;
             const ptrdiff_t at = ((ptrdiff_t)s->image * c->h + i) * c->w + s->left;
             x_row[rows] = c->k == 1 ? at * c->ic
-                                    : conv_stage_row(stage, r) - x + (s->left + kx * c->dilation) * stage->pixel;
+                                    : conv_window_row(stage, r) - x + (s->left + kx * c->dilation) * stage->pixel;
             dy_row[rows++] = g->direct_dy ? at * c->oc : (ptrdiff_t)(i - s->begin) * count * width;
         }
         const ptrdiff_t dy_stride = g->direct_dy ? c->oc : width;
@@ -209,10 +187,10 @@ static void run_chunk(const job *g, int chunk, int group, bool weights)
     float *sums = g->sums + chunk * g->size,
           *bias = g->bias_sums && group == 0 ? g->bias_sums + (ptrdiff_t)chunk * c->oc : NULL;
     if (bias) memset(bias, 0, sizeof(float) * (size_t)c->oc);
-    conv_stage stage = {0};
+    conv_window stage = {0};
     if (staged) {
-        stage = conv_stage_make(&g->plan, rows_pass + reach, g->plan.first, c->w + reach);
-        stage.memory = ts_scratch(0, conv_stage_size(&stage) * sizeof(float));
+        stage = conv_window_make(&g->plan, rows_pass + reach, g->plan.first, c->w + reach);
+        stage.memory = ts_scratch(0, conv_window_size(&stage) * sizeof(float));
     }
     for (int row = begin, image_before = -1; row < end; row += s.end - s.begin) {
         s.image = row / c->h;
@@ -224,7 +202,7 @@ static void run_chunk(const job *g, int chunk, int group, bool weights)
         image_before = s.image;
         if (staged) {
             const int low = s.begin + g->plan.first, high = s.end - 1 + g->plan.first + reach;
-            conv_stage_fill(&stage, &g->plan, s.image, conv_clamp(low, c->h), conv_clamp(high, c->h));
+            conv_window_fill(&stage, &g->plan, s.image, conv_clamp(low, c->h), conv_clamp(high, c->h));
         }
         if (weights) plan_fetch(g, &s, row + s.end - s.begin, s.end - s.begin, blocks);
         for (int b = 0; weights && b < blocks; b++) {
@@ -274,15 +252,15 @@ static void reduce_block(const job *g, int o0, int o1, int c0, int c1, float *dw
     }
 }
 
-static void run_rows(job *g, float *dweight, float *dbias)
+void conv_direct_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
 {
-    const ts_conv *c = g->c;
+    job made = make_job(c, x, dy), *g = &made;
     const size_t count = (size_t)(g->size * g->chunks) + (size_t)(c->oc * g->chunks);
     g->sums = ts_scratch(2, sizeof(float) * count);
     g->bias_sums = dbias ? g->sums + g->size * g->chunks : NULL;
     const int groups = dweight ? g->groups : 1, o_blocks = dweight ? (c->oc + REDUCE_OUTPUTS - 1) / REDUCE_OUTPUTS : 0;
     const int c_blocks = (c->ic + REDUCE_INPUTS - 1) / REDUCE_INPUTS;
-#pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads_of(c->compute.threads))
     {
 #pragma omp for collapse(2) schedule(dynamic)
         for (int chunk = 0; chunk < g->chunks; chunk++)
@@ -296,15 +274,4 @@ static void run_rows(job *g, float *dweight, float *dbias)
     }
     for (int i = 0; dbias && i < g->chunks; i++)
         for (int o = 0; o < c->oc; o++) dbias[o] += g->bias_sums[(ptrdiff_t)i * c->oc + o];
-}
-
-void ts_conv_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
-{
-    if (dweight && c->k > 1 && c->h * c->w <= CONV_POSITIONS) {
-        conv_weight_positions(c, x, dy, dweight);
-        dweight = NULL;
-    }
-    if (!dweight && !dbias) return;
-    job g = make_job(c, x, dy);
-    run_rows(&g, dweight, dbias);
 }

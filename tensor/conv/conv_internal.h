@@ -1,6 +1,28 @@
-/* Internal to tensor/conv*.c: what forward and the data gradient have in common. */
-#ifndef TS_CONV_PLAN_H
-#define TS_CONV_PLAN_H
+/* Internal to tensor/conv/: the layouts that the ways share, and the plan of a forward or a data gradient.
+ *
+ * Padded window (conv_window): rows of input with their padding columns, made when first needed, in a ring.
+ *
+ *      left                          columns
+ *       | pad | x[r][0] x[r][1] ... x[r][w-1] | pad |      source row r      at memory + r % rows * row
+ *       | pad | x[r+1][0] ...                 | pad |      source row r + 1
+ *                      ^ one pixel: ic floats (of bf16: pairs of channels), pixel floats apart
+ *
+ * Panel: the weights of two vectors of output channels (the last of one, where that is enough).
+ *
+ *      packed: [panel][ky][kx][input channel][2 lanes outputs]          lanes = 16 with AVX-512, 8 with AVX2
+ *
+ * Register tile (ts_tile): sums that stay in registers over all taps and input channels.
+ *
+ *                        panel's outputs
+ *                    +---------+---------+
+ *      pixel 0       | vector  | vector  |     y[p][o] = act(bias[o] + sum_k a[p][k] w[k][o])
+ *      pixel 1       |         |         |     k runs through segments: stretches of a and w that both are contiguous,
+ *      ...           |         |         |     such as the taps of a kernel row
+ *      pixel < TS_TILE_PIXELS            |
+ *                    +---------+---------+
+ */
+#ifndef TS_CONV_INTERNAL_H
+#define TS_CONV_INTERNAL_H
 #include "tensor/conv/conv.h"
 #include "tensor/kernels/conv.h"
 
@@ -19,31 +41,32 @@ typedef struct conv_plan {
     bool add;
     bool bf16;    /* weights, and x as tiles read it, are pairs of bf16 values, each where a float would be; */
     int channels; /* x itself is floats, so many a pixel */
+    int threads;
 } conv_plan;
 
 enum {
     CONV_BLOCK_BYTES = 640 << 10, /* weights that stay in the second cache while pixels pass by */
-    CONV_STAGE_SLACK = 64         /* the weight gradient reads whole vectors past the last pixel */
+    CONV_WINDOW_SLACK = 64        /* the weight gradient reads whole vectors past the last pixel */
 };
 
 /* n consecutive pixels of x as tiles read them, stride floats apart. */
 void conv_put_pixels(const conv_plan *p, const float *from, ptrdiff_t n, float *to, ptrdiff_t stride);
 
 /* A window of input rows with their padding columns, of which a row is made when first needed. */
-typedef struct conv_stage {
+typedef struct conv_window {
     float *memory;
     ptrdiff_t pixel, row; /* strides in floats */
     int rows, left, columns;
     int next; /* first source row that is not there yet */
-} conv_stage;
+} conv_window;
 
 /* The layout of a window of rows and columns, the first column being input column left (may be negative). No memory
- * yet: the caller puts conv_stage_size floats into memory. */
-conv_stage conv_stage_make(const conv_plan *p, int rows, int left, int columns);
-static inline size_t conv_stage_size(const conv_stage *s) { return (size_t)(s->row * s->rows) + CONV_STAGE_SLACK; }
+ * yet: the caller puts conv_window_size floats into memory. */
+conv_window conv_window_make(const conv_plan *p, int rows, int left, int columns);
+static inline size_t conv_window_size(const conv_window *s) { return (size_t)(s->row * s->rows) + CONV_WINDOW_SLACK; }
 /* Makes source rows first to last of image n that are not there yet. */
-void conv_stage_fill(conv_stage *s, const conv_plan *p, int n, int first, int last);
-static inline const float *conv_stage_row(const conv_stage *s, int row) { return s->memory + row % s->rows * s->row; }
+void conv_window_fill(conv_window *s, const conv_plan *p, int n, int first, int last);
+static inline const float *conv_window_row(const conv_window *s, int row) { return s->memory + row % s->rows * s->row; }
 
 /* For output coordinate i: the source coordinates and taps that meet there, in order of the tap. Returns how many;
  * at most conv_pairs_max. */
@@ -53,18 +76,15 @@ typedef struct conv_pair {
 int conv_pairs(const conv_plan *p, int i, int size, conv_pair *pair);
 static inline int conv_pairs_max(const conv_plan *p) { return p->k * (p->fold + 1) + p->k * p->fold; }
 
+/* Pixels of a map that the ways of a batch hold at a time. */
+enum { CONV_BATCH_PIXELS = 64 };
+
 /* Panels of 2 vectors of output channels; the last has one vector where that is enough. */
 static inline int conv_lanes(void) { return ts_conv_k()->lanes; }
+/* In whole vectors. */
+static inline int conv_whole(int n) { return (n + conv_lanes() - 1) / conv_lanes() * conv_lanes(); }
 static inline int conv_panels(int oc) { return (oc + 2 * conv_lanes() - 1) / (2 * conv_lanes()); }
 static inline int conv_vectors(int oc, int panel) { return oc - panel * 2 * conv_lanes() > conv_lanes() ? 2 : 1; }
-
-/* Few pixels in an image and several images: tiles run over the images at one position, which needs no padding at all.
- * A tile of four is slower than a row of eight. */
-enum { CONV_POSITIONS = 64, CONV_POSITIONS_OF_FEW = 16 };
-static inline bool conv_by_position(int n, int h, int w)
-{
-    return n >= 4 && h * w <= (n < 8 ? CONV_POSITIONS_OF_FEW : CONV_POSITIONS);
-}
 
 static inline int conv_clamp(int i, int size) { return i < 0 ? 0 : i >= size ? size - 1 : i; }
 
@@ -83,37 +103,33 @@ void conv_run_tile(ts_tile *t, int vectors, const float *a, float *y, int pixels
 /* Side 1, serial: pixels [first, first + count) of panels [panel0, panel1); p->x is as tiles read it. */
 void conv_run_pixels(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, int panel0, int panel1);
 
-void conv_run_rows(const conv_plan *p);
+void conv_run_direct(const conv_plan *p);
 void conv_run_pointwise(const conv_plan *p);
-void conv_run_positions(const conv_plan *p);
+void conv_run_batch(const conv_plan *p);
 void conv_run_lanes(const conv_plan *p);
 void conv_run_col2im(const conv_plan *p);
-/* Whichever of them suits. */
-void conv_run(const conv_plan *p);
 
 /* bf16 where the CPU has a matrix unit: weights are packed for it alone. */
-bool conv_by_matrix(void);
-size_t conv_matrix_count(int ic, int oc, int k, int dilation);
-void conv_matrix_pack(const ts_conv *c, bool forward, const float *weight, float *packed);
-void conv_run_matrix(const conv_plan *p);
-/* Side 1, serial: count pixels of pairs p->x, behind which CONV_MATRIX_SLACK pixels and 32 more values can be read and
+bool conv_amx_present(void);
+size_t conv_amx_count(int ic, int oc, int k, int dilation);
+void conv_amx_pack(const ts_conv *c, bool forward, const float *weight, float *packed);
+void conv_run_amx(const conv_plan *p);
+/* Side 1, serial: count pixels of pairs p->x, behind which CONV_AMX_SLACK pixels and 32 more values can be read and
  * are finite. */
-enum { CONV_MATRIX_SLACK = 32 };
-void conv_matrix_pixels(const conv_plan *p, int count);
+enum { CONV_AMX_SLACK = 32 };
+void conv_amx_pixels(const conv_plan *p, int count);
 /* The same of steps of 32 channels that begin at bytes from a pixel, which are p->ic pairs apart. */
-void conv_matrix_steps(const conv_plan *p, const ptrdiff_t *at, int steps, int count);
+void conv_amx_steps(const conv_plan *p, const ptrdiff_t *at, int steps, int count);
 
 static inline int conv_bf16_depth(int channels) { return (channels + 1) / 2; }
 size_t conv_bf16_count(const ts_conv *c, int ic, int oc);
 void conv_pack_bf16(const ts_conv *c, bool forward, const float *weight, float *packed);
 
 ptrdiff_t conv_panels_count(int ic, int oc, int k);
-/* To few channels weights are packed behind the panels once more: for conv_run_col2im, or else for conv_run_lanes,
- * which leaves narrow images to the panels. */
-bool conv_by_col2im(int ic, int oc, int k);
+/* To few channels weights are packed behind the panels once more, for this way: TS_CONV_BY_COL2IM, TS_CONV_BY_LANES, or
+ * TS_CONV_DIRECTLY where they are not. */
+ts_conv_way conv_choose_narrow(int ic, int oc, int k);
 ptrdiff_t conv_col2im_count(int ic, int oc, int k);
-bool conv_few_channels(int oc, int k);
-bool conv_by_lanes(const conv_plan *p);
 /* weight[i * i_step + o * o_step + tap] */
 void conv_pack_col2im(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step,
                       float *packed);
@@ -123,6 +139,8 @@ void conv_pack_lanes(int ic, int oc, int k, bool mirrored, const float *weight, 
 size_t conv_winograd_count(int ic, int oc);
 void conv_winograd_pack(const ts_conv *c, bool forward, const float *weight, float *packed);
 
-/* dweight += for at most CONV_POSITIONS pixels an image. */
-void conv_weight_positions(const ts_conv *c, const float *x, const float *dy, float *dweight);
+/* dweight += for at most CONV_BATCH_PIXELS pixels an image. */
+void conv_batch_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight);
+/* Either may be NULL. */
+void conv_direct_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias);
 #endif

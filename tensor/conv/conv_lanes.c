@@ -5,27 +5,6 @@
 #include "tensor/threads.h"
 #include <string.h>
 
-/* In twelfths of an FMA per input, pixel and tap: panels of one vector are held back by their loads. */
-static int64_t panel_cost(int oc, int pixels)
-{
-    const int vectors = (oc + conv_lanes() - 1) / conv_lanes();
-    return (int64_t)vectors * conv_lanes() * pixels * (vectors == 1 ? 13 : 12);
-}
-
-static int padded_pixels(int pixels) { return (pixels + conv_lanes() - 1) / conv_lanes() * conv_lanes(); }
-
-bool conv_few_channels(int oc, int k)
-{
-    return k > 1 && oc <= 2 * conv_lanes() && (int64_t)15 * oc * 64 < panel_cost(oc, 64);
-}
-
-bool conv_by_lanes(const conv_plan *p)
-{
-    const int out_w = p->w + 2 * p->fold;
-    return !p->bf16 && conv_few_channels(p->oc, p->k) &&
-        (int64_t)14 * p->oc * padded_pixels(out_w) < panel_cost(p->oc, out_w);
-}
-
 /* Inputs whose rows stay in the first cache over all taps, three lines of each. */
 static int chunk_of(int k) { return 84 / k; }
 
@@ -154,7 +133,7 @@ static void put_row(const conv_plan *p, const rows *s, const float *out, float *
 
 static void run_band(const conv_plan *p, int image, int begin, int end)
 {
-    const int reach = (p->k - 1) * p->dilation, pixels = padded_pixels(p->w + 2 * p->fold);
+    const int reach = (p->k - 1) * p->dilation, pixels = conv_whole(p->w + 2 * p->fold);
     const int e0 = begin == 0 ? 0 : begin + p->fold, e1 = end == p->h ? p->h + 2 * p->fold : end + p->fold;
     rows s = rows_make(p, pixels);
     s.memory = ts_scratch(0, sizeof(float) * (size_t)(s.row * s.count));
@@ -174,9 +153,9 @@ static void run_band(const conv_plan *p, int image, int begin, int end)
 
 void conv_run_lanes(const conv_plan *p)
 {
-    int bands = (4 * ts_threads() + p->n - 1) / p->n; /* each makes the rows around it anew */
+    int bands = (4 * ts_threads_of(p->threads) + p->n - 1) / p->n; /* each makes the rows around it anew */
     if (bands > (p->h + 7) / 8) bands = (p->h + 7) / 8;
-#pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads())
+#pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads_of(p->threads))
     for (int n = 0; n < p->n; n++)
         for (int i = 0; i < bands; i++) {
             int begin, end;

@@ -2,9 +2,9 @@
 #include "tensor/conv/conv_internal.h"
 #include <string.h>
 
-conv_stage conv_stage_make(const conv_plan *p, int rows, int left, int columns)
+conv_window conv_window_make(const conv_plan *p, int rows, int left, int columns)
 {
-    conv_stage s = {.rows = rows < p->h ? rows : p->h, .left = left, .columns = columns};
+    conv_window s = {.rows = rows < p->h ? rows : p->h, .left = left, .columns = columns};
     /* Strides of a multiple of 2 KiB put all pixels of a tile into two sets of the first cache. */
     s.pixel = p->ic % 512 ? p->ic : p->ic + 16;
     s.row = s.columns * s.pixel;
@@ -21,7 +21,7 @@ void conv_put_pixels(const conv_plan *p, const float *from, ptrdiff_t n, float *
 }
 
 /* n pixels: copies of one, or zeros where from is NULL. */
-static void fill_pixels(const conv_stage *s, const conv_plan *p, float *to, const float *from, int n)
+static void fill_pixels(const conv_window *s, const conv_plan *p, float *to, const float *from, int n)
 {
     for (int j = 0; j < n; j++, to += s->pixel) {
         if (from) conv_put_pixels(p, from, 1, to, s->pixel);
@@ -29,7 +29,7 @@ static void fill_pixels(const conv_stage *s, const conv_plan *p, float *to, cons
     }
 }
 
-void conv_stage_fill(conv_stage *s, const conv_plan *p, int n, int first, int last)
+void conv_window_fill(conv_window *s, const conv_plan *p, int n, int first, int last)
 {
     /* Columns [left, left + columns): before the image, in it, behind it. */
     const int end = s->left + s->columns;

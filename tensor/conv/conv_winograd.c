@@ -8,14 +8,8 @@
 #include <string.h>
 
 enum {
-    TILES = 28, /* two full register tiles; their 36 inputs and outputs stay in the second cache beside the weights */
-    TILES_LEAST = 64 /* fewer save less than the transformation of the weights costs */
+    TILES = 28 /* two full register tiles; their 36 inputs and outputs stay in the second cache beside the weights */
 };
-
-static _Thread_local bool exact = true;
-
-void ts_conv_exact_set(bool on) { exact = on; }
-bool ts_conv_exact(void) { return exact; }
 
 /* Tiles along a side of the interleaved images, the largest of which has ceil(size / dilation) pixels. */
 static int tiles_along(int size, int dilation)
@@ -33,7 +27,8 @@ static winograd_grid with_tiles(winograd_grid g)
 
 winograd_grid winograd_grid_forward(const ts_conv *c)
 {
-    return with_tiles((winograd_grid){.n = c->n,
+    return with_tiles((winograd_grid){.threads = c->compute.threads,
+                                      .n = c->n,
                                       .h = c->h,
                                       .w = c->w,
                                       .ic = c->ic,
@@ -47,7 +42,8 @@ winograd_grid winograd_grid_forward(const ts_conv *c)
 
 winograd_grid winograd_grid_gradient(const ts_conv *c, int fold)
 {
-    return with_tiles((winograd_grid){.n = c->n,
+    return with_tiles((winograd_grid){.threads = c->compute.threads,
+                                      .n = c->n,
                                       .h = c->h,
                                       .w = c->w,
                                       .ic = c->oc,
@@ -56,14 +52,6 @@ winograd_grid winograd_grid_gradient(const ts_conv *c, int fold)
                                       .oc = ts_conv_variables(c),
                                       .dilation = c->dilation,
                                       .first = -c->dilation - fold});
-}
-
-bool ts_conv_winograd(const ts_conv *c, ts_conv_use use)
-{
-    const bool forward = use == TS_CONV_WINOGRAD;
-    if (c->k != 3 || (forward ? c->ic : c->oc) < 16 || (forward ? c->oc : ts_conv_variables(c)) < 24) return false;
-    const winograd_grid g = winograd_grid_forward(c); /* tiles that are mostly outside cost what fewer products save */
-    return g.tiles >= TILES_LEAST && 2 * g.tiles * WINOGRAD_SIDE * WINOGRAD_SIDE <= 3 * (int64_t)c->n * c->h * c->w;
 }
 
 size_t conv_winograd_count(int ic, int oc) { return (size_t)conv_panels_count(ic, oc, 1) * WINOGRAD_AREA; }
@@ -76,7 +64,7 @@ void conv_winograd_pack(const ts_conv *c, bool forward, const float *weight, flo
     const ptrdiff_t plane = conv_panels_count(ic, oc, 1);
     /* weight[o][c][tap]: strides of the packed input and output channel */
     const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * 9 : 9, i_step = forward ? 9 : (ptrdiff_t)c->ic * 9;
-#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
+#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(c->compute.threads))
     for (int panel = 0; panel < panels; panel++)
         for (int i = 0; i < ic; i++) {
             const int vectors = conv_vectors(oc, panel), width = vectors * lanes, o0 = panel * 2 * lanes;
@@ -179,7 +167,7 @@ static void run(const winograd_grid *g, const float *x, const float *packed, con
 {
     const ptrdiff_t in = winograd_plane(TILES, g->ic), out = winograd_plane(TILES, g->oc);
     const struct ts_winograd_kernels *kernels = ts_winograd_k();
-#pragma omp parallel for schedule(dynamic) num_threads(ts_threads())
+#pragma omp parallel for schedule(dynamic) num_threads(ts_threads_of(g->threads))
     for (int64_t first = 0; first < g->tiles; first += TILES) {
         const int count = (int)(g->tiles - first < TILES ? g->tiles - first : TILES);
         float *v = ts_scratch(0, sizeof(float) * (size_t)(in * WINOGRAD_AREA)),
@@ -240,7 +228,7 @@ void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const flo
     const ptrdiff_t image = (ptrdiff_t)g.out_h * g.out_w * channels;
     float *larger = ts_scratch(3, sizeof(float) * (size_t)(image * c->n));
     run(&g, dy, packed, NULL, 1, false, larger);
-#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
+#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(c->compute.threads))
     for (int n = 0; n < c->n; n++)
         for (int i = 0; i < c->h; i++)
             fold_row(c, fold, channels, larger + n * image, i, accumulate,

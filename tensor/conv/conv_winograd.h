@@ -6,7 +6,8 @@
 enum {
     WINOGRAD_SIDE = 4,  /* of a tile's outputs */
     WINOGRAD_REACH = 6, /* of its inputs */
-    WINOGRAD_AREA = WINOGRAD_REACH * WINOGRAD_REACH
+    WINOGRAD_AREA = WINOGRAD_REACH * WINOGRAD_REACH,
+    WINOGRAD_CHUNK_TILES = 128 /* of a weight gradient's sum: clearing and adding it is little beside making it */
 };
 
 /* Outputs [0, out_h) x [0, out_w); tap 0 of output 0 reads coordinate first. Dilation 2 is four interleaved images. */
@@ -17,6 +18,7 @@ typedef struct winograd_grid {
     bool replicate;
     int rows, columns; /* tiles of one interleaved image */
     int64_t tiles;     /* of all */
+    int threads;
 } winograd_grid;
 
 /* Of a convolution; of the gradient of its input on the domain that is larger by fold on each side. */

@@ -7,17 +7,11 @@
 #include <string.h>
 
 enum {
-    CHUNK_TILES = 128, /* at least: clearing and adding a chunk's sums is little beside making them */
     CHUNKS = 8,
     GROUP_TILES = 64,        /* transformed together: long runs for the sums, */
     GROUP_BYTES = 896 << 10, /* as many as stay in the second cache */
     GROUP_TILES_LEAST = 28
 };
-
-bool ts_conv_winograd_weights(const ts_conv *c)
-{
-    return ts_conv_winograd(c, TS_CONV_WINOGRAD) && winograd_grid_forward(c).tiles >= 4 * CHUNK_TILES;
-}
 
 typedef struct job {
     winograd_grid g;
@@ -36,7 +30,7 @@ static job make_job(const ts_conv *c, const float *x, const float *dy)
     j.group = GROUP_BYTES / (WINOGRAD_AREA * (int)sizeof(float) * (c->ic + j.padded));
     if (j.group > GROUP_TILES) j.group = GROUP_TILES;
     if (j.group < GROUP_TILES_LEAST) j.group = GROUP_TILES_LEAST;
-    const int64_t chunks = j.g.tiles / CHUNK_TILES;
+    const int64_t chunks = j.g.tiles / WINOGRAD_CHUNK_TILES;
     j.chunks = chunks > CHUNKS ? CHUNKS : chunks < 1 ? 1 : (int)chunks;
     j.in = winograd_plane(j.group, c->ic);
     j.out = winograd_plane(j.group, j.padded);
@@ -119,7 +113,7 @@ void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const fl
     job j = make_job(c, x, dy);
     const int lanes = conv_lanes();
     j.sums = ts_scratch(2, sizeof(float) * (size_t)(j.size * j.chunks));
-#pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads_of(c->compute.threads))
     {
 #pragma omp for schedule(dynamic)
         for (int chunk = 0; chunk < j.chunks; chunk++) run_chunk(&j, chunk);

@@ -8,16 +8,16 @@
 /* Tiles 0 .. 3 are sums, 4 and 5 rows of a, 6 and 7 columns of b. Their numbers are part of the instructions, so that
  * this cannot be a loop. */
 #define PRODUCT(name, tall, wide)                                                        \
-    static void name(const ts_matrix *m)                                                 \
+    static void name(const ts_amx_product *m)                                            \
     {                                                                                    \
         const size_t a_row = (size_t)m->a_row, b_row = (size_t)m->b_row * sizeof(float), \
                      c_row = (size_t)m->c_row * sizeof(float);                           \
-        float *low = m->c + TS_MATRIX_SIDE * m->c_row;                                   \
+        float *low = m->c + TS_AMX_SIDE * m->c_row;                                      \
         if (m->add) {                                                                    \
             _tile_loadd(0, m->c, c_row);                                                 \
-            if (wide) _tile_loadd(1, m->c + TS_MATRIX_SIDE, c_row);                      \
+            if (wide) _tile_loadd(1, m->c + TS_AMX_SIDE, c_row);                         \
             if (tall) _tile_loadd(2, low, c_row);                                        \
-            if (tall && wide) _tile_loadd(3, low + TS_MATRIX_SIDE, c_row);               \
+            if (tall && wide) _tile_loadd(3, low + TS_AMX_SIDE, c_row);                  \
         } else {                                                                         \
             _tile_zero(0);                                                               \
             if (wide) _tile_zero(1);                                                     \
@@ -25,21 +25,21 @@
             if (tall && wide) _tile_zero(3);                                             \
         }                                                                                \
         const float *b = m->b;                                                           \
-        for (int s = 0; s < m->steps; s++, b += TS_MATRIX_PAIRS * m->b_row) {            \
+        for (int s = 0; s < m->steps; s++, b += TS_AMX_PAIRS * m->b_row) {               \
             const char *a = (const char *)m->a + m->a_at[s];                             \
             _tile_loadd(6, b, b_row);                                                    \
             _tile_loadd(4, a, a_row);                                                    \
             _tile_dpbf16ps(0, 4, 6);                                                     \
-            if (wide) _tile_loadd(7, b + TS_MATRIX_SIDE, b_row);                         \
+            if (wide) _tile_loadd(7, b + TS_AMX_SIDE, b_row);                            \
             if (wide) _tile_dpbf16ps(1, 4, 7);                                           \
-            if (tall) _tile_loadd(5, a + TS_MATRIX_SIDE * a_row, a_row);                 \
+            if (tall) _tile_loadd(5, a + TS_AMX_SIDE * a_row, a_row);                    \
             if (tall) _tile_dpbf16ps(2, 5, 6);                                           \
             if (tall && wide) _tile_dpbf16ps(3, 5, 7);                                   \
         }                                                                                \
         _tile_stored(0, m->c, c_row);                                                    \
-        if (wide) _tile_stored(1, m->c + TS_MATRIX_SIDE, c_row);                         \
+        if (wide) _tile_stored(1, m->c + TS_AMX_SIDE, c_row);                            \
         if (tall) _tile_stored(2, low, c_row);                                           \
-        if (tall && wide) _tile_stored(3, low + TS_MATRIX_SIDE, c_row);                  \
+        if (tall && wide) _tile_stored(3, low + TS_AMX_SIDE, c_row);                     \
     }
 PRODUCT(product_1_1, 0, 0)
 PRODUCT(product_1_2, 0, 1)
@@ -55,7 +55,7 @@ static void finish(const float *c, ptrdiff_t c_row, int pixels, int channels, co
         const vf b = bias ? v_load_part(bias + o, left) : v_set(0);
         for (int p = 0; p < pixels; p++) {
             float *to = y + p * y_row + o;
-            __builtin_prefetch(to + TS_MATRIX_BLOCK * y_row,
+            __builtin_prefetch(to + TS_AMX_BLOCK * y_row,
                                1); /* where the next product's go: stores that miss would hold up what follows */
             vf v = v_load(c + p * c_row + o) + b;
             if (add) v += v_load_part(to, left);
@@ -89,12 +89,12 @@ static void pixel_pairs(const float *x, ptrdiff_t x_row, int pixels, int channel
         }
 }
 
-const struct ts_matrix_kernels TS_TABLE(matrix) = {.begin = tiles_begin,
-                                                   .end = tiles_end,
-                                                   .product = {{product_1_1, product_1_2}, {product_2_1, product_2_2}},
-                                                   .finish = finish,
-                                                   .planes = planes,
-                                                   .pixel_pairs = pixel_pairs};
+const struct ts_amx_kernels TS_TABLE(amx) = {.begin = tiles_begin,
+                                             .end = tiles_end,
+                                             .product = {{product_1_1, product_1_2}, {product_2_1, product_2_2}},
+                                             .finish = finish,
+                                             .planes = planes,
+                                             .pixel_pairs = pixel_pairs};
 #else
-const struct ts_matrix_kernels TS_TABLE(matrix) = {.begin = NULL};
+const struct ts_amx_kernels TS_TABLE(amx) = {.begin = NULL};
 #endif

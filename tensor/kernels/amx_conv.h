@@ -9,14 +9,14 @@
 #include <stdint.h>
 
 enum {
-    TS_MATRIX_SIDE = 16,                 /* rows and columns of a tile of sums */
-    TS_MATRIX_PAIRS = 16,                /* a step multiplies so many pairs of neighbouring k */
-    TS_MATRIX_BLOCK = 2 * TS_MATRIX_SIDE /* rows and columns of the largest product */
+    TS_AMX_SIDE = 16,              /* rows and columns of a tile of sums */
+    TS_AMX_PAIRS = 16,             /* a step multiplies so many pairs of neighbouring k */
+    TS_AMX_BLOCK = 2 * TS_AMX_SIDE /* rows and columns of the largest product */
 };
 
 /* c[m][n] (+)= sum over steps s and pairs i of a[m][s, 2i] b[s, 2i][n] + a[m][s, 2i + 1] b[s, 2i + 1][n], a pair of
  * bf16 values being kept where a float would be, the even one in the low half. */
-typedef struct ts_matrix {
+typedef struct ts_amx_product {
     const void *a;
     const float *b;
     const ptrdiff_t *a_at; /* row m of a at step s: a + m a_row + a_at[s], in bytes */
@@ -26,13 +26,13 @@ typedef struct ts_matrix {
     float *c;
     ptrdiff_t c_row;
     bool add;
-} ts_matrix;
+} ts_amx_product;
 
-struct ts_matrix_kernels {
+struct ts_amx_kernels {
     void (*begin)(void); /* on the thread that is to multiply */
     void (*end)(void);   /* gives the tiles back: until then the system saves them at every switch */
     void (*product[2][2])(
-        const ts_matrix *m); /* [rows > 16][columns > 16]: all 16 or 32 of both are read and written */
+        const ts_amx_product *m); /* [rows > 16][columns > 16]: all 16 or 32 of both are read and written */
     /* y[p y_row + o] = act(c[p c_row + o] + bias[o] (+ y[p y_row + o])), act as in tensor/conv/conv.h; bias may be NULL
      */
     void (*finish)(const float *c, ptrdiff_t c_row, int pixels, int channels, const float *bias, bool add, float leak,
@@ -42,5 +42,5 @@ struct ts_matrix_kernels {
     void (*planes)(const float *x, ptrdiff_t x_row, int pixels, int channels, uint16_t *to, ptrdiff_t plane);
     void (*pixel_pairs)(const float *x, ptrdiff_t x_row, int pixels, int channels, float *to, ptrdiff_t to_row);
 };
-TS_FAMILY(matrix)
+TS_FAMILY(amx)
 #endif

@@ -51,8 +51,8 @@ INLINE void store_lanes(float *p, vf v, lanes n)
 }
 #endif
 
-/* Sums over more k than this are made of parts: the rounding of a float sum grows with its length, a published
- * convolution has 25,600 terms, and a part of 96 cost a fiftieth of its time to put away. */
+/* Sums over more k than this are made of parts: the rounding of a float sum grows with its length, and a
+ * published convolution has 25,600 terms. Shorter parts cost more time to put away. */
 enum { PART = 192 };
 
 /* acc + the products of both halves of x and b. A bf16 value is the upper half of the float that it stands for. */
@@ -115,7 +115,7 @@ INLINE void tile(const ts_tile *t, const int pixels, const int vectors, const bo
     ptrdiff_t stride[TS_TILE_GROUP]; /* in bytes */
     const char *fetch0 = (const char *)t->fetch[0], *fetch1 = (const char *)t->fetch[1];
     UNROLL for (int i = 0; i < TS_TILE_GROUP; i++) stride[i] = i * t->a_stride * (ptrdiff_t)sizeof(float);
-    ptrdiff_t left = 0, room = PART; /* of this segment, of this part */
+    ptrdiff_t left = 0, space = PART; /* of this segment, of this part */
     const char *a[3];
     const float *w = t->w;
     for (int g = 0; g < t->segments || left > 0;) {
@@ -124,7 +124,7 @@ INLINE void tile(const ts_tile *t, const int pixels, const int vectors, const bo
             UNROLL for (int i = 0; i < 3; i++) a[i] = (const char *)(t->a[i] + t->segment[g].a);
             left = t->segment[g++].count;
         }
-        if (room == 0) {
+        if (space == 0) {
             if (!parts)
                 UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++)
                     whole[p][v] = acc[p][v];
@@ -133,11 +133,11 @@ INLINE void tile(const ts_tile *t, const int pixels, const int vectors, const bo
                     whole[p][v] += acc[p][v];
             UNROLL for (int p = 0; p < pixels; p++) UNROLL for (int v = 0; v < vectors; v++) acc[p][v] = (vf){0};
             parts = true;
-            room = PART;
+            space = PART;
         }
-        ptrdiff_t n = left < room ? left : room;
+        ptrdiff_t n = left < space ? left : space;
         left -= n;
-        room -= n;
+        space -= n;
         for (; n >= 4; n -= 4) {
             STEP(0) __builtin_prefetch(fetch0);
             STEP(1) __builtin_prefetch(fetch1);

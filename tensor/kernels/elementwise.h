@@ -37,8 +37,8 @@ struct ts_elementwise_kernels {
     void (*copy)(int64_t pixels, int c, const float *src, int64_t src_stride, float *dst, int64_t dst_stride,
                  bool accumulate);
 
-    /* The gates and the new state of tensor/gru.h. ih: [pixels][3c] in chunks z, r, n; hh_stride 3c, or 0 for one hh
-     * for all pixels; old [pixels][c] or NULL = 0; saved: [pixels][4c] = z, r, n, hh_n, or NULL. */
+    /* The gates and the new state of tensor/conv/gru.h. ih: [pixels][3c] in chunks z, r, n; hh_stride 3c, or 0 for one
+     * hh for all pixels; old [pixels][c] or NULL = 0; saved: [pixels][4c] = z, r, n, hh_n, or NULL. */
     void (*gru)(int64_t pixels, int c, const float *ih, const float *hh, int64_t hh_stride, const float *old, float *y,
                 float *saved);
     /* With dm = dy z (1 - n^2): d[pixels][4c] = dm, dy (n - old) z (1 - z), dm hh_n r (1 - r), dm r: the gradients of

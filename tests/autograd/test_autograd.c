@@ -340,12 +340,12 @@ TEST(tape_beside_another_shares_its_packed_weights)
     ts_status st = {0};
     static float w[4 * 3 * 9];
     fill(w, 4 * 3 * 9, 3, -1, 1);
-    const ts_conv c = {1, 8, 8, 3, 4, 3, 1, TS_PAD_ZERO, 0};
+    const ts_conv c = {1, 8, 8, 3, 4, 3, 1, TS_PAD_ZERO, 0, {0}};
     ag_tape *tape = prepared(false);
     ag_freeze(tape, false);
-    CHECK(!ag_tape_beside(tape, &st) && st.code == TS_INVALID, "beside one whose weights change");
+    CHECK(!ag_tape_sharing(tape, &st) && st.code == TS_INVALID, "beside one whose weights change");
     ag_freeze(tape, true);
-    ag_tape *other = ag_tape_beside(tape, &st);
+    ag_tape *other = ag_tape_sharing(tape, &st);
     CHECK(other, "%s", st.message);
     const float *packed = ag_packed(other, &c, TS_CONV_FORWARD, w), first = packed[0];
     ag_reset(other);
@@ -360,7 +360,7 @@ TEST(tape_frozen_weights_are_packed_once)
     ag_tape *tape = prepared(false);
     static float w[4 * 3 * 9];
     fill(w, 4 * 3 * 9, 3, -1, 1);
-    const ts_conv c = {1, 8, 8, 3, 4, 3, 1, TS_PAD_ZERO, 0};
+    const ts_conv c = {1, 8, 8, 3, 4, 3, 1, TS_PAD_ZERO, 0, {0}};
     for (int frozen = 0; frozen < 2; frozen++) {
         ag_freeze(tape, frozen);
         ag_reset(tape);

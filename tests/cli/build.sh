@@ -1,5 +1,5 @@
 #!/bin/sh
-# What make promises: who includes whom, install and uninstall, a program linked against the installed library, and what every program shares.
+# What make promises: who includes whom, how it installs packages, and what every program shares. The library: library.sh
 . tests/cli/lib.sh
 PROGRAMS="train infer eval data"
 
@@ -57,24 +57,56 @@ deps_name_what_is_missing() {
 }
 check deps_name_what_is_missing deps_name_what_is_missing
 
-install_link_uninstall() {
-    case ${MAKEFLAGS:-} in *fsanitize*) skip "the sanitizers' build is not installed" ;; esac
-    command -v pkg-config >/dev/null || skip "no pkg-config"
-    expect 0 make --no-print-directory install BUILD="$BUILD" DESTDIR="$T/root" PREFIX=/usr/local
-    find "$T/root" -type f | sed "s|$T/root||" | sort >"$T/files"
-    for f in bin/lgd-infer bin/lgd-train bin/lgd-eval bin/lgd-data lib/liblgd.a lib/lgd/liblgd_image.so include/lgd.h share/lgd/single.safetensors lib/pkgconfig/lgd.pc; do
-        grep -qx "/usr/local/$f" "$T/files" || fail "$f is not installed"
-    done
-    sed -n '/^## As a library/,/^## /s/^    //p' README.md >"$T/user.c" # the README's own program
-    PKG_CONFIG_PATH=$T/root/usr/local/lib/pkgconfig
-    export PKG_CONFIG_PATH
-    # shellcheck disable=SC2046
-    expect 0 ${CC:-gcc} -o "$T/user" "$T/user.c" $(pkg-config --define-prefix --cflags --libs lgd)
-    expect 0 "$T/user" "$T/root/usr/local/share/lgd/single.safetensors"
-    says "$T/out" "roughness of the first pixel: 0."
-    expect 1 "$T/user" "$T/absent.safetensors"
-    says "$T/out" "absent.safetensors"
-    expect 0 make --no-print-directory uninstall BUILD="$BUILD" DESTDIR="$T/root" PREFIX=/usr/local
-    [ -z "$(find "$T/root" -type f)" ] || fail "left behind: $(find "$T/root" -type f | head -n 3)"
+# A machine on which nothing is installed, with an apt-get that writes down how it is called.
+bare_machine() {
+    mkdir "$T/bin"
+    for tool in sh cat; do ln -s "$(command -v $tool)" "$T/bin/"; done
+    printf '#!/bin/sh\necho 0\n' >"$T/bin/id"
+    printf '#!/bin/sh\necho "$*" >>"%s"\n' "$T/apt" >"$T/bin/apt-get"
+    chmod +x "$T/bin/id" "$T/bin/apt-get"
 }
-check install_link_uninstall install_link_uninstall
+
+deps_go_on_without_a_terminal() {
+    bare_machine
+    unset YES CI
+    PATH="$T/bin" expect 0 "$T/bin/sh" .ci/deps.sh zlib </dev/null
+    says "$T/err" "gcc g++ pkg-config zlib1g-dev"
+    says "$T/apt" "gcc g++ pkg-config zlib1g-dev"
+}
+check deps_go_on_without_a_terminal deps_go_on_without_a_terminal
+
+deps_ask_on_a_terminal() {
+    command -v script >/dev/null || skip "no script(1), which makes a terminal"
+    bare_machine
+    unset YES CI
+    terminal="$(command -v script) -qec"
+    ask="PATH=$T/bin $T/bin/sh .ci/deps.sh zlib; echo ended: \$?"
+    $terminal "$ask" /dev/null </dev/null >"$T/out" 2>&1 # the end of the input instead of Enter
+    says "$T/out" "zlib1g-dev"
+    says "$T/out" "Enter installs them"
+    says "$T/out" "ended: 1"
+    [ -e "$T/apt" ] && fail "packages are installed before Enter"
+    echo | $terminal "$ask" /dev/null >"$T/out" 2>&1
+    says "$T/out" "ended: 0"
+    says "$T/apt" "zlib1g-dev"
+    rm "$T/apt"
+    YES=1 $terminal "$ask" /dev/null </dev/null >"$T/out" 2>&1
+    grep -q "Enter installs" "$T/out" && fail "YES=1 asks"
+    says "$T/apt" "zlib1g-dev"
+}
+check deps_ask_on_a_terminal deps_ask_on_a_terminal
+
+make_says_what_it_does() {
+    expect 0 make --no-print-directory help
+    for target in demo test install YES=1 V=1; do says "$T/out" "$target"; done
+    # Two objects of this tree in a folder of their own: a line each, the commands with V=1.
+    expect 0 make --no-print-directory -j1 BUILD="$T/b" "$T/b/obj/tensor/status.o" "$T/b/obj/data/folders.o"
+    says "$T/out" "  CC    tensor/status.c"
+    lines "$T/out" 2
+    expect 0 make --no-print-directory -j1 BUILD="$T/b" V=1 PREFIX=/elsewhere "$T/b/obj/tensor/status.o" "$T/b/obj/data/folders.o"
+    says "$T/out" "data/folders.c"
+    says "$T/out" "-std=c11"
+    grep -q "tensor/status.c" "$T/out" && fail "another PREFIX compiles everything again"
+    :
+}
+check make_says_what_it_does make_says_what_it_does

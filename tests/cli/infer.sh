@@ -54,6 +54,18 @@ threads_agree() {
     done
 }
 
+# LGD_TRACE=1 shows every operation and changes no byte; without it nothing is shown.
+trace() {
+    model
+    photo "$T/p.ppm" 32 32
+    expect 0 infer -q "$T/p.ppm" -o "$T/0"
+    [ ! -s "$T/err" ] || fail "untraced says: $(cat "$T/err")"
+    expect 0 env LGD_TRACE=1 "$BIN/lgd-infer" --size 32 --iterations 1 --threads 1 -q "$T/p.ppm" -o "$T/1"
+    grep -Eq '^trace: conv +forward +1x[0-9x]+ -> 1x[0-9x]+, with [0-9x]+, [A-Za-z0-9]+, [0-9.]+ ms$' "$T/err" || fail "no convolution: $(head -3 "$T/err")"
+    if grep -v '^trace: ' "$T/err"; then fail "other lines"; fi
+    for f in $FILES; do cmp -s "$T/0/p/$f" "$T/1/p/$f" || fail "$f differs when traced"; done
+}
+
 only_what_is_asked_for() {
     model
     photo "$T/p.ppm" 32 32
@@ -163,7 +175,8 @@ mask_and_tolerance() {
         expect 2 infer --tolerance $x "$T/p.ppm" -o "$T/o"
         says "$T/err" "--tolerance"
     done
-    one="$BIN/lgd-infer --size 32 --threads 1 --model models/ablation/t6.safetensors $T/p.ppm"
+    make_weights_with_h
+    one="$BIN/lgd-infer --size 32 --threads 1 --model $T/h.safetensors $T/p.ppm"
     expect 0 $one --iterations 1 -o "$T/step"
     expect 0 $one --tolerance 1 -o "$T/one"
     cmp -s "$T/one/p/normal.png" "$T/step/p/normal.png" || fail "with a tolerance above every change it is not the first step that counts"
@@ -174,16 +187,17 @@ mask_and_tolerance() {
 
 usual_tolerance() {
     photo "$T/p.ppm" 64 64 120
-    run="$BIN/lgd-infer --size 64 --threads 1 --maps normal,exr --model models/ablation/t6.safetensors $T/p.ppm"
+    make_weights_with_h
+    run="$BIN/lgd-infer --size 64 --threads 1 --maps normal,exr --model $T/h.safetensors $T/p.ppm"
     expect 0 $run -o "$T/usual"
     expect 0 $run --tolerance 0.003 -o "$T/same"
     expect 0 $run --tolerance 0 -o "$T/all"
-    expect 0 $run --iterations 6 -o "$T/six"
+    expect 0 $run --iterations 24 -o "$T/fixed"
     expect 0 $run --exact -o "$T/exact"
     expect 0 $run --exact --tolerance 0 -o "$T/exact_all"
     cmp -s "$T/usual/p/maps.exr" "$T/same/p/maps.exr" || fail "the usual tolerance is not 0.003"
     cmp -s "$T/usual/p/maps.exr" "$T/all/p/maps.exr" && fail "it ends nothing early"
-    cmp -s "$T/six/p/maps.exr" "$T/all/p/maps.exr" || fail "there is a tolerance where the number of steps is given"
+    cmp -s "$T/fixed/p/maps.exr" "$T/all/p/maps.exr" || fail "there is a tolerance where the number of steps is given"
     cmp -s "$T/exact/p/maps.exr" "$T/exact_all/p/maps.exr" || fail "there is a tolerance with --exact"
     run="$BIN/lgd-infer --size 64 --threads 1 --maps normal,exr $T/p.ppm" # no network refines at the photograph's size
     expect 0 $run -o "$T/usual"
@@ -274,6 +288,7 @@ check infer_wrong_usage wrong_usage
 check infer_whole_run whole_run
 check infer_far_from_the_photograph far_from_the_photograph
 check infer_threads_agree threads_agree
+check infer_trace trace
 check infer_writes_only_what_is_asked_for only_what_is_asked_for
 check infer_overlap_changes_nothing overlap_changes_nothing
 check infer_old_results_are_replaced old_results

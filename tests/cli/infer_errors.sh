@@ -1,4 +1,4 @@
-# lgd-infer and everything that goes wrong around it: names, folders, disks, pipes, signals, weights (DESIGN section 8).
+# Errors of lgd-infer: names, folders, disks, pipes, signals, weights.
 . tests/cli/lib_infer.sh
 
 bad_ones_do_not_stop() {

@@ -36,7 +36,7 @@ static double relief_error(int size, double *spread)
         }
     float *height = malloc((size_t)size * (size_t)size * sizeof *height);
     ts_status st = {0};
-    CHECK(io_height(&m, height, &st) == TS_OK, "%s", st.message);
+    CHECK(io_height(&m, height, 0, &st) == TS_OK, "%s", st.message);
     double mean = 0, got = 0, worst = 0, square = 0;
     const double pixels = (double)size * size;
     for (int k = 0; k < size * size; k++) {
@@ -74,7 +74,7 @@ TEST(height_is_finite_for_any_maps)
         for (int k = 0; k < size * size * MAP_CHANNELS; k++) m.maps[k] = extreme[ts_rng_int(&r, 8)];
         float height[400];
         ts_status st = {0};
-        CHECK(io_height(&m, height, &st) == TS_OK, "%s", st.message);
+        CHECK(io_height(&m, height, 0, &st) == TS_OK, "%s", st.message);
         for (int k = 0; k < size * size; k++)
             CHECK(isfinite(height[k]), "%d x %d, pixel %d: %g", size, size, k, (double)height[k]);
         io_material_free(&m);

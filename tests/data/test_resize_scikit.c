@@ -104,13 +104,14 @@ TEST(scikit_photographs_for_published_weights)
     CHECK(!io_image_create(&image, 8, 8, 3, &st), "%s", st.message);
     for (int i = 0; i < 8 * 8 * 3; i++) image.data[i] = (float)(i / 3 % 2);
     CHECK(!io_write_png(path, &image, 8, false, &st) &&
-              !lgd_photograph_square(path, true, 1000, 2, &square, &width, &height, &st) && width == 8 && height == 8,
+              !lgd_photograph_square(path, true, 1000, 2, 0, &square, &width, &height, &st) && width == 8 &&
+              height == 8,
           "%s", st.message);
     for (int i = 0; i < 12; i++)
         CHECK(fabs((double)square.data[i] - pow(0.5, rd_published.gamma)) < 0.02, "a fine pattern becomes %g",
               (double)square.data[i]);
     io_image_free(&square);
-    CHECK(!lgd_photograph_square(path, false, 1000, 2, &square, &width, &height, &st) && width == 8 && height == 8,
+    CHECK(!lgd_photograph_square(path, false, 1000, 2, 0, &square, &width, &height, &st) && width == 8 && height == 8,
           "%s", st.message);
     for (int i = 0; i < 12; i++)
         CHECK(fabs((double)square.data[i] - 0.5) < 0.1, "without compat a fine pattern becomes %g",

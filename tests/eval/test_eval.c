@@ -142,8 +142,10 @@ TEST(eval_summary_is_mean_and_deviation)
     ev_row mean, deviation;
     CHECK(ev_report_summary(&r, 0, 0, &mean, &deviation) == 3, "three materials");
     for (int k = 0; k < EV_METRICS; k++)
-        CHECK(fabs(mean.value[k] - 3 - k) < 1e-12 && fabs(deviation.value[k] - sqrt(7)) < 1e-12,
-              "mean %g, deviation %g", mean.value[k], deviation.value[k]);
+        CHECK(k == EV_OVER_FLAT || fabs(mean.value[k] - 3 - k) < 1e-12, "mean %g", mean.value[k]);
+    CHECK(fabs(mean.value[EV_OVER_FLAT] - mean.value[EV_NORMAL] / mean.value[EV_FLAT]) < 1e-12, "not the quotient");
+    for (int k = 0; k < EV_METRICS; k++)
+        CHECK(fabs(deviation.value[k] - sqrt(7)) < 1e-12, "deviation %g", deviation.value[k]);
     CHECK(ev_report_summary(&r, 1, 1, &mean, &deviation) == 1 && mean.value[0] == 50 && deviation.value[0] == 0,
           "one material has no spread");
     CHECK(ev_report_summary(&r, -1, 1, &mean, &deviation) == 4 && fabs(mean.value[2] - 35) < 1e-12, "all sets: %g",
@@ -170,7 +172,8 @@ TEST(eval_csv_quotes_what_needs_it)
     ts_status st = {0};
     char path[256], line[256] = "";
     CHECK(ev_report_add(&r, 0, "plain", &st) == 0, "%s", st.message);
-    r.result[0].row[0] = (ev_row){{0.5, 0.25, 0.125, 0, 1, 12, NAN, 0.75, 2, NAN}};
+    r.result[0].row[0] = (ev_row){{0.5, 0.25, 0.125, 0, 1, 12, NAN, 0.75, 2, NAN, 0.5, 2}};
+    for (int k = EV_BAND; k < EV_METRICS; k++) r.result[0].row[0].value[k] = NAN;
     r.result[0].seconds[0] = 1.5;
     r.result[0].peak[0] = 2e9;
     CHECK(ev_report_write(&r, test_folder(), &st) == TS_OK, "%s", st.message);
@@ -179,14 +182,15 @@ TEST(eval_csv_quotes_what_needs_it)
     CHECK(f && fgets(line, sizeof line, f), "%s is missing", path);
     CHECK(
         strcmp(line,
-               "set,material,method,step,diffuse,specular,roughness,normal,render,angle,ssim,flip,exposure,lpips\n") ==
-            0,
+               "set,material,method,step,diffuse,specular,roughness,normal,render,angle,ssim,flip,exposure,lpips,flat,"
+               "over_flat,band_2_8,band_8_32,band_32_64,band_64_128,residue_diffuse,residue_specular,residue_roughness,"
+               "residue_hue,relief\n") == 0,
         "header: %s", line);
     CHECK(fgets(line, sizeof line, f) &&
               strcmp(line,
                      "\"maps:a,b "
                      "\"\"c\"\"\",plain,\"d:x=1,y=2\",20,0.500000,0.250000,0.125000,0.000000,1.000000,12.000000,,0."
-                     "750000,2.000000,\n") == 0,
+                     "750000,2.000000,,0.500000,2.000000,,,,,,,,,\n") == 0,
           "row: %s", line);
     CHECK(!fgets(line, sizeof line, f), "more rows: %s", line);
     fclose(f);

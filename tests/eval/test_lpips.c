@@ -18,9 +18,9 @@ static double uniform(const char *name, uint64_t i)
     return (double)(z >> 40) / (1 << 23) - 1;
 }
 
-static nn_entry formula(const char *name, int rank, const int64_t *dim, double scale, bool positive)
+static nn_tensor formula(const char *name, int rank, const int64_t *dim, double scale, bool positive)
 {
-    nn_entry e = {.name = strdup(name), .rank = rank, .count = 1};
+    nn_tensor e = {.name = strdup(name), .rank = rank, .count = 1};
     for (int i = rank - 1; i >= 0; i--) {
         e.dim[i] = dim[i];
         e.stride[i] = e.count;
@@ -41,7 +41,7 @@ static ev_lpips *network(void)
 {
     static const int number[] = {0, 3, 6, 8, 10}, in[] = {3, 64, 192, 384, 256}, out[] = {64, 192, 384, 256, 256},
                      kernel[] = {11, 5, 3, 3, 3};
-    nn_entry t[10], l[5];
+    nn_tensor t[10], l[5];
     ts_status st = {0};
     char name[64];
     for (int i = 0; i < 5; i++) {

@@ -46,8 +46,8 @@ static const char *weights(bool latent, bool gradient)
     nn_arch a = nn_arch_default();
     a.g_width = 4, a.g_width_max = 8, a.g_levels = 2, a.g_size = 16, a.h_width = 4, a.h_gru = 4, a.iterations = 3,
     a.gradient = gradient;
-    if (latent) a.latent = 4, a.h_width = 0, a.iterations = 0;
-    nn_model *m = nn_model_create(&a, &st);
+    const nn_coder coder = {.code = 4, .width = 4, .width_max = 8, .levels = 2};
+    nn_model *m = latent ? nn_coder_create(&coder, &st) : nn_model_create(&a, &st);
     CHECK(m, "%s", st.message);
     nn_model_init(m, 5);
     snprintf(p, sizeof path[0], "%s/%d%d.safetensors", test_folder(), latent, gradient);

@@ -12,13 +12,13 @@ static void use(nn_file *f)
     for (int i = 0; nn_file_meta_key(f, i); i++)
         if (strlen(nn_file_meta(f, nn_file_meta_key(f, i))) > 1 << 30) abort(); /* reads all of it */
     for (int i = 0; i < nn_file_count(f); i++) {
-        const nn_entry *e = nn_file_entry(f, i);
+        const nn_tensor *e = nn_file_tensor(f, i);
         if (nn_file_find(f, e->name) != e) abort();
         if (e->count > MOST) continue;
-        nn_entry_copy(e, e->dtype, as_is);
+        nn_tensor_copy(e, e->dtype, as_is);
         if (nn_file_read(f, e->name, e->rank, e->dim, real, NULL)) continue;
-        nn_entry_copy(e, NN_F16, as_is);
-        nn_entry_copy(e, NN_BF16, as_is);
+        nn_tensor_copy(e, NN_F16, as_is);
+        nn_tensor_copy(e, NN_BF16, as_is);
     }
 }
 

@@ -15,8 +15,9 @@ TEST(infer_exact_and_fast_maps_are_near)
     static float image[LARGE * LARGE * 3], exact[MAPS], fast[MAPS], again[MAPS];
     lgd_error e;
     make_image(image, LARGE);
-    const lgd_options direct = {.iterations = T, .exact = 1}, quick = {.iterations = T, .threads = 1},
-                      three = {.iterations = T, .threads = 3};
+    const lgd_options direct = {.size = sizeof direct, .iterations = T, .exact = 1},
+                      quick = {.size = sizeof quick, .iterations = T, .threads = 1},
+                      three = {.size = sizeof three, .iterations = T, .threads = 3};
     CHECK(!lgd_estimate(m, image, LARGE, &direct, exact, &e) && !lgd_estimate(m, image, LARGE, &quick, fast, &e) &&
               !lgd_estimate(m, image, LARGE, &three, again, &e),
           "%s", e.message);
@@ -77,11 +78,12 @@ TEST(infer_calls_at_once_are_calls_in_turn)
     enum { CALLERS = 5 };
     static caller c[CALLERS];
     static float alone[AT_ONCE * AT_ONCE * MAP_CHANNELS];
-    const lgd_options options[CALLERS] = {{.iterations = T, .threads = 1},
-                                          {.iterations = T, .threads = 2},
-                                          {.iterations = 1, .threads = 1, .exact = 1},
-                                          {.iterations = T, .threads = 1, .precision = LGD_BF16},
-                                          {.iterations = T, .threads = 3, .exact = 1}};
+    const lgd_options options[CALLERS] = {
+        {.size = sizeof(lgd_options), .iterations = T, .threads = 1},
+        {.size = sizeof(lgd_options), .iterations = T, .threads = 2},
+        {.size = sizeof(lgd_options), .iterations = 1, .threads = 1, .exact = 1},
+        {.size = sizeof(lgd_options), .iterations = T, .threads = 1, .precision = LGD_BF16},
+        {.size = sizeof(lgd_options), .iterations = T, .threads = 3, .exact = 1}};
     pthread_t thread[CALLERS];
     nn_arch a = tiny();
     a.h_width = 32; /* so that the ways of computing differ */
@@ -201,12 +203,12 @@ TEST(infer_wrong_arguments_are_named)
                  {2, 1, 1 << 20, "threads"}};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         lgd_error e = {0};
-        const lgd_options o = {.iterations = wrong[i].iterations, .threads = wrong[i].threads};
+        const lgd_options o = {.size = sizeof o, .iterations = wrong[i].iterations, .threads = wrong[i].threads};
         CHECK(lgd_estimate(m, image, wrong[i].side, &o, maps, &e) != 0 && strstr(e.message, wrong[i].word),
               "case %zu: '%s'", i, e.message);
     }
     lgd_error e = {0};
-    const lgd_options third = {.iterations = 1, .precision = 2};
+    const lgd_options third = {.size = sizeof third, .iterations = 1, .precision = 2};
     CHECK(lgd_estimate(m, image, 2, &third, maps, &e) == TS_INVALID && strstr(e.message, "precision"), "'%s'",
           e.message);
     CHECK(lgd_estimate(NULL, image, 2, NULL, maps, &e) == TS_INVALID, "no model is taken");
@@ -248,6 +250,40 @@ TEST(infer_load_names_a_bad_file)
     CHECK(!strchr(e.message, '\n'), "more than a line: '%s'", e.message);
 }
 
+/* A caller that was compiled with another lgd.h: its options end earlier or later than ours. */
+TEST(infer_options_of_another_size)
+{
+    struct later {
+        lgd_options known;
+        char more[24];
+    } later;
+    lgd_options earlier = {0};
+    lgd_error e;
+    static float image[SIDE * SIDE * 3], as_default[VALUES], maps[VALUES];
+    lgd_model *m = load(tiny());
+    make_image(image, SIDE);
+    CHECK(!lgd_estimate(m, image, SIDE, NULL, as_default, &e), "%s", e.message);
+
+    lgd_options_init(&earlier, offsetof(lgd_options, exact));
+    CHECK(earlier.size == offsetof(lgd_options, exact) && earlier.iterations == -1 && earlier.orientations == 0,
+          "more than the size was written");
+    earlier.orientations = 77; /* beyond its end: not read */
+    CHECK(!lgd_estimate(m, image, SIDE, &earlier, maps, &e), "%s", e.message);
+    CHECK(!memcmp(maps, as_default, sizeof maps), "an absent field has not its default");
+
+    lgd_options_init(&later.known, sizeof later);
+    CHECK(!lgd_estimate(m, image, SIDE, &later.known, maps, &e), "%s", e.message);
+    CHECK(!memcmp(maps, as_default, sizeof maps), "a field that is zero counts");
+    later.more[7] = 1;
+    CHECK(lgd_estimate(m, image, SIDE, &later.known, maps, &e) == TS_UNSUPPORTED && strstr(e.message, "newer liblgd"),
+          "'%s'", e.message);
+
+    lgd_options none = {.iterations = 1};
+    CHECK(lgd_estimate(m, image, SIDE, &none, maps, &e) == TS_INVALID && strstr(e.message, "options.size is 0"), "'%s'",
+          e.message);
+    lgd_free(&m);
+}
+
 TEST(infer_without_a_refiner_only_the_first_estimate)
 {
     static float image[SIDE * SIDE * 3], maps[VALUES];
@@ -259,7 +295,7 @@ TEST(infer_without_a_refiner_only_the_first_estimate)
     run(m, image, SIDE, -1, 1, &t, maps);
     CHECK(t.calls == 1 && in_range(maps, SIDE), "%d calls", t.calls);
     lgd_error e;
-    const lgd_options o = {.iterations = 1};
+    const lgd_options o = {.size = sizeof o, .iterations = 1};
     CHECK(lgd_estimate(m, image, SIDE, &o, maps, &e) == TS_UNSUPPORTED && strstr(e.message, "refiner"), "'%s'",
           e.message);
     lgd_free(&m);

@@ -21,7 +21,7 @@ TEST(infer_auto_stops_where_the_loss_no_longer_falls)
     CHECK(!memcmp(chosen, fixed, sizeof chosen), "the maps are not those of step %d", t.calls - 1);
     unsigned char *mask = malloc(SIDE * SIDE); /* the same number where tiles are refined */
     memset(mask, 1, SIDE * SIDE);
-    const lgd_options o = {.iterations = LGD_AUTO, .mask = mask};
+    const lgd_options o = {.size = sizeof o, .iterations = LGD_AUTO, .mask = mask};
     CHECK(!lgd_estimate(m, image, SIDE, &o, chosen, &e), "%s", e.message);
     for (int i = 0; i < VALUES; i++)
         CHECK(fabs((double)chosen[i] - fixed[i]) < 1e-4, "value %d: %g and %g", i, chosen[i], fixed[i]);
@@ -66,12 +66,17 @@ TEST(infer_rmse_of_the_ends_alone)
         const int tiles = way % 2;
         for (int stop = -1; stop < T; stop++) {
             trace all = {.stop_at = stop}, ends = all;
-            const lgd_options every = {.iterations = T,
+            const lgd_options every = {.size = sizeof every,
+                                       .iterations = T,
                                        .progress = record,
                                        .user = &all,
                                        .every_rmse = 1,
                                        .mask = tiles ? mask : NULL},
-                              few = {.iterations = T, .progress = record, .user = &ends, .mask = every.mask};
+                              few = {.size = sizeof few,
+                                     .iterations = T,
+                                     .progress = record,
+                                     .user = &ends,
+                                     .mask = every.mask};
             CHECK(!lgd_estimate(m, image, SIDE, &every, maps, &e) && !lgd_estimate(m, image, SIDE, &few, other, &e),
                   "%s", e.message);
             CHECK(!memcmp(maps, other, sizeof maps), "tiles %d, stopped at %d: other maps", tiles, stop);

@@ -23,9 +23,9 @@ static double fit(const nn_model *m, const float *const *image, const rd_view *v
     ts_status st = {0};
     ag_tape *t = tape_create(false);
     double factor = -1;
-    float *proposed = malloc((size_t)(m->arch.g_size * m->arch.g_size * m->arch.channels) * sizeof *proposed);
-    CHECK(proposed && !lgd_fit_power(t, m, image, views, given, side, 1, proposed, &factor, &st), "%s", st.message);
-    free(proposed);
+    float *r0 = malloc((size_t)(m->arch.g_size * m->arch.g_size * m->arch.channels) * sizeof *r0);
+    CHECK(r0 && !lgd_fit_power(t, m, image, views, given, side, 1, r0, &factor, &st), "%s", st.message);
+    free(r0);
     ag_tape_destroy(&t);
     return factor;
 }
@@ -82,13 +82,13 @@ TEST(infer_power_leaves_r0_for_what_follows)
     ts_rng r = ts_rng_make(53, TS_STREAM_TEST, 0);
     for (int i = 0; i < LARGE * LARGE * 3; i++) photo[i] = 0.3f * ts_rng_uniform(&r);
     const float *const image[] = {photo};
-    float *proposed = malloc((size_t)(a.g_size * a.g_size * a.channels) * sizeof *proposed);
-    CHECK(proposed, "no memory");
+    float *r0 = malloc((size_t)(a.g_size * a.g_size * a.channels) * sizeof *r0);
+    CHECK(r0, "no memory");
     for (int orientations = 1; orientations <= 4; orientations *= 4) {
         rd_view flash = rd_flash();
         double factor = 1;
         ag_tape *t = tape_create(false);
-        CHECK(!lgd_fit_power(t, m, image, &flash, 1, LARGE, orientations, proposed, &factor, &st), "%s", st.message);
+        CHECK(!lgd_fit_power(t, m, image, &flash, 1, LARGE, orientations, r0, &factor, &st), "%s", st.message);
         flash.power *= (float)factor;
         for (int tiles = 0; tiles < 2; tiles++) {
             for (int again = 0; again < 2; again++) {
@@ -96,7 +96,7 @@ TEST(infer_power_leaves_r0_for_what_follows)
                                .grid = rd_grid_full(LARGE),
                                .view = flash,
                                .orientations = orientations,
-                               .proposed = again ? NULL : proposed};
+                               .r0 = again ? NULL : r0};
                 lgd_tiles of = {.image = image,
                                 .views = &flash,
                                 .given = 1,
@@ -104,7 +104,7 @@ TEST(infer_power_leaves_r0_for_what_follows)
                                 .tile = 16,
                                 .steps = 2,
                                 .orientations = orientations,
-                                .proposed = in.proposed};
+                                .r0 = in.r0};
                 ag_value *out;
                 ag_reset(t);
                 if (tiles) CHECK(!lgd_tiles_run(t, m, &of, maps[again], &st), "%s", st.message);
@@ -118,6 +118,6 @@ TEST(infer_power_leaves_r0_for_what_follows)
         }
         ag_tape_destroy(&t);
     }
-    free(proposed);
+    free(r0);
     nn_model_free(&m);
 }

@@ -65,7 +65,7 @@ TEST(nn_coarse_steps_read_the_photograph_at_up_to_twice_their_size)
         nn_input in = photographs(2, side, 4, NULL);
         ag_tape *t = tape_create(false);
         ag_value *maps[2];
-        CHECK(!nn_coarse_steps(t, m, &in, 1, maps), "%s", ag_status(t)->message);
+        CHECK(!nn_coarse_steps(t, m, &in, 1, maps, NULL, NULL), "%s", ag_status(t)->message);
         const int coarse = side < sizes[k].coarse ? side : sizes[k].coarse;
         const ag_value *read = as_read(t, &in, side, coarse);
         const int size = read->t.shape.h;

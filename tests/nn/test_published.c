@@ -127,7 +127,7 @@ TEST(published_needs_its_other_keys)
     CHECK(nn_arch_check(&a, &st) == TS_INVALID && strstr(st.message, "descent"), "'%s'", st.message);
 }
 
-/* The renderer as DESIGN says it, directly: value of colour c. */
+/* The published renderer (render/published.h), written out directly: value of colour c. */
 static double plain(const double m[9], const double at[2], int c)
 {
     const double e = 1e-6, d = 250.0 / 256, power = 329288.0 / 65536, pi = acos(-1);

@@ -205,12 +205,12 @@ TEST(file_numbers_are_rounded_to_nearest_even)
     uint16_t *half = malloc(65536 * 2), *back = malloc(65536 * 2);
     float *f = malloc(65536 * 4);
     for (int i = 0; i < 65536; i++) half[i] = (uint16_t)i;
-    nn_entry e = {"x", NN_F16, false, 1, {65536}, {1}, 65536, (const unsigned char *)half}, g = e;
+    nn_tensor e = {"x", NN_F16, false, 1, {65536}, {1}, 65536, (const unsigned char *)half}, g = e;
     g.dtype = NN_F32, g.data = (const unsigned char *)f;
     for (int b = 0; b < 2; b++) {
         nn_dtype type = b ? NN_BF16 : NN_F16;
         e.dtype = type;
-        CHECK(nn_entry_copy(&e, NN_F32, f) && nn_entry_copy(&g, type, back), "an overflow");
+        CHECK(nn_tensor_copy(&e, NN_F32, f) && nn_tensor_copy(&g, type, back), "an overflow");
         for (int i = 0; i < 65536; i++)
             CHECK(back[i] == half[i] || (isnan(f[i]) && b ? (back[i] | 0x40) == (half[i] | 0x40) : isnan(f[i])),
                   "%04x -> %04x", half[i], back[i]);
@@ -218,18 +218,18 @@ TEST(file_numbers_are_rounded_to_nearest_even)
             float middle = (float)(((double)f[i] + f[i + 1]) / 2),
                   three[3] = {nextafterf(middle, 0), middle, nextafterf(middle, INFINITY)};
             uint16_t got[3];
-            nn_entry m = {"m", NN_F32, false, 1, {3}, {1}, 3, (const unsigned char *)three};
-            CHECK(nn_entry_copy(&m, type, got), "an overflow");
+            nn_tensor m = {"m", NN_F32, false, 1, {3}, {1}, 3, (const unsigned char *)three};
+            CHECK(nn_tensor_copy(&m, type, got), "an overflow");
             if (fabsf(f[i]) < 1e-36f) continue; /* bfloat16 subnormals: the middle itself is rounded */
             CHECK(got[0] == i && got[1] == i + (i & 1) && got[2] == i + 1, "%s %04x: %04x %04x %04x",
                   nn_dtype_name(type), i, got[0], got[1], got[2]);
         }
     }
     float large[] = {65519.996f, 65520};
-    nn_entry l = {"l", NN_F32, false, 1, {1}, {1}, 1, (const unsigned char *)large};
-    CHECK(nn_entry_copy(&l, NN_F16, back) && back[0] == 0x7bff, "65519.996 -> %04x", back[0]);
+    nn_tensor l = {"l", NN_F32, false, 1, {1}, {1}, 1, (const unsigned char *)large};
+    CHECK(nn_tensor_copy(&l, NN_F16, back) && back[0] == 0x7bff, "65519.996 -> %04x", back[0]);
     l.data += 4;
-    CHECK(!nn_entry_copy(&l, NN_F16, back), "65520 fits a half");
+    CHECK(!nn_tensor_copy(&l, NN_F16, back), "65520 fits a half");
 }
 
 /* Strides, byte orders and types against the definition. */
@@ -257,7 +257,7 @@ TEST(file_numbers_with_any_layout)
              {3, {2, 3, 4}, {24, 4, 1}, false}};
     for (size_t k = 0; k < sizeof c / sizeof *c; k++)
         for (int order = 0; order < 2; order++) {
-            nn_entry e = {"x", NN_F64, order, c[k].rank, {0}, {0}, 1, order ? swapped : (unsigned char *)wide};
+            nn_tensor e = {"x", NN_F64, order, c[k].rank, {0}, {0}, 1, order ? swapped : (unsigned char *)wide};
             int64_t at[4] = {0}, n = 0;
             for (int i = 0; i < e.rank; i++) {
                 e.dim[i] = c[k].dim[i];
@@ -266,8 +266,8 @@ TEST(file_numbers_with_any_layout)
             }
             float out[64];
             double as_is[64];
-            CHECK(nn_entry_plain(&e) == (c[k].plain && (!order || !e.count)), "case %zu: plain", k);
-            CHECK(nn_entry_copy(&e, NN_F32, out) && nn_entry_copy(&e, NN_F64, as_is), "an overflow");
+            CHECK(nn_tensor_plain(&e) == (c[k].plain && (!order || !e.count)), "case %zu: plain", k);
+            CHECK(nn_tensor_copy(&e, NN_F32, out) && nn_tensor_copy(&e, NN_F64, as_is), "an overflow");
             for (; n < e.count; n++) {
                 int64_t from = 0;
                 for (int i = 0; i < e.rank; i++) from += at[i] * e.stride[i];

@@ -44,8 +44,8 @@ static void check_good(const char *path, char *tensors)
     for (char *t = strtok_r(tensors, ";", &end); t; t = strtok_r(NULL, ";", &end), n++) {
         char name[64], type[16], shape[64], values[256], has[64] = "";
         CHECK(sscanf(t, "%63s %15s %63s %255s", name, type, shape, values) == 4, "%s: '%s'", path, t);
-        const nn_entry *e = nn_file_find(f, name);
-        CHECK(e && nn_file_entry(f, n) == e, "%s: tensor %s is not number %d", path, name, n);
+        const nn_tensor *e = nn_file_find(f, name);
+        CHECK(e && nn_file_tensor(f, n) == e, "%s: tensor %s is not number %d", path, name, n);
         for (int i = 0; i < e->rank; i++) sprintf(has + strlen(has), "%s%lld", i ? "x" : "", (long long)e->dim[i]);
         CHECK(!strcmp(nn_dtype_name(e->dtype), type) && !strcmp(*has ? has : "-", shape), "%s: %s is %s %s", path, name,
               nn_dtype_name(e->dtype), has);
@@ -116,7 +116,7 @@ TEST(torch_changed_bytes_do_no_harm)
                 nn_file *f = nn_file_open(to, &st);
                 CHECK(f || (st.code && *st.message), "no message for byte %zu of %s", i, name[k]);
                 for (int j = 0; f && j < nn_file_count(f); j++) {
-                    const nn_entry *e = nn_file_entry(f, j);
+                    const nn_tensor *e = nn_file_tensor(f, j);
                     float out[4096];
                     if (e->count > 4096 || nn_file_read(f, e->name, e->rank, e->dim, out, NULL)) continue;
                     for (int m = 0; m < e->count; m++) sum += out[m] > 0;
@@ -133,10 +133,10 @@ TEST(torch_writing_and_reading_is_exact)
     ts_status st = {0};
     float value[] = {1, -0.0f, 1e-42f, 65504, 3.1415927f, -2};
     int64_t whole = -7;
-    nn_entry entry[] = {{"g.a \"b\" \xc3\xa9", NN_F32, false, 2, {3, 2}, {1, 3}, 6, (unsigned char *)value},
-                        {"n", NN_I64, false, 0, {0}, {0}, 1, (unsigned char *)&whole},
-                        {"none", NN_F32, false, 2, {0, 4}, {4, 1}, 0, (unsigned char *)value},
-                        {"rows", NN_F32, false, 2, {2, 3}, {3, 1}, 6, (unsigned char *)value}};
+    nn_tensor entry[] = {{"g.a \"b\" \xc3\xa9", NN_F32, false, 2, {3, 2}, {1, 3}, 6, (unsigned char *)value},
+                         {"n", NN_I64, false, 0, {0}, {0}, 1, (unsigned char *)&whole},
+                         {"none", NN_F32, false, 2, {0, 4}, {4, 1}, 0, (unsigned char *)value},
+                         {"rows", NN_F32, false, 2, {2, 3}, {3, 1}, 6, (unsigned char *)value}};
     nn_meta meta[] = {{"format", "lgd"}, {"note", "two\nlines \xf0\x9f\xaa\xa8"}};
     for (int k = 0; k < 2; k++) {
         const char *path = path_of(k ? "w.pth" : "w.safetensors");
@@ -148,10 +148,10 @@ TEST(torch_writing_and_reading_is_exact)
                   !nn_file_meta_key(f, 2),
               "metadata");
         for (int i = 0; i < 4; i++) {
-            const nn_entry *e = nn_file_find(f, entry[i].name);
+            const nn_tensor *e = nn_file_find(f, entry[i].name);
             unsigned char wanted[64], has[64];
-            CHECK(e && e->dtype == entry[i].dtype && e->count == entry[i].count && nn_entry_plain(e), "tensor %d", i);
-            CHECK(nn_entry_copy(&entry[i], e->dtype, wanted) && nn_entry_copy(e, e->dtype, has), "an overflow");
+            CHECK(e && e->dtype == entry[i].dtype && e->count == entry[i].count && nn_tensor_plain(e), "tensor %d", i);
+            CHECK(nn_tensor_copy(&entry[i], e->dtype, wanted) && nn_tensor_copy(e, e->dtype, has), "an overflow");
             CHECK(!memcmp(wanted, has, (size_t)e->count * (size_t)nn_dtype_size(e->dtype)), "values of tensor %d", i);
             CHECK(!k || ((uintptr_t)e->data % 64 == 0), "tensor %d is not aligned", i);
         }
@@ -188,7 +188,7 @@ TEST(torch_model_round_trip)
     int metas = 0;
     for (const char *key; (key = nn_file_meta_key(f, metas)); metas++)
         meta[metas] = (nn_meta){key, nn_file_meta(f, key)};
-    CHECK(!nn_file_write(path_of("m.pth"), NN_FORM_TORCH_ZIP, nn_file_entry(f, 0), nn_file_count(f), NN_DTYPES, meta,
+    CHECK(!nn_file_write(path_of("m.pth"), NN_FORM_TORCH_ZIP, nn_file_tensor(f, 0), nn_file_count(f), NN_DTYPES, meta,
                          metas, &st),
           "%s", st.message);
     nn_file_close(&f);

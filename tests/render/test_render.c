@@ -246,14 +246,14 @@ TEST(render_tone)
         ts_isa_use((ts_isa)isa);
         for (int i = 0; i < N; i++) x[i] = (float)i / (N - 5) - 1e-5f;
         x[7] = NAN, x[8] = INFINITY, x[9] = -1e30f;
-        rd_log_encode(N, x, y);
+        rd_log_encode(N, x, y, 0);
         for (int i = 0; i < N; i++) {
             double v = x[i] > 0 ? x[i] < 1 ? (double)x[i] : 1 : 0,
                    expected = 2 * (log(v + 0.01) - log(0.01)) / (log(1.01) - log(0.01)) - 1;
             CHECK(fabs((double)y[i] - expected) < 1e-6, "log encoding of %g is %.9g instead of %.9g", (double)x[i],
                   (double)y[i], expected);
         }
-        rd_log_encode(N, x, x);
+        rd_log_encode(N, x, x, 0);
         CHECK(!memcmp(x, y, N * sizeof *x), "in place differs");
     }
     CHECK(rd_gamma(0) == 0 && rd_gamma(1) == 1 && rd_gamma(5) == 1 && rd_gamma(-2) == 0 && rd_gamma(NAN) == 0,

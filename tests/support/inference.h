@@ -68,8 +68,12 @@ static inline int record(int step, double rmse, void *user)
 static inline void run(lgd_model *m, const float *image, int side, int iterations, int threads, trace *t, float *maps)
 {
     lgd_error e = {.code = 77};
-    const lgd_options o = {
-        .iterations = iterations, .threads = threads, .progress = t ? record : NULL, .user = t, .every_rmse = 1};
+    const lgd_options o = {.size = sizeof o,
+                           .iterations = iterations,
+                           .threads = threads,
+                           .progress = t ? record : NULL,
+                           .user = t,
+                           .every_rmse = 1};
     CHECK(lgd_estimate(m, image, side, &o, maps, &e) == 0 && e.code == 0 && !e.message[0], "%s", e.message);
 }
 #endif

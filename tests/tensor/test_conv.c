@@ -197,17 +197,17 @@ TEST(conv_weight_gradient_naive) { against_naive(check_weight_gradient, 3); }
 TEST(conv_chosen_shapes)
 {
     static const ts_conv shapes[] = {
-        {1, 1, 1, 1, 1, 15, 2, TS_PAD_REPLICATE, 0},    {2, 1, 1, 3, 2, 15, 2, TS_PAD_ZERO, 0},
-        {1, 1, 300, 3, 9, 3, 1, TS_PAD_REPLICATE, 0},   {1, 300, 1, 9, 3, 5, 2, TS_PAD_REPLICATE, 0},
-        {1, 3, 211, 2, 33, 5, 1, TS_PAD_ZERO, 0},       {4, 2, 2, 512, 40, 3, 1, TS_PAD_ZERO, 0},
-        {1, 2, 3, 512, 33, 3, 1, TS_PAD_REPLICATE, 0},  {1, 5, 4, 40, 512, 3, 2, TS_PAD_REPLICATE, 0},
-        {1, 3, 3, 700, 5, 7, 1, TS_PAD_ZERO, 0},        {1, 9, 7, 5, 700, 7, 1, TS_PAD_REPLICATE, 0},
-        {9, 8, 8, 16, 16, 5, 2, TS_PAD_REPLICATE, 0},   {5, 8, 8, 3, 20, 5, 1, TS_PAD_ZERO, 0},
-        {1, 40, 40, 18, 33, 1, 1, TS_PAD_ZERO, 0},      {17, 2, 2, 33, 65, 5, 1, TS_PAD_ZERO, 0},
-        {1, 64, 64, 3, 16, 3, 1, TS_PAD_ZERO, 0},       {2, 33, 64, 16, 9, 3, 2, TS_PAD_REPLICATE, 0},
-        {2, 20, 70, 24, 10, 5, 2, TS_PAD_REPLICATE, 0}, {1, 17, 150, 48, 9, 3, 1, TS_PAD_REPLICATE, 0},
-        {1, 7, 80, 80, 10, 5, 2, TS_PAD_ZERO, 0},       {1, 9, 80, 9, 90, 5, 2, TS_PAD_REPLICATE, 0},
-        {2, 5, 70, 10, 70, 5, 1, TS_PAD_REPLICATE, 0},
+        {1, 1, 1, 1, 1, 15, 2, TS_PAD_REPLICATE, 0, {0}},    {2, 1, 1, 3, 2, 15, 2, TS_PAD_ZERO, 0, {0}},
+        {1, 1, 300, 3, 9, 3, 1, TS_PAD_REPLICATE, 0, {0}},   {1, 300, 1, 9, 3, 5, 2, TS_PAD_REPLICATE, 0, {0}},
+        {1, 3, 211, 2, 33, 5, 1, TS_PAD_ZERO, 0, {0}},       {4, 2, 2, 512, 40, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {1, 2, 3, 512, 33, 3, 1, TS_PAD_REPLICATE, 0, {0}},  {1, 5, 4, 40, 512, 3, 2, TS_PAD_REPLICATE, 0, {0}},
+        {1, 3, 3, 700, 5, 7, 1, TS_PAD_ZERO, 0, {0}},        {1, 9, 7, 5, 700, 7, 1, TS_PAD_REPLICATE, 0, {0}},
+        {9, 8, 8, 16, 16, 5, 2, TS_PAD_REPLICATE, 0, {0}},   {5, 8, 8, 3, 20, 5, 1, TS_PAD_ZERO, 0, {0}},
+        {1, 40, 40, 18, 33, 1, 1, TS_PAD_ZERO, 0, {0}},      {17, 2, 2, 33, 65, 5, 1, TS_PAD_ZERO, 0, {0}},
+        {1, 64, 64, 3, 16, 3, 1, TS_PAD_ZERO, 0, {0}},       {2, 33, 64, 16, 9, 3, 2, TS_PAD_REPLICATE, 0, {0}},
+        {2, 20, 70, 24, 10, 5, 2, TS_PAD_REPLICATE, 0, {0}}, {1, 17, 150, 48, 9, 3, 1, TS_PAD_REPLICATE, 0, {0}},
+        {1, 7, 80, 80, 10, 5, 2, TS_PAD_ZERO, 0, {0}},       {1, 9, 80, 9, 90, 5, 2, TS_PAD_REPLICATE, 0, {0}},
+        {2, 5, 70, 10, 70, 5, 1, TS_PAD_REPLICATE, 0, {0}},
     };
     ts_rng r = ts_rng_make(4, TS_STREAM_TEST, 0);
     for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
@@ -239,7 +239,8 @@ TEST(conv_blocks_of_columns)
                                    ts_rng_int(&r, 2) ? 3 : 5,
                                    1 + ts_rng_int(&r, 2),
                                    ts_rng_int(&r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE,
-                                   0};
+                                   0,
+                                   {0}};
                 ts_conv back = c;
                 back.ic = c.oc, back.oc = c.ic;
                 problem p = make_problem(c, &r), q = make_problem(back, &r);
@@ -285,9 +286,9 @@ TEST(conv_adjoint)
 TEST(conv_same_bytes_for_any_threads)
 {
     static const ts_conv shapes[] = {
-        {3, 37, 41, 18, 40, 5, 1, TS_PAD_REPLICATE, 0}, {1, 8, 8, 96, 130, 3, 1, TS_PAD_ZERO, 0},
-        {8, 4, 4, 48, 66, 5, 1, TS_PAD_ZERO, 0},        {2, 64, 50, 20, 9, 3, 2, TS_PAD_REPLICATE, 0},
-        {2, 30, 31, 33, 70, 1, 1, TS_PAD_ZERO, 0},      {1, 6, 5, 700, 33, 7, 1, TS_PAD_REPLICATE, 0},
+        {3, 37, 41, 18, 40, 5, 1, TS_PAD_REPLICATE, 0, {0}}, {1, 8, 8, 96, 130, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {8, 4, 4, 48, 66, 5, 1, TS_PAD_ZERO, 0, {0}},        {2, 64, 50, 20, 9, 3, 2, TS_PAD_REPLICATE, 0, {0}},
+        {2, 30, 31, 33, 70, 1, 1, TS_PAD_ZERO, 0, {0}},      {1, 6, 5, 700, 33, 7, 1, TS_PAD_REPLICATE, 0, {0}},
     };
     static const int threads[] = {1, 2, 3, 7};
     ts_rng r = ts_rng_make(6, TS_STREAM_TEST, 0);
@@ -346,7 +347,7 @@ TEST(conv_long_sums_stay_accurate)
 
 TEST(conv_check_refuses)
 {
-    const ts_conv good = {1, 4, 4, 3, 5, 3, 1, TS_PAD_ZERO, 0};
+    const ts_conv good = {1, 4, 4, 3, 5, 3, 1, TS_PAD_ZERO, 0, {0}};
     CHECK(ts_conv_check(&good, NULL) == TS_OK, "a good shape is refused");
     for (int i = 0; i < 11; i++) {
         ts_conv c = good;

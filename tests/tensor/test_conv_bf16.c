@@ -2,7 +2,7 @@
 #include "ops.h"
 #include "tensor/conv/conv.h"
 #include "tensor/cpu.h"
-#include "tensor/gru.h"
+#include "tensor/conv/gru.h"
 #include "tensor/kernels/conv.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"
@@ -13,6 +13,12 @@
 #include <string.h>
 
 enum { GUARD = 64 };
+
+static bool amx(void)
+{
+    const ts_conv c = {1, 1, 1, 1, 1, 1, 1, TS_PAD_ZERO, 0, {.precision = TS_BF16}};
+    return ts_conv_choose(&c, TS_CONV_WEIGHTS) == TS_CONV_BY_AMX;
+}
 
 static float from_bits(uint32_t bits)
 {
@@ -46,7 +52,7 @@ static float *rounded(const float *x, size_t count)
 
 /* What sits between two floats that have 16 bits less: near the middle, at the edges of exponents, denormal, infinite,
  * and no number. */
-static float awkward(ts_rng *r)
+static float hard_to_round(ts_rng *r)
 {
     static const uint32_t tails[] = {0, 1, 0x7fff, 0x8000, 0x8001, 0xffff},
                           heads[] = {0, 1, 0x7f, 0x80, 0x3f80, 0x7f7f, 0x7f80, 0x7fbf, 0x7fc0, 0x7fff};
@@ -82,7 +88,7 @@ TEST(bf16_pairs_naive)
             float *x = malloc(sizeof(float) * (size_t)(pixels * channels)),
                   *to = malloc(count * sizeof(float)); /* exact: the sanitizer sees a read past it */
             CHECK(x && to, "no memory");
-            for (int i = 0; i < pixels * channels; i++) x[i] = awkward(&r);
+            for (int i = 0; i < pixels * channels; i++) x[i] = hard_to_round(&r);
             memset(to, 0x5a, count * sizeof(float));
             ts_conv_k()->pairs(x, pixels, channels, to, depth + gap);
             for (size_t i = 0; i < count; i++) {
@@ -182,7 +188,7 @@ static void against_naive(ts_conv c, ts_rng *r)
         same(dx, naive_dx, count, (double)c.oc * pow(c.k, 4), b ? "added data gradient" : "data gradient", &c);
         free(dx), free(naive_dx);
     }
-    if (ts_conv_bf16_weights()) {
+    if (amx()) {
         float *dweight = gradient_of_weights(&p), *naive = values(weight_count(&c), NULL);
         memcpy(naive, p.weight, weight_count(&c) * sizeof(float));
         ts_conv_weight_gradient_naive(&c, x, dy, naive, NULL);
@@ -196,11 +202,11 @@ static void against_naive(ts_conv c, ts_rng *r)
 TEST(bf16_conv_naive)
 {
     static const ts_conv shapes[] = {
-        {1, 1, 1, 1, 1, 15, 2, TS_PAD_REPLICATE, 0},    {1, 300, 1, 9, 3, 5, 2, TS_PAD_REPLICATE, 0},
-        {1, 3, 211, 2, 33, 5, 1, TS_PAD_ZERO, 0},       {4, 2, 2, 512, 40, 3, 1, TS_PAD_ZERO, 0},
-        {1, 2, 3, 1024, 33, 3, 1, TS_PAD_REPLICATE, 0}, {1, 9, 7, 5, 700, 7, 1, TS_PAD_REPLICATE, 0},
-        {1, 40, 40, 18, 33, 1, 1, TS_PAD_ZERO, 0},      {17, 2, 2, 33, 65, 5, 1, TS_PAD_ZERO, 0},
-        {2, 20, 70, 24, 10, 5, 2, TS_PAD_REPLICATE, 0},
+        {1, 1, 1, 1, 1, 15, 2, TS_PAD_REPLICATE, 0, {0}},    {1, 300, 1, 9, 3, 5, 2, TS_PAD_REPLICATE, 0, {0}},
+        {1, 3, 211, 2, 33, 5, 1, TS_PAD_ZERO, 0, {0}},       {4, 2, 2, 512, 40, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {1, 2, 3, 1024, 33, 3, 1, TS_PAD_REPLICATE, 0, {0}}, {1, 9, 7, 5, 700, 7, 1, TS_PAD_REPLICATE, 0, {0}},
+        {1, 40, 40, 18, 33, 1, 1, TS_PAD_ZERO, 0, {0}},      {17, 2, 2, 33, 65, 5, 1, TS_PAD_ZERO, 0, {0}},
+        {2, 20, 70, 24, 10, 5, 2, TS_PAD_REPLICATE, 0, {0}},
     };
     ts_rng r = ts_rng_make(22, TS_STREAM_TEST, 0);
     for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
@@ -213,9 +219,9 @@ TEST(bf16_conv_naive)
 TEST(bf16_conv_same_bytes_for_any_threads)
 {
     static const ts_conv shapes[] = {
-        {3, 37, 41, 18, 40, 5, 1, TS_PAD_REPLICATE, 0}, {1, 8, 8, 96, 130, 3, 1, TS_PAD_ZERO, 0},
-        {8, 4, 4, 47, 66, 5, 1, TS_PAD_ZERO, 0},        {2, 64, 50, 20, 9, 3, 2, TS_PAD_REPLICATE, 0},
-        {2, 30, 31, 33, 70, 1, 1, TS_PAD_ZERO, 0},      {1, 6, 5, 700, 33, 7, 1, TS_PAD_REPLICATE, 0}};
+        {3, 37, 41, 18, 40, 5, 1, TS_PAD_REPLICATE, 0, {0}}, {1, 8, 8, 96, 130, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {8, 4, 4, 47, 66, 5, 1, TS_PAD_ZERO, 0, {0}},        {2, 64, 50, 20, 9, 3, 2, TS_PAD_REPLICATE, 0, {0}},
+        {2, 30, 31, 33, 70, 1, 1, TS_PAD_ZERO, 0, {0}},      {1, 6, 5, 700, 33, 7, 1, TS_PAD_REPLICATE, 0, {0}}};
     static const int threads[] = {1, 2, 3, 7};
     ts_rng r = ts_rng_make(23, TS_STREAM_TEST, 0);
     for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
@@ -227,7 +233,7 @@ TEST(bf16_conv_same_bytes_for_any_threads)
                 ts_threads_set(threads[t]);
                 float *y_now = run(&p, TS_CONV_FORWARD_BF16, p.bias, NULL),
                       *dx_now = run(&p, TS_CONV_DATA_GRADIENT_BF16, NULL, NULL);
-                float *dweight_now = ts_conv_bf16_weights() ? gradient_of_weights(&p) : NULL;
+                float *dweight_now = amx() ? gradient_of_weights(&p) : NULL;
                 CHECK(!y ||
                           (!memcmp(y, y_now, out_count(&p.c) * sizeof(float)) &&
                            !memcmp(dx, dx_now, in_count(&p.c) * sizeof(float))),
@@ -251,7 +257,7 @@ TEST(bf16_gru_naive)
     for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
         ts_isa_use((ts_isa)isa);
         for (int t = 0; t < 40; t++) {
-            const ts_gru g = {1 + ts_rng_int(&r, 300), 1 + ts_rng_int(&r, 40), 1 + ts_rng_int(&r, 40), true};
+            const ts_gru g = {1 + ts_rng_int(&r, 300), 1 + ts_rng_int(&r, 40), 1 + ts_rng_int(&r, 40), true, 0};
             const ts_conv in = ts_gru_input(&g), hidden = ts_gru_hidden(&g);
             const size_t pixels = (size_t)g.pixels, c = (size_t)g.c, ic = (size_t)g.ic;
             float *x = values(pixels * ic, &r), *any = values(pixels * c, &r), *ih = values(weight_count(&in), &r),
@@ -286,7 +292,7 @@ static void on_tape(ts_precision precision, const problem *p, float *y, float *d
     for (int i = 0; i < 64; i++) ones[i] = 1;
     ag_tape *tape = ag_tape_create(true, &st);
     CHECK(tape, "%s", st.message);
-    ts_conv_precision_set(precision);
+    ag_compute_set(tape, (ts_compute){.exact = true, .precision = precision});
     memset(dx, 0, in_count(c) * sizeof(float));
     memset(dweight, 0, weight_count(c) * sizeof(float));
     ag_value *x = ag_parameter(tape, ts_view(p->x, (ts_shape){c->n, c->h, c->w, c->ic}), dx);
@@ -297,16 +303,14 @@ static void on_tape(ts_precision precision, const problem *p, float *y, float *d
     CHECK(ag_backward(tape, sum) == TS_OK, "%s", ag_status(tape)->message);
     memcpy(y, out->t.data, out_count(c) * sizeof(float));
     ag_tape_destroy(&tape);
-    ts_conv_precision_set(TS_F32);
 }
 
 /* Forward and the data gradient follow the choice. The weight gradient's operands are rounded for a matrix unit, and
  * its bytes are the same elsewhere. */
 TEST(bf16_in_ag_conv)
 {
-    CHECK(ts_conv_precision() == TS_F32, "f32 is not the default");
     ts_rng r = ts_rng_make(25, TS_STREAM_TEST, 0);
-    problem p = make_problem((ts_conv){1, 16, 32, 20, 33, 3, 2, TS_PAD_REPLICATE, 0}, &r);
+    problem p = make_problem((ts_conv){1, 16, 32, 20, 33, 3, 2, TS_PAD_REPLICATE, 0, {0}}, &r);
     const ts_conv *c = &p.c;
     float *y[3], *dx[3], *dweight[3];
     for (int i = 0; i < 3; i++) {
@@ -322,7 +326,7 @@ TEST(bf16_in_ag_conv)
     same(dx[1], dx[2], in_count(c), 9. * c->oc / 512, "data gradient", c);
     CHECK(memcmp(y[0], y[1], out_count(c) * sizeof(float)) && memcmp(dx[0], dx[1], in_count(c) * sizeof(float)),
           "bf16 gives what f32 gives");
-    if (ts_conv_bf16_weights()) {
+    if (amx()) {
         memset(dweight[2], 0, weight_count(c) * sizeof(float));
         ts_conv_weight_gradient_naive(c, x, p.dy, dweight[2], NULL);
         same(dweight[1], dweight[2], weight_count(c), (double)c->h * c->w / 512, "weight gradient", c);

@@ -381,7 +381,7 @@ TEST(resize_laws)
                             t % 4 ? 1 + ts_rng_int(&r, 20) : x.shape.w, x.shape.c);
         /* a constant stays one, values stay within the image's range */
         for (int64_t i = 0; i < ts_count(x.shape); i++) x.data[i] = t % 3 ? ts_rng_range(&r, 2, 5) : 0.7f;
-        CHECK(ts_resize(&y, &x, arena, &st) == TS_OK, "%s", st.message);
+        CHECK(ts_resize(&y, &x, arena, 0, &st) == TS_OK, "%s", st.message);
         for (int64_t i = 0; i < ts_count(y.shape); i++) {
             if (t % 3 == 0) CHECK(fabsf(y.data[i] - 0.7f) < 1e-6f, "a constant image changed: %g", (double)y.data[i]);
             else
@@ -397,7 +397,7 @@ TEST(resize_laws)
     for (int w = 5; w < 200; w += 23) {
         ts_tensor x = image(arena, 1, 3, 64, 2), y = image(arena, 1, 5, w, 2);
         for (int64_t i = 0; i < ts_count(x.shape); i++) x.data[i] = (float)(i / 2 % 64);
-        CHECK(ts_resize(&y, &x, arena, &st) == TS_OK, "%s", st.message);
+        CHECK(ts_resize(&y, &x, arena, 0, &st) == TS_OK, "%s", st.message);
         const double step = 64.0 / w, margin = step > 1 ? step : 1;
         for (int j = 0; j < w; j++) {
             const double want = (j + 0.5) * step - 0.5;
@@ -409,9 +409,9 @@ TEST(resize_laws)
     /* Halving averages with the triangle's weights 1 3 3 1 over 8. */
     ts_tensor x = image(arena, 1, 1, 8, 1), y = image(arena, 1, 1, 4, 1), wrong = image(arena, 1, 1, 4, 2);
     for (int i = 0; i < 8; i++) x.data[i] = (float)(i * i);
-    CHECK(ts_resize(&y, &x, arena, &st) == TS_OK, "%s", st.message);
+    CHECK(ts_resize(&y, &x, arena, 0, &st) == TS_OK, "%s", st.message);
     CHECK(fabsf(y.data[1] - (1 * 1 + 3 * 4 + 3 * 9 + 1 * 16) / 8.0f) < 1e-5f, "half: %g", (double)y.data[1]);
-    CHECK(ts_resize(&wrong, &x, arena, &st) == TS_INVALID && strstr(st.message, "channels"),
+    CHECK(ts_resize(&wrong, &x, arena, 0, &st) == TS_INVALID && strstr(st.message, "channels"),
           "channels may not change: %s", st.message);
     ts_arena_destroy(&arena);
 }
@@ -426,7 +426,7 @@ TEST(resize_any_threads)
     const int counts[] = {1, 2, 3, 7};
     for (int t = 0; t < 4; t++) {
         ts_threads_set(counts[t]);
-        CHECK(ts_resize(t ? &y : &first, &x, arena, &st) == TS_OK, "%s", st.message);
+        CHECK(ts_resize(t ? &y : &first, &x, arena, 0, &st) == TS_OK, "%s", st.message);
         CHECK(t == 0 || memcmp(y.data, first.data, (size_t)ts_count(y.shape) * sizeof(float)) == 0,
               "%d threads give other bytes", counts[t]);
     }

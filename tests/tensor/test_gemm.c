@@ -1,5 +1,5 @@
 #include "tensor/cpu.h"
-#include "tensor/gemm.h"
+#include "tensor/conv/gemm.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"
 #include "tests/test.h"
@@ -28,7 +28,7 @@ static void check(bool ta, bool tb, int m, int n, int k, float alpha, float beta
     if (beta == 0)
         for (size_t i = 0; i < count; i++) naive[GUARD + i] = NAN; /* never read */
     memcpy(fast, naive, (count + 2 * GUARD) * sizeof(float));
-    ts_gemm(ta, tb, m, n, k, alpha, a, b, beta, fast + GUARD);
+    ts_gemm(ta, tb, m, n, k, alpha, a, b, beta, fast + GUARD, 0);
     ts_gemm_naive(ta, tb, m, n, k, alpha, a, b, beta, naive + GUARD);
     for (size_t i = 0; i < count + 2 * GUARD; i++) {
         const bool guard = i < GUARD || i >= count + GUARD;
@@ -65,7 +65,7 @@ TEST(gemm_same_bytes_for_any_threads)
     float *c = values((size_t)(m * n), &r), *first = values((size_t)(m * n), &r);
     for (int t = 0; t < 4; t++) {
         ts_threads_set(threads[t]);
-        ts_gemm(true, false, m, n, k, 1, a, b, 0, t == 0 ? first : c);
+        ts_gemm(true, false, m, n, k, 1, a, b, 0, t == 0 ? first : c, 0);
         CHECK(t == 0 || memcmp(first, c, sizeof(float) * (size_t)(m * n)) == 0, "other bytes with %d threads",
               threads[t]);
     }

@@ -1,5 +1,5 @@
 #include "tensor/cpu.h"
-#include "tensor/gru.h"
+#include "tensor/conv/gru.h"
 #include "tensor/kernels/elementwise.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"
@@ -118,7 +118,7 @@ TEST(gru_naive)
         ts_isa_use((ts_isa)isa);
         for (int i = 0; i < 40; i++) {
             subject s = make((ts_gru){pixels[i < 4 ? 9 : ts_rng_int(&r, 9)], channels[ts_rng_int(&r, 9)],
-                                      channels[ts_rng_int(&r, i < 4 ? 5 : 9)], false},
+                                      channels[ts_rng_int(&r, i < 4 ? 5 : 9)], false, 0},
                              (uint64_t)i);
             results a = fast(&s, i % 3, i % 2), b = naive(&s, i % 3, i % 2);
             same("state", &s, a.y, b.y, s.counts[DY], 2e-5);
@@ -134,7 +134,7 @@ TEST(gru_naive)
 TEST(gru_same_bytes_for_any_threads)
 {
     for (int bf16 = 0; bf16 < 2; bf16++) {
-        subject s = make((ts_gru){5000, 20, 32, bf16}, 77);
+        subject s = make((ts_gru){5000, 20, 32, bf16, 0}, 77);
         results first = {0};
         for (int threads = 1; threads <= 3; threads++) {
             ts_threads_set(threads);
@@ -172,7 +172,7 @@ TEST(gru_backward_bf16_naive)
     ts_rng r = ts_rng_make(32, TS_STREAM_TEST, 0);
     for (int i = 0; i < 30; i++) {
         const int ic = inputs[ts_rng_int(&r, 5)], c = channels[ts_rng_int(&r, 4)];
-        subject s = make((ts_gru){pixels[i < 3 ? 6 : ts_rng_int(&r, 6)], ic, c, true}, (uint64_t)i);
+        subject s = make((ts_gru){pixels[i < 3 ? 6 : ts_rng_int(&r, 6)], ic, c, true, 0}, (uint64_t)i);
         const bool old = i % 3, add = i % 2;
         CHECK(ts_gru_backward_bf16(&s.g), "%d channels are not rounded", c);
         results a = fast(&s, old, add), b = room(&s, old, add);

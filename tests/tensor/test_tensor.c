@@ -166,12 +166,11 @@ TEST(threads_and_scratch)
     ts_threads_set(0);
     CHECK(ts_threads() == ts_threads_allowed(), "default");
     ts_threads_set(2);
-    CHECK(ts_threads_own(5) == 0 && ts_threads() == 5, "the calling thread's own");
+    CHECK(ts_threads_of(5) == 5 && ts_threads_of(0) == 2, "a loop's own number, and the process's");
     pthread_t other;
     int seen = 0;
     CHECK(!pthread_create(&other, NULL, threads_seen, &seen) && !pthread_join(other, NULL) && seen == 2,
           "another thread uses %d", seen);
-    CHECK(ts_threads_own(0) == 5 && ts_threads() == 2, "the process's again");
     ts_threads_set(0);
     unsigned char *a = ts_scratch(0, 1000), *b = ts_scratch(1, 1000);
     CHECK(a != b && (uintptr_t)a % 64 == 0, "slots are apart and aligned");

@@ -120,12 +120,19 @@ static void over_shapes(void (*check)(ts_conv c, ts_rng *r), uint64_t seed)
     for (int isa = 0; isa <= (int)ts_isa_best(); isa++) {
         ts_isa_use((ts_isa)isa);
         for (int i = 0; i < 80; i++)
-            check((ts_conv){1 + ts_rng_int(&r, 2), sizes[ts_rng_int(&r, 11)], sizes[ts_rng_int(&r, 11)],
-                            channels[ts_rng_int(&r, 8)], channels[ts_rng_int(&r, 8)], 3, 1 + ts_rng_int(&r, 2),
-                            ts_rng_int(&r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE, 0},
+            check((ts_conv){1 + ts_rng_int(&r, 2),
+                            sizes[ts_rng_int(&r, 11)],
+                            sizes[ts_rng_int(&r, 11)],
+                            channels[ts_rng_int(&r, 8)],
+                            channels[ts_rng_int(&r, 8)],
+                            3,
+                            1 + ts_rng_int(&r, 2),
+                            ts_rng_int(&r, 2) ? TS_PAD_ZERO : TS_PAD_REPLICATE,
+                            0,
+                            {0}},
                   &r);
-        check((ts_conv){1, 43, 29, 64, 64, 3, 1, TS_PAD_ZERO, 0}, &r);
-        check((ts_conv){1, 24, 37, 32, 70, 3, 2, TS_PAD_REPLICATE, 0}, &r);
+        check((ts_conv){1, 43, 29, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}}, &r);
+        check((ts_conv){1, 24, 37, 32, 70, 3, 2, TS_PAD_REPLICATE, 0, {0}}, &r);
     }
 }
 
@@ -135,7 +142,7 @@ TEST(winograd_gradients_naive) { over_shapes(gradients_against_naive, 14); }
 TEST(winograd_same_bytes_for_any_threads)
 {
     static const int threads[] = {1, 2, 3};
-    const ts_conv c = {2, 37, 31, 33, 40, 3, 2, TS_PAD_REPLICATE, 0};
+    const ts_conv c = {2, 37, 31, 33, 40, 3, 2, TS_PAD_REPLICATE, 0, {0}};
     ts_rng r = ts_rng_make(12, TS_STREAM_TEST, 0);
     const size_t weights = (size_t)c.ic * (size_t)c.oc * 9, count[3] = {count_y(&c), count_x(&c), weights};
     float *x = values(count_x(&c), &r), *weight = values(weights, &r), *dy = values(count_y(&c), &r), *first[3] = {0};
@@ -159,21 +166,20 @@ TEST(winograd_same_bytes_for_any_threads)
 TEST(winograd_in_ag_conv)
 {
     enum { Y, DX, DWEIGHT, RESULTS };
-    const ts_conv c = {1, 128, 68, 24, 32, 3, 1, TS_PAD_REPLICATE, 0};
+    const ts_conv c = {1, 128, 68, 24, 32, 3, 1, TS_PAD_REPLICATE, 0, {0}};
     const size_t weights = (size_t)c.ic * (size_t)c.oc * 9, count[RESULTS] = {count_y(&c), count_x(&c), weights};
     static const char *const names[] = {"y", "dx", "dweight"};
     ts_rng r = ts_rng_make(13, TS_STREAM_TEST, 0);
     float *x = values(count_x(&c), &r), *weight = values(weights, &r), *mix = values((size_t)c.oc, &r),
           *result[3][RESULTS];
-    CHECK(ts_conv_exact(), "direct is not the default");
-    CHECK(ts_conv_winograd(&c, TS_CONV_WINOGRAD) && ts_conv_winograd(&c, TS_CONV_DATA_GRADIENT_WINOGRAD) &&
-              ts_conv_winograd_weights(&c),
-          "this shape should pay");
+    for (int d = TS_CONV_OUTPUT; d <= TS_CONV_WEIGHTS; d++)
+        CHECK(ts_conv_choose(&c, (ts_conv_direction)d) == TS_CONV_BY_WINOGRAD, "this shape should pay");
     for (int i = 0; i < 3; i++) {
         ts_status st = {0};
         ag_tape *tape = ag_tape_create(true, &st);
         CHECK(tape, "%s", st.message);
-        ts_conv_exact_set(i != 1);
+        CHECK(ag_compute(tape)->exact, "direct is not the default");
+        ag_compute_set(tape, (ts_compute){.exact = i != 1});
         float *dx = calloc(count[DX], sizeof *dx), *dweight = calloc(weights, sizeof *dweight);
         ag_value *in = ag_parameter(tape, ts_view(x, (ts_shape){c.n, c.h, c.w, c.ic}), dx);
         ag_value *y = ag_conv(tape, in, ag_parameter(tape, ts_view(weight, (ts_shape){c.oc, c.ic, 3, 3}), dweight),
@@ -186,7 +192,6 @@ TEST(winograd_in_ag_conv)
         memcpy(result[i][Y], y->t.data, count[Y] * sizeof(float));
         ag_tape_destroy(&tape);
     }
-    ts_conv_exact_set(true);
     for (int k = 0; k < RESULTS; k++) {
         CHECK(memcmp(result[0][k], result[2][k], count[k] * sizeof(float)) == 0, "%s: direct again, but other bytes",
               names[k]);

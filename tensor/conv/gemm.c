@@ -1,5 +1,5 @@
 /* Matrix products with the tiles of the convolutions: rows of A are the pixels, B is packed as the weights. */
-#include "tensor/gemm.h"
+#include "tensor/conv/gemm.h"
 #include "tensor/conv/conv_internal.h"
 #include "tensor/threads.h"
 
@@ -15,10 +15,10 @@ static inline float value(const float *m, bool transposed, ptrdiff_t row_length,
 }
 
 /* alpha op(B) as [panel][k][lane] */
-static void pack_b(bool tb, int n, int k, float alpha, const float *b, float *packed)
+static void pack_b(bool tb, int n, int k, float alpha, const float *b, float *packed, int threads)
 {
     const int lanes = conv_lanes(), panels = conv_panels(n), parts = k > 64 ? 16 : 1;
-#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads())
+#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(threads))
     for (int panel = 0; panel < panels; panel++)
         for (int part = 0; part < parts; part++) {
             const int j0 = panel * 2 * lanes, width = conv_vectors(n, panel) * lanes,
@@ -81,11 +81,12 @@ static void run_block(const product *p, int row, int rows, int k0, int k1, int p
     }
 }
 
-void ts_gemm(bool ta, bool tb, int m, int n, int k, float alpha, const float *a, const float *b, float beta, float *c)
+void ts_gemm(bool ta, bool tb, int m, int n, int k, float alpha, const float *a, const float *b, float beta, float *c,
+             int threads)
 {
     const int lanes = conv_lanes(), panels = conv_panels(n), units = (m + ROWS - 1) / ROWS;
     float *packed = ts_scratch(2, sizeof(float) * (size_t)k * (size_t)((n + lanes - 1) / lanes * lanes));
-    pack_b(tb, n, k, alpha, b, packed);
+    pack_b(tb, n, k, alpha, b, packed, threads);
     const product p = {.ta = ta,
                        .scale = beta != 0 && beta != 1,
                        .m = m,
@@ -97,7 +98,7 @@ void ts_gemm(bool ta, bool tb, int m, int n, int k, float alpha, const float *a,
                        .c = c};
     int groups = units < 8 ? (8 + units - 1) / units : 1;
     if (groups > panels) groups = panels;
-#pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads())
+#pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads_of(threads))
     for (int i = 0; i < units; i++)
         for (int g = 0; g < groups; g++) {
             int panel0, panel1;

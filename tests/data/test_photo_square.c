@@ -27,7 +27,7 @@ static io_image blank(int width, int height, int channels)
 static const int shapes[][3] = {{1, 1, 1},    {1, 9, 4},    {9, 1, 3},  {2, 3, 5},    {64, 48, 16},
                                 {61, 97, 13}, {40, 40, 40}, {5, 5, 64}, {300, 200, 7}};
 
-TEST(square_keeps_a_constant)
+TEST(photo_square_keeps_a_constant)
 {
     for (int k = 0; k < 9; k++) {
         io_image in = blank(shapes[k][0], shapes[k][1], 3);
@@ -42,7 +42,7 @@ TEST(square_keeps_a_constant)
 
 /* An average: within the range of the values (no ringing), and what is shrunk by a whole factor keeps its mean but for
  * the edges' weight. */
-TEST(square_neither_rings_nor_aliases)
+TEST(photo_square_neither_rings_nor_aliases)
 {
     io_image in = blank(240, 240, 1);
     for (int i = 0; i < 240 * 240; i++) in.data[i] = (i % 240 / 1 + i / 240) % 2 ? 1 : 0;
@@ -61,7 +61,7 @@ TEST(square_neither_rings_nor_aliases)
 }
 
 /* The middle is taken, on both axes, and a ramp stays the same ramp. */
-TEST(square_is_centred)
+TEST(photo_square_is_centred)
 {
     for (int tall = 0; tall < 2; tall++) {
         io_image in = blank(tall ? 40 : 120, tall ? 120 : 40, 2);
@@ -108,7 +108,7 @@ static void same_square(const char *path, int size)
     CHECK(!io_read_photo(path, 1 << 20, &whole, &st) && !io_centre_square(&whole, size, &cut, &st), "%s", st.message);
     for (int threads = 1; threads <= 3; threads++) {
         ts_threads_set(threads);
-        CHECK(!io_read_square(path, 1 << 20, size, &square, &width, &height, &st), "%s", st.message);
+        CHECK(!io_read_photo_square(path, 1 << 20, size, 0, &square, &width, &height, &st), "%s", st.message);
         CHECK(width == whole.width && height == whole.height && square.width == size && square.height == size &&
                   square.channels == 3,
               "%s: %d x %d", path, width, height);
@@ -120,7 +120,7 @@ static void same_square(const char *path, int size)
     io_image_free(&cut), io_image_free(&whole);
 }
 
-TEST(square_of_a_file_is_that_of_the_whole)
+TEST(photo_square_of_a_file_is_that_of_the_whole)
 {
     static const int sizes[] = {1, 7, 16, 61, 64, 100};
     char path[512];
@@ -152,13 +152,15 @@ TEST(square_of_a_file_is_that_of_the_whole)
     snprintf(path, sizeof path, "%s/none.png", test_folder());
     io_image square = {0};
     int width, height;
-    CHECK(io_read_square(path, 1 << 20, 8, &square, &width, &height, &st) == TS_IO && !square.data, "a missing file");
+    CHECK(io_read_photo_square(path, 1 << 20, 8, 0, &square, &width, &height, &st) == TS_IO && !square.data,
+          "a missing file");
     st = (ts_status){0};
     snprintf(path, sizeof path, "%s/upright.jpg", test_folder());
-    CHECK(io_read_square(path, 97 * 61 - 1, 8, &square, &width, &height, &st) == TS_UNSUPPORTED && !square.data &&
-              strstr(st.message, "97 x 61"),
+    CHECK(io_read_photo_square(path, 97 * 61 - 1, 8, 0, &square, &width, &height, &st) == TS_UNSUPPORTED &&
+              !square.data && strstr(st.message, "97 x 61"),
           "the limit: %s", st.message);
     st = (ts_status){0};
-    CHECK(io_read_square(path, 1 << 20, 0, &square, &width, &height, &st) == TS_INVALID && !square.data, "size 0");
+    CHECK(io_read_photo_square(path, 1 << 20, 0, 0, &square, &width, &height, &st) == TS_INVALID && !square.data,
+          "size 0");
     io_image_free(&in);
 }

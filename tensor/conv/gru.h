@@ -11,9 +11,10 @@
 
 typedef struct ts_gru {
     int64_t pixels;
-    int ic, c; /* channels of x and of the state */
-    bool bf16; /* both products of forward on rounded x, old and weights, as in tensor/conv/conv.h; weights packed for
-                  TS_CONV_FORWARD_BF16; of backward where ts_gru_backward_bf16 says so */
+    int ic, c;   /* channels of x and of the state */
+    bool bf16;   /* both products of forward on rounded x, old and weights, as in tensor/conv/conv.h; weights packed for
+                    TS_CONV_FORWARD_BF16; of backward where ts_gru_backward_bf16 says so */
+    int threads; /* of the loops; 0: the process's number */
 } ts_gru;
 
 /* The products as convolutions: what ts_conv_pack packs the weights W_ih [3c][ic] and W_hh [3c][c] for. */

@@ -1,4 +1,4 @@
-#include "tensor/gru.h"
+#include "tensor/conv/gru.h"
 #include <math.h>
 
 static double sigmoid(double x) { return 1 / (1 + exp(-x)); }

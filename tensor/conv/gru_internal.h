@@ -1,8 +1,8 @@
-/* Internal to tensor/gru*.c: the products of a backward band by the matrix unit. */
-#ifndef TS_GRU_PARTS_H
-#define TS_GRU_PARTS_H
+/* Internal to tensor/conv/gru*.c: the products of a backward band by the matrix unit. */
+#ifndef TS_GRU_INTERNAL_H
+#define TS_GRU_INTERNAL_H
 #include "tensor/conv/conv_internal.h"
-#include "tensor/gru.h"
+#include "tensor/conv/gru.h"
 
 enum {
     GRU_BAND = 8 * TS_TILE_PIXELS
@@ -14,13 +14,13 @@ typedef struct gru_rounded {
     int c, count;
     float *pairs;     /* [count][2c] */
     uint16_t *planes; /* [4c][whole steps], zeros behind count */
-    float *others;    /* room for the pairs of pixels that weights are multiplied with */
+    float *others;    /* memory for the pairs of pixels that weights are multiplied with */
 } gru_rounded;
 
-/* d [count][4c] = n, z, r, n' (tensor/gru.c). */
+/* d [count][4c] = n, z, r, n' (tensor/conv/gru.c). */
 gru_rounded gru_round(const ts_gru *g, const float *d, int count);
 /* y [count][oc] (+)= the input's n, z, r or the hidden z, r, n' times weights packed for TS_CONV_DATA_GRADIENT_BF16. */
-void gru_matrix_product(const gru_rounded *r, bool hidden, const float *packed, int oc, float *y, bool add);
+void gru_amx_product(const gru_rounded *r, bool hidden, const float *packed, int oc, float *y, bool add);
 /* sum [3c][channels, whole vectors] += the same, of each pixel, times x [count][channels] */
-void gru_matrix_weights(const gru_rounded *r, bool hidden, const float *x, int channels, float *sum);
+void gru_amx_weights(const gru_rounded *r, bool hidden, const float *x, int channels, float *sum);
 #endif

@@ -1,4 +1,4 @@
-#include "tensor/gru_internal.h"
+#include "tensor/conv/gru_internal.h"
 #include "tensor/kernels/elementwise.h"
 #include "tensor/threads.h"
 #include <string.h>
@@ -8,8 +8,14 @@ enum {
     PARTS = 16          /* and no more of them, by shape alone */
 };
 
-ts_conv ts_gru_input(const ts_gru *g) { return (ts_conv){1, 1, 1, g->ic, 3 * g->c, 1, 1, TS_PAD_ZERO, 0}; }
-ts_conv ts_gru_hidden(const ts_gru *g) { return (ts_conv){1, 1, 1, g->c, 3 * g->c, 1, 1, TS_PAD_ZERO, 0}; }
+static ts_conv product_of(const ts_gru *g, int ic)
+{
+    return (ts_conv){
+        .n = 1, .h = 1, .w = 1, .ic = ic, .oc = 3 * g->c, .k = 1, .dilation = 1, .compute.threads = g->threads};
+}
+
+ts_conv ts_gru_input(const ts_gru *g) { return product_of(g, g->ic); }
+ts_conv ts_gru_hidden(const ts_gru *g) { return product_of(g, g->c); }
 
 static conv_plan gates_of(const ts_gru *g, int channels, const float *packed, const float *bias)
 {
@@ -29,13 +35,13 @@ static void gates_forward(conv_plan p, const float *x, int count, float *y)
     p.x = x;
     p.y = y;
     if (p.bf16) {
-        const size_t behind = (size_t)(CONV_MATRIX_SLACK * (p.ic + 1));
+        const size_t behind = (size_t)(CONV_AMX_SLACK * (p.ic + 1));
         float *rounded = ts_scratch(2, sizeof(float) * ((size_t)(GRU_BAND * p.ic) + behind));
         conv_put_pixels(&p, x, count, rounded, p.ic);
         p.x = rounded;
-        if (conv_by_matrix()) {
+        if (conv_amx_present()) {
             memset(rounded + count * p.ic, 0, behind * sizeof(float));
-            conv_matrix_pixels(&p, count);
+            conv_amx_pixels(&p, count);
             return;
         }
     }
@@ -48,7 +54,7 @@ void ts_gru_forward(const ts_gru *g, const float *x, const float *old, const flo
     const struct ts_elementwise_kernels *k = ts_elementwise_k();
     const int gates = 3 * g->c;
     const conv_plan input = gates_of(g, g->ic, ih_packed, ih_bias), hidden = gates_of(g, g->c, hh_packed, hh_bias);
-#pragma omp parallel for schedule(dynamic, 4) num_threads(ts_threads())
+#pragma omp parallel for schedule(dynamic, 4) num_threads(ts_threads_of(g->threads))
     for (int64_t p = 0; p < g->pixels; p += GRU_BAND) {
         const int count = (int)(g->pixels - p < GRU_BAND ? g->pixels - p : GRU_BAND);
         float *ih = ts_scratch(0, sizeof(float) * (size_t)(GRU_BAND * gates)),
@@ -132,10 +138,10 @@ static void run_band(const ts_gru *g, int64_t p, int count, const float *x, cons
                                      to->dold_add, s.bias);
     if (ts_gru_backward_bf16(g)) {
         const gru_rounded r = gru_round(g, d, count);
-        if (dold) gru_matrix_product(&r, true, hh_packed, c, dold, true);
-        if (to->dx) gru_matrix_product(&r, false, ih_packed, g->ic, to->dx + p * g->ic, to->dx_add);
-        if (to->ih_weight) gru_matrix_weights(&r, false, x + p * g->ic, g->ic, s.input);
-        if (to->hh_weight && old) gru_matrix_weights(&r, true, old + p * c, c, s.hidden);
+        if (dold) gru_amx_product(&r, true, hh_packed, c, dold, true);
+        if (to->dx) gru_amx_product(&r, false, ih_packed, g->ic, to->dx + p * g->ic, to->dx_add);
+        if (to->ih_weight) gru_amx_weights(&r, false, x + p * g->ic, g->ic, s.input);
+        if (to->hh_weight && old) gru_amx_weights(&r, true, old + p * c, c, s.hidden);
         return;
     }
     if (dold) product(d, 4 * c, &hidden, 1, 3 * c, hh_packed, c, dold, true, count);
@@ -174,7 +180,7 @@ void ts_gru_backward(const ts_gru *g, const float *x, const float *old, const fl
     const ptrdiff_t input = (ptrdiff_t)gates * padded(g->ic), hidden = (ptrdiff_t)gates * padded(c);
     const ptrdiff_t doubles = 4 * c, size = doubles + (input + hidden + 1) / 2; /* of a part, in doubles */
     double *memory = ts_scratch(2, sizeof(double) * (size_t)(size * parts));
-#pragma omp parallel num_threads(ts_threads())
+#pragma omp parallel num_threads(ts_threads_of(g->threads))
     {
 #pragma omp for schedule(dynamic)
         for (int part = 0; part < parts; part++) {

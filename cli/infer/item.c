@@ -1,0 +1,108 @@
+#include "cli/infer/item.h"
+#include "infer/estimate.h"
+#include "infer/output.h"
+#include "infer/photograph.h"
+#include <math.h>
+#include <stdlib.h>
+
+/* The mask is cut and resampled as the photograph is; what is not black in a pixel makes it wanted. */
+static ts_code read_mask(const lgd_command *c, int width, int height, unsigned char **mask, ts_status *st)
+{
+    io_image whole = {0}, square = {0};
+    const size_t pixels = (size_t)c->size * (size_t)c->size;
+    ts_code code = io_read_data(c->mask, 1, c->max_pixels, &whole, st);
+    if (code) return code;
+    const double difference = (double)whole.width * height -
+        (double)whole.height * width; /* a pixel of rounding is none */
+    if (fabs(difference) > fmax(whole.width, whole.height) + fmax(width, height))
+        code = ts_fail(st, TS_INVALID, "the mask %s is %d x %d pixels and the photograph %d x %d: not the same shape",
+                       c->mask, whole.width, whole.height, width, height);
+    if (!code) code = io_centre_square(&whole, c->size, &square, st);
+    if (!code && !(*mask = malloc(pixels))) code = ts_fail(st, TS_NOMEM, "out of memory for the mask");
+    for (size_t i = 0; i < pixels && !code; i++) (*mask)[i] = square.data[i] > 0;
+    io_image_free(&whole);
+    io_image_free(&square);
+    return code;
+}
+
+void lgd_item_read(const lgd_command *c, bool published, lgd_item *item)
+{
+    if (*c->capture) {
+        if (lgd_read_capture(c->capture, c->size, c->max_pixels, &item->capture, &item->st) != TS_OK) return;
+        item->photo_side = c->size;
+        item->image = item->capture.image;
+        return;
+    }
+    int width, height;
+    if (lgd_photograph_square(item->job->photo, published, c->max_pixels, c->size, item->threads, &item->square, &width,
+                              &height, &item->st))
+        return;
+    item->photo_side = width < height ? width : height;
+    item->image = item->square.data;
+    if (c->mask && read_mask(c, width, height, &item->mask, &item->st)) ts_context(&item->st, "%s", item->job->photo);
+}
+
+/* What the library's calls get as their user. */
+typedef struct task {
+    lgd_item *item;
+    int steps; /* that will be made, at most */
+    lgd_item_progress progress;
+    void *user;
+} task;
+
+static int after_step(int step, double rmse, void *user)
+{
+    const task *t = user;
+    if (step == 0) t->item->first = rmse;
+    t->item->last = rmse;
+    t->item->steps = step;
+    return t->progress(t->item, (step + 1.0) / (t->steps + 1), t->user);
+}
+
+static int before_tile(double done, void *user)
+{
+    const task *t = user;
+    return t->progress(t->item, done, t->user);
+}
+
+void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, lgd_item_progress progress, void *user)
+{
+    const bool fixed = c->power > 0;
+    task t = {item, lgd_command_steps(c, model), progress, user};
+    const lgd_options options = {.size = sizeof options,
+                                 .iterations = c->iterations,
+                                 .threads = item->threads,
+                                 .progress = after_step,
+                                 .user = &t,
+                                 .power = fixed ? NULL : &item->power,
+                                 .exact = c->exact,
+                                 .precision = c->bf16 ? LGD_BF16 : LGD_F32,
+                                 .orientations = c->orientations,
+                                 .mask = item->mask,
+                                 .tolerance = c->tolerance,
+                                 .tile = before_tile};
+    item->photo[0] = lgd_flash_photo(item->image);
+    item->photos = item->capture.images ? lgd_capture_photos(&item->capture, lgd_most_photos(model), item->photo) : 1;
+    item->power = fixed ? c->power : 1;
+    for (int k = 0; k < item->photos; k++) item->photo[k].power *= (float)item->power;
+    if (io_material_create(&item->m, c->size, &item->st) != TS_OK ||
+        lgd_model_estimate(model, item->photo, item->photos, c->size, &options, true, item->m.maps, &item->st))
+        ts_context(&item->st, "%s", item->job->photo);
+    else if (!fixed) item->photo[0].power *= (float)item->power;
+}
+
+void lgd_item_write(const lgd_command *c, lgd_item *item)
+{
+    if (lgd_output_write(c->out, item->job->stem, &item->m, &item->photo[0], c->outputs, c->directx, item->threads,
+                         &item->lost, &item->st))
+        ts_context(&item->st, "%s", item->job->photo);
+}
+
+void lgd_item_free(lgd_item *item)
+{
+    io_image_free(&item->square);
+    io_capture_free(&item->capture);
+    io_material_free(&item->m);
+    free(item->mask);
+    item->mask = NULL;
+}

@@ -1,0 +1,40 @@
+/* A photograph on its way: read, estimated, written. */
+#ifndef LGD_ITEM_H
+#define LGD_ITEM_H
+#include "cli/infer/options.h"
+#include "cli/infer/plan.h"
+#include "data/material.h"
+#include "data/metallic.h"
+#include "infer/capture.h"
+#include "infer/lgd.h"
+
+typedef struct lgd_item {
+    const lgd_job *job;
+    int index;           /* into the plan */
+    ts_status st;        /* the first failure on the way; later stages leave the item alone */
+    io_image square;     /* linear, command->size a side; not of a capture */
+    io_capture capture;  /* images 0: there is none */
+    const float *image;  /* the photograph, or the first of the capture: in one of these; NULL: not read */
+    unsigned char *mask; /* [size][size] from command->mask, or NULL */
+    int photo_side;      /* the shorter side of the photograph in pixels */
+    lgd_photo photo[IO_CAPTURE_IMAGES];
+    int photos;             /* of these, the ones that the weights read */
+    io_material m;          /* in the encoding of tensor/maps.h */
+    double first, last;     /* reconstruction RMSE of R_0 and of the last R_t */
+    int steps;              /* t of that */
+    double power;           /* of the light that was taken, in those that the photographs name */
+    io_metallic_error lost; /* infer/output.h */
+    int threads;            /* to compute and write it on, the calling thread's own (tensor/threads.h) */
+    double shown;           /* the progress function's: how much of it the progress bar has, 0 .. 1 */
+    int stage;              /* the pipeline's */
+} lgd_item;
+
+/* Called while an item is estimated, with the part that is done; nonzero: stop. */
+typedef int (*lgd_item_progress)(lgd_item *item, double done, void *user);
+
+/* Each sets the item's st on failure. published: as infer/photograph.h says. */
+void lgd_item_read(const lgd_command *c, bool published, lgd_item *item);
+void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, lgd_item_progress progress, void *user);
+void lgd_item_write(const lgd_command *c, lgd_item *item);
+void lgd_item_free(lgd_item *item);
+#endif

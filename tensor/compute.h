@@ -1,0 +1,17 @@
+/* How something is computed: a tape is given one (ag_compute_set), its operations hand it on. */
+#ifndef TS_COMPUTE_H
+#define TS_COMPUTE_H
+#include <stdbool.h>
+
+/* TS_BF16: inputs and weights of products are rounded to bf16, sums stay f32. */
+typedef enum ts_precision { TS_F32, TS_BF16, TS_PRECISION_COUNT } ts_precision;
+
+typedef struct ts_compute {
+    bool exact;             /* no Winograd, whose rounding errors are about ten times as large */
+    ts_precision precision; /* of convolutions and gated units: forward and the gradient of the input; of the gradient
+                               of the weights where the CPU has a matrix unit */
+    int threads;            /* of loops; 0: the process's number (tensor/threads.h) */
+} ts_compute;
+
+const char *ts_precision_name(ts_precision p); /* f32, bf16 */
+#endif

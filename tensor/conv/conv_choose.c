@@ -1,0 +1,90 @@
+/* Which way a convolution goes. Nobody else decides: the tape, packing and the entries in conv.c ask here. */
+#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/conv_winograd.h"
+
+const char *ts_precision_name(ts_precision p) { return p == TS_BF16 ? "bf16" : "f32"; }
+
+const char *ts_conv_way_name(ts_conv_way way)
+{
+    static const char *const names[] = {"direct", "pointwise", "batch", "col2im", "lanes", "Winograd", "AMX"};
+    return names[way];
+}
+
+/* Small maps in a batch: a register tile holds one pixel position of several images, so nothing is padded. With fewer
+ * than 8 images the tile is half empty and pays only up to 16 pixels. */
+static bool small_maps(const ts_conv *c)
+{
+    return c->n >= 4 && c->h * c->w <= (c->n < 8 ? CONV_BATCH_PIXELS / 4 : CONV_BATCH_PIXELS);
+}
+
+/* In twelfths of an FMA per input, pixel and tap: panels of one vector are held back by their loads. */
+static int64_t panel_cost(int oc, int pixels)
+{
+    const int vectors = conv_whole(oc) / conv_lanes();
+    return (int64_t)vectors * conv_lanes() * pixels * (vectors == 1 ? 13 : 12);
+}
+
+/* The same with pixels in the lanes, which leaves none empty but at the end of a row. */
+static bool lanes_pay(int oc, int k)
+{
+    return k > 1 && oc <= 2 * conv_lanes() && (int64_t)15 * oc * 64 < panel_cost(oc, 64);
+}
+
+/* In tenths of an FMA of a lane; the constants are of measured times, by AVX-512. To add a product costs as much as to
+ * make it of 25 inputs. */
+static bool col2im_pays(int ic, int oc, int k)
+{
+    if (k == 1 || oc > 2 * conv_lanes()) return false;
+    const int64_t products = (int64_t)k * k * ic, here = (int64_t)12 * conv_whole(k * k * oc) * (ic + 25);
+    return here < products * 13 * conv_whole(oc) && (!lanes_pay(oc, k) || here < products * (13 * oc + 70));
+}
+
+ts_conv_way conv_choose_narrow(int ic, int oc, int k)
+{
+    return col2im_pays(ic, oc, k) ? TS_CONV_BY_COL2IM : lanes_pay(oc, k) ? TS_CONV_BY_LANES : TS_CONV_DIRECTLY;
+}
+
+/* 36 products in place of 144 pay for the transformations. Tiles that are mostly outside cost what that saves, and
+ * fewer than 64 tiles save less than the transformation of the weights costs. */
+static bool winograd_pays(const ts_conv *c, int ic, int oc)
+{
+    const int64_t tiles = winograd_grid_forward(c).tiles;
+    return c->k == 3 && ic >= 16 && oc >= 24 && tiles >= 64 &&
+        2 * tiles * WINOGRAD_SIDE * WINOGRAD_SIDE <= 3 * (int64_t)c->n * c->h * c->w;
+}
+
+static ts_conv_way choose_weights(const ts_conv *c, bool bf16)
+{
+    if (bf16 && conv_amx_present()) return TS_CONV_BY_AMX;
+    if (!c->compute.exact && winograd_pays(c, c->ic, c->oc) &&
+        winograd_grid_forward(c).tiles >= 4 * WINOGRAD_CHUNK_TILES) /* a sum each for the threads */
+        return TS_CONV_BY_WINOGRAD;
+    if (c->k > 1 && c->h * c->w <= CONV_BATCH_PIXELS) return TS_CONV_BY_BATCH; /* padding is never multiplied */
+    return TS_CONV_DIRECTLY;
+}
+
+ts_conv_way ts_conv_choose(const ts_conv *c, ts_conv_direction direction)
+{
+    const bool forward = direction == TS_CONV_OUTPUT, bf16 = c->compute.precision == TS_BF16;
+    if (direction == TS_CONV_WEIGHTS) return choose_weights(c, bf16);
+    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c);
+    if (bf16 && conv_amx_present()) return TS_CONV_BY_AMX; /* 8 to 16 times the products of f32 */
+    if (!bf16 && !c->compute.exact && winograd_pays(c, ic, oc)) return TS_CONV_BY_WINOGRAD; /* half the time */
+    if (c->k == 1) return TS_CONV_BY_PIXELS; /* all images are one row: no window */
+    if (small_maps(c)) return TS_CONV_BY_BATCH;
+    if (bf16) return TS_CONV_DIRECTLY; /* pairs have no narrow way */
+    const ts_conv_way narrow = conv_choose_narrow(ic, oc, c->k);
+    const int fold = forward || c->pad == TS_PAD_ZERO ? 0 : c->dilation * (c->k / 2), width = c->w + 2 * fold;
+    if (narrow == TS_CONV_BY_LANES && (int64_t)14 * oc * conv_whole(width) >= panel_cost(oc, width))
+        return TS_CONV_DIRECTLY; /* rows so narrow that lanes stay empty at their end */
+    return narrow;
+}
+
+ts_conv_use ts_conv_packing(const ts_conv *c, ts_conv_direction direction)
+{
+    const bool forward = direction == TS_CONV_OUTPUT;
+    if (c->compute.precision == TS_BF16) return forward ? TS_CONV_FORWARD_BF16 : TS_CONV_DATA_GRADIENT_BF16;
+    if (ts_conv_choose(c, direction) == TS_CONV_BY_WINOGRAD)
+        return forward ? TS_CONV_WINOGRAD : TS_CONV_DATA_GRADIENT_WINOGRAD;
+    return forward ? TS_CONV_FORWARD : TS_CONV_DATA_GRADIENT;
+}

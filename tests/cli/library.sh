@@ -1,0 +1,74 @@
+#!/bin/sh
+# liblgd: which symbols it has, that it installs and goes away, and that the README's program runs with both forms of it.
+. tests/cli/lib.sh
+case "$BUILD ${MAKEFLAGS:-}" in *asan* | *fsanitize*) SANITIZED=1 ;; *) SANITIZED= ;; esac
+
+# The functions that lgd.h declares for others, by name.
+api() {
+    sed -n 's/^LGD_API .*[ *]\(lgd_[a-z_]*\)(.*/\1/p' infer/lgd.h | sort >"$T/api"
+    [ "$(wc -l <"$T/api")" -gt 5 ] || fail "lgd.h declares $(wc -l <"$T/api") functions"
+}
+
+same() { cmp -s "$1" "$2" || fail "$3: $(diff "$1" "$2" | grep '^[<>]' | head -n 3 | tr '\n' ' ')"; }
+
+exports_are_those_of_the_header() {
+    [ -z "$SANITIZED" ] || skip "the sanitizers add symbols of their own"
+    api
+    nm -g --defined-only "$BUILD/liblgd.a" | awk 'NF == 3 { print $3 }' | sort >"$T/static"
+    nm -D --defined-only "$BUILD/liblgd.so" | awk 'NF == 3 { print $3 }' | sort >"$T/shared"
+    same "$T/api" "$T/static" "liblgd.a exports"
+    same "$T/api" "$T/shared" "liblgd.so exports"
+    readelf -d "$BUILD/liblgd.so" >"$T/dynamic"
+    says "$T/dynamic" "soname: [liblgd.so.0]"
+}
+check library_exports_are_those_of_the_header exports_are_those_of_the_header
+
+reads_no_images() {
+    nm "$BUILD/liblgd.a" >"$T/symbols" 2>/dev/null
+    for name in png_ jpeg_ exr_ io_read_ tr_ cl_ ev_; do
+        grep -q " $name" "$T/symbols" && fail "liblgd.a holds or needs $(grep -m 1 -o " $name.*" "$T/symbols")"
+    done
+    :
+}
+check library_reads_no_images reads_no_images
+
+install_link_uninstall() {
+    [ -z "$SANITIZED" ] || skip "the sanitizers' build is not installed"
+    command -v pkg-config >/dev/null || skip "no pkg-config"
+    expect 0 make --no-print-directory install BUILD="$BUILD" DESTDIR="$T/root" PREFIX=/usr/local
+    root=$T/root/usr/local
+    for f in bin/lgd-infer bin/lgd-train bin/lgd-eval bin/lgd-data bin/lgd-convert lib/liblgd.a lib/liblgd.so lib/liblgd.so.0 \
+        lib/lgd/liblgd_image.so include/lgd.h share/lgd/single.safetensors lib/pkgconfig/lgd.pc; do
+        [ -s "$root/$f" ] || fail "$f is not installed"
+    done
+    sed -n '/^## As a library/,/^## /s/^    //p' README.md >"$T/user.c" # the README's own program
+    # Names that a program may well have itself.
+    printf '%s\n' 'int zip_open; int json_parse; int ts_fail; int nn_model_load; int io_unit;' >"$T/clash.c"
+    PKG_CONFIG_PATH=$root/lib/pkgconfig
+    export PKG_CONFIG_PATH
+    weights=$root/share/lgd/single.safetensors
+    shared=$(pkg-config --define-prefix --cflags --libs lgd)
+    static=$(pkg-config --define-prefix --static --cflags --libs lgd | sed 's/-llgd/-l:liblgd.a/')
+    # shellcheck disable=SC2086
+    expect 0 ${CC:-gcc} -Wall -Werror -o "$T/with_shared" "$T/user.c" "$T/clash.c" $shared
+    # shellcheck disable=SC2086
+    expect 0 ${CC:-gcc} -Wall -Werror -o "$T/with_static" "$T/user.c" "$T/clash.c" $static
+    readelf -d "$T/with_shared" >"$T/needed"
+    says "$T/needed" "liblgd.so.0"
+    export LD_LIBRARY_PATH="$root/lib"
+    expect 0 "$T/with_shared" "$weights"
+    says "$T/out" "roughness of the first pixel: 0."
+    cp "$T/out" "$T/first"
+    expect 1 "$T/with_shared" "$T/absent.safetensors"
+    says "$T/out" "absent.safetensors"
+    unset LD_LIBRARY_PATH
+    expect 0 "$T/with_static" "$weights"
+    same "$T/first" "$T/out" "the two libraries differ"
+    printf '#include <lgd.h>\nint main() { lgd_options o = lgd_options_default(); return o.size != sizeof o; }\n' >"$T/user.cpp"
+    # shellcheck disable=SC2086
+    expect 0 ${CXX:-g++} -Wall -Werror -o "$T/cpp" "$T/user.cpp" $static
+    expect 0 "$T/cpp"
+    expect 0 make --no-print-directory uninstall BUILD="$BUILD" DESTDIR="$T/root" PREFIX=/usr/local
+    [ -z "$(find "$T/root" ! -type d)" ] || fail "left behind: $(find "$T/root" ! -type d | head -n 3)"
+}
+check install_link_uninstall install_link_uninstall
