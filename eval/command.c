@@ -210,7 +210,7 @@ ts_code ev_command_parse(int argc, char **argv, ev_command *c, ts_status *st)
 void ev_command_help(void)
 {
     puts("Usage: lgd-eval [options] --set KIND:WHERE... -o DIR\n"
-         "Renders each known material under a flash (of a capture: takes its first picture) and estimates its maps "
+         "Renders each known material under a flash (of a capture: takes one picture) and estimates its maps "
          "from\n"
          "that photograph. Prints, for R_0 and after every refinement step, or for each method:\n"
          "  the RMSE of the maps (diffuse and specular in gamma space, roughness and normal linear), the RMSE of\n"

@@ -15,7 +15,7 @@ cat "$results.part" | tee -a "$results"
 if [ $code -ne 0 ] && ! grep -q '^FAIL ' "$results.part"; then echo "FAIL lgd-test: exit status $code" | tee -a "$results"; fi
 rm -f "$results.part"
 for script in tests/cli/*.sh; do
-    case $script in */lib*.sh) continue ;; esac
+    case $script in */lib.sh | */lib_*.sh) continue ;; esac
     sh "$script" >"$results.part" 2>&1
     code=$?
     cat "$results.part" | tee -a "$results"
