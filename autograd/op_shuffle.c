@@ -41,8 +41,8 @@ static void move(int threads, ts_shape large, int r, bool to_deep, const float *
 static void forward(ag_tape *tape, ag_node *node)
 {
     const shuffle_attr *a = node->attr;
-    move(ag_threads(tape), a->deep ? node->in[0]->t.shape : node->out->t.shape, a->r, a->deep, node->in[0]->t.data, node->out->t.data,
-         false);
+    move(ag_threads(tape), a->deep ? node->in[0]->t.shape : node->out->t.shape, a->r, a->deep, node->in[0]->t.data,
+         node->out->t.data, false);
 }
 
 static void backward(ag_tape *tape, ag_node *node)
@@ -50,7 +50,9 @@ static void backward(ag_tape *tape, ag_node *node)
     const shuffle_attr *a = node->attr;
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
-    if (dx) move(ag_threads(tape), a->deep ? node->in[0]->t.shape : node->out->t.shape, a->r, !a->deep, node->out->grad, dx, accumulate);
+    if (dx)
+        move(ag_threads(tape), a->deep ? node->in[0]->t.shape : node->out->t.shape, a->r, !a->deep, node->out->grad, dx,
+             accumulate);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)

@@ -33,7 +33,8 @@ enum {
 static const cl_argument arguments[] = {
     {'o', "output", "DIR", "write results.csv, summary.csv, times.csv, results.json and report.html there (required)"},
     {'d', "set", "KIND:WHERE",
-     "materials to evaluate (required, may be repeated):\nprocedural:SEED,COUNT[,FAMILY...]  generated materials, of classic, the first seventeen families (the\n"
+     "materials to evaluate (required, may be repeated):\nprocedural:SEED,COUNT[,FAMILY...]  generated materials, of "
+     "classic, the first seventeen families (the\n"
      "default), of all, or of those that lgd-data --help names\n"
      "strips:FOLDER  images of five panels: input, normal, diffuse, roughness, specular\nmaps:FOLDER  a folder of map "
      "folders\nmultiview:FOLDER  a capture, or a folder of them: 00.png, 01.png ..., camera_pos.txt,\nlight_pos.txt, "

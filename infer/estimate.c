@@ -1,5 +1,6 @@
 #include "infer/estimate.h"
 #include "data/material.h"
+#include "infer/first_guess.h"
 #include "infer/memory.h"
 #include "infer/power.h"
 #include "infer/tiles.h"
@@ -24,7 +25,7 @@ typedef struct given_photos {
     const float *image[NN_MAX_IMAGES];
     rd_view views[NN_MAX_IMAGES];
     int count, side;
-    const float *r0;
+    const float *r0, *deviation; /* deviation: of a model that says it */
 } given_photos;
 
 /* The photographs in the order in which models read them. */
@@ -139,6 +140,7 @@ static ts_code refine(const lgd_estimator *e, const given_photos *p, const lgd_o
                    .views = p->views,
                    .given = p->count,
                    .r0 = p->r0,
+                   .deviation = p->deviation,
                    .mask = o->mask,
                    .side = side,
                    .tile = tile,
@@ -212,6 +214,22 @@ static ts_code fit_power(const lgd_estimator *e, given_photos *p, const lgd_opti
     return code;
 }
 
+/* What a model that guesses the scene says first. Where the power is to be estimated, so are the places. */
+static ts_code first_guess(const lgd_estimator *e, given_photos *p, const lgd_options *o, lgd_first_guess *guess,
+                           ts_status *st)
+{
+    const int known = o->power ? 0 : NN_KNOWN_ALL;
+    const double power = (double)p->views[0].power;
+    const ts_code code = lgd_first_guess_make(e->tape, e->net, p->image[0], p->side, &p->views[0], known,
+                                              o->orientations, guess, st);
+    if (code) return code;
+    p->views[0] = rd_scene_view(guess->number);
+    p->r0 = guess->r0;
+    p->deviation = guess->deviation;
+    if (o->power) *o->power = (double)p->views[0].power / power;
+    return TS_OK;
+}
+
 static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int photos, int side, const lgd_options *given,
                         float *maps, ts_status *st)
 {
@@ -226,11 +244,15 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     /* Once: memory that one stage has touched is there for the next, and touching it first costs as much as computing.
      */
     ag_reset(e->tape);
-    ts_code code = o.power ? fit_power(e, &p, &o, &r0, st) : TS_OK;
+    lgd_first_guess guess = {0};
+    ts_code code = TS_OK;
+    if (a->descent == NN_DESCENT_POSTERIOR) code = first_guess(e, &p, &o, &guess, st);
+    else if (o.power) code = fit_power(e, &p, &o, &r0, st);
     if (!code && o.iterations == LGD_AUTO && !choose) code = count_steps(e, &p, o.orientations, &steps, st);
     if (!code) code = refine(e, &p, &o, choose, &steps, maps, st);
     if (side > ONE_TILE) ag_drop(e->tape); /* what is done with such maps needs memory of its own */
     free(r0);
+    lgd_first_guess_free(&guess);
     return code;
 }
 

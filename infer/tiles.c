@@ -109,6 +109,22 @@ static bool after_step(int step, const ag_value *maps, void *user)
     return look(u->w, &u->loop->in, u->loop->core, step, maps ? maps->t.data : NULL);
 }
 
+/* R_0 of a window, which its steps will overwrite, and its errors' deviations there. */
+static bool prior(const work *w, rd_grid window, const float *maps, nn_state *state)
+{
+    const size_t pixels = (size_t)nn_window_pixels(window);
+    const ts_taps down = ts_taps_part(&w->taps[0], window.y0, window.h),
+                  across = ts_taps_part(&w->taps[0], window.x0, window.w);
+    float *mean = ts_arena_alloc(ag_arena(w->tape), pixels * (size_t)w->channels * sizeof *mean),
+          *deviation = ts_arena_alloc(ag_arena(w->tape), pixels * NN_SPREADS * sizeof *deviation);
+    if (!mean || !deviation) return ag_fail(w->tape, TS_NOMEM, "out of memory"), false;
+    memcpy(mean, maps, pixels * (size_t)w->channels * sizeof *mean);
+    ts_resample(1, NN_SPREADS, &down, &across, w->t->deviation, deviation, false, w->threads);
+    state->mean = mean;
+    state->deviation = deviation;
+    return true;
+}
+
 /* The steps of a tile. window: the tile and as much around it as its last step depends on, of which image is; maps gets
  * R_T of the tile. */
 static void refine(work *w, rd_grid core, rd_grid window, ts_tensor image, float *maps)
@@ -128,9 +144,12 @@ static void refine(work *w, rd_grid core, rd_grid window, ts_tensor image, float
         if (looks || i == begin) start(w, i, window, maps);
         if (looks) look(w, &loop.in, core, i, maps);
     }
+    const ts_mark mark = ts_arena_mark(ag_arena(w->tape));
+    if (t->deviation && !w->stopped && !prior(w, window, maps, &loop.state)) return;
     ag_value *now = ag_constant(w->tape, ts_view(maps, (ts_shape){1, window.h, window.w, w->channels}));
     if (now && !w->stopped) nn_steps(w->tape, w->model, &loop, &now);
     t->refined += (int64_t)nn_window_pixels(core) * loop.made;
+    ts_arena_release(ag_arena(w->tape), mark);
 }
 
 /* The smallest part of a tile that holds its wanted pixels; of no rows when there are none. */

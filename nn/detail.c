@@ -46,7 +46,7 @@ bool nn_detail(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *
     const int n = y->t.shape.n, side = y->t.shape.h;
     mark = ag_scope_begin(tape);
     y = nn_conv_with_constants(tape, model, l->detail[3], y, ag_concat(tape, photo, nn_coordinates(tape, n, side)), 1,
-                       TS_PAD_REPLICATE, NN_LEAK_G);
+                               TS_PAD_REPLICATE, NN_LEAK_G);
     y = nn_conv(tape, model, l->detail[4], y, 1, TS_PAD_REPLICATE, 1);
     ag_value *added = ag_shading_frame(tape, ag_channels(tape, y, 0, framed));
     ag_value *keep[2] = {ag_tanh(tape, ag_add(tape, ag_resize_smooth(tape, coarse, side, side), added)), NULL};

@@ -180,7 +180,7 @@ static void plan_refiner(nn_model *m, const char *name, int width, int gru, nn_r
         h->output = conv(m, full, a->channels, gru, 3, false, 1);
         l->start[h->output.weight] = 1e-3; /* h starts as nothing, nearly */
     }
-    if (a->descent == NN_DESCENT_NONE || !a->gradient) return;
+    if (a->descent == NN_DESCENT_NONE || a->descent == NN_DESCENT_POSTERIOR || !a->gradient) return;
     const bool newton = a->descent == NN_DESCENT_NEWTON;
     snprintf(full, sizeof full, "%s.%s", name, newton ? "newton" : "descent");
     h->path = conv(m, full, a->channels, newton ? a->channels : a->images * a->channels, 1, false, 1);

@@ -3,6 +3,7 @@
 #define NN_MODEL_H
 #include "autograd/tape.h"
 #include "nn/coder.h"
+#include "render/posterior.h"
 #include "render/scene.h"
 
 typedef enum nn_rmse {
@@ -27,8 +28,10 @@ typedef enum nn_compat {
 typedef enum nn_descent {
     NN_DESCENT_NONE,     /* nothing (published) */
     NN_DESCENT_GRADIENT, /* the encoded gradients */
-    NN_DESCENT_NEWTON /* the step of Gauss and Newton's method that fits each pixel to its photographs (rd_newton_step),
-                         by a learned 9 x 9 matrix */
+    NN_DESCENT_NEWTON,   /* the step of Gauss and Newton's method that fits each pixel to its photographs
+                          * (rd_newton_step), by a learned 9 x 9 matrix */
+    NN_DESCENT_POSTERIOR /* the whole step to the most probable maps (render/posterior.h); R_0 and what g says of its
+                          * errors are the prior */
 } nn_descent;
 
 /* The architecture, in the metadata of a weights file with one key each. */
@@ -195,9 +198,11 @@ typedef struct nn_state {
     ag_value *gru[2],
         *to[2];     /* to: NULL, or where the new states are written (a tape without gradients); to[i] may be gru[i] */
     ag_value *into; /* NULL, or where nn_refine writes R_{t+1} (a tape without gradients); may be R_t */
-    double *rmse0;  /* of each whole photograph by R_0, in the tape's arena; NULL: nn_refine measures it on its maps */
-    int step;       /* steps done; those beyond arch.iterations are shortened (docs/math.md, S7), but if compat is
-                       published */
+    const float *mean, *deviation; /* NN_DESCENT_POSTERIOR: R_0 and its errors' standard deviations in the grid's
+                                    * window, [h, w, channels] and [h, w, NN_SPREADS] */
+    double *rmse0; /* of each whole photograph by R_0, in the tape's arena; NULL: nn_refine measures it on its maps */
+    int step;      /* steps done; those beyond arch.iterations are shortened (docs/math.md, S7), but if compat is
+                      published */
 } nn_state;
 
 /* A step at the photograph's size (docs/math.md, S4): R_{t+1} = R_t + h(R_t, e) + D p. e is dL/dR_t, encoded
@@ -205,7 +210,9 @@ typedef struct nn_state {
  * depends on arch.descent:
  *     NN_DESCENT_NEWTON    the Newton step, damped by 0.1, in F0 by 1; D begins as half the identity
  *     NN_DESCENT_GRADIENT  e; D begins as -0.003 times the identity: an untrained loop is plain descent
+ *     NN_DESCENT_POSTERIOR the step to the most probable maps; D is the identity
  *     NN_DESCENT_NONE      0, as published */
+extern const ts_prior nn_step_prior; /* of NN_DESCENT_POSTERIOR */
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
 /* RMSE(R_t) = nn_rmse_of what nn_add_squares leaves: squares[i] += the squared differences between photograph i of in

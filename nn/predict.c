@@ -77,6 +77,7 @@ static bool reduce(ag_tape *tape, const nn_model *model, const nn_input *in, nn_
                         .grid = rd_grid_full(size),
                         .view = in->view,
                         .views = in->views,
+                        .known = in->known,
                         .given = in->given,
                         .orientations = in->orientations};
     return whole->shape.h == size || nn_resized(tape, whole, size, &small->image);

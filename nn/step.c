@@ -1,6 +1,7 @@
 /* A refinement step: the gradient and the Newton step of R_t, and R_{t+1} from them (docs/math.md, S4 to S11). */
 #include "nn/lgd_internal.h"
 #include "ops.h"
+#include "render/posterior.h"
 #include "render/published.h"
 #include "render/render.h"
 #include "tensor/kernels/elementwise.h"
@@ -96,6 +97,25 @@ static void newton_step(const ag_tape *tape, const nn_model *model, const nn_inp
     }
 }
 
+/* The correlations of the prior: q of the diffuse values and of F0's. And the noise of a photograph: as the Newton step
+ * has it, and what renderer and lens leave out. */
+const ts_prior nn_step_prior = {.hue = {0.1f, 0.1f}, .model = 0.03f, .noise = 0.002f};
+
+/* The step to the most probable maps of one photograph each: to is [N, H, W, channels]. */
+static bool posterior_step(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps,
+                           const nn_state *state, float *to)
+{
+    const ts_shape s = maps->shape;
+    if (!state->mean || !state->deviation || s.n != 1)
+        return ag_fail(tape, TS_INVALID, "the step to the most probable maps needs the prior of one material"), false;
+    const rd_view view = nn_view_of(model, in, 0);
+    const float *image = in->image.data;
+    const rd_prior prior = {state->mean, state->deviation, nn_step_prior};
+    rd_posterior_step(rd_grid_on(in->grid, ag_compute(tape)->threads), maps->data, s.c, &view, &image, 1, &prior, to,
+                      NULL);
+    return true;
+}
+
 bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps, const double *rmse0,
              float *gradient, float *newton)
 {
@@ -152,6 +172,13 @@ ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag
     ag_value *gradient = NULL, *newton = NULL;
     if (h->width > 0 || nn_descends(model, NN_DESCENT_GRADIENT))
         gradient = ag_empty(tape, (ts_shape){s.n, s.h, s.w, s.c * model->arch.images});
+    if (nn_descends(model, NN_DESCENT_POSTERIOR)) {
+        ag_value *step = ag_empty(tape, s);
+        if (!step || !posterior_step(tape, model, in, &maps->t, state, step->t.data)) return NULL;
+        state->step++;
+        ag_into(tape, state->into);
+        return ag_add(tape, maps, step);
+    }
     if (nn_descends(model, NN_DESCENT_NEWTON)) newton = ag_empty(tape, s);
     if (ag_status(tape)->code) return NULL;
     if (!nn_read(tape, model, in, &maps->t, state->rmse0, gradient ? gradient->t.data : NULL,

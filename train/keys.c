@@ -2,12 +2,12 @@
 #include "train/config.h"
 #include <stddef.h>
 
-static const char *const encoding_names[] = {"raw", "asinh", NULL};              /* as nn_gradient */
-static const char *const compat_names[] = {"none", "published", NULL};           /* as nn_compat */
-static const char *const descent_names[] = {"none", "gradient", "newton", NULL}; /* as nn_descent */
-static const char *const precision_names[] = {"f32", "bf16", NULL};              /* as ts_precision */
-static const char *const rmse_names[] = {"start", "batch", NULL};                /* as nn_rmse */
-static const char *const camera_names[] = {"data", "default", NULL};             /* as tr_camera */
+static const char *const encoding_names[] = {"raw", "asinh", NULL};                           /* as nn_gradient */
+static const char *const compat_names[] = {"none", "published", NULL};                        /* as nn_compat */
+static const char *const descent_names[] = {"none", "gradient", "newton", "posterior", NULL}; /* as nn_descent */
+static const char *const precision_names[] = {"f32", "bf16", NULL};                           /* as ts_precision */
+static const char *const rmse_names[] = {"start", "batch", NULL};                             /* as nn_rmse */
+static const char *const camera_names[] = {"data", "default", NULL};                          /* as tr_camera */
 
 #define AT(field) offsetof(tr_config, field)
 
@@ -58,7 +58,7 @@ const tr_key tr_keys[] = {
      "h carries its states from step to step"},
     {"model", "gradient", TR_BOOL, AT(arch.gradient), 0, 1, NULL, NULL, false,
      "h reads the gradient of the reconstruction error (no: zeros, an ablation)"},
-    {"model", "descent", TR_CHOICE, AT(arch.descent), 0, NN_DESCENT_NEWTON, NULL, descent_names, false,
+    {"model", "descent", TR_CHOICE, AT(arch.descent), 0, NN_DESCENT_POSTERIOR, NULL, descent_names, false,
      "what is added to the maps beside h, through a learned matrix over the channels: nothing (none, published), the "
      "gradient, or the Gauss-Newton step of each pixel (newton)"},
     {"model", "mean_before_norm", TR_BOOL, AT(arch.mean_before_norm), 0, 1, NULL, NULL, false,

@@ -21,7 +21,7 @@ typedef struct field {
 
 static const char *const rmse_words[] = {"start", "batch"}, *const encoding_words[] = {"raw", "asinh"},
                          *const compat_words[] = {"none", "published"};
-static const char *const descent_words[] = {"none", "gradient", "newton"};
+static const char *const descent_words[] = {"none", "gradient", "newton", "posterior"};
 _Static_assert(sizeof(nn_rmse) == sizeof(int) && sizeof(nn_compat) == sizeof(int) &&
                    sizeof(nn_gradient) == sizeof(int) && sizeof(nn_descent) == sizeof(int),
                "a word's field is read and written as an int");
@@ -41,7 +41,8 @@ static const field fields[] = {
     {"iterations", FIELD_INT, AT(iterations), 0, 1000, 6, NULL, false},
     {"recurrent", FIELD_BOOL, AT(recurrent), 0, 1, true, NULL, false},
     {"gradient", FIELD_BOOL, AT(gradient), 0, 1, true, NULL, false},
-    {"descent", FIELD_WORD, AT(descent), NN_DESCENT_NONE, NN_DESCENT_NEWTON, NN_DESCENT_NEWTON, descent_words, false},
+    {"descent", FIELD_WORD, AT(descent), NN_DESCENT_NONE, NN_DESCENT_POSTERIOR, NN_DESCENT_NEWTON, descent_words,
+     false},
     {"mean_before_norm", FIELD_BOOL, AT(mean_before_norm), 0, 1, true, NULL, false},
     {"rmse", FIELD_WORD, AT(rmse), NN_RMSE_START, NN_RMSE_BATCH, NN_RMSE_START, rmse_words, false},
     {"encoding", FIELD_WORD, AT(encoding), NN_GRADIENT_RAW, NN_GRADIENT_ASINH, NN_GRADIENT_ASINH, encoding_words,
@@ -129,6 +130,8 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
     if (a->g_unshuffle > 1 && a->images > 1)
         return ts_fail(st, TS_INVALID, "unshuffle is %d: that needs images 1", a->g_unshuffle);
     if (a->spread && a->g_unshuffle == 1) return ts_fail(st, TS_INVALID, "spread is set: that needs unshuffle above 1");
+    if (a->descent == NN_DESCENT_POSTERIOR && (!a->spread || !a->scene || a->coarse_steps > 0 || a->h_width > 0))
+        return ts_fail(st, TS_INVALID, "descent is posterior: that needs spread, scene, h_width 0 and coarse_steps 0");
     if (a->scene && a->images > 1) return ts_fail(st, TS_INVALID, "scene is set: that needs images 1");
     if (a->images > 1 && a->rmse == NN_RMSE_BATCH)
         return ts_fail(st, TS_INVALID, "images is %d: with rmse = batch it must be 1", a->images);

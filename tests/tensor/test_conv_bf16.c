@@ -199,6 +199,21 @@ static void against_naive(ts_conv c, ts_rng *r)
     finish(&p);
 }
 
+/* Of few inputs a band has many rows, and more steps than one of the largest block. */
+TEST(bf16_weight_gradient_of_few_inputs)
+{
+    if (!amx()) test_skip("the CPU has no matrix unit");
+    ts_rng r = ts_rng_make(27, TS_STREAM_TEST, 0);
+    problem p = make_problem((ts_conv){1, 256, 256, 16, 15, 3, 1, TS_PAD_REPLICATE, 0, {0}}, &r);
+    float *x = rounded(p.x, in_count(&p.c)), *dy = rounded(p.dy, out_count(&p.c));
+    float *dweight = gradient_of_weights(&p), *naive = values(weight_count(&p.c), NULL);
+    memcpy(naive, p.weight, weight_count(&p.c) * sizeof(float));
+    ts_conv_weight_gradient_naive(&p.c, x, dy, naive, NULL);
+    same(dweight, naive, weight_count(&p.c), (double)p.c.h * p.c.w, "weight gradient", &p.c);
+    free(x), free(dy), free(dweight), free(naive);
+    finish(&p);
+}
+
 TEST(bf16_conv_naive)
 {
     static const ts_conv shapes[] = {

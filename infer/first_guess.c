@@ -1,0 +1,91 @@
+#include "infer/first_guess.h"
+#include "infer/clip.h"
+#include "render/scene_model.h"
+#include "tensor/maps.h"
+#include "tensor/resize.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Of F0's error, what is not a level of the whole material: the part that a pixel may change by itself. */
+#define F0_DETAIL 0.35f
+#define LAPLACE 1.41421356f /* a Laplace density's standard deviation over its mean absolute error */
+
+/* The numbers that are known have no error: the prior keeps them. */
+static void scene_prior(const float *said, const rd_view *view, int known, rd_scene_prior *prior)
+{
+    float given[RD_SCENE_NUMBERS];
+    rd_scene_numbers(view, 0, 0, given);
+    for (int i = 0; i < RD_SCENE_NUMBERS; i++) {
+        prior->mean[i] = said[i];
+        prior->deviation[i] = LAPLACE * expf(fminf(fmaxf(said[RD_SCENE_NUMBERS + i], -6), 4));
+    }
+    const bool camera = known & NN_KNOWN_CAMERA, light = known & NN_KNOWN_LIGHT, power = known & NN_KNOWN_POWER;
+    const bool fixed[RD_SCENE_NUMBERS] = {[RD_SCENE_DISTANCE] = camera,         [RD_SCENE_CAMERA_X] = camera && light,
+                                          [RD_SCENE_CAMERA_Y] = camera && light, [RD_SCENE_LIGHT_X] = light,
+                                          [RD_SCENE_LIGHT_Y] = light,            [RD_SCENE_EXPOSURE] = power};
+    for (int i = 0; i < RD_SCENE_NUMBERS; i++) {
+        if (!fixed[i]) continue;
+        prior->mean[i] = given[i];
+        prior->deviation[i] = 0;
+    }
+    prior->mean[RD_SCENE_AMBIENT] = fmaxf(prior->mean[RD_SCENE_AMBIENT], 0);
+    prior->mean[RD_SCENE_TONE] = prior->deviation[RD_SCENE_TONE] = 0; /* the steps have no tone curve */
+}
+
+static ts_code make(ag_tape *tape, const nn_model *model, const float *image, int side, const rd_view *view, int known,
+                    int orientations, lgd_first_guess *g, ts_status *st)
+{
+    const int size = nn_arch_side(&model->arch), threads = ag_compute(tape)->threads;
+    const size_t pixels = (size_t)size * (size_t)size, whole = (size_t)side * (size_t)side * 3;
+    ag_value *small = ag_empty(tape, (ts_shape){1, size, size, 3});
+    g->r0 = malloc(pixels * (size_t)model->arch.channels * sizeof *g->r0);
+    g->deviation = malloc(pixels * NN_SPREADS * sizeof *g->deviation);
+    ts_tensor full = ts_new(ag_arena(tape), (ts_shape){1, side, side, 3});
+    if (!small || !g->r0 || !g->deviation || !full.data)
+        return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
+    lgd_clip((int64_t)whole, image, full.data);
+    if (side == size) memcpy(small->t.data, full.data, whole * sizeof(float));
+    else if (ts_resize(&small->t, &full, ag_arena(tape), threads, st)) return st->code;
+    const unsigned char is_known = (unsigned char)known;
+    const nn_input in = {.image = small->t,
+                         .grid = rd_grid_full(size),
+                         .views = view,
+                         .known = &is_known,
+                         .given = 1,
+                         .orientations = orientations};
+    nn_guess guess;
+    if (!nn_guess_from(tape, model, &in, &guess)) {
+        *st = *ag_status(tape);
+        return st->code;
+    }
+    memcpy(g->r0, guess.maps->t.data, pixels * (size_t)model->arch.channels * sizeof *g->r0);
+    for (size_t i = 0; i < pixels * NN_SPREADS; i++)
+        g->deviation[i] = (i % NN_SPREADS == GROUP_SPECULAR ? F0_DETAIL : 1) * LAPLACE * NN_SPREAD_UNIT *
+            expf(fminf(fmaxf(guess.spread->t.data[i], -6), 4));
+    rd_scene_prior prior;
+    scene_prior(guess.scene->t.data, view, known, &prior);
+    memcpy(g->number, prior.mean, sizeof g->number);
+    const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior};
+    rd_scene_fit(rd_grid_on(rd_grid_full(size), threads), g->r0, model->arch.channels, g->deviation, small->t.data,
+                 &prior, &how, g->number, NULL);
+    return TS_OK;
+}
+
+ts_code lgd_first_guess_make(ag_tape *tape, const nn_model *model, const float *image, int side, const rd_view *view,
+                             int known, int orientations, lgd_first_guess *guess, ts_status *st)
+{
+    *guess = (lgd_first_guess){0};
+    const ts_mark mark = ag_scope_begin(tape);
+    const ts_code code = make(tape, model, image, side, view, known, orientations, guess, st);
+    ag_scope_end(tape, mark, NULL, 0);
+    if (code) lgd_first_guess_free(guess);
+    return code;
+}
+
+void lgd_first_guess_free(lgd_first_guess *guess)
+{
+    free(guess->r0);
+    free(guess->deviation);
+    *guess = (lgd_first_guess){0};
+}

@@ -1,0 +1,127 @@
+/* Estimates of a model that guesses the scene and steps to the most probable maps. */
+#include "infer/estimate.h"
+#include "infer/first_guess.h"
+#include "tests/support/networks.h"
+
+enum { PLACE = 64, WIDE = 600 };
+
+static nn_model *network(void)
+{
+    nn_arch a = tiny();
+    a.g_unshuffle = 4, a.g_detail = 6, a.h_width = 0, a.descent = NN_DESCENT_POSTERIOR, a.iterations = 4;
+    a.conditions = a.spread = a.scene = true;
+    return create(&a, 81);
+}
+
+static float *estimate(const nn_model *m, const float *image, int side, int steps, double *power)
+{
+    ts_status st = {0};
+    float *maps = malloc(sizeof *maps * (size_t)side * (size_t)side * 9);
+    ag_tape *tape = tape_create(false);
+    ag_freeze(tape, true);
+    const lgd_photo photo = lgd_flash_photo(image);
+    const lgd_options o = {.size = sizeof o, .iterations = steps, .power = power};
+    const lgd_estimator e = {.net = m, .tape = tape, .encoded = true};
+    CHECK(!lgd_estimator_run(&e, &photo, 1, side, &o, maps, &st), "%s", st.message);
+    ag_tape_destroy(&tape);
+    return maps;
+}
+
+static double rmse(const float *maps, const float *image, int side)
+{
+    const rd_view view = rd_flash();
+    double error;
+    rd_flash_rmse(rd_grid_full(side), maps, 9, &view, image, &error);
+    return error;
+}
+
+/* Under a scene that is known the steps bring renderings nearer to the photograph, and leave them where it is black
+ * and white alike. */
+TEST(first_guess_steps_explain_the_photograph)
+{
+    nn_model *m = network();
+    const nn_input in = photographs(1, PLACE, 82, NULL);
+    float *r0 = estimate(m, in.image.data, PLACE, 0, NULL), *r4 = estimate(m, in.image.data, PLACE, 4, NULL);
+    const double before = rmse(r0, in.image.data, PLACE), after = rmse(r4, in.image.data, PLACE);
+    CHECK(after < 0.7 * before, "RMSE %g after %g", after, before);
+    for (int i = 0; i < PLACE * PLACE * 9; i++) CHECK(r4[i] >= -1 && r4[i] <= 1, "a map of %g", (double)r4[i]);
+    free(r0);
+    free(r4);
+    free(in.image.data);
+    nn_model_free(&m);
+}
+
+/* A network that is sure of its maps keeps them. */
+TEST(first_guess_that_is_sure_stays)
+{
+    nn_model *m = network();
+    const nn_param *bias = nn_model_find(m, "g.detail.conv5.bias");
+    for (size_t i = 11; i < bias->count; i++) m->value[bias->offset + i] = -6;
+    const nn_input in = photographs(1, PLACE, 83, NULL);
+    float *r0 = estimate(m, in.image.data, PLACE, 0, NULL), *r4 = estimate(m, in.image.data, PLACE, 4, NULL);
+    double sum = 0;
+    for (int i = 0; i < PLACE * PLACE * 9; i++) sum += ((double)r0[i] - (double)r4[i]) * ((double)r0[i] - (double)r4[i]);
+    sum = sqrt(sum / (PLACE * PLACE * 9));
+    CHECK(sum < 3e-4, "the maps moved by %g (RMS)", sum);
+    free(r0);
+    free(r4);
+    free(in.image.data);
+    nn_model_free(&m);
+}
+
+/* What is known of the scene is kept as it is; what is not is finite and reported. */
+TEST(first_guess_keeps_what_is_known)
+{
+    nn_model *m = network();
+    const nn_input in = photographs(1, PLACE, 84, NULL);
+    ts_status st = {0};
+    ag_tape *tape = tape_create(false);
+    rd_view view = rd_flash();
+    view.camera[2] = view.light[2] = 1.5f;
+    view.light[0] = 0.1f;
+    for (int known = 0; known <= NN_KNOWN_ALL; known++) {
+        lgd_first_guess g;
+        float want[RD_SCENE_NUMBERS];
+        CHECK(!lgd_first_guess_make(tape, m, in.image.data, PLACE, &view, known, 1, &g, &st), "%s", st.message);
+        rd_scene_numbers(&view, 0, 0, want);
+        for (int i = 0; i < RD_SCENE_NUMBERS; i++) CHECK(isfinite(g.number[i]), "number %d is not finite", i);
+        if (known & NN_KNOWN_CAMERA)
+            CHECK(g.number[RD_SCENE_DISTANCE] == want[RD_SCENE_DISTANCE], "known %d: the distance moved", known);
+        if (known & NN_KNOWN_LIGHT)
+            CHECK(g.number[RD_SCENE_LIGHT_X] == want[RD_SCENE_LIGHT_X], "known %d: the light moved", known);
+        if (known & NN_KNOWN_POWER)
+            CHECK(g.number[RD_SCENE_EXPOSURE] == want[RD_SCENE_EXPOSURE], "known %d: the power changed", known);
+        lgd_first_guess_free(&g);
+    }
+    ag_tape_destroy(&tape);
+    double power = 0;
+    free(estimate(m, in.image.data, PLACE, 0, &power));
+    CHECK(power > 0 && isfinite(power), "a power of %g", power);
+    free(in.image.data);
+    nn_model_free(&m);
+}
+
+/* In tiles as in one piece. */
+TEST(first_guess_in_tiles)
+{
+    nn_model *m = network();
+    const nn_input in = photographs(1, WIDE, 85, NULL);
+    float *tiles = estimate(m, in.image.data, WIDE, 2, NULL);
+    ts_status st = {0};
+    float *whole = malloc(sizeof *whole * WIDE * WIDE * 9);
+    ag_tape *tape = tape_create(false);
+    ag_freeze(tape, true);
+    unsigned char *mask = malloc((size_t)WIDE * WIDE);
+    memset(mask, 1, (size_t)WIDE * WIDE);
+    const lgd_photo photo = lgd_flash_photo(in.image.data);
+    const lgd_options o = {.size = sizeof o, .iterations = 2, .mask = mask}; /* other tiles */
+    const lgd_estimator e = {.net = m, .tape = tape, .encoded = true};
+    CHECK(!lgd_estimator_run(&e, &photo, 1, WIDE, &o, whole, &st), "%s", st.message);
+    CHECK(!memcmp(tiles, whole, sizeof *whole * WIDE * WIDE * 9), "tiles of another size give other maps");
+    ag_tape_destroy(&tape);
+    free(mask);
+    free(whole);
+    free(tiles);
+    free(in.image.data);
+    nn_model_free(&m);
+}

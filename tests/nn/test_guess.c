@@ -1,0 +1,170 @@
+/* g at full detail: what it reads of the scene, what it says of its errors, and how it begins as a smaller g. */
+#include "nn/weights/weights.h"
+#include "tests/support/networks.h"
+
+enum { FINE = 4 * SIDE };
+
+static nn_arch detailed(void)
+{
+    nn_arch a = tiny();
+    a.g_unshuffle = 4, a.g_detail = 6, a.g_trunk = 1, a.h_width = 0, a.descent = NN_DESCENT_POSTERIOR;
+    a.conditions = a.spread = a.scene = true;
+    return a;
+}
+
+/* Every last layer that begins as zero gets values. */
+static void enliven_guess(nn_model *m)
+{
+    static const char *const last[] = {"g.detail.conv5.weight", "g.scene.numbers.weight", "g.trunk1.conv2.weight"};
+    for (size_t k = 0; k < sizeof last / sizeof *last; k++) {
+        const nn_param *p = nn_model_find(m, last[k]);
+        ts_rng r = ts_rng_make(9, TS_STREAM_TEST, k);
+        for (size_t i = 0; i < p->count; i++) m->value[p->offset + i] = ts_rng_range(&r, -0.1f, 0.1f);
+    }
+}
+
+static void guess(nn_model *m, const nn_input *in, float *maps, float *spread, float *scene)
+{
+    ag_tape *tape = tape_create(false);
+    nn_guess g;
+    CHECK(nn_guess_from(tape, m, in, &g), "%s", ag_status(tape)->message);
+    CHECK(ts_same(g.maps->t.shape, (ts_shape){1, FINE, FINE, 9}), "the maps' shape");
+    CHECK(ts_same(g.spread->t.shape, (ts_shape){1, FINE, FINE, NN_SPREADS}), "the spread's shape");
+    CHECK(ts_same(g.scene->t.shape, (ts_shape){1, 1, 1, 2 * RD_SCENE_NUMBERS}), "the scene's shape");
+    memcpy(maps, g.maps->t.data, sizeof(float) * FINE * FINE * 9);
+    memcpy(spread, g.spread->t.data, sizeof(float) * FINE * FINE * NN_SPREADS);
+    memcpy(scene, g.scene->t.data, sizeof(float) * 2 * RD_SCENE_NUMBERS);
+    ag_tape_destroy(&tape);
+}
+
+static double difference(const float *a, const float *b, size_t n)
+{
+    double most = 0;
+    for (size_t i = 0; i < n; i++) most = fmax(most, fabs((double)a[i] - (double)b[i]));
+    return most;
+}
+
+static float one[FINE * FINE * 9], two[FINE * FINE * 9], s1[FINE * FINE * NN_SPREADS], s2[FINE * FINE * NN_SPREADS];
+
+/* What is not known of a view changes nothing; what is known does. */
+TEST(guess_reads_what_is_known)
+{
+    const nn_arch a = detailed();
+    nn_model *m = create(&a, 71);
+    enliven_guess(m);
+    nn_input in = photographs(1, FINE, 72, NULL);
+    rd_view near = rd_flash(), far = near;
+    far.camera[2] = far.light[2] = 2;
+    far.light[0] = 0.2f;
+    far.power = 9;
+    float n1[2 * RD_SCENE_NUMBERS], n2[2 * RD_SCENE_NUMBERS];
+    for (int known = 0; known <= NN_KNOWN_ALL; known++) {
+        const unsigned char flags = (unsigned char)known;
+        in.known = &flags;
+        in.views = &near;
+        guess(m, &in, one, s1, n1);
+        in.views = &far;
+        guess(m, &in, two, s2, n2);
+        const double maps = difference(one, two, FINE * FINE * 9), scene = difference(n1, n2, 2 * RD_SCENE_NUMBERS);
+        CHECK(known ? maps > 1e-7 && scene > 1e-9 : maps == 0 && scene == 0, "known %d: maps %g, scene %g", known, maps,
+              scene);
+    }
+    nn_model_free(&m);
+    free(in.image.data);
+}
+
+/* Turned by a quarter, the mean over four orientations turns with the photograph, and so does the light's guess. */
+TEST(guess_turns_with_the_photograph)
+{
+    const nn_arch a = detailed();
+    nn_model *m = create(&a, 73);
+    enliven_guess(m);
+    nn_input in = photographs(1, FINE, 74, NULL);
+    const unsigned char nothing = 0;
+    const rd_view view = rd_flash();
+    in.known = &nothing;
+    in.views = &view;
+    in.orientations = 4;
+    float n1[2 * RD_SCENE_NUMBERS], n2[2 * RD_SCENE_NUMBERS];
+    guess(m, &in, one, s1, n1);
+    float *turned = malloc(sizeof(float) * FINE * FINE * 3), *own = in.image.data;
+    for (int y = 0; y < FINE; y++) /* a quarter counter-clockwise: (x, y) from (FINE - 1 - y, x) */
+        for (int x = 0; x < FINE; x++)
+            memcpy(turned + (y * FINE + x) * 3, own + (x * FINE + FINE - 1 - y) * 3, 3 * sizeof(float));
+    in.image = ts_view(turned, in.image.shape);
+    guess(m, &in, two, s2, n2);
+    double most = 0, spread = 0;
+    for (int y = 0; y < FINE; y++)
+        for (int x = 0; x < FINE; x++) {
+            const float *p = one + (x * FINE + FINE - 1 - y) * 9, *q = two + (y * FINE + x) * 9;
+            for (int c = 0; c < 9; c++) {
+                const float want = c == 3 ? -p[4] : c == 4 ? p[3] : p[c];
+                most = fmax(most, fabs((double)q[c] - (double)want));
+            }
+            spread = fmax(
+                spread,
+                difference(s1 + (x * FINE + FINE - 1 - y) * NN_SPREADS, s2 + (y * FINE + x) * NN_SPREADS, NN_SPREADS));
+        }
+    CHECK(most < 2e-5 && spread < 2e-5, "maps %g, spread %g", most, spread);
+    CHECK(fabs((double)(n2[RD_SCENE_LIGHT_X] + n1[RD_SCENE_LIGHT_Y])) < 2e-5 &&
+              fabs((double)(n2[RD_SCENE_LIGHT_Y] - n1[RD_SCENE_LIGHT_X])) < 2e-5,
+          "the light %g %g became %g %g", (double)n1[RD_SCENE_LIGHT_X], (double)n1[RD_SCENE_LIGHT_Y],
+          (double)n2[RD_SCENE_LIGHT_X], (double)n2[RD_SCENE_LIGHT_Y]);
+    nn_model_free(&m);
+    free(own);
+    free(turned);
+}
+
+/* A g that reads squares and conditions begins as the g that reads their means: of a photograph without detail its
+ * coarse maps are the same, and it adds nothing yet. */
+TEST(guess_begins_as_a_smaller_g)
+{
+    nn_arch small = tiny(), a = detailed();
+    small.h_width = 0;
+    nn_model *from = create(&small, 75), *m = create(&a, 76);
+    char path[256];
+    ts_status st = {0};
+    int taken, left;
+    snprintf(path, sizeof path, "%s/small.safetensors", test_folder());
+    CHECK(!nn_model_save(from, from->value, path, NULL, 0, &st), "%s", st.message);
+    CHECK(!nn_model_init_from(m, path, NULL, &taken, &left, &st), "%s", st.message);
+    float *plain = malloc(sizeof(float) * FINE * FINE * 3);
+    for (int i = 0; i < FINE * FINE * 3; i++) plain[i] = 0.2f + 0.1f * (float)(i % 3);
+    const unsigned char nothing = 0;
+    const rd_view view = rd_flash();
+    nn_input in = {.image = ts_view(plain, (ts_shape){1, FINE, FINE, 3}),
+                   .grid = rd_grid_full(FINE),
+                   .views = &view,
+                   .known = &nothing,
+                   .given = 1};
+    float scene[2 * RD_SCENE_NUMBERS];
+    guess(m, &in, one, s1, scene);
+    ag_tape *tape = tape_create(false);
+    const ag_value *maps = nn_predict(tape, from, &in);
+    CHECK(maps, "%s", ag_status(tape)->message);
+    double most = 0; /* tanh is applied before the one enlargement and after the other */
+    for (int i = 0; i < FINE * FINE * 9; i++) most = fmax(most, fabs((double)one[i] - (double)maps->t.data[i]));
+    CHECK(most < 0.02, "the maps differ by %g", most);
+    ag_tape_destroy(&tape);
+    nn_model_free(&from);
+    nn_model_free(&m);
+    free(plain);
+}
+
+/* An architecture that cannot be is refused by its key. */
+TEST(guess_architectures_are_checked)
+{
+    ts_status st = {0};
+    for (int i = 0; i < 5; i++) {
+        nn_arch a = detailed();
+        if (i == 0) a.images = 2;
+        if (i == 1) a.g_unshuffle = 1;
+        if (i == 2) a.scene = false;
+        if (i == 3) a.h_width = 4;
+        if (i == 4) a.coarse_steps = 1;
+        st = (ts_status){0};
+        CHECK(nn_arch_check(&a, &st) == TS_INVALID && *st.message, "%d is accepted", i);
+    }
+    const nn_arch a = detailed();
+    CHECK(!nn_arch_check(&a, &st), "%s", st.message);
+}
