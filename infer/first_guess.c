@@ -21,9 +21,12 @@ static void scene_prior(const float *said, const rd_view *view, int known, rd_sc
         prior->deviation[i] = LAPLACE * expf(fminf(fmaxf(said[RD_SCENE_NUMBERS + i], -6), 4));
     }
     const bool camera = known & NN_KNOWN_CAMERA, light = known & NN_KNOWN_LIGHT, power = known & NN_KNOWN_POWER;
-    const bool fixed[RD_SCENE_NUMBERS] = {[RD_SCENE_DISTANCE] = camera,         [RD_SCENE_CAMERA_X] = camera && light,
-                                          [RD_SCENE_CAMERA_Y] = camera && light, [RD_SCENE_LIGHT_X] = light,
-                                          [RD_SCENE_LIGHT_Y] = light,            [RD_SCENE_EXPOSURE] = power};
+    const bool fixed[RD_SCENE_NUMBERS] = {[RD_SCENE_DISTANCE] = camera,
+                                          [RD_SCENE_CAMERA_X] = camera && light,
+                                          [RD_SCENE_CAMERA_Y] = camera && light,
+                                          [RD_SCENE_LIGHT_X] = light,
+                                          [RD_SCENE_LIGHT_Y] = light,
+                                          [RD_SCENE_EXPOSURE] = power};
     for (int i = 0; i < RD_SCENE_NUMBERS; i++) {
         if (!fixed[i]) continue;
         prior->mean[i] = given[i];

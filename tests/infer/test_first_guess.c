@@ -60,7 +60,8 @@ TEST(first_guess_that_is_sure_stays)
     const nn_input in = photographs(1, PLACE, 83, NULL);
     float *r0 = estimate(m, in.image.data, PLACE, 0, NULL), *r4 = estimate(m, in.image.data, PLACE, 4, NULL);
     double sum = 0;
-    for (int i = 0; i < PLACE * PLACE * 9; i++) sum += ((double)r0[i] - (double)r4[i]) * ((double)r0[i] - (double)r4[i]);
+    for (int i = 0; i < PLACE * PLACE * 9; i++)
+        sum += ((double)r0[i] - (double)r4[i]) * ((double)r0[i] - (double)r4[i]);
     sum = sqrt(sum / (PLACE * PLACE * 9));
     CHECK(sum < 3e-4, "the maps moved by %g (RMS)", sum);
     free(r0);
