@@ -18,7 +18,7 @@ enum { SIZE = 32, IMAGES = 5 };
 static void make(io_material *m, io_capture *c, float brightness)
 {
     ts_status st = {0};
-    const io_procedural p = {.seed = 9};
+    const io_procedural p = {.seed = 9, .families = io_family_mask("classic")};
     CHECK(io_material_create(m, SIZE, &st) == TS_OK && io_capture_create(c, IMAGES, SIZE, &st) == TS_OK, "%s",
           st.message);
     io_procedural_make(&p, 4, m);

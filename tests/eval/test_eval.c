@@ -17,7 +17,7 @@ enum { SIZE = 16 };
 static void make_case(io_material *m, float *image, rd_view *views, ev_case *c)
 {
     ts_status st = {0};
-    const io_procedural p = {.seed = 9};
+    const io_procedural p = {.seed = 9, .families = io_family_mask("classic")};
     CHECK(io_material_create(m, SIZE, &st) == TS_OK, "%s", st.message);
     io_procedural_make(&p, 4, m);
     ts_rng rng = ts_rng_make(2, TS_STREAM_EVAL, 0);
