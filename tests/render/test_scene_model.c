@@ -311,3 +311,30 @@ TEST(scene_is_the_same_for_any_number_of_threads)
     ts_threads_set(0);
     end(&j);
 }
+
+TEST(scene_fit_is_finite)
+{
+    static const float extreme[] = {-1, 1, 0, -0.999999f, 0.999999f, 2, -5, 1e30f, -1e30f, 1e-40f};
+    static const float widths[] = {0, 1e-20f, 0.1f, 1, 1e30f, INFINITY, -1, NAN};
+    enum { EXTREMES = sizeof extreme / sizeof *extreme, WIDTHS = sizeof widths / sizeof *widths };
+    for (int isa = TS_BASE; isa <= (int)ts_isa_best(); isa++) {
+        ts_isa_use((ts_isa)isa);
+        job j = begin(3);
+        ts_rng rng = ts_rng_make(54, TS_STREAM_TEST, 0);
+        for (int round = 0; round < 40; round++) {
+            float number[K], after[K];
+            for (int i = 0; i < PIXELS * C; i++)
+                j.maps[i] = ts_rng_int(&rng, 3) ? extreme[ts_rng_int(&rng, EXTREMES)] : ts_rng_range(&rng, -1, 1);
+            for (int i = 0; i < PIXELS * G; i++) j.deviation[i] = widths[ts_rng_int(&rng, WIDTHS)];
+            for (int i = 0; i < PIXELS * 3; i++)
+                j.image[i] = round % 4 < 2 ? (float)(round % 2) : ts_rng_range(&rng, 0, 1);
+            j.how = (rd_scene_how){6, 1 + round % 3, 10, {{0.1f, 0}, round % 5 ? 0.1f : 0, round % 3 ? 0.1f : 0}};
+            fit(&j, number, after);
+            for (int i = 0; i < K; i++)
+                CHECK(fabsf(number[i]) <= 6 && after[i] >= 0 && after[i] <= j.prior.deviation[i] * 1.00001f,
+                      "%s, round %d: number %d is %g +- %g", ts_isa_name((ts_isa)isa), round, i, (double)number[i],
+                      (double)after[i]);
+        }
+        end(&j);
+    }
+}
