@@ -3,6 +3,7 @@
 #include "render/losses.h"
 #include "render/posterior.h"
 #include "render/render.h"
+#include "render/scene_model.h"
 #include "tensor/maps.h"
 #include <stdlib.h>
 #include <string.h>
@@ -58,6 +59,16 @@ static void posterior(void *user)
     for (int k = 0; k < j->photographs; k++) views[k] = rd_capture_view(k), image[k] = j->image;
     rd_posterior_step(rd_grid_full(j->side), j->maps, MAP_CHANNELS, views, image, j->photographs, &prior, j->gradient,
                       j->after);
+}
+
+/* Four steps, of every sixteenth row. */
+static void scene(void *user)
+{
+    job *j = user;
+    const rd_scene_prior prior = {{0}, {0.3f, 1, 1, 0.5f, 0.5f, 1, 1, 0.3f}};
+    const rd_scene_how how = {4, 16, 100, {{0.1f, 0.1f}, 0.1f, 0.02f}};
+    float number[RD_SCENE_NUMBERS] = {0}, after[RD_SCENE_NUMBERS];
+    rd_scene_fit(rd_grid_full(j->side), j->maps, MAP_CHANNELS, j->deviation, j->image, &prior, &how, number, after);
 }
 
 static void loss(void *user)
@@ -135,6 +146,9 @@ BENCH(render)
         t = bench_measure(posterior, &j);
         bench_row_unit(name[k], t, (double)pixels * j.photographs / t.seconds * 1e-6, "Mpixel/s");
     }
+    t = bench_measure(scene, &j);
+    bench_row_unit("the scene from 16 rows, 4 steps, 256^2", t, 4.0 * (double)pixels / 16 / t.seconds * 1e-6,
+                   "Mpixel/s");
     skipped(&j);
     t = bench_measure(loss, &j);
     /* prediction and target are both rendered, and counted once */

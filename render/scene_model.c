@@ -89,7 +89,7 @@ static float untone(double tone, double value)
         if (at > w) high = y;
         else low = y;
         const double to = y - (at - w) / slope;
-        y = to > low && to < high ? to : (low + high) / 2;
+        y = to >= low && to <= high ? to : (low + high) / 2;
     }
     return (float)(y * y);
 }
@@ -132,11 +132,12 @@ static void upper(double a[K][K], double x[K])
 
 /* The sums over the rows that are read, added in their order. */
 static ts_scene_sums sums_of(rd_grid grid, const float *maps, int channels, const float *deviation, const float *image,
-                             const rd_scene_how *how, const float number[K])
+                             const rd_scene_how *how, bool least, const float number[K])
 {
-    const ts_scene scene = rd_scene_of(number);
+    ts_scene scene = rd_scene_of(number);
     const int first = how->every / 2 < grid.h ? how->every / 2 : 0,
               rows = (grid.h - first + how->every - 1) / how->every;
+    scene.least = least;
     ts_scene_sums *part = ts_scratch(0, (size_t)rows * sizeof *part), all = {.misfit = 0};
 #pragma omp parallel for num_threads(ts_threads_of(grid.threads)) schedule(static)
     for (int i = 0; i < rows; i++) {
@@ -165,7 +166,8 @@ void rd_scene_fit(rd_grid grid, const float *maps, int channels, const float *de
 {
     const double worth = fmin((double)how->every / fmax((double)how->correlated, 1), 1);
     for (int step = 0; step < how->steps; step++) {
-        const ts_scene_sums sums = sums_of(grid, maps, channels, deviation, image, how, number);
+        const ts_scene_sums sums = sums_of(grid, maps, channels, deviation, image, how, step >= (how->steps + 1) / 2,
+                                           number);
         double a[K][K], z[K], to[K], longest = RD_SCENE_STRIDE;
         for (int i = 0, at = 0; i < K; i++)
             for (int j = i; j < K; j++, at++) a[i][j] = a[j][i] = worth * sums.matrix[at];

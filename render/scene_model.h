@@ -25,8 +25,8 @@ void rd_scene_value(const double maps[MAP_CHANNELS], const double point[2], cons
 void rd_scene_photograph(rd_grid grid, const float *maps, int channels, const float number[RD_SCENE_NUMBERS],
                          bool clamp, float *image);
 
-/* The tone curve undone, on so many threads (0: the process's number): values in [0, 1] of a photograph become those
- * that the curve was applied to. Others stay. in may be out. */
+/* The tone curve undone, on so many threads (0: the process's number): values in [0, 1] of a photograph become those that the curve was applied to. Others stay. in
+ * may be out. */
 void rd_scene_untone(int64_t count, const float *in, float tone, int threads, float *out);
 
 /* The photographs [N, S, S, 3] of maps [N, S, S, 9 or more], whole patches, in the scenes numbers [N, 1, 1,
@@ -43,17 +43,24 @@ typedef struct rd_scene_how {
     int steps;
     int every;        /* rows: the first one read is every / 2; 1 reads all */
     float correlated; /* so many pixels are worth one: the maps' errors of neighbours are alike */
-    ts_prior scale;   /* of the maps' prior, and of a photograph's noise */
+    ts_prior scale;   /* q of the maps' prior, and of a photograph's values the variance */
 } rd_scene_how;
 
-/* Gauss and Newton's method on the numbers of a photograph's scene, for maps that are uncertain. e = image - seen
- * (render/ posterior.h: its logarithm above 1, nothing where both are burnt out), J_t = d seen / d t, J = d seen / d
- * maps and the maps' covariance Sigma of a pixel give, summed over the pixels that are read, V = (J Sigma J' + S)^-1,
- * A = w sum J_t' V J_t,   b = w sum J_t' V e, where w = min(every / correlated, 1). With the prior's mean m and
- * deviations in the diagonal matrix Q a step goes to t = m + Q z,   (I + Q A Q) z = Q (b + A (t_before - m)), at most
- * RD_SCENE_STRIDE in any number; the ambient light is not let below 0, nor the tone curve out of
- * +-RD_SCENE_TONE_MOST. number begins with the caller's values; after (may be NULL): the square roots of the diagonal
- * of Q (I + Q A Q)^-1 Q at the last step. deviation [h, w, MAP_GROUPS] of the maps; image [h, w, 3]. Threaded; the same
+/* Gauss and Newton's method on the numbers of a photograph's scene, for maps that are uncertain. With e = image - seen
+ * (as in render/posterior.h: a logarithm above 1, nothing where both are burnt out), J_t = d seen / d t,
+ * J = d seen / d maps and the covariance Sigma of a pixel's maps, the sums over the pixels that are read are
+ *     V = (J Sigma J' + S)^-1,   A = w sum J_t' V J_t,   b = w sum J_t' V e,   w = min(every / correlated, 1).
+ * S has the variance model^2 + noise min(value, 1) of the rendering's value: with the photograph's, what is darker by
+ * chance would weigh more. With the prior's mean m and its deviations in the diagonal matrix Q a step goes to
+ *     t = m + Q z,   (I + Q A Q) z = Q (b + A (t_before - m)),
+ * at most RD_SCENE_STRIDE in any number. The ambient light is not let below 0, nor the tone curve's strength out of
+ * +-RD_SCENE_TONE_MOST.
+ * In the first half of the steps, values of the photograph that are burnt out tell nothing; from then on they tell that
+ * the rendering is no darker. Where much is burnt out and the maps are uncertain, exposure and tone curve lean to what
+ * by chance is not. The maps are the mean of what the material may be: of maps that were fitted to this photograph the
+ * errors depend on it, which is not foreseen.
+ * number begins with the caller's values. after (may be NULL): the square roots of the diagonal of
+ * Q (I + Q A Q)^-1 Q at the last step. deviation: of the maps, [h, w, MAP_GROUPS]; image: [h, w, 3]. Threaded; the same
  * bytes for any number of threads. */
 #define RD_SCENE_STRIDE 1.0
 #define RD_SCENE_TONE_MOST 1.5f
@@ -61,6 +68,6 @@ void rd_scene_fit(rd_grid grid, const float *maps, int channels, const float *de
                   const rd_scene_prior *prior, const rd_scene_how *how, float number[RD_SCENE_NUMBERS],
                   float after[RD_SCENE_NUMBERS]);
 
-/* For the op. */
+/* What the kernels need of them. */
 ts_scene rd_scene_of(const float number[RD_SCENE_NUMBERS]);
 #endif

@@ -62,8 +62,8 @@ V_INLINE void move(const ts_scene *scene, const lighting *e, const angles *g, mo
 V_INLINE void by_numbers(int c, const ts_scene *scene, const surface *s, const radiance *r, const couplings *k,
                          const motion *m, vf by[TS_SCENE_NUMBERS])
 {
-    const vf ud = diffuse_part(s, c), um = r->fresnel[c],
-             white = s->specular[c] + (1.0f - s->specular[c]) * s->diffuse[c];
+    const vf ud = diffuse_part(s, c), um = r->fresnel[c];
+    const vf white = s->specular[c] + (1.0f - s->specular[c]) * s->diffuse[c];
     const vf flash = v_fma(r->lobe, um, ud) * r->scale, mirror = r->lobe * r->scale * (1.0f - s->specular[c]);
     const vf l = ud * k->diffuse_l + um * k->mirror_l, v = um * k->mirror_v, h = um * k->mirror_h;
     for (int j = 0; j < PLACES; j++)
@@ -164,7 +164,12 @@ static void normal(const ts_scene *scene, const ts_shade_row *row, const float *
             for (int j = 0; j < TONE; j++) by[c][j] = v_min(v_max(slope * by[c][j], v_set(-STEEPEST)), v_set(STEEPEST));
             by[c][TONE] = above * tone;
             error[c] = v_select(burnt_out(value, t.target[c]), v_set(0), t.target[c] - seen);
-            variance[c] = variance_of(t.target[c], prior);
+            variance[c] = variance_of(v_min(value, v_set(1)), prior);
+            if (scene->least) continue;
+            const vf keep = v_select(t.target[c] >= v_set(TS_NEWTON_BURNT), v_set(0), v_set(1));
+            error[c] *= keep;
+            for (int j = own_at(c); j < MAP_CHANNELS; j++) g.u[c][j] *= keep;
+            for (int j = 0; j < TS_SCENE_NUMBERS; j++) by[c][j] *= keep;
         }
         orthogonalise(variance, &g);
         forward(&g, error);

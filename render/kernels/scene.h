@@ -12,6 +12,7 @@ typedef struct ts_scene {
     float offset;       /* patch widths for one number of a place */
     float ambient;      /* radiance for one number of the ambient light */
     float tone;         /* strength of the tone curve */
+    bool least;         /* a value that is burnt out tells that the rendering is no darker; else it tells nothing */
 } ts_scene;
 
 /* Sums over pixels of the normal equations, the upper triangle of the matrix by rows. */

@@ -2,6 +2,7 @@
  * where its vector is skipped, as beside pixels that need all. */
 #include "render/rows.h"
 #include "render/kernels/newton.h"
+#include "render/kernels/posterior.h"
 #include "tests/support/shading.h"
 #include "tensor/cpu.h"
 #include <math.h>
@@ -36,11 +37,15 @@ static void make_pixel(ts_rng *rng, const scene *s, bool needless, float *m, flo
 
 typedef struct results {
     float image[SIDE * 3], flash[SIDE * C], loss[SIDE * C], step[SIDE * C];
+    float probable[SIDE * C], after[SIDE * MAP_GROUPS];
 } results;
 
 static void compute(const scene *s, int y, const float *maps, const float *dark, const float *photo, results *r)
 {
     const float damping[C] = {0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 1, 1, 1};
+    const ts_prior prior = {{0.2f, 0.1f}, 0.1f, 0.5f};
+    float deviation[SIDE * MAP_GROUPS];
+    for (int i = 0; i < SIDE * MAP_GROUPS; i++) deviation[i] = 0.1f + 0.01f * (float)(i % 7);
     const rd_grid grid = rd_grid_full(SIDE);
     const ts_shade_view view = rd_shade_view(&s->view);
     ts_shade_row row = rd_shade_row(grid, 0, maps, C), other = rd_shade_row(grid, 0, dark, C);
@@ -49,6 +54,7 @@ static void compute(const scene *s, int y, const float *maps, const float *dark,
     ts_shade_k()->flash(&view, &row, photo, 3, r->flash);
     ts_shade_k()->log_loss(&view, 1, &row, &other, 3, r->loss);
     ts_newton_k()->step(&view, &photo, 1, &row, damping, r->step);
+    ts_posterior_k()->step(&view, &photo, 1, &row, &prior, dark, deviation, r->probable, r->after);
 }
 
 static void compare(const char *isa, const scene *s, int y)
@@ -78,6 +84,9 @@ static void compare(const char *isa, const scene *s, int y)
               "%s, %s: pixel %d has another gradient of the training loss beside others", isa, s->name, p);
         CHECK(!memcmp(r[0].step + p * C, r[1].step + p * C, C * sizeof(float)),
               "%s, %s: pixel %d goes elsewhere beside others", isa, s->name, p);
+        CHECK(!memcmp(r[0].probable + p * C, r[1].probable + p * C, C * sizeof(float)) &&
+                  !memcmp(r[0].after + p * MAP_GROUPS, r[1].after + p * MAP_GROUPS, MAP_GROUPS * sizeof(float)),
+              "%s, %s: pixel %d is probably elsewhere beside others", isa, s->name, p);
         for (int c = 0; c < 3; c++)
             CHECK(r[0].image[p * 3 + c] == (s->burnt ? 1 : 0), "%s, %s: pixel %d has the value %g", isa, s->name, p,
                   (double)r[0].image[p * 3 + c]);

@@ -70,7 +70,7 @@ static void blank_speed(char *text)
 {
     for (char *line = text; line && *line; line = strchr(line, '\n') ? strchr(line, '\n') + 1 : NULL) {
         char *comma = line;
-        for (int i = 0; i < 10; i++) comma = strchr(comma, ',') + 1;
+        for (int i = 0; i < 12; i++) comma = strchr(comma, ',') + 1;
         for (; *comma && *comma != ','; comma++) *comma = '_';
     }
     /* Blanks of equal length: times differ in their digits. */
