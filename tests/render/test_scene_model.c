@@ -69,7 +69,7 @@ TEST(scene_tone_is_undone)
             const double y = i / (STEPS - 1.0), w = y + tone * y * (1 - y) * (y - 0.5);
             maps[i] = (float)(w * w);
         }
-        rd_scene_untone(STEPS, maps, (float)tone, out);
+        rd_scene_untone(STEPS, maps, (float)tone, 0, out);
         for (int i = 0; i < STEPS; i++)
             CHECK(fabs(sqrt((double)out[i]) - i / (STEPS - 1.0)) < 2e-6, "tone %g: %g, not %g", tone,
                   sqrt((double)out[i]), i / (STEPS - 1.0));
