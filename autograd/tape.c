@@ -263,7 +263,7 @@ void ag_scope_end(ag_tape *tape, ts_mark mark, ag_value **keep, int count)
 {
     if (tape->gradients) return;
     ts_mark moving = ts_arena_mark(tape->moving);
-    /* Out of the way first, back in afterwards: what is kept may be larger than the room before it. */
+    /* Out of the way first, back in afterwards: what is kept may be larger than the space before it. */
     struct {
         ts_shape shape;
         float *data;

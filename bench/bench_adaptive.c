@@ -24,14 +24,14 @@ typedef struct setting {
     lgd_options options;
 } setting;
 
-static int load(const char *spec, int step, sample *s, int room)
+static int load(const char *spec, int step, sample *s, int capacity)
 {
     ev_set set = {0};
     ts_status st = {0};
     io_material m = {0};
     int n = 0;
     if (ev_set_open(spec, NULL, &set, &st)) return printf("  %s: %s\n", spec, st.message), 0;
-    for (int i = 0; i < set.count && n < room; i += step) {
+    for (int i = 0; i < set.count && n < capacity; i += step) {
         if (ev_set_load(&set, i, SIDE, &m, &st)) continue;
         ts_rng rng = ts_rng_make(1, TS_STREAM_EVAL, ev_set_identity(&set, i));
         s[n].image = malloc(PIXELS * 3 * sizeof(float));

@@ -70,11 +70,11 @@ static void material(void *user)
 }
 
 /* The same network and steps for the peer. */
-static void peer_job(const subject *s, char *job, size_t room)
+static void peer_job(const subject *s, char *job, size_t size)
 {
-    bench_peer_network("train", &s->model->arch, s->steps, job, (int)room);
+    bench_peer_network("train", &s->model->arch, s->steps, job, (int)size);
     const size_t n = strlen(job);
-    snprintf(job + n, room - n, " %d %d %d %d", s->c.train.batch, s->c.data.patch, s->in.grid.w, s->model->fixed[NN_G]);
+    snprintf(job + n, size - n, " %d %d %d %d", s->c.train.batch, s->c.data.patch, s->in.grid.w, s->model->fixed[NN_G]);
 }
 
 static double megabytes(subject *s, int steps, bool recompute)

@@ -88,12 +88,12 @@ static ts_code combine(const io_map_set *set, io_image map[IO_MAP_KINDS], int si
     return code;
 }
 
-ts_code io_read_map_folder(const char *path, const io_map_convention *told, int size, io_material *m, ts_status *st)
+ts_code io_read_map_folder(const char *path, const io_map_convention *given, int size, io_material *m, ts_status *st)
 {
     io_map_set set;
     io_image map[IO_MAP_KINDS] = {{0}};
     memset(m, 0, sizeof *m);
-    ts_code code = io_describe_map_folder(path, told, &set, st);
+    ts_code code = io_describe_map_folder(path, given, &set, st);
     if (code != TS_OK) return code;
     for (int k = 0; k < IO_MAP_KINDS && code == TS_OK; k++) {
         bool wanted = set.file[k][0] && !(k == IO_METALLIC_MAP && set.specular) &&

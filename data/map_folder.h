@@ -22,6 +22,6 @@ typedef struct io_map_set {
     bool directx;                 /* the normal's y points down */
 } io_map_set;
 
-/* Reads the folder's names and its meta.txt; told (may be NULL) holds the options, which win. */
-ts_code io_describe_map_folder(const char *path, const io_map_convention *told, io_map_set *set, ts_status *st);
+/* Reads the folder's names and its meta.txt; given (may be NULL) holds the options, which win. */
+ts_code io_describe_map_folder(const char *path, const io_map_convention *given, io_map_set *set, ts_status *st);
 #endif

@@ -169,14 +169,14 @@ static ts_code settle_normal(const char *path, const char *meta, io_normal conve
                              : "nothing says whether the normal's y is OpenGL or DirectX");
 }
 
-static ts_code settle_workflow(const char *path, const char *meta, io_workflow told, io_map_set *set, ts_status *st)
+static ts_code settle_workflow(const char *path, const char *meta, io_workflow given, io_map_set *set, ts_status *st)
 {
     char text[512] = "";
     bool base = set->file[IO_BASECOLOR][0], diffuse = set->file[IO_DIFFUSE_MAP][0],
          metallic = set->file[IO_METALLIC_MAP][0];
     bool specular = set->file[IO_SPECULAR_MAP][0], said_specular = false, said_metallic = false;
-    if (told != IO_WORKFLOW_FROM_FILE) {
-        said_specular = told == IO_WORKFLOW_SPECULAR;
+    if (given != IO_WORKFLOW_FROM_FILE) {
+        said_specular = given == IO_WORKFLOW_SPECULAR;
         said_metallic = !said_specular;
     } else if (find_key(meta, "workflow", text, sizeof text)) {
         said_specular = !strncasecmp(text, "specular", 8);
@@ -209,9 +209,9 @@ static ts_code settle_workflow(const char *path, const char *meta, io_workflow t
     return TS_OK;
 }
 
-ts_code io_describe_map_folder(const char *path, const io_map_convention *told, io_map_set *set, ts_status *st)
+ts_code io_describe_map_folder(const char *path, const io_map_convention *given, io_map_set *set, ts_status *st)
 {
-    const io_map_convention say = told ? *told : (io_map_convention){0};
+    const io_map_convention say = given ? *given : (io_map_convention){0};
     memset(set, 0, sizeof *set);
     char meta_path[PATH_MAX], *meta = NULL, text[512];
     size_t size;

@@ -28,8 +28,8 @@ typedef struct io_map_convention {
     io_workflow workflow;
     io_encoding colour;
 } io_map_convention;
-/* told: conventions from options, or NULL: from the folder. */
-ts_code io_read_map_folder(const char *path, const io_map_convention *told, int size, io_material *m, ts_status *st);
+/* given: conventions from options, or NULL: from the folder. */
+ts_code io_read_map_folder(const char *path, const io_map_convention *given, int size, io_material *m, ts_status *st);
 
 /* A strip: equal square panels side by side: input | normal | diffuse | roughness | specular, all linear, OpenGL y.
  * input (may be NULL) gets the first panel, linear. */

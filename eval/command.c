@@ -146,8 +146,8 @@ ts_code ev_command_parse(int argc, char **argv, ev_command *c, ts_status *st)
                 code = ts_fail(st, TS_INVALID, "--exposure: '%s' is not a number in 0.01 .. 100", value);
             break;
         case LIGHT: code = parse_light(value, c->light, st); break;
-        case TOLD: c->told_all = true; break;
-        case UNTOLD: c->untold = true; break;
+        case TOLD: c->light_known = true; break;
+        case UNTOLD: c->light_unknown = true; break;
         case PEER_MAPS: c->peer_maps = value; break;
         case IMAGES: c->images = true; break;
         case FAST: c->fast = true; break;
@@ -174,15 +174,15 @@ ts_code ev_command_parse(int argc, char **argv, ev_command *c, ts_status *st)
             c->threads = (int)n;
             break;
         case NORMAL:
-            if (!ev_set_ini_key("normal", value, &c->told))
+            if (!ev_set_ini_key("normal", value, &c->convention))
                 code = ts_fail(st, TS_INVALID, "--normal: '%s' is neither 'opengl' nor 'directx'", value);
             break;
         case WORKFLOW:
-            if (!ev_set_ini_key("workflow", value, &c->told))
+            if (!ev_set_ini_key("workflow", value, &c->convention))
                 code = ts_fail(st, TS_INVALID, "--workflow: '%s' is neither 'metallic' nor 'specular'", value);
             break;
         case COLOUR:
-            if (!ev_set_ini_key("colour", value, &c->told))
+            if (!ev_set_ini_key("colour", value, &c->convention))
                 code = ts_fail(st, TS_INVALID, "--colour: '%s' is neither 'srgb' nor 'linear'", value);
             break;
         case NOISE:

@@ -11,9 +11,9 @@ typedef struct ev_command {
     int64_t seed;
     const char *peer_maps;
     double noise, exposure, light[2]; /* exposure 0: not given */
-    io_map_convention told;
-    bool told_all, untold, images, fast, exact, pin, tune, pareto, iterations_figure, methods_figure, quiet, help,
-        version;
+    io_map_convention convention;
+    bool light_known, light_unknown, images, fast, exact, pin, tune, pareto, iterations_figure, methods_figure, quiet,
+        help, version;
 } ev_command;
 
 /* TS_INVALID with a message that names the option. The strings are argv's. */

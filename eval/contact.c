@@ -5,12 +5,12 @@
 ts_code ev_contact_add(ev_contact *contact, const ev_case *c, const float *maps, ts_status *st)
 {
     if (c->truth || c->capture) return TS_OK;
-    if (contact->count == contact->room) {
-        const int room = contact->room ? 2 * contact->room : 32;
-        io_image *more = realloc(contact->sheet, (size_t)room * sizeof *more);
+    if (contact->count == contact->capacity) {
+        const int capacity = contact->capacity ? 2 * contact->capacity : 32;
+        io_image *more = realloc(contact->sheet, (size_t)capacity * sizeof *more);
         if (!more) return ts_fail(st, TS_NOMEM, "out of memory for the contact sheet");
         contact->sheet = more;
-        contact->room = room;
+        contact->capacity = capacity;
     }
     const ts_code code = ev_sheet_small(c, maps, &contact->sheet[contact->count], st);
     contact->count += code == TS_OK;

@@ -6,7 +6,7 @@
 /* Rows of panels in the order of ev_contact_add. */
 typedef struct ev_contact {
     io_image *sheet;
-    int count, room;
+    int count, capacity;
 } ev_contact;
 
 /* A photograph without known maps, its estimate and, where there are any, a peer's maps; other cases are left out. */

@@ -41,23 +41,23 @@ static void show_progress(int64_t done, int64_t total, const char *name, void *u
     if (!w->c->quiet) cl_progress_show(&w->bar, done, name);
 }
 
-/* Whether the methods are told the light of a set's photographs. */
-static bool is_told(const ev_command *c, const ev_set *set)
+/* Whether the methods know the light of a set's photographs. */
+static bool is_light_known(const ev_command *c, const ev_set *set)
 {
     if (set->kind == EV_PHOTOS || set->kind == EV_PEERS) return false;
-    return set->kind == EV_MULTIVIEW ? c->told_all : !c->untold;
+    return set->kind == EV_MULTIVIEW ? c->light_known : !c->light_unknown;
 }
 
-/* The method where none is named: as lgd-infer estimates where nothing is told. */
-static ts_code parse_usual(const work *w, const char **spec, ts_status *st)
+/* The method where none is named: as lgd-infer estimates where the light is unknown. */
+static ts_code parse_default(const work *w, const char **spec, ts_status *st)
 {
-    const bool told = is_told(w->c, &w->set[0]);
+    const bool known = is_light_known(w->c, &w->set[0]);
     for (int s = 1; s < w->c->sets; s++)
-        if (is_told(w->c, &w->set[s]) != told)
+        if (is_light_known(w->c, &w->set[s]) != known)
             return ts_fail(st, TS_INVALID,
                            "--set %s: its light is %s, unlike that of %s: give --method, --told or --untold",
-                           w->set[s].spec, told ? "not told" : "told", w->set[0].spec);
-    *spec = told ? "lgd" : "lgd:power=auto,orientations=2,label=lgd";
+                           w->set[s].spec, known ? "not told" : "told", w->set[0].spec);
+    *spec = known ? "lgd" : "lgd:power=auto,orientations=2,label=lgd";
     return TS_OK;
 }
 
@@ -66,12 +66,12 @@ static ts_code parse_methods(work *w, ts_status *st)
 {
     const ev_command *c = w->c;
     w->run.methods = c->methods ? c->methods : 1;
-    const char *usual = "lgd";
-    if (!c->methods && parse_usual(w, &usual, st) != TS_OK) return st->code;
+    const char *spec = "lgd";
+    if (!c->methods && parse_default(w, &spec, st) != TS_OK) return st->code;
     w->method = calloc((size_t)w->run.methods, sizeof *w->method);
     if (!w->method) return ts_fail(st, TS_NOMEM, "out of memory");
     for (int i = 0; i < w->run.methods; i++) {
-        if (ev_method_parse(c->methods ? c->method[i] : usual, w->model, c->iterations, &w->method[i], st) != TS_OK)
+        if (ev_method_parse(c->methods ? c->method[i] : spec, w->model, c->iterations, &w->method[i], st) != TS_OK)
             return st->code;
         for (int j = 0; j < i; j++)
             if (!strcmp(w->method[i].label, w->method[j].label))
@@ -138,8 +138,8 @@ static int evaluate(work *w, ts_status *st)
     r->seed = (uint64_t)c->seed;
     r->noise = c->noise;
     r->exposure = c->exposure > 0 ? c->exposure : 1;
-    r->fit = c->exposure > 0 || c->untold;
-    r->told = c->told_all;
+    r->fit = c->exposure > 0 || c->light_unknown;
+    r->light_known = c->light_known;
     r->flash = rd_flash();
     for (int k = 0; k < 2; k++) r->flash.light[k] = (float)c->light[k];
     r->perceptual = !c->fast && !c->tune;
@@ -170,7 +170,7 @@ static int start(const ev_command *c)
     int code = CL_OK;
     w->c = c;
     for (int s = 0; s < c->sets && code == CL_OK; s++)
-        if (ev_set_open(c->spec[s], &c->told, &w->set[s], &st) != TS_OK)
+        if (ev_set_open(c->spec[s], &c->convention, &w->set[s], &st) != TS_OK)
             code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
         else w->set[s].peers = c->peer_maps;
     ts_threads_set(c->threads);

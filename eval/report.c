@@ -6,12 +6,12 @@
 
 int ev_report_add(ev_report *r, int set, const char *material, ts_status *st)
 {
-    if (r->results == r->room) {
-        const int room = r->room ? 2 * r->room : 64;
-        ev_result *more = realloc(r->result, (size_t)room * sizeof *more);
+    if (r->results == r->capacity) {
+        const int capacity = r->capacity ? 2 * r->capacity : 64;
+        ev_result *more = realloc(r->result, (size_t)capacity * sizeof *more);
         if (!more) return ts_fail(st, TS_NOMEM, "out of memory for the results"), -1;
         r->result = more;
-        r->room = room;
+        r->capacity = capacity;
     }
     const size_t columns = (size_t)r->columns, methods = (size_t)r->methods;
     ev_result *to = &r->result[r->results++];
@@ -45,7 +45,7 @@ void ev_report_free(ev_report *r)
     }
     free(r->result);
     r->result = NULL;
-    r->results = r->room = 0;
+    r->results = r->capacity = 0;
 }
 
 static int by_size(const void *a, const void *b)

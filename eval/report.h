@@ -31,7 +31,7 @@ typedef struct ev_report {
     int *step; /* of each column; the caller's */
     int columns;
     ev_result *result;
-    int results, room;
+    int results, capacity;
 } ev_report;
 
 /* A material with nothing measured yet: its index in r->result, -1 with st. */

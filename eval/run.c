@@ -60,8 +60,9 @@ static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, t
             return ts_fail(st, TS_FORMAT, "%s: has %d pictures: %d are the input, and one more at least is compared",
                            b->name, b->capture.images, r->inputs);
         ev_capture_nearest_first(&b->capture);
-        if (r->told) ev_capture_input(&b->capture, r->inputs, b->image);
-        *c = ev_case_of_capture(&b->capture, r->told ? b->image : b->capture.image, r->inputs, r->told, r->perceptual);
+        if (r->light_known) ev_capture_input(&b->capture, r->inputs, b->image);
+        *c = ev_case_of_capture(&b->capture, r->light_known ? b->image : b->capture.image, r->inputs, r->light_known,
+                                r->perceptual);
         c->lpips = r->lpips;
         return TS_OK;
     }

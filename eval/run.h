@@ -16,7 +16,7 @@ typedef struct ev_run {
     double noise, exposure; /* exposure: true power of the inputs' lights over the power that the methods know */
     rd_view flash;          /* of the first input, as the methods know it; not of captures */
     bool fit;               /* compare renderings after one factor is fitted */
-    bool told;              /* of captures: the methods are told their lights and cameras */
+    bool light_known;       /* of captures: the methods know their lights and cameras */
     bool perceptual, pictures, pinned; /* SSIM and FLIP; pictures for the report; whether the threads are pinned */
     bool exact;                        /* of every method (ev_estimator) */
     ev_lpips *lpips;                   /* also LPIPS, unless NULL */

@@ -51,7 +51,7 @@ static ts_code parse(const char *path, char *text, io_map_convention *c, ts_stat
     return TS_OK;
 }
 
-ts_code ev_set_ini(const char *folder, const io_map_convention *told, io_map_convention *out, ts_status *st)
+ts_code ev_set_ini(const char *folder, const io_map_convention *given, io_map_convention *out, ts_status *st)
 {
     char path[PATH_MAX], *text;
     size_t size;
@@ -65,8 +65,8 @@ ts_code ev_set_ini(const char *folder, const io_map_convention *told, io_map_con
         free(text);
         if (code) return code;
     }
-    if (told && told->normal) out->normal = told->normal;
-    if (told && told->workflow) out->workflow = told->workflow;
-    if (told && told->colour) out->colour = told->colour;
+    if (given && given->normal) out->normal = given->normal;
+    if (given && given->workflow) out->workflow = given->workflow;
+    if (given && given->colour) out->colour = given->colour;
     return TS_OK;
 }

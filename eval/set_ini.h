@@ -10,8 +10,8 @@
 #define EV_SET_INI_H
 #include "data/material.h"
 
-/* *out: told (from options, may be NULL), and for what it leaves open folder/set.ini, if it exists. */
-ts_code ev_set_ini(const char *folder, const io_map_convention *told, io_map_convention *out, ts_status *st);
+/* *out: given (from options, may be NULL), and for what it leaves open folder/set.ini, if it exists. */
+ts_code ev_set_ini(const char *folder, const io_map_convention *given, io_map_convention *out, ts_status *st);
 
 /* One such pair into *c; false when there is no such key or value. */
 bool ev_set_ini_key(const char *key, const char *value, io_map_convention *c);

@@ -41,12 +41,12 @@ static ts_code list_folder(ev_set *set, ts_status *st)
     DIR *d = opendir(set->where);
     if (!d) return ts_fail(st, TS_IO, "%s: cannot be read: %s", set->where, strerror(errno));
     ts_code code = TS_OK;
-    int room = 0;
+    int capacity = 0;
     for (struct dirent *e; !code && (e = readdir(d));) {
         if (!belongs(set, e->d_name)) continue;
-        if (set->count == room) {
-            room = room ? 2 * room : 64;
-            char **more = realloc(set->entry, (size_t)room * sizeof *more);
+        if (set->count == capacity) {
+            capacity = capacity ? 2 * capacity : 64;
+            char **more = realloc(set->entry, (size_t)capacity * sizeof *more);
             if (!more) code = ts_fail(st, TS_NOMEM, "%s: out of memory", set->where);
             else set->entry = more;
         }
@@ -103,7 +103,7 @@ static ts_code list_captures(ev_set *set, ts_status *st)
     return TS_OK;
 }
 
-ts_code ev_set_open(const char *spec, const io_map_convention *told, ev_set *set, ts_status *st)
+ts_code ev_set_open(const char *spec, const io_map_convention *given, ev_set *set, ts_status *st)
 {
     *set = (ev_set){.spec = strdup(spec), .kind = EV_KINDS};
     if (!set->spec) return ts_fail(st, TS_NOMEM, "--set %s: out of memory", spec);
@@ -123,8 +123,8 @@ ts_code ev_set_open(const char *spec, const io_map_convention *told, ev_set *set
         code = set->kind == EV_PROCEDURAL ? parse_procedural(set, st)
             : set->kind == EV_MULTIVIEW   ? list_captures(set, st)
                                           : list_folder(set, st);
-        if (!code && set->kind == EV_MAPS) code = ev_set_ini(set->where, told, &set->told, st);
-        if (told) set->option = *told;
+        if (!code && set->kind == EV_MAPS) code = ev_set_ini(set->where, given, &set->convention, st);
+        if (given) set->option = *given;
     }
     if (code) ev_set_close(set);
     return code;
@@ -156,9 +156,9 @@ static ts_code load_maps(const ev_set *set, const char *path, int size, io_mater
     io_map_convention own;
     const ts_code code = ev_set_ini(path, &set->option, &own, st);
     if (code) return code;
-    if (!own.normal) own.normal = set->told.normal;
-    if (!own.workflow) own.workflow = set->told.workflow;
-    if (!own.colour) own.colour = set->told.colour;
+    if (!own.normal) own.normal = set->convention.normal;
+    if (!own.workflow) own.workflow = set->convention.workflow;
+    if (!own.colour) own.colour = set->convention.colour;
     return io_read_map_folder(path, &own, size, m, st);
 }
 

@@ -12,18 +12,18 @@ typedef struct ev_set {
     const char *where;       /* into spec */
     uint64_t seed, families; /* EV_PROCEDURAL; families as in io_procedural */
     int count;
-    io_map_convention option, told; /* EV_MAPS: what the options say, and with set.ini */
-    const char *peers;              /* EV_PHOTOS: a folder of a peer's maps, or NULL */
-    char **entry;                   /* the names in the folder, sorted; NULL for EV_PROCEDURAL */
+    io_map_convention option, convention; /* EV_MAPS: what the options say, and with set.ini */
+    const char *peers;                    /* EV_PHOTOS: a folder of a peer's maps, or NULL */
+    char **entry;                         /* the names in the folder, sorted; NULL for EV_PROCEDURAL */
 } ev_set;
 
 /* procedural:SEED,COUNT[,FAMILY...] (classic families without a list: io_family_mask), strips:FOLDER (a folder of strip
  * images), maps:FOLDER (a folder of map folders), multiview:FOLDER (a capture, or a folder of them), photos:FOLDER
- * (photographs) or peers:FOLDER (images of nine panels, eval/panels.h). Conventions of map folders come from told (the
+ * (photographs) or peers:FOLDER (images of nine panels, eval/panels.h). Conventions of map folders come from given (the
  * options, may be NULL), else from set.ini (eval/set_ini.h) in the map folder, else from set.ini in FOLDER. The caller
  * closes it after success. TS_INVALID for a wrong spec, TS_IO for a folder that cannot be read or holds nothing of that
  * kind. */
-ts_code ev_set_open(const char *spec, const io_map_convention *told, ev_set *set, ts_status *st);
+ts_code ev_set_open(const char *spec, const io_map_convention *given, ev_set *set, ts_status *st);
 void ev_set_close(ev_set *set);
 
 /* Material number i of 0 .. count-1, size x size pixels; m->name is its name within the set. m is zeroed or a material

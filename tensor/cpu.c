@@ -51,9 +51,9 @@ static ts_isa detect(void)
     const unsigned f = 1u << 16, dq = 1u << 17, bw = 1u << 30, vl = 1u << 31;
     if ((b & (f | dq | bw | vl)) != (f | dq | bw | vl)) return TS_AVX2;
     if ((saved & 0xe6) != 0xe6) return TS_AVX2; /* mask registers and zmm */
-    const unsigned bf16 = 1u << 5, tiles_bf16 = 1u << 22, tiles = 1u << 24, matrix = d;
+    const unsigned bf16 = 1u << 5, tiles_bf16 = 1u << 22, tiles = 1u << 24, amx = d;
     if (!__get_cpuid_count(7, 1, &a, &b, &c, &d) || !(a & bf16)) return TS_AVX512;
-    if ((matrix & (tiles_bf16 | tiles)) != (tiles_bf16 | tiles) || (saved & 0x60000) != 0x60000 || !may_use_tiles())
+    if ((amx & (tiles_bf16 | tiles)) != (tiles_bf16 | tiles) || (saved & 0x60000) != 0x60000 || !may_use_tiles())
         return TS_AVX512BF16;
     return TS_AMX;
 }

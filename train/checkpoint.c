@@ -79,7 +79,7 @@ ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
     snprintf(number[3], sizeof number[3], "%d", t->in_a_row);
     snprintf(number[4], sizeof number[4], "%.17g", t->best);
     snprintf(number[5], sizeof number[5], "%" PRId64, t->best_step);
-    snprintf(number[6], sizeof number[6], "%.17g", t->usual_norm);
+    snprintf(number[6], sizeof number[6], "%.17g", t->mean_norm);
     const nn_meta meta[] = {{"format", format_name},
                             {"step", number[0]},
                             {"adam_step", number[1]},
@@ -124,7 +124,7 @@ static ts_code check_config(const tr_trainer *t, const nn_file *file, const char
 static ts_code restore(tr_trainer *t, const nn_file *file, const char *path, ts_status *st)
 {
     const char *format = nn_file_meta(file, "format"), *best = nn_file_meta(file, "best"),
-               *usual = nn_file_meta(file, "usual_norm");
+               *mean = nn_file_meta(file, "usual_norm");
     const int64_t dim[1] = {(int64_t)t->model->count};
     int64_t in_a_row = 0;
     nn_block block[4];
@@ -137,11 +137,11 @@ static ts_code restore(tr_trainer *t, const nn_file *file, const char *path, ts_
         read_count(file, path, "skipped_in_a_row", &in_a_row, st) != TS_OK ||
         read_count(file, path, "best_step", &t->best_step, st) != TS_OK)
         return st->code;
-    if (!best || !usual) return ts_fail(st, TS_FORMAT, "%s: %s is missing", path, best ? "usual_norm" : "best");
+    if (!best || !mean) return ts_fail(st, TS_FORMAT, "%s: %s is missing", path, best ? "usual_norm" : "best");
     if (t->step > tr_total(&t->config))
         return ts_fail(st, TS_FORMAT, "%s: step %" PRId64 " is beyond the end of the run", path, t->step);
     t->best = strtod(best, NULL);
-    t->usual_norm = strtod(usual, NULL);
+    t->mean_norm = strtod(mean, NULL);
     t->in_a_row = (int)(in_a_row < 1000000 ? in_a_row : 1000000);
     const int n = blocks(t, block);
     for (int i = 0; i < n; i++) {

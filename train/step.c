@@ -174,7 +174,7 @@ static void begin_phase(tr_trainer *t)
     t->best = INFINITY; /* R_0's error before, R_T's from now on */
 }
 
-#define USUAL_DECAY 0.98
+#define NORM_DECAY 0.98
 
 /* A gradient of 0 comes from saturated outputs, which do not recover. One far above the recent norm, even clipped,
  * moves every weight with a small second moment by a whole step, and can end a run. */
@@ -185,7 +185,7 @@ static const char *why_skip(const tr_trainer *t, const tr_row *row)
     if (!isfinite(row->loss)) return "loss is not finite";
     if (!isfinite(row->norm)) return "gradient is not finite";
     if (row->norm == 0) return "gradient is zero";
-    if (spike > 0 && t->adam.step >= SETTLED && row->norm > spike * t->usual_norm)
+    if (spike > 0 && t->adam.step >= SETTLED && row->norm > spike * t->mean_norm)
         return "gradient is far longer than usual (train.spike)";
     return NULL;
 }
@@ -267,7 +267,7 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
             if (!t->model->fixed[part] && last > first)
                 nn_adam_step(&t->adam, t->model, first, last, (float)(row->rate * factor[part]), scale);
         }
-        t->usual_norm = t->adam.step == 1 ? row->norm : USUAL_DECAY * t->usual_norm + (1 - USUAL_DECAY) * row->norm;
+        t->mean_norm = t->adam.step == 1 ? row->norm : NORM_DECAY * t->mean_norm + (1 - NORM_DECAY) * row->norm;
         t->in_a_row = 0;
     }
     row->step = ++t->step;

@@ -44,11 +44,11 @@ struct tr_trainer {
     rd_view *views;       /* [batch][RD_LOSS_VIEWS] */
     tr_validator validator;
     FILE *log, *validation_log;
-    int64_t step;      /* steps made */
-    int64_t skipped;   /* of them without an update */
-    int in_a_row;      /* of those, the latest without one that worked */
-    double usual_norm; /* of the gradient, a moving average */
-    double best;       /* least validated error in this phase; infinity: none yet */
+    int64_t step;     /* steps made */
+    int64_t skipped;  /* of them without an update */
+    int in_a_row;     /* of those, the latest without one that worked */
+    double mean_norm; /* of the gradient, a moving average */
+    double best;      /* least validated error in this phase; infinity: none yet */
     int64_t best_step;
 };
 

@@ -65,10 +65,10 @@ bool io_exif(const unsigned char *segment, size_t size, int *orientation, bool *
     if (memcmp(t.bytes, t.little ? "II" : "MM", 2) != 0 || get16(&t, 2) != 42) return false;
     const size_t first = get32(&t, 4);
     if (first < 8) return false;
-    const size_t turn = entry(&t, first, ORIENTATION);
-    if (turn) {
-        if (get16(&t, turn + 2) != SHORT || get32(&t, turn + 4) != 1) t.odd = true;
-        const unsigned v = get16(&t, turn + 8);
+    const size_t at = entry(&t, first, ORIENTATION);
+    if (at) {
+        if (get16(&t, at + 2) != SHORT || get32(&t, at + 4) != 1) t.odd = true;
+        const unsigned v = get16(&t, at + 8);
         *orientation = v >= 1 && v <= 8 ? (int)v : 1;
     }
     const size_t exif = follow(&t, entry(&t, first, EXIF_DIRECTORY));

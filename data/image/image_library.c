@@ -89,10 +89,10 @@ ts_code oi_encode_jpeg(const char *name, const oi_encoding *e, const uint8_t *pi
 
 bool oi_knows_extension(const char *extension)
 {
-    /* The usual ones need no look into the library. */
-    static const char *const usual[] = {"png", "jpg", "jpeg", "tif", "tiff", "exr", "hdr"};
-    for (size_t i = 0; i < sizeof usual / sizeof *usual; i++)
-        if (strcasecmp(extension, usual[i]) == 0) return true;
+    /* The common ones need no look into the library. */
+    static const char *const common[] = {"png", "jpg", "jpeg", "tif", "tiff", "exr", "hdr"};
+    for (size_t i = 0; i < sizeof common / sizeof *common; i++)
+        if (strcasecmp(extension, common[i]) == 0) return true;
     if (strcasecmp(extension, "txt") == 0) return false;
     const oi_library *l = loaded(extension, NULL);
     return l && l->knows_extension(extension);

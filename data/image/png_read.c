@@ -44,7 +44,7 @@ static bool plain_texts(reading *r)
     return true;
 }
 
-static bool usual(reading *r)
+static bool supported(reading *r)
 {
     png_bytep exif;
     png_uint_32 exif_size;
@@ -91,7 +91,7 @@ static bool work(reading *r)
     png_read_info(r->png, r->info);
     oi_image *image = r->image;
     r->bits = png_get_bit_depth(r->png, r->info);
-    if (!usual(r)) return false;
+    if (!supported(r)) return false;
     image->width = (int)png_get_image_width(r->png, r->info);
     image->height = (int)png_get_image_height(r->png, r->info);
     image->channels = png_get_channels(r->png, r->info);

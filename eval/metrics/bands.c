@@ -36,7 +36,7 @@ static void transform(int n, const complex_t *in, size_t stride, complex_t *out,
     }
 }
 
-/* Rows, then columns, in place; line: two lines' room. */
+/* Rows, then columns, in place; line: space for two lines. */
 static void transform_plane(int size, complex_t *plane, const complex_t *root, complex_t *line)
 {
     for (int pass = 0; pass < 2; pass++)

@@ -23,7 +23,7 @@ struct ev_lpips {
     float *weight[EV_LPIPS_TAPS]; /* [out, k, k, in]: as the pixels of a window lie in memory */
     float *bias[EV_LPIPS_TAPS], *head[EV_LPIPS_TAPS];
     float *work[3]; /* an image pair, another one, its windows */
-    size_t room[3];
+    size_t capacity[3];
 };
 
 static size_t window(int l) { return (size_t)layer[l].kernel * (size_t)layer[l].kernel * (size_t)layer[l].in; }
@@ -89,10 +89,10 @@ void ev_lpips_free(ev_lpips **net)
 
 static float *work(ev_lpips *net, int slot, size_t floats)
 {
-    if (floats > net->room[slot]) {
+    if (floats > net->capacity[slot]) {
         free(net->work[slot]);
         net->work[slot] = ts_block(floats * sizeof(float));
-        net->room[slot] = net->work[slot] ? floats : 0;
+        net->capacity[slot] = net->work[slot] ? floats : 0;
     }
     return net->work[slot];
 }

@@ -41,11 +41,11 @@ void ev_photograph(const io_material *truth, const ev_photo *photo, float *image
     if (photo->noise > 0) io_camera_apply(&camera, photo->seed, photo->identity, truth->size, image);
 }
 
-void ev_input_views(const rd_view *told, int count, uint64_t seed, uint64_t identity, rd_view *input)
+void ev_input_views(const rd_view *given, int count, uint64_t seed, uint64_t identity, rd_view *input)
 {
     ts_rng rng = ts_rng_make(seed, TS_STREAM_CAPTURE, identity);
     rd_capture_draw(&rng, count, input);
-    input[0] = *told; /* instead of the flash */
+    input[0] = *given; /* instead of the flash */
 }
 
 /* SSIM and LPIPS as RMSE in gamma space; FLIP takes linear values. */
@@ -89,16 +89,16 @@ ev_case ev_case_of_photo(const float *image, int size)
     return (ev_case){.size = size, .view = flash, .image = image, .inputs = 1, .input = {flash}, .exposure = 1};
 }
 
-ev_case ev_case_of_capture(const io_capture *capture, const float *image, int inputs, bool told, bool perceptual)
+ev_case ev_case_of_capture(const io_capture *capture, const float *image, int inputs, bool light_known, bool perceptual)
 {
     ev_case c = {.size = capture->size,
-                 .view = told ? ev_capture_view(capture, 0) : rd_flash(),
+                 .view = light_known ? ev_capture_view(capture, 0) : rd_flash(),
                  .image = image,
                  .inputs = inputs,
                  .exposure = 1,
                  .capture = capture,
                  .perceptual = perceptual};
-    for (int i = 0; i < inputs; i++) c.input[i] = told ? ev_capture_view(capture, i) : rd_flash();
+    for (int i = 0; i < inputs; i++) c.input[i] = light_known ? ev_capture_view(capture, i) : rd_flash();
     return c;
 }
 

@@ -56,8 +56,9 @@ typedef struct ev_case {
 
 /* One input, under the flash. */
 ev_case ev_case_of_maps(const io_material *truth, const float *image, const rd_view *views, bool perceptual);
-/* inputs: the first so many pictures of the capture, image being ev_capture_input's, told or not. */
-ev_case ev_case_of_capture(const io_capture *capture, const float *image, int inputs, bool told, bool perceptual);
+/* inputs: the first so many pictures of the capture, image being ev_capture_input's where light_known. */
+ev_case ev_case_of_capture(const io_capture *capture, const float *image, int inputs, bool light_known,
+                           bool perceptual);
 /* One picture, taken for a flash photograph. */
 ev_case ev_case_of_photo(const float *image, int size);
 
@@ -72,9 +73,9 @@ typedef struct ev_photo {
 /* The rendering of it, clamped. image: size x size x 3. */
 void ev_photograph(const io_material *truth, const ev_photo *photo, float *image);
 
-/* The views of count inputs: the view told, then others of the predefined configurations of captures (render/scene.h),
+/* The views of count inputs: the view given, then others of the predefined configurations of captures (render/scene.h),
  * drawn with (seed, identity). */
-void ev_input_views(const rd_view *told, int count, uint64_t seed, uint64_t identity, rd_view *input);
+void ev_input_views(const rd_view *given, int count, uint64_t seed, uint64_t identity, rd_view *input);
 
 /* The factor c of least sum of (gamma(c a) - gamma(b))^2 over the values that are not clipped: gamma(c a) =
  * c^(1/2.2) gamma(a). Both linear; 1 where all are clipped or black. */

@@ -59,22 +59,22 @@ const char *pk_printable(const char *text, size_t length, char *out, size_t size
     return out;
 }
 
-/* Room for one more item of size bytes in an array on the heap. */
-static bool room(pickle *p, void *array, uint32_t count, uint32_t *has, size_t size)
+/* Makes space for one more item of size bytes in an array on the heap. */
+static bool reserve(pickle *p, void *array, uint32_t count, uint32_t *capacity, size_t size)
 {
     void **a = array;
-    if (count < *has) return true;
-    uint32_t wanted = *has ? 2 * *has : 64;
+    if (count < *capacity) return true;
+    uint32_t wanted = *capacity ? 2 * *capacity : 64;
     void *grown = realloc(*a, wanted * size);
     if (!grown) return no_memory(p);
     *a = grown;
-    *has = wanted;
+    *capacity = wanted;
     return true;
 }
 
 static void push(pickle *p, pk_value *v)
 {
-    if (v && room(p, &p->stack, p->depth, &p->stack_room, sizeof *p->stack)) p->stack[p->depth++] = v;
+    if (v && reserve(p, &p->stack, p->depth, &p->stack_capacity, sizeof *p->stack)) p->stack[p->depth++] = v;
 }
 
 /* Where the stack begins that opcodes without a mark may take from. */
@@ -142,13 +142,13 @@ static void push_long(pickle *p, uint64_t bytes)
 
 static bool append(pickle *p, pk_value *list, pk_value *item)
 {
-    if (list->length == list->room) {
-        uint32_t wanted = list->room ? 2 * list->room : 8;
+    if (list->length == list->capacity) {
+        uint32_t wanted = list->capacity ? 2 * list->capacity : 8;
         pk_value **grown = pk_take(p, wanted * sizeof *grown);
         if (!grown) return false;
         if (list->length) memcpy(grown, list->item, list->length * sizeof *grown);
         list->item = grown;
-        list->room = wanted;
+        list->capacity = wanted;
     }
     list->item[list->length++] = item;
     return true;
@@ -163,7 +163,7 @@ static void push_tuple(pickle *p, uint32_t count)
     pk_value *v = pk_new(p, PK_TUPLE);
     if (v && count && !(v->item = pk_take(p, count * sizeof *v->item))) return;
     if (!v) return;
-    v->length = v->room = count;
+    v->length = v->capacity = count;
     p->depth -= count;
     if (count) memcpy(v->item, p->stack + p->depth, count * sizeof *v->item);
     push(p, v);
@@ -203,7 +203,7 @@ static void put_memo(pickle *p, uint64_t i)
         return;
     }
     while (p->memos <= i) {
-        if (!room(p, &p->memo, p->memos, &p->memo_room, sizeof *p->memo)) return;
+        if (!reserve(p, &p->memo, p->memos, &p->memo_capacity, sizeof *p->memo)) return;
         p->memo[p->memos++] = NULL;
     }
     p->memo[i] = v;
@@ -326,7 +326,7 @@ static void step(pickle *p, int op)
     case 0x86:
     case 0x87: push_tuple(p, (uint32_t)op - 0x84); break; /* TUPLE1 … 3 */
     case '(':
-        if (room(p, &p->mark, p->marks, &p->mark_room, sizeof *p->mark)) p->mark[p->marks++] = p->depth;
+        if (reserve(p, &p->mark, p->marks, &p->mark_capacity, sizeof *p->mark)) p->mark[p->marks++] = p->depth;
         break;
     case 't': {
         uint32_t count = pop_mark(p);
@@ -362,7 +362,7 @@ pk_value *pk_read(pickle *p)
     p->failed = false;
     p->stack = p->memo = NULL;
     p->mark = NULL;
-    p->depth = p->stack_room = p->memos = p->memo_room = p->marks = p->mark_room = 0;
+    p->depth = p->stack_capacity = p->memos = p->memo_capacity = p->marks = p->mark_capacity = 0;
     pk_value *result = NULL;
     if (p->at >= p->size || p->data[p->at] != 0x80) pk_fail(p, "no pickle of protocol 2 or later");
     while (!p->failed) {

@@ -27,7 +27,7 @@ typedef struct pk_value {
     pk_kind kind;
     int tag;         /* the caller's, of PK_GLOBAL and PK_OBJECT */
     uint32_t length; /* of text and bytes; items of a tuple or list; 2 * pairs of a dict: key, value, key, value, … */
-    uint32_t room;
+    uint32_t capacity;
     union {
         int64_t number;   /* PK_INT, PK_BOOL, PK_GLOBAL */
         const char *text; /* PK_TEXT and PK_BYTES: in the pickle, no 0 at its end */
@@ -60,7 +60,7 @@ struct pickle {
     size_t pool_left;
     pk_value **stack, **memo;
     uint32_t *mark;
-    uint32_t depth, stack_room, memos, memo_room, marks, mark_room;
+    uint32_t depth, stack_capacity, memos, memo_capacity, marks, mark_capacity;
 };
 
 /* Reads one pickle that begins at data + at; at is behind it afterwards. NULL and st on failure. */

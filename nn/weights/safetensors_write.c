@@ -14,7 +14,7 @@ static bool put_string(nn_text *t, const char *s)
     int64_t n = json_escape(s, NULL);
     if (n < 0) return false;
     nn_text_put(t, "\"");
-    char *to = nn_text_room(t, (size_t)n);
+    char *to = nn_text_extend(t, (size_t)n);
     if (to) json_escape(s, to);
     nn_text_put(t, "\"");
     return true;

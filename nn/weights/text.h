@@ -12,7 +12,7 @@ typedef struct nn_text {
 } nn_text;
 
 /* n more bytes, to be filled; NULL when there is no memory. */
-char *nn_text_room(nn_text *t, size_t n);
+char *nn_text_extend(nn_text *t, size_t n);
 void nn_text_bytes(nn_text *t, const void *data, size_t n);
 void nn_text_put(nn_text *t, const char *s);
 /* The lowest bytes of v, little endian. */

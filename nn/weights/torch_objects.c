@@ -113,7 +113,7 @@ static pk_value *ordered_dict(pickle *p, const pk_value *a)
         d->item[d->length++] = pair->item[0];
         d->item[d->length++] = pair->item[1];
     }
-    d->room = d->length;
+    d->capacity = d->length;
     return d;
 }
 

@@ -241,18 +241,18 @@ static const unsigned char old_magic[] = {0x8a, 0x0a, 0x6c, 0xfc, 0x9c, 0x46, 0x
  * pickle of the tensors; here only counts are, so that the size of a number is asked of the tensors' storages. */
 typedef struct sizes {
     const torch_storage **storage;
-    int count, room;
+    int count, capacity;
 } sizes;
 
 static bool collect(reader *r, sizes *s, const pk_value *v, int depth)
 {
     if (v->kind == PK_OBJECT && v->tag == TORCH_TENSOR) {
-        if (s->count == s->room) {
-            int room = s->room ? 2 * s->room : 64;
-            const torch_storage **grown = realloc(s->storage, (size_t)room * sizeof *grown);
+        if (s->count == s->capacity) {
+            int capacity = s->capacity ? 2 * s->capacity : 64;
+            const torch_storage **grown = realloc(s->storage, (size_t)capacity * sizeof *grown);
             if (!grown) return false;
             s->storage = grown;
-            s->room = room;
+            s->capacity = capacity;
         }
         s->storage[s->count++] = ((const torch_tensor *)v->object)->storage;
     }

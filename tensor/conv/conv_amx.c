@@ -1,4 +1,4 @@
-/* Convolutions of bf16 by the matrix unit (tensor/kernels/amx_conv.h). A band of rows is rounded into a stage with its
+/* Convolutions of bf16 by the matrix unit (tensor/kernels/amx_conv.h). A band of rows is rounded into a window with its
  * halo, where all its pixels are one line: what tap (ky, kx) reads for pixel q of the line is pixel q + ky d columns +
  * kx d, wherever the rows end. So any 32 pixels in a run are rows of one product of matrices, however narrow the image;
  * those that fall on the halo's columns are computed and thrown away. */
@@ -8,14 +8,14 @@
 #include <string.h>
 
 enum {
-    STAGE_FLOATS = 96 << 10, /* a stage that leaves most of the second cache to weights */
+    WINDOW_FLOATS = 96 << 10, /* a window that leaves most of the second cache to weights */
     PART_FLOATS = 64 << 10,
     UNITS = 8 /* of work, at least, where the shape allows */
 };
 
 bool conv_amx_present(void) { return ts_amx_k()->product[0][0] != NULL; }
 
-/* Undilated, the taps of a kernel row are neighbours in the stage and are summed in one run. */
+/* Undilated, the taps of a kernel row are neighbours in the window and are summed in one run. */
 static bool merged(int dilation) { return dilation == 1; }
 
 /* Steps of one kernel row. */
@@ -64,11 +64,11 @@ void conv_amx_pack(const ts_conv *c, bool forward, const float *weight, float *p
         }
 }
 
-/* Pixels [0, count) of a line into y, whose row holds the first columns of every so many of them. stage: readable 32
+/* Pixels [0, count) of a line into y, whose row holds the first columns of every so many of them. window: readable 32
  * pixels and 32 channels beyond. */
 typedef struct line {
     const conv_plan *p;
-    const float *stage;
+    const float *window;
     const ptrdiff_t *at;
     int steps, count, columns, inside; /* pixels; of a row; of those that exist */
 } line;
@@ -106,7 +106,7 @@ static void run_part(const line *l, int first, int end, int panel, float *const 
                         .c_row = TS_AMX_BLOCK};
     for (int q = first; q < end; q += TS_AMX_BLOCK) {
         const int pixels = end - q < TS_AMX_BLOCK ? end - q : TS_AMX_BLOCK;
-        m.a = l->stage + (ptrdiff_t)q * p->ic;
+        m.a = l->window + (ptrdiff_t)q * p->ic;
         k->product[pixels > TS_AMX_SIDE][channels > TS_AMX_SIDE](&m);
         for (int i = 0, run; i < pixels; i += run) {
             const int row = (q + i) / l->columns, column = (q + i) % l->columns, left = l->columns - column,
@@ -133,13 +133,13 @@ static void run_line(const line *l, int panel0, int panel1, float *const *y_row)
 
 typedef struct frame {
     const conv_plan *p;
-    int reach, columns, out_w; /* of the stage; of the output's domain */
+    int reach, columns, out_w; /* of the window; of the output's domain */
     int steps;
     const ptrdiff_t *at;
 } frame;
 
 /* Rows e0 + first to e1 - 1 + first + reach of an image, with their padding; then zeros, for what is read beyond. */
-static void stage_band(const frame *f, int image, int e0, int e1, float *to)
+static void fill_window(const frame *f, int image, int e0, int e1, float *to)
 {
     const conv_plan *p = f->p;
     const int left = p->first < 0 ? -p->first : 0, behind = f->columns - left - p->w;
@@ -172,9 +172,9 @@ static void run_band(const frame *f, int image, int begin, int end, int panel0, 
     const int e0 = begin == 0 ? 0 : begin + p->fold, e1 = end == p->h ? p->h + 2 * p->fold : end + p->fold,
               rows = e1 - e0;
     const size_t pixels = (size_t)(rows + f->reach) * (size_t)f->columns + TS_AMX_BLOCK;
-    float *stage = ts_scratch(0, sizeof(float) * (pixels * (size_t)p->ic + TS_AMX_PAIRS));
+    float *window = ts_scratch(0, sizeof(float) * (pixels * (size_t)p->ic + TS_AMX_PAIRS));
     float **y_row = ts_scratch(1, sizeof(float *) * (size_t)rows);
-    stage_band(f, image, e0, e1, stage);
+    fill_window(f, image, e0, e1, window);
     for (int i = 0; i < rows; i++)
         y_row[i] = p->y + ((ptrdiff_t)image * p->h + conv_clamp(e0 + i - p->fold, p->h)) * p->w * p->oc;
     if (p->fold && !p->add) {
@@ -182,13 +182,13 @@ static void run_band(const frame *f, int image, int begin, int end, int panel0, 
         for (ptrdiff_t q = (ptrdiff_t)begin * p->w; q < (ptrdiff_t)end * p->w; q++)
             memset(p->y + ((ptrdiff_t)image * p->h * p->w + q) * p->oc + o0, 0, sizeof(float) * (size_t)(o1 - o0));
     }
-    const line l = {p, stage, f->at, f->steps, (rows - 1) * f->columns + f->out_w, f->columns, f->out_w};
+    const line l = {p, window, f->at, f->steps, (rows - 1) * f->columns + f->out_w, f->columns, f->out_w};
     ts_amx_k()->begin();
     run_line(&l, panel0, panel1, y_row);
     ts_amx_k()->end();
 }
 
-/* Where the steps read, from a pixel of a stage with so many columns. */
+/* Where the steps read, from a pixel of a window with so many columns. */
 static void place_steps(const conv_plan *p, int columns, ptrdiff_t *at)
 {
     const int steps = row_steps(p->ic, p->k, p->dilation), run_steps = merged(p->dilation) ? steps : steps / p->k;
@@ -207,7 +207,7 @@ void conv_run_amx(const conv_plan *p)
     place_steps(p, f.columns, at);
     f.at = at;
     const int panels = panels_of(p->oc);
-    int rows = (int)(STAGE_FLOATS / ((ptrdiff_t)f.columns * p->ic)) - f.reach, least = f.reach > 4 ? f.reach : 4;
+    int rows = (int)(WINDOW_FLOATS / ((ptrdiff_t)f.columns * p->ic)) - f.reach, least = f.reach > 4 ? f.reach : 4;
     if (rows < least) rows = least;
     int bands = (p->h + rows - 1) / rows;
     if (p->n * bands < UNITS) bands = (UNITS + p->n - 1) / p->n;

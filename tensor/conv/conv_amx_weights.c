@@ -1,5 +1,5 @@
 /* The gradient of weights by the matrix unit: for each tap the product of x, channel by channel, and dy, pixel by
- * pixel, over the pixels of a band. Both are staged as lines (tensor/conv/conv_amx.c) with dy zero on the halo's
+ * pixel, over the pixels of a band. Both are packed as lines (tensor/conv/conv_amx.c) with dy zero on the halo's
  * columns, so that a tap is but another place to begin at in x. */
 #include "tensor/conv/conv_internal.h"
 #include "tensor/kernels/amx_conv.h"
@@ -8,8 +8,8 @@
 
 enum {
     STEP_PIXELS = 2 * TS_AMX_PAIRS,
-    STAGE_BYTES = 640 << 10, /* x and dy of a band: they stay in the second cache for all taps */
-    CHUNK_PIXELS = 4096,     /* so many that clearing and adding a chunk's sums is little beside making them */
+    BAND_BYTES = 640 << 10, /* x and dy of a band: they stay in the second cache for all taps */
+    CHUNK_PIXELS = 4096,    /* so many that clearing and adding a chunk's sums is little beside making them */
     CHUNKS = 8,
     UNITS = 8, /* of work, at least, where the shape allows */
     REDUCE_INPUTS = 16
@@ -20,7 +20,7 @@ typedef struct job {
     const float *x, *dy;
     int reach, columns;  /* columns of a line: even, so that pairs of pixels do not straddle rows */
     int ic, oc;          /* whole tiles */
-    int chunks, groups;  /* of rows over all images; of input blocks */
+    int chunks, groups;  /* of rows over all images; of parts of the inputs */
     const ptrdiff_t *at; /* of steps, in x */
     float *sums;         /* [chunk][tap][ic][oc] */
     ptrdiff_t size;      /* of a chunk's */
@@ -43,13 +43,13 @@ static int band_rows(const job *g, int inputs)
 {
     const ptrdiff_t row = (ptrdiff_t)g->columns * 2 * (inputs + g->oc),
                     halo = (ptrdiff_t)g->columns * 2 * inputs * g->reach;
-    const ptrdiff_t rows = (STAGE_BYTES - halo) / row;
+    const ptrdiff_t rows = (BAND_BYTES - halo) / row;
     return rows < 4 ? 4 : rows < g->c->h ? (int)rows : g->c->h;
 }
 
 /* Rows [begin, end) of dy and what their taps read of channels [c0, c1). */
-static void stage_band(const job *g, int image, int begin, int end, int c0, int c1, uint16_t *x, ptrdiff_t plane,
-                       float *dy)
+static void pack_band(const job *g, int image, int begin, int end, int c0, int c1, uint16_t *x, ptrdiff_t plane,
+                      float *dy)
 {
     const ts_conv *c = g->c;
     const struct ts_amx_kernels *k = ts_amx_k();
@@ -75,7 +75,7 @@ static void stage_band(const job *g, int image, int begin, int end, int c0, int 
     memset(dy + (ptrdiff_t)done * g->oc, 0, sizeof(float) * (size_t)(pairs - done) * (size_t)g->oc);
 }
 
-/* All taps, channels [c0, c1) and outputs, of a staged band. */
+/* All taps, channels [c0, c1) and outputs, of a packed band. */
 static void add_band(const job *g, int rows, int c0, int c1, const uint16_t *x, ptrdiff_t plane, const float *dy,
                      float *sums)
 {
@@ -101,10 +101,10 @@ static void add_band(const job *g, int rows, int c0, int c1, const uint16_t *x, 
 static void run_chunk(const job *g, int chunk, int group)
 {
     const ts_conv *c = g->c;
-    int begin, end, block0, block1;
+    int begin, end, part0, part1;
     conv_part(c->n * c->h, g->chunks, chunk, &begin, &end);
-    conv_part((g->ic + TS_AMX_BLOCK - 1) / TS_AMX_BLOCK, g->groups, group, &block0, &block1);
-    const int c0 = block0 * TS_AMX_BLOCK, c1 = block1 * TS_AMX_BLOCK < g->ic ? block1 * TS_AMX_BLOCK : g->ic,
+    conv_part((g->ic + TS_AMX_BLOCK - 1) / TS_AMX_BLOCK, g->groups, group, &part0, &part1);
+    const int c0 = part0 * TS_AMX_BLOCK, c1 = part1 * TS_AMX_BLOCK < g->ic ? part1 * TS_AMX_BLOCK : g->ic,
               rows = band_rows(g, c1 - c0);
     float *sums = g->sums + chunk * g->size;
     for (int tap = 0; tap < c->k * c->k; tap++)
@@ -119,14 +119,14 @@ static void run_chunk(const job *g, int chunk, int group)
         if (last > c->h) last = c->h;
         if (last - first > end - row) last = first + end - row;
         next = row + last - first;
-        stage_band(g, image, first, last, c0, c1, x, plane, dy);
+        pack_band(g, image, first, last, c0, c1, x, plane, dy);
         add_band(g, last - first, c0, c1, x, plane, dy, sums);
     }
     ts_amx_k()->end();
 }
 
 /* Inputs [c0, c1) of outputs [o0, o1): so few that the places they go to, taps fastest, stay in cache. */
-static void reduce_block(const job *g, int o0, int o1, int c0, int c1, float *dweight)
+static void reduce_part(const job *g, int o0, int o1, int c0, int c1, float *dweight)
 {
     const int taps = g->c->k * g->c->k;
     for (int tap = 0; tap < taps; tap++)
@@ -154,8 +154,8 @@ void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float 
     const ptrdiff_t rows = (ptrdiff_t)c->n * c->h, chunks = rows * c->w / CHUNK_PIXELS,
                     most = CHUNKS < rows ? CHUNKS : rows;
     g.chunks = (int)(chunks < 1 ? 1 : chunks < most ? chunks : most);
-    const int blocks = (g.ic + TS_AMX_BLOCK - 1) / TS_AMX_BLOCK, groups = (UNITS + g.chunks - 1) / g.chunks;
-    g.groups = groups < blocks ? groups : blocks;
+    const int input_parts = (g.ic + TS_AMX_BLOCK - 1) / TS_AMX_BLOCK, groups = (UNITS + g.chunks - 1) / g.chunks;
+    g.groups = groups < input_parts ? groups : input_parts;
     /* of the longest line: the fewer inputs, the more rows a band has */
     const int steps = line_pixels(&g, band_rows(&g, TS_AMX_SIDE)) / STEP_PIXELS;
     ptrdiff_t *at = ts_scratch(3, sizeof *at * (size_t)steps);
@@ -170,7 +170,7 @@ void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float 
 #pragma omp for collapse(2) schedule(static)
         for (int o = 0; o < c->oc; o += TS_AMX_BLOCK)
             for (int i = 0; i < c->ic; i += REDUCE_INPUTS)
-                reduce_block(&g, o, o + TS_AMX_BLOCK < c->oc ? o + TS_AMX_BLOCK : c->oc, i,
-                             i + REDUCE_INPUTS < c->ic ? i + REDUCE_INPUTS : c->ic, dweight);
+                reduce_part(&g, o, o + TS_AMX_BLOCK < c->oc ? o + TS_AMX_BLOCK : c->oc, i,
+                            i + REDUCE_INPUTS < c->ic ? i + REDUCE_INPUTS : c->ic, dweight);
     }
 }

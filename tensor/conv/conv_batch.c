@@ -12,11 +12,11 @@ void conv_run_batch(const conv_plan *p)
 #pragma omp parallel num_threads(ts_threads_of(p->threads))
     {
         /* x as [position][image][channel] */
-        float *staged = ts_scratch(0, sizeof(float) * (size_t)(positions * pixel) * (size_t)p->n);
+        float *gathered = ts_scratch(0, sizeof(float) * (size_t)(positions * pixel) * (size_t)p->n);
         for (int q = 0; q < positions; q++)
             for (int n = 0; n < p->n; n++)
                 conv_put_pixels(p, p->x + n * image + (ptrdiff_t)q * p->channels, 1,
-                                staged + ((ptrdiff_t)q * p->n + n) * pixel, pixel);
+                                gathered + ((ptrdiff_t)q * p->n + n) * pixel, pixel);
         char *memory = ts_scratch(1,
                                   sizeof(conv_pair) * (size_t)(2 * most) + sizeof(ts_segment) * (size_t)(most * most));
         ts_segment *segment = (ts_segment *)(void *)memory;
@@ -41,7 +41,7 @@ void conv_run_batch(const conv_plan *p)
                     for (int tile = 0; tile < tiles; tile++) {
                         int begin, end;
                         conv_part(p->n, tiles, tile, &begin, &end);
-                        conv_run_tile(&t, conv_vectors(p->oc, panel), staged + begin * pixel, y + begin * t.y_stride,
+                        conv_run_tile(&t, conv_vectors(p->oc, panel), gathered + begin * pixel, y + begin * t.y_stride,
                                       end - begin, p->bf16);
                     }
                 }

@@ -1,4 +1,4 @@
-/* The weight gradient of small images. A unit is a panel of outputs and a block of inputs, with all taps, over all
+/* The weight gradient of small images. A unit is a panel of outputs and a part of the inputs, with all taps, over all
  * pixels; nobody else touches its sums. Runs of pixels are the images at a pair of positions, so that padding is never
  * multiplied. */
 #include "tensor/conv/conv_internal.h"
@@ -10,13 +10,13 @@ enum {
     PIECES = 16
 };
 
-typedef struct staged {
+typedef struct operands {
     const float *x;  /* [position][image][channel] */
     const float *dy; /* [panel][position][image][lane] */
     ptrdiff_t pixel; /* floats per pixel of x */
-} staged;
+} operands;
 
-static staged stage(const ts_conv *c, const float *x, const float *dy)
+static operands gather(const ts_conv *c, const float *x, const float *dy)
 {
     const int lanes = conv_lanes(), positions = c->h * c->w, panels = conv_panels(c->oc),
               padded = (c->oc + lanes - 1) / lanes * lanes;
@@ -33,7 +33,7 @@ static staged stage(const ts_conv *c, const float *x, const float *dy)
                                    to_dy + pixels * o0 + to * width);
             }
         }
-    return (staged){to_x, to_dy, pixel};
+    return (operands){to_x, to_dy, pixel};
 }
 
 /* The pairs of positions that a tap joins, as rows of count pixels of a sum. */
@@ -43,7 +43,7 @@ typedef struct joined {
 } joined;
 
 /* Neighbours stay neighbours unless they are replicated. */
-static void join(const ts_conv *c, const staged *s, int tap, int width, joined *to)
+static void join(const ts_conv *c, const operands *s, int tap, int width, joined *to)
 {
     const int reach = c->dilation * (c->k / 2), di = tap / c->k * c->dilation - reach,
               dj = tap % c->k * c->dilation - reach;
@@ -74,23 +74,22 @@ void conv_batch_weight_gradient(const ts_conv *c, const float *x, const float *d
 {
     const struct ts_conv_kernels *kernels = ts_conv_k();
     const int lanes2 = 2 * kernels->lanes, panels = conv_panels(c->oc), taps = c->k * c->k;
-    const int blocks = (c->ic + kernels->rows - 1) / kernels->rows;
-    const int piece = (panels * blocks + PIECES - 1) /
-        PIECES; /* of neighbouring blocks, which share lines of dweight */
+    const int parts = (c->ic + kernels->rows - 1) / kernels->rows;
+    const int piece = (panels * parts + PIECES - 1) / PIECES; /* of neighbouring parts, which share lines of dweight */
     const ptrdiff_t pixels = (ptrdiff_t)c->h * c->w * c->n, row = (ptrdiff_t)c->ic * taps;
 #pragma omp parallel num_threads(ts_threads_of(c->compute.threads))
     {
-        const staged s = stage(c, x, dy);
+        const operands s = gather(c, x, dy);
         float *sums = ts_scratch(2, sizeof(float) * (size_t)(taps * kernels->rows * lanes2)); /* [input][tap][lane] */
         joined *of = ts_scratch(3, sizeof(joined) * (size_t)taps);
         int joined_width = 0;
 #pragma omp for collapse(2) schedule(dynamic, piece)
         for (int panel = 0; panel < panels; panel++)
-            for (int block = 0; block < blocks; block++) {
+            for (int part = 0; part < parts; part++) {
                 const int vectors = conv_vectors(c->oc, panel), width = vectors * kernels->lanes, o0 = panel * lanes2;
                 const int count = c->oc - o0 < width ? c->oc - o0 : width;
                 int begin, end;
-                conv_part(c->ic, blocks, block, &begin, &end);
+                conv_part(c->ic, parts, part, &begin, &end);
                 float *to = dweight + o0 * row + (ptrdiff_t)begin * taps;
                 if (width != joined_width)
                     for (int tap = 0; tap < taps; tap++) join(c, &s, tap, width, &of[tap]);

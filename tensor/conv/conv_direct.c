@@ -11,26 +11,26 @@ typedef struct band {
     int next; /* panel whose weights will be needed after these, and are fetched meanwhile; -1: none is known */
 } band;
 
-/* Panels are taken together for a row, and taps in blocks of ky, so that their weights stay in cache. */
-typedef struct blocking {
+/* Panels are taken together for a row, and the rows of taps in parts of ky, so that their weights stay in cache. */
+typedef struct weight_part {
     int panels, ky;
-} blocking;
+} weight_part;
 
-static blocking choose_blocking(const conv_plan *p)
+static weight_part choose_weight_part(const conv_plan *p)
 {
     const ptrdiff_t line = (ptrdiff_t)p->k * p->ic * 2 * conv_lanes() *
         (ptrdiff_t)sizeof(float); /* a panel's bytes for one ky */
-    ptrdiff_t ky = CONV_BLOCK_BYTES / line;
+    ptrdiff_t ky = CONV_CACHED_BYTES / line;
     if (ky < 1) ky = 1;
-    if (ky >= p->k) return (blocking){(int)(CONV_BLOCK_BYTES / (line * p->k)), p->k};
-    const ptrdiff_t blocks = (p->k + ky - 1) / ky;
-    return (blocking){1, (int)((p->k + blocks - 1) / blocks)};
+    if (ky >= p->k) return (weight_part){(int)(CONV_CACHED_BYTES / (line * p->k)), p->k};
+    const ptrdiff_t parts = (p->k + ky - 1) / ky;
+    return (weight_part){1, (int)((p->k + parts - 1) / parts)};
 }
 
 /* A source of pixels for tiles [begin, end): a strip, or the image itself. */
 typedef struct source {
     int begin, end;
-    conv_window stage;   /* rows == 0: the image */
+    conv_window window;  /* rows == 0: the image */
     const float *pixel0; /* column that tap 0 of output column 0 reads, in memory terms */
     ptrdiff_t pixel;
     ts_segment segment[15 * 15];
@@ -82,17 +82,17 @@ static void make_sources(runner *r, int rows)
             tile_range(r, s->begin, &first, &unused);
             tile_range(r, s->end - 1, &unused, &last);
             if (i == 1) {
-                s->stage.rows = 0;
+                s->window.rows = 0;
                 s->pixel = p->ic;
                 s->pixel0 = p->x + (ptrdiff_t)r->b->image * p->h * p->w * p->ic + (ptrdiff_t)p->first * p->ic;
             } else {
-                s->stage = conv_window_make(p, rows, first + p->first, last - first + reach);
-                s->pixel = s->stage.pixel;
+                s->window = conv_window_make(p, rows, first + p->first, last - first + reach);
+                s->pixel = s->window.pixel;
                 if (pass) {
-                    s->stage.memory = memory + used;
-                    s->pixel0 = s->stage.memory - first * s->pixel;
+                    s->window.memory = memory + used;
+                    s->pixel0 = s->window.memory - first * s->pixel;
                 }
-                used += conv_window_size(&s->stage);
+                used += conv_window_size(&s->window);
             }
         }
     }
@@ -108,8 +108,8 @@ static void make_segments(const runner *r, source *s, int e, int ky0, int ky1)
         int row = e + p->first + ky * p->dilation;
         if (p->replicate) row = conv_clamp(row, p->h);
         else if (row < 0 || row >= p->h) continue;
-        const ptrdiff_t at = s->stage.rows ? conv_window_row(&s->stage, row) - s->stage.memory
-                                           : (ptrdiff_t)row * p->w * p->ic;
+        const ptrdiff_t at = s->window.rows ? conv_window_row(&s->window, row) - s->window.memory
+                                            : (ptrdiff_t)row * p->w * p->ic;
         const ptrdiff_t w = (ptrdiff_t)ky * p->k * p->ic;
         if (merged) s->segment[s->segments++] = (ts_segment){at, w, (ptrdiff_t)p->k * p->ic};
         else
@@ -138,8 +138,8 @@ static void run_row(runner *r, int e, int ky0, int ky1, int panel0, int panel1, 
     ptrdiff_t depth = 0;
     for (int i = 0; i < r->sources; i++) {
         source *s = &r->source[i];
-        if (s->stage.rows)
-            conv_window_fill(&s->stage, p, r->b->image, conv_clamp(e + p->first, p->h),
+        if (s->window.rows)
+            conv_window_fill(&s->window, p, r->b->image, conv_clamp(e + p->first, p->h),
                              conv_clamp(e + p->first + reach, p->h));
         make_segments(r, s, e, ky0, ky1);
         depth = s->segments ? s->segments * s->segment[0].count : 0;
@@ -162,7 +162,7 @@ static void run_row(runner *r, int e, int ky0, int ky1, int panel0, int panel1, 
             t.a_stride = s->pixel;
             /* So is its newest input row while the first panel passes by; a strip is in the cache. */
             const float *fresh = NULL;
-            if (panel == panel0 && s->segments && !s->stage.rows) {
+            if (panel == panel0 && s->segments && !s->window.rows) {
                 const ts_segment *newest = &s->segment[s->segments - 1];
                 fresh = s->pixel0 + newest->a +
                     (newest->count == p->ic ? 0 : reach) *
@@ -190,7 +190,7 @@ static void run_row(runner *r, int e, int ky0, int ky1, int panel0, int panel1, 
     }
 }
 
-static void run_band(const conv_plan *p, blocking block, const band *b)
+static void run_band(const conv_plan *p, weight_part part, const band *b)
 {
     runner r = {.p = p, .b = b, .out_w = p->w + 2 * p->fold};
     const int reach = (p->k - 1) * p->dilation, step = ts_conv_k()->pixels;
@@ -198,14 +198,14 @@ static void run_band(const conv_plan *p, blocking block, const band *b)
     r.tiles = (r.out_w + step - 1) / step;
     r.tile_size = r.out_w / r.tiles;
     r.larger = r.out_w % r.tiles;
-    make_sources(&r, block.ky < p->k ? e1 - e0 + reach : reach + 1);
+    make_sources(&r, part.ky < p->k ? e1 - e0 + reach : reach + 1);
     if (p->fold) r.extended = ts_scratch(1, sizeof(float) * (size_t)r.out_w * (size_t)(2 * conv_lanes()));
-    for (int panel0 = b->panel_begin; panel0 < b->panel_end; panel0 += block.panels) {
-        const int panel1 = panel0 + block.panels < b->panel_end ? panel0 + block.panels : b->panel_end;
-        if (block.ky == p->k)
-            for (int i = 0; i < r.sources; i++) r.source[i].stage.next = 0;
-        for (int ky = 0; ky < p->k; ky += block.ky) {
-            const int ky_end = ky + block.ky < p->k ? ky + block.ky : p->k;
+    for (int panel0 = b->panel_begin; panel0 < b->panel_end; panel0 += part.panels) {
+        const int panel1 = panel0 + part.panels < b->panel_end ? panel0 + part.panels : b->panel_end;
+        if (part.ky == p->k)
+            for (int i = 0; i < r.sources; i++) r.source[i].window.next = 0;
+        for (int ky = 0; ky < p->k; ky += part.ky) {
+            const int ky_end = ky + part.ky < p->k ? ky + part.ky : p->k;
             for (int e = e0, before = -1; e < e1; e++) {
                 const int row = conv_clamp(e - p->fold, p->h);
                 run_row(&r, e, ky, ky_end, panel0, panel1, !p->add && ky == 0 && row != before);
@@ -217,17 +217,17 @@ static void run_band(const conv_plan *p, blocking block, const band *b)
 
 void conv_run_direct(const conv_plan *p)
 {
-    const blocking block = choose_blocking(p);
+    const weight_part part = choose_weight_part(p);
     const int panels = conv_panels(p->oc);
-    /* Bands as long as the number of units allows: each stages its halo anew. */
+    /* Bands as long as the number of units allows: each copies its halo anew. */
     int bands = (16 + p->n - 1) / p->n;
     if (bands > (p->h + 3) / 4) bands = (p->h + 3) / 4;
     int groups = p->n * bands < 8 ? (8 + p->n * bands - 1) / (p->n * bands) : 1;
-    /* More weights than values: a block of them stays in the second cache while all images pass by, and where it is a
+    /* More weights than values: a part of them stays in the second cache while all images pass by, and where it is a
      * panel those who come to it next have it fetched. */
-    const int blocks = (panels + block.panels - 1) / block.panels, ahead = ts_threads_of(p->threads);
+    const int parts = (panels + part.panels - 1) / part.panels, ahead = ts_threads_of(p->threads);
     const bool weighty = (ptrdiff_t)p->k * p->k * p->oc > (ptrdiff_t)p->n * p->h * p->w;
-    if (weighty && groups < blocks) groups = blocks;
+    if (weighty && groups < parts) groups = parts;
     if (groups > panels) groups = panels;
     if (weighty && p->h <= WHOLE_ROWS && groups * p->n >= 8) bands = 1;
 #pragma omp parallel for collapse(3) schedule(dynamic) num_threads(ts_threads_of(p->threads))
@@ -235,11 +235,11 @@ void conv_run_direct(const conv_plan *p)
         for (int n = 0; n < p->n; n++)
             for (int i = 0; i < bands; i++) {
                 band b = {.image = n,
-                          .next = weighty && block.ky == p->k && bands == 1 && groups == panels && g + ahead < panels
+                          .next = weighty && part.ky == p->k && bands == 1 && groups == panels && g + ahead < panels
                               ? g + ahead
                               : -1};
                 conv_part(p->h, bands, i, &b.begin, &b.end);
                 conv_part(panels, groups, g, &b.panel_begin, &b.panel_end);
-                run_band(p, block, &b);
+                run_band(p, part, &b);
             }
 }

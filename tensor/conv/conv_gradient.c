@@ -17,19 +17,19 @@ enum {
  */
 typedef struct job {
     const ts_conv *c;
-    conv_plan plan; /* how x is staged */
+    conv_plan plan; /* how x is copied into a window */
     const float *x, *dy;
     bool swapped;            /* n is the position in the line */
     bool direct_dy;          /* dy's panels are read where they are */
     int lines, taps, length; /* lines, lines per kernel row, inputs per line */
     int m, n, padded;
-    ptrdiff_t pixel, size; /* floats per staged pixel and per chunk */
+    ptrdiff_t pixel, size; /* floats per pixel of x and per chunk */
     float *sums, *bias_sums;
     int chunks, groups; /* groups of (panel of n, line) share a chunk's pixels */
 } job;
 
-/* FMAs per pixel of an m x n block, counting what tails and short chains leave idle. */
-static int64_t block_cost(int m, int n)
+/* FMAs per pixel of an m x n tile, counting what tails and short chains leave idle. */
+static int64_t tile_cost(int m, int n)
 {
     const int rows = ts_conv_k()->rows, tiles = (m + rows - 1) / rows, vectors = (n + conv_lanes() - 1) / conv_lanes();
     const int64_t cost = (int64_t)m * vectors, least = 8 * (int64_t)tiles * ((vectors + 1) / 2);
@@ -54,9 +54,9 @@ static job make_job(const ts_conv *c, const float *x, const float *dy)
     g.taps = c->dilation == 1 && g.pixel == c->ic ? 1 : c->k;
     g.lines = c->k * g.taps;
     g.length = g.taps == 1 ? c->k * c->ic : c->ic;
-    /* Read where it is, x has no room behind its last pixel for a whole vector. */
+    /* Read where it is, x has nothing readable behind its last pixel for a whole vector. */
     const bool whole = c->k > 1 || c->ic % conv_lanes() == 0;
-    g.swapped = whole && block_cost(c->oc, g.length) < block_cost(g.length, c->oc);
+    g.swapped = whole && tile_cost(c->oc, g.length) < tile_cost(g.length, c->oc);
     g.m = g.swapped ? c->oc : g.length;
     g.n = g.swapped ? g.length : c->oc;
     const int lanes = conv_lanes();
@@ -78,13 +78,13 @@ static job make_job(const ts_conv *c, const float *x, const float *dy)
 typedef struct pass {
     int image, begin, end, left, right, item, item_end;
     bool first; /* of the chunk */
-    /* What the next pass reads, fetched a little with each block. */
+    /* What the next pass reads, fetched a little with each tile. */
     const char *next[2];
     ptrdiff_t next_bytes[2], fetched, fetch_each;
 } pass;
 
 /* dy of a pass as [pixel][lane of the panel], zeros in the lanes that do not exist. */
-static void stage_dy(const job *g, const pass *s, int panel, float *to)
+static void pack_dy(const job *g, const pass *s, int panel, float *to)
 {
     const int lanes = conv_lanes(), oc = g->c->oc;
     const int width = conv_vectors(oc, panel) * lanes, o0 = panel * 2 * lanes, count = s->right - s->left;
@@ -93,7 +93,7 @@ static void stage_dy(const job *g, const pass *s, int panel, float *to)
                            oc - o0 < width ? oc - o0 : width, to);
 }
 
-/* All blocks of m of one line and one panel of n. */
+/* All tiles of m of one line and one panel of n. */
 static void sum_line(const job *g, ts_sum *t, pass *s, int panel, float *c)
 {
     const struct ts_conv_kernels *kernels = ts_conv_k();
@@ -103,7 +103,7 @@ static void sum_line(const job *g, ts_sum *t, pass *s, int panel, float *c)
     for (int i = 0; i < tiles; i++) {
         int begin, end;
         conv_part(g->m, tiles, i, &begin, &end);
-        /* The next block's sums, which are in memory where there are many weights. */
+        /* The next tile's sums, which are in memory where there are many weights. */
         const float *next = c + (ptrdiff_t)end * g->padded + panel * 2 * kernels->lanes;
         for (int m = end; m < g->m && m < end + kernels->rows; m++, next += g->padded)
             __builtin_prefetch(next, 1), __builtin_prefetch(next + 16, 1);
@@ -117,19 +117,19 @@ static void sum_line(const job *g, ts_sum *t, pass *s, int panel, float *c)
     t->a = a;
 }
 
-static void run_pass(const job *g, pass *s, const conv_window *stage, float *sums)
+static void run_pass(const job *g, pass *s, const conv_window *window, float *sums)
 {
     const ts_conv *c = g->c;
     const int lanes = conv_lanes(), count = s->right - s->left;
-    float *staged_dy = g->direct_dy
+    float *packed_dy = g->direct_dy
         ? NULL
         : ts_scratch(1, sizeof(float) * (size_t)(s->end - s->begin) * (size_t)(count * 2 * lanes));
     ptrdiff_t x_row[PASS_PIXELS], dy_row[PASS_PIXELS];
-    const float *x = c->k == 1 ? g->x : stage->memory, *dy = g->direct_dy ? g->dy : staged_dy;
+    const float *x = c->k == 1 ? g->x : window->memory, *dy = g->direct_dy ? g->dy : packed_dy;
     for (int item = s->item, panel_before = -1; item < s->item_end; item++) {
         const int panel = item / g->lines, line = item % g->lines, ky = line / g->taps, kx = line % g->taps;
         const int width = conv_vectors(g->n, panel) * lanes;
-        if (staged_dy && panel != panel_before) stage_dy(g, s, panel, staged_dy);
+        if (packed_dy && panel != panel_before) pack_dy(g, s, panel, packed_dy);
         panel_before = panel;
         int rows = 0;
         for (int i = s->begin; i < s->end; i++) {
@@ -138,7 +138,7 @@ static void run_pass(const job *g, pass *s, const conv_window *stage, float *sum
             else if (r < 0 || r >= c->h) continue;
             const ptrdiff_t at = ((ptrdiff_t)s->image * c->h + i) * c->w + s->left;
             x_row[rows] = c->k == 1 ? at * c->ic
-                                    : conv_window_row(stage, r) - x + (s->left + kx * c->dilation) * stage->pixel;
+                                    : conv_window_row(window, r) - x + (s->left + kx * c->dilation) * window->pixel;
             dy_row[rows++] = g->direct_dy ? at * c->oc : (ptrdiff_t)(i - s->begin) * count * width;
         }
         const ptrdiff_t dy_stride = g->direct_dy ? c->oc : width;
@@ -156,7 +156,7 @@ static void run_pass(const job *g, pass *s, const conv_window *stage, float *sum
 }
 
 /* What the pass after rows up to row_end (counted over all images) will read. */
-static void plan_fetch(const job *g, pass *s, int row_end, int rows, int blocks)
+static void plan_fetch(const job *g, pass *s, int row_end, int rows, int column_parts)
 {
     const ts_conv *c = g->c;
     const int all = c->n * c->h, m_tiles = (g->m + ts_conv_k()->rows - 1) / ts_conv_k()->rows;
@@ -168,7 +168,8 @@ static void plan_fetch(const job *g, pass *s, int row_end, int rows, int blocks)
     s->next_bytes[0] = (ptrdiff_t)sizeof(float) * rows * c->w * c->ic;
     s->next_bytes[1] = (ptrdiff_t)sizeof(float) * rows * c->w * c->oc;
     s->fetched = 0;
-    s->fetch_each = (s->next_bytes[0] + s->next_bytes[1]) / ((ptrdiff_t)blocks * (s->item_end - s->item) * m_tiles);
+    s->fetch_each = (s->next_bytes[0] + s->next_bytes[1]) /
+        ((ptrdiff_t)column_parts * (s->item_end - s->item) * m_tiles);
 }
 
 /* A chunk's rows (counted over all images) into its sums, for one group of (panel, line); group 0 also makes the bias.
@@ -177,9 +178,9 @@ static void run_chunk(const job *g, int chunk, int group, bool weights)
 {
     const ts_conv *c = g->c;
     const int most = c->k == 1 ? PASS_POINTWISE : PASS_PIXELS, rows_pass = c->w < most ? most / c->w : 1,
-              blocks = (c->w + most - 1) / most;
+              column_parts = (c->w + most - 1) / most;
     const int reach = (c->k - 1) * c->dilation;
-    const bool staged = weights && c->k > 1;
+    const bool windowed = weights && c->k > 1;
     pass s = {0};
     int begin, end;
     conv_part(c->n * c->h, g->chunks, chunk, &begin, &end);
@@ -187,10 +188,10 @@ static void run_chunk(const job *g, int chunk, int group, bool weights)
     float *sums = g->sums + chunk * g->size,
           *bias = g->bias_sums && group == 0 ? g->bias_sums + (ptrdiff_t)chunk * c->oc : NULL;
     if (bias) memset(bias, 0, sizeof(float) * (size_t)c->oc);
-    conv_window stage = {0};
-    if (staged) {
-        stage = conv_window_make(&g->plan, rows_pass + reach, g->plan.first, c->w + reach);
-        stage.memory = ts_scratch(0, conv_window_size(&stage) * sizeof(float));
+    conv_window window = {0};
+    if (windowed) {
+        window = conv_window_make(&g->plan, rows_pass + reach, g->plan.first, c->w + reach);
+        window.memory = ts_scratch(0, conv_window_size(&window) * sizeof(float));
     }
     for (int row = begin, image_before = -1; row < end; row += s.end - s.begin) {
         s.image = row / c->h;
@@ -198,17 +199,17 @@ static void run_chunk(const job *g, int chunk, int group, bool weights)
         s.end = s.begin + rows_pass;
         if (s.end > c->h) s.end = c->h;
         if (s.end - s.begin > end - row) s.end = s.begin + end - row;
-        if (s.image != image_before) stage.next = 0;
+        if (s.image != image_before) window.next = 0;
         image_before = s.image;
-        if (staged) {
+        if (windowed) {
             const int low = s.begin + g->plan.first, high = s.end - 1 + g->plan.first + reach;
-            conv_window_fill(&stage, &g->plan, s.image, conv_clamp(low, c->h), conv_clamp(high, c->h));
+            conv_window_fill(&window, &g->plan, s.image, conv_clamp(low, c->h), conv_clamp(high, c->h));
         }
-        if (weights) plan_fetch(g, &s, row + s.end - s.begin, s.end - s.begin, blocks);
-        for (int b = 0; weights && b < blocks; b++) {
-            conv_part(c->w, blocks, b, &s.left, &s.right);
+        if (weights) plan_fetch(g, &s, row + s.end - s.begin, s.end - s.begin, column_parts);
+        for (int b = 0; weights && b < column_parts; b++) {
+            conv_part(c->w, column_parts, b, &s.left, &s.right);
             s.first = row == begin && b == 0;
-            run_pass(g, &s, &stage, sums);
+            run_pass(g, &s, &window, sums);
         }
         if (bias)
             ts_conv_k()->columns(g->dy + (ptrdiff_t)row * c->w * c->oc, (int64_t)(s.end - s.begin) * c->w, c->oc, bias);
@@ -229,7 +230,7 @@ enum { REDUCE_OUTPUTS = 32, REDUCE_INPUTS = 16 };
 
 /* Outputs [o0, o1) and inputs [c0, c1): together small enough that the places they go to, taps fastest, stay in cache.
  */
-static void reduce_block(const job *g, int o0, int o1, int c0, int c1, float *dweight)
+static void reduce_part(const job *g, int o0, int o1, int c0, int c1, float *dweight)
 {
     const ts_conv *c = g->c;
     const ptrdiff_t taps = (ptrdiff_t)c->k * c->k;
@@ -258,19 +259,19 @@ void conv_direct_weight_gradient(const ts_conv *c, const float *x, const float *
     const size_t count = (size_t)(g->size * g->chunks) + (size_t)(c->oc * g->chunks);
     g->sums = ts_scratch(2, sizeof(float) * count);
     g->bias_sums = dbias ? g->sums + g->size * g->chunks : NULL;
-    const int groups = dweight ? g->groups : 1, o_blocks = dweight ? (c->oc + REDUCE_OUTPUTS - 1) / REDUCE_OUTPUTS : 0;
-    const int c_blocks = (c->ic + REDUCE_INPUTS - 1) / REDUCE_INPUTS;
+    const int groups = dweight ? g->groups : 1, o_parts = dweight ? (c->oc + REDUCE_OUTPUTS - 1) / REDUCE_OUTPUTS : 0;
+    const int c_parts = (c->ic + REDUCE_INPUTS - 1) / REDUCE_INPUTS;
 #pragma omp parallel num_threads(ts_threads_of(c->compute.threads))
     {
 #pragma omp for collapse(2) schedule(dynamic)
         for (int chunk = 0; chunk < g->chunks; chunk++)
             for (int group = 0; group < groups; group++) run_chunk(g, chunk, group, dweight != NULL);
 #pragma omp for collapse(2) schedule(static)
-        for (int o = 0; o < o_blocks; o++)
-            for (int i = 0; i < c_blocks; i++)
-                reduce_block(g, o * REDUCE_OUTPUTS, (o + 1) * REDUCE_OUTPUTS < c->oc ? (o + 1) * REDUCE_OUTPUTS : c->oc,
-                             i * REDUCE_INPUTS, (i + 1) * REDUCE_INPUTS < c->ic ? (i + 1) * REDUCE_INPUTS : c->ic,
-                             dweight);
+        for (int o = 0; o < o_parts; o++)
+            for (int i = 0; i < c_parts; i++)
+                reduce_part(g, o * REDUCE_OUTPUTS, (o + 1) * REDUCE_OUTPUTS < c->oc ? (o + 1) * REDUCE_OUTPUTS : c->oc,
+                            i * REDUCE_INPUTS, (i + 1) * REDUCE_INPUTS < c->ic ? (i + 1) * REDUCE_INPUTS : c->ic,
+                            dweight);
     }
     for (int i = 0; dbias && i < g->chunks; i++)
         for (int o = 0; o < c->oc; o++) dbias[o] += g->bias_sums[(ptrdiff_t)i * c->oc + o];

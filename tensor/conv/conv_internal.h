@@ -45,8 +45,8 @@ typedef struct conv_plan {
 } conv_plan;
 
 enum {
-    CONV_BLOCK_BYTES = 640 << 10, /* weights that stay in the second cache while pixels pass by */
-    CONV_WINDOW_SLACK = 64        /* the weight gradient reads whole vectors past the last pixel */
+    CONV_CACHED_BYTES = 640 << 10, /* weights that stay in the second cache while pixels pass by */
+    CONV_WINDOW_SLACK = 64         /* the weight gradient reads whole vectors past the last pixel */
 };
 
 /* n consecutive pixels of x as tiles read them, stride floats apart. */

@@ -1,6 +1,6 @@
 /* Convolution of few inputs to few output channels, which would leave most lanes empty: lanes are pixels of a row
- * instead. A block of columns goes down the image; its rows of input, transposed to [channel][column], stay in the
- * second cache, and a block of output channels x pixels stays in registers over all taps and inputs. */
+ * instead. A strip of columns goes down the image; its rows of input, transposed to [channel][column], stay in the
+ * second cache, and a tile of output channels x pixels stays in registers over all taps and inputs. */
 #include "tensor/conv/conv_internal.h"
 #include "tensor/threads.h"
 #include <string.h>
@@ -8,14 +8,14 @@
 /* Inputs whose rows stay in the first cache over all taps, three lines of each. */
 static int chunk_of(int k) { return 84 / k; }
 
-/* [block of outputs][chunk of inputs][tap][input][output of the block] */
+/* [part of the outputs][chunk of inputs][tap][input][output of the part] */
 void conv_pack_lanes(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step,
                      float *packed)
 {
-    const int rows = ts_conv_k()->rows, blocks = (oc + rows - 1) / rows, taps = k * k, chunk = chunk_of(k);
-    for (int block = 0; block < blocks; block++) {
+    const int rows = ts_conv_k()->rows, parts = (oc + rows - 1) / rows, taps = k * k, chunk = chunk_of(k);
+    for (int part = 0; part < parts; part++) {
         int begin, end;
-        conv_part(oc, blocks, block, &begin, &end);
+        conv_part(oc, parts, part, &begin, &end);
         for (int c = 0; c < ic; c += chunk)
             for (int t = 0; t < taps; t++)
                 for (int i = c; i < c + chunk && i < ic; i++)
@@ -31,7 +31,7 @@ typedef struct rows {
     int begin, width, count, next;
 } rows;
 
-enum { STAGE_BYTES = 384 << 10 };
+enum { ROWS_BYTES = 384 << 10 };
 
 static rows rows_make(const conv_plan *p, int pixels)
 {
@@ -41,7 +41,7 @@ static rows rows_make(const conv_plan *p, int pixels)
         if (s.width > pixels) s.width = pixels;
         s.plane = s.width + (reach + lanes - 1) / lanes * lanes;
         s.row = s.plane * p->ic;
-        if (s.width <= 2 * lanes || s.row * s.count * (ptrdiff_t)sizeof(float) <= STAGE_BYTES) return s;
+        if (s.width <= 2 * lanes || s.row * s.count * (ptrdiff_t)sizeof(float) <= ROWS_BYTES) return s;
     }
 }
 
@@ -67,11 +67,11 @@ static void fill(rows *s, const conv_plan *p, int image, int first, int last)
     if (last >= s->next) s->next = last + 1;
 }
 
-/* The block's outputs of extended row e as [channel][pixel]. */
+/* The strip's outputs of extended row e as [channel][pixel]. */
 static void sum_row(const conv_plan *p, const rows *s, int e, float *out)
 {
     const struct ts_conv_kernels *kernels = ts_conv_k();
-    const int lanes = kernels->lanes, blocks = (p->oc + kernels->rows - 1) / kernels->rows, taps = p->k * p->k,
+    const int lanes = kernels->lanes, parts = (p->oc + kernels->rows - 1) / kernels->rows, taps = p->k * p->k,
               chunk = chunk_of(p->k);
     int runs = 0, valid[15 * 15];
     ptrdiff_t at[15 * 15];
@@ -85,9 +85,9 @@ static void sum_row(const conv_plan *p, const rows *s, int e, float *out)
     for (int o = 0; o < p->oc; o++)
         for (int j = 0; j < s->width; j++) out[(ptrdiff_t)o * s->width + j] = p->bias ? p->bias[o] : 0;
     const float *w = p->packed + conv_panels_count(p->ic, p->oc, p->k);
-    for (int block = 0; block < blocks; block++) {
+    for (int part = 0; part < parts; part++) {
         int begin, end;
-        conv_part(p->oc, blocks, block, &begin, &end);
+        conv_part(p->oc, parts, part, &begin, &end);
         for (int c = 0; c < p->ic; c += chunk) {
             ptrdiff_t x_row[15 * 15], w_row[15 * 15];
             const int count = p->ic - c < chunk ? p->ic - c : chunk;
@@ -113,8 +113,8 @@ static void sum_row(const conv_plan *p, const rows *s, int e, float *out)
     }
 }
 
-/* y's row from the block's [channel][pixel]. first: nothing has been put into these columns of it yet. What the
- * extended domain has outside is added to the border pixel, which is there: it lies in this block, or in the one
+/* y's row from the strip's [channel][pixel]. first: nothing has been put into these columns of it yet. What the
+ * extended domain has outside is added to the border pixel, which is there: it lies in this strip, or in the one
  * before. */
 static void put_row(const conv_plan *p, const rows *s, const float *out, float *y, bool first)
 {

@@ -63,7 +63,7 @@ static void run_together(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, i
 
 void conv_run_pixels(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, int panel0, int panel1)
 {
-    ptrdiff_t together = CONV_BLOCK_BYTES / ((ptrdiff_t)p->ic * 2 * conv_lanes() * (ptrdiff_t)sizeof(float));
+    ptrdiff_t together = CONV_CACHED_BYTES / ((ptrdiff_t)p->ic * 2 * conv_lanes() * (ptrdiff_t)sizeof(float));
     if (together < 1) together = 1;
     if (together > PANELS_TOGETHER) together = PANELS_TOGETHER;
     for (int base = panel0; base < panel1; base += (int)together)

@@ -69,14 +69,14 @@ static void transform(const job *j, int64_t first, int count, const float *nothi
 static void add_products(const job *j, int count, const float *v, const float *m, float *sums)
 {
     const struct ts_conv_kernels *k = ts_conv_k();
-    const int ic = j->g.ic, blocks = (ic + k->rows - 1) / k->rows, panels = conv_panels(j->g.oc);
+    const int ic = j->g.ic, parts = (ic + k->rows - 1) / k->rows, panels = conv_panels(j->g.oc);
     const ptrdiff_t start = 0;
     for (int q = 0; q < WINOGRAD_AREA; q++)
         for (int panel = 0; panel < panels; panel++) {
             const int o0 = panel * 2 * k->lanes, vectors = conv_vectors(j->g.oc, panel);
-            for (int b = 0; b < blocks; b++) {
+            for (int b = 0; b < parts; b++) {
                 int begin, end;
-                conv_part(ic, blocks, b, &begin, &end);
+                conv_part(ic, parts, b, &begin, &end);
                 const ts_sum t = {.a = v + q * j->in + begin,
                                   .b = m + q * j->out + o0,
                                   .a_row = &start,

@@ -41,7 +41,7 @@ typedef struct product {
 } product;
 
 /* Rows [row, row + rows) of C, k in [k0, k1), panels [panel0, panel1). */
-static void run_block(const product *p, int row, int rows, int k0, int k1, int panel0, int panel1)
+static void run_part(const product *p, int row, int rows, int k0, int k1, int panel0, int panel1)
 {
     const struct ts_conv_kernels *kernels = ts_conv_k();
     const float *a = p->a + (ptrdiff_t)row * p->k + k0;
@@ -105,7 +105,7 @@ void ts_gemm(bool ta, bool tb, int m, int n, int k, float alpha, const float *a,
             conv_part(panels, groups, g, &panel0, &panel1);
             const int row = i * ROWS, rows = m - row < ROWS ? m - row : ROWS;
             for (int k0 = 0; k0 < k; k0 += DEPTH)
-                run_block(&p, row, rows, k0, k - k0 < DEPTH ? k : k0 + DEPTH, panel0, panel1);
+                run_part(&p, row, rows, k0, k - k0 < DEPTH ? k : k0 + DEPTH, panel0, panel1);
         }
 }
 

@@ -101,12 +101,12 @@ static void add_products(const float *d, int c, const float *b, int channels, in
     const ptrdiff_t zero = 0;
     ptrdiff_t b_stride = channels;
     if (width != channels) { /* whole vectors are read */
-        float *staged = ts_scratch(1, sizeof(float) * (size_t)(GRU_BAND * width));
+        float *wide = ts_scratch(1, sizeof(float) * (size_t)(GRU_BAND * width));
         for (int p = 0; p < count; p++) {
-            memcpy(staged + (ptrdiff_t)p * width, b + (ptrdiff_t)p * channels, sizeof(float) * (size_t)channels);
-            memset(staged + (ptrdiff_t)p * width + channels, 0, sizeof(float) * (size_t)(width - channels));
+            memcpy(wide + (ptrdiff_t)p * width, b + (ptrdiff_t)p * channels, sizeof(float) * (size_t)channels);
+            memset(wide + (ptrdiff_t)p * width + channels, 0, sizeof(float) * (size_t)(width - channels));
         }
-        b = staged;
+        b = wide;
         b_stride = width;
     }
     for (int panel = 0; panel < conv_panels(channels); panel++)

@@ -62,19 +62,19 @@ TEST(trainer_skips_a_spike)
     tr_trainer *t = tr_create(&c, folder("run"), false, NULL, &st);
     CHECK(t, "%s", st.message);
     CHECK(tr_step(t, &row, &st) == TS_OK && !row.skip, "%s", st.message);
-    CHECK(t->usual_norm == row.norm, "the usual norm is %g after a first of %g", t->usual_norm, row.norm);
-    const double usual = t->usual_norm;
-    t->usual_norm = row.norm / 1000;
+    CHECK(t->mean_norm == row.norm, "the mean norm is %g after a first of %g", t->mean_norm, row.norm);
+    const double mean = t->mean_norm;
+    t->mean_norm = row.norm / 1000;
     CHECK(tr_step(t, &row, &st) == TS_OK && !row.skip, "a spike among the first steps was skipped: %s", row.skip);
     t->adam.step = 200;
-    t->usual_norm = usual / 1000;
+    t->mean_norm = mean / 1000;
     CHECK(tr_step(t, &row, &st) == TS_OK && row.skip && strstr(row.skip, "train.spike"), "no spike was seen");
-    CHECK(t->usual_norm == usual / 1000 && t->adam.step == 200 && t->in_a_row == 1, "a spike changed the state");
-    t->usual_norm = usual;
+    CHECK(t->mean_norm == mean / 1000 && t->adam.step == 200 && t->in_a_row == 1, "a spike changed the state");
+    t->mean_norm = mean;
     CHECK(tr_step(t, &row, &st) == TS_OK && !row.skip && t->in_a_row == 0 && t->skipped == 1,
           "the run does not go on after a spike: %s", row.skip);
     t->config.train.spike = 0;
-    t->usual_norm = usual / 1000;
+    t->mean_norm = mean / 1000;
     CHECK(tr_step(t, &row, &st) == TS_OK && !row.skip, "0 does not turn it off");
     tr_destroy(&t);
 }
