@@ -85,7 +85,6 @@ static const lgd_argument arguments[] = {
     {'V', "version", NULL, "print the version"},
     {0, NULL, NULL, NULL}};
 
-
 static ts_code whole(const char *name, const char *text, int64_t lo, int64_t hi, int64_t *value, ts_status *st)
 {
     if (cl_parse_int(text, lo, hi, value)) return TS_OK;

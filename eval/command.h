@@ -12,7 +12,8 @@ typedef struct ev_command {
     const char *peer_maps;
     double noise, exposure, light[2]; /* exposure 0: not given */
     io_map_convention told;
-    bool told_all, untold, images, fast, exact, pin, tune, pareto, iterations_figure, methods_figure, quiet, help, version;
+    bool told_all, untold; /* lights and cameras of captures are told; the power of other sets is not */
+    bool images, fast, exact, pin, tune, pareto, iterations_figure, methods_figure, quiet, help, version;
 } ev_command;
 
 /* TS_INVALID with a message that names the option. The strings are argv's. */

@@ -10,4 +10,6 @@ void rd_log_encode(int64_t count, const float *in, float *out);
 /* What evaluation compares: clamp(v, 0, 1)^(1/2.2), and not the sRGB curve, since the figures that others publish are
  * in this space. NaN becomes 0. */
 float rd_gamma(float v);
+/* The same of count values, within rounding. in may be out. Threaded. */
+void rd_gamma_encode(int64_t count, const float *in, float *out);
 #endif
