@@ -9,4 +9,6 @@ void rd_log_encode(int64_t count, const float *in, float *out, int threads);
 
 /* The encoding for evaluation: clamp(v, 0, 1)^(1/2.2), as in published figures, not the sRGB curve. NaN becomes 0. */
 float rd_gamma(float v);
+/* The same of count values, within rounding. in may be out. Threaded. */
+void rd_gamma_encode(int64_t count, const float *in, float *out);
 #endif

@@ -75,12 +75,26 @@ static ts_code fit(const ev_case *c, float mean[MAP_CHANNELS], float *maps, ts_s
     return TS_OK;
 }
 
+/* A flat matt material of the photograph's mean colour. */
+static void photo_colour(const ev_case *c, float mean[MAP_CHANNELS])
+{
+    const io_texel plain = {.normal = {0, 0, 1}, .roughness = 0.5f, .specular = {0.04f, 0.04f, 0.04f}};
+    double colour[3];
+    mean_colour(c->image, (int64_t)c->size * c->size, colour);
+    io_texel_put(mean, &plain);
+    for (int k = 0; k < 3; k++) mean[MAP_DIFFUSE + k] = (float)(2 * fmin(colour[k], 1) - 1);
+}
+
+enum { FIT_NO, FIT_YES, FIT_COLOUR };
+
 static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
 {
     float mean[MAP_CHANNELS];
     ts_code code = procedural_mean(mean, st);
     if (!code) code = ev_block(e, (size_t)c->size * (size_t)c->size * MAP_CHANNELS, st);
-    if (!code && ev_number(e, "fit") > 0) code = fit(c, mean, e->x, st);
+    const int how = (int)ev_number(e, "fit");
+    if (how == FIT_COLOUR) photo_colour(c, mean);
+    if (!code && how == FIT_YES) code = fit(c, mean, e->x, st);
     if (code) return code;
     fill(c, mean, e->x);
     seen(0, e->x, MAP_CHANNELS, user);
@@ -90,10 +104,11 @@ static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, 
 static const ev_setting settings[] = {
     {.key = "fit",
      .type = EV_WORD,
-     .words = "no yes",
+     .words = "no yes colour",
      .initial = "yes",
      .grid = "no yes",
-     .help = "scale its diffuse so that the re-rendering is as bright as the photograph"},
+     .help = "scale its diffuse so that the re-rendering is as bright as the photograph; or of the photograph's mean "
+             "colour, flat, F0 0.04, roughness 0.5"},
     {0}};
 const ev_method ev_method_mean = {
     .name = "mean", .help = "the mean of procedural materials, the same everywhere", .settings = settings, .run = run};

@@ -61,7 +61,7 @@ static void load(int size, const float *maps, int channels, complex_t *plane)
 void ev_band_correlation(int size, const float *maps, int channels, const float *truth, int truth_channels,
                          double correlation[EV_BANDS])
 {
-    const double floor = 1e-12; /* of what rounding leaves in a band */
+    const double rounding = 1e-6, relief = EV_LEAST_RELIEF; /* RMS; rounding: what floats leave in a band */
     const size_t pixels = (size_t)size * (size_t)size;
     double products[EV_BANDS] = {0}, mine[EV_BANDS] = {0}, theirs[EV_BANDS] = {0};
     complex_t *memory = malloc((2 * pixels + 3 * (size_t)size) * sizeof *memory);
@@ -87,8 +87,9 @@ void ev_band_correlation(int size, const float *maps, int channels, const float 
                 theirs[k] += creal(conj(b[i]) * b[i]);
             }
         }
-    const double least = floor * (double)pixels * (double)pixels;
+    const double square = (double)pixels * (double)pixels;
     for (int k = 0; k < EV_BANDS; k++)
-        if (theirs[k] > least) correlation[k] = mine[k] > least ? products[k] / sqrt(mine[k] * theirs[k]) : 0;
+        if (theirs[k] > relief * relief * square)
+            correlation[k] = mine[k] > rounding * rounding * square ? products[k] / sqrt(mine[k] * theirs[k]) : 0;
     free(memory);
 }

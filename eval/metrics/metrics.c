@@ -106,11 +106,14 @@ typedef struct factor {
     double products, squares;
 } factor;
 
-static void factor_add(factor *f, size_t values, const float *mine, const float *truth)
+/* encoded: room for 2 x values. */
+static void factor_add(factor *f, size_t values, const float *mine, const float *truth, float *encoded)
 {
+    rd_gamma_encode((int64_t)values, mine, encoded);
+    rd_gamma_encode((int64_t)values, truth, encoded + values);
     for (size_t i = 0; i < values; i++) {
         if (mine[i] > 1 || truth[i] > 1) continue;
-        const double a = (double)rd_gamma(mine[i]), b = (double)rd_gamma(truth[i]);
+        const double a = (double)encoded[i], b = (double)encoded[values + i];
         f->products += a * b;
         f->squares += a * a;
     }
@@ -121,19 +124,22 @@ static double factor_of(const factor *f) { return f->products > 0 ? pow(f->produ
 double ev_factor(size_t values, const float *a, const float *b)
 {
     factor f = {0};
-    factor_add(&f, values, a, b);
+    float *encoded = malloc(2 * values * sizeof *encoded);
+    if (encoded) factor_add(&f, values, a, b, encoded);
+    free(encoded);
     return factor_of(&f);
 }
 
 /* That of all renderings together. */
-static double fitted_exposure(const ev_case *c, const float *maps, int channels, float *mine, float *truth)
+static double fitted_exposure(const ev_case *c, const float *maps, int channels, float *mine, float *truth,
+                              float *encoded)
 {
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
     factor f = {0};
     for (int v = 0; v < RD_EVAL_VIEWS; v++) {
         rd_render(rd_grid_full(c->size), maps, channels, &c->views[v], false, mine);
         rd_render(rd_grid_full(c->size), c->truth->maps, MAP_CHANNELS, &c->views[v], false, truth);
-        factor_add(&f, values, mine, truth);
+        factor_add(&f, values, mine, truth, encoded);
     }
     return factor_of(&f);
 }
@@ -142,19 +148,20 @@ static double fitted_exposure(const ev_case *c, const float *maps, int channels,
 static void fit(const ev_case *c, const float *maps, int channels, ev_row *row)
 {
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
-    float *mine = malloc(2 * values * sizeof *mine), *truth = mine + values;
+    float *mine = malloc(4 * values * sizeof *mine), *truth = mine + values;
     row->value[EV_RENDER] = NAN;
     if (!mine) return;
-    const double exposure = fitted_exposure(c, maps, channels, mine, truth);
+    const double exposure = fitted_exposure(c, maps, channels, mine, truth, truth + values);
     double rmse = 0;
     for (int v = 0; v < RD_EVAL_VIEWS; v++) {
         rd_view view = c->views[v];
         rd_render(rd_grid_full(c->size), c->truth->maps, MAP_CHANNELS, &view, true, truth);
         view.power *= (float)exposure;
         rd_render(rd_grid_full(c->size), maps, channels, &view, true, mine);
+        rd_gamma_encode(2 * (int64_t)values, mine, mine);
         double sum = 0;
         for (size_t i = 0; i < values; i++) {
-            const double d = (double)rd_gamma(mine[i]) - (double)rd_gamma(truth[i]);
+            const double d = (double)mine[i] - (double)truth[i];
             sum += d * d;
         }
         rmse += sqrt(sum / (double)values) / RD_EVAL_VIEWS;
@@ -188,7 +195,7 @@ static void score_normals(const io_material *truth, const float *maps, int chann
         squares += e * e / (double)pixels;
     }
     row->value[EV_FLAT] = sqrt(squares);
-    row->value[EV_OVER_FLAT] = squares > 0 ? row->value[EV_NORMAL] / sqrt(squares) : NAN;
+    row->value[EV_OVER_FLAT] = sqrt(squares) > EV_LEAST_RELIEF ? row->value[EV_NORMAL] / sqrt(squares) : NAN;
     ev_band_correlation(truth->size, maps, channels, truth->maps, MAP_CHANNELS, row->value + EV_BAND);
 }
 

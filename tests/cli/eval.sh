@@ -9,7 +9,7 @@ evaluate() { "$BIN/lgd-eval" --size 32 --iterations 2 --threads 1 "$@"; }
 
 help_names_the_options() {
     expect 0 "$BIN/lgd-eval" --help
-    for o in method repeat pin tune figure pareto descent finetune fast set iterations model threads seed noise images size output procedural strips maps; do says "$T/out" "$o"; done
+    for o in method repeat pin tune figure pareto descent finetune fast set iterations model threads seed noise images size output procedural strips maps told untold peer-maps photos peers; do says "$T/out" "$o"; done
 }
 
 wrong_usage() {
@@ -148,13 +148,19 @@ captures() {
     model
     expect 0 "$BIN/lgd-data" --format captures --count 2 --size 32 -o "$T/c"
     [ "$(ls "$T"/c/*/ | grep -c 'png$')" = 18 ] || fail "pictures: $(ls "$T"/c/*)"
-    expect 0 evaluate --set "multiview:$T/c" --images -o "$T/o"
+    expect 0 evaluate --told --set "multiview:$T/c" --images -o "$T/o"
     says "$T/out" exposure
     lines "$T/o/results.csv" 7
     awk -F, 'NR > 1 && !($5 == "" && $9 > 0 && $9 < 0.5 && $13 > 0.3 && $13 < 3) { exit 1 }' "$T/o/results.csv" || fail "$(cat "$T/o/results.csv")"
     [ "$(ls "$T/o/images" | wc -l)" = 2 ] || fail "images: $(ls "$T/o/images")"
     one=$(ls -d "$T"/c/* | head -n 1)
     expect 0 evaluate --set "multiview:$one" -o "$T/p"
+    expect 0 evaluate --set "multiview:$one" --method lgd:power=auto,orientations=2,label=lgd -o "$T/same"
+    cmp -s "$T/p/results.csv" "$T/same/results.csv" || fail "the default is not as lgd-infer estimates"
+    expect 0 evaluate --told --set "multiview:$one" -o "$T/told"
+    if cmp -s "$T/p/results.csv" "$T/told/results.csv"; then fail "--told changes nothing"; fi
+    expect 2 evaluate --set "multiview:$one" --set procedural:1,1 -o "$T/mixed"
+    says "$T/err" "--told"
     rm "$one/light_pos.txt"
     expect 1 evaluate --set "multiview:$T/c" -o "$T/q"
     says "$T/err" light_pos.txt
@@ -255,7 +261,43 @@ searches_and_figures() {
     done
 }
 
+# Column NAME of a CSV file whose names of sets have no commas.
+column() { awk -F, -v name="$2" 'NR == 1 { for (k = 1; k <= NF; k++) if ($k == name) c = k } NR > 1 { print $c }' "$1"; }
+
+# Photographs without known maps, and what others made of them.
+photographs() {
+    model
+    mkdir "$T/photos" "$T/peers"
+    cp demo/flash.jpg "$T/photos/a.jpg"
+    cp demo/flash.jpg "$T/photos/b.jpg"
+    expect 0 evaluate --set "photos:$T/photos" --images -o "$T/o"
+    says "$T/out" "2 materials"
+    for c in residue_diffuse residue_specular residue_roughness residue_hue relief; do
+        [ "$(column "$T/o/results.csv" $c | awk '$1 >= 0 && $1 < 1' | wc -l)" = 6 ] || fail "$c: $(column "$T/o/results.csv" $c)"
+    done
+    [ "$(column "$T/o/results.csv" render | tr -d '\n')" = "" ] || fail "an error without a truth"
+    [ "$(ls "$T/o/images" | tr '\n' ' ')" = "1-a.png 1-b.png contact.png " ] || fail "images: $(ls "$T/o/images")"
+    [ "$(grep -c 'data:image/png' "$T/o/report.html")" = 2 ] || fail "no pictures in the report"
+    expect 0 evaluate --set "photos:$T/photos" --peer-maps "$T/peers" --method lgd --method peer -o "$T/p"
+    says "$T/out" "2 materials"
+    expect 1 evaluate --set "peers:$T/photos" -o "$T/q"
+    says "$T/err" "a.jpg"
+}
+
+# Nobody tells the light: one factor is fitted, and the estimate finds the power.
+untold() {
+    model
+    expect 0 evaluate --set procedural:3,2 --untold -o "$T/o"
+    says "$T/out" exposure
+    says "$T/out" over_flat
+    says "$T/out" band_8_32
+    expect 0 evaluate --set procedural:3,2 --untold --method lgd:power=auto,orientations=2,label=lgd -o "$T/p"
+    cmp -s "$T/o/results.csv" "$T/p/results.csv" || fail "the default is not as lgd-infer estimates"
+}
+
 check eval_captures captures
+check eval_photographs photographs
+check eval_untold untold
 check eval_lpips lpips
 check eval_maps_options told
 check eval_methods methods

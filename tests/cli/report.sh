@@ -14,7 +14,7 @@ opens_and_sorts() {
     BROWSER=$(command -v chromium || command -v chromium-browser || command -v google-chrome) || skip "no chromium is installed"
     [ -f "$MODEL" ] || fail "$MODEL is absent: the weights that the project ships"
     expect 0 "$BIN/lgd-data" --format captures --count 1 --size 32 -o "$T/c"
-    expect 0 "$BIN/lgd-eval" --size 32 -i 1 --threads 1 --set procedural:3,4 --set "multiview:$T/c" -o "$T/o"
+    expect 0 "$BIN/lgd-eval" --size 32 -i 1 --threads 1 --told --set procedural:3,4 --set "multiview:$T/c" -o "$T/o"
     browse "$T/o/report.html"
     says "$T/dom" 'data-failed="0"'
     [ "$(keys render | wc -l)" = 5 ] || fail "$(keys render | wc -l) materials"
