@@ -118,7 +118,7 @@ static void write_sheet(const char *path, const io_material *m, bool truth)
 
 TEST(eval_a_peer_that_has_the_truth_has_no_error)
 {
-    const io_procedural p = {.seed = 3};
+    const io_procedural p = {.seed = 3, .families = io_family_mask("classic")};
     io_material m = {0}, truth = {0}, peer = {0};
     ts_status st = {0};
     ev_set set;
@@ -161,7 +161,7 @@ TEST(eval_a_peer_that_has_the_truth_has_no_error)
 
 TEST(eval_photographs_and_their_peers)
 {
-    const io_procedural p = {.seed = 3};
+    const io_procedural p = {.seed = 3, .families = io_family_mask("classic")};
     io_material m = {0}, truth = {0}, peer = {0};
     ts_status st = {0};
     ev_set set;
