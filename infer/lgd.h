@@ -75,7 +75,8 @@ typedef struct lgd_options {
     int (*tile)(double done, void *user);
     /* NULL: the lights' powers are those of the photographs. Else the factor that fits them all is estimated from the
      * photographs, used, and written here. A stronger light and a brighter albedo look alike, so only what the model's
-     * materials cannot explain, such as an albedo above 1, counts. 1 for published weights, whose light is fixed. */
+     * materials cannot explain, such as an albedo above 1, counts. 1 for published weights, whose light is fixed.
+     * Models that guess the scene estimate the places of light and camera too unless this is NULL. */
     double *power;
 } lgd_options;
 /* Fills size bytes with the defaults, whichever version the library has. */
