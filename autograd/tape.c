@@ -2,6 +2,7 @@
 #include "autograd/op.h"
 #include "autograd/tape_internal.h"
 #include "tensor/memory.h"
+#include "tensor/scratch.h"
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>

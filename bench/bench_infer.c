@@ -35,6 +35,17 @@ static void whole(void *user)
     lgd_estimator_run(&e, &photo, 1, SIDE, &s->options, maps, &s->st);
 }
 
+/* The estimate without what the estimator adds: the photograph clipped, the maps made the caller's. */
+static void network(void *user)
+{
+    subject *s = user;
+    ag_value *maps;
+    const ts_mark mark = ag_scope_begin(s->own);
+    ag_compute_set(s->own, *ag_compute(s->tape));
+    nn_lgd(s->own, s->model, &s->in, s->options.iterations, false, &maps, NULL);
+    ag_scope_end(s->own, mark, NULL, 0);
+}
+
 static void step(void *user)
 {
     subject *s = user;
@@ -108,6 +119,7 @@ static void measure(nn_arch arch, const char *heading)
         bench_row(label, t, flop);
         if (!exact) bench_row_peer(t, flop, peer = bench_peer(job));
         if (exact) bench_row_threads(whole, &s);
+        bench_row("  of which g and the steps", bench_measure(network, &s), flop);
     }
     s.options.exact = 1;
     s.options.precision = LGD_BF16;

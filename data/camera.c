@@ -3,7 +3,7 @@
 #include "data/image/image.h"
 #include "data/materials/noise.h"
 #include "tensor/rng.h"
-#include "tensor/threads.h"
+#include "tensor/scratch.h"
 #include <math.h>
 #include <pthread.h>
 #include <stddef.h>

@@ -1,7 +1,7 @@
 #include "data/develop.h"
 #include "data/image/image.h"
 #include "data/materials/noise.h"
-#include "tensor/threads.h"
+#include "tensor/scratch.h"
 #include <math.h>
 #include <pthread.h>
 #include <string.h>

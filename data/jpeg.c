@@ -3,7 +3,7 @@
  * every photograph, and its bytes depend on its build. */
 #include "data/camera.h"
 #include "data/materials/noise.h"
-#include "tensor/threads.h"
+#include "tensor/scratch.h"
 #include <math.h>
 #include <pthread.h>
 #include <stddef.h>

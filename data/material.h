@@ -2,6 +2,7 @@
 #ifndef IO_MATERIAL_H
 #define IO_MATERIAL_H
 #include "data/image/image.h"
+#include "data/texel.h"
 #include "tensor/maps.h"
 
 typedef struct io_material {
@@ -54,18 +55,4 @@ ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_
 ts_code io_write_strip(const char *path, const io_material *m, const io_image *input, ts_status *st);
 /* Reads maps.exr; the maps' normals have y up, whatever the file's have. */
 ts_code io_read_maps_exr(const char *path, io_material *m, ts_status *st);
-
-/* An encoded value of [-1, 1] as one of [0, 1]; NaN to 0. */
-static inline float io_unit(float x)
-{
-    const float v = x * 0.5f + 0.5f;
-    return v > 0 ? v < 1 ? v : 1 : 0;
-}
-
-/* The reconstructed normal and physical values of one pixel, for writers and statistics. */
-typedef struct io_texel {
-    float diffuse[3], normal[3], roughness, specular[3];
-} io_texel;
-io_texel io_texel_get(const float *maps9);
-void io_texel_put(float *maps9, const io_texel *t); /* the normal is normalised; z < 0 is an error of the caller */
 #endif

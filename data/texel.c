@@ -1,6 +1,7 @@
 /* The encoding of tensor/maps.h, one pixel at a time. */
-#include "data/material.h"
+#include "data/texel.h"
 #include <math.h>
+#include <stdbool.h>
 
 static float level(float v) { return v > 0 ? v < 1 ? 2 * v - 1 : 1 : -1; }
 

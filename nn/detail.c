@@ -4,12 +4,6 @@
 #include "ops.h"
 #include "render/losses.h"
 
-enum { FRAME = 2 };
-
-int nn_detail_writes(const nn_arch *a) { return a->channels + FRAME + (a->spread ? NN_SPREADS : 0); }
-
-const signed char nn_spread_of[] = {0, 0, 0, 1, 1, 2, 3, 3, 3};
-
 ag_value *nn_coordinates(ag_tape *tape, int n, int side)
 {
     ag_value *v = ag_empty(tape, (ts_shape){n, side, side, NN_COORDINATES});
@@ -38,7 +32,7 @@ bool nn_detail(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *
                ag_value *coarse, nn_guess *guess)
 {
     const nn_layers *l = model->layers;
-    const int framed = model->arch.channels + FRAME;
+    const int framed = model->arch.channels + NN_FRAME;
     ts_mark mark = ag_scope_begin(tape);
     ag_value *y = squares(tape, model, seen, features);
     ag_scope_end(tape, mark, &y, 1);

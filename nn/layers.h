@@ -72,7 +72,7 @@ ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_val
 /* Channels of what is known of a photograph, for each pixel: the view direction's x and y and 1, or three zeros where
  * the camera's place is not known; the same of the light; the light's power over the square of its height, in stops
  * above the default flash's, and 1, or two zeros. */
-enum { NN_CONDITIONS = 8, NN_COORDINATES = 2 };
+enum { NN_CONDITIONS = 8, NN_COORDINATES = 2, NN_FRAME = 2 };
 
 /* Channels that g's first layers read, and that the last of nn_detail writes: the maps', two of the shading's frame
  * (render/op_shading_frame.c), and the spreads. */

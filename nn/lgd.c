@@ -23,18 +23,6 @@ static void step_again(ag_tape *tape, ag_value *const *in, ag_value **out, const
     for (int i = 0; i < 2 && nn_arch_carries(&s->model->arch); i++) out[i + 1] = state.gru[i];
 }
 
-bool nn_gradient_buffers(ag_tape *tape, const ag_value *maps, int gru, float *buffer[2][3])
-{
-    const size_t pixels = (size_t)ts_pixels(maps->t.shape);
-    for (int i = 0; i < 6; i++) {
-        const int channels = i % 3 ? gru : maps->t.shape.c;
-        float **b = &buffer[i / 3][i % 3];
-        *b = channels ? ts_arena_alloc(ag_arena(tape), pixels * (size_t)channels * sizeof(float)) : NULL;
-        if (channels && !*b) return ag_fail(tape, TS_NOMEM, "no memory for a step's gradients"), false;
-    }
-    return true;
-}
-
 static ag_value *step_and_forget(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps,
                                  nn_state *state, float *const buffer[3])
 {

@@ -97,6 +97,10 @@ int nn_level_width(const nn_arch *a, int level)
     return w < a->g_width_max ? (int)w : a->g_width_max;
 }
 
+const signed char nn_spread_of[] = {0, 0, 0, 1, 1, 2, 3, 3, 3};
+
+int nn_detail_writes(const nn_arch *a) { return a->channels + NN_FRAME + (a->spread ? NN_SPREADS : 0); }
+
 int nn_g_reads(const nn_arch *a)
 {
     const int squares = a->g_unshuffle * a->g_unshuffle;

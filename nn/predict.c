@@ -5,17 +5,6 @@
 #include "tensor/resize.h"
 #include <string.h>
 
-int nn_given(const nn_input *in) { return in->given > 0 ? in->given : 1; }
-int nn_materials(const nn_input *in) { return in->image.shape.n / nn_given(in); }
-
-/* The view of a photograph, for the model's renderer. */
-rd_view nn_view_of(const nn_model *model, const nn_input *in, int photograph)
-{
-    rd_view view = in->views ? in->views[photograph] : in->view;
-    if (model->arch.compat == NN_COMPAT_PUBLISHED && view.kind == RD_POINT) view.kind = RD_PUBLISHED;
-    return view;
-}
-
 bool nn_input_check(ag_tape *tape, const nn_model *model, const nn_input *in)
 {
     ts_shape s = in->image.shape;

@@ -9,6 +9,18 @@
 #include "tensor/threads.h"
 #include <string.h>
 
+bool nn_gradient_buffers(ag_tape *tape, const ag_value *maps, int gru, float *buffer[2][3])
+{
+    const size_t pixels = (size_t)ts_pixels(maps->t.shape);
+    for (int i = 0; i < 6; i++) {
+        const int channels = i % 3 ? gru : maps->t.shape.c;
+        float **b = &buffer[i / 3][i % 3];
+        *b = channels ? ts_arena_alloc(ag_arena(tape), pixels * (size_t)channels * sizeof(float)) : NULL;
+        if (channels && !*b) return ag_fail(tape, TS_NOMEM, "no memory for a step's gradients"), false;
+    }
+    return true;
+}
+
 bool nn_measure_start(ag_tape *tape, const nn_model *model, const nn_input *in, const ag_value *maps, nn_state *state)
 {
     if (!maps || !model->arch.gradient) return maps != NULL;

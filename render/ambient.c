@@ -1,6 +1,7 @@
 #include "render/ambient.h"
 #include "render/rows.h"
 #include "tensor/maps.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <math.h>
 

@@ -4,6 +4,7 @@
 #include "render/brdf.h"
 #include "render/rows.h"
 #include "render/scene_model.h"
+#include "tensor/scratch.h"
 #include <math.h>
 #include <string.h>
 

@@ -3,6 +3,7 @@
 #include "render/published.h"
 #include "render/rows.h"
 #include "render/kernels/newton.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <math.h>
 

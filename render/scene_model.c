@@ -1,6 +1,7 @@
 #include "render/scene_model.h"
 #include "render/brdf.h"
 #include "render/rows.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <math.h>
 #include <string.h>

@@ -1,5 +1,6 @@
 #include "tensor/resample.h"
 #include "tensor/kernels/resample.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <math.h>
 

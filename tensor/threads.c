@@ -1,7 +1,5 @@
 #include "tensor/threads.h"
-#include "tensor/memory.h"
 #include <omp.h>
-#include <pthread.h>
 #include <sched.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -88,67 +86,4 @@ int ts_threads(void)
 {
     if (atomic_load_explicit(&wanted, memory_order_relaxed) == 0) ts_threads_set(0);
     return atomic_load_explicit(&wanted, memory_order_relaxed);
-}
-
-typedef struct scratch {
-    void *memory[TS_SCRATCH_SLOTS];
-    size_t size[TS_SCRATCH_SLOTS];
-} scratch;
-
-static pthread_key_t key;
-static pthread_once_t once = PTHREAD_ONCE_INIT;
-
-static void free_scratch(void *p)
-{
-    scratch *s = p;
-    for (int i = 0; i < TS_SCRATCH_SLOTS; i++) free(s->memory[i]);
-    free(s);
-}
-
-static void make_key(void)
-{
-    if (pthread_key_create(&key, free_scratch) != 0) abort();
-}
-
-static atomic_size_t most[TS_SCRATCH_SLOTS]; /* the largest request of any thread */
-
-static scratch *own_scratch(void)
-{
-    pthread_once(&once, make_key);
-    scratch *s = pthread_getspecific(key);
-    if (!s) {
-        s = calloc(1, sizeof *s);
-        if (!s || pthread_setspecific(key, s) != 0) abort();
-    }
-    return s;
-}
-
-static void grow(scratch *s, int slot, size_t bytes)
-{
-    if (s->size[slot] >= bytes) return;
-    free(s->memory[slot]);
-    s->memory[slot] = ts_block(bytes);
-    if (!s->memory[slot]) abort();
-    s->size[slot] = bytes;
-}
-
-void *ts_scratch(int slot, size_t bytes)
-{
-    scratch *s = own_scratch();
-    if (s->size[slot] < bytes) {
-        bytes = (bytes + 4095) / 4096 * 4096;
-        size_t before = atomic_load(&most[slot]);
-        while (before < bytes && !atomic_compare_exchange_weak(&most[slot], &before, bytes)) continue;
-        grow(s, slot, bytes);
-    }
-    return s->memory[slot];
-}
-
-void ts_scratch_level(int threads)
-{
-#pragma omp parallel num_threads(ts_threads_of(threads))
-    {
-        scratch *s = own_scratch();
-        for (int i = 0; i < TS_SCRATCH_SLOTS; i++) grow(s, i, atomic_load(&most[i]));
-    }
 }

@@ -1,4 +1,4 @@
-/* How many threads the OpenMP loops use, and scratch memory for each of them. */
+/* How many threads the OpenMP loops use. */
 #ifndef TS_THREADS_H
 #define TS_THREADS_H
 #include <stdbool.h>
@@ -16,15 +16,4 @@ static inline int ts_threads_of(int n) { return n > 0 ? n : ts_threads(); }
  * not depend on where the system moves them. False, with nothing changed, when there are fewer CPUs than threads. Call
  * after ts_threads_set. */
 bool ts_threads_pin(void);
-
-/* At least bytes of 64-byte aligned memory that belong to the calling thread and slot (0 .. TS_SCRATCH_SLOTS-1) until
- * the next call with that slot on that thread. Grows only, never shrinks, so a repeated workload stops allocating.
- * Never NULL: when memory is out it prints nothing and aborts, since no kernel can go on. */
-enum { TS_SCRATCH_SLOTS = 4 };
-void *ts_scratch(int slot, size_t bytes);
-
-/* Between steps, while no scratch is in use: each of so many threads (0: the process's number) grows its slots to the
- * largest size that any thread has asked for. Under a dynamic schedule a thread may meet its largest task late; after
- * this it finds the memory there. */
-void ts_scratch_level(int threads);
 #endif

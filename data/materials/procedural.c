@@ -1,6 +1,6 @@
 #include "data/materials/procedural.h"
 #include "data/materials/family.h"
-#include "tensor/threads.h"
+#include "tensor/scratch.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

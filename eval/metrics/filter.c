@@ -1,4 +1,5 @@
 #include "eval/metrics/filter.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <math.h>
 #include <stdint.h>

@@ -1,6 +1,6 @@
 /* Convolution: checks, packed weights, and the entries, which hand a plan to the way that conv_choose.c names. */
 #include "tensor/conv/conv.h"
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
 #include "tensor/threads.h"
 
 ts_code ts_conv_check(const ts_conv *c, ts_status *st)

@@ -2,8 +2,9 @@
  * halo, where all its pixels are one line: what tap (ky, kx) reads for pixel q of the line is pixel q + ky d columns +
  * kx d, wherever the rows end. So any 32 pixels in a run are rows of one product of matrices, however narrow the image;
  * those that fall on the halo's columns are computed and thrown away. */
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
 #include "tensor/kernels/amx_conv.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <string.h>
 

@@ -1,8 +1,9 @@
 /* The gradient of weights by the matrix unit: for each tap the product of x, channel by channel, and dy, pixel by
  * pixel, over the pixels of a band. Both are packed as lines (tensor/conv/conv_amx.c) with dy zero on the halo's
  * columns, so that a tap is but another place to begin at in x. */
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
 #include "tensor/kernels/amx_conv.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <string.h>
 

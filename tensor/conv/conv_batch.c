@@ -1,5 +1,6 @@
 /* Small maps in a batch: tiles run over the images at one position, so that nothing is padded. */
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 
 /* Small images: a tile is one position in several images, and only taps that meet an input are multiplied. */

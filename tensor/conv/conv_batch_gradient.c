@@ -1,7 +1,8 @@
 /* The weight gradient of small images. A unit is a panel of outputs and a part of the inputs, with all taps, over all
  * pixels; nobody else touches its sums. Runs of pixels are the images at a pair of positions, so that padding is never
  * multiplied. */
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* Packed weights of bf16 for the panels: pairs of channels in place of channels. */
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
 #include "tensor/threads.h"
 
 size_t conv_bf16_count(const ts_conv *c, int ic, int oc)

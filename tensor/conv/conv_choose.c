@@ -1,5 +1,5 @@
 /* Which way a convolution goes. Nobody else decides: the tape, packing and the entries in conv.c ask here. */
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
 #include "tensor/conv/conv_winograd.h"
 
 const char *ts_precision_name(ts_precision p) { return p == TS_BF16 ? "bf16" : "f32"; }

@@ -1,7 +1,8 @@
 /* Convolution of many inputs to few output channels, which alone would leave most lanes empty: of each input pixel the
  * products with all taps are made at once, as a kernel of side 1 to taps x outputs makes them, and added where they
  * belong (GEMM and col2im). */
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <string.h>
 

@@ -1,7 +1,8 @@
 /* Convolution row by row. Tiles of pixels inside the image read it where it is; for those at the left and right edge
  * the columns that they need are copied, with their padding, into strips of a few rows. bf16 tiles read strips alone.
  */
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <string.h>
 

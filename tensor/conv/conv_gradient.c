@@ -1,6 +1,7 @@
 /* The weight gradient, directly: a matrix product over pixels. Blocks of (tap, input) x output stay in
  * registers while pixels pass by. */
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <string.h>
 

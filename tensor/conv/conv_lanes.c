@@ -1,7 +1,8 @@
 /* Convolution of few inputs to few output channels, which would leave most lanes empty: lanes are pixels of a row
  * instead. A strip of columns goes down the image; its rows of input, transposed to [channel][column], stay in the
  * second cache, and a tile of output channels x pixels stays in registers over all taps and inputs. */
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* Panels of packed weights and the register tiles that multiply them: what the ways have in common. */
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
 
 ptrdiff_t conv_panels_count(int ic, int oc, int k)
 {

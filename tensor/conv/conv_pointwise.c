@@ -1,5 +1,6 @@
 /* Kernels of side 1: a matrix product over all pixels, without a window. */
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 
 /* Side 1: all pixels of all images are one row, read where they are, or from a chunk as bf16. */

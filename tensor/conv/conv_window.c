@@ -1,5 +1,5 @@
 /* Rows of input with their padding, and which taps meet which inputs. */
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
 #include <string.h>
 
 conv_window conv_window_make(const conv_plan *p, int rows, int left, int columns)

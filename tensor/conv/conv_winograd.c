@@ -4,6 +4,7 @@
 #include "tensor/conv/conv_winograd.h"
 #include "tensor/kernels/elementwise.h"
 #include "tensor/kernels/winograd.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <string.h>
 

@@ -1,7 +1,7 @@
 /* Internal to tensor/conv_winograd*.c: which pixels the tiles of F(4 x 4, 3 x 3) read and make. */
 #ifndef TS_CONV_WINOGRAD_H
 #define TS_CONV_WINOGRAD_H
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
 
 enum {
     WINOGRAD_SIDE = 4,  /* of a tile's outputs */

@@ -3,6 +3,7 @@
  * so that threads do not change them. */
 #include "tensor/conv/conv_winograd.h"
 #include "tensor/kernels/winograd.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <string.h>
 

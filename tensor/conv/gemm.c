@@ -1,6 +1,7 @@
 /* Matrix products with the tiles of the convolutions: rows of A are the pixels, B is packed as the weights. */
 #include "tensor/conv/gemm.h"
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 
 enum {

@@ -1,5 +1,6 @@
 #include "tensor/conv/gru_internal.h"
 #include "tensor/kernels/elementwise.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include <string.h>
 

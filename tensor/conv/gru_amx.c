@@ -1,6 +1,6 @@
 #include "tensor/conv/gru_internal.h"
 #include "tensor/kernels/amx_conv.h"
-#include "tensor/threads.h"
+#include "tensor/scratch.h"
 #include <string.h>
 
 enum {

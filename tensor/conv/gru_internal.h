@@ -1,7 +1,7 @@
 /* Internal to tensor/conv/gru*.c: the products of a backward band by the matrix unit. */
 #ifndef TS_GRU_INTERNAL_H
 #define TS_GRU_INTERNAL_H
-#include "tensor/conv/conv_internal.h"
+#include "tensor/conv/plan.h"
 #include "tensor/conv/gru.h"
 
 enum {

@@ -4,6 +4,7 @@
 #include "tensor/cpu.h"
 #include "tensor/rng.h"
 #include "tensor/tensor.h"
+#include "tensor/scratch.h"
 #include "tensor/threads.h"
 #include "tests/test.h"
 #include <math.h>

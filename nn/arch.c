@@ -1,23 +1,9 @@
-/* The architecture's fields in one table: default, range, metadata key. */
-#include "nn/weights/weights.h"
+/* The architecture's fields in one table: default, range, key. */
+#include "nn/arch_fields.h"
 #include "nn/layers.h"
-#include "nn/weights/published.h"
 #include "tensor/maps.h"
 #include <stddef.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-
-typedef enum field_kind { FIELD_INT, FIELD_BOOL, FIELD_WORD } field_kind;
-
-typedef struct field {
-    const char *key;
-    field_kind kind;
-    size_t at;
-    int lo, hi, start;
-    const char *const *words; /* FIELD_WORD: its values' names, lo .. hi */
-    bool late;                /* files older than the field do not have it */
-} field;
 
 static const char *const rmse_words[] = {"start", "batch"}, *const encoding_words[] = {"raw", "asinh"},
                          *const compat_words[] = {"none", "published"};
@@ -28,7 +14,7 @@ _Static_assert(sizeof(nn_rmse) == sizeof(int) && sizeof(nn_compat) == sizeof(int
 
 /* The upper bounds keep products of sizes far from overflow. The defaults are a model that two cores can train. */
 #define AT(member) offsetof(nn_arch, member)
-static const field fields[] = {
+const nn_arch_field nn_arch_fields[NN_ARCH_FIELDS] = {
     {"channels", FIELD_INT, AT(channels), 9, 10, 9, NULL, false},
     {"g_width", FIELD_INT, AT(g_width), 1, 4096, 16, NULL, false},
     {"g_width_max", FIELD_INT, AT(g_width_max), 1, 4096, 128, NULL, false},
@@ -65,11 +51,8 @@ static const field fields[] = {
     {.key = "coarse_width", .kind = FIELD_INT, .at = AT(coarse_width), .lo = 1, .hi = 4096, .start = 128, .late = true},
     {.key = "coarse_gru", .kind = FIELD_INT, .at = AT(coarse_gru), .lo = 1, .hi = 1024, .start = 64, .late = true},
 };
-enum { FIELDS = sizeof fields / sizeof *fields };
-_Static_assert(FIELDS + 1 <= NN_ARCH_META, "there is metadata for every field and the format");
-static const char prefix[] = "arch.";
 
-static int get(const nn_arch *a, const field *f)
+int nn_arch_get(const nn_arch *a, const nn_arch_field *f)
 {
     const void *p = (const char *)a + f->at;
     if (f->kind == FIELD_BOOL) return *(const bool *)p;
@@ -78,7 +61,7 @@ static int get(const nn_arch *a, const field *f)
     return v;
 }
 
-static void set(nn_arch *a, const field *f, int v)
+void nn_arch_set(nn_arch *a, const nn_arch_field *f, int v)
 {
     void *p = (char *)a + f->at;
     if (f->kind == FIELD_BOOL) *(bool *)p = v != 0;
@@ -89,7 +72,7 @@ nn_arch nn_arch_default(void)
 {
     nn_arch a;
     memset(&a, 0, sizeof a);
-    for (int i = 0; i < FIELDS; i++) set(&a, &fields[i], fields[i].start);
+    for (int i = 0; i < NN_ARCH_FIELDS; i++) nn_arch_set(&a, &nn_arch_fields[i], nn_arch_fields[i].start);
     return a;
 }
 
@@ -108,9 +91,9 @@ bool nn_arch_carries(const nn_arch *a) { return a->recurrent && a->h_width > 0; 
 
 ts_code nn_arch_check(const nn_arch *a, ts_status *st)
 {
-    for (int i = 0; i < FIELDS; i++) {
-        const field *f = &fields[i];
-        int v = get(a, f);
+    for (int i = 0; i < NN_ARCH_FIELDS; i++) {
+        const nn_arch_field *f = &nn_arch_fields[i];
+        int v = nn_arch_get(a, f);
         if (v < f->lo || v > f->hi)
             return ts_fail(st, TS_INVALID, "%s is %d: it must be %d to %d", f->key, v, f->lo, f->hi);
     }
@@ -148,92 +131,5 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
         return ts_fail(st, TS_INVALID,
                        "iterations is %d: with h_width 0 and no descent (or no gradient) it must be coarse_steps, %d",
                        a->iterations, a->coarse_steps);
-    return TS_OK;
-}
-
-static const char *value_text(const nn_arch *a, const field *f, char *text, size_t size)
-{
-    int v = get(a, f);
-    if (f->kind == FIELD_BOOL) snprintf(text, size, "%s", v ? "true" : "false");
-    else if (f->kind == FIELD_WORD) snprintf(text, size, "%s", f->words[v]);
-    else snprintf(text, size, "%d", v);
-    return text;
-}
-
-int nn_arch_to_meta(const nn_arch *arch, nn_meta *meta, int capacity, char *text, size_t text_size)
-{
-    size_t used = 0;
-    int n = 0;
-    if (capacity < 1) return -1;
-    meta[n++] = (nn_meta){"format", "lgd"};
-    for (int i = 0; i < FIELDS; i++) {
-        if (fields[i].late && get(arch, &fields[i]) == fields[i].start) continue;
-        char value[16], both[64];
-        value_text(arch, &fields[i], value, sizeof value);
-        int key = snprintf(both, sizeof both, "%s%s", prefix, fields[i].key) + 1;
-        int all = key + snprintf(both + key, sizeof both - (size_t)key, "%s", value) + 1;
-        if (n == capacity || used + (size_t)all > text_size) return -1;
-        memcpy(text + used, both, (size_t)all);
-        meta[n++] = (nn_meta){text + used, text + used + key};
-        used += (size_t)all;
-    }
-    return n;
-}
-
-static bool parse(const field *f, const char *text, int *v)
-{
-    if (f->kind == FIELD_BOOL) {
-        *v = !strcmp(text, "true");
-        return *v || !strcmp(text, "false");
-    }
-    if (f->kind == FIELD_WORD) {
-        for (*v = f->lo; *v <= f->hi; ++*v)
-            if (!strcmp(text, f->words[*v])) return true;
-        return false;
-    }
-    size_t n = strlen(text);
-    if (n < 1 || n > 9 || strspn(text, "0123456789") != n) return false; /* nine digits fit an int */
-    *v = atoi(text);
-    return true;
-}
-
-ts_code nn_arch_from_file(const nn_file *file, nn_arch *arch, ts_status *st)
-{
-    const char *format = nn_file_meta(file, "format"), *key;
-    memset(arch, 0, sizeof *arch);
-    if (format && strcmp(format, NN_CODER_FORMAT) == 0)
-        return ts_fail(st, TS_UNSUPPORTED, "%s: is an auto-encoder of maps, not a network that reads a photograph",
-                       nn_file_path(file));
-    if (!format || strcmp(format, "lgd") != 0) {
-        if (nn_published_file(file)) return nn_published_arch(file, arch, st);
-        return ts_fail(st, TS_FORMAT,
-                       "%s: metadata key \"format\" is %.40s, not \"lgd\", and the tensors are not the published "
-                       "network's: these are not weights of this program",
-                       nn_file_path(file), format ? format : "missing");
-    }
-    for (int i = 0; (key = nn_file_meta_key(file, i)) != NULL; i++) {
-        bool known = strncmp(key, prefix, sizeof prefix - 1) != 0;
-        for (int j = 0; j < FIELDS && !known; j++) known = !strcmp(key + sizeof prefix - 1, fields[j].key);
-        if (!known)
-            return ts_fail(st, TS_UNSUPPORTED,
-                           "%s: metadata key \"%.80s\" is not known: the file needs another version of this program",
-                           nn_file_path(file), key);
-    }
-    for (int i = 0; i < FIELDS; i++) {
-        char name[64];
-        int v;
-        snprintf(name, sizeof name, "%s%s", prefix, fields[i].key);
-        const char *text = nn_file_meta(file, name);
-        if (!text && fields[i].late) {
-            set(arch, &fields[i], fields[i].start);
-            continue;
-        }
-        if (!text) return ts_fail(st, TS_FORMAT, "%s: metadata key \"%s\" is missing", nn_file_path(file), name);
-        if (!parse(&fields[i], text, &v))
-            return ts_fail(st, TS_FORMAT, "%s: metadata key \"%s\" is \"%.40s\": not a value of it", nn_file_path(file),
-                           name, text);
-        set(arch, &fields[i], v);
-    }
-    if (nn_arch_check(arch, st)) return ts_context(st, "%s: architecture", nn_file_path(file));
     return TS_OK;
 }

@@ -1,0 +1,94 @@
+/* Maps as picture files in a folder, and the meta.txt that says what they mean. */
+#include "data/material.h"
+#include "data/image/exr.h"
+#include "data/file.h"
+#include <limits.h>
+#include <stdio.h>
+#include <string.h>
+
+typedef struct map {
+    const io_material *m;
+    unsigned which;
+    bool directx;
+} map;
+
+/* Rows of a map: diffuse, specular and roughness in [0, 1], normals as (n + 1) / 2. */
+static ts_code make_rows(int y, int count, float *out, void *user, ts_status *st)
+{
+    const map *q = user;
+    const size_t first = (size_t)y * (size_t)q->m->size, pixels = (size_t)count * (size_t)q->m->size;
+    const int from = q->which == IO_MAPS_DIFFUSE ? MAP_DIFFUSE
+        : q->which == IO_MAPS_SPECULAR           ? MAP_SPECULAR
+                                                 : MAP_ROUGHNESS,
+              channels = q->which == IO_MAPS_ROUGHNESS ? 1 : 3;
+    (void)st;
+    for (size_t i = 0; i < pixels; i++, out += channels) {
+        const float *maps = q->m->maps + (first + i) * MAP_CHANNELS;
+        if (q->which == IO_MAPS_NORMAL) {
+            const io_texel t = io_texel_get(maps);
+            for (int c = 0; c < 3; c++) out[c] = (c == 1 && q->directx ? -t.normal[c] : t.normal[c]) * 0.5f + 0.5f;
+        } else {
+            for (int c = 0; c < channels; c++) out[c] = io_unit(maps[from + c]);
+        }
+    }
+    return TS_OK;
+}
+
+static ts_code write_map(const char *folder, const char *file, const io_material *m, unsigned which, bool directx,
+                         ts_status *st)
+{
+    char path[PATH_MAX];
+    if (snprintf(path, sizeof path, "%s/%s", folder, file) >= (int)sizeof path)
+        return ts_fail(st, TS_INVALID, "%s: name too long", folder);
+    if (which == IO_MAPS_EXR) return io_write_maps_exr(path, m, directx, st);
+    bool colour = which == IO_MAPS_DIFFUSE || which == IO_MAPS_SPECULAR;
+    map q = {m, which, directx};
+    const io_rows rows = {.width = m->size,
+                          .height = m->size,
+                          .channels = which == IO_MAPS_ROUGHNESS ? 1 : 3,
+                          .make = make_rows,
+                          .user = &q};
+    /* Eight bits of the sRGB curve are enough for albedo; steps of a normal or of roughness are seen in highlights. */
+    return io_write_png_rows(path, &rows, colour ? 8 : 16, colour, st);
+}
+
+/* The conventions of the files, for io_read_map_folder. */
+ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_status *st)
+{
+    char path[PATH_MAX], text[512];
+    if (snprintf(path, sizeof path, "%s/meta.txt", folder) >= (int)sizeof path)
+        return ts_fail(st, TS_INVALID, "%s: name too long", folder);
+    /* With a base colour and a metallic map the reader must not look for F0. */
+    int length = snprintf(
+        text, sizeof text,
+        "%sroughness: linear value, perceptual (alpha = roughness^2)\nnormal: tangent space, %s y\n%s",
+        which & (IO_MAPS_DIFFUSE | IO_MAPS_SPECULAR) ? "workflow: specular (F0)\ndiffuse: sRGB\nspecular: sRGB\n" : "",
+        directx ? "DirectX" : "OpenGL",
+        which & IO_MAPS_EXR ? "maps.exr: diffuse, specular (F0), roughness and normal, linear\n" : "");
+    return io_write_bytes(path, text, (size_t)length, st);
+}
+
+ts_code io_write_map_files(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st)
+{
+    static const struct {
+        unsigned which;
+        const char *file;
+    } files[] = {{IO_MAPS_DIFFUSE, "diffuse.png"},
+                 {IO_MAPS_SPECULAR, "specular.png"},
+                 {IO_MAPS_ROUGHNESS, "roughness.png"},
+                 {IO_MAPS_NORMAL, "normal.png"},
+                 {IO_MAPS_EXR, "maps.exr"}};
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+        if (!(which & files[i].which)) continue;
+        ts_code code = write_map(folder, files[i].file, m, files[i].which, directx, st);
+        if (code != TS_OK) return code;
+    }
+    return TS_OK;
+}
+
+ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st)
+{
+    const ts_code code = io_write_map_files(folder, m, which, directx, st);
+    if (code != TS_OK) return code;
+    return which ? io_write_maps_meta(folder, which, directx, st) : TS_OK;
+}
