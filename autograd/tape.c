@@ -278,7 +278,7 @@ void ag_scope_end(ag_tape *tape, ts_mark mark, ag_value **keep, int count)
             kept = NULL;
             break;
         }
-        ts_block_copy(kept[i].data, keep[i]->t.data, bytes, tape->compute.threads);
+        ts_memory_copy(kept[i].data, keep[i]->t.data, bytes, tape->compute.threads);
     }
     if (!kept) { /* nothing is lost: the memory stays taken */
         no_memory(tape, "the values that a scope keeps");
@@ -290,8 +290,8 @@ void ag_scope_end(ag_tape *tape, ts_mark mark, ag_value **keep, int count)
         if (!kept[i].data) continue;
         keep[i] = ag_empty(tape, kept[i].shape);
         if (keep[i])
-            ts_block_copy(keep[i]->t.data, kept[i].data, (size_t)ts_count(kept[i].shape) * sizeof(float),
-                          tape->compute.threads);
+            ts_memory_copy(keep[i]->t.data, kept[i].data, (size_t)ts_count(kept[i].shape) * sizeof(float),
+                           tape->compute.threads);
     }
     ts_arena_release(tape->moving, moving);
     if (ts_arena_used(tape->moving) == 0) ts_arena_reset(tape->moving); /* several chunks become one */

@@ -30,7 +30,7 @@ BENCH(weights)
 {
     static char names[TENSORS][8];
     const char *folder = getenv("TMPDIR");
-    subject s = {.block = ts_block((size_t)TENSORS * SIDE * SIDE * sizeof(float))};
+    subject s = {.block = ts_memory((size_t)TENSORS * SIDE * SIDE * sizeof(float))};
     nn_tensor entry[TENSORS];
     bench_heading("Weights files of 160 million numbers, from the page cache");
     for (int i = 0; s.block && i < TENSORS * SIDE * SIDE; i++) s.block[i] = (float)(i % 1000) * 1e-3f;

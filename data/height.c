@@ -58,7 +58,7 @@ ts_code io_height(const io_material *m, float *height, int threads, ts_status *s
 {
     const int n = m->size;
     const size_t pixels = (size_t)n * (size_t)n;
-    float *memory = ts_block(3 * pixels * sizeof *memory);
+    float *memory = ts_memory(3 * pixels * sizeof *memory);
     if (!memory) return ts_fail(st, TS_NOMEM, "no memory for heights of %d x %d pixels", n, n);
     float *a = memory, *b = a + pixels, *c = b + pixels;
     slopes(m, a, b);

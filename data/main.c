@@ -89,7 +89,7 @@ static void print_help(void)
         printf("%s%s%s", i ? "," : "", i % 9 == 0 ? "\n                        " : "", io_family_name(i));
     printf("\n\nPhotographs, largest values of what each draws:\n");
     for (int i = 0; i < LGD_CAMERA_OPTIONS; i++) {
-        io_camera usual = lgd_usual_camera;
+        io_camera usual = lgd_default_camera;
         const lgd_camera_option *k = &lgd_camera_options[i];
         printf("      --%s X%*s%s, 0 .. %g (default %g)\n", k->name, 15 - (int)strlen(k->name), "", k->help, k->most,
                (double)*lgd_camera_value(&usual, i));
@@ -335,7 +335,7 @@ static ts_code make_histograms(const options *o, ts_status *st)
 
 int main(int argc, char **argv)
 {
-    options o = {.quality = 90, .camera = lgd_usual_camera};
+    options o = {.quality = 90, .camera = lgd_default_camera};
     ts_status st = {0};
     int code = cl_init("lgd-data");
     if (!code) code = parse_options(argc, argv, &o);

@@ -10,7 +10,7 @@ enum { CHUNK = 1 << 14, PARTS = 256 }; /* fixed, so that sums do not depend on t
 
 static float *aligned(size_t count)
 {
-    float *p = ts_block(count * sizeof *p); /* a block's count is a multiple of 16 */
+    float *p = ts_memory(count * sizeof *p); /* a block's count is a multiple of 16 */
     if (p) memset(p, 0, count * sizeof *p);
     return p;
 }

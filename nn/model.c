@@ -225,7 +225,7 @@ static size_t offset_of(const nn_model *m, int index) { return index < m->params
 
 static float *block(size_t count, const char *what, ts_status *st)
 {
-    float *p = ts_block(count * sizeof *p);
+    float *p = ts_memory(count * sizeof *p);
     if (!p) ts_fail(st, TS_NOMEM, "no memory for the model's %s (%.0f MB)", what, (double)count * sizeof *p / 1e6);
     return p;
 }
@@ -233,7 +233,7 @@ static float *block(size_t count, const char *what, ts_status *st)
 static float *zero_block(size_t count, const char *what, ts_status *st)
 {
     float *p = block(count, what, st);
-    if (p) ts_block_clear(p, count * sizeof *p, 0);
+    if (p) ts_memory_clear(p, count * sizeof *p, 0);
     return p;
 }
 

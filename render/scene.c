@@ -23,8 +23,8 @@ rd_view rd_flash(void)
 
 static float stops(const rd_view *view)
 {
-    const float usual = RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE);
-    return log2f(view->power / (view->light[2] * view->light[2]) / usual);
+    const float reference = RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE);
+    return log2f(view->power / (view->light[2] * view->light[2]) / reference);
 }
 
 void rd_scene_numbers(const rd_view *view, float ambient, float tone, float number[RD_SCENE_NUMBERS])

@@ -23,7 +23,7 @@ ts_arena *ts_arena_create(size_t initial, ts_status *st)
     ts_arena *a = calloc(1, sizeof *a);
     if (a && initial) {
         initial = (initial + ALIGN - 1) / ALIGN * ALIGN;
-        a->chunk[0].base = ts_block(initial);
+        a->chunk[0].base = ts_memory(initial);
         if (a->chunk[0].base) {
             a->chunk[0].size = initial;
             a->chunks = 1;
@@ -61,8 +61,8 @@ static int add_chunk(ts_arena *a, size_t bytes)
     size_t size = held / 2 > bytes ? held / 2 : bytes;
     if (size < MIN_CHUNK) size = MIN_CHUNK;
     size = (size + CHUNK_STEP - 1) / CHUNK_STEP * CHUNK_STEP;
-    unsigned char *base = ts_block(size);
-    if (!base && size > bytes) base = ts_block(size = bytes);
+    unsigned char *base = ts_memory(size);
+    if (!base && size > bytes) base = ts_memory(size = bytes);
     if (!base) return 0;
     a->chunk[a->chunks].base = base;
     a->chunk[a->chunks].size = size;

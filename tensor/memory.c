@@ -6,7 +6,7 @@
 #include <string.h>
 #include <sys/mman.h>
 
-void *ts_block(size_t bytes)
+void *ts_memory(size_t bytes)
 {
     const size_t line = 64, huge = (size_t)2 << 20, align = bytes >= 2 * huge ? huge : line;
     if (bytes > SIZE_MAX - align) return NULL;
@@ -20,14 +20,14 @@ void *ts_block(size_t bytes)
 
 enum { PART = 128 << 10 };
 
-void ts_block_copy(void *to, const void *from, size_t bytes, int threads)
+void ts_memory_copy(void *to, const void *from, size_t bytes, int threads)
 {
 #pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static) if (bytes > 2 * PART)
     for (size_t i = 0; i < bytes; i += PART)
         memcpy((char *)to + i, (const char *)from + i, bytes - i < PART ? bytes - i : PART);
 }
 
-void ts_block_clear(void *to, size_t bytes, int threads)
+void ts_memory_clear(void *to, size_t bytes, int threads)
 {
 #pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static) if (bytes > 2 * PART)
     for (size_t i = 0; i < bytes; i += PART) memset((char *)to + i, 0, bytes - i < PART ? bytes - i : PART);

@@ -5,8 +5,8 @@
 
 /* bytes, aligned to 64, contents undefined; NULL when there is none. The caller frees with free(). A large block is
  * offered to the kernel for huge pages: one fault instead of 512, and convolutions miss the TLB less. */
-void *ts_block(size_t bytes);
+void *ts_memory(size_t bytes);
 /* memcpy, and memset to zeros, by so many threads (0: the process's number) where there is much to do. */
-void ts_block_copy(void *to, const void *from, size_t bytes, int threads);
-void ts_block_clear(void *to, size_t bytes, int threads);
+void ts_memory_copy(void *to, const void *from, size_t bytes, int threads);
+void ts_memory_clear(void *to, size_t bytes, int threads);
 #endif

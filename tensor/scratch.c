@@ -42,7 +42,7 @@ static void grow(scratch *s, int slot, size_t bytes)
 {
     if (s->size[slot] >= bytes) return;
     free(s->memory[slot]);
-    s->memory[slot] = ts_block(bytes);
+    s->memory[slot] = ts_memory(bytes);
     if (!s->memory[slot]) abort();
     s->size[slot] = bytes;
 }

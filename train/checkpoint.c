@@ -87,7 +87,7 @@ ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
                             {"skipped_in_a_row", number[3]},
                             {"best", number[4]},
                             {"best_step", number[5]},
-                            {"usual_norm", number[6]},
+                            {"mean_norm", number[6]},
                             {"config", text}};
     const ts_code code = nn_safetensors_write(path, block, n, meta, (int)(sizeof meta / sizeof *meta), st);
     free(text);
@@ -124,7 +124,7 @@ static ts_code check_config(const tr_trainer *t, const nn_file *file, const char
 static ts_code restore(tr_trainer *t, const nn_file *file, const char *path, ts_status *st)
 {
     const char *format = nn_file_meta(file, "format"), *best = nn_file_meta(file, "best"),
-               *mean = nn_file_meta(file, "usual_norm");
+               *mean = nn_file_meta(file, "mean_norm");
     const int64_t dim[1] = {(int64_t)t->model->count};
     int64_t in_a_row = 0;
     nn_block block[4];
@@ -137,7 +137,7 @@ static ts_code restore(tr_trainer *t, const nn_file *file, const char *path, ts_
         read_count(file, path, "skipped_in_a_row", &in_a_row, st) != TS_OK ||
         read_count(file, path, "best_step", &t->best_step, st) != TS_OK)
         return st->code;
-    if (!best || !mean) return ts_fail(st, TS_FORMAT, "%s: %s is missing", path, best ? "usual_norm" : "best");
+    if (!best || !mean) return ts_fail(st, TS_FORMAT, "%s: %s is missing", path, best ? "mean_norm" : "best");
     if (t->step > tr_total(&t->config))
         return ts_fail(st, TS_FORMAT, "%s: step %" PRId64 " is beyond the end of the run", path, t->step);
     t->best = strtod(best, NULL);

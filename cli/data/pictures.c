@@ -23,7 +23,7 @@ const lgd_camera_option lgd_camera_options[LGD_CAMERA_OPTIONS] = {
     {"tone", 1, AT(tone), "largest strength of a tone curve"},
     {"sharpen", 3, AT(sharpen), "largest amount of sharpening"},
 };
-const io_camera lgd_usual_camera = {.noise = 0.5f, .blur = 0.6f, .quantise = true};
+const io_camera lgd_default_camera = {.noise = 0.5f, .blur = 0.6f, .quantise = true};
 
 float *lgd_camera_value(io_camera *camera, int option)
 {

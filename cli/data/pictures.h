@@ -15,7 +15,7 @@ typedef struct lgd_camera_option {
 
 enum { LGD_CAMERA_OPTIONS = 14 };
 extern const lgd_camera_option lgd_camera_options[LGD_CAMERA_OPTIONS];
-extern const io_camera lgd_usual_camera;
+extern const io_camera lgd_default_camera;
 float *lgd_camera_value(io_camera *camera, int option);
 
 /* A photograph under the flash, [size][size][3]. */

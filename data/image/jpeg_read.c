@@ -56,7 +56,7 @@ static bool pixels(reading *r)
     oi_image *image = r->image;
     const size_t values = (size_t)image->width * (size_t)image->channels;
     image->type = OI_U8;
-    image->data = ts_block(values * (size_t)image->height);
+    image->data = ts_memory(values * (size_t)image->height);
     if (!image->data) return false;
     for (int y = 0; y < image->height; y++) {
         JSAMPROW row = (JSAMPROW)image->data + (size_t)y * values;

@@ -75,7 +75,7 @@ static bool pixels(reading *r)
     oi_image *image = r->image;
     const size_t row = (size_t)image->width * (size_t)image->channels * (size_t)(r->bits / 8);
     image->type = r->bits == 8 ? OI_U8 : OI_U16;
-    image->data = ts_block(row * (size_t)image->height);
+    image->data = ts_memory(row * (size_t)image->height);
     if (!image->data) return false;
     const uint16_t one = 1;
     if (r->bits == 16 && *(const uint8_t *)&one) png_set_swap(r->png); /* the file's are big endian */

@@ -57,7 +57,7 @@ ts_code io_joint(const io_material *m, double out[IO_JOINTS], ts_status *st)
     enum { X, Y, HEIGHT, COLOUR, GLOSSES, PLANES };
     const int n = m->size;
     const size_t pixels = (size_t)n * (size_t)n;
-    float *memory = ts_block((PLANES + 2) * pixels * sizeof *memory);
+    float *memory = ts_memory((PLANES + 2) * pixels * sizeof *memory);
     if (!memory) return ts_fail(st, TS_NOMEM, "no memory for statistics of %d x %d pixels", n, n);
     float *plane[PLANES], *cosines = memory + PLANES * pixels, *work = cosines + pixels;
     for (int k = 0; k < PLANES; k++) plane[k] = memory + (size_t)k * pixels;

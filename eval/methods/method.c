@@ -255,8 +255,8 @@ ts_code ev_block(ev_estimator *e, size_t count, ts_status *st)
         free(e->x);
         free(e->gradient);
         nn_adam_free(&e->adam);
-        e->x = ts_block(count * sizeof *e->x);
-        e->gradient = ts_block(count * sizeof *e->gradient);
+        e->x = ts_memory(count * sizeof *e->x);
+        e->gradient = ts_memory(count * sizeof *e->gradient);
         const nn_model numbers = {.count = count, .value = e->x}; /* all that Adam looks at */
         if (!e->x || !e->gradient || nn_adam_create(&e->adam, &numbers, 0, st) != TS_OK)
             return ts_fail(st, TS_NOMEM, "out of memory for %zu numbers", count);

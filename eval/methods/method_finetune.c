@@ -14,7 +14,7 @@ static ts_code open(ev_estimator *e, ts_status *st)
         return st->code;
     ag_freeze(e->tape, false); /* the weights change */
     e->bytes = e->net->count * sizeof *e->kept;
-    e->kept = ts_block(e->bytes);
+    e->kept = ts_memory(e->bytes);
     if (!e->kept) return ts_fail(st, TS_NOMEM, "out of memory for a copy of the weights");
     memcpy(e->kept, e->net->value, e->bytes);
     return TS_OK;

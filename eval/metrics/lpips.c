@@ -33,7 +33,7 @@ static ts_code read_layer(const nn_file *trunk, const nn_file *linear, int l, ev
     const int out = layer[l].out, in = layer[l].in, k = layer[l].kernel;
     char name[64];
     float *planes = malloc((size_t)out * window(l) * sizeof *planes);
-    net->weight[l] = ts_block((size_t)out * window(l) * sizeof(float));
+    net->weight[l] = ts_memory((size_t)out * window(l) * sizeof(float));
     net->bias[l] = malloc((size_t)out * sizeof(float));
     net->head[l] = malloc((size_t)out * sizeof(float));
     ts_code code = planes && net->weight[l] && net->bias[l] && net->head[l]
@@ -91,7 +91,7 @@ static float *work(ev_lpips *net, int slot, size_t floats)
 {
     if (floats > net->capacity[slot]) {
         free(net->work[slot]);
-        net->work[slot] = ts_block(floats * sizeof(float));
+        net->work[slot] = ts_memory(floats * sizeof(float));
         net->capacity[slot] = net->work[slot] ? floats : 0;
     }
     return net->work[slot];
