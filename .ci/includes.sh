@@ -14,7 +14,7 @@ allowed() {
     data/image) echo "data/image data tensor" ;;
     data/materials) echo "data/materials data data/image tensor tensor/conv tensor/kernels" ;;
     data) echo "data data/image data/materials tensor tensor/conv" ;;
-    cli) echo "cli autograd tensor" ;;
+    cli) echo "cli render data autograd tensor" ;;
     cli/data) echo "cli cli/data render data data/image autograd tensor" ;;
     cli/infer|cli/convert) echo "cli cli/infer infer nn nn/weights render data data/image autograd tensor tensor/conv" ;;
     train) echo "train cli nn nn/weights render data data/image data/materials autograd tensor tensor/conv" ;;

@@ -1,5 +1,6 @@
 /* lgd-data: procedural materials as map folders, strips, photographs or a contact sheet, and how they compare with
  * others' materials. */
+#include "cli/camera.h"
 #include "cli/cli.h"
 #include "cli/data/pictures.h"
 #include "data/materials/compare.h"
@@ -41,7 +42,7 @@ enum {
     OPT_THREADS,
     OPT_HELP,
     OPT_VERSION,
-    OPT_CAMERA /* and more: lgd_camera_options */
+    OPT_CAMERA /* and more: cl_camera_options */
 };
 
 static const struct option plain_options[] = {{"output", required_argument, NULL, 'o'},
@@ -88,11 +89,11 @@ static void print_help(void)
     for (int i = 0; i < io_family_count(); i++)
         printf("%s%s%s", i ? "," : "", i % 9 == 0 ? "\n                        " : "", io_family_name(i));
     printf("\n\nPhotographs, largest values of what each draws:\n");
-    for (int i = 0; i < LGD_CAMERA_OPTIONS; i++) {
-        io_camera usual = lgd_default_camera;
-        const lgd_camera_option *k = &lgd_camera_options[i];
+    for (int i = 0; i < CL_CAMERA_OPTIONS; i++) {
+        io_camera least = cl_camera_default;
+        const cl_camera_option *k = &cl_camera_options[i];
         printf("      --%s X%*s%s, 0 .. %g (default %g)\n", k->name, 15 - (int)strlen(k->name), "", k->help, k->most,
-               (double)*lgd_camera_value(&usual, i));
+               (double)*cl_camera_value(&least, i));
     }
     printf("\nOther:\n"
            "      --quality N       of photographs' JPEG, 1 .. 100 (default 90)\n"
@@ -133,10 +134,10 @@ static int parse_options(int argc, char **argv, options *o)
     int code = CL_OK, c;
     int64_t seed = 1;
     enum { PLAIN = sizeof plain_options / sizeof *plain_options };
-    struct option long_options[PLAIN + LGD_CAMERA_OPTIONS];
-    for (int i = 0; i < LGD_CAMERA_OPTIONS; i++)
-        long_options[i] = (struct option){lgd_camera_options[i].name, required_argument, NULL, OPT_CAMERA + i};
-    memcpy(long_options + LGD_CAMERA_OPTIONS, plain_options, sizeof plain_options);
+    struct option long_options[PLAIN + CL_CAMERA_OPTIONS];
+    for (int i = 0; i < CL_CAMERA_OPTIONS; i++)
+        long_options[i] = (struct option){cl_camera_options[i].name, required_argument, NULL, OPT_CAMERA + i};
+    memcpy(long_options + CL_CAMERA_OPTIONS, plain_options, sizeof plain_options);
     opterr = 0;
     while (code == CL_OK && (c = getopt_long(argc, argv, ":o:", long_options, NULL)) != -1) switch (c) {
         case 'o': o->output = optarg; break;
@@ -163,8 +164,8 @@ static int parse_options(int argc, char **argv, options *o)
         case ':': code = cl_usage("%s needs a value", argv[optind - 1]); break;
         default:
             if (c >= OPT_CAMERA) {
-                const lgd_camera_option *k = &lgd_camera_options[c - OPT_CAMERA];
-                code = parse_share(k->name, optarg, k->most, lgd_camera_value(&o->camera, c - OPT_CAMERA));
+                const cl_camera_option *k = &cl_camera_options[c - OPT_CAMERA];
+                code = parse_share(k->name, optarg, k->most, cl_camera_value(&o->camera, c - OPT_CAMERA));
             } else code = cl_usage("no option is called '%s'", argv[optind - 1]);
         }
     if (code) return code;
@@ -213,7 +214,7 @@ static ts_code write_material(const options *o, uint64_t index, io_material *m, 
         if (!code) code = lgd_write_capture(path, m, st);
     }
     if (!code && o->photographs) {
-        lgd_take_photograph(&o->camera, o->procedural.seed, index, m, photo->data);
+        cl_photograph(&o->camera, o->procedural.seed, index, &flash, m->size, m->maps, photo->data);
         code = make_path(path, o, m->name, ".jpg", st);
         if (!code) code = io_write_jpeg(path, photo, (int)o->quality, st);
     }
@@ -335,7 +336,7 @@ static ts_code make_histograms(const options *o, ts_status *st)
 
 int main(int argc, char **argv)
 {
-    options o = {.quality = 90, .camera = lgd_default_camera};
+    options o = {.quality = 90, .camera = cl_camera_default};
     ts_status st = {0};
     int code = cl_init("lgd-data");
     if (!code) code = parse_options(argc, argv, &o);

@@ -1,5 +1,6 @@
 #include "eval/command.h"
 #include "cli/arguments.h"
+#include "cli/camera.h"
 #include "cli/cli.h"
 #include "eval/methods/method.h"
 #include "eval/set_ini.h"
@@ -27,7 +28,8 @@ enum {
     LIGHT,
     TOLD,
     UNTOLD,
-    PEER_MAPS
+    PEER_MAPS,
+    CAMERA
 };
 
 static const cl_argument arguments[] = {
@@ -41,7 +43,7 @@ static const cl_argument arguments[] = {
      "image_size.txt, light_power.txt; the input is the picture nearest to the sample's axis\n"
      "photos:FOLDER  photographs without known maps: what the flash leaves in theirs is measured\n"
      "peers:FOLDER  images of nine panels: input, normal, diffuse, roughness, specular, then a peer's four maps"},
-    {TOLD, "told", NULL, "captures: the methods know light and camera (default: they know neither)"},
+    {TOLD, "told", NULL, "captures, and with --camera: the methods know light and camera (default: they know neither)"},
     {UNTOLD, "untold", NULL,
      "generated materials, strips and map folders: the methods do not know the light's power; renderings are\n"
      "compared after fitting one factor to the estimate's"},
@@ -63,6 +65,9 @@ static const cl_argument arguments[] = {
     {EXPOSURE, "exposure", "S",
      "the photographs' light is S times the power that the methods assume, 0.01 .. 100; renderings are then\n"
      "compared after fitting one factor to the estimate's (default 1, without a fit)"},
+    {CAMERA, "camera", "phone|KEY=VALUE,...",
+     "known materials are photographed by a camera with faults, drawn from --seed: phone, or the ranges that\n"
+     "lgd-data --help names; the methods do not know light and camera, unless --told"},
     {LIGHT, "light", "X,Y",
      "position of the flash, X, Y patch widths from the centre, -4 .. 4 each, known to the methods (default 0,0)"},
     {IMAGES, "images", NULL,
@@ -146,6 +151,10 @@ ts_code ev_command_parse(int argc, char **argv, ev_command *c, ts_status *st)
                 code = ts_fail(st, TS_INVALID, "--exposure: '%s' is not a number in 0.01 .. 100", value);
             break;
         case LIGHT: code = parse_light(value, c->light, st); break;
+        case CAMERA:
+            c->photographed = true;
+            code = cl_camera_parse(value, &c->camera, st);
+            break;
         case TOLD: c->light_known = true; break;
         case UNTOLD: c->light_unknown = true; break;
         case PEER_MAPS: c->peer_maps = value; break;
@@ -195,6 +204,8 @@ ts_code ev_command_parse(int argc, char **argv, ev_command *c, ts_status *st)
     if (code || c->help || c->version) return code;
     if (operands < argc)
         return ts_fail(st, TS_INVALID, "'%s' is not an option; sets are given as --set KIND:WHERE", argv[operands]);
+    if (c->photographed && (c->exposure > 0 || c->noise > 0 || c->light_unknown))
+        return ts_fail(st, TS_INVALID, "--camera draws light and noise: give no --exposure, --noise or --untold");
     if (c->sets == 0) return ts_fail(st, TS_INVALID, "no set is given: --set KIND:WHERE");
     if (c->tune + c->pareto + (c->iterations_figure || c->methods_figure) > 1)
         return ts_fail(st, TS_INVALID, "--tune, --pareto and --figure are different tasks: choose one");

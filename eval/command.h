@@ -1,6 +1,7 @@
 /* lgd-eval's command line. */
 #ifndef EV_COMMAND_H
 #define EV_COMMAND_H
+#include "data/camera.h"
 #include "data/material.h"
 
 enum { EV_SETS_MAX = 64, EV_METHODS_MAX = 64 };
@@ -11,9 +12,10 @@ typedef struct ev_command {
     int64_t seed;
     const char *peer_maps;
     double noise, exposure, light[2]; /* exposure 0: not given */
+    io_camera camera;                 /* of known materials, where photographed */
     io_map_convention convention;
-    bool light_known, light_unknown, images, fast, exact, pin, tune, pareto, iterations_figure, methods_figure, quiet,
-        help, version;
+    bool light_known, light_unknown, photographed, images, fast, exact, pin, tune, pareto, iterations_figure,
+        methods_figure, quiet, help, version;
 } ev_command;
 
 /* TS_INVALID with a message that names the option. The strings are argv's. */

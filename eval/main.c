@@ -45,7 +45,7 @@ static void show_progress(int64_t done, int64_t total, const char *name, void *u
 static bool is_light_known(const ev_command *c, const ev_set *set)
 {
     if (set->kind == EV_PHOTOS || set->kind == EV_PEERS) return false;
-    return set->kind == EV_MULTIVIEW ? c->light_known : !c->light_unknown;
+    return set->kind == EV_MULTIVIEW || c->photographed ? c->light_known : !c->light_unknown;
 }
 
 /* The method where none is named: as lgd-infer estimates where the light is unknown. */
@@ -138,7 +138,8 @@ static int evaluate(work *w, ts_status *st)
     r->seed = (uint64_t)c->seed;
     r->noise = c->noise;
     r->exposure = c->exposure > 0 ? c->exposure : 1;
-    r->fit = c->exposure > 0 || c->light_unknown;
+    r->fit = c->exposure > 0 || c->light_unknown || (c->photographed && !c->light_known);
+    r->camera = c->photographed ? &c->camera : NULL;
     r->light_known = c->light_known;
     r->flash = rd_flash();
     for (int k = 0; k < 2; k++) r->flash.light[k] = (float)c->light[k];

@@ -1,4 +1,5 @@
 #include "eval/run.h"
+#include "cli/camera.h"
 #include "eval/contact.h"
 #include "eval/multiview.h"
 #include "eval/sheet.h"
@@ -76,10 +77,17 @@ static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, t
     c->fit = r->fit;
     ev_input_views(&c->view, c->inputs, r->seed, identity, c->input);
     for (int k = 0; k < c->inputs; k++) {
-        const ev_photo photo = {c->input[k], c->exposure, (float)r->noise, r->seed,
-                                identity * NN_MAX_IMAGES + (uint64_t)k};
-        ev_photograph(&b->truth, &photo, b->image + (size_t)k * (size_t)r->size * (size_t)r->size * 3);
+        const uint64_t which = identity * NN_MAX_IMAGES + (uint64_t)k;
+        float *image = b->image + (size_t)k * (size_t)r->size * (size_t)r->size * 3;
+        if (r->camera) {
+            const cl_shot shot = cl_photograph(r->camera, r->seed, which, &c->input[k], r->size, b->truth.maps, image);
+            if (r->light_known) c->input[k] = shot.view;
+        } else {
+            const ev_photo photo = {c->input[k], c->exposure, (float)r->noise, r->seed, which};
+            ev_photograph(&b->truth, &photo, image);
+        }
     }
+    c->view = c->input[0];
     c->lpips = r->lpips;
     return TS_OK;
 }

@@ -1,6 +1,7 @@
 /* Every method on every material of every set. */
 #ifndef EV_RUN_H
 #define EV_RUN_H
+#include "data/camera.h"
 #include "eval/estimate.h"
 #include "eval/report.h"
 #include "eval/sets.h"
@@ -12,11 +13,12 @@ typedef struct ev_run {
     ev_estimator *method; /* parsed, not open */
     int methods;
     int size, repeat;
-    uint64_t seed;          /* of the renderings' views and the noise */
-    double noise, exposure; /* exposure: true power of the inputs' lights over the power that the methods know */
-    rd_view flash;          /* of the first input, as the methods know it; not of captures */
-    bool fit;               /* compare renderings after one factor is fitted */
-    bool light_known;       /* of captures: the methods know their lights and cameras */
+    uint64_t seed;           /* of the renderings' views and the noise */
+    double noise, exposure;  /* exposure: true power of the inputs' lights over the power that the methods know */
+    rd_view flash;           /* of the first input, as the methods know it; not of captures */
+    bool fit;                /* compare renderings after one factor is fitted */
+    const io_camera *camera; /* of known materials, or NULL: a clean rendering under flash */
+    bool light_known;        /* of captures, and where camera is not NULL: the methods know lights and cameras */
     bool perceptual, pictures, pinned; /* SSIM and FLIP; pictures for the report; whether the threads are pinned */
     bool exact;                        /* of every method (ev_estimator) */
     ev_lpips *lpips;                   /* also LPIPS, unless NULL */

@@ -1,7 +1,5 @@
 /* Photographs of materials, with the camera's faults: the networks' input. */
-#include "data/camera.h"
-#include "render/ambient.h"
-#include "render/render.h"
+#include "cli/camera.h"
 #include "tensor/maps.h"
 #include "tensor/threads.h"
 #include "train/trainer_internal.h"
@@ -29,33 +27,6 @@ static io_camera camera_of(const tr_config *c)
                        .told_power = (float)c->data.told_power};
 }
 
-static void add_ambient(const io_camera *camera, uint64_t seed, uint64_t index, int size, const float *material,
-                        tr_shot *shot, float *image)
-{
-    const io_ambient light = io_camera_ambient(camera, seed, index);
-    rd_ambient ambient;
-    memcpy(ambient.uniform, light.uniform, sizeof ambient.uniform);
-    memcpy(ambient.side, light.side, sizeof ambient.side);
-    memcpy(ambient.direction, light.direction, sizeof ambient.direction);
-    shot->ambient = light.share;
-    rd_ambient_add(rd_grid_full(size), material, MAP_CHANNELS, &shot->view, &ambient, image);
-}
-
-static tr_shot shoot(const io_camera *camera, uint64_t seed, uint64_t index, const rd_view *planned)
-{
-    tr_shot shot = {.view = *planned};
-    io_rig rig = {.power = planned->power};
-    memcpy(rig.camera, planned->camera, sizeof rig.camera);
-    memcpy(rig.light, planned->light, sizeof rig.light);
-    io_camera_rig(camera, seed, index, &rig);
-    memcpy(shot.view.camera, rig.camera, sizeof rig.camera);
-    memcpy(shot.view.light, rig.light, sizeof rig.light);
-    shot.view.power = rig.power;
-    shot.tone = io_camera_tone(camera, seed, index).contrast;
-    io_camera_told(camera, seed, index, &shot.told_view, &shot.told_power);
-    return shot;
-}
-
 void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
                     const rd_view *views, int number, float *images, tr_shot *shots)
 {
@@ -64,14 +35,13 @@ void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count
     const size_t pixels = (size_t)size * (size_t)size;
     const uint64_t first = index * (uint64_t)number;
     for (int i = 0; i < count * number; i++) {
-        tr_shot shot = shoot(&camera, seed, first + (uint64_t)i, views ? &views[i] : &flash);
-        const float *material = maps + (size_t)(i / number) * pixels * MAP_CHANNELS;
-        float *image = images + (size_t)i * pixels * 3;
-        rd_render(rd_grid_full(size), material, MAP_CHANNELS, &shot.view, false, image);
-        if (camera.ambient > 0) add_ambient(&camera, seed, first + (uint64_t)i, size, material, &shot, image);
+        const uint64_t which = first + (uint64_t)i;
+        const cl_shot s = cl_expose(&camera, seed, which, views ? &views[i] : &flash, size,
+                                    maps + (size_t)(i / number) * pixels * MAP_CHANNELS,
+                                    images + (size_t)i * pixels * 3);
         if (!shots) continue;
-        shot.view.power *= io_camera_exposure(&camera, seed, first + (uint64_t)i);
-        shots[i] = shot;
+        shots[i] = (tr_shot){.view = s.view, .ambient = s.ambient, .tone = s.tone};
+        io_camera_told(&camera, seed, which, &shots[i].told_view, &shots[i].told_power);
     }
 #pragma omp parallel for num_threads(ts_threads()) schedule(static)
     for (int i = 0; i < count * number; i++)
