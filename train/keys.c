@@ -162,6 +162,8 @@ const tr_key tr_keys[] = {
      "weight of the maps' L1 beside the rendering loss"},
     {"train", "normal_weight", TR_REAL, AT(train.normal_weight), 0, 1e3, "1", NULL, false,
      "weight of the normals in the maps' L1"},
+    {"train", "normal_rmse", TR_REAL, AT(train.normal_rmse), 0, 1e3, "0", NULL, false,
+     "weight of the normals' RMSE of each material, which relief that is uncertain does not pull to flat"},
     {"train", "specular_weight", TR_REAL, AT(train.specular_weight), 0, 1e3, "1", NULL, false,
      "weight of F0 in the maps' L1"},
     {"train", "spread_weight", TR_REAL, AT(train.spread_weight), 0, 1e3, "0.05", NULL, false,

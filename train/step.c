@@ -25,6 +25,10 @@ static ag_value *add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value
         if (l1) *map = (double)l1->t.data[0];
         loss = ag_add(tape, loss, map_weight == 1 ? l1 : ag_scale(tape, l1, (float)map_weight));
     }
+    if (t->config.train.normal_rmse > 0)
+        loss = ag_add(
+            tape, loss,
+            ag_scale(tape, ag_rmse_loss(tape, maps, target, MAP_NORMAL, 2), (float)t->config.train.normal_rmse));
     if (weight != 1) loss = ag_scale(tape, loss, (float)weight);
     return sum ? ag_add(tape, sum, loss) : loss;
 }

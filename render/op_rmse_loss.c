@@ -1,0 +1,134 @@
+/* The mean over images of the RMSE of some channels (render/losses.h). */
+#include "autograd/gradcheck.h"
+#include "autograd/op.h"
+#include "render/losses.h"
+#include <math.h>
+
+extern const ag_op op_rmse_loss;
+
+typedef struct range {
+    int first, count;
+} range;
+
+#define LEAST 1e-6 /* squared error that is as good as none: it keeps the gradient of a perfect image finite */
+
+ag_value *ag_rmse_loss(ag_tape *tape, ag_value *maps, ag_value *target, int first, int count)
+{
+    ag_value *in[2] = {maps, target};
+    if (!ag_ready(tape, "rmse_loss", 2, in)) return NULL;
+    char text[2][AG_SHAPE_TEXT];
+    if (!ts_same(maps->t.shape, target->t.shape))
+        return ag_fail(tape, TS_INVALID, "rmse_loss: maps %s and target %s differ in shape",
+                       ag_shape_text(text[0], maps->t.shape), ag_shape_text(text[1], target->t.shape));
+    if (target->needs_grad) return ag_fail(tape, TS_INVALID, "rmse_loss: target has no gradient here; detach it");
+    if (first < 0 || count < 1 || first + count > maps->t.shape.c)
+        return ag_fail(tape, TS_INVALID, "rmse_loss: maps %s have no %d channels from channel %d",
+                       ag_shape_text(text[0], maps->t.shape), count, first);
+    return ag_apply(tape, &op_rmse_loss, 2, in, (ts_shape){1, 1, 1, 1}, &(range){first, count}, sizeof(range));
+}
+
+/* The sum of squared differences of rows' parts of an image, in an order that does not depend on the threads. */
+static double squares(const ag_node *node, int64_t image, int threads, double *row)
+{
+    const ts_shape s = node->in[0]->t.shape;
+    const range *r = node->attr;
+    const float *a = node->in[0]->t.data, *b = node->in[1]->t.data;
+    double sum = 0;
+#pragma omp parallel for num_threads(threads) schedule(static)
+    for (int y = 0; y < s.h; y++) {
+        const int64_t at = (image * s.h + y) * s.w * s.c + r->first;
+        double part = 0;
+        for (int64_t x = 0; x < s.w; x++)
+            for (int c = 0; c < r->count; c++) {
+                const double d = (double)a[at + x * s.c + c] - (double)b[at + x * s.c + c];
+                part += d * d;
+            }
+        row[y] = part;
+    }
+    for (int y = 0; y < s.h; y++) sum += row[y];
+    return sum;
+}
+
+/* RMSE of each image, which backward divides by. */
+static float *rmse_of(ag_tape *tape, const ag_node *node)
+{
+    const ts_shape s = node->in[0]->t.shape;
+    const double values = (double)s.h * s.w * ((const range *)node->attr)->count;
+    double *row = ts_arena_alloc(ag_arena(tape), (size_t)s.h * sizeof *row);
+    float *rmse = ts_arena_alloc(ag_arena(tape), (size_t)s.n * sizeof *rmse);
+    if (!row || !rmse) return ag_fail(tape, TS_NOMEM, "rmse_loss: no memory for %d images", s.n), NULL;
+    for (int i = 0; i < s.n; i++) rmse[i] = (float)sqrt(squares(node, i, ag_threads(tape), row) / values + LEAST);
+    return rmse;
+}
+
+static void forward(ag_tape *tape, ag_node *node)
+{
+    const int n = node->in[0]->t.shape.n;
+    const float *rmse = rmse_of(tape, node);
+    double sum = 0;
+    for (int i = 0; i < n && rmse; i++) sum += (double)rmse[i];
+    node->out->t.data[0] = (float)(sum / n);
+}
+
+static void backward(ag_tape *tape, ag_node *node)
+{
+    bool add;
+    float *to = ag_grad_target(tape, node->in[0], &add);
+    const float *rmse = to ? rmse_of(tape, node) : NULL;
+    if (!rmse) return;
+    const ts_shape s = node->in[0]->t.shape;
+    const range *r = node->attr;
+    const float *a = node->in[0]->t.data, *b = node->in[1]->t.data;
+    const double up = (double)node->out->grad[0] / ((double)s.n * s.h * s.w * r->count);
+    const int64_t rows = (int64_t)s.n * s.h;
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static)
+    for (int64_t y = 0; y < rows; y++) {
+        const float w = (float)(up / (double)rmse[y / s.h]);
+        for (int64_t i = y * s.w * s.c; i < (y + 1) * s.w * s.c; i++) {
+            const int c = (int)(i % s.c) - r->first;
+            const float g = c >= 0 && c < r->count ? w * (a[i] - b[i]) : 0;
+            to[i] = add ? to[i] + g : g;
+        }
+    }
+}
+
+static void reference(const ag_node *node, const double *const *in, double *out)
+{
+    const ts_shape s = node->in[0]->t.shape;
+    const range *r = node->attr;
+    const int64_t pixels = (int64_t)s.h * s.w;
+    out[0] = 0;
+    for (int i = 0; i < s.n; i++) {
+        double sum = 0;
+        for (int64_t p = i * pixels; p < (i + 1) * pixels; p++)
+            for (int c = r->first; c < r->first + r->count; c++)
+                sum += (in[0][p * s.c + c] - in[1][p * s.c + c]) * (in[0][p * s.c + c] - in[1][p * s.c + c]);
+        out[0] += sqrt(sum / (double)(pixels * r->count) + LEAST) / s.n;
+    }
+}
+
+static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
+{
+    const range *r = user;
+    return ag_rmse_loss(tape, in[0], in[1], r->first, r->count);
+}
+
+static void cases(ag_gradcheck *g)
+{
+    static const ts_shape shapes[] = {{1, 1, 1, 1}, {2, 3, 5, 9}, {3, 17, 9, 9}};
+    static const range ranges[] = {{0, 1}, {3, 2}, {6, 3}};
+    for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
+        ag_case c = {.label = i ? "images" : "one value",
+                     .inputs = 2,
+                     .shape = {shapes[i], shapes[i]},
+                     .fixed = {false, true},
+                     .lo = -1.5f,
+                     .hi = 1.5f,
+                     .build = build,
+                     .user = &ranges[i]};
+        if (ag_gradcheck_run(g, &c) != TS_OK) return;
+    }
+}
+
+const ag_op op_rmse_loss = {
+    .name = "rmse_loss", .forward = forward, .backward = backward, .reference = reference, .cases = cases};
