@@ -2,6 +2,7 @@
  * of name. */
 #include "bench/batches.h"
 #include "bench/bench.h"
+#include "cli/cli.h"
 #include "tensor/cpu.h"
 #include "tensor/kernels/conv.h"
 #include "tensor/kernels/peak.h"
@@ -184,6 +185,7 @@ static int by_name(const void *a, const void *b)
 
 int main(int argc, char **argv)
 {
+    cl_open_streams();
     ts_status st = {0};
     if (argc == 2 && strcmp(argv[1], "--help") == 0) {
         printf("usage: lgd-bench [--list | --cpu | --batches CONFIG.ini] [NAME...]\nRuns the benchmarks whose name "

@@ -2,6 +2,7 @@
 #include "tensor/cpu.h"
 #include <ctype.h>
 #include <errno.h>
+#include <fcntl.h>
 #include <locale.h>
 #include <math.h>
 #include <signal.h>
@@ -14,6 +15,17 @@
 #include <unistd.h>
 
 static const char *program_name = "lgd";
+
+void cl_open_streams(void)
+{
+    for (int fd = STDIN_FILENO; fd <= STDERR_FILENO; fd++) {
+        if (fcntl(fd, F_GETFD) != -1 || errno != EBADF) continue;
+        if (open("/dev/null", fd == STDIN_FILENO ? O_WRONLY : O_RDONLY) == fd) continue; /* the least that is free */
+        static const char message[] = "lgd: a standard stream is closed and /dev/null cannot be opened in its place\n";
+        (void)!write(STDERR_FILENO, message, sizeof message - 1);
+        _exit(CL_FAILED);
+    }
+}
 
 int cl_init(const char *program)
 {

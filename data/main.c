@@ -336,6 +336,7 @@ static ts_code make_histograms(const options *o, ts_status *st)
 
 int main(int argc, char **argv)
 {
+    cl_open_streams();
     options o = {.quality = 90, .camera = cl_camera_default};
     ts_status st = {0};
     int code = cl_init("lgd-data");

@@ -190,6 +190,7 @@ static int start(const ev_command *c)
 
 int main(int argc, char **argv)
 {
+    cl_open_streams();
     ev_command c;
     ts_status st = {0};
     const int bad = cl_init("lgd-eval");

@@ -1,5 +1,6 @@
 /* Runs every registered test in a process of its own, so that a crash is one failure and not the end, and prints
  * "ok NAME", "FAIL NAME: why" or "skip NAME: why" for each. An argument selects the tests whose name contains it. */
+#include "cli/cli.h"
 #include "tests/test.h"
 #include "tensor/cpu.h"
 #include <errno.h>
@@ -133,6 +134,7 @@ static int run(int i)
 
 int main(int argc, char **argv)
 {
+    cl_open_streams();
     ts_status st = {0};
     if (ts_isa_init(&st) != TS_OK) {
         fprintf(stderr, "%s\n", st.message);

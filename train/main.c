@@ -133,6 +133,7 @@ static const struct option options[] = {
 
 int main(int argc, char **argv)
 {
+    cl_open_streams();
     bool resume = false, print = false;
     const char *init[2] = {NULL, NULL}, *initial = NULL;
     const char **set = malloc((size_t)argc * sizeof *set);

@@ -141,6 +141,7 @@ static ts_code run(const command *c, ts_status *st)
 
 int main(int argc, char **argv)
 {
+    cl_open_streams();
     command c;
     ts_status st = {0};
     int code = cl_init("lgd-convert");

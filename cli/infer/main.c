@@ -161,6 +161,7 @@ static int work(const lgd_command *c)
 
 int main(int argc, char **argv)
 {
+    cl_open_streams();
     lgd_command c;
     ts_status st = {0};
     const int bad = cl_init("lgd-infer");

@@ -1,11 +1,14 @@
 /* What the programs share. */
 #include "cli/cli.h"
 #include "tests/test.h"
+#include <fcntl.h>
 #include <locale.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 TEST(cli_numbers_are_whole_strings_in_range)
 {
@@ -31,6 +34,33 @@ TEST(cli_numbers_ignore_the_locale)
     char text[32];
     snprintf(text, sizeof text, "%.2f", 0.25);
     CHECK(!strcmp(text, "0.25"), "printed as %s", text);
+}
+
+/* In a process of its own, which tells by its exit status what went wrong. */
+static int with_closed_streams(int closed)
+{
+    for (int fd = 0; fd < 3; fd++)
+        if (closed >> fd & 1) close(fd);
+    cl_open_streams();
+    for (int fd = 0; fd < 3; fd++)
+        if (fcntl(fd, F_GETFD) == -1) return 10 + fd;
+    const int next = open("/dev/null", O_RDWR);
+    if (next < 3) return 20 + next;
+    char byte = 0;
+    for (int fd = 0; fd < 3; fd++) /* what is closed says so */
+        if (closed >> fd & 1 && (fd ? write(fd, &byte, 1) : read(fd, &byte, 1)) != -1) return 30 + fd;
+    return 0;
+}
+
+TEST(cli_closed_streams_are_opened)
+{
+    for (int closed = 0; closed < 8; closed++) {
+        int status = -1;
+        const pid_t child = fork();
+        if (child == 0) _exit(with_closed_streams(closed));
+        CHECK(child > 0 && waitpid(child, &status, 0) == child && WIFEXITED(status), "fork");
+        CHECK(WEXITSTATUS(status) == 0, "streams %d closed: %d", closed, WEXITSTATUS(status));
+    }
 }
 
 TEST(cli_folders)

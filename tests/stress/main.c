@@ -1,4 +1,5 @@
 /* lgd-stress: every part in full. Ends with 1 where a bound breaks. */
+#include "cli/cli.h"
 #include "tests/stress/stress.h"
 #include "tensor/cpu.h"
 #include "tensor/threads.h"
@@ -22,6 +23,7 @@ static int help(void)
 
 int main(int argc, char **argv)
 {
+    cl_open_streams();
     if (argc > 1 && !strcmp(argv[1], "--help")) return help();
     if (argc > 2 || (argc > 1 && argv[1][0] == '-'))
         return fprintf(stderr, "lgd-stress: one part at most, no options but --help\n"), 2;
