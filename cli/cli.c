@@ -1,5 +1,6 @@
 #include "cli/cli.h"
 #include "tensor/cpu.h"
+#include "tensor/new_file.h"
 #include <ctype.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -177,5 +178,6 @@ ts_code cl_make_folder(const char *path, ts_status *st)
     }
     struct stat info;
     if (stat(path, &info) != 0 || !S_ISDIR(info.st_mode)) return ts_fail(st, TS_IO, "%s: is not a folder", path);
+    ts_sweep(path);
     return TS_OK;
 }

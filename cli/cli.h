@@ -54,6 +54,7 @@ void cl_trace(void);
 void cl_catch_interrupt(void);
 bool cl_interrupted(void);
 
-/* Creates a folder and its parents; an existing folder is fine. */
+/* Creates an output folder and its parents. An existing folder is fine: what killed processes have left in it is
+ * removed (ts_sweep). */
 ts_code cl_make_folder(const char *path, ts_status *st);
 #endif

@@ -53,7 +53,7 @@ static ts_code write_map(const char *folder, const char *file, const io_material
 }
 
 /* The conventions of the files, for io_read_map_folder. */
-ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_status *st)
+ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, const char *more, ts_status *st)
 {
     char path[PATH_MAX], text[512];
     if (snprintf(path, sizeof path, "%s/meta.txt", folder) >= (int)sizeof path)
@@ -61,10 +61,10 @@ ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_
     /* With a base colour and a metallic map the reader must not look for F0. */
     int length = snprintf(
         text, sizeof text,
-        "%sroughness: linear value, perceptual (alpha = roughness^2)\nnormal: tangent space, %s y\n%s",
+        "%sroughness: linear value, perceptual (alpha = roughness^2)\nnormal: tangent space, %s y\n%s%s",
         which & (IO_MAPS_DIFFUSE | IO_MAPS_SPECULAR) ? "workflow: specular (F0)\ndiffuse: sRGB\nspecular: sRGB\n" : "",
         directx ? "DirectX" : "OpenGL",
-        which & IO_MAPS_EXR ? "maps.exr: diffuse, specular (F0), roughness and normal, linear\n" : "");
+        which & IO_MAPS_EXR ? "maps.exr: diffuse, specular (F0), roughness and normal, linear\n" : "", more);
     return io_write_bytes(path, text, (size_t)length, st);
 }
 
@@ -90,5 +90,5 @@ ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, 
 {
     const ts_code code = io_write_map_files(folder, m, which, directx, st);
     if (code != TS_OK) return code;
-    return which ? io_write_maps_meta(folder, which, directx, st) : TS_OK;
+    return which ? io_write_maps_meta(folder, which, directx, "", st) : TS_OK;
 }

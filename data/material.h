@@ -48,9 +48,10 @@ enum {
     IO_MAPS_ALL = 31
 };
 ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st);
-/* The two halves of it: the files alone (from several threads at once too, for different files), the meta.txt alone. */
+/* The two halves of it: the files alone (from several threads at once too, for different files), the meta.txt alone,
+ * with more lines at its end. */
 ts_code io_write_map_files(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st);
-ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_status *st);
+ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, const char *more, ts_status *st);
 /* A five-panel strip as io_read_strip reads it (16-bit PNG); input is linear, size x size. */
 ts_code io_write_strip(const char *path, const io_material *m, const io_image *input, ts_status *st);
 /* Reads maps.exr; the maps' normals have y up, whatever the file's have. */

@@ -1,6 +1,8 @@
 /* The report's files. */
 #include "eval/html.h"
+#include "tensor/new_file.h"
 #include <errno.h>
+#include <fcntl.h>
 #include <math.h>
 #include <string.h>
 #include <unistd.h>
@@ -104,21 +106,21 @@ static void write_html(const void *what, FILE *f) { ev_html_write(what, f); }
 ts_code ev_replace(const char *folder, const char *name, void (*write_to)(const void *what, FILE *f), const void *what,
                    ts_status *st)
 {
-    char path[PATH_LENGTH], part[PATH_LENGTH];
-    if (snprintf(path, sizeof path, "%s/%s", folder, name) >= (int)sizeof path ||
-        snprintf(part, sizeof part, "%s/.%s.%ld", folder, name, (long)getpid()) >= (int)sizeof part)
+    char path[PATH_LENGTH];
+    ts_new_file part;
+    if (snprintf(path, sizeof path, "%s/%s", folder, name) >= (int)sizeof path)
         return ts_fail(st, TS_INVALID, "%s: the name is too long", folder);
-    FILE *f = fopen(part, "we");
-    if (!f) return ts_fail(st, TS_IO, "%s: cannot be written: %s", path, strerror(errno));
-    write_to(what, f);
-    const bool written = fflush(f) == 0 && !ferror(f) && fsync(fileno(f)) == 0;
-    int why = errno;
-    const bool closed = fclose(f) == 0;
-    if (written && !closed) why = errno;
-    if (written && closed && rename(part, path) == 0) return TS_OK;
-    if (written && closed) why = errno;
-    unlink(part);
-    return ts_fail(st, TS_IO, "%s: cannot be written: %s", path, strerror(why));
+    if (ts_new_file_begin(&part, path, st) != TS_OK) return st->code;
+    const int copy = fcntl(part.fd, F_DUPFD_CLOEXEC, 0);
+    FILE *f = copy < 0 ? NULL : fdopen(copy, "w");
+    if (!f) part.error = errno;
+    else {
+        write_to(what, f);
+        if (fflush(f) != 0 || ferror(f)) part.error = errno ? errno : EIO;
+        if (fclose(f) != 0 && !part.error) part.error = errno;
+    }
+    if (!f && copy >= 0) close(copy);
+    return ts_new_file_end(&part, TS_OK, st);
 }
 
 ts_code ev_report_write(const ev_report *r, const char *folder, ts_status *st)

@@ -4,10 +4,15 @@
 #include "infer/export.h"
 #include "render/render.h"
 #include "render/scene.h"
+#include "tensor/maps.h"
+#include "tensor/new_file.h"
 #include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -45,33 +50,15 @@ static ts_code join(char path[PATH_LENGTH], const char *folder, const char *name
     return TS_OK;
 }
 
-/* A new hidden folder in parent, one that no other process and no killed one has. */
-static ts_code make_hidden(const char *parent, char path[PATH_LENGTH], ts_status *st)
-{
-    char name[64];
-    for (int i = 0; i < 1000; i++) {
-        snprintf(name, sizeof name, ".lgd-infer-%ld-%d", (long)getpid(), i);
-        if (join(path, parent, name, st) != TS_OK) return st->code;
-        if (mkdir(path, 0777) == 0) return TS_OK;
-        if (errno != EEXIST) break;
-    }
-    return ts_fail(st, TS_IO, "%s: nothing can be written there: %s", parent, strerror(errno));
-}
-
-static void remove_hidden(const char *hidden)
-{
-    char path[PATH_LENGTH];
-    for (int i = 0; i < LGD_FILES; i++)
-        if (join(path, hidden, lgd_files[i], NULL) == TS_OK) unlink(path);
-    rmdir(hidden);
-}
-
 ts_code lgd_output_check(const char *folder, ts_status *st)
 {
-    char hidden[PATH_LENGTH];
-    const ts_code code = make_hidden(folder, hidden, st);
-    if (!code) rmdir(hidden);
-    return code;
+    char *hidden;
+    int lock;
+    const ts_code code = ts_hidden_folder(folder, &hidden, &lock, st);
+    if (code) return code;
+    ts_hidden_folder_remove(hidden, &lock);
+    free(hidden);
+    return TS_OK;
 }
 
 /* folder/lgd_files[of the bit which]. */
@@ -212,7 +199,7 @@ static ts_code write_portion(const char *folder, const io_material *m, const lgd
 
 /* Of several failures the first portion's is reported. */
 static ts_code write_all(const char *folder, const io_material *m, const lgd_photo *photo, unsigned which, bool directx,
-                         int threads, io_metallic_error *lost, ts_status *st)
+                         int threads, const char *mark, io_metallic_error *lost, ts_status *st)
 {
     ts_status failure[PORTIONS] = {{0}};
 #pragma omp parallel for num_threads(threads) schedule(dynamic)
@@ -220,38 +207,98 @@ static ts_code write_all(const char *folder, const io_material *m, const lgd_pho
     for (int i = 0; i < PORTIONS; i++)
         if (failure[i].code) return ts_fail(st, failure[i].code, "%s", failure[i].message);
     const unsigned maps = map_bits(which);
-    return maps ? io_write_maps_meta(folder, maps, directx, st) : TS_OK;
+    return maps ? io_write_maps_meta(folder, maps, directx, mark, st) : TS_OK;
 }
 
-/* Every complete file from the hidden folder over the one in folder. */
-static ts_code move_files(const char *hidden, const char *folder, ts_status *st)
+enum { MARK = 40 };
+
+/* The line of meta.txt that says which estimate the folder's files are of: a hash of the maps. */
+static void mark_of(const io_material *m, bool directx, char mark[MARK])
+{
+    const uint64_t values = (uint64_t)m->size * (uint64_t)m->size * MAP_CHANNELS;
+    uint64_t h = 0x9e3779b97f4a7c15u + directx;
+    for (uint64_t i = 0; i < values; i++) { /* splitmix64 of each value, chained */
+        uint32_t bits;
+        memcpy(&bits, &m->maps[i], sizeof bits);
+        h = (h ^ bits) + 0x9e3779b97f4a7c15u;
+        h = (h ^ h >> 30) * 0xbf58476d1ce4e5b9u;
+        h = (h ^ h >> 27) * 0x94d049bb133111ebu;
+        h ^= h >> 31;
+    }
+    snprintf(mark, MARK, "estimate: %016" PRIx64 "\n", h);
+}
+
+/* Whether the folder's files are of the estimate with that mark. */
+static bool is_marked(const char *folder, const char *mark)
+{
+    char path[PATH_LENGTH], *text;
+    size_t size;
+    if (join(path, folder, "meta.txt", NULL) != TS_OK || io_read_bytes(path, 1 << 16, &text, &size, NULL) != TS_OK)
+        return false;
+    const bool marked = strstr(text, mark) != NULL;
+    free(text);
+    return marked;
+}
+
+/* Every complete file from the hidden folder over the one in folder. Where that has another estimate's files, those
+ * that were not replaced are removed; *removed gets their bits. */
+static ts_code move_files(const char *hidden, const char *folder, const char *mark, unsigned *removed, ts_status *st)
 {
     char from[PATH_LENGTH], to[PATH_LENGTH];
+    const bool same = is_marked(folder, mark);
+    unsigned moved = 0;
     for (int i = 0; i < LGD_FILES; i++) {
         if (join(from, hidden, lgd_files[i], st) != TS_OK || join(to, folder, lgd_files[i], st) != TS_OK)
             return st->code;
         if (access(from, F_OK) != 0) continue; /* not asked for */
         if (rename(from, to) != 0) return ts_fail(st, TS_IO, "%s: cannot be replaced: %s", to, strerror(errno));
+        moved |= 1u << i;
+    }
+    for (int i = 0; i < LGD_FILES && !same; i++) {
+        if (moved >> i & 1 || join(to, folder, lgd_files[i], st) != TS_OK) continue;
+        if (unlink(to) == 0) *removed |= 1u << i;
+        else if (errno != ENOENT && errno != EISDIR) /* a folder is nothing of ours */
+            return ts_fail(st, TS_IO, "%s: cannot be removed: %s", to, strerror(errno));
     }
     return TS_OK;
 }
 
-ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const lgd_photo *photo,
-                         unsigned which, bool directx, int threads, io_metallic_error *lost, ts_status *st)
+/* One process at a time, so that the files that stay are of one run. Without locks they come in any order. */
+static ts_code move_locked(const char *hidden, const char *folder, const char *mark, unsigned *removed, ts_status *st)
 {
-    char folder[PATH_LENGTH], hidden[PATH_LENGTH];
+    const int lock = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (lock >= 0) (void)!flock(lock, LOCK_EX);
+    const ts_code code = move_files(hidden, folder, mark, removed, st);
+    if (lock >= 0) close(lock);
+    return code;
+}
+
+ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const lgd_photo *photo,
+                         unsigned which, bool directx, int threads, lgd_output_result *result, ts_status *st)
+{
+    char folder[PATH_LENGTH], mark[MARK], *hidden;
+    lgd_output_result ignored, *r = result ? result : &ignored;
     struct stat info;
+    int lock;
+    *r = (lgd_output_result){0};
     if (join(folder, parent, stem, st) != TS_OK) return st->code;
     const bool there = stat(folder, &info) == 0;
     if (there && !S_ISDIR(info.st_mode)) return ts_fail(st, TS_IO, "%s: is in the way: it is not a folder", folder);
+    if (there) ts_sweep(folder);
     /* inside the folder when it exists: it may lie on another file system than its parent */
-    if (make_hidden(there ? folder : parent, hidden, st) != TS_OK) return st->code;
-    ts_code code = write_all(hidden, m, photo, which, directx, threads, lost, st);
-    if (!code && there) code = move_files(hidden, folder, st);
-    else if (!code && rename(hidden, folder) != 0)
-        code = ts_fail(st, TS_IO, "%s: cannot be made: %s", folder, strerror(errno));
-    if (code || there) remove_hidden(hidden);
-    if (!code) io_sync_folder(folder);
-    if (!code && !there) io_sync_folder(parent);
+    if (ts_hidden_folder(there ? folder : parent, &hidden, &lock, st) != TS_OK) return st->code;
+    mark_of(m, directx, mark);
+    ts_code code = write_all(hidden, m, photo, which, directx, threads, mark, &r->lost, st);
+    bool moves = there;
+    if (!code && !there && rename(hidden, folder) != 0) {
+        if (errno == ENOTEMPTY || errno == EEXIST) moves = true; /* another process has made it meanwhile */
+        else code = ts_fail(st, TS_IO, "%s: cannot be made: %s", folder, strerror(errno));
+    }
+    if (!code && moves) code = move_locked(hidden, folder, mark, &r->removed, st);
+    if (code || moves) ts_hidden_folder_remove(hidden, &lock);
+    else close(lock);
+    free(hidden);
+    if (!code) ts_sync_folder(folder);
+    if (!code && !there) ts_sync_folder(parent);
     return code;
 }

@@ -1,6 +1,7 @@
 /* The run: what it owns, its folder, the loop over steps. */
 #include "nn/weights/weights.h"
 #include "tensor/maps.h"
+#include "tensor/new_file.h"
 #include "train/trainer_internal.h"
 #include <errno.h>
 #include <fcntl.h>
@@ -128,6 +129,7 @@ static ts_code build(tr_trainer *t, bool resume, ts_status *st)
     const tr_config *c = &t->config;
     const size_t batch = (size_t)c->train.batch, pixels = (size_t)c->data.patch * (size_t)c->data.patch;
     if (lock_folder(t, st) != TS_OK || (!resume && check_empty(t, st) != TS_OK)) return st->code;
+    ts_sweep(t->folder);
     const size_t photographs = batch * (size_t)c->arch.images;
     t->images = malloc(photographs * pixels * 3 * sizeof(float));
     t->captures = malloc(photographs * sizeof *t->captures);

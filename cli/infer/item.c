@@ -94,7 +94,7 @@ void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, l
 void lgd_item_write(const lgd_command *c, lgd_item *item)
 {
     if (lgd_output_write(c->out, item->job->stem, &item->m, &item->photo[0], c->outputs, c->directx, item->threads,
-                         &item->lost, &item->st))
+                         &item->written, &item->st))
         ts_context(&item->st, "%s", item->job->photo);
 }
 

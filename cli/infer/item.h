@@ -4,9 +4,9 @@
 #include "cli/infer/options.h"
 #include "cli/infer/plan.h"
 #include "data/material.h"
-#include "data/metallic.h"
 #include "infer/capture.h"
 #include "infer/lgd.h"
+#include "infer/output.h"
 
 typedef struct lgd_item {
     const lgd_job *job;
@@ -18,15 +18,15 @@ typedef struct lgd_item {
     unsigned char *mask; /* [size][size] from command->mask, or NULL */
     int photo_side;      /* the shorter side of the photograph in pixels */
     lgd_photo photo[IO_CAPTURE_IMAGES];
-    int photos;             /* of these, the ones that the weights read */
-    io_material m;          /* in the encoding of tensor/maps.h */
-    double first, last;     /* reconstruction RMSE of R_0 and of the last R_t */
-    int steps;              /* t of that */
-    double power;           /* of the light that was taken, in those that the photographs name */
-    io_metallic_error lost; /* infer/output.h */
-    int threads;            /* to compute and write it on, the calling thread's own (tensor/threads.h) */
-    double shown;           /* the progress function's: how much of it the progress bar has, 0 .. 1 */
-    int stage;              /* the pipeline's */
+    int photos;         /* of these, the ones that the weights read */
+    io_material m;      /* in the encoding of tensor/maps.h */
+    double first, last; /* reconstruction RMSE of R_0 and of the last R_t */
+    int steps;          /* t of that */
+    double power;       /* of the light that was taken, in those that the photographs name */
+    lgd_output_result written;
+    int threads;  /* to compute and write it on, the calling thread's own (tensor/threads.h) */
+    double shown; /* the progress function's: how much of it the progress bar has, 0 .. 1 */
+    int stage;    /* the pipeline's */
 } lgd_item;
 
 /* Called while an item is estimated, with the part that is done; nonzero: stop. */

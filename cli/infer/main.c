@@ -10,6 +10,7 @@
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 typedef struct run {
     const lgd_command *command;
@@ -59,6 +60,15 @@ static void look_at(const lgd_item *item, int size)
     0.01 /* reconstruction RMSE after the trained steps from which a highlight may be seen where the photograph has \
             none */
 
+static void name_removed(const lgd_item *item)
+{
+    char names[256] = "";
+    for (int i = 0; i < LGD_FILES; i++)
+        if (item->written.removed >> i & 1)
+            snprintf(names + strlen(names), sizeof names - strlen(names), " %s", lgd_files[i]);
+    cl_note("%s: note: removed from the folder, because they are of another estimate:%s", item->job->photo, names);
+}
+
 static void report(run *r, const lgd_item *item)
 {
     cl_progress_end(&r->bar);
@@ -72,9 +82,10 @@ static void report(run *r, const lgd_item *item)
         return;
     }
     r->done++;
+    if (item->written.removed) name_removed(item);
     if (r->command->outputs & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC) && !r->command->quiet)
         cl_note("%s: base colour and metalness miss diffuse by %.4f and F0 by %.4f (RMS, linear)", item->job->photo,
-                item->lost.diffuse, item->lost.specular);
+                item->written.lost.diffuse, item->written.lost.specular);
     printf("%s\n", item->job->folder);
     fflush(stdout); /* a reader at the other end of a pipe gets each folder when it is there */
     if (r->command->quiet) return;

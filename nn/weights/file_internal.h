@@ -3,6 +3,7 @@
 #define NN_FILE_INTERNAL_H
 #include "nn/weights/file.h"
 #include "tensor/arena.h"
+#include "tensor/new_file.h"
 
 struct nn_file {
     char *path;
@@ -30,18 +31,6 @@ ts_code nn_torch_parse(nn_file *f, ts_status *st);
 bool nn_torch_is_zip(const nn_file *f);
 bool nn_torch_is_old(const nn_file *f); /* not a ZIP archive: PyTorch before 1.6 */
 
-/* A file that is being written: put as often as needed (the first error stays), then end, which renames it to path, or
- * removes it after an error or when code is one. path must live until then. */
-typedef struct nn_atomic_file {
-    const char *path;
-    char *temporary;
-    int fd, error;
-    int64_t written;
-} nn_atomic_file;
-ts_code nn_atomic_begin(nn_atomic_file *o, const char *path, ts_status *st);
-void nn_atomic_put(nn_atomic_file *o, const void *data, size_t size);
-ts_code nn_atomic_end(nn_atomic_file *o, ts_code code, ts_status *st);
-
 /* What a tensor of that type is written as. */
 nn_dtype nn_dtype_out(nn_dtype has, nn_dtype real);
 /* The numbers of e as type to: e's own memory, or *work, which grows to what is needed (the caller frees it). */
@@ -49,8 +38,8 @@ const void *nn_tensor_bytes(const nn_tensor *e, nn_dtype to, const char *path, v
                             ts_status *st);
 
 /* The forms' writers. */
-ts_code nn_safetensors_put(nn_atomic_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
+ts_code nn_safetensors_put(ts_new_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
                            int metas, ts_status *st);
-ts_code nn_torch_put(nn_atomic_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
+ts_code nn_torch_put(ts_new_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
                      int metas, ts_status *st);
 #endif

@@ -63,7 +63,7 @@ static ts_code make_header(nn_text *t, const char *path, const nn_tensor *tensor
     return TS_OK;
 }
 
-ts_code nn_safetensors_put(nn_atomic_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
+ts_code nn_safetensors_put(ts_new_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
                            int metas, ts_status *st)
 {
     nn_text t = {0};
@@ -71,18 +71,18 @@ ts_code nn_safetensors_put(nn_atomic_file *o, const nn_tensor *tensor, int tenso
     void *work = NULL;
     size_t work_size = 0;
     ts_code code = TS_OK;
-    if (!order) code = ts_fail(st, TS_NOMEM, "%s: no memory to write it", o->path);
+    if (!order) code = ts_fail(st, TS_NOMEM, "%s: no memory to write it", o->name);
     for (int size = 8; !code && size; size /= 2) /* the widest first, so that every number is aligned to its size */
         for (int i = 0; i < tensors; i++)
             if (nn_dtype_size(nn_dtype_out(tensor[i].dtype, real)) == size) order[n++] = i;
-    if (!code) code = make_header(&t, o->path, tensor, order, tensors, real, meta, metas, st);
-    if (!code) nn_atomic_put(o, t.data, t.used);
+    if (!code) code = make_header(&t, o->name, tensor, order, tensors, real, meta, metas, st);
+    if (!code) ts_new_file_put(o, t.data, t.used);
     for (int i = 0; i < tensors && !code && !o->error; i++) {
         const nn_tensor *e = &tensor[order[i]];
         const nn_dtype to = nn_dtype_out(e->dtype, real);
-        const void *bytes = nn_tensor_bytes(e, to, o->path, &work, &work_size, st);
+        const void *bytes = nn_tensor_bytes(e, to, o->name, &work, &work_size, st);
         if (!bytes) code = st ? st->code : TS_FORMAT;
-        else nn_atomic_put(o, bytes, (size_t)e->count * (size_t)nn_dtype_size(to));
+        else ts_new_file_put(o, bytes, (size_t)e->count * (size_t)nn_dtype_size(to));
     }
     free(work);
     free(order);

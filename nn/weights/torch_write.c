@@ -93,7 +93,7 @@ static ts_code pickle_all(nn_text *t, const char *path, const nn_tensor *tensor,
 /* The archive's directory grows beside it. Sizes and offsets are always in the 64-bit fields: one form for small and
  * for large files. */
 typedef struct archive {
-    nn_atomic_file *o;
+    ts_new_file *o;
     nn_text directory;
     int entries;
 } archive;
@@ -129,9 +129,9 @@ static void put_entry(archive *a, const char *name, const void *data, size_t siz
     nn_text_number(&local, padding, 2);
     for (uint64_t i = 0; i < padding; i++) nn_text_put(&local, "Z");
     a->directory.failed |= local.failed;
-    if (!local.failed) nn_atomic_put(a->o, local.data, local.used);
+    if (!local.failed) ts_new_file_put(a->o, local.data, local.used);
     free(local.data);
-    nn_atomic_put(a->o, data, size);
+    ts_new_file_put(a->o, data, size);
 
     nn_text *d = &a->directory;
     nn_text_put(d, "PK\1\2");
@@ -170,19 +170,19 @@ static void put_directory(archive *a)
     nn_text_number(d, UINT32_MAX, 4); /* both counts */
     nn_text_number(d, UINT64_MAX, 8); /* size and place */
     nn_text_number(d, 0, 2);
-    if (!d->failed) nn_atomic_put(a->o, d->data, d->used);
+    if (!d->failed) ts_new_file_put(a->o, d->data, d->used);
 }
 
-ts_code nn_torch_put(nn_atomic_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
+ts_code nn_torch_put(ts_new_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
                      int metas, ts_status *st)
 {
     archive a = {.o = o};
     nn_text list = {0};
     void *work = NULL;
     size_t work_size = 0;
-    ts_code code = pickle_all(&list, o->path, tensor, tensors, real, meta, metas, st);
+    ts_code code = pickle_all(&list, o->name, tensor, tensors, real, meta, metas, st);
     if (!code && list.used > PK_MOST_BYTES)
-        code = ts_fail(st, TS_UNSUPPORTED, "%s: not written: %d tensors are more than are read back", o->path, tensors);
+        code = ts_fail(st, TS_UNSUPPORTED, "%s: not written: %d tensors are more than are read back", o->name, tensors);
     if (!code) {
         put_entry(&a, "archive/data.pkl", list.data, list.used);
         put_entry(&a, "archive/byteorder", "little", 6);
@@ -190,7 +190,7 @@ ts_code nn_torch_put(nn_atomic_file *o, const nn_tensor *tensor, int tensors, nn
     for (int i = 0; i < tensors && !code && !o->error; i++) {
         char name[40];
         const nn_dtype to = nn_dtype_out(tensor[i].dtype, real);
-        const void *bytes = nn_tensor_bytes(&tensor[i], to, o->path, &work, &work_size, st);
+        const void *bytes = nn_tensor_bytes(&tensor[i], to, o->name, &work, &work_size, st);
         snprintf(name, sizeof name, "archive/data/%d", i);
         if (!bytes) code = st ? st->code : TS_FORMAT;
         else put_entry(&a, name, bytes, (size_t)tensor[i].count * (size_t)nn_dtype_size(to));
@@ -199,7 +199,7 @@ ts_code nn_torch_put(nn_atomic_file *o, const nn_tensor *tensor, int tensors, nn
         put_entry(&a, "archive/version", "3\n", 2);
         put_directory(&a);
     }
-    if (!code && a.directory.failed) code = ts_fail(st, TS_NOMEM, "%s: no memory for its directory", o->path);
+    if (!code && a.directory.failed) code = ts_fail(st, TS_NOMEM, "%s: no memory for its directory", o->name);
     free(work);
     free(list.data);
     free(a.directory.data);

@@ -298,6 +298,29 @@ TEST(weights_init_from_a_narrower_g_computes_the_same)
     nn_model_free(&m), nn_model_free(&n);
 }
 
+/* As data/file.c: the file that the link leads to is replaced, and a device is written to. */
+TEST(weights_writing_follows_links)
+{
+    ts_status st = {0};
+    char link[512];
+    float two[] = {1, 2};
+    const nn_block block = {"a", 1, {2}, two};
+    mkdir(path_of("far"), 0700);
+    snprintf(link, sizeof link, "%s", path_of("link.safetensors"));
+    spill(path_of("far/w.safetensors"), "old", 3);
+    CHECK(symlink("far/w.safetensors", link) == 0, "symlink");
+    CHECK(!nn_safetensors_write(link, &block, 1, NULL, 0, &st), "%s", st.message);
+    struct stat info;
+    CHECK(!lstat(link, &info) && S_ISLNK(info.st_mode), "the link was replaced");
+    nn_file *f = nn_safetensors_open(path_of("far/w.safetensors"), &st);
+    CHECK(f && nn_file_has(f, "a"), "the link was not followed: %s", st.message);
+    nn_file_close(&f);
+    if (access("/dev/full", W_OK) != 0) return;
+    CHECK(nn_safetensors_write("/dev/full", &block, 1, NULL, 0, &st) == TS_IO && strstr(st.message, "/dev/full"),
+          "'%s'", st.message);
+    CHECK(!stat("/dev/full", &info) && S_ISCHR(info.st_mode), "the device was replaced");
+}
+
 TEST(weights_writing_leaves_the_old_file_or_the_new_one)
 {
     ts_status st = {0};
