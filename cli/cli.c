@@ -146,7 +146,8 @@ static volatile sig_atomic_t interrupted;
 
 static void on_signal(int signal_number)
 {
-    if (interrupted) {
+    /* A terminal that closes sends SIGHUP twice, through the shell and by itself. */
+    if (interrupted && signal_number != SIGHUP) {
         signal(signal_number, SIG_DFL);
         raise(signal_number);
     }
@@ -159,6 +160,9 @@ void cl_catch_interrupt(void)
     sigemptyset(&action.sa_mask);
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
+    struct sigaction hangup;
+    if (sigaction(SIGHUP, NULL, &hangup) == 0 && hangup.sa_handler != SIG_IGN) /* nohup ignores it */
+        sigaction(SIGHUP, &action, NULL);
 }
 
 bool cl_interrupted(void) { return interrupted != 0; }

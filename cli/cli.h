@@ -50,7 +50,8 @@ double cl_seconds(void); /* monotonic */
 /* With LGD_TRACE=1 in the environment: a line on stderr for each operation, with its shapes, way and time. */
 void cl_trace(void);
 
-/* Ctrl-C and SIGTERM set a flag; a second one ends the program at once. */
+/* Ctrl-C, SIGTERM and, where nohup does not ignore it, SIGHUP set a flag; a second Ctrl-C or SIGTERM ends the program
+ * at once. */
 void cl_catch_interrupt(void);
 bool cl_interrupted(void);
 

@@ -3,6 +3,7 @@
  */
 #include "nn/weights/weights.h"
 #include "data/ini.h"
+#include "tensor/cpu.h"
 #include "train/trainer_internal.h"
 #include <errno.h>
 #include <inttypes.h>
@@ -69,7 +70,10 @@ ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
         if (!all_finite(block[i].data, t->model->count))
             return ts_fail(st, TS_NUMERIC, "%s are not finite after step %" PRId64 ", the checkpoint before is kept",
                            block[i].name, t->step);
-    if (tr_log_flush(t, st) != TS_OK || tr_save_weights(t, "last.safetensors", st) != TS_OK) return st->code;
+    if (tr_log_flush(t, st) != TS_OK) return st->code;
+    /* Weights first: after a kill between the two the steps behind the checkpoint are made again. Before step 1 there
+     * are none, so that a folder without a checkpoint has none either. */
+    if (t->step > 0 && tr_save_weights(t, "last.safetensors", st) != TS_OK) return st->code;
     char *text = config_text(&t->config, st);
     if (!text) return st->code;
     tr_path(t, "checkpoint.safetensors", path);
@@ -88,9 +92,11 @@ ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
                             {"best", number[4]},
                             {"best_step", number[5]},
                             {"mean_norm", number[6]},
+                            {"isa", ts_isa_name(ts_isa_now())},
                             {"config", text}};
     const ts_code code = nn_safetensors_write(path, block, n, meta, (int)(sizeof meta / sizeof *meta), st);
     free(text);
+    t->saved = !code;
     return code;
 }
 
@@ -160,6 +166,13 @@ ts_code tr_resume(tr_trainer *t, ts_status *st)
     nn_file *file = nn_safetensors_open(path, st);
     if (!file) return ts_context(st, "nothing to resume");
     const ts_code code = restore(t, file, path, st);
+    const char *isa = nn_file_meta(file, "isa"), *now = ts_isa_name(ts_isa_now());
+    if (!code && isa && strcmp(isa, now) != 0)
+        tr_note(t,
+                "%s: warning: was made with the instruction set %s and goes on with %s: what follows differs from that "
+                "of a run that was not interrupted (LGD_ISA chooses one)",
+                path, isa, now);
     nn_file_close(&file);
+    t->saved = !code;
     return code;
 }

@@ -24,7 +24,7 @@ static const char usage[] =
     "  --help                   print this\n"
     "  --version                print the version\n"
     "\n"
-    "Ctrl-C finishes the step, saves a checkpoint and exits with status 1.\n";
+    "Ctrl-C, SIGTERM and SIGHUP finish the step, save a checkpoint and exit with status 1.\n";
 
 typedef struct shown {
     cl_progress progress;
@@ -97,7 +97,7 @@ static int train(const tr_config *config, const char *folder, bool resume)
     const int64_t total = config->train.pretrain_steps + config->train.steps;
     s.first = tr_step_now(t);
     s.progress = cl_progress_start("train", total - s.first);
-    if (resume)
+    if (resume && s.first > 0)
         cl_note("%s: %s step %lld of %lld", folder, s.first < total ? "going on from" : "complete at",
                 (long long)s.first, (long long)total);
     const ts_code code = tr_run(t, &st);

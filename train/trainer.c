@@ -65,18 +65,44 @@ static ts_code lock_folder(tr_trainer *t, ts_status *st)
     return ts_fail(st, TS_IO, "%s: %s", path, strerror(errno));
 }
 
-/* Weights are hours of work: they are never overwritten by a run that was not asked to go on. */
-static ts_code check_empty(const tr_trainer *t, ts_status *st)
+/* A run that was not asked to go on never overwrites one that can be gone on with. One without a checkpoint is begun
+ * again. *resume: whether there is one to go on with. */
+static ts_code check_folder(const tr_trainer *t, bool *resume, ts_status *st)
 {
-    static const char *const names[] = {"checkpoint.safetensors", "last.safetensors", "best.safetensors"};
-    for (int i = 0; i < 3; i++) {
-        char path[TR_PATH];
-        tr_path(t, names[i], path);
-        if (access(path, F_OK) == 0)
-            return ts_fail(
-                st, TS_INVALID,
-                "%s: there is a run already (%s): --resume goes on with it, output.folder chooses another folder",
-                t->folder, names[i]);
+    char path[TR_PATH];
+    tr_path(t, "checkpoint.safetensors", path);
+    const bool there = access(path, F_OK) == 0;
+    if (there && !*resume)
+        return ts_fail(st, TS_INVALID,
+                       "%s: there is a run already (checkpoint.safetensors): --resume goes on with it, output.folder "
+                       "chooses another folder",
+                       t->folder);
+    if (!there && *resume) tr_note(t, "%s: has no checkpoint to resume from: the run begins at step 1", t->folder);
+    *resume = there;
+    return TS_OK;
+}
+
+/* Weights are hours of work. Where a run without a checkpoint has some, NAME.EXT becomes NAME-1.EXT, or gets the first
+ * number that is free. */
+static ts_code set_aside(const tr_trainer *t, ts_status *st)
+{
+    static const char *const names[][2] = {
+        {"last", "safetensors"}, {"best", "safetensors"}, {"config", "ini"}, {"log", "csv"}, {"val", "csv"}};
+    bool weights = false;
+    for (int i = 0; i < 5; i++) {
+        char path[TR_PATH], kept[TR_PATH], file[64];
+        int number = 1;
+        snprintf(file, sizeof file, "%s.%s", names[i][0], names[i][1]);
+        tr_path(t, file, path);
+        if (access(path, F_OK) != 0) continue;
+        weights |= i < 2;
+        if (!weights) break; /* the rest of a run that made none */
+        do {
+            snprintf(file, sizeof file, "%s-%d.%s", names[i][0], number++, names[i][1]);
+            tr_path(t, file, kept);
+        } while (access(kept, F_OK) == 0);
+        if (rename(path, kept) != 0) return ts_fail(st, TS_IO, "%s: cannot be renamed: %s", path, strerror(errno));
+        tr_note(t, "%s, of a run without a checkpoint, is kept as %s", path, file);
     }
     return TS_OK;
 }
@@ -128,7 +154,7 @@ static ts_code build(tr_trainer *t, bool resume, ts_status *st)
 {
     const tr_config *c = &t->config;
     const size_t batch = (size_t)c->train.batch, pixels = (size_t)c->data.patch * (size_t)c->data.patch;
-    if (lock_folder(t, st) != TS_OK || (!resume && check_empty(t, st) != TS_OK)) return st->code;
+    if (lock_folder(t, st) != TS_OK || check_folder(t, &resume, st) != TS_OK) return st->code;
     ts_sweep(t->folder);
     const size_t photographs = batch * (size_t)c->arch.images;
     t->images = malloc(photographs * pixels * 3 * sizeof(float));
@@ -149,7 +175,7 @@ static ts_code build(tr_trainer *t, bool resume, ts_status *st)
     const io_procedural source = {.seed = (uint64_t)c->data.seed, .families = c->data.families};
     t->loader = io_loader_create(&source, c->data.patch, c->train.batch, (uint64_t)t->step, c->data.prefetch,
                                  c->data.threads, st);
-    if (!t->loader || tr_log_open(t, st) != TS_OK) return st->code;
+    if (!t->loader || (!resume && set_aside(t, st) != TS_OK) || tr_log_open(t, st) != TS_OK) return st->code;
     return write_config(t, st);
 }
 
@@ -196,12 +222,12 @@ void tr_destroy(tr_trainer **trainer)
     *trainer = NULL;
 }
 
-/* What follows a step: log, validation, checkpoint. *saved: whether the folder holds the state of now. */
-static ts_code after_step(tr_trainer *t, const tr_row *row, bool *saved, ts_status *st)
+/* What follows a step: log, validation, checkpoint. */
+static ts_code after_step(tr_trainer *t, const tr_row *row, ts_status *st)
 {
     const tr_config *c = &t->config;
     const bool end = t->step == tr_total(c);
-    *saved = false;
+    t->saved = false;
     if (tr_log_row(t, row, st) != TS_OK) return st->code;
     if (t->listener.step) t->listener.step(row, t->listener.user);
     if (row->skip) tr_note(t, "step %" PRId64 " is skipped: its %s (%d in a row)", t->step, row->skip, t->in_a_row);
@@ -217,23 +243,18 @@ static ts_code after_step(tr_trainer *t, const tr_row *row, bool *saved, ts_stat
         if (tr_validate(t, &v, st) != TS_OK || tr_log_validation(t, &v, st) != TS_OK) return st->code;
         if (t->listener.validated) t->listener.validated(&v, t->listener.user);
     }
-    if (end || t->step % c->train.checkpoint_every == 0) {
-        if (tr_save_checkpoint(t, st) != TS_OK) return st->code;
-        *saved = true;
-    }
-    return TS_OK;
+    return end || t->step % c->train.checkpoint_every == 0 ? tr_save_checkpoint(t, st) : TS_OK;
 }
 
 ts_code tr_run(tr_trainer *t, ts_status *st)
 {
-    bool saved = t->step > 0;
     while (t->step < tr_total(&t->config)) {
         tr_row row;
-        if (t->listener.stop && t->listener.stop(t->listener.user)) {
-            if (!saved && tr_save_checkpoint(t, st) != TS_OK) return st->code;
-            return ts_fail(st, TS_INTERRUPTED, "interrupted at step %" PRId64 ", go on with --resume", t->step);
-        }
-        if (tr_step(t, &row, st) != TS_OK || after_step(t, &row, &saved, st) != TS_OK) return st->code;
+        const bool stop = t->listener.stop && t->listener.stop(t->listener.user);
+        /* before step 1 too: a run that is killed at once can be resumed */
+        if ((stop || t->step == 0) && !t->saved && tr_save_checkpoint(t, st) != TS_OK) return st->code;
+        if (stop) return ts_fail(st, TS_INTERRUPTED, "interrupted at step %" PRId64 ", go on with --resume", t->step);
+        if (tr_step(t, &row, st) != TS_OK || after_step(t, &row, st) != TS_OK) return st->code;
     }
     return TS_OK;
 }

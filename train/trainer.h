@@ -5,8 +5,8 @@
  * R_0's. Each has its own warm-up, cosine and Adam moments, since the two losses differ.
  *
  * The folder's files: config.ini (as it runs), log.csv (a row a step), val.csv (a row a validation), best.safetensors
- * (weights with the least validated error in the phase), last.safetensors (weights at the last checkpoint),
- * checkpoint.safetensors (what --resume reads), lock. */
+ * (weights with the least validated error in the phase), last.safetensors (weights at the last checkpoint after
+ * step 1), checkpoint.safetensors (what --resume reads; there before step 1), lock. */
 #ifndef TR_TRAINER_H
 #define TR_TRAINER_H
 #include "train/config.h"
@@ -47,8 +47,9 @@ typedef struct tr_listener {
 
 typedef struct tr_trainer tr_trainer;
 
-/* Takes the folder (which exists) for this run; another trainer in it, a run in it without resume, and a checkpoint of
- * another configuration with resume are errors. NULL and st set on failure. */
+/* Takes the folder (which exists) for this run; another trainer in it, a checkpoint in it without resume, and one of
+ * another configuration with resume are errors. In a folder without a checkpoint the run begins, with resume too; what
+ * a run has left there beside weights is renamed. NULL and st set on failure. */
 tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, const tr_listener *listener,
                       ts_status *st);
 
@@ -60,7 +61,8 @@ void tr_default_folder(const char *config_path, char *folder, size_t size);
 
 int64_t tr_step_now(const tr_trainer *t);
 
-/* To the end, or to the listener's stop (TS_INTERRUPTED, with a checkpoint saved), or to the first error. */
+/* Writes a checkpoint before step 1, then works to the end, or to the listener's stop (TS_INTERRUPTED, with a
+ * checkpoint saved), or to the first error. */
 ts_code tr_run(tr_trainer *t, ts_status *st);
 
 void tr_destroy(tr_trainer **t);

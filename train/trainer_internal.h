@@ -44,6 +44,7 @@ struct tr_trainer {
     rd_view *views;       /* [batch][RD_LOSS_VIEWS] */
     tr_validator validator;
     FILE *log, *validation_log;
+    bool saved;       /* the folder's checkpoint is the state of now */
     int64_t step;     /* steps made */
     int64_t skipped;  /* of them without an update */
     int in_a_row;     /* of those, the latest without one that worked */

@@ -39,7 +39,7 @@ run_makes_its_files() {
     lines "$T/run/log.csv" 11
     lines "$T/run/val.csv" 3
     for f in best.safetensors last.safetensors checkpoint.safetensors config.ini; do [ -s "$T/run/$f" ] || fail "no $f"; done
-    [ -z "$(find "$T/run" -name '*.safetensors.*')" ] || fail "temporary files are left"
+    [ -z "$(find "$T/run" -name '.*')" ] || fail "temporary files are left"
     "$TRAIN" "$T/run/config.ini" --print-config | cmp -s - "$T/run/config.ini" || fail "config.ini does not read back"
     expect 0 train --resume
     says "$T/err" "complete at step 10 of 10"
@@ -151,13 +151,14 @@ interrupt_saves_and_resume_is_exact() {
     set -- --set train.steps=200 --set validate.every=100
     expect 0 train "$@"
     mv "$T/run" "$T/whole"
-    for signal in INT TERM; do
+    for signal in INT TERM HUP; do
         rm -rf "$T/run"
         # A job in the background has SIGINT ignored; the program's handler is set all the same.
         "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 "$@" --set train.checkpoint_every=1 >"$T/out" 2>"$T/err" &
         job=$!
-        await "$T/run/checkpoint.safetensors"
+        await "$T/run/last.safetensors"
         kill -$signal $job
+        if [ $signal = HUP ]; then kill -HUP $job 2>/dev/null; fi # a closed terminal sends it twice
         wait $job
         [ $? -eq 1 ] || fail "SIG$signal: exit status is not 1: $(tail -n 1 "$T/err")"
         says "$T/err" "interrupted at step"
@@ -166,6 +167,61 @@ interrupt_saves_and_resume_is_exact() {
         cmp -s "$T/whole/best.safetensors" "$T/run/best.safetensors" || fail "SIG$signal: the best weights differ"
         lines "$T/run/log.csv" 205
     done
+}
+
+# Under nohup a run goes on when the terminal is closed.
+hangup_is_ignored_under_nohup() {
+    config
+    command -v nohup >/dev/null || skip "no nohup(1)"
+    nohup "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 --set train.steps=100 >"$T/out" 2>"$T/err" &
+    job=$!
+    await "$T/run/last.safetensors"
+    kill -HUP $job 2>/dev/null
+    wait $job || fail "it was stopped: $(tail -n 1 "$T/err")"
+}
+
+# A run that was killed before its first checkpoint after step 1 goes on, and in a folder without a checkpoint one begins.
+killed_before_a_checkpoint() {
+    config
+    "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 --set train.steps=100000 --set train.checkpoint_every=100000 >"$T/out" 2>"$T/err" &
+    job=$!
+    await "$T/run/best.safetensors"
+    kill -KILL $job
+    wait $job 2>/dev/null
+    [ ! -e "$T/run/last.safetensors" ] || fail "it was killed too late: the test is none"
+    : >"$T/err"
+    "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 --set train.steps=100000 --set train.checkpoint_every=100000 --set train.log_every=1 --resume \
+        >"$T/out" 2>"$T/err" &
+    job=$!
+    await "$T/err"
+    kill -TERM $job
+    wait $job
+    [ $? -eq 1 ] || fail "it does not go on: $(tail -n 1 "$T/err")"
+    says "$T/err" "interrupted at step"
+    rm "$T/run/checkpoint.safetensors"
+    cp "$T/run/best.safetensors" "$T/best"
+    cp "$T/run/log.csv" "$T/log"
+    expect 0 train --resume
+    says "$T/err" "no checkpoint to resume from"
+    lines "$T/run/log.csv" 11
+    cmp -s "$T/best" "$T/run/best-1.safetensors" && cmp -s "$T/log" "$T/run/log-1.csv" || fail "weights without a checkpoint are not kept"
+    rm "$T/run/checkpoint.safetensors"
+    expect 0 train
+    says "$T/err" "best-2.safetensors"
+    cmp -s "$T/run/best.safetensors" "$T/run/best-2.safetensors" || fail "the same run gives other weights"
+    expect 1 train
+    expect 1 "$TRAIN" "$T/small.ini" --set output.folder="$T/none" --resume
+    says "$T/err" "$T/none: there is no run to resume"
+}
+
+other_instruction_set_is_said() {
+    config
+    LGD_ISA=avx2 "$TRAIN" --version >/dev/null 2>&1 || skip "this CPU has one instruction set"
+    LGD_ISA=base expect 0 train
+    LGD_ISA=base expect 0 train --resume
+    if grep -q "instruction set" "$T/err"; then fail "the same one is said"; fi
+    LGD_ISA=avx2 expect 0 train --resume
+    says "$T/err" "was made with the instruction set base and goes on with avx2"
 }
 
 second_trainer_is_refused() {
@@ -241,6 +297,8 @@ full_disk() {
     [ $? -eq 1 ] || fail "exit status is not 1"
     says "$T/err" ".safetensors: "
     [ -z "$(find "$T/run" -name '*.safetensors*')" ] || fail "half a file is left"
+    expect 0 train # the first checkpoint failed: nothing stands in the way
+    rm -r "$T/run"
     "$TRAIN" --help-config >/dev/full 2>"$T/err"
     [ $? -eq 1 ] || fail "a full standard output went unnoticed"
 }
@@ -258,6 +316,9 @@ check train_comma_locale comma_locale
 check train_changed_configuration_is_refused changed_configuration_is_refused
 check train_threads_do_not_change_bytes threads_do_not_change_bytes
 check train_interrupt_saves_and_resume_is_exact interrupt_saves_and_resume_is_exact
+check train_hangup_is_ignored_under_nohup hangup_is_ignored_under_nohup
+check train_killed_before_a_checkpoint killed_before_a_checkpoint
+check train_other_instruction_set_is_said other_instruction_set_is_said
 check train_second_trainer_is_refused second_trainer_is_refused
 check train_init_from_weights init_from_weights
 check train_divergence_stops_with_a_reason divergence_stops_with_a_reason
