@@ -10,7 +10,7 @@ static ts_code read_mask(const lgd_command *c, int width, int height, unsigned c
 {
     io_image whole = {0}, square = {0};
     const size_t pixels = (size_t)c->size * (size_t)c->size;
-    ts_code code = io_read_data(c->mask, 1, c->max_pixels, &whole, st);
+    ts_code code = io_read_mask(c->mask, c->max_pixels, &whole, st);
     if (code) return code;
     const double difference = (double)whole.width * height -
         (double)whole.height * width; /* a pixel of rounding is none */

@@ -60,6 +60,16 @@ static void look_at(const lgd_item *item, int size)
     0.01 /* reconstruction RMSE after the trained steps from which a highlight may be seen where the photograph has \
             none */
 
+/* A mask of another photograph, or black and white exchanged. */
+static void look_at_mask(const lgd_command *c, const lgd_item *item)
+{
+    const int64_t pixels = (int64_t)c->size * c->size;
+    int64_t i = 0;
+    while (i < pixels && !item->mask[i]) i++;
+    if (i == pixels)
+        cl_note("%s: warning: the mask %s is black all over its square: nothing is refined", item->job->photo, c->mask);
+}
+
 static void name_removed(const lgd_item *item)
 {
     char names[256] = "";
@@ -76,6 +86,7 @@ static void report(run *r, const lgd_item *item)
         cl_note("%s: note: the first %d of its %d photographs are used: these weights read no more", item->job->photo,
                 item->photos, item->capture.images);
     if (item->image) look_at(item, r->command->size);
+    if (item->mask) look_at_mask(r->command, item);
     if (item->st.code) {
         cl_failed("%s", item->st.message);
         r->failed++;

@@ -36,6 +36,9 @@ ts_code io_read_stored(const char *path, int64_t max_pixels, double gamma, io_im
  * 1 or 3 forced. */
 ts_code io_read_data(const char *path, int channels, int64_t max_pixels, io_image *image, ts_status *st);
 
+/* The same of a mask, one channel: upright, as the photograph that it belongs to. */
+ts_code io_read_mask(const char *path, int64_t max_pixels, io_image *image, ts_status *st);
+
 /* The largest centred square, resampled to size x size by an antialiased filter in linear light (ts_resize: no
  * ringing). in may have any number of channels; out is created, also where size is the square's own. */
 ts_code io_centre_square(const io_image *in, int size, io_image *out, ts_status *st);

@@ -50,21 +50,38 @@ ts_code io_read_stored(const char *path, int64_t max_pixels, double gamma, io_im
     return code == TS_OK ? code : ts_context(st, "%s", path);
 }
 
-ts_code io_read_data(const char *path, int channels, int64_t max_pixels, io_image *image, ts_status *st)
+static ts_code read_data(const char *path, int channels, bool upright, int64_t max_pixels, io_image *image,
+                         ts_status *st)
 {
     oi_image raw;
     *image = (io_image){0};
-    if (channels != 1 && channels != 3) return ts_fail(st, TS_INVALID, "%s: %d channels asked for", path, channels);
     ts_code code = io_read_raw(path, max_pixels, &raw, st);
     if (code != TS_OK) return code;
-    code = io_image_create(image, raw.width, raw.height, channels, st);
-    for (size_t i = 0, n = code == TS_OK ? (size_t)raw.width * (size_t)raw.height : 0; i < n; i++) {
-        float *out = image->data + i * (size_t)channels, in[3];
-        for (int c = 0; c < 3; c++) in[c] = oi_value(&raw, i * (size_t)raw.channels + (size_t)raw.colour[c]);
-        if (channels == 1) *out = raw.grey ? in[0] : (in[0] + in[1] + in[2]) / 3;
-        else
-            for (int c = 0; c < 3; c++) out[c] = in[c];
-    }
+    const int orientation = upright ? raw.orientation : 1;
+    const bool swap = orientation >= 5;
+    code = io_image_create(image, swap ? raw.height : raw.width, swap ? raw.width : raw.height, channels, st);
+    float *out = image->data;
+    for (int y = 0; code == TS_OK && y < image->height; y++)
+        for (int x = 0; x < image->width; x++, out += channels) {
+            const size_t at = io_stored_at(orientation, x, y, raw.width, raw.height) * (size_t)raw.channels;
+            float in[3];
+            for (int c = 0; c < 3; c++) in[c] = oi_value(&raw, at + (size_t)raw.colour[c]);
+            if (channels == 1) *out = raw.grey ? in[0] : (in[0] + in[1] + in[2]) / 3;
+            else
+                for (int c = 0; c < 3; c++) out[c] = in[c];
+        }
     oi_free(&raw);
     return code == TS_OK ? code : ts_context(st, "%s", path);
+}
+
+ts_code io_read_data(const char *path, int channels, int64_t max_pixels, io_image *image, ts_status *st)
+{
+    *image = (io_image){0};
+    if (channels != 1 && channels != 3) return ts_fail(st, TS_INVALID, "%s: %d channels asked for", path, channels);
+    return read_data(path, channels, false, max_pixels, image, st);
+}
+
+ts_code io_read_mask(const char *path, int64_t max_pixels, io_image *image, ts_status *st)
+{
+    return read_data(path, 1, true, max_pixels, image, st);
 }

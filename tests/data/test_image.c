@@ -143,6 +143,14 @@ TEST(orientation)
         io_image raw;
         CHECK(io_read_data(turned_path, 3, IO_MAX_PIXELS_DEFAULT, &raw, &st) == TS_OK && raw.width == 64,
               "data is turned");
+        io_image_free(&raw);
+        CHECK(io_read_mask(turned_path, IO_MAX_PIXELS_DEFAULT, &raw, &st) == TS_OK && raw.width == seen.width &&
+                  raw.height == seen.height && raw.channels == 1,
+              "a mask is not turned");
+        for (int right_side = 0; right_side < 2; right_side++) {
+            const float *c = right_side ? r : l, v = raw.data[4 * raw.width + (right_side ? raw.width - 5 : 4)];
+            CHECK(fabsf(v - (c[0] + c[1] + c[2]) / 3) < 0.05f, "orientation %d: %g in the mask", k, v);
+        }
         io_image_free(&seen);
         io_image_free(&raw);
     }
