@@ -1,5 +1,6 @@
 /* The report's files. */
 #include "eval/html.h"
+#include "eval/text.h"
 #include "tensor/new_file.h"
 #include <errno.h>
 #include <fcntl.h>
@@ -8,20 +9,6 @@
 #include <unistd.h>
 
 enum { PATH_LENGTH = 4096 };
-
-void ev_csv_field(FILE *f, const char *text)
-{
-    if (!strpbrk(text, ",\"\r\n")) {
-        fputs(text, f);
-        return;
-    }
-    fputc('"', f);
-    for (; *text; text++) {
-        if (*text == '"') fputc('"', f);
-        fputc(*text, f);
-    }
-    fputc('"', f);
-}
 
 void ev_csv_number(FILE *f, double v)
 {

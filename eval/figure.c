@@ -1,5 +1,6 @@
 #include "eval/figure.h"
 #include "eval/plot.h"
+#include "eval/text.h"
 #include "tensor/cpu.h"
 #include <math.h>
 #include <stdlib.h>

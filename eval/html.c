@@ -1,5 +1,6 @@
 #include "eval/html.h"
 #include "eval/plot.h"
+#include "eval/text.h"
 #include "tensor/conv/conv.h"
 #include <math.h>
 #include <stdlib.h>

@@ -1,19 +1,8 @@
 /* results.json. */
 #include "eval/html.h"
+#include "eval/text.h"
 #include "tensor/conv/conv.h"
 #include <math.h>
-
-static void put_string(FILE *f, const char *text)
-{
-    fputc('"', f);
-    for (; *text; text++) {
-        const unsigned char c = (unsigned char)*text;
-        if (c == '"' || c == '\\') fprintf(f, "\\%c", c);
-        else if (c < 0x20) fprintf(f, "\\u%04x", c);
-        else fputc(c, f);
-    }
-    fputc('"', f);
-}
 
 static void put_number(FILE *f, double v)
 {
@@ -34,21 +23,21 @@ static void put_row(FILE *f, const ev_row *row)
 static void put_column(const ev_report *r, int column, FILE *f)
 {
     fputs("{\"method\": ", f);
-    put_string(f, r->method[ev_report_method(r, column)].label);
+    ev_json_string(f, r->method[ev_report_method(r, column)].label);
     fprintf(f, ", \"step\": %d, ", r->step[column]);
 }
 
 void ev_json_write(const ev_report *r, FILE *f)
 {
     fprintf(f, "{\n\"version\": \"%s\",\n\"model\": ", LGD_VERSION);
-    put_string(f, r->model);
+    ev_json_string(f, r->model);
     fprintf(f,
             ",\n\"size\": %d,\n\"threads\": %d,\n\"pinned\": %s,\n\"repeat\": %d,\n\"isa\": \"%s\",\n\"convolutions\": "
             "\"%s\",\n\"methods\": [",
             r->size, r->threads, r->pinned ? "true" : "false", r->repeat, r->isa, r->exact ? "direct" : "Winograd");
     for (int m = 0; m < r->methods; m++) {
         fputs(m ? ",\n{\"label\": " : "\n{\"label\": ", f);
-        put_string(f, r->method[m].label);
+        ev_json_string(f, r->method[m].label);
         fprintf(f, ", \"bytes\": %zu, \"peak_flops\": ", r->method[m].bytes);
         put_number(f, ev_report_peak(r, -1, m));
         fputc('}', f);
@@ -56,7 +45,7 @@ void ev_json_write(const ev_report *r, FILE *f)
     fputs("],\n\"sets\": [", f);
     for (int s = 0; s < r->sets; s++) {
         fputs(s ? ",\n{\"name\": " : "\n{\"name\": ", f);
-        put_string(f, r->set_name[s]);
+        ev_json_string(f, r->set_name[s]);
         fputs(", \"steps\": [", f);
         for (int c = 0; c < r->columns; c++) {
             ev_row mean, deviation;
@@ -79,7 +68,7 @@ void ev_json_write(const ev_report *r, FILE *f)
     for (int i = 0; i < r->results; i++) {
         const ev_result *m = &r->result[i];
         fprintf(f, "%s\n{\"set\": %d, \"name\": ", i ? "," : "", m->set);
-        put_string(f, m->material);
+        ev_json_string(f, m->material);
         fputs(", \"steps\": [", f);
         for (int c = 0; c < r->columns; c++) {
             fputs(c ? ",\n  " : "\n  ", f);

@@ -1,4 +1,5 @@
 #include "eval/plot.h"
+#include "eval/text.h"
 #include <math.h>
 #include <string.h>
 
@@ -9,17 +10,6 @@ enum { WIDTH = 760, HEIGHT = 420, LEFT = 70, RIGHT = 210, TOP = 20, BOTTOM = 50,
 static const char *const colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00",
                                       "#56b4e9", "#000000", "#8c564b", "#7f7f7f", "#9467bd"};
 #define COLOUR(s) colours[(size_t)(s) % (sizeof colours / sizeof *colours)]
-
-void ev_put_text(FILE *f, const char *text)
-{
-    for (; *text; text++) switch (*text) {
-        case '&': fputs("&amp;", f); break;
-        case '<': fputs("&lt;", f); break;
-        case '>': fputs("&gt;", f); break;
-        case '"': fputs("&quot;", f); break;
-        default: fputc(*text, f);
-        }
-}
 
 typedef struct frame {
     double x0, x1, y0, y1; /* of x its place */

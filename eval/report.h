@@ -66,7 +66,6 @@ ts_code ev_report_write(const ev_report *r, const char *folder, ts_status *st);
 /* Writes folder/name by write_to, as a whole or not at all. */
 ts_code ev_replace(const char *folder, const char *name, void (*write_to)(const void *what, FILE *f), const void *what,
                    ts_status *st);
-/* RFC 4180: a field in quotes when it has to be; ",NUMBER", empty for what was not measured. */
-void ev_csv_field(FILE *f, const char *text);
+/* ",NUMBER", empty for what was not measured. */
 void ev_csv_number(FILE *f, double v);
 #endif

@@ -1,4 +1,5 @@
 #include "eval/methods/tune.h"
+#include "eval/text.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -37,9 +37,8 @@ bool json_end(json_reader *r)
     return !r->failed;
 }
 
-/* Length of the UTF-8 character at s (n bytes are there), 0 when it is not one: no overlong forms, surrogates or values
- * above U+10FFFF (RFC 3629, section 4). */
-static int utf8_length(const unsigned char *s, size_t n)
+/* No overlong forms, surrogates or values above U+10FFFF (RFC 3629, section 4). */
+int json_utf8(const unsigned char *s, size_t n)
 {
     unsigned char c = s[0], lo = 0x80, hi = 0xbf;
     if (c < 0x80) return 1;
@@ -127,7 +126,7 @@ const char *json_string(json_reader *r)
             if (!found && !put_unicode(r)) return NULL;
             continue;
         }
-        int n = c < 0x20 ? 0 : utf8_length((const unsigned char *)r->text + r->at, r->size - r->at);
+        int n = c < 0x20 ? 0 : json_utf8((const unsigned char *)r->text + r->at, r->size - r->at);
         if (!n) {
             json_fail(r, c < 0x20 ? "a control character in a string" : "not UTF-8");
             return NULL;
@@ -166,7 +165,7 @@ int64_t json_escape(const char *s, char *out)
     for (size_t i = 0; i < n;) {
         unsigned char c = (unsigned char)s[i];
         char code[8];
-        int length = utf8_length((const unsigned char *)s + i, n - i), written = length;
+        int length = json_utf8((const unsigned char *)s + i, n - i), written = length;
         if (!length) return -1;
         if (c == '"' || c == '\\') written = snprintf(code, sizeof code, "\\%c", c);
         else if (c < 0x20) written = snprintf(code, sizeof code, "\\u%04x", c);

@@ -326,4 +326,19 @@ light() {
     expect 0 evaluate --set procedural:3,2 -o "$T/middle"
     if cmp -s "$T/side/results.csv" "$T/middle/results.csv"; then fail "--light changes nothing"; fi
 }
+# A file name is bytes; a report is UTF-8.
+names_of_any_bytes() {
+    model
+    mkdir -p "$T/m"
+    expect 0 "$BIN/lgd-data" --count 1 --size 16 -o "$T/d"
+    mv "$T/d"/* "$T/m/$(printf 'caf\351 \303\251')" 2>/dev/null || skip "this file system takes no such name"
+    expect 0 evaluate --size 16 --set "maps:$T/m" -o "$T/o"
+    for f in results.csv summary.csv times.csv results.json report.html; do
+        iconv -f UTF-8 -t UTF-8 "$T/o/$f" >/dev/null 2>&1 || fail "$f is not UTF-8"
+    done
+    says "$T/o/results.csv" "$(printf 'caf\\xE9 \303\251')"
+    says "$T/o/results.json" "$(printf 'caf\\\\xE9 \303\251')"
+}
+
 check eval_light light
+check eval_names_of_any_bytes names_of_any_bytes

@@ -1,6 +1,7 @@
 /* The report's files: what they say and that they are what they claim to be. */
 #include "eval/html.h"
 #include "eval/plot.h"
+#include "eval/text.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
@@ -229,4 +230,35 @@ TEST(report_plot_labels_keep_apart)
     }
     CHECK(labels == 4, "%d of 5 labels, for which there are four places", labels);
     free(text);
+}
+
+static void put_json(const char *text, FILE *f) { ev_json_string(f, text); }
+static void put_csv(const char *text, FILE *f) { ev_csv_field(f, text); }
+static void put_html(const char *text, FILE *f) { ev_put_text(f, text); }
+
+/* File names are bytes: what is no UTF-8 is written as hexadecimal digits, the rest as it is. */
+TEST(report_names_are_utf8)
+{
+    static const struct {
+        const char *name, *json, *csv, *html;
+    } cases[] = {{"caf\xc3\xa9 \xe2\x82\xac \xf0\x9f\x98\x80", "\"caf\xc3\xa9 \xe2\x82\xac \xf0\x9f\x98\x80\"",
+                  "caf\xc3\xa9 \xe2\x82\xac \xf0\x9f\x98\x80", "caf\xc3\xa9 \xe2\x82\xac \xf0\x9f\x98\x80"},
+                 {"caf\xe9", "\"caf\\\\xE9\"", "caf\\xE9", "caf\\xE9"},
+                 {"a\xe2\x82", "\"a\\\\xE2\\\\x82\"", "a\\xE2\\x82", "a\\xE2\\x82"}, /* cut off */
+                 {"\xc0\xaf", "\"\\\\xC0\\\\xAF\"", "\\xC0\\xAF", "\\xC0\\xAF"},     /* overlong */
+                 {"\xed\xa0\x80", "\"\\\\xED\\\\xA0\\\\x80\"", "\\xED\\xA0\\x80", "\\xED\\xA0\\x80"},
+                 {"\xff,\"<", "\"\\\\xFF,\\\"<\"", "\"\\xFF,\"\"<\"", "\\xFF,&quot;&lt;"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        void (*const put[])(const char *, FILE *) = {put_json, put_csv, put_html};
+        const char *const want[] = {cases[i].json, cases[i].csv, cases[i].html};
+        for (int k = 0; k < 3; k++) {
+            char *text = NULL;
+            size_t size;
+            FILE *f = open_memstream(&text, &size);
+            CHECK(f, "open_memstream");
+            put[k](cases[i].name, f);
+            CHECK(fclose(f) == 0 && strcmp(text, want[k]) == 0, "name %zu, writer %d: %s, not %s", i, k, text, want[k]);
+            free(text);
+        }
+    }
 }
