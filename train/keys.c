@@ -42,7 +42,7 @@ const tr_key tr_keys[] = {
      "g guesses the camera's distance, the light's place and exposure, ambient light and tone curve"},
     {"model", "h_width", TR_INT, AT(arch.h_width), 0, 4096, NULL, NULL, false,
      "channels of h's convolutions; 0: no h, a step is then what model.descent gives"},
-    {"model", "h_gru", TR_INT, AT(arch.h_gru), 1, 4096, NULL, NULL, false, "channels of h's recurrent states"},
+    {"model", "h_gru", TR_INT, AT(arch.h_gru), 1, 1024, NULL, NULL, false, "channels of h's recurrent states"},
     {"model", "coarse_steps", TR_INT, AT(arch.coarse_steps), 0, 64, NULL, NULL, false,
      "number of first steps that refine the maps at coarse_size, with a network of their own; the others work at the "
      "photograph's size"},

@@ -109,4 +109,19 @@ make_says_what_it_does() {
     grep -q "tensor/status.c" "$T/out" && fail "another PREFIX compiles everything again"
     :
 }
+# All that this build has, as another PREFIX would have it: one object is compiled. What make notes of its variables is put back.
+install_compiles_one_file() {
+    cp -p "$BUILD/gen/prefix" "$BUILD/gen/flags" "$T" || skip "$BUILD was not built by make"
+    make -n --no-print-directory -j1 BUILD="$BUILD" V=1 PREFIX=/elsewhere programs >"$T/out" 2>"$T/err"
+    code=$?
+    cmp -s "$T/flags" "$BUILD/gen/flags" || other=1
+    cp -p "$T/prefix" "$T/flags" "$BUILD/gen"
+    [ -z "${other-}" ] || skip "$BUILD was built with other flags"
+    [ $code -eq 0 ] || fail "make -n ends with $code: $(tail -n 1 "$T/err")"
+    [ "$(grep -c -- ' -c -o ' "$T/out")" = 1 ] || fail "$(grep -c -- ' -c -o ' "$T/out") objects are compiled"
+    says "$T/out" "-c -o $BUILD/obj/data/folders.o"
+}
+
+
 check make_says_what_it_does make_says_what_it_does
+check make_install_compiles_one_file install_compiles_one_file

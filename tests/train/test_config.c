@@ -305,3 +305,22 @@ TEST(config_default_folder_stays_in_runs)
         CHECK(!strcmp(folder, cases[i][1]), "%s gives %s, not %s", cases[i][0], folder, cases[i][1]);
     }
 }
+
+/* No key of the network is said to go further than the network does. */
+TEST(config_ranges_are_within_the_architectures)
+{
+    for (int i = 0; i < tr_key_count; i++) {
+        const tr_key *k = &tr_keys[i];
+        if (strcmp(k->section, "model") != 0 || k->type != TR_INT) continue;
+        for (int high = 0; high < 2; high++) {
+            tr_config c = tr_config_default();
+            ts_status st = {0};
+            int lo, hi;
+            const char *at;
+            *(int *)((char *)&c + k->offset) = (int)(high ? k->hi : k->lo);
+            if (nn_arch_check(&c.arch, &st) == TS_OK || !(at = strstr(st.message, ": it must be "))) continue;
+            CHECK(sscanf(at, ": it must be %d to %d", &lo, &hi) != 2, "model.%s goes from %g to %g, but %s", k->key,
+                  k->lo, k->hi, st.message);
+        }
+    }
+}
