@@ -174,7 +174,7 @@ int ts_sync_folder(const char *folder)
 static void sweep_one(int d, const char *name, uint32_t boot)
 {
     struct stat info, named;
-    int fd = openat(d, name, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC); /* a network's lock wants a right to write */
+    int fd = openat(d, name, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC); /* NFS locks what can be written */
     if (fd < 0) fd = openat(d, name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0) return;
     const int error = flock(fd, LOCK_EX | LOCK_NB) != 0 ? errno : 0;

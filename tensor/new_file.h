@@ -2,8 +2,8 @@
  * stand, .lgd-KERNEL-PROCESS-NUMBER.tmp, and renamed. A killed process leaves its hidden names; ts_sweep removes them.
  *
  * Process numbers are used again, and those of other hosts or containers say nothing here. Whether a maker is alive is
- * told by a lock (flock) that it holds on what it makes, which ends with the process. KERNEL is a number of this boot of
- * this machine: on a file system that several machines share, a lock may be seen on one of them alone. */
+ * told by a lock (flock) that it holds on what it makes, which ends with the process. KERNEL is a number of this boot
+ * of this machine: on a file system that several machines share, a lock may be seen on one of them alone. */
 #ifndef TS_NEW_FILE_H
 #define TS_NEW_FILE_H
 #include "tensor/status.h"
@@ -39,7 +39,7 @@ char *ts_folder_of(const char *path);
 int ts_sync_folder(const char *folder);
 
 /* Removes what killed processes have left in folder: hidden names without a lock if they were made under this boot of
- * this machine, otherwise, and where the file system has no locks, those that have not changed for a day. What cannot be
- * removed stays. */
+ * this machine, otherwise, and where the file system has no locks, those that have not changed for a day. What cannot
+ * be removed stays. */
 void ts_sweep(const char *folder);
 #endif

@@ -42,8 +42,8 @@ const cl_argument lgd_infer_arguments[] = {
      "power of the light, relative to the default light (of a capture: to the power it states): a number in\n"
      "0.01 .. 100, or auto = estimated from the photograph and printed (default auto; of a capture 1)"},
     {MASK, "mask", "FILE",
-     "an image of the photographs' shape: refine only where it is not black; there the maps are the same as without\n"
-     "it, elsewhere they may be those of an earlier step"},
+     "an image of the photographs' shape, upright as they are: refine only where it is not black; there the maps are\n"
+     "the same as without it, elsewhere they may be those of an earlier step"},
     {TOLERANCE, "tolerance", "X",
      "early stop, 0 .. 1: a tile is done when one step changes its maps by less than X (RMS, maps in -1 .. 1);\n"
      "photographs up to 512 pixels are one tile; 0 = never (default: 0.003 for models whose network works at the\n"
@@ -54,7 +54,7 @@ const cl_argument lgd_infer_arguments[] = {
     {NORMAL, "normal", "gl|dx", "y of normal.png: up (gl, OpenGL, default) or down (dx, DirectX)"},
     {MAPS, "maps", "LIST",
      "files to write, separated by commas: diffuse, specular, roughness, normal, exr, render, preview (default: all\n"
-     "of these), basecolor, metallic, height, gltf, materialx"},
+     "of these), basecolor, metallic, height, gltf, materialx; those of another estimate in DIR/STEM/ are removed"},
     {WORKFLOW, "workflow", "W",
      "specular (default), or metallic: base colour and metalness instead of diffuse and specular; the error of the\n"
      "conversion is printed"},
