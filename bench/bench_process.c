@@ -64,9 +64,8 @@ static bool make_large(const char *path)
 {
     io_image square = {0}, large = {0};
     ts_status st = {0};
-    int width, height;
     ts_rng rng = ts_rng_make(1, TS_STREAM_TEST, 0);
-    bool fine = !io_read_photo_square(photograph, 1 << 24, TALL, 0, &square, &width, &height, &st) &&
+    bool fine = !io_read_photo_square(photograph, 1 << 24, TALL, 0, &square, NULL, &st) &&
         !io_image_create(&large, WIDE, TALL, 3, &st);
     for (int y = 0; y < TALL && fine; y++)
         for (int x = 0; x < WIDE; x++)
@@ -117,9 +116,8 @@ static double computing(void)
     lgd_error e = {0};
     call c = {.maps = malloc(SIDE * SIDE * 9 * sizeof(float))};
     double t = 0;
-    int width, height;
     if (!c.maps || lgd_model_path(NULL, "single", path, &st) || !(c.model = lgd_load(path, &e)) ||
-        io_read_photo_square(photograph, 1 << 24, SIDE, 0, &c.image, &width, &height, &st))
+        io_read_photo_square(photograph, 1 << 24, SIDE, 0, &c.image, NULL, &st))
         printf("  the computing was not measured: %s\n", st.code ? st.message : e.message);
     else {
         const bench_time time = bench_measure(estimate, &c);

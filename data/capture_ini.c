@@ -97,8 +97,7 @@ static ts_code read_square(const char *path, const photo *p, int64_t max_pixels,
     if (snprintf(name, sizeof name, "%.*s%s", folder, path, p->file) >= PATH_MAX)
         return ts_fail(st, TS_INVALID, "%s:%d: the file's name is too long", path, p->line);
     io_image square;
-    int width, height;
-    const ts_code code = io_read_photo_square(name, max_pixels, c->size, 0, &square, &width, &height, st);
+    const ts_code code = io_read_photo_square(name, max_pixels, c->size, 0, &square, NULL, st);
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
     if (!code) memcpy(c->image + (size_t)k * values, square.data, values * sizeof(float));
     io_image_free(&square);

@@ -52,20 +52,26 @@ static ts_code write_map(const char *folder, const char *file, const io_material
     return io_write_png_rows(path, &rows, colour ? 8 : 16, colour, st);
 }
 
-/* The conventions of the files, for io_read_map_folder. */
-ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, const char *more, ts_status *st)
+void io_print_conventions(FILE *f, unsigned which, bool directx)
 {
-    char path[PATH_MAX], text[512];
+    /* With a base colour and a metallic map the reader must not look for F0. */
+    if (which & (IO_MAPS_DIFFUSE | IO_MAPS_SPECULAR))
+        fputs("workflow: specular (F0)\ndiffuse: sRGB\nspecular: sRGB\n", f);
+    fprintf(f, "roughness: linear value, perceptual (alpha = roughness^2)\nnormal: tangent space, %s y\n",
+            directx ? "DirectX" : "OpenGL");
+}
+
+ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_status *st)
+{
+    char path[PATH_MAX], text[512] = "";
     if (snprintf(path, sizeof path, "%s/meta.txt", folder) >= (int)sizeof path)
         return ts_fail(st, TS_INVALID, "%s: name too long", folder);
-    /* With a base colour and a metallic map the reader must not look for F0. */
-    int length = snprintf(
-        text, sizeof text,
-        "%sroughness: linear value, perceptual (alpha = roughness^2)\nnormal: tangent space, %s y\n%s%s",
-        which & (IO_MAPS_DIFFUSE | IO_MAPS_SPECULAR) ? "workflow: specular (F0)\ndiffuse: sRGB\nspecular: sRGB\n" : "",
-        directx ? "DirectX" : "OpenGL",
-        which & IO_MAPS_EXR ? "maps.exr: diffuse, specular (F0), roughness and normal, linear\n" : "", more);
-    return io_write_bytes(path, text, (size_t)length, st);
+    FILE *f = fmemopen(text, sizeof text, "w");
+    if (!f) return ts_fail(st, TS_NOMEM, "%s: out of memory", path);
+    io_print_conventions(f, which, directx);
+    if (which & IO_MAPS_EXR) fputs("maps.exr: diffuse, specular (F0), roughness and normal, linear\n", f);
+    fclose(f);
+    return io_write_bytes(path, text, strlen(text), st);
 }
 
 ts_code io_write_map_files(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st)
@@ -90,5 +96,5 @@ ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, 
 {
     const ts_code code = io_write_map_files(folder, m, which, directx, st);
     if (code != TS_OK) return code;
-    return which ? io_write_maps_meta(folder, which, directx, "", st) : TS_OK;
+    return which ? io_write_maps_meta(folder, which, directx, st) : TS_OK;
 }

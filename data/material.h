@@ -4,6 +4,7 @@
 #include "data/image/image.h"
 #include "data/texel.h"
 #include "tensor/maps.h"
+#include <stdio.h>
 
 typedef struct io_material {
     int size;
@@ -48,10 +49,11 @@ enum {
     IO_MAPS_ALL = 31
 };
 ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st);
-/* The two halves of it: the files alone (from several threads at once too, for different files), the meta.txt alone,
- * with more lines at its end. */
+/* The two halves of it: the files alone (from several threads at once too, for different files), the meta.txt alone. */
 ts_code io_write_map_files(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st);
-ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, const char *more, ts_status *st);
+ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_status *st);
+/* The lines of meta.txt that io_read_map_folder reads; without metallic files the colours are diffuse and F0. */
+void io_print_conventions(FILE *f, unsigned which, bool directx);
 /* A five-panel strip as io_read_strip reads it (16-bit PNG); input is linear, size x size. */
 ts_code io_write_strip(const char *path, const io_material *m, const io_image *input, ts_status *st);
 /* Reads maps.exr; the maps' normals have y up, whatever the file's have. */

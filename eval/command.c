@@ -4,6 +4,7 @@
 #include "cli/cli.h"
 #include "eval/methods/method.h"
 #include "eval/set_ini.h"
+#include "infer/lgd.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -26,6 +27,7 @@ enum {
     PARETO,
     EXPOSURE,
     LIGHT,
+    FOV,
     TOLD,
     UNTOLD,
     PEER_MAPS,
@@ -68,6 +70,9 @@ static const cl_argument arguments[] = {
     {CAMERA, "camera", "phone|KEY=VALUE,...",
      "known materials are photographed by a camera with faults, drawn from --seed: phone, or the ranges that\n"
      "lgd-data --help names; the methods do not know light and camera, unless --told"},
+    {FOV, "fov", "DEG",
+     "the photographs' field of view, 1 .. 170 degrees across their side; the methods know it unless they say\n"
+     "view=unknown; not of captures and photographs, which have theirs (default 54.2)"},
     {LIGHT, "light", "X,Y",
      "position of the flash, X, Y patch widths from the centre, -4 .. 4 each, known to the methods (default 0,0)"},
     {IMAGES, "images", NULL,
@@ -149,6 +154,11 @@ ts_code ev_command_parse(int argc, char **argv, ev_command *c, ts_status *st)
         case EXPOSURE:
             if (!cl_parse_real(value, 0.01, 100, &c->exposure))
                 code = ts_fail(st, TS_INVALID, "--exposure: '%s' is not a number in 0.01 .. 100", value);
+            break;
+        case FOV:
+            if (!cl_parse_real(value, LGD_FOV_LEAST, LGD_FOV_MOST, &c->fov))
+                code = ts_fail(st, TS_INVALID, "--fov: '%s' is not an angle in %g .. %g degrees", value, LGD_FOV_LEAST,
+                               LGD_FOV_MOST);
             break;
         case LIGHT: code = parse_light(value, c->light, st); break;
         case CAMERA:

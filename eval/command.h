@@ -11,8 +11,8 @@ typedef struct ev_command {
     int sets, methods, iterations, threads, size, repeat;
     int64_t seed;
     const char *peer_maps;
-    double noise, exposure, light[2]; /* exposure 0: not given */
-    io_camera camera;                 /* of known materials, where photographed */
+    double noise, exposure, fov, light[2]; /* exposure and fov 0: not given */
+    io_camera camera;                      /* of known materials, where photographed */
     io_map_convention convention;
     bool light_known, light_unknown, photographed, images, fast, exact, pin, tune, pareto, iterations_figure,
         methods_figure, quiet, help, version;

@@ -141,7 +141,7 @@ static int evaluate(work *w, ts_status *st)
     r->fit = c->exposure > 0 || c->light_unknown || (c->photographed && !c->light_known);
     r->camera = c->photographed ? &c->camera : NULL;
     r->light_known = c->light_known;
-    r->flash = rd_flash();
+    r->flash = rd_view_from(rd_flash(), c->fov > 0 ? rd_fov_distance(c->fov) : (double)RD_FLASH_DISTANCE);
     for (int k = 0; k < 2; k++) r->flash.light[k] = (float)c->light[k];
     r->perceptual = !c->fast && !c->tune;
     r->exact = c->exact;

@@ -31,9 +31,11 @@ typedef struct bench {
 static ts_code load_photo(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, ts_status *st)
 {
     free(b->photo);
-    if (ev_set_load_photo(set, i, r->size, &b->photo, &b->truth, &b->peer, st) != TS_OK) return st->code;
+    double fov;
+    if (ev_set_load_photo(set, i, r->size, &b->photo, &fov, &b->truth, &b->peer, st) != TS_OK) return st->code;
     b->name = b->truth.name;
     *c = ev_case_of_photo(b->photo, r->size);
+    c->fov = fov;
     if (b->peer.size) c->peer = &b->peer;
     if (!b->truth.size) return TS_OK;
     ts_rng rng = ts_rng_make(r->seed, TS_STREAM_EVAL, ev_set_identity(set, i));
@@ -72,6 +74,7 @@ static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, t
     rd_eval_views(&rng, RD_EVAL_VIEWS, b->views);
     *c = ev_case_of_maps(&b->truth, b->image, b->views, r->perceptual);
     c->view = r->flash;
+    c->fov = rd_fov_of((double)r->flash.camera[2]);
     c->inputs = r->inputs;
     c->exposure = r->exposure;
     c->fit = r->fit;
@@ -81,6 +84,7 @@ static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, t
         float *image = b->image + (size_t)k * (size_t)r->size * (size_t)r->size * 3;
         if (r->camera) {
             const cl_shot shot = cl_photograph(r->camera, r->seed, which, &c->input[k], r->size, b->truth.maps, image);
+            if (k == 0) c->fov = rd_fov_of((double)shot.view.camera[2]);
             if (r->light_known) c->input[k] = shot.view;
         } else {
             const ev_photo photo = {c->input[k], c->exposure, (float)r->noise, r->seed, which};

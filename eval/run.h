@@ -15,7 +15,7 @@ typedef struct ev_run {
     int size, repeat;
     uint64_t seed;           /* of the renderings' views and the noise */
     double noise, exposure;  /* exposure: true power of the inputs' lights over the power that the methods know */
-    rd_view flash;           /* of the first input, as the methods know it; not of captures */
+    rd_view flash;           /* of the first input; not of captures */
     bool fit;                /* compare renderings after one factor is fitted */
     const io_camera *camera; /* of known materials, or NULL: a clean rendering under flash */
     bool light_known;        /* of captures, and where camera is not NULL: the methods know lights and cameras */

@@ -204,20 +204,23 @@ static ts_code entry_path(const ev_set *set, const char *folder, const char *ent
     return ts_fail(st, TS_INVALID, "%s: the name is too long", set->where);
 }
 
-ts_code ev_set_load_photo(const ev_set *set, int i, int size, float **image, io_material *truth, io_material *peer,
-                          ts_status *st)
+ts_code ev_set_load_photo(const ev_set *set, int i, int size, float **image, double *fov, io_material *truth,
+                          io_material *peer, ts_status *st)
 {
     char path[PATH_LENGTH], name[sizeof truth->name + 4];
-    int width, height;
+    char from[128];
+    io_photo_facts facts;
     io_image square;
     *image = NULL;
+    *fov = 0;
     io_material_free(truth);
     io_material_free(peer);
     ts_code code = entry_path(set, set->where, set->entry[i], path, st);
     if (code) return code;
     if (set->kind == EV_PEERS) return ev_read_nine_panels(path, size, image, truth, peer, st);
-    code = io_read_photo_square(path, IO_MAX_PIXELS_DEFAULT, size, 0, &square, &width, &height, st);
+    code = io_read_photo_square(path, IO_MAX_PIXELS_DEFAULT, size, 0, &square, &facts, st);
     if (code) return code;
+    *fov = io_lens_fov(&facts.lens, facts.width, facts.height, from, sizeof from);
     *image = square.data;
     io_name_from_path(path, truth->name, sizeof truth->name);
     if (!set->peers) return TS_OK;

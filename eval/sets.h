@@ -33,9 +33,9 @@ ts_code ev_set_load(const ev_set *set, int i, int size, io_material *m, ts_statu
 ts_code ev_set_load_capture(const ev_set *set, int i, int size, io_capture *c, ts_status *st);
 
 /* The same of EV_PHOTOS and EV_PEERS: image is linear, size x size x 3, malloced and the caller's. truth is empty
- * (size 0) of a photograph, peer where nothing has its name. */
-ts_code ev_set_load_photo(const ev_set *set, int i, int size, float **image, io_material *truth, io_material *peer,
-                          ts_status *st);
+ * (size 0) of a photograph, peer where nothing has its name. fov: as the file says it (io_lens_fov), or 0. */
+ts_code ev_set_load_photo(const ev_set *set, int i, int size, float **image, double *fov, io_material *truth,
+                          io_material *peer, ts_status *st);
 
 /* A number of the material, independent of its place in the set: the seed of its evaluation views. */
 uint64_t ev_set_identity(const ev_set *set, int i);

@@ -24,25 +24,26 @@ enum {
 typedef struct given_photos {
     const float *image[NN_MAX_IMAGES];
     rd_view views[NN_MAX_IMAGES];
+    int order[NN_MAX_IMAGES]; /* the caller's number of each */
     int count, side;
     const float *r0, *deviation; /* deviation: of a model that says it */
 } given_photos;
 
 /* The photographs in the order in which models read them. */
-static given_photos in_order(const lgd_photo *photo, int photos, int side)
+static given_photos in_order(const lgd_photo *photo, int photos, int side, double fov)
 {
     given_photos p = {.count = photos, .side = side};
     rd_view view[NN_MAX_IMAGES] = {0};
-    int order[NN_MAX_IMAGES];
     for (int k = 0; k < photos; k++) {
         view[k] = (rd_view){.kind = RD_POINT, .power = photo[k].power};
         memcpy(view[k].light, photo[k].light, sizeof view[k].light);
         memcpy(view[k].camera, photo[k].camera, sizeof view[k].camera);
+        if (fov > 0) view[k] = rd_view_from(view[k], rd_fov_distance(fov));
     }
-    rd_capture_order(view, photos, order);
+    rd_capture_order(view, photos, p.order);
     for (int k = 0; k < photos; k++) {
-        p.image[k] = photo[order[k]].image;
-        p.views[k] = view[order[k]];
+        p.image[k] = photo[p.order[k]].image;
+        p.views[k] = view[p.order[k]];
     }
     return p;
 }
@@ -214,19 +215,30 @@ static ts_code fit_power(const lgd_estimator *e, given_photos *p, const lgd_opti
     return code;
 }
 
-/* What a model that guesses the scene says first. Where the power is to be estimated, so are the places. */
+/* What of the views is true. A flash is beside the lens, nobody tells where. */
+static int known(const lgd_options *o)
+{
+    return (o->power ? 0 : NN_KNOWN_POWER) |
+        (o->fov > 0                       ? NN_KNOWN_CAMERA
+             : o->fov == LGD_FOV_OF_PHOTO ? NN_KNOWN_CAMERA | NN_KNOWN_LIGHT
+                                          : 0);
+}
+
+/* Power over distance squared at the centre of the sample, of a light above it. */
+static double irradiance(const rd_view *view) { return (double)view->power / pow((double)view->light[2], 2); }
+
+/* What a model that guesses the scene says first. */
 static ts_code first_guess(const lgd_estimator *e, given_photos *p, const lgd_options *o, lgd_first_guess *guess,
                            ts_status *st)
 {
-    const int known = o->power ? 0 : NN_KNOWN_ALL;
-    const double power = (double)p->views[0].power;
-    const ts_code code = lgd_first_guess_make(e->tape, e->net, p->image[0], p->side, &p->views[0], known,
+    const double before = irradiance(&p->views[0]);
+    const ts_code code = lgd_first_guess_make(e->tape, e->net, p->image[0], p->side, &p->views[0], known(o),
                                               o->orientations, guess, st);
     if (code) return code;
     p->views[0] = rd_scene_view(guess->number);
     p->r0 = guess->r0;
     p->deviation = guess->deviation;
-    if (o->power) *o->power = (double)p->views[0].power / power;
+    if (o->power) *o->power = irradiance(&p->views[0]) / before;
     return TS_OK;
 }
 
@@ -235,7 +247,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
 {
     const nn_arch *a = &e->net->arch;
     lgd_options o = *given;
-    given_photos p = in_order(photo, photos, side);
+    given_photos p = in_order(photo, photos, side, o.fov);
     float *r0 = NULL;
     o.tolerance = tolerance(a, given);
     int steps = o.iterations == -1 ? a->iterations : o.iterations;
@@ -249,6 +261,12 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     if (a->descent == NN_DESCENT_POSTERIOR) code = first_guess(e, &p, &o, &guess, st);
     else if (o.power) code = fit_power(e, &p, &o, &r0, st);
     if (!code && o.iterations == LGD_AUTO && !choose) code = count_steps(e, &p, o.orientations, &steps, st);
+    for (int k = 0; k < photos && !code && o.taken; k++) {
+        lgd_photo *to = &o.taken[p.order[k]];
+        *to = (lgd_photo){.image = p.image[k], .power = p.views[k].power};
+        memcpy(to->light, p.views[k].light, sizeof to->light);
+        memcpy(to->camera, p.views[k].camera, sizeof to->camera);
+    }
     if (!code) code = refine(e, &p, &o, choose, &steps, maps, st);
     if (side > ONE_TILE) ag_drop(e->tape); /* what is done with such maps needs memory of its own */
     free(r0);

@@ -159,6 +159,19 @@ static ts_code check_photo(const lgd_photo *p, int number, ts_status *st)
     return TS_OK;
 }
 
+static ts_code check_fov(double fov, int photos, ts_status *st)
+{
+    if (fov == LGD_FOV_UNKNOWN || fov == LGD_FOV_OF_PHOTO) return TS_OK;
+    if (!(fov >= LGD_FOV_LEAST && fov <= LGD_FOV_MOST))
+        return ts_fail(st, TS_INVALID,
+                       "lgd_estimate: fov is %g and must lie in %g .. %g degrees, or be %g for unknown or %g for the "
+                       "photograph's",
+                       fov, LGD_FOV_LEAST, LGD_FOV_MOST, LGD_FOV_UNKNOWN, LGD_FOV_OF_PHOTO);
+    if (photos > 1)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: fov is of one photograph: of %d, each names its camera", photos);
+    return TS_OK;
+}
+
 static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, int photos, int side,
                                const lgd_options *o, const float *maps, ts_status *st)
 {
@@ -187,6 +200,7 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
     if (o->orientations != 0 && o->orientations != 1 && o->orientations != 2 && o->orientations != 4 &&
         o->orientations != 8)
         return ts_fail(st, TS_INVALID, "lgd_estimate: orientations is %d and must be 1, 2, 4 or 8", o->orientations);
+    if (check_fov(o->fov, photos, st) != TS_OK) return st->code;
     if ((o->tolerance > 0 || o->mask) && !lgd_tiles_exact(&model->net->arch))
         return ts_fail(st, TS_UNSUPPORTED,
                        "lgd_estimate: these weights' loss is taken anew over the whole photograph at every step: no "

@@ -43,6 +43,16 @@ enum { LGD_AUTO = -2, LGD_AUTO_MOST = 24 };
 
 enum { LGD_F32, LGD_BF16 };
 
+/* The angle in degrees across the side of the square that the image is; 2 atan(1/2 / d), d the camera's height in patch
+ * widths. */
+#define LGD_FOV_DEFAULT 54.2249 /* that of lgd_flash_photo */
+#define LGD_FOV_UNKNOWN 0.0
+#define LGD_FOV_OF_PHOTO (-1.0) /* the places in lgd_photo are true */
+#define LGD_FOV_LEAST 1.0
+#define LGD_FOV_MOST 170.0
+
+typedef struct lgd_photo lgd_photo;
+
 /* New fields are added at the end. Begin with lgd_options_default(). */
 typedef struct lgd_options {
     size_t size;      /* sizeof(lgd_options) where the caller was compiled: fields beyond it have their defaults */
@@ -75,9 +85,17 @@ typedef struct lgd_options {
     int (*tile)(double done, void *user);
     /* NULL: the lights' powers are those of the photographs. Else the factor that fits them all is estimated from the
      * photographs, used, and written here. A stronger light and a brighter albedo look alike, so only what the model's
-     * materials cannot explain, such as an albedo above 1, counts. 1 for published weights, whose light is fixed.
-     * Models that guess the scene estimate the places of light and camera too unless this is NULL. */
+     * materials cannot explain, such as an albedo above 1, counts. 1 for published weights, whose light is fixed. Of a
+     * model that guesses how far away the camera is, the factor on what reaches the sample. */
     double *power;
+    /* The photograph's field of view, LGD_FOV_LEAST .. LGD_FOV_MOST degrees, of one photograph alone: camera and light
+     * are moved to that height, and the power grows so that the sample is as bright. LGD_FOV_UNKNOWN (the default):
+     * they are where the photograph says, and models that guess the scene estimate the places of both.
+     * LGD_FOV_OF_PHOTO: they are where it says, and those models know it. */
+    double fov;
+    /* NULL, or room for as many photographs as are given: each with light, camera and power as they were taken. May be
+     * the given ones. */
+    lgd_photo *taken;
 } lgd_options;
 /* Fills size bytes with the defaults, whichever version the library has. */
 LGD_API void lgd_options_init(lgd_options *options, size_t size);
@@ -96,10 +114,10 @@ LGD_API int lgd_estimate(lgd_model *model, const float *image, int side, const l
 
 /* A photograph of the sample, rectified to it. Positions in patch widths (the sample is [-1/2, 1/2]^2 at z = 0, x
  * right, y up), both above the sample; radiance = BRDF max(n.l, 0) power / distance^2. */
-typedef struct lgd_photo {
+struct lgd_photo {
     const float *image; /* side x side x 3 linear values (clamped to [0, 1] here), top row first */
     float light[3], camera[3], power;
-} lgd_photo;
+};
 
 /* The photograph that lgd_estimate assumes: light and camera at one place above the centre, of the default power. */
 LGD_API lgd_photo lgd_flash_photo(const float *image);

@@ -2,6 +2,7 @@
 #include "data/file.h"
 #include "data/height.h"
 #include "infer/export.h"
+#include "infer/meta.h"
 #include "render/render.h"
 #include "render/scene.h"
 #include "tensor/maps.h"
@@ -115,10 +116,14 @@ static ts_code write_render(const char *folder, const io_material *m, const lgd_
     return write_strip(folder, "render.png", &s, st);
 }
 
-static ts_code write_preview(const char *folder, const io_material *m, ts_status *st)
+/* Seen from as far away as the photograph. */
+static ts_code write_preview(const char *folder, const io_material *m, const lgd_photo *photo, ts_status *st)
 {
     strip s = {.m = m, .panels = LGD_PREVIEW_LIGHTS};
-    for (int i = 0; i < s.panels; i++) s.view[i] = rd_preview_view(i, s.panels);
+    for (int i = 0; i < s.panels; i++) {
+        s.view[i] = rd_preview_view(i, s.panels);
+        s.view[i].camera[2] = photo->camera[2];
+    }
     return write_strip(folder, "preview.png", &s, st);
 }
 
@@ -180,34 +185,35 @@ static unsigned map_bits(unsigned which)
     return maps;
 }
 
-static ts_code write_portion(const char *folder, const io_material *m, const lgd_photo *photo, unsigned which,
-                             bool directx, io_metallic_error *lost, ts_status *st)
+static ts_code write_portion(const char *folder, const io_material *m, const lgd_photo *photo, const lgd_order *order,
+                             unsigned portion, io_metallic_error *lost, ts_status *st)
 {
+    const unsigned which = order->which & portion;
     switch (which) {
     case 0: return TS_OK;
     case LGD_OUT_RENDER: return write_render(folder, m, photo, st);
-    case LGD_OUT_PREVIEW: return write_preview(folder, m, st);
+    case LGD_OUT_PREVIEW: return write_preview(folder, m, photo, st);
     case LGD_OUT_HEIGHT: return write_height(folder, m, st);
     case LGD_OUT_GLTF: return write_document(folder, "material.gltf", lgd_write_gltf, st);
     case LGD_OUT_MATERIALX: return write_document(folder, "material.mtlx", lgd_write_materialx, st);
     default:
         return which & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC)
             ? write_metallic(folder, m, which, lost, st)
-            : io_write_map_files(folder, m, map_bits(which), directx, st);
+            : io_write_map_files(folder, m, map_bits(which), order->directx, st);
     }
 }
 
 /* Of several failures the first portion's is reported. */
-static ts_code write_all(const char *folder, const io_material *m, const lgd_photo *photo, unsigned which, bool directx,
-                         int threads, const char *mark, io_metallic_error *lost, ts_status *st)
+static ts_code write_all(const char *folder, const io_material *m, const lgd_photo *photo, const lgd_order *order,
+                         const char *mark, io_metallic_error *lost, ts_status *st)
 {
     ts_status failure[PORTIONS] = {{0}};
-#pragma omp parallel for num_threads(threads) schedule(dynamic)
-    for (int i = 0; i < PORTIONS; i++) write_portion(folder, m, photo, which & portions[i], directx, lost, &failure[i]);
+#pragma omp parallel for num_threads(order->threads) schedule(dynamic)
+    for (int i = 0; i < PORTIONS; i++) write_portion(folder, m, photo, order, portions[i], lost, &failure[i]);
     for (int i = 0; i < PORTIONS; i++)
         if (failure[i].code) return ts_fail(st, failure[i].code, "%s", failure[i].message);
-    const unsigned maps = map_bits(which);
-    return maps ? io_write_maps_meta(folder, maps, directx, mark, st) : TS_OK;
+    char path[PATH_LENGTH];
+    return join(path, folder, "meta.txt", st) ? st->code : lgd_write_meta(path, photo, order, mark, st);
 }
 
 enum { MARK = 40 };
@@ -274,7 +280,7 @@ static ts_code move_locked(const char *hidden, const char *folder, const char *m
 }
 
 ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const lgd_photo *photo,
-                         unsigned which, bool directx, int threads, lgd_output_result *result, ts_status *st)
+                         const lgd_order *order, lgd_output_result *result, ts_status *st)
 {
     char folder[PATH_LENGTH], mark[MARK], *hidden;
     lgd_output_result ignored, *r = result ? result : &ignored;
@@ -287,8 +293,8 @@ ts_code lgd_output_write(const char *parent, const char *stem, const io_material
     if (there) ts_sweep(folder);
     /* inside the folder when it exists: it may lie on another file system than its parent */
     if (ts_hidden_folder(there ? folder : parent, &hidden, &lock, st) != TS_OK) return st->code;
-    mark_of(m, directx, mark);
-    ts_code code = write_all(hidden, m, photo, which, directx, threads, mark, &r->lost, st);
+    mark_of(m, order->directx, mark);
+    ts_code code = write_all(hidden, m, photo, order, mark, &r->lost, st);
     bool moves = there;
     if (!code && !there && rename(hidden, folder) != 0) {
         if (errno == ENOTEMPTY || errno == EEXIST) moves = true; /* another process has made it meanwhile */

@@ -32,16 +32,23 @@ ts_code lgd_output_parse(const char *list, unsigned *which, ts_status *st);
 /* Fails with one clear line when nothing can be made inside the folder, before any work is done for it. */
 ts_code lgd_output_check(const char *folder, ts_status *st);
 
+typedef struct lgd_order {
+    unsigned which;       /* bits */
+    bool directx;         /* normals with y down */
+    int threads;          /* that files are made on */
+    const char *fov_from; /* where photo's field of view is known from, for meta.txt */
+} lgd_order;
+
 typedef struct lgd_output_result {
     io_metallic_error lost; /* what base colour and metalness cannot express, where they are written */
     unsigned removed;       /* files of another estimate that were removed: a bit each in the order of lgd_files */
 } lgd_output_result;
 
-/* Writes which (bits) and, beside maps, meta.txt (what they mean) to parent/stem; nothing else is computed. They are
+/* Writes what is ordered and meta.txt (what they mean) to parent/stem; nothing else is computed. They are
  * written to a hidden folder first and renamed when all are complete: a failure leaves what was there before, and
  * nothing else. When the folder has files of another estimate (of another photograph, or made otherwise: meta.txt names
  * the estimate), those of lgd_files that are not written now are removed. Several processes may write the same folder:
- * one's files stay. photo: of the material's size. result: may be NULL. Files are made on as many threads as given. */
+ * one's files stay. photo: of the material's size, with light and camera as they were taken. result: may be NULL. */
 ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const lgd_photo *photo,
-                         unsigned which, bool directx, int threads, lgd_output_result *result, ts_status *st);
+                         const lgd_order *order, lgd_output_result *result, ts_status *st);
 #endif

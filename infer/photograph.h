@@ -9,8 +9,7 @@ ts_code lgd_weights_published(const char *path, bool *published, ts_status *st);
 
 /* The photograph's largest centred square at size x size pixels, linear, which the caller frees. published: resampled
  * by io_centre_square_scikit as it is stored (8-bit values / 255) and only then raised to rd_published.gamma; otherwise
- * resampled while linear. width, height: of the whole, upright. threads: of io_read_photo_square. Messages name
- * it. */
+ * resampled while linear. threads: of io_read_photo_square. Messages name it. */
 ts_code lgd_photograph_square(const char *path, bool published, int64_t max_pixels, int size, int threads,
-                              io_image *square, int *width, int *height, ts_status *st);
+                              io_image *square, io_photo_facts *facts, ts_status *st);
 #endif

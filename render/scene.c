@@ -21,6 +21,18 @@ rd_view rd_flash(void)
                      .power = RD_FLASH_POWER};
 }
 
+#define DEGREES 57.295779513082320877
+double rd_fov_of(double distance) { return 2 * DEGREES * atan(0.5 / distance); }
+double rd_fov_distance(double fov) { return 0.5 / tan(fov / (2 * DEGREES)); }
+
+rd_view rd_view_from(rd_view view, double distance)
+{
+    const float d = (float)distance, farther = d / view.light[2];
+    view.power *= farther * farther;
+    view.camera[2] = view.light[2] = d;
+    return view;
+}
+
 static float stops(const rd_view *view)
 {
     const float reference = RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE);

@@ -38,6 +38,13 @@ typedef struct rd_view {
 #define RD_FLASH_POWER (329288.0f / 65536.0f)
 rd_view rd_flash(void);
 
+/* Seen from height d the sample's side spans the angle fov = 2 atan(1 / 2d), in degrees; RD_FLASH_DISTANCE: 54.2. */
+double rd_fov_of(double distance);
+double rd_fov_distance(double fov);
+/* The same view with camera and light at that height, the power as much greater as the light's height has been squared:
+ * the sample is as bright as before. */
+rd_view rd_view_from(rd_view view, double distance);
+
 /* What is global about a photograph, as numbers of about the size of 1: the logarithm of the camera's height over
  * RD_FLASH_DISTANCE; the light's place beside the camera, x and y, in RD_SCENE_OFFSET patch widths; the camera's place
  * beside the centre, x and y, in the same; the light's power over the square of its height in stops above the default

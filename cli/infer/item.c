@@ -3,6 +3,7 @@
 #include "infer/output.h"
 #include "infer/photograph.h"
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 /* The mask is cut and resampled as the photograph is; what is not black in a pixel makes it wanted. */
@@ -31,15 +32,21 @@ void lgd_item_read(const lgd_command *c, bool published, lgd_item *item)
         if (lgd_read_capture(c->capture, c->size, c->max_pixels, &item->capture, &item->st) != TS_OK) return;
         item->photo_side = c->size;
         item->image = item->capture.image;
+        item->fov = LGD_FOV_OF_PHOTO;
+        snprintf(item->fov_from, sizeof item->fov_from, "the capture");
         return;
     }
-    int width, height;
-    if (lgd_photograph_square(item->job->photo, published, c->max_pixels, c->size, item->threads, &item->square, &width,
-                              &height, &item->st))
+    io_photo_facts facts;
+    if (lgd_photograph_square(item->job->photo, published, c->max_pixels, c->size, item->threads, &item->square, &facts,
+                              &item->st))
         return;
-    item->photo_side = width < height ? width : height;
+    item->photo_side = facts.width < facts.height ? facts.width : facts.height;
+    if (c->fov > 0) snprintf(item->fov_from, sizeof item->fov_from, "--fov");
+    item->fov = c->fov > 0 ? c->fov
+                           : io_lens_fov(&facts.lens, facts.width, facts.height, item->fov_from, sizeof item->fov_from);
     item->image = item->square.data;
-    if (c->mask && read_mask(c, width, height, &item->mask, &item->st)) ts_context(&item->st, "%s", item->job->photo);
+    if (c->mask && read_mask(c, facts.width, facts.height, &item->mask, &item->st))
+        ts_context(&item->st, "%s", item->job->photo);
 }
 
 /* What the library's calls get as their user. */
@@ -80,7 +87,9 @@ void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, l
                                  .orientations = c->orientations,
                                  .mask = item->mask,
                                  .tolerance = c->tolerance,
-                                 .tile = before_tile};
+                                 .tile = before_tile,
+                                 .fov = item->fov,
+                                 .taken = item->photo};
     item->photo[0] = lgd_flash_photo(item->image);
     item->photos = item->capture.images ? lgd_capture_photos(&item->capture, lgd_most_photos(model), item->photo) : 1;
     item->power = fixed ? c->power : 1;
@@ -88,13 +97,20 @@ void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, l
     if (io_material_create(&item->m, c->size, &item->st) != TS_OK ||
         lgd_model_estimate(model, item->photo, item->photos, c->size, &options, true, item->m.maps, &item->st))
         ts_context(&item->st, "%s", item->job->photo);
-    else if (!fixed) item->photo[0].power *= (float)item->power;
+}
+
+const char *lgd_item_assumption(const lgd_item *item)
+{
+    if (item->fov != LGD_FOV_UNKNOWN) return "";
+    return item->photo[0].camera[2] == lgd_flash_photo(NULL).camera[2] ? "assumed: " : "estimated: ";
 }
 
 void lgd_item_write(const lgd_command *c, lgd_item *item)
 {
-    if (lgd_output_write(c->out, item->job->stem, &item->m, &item->photo[0], c->outputs, c->directx, item->threads,
-                         &item->written, &item->st))
+    char from[sizeof item->fov_from + 32];
+    snprintf(from, sizeof from, "%s%s", lgd_item_assumption(item), item->fov_from);
+    const lgd_order order = {.which = c->outputs, .directx = c->directx, .threads = item->threads, .fov_from = from};
+    if (lgd_output_write(c->out, item->job->stem, &item->m, &item->photo[0], &order, &item->written, &item->st))
         ts_context(&item->st, "%s", item->job->photo);
 }
 

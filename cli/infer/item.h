@@ -16,6 +16,8 @@ typedef struct lgd_item {
     io_capture capture;  /* images 0: there is none */
     const float *image;  /* the photograph, or the first of the capture: in one of these; NULL: not read */
     unsigned char *mask; /* [size][size] from command->mask, or NULL */
+    double fov;          /* of the photograph, in degrees across the square; LGD_FOV_UNKNOWN, LGD_FOV_OF_PHOTO */
+    char fov_from[128];  /* where it is known from, or why it is not */
     int photo_side;      /* the shorter side of the photograph in pixels */
     lgd_photo photo[IO_CAPTURE_IMAGES];
     int photos;         /* of these, the ones that the weights read */
@@ -35,6 +37,9 @@ typedef int (*lgd_item_progress)(lgd_item *item, double done, void *user);
 /* Each sets the item's st on failure. published: as infer/photograph.h says. */
 void lgd_item_read(const lgd_command *c, bool published, lgd_item *item);
 void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, lgd_item_progress progress, void *user);
+/* Of an estimated item: "assumed: " where its field of view is the default, "estimated: " where the model guessed it,
+ * or "". */
+const char *lgd_item_assumption(const lgd_item *item);
 void lgd_item_write(const lgd_command *c, lgd_item *item);
 void lgd_item_free(lgd_item *item);
 #endif

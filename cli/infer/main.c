@@ -5,6 +5,7 @@
 #include "infer/model_path.h"
 #include "infer/output.h"
 #include "infer/photograph.h"
+#include "render/scene.h"
 #include "tensor/threads.h"
 #include <math.h>
 #include <pthread.h>
@@ -56,6 +57,20 @@ static void look_at(const lgd_item *item, int size)
                 100.0 * (double)over / (double)values);
 }
 
+/* What was assumed of the camera. */
+static void say_fov(const lgd_item *item)
+{
+    const double fov = rd_fov_of((double)item->photo[0].camera[2]);
+    const char *how = lgd_item_assumption(item);
+    if (item->fov == LGD_FOV_OF_PHOTO) return;
+    if (!*how) cl_note("%s: field of view %.1f degrees (%s)", item->job->photo, fov, item->fov_from);
+    else if (*how == 'e')
+        cl_note("%s: field of view %.1f degrees, estimated: %s", item->job->photo, fov, item->fov_from);
+    else
+        cl_note("%s: warning: a field of view of %.1f degrees is assumed: %s; --fov DEG tells it", item->job->photo,
+                fov, item->fov_from);
+}
+
 #define FAR                                                                                                         \
     0.01 /* reconstruction RMSE after the trained steps from which a highlight may be seen where the photograph has \
             none */
@@ -100,6 +115,7 @@ static void report(run *r, const lgd_item *item)
     printf("%s\n", item->job->folder);
     fflush(stdout); /* a reader at the other end of a pipe gets each folder when it is there */
     if (r->command->quiet) return;
+    say_fov(item);
     if (fabs(item->power - 1) >= 0.005)
         cl_note("%s: light power %.2f of the %s", item->job->photo, item->power,
                 item->capture.images ? "capture's" : "default");

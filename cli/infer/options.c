@@ -8,6 +8,7 @@ enum {
     NORMAL = 256,
     CAPTURE,
     POWER,
+    FOV,
     MAPS,
     WORKFLOW,
     MASK,
@@ -38,6 +39,10 @@ const cl_argument lgd_infer_arguments[] = {
     {CAPTURE, "capture", "WHERE",
      "instead of PHOTO: several photographs of one sample under known lights, listed in an INI file or in a folder\n"
      "in MaterialGAN's layout; the default model is then multi"},
+    {FOV, "fov", "DEG",
+     "field of view of the photographs, 1 .. 170 degrees across the side of the square that the maps cover (default: "
+     "from\n"
+     "the file's EXIF, else 54.2, with a warning)"},
     {POWER, "light-power", "P",
      "power of the light, relative to the default light (of a capture: to the power it states): a number in\n"
      "0.01 .. 100, or auto = estimated from the photograph and printed (default auto; of a capture 1)"},
@@ -127,6 +132,11 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
             if (!c->bf16 && strcmp(value, "f32") != 0)
                 code = ts_fail(st, TS_INVALID, "--precision: '%s' is neither f32 nor bf16", value);
             break;
+        case FOV:
+            if (!cl_parse_real(value, LGD_FOV_LEAST, LGD_FOV_MOST, &c->fov))
+                code = ts_fail(st, TS_INVALID, "--fov: '%s' is not an angle in %g .. %g degrees", value, LGD_FOV_LEAST,
+                               LGD_FOV_MOST);
+            break;
         case POWER:
             power_given = true;
             c->power = 0;
@@ -173,6 +183,7 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
     c->photos = argc - operands;
     if (*c->capture && c->photos > 0)
         return ts_fail(st, TS_INVALID, "--capture lists its photographs: '%s' is one more", c->photo[0]);
+    if (*c->capture && c->fov > 0) return ts_fail(st, TS_INVALID, "--capture says where its cameras are: no --fov");
     if (*c->capture && c->mask)
         return ts_fail(st, TS_INVALID, "--mask needs the shape of a photograph: not with --capture");
     if (*c->capture) {

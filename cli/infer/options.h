@@ -13,6 +13,7 @@ typedef struct lgd_command {
     int64_t max_pixels;
     double tolerance;
     int orientations; /* 1, 2, 4 or 8 */
+    double fov;       /* degrees across the square; 0: from the file */
     double power;     /* of the light, in default ones; 0: estimated */
     unsigned outputs; /* LGD_OUT_... */
     bool directx, metallic, exact, bf16, quiet, help, version;

@@ -11,6 +11,7 @@ bool io_read_png_file(const char *path, int64_t max_pixels,
 bool io_read_jpeg_file(const char *path, int64_t max_pixels,
                        oi_image *image); /* grey and YCbCr or RGB, EXIF orientation, ICC profile */
 
-/* Reads a JPEG's Exif segment (from its "Exif\0\0" on). False: it does not follow the standard. */
-bool io_exif(const unsigned char *segment, size_t size, int *orientation, bool *adobe);
+/* Reads a JPEG's Exif segment (from its "Exif\0\0" on). False: it does not follow the standard. What is odd about the
+ * lens is only not said. */
+bool io_exif(const unsigned char *segment, size_t size, int *orientation, bool *adobe, io_lens *lens);
 #endif

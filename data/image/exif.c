@@ -1,7 +1,9 @@
-/* Orientation and interoperability index from an Exif segment (Exif 2.3, 4.5 to 4.6: a TIFF header and its
+/* Orientation, interoperability index and lens from an Exif segment (Exif 2.3, 4.5 to 4.6: a TIFF header and its
  * directories). */
 #include "data/image/common_read.h"
+#include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 typedef struct tiff {
     const unsigned char *bytes;
@@ -23,13 +25,22 @@ static uint32_t get32(tiff *t, size_t at)
 }
 
 enum {
+    MAKE = 0x10f,
     ORIENTATION = 0x112,
+    FOCAL_LENGTH = 0x920a,
+    PIXEL_X_DIMENSION = 0xa002,
+    PIXEL_Y_DIMENSION = 0xa003,
+    FOCAL_PLANE_X_RESOLUTION = 0xa20e,
+    FOCAL_PLANE_RESOLUTION_UNIT = 0xa210,
+    DIGITAL_ZOOM_RATIO = 0xa404,
+    FOCAL_LENGTH_35MM = 0xa405,
     EXIF_DIRECTORY = 0x8769,
     INTEROPERABILITY_DIRECTORY = 0xa005,
     INTEROPERABILITY_INDEX = 1,
     ASCII = 2,
     SHORT = 3,
-    LONG = 4
+    LONG = 4,
+    RATIONAL = 5
 };
 
 /* Where the directory's entry with that tag begins, or 0. Two with the same tag are odd. */
@@ -56,10 +67,48 @@ static size_t follow(tiff *t, size_t at)
     return t->odd ? 0 : to;
 }
 
-bool io_exif(const unsigned char *segment, size_t size, int *orientation, bool *adobe)
+/* The number of the directory's entry with that tag, or 0. */
+static double number(tiff t, size_t directory, unsigned tag)
+{
+    const size_t at = entry(&t, directory, tag);
+    if (!at || get32(&t, at + 4) != 1) return 0;
+    const unsigned type = get16(&t, at + 2);
+    double v = type == SHORT ? get16(&t, at + 8) : type == LONG ? get32(&t, at + 8) : 0;
+    if (type == RATIONAL) {
+        const size_t pair = get32(&t, at + 8);
+        const double over = get32(&t, pair), under = get32(&t, pair + 4);
+        v = under > 0 ? over / under : 0;
+    }
+    return t.odd ? 0 : v;
+}
+
+/* t is a copy: what is odd here is no reason to distrust the rest. */
+static void read_lens(tiff t, size_t first, size_t exif, io_lens *lens)
+{
+    const double millimetres[] = {[2] = 25.4, [3] = 10, [4] = 1, [5] = 1e-3};
+    const double unit = number(t, exif, FOCAL_PLANE_RESOLUTION_UNIT), x = number(t, exif, PIXEL_X_DIMENSION),
+                 y = number(t, exif, PIXEL_Y_DIMENSION);
+    const int known = unit >= 2 && unit <= 5 ? (int)unit : 2; /* inches where it is not said */
+    char make[8] = "";
+    const size_t at = entry(&t, first, MAKE);
+    const size_t length = at && get16(&t, at + 2) == ASCII ? get32(&t, at + 4) : 0,
+                 text = length > 4 ? get32(&t, at + 8) : at + 8;
+    if (!t.odd && length && text + length <= t.size)
+        snprintf(make, sizeof make, "%.*s", (int)(length < 7 ? length : 7), (const char *)t.bytes + text);
+    *lens = (io_lens){.focal_35mm = number(t, exif, FOCAL_LENGTH_35MM),
+                      .focal = number(t, exif, FOCAL_LENGTH),
+                      .plane = number(t, exif, FOCAL_PLANE_X_RESOLUTION) / millimetres[known],
+                      .zoom = number(t, exif, DIGITAL_ZOOM_RATIO),
+                      .width = x < 1e6 ? (int)x : 0,
+                      .height = y < 1e6 ? (int)y : 0,
+                      .zoom_in_focal35 = strncasecmp(make, "Apple", 5) == 0};
+}
+
+bool io_exif(const unsigned char *segment, size_t size, int *orientation, bool *adobe, io_lens *lens)
 {
     *orientation = 1;
     *adobe = false;
+    *lens = (io_lens){0};
     if (size < 14 || memcmp(segment, "Exif\0\0", 6) != 0) return false;
     tiff t = {segment + 6, size - 6, segment[6] == 'I', false};
     if (memcmp(t.bytes, t.little ? "II" : "MM", 2) != 0 || get16(&t, 2) != 42) return false;
@@ -72,6 +121,7 @@ bool io_exif(const unsigned char *segment, size_t size, int *orientation, bool *
         *orientation = v >= 1 && v <= 8 ? (int)v : 1;
     }
     const size_t exif = follow(&t, entry(&t, first, EXIF_DIRECTORY));
+    if (exif && !t.odd) read_lens(t, first, exif, lens);
     const size_t interoperability = exif && !t.odd ? follow(&t, entry(&t, exif, INTEROPERABILITY_DIRECTORY)) : 0;
     const size_t index = interoperability && !t.odd ? entry(&t, interoperability, INTEROPERABILITY_INDEX) : 0;
     if (index) {

@@ -1,6 +1,7 @@
 /* Images in memory and in files. Floats, [height, width, channels], channels 1, 3 or 4, top row first. */
 #ifndef IO_IMAGE_H
 #define IO_IMAGE_H
+#include "data/image/lens.h"
 #include "tensor/status.h"
 #include <stdbool.h>
 #include <stddef.h>
@@ -22,15 +23,22 @@ void io_image_free(io_image *image); /* and zeroes the struct */
  * Negative and NaN become 0; values over 1 stay. The size is checked against max_pixels before memory is taken. */
 ts_code io_read_photo(const char *path, int64_t max_pixels, io_image *image, ts_status *st);
 
+/* What is known of a photograph beside its pixels. */
+typedef struct io_photo_facts {
+    int width, height; /* of the whole, upright */
+    io_lens lens;
+} io_photo_facts;
+
 /* Its largest centred square as io_centre_square has it, the same values, with memory for a few of the photograph's
- * rows as floats alone. threads: that it is resampled on; 0: the process's number. width, height: of the whole,
- * upright. */
-ts_code io_read_photo_square(const char *path, int64_t max_pixels, int size, int threads, io_image *square, int *width,
-                             int *height, ts_status *st);
+ * rows as floats alone. threads: that it is resampled on; 0: the process's number. facts may be NULL. */
+ts_code io_read_photo_square(const char *path, int64_t max_pixels, int size, int threads, io_image *square,
+                             io_photo_facts *facts, ts_status *st);
 
 /* A photograph with its values as stored, integers / their maximum: upright, three channels, alpha ignored, no colour
- * transform. Float formats, which are linear, are raised to 1 / gamma, so that all come in one encoding. */
-ts_code io_read_stored(const char *path, int64_t max_pixels, double gamma, io_image *image, ts_status *st);
+ * transform. Float formats, which are linear, are raised to 1 / gamma, so that all come in one encoding. facts may be
+ * NULL. */
+ts_code io_read_stored(const char *path, int64_t max_pixels, double gamma, io_image *image, io_photo_facts *facts,
+                       ts_status *st);
 
 /* A data image (a map): values as stored, integers / their maximum, no colour transform, orientation ignored. channels:
  * 1 or 3 forced. */

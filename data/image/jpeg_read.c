@@ -37,7 +37,8 @@ static bool markers(reading *r)
     for (jpeg_saved_marker_ptr m = r->jpeg.marker_list; m; m = m->next) {
         if (m->data_length != m->original_length) return false;
         if (m->marker == JPEG_APP0 + 1 && m->data_length >= 6 && memcmp(m->data, "Exif\0\0", 6) == 0) {
-            if (exif || !io_exif(m->data, m->data_length, &r->image->orientation, &r->image->adobe)) return false;
+            if (exif || !io_exif(m->data, m->data_length, &r->image->orientation, &r->image->adobe, &r->image->lens))
+                return false;
             exif = true;
         } else if (m->marker == JPEG_APP0 + 1) {
             /* XMP: seldom has more to say than the Exif segment */

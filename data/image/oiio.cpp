@@ -57,6 +57,27 @@ static void choose_channels(const ImageSpec &spec, oi_image *image)
     image->grey = r == g && g == b;
 }
 
+static double number(const ImageSpec &spec, const char *name)
+{
+    return std::max(0.0f, spec.get_float_attribute(name, 0));
+}
+
+static io_lens lens_of(const ImageSpec &spec)
+{
+    static const double millimetres[] = {25.4, 25.4, 25.4, 10, 1, 1e-3};
+    const int unit = spec.get_int_attribute("Exif:FocalPlaneResolutionUnit", 2);
+    const string_view make = spec.get_string_attribute("Make");
+    io_lens lens = {};
+    lens.focal_35mm = number(spec, "Exif:FocalLengthIn35mmFilm");
+    lens.focal = number(spec, "Exif:FocalLength");
+    lens.plane = number(spec, "Exif:FocalPlaneXResolution") / millimetres[unit >= 0 && unit < 6 ? unit : 2];
+    lens.zoom = number(spec, "Exif:DigitalZoomRatio");
+    lens.width = std::max(0, spec.get_int_attribute("Exif:PixelXDimension", 0));
+    lens.height = std::max(0, spec.get_int_attribute("Exif:PixelYDimension", 0));
+    lens.zoom_in_focal35 = Strutil::istarts_with(make, "Apple");
+    return lens;
+}
+
 static void describe(const ImageSpec &spec, oi_image *image)
 {
     TypeDesc type = spec.format;
@@ -74,6 +95,7 @@ static void describe(const ImageSpec &spec, oi_image *image)
         image->primaries = true;
         memcpy(image->chromaticities, p->data(), sizeof image->chromaticities);
     }
+    image->lens = lens_of(spec);
     p = spec.find_attribute("ICCProfile");
     if (p && p->type().basetype == TypeDesc::UINT8 && p->type().size() > 128) {
         image->icc_size = p->type().size();

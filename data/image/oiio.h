@@ -7,6 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "data/image/lens.h"
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -30,6 +32,7 @@ typedef struct oi_image {
     float chromaticities[8];
     unsigned char *icc; /* ICC profile, or NULL */
     size_t icc_size;
+    io_lens lens;
 } oi_image;
 
 /* The i-th value of data as OI_F32 would have it. */
@@ -69,7 +72,7 @@ typedef struct oi_library {
     bool (*knows_extension)(const char *extension);
 } oi_library;
 #define OI_LIBRARY "lgd_image_library"
-#define OI_BUILD "lgd " LGD_VERSION " image library 2"
+#define OI_BUILD "lgd " LGD_VERSION " image library 3"
 
 #ifdef __cplusplus
 }

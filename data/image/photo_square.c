@@ -64,8 +64,8 @@ static ts_code resample(const io_photo_rows *photo, const cut *c, int most_threa
     return TS_OK;
 }
 
-ts_code io_read_photo_square(const char *path, int64_t max_pixels, int size, int threads, io_image *square, int *width,
-                             int *height, ts_status *st)
+ts_code io_read_photo_square(const char *path, int64_t max_pixels, int size, int threads, io_image *square,
+                             io_photo_facts *facts, ts_status *st)
 {
     io_photo_rows photo;
     *square = (io_image){0};
@@ -83,7 +83,7 @@ ts_code io_read_photo_square(const char *path, int64_t max_pixels, int size, int
         io_image_free(square);
         ts_context(st, "%s", path);
     }
-    *width = photo.width, *height = photo.height;
+    if (facts) *facts = (io_photo_facts){photo.width, photo.height, photo.raw.lens};
     ts_arena_destroy(&arena);
     io_photo_close(&photo);
     return code;

@@ -55,6 +55,26 @@ static ts_code run_g(ev_estimator *e, const ev_case *c, ev_seen seen, void *user
 }
 
 enum { POWER_GIVEN, POWER_AUTO, POWER_KNOWN };
+enum { VIEW_SET, VIEW_TOLD, VIEW_UNKNOWN };
+
+/* The photographs as the method is told of them, and its field of view. */
+static double tell(const ev_estimator *e, const ev_case *c, int count, lgd_photo photo[])
+{
+    const int power = (int)ev_number(e, "power"), view = (int)ev_number(e, "view");
+    const size_t pixels = (size_t)c->size * (size_t)c->size;
+    for (int k = 0; k < count; k++) {
+        const float *image = c->image + (size_t)k * pixels * 3;
+        const float factor = power == POWER_KNOWN ? (float)c->exposure : 1;
+        photo[k] = lgd_flash_photo(image);
+        photo[k].power *= factor;
+        if (view != VIEW_SET) continue;
+        photo[k].power = c->input[k].power * factor;
+        memcpy(photo[k].light, c->input[k].light, sizeof photo[k].light);
+        memcpy(photo[k].camera, c->input[k].camera, sizeof photo[k].camera);
+    }
+    if (view == VIEW_TOLD) return c->fov;
+    return view == VIEW_SET && power != POWER_AUTO ? LGD_FOV_OF_PHOTO : LGD_FOV_UNKNOWN;
+}
 
 /* As lgd-infer estimates. */
 static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
@@ -63,6 +83,8 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
     const size_t pixels = (size_t)c->size * (size_t)c->size;
     const lgd_estimator estimator = {.net = e->net, .tape = e->tape, .seen = seen, .user = user};
     double factor;
+    lgd_photo photo[NN_MAX_IMAGES];
+    const double fov = tell(e, c, count, photo);
     const lgd_options options = {.size = sizeof options,
                                  .iterations = steps(e),
                                  .exact = e->exact,
@@ -70,15 +92,8 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
                                  .orientations = ev_orientations(e),
                                  .threads = ts_threads(),
                                  .tolerance = ev_number(e, "tolerance"),
-                                 .power = power == POWER_AUTO ? &factor : NULL};
-    lgd_photo photo[NN_MAX_IMAGES];
-    for (int k = 0; k < count; k++) {
-        const rd_view *view = &c->input[k];
-        photo[k] = (lgd_photo){.image = c->image + (size_t)k * pixels * 3,
-                               .power = view->power * (power == POWER_KNOWN ? (float)c->exposure : 1)};
-        memcpy(photo[k].light, view->light, sizeof view->light);
-        memcpy(photo[k].camera, view->camera, sizeof view->camera);
-    }
+                                 .power = power == POWER_AUTO ? &factor : NULL,
+                                 .fov = fov};
     float *maps = malloc(pixels * MAP_CHANNELS * sizeof *maps);
     const ts_code code = maps ? lgd_estimator_run(&estimator, photo, count, c->size, &options, maps, st)
                               : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", c->size, c->size);
@@ -119,13 +134,19 @@ static const ev_setting joint[] = {MODEL("weights of g and h (default: the progr
         .help =                                                                                                     \
             "of the light: given = the default, auto = as lgd-infer --light-power auto, known = that of --exposure" \
     }
+#define VIEW                                                                                                          \
+    {                                                                                                                 \
+        .key = "view", .type = EV_WORD, .words = "set told unknown", .initial = "set",                                \
+        .help = "of the camera: set = its place as the set tells it (with power=auto taken for a guess), told = its " \
+                "field of view alone, as lgd-infer --fov, unknown = nothing"                                          \
+    }
 #define PRECISION                                                                   \
     {                                                                               \
         .key = "precision", .type = EV_WORD, .words = "f32 bf16", .initial = "f32", \
         .help = "of the products in convolutions, as lgd-infer --precision"         \
     }
 #define REFINER \
-    ITERATIONS, TOLERANCE, EV_ORIENTATIONS, PHOTOS, POWER, PRECISION, { 0 }
+    ITERATIONS, TOLERANCE, EV_ORIENTATIONS, PHOTOS, POWER, VIEW, PRECISION, { 0 }
 
 static const ev_setting lgd[] = {MODEL("weights of g and h (default: the program's)"), REFINER};
 static const ev_setting nograd[] = {MODEL_GIVEN("weights trained with model.gradient = no"), REFINER};

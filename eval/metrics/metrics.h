@@ -44,6 +44,7 @@ typedef struct ev_case {
     const float *image;           /* the input pictures, [inputs][size][size][3], linear, in [0, 1] */
     int inputs;                   /* 1 .. NN_MAX_IMAGES; all but the first are for methods that read several */
     rd_view input[NN_MAX_IMAGES]; /* their views, the first being view */
+    double fov;                   /* the first input's true field of view in degrees (render/scene.h); 0: unknown */
     double exposure;              /* true power of the inputs' lights over the power that the methods know */
     const io_material *truth;     /* NULL: unknown */
     const io_material *peer;      /* another program's maps of it, or NULL */

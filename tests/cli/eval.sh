@@ -167,6 +167,29 @@ captures() {
     lines "$T/q/results.csv" 4
 }
 
+# A field of view is told by the set, by --fov, or not at all, and changes what the steps make.
+field_of_view() {
+    for degrees in 0 180; do
+        expect 2 "$BIN/lgd-eval" --set procedural:1,1 --fov $degrees -o "$T/o"
+        says "$T/err" "--fov: '$degrees' is not an angle in 1 .. 170 degrees"
+    done
+    model
+    expect 0 "$BIN/lgd-data" --format captures --count 1 --size 32 -o "$T/c"
+    one=$(ls -d "$T"/c/*)
+    awk -F, '{ print $1 "," $2 "," 2 * $3 }' "$one/camera_pos.txt" >"$T/far" && mv "$T/far" "$one/camera_pos.txt"
+    untold=lgd:power=auto,label=untold told=lgd:power=auto,view=told,label=told
+    expect 0 evaluate --set "multiview:$one" --method $untold --method $told -o "$T/m"
+    awk -F, '$3 == "untold" && $4 == 2 { a = $9 } $3 == "told" && $4 == 2 { b = $9 } END { exit !(a > 0 && b > 0 && a != b) }' "$T/m/results.csv" ||
+        fail "told the steps make the same: $(cat "$T/m/results.csv")"
+    for fov in 54.2249 30; do
+        expect 0 evaluate --fov $fov --set procedural:1,1 --method lgd:label=set --method lgd:view=told,label=told \
+            --method lgd:view=unknown,label=unknown -o "$T/$fov"
+        awk -F, -v fov=$fov '$5 == 2 { v[$4] = $10 } function near(a, b) { return a > 0 && (a - b) ^ 2 < 1e-8 }
+            END { exit !(near(v["set"], v["told"]) && near(v["unknown"], v["told"]) == (fov > 54)) }' \
+            "$T/$fov/results.csv" || fail "at $fov degrees: $(cat "$T/$fov/results.csv")"
+    done
+}
+
 told() {
     for o in --normal=up --workflow=mixed --colour=p3; do
         expect 2 "$BIN/lgd-eval" --set "maps:$T" $o -o "$T/o"
@@ -296,6 +319,7 @@ untold() {
 }
 
 check eval_captures captures
+check eval_field_of_view field_of_view
 check eval_photographs photographs
 check eval_untold untold
 check eval_lpips lpips

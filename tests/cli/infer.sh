@@ -66,6 +66,28 @@ trace() {
     for f in $FILES; do cmp -s "$T/0/p/$f" "$T/1/p/$f" || fail "$f differs when traced"; done
 }
 
+# The field of view that is told, or assumed with a warning; what is no angle is refused.
+field_of_view() {
+    model
+    photo "$T/p.ppm" 32 32
+    expect 0 infer --maps render "$T/p.ppm" -o "$T/0"
+    says "$T/err" "p.ppm: warning: a field of view of 54.2 degrees is assumed: it has no focal length in its EXIF; --fov DEG tells it"
+    says "$T/0/p/meta.txt" "field of view: 54.22 degrees across the square (assumed: it has no focal length in its EXIF)"
+    expect 0 infer --fov 28 --maps render,preview "$T/p.ppm" -o "$T/28"
+    says "$T/err" "p.ppm: field of view 28.0 degrees (--fov)"
+    says "$T/28/p/meta.txt" "field of view: 28.00 degrees across the square (--fov)"
+    says "$T/28/p/meta.txt" "camera: 0.0000 0.0000 2.0054"
+    expect 0 infer --fov 54.2249 "$T/p.ppm" -o "$T/54"
+    expect 0 infer "$T/p.ppm" -o "$T/usual"
+    cmp "$T/54/p/diffuse.png" "$T/usual/p/diffuse.png" || fail "told the default the maps differ"
+    if cmp -s "$T/28/p/render.png" "$T/0/p/render.png"; then fail "the field of view changes no rendering"; fi
+    for degrees in 0 180 -20 wide; do
+        expect 2 infer --fov=$degrees "$T/p.ppm" -o "$T/none"
+        says "$T/err" "--fov: '$degrees' is not an angle in 1 .. 170 degrees"
+    done
+    [ ! -e "$T/none" ] || fail "a folder is made"
+}
+
 only_what_is_asked_for() {
     model
     photo "$T/p.ppm" 32 32
@@ -73,7 +95,7 @@ only_what_is_asked_for() {
     for list in diffuse specular roughness normal exr render preview; do
         expect 0 infer --maps $list "$T/p.ppm" -o "$T/$list"
         for f in "$T/$list/p"/*.[pe]*; do cmp -s "$f" "$T/all/p/${f##*/}" || fail "--maps $list: ${f##*/} differs"; done
-        case $list in render|preview) want="$list.png " ;; exr) want="maps.exr meta.txt " ;; *) want=$(printf '%s\n' "$list.png" meta.txt | sort | tr '\n' ' ') ;; esac
+        case $list in render|preview) want="meta.txt $list.png " ;; exr) want="maps.exr meta.txt " ;; *) want=$(printf '%s\n' "$list.png" meta.txt | sort | tr '\n' ' ') ;; esac
         [ "$(ls -A "$T/$list/p" | tr '\n' ' ')" = "$want" ] || fail "--maps $list writes $(ls -A "$T/$list/p" | tr '\n' ' ')"
     done
     expect 0 infer --maps render,normal "$T/p.ppm" -o "$T/all"
@@ -322,6 +344,7 @@ check infer_whole_run whole_run
 check infer_far_from_the_photograph far_from_the_photograph
 check infer_threads_agree threads_agree
 check infer_trace trace
+check infer_field_of_view field_of_view
 check infer_writes_only_what_is_asked_for only_what_is_asked_for
 check infer_overlap_changes_nothing overlap_changes_nothing
 check infer_old_results_are_replaced old_results

@@ -166,8 +166,9 @@ TEST(damaged_exif)
                      "\1\0\5\240\4\0\1\0\0\0\70\0\0\0\0\0\0\0\1\0\1\0\2\0\4\0\0\0R03\0\0\0\0\0";
     int orientation;
     bool adobe;
+    io_lens lens;
     const size_t size = sizeof good - 1;
-    CHECK(io_exif(good, size, &orientation, &adobe) && orientation == 6 && adobe, "orientation %d, Adobe %d",
+    CHECK(io_exif(good, size, &orientation, &adobe, &lens) && orientation == 6 && adobe, "orientation %d, Adobe %d",
           orientation, adobe);
     unsigned state = 1;
     for (int round = 0; round < 50000; round++) {
@@ -179,7 +180,7 @@ TEST(damaged_exif)
             state = state * 1664525 + 1013904223;
             copy[(state >> 8) % n] = (uint8_t)(state >> 24);
         }
-        io_exif(copy, n, &orientation, &adobe);
+        io_exif(copy, n, &orientation, &adobe, &lens);
         CHECK(orientation >= 1 && orientation <= 8, "orientation %d", orientation);
         free(copy);
     }

@@ -104,14 +104,14 @@ static void same_square(const char *path, int size)
 {
     io_image whole, cut, square;
     ts_status st = {0};
-    int width, height;
+    io_photo_facts facts;
     CHECK(!io_read_photo(path, 1 << 20, &whole, &st) && !io_centre_square(&whole, size, &cut, &st), "%s", st.message);
     for (int threads = 1; threads <= 3; threads++) {
         ts_threads_set(threads);
-        CHECK(!io_read_photo_square(path, 1 << 20, size, 0, &square, &width, &height, &st), "%s", st.message);
-        CHECK(width == whole.width && height == whole.height && square.width == size && square.height == size &&
-                  square.channels == 3,
-              "%s: %d x %d", path, width, height);
+        CHECK(!io_read_photo_square(path, 1 << 20, size, 0, &square, &facts, &st), "%s", st.message);
+        CHECK(facts.width == whole.width && facts.height == whole.height && square.width == size &&
+                  square.height == size && square.channels == 3,
+              "%s: %d x %d", path, facts.width, facts.height);
         CHECK(!memcmp(square.data, cut.data, (size_t)size * (size_t)size * 3 * sizeof(float)),
               "%s to %d pixels on %d threads: other values", path, size, threads);
         io_image_free(&square);
@@ -151,16 +151,13 @@ TEST(photo_square_of_a_file_is_that_of_the_whole)
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) same_square(floats, sizes[i]);
     snprintf(path, sizeof path, "%s/none.png", test_folder());
     io_image square = {0};
-    int width, height;
-    CHECK(io_read_photo_square(path, 1 << 20, 8, 0, &square, &width, &height, &st) == TS_IO && !square.data,
-          "a missing file");
+    CHECK(io_read_photo_square(path, 1 << 20, 8, 0, &square, NULL, &st) == TS_IO && !square.data, "a missing file");
     st = (ts_status){0};
     snprintf(path, sizeof path, "%s/upright.jpg", test_folder());
-    CHECK(io_read_photo_square(path, 97 * 61 - 1, 8, 0, &square, &width, &height, &st) == TS_UNSUPPORTED &&
-              !square.data && strstr(st.message, "97 x 61"),
+    CHECK(io_read_photo_square(path, 97 * 61 - 1, 8, 0, &square, NULL, &st) == TS_UNSUPPORTED && !square.data &&
+              strstr(st.message, "97 x 61"),
           "the limit: %s", st.message);
     st = (ts_status){0};
-    CHECK(io_read_photo_square(path, 1 << 20, 0, 0, &square, &width, &height, &st) == TS_INVALID && !square.data,
-          "size 0");
+    CHECK(io_read_photo_square(path, 1 << 20, 0, 0, &square, NULL, &st) == TS_INVALID && !square.data, "size 0");
     io_image_free(&in);
 }

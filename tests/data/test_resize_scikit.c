@@ -70,12 +70,12 @@ TEST(scikit_stored_values_of_photographs)
     for (int i = 0; i < 24; i++) image.data[i] = (float)i / 23;
     snprintf(path, sizeof path, "%s/a.png", test_folder());
     CHECK(!io_write_png(path, &image, 8, false, &st), "%s", st.message);
-    CHECK(!io_read_stored(path, 1000, 2.2, &back, &st), "%s", st.message);
+    CHECK(!io_read_stored(path, 1000, 2.2, &back, NULL, &st), "%s", st.message);
     for (int i = 0; i < 24; i++)
         CHECK(fabsf(back.data[i] * 255 - rintf(image.data[i] * 255)) < 1e-4f, "value %d is %g", i,
               (double)back.data[i]);
-    CHECK(io_read_stored(path, 7, 2.2, &back, &st) != TS_OK, "more pixels than allowed");
-    CHECK(io_read_stored("/nonexistent", 7, 2.2, &back, &st) == TS_IO && !back.data, "a missing file");
+    CHECK(io_read_stored(path, 7, 2.2, &back, NULL, &st) != TS_OK, "more pixels than allowed");
+    CHECK(io_read_stored("/nonexistent", 7, 2.2, &back, NULL, &st) == TS_IO && !back.data, "a missing file");
 }
 
 /* Which weights want which photograph, and that the power comes after the resampling: of 0 and 255 side by side the
@@ -100,18 +100,19 @@ TEST(scikit_photographs_for_published_weights)
     bool is;
     CHECK(lgd_weights_published("/nonexistent", &is, &st) == TS_IO && !is, "a missing file");
     io_image image, square;
-    int width, height;
+    io_photo_facts facts;
     CHECK(!io_image_create(&image, 8, 8, 3, &st), "%s", st.message);
     for (int i = 0; i < 8 * 8 * 3; i++) image.data[i] = (float)(i / 3 % 2);
     CHECK(!io_write_png(path, &image, 8, false, &st) &&
-              !lgd_photograph_square(path, true, 1000, 2, 0, &square, &width, &height, &st) && width == 8 &&
-              height == 8,
+              !lgd_photograph_square(path, true, 1000, 2, 0, &square, &facts, &st) && facts.width == 8 &&
+              facts.height == 8,
           "%s", st.message);
     for (int i = 0; i < 12; i++)
         CHECK(fabs((double)square.data[i] - pow(0.5, rd_published.gamma)) < 0.02, "a fine pattern becomes %g",
               (double)square.data[i]);
     io_image_free(&square);
-    CHECK(!lgd_photograph_square(path, false, 1000, 2, 0, &square, &width, &height, &st) && width == 8 && height == 8,
+    CHECK(!lgd_photograph_square(path, false, 1000, 2, 0, &square, &facts, &st) && facts.width == 8 &&
+              facts.height == 8,
           "%s", st.message);
     for (int i = 0; i < 12; i++)
         CHECK(fabs((double)square.data[i] - 0.5) < 0.1, "without compat a fine pattern becomes %g",

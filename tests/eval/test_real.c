@@ -124,6 +124,7 @@ TEST(eval_a_peer_that_has_the_truth_has_no_error)
     ev_set set;
     char path[300], spec[320];
     float *image;
+    double fov;
     CHECK(io_material_create(&m, 32, &st) == TS_OK, "%s", st.message);
     io_procedural_make(&p, 2, &m);
     for (int i = 0; i < 2; i++) {
@@ -134,7 +135,7 @@ TEST(eval_a_peer_that_has_the_truth_has_no_error)
     }
     snprintf(spec, sizeof spec, "peers:%s/peers", test_folder());
     CHECK(ev_set_open(spec, NULL, &set, &st) == TS_OK && set.count == 1, "%s", st.message);
-    CHECK(ev_set_load_photo(&set, 0, 32, &image, &truth, &peer, &st) == TS_OK, "%s", st.message);
+    CHECK(ev_set_load_photo(&set, 0, 32, &image, &fov, &truth, &peer, &st) == TS_OK, "%s", st.message);
     CHECK(strcmp(truth.name, "a.b") == 0 && truth.size == 32 && peer.size == 32, "%s", truth.name);
     CHECK(fabsf(image[0] - 0.25f) < 1e-4f, "the input's first value is %g", (double)image[0]);
     rd_view views[RD_EVAL_VIEWS];
@@ -168,6 +169,7 @@ TEST(eval_photographs_and_their_peers)
     char path[400], spec[320], peers[300];
     ev_contact contact = {0};
     float *image;
+    double fov;
     CHECK(io_material_create(&m, 32, &st) == TS_OK, "%s", st.message);
     io_procedural_make(&p, 2, &m);
     io_image photo;
@@ -186,7 +188,7 @@ TEST(eval_photographs_and_their_peers)
     CHECK(ev_set_open(spec, NULL, &set, &st) == TS_OK && set.count == 10, "%s", st.message);
     set.peers = peers;
     for (int i = 0; i < 10; i++) {
-        CHECK(ev_set_load_photo(&set, i, 32, &image, &truth, &peer, &st) == TS_OK, "%s", st.message);
+        CHECK(ev_set_load_photo(&set, i, 32, &image, &fov, &truth, &peer, &st) == TS_OK, "%s", st.message);
         CHECK(truth.size == 0 && peer.size == (i == 1 ? 32 : 0) && truth.name[0] == '0' + i, "%d: %s", i, truth.name);
         CHECK(fabsf(image[0] - 0.25f) < 2e-3f, "a value is %g", (double)image[0]);
         ev_case c = ev_case_of_photo(image, 32);

@@ -20,7 +20,8 @@ static float *estimate(const nn_model *m, const float *image, int side, int step
     ag_tape *tape = tape_create(false);
     ag_freeze(tape, true);
     const lgd_photo photo = lgd_flash_photo(image);
-    const lgd_options o = {.size = sizeof o, .iterations = steps, .power = power};
+    const lgd_options o = {
+        .size = sizeof o, .iterations = steps, .power = power, .fov = power ? LGD_FOV_UNKNOWN : LGD_FOV_OF_PHOTO};
     const lgd_estimator e = {.net = m, .tape = tape, .encoded = true};
     CHECK(!lgd_estimator_run(&e, &photo, 1, side, &o, maps, &st), "%s", st.message);
     ag_tape_destroy(&tape);
@@ -102,6 +103,37 @@ TEST(first_guess_keeps_what_is_known)
     nn_model_free(&m);
 }
 
+/* The field of view and the power are told or guessed each by itself. */
+TEST(first_guess_is_told_view_and_power_apart)
+{
+    nn_model *m = network();
+    const nn_input in = photographs(1, PLACE, 86, NULL);
+    static float maps[PLACE * PLACE * 9];
+    ts_status st = {0};
+    ag_tape *tape = tape_create(false);
+    ag_freeze(tape, true);
+    const lgd_estimator e = {.net = m, .tape = tape};
+    for (int k = 0; k < 4; k++) {
+        const bool view = k & 1, power_known = k & 2;
+        double power = 0;
+        lgd_photo photo = lgd_flash_photo(in.image.data), taken;
+        const lgd_options o = {.size = sizeof o,
+                               .fov = view ? 30 : LGD_FOV_UNKNOWN,
+                               .power = power_known ? NULL : &power,
+                               .taken = &taken};
+        CHECK(!lgd_estimator_run(&e, &photo, 1, PLACE, &o, maps, &st), "%s", st.message);
+        const double seen = rd_fov_of((double)taken.camera[2]),
+                     bright = (double)(taken.power / (taken.light[2] * taken.light[2])) /
+            ((double)RD_FLASH_POWER / ((double)RD_FLASH_DISTANCE * (double)RD_FLASH_DISTANCE));
+        CHECK((fabs(seen - 30) < 1e-3) == view, "case %d: a field of view of %g", k, seen);
+        CHECK((fabs(bright - 1) < 1e-4) == power_known, "case %d: a power of %g", k, bright);
+        CHECK(power_known || fabs(power - bright) < 1e-4, "case %d: %g is reported, %g was taken", k, power, bright);
+    }
+    ag_tape_destroy(&tape);
+    free(in.image.data);
+    nn_model_free(&m);
+}
+
 /* In tiles as in one piece. */
 TEST(first_guess_in_tiles)
 {
@@ -115,7 +147,7 @@ TEST(first_guess_in_tiles)
     unsigned char *mask = malloc((size_t)WIDE * WIDE);
     memset(mask, 1, (size_t)WIDE * WIDE);
     const lgd_photo photo = lgd_flash_photo(in.image.data);
-    const lgd_options o = {.size = sizeof o, .iterations = 2, .mask = mask}; /* other tiles */
+    const lgd_options o = {.size = sizeof o, .iterations = 2, .mask = mask, .fov = LGD_FOV_OF_PHOTO}; /* other tiles */
     const lgd_estimator e = {.net = m, .tape = tape, .encoded = true};
     CHECK(!lgd_estimator_run(&e, &photo, 1, WIDE, &o, whole, &st), "%s", st.message);
     CHECK(!memcmp(tiles, whole, sizeof *whole * WIDE * WIDE * 9), "tiles of another size give other maps");

@@ -284,6 +284,39 @@ TEST(infer_options_of_another_size)
     lgd_free(&m);
 }
 
+/* A field of view is a height of camera and light, at which the sample is as bright; what was taken is told. */
+TEST(infer_field_of_view)
+{
+    static float image[SIDE * SIDE * 3], told[VALUES], placed[VALUES], usual[VALUES];
+    lgd_error e;
+    lgd_model *m = load(tiny());
+    make_image(image, SIDE);
+    lgd_photo far = lgd_flash_photo(image), taken;
+    const float d = 0.5f / tanf(0.5f * 30 / 57.29578f), farther = d / far.camera[2];
+    lgd_options o = lgd_options_default();
+    o.taken = &taken;
+    CHECK(!lgd_estimate(m, image, SIDE, &o, usual, &e), "%s", e.message);
+    CHECK(!memcmp(taken.camera, far.camera, sizeof far.camera) && taken.power == far.power && taken.image == image,
+          "without a field of view the camera is %g high", (double)taken.camera[2]);
+    o.fov = 30;
+    CHECK(!lgd_estimate(m, image, SIDE, &o, told, &e), "%s", e.message);
+    CHECK(fabsf(taken.camera[2] - d) < 1e-4f && fabsf(taken.light[2] - d) < 1e-4f &&
+              fabsf(taken.power / (far.power * farther * farther) - 1) < 1e-4f,
+          "30 degrees: %g high, power %g", (double)taken.camera[2], (double)taken.power);
+    far = taken;
+    o.fov = LGD_FOV_OF_PHOTO;
+    CHECK(!lgd_estimate_photos(m, &far, 1, SIDE, &o, placed, &e), "%s", e.message);
+    CHECK(!memcmp(told, placed, sizeof told), "told by the angle and by the place the maps differ");
+    CHECK(memcmp(told, usual, sizeof told), "the steps do not see the field of view");
+    static const double wrong[] = {180, 0.5, -3, NAN, INFINITY};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        o.fov = wrong[i];
+        CHECK(lgd_estimate(m, image, SIDE, &o, told, &e) == TS_INVALID && strstr(e.message, "fov"), "fov %g: '%s'",
+              wrong[i], e.message);
+    }
+    lgd_free(&m);
+}
+
 TEST(infer_without_a_refiner_only_the_first_estimate)
 {
     static float image[SIDE * SIDE * 3], maps[VALUES];

@@ -195,6 +195,28 @@ TEST(render_known_values)
           (double)image[1]);
 }
 
+/* A camera farther away sees the same middle, and the sample under the same angle back and forth. */
+TEST(render_view_from_farther)
+{
+    const rd_view near = rd_flash(), same = rd_view_from(near, (double)RD_FLASH_DISTANCE);
+    CHECK(!memcmp(&near, &same, sizeof near), "the default distance changes the default view");
+    CHECK(fabs(rd_fov_of((double)RD_FLASH_DISTANCE) - 54.2249) < 1e-4, "%g degrees",
+          rd_fov_of((double)RD_FLASH_DISTANCE));
+    static const float diffuse[9] = {0.5f, 0.2f, -0.4f, 0, 0, 0.9f, -1, -1, -1};
+    float a[3], b[3];
+    for (int degrees = 5; degrees < 170; degrees += 11) {
+        const double d = rd_fov_distance(degrees);
+        const rd_view far = rd_view_from(near, d);
+        CHECK(fabs(rd_fov_of(d) - degrees) < 1e-9, "%d degrees became %g", degrees, rd_fov_of(d));
+        CHECK(far.camera[2] == (float)d && far.light[2] == (float)d, "%g high", (double)far.camera[2]);
+        rd_render(rd_grid_full(1), diffuse, 9, &near, false, a);
+        rd_render(rd_grid_full(1), diffuse, 9, &far, false, b);
+        for (int c = 0; c < 3; c++)
+            CHECK(fabsf(a[c] - b[c]) < 1e-5f, "%d degrees: %g in the middle, not %g", degrees, (double)b[c],
+                  (double)a[c]);
+    }
+}
+
 TEST(render_views)
 {
     ts_rng rng = ts_rng_make(9, TS_STREAM_TEST, 0);

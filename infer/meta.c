@@ -1,0 +1,61 @@
+#include "infer/meta.h"
+#include "data/file.h"
+#include "render/scene.h"
+#include <stdio.h>
+#include <stdlib.h>
+
+/* In the order of lgd_files. */
+static const char *const meaning[LGD_OUTPUTS] = {
+    "sRGB, 8 bit: diffuse albedo",
+    "sRGB, 8 bit: F0, the reflectance straight on",
+    "linear, 16 bit: perceptual roughness, alpha = roughness^2",
+    "linear, 16 bit: (n + 1) / 2 of the unit normal n, x to the right, y %s, z toward the camera",
+    "linear: diffuse, specular (F0), roughness, normal",
+    "sRGB, 8 bit: the photograph and the maps under its light",
+    "sRGB, 8 bit: the maps under four lights",
+    "sRGB, 8 bit: base colour of the metallic workflow",
+    "linear, 16 bit: metalness",
+    "linear, 16 bit: height; 0.5 is the mean, the full range one side of the square",
+    "glTF 2.0: a square with the material",
+    "MaterialX 1.39: the material"};
+
+static void print_scene(FILE *f, const lgd_photo *p, const lgd_order *order)
+{
+    fprintf(f, "field of view: %.2f degrees across the square (%s)\n", rd_fov_of((double)p->camera[2]),
+            order->fov_from);
+    fprintf(f, "camera: %.4f %.4f %.4f, in sides of the square, from its centre\n", (double)p->camera[0],
+            (double)p->camera[1], (double)p->camera[2]);
+    fprintf(f, "light: %.4f %.4f %.4f, of power %.4f\n", (double)p->light[0], (double)p->light[1], (double)p->light[2],
+            (double)p->power);
+}
+
+static void print(FILE *f, const lgd_photo *photo, const lgd_order *order)
+{
+    io_print_conventions(f,
+                         order->which & (LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR) ? IO_MAPS_DIFFUSE | IO_MAPS_SPECULAR : 0,
+                         order->directx);
+    for (int k = 0; k < LGD_OUTPUTS; k++) {
+        if (!(order->which >> k & 1)) continue;
+        fprintf(f, "%s: ", lgd_files[k]);
+        fprintf(f, meaning[k], order->directx ? "down (DirectX)" : "up (OpenGL)");
+        fputc('\n', f);
+    }
+    print_scene(f, photo, order);
+}
+
+ts_code lgd_write_meta(const char *path, const lgd_photo *photo, const lgd_order *order, const char *mark,
+                       ts_status *st)
+{
+    char *text = NULL;
+    size_t size = 0;
+    FILE *f = open_memstream(&text, &size);
+    if (f) {
+        print(f, photo, order);
+        fputs(mark, f);
+    }
+    ts_code code = TS_OK;
+    if (!f || fclose(f) != 0 || !text) code = ts_fail(st, TS_NOMEM, "%s: no memory for its text", path);
+    else code = io_write_bytes(path, text, size, st);
+    free(text);
+    return code;
+}

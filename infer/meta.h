@@ -1,0 +1,11 @@
+/* meta.txt: what the files of a folder mean, and what was assumed of the photograph. */
+#ifndef LGD_META_H
+#define LGD_META_H
+#include "infer/output.h"
+
+/* The conventions that io_read_map_folder reads, then a line for each file that is ordered, then the scene: the field
+ * of view and where it is known from, camera and light in patch widths, and the light's power (infer/lgd.h); mark, a
+ * line more. */
+ts_code lgd_write_meta(const char *path, const lgd_photo *photo, const lgd_order *order, const char *mark,
+                       ts_status *st);
+#endif
