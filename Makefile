@@ -3,6 +3,7 @@
 #: make demo         the same, then demo/flash.jpg to maps in build/demo/
 #: make test         the same, then every test
 #: make deps         installs what the build needs (Debian, Ubuntu); the three above do so first
+#: make test-blender material.glb in Blender's renderer, with PYTHON= that has bpy; skipped without
 #: make install      into PREFIX (/usr/local), below DESTDIR when given; make uninstall takes it away again
 #: make bench        times; BENCH="conv_ infer" runs the benchmarks whose names contain these words
 #: make bench-deps   PyTorch, for the comparison in make bench
@@ -224,6 +225,9 @@ bench: deps
 	@$(MAKE) --no-print-directory programs $(BENCH_BIN)
 	@TESTDATA=$(TESTDATA) $(BENCH_BIN) $(BENCH)
 
+test-blender: programs
+	@BUILD=$(BUILD) sh tests/blender/run.sh
+
 # PyTorch for the peer's column: bench/peer_torch.py
 bench-deps:
 	@BUILD=$(BUILD) sh .ci/bench-deps.sh
@@ -302,6 +306,6 @@ uninstall:
 clean:
 	rm -rf $(BUILD) $(BUILD)-asan
 
-.PHONY: all programs help deps test bench bench-deps stress fuzz asan demo install uninstall clean
+.PHONY: all programs help deps test test-blender bench bench-deps stress fuzz asan demo install uninstall clean
 .SECONDARY:
 -include $(shell find $(OBJ) $(BUILD)/fuzz/obj -name '*.d' 2>/dev/null)

@@ -46,7 +46,8 @@ enum {
     IO_MAPS_ROUGHNESS = 4,
     IO_MAPS_NORMAL = 8,
     IO_MAPS_EXR = 16,
-    IO_MAPS_ALL = 31
+    IO_MAPS_ALL = 31,
+    IO_MAPS_HALF = 32 /* maps.exr in half floats (data/image/exr.h) */
 };
 ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st);
 /* The two halves of it: the files alone (from several threads at once too, for different files), the meta.txt alone. */

@@ -1,96 +1,6 @@
 #include "infer/export.h"
 #include "data/file.h"
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-
-static void base64(FILE *f, const unsigned char *bytes, size_t n)
-{
-    static const char digit[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    for (size_t i = 0; i < n; i += 3) {
-        const uint32_t v = (uint32_t)bytes[i] << 16 | (i + 1 < n ? (uint32_t)bytes[i + 1] << 8 : 0) |
-            (i + 2 < n ? bytes[i + 2] : 0);
-        fputc(digit[v >> 18], f);
-        fputc(digit[v >> 12 & 63], f);
-        fputc(i + 1 < n ? digit[v >> 6 & 63] : '=', f);
-        fputc(i + 2 < n ? digit[v & 63] : '=', f);
-    }
-}
-
-/* Little-endian, as glTF wants it on any machine. */
-static unsigned char *put_float(unsigned char *to, float v)
-{
-    uint32_t bits;
-    memcpy(&bits, &v, sizeof bits);
-    for (int i = 0; i < 4; i++) *to++ = (unsigned char)(bits >> 8 * i);
-    return to;
-}
-
-enum { CORNERS = 4, POSITION = 0, NORMAL = 48, TANGENT = 96, TEXCOORD = 160, INDEX = 192, BUFFER = 204 };
-
-/* Corners anticlockwise from the lower left; texture coordinates begin in the upper left. */
-static void square(unsigned char out[BUFFER])
-{
-    static const float x[CORNERS] = {-0.5f, 0.5f, 0.5f, -0.5f}, y[CORNERS] = {-0.5f, -0.5f, 0.5f, 0.5f};
-    static const unsigned char index[6] = {0, 1, 2, 0, 2, 3};
-    unsigned char *at = out;
-    for (int i = 0; i < CORNERS; i++) at = put_float(put_float(put_float(at, x[i]), y[i]), 0);
-    for (int i = 0; i < CORNERS; i++) at = put_float(put_float(put_float(at, 0), 0), 1);
-    for (int i = 0; i < CORNERS; i++) at = put_float(put_float(put_float(put_float(at, 1), 0), 0), 1);
-    for (int i = 0; i < CORNERS; i++) at = put_float(put_float(at, x[i] + 0.5f), 0.5f - y[i]);
-    for (int i = 0; i < 6; i++) *at++ = index[i], *at++ = 0;
-}
-
-static const char gltf_before[] =
-    "{\n"
-    "  \"asset\": {\"version\": \"2.0\", \"generator\": \"lgd-infer\"},\n"
-    "  \"extensionsUsed\": [\"KHR_materials_specular\", \"KHR_materials_ior\"],\n"
-    "  \"scene\": 0,\n"
-    "  \"scenes\": [{\"nodes\": [0]}],\n"
-    "  \"nodes\": [{\"mesh\": 0, \"name\": \"sample\"}],\n"
-    "  \"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0, \"NORMAL\": 1, \"TANGENT\": 2, "
-    "\"TEXCOORD_0\": 3}, \"indices\": 4, \"material\": 0}]}],\n"
-    "  \"materials\": [{\n"
-    "    \"name\": \"sample\",\n"
-    "    \"pbrMetallicRoughness\": {\"baseColorTexture\": {\"index\": 0}, \"metallicFactor\": 0, "
-    "\"metallicRoughnessTexture\": {\"index\": 2}},\n"
-    "    \"normalTexture\": {\"index\": 3},\n"
-    "    \"extensions\": {\"KHR_materials_ior\": {\"ior\": 0}, \"KHR_materials_specular\": {\"specularColorTexture\": "
-    "{\"index\": 1}}}\n"
-    "  }],\n"
-    "  \"textures\": [{\"source\": 0, \"sampler\": 0}, {\"source\": 1, \"sampler\": 0}, {\"source\": 2, \"sampler\": "
-    "0}, {\"source\": 3, \"sampler\": 0}],\n"
-    "  \"samplers\": [{\"magFilter\": 9729, \"minFilter\": 9987, \"wrapS\": 33071, \"wrapT\": 33071}],\n"
-    "  \"images\": [{\"uri\": \"diffuse.png\"}, {\"uri\": \"specular.png\"}, {\"uri\": \"roughness.png\"}, {\"uri\": "
-    "\"normal.png\"}],\n";
-
-static void print_gltf(FILE *f)
-{
-    unsigned char bytes[BUFFER];
-    square(bytes);
-    fputs(gltf_before, f);
-    fprintf(f,
-            "  \"accessors\": [\n"
-            "    {\"bufferView\": 0, \"byteOffset\": %d, \"componentType\": 5126, \"count\": 4, \"type\": \"VEC3\", "
-            "\"min\": [-0.5, -0.5, 0], \"max\": [0.5, 0.5, 0]},\n"
-            "    {\"bufferView\": 0, \"byteOffset\": %d, \"componentType\": 5126, \"count\": 4, \"type\": \"VEC3\"},\n"
-            "    {\"bufferView\": 1, \"byteOffset\": 0, \"componentType\": 5126, \"count\": 4, \"type\": \"VEC4\"},\n"
-            "    {\"bufferView\": 2, \"byteOffset\": 0, \"componentType\": 5126, \"count\": 4, \"type\": \"VEC2\"},\n"
-            "    {\"bufferView\": 3, \"byteOffset\": 0, \"componentType\": 5123, \"count\": 6, \"type\": \"SCALAR\"}\n"
-            "  ],\n"
-            "  \"bufferViews\": [\n"
-            "    {\"buffer\": 0, \"byteOffset\": 0, \"byteLength\": %d, \"byteStride\": 12, \"target\": 34962},\n"
-            "    {\"buffer\": 0, \"byteOffset\": %d, \"byteLength\": %d, \"byteStride\": 16, \"target\": 34962},\n"
-            "    {\"buffer\": 0, \"byteOffset\": %d, \"byteLength\": %d, \"byteStride\": 8, \"target\": 34962},\n"
-            "    {\"buffer\": 0, \"byteOffset\": %d, \"byteLength\": %d, \"target\": 34963}\n"
-            "  ],\n"
-            "  \"buffers\": [{\"byteLength\": %d, \"uri\": \"data:application/octet-stream;base64,",
-            POSITION, NORMAL, TANGENT, TANGENT, TEXCOORD - TANGENT, TEXCOORD, INDEX - TEXCOORD, INDEX, BUFFER - INDEX,
-            BUFFER);
-    base64(f, bytes, sizeof bytes);
-    fputs("\"}]\n}\n", f);
-}
 
 static const char materialx[] =
     "<?xml version=\"1.0\"?>\n"
@@ -149,20 +59,7 @@ static const char materialx[] =
     "nodename=\"openpbr_shader\"/></surfacematerial>\n"
     "</materialx>\n";
 
-static void print_materialx(FILE *f) { fputs(materialx, f); }
-
-static ts_code write_document(const char *path, void (*print)(FILE *f), ts_status *st)
+ts_code lgd_write_materialx(const char *path, ts_status *st)
 {
-    char *text = NULL;
-    size_t size = 0;
-    FILE *f = open_memstream(&text, &size);
-    if (f) print(f);
-    ts_code code = TS_OK;
-    if (!f || fclose(f) != 0 || !text) code = ts_fail(st, TS_NOMEM, "%s: no memory for its text", path);
-    else code = io_write_bytes(path, text, size, st);
-    free(text);
-    return code;
+    return io_write_bytes(path, materialx, strlen(materialx), st);
 }
-
-ts_code lgd_write_gltf(const char *path, ts_status *st) { return write_document(path, print_gltf, st); }
-ts_code lgd_write_materialx(const char *path, ts_status *st) { return write_document(path, print_materialx, st); }

@@ -10,14 +10,17 @@ static const char *const meaning[LGD_OUTPUTS] = {
     "sRGB, 8 bit: F0, the reflectance straight on",
     "linear, 16 bit: perceptual roughness, alpha = roughness^2",
     "linear, 16 bit: (n + 1) / 2 of the unit normal n, x to the right, y %s, z toward the camera",
-    "linear: diffuse, specular (F0), roughness, normal",
+    "linear, %s: diffuse, specular (F0), roughness, normal; R, G, B are diffuse",
     "sRGB, 8 bit: the photograph and the maps under its light",
     "sRGB, 8 bit: the maps under four lights",
     "sRGB, 8 bit: base colour of the metallic workflow",
     "linear, 16 bit: metalness",
-    "linear, 16 bit: height; 0.5 is the mean, the full range one side of the square",
+    "linear, 16 bit: height, %s",
     "glTF 2.0: a square with the material",
-    "MaterialX 1.39: the material"};
+    "MaterialX 1.39: the material",
+    "glTF 2.0 as one file: a square with the material",
+    "linear, 16 bit: red ambient occlusion, green roughness, blue metalness",
+    "linear, 8 bit: ambient occlusion of the height, 1 is open"};
 
 static void print_scene(FILE *f, const lgd_photo *p, const lgd_order *order)
 {
@@ -29,28 +32,39 @@ static void print_scene(FILE *f, const lgd_photo *p, const lgd_order *order)
             (double)p->power);
 }
 
-static void print(FILE *f, const lgd_photo *photo, const lgd_order *order)
+static void print(FILE *f, const lgd_photo *photo, const lgd_order *order, const lgd_output_result *facts)
 {
+    char height[128];
+    snprintf(height, sizeof height, "value v is %.6f + %.6f v sides of the square, up is toward the camera",
+             (double)facts->low, (double)(facts->high - facts->low));
     io_print_conventions(f,
                          order->which & (LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR) ? IO_MAPS_DIFFUSE | IO_MAPS_SPECULAR : 0,
                          order->directx);
     for (int k = 0; k < LGD_OUTPUTS; k++) {
         if (!(order->which >> k & 1)) continue;
+        const char *more = 1u << k == LGD_OUT_EXR ? order->half ? "half float" : "float"
+            : 1u << k == LGD_OUT_HEIGHT           ? height
+            : order->directx                      ? "down (DirectX)"
+                                                  : "up (OpenGL)";
         fprintf(f, "%s: ", lgd_files[k]);
-        fprintf(f, meaning[k], order->directx ? "down (DirectX)" : "up (OpenGL)");
+        fprintf(f, meaning[k], more);
         fputc('\n', f);
     }
+    if (order->repeats)
+        fputs("seamless: the maps repeat; a seam was cut through the photograph's and 7/8 of them stretched to the "
+              "whole\n",
+              f);
     print_scene(f, photo, order);
 }
 
-ts_code lgd_write_meta(const char *path, const lgd_photo *photo, const lgd_order *order, const char *mark,
-                       ts_status *st)
+ts_code lgd_write_meta(const char *path, const lgd_photo *photo, const lgd_order *order, const lgd_output_result *facts,
+                       const char *mark, ts_status *st)
 {
     char *text = NULL;
     size_t size = 0;
     FILE *f = open_memstream(&text, &size);
     if (f) {
-        print(f, photo, order);
+        print(f, photo, order, facts);
         fputs(mark, f);
     }
     ts_code code = TS_OK;

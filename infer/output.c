@@ -1,6 +1,6 @@
 #include "infer/output.h"
 #include "data/file.h"
-#include "data/height.h"
+#include "infer/derived.h"
 #include "infer/export.h"
 #include "infer/meta.h"
 #include "render/render.h"
@@ -19,11 +19,13 @@
 
 enum { PATH_LENGTH = 4096 };
 
-const char *const lgd_output_names[LGD_OUTPUTS] = {"diffuse", "specular",  "roughness", "normal", "exr",  "render",
-                                                   "preview", "basecolor", "metallic",  "height", "gltf", "materialx"};
-const char *const lgd_files[LGD_FILES] = {
-    "diffuse.png",   "specular.png", "roughness.png", "normal.png",    "maps.exr",      "render.png", "preview.png",
-    "basecolor.png", "metallic.png", "height.png",    "material.gltf", "material.mtlx", "meta.txt"};
+const char *const lgd_output_names[LGD_OUTPUTS] = {"diffuse", "specular",  "roughness", "normal",   "exr",
+                                                   "render",  "preview",   "basecolor", "metallic", "height",
+                                                   "gltf",    "materialx", "glb",       "orm",      "ao"};
+const char *const lgd_files[LGD_FILES] = {"diffuse.png",  "specular.png", "roughness.png", "normal.png",
+                                          "maps.exr",     "render.png",   "preview.png",   "basecolor.png",
+                                          "metallic.png", "height.png",   "material.gltf", "material.mtlx",
+                                          "material.glb", "orm.png",      "occlusion.png", "meta.txt"};
 
 ts_code lgd_output_parse(const char *list, unsigned *which, ts_status *st)
 {
@@ -38,9 +40,23 @@ ts_code lgd_output_parse(const char *list, unsigned *which, ts_status *st)
         at += n;
         if (!*at) break;
     }
-    if (*which & (LGD_OUT_GLTF | LGD_OUT_MATERIALX))
-        *which |= LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR | LGD_OUT_ROUGHNESS | LGD_OUT_NORMAL;
     return TS_OK;
+}
+
+/* The maps that glTF and MaterialX documents refer to. */
+static unsigned referred(bool metallic)
+{
+    return metallic ? LGD_OUT_BASECOLOR | LGD_OUT_ORM | LGD_OUT_NORMAL
+                    : LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR | LGD_OUT_ROUGHNESS | LGD_OUT_NORMAL;
+}
+
+unsigned lgd_output_complete(unsigned which, bool metallic)
+{
+    const unsigned f0 = which & (LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR);
+    if (metallic) /* what was asked of the one workflow is given in the other */
+        which = (which & ~f0) | (f0 & LGD_OUT_DIFFUSE ? LGD_OUT_BASECOLOR : 0) |
+            (f0 & LGD_OUT_SPECULAR ? LGD_OUT_METALLIC : 0);
+    return which & (LGD_OUT_GLTF | LGD_OUT_MATERIALX) ? which | referred(metallic) : which;
 }
 
 /* folder/name; TS_INVALID when it is too long. */
@@ -60,16 +76,6 @@ ts_code lgd_output_check(const char *folder, ts_status *st)
     ts_hidden_folder_remove(hidden, &lock);
     free(hidden);
     return TS_OK;
-}
-
-/* folder/lgd_files[of the bit which]. */
-static ts_code write_png(const char *folder, unsigned which, const io_image *image, int bits, bool srgb, ts_status *st)
-{
-    char path[PATH_LENGTH];
-    int k = 0;
-    while (which >> k != 1) k++;
-    if (join(path, folder, lgd_files[k], st) != TS_OK) return st->code;
-    return io_write_png(path, image, bits, srgb, st);
 }
 
 /* A picture of square panels whose rows are rendered while they are written. photo: the first panel, or NULL. */
@@ -127,46 +133,10 @@ static ts_code write_preview(const char *folder, const io_material *m, const lgd
     return write_strip(folder, "preview.png", &s, st);
 }
 
-static ts_code write_metallic(const char *folder, const io_material *m, unsigned which, io_metallic_error *lost,
-                              ts_status *st)
-{
-    io_image base = {0}, metal = {0};
-    ts_code code = io_image_create(&base, m->size, m->size, 3, st);
-    if (!code) code = io_image_create(&metal, m->size, m->size, 1, st);
-    if (!code) {
-        const io_metallic_error e = io_to_metallic(m, base.data, metal.data);
-        if (lost) *lost = e;
-    }
-    if (!code && which & LGD_OUT_BASECOLOR) code = write_png(folder, LGD_OUT_BASECOLOR, &base, 8, true, st);
-    if (!code && which & LGD_OUT_METALLIC) code = write_png(folder, LGD_OUT_METALLIC, &metal, 16, false, st);
-    io_image_free(&base);
-    io_image_free(&metal);
-    return code;
-}
-
-static ts_code write_height(const char *folder, const io_material *m, ts_status *st)
-{
-    io_image height = {0};
-    ts_code code = io_image_create(&height, m->size, m->size, 1, st);
-    if (!code) code = io_height(m, height.data, 1, st);
-    for (int64_t i = 0; i < (int64_t)m->size * m->size && !code; i++) height.data[i] += 0.5f;
-    if (!code) code = write_png(folder, LGD_OUT_HEIGHT, &height, 16, false, st);
-    io_image_free(&height);
-    return code;
-}
-
-static ts_code write_document(const char *folder, const char *name, ts_code (*write)(const char *path, ts_status *st),
-                              ts_status *st)
-{
-    char path[PATH_LENGTH];
-    return join(path, folder, name, st) ? st->code : write(path, st);
-}
-
 /* What is made in one go; bits of which. Slow ones first, so that two threads end together. */
-static const unsigned portions[] = {
-    LGD_OUT_EXR,      LGD_OUT_HEIGHT,    LGD_OUT_PREVIEW, LGD_OUT_NORMAL,   LGD_OUT_BASECOLOR | LGD_OUT_METALLIC,
-    LGD_OUT_RENDER,   LGD_OUT_ROUGHNESS, LGD_OUT_DIFFUSE, LGD_OUT_SPECULAR, LGD_OUT_GLTF,
-    LGD_OUT_MATERIALX};
+static const unsigned portions[] = {LGD_OUT_EXR,    LGD_DERIVED,       LGD_OUT_PREVIEW, LGD_OUT_NORMAL,
+                                    LGD_OUT_RENDER, LGD_OUT_ROUGHNESS, LGD_OUT_DIFFUSE, LGD_OUT_SPECULAR,
+                                    LGD_OUT_GLTF,   LGD_OUT_MATERIALX};
 enum { PORTIONS = sizeof portions / sizeof *portions };
 
 /* The bits of data/material.h. */
@@ -185,35 +155,60 @@ static unsigned map_bits(unsigned which)
     return maps;
 }
 
-static ts_code write_portion(const char *folder, const io_material *m, const lgd_photo *photo, const lgd_order *order,
-                             unsigned portion, io_metallic_error *lost, ts_status *st)
+/* What is written, of a photograph. */
+typedef struct task {
+    const char *folder;
+    const io_material *m, *estimate;
+    const lgd_photo *photo;
+    const lgd_order *order;
+    lgd_gltf gltf;
+    const char *mark; /* a line of meta.txt */
+} task;
+
+static ts_code write_portion(const task *t, unsigned which, lgd_output_result *facts, ts_status *st)
 {
-    const unsigned which = order->which & portion;
+    char path[PATH_LENGTH];
     switch (which) {
     case 0: return TS_OK;
-    case LGD_OUT_RENDER: return write_render(folder, m, photo, st);
-    case LGD_OUT_PREVIEW: return write_preview(folder, m, photo, st);
-    case LGD_OUT_HEIGHT: return write_height(folder, m, st);
-    case LGD_OUT_GLTF: return write_document(folder, "material.gltf", lgd_write_gltf, st);
-    case LGD_OUT_MATERIALX: return write_document(folder, "material.mtlx", lgd_write_materialx, st);
+    case LGD_OUT_RENDER: return write_render(t->folder, t->estimate, t->photo, st);
+    case LGD_OUT_PREVIEW: return write_preview(t->folder, t->m, t->photo, st);
+    case LGD_OUT_GLTF:
+        return join(path, t->folder, "material.gltf", st) ? st->code : lgd_write_gltf(path, &t->gltf, st);
+    case LGD_OUT_MATERIALX:
+        return join(path, t->folder, "material.mtlx", st) ? st->code : lgd_write_materialx(path, st);
     default:
-        return which & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC)
-            ? write_metallic(folder, m, which, lost, st)
-            : io_write_map_files(folder, m, map_bits(which), order->directx, st);
+        return which & LGD_DERIVED
+            ? lgd_write_derived(t->folder, t->m, which, t->order->repeats, facts, st)
+            : io_write_map_files(t->folder, t->m, map_bits(which) | (t->order->half ? IO_MAPS_HALF : 0),
+                                 t->order->directx, st);
     }
 }
 
+/* material.glb from the maps beside it, then those of them that nobody ordered are taken away. */
+static ts_code write_glb(const task *t, unsigned written, ts_status *st)
+{
+    char path[PATH_LENGTH];
+    ts_code code = join(path, t->folder, "material.glb", st);
+    if (!code) code = lgd_write_glb(path, t->folder, &t->gltf, st);
+    for (int k = 0; k < LGD_OUTPUTS && !code; k++)
+        if (written & ~t->order->which & 1u << k && join(path, t->folder, lgd_files[k], st) == TS_OK) unlink(path);
+    return code;
+}
+
 /* Of several failures the first portion's is reported. */
-static ts_code write_all(const char *folder, const io_material *m, const lgd_photo *photo, const lgd_order *order,
-                         const char *mark, io_metallic_error *lost, ts_status *st)
+static ts_code write_all(const task *t, lgd_output_result *facts, ts_status *st)
 {
     ts_status failure[PORTIONS] = {{0}};
-#pragma omp parallel for num_threads(order->threads) schedule(dynamic)
-    for (int i = 0; i < PORTIONS; i++) write_portion(folder, m, photo, order, portions[i], lost, &failure[i]);
+    const bool glb = t->order->which & LGD_OUT_GLB;
+    const unsigned which = t->order->which | (glb ? referred(t->order->metallic) : 0);
+#pragma omp parallel for num_threads(t->order->threads) schedule(dynamic)
+    for (int i = 0; i < PORTIONS; i++) write_portion(t, which & portions[i], facts, &failure[i]);
     for (int i = 0; i < PORTIONS; i++)
         if (failure[i].code) return ts_fail(st, failure[i].code, "%s", failure[i].message);
+    if (glb && write_glb(t, which, st) != TS_OK) return st->code;
     char path[PATH_LENGTH];
-    return join(path, folder, "meta.txt", st) ? st->code : lgd_write_meta(path, photo, order, mark, st);
+    return join(path, t->folder, "meta.txt", st) ? st->code
+                                                 : lgd_write_meta(path, t->photo, t->order, facts, t->mark, st);
 }
 
 enum { MARK = 40 };
@@ -279,8 +274,8 @@ static ts_code move_locked(const char *hidden, const char *folder, const char *m
     return code;
 }
 
-ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const lgd_photo *photo,
-                         const lgd_order *order, lgd_output_result *result, ts_status *st)
+ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const io_material *estimate,
+                         const lgd_photo *photo, const lgd_order *order, lgd_output_result *result, ts_status *st)
 {
     char folder[PATH_LENGTH], mark[MARK], *hidden;
     lgd_output_result ignored, *r = result ? result : &ignored;
@@ -294,7 +289,8 @@ ts_code lgd_output_write(const char *parent, const char *stem, const io_material
     /* inside the folder when it exists: it may lie on another file system than its parent */
     if (ts_hidden_folder(there ? folder : parent, &hidden, &lock, st) != TS_OK) return st->code;
     mark_of(m, order->directx, mark);
-    ts_code code = write_all(hidden, m, photo, order, mark, &r->lost, st);
+    const task t = {hidden, m, estimate, photo, order, {order->metallic, order->repeats}, mark};
+    ts_code code = write_all(&t, r, st);
     bool moves = there;
     if (!code && !there && rename(hidden, folder) != 0) {
         if (errno == ENOTEMPTY || errno == EEXIST) moves = true; /* another process has made it meanwhile */

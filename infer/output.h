@@ -16,18 +16,23 @@ enum {
     LGD_OUT_PREVIEW = 1 << 6,   /* preview.png: LGD_PREVIEW_LIGHTS light positions */
     LGD_OUT_BASECOLOR = 1 << 7, /* basecolor.png, sRGB (data/metallic.h) */
     LGD_OUT_METALLIC = 1 << 8,  /* metallic.png, linear, 16 bit */
-    LGD_OUT_HEIGHT = 1 << 9, /* height.png, 16 bit: 0.5 is the mean, the full range one patch width (data/height.h) */
-    LGD_OUT_GLTF = 1 << 10,  /* material.gltf (infer/export.h) */
-    LGD_OUT_MATERIALX = 1 << 11 /* material.mtlx */
+    LGD_OUT_HEIGHT =
+        1 << 9,             /* height.png, 16 bit: the whole range of heights (data/height.h); meta.txt has the scale */
+    LGD_OUT_GLTF = 1 << 10, /* material.gltf (infer/export.h) */
+    LGD_OUT_MATERIALX = 1 << 11, /* material.mtlx */
+    LGD_OUT_GLB = 1 << 12,       /* material.glb: the same as one file */
+    LGD_OUT_ORM = 1 << 13,       /* orm.png, linear, 16 bit: occlusion, roughness, metalness */
+    LGD_OUT_AO = 1 << 14         /* occlusion.png, linear, 8 bit (data/occlusion.h) */
 };
-enum { LGD_OUTPUTS = 12, LGD_FILES = LGD_OUTPUTS + 1, LGD_PREVIEW_LIGHTS = 4 };
+enum { LGD_OUTPUTS = 15, LGD_FILES = LGD_OUTPUTS + 1, LGD_PREVIEW_LIGHTS = 4 };
 #define LGD_OUT_DEFAULT 0x7fu
 extern const char *const lgd_output_names[LGD_OUTPUTS];
 extern const char *const lgd_files[LGD_FILES]; /* the file of each, then meta.txt */
 
-/* A list such as "normal,height" as bits. The documents bring the four maps that they refer to. TS_INVALID names the
- * word. */
+/* A list such as "normal,height" as bits. TS_INVALID names the word. */
 ts_code lgd_output_parse(const char *list, unsigned *which, ts_status *st);
+/* The same in the workflow, with the maps that documents refer to: of the metallic one base colour and orm.png. */
+unsigned lgd_output_complete(unsigned which, bool metallic);
 
 /* Fails with one clear line when nothing can be made inside the folder, before any work is done for it. */
 ts_code lgd_output_check(const char *folder, ts_status *st);
@@ -35,11 +40,15 @@ ts_code lgd_output_check(const char *folder, ts_status *st);
 typedef struct lgd_order {
     unsigned which;       /* bits */
     bool directx;         /* normals with y down */
+    bool metallic;        /* what documents and material.glb refer to */
+    bool half;            /* maps.exr */
+    bool repeats;         /* the maps are seamless (data/seamless.h) */
     int threads;          /* that files are made on */
     const char *fov_from; /* where photo's field of view is known from, for meta.txt */
 } lgd_order;
 
 typedef struct lgd_output_result {
+    float low, high;        /* the heights that 0 and 1 of height.png are, in sides of the square */
     io_metallic_error lost; /* what base colour and metalness cannot express, where they are written */
     unsigned removed;       /* files of another estimate that were removed: a bit each in the order of lgd_files */
 } lgd_output_result;
@@ -48,7 +57,9 @@ typedef struct lgd_output_result {
  * written to a hidden folder first and renamed when all are complete: a failure leaves what was there before, and
  * nothing else. When the folder has files of another estimate (of another photograph, or made otherwise: meta.txt names
  * the estimate), those of lgd_files that are not written now are removed. Several processes may write the same folder:
- * one's files stay. photo: of the material's size, with light and camera as they were taken. result: may be NULL. */
-ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const lgd_photo *photo,
-                         const lgd_order *order, lgd_output_result *result, ts_status *st);
+ * one's files stay. m: what is written; estimate: what the photograph is compared with in render.png, m itself where
+ * the maps were not changed since. photo: of the material's size, with light and camera as they were taken. result: may
+ * be NULL. */
+ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const io_material *estimate,
+                         const lgd_photo *photo, const lgd_order *order, lgd_output_result *result, ts_status *st);
 #endif

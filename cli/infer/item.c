@@ -1,6 +1,6 @@
 #include "cli/infer/item.h"
+#include "data/seamless.h"
 #include "infer/estimate.h"
-#include "infer/output.h"
 #include "infer/photograph.h"
 #include <math.h>
 #include <stdio.h>
@@ -109,9 +109,19 @@ void lgd_item_write(const lgd_command *c, lgd_item *item)
 {
     char from[sizeof item->fov_from + 32];
     snprintf(from, sizeof from, "%s%s", lgd_item_assumption(item), item->fov_from);
-    const lgd_order order = {.which = c->outputs, .directx = c->directx, .threads = item->threads, .fov_from = from};
-    if (lgd_output_write(c->out, item->job->stem, &item->m, &item->photo[0], &order, &item->written, &item->st))
+    const lgd_order order = {.which = c->outputs,
+                             .directx = c->directx,
+                             .metallic = c->metallic,
+                             .half = c->half,
+                             .repeats = c->seamless,
+                             .threads = item->threads,
+                             .fov_from = from};
+    io_material tile = {0};
+    if ((c->seamless && io_seamless(&item->m, &tile, item->threads, &item->st)) ||
+        lgd_output_write(c->out, item->job->stem, c->seamless ? &tile : &item->m, &item->m, &item->photo[0], &order,
+                         &item->written, &item->st))
         ts_context(&item->st, "%s", item->job->photo);
+    io_material_free(&tile);
 }
 
 void lgd_item_free(lgd_item *item)

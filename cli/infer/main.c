@@ -109,7 +109,7 @@ static void report(run *r, const lgd_item *item)
     }
     r->done++;
     if (item->written.removed) name_removed(item);
-    if (r->command->outputs & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC) && !r->command->quiet)
+    if (r->command->outputs & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC | LGD_OUT_ORM) && !r->command->quiet)
         cl_note("%s: base colour and metalness miss diffuse by %.4f and F0 by %.4f (RMS, linear)", item->job->photo,
                 item->written.lost.diffuse, item->written.lost.specular);
     printf("%s\n", item->job->folder);

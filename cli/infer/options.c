@@ -1,6 +1,7 @@
 #include "cli/infer/options.h"
 #include "cli/cli.h"
 #include "data/image/image.h"
+#include "data/seamless.h"
 #include "infer/output.h"
 #include <string.h>
 
@@ -10,6 +11,9 @@ enum {
     POWER,
     FOV,
     MAPS,
+    AO,
+    SEAMLESS,
+    EXR,
     WORKFLOW,
     MASK,
     TOLERANCE,
@@ -20,6 +24,7 @@ enum {
     HELP = 'h',
     VERSION = 'V'
 };
+enum { HALF_ABOVE = 512 }; /* pixels a side: as floats a maps.exr of 1024 x 1024 has 54 MB */
 
 const cl_argument lgd_infer_arguments[] = {
     {'o', "output", "DIR",
@@ -59,7 +64,14 @@ const cl_argument lgd_infer_arguments[] = {
     {NORMAL, "normal", "gl|dx", "y of normal.png: up (gl, OpenGL, default) or down (dx, DirectX)"},
     {MAPS, "maps", "LIST",
      "files to write, separated by commas: diffuse, specular, roughness, normal, exr, render, preview (default: all\n"
-     "of these), basecolor, metallic, height, gltf, materialx; those of another estimate in DIR/STEM/ are removed"},
+     "of these), basecolor, metallic, height, ao (ambient occlusion), orm (occlusion, roughness and metalness in "
+     "one),\n"
+     "gltf, glb (glTF as one file), materialx; those of another estimate in DIR/STEM/ are removed"},
+    {AO, "ao", NULL, "also write occlusion.png: ambient occlusion of the height"},
+    {SEAMLESS, "seamless", NULL,
+     "all maps repeat without a visible border: the same seam is cut through all of them; 7/8 of the square remain"},
+    {EXR, "exr", "half|float",
+     "numbers of maps.exr: half floats, compressed, or floats (default: float up to 512 pixels, half above)"},
     {WORKFLOW, "workflow", "W",
      "specular (default), or metallic: base colour and metalness instead of diffuse and specular; the error of the\n"
      "conversion is printed"},
@@ -98,7 +110,7 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
     int key, operands = argc;
     int64_t n = 0;
     ts_code code = TS_OK;
-    bool power_given = false;
+    bool power_given = false, exr_given = false, ao = false;
     while (!code && !c->help && !c->version &&
            (key = cl_argument_next(argc, argv, lgd_infer_arguments, &value, &operands, st)) != CL_ARGUMENT_END) {
         switch (key) {
@@ -154,6 +166,14 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
             code = lgd_output_parse(value, &c->outputs, st);
             if (code) ts_context(st, "--maps");
             break;
+        case AO: ao = true; break;
+        case SEAMLESS: c->seamless = true; break;
+        case EXR:
+            exr_given = true;
+            c->half = strcmp(value, "half") == 0;
+            if (!c->half && strcmp(value, "float") != 0)
+                code = ts_fail(st, TS_INVALID, "--exr: '%s' is neither half nor float", value);
+            break;
         case WORKFLOW:
             c->metallic = strcmp(value, "metallic") == 0;
             if (!c->metallic && strcmp(value, "specular") != 0)
@@ -168,17 +188,14 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
         }
     }
     if (code || c->help || c->version) return code;
-    const unsigned documents = LGD_OUT_GLTF | LGD_OUT_MATERIALX;
-    if (c->outputs & documents && c->directx)
+    if (c->outputs & (LGD_OUT_GLTF | LGD_OUT_GLB | LGD_OUT_MATERIALX) && c->directx)
         return ts_fail(st, TS_INVALID, "--normal dx: glTF and MaterialX need OpenGL normals");
-    if (c->outputs & documents && c->metallic)
-        return ts_fail(st, TS_INVALID, "--workflow metallic: the glTF and MaterialX documents refer to F0");
-    if (!c->outputs) c->outputs = LGD_OUT_DEFAULT;
-    if (c->metallic) { /* what was asked of the one workflow is given in the other */
-        const unsigned f0 = c->outputs & (LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR);
-        c->outputs = (c->outputs & ~f0) | (f0 & LGD_OUT_DIFFUSE ? LGD_OUT_BASECOLOR : 0) |
-            (f0 & LGD_OUT_SPECULAR ? LGD_OUT_METALLIC : 0);
-    }
+    if (c->outputs & LGD_OUT_MATERIALX && c->metallic)
+        return ts_fail(st, TS_INVALID, "--workflow metallic: the MaterialX document refers to F0");
+    if (c->seamless && c->size < IO_SEAMLESS_LEAST)
+        return ts_fail(st, TS_INVALID, "--seamless needs a --size of %d at least", IO_SEAMLESS_LEAST);
+    c->outputs = lgd_output_complete((c->outputs ? c->outputs : LGD_OUT_DEFAULT) | (ao ? LGD_OUT_AO : 0), c->metallic);
+    if (!exr_given) c->half = c->size > HALF_ABOVE;
     c->photo = argv + operands;
     c->photos = argc - operands;
     if (*c->capture && c->photos > 0)

@@ -16,7 +16,7 @@ typedef struct lgd_command {
     double fov;       /* degrees across the square; 0: from the file */
     double power;     /* of the light, in default ones; 0: estimated */
     unsigned outputs; /* LGD_OUT_... */
-    bool directx, metallic, exact, bf16, quiet, help, version;
+    bool directx, metallic, seamless, half /* of maps.exr */, exact, bf16, quiet, help, version;
     char **photo; /* into argv; with a capture, that alone */
     char *only[1];
     int photos;

@@ -1,5 +1,5 @@
-/* maps.exr through OpenEXR's C core: channels diffuse.R .G .B, normal.X .Y .Z, roughness.Y, specular.R .G .B, 32-bit
- * float, written uncompressed: ZIP saves a twelfth of the file and takes longer than the estimate. */
+/* maps.exr through OpenEXR's C core: channels diffuse.R .G .B, normal.X .Y .Z, roughness.Y, specular.R .G .B, and R, G,
+ * B, the diffuse once more: programs that know no layers show these. The reader takes the named ones. */
 #include "data/image/exr.h"
 #include "data/file.h"
 #include "data/name.h"
@@ -13,7 +13,8 @@
 #include <unistd.h>
 
 /* In the file's order, which is alphabetical; value k of a pixel is channel k. */
-enum { CHANNELS = 10 };
+enum { CHANNELS = 10, SHOWN = 3, STORED = SHOWN + CHANNELS };
+static const char *const shown[SHOWN] = {"B", "G", "R"}; /* capitals stand before the rest */
 static const char *const names[CHANNELS] = {"diffuse.B", "diffuse.G",   "diffuse.R",  "normal.X",   "normal.Y",
                                             "normal.Z",  "roughness.Y", "specular.B", "specular.G", "specular.R"};
 
@@ -104,30 +105,36 @@ static int64_t on_size(exr_const_context_t context, void *user)
 /* A string attribute of the file: which way the normal's y points. Without it, up. */
 static const char y_attribute[] = "normalY", y_up[] = "OpenGL", y_down[] = "DirectX";
 
-static exr_result_t write_header(exr_context_t f, int size, bool directx)
+/* The named channel that a stored one has the values of. */
+static int named(int stored) { return stored < SHOWN ? stored : stored - SHOWN; }
+
+static exr_result_t write_header(exr_context_t f, int size, bool directx, bool half)
 {
     int part = 0;
     exr_result_t r = exr_add_part(f, "maps", EXR_STORAGE_SCANLINE, &part);
-    if (!r) r = exr_initialize_required_attr_simple(f, part, size, size, EXR_COMPRESSION_NONE);
-    for (int c = 0; c < CHANNELS && !r; c++) {
+    if (!r)
+        r = exr_initialize_required_attr_simple(f, part, size, size, half ? EXR_COMPRESSION_ZIP : EXR_COMPRESSION_NONE);
+    for (int k = 0; k < STORED && !r; k++) {
+        const int c = named(k);
         bool linear = c >= 3 && c <= 6; /* normals and roughness are no colours */
-        r = exr_add_channel(f, part, names[c], EXR_PIXEL_FLOAT,
+        r = exr_add_channel(f, part, k < SHOWN ? shown[k] : names[c], half ? EXR_PIXEL_HALF : EXR_PIXEL_FLOAT,
                             linear ? EXR_PERCEPTUALLY_LINEAR : EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
     }
     if (!r) r = exr_attr_set_string(f, part, y_attribute, directx ? y_down : y_up);
     return r ? r : exr_write_header(f);
 }
 
-/* row: memory for a scan line, which is a chunk where nothing is compressed, [size][CHANNELS]. */
-static exr_result_t write_chunks(exr_context_t f, const io_material *m, bool directx, float *row)
+/* rows: memory for the scan lines of a chunk, [lines][size][CHANNELS]. */
+static exr_result_t write_chunks(exr_context_t f, const io_material *m, bool directx, int lines, float *rows)
 {
     exr_encode_pipeline_t encoder = EXR_ENCODE_PIPELINE_INITIALIZER;
     exr_result_t r = EXR_ERR_SUCCESS;
-    for (int y = 0; y < m->size && !r; y++) {
-        for (size_t i = 0; i < (size_t)m->size; i++) {
+    for (int y = 0; y < m->size && !r; y += lines) {
+        const int count = m->size - y < lines ? m->size - y : lines;
+        for (size_t i = 0; i < (size_t)count * (size_t)m->size; i++) {
             io_texel t = io_texel_get(m->maps + ((size_t)y * (size_t)m->size + i) * MAP_CHANNELS);
             if (directx) t.normal[1] = -t.normal[1];
-            to_values(&t, row + i * CHANNELS);
+            to_values(&t, rows + i * CHANNELS);
         }
         exr_chunk_info_t chunk;
         r = exr_write_scanline_chunk_info(f, 0, y, &chunk);
@@ -135,7 +142,7 @@ static exr_result_t write_chunks(exr_context_t f, const io_material *m, bool dir
             r = y == 0 ? exr_encoding_initialize(f, 0, &chunk, &encoder) : exr_encoding_update(f, 0, &chunk, &encoder);
         for (int c = 0; c < encoder.channel_count && !r; c++) {
             exr_coding_channel_info_t *info = &encoder.channels[c];
-            info->encode_from_ptr = (const uint8_t *)(row + c);
+            info->encode_from_ptr = (const uint8_t *)(rows + named(c));
             info->user_pixel_stride = CHANNELS * sizeof(float);
             info->user_line_stride = CHANNELS * (int32_t)sizeof(float) * m->size;
             info->user_bytes_per_element = sizeof(float);
@@ -148,14 +155,15 @@ static exr_result_t write_chunks(exr_context_t f, const io_material *m, bool dir
     return r;
 }
 
-ts_code io_write_maps_exr(const char *path, const io_material *m, bool directx, ts_status *st)
+ts_code io_write_maps_exr(const char *path, const io_material *m, bool directx, bool half, ts_status *st)
 {
+    const int lines = half ? 16 : 1; /* of a chunk, by the kind of compression */
     enum {
         HEADER = 1 << 16
     }; /* more than it takes, as 16 bytes are more than a line has beside its values; on_write has the last word */
-    const size_t line = (size_t)m->size * CHANNELS * sizeof(float);
-    stream s = {.fd = -1, .capacity = HEADER + (size_t)m->size * (line + 16)};
-    float *row = malloc(line);
+    const size_t line = (size_t)m->size * STORED * sizeof(float);
+    stream s = {.fd = -1, .capacity = HEADER + (size_t)m->size * ((half ? line / 2 : line) + 16)};
+    float *row = malloc((size_t)lines * (size_t)m->size * CHANNELS * sizeof *row);
     s.bytes = calloc(s.capacity, 1);
     if (!row || !s.bytes) {
         free(row), free(s.bytes);
@@ -167,8 +175,8 @@ ts_code io_write_maps_exr(const char *path, const io_material *m, bool directx, 
     init.user_data = &s;
     init.write_fn = on_write;
     exr_result_t r = exr_start_write(&f, path, EXR_WRITE_FILE_DIRECTLY, &init);
-    if (!r) r = write_header(f, m->size, directx);
-    if (!r) r = write_chunks(f, m, directx, row);
+    if (!r) r = write_header(f, m->size, directx, half);
+    if (!r) r = write_chunks(f, m, directx, lines, row);
     exr_result_t finish = exr_finish(&f);
     if (!r) r = finish;
     free(row);

@@ -72,7 +72,7 @@ ts_code io_joint(const io_material *m, double out[IO_JOINTS], ts_status *st)
         f0 += 0.2126 * t.specular[0] + 0.7152 * t.specular[1] + 0.0722 * t.specular[2];
         gloss += t.roughness;
     }
-    const ts_code code = io_height(m, plane[HEIGHT], 1, st);
+    const ts_code code = io_height(m, false, plane[HEIGHT], 1, st);
     if (!code) {
         io_cosines(n, cosines);
         for (int k = 0; k < PLANES; k++) transform(n, cosines, plane[k], work);

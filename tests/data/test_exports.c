@@ -1,10 +1,13 @@
 /* What is made of the maps for other people's tools: heights, metalness. */
 #include "data/height.h"
 #include "data/metallic.h"
+#include "data/occlusion.h"
+#include "data/seamless.h"
 #include "tensor/rng.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #define PI 3.14159265358979323846
 
@@ -36,7 +39,7 @@ static double relief_error(int size, double *spread)
         }
     float *height = malloc((size_t)size * (size_t)size * sizeof *height);
     ts_status st = {0};
-    CHECK(io_height(&m, height, 0, &st) == TS_OK, "%s", st.message);
+    CHECK(io_height(&m, false, height, 0, &st) == TS_OK, "%s", st.message);
     double mean = 0, got = 0, worst = 0, square = 0;
     const double pixels = (double)size * size;
     for (int k = 0; k < size * size; k++) {
@@ -74,11 +77,107 @@ TEST(height_is_finite_for_any_maps)
         for (int k = 0; k < size * size * MAP_CHANNELS; k++) m.maps[k] = extreme[ts_rng_int(&r, 8)];
         float height[400];
         ts_status st = {0};
-        CHECK(io_height(&m, height, 0, &st) == TS_OK, "%s", st.message);
+        CHECK(io_height(&m, false, height, 0, &st) == TS_OK, "%s", st.message);
         for (int k = 0; k < size * size; k++)
             CHECK(isfinite(height[k]), "%d x %d, pixel %d: %g", size, size, k, (double)height[k]);
         io_material_free(&m);
     }
+}
+
+/* Of maps that repeat the heights do: waves that go around come back, with a border like every other place. */
+TEST(height_of_what_repeats)
+{
+    enum { N = 60 };
+    io_material m = material(N);
+    float height[N * N];
+    ts_status st = {0};
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++) {
+            const double a = 2 * PI * (2 * (j + 0.5) - (i + 0.5)) / N + 0.7, slope = -0.01 * 2 * PI * sin(a);
+            io_texel t = {.normal = {(float)(-2 * slope), (float)-slope, 1}}; /* rows go down, y up */
+            io_texel_put(m.maps + (i * N + j) * MAP_CHANNELS, &t);
+        }
+    CHECK(io_height(&m, true, height, 0, &st) == TS_OK, "%s", st.message);
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++) {
+            const double want = 0.01 * cos(2 * PI * (2 * (j + 0.5) - (i + 0.5)) / N + 0.7);
+            CHECK(fabs((double)height[i * N + j] - want) < 3e-4, "(%d, %d): %g, not %g", i, j,
+                  (double)height[i * N + j], want);
+        }
+    io_material_free(&m);
+}
+
+/* A plane sees all of its sky, however it lies (to what eight slices leave out); the middle of a trench what its width
+ * over its depth says. */
+TEST(occlusion_of_known_reliefs)
+{
+    enum { N = 256 };
+    static float height[N * N], occlusion[N * N];
+    for (int i = 0; i < N * N; i++) height[i] = 0.4f * (float)(i % N) / N - 0.3f * (float)(i / N) / N;
+    io_occlusion(N, height, false, occlusion, 0);
+    for (int i = 0; i < N * N; i++) CHECK(occlusion[i] > 0.997f, "pixel %d of a plane: %g", i, (double)occlusion[i]);
+    const float depth = 0.02f;
+    const int width = 9;
+    for (int i = 0; i < N * N; i++) height[i] = abs(i % N - N / 2) <= width / 2 ? 0 : depth;
+    io_occlusion(N, height, true, occlusion, 0);
+    const double half = (width / 2 + 1.0) / N, want = half / hypot(half, (double)depth);
+    for (int i = 0; i < N; i++) {
+        const double got = (double)occlusion[i * N + N / 2];
+        CHECK(fabs(got - want) < 0.05, "the middle of a trench sees %g of %g", got, want);
+        CHECK(occlusion[i * N] > 0.999f, "far beside it %g", (double)occlusion[i * N]);
+    }
+}
+
+/* RMS of the differences of neighbours across the borders over those within, all maps or the heights. */
+static double border_over_inside(int n, int channels, const float *v)
+{
+    double border = 0, inside = 0;
+    for (int i = 0; i < n; i++)
+        for (int j = 0; j < n; j++)
+            for (int c = 0; c < channels; c++) {
+                const double here = (double)v[(i * n + j) * channels + c],
+                             right = (double)v[(i * n + (j + 1) % n) * channels + c] - here,
+                             down = (double)v[((i + 1) % n * n + j) * channels + c] - here;
+                *(j == n - 1 ? &border : &inside) += right * right;
+                *(i == n - 1 ? &border : &inside) += down * down;
+            }
+    return sqrt(border / (2 * n)) / sqrt(inside / (2.0 * n * (n - 1)));
+}
+
+/* Maps and heights continue at the opposite border as they do within. */
+TEST(seamless_borders_are_as_the_inside)
+{
+    static const int sizes[] = {16, 33, 64, 128, 200, 256};
+    ts_status st = {0};
+    for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
+        const int n = sizes[k];
+        io_material m = material(n), tile, again;
+        for (int i = 0; i < n; i++)
+            for (int j = 0; j < n; j++) {
+                /* a slope from border to border, waves that do not close, and grain */
+                const double x = (double)j / n, y = (double)i / n,
+                             wave = 0.2 * sin(17.3 * x + 5 * y) + 0.2 * cos(21.1 * y - 3 * x);
+                float *v = m.maps + ((size_t)i * (size_t)n + (size_t)j) * MAP_CHANNELS;
+                for (int c = 0; c < MAP_CHANNELS; c++)
+                    v[c] = (float)(0.5 * (x + y - 1) + wave + 0.02 * sin(i * 12.9898 + j * 78.233 + c));
+            }
+        CHECK(border_over_inside(n, MAP_CHANNELS, m.maps) > 1.5, "%d: the maps repeat already", n);
+        CHECK(io_seamless(&m, &tile, 0, &st) == TS_OK && io_seamless(&m, &again, 1, &st) == TS_OK, "%s", st.message);
+        CHECK(tile.size == n && !memcmp(tile.maps, again.maps, sizeof(float) * MAP_CHANNELS * (size_t)n * (size_t)n),
+              "%d: the number of threads changes the maps", n);
+        const double ratio = border_over_inside(n, MAP_CHANNELS, tile.maps);
+        CHECK(ratio <= 1, "%d: across the border %g times the inside", n, ratio);
+        float *height = malloc(sizeof *height * (size_t)n * (size_t)n);
+        CHECK(io_height(&tile, true, height, 0, &st) == TS_OK, "%s", st.message);
+        const double steps = border_over_inside(n, 1, height);
+        CHECK(steps <= 1, "%d: heights across the border %g times the inside", n, steps);
+        free(height);
+        io_material_free(&m), io_material_free(&tile), io_material_free(&again);
+    }
+    io_material small = material(IO_SEAMLESS_LEAST - 1), none;
+    CHECK(io_seamless(&small, &none, 0, &st) == TS_INVALID && strstr(st.message, "16 at least") && !none.maps, "'%s'",
+          st.message);
+    io_material_free(&small);
 }
 
 /* What a metallic workflow can express comes back exactly; what it cannot is reported as an error. */
