@@ -44,7 +44,7 @@ MAKEFLAGS += -j$(shell nproc 2>/dev/null || echo 2)
 endif
 
 # What the programs read and write themselves, and what only the shared object needs that reads all other image formats.
-PKG := OpenEXR libpng libjpeg zlib
+PKG := OpenEXR libpng libjpeg zlib lcms2
 PKG_IMAGE := OpenImageIO
 WARN := -Wall -Wextra -Wshadow
 CPPFLAGS_ALL = -I. -I$(BUILD)/gen -D_GNU_SOURCE -DLGD_VERSION='"$(VERSION)"' $(CPPFLAGS)

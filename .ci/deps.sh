@@ -12,6 +12,7 @@ for module in "$@"; do
     case $module in
     OpenImageIO) missing="$missing libopenimageio-dev" ;;
     OpenEXR) missing="$missing libopenexr-dev" ;;
+    lcms2) missing="$missing liblcms2-dev" ;; # colour profiles with look-up tables
     libpng) missing="$missing libpng-dev" ;;
     zlib) missing="$missing zlib1g-dev" ;; # nn/weights/zip.c: compressed entries of PyTorch's files
     libjpeg) missing="$missing libjpeg-dev" ;;

@@ -14,4 +14,7 @@ bool io_read_jpeg_file(const char *path, int64_t max_pixels,
 /* Reads a JPEG's Exif segment (from its "Exif\0\0" on). False: it does not follow the standard. What is odd about the
  * lens is only not said. */
 bool io_exif(const unsigned char *segment, size_t size, int *orientation, bool *adobe, io_lens *lens);
+
+/* Of a WebP file that oi_read has read: what its EXIF says. Other files are left alone. */
+void io_webp_exif(const char *path, oi_image *image);
 #endif

@@ -27,6 +27,7 @@ ts_code io_read_photo(const char *path, int64_t max_pixels, io_image *image, ts_
 typedef struct io_photo_facts {
     int width, height; /* of the whole, upright */
     io_lens lens;
+    char profile[96]; /* the name of a colour profile that cannot be used: sRGB is assumed; empty: there is none */
 } io_photo_facts;
 
 /* Its largest centred square as io_centre_square has it, the same values, with memory for a few of the photograph's

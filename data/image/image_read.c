@@ -38,7 +38,7 @@ ts_code io_read_stored(const char *path, int64_t max_pixels, double gamma, io_im
     if (code != TS_OK) return code;
     const bool swap = raw.orientation >= 5;
     code = io_image_create(image, swap ? raw.height : raw.width, swap ? raw.width : raw.height, 3, st);
-    if (facts) *facts = (io_photo_facts){image->width, image->height, raw.lens};
+    if (facts) *facts = (io_photo_facts){.width = image->width, .height = image->height, .lens = raw.lens};
     float *out = image->data;
     for (int y = 0; code == TS_OK && y < image->height; y++)
         for (int x = 0; x < image->width; x++, out += 3) {

@@ -44,7 +44,7 @@ static void choose_channels(const ImageSpec &spec, oi_image *image)
     int n = spec.nchannels, r = channel(spec, "R"), g = channel(spec, "G"), b = channel(spec, "B");
     image->alpha = spec.alpha_channel >= 0 && spec.alpha_channel < n && n > 1 ? spec.alpha_channel : -1;
     if (r < 0 || g < 0 || b < 0) {
-        int others[3], found = 0;
+        int others[3] = {0, 0, 0}, found = 0;
         for (int c = 0; c < n && found < 3; c++)
             if (c != image->alpha) others[found++] = c;
         r = others[0];
@@ -105,6 +105,16 @@ static void describe(const ImageSpec &spec, oi_image *image)
     }
 }
 
+/* The colours without alpha, which the library's reader of WebP multiplies encoded values by. */
+static void divide_by_alpha(oi_image *image)
+{
+    float *v = (float *)image->data;
+    for (size_t i = 0; i < (size_t)image->width * image->height; i++, v += image->channels)
+        for (int c = 0; c < image->channels; c++)
+            if (c != image->alpha) v[c] = v[image->alpha] > 0 ? std::min(v[c] / v[image->alpha], 1.0f) : 0;
+    image->associated = false;
+}
+
 static ts_code read_file(const char *path, int64_t max_pixels, oi_image *image, ts_status *st)
 {
     ImageSpec config;
@@ -120,6 +130,7 @@ static ts_code read_file(const char *path, int64_t max_pixels, oi_image *image, 
                        spec.width, spec.height, (long long)max_pixels);
     if (spec.depth > 1) return ts_fail(st, TS_UNSUPPORTED, "%s: a volume, not an image", path);
     if (spec.deep) return ts_fail(st, TS_UNSUPPORTED, "%s: a deep image; flatten it first", path);
+    const bool webp = !strcmp(in->format_name(), "webp");
     choose_channels(spec, image);
     describe(spec, image);
 
@@ -143,6 +154,7 @@ static ts_code read_file(const char *path, int64_t max_pixels, oi_image *image, 
     /* Some readers note a problem and go on with what they have. */
     if (in->has_error())
         return ts_fail(st, TS_FORMAT, "%s: damaged or cut short: %s", path, one_line(in->geterror()).c_str());
+    if (webp && image->associated && image->alpha >= 0) divide_by_alpha(image);
     return TS_OK;
 }
 

@@ -4,6 +4,7 @@
 #include "data/image/png_file.h"
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 ts_code io_read_raw(const char *path, int64_t max_pixels, oi_image *raw, ts_status *st)
 {
@@ -11,7 +12,9 @@ ts_code io_read_raw(const char *path, int64_t max_pixels, oi_image *raw, ts_stat
     if (code == TS_OK) code = io_check_png(path, st);
     if (code != TS_OK || io_read_png_file(path, max_pixels, raw) || io_read_jpeg_file(path, max_pixels, raw))
         return code;
-    return oi_read(path, max_pixels, raw, st);
+    code = oi_read(path, max_pixels, raw, st);
+    if (!code) io_webp_exif(path, raw);
+    return code;
 }
 
 size_t io_stored_at(int orientation, int x, int y, int w, int h)
@@ -30,11 +33,18 @@ size_t io_stored_at(int orientation, int x, int y, int w, int h)
     return (size_t)row * (size_t)w + (size_t)column;
 }
 
-static io_space space_of(const char *path, const oi_image *image)
+/* Sets p's space, or where only a profile says what the values are, that. */
+static io_space space_of(const char *path, io_photo_rows *p)
 {
+    const oi_image *image = &p->raw;
     io_space space;
+    char name[sizeof p->unread];
     if (io_space_png(path, &space)) return space;
     if (io_space_icc(image->icc, image->icc_size, &space)) return space;
+    if (image->icc) {
+        p->profile = io_profile_open(image->icc, image->icc_size, image->grey, name, sizeof name);
+        if (!p->profile) memcpy(p->unread, name, sizeof name);
+    }
     if (image->primaries && io_space_primaries(image->chromaticities, image->floating ? 1 : 0, &space)) return space;
     if (image->floating || image->linear) return io_space_linear();
     return image->adobe ? io_space_adobe_rgb() : io_space_srgb();
@@ -63,12 +73,12 @@ ts_code io_photo_open(const char *path, int64_t max_pixels, bool upright, io_pho
     *p = (io_photo_rows){0};
     const ts_code code = io_read_raw(path, max_pixels, &p->raw, st);
     if (code) return code;
-    p->space = space_of(path, &p->raw);
+    p->space = space_of(path, p);
     p->orientation = upright ? p->raw.orientation : 1;
     const bool swap = p->orientation >= 5;
     p->width = swap ? p->raw.height : p->raw.width;
     p->height = swap ? p->raw.width : p->raw.height;
-    if (p->raw.floating || build_tables(p)) return TS_OK;
+    if (p->raw.floating || p->profile || build_tables(p)) return TS_OK;
     io_photo_close(p);
     return ts_fail(st, TS_NOMEM, "%s: out of memory", path);
 }
@@ -76,6 +86,7 @@ ts_code io_photo_open(const char *path, int64_t max_pixels, bool upright, io_pho
 void io_photo_close(io_photo_rows *p)
 {
     free(p->tables);
+    io_profile_close(&p->profile);
     oi_free(&p->raw);
     *p = (io_photo_rows){0};
 }
@@ -84,6 +95,18 @@ static float lookup(const float *table, int levels, float v)
 {
     int i = v > 0 ? (int)(v * (float)(levels - 1) + 0.5f) : 0;
     return table[i < levels ? i : levels - 1];
+}
+
+/* What a profile says of one pixel. */
+static void convert_by_profile(const io_photo_rows *p, size_t at, float *out)
+{
+    const oi_image *raw = &p->raw;
+    for (int c = 0; c < 3; c++) out[c] = oi_value(raw, at + (size_t)raw->colour[c]);
+    io_profile_apply(p->profile, out, 1);
+    const io_space linear = io_space_linear();
+    if (shows_through(raw))
+        for (int c = 0; c < 3; c++) out[c] *= oi_value(raw, at + (size_t)raw->alpha);
+    io_space_matrix(&linear, out);
 }
 
 /* at: of its first channel. */
@@ -119,5 +142,7 @@ void io_photo_row(const io_photo_rows *p, int x, int y, int count, float *out)
         }
         return;
     }
-    for (int i = 0; i < count; i++) convert_pixel(p, (size_t)(at + i * jump), out + 3 * i);
+    for (int i = 0; i < count; i++)
+        if (p->profile) convert_by_profile(p, (size_t)(at + i * jump), out + 3 * i);
+        else convert_pixel(p, (size_t)(at + i * jump), out + 3 * i);
 }

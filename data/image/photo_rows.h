@@ -4,6 +4,7 @@
 #define IO_PHOTO_ROWS_H
 #include "data/image/colour.h"
 #include "data/image/oiio.h"
+#include "data/image/profile.h"
 
 typedef struct io_photo_rows {
     int width, height; /* upright */
@@ -13,6 +14,8 @@ typedef struct io_photo_rows {
     float *tables; /* [3][raw.levels]: the curve of every value of an integer file; where the colours need no matrix
                       (plain), the whole conversion */
     bool plain;
+    io_profile *profile; /* NULL, or what takes the place of space */
+    char unread[96];     /* empty, or the name of a profile that cannot be used: sRGB is assumed */
 } io_photo_rows;
 
 /* As io_read_photo; upright: turned by the file's orientation. On success the caller calls io_photo_close. */

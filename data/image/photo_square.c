@@ -83,7 +83,10 @@ ts_code io_read_photo_square(const char *path, int64_t max_pixels, int size, int
         io_image_free(square);
         ts_context(st, "%s", path);
     }
-    if (facts) *facts = (io_photo_facts){photo.width, photo.height, photo.raw.lens};
+    if (facts) {
+        *facts = (io_photo_facts){.width = photo.width, .height = photo.height, .lens = photo.raw.lens};
+        memcpy(facts->profile, photo.unread, sizeof facts->profile);
+    }
     ts_arena_destroy(&arena);
     io_photo_close(&photo);
     return code;

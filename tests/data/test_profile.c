@@ -1,0 +1,136 @@
+/* Colour profiles that are look-up tables; WebP's orientation and alpha. */
+#include "data/image/image.h"
+#include "tests/support/make_images.h"
+#include "tests/test.h"
+#include <lcms2.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Lab of sRGB with red and blue exchanged, so that taking the file for sRGB is seen. */
+static cmsInt32Number sample(const cmsUInt16Number in[], cmsUInt16Number out[], void *to_lab)
+{
+    const cmsUInt16Number exchanged[3] = {in[2], in[1], in[0]};
+    cmsDoTransform(to_lab, exchanged, out, 1);
+    return 1;
+}
+
+/* kind: cmsSigRgbData, or another space, whose profile no RGB file can use. */
+static bytes table_profile(cmsColorSpaceSignature kind)
+{
+    const unsigned channels = kind == cmsSigRgbData ? 3 : 4;
+    cmsHPROFILE srgb = cmsCreate_sRGBProfile(), lab = cmsCreateLab4Profile(NULL), p = cmsCreateProfilePlaceholder(NULL);
+    cmsHTRANSFORM to_lab = cmsCreateTransform(srgb, TYPE_RGB_16, lab, TYPE_Lab_16, INTENT_RELATIVE_COLORIMETRIC,
+                                              cmsFLAGS_NOOPTIMIZE);
+    cmsPipeline *pipeline = cmsPipelineAlloc(NULL, channels, 3);
+    cmsStage *table = cmsStageAllocCLut16bit(NULL, channels == 3 ? 21 : 2, channels, 3, NULL);
+    cmsMLU *name = cmsMLUalloc(NULL, 1);
+    CHECK(srgb && lab && p && to_lab && pipeline && table && name, "lcms2 has no memory");
+    CHECK(cmsStageSampleCLut16bit(table, sample, to_lab, 0) &&
+              cmsPipelineInsertStage(pipeline, cmsAT_END, cmsStageAllocToneCurves(NULL, channels, NULL)) &&
+              cmsPipelineInsertStage(pipeline, cmsAT_END, table) &&
+              cmsPipelineInsertStage(pipeline, cmsAT_END, cmsStageAllocToneCurves(NULL, 3, NULL)),
+          "the table is not made");
+    cmsMLUsetASCII(name, "en", "US", "exchanged");
+    cmsSetProfileVersion(p, 4.3);
+    cmsSetDeviceClass(p, cmsSigInputClass);
+    cmsSetColorSpace(p, kind);
+    cmsSetPCS(p, cmsSigLabData);
+    CHECK(cmsWriteTag(p, cmsSigAToB0Tag, pipeline) && cmsWriteTag(p, cmsSigProfileDescriptionTag, name) &&
+              cmsWriteTag(p, cmsSigMediaWhitePointTag, cmsD50_XYZ()),
+          "the profile is not made");
+    cmsUInt32Number size = 0;
+    bytes b = {0};
+    CHECK(cmsSaveProfileToMem(p, NULL, &size) && size > 0, "the profile has no size");
+    uint8_t *memory = malloc(size);
+    CHECK(cmsSaveProfileToMem(p, memory, &size), "the profile is not saved");
+    put(&b, memory, size);
+    free(memory);
+    cmsMLUfree(name);
+    cmsPipelineFree(pipeline);
+    cmsDeleteTransform(to_lab);
+    cmsCloseProfile(p), cmsCloseProfile(lab), cmsCloseProfile(srgb);
+    return b;
+}
+
+TEST(profile_of_tables)
+{
+    enum { N = 8 };
+    uint8_t pixels[N * 3];
+    for (int i = 0; i < N * 3; i++) pixels[i] = (uint8_t)(37 * i % 256);
+    bytes profile = table_profile(cmsSigRgbData), b = {0};
+    png_begin(&b, N, 1, 8, 2), png_profile(&b, &profile), png_pixels(&b, pixels, N * 3, 1), png_end(&b);
+    bytes_free(&profile);
+    const char *path = bytes_save(&b, test_folder(), "p.png");
+    io_image image, square;
+    io_photo_facts facts;
+    ts_status st = {0};
+    CHECK(!io_read_photo(path, 1 << 20, &image, &st), "%s", st.message);
+    for (int i = 0; i < N * 3; i++) {
+        const double want = (double)io_srgb_to_linear((float)pixels[i / 3 * 3 + 2 - i % 3] / 255);
+        CHECK(fabs((double)image.data[i] - want) < 6e-3, "value %d: %g, not %g", i, (double)image.data[i], want);
+    }
+    CHECK(!io_read_photo_square(path, 1 << 20, 1, 0, &square, &facts, &st) && !*facts.profile, "'%s' %s", facts.profile,
+          st.message);
+    io_image_free(&image);
+    io_image_free(&square);
+}
+
+/* One of another kind of colours is named, and sRGB assumed. */
+TEST(profile_that_cannot_be_used_is_named)
+{
+    char path[512];
+    ts_status st = {0};
+    io_image image, square;
+    io_photo_facts facts;
+    CHECK(!io_image_create(&image, 16, 16, 3, &st), "%s", st.message);
+    for (int i = 0; i < 16 * 16 * 3; i++) image.data[i] = 0.25f;
+    snprintf(path, sizeof path, "%s/a.jpg", test_folder());
+    CHECK(!io_write_jpeg(path, &image, 95, &st), "%s", st.message);
+    bytes jpeg = bytes_load(path), profile = table_profile(cmsSigCmykData);
+    jpeg_profile(&jpeg, &profile);
+    CHECK(!io_read_photo_square(bytes_save(&jpeg, test_folder(), "b.jpg"), 1 << 20, 4, 0, &square, &facts, &st), "%s",
+          st.message);
+    CHECK(strcmp(facts.profile, "exchanged") == 0, "'%s' is reported", facts.profile);
+    CHECK(fabsf(square.data[0] - 0.25f) < 0.01f, "%g, not sRGB", (double)square.data[0]);
+    io_image_free(&image);
+    io_image_free(&square);
+}
+
+static void chunk(bytes *b, const char *type, const void *data, size_t size)
+{
+    put(b, type, 4), put32le(b, (uint32_t)size), put(b, data, size);
+    if (size & 1) put8(b, 0);
+}
+
+/* 4 x 2 pixels of (200, 100, 50), the lower half with an alpha of 128, by cwebp -lossless -exact. */
+static const uint8_t lossless[] = {0x2f, 0x03, 0x40, 0x00, 0x10, 0x0f, 0x30, 0x64, 0x83, 0x3c, 0x32, 0xff, 0x03, 0x8c, 0x07, 0xcc, 0x43, 0x44, 0xff, 0x23};
+
+/* Turned by EXIF, with "Exif" before the header as some write or without as the format says; alpha over black in linear
+ * light, as of a PNG. */
+TEST(webp_is_turned_and_transparent_as_png)
+{
+    static const uint8_t exif[] = "Exif\0\0II*\0\10\0\0\0\1\0\22\1\3\0\1\0\0\0\6\0\0\0\0\0\0\0";
+    const uint8_t extended[10] = {0x18, 0, 0, 0, 3, 0, 0, 1, 0, 0}; /* alpha, EXIF; 4 x 2 */
+    for (int prefix = 0; prefix < 2; prefix++) {
+        bytes inner = {0}, b = {0};
+        put(&inner, "WEBP", 4);
+        chunk(&inner, "VP8X", extended, sizeof extended);
+        chunk(&inner, "VP8L", lossless, sizeof lossless);
+        chunk(&inner, "EXIF", exif + (prefix ? 0 : 6), sizeof exif - 1 - (prefix ? 0 : 6));
+        chunk(&b, "RIFF", inner.data, inner.size);
+        bytes_free(&inner);
+        io_image image;
+        ts_status st = {0};
+        CHECK(!io_read_photo(bytes_save(&b, test_folder(), "a.webp"), 1 << 20, &image, &st), "%s", st.message);
+        CHECK(image.width == 2 && image.height == 4, "prefix %d: %d x %d", prefix, image.width, image.height);
+        for (int i = 0; i < 8; i++) /* a quarter turn: the lower row is the left column */
+            for (int c = 0; c < 3; c++) {
+                static const float stored[3] = {200, 100, 50};
+                const float want = io_srgb_to_linear(stored[c] / 255) * (i % 2 ? 1 : 128.0f / 255);
+                CHECK(fabsf(image.data[3 * i + c] - want) < 0.01f * want + 2e-3f, "prefix %d, pixel %d: %g, not %g", prefix,
+                      i, (double)image.data[3 * i + c], (double)want);
+            }
+        io_image_free(&image);
+    }
+}
