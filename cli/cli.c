@@ -65,6 +65,15 @@ int cl_failed(const char *format, ...)
     return CL_FAILED;
 }
 
+int cl_stopped(const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    say(format, args);
+    va_end(args);
+    return CL_INTERRUPTED;
+}
+
 void cl_note(const char *format, ...)
 {
     va_list args;

@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { CL_OK = 0, CL_FAILED = 1, CL_USAGE = 2 };
+enum { CL_OK = 0, CL_FAILED = 1, CL_USAGE = 2, CL_INTERRUPTED = 130 };
 
 /* The first call of every main: opens /dev/null as those of the descriptors 0 to 2 that are closed, so that no file
  * that is opened later becomes the standard stream that messages go to. It is opened the wrong way round: what reads or
@@ -22,6 +22,8 @@ int cl_init(const char *program);
  */
 int cl_usage(const char *format, ...) __attribute__((format(printf, 1, 2)));
 int cl_failed(const char *format, ...) __attribute__((format(printf, 1, 2)));
+/* The same after cl_interrupted: CL_INTERRUPTED, as shells report Ctrl-C. */
+int cl_stopped(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void cl_note(const char *format, ...) __attribute__((format(printf, 1, 2)));
 
 /* Whole-string numbers in the C locale, within [lo, hi]; false otherwise. */

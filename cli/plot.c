@@ -1,5 +1,4 @@
-#include "eval/plot.h"
-#include "eval/text.h"
+#include "cli/plot.h"
 #include <math.h>
 #include <string.h>
 
@@ -11,12 +10,23 @@ static const char *const colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7"
                                       "#56b4e9", "#000000", "#8c564b", "#7f7f7f", "#9467bd"};
 #define COLOUR(s) colours[(size_t)(s) % (sizeof colours / sizeof *colours)]
 
+void cl_put_text(FILE *f, const char *text)
+{
+    for (; *text; text++) switch (*text) {
+        case '&': fputs("&amp;", f); break;
+        case '<': fputs("&lt;", f); break;
+        case '>': fputs("&gt;", f); break;
+        case '"': fputs("&quot;", f); break;
+        default: fputc(*text, f);
+        }
+}
+
 typedef struct frame {
     double x0, x1, y0, y1; /* of x its place */
     bool log_x;
 } frame;
 
-static bool shown(const frame *r, const ev_point *p)
+static bool shown(const frame *r, const cl_point *p)
 {
     return isfinite(p->x) && (p->x > 0 || !r->log_x) && isfinite(p->y);
 }
@@ -34,12 +44,12 @@ static double round_step(double v)
     return v <= ten ? ten : v <= 2 * ten ? 2 * ten : v <= 5 * ten ? 5 * ten : 10 * ten;
 }
 
-static bool make_frame(const ev_series *series, int count, bool log_x, frame *r)
+static bool make_frame(const cl_series *series, int count, bool log_x, frame *r)
 {
     *r = (frame){INFINITY, -INFINITY, INFINITY, -INFINITY, log_x};
     for (int s = 0; s < count; s++)
         for (int i = 0; i < series[s].points; i++) {
-            const ev_point *p = &series[s].point[i];
+            const cl_point *p = &series[s].point[i];
             if (!shown(r, p)) continue;
             r->x0 = fmin(r->x0, place(r, p->x)), r->x1 = fmax(r->x1, place(r, p->x));
             r->y0 = fmin(r->y0, p->y), r->y1 = fmax(r->y1, p->y);
@@ -86,10 +96,10 @@ static void draw_axes(FILE *f, const frame *r, const char *x_title, const char *
         for (double x = ceil(r->x0 / unit) * unit + 0.0; x <= r->x1; x += unit) tick(f, r, x, true); /* + 0: no -0 */
     }
     fprintf(f, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">", (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 10);
-    ev_put_text(f, x_title);
+    cl_put_text(f, x_title);
     fprintf(f, "</text>\n<text transform=\"translate(16 %d) rotate(-90)\" text-anchor=\"middle\">",
             (TOP + HEIGHT - BOTTOM) / 2);
-    ev_put_text(f, y_title);
+    cl_put_text(f, y_title);
     fputs("</text>\n", f);
 }
 
@@ -117,13 +127,13 @@ static void put_label(FILE *f, labels *all, double x, double y, const char *text
         if (!free || all->count == (int)(sizeof all->box / sizeof *all->box)) continue;
         all->box[all->count].x = at_x, all->box[all->count].y = at_y, all->box[all->count++].width = width;
         fprintf(f, "<text x=\"%.1f\" y=\"%.1f\" font-size=\"10\">", at_x, at_y);
-        ev_put_text(f, text);
+        cl_put_text(f, text);
         fputs("</text>", f);
         return;
     }
 }
 
-static void draw(FILE *f, const frame *r, const ev_series *series, int s, labels *all)
+static void draw(FILE *f, const frame *r, const cl_series *series, int s, labels *all)
 {
     const char *radius = series->points > 50 ? "1.5" : "3.5";
     const int legend = TOP + 12 + 18 * s;
@@ -135,22 +145,22 @@ static void draw(FILE *f, const frame *r, const ev_series *series, int s, labels
         fprintf(f, "%d,%.1f %d,%.1f", LEFT, down(r, series->point->y), WIDTH - RIGHT, down(r, series->point->y));
     fputs("\"/></g>\n", f);
     for (int i = 0; i < series->points; i++) {
-        const ev_point *p = &series->point[i];
+        const cl_point *p = &series->point[i];
         if (!shown(r, p)) continue;
         fprintf(f, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%s\" fill=\"%s\"><title>", across(r, p->x), down(r, p->y),
                 radius, COLOUR(s));
-        ev_put_text(f, series->name);
+        cl_put_text(f, series->name);
         fprintf(f, " %s: %.4g, %.4f &#177; %.4f</title></circle>", p->label, p->x, p->y, p->deviation);
         if (p->label[0]) put_label(f, all, across(r, p->x), down(r, p->y), p->label);
         fputs("\n", f);
     }
     fprintf(f, "<circle cx=\"%d\" cy=\"%d\" r=\"3.5\" fill=\"%s\"/><text x=\"%d\" y=\"%d\">", WIDTH - RIGHT + 14,
             legend, COLOUR(s), WIDTH - RIGHT + 24, legend + 4);
-    ev_put_text(f, series->name);
+    cl_put_text(f, series->name);
     fputs("</text>\n", f);
 }
 
-void ev_plot_write(FILE *f, const ev_axes *axes, const ev_series *series, int count)
+void cl_plot_write(FILE *f, const cl_axes *axes, const cl_series *series, int count)
 {
     frame r;
     labels all = {.count = 0};

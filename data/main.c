@@ -77,7 +77,7 @@ static void print_help(void)
         "                        captures: DIR/NAME/ with nine photographs 00.png .. 08.png and their lights and "
         "cameras\n"
         "      --photographs     DIR/NAME.jpg: renderings under the flash, with sensor noise, blur and JPEG\n"
-        "      --contact-sheet   DIR/contact-sheet.png: a row for each family\n"
+        "      --contact-sheet   DIR/contact-sheet.png: a row for each family, with its name\n"
         "      --statistics      print a table that compares the maps with those of --testdata\n"
         "      --histograms      DIR/histograms.svg and .csv: histograms of the maps and of those of --testdata\n\n"
         "Which materials:\n"
@@ -298,6 +298,8 @@ static ts_code make_sheet(const options *o, ts_status *st)
         ? ts_fail(st, TS_INVALID, "a contact sheet of %lld materials is too large: ask for fewer", (long long)o->count)
         : TS_OK;
     if (!code) code = io_sheet_create(&sheet, (int)columns, rows, o->size ? (int)o->size : 128, st);
+    for (int i = 0, row = 0; !code && i < io_family_count(); i++)
+        if (!o->procedural.families || o->procedural.families >> i & 1) io_sheet_name(&sheet, row++, io_family_name(i));
     if (!code) code = run(o, "contact sheet", sheet_task, columns * rows, sheet.size, &sheet, st);
     if (!code) code = make_path(path, o, "contact-sheet", ".png", st);
     if (!code) code = io_write_png(path, &sheet.image, 8, true, st);
@@ -350,5 +352,6 @@ int main(int argc, char **argv)
     if (!st.code && o.sheet) make_sheet(&o, &st);
     if (!st.code && o.statistics) compare(&o, &st);
     if (!st.code && o.histograms) make_histograms(&o, &st);
+    if (st.code == TS_INTERRUPTED) return cl_finish(cl_stopped("%s", st.message));
     return cl_finish(st.code ? cl_failed("%s", st.message) : CL_OK);
 }

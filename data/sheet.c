@@ -1,11 +1,13 @@
 #include "data/sheet.h"
+#include "data/label.h"
 
 enum { PANELS = 5, GAP = 4 };
 
 ts_code io_sheet_create(io_sheet *sheet, int columns, int rows, int size, ts_status *st)
 {
     *sheet = (io_sheet){.columns = columns, .rows = rows, .size = size};
-    int64_t width = (int64_t)columns * (PANELS * size + GAP) - GAP, height = (int64_t)rows * (size + GAP) - GAP;
+    int64_t width = (int64_t)columns * (PANELS * size + GAP) - GAP,
+            height = (int64_t)rows * (IO_LABEL_HEIGHT + size + GAP) - GAP;
     if (width * height > IO_MAX_PIXELS_DEFAULT)
         return ts_fail(st, TS_INVALID,
                        "a contact sheet of %lld x %lld pixels is too large: ask for fewer or smaller materials",
@@ -20,7 +22,7 @@ void io_sheet_put(io_sheet *sheet, int column, int row, const float *maps, const
         for (int x = 0; x < size; x++) {
             size_t i = (size_t)y * (size_t)size + (size_t)x;
             io_texel t = io_texel_get(maps + i * MAP_CHANNELS);
-            size_t line = (size_t)row * (size_t)(size + GAP) + (size_t)y;
+            size_t line = (size_t)row * (size_t)(IO_LABEL_HEIGHT + size + GAP) + IO_LABEL_HEIGHT + (size_t)y;
             float *out = sheet->image.data +
                 (line * (size_t)sheet->image.width + (size_t)column * (size_t)(PANELS * size + GAP) + (size_t)x) * 3;
             for (int k = 0; k < 3; k++, out++) {
@@ -31,4 +33,9 @@ void io_sheet_put(io_sheet *sheet, int column, int row, const float *maps, const
                 out[12 * size] = t.specular[k];
             }
         }
+}
+
+void io_sheet_name(io_sheet *sheet, int row, const char *name)
+{
+    io_label(&sheet->image, 2, row * (IO_LABEL_HEIGHT + sheet->size + GAP) + 3, name);
 }

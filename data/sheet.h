@@ -12,5 +12,6 @@ typedef struct io_sheet {
 /* size: of one panel. Owns its image; io_image_free(&sheet->image) frees it. */
 ts_code io_sheet_create(io_sheet *sheet, int columns, int rows, int size, ts_status *st);
 /* maps: [size][size][9]; photo: [size][size][3], linear. Cells may be filled from several threads. */
+void io_sheet_name(io_sheet *sheet, int row, const char *name); /* above the row, as io_label writes it */
 void io_sheet_put(io_sheet *sheet, int column, int row, const float *maps, const float *photo);
 #endif

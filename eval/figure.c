@@ -1,5 +1,5 @@
 #include "eval/figure.h"
-#include "eval/plot.h"
+#include "cli/plot.h"
 #include "eval/text.h"
 #include "tensor/cpu.h"
 #include <math.h>
@@ -8,18 +8,18 @@
 
 /* A figure's lines, and what is written of them. */
 typedef struct figure {
-    ev_series *series;
-    ev_point *point; /* of all series, in order */
+    cl_series *series;
+    cl_point *point; /* of all series, in order */
     char (*name)[EV_NAME];
     int count, points;
-    ev_axes axes;
+    cl_axes axes;
     const char *x_name;
 } figure;
 
 static void write_svg(const void *what, FILE *f)
 {
     const figure *g = what;
-    ev_plot_write(f, &g->axes, g->series, g->count);
+    cl_plot_write(f, &g->axes, g->series, g->count);
 }
 
 static void write_csv(const void *what, FILE *f)
@@ -28,7 +28,7 @@ static void write_csv(const void *what, FILE *f)
     fprintf(f, "series,point,%s,render_mean,render_deviation\n", g->x_name);
     for (int s = 0; s < g->count; s++)
         for (int i = 0; i < g->series[s].points; i++) {
-            const ev_point *p = &g->series[s].point[i];
+            const cl_point *p = &g->series[s].point[i];
             ev_csv_field(f, g->series[s].name);
             fputc(',', f);
             ev_csv_field(f, p->label);
@@ -49,11 +49,11 @@ static void clear(figure *g)
 /* Room for more series and points; what is there stays. */
 static bool grow(figure *g, int series, int points)
 {
-    ev_series *s = realloc(g->series, (size_t)(g->count + series) * sizeof *s);
+    cl_series *s = realloc(g->series, (size_t)(g->count + series) * sizeof *s);
     if (s) g->series = s;
     char(*n)[EV_NAME] = realloc(g->name, (size_t)(g->count + series) * sizeof *n);
     if (n) g->name = n;
-    ev_point *p = realloc(g->point, (size_t)(g->points + points) * sizeof *p);
+    cl_point *p = realloc(g->point, (size_t)(g->points + points) * sizeof *p);
     if (p) g->point = p;
     return s && n && p;
 }
@@ -62,8 +62,8 @@ static void put_point(figure *g, const ev_report *r, int column, double x, const
 {
     ev_row mean, deviation;
     ev_report_summary(r, -1, column, &mean, &deviation);
-    ev_point *p = &g->point[g->points++];
-    *p = (ev_point){.x = x, .y = mean.value[EV_RENDER], .deviation = deviation.value[EV_RENDER]};
+    cl_point *p = &g->point[g->points++];
+    *p = (cl_point){.x = x, .y = mean.value[EV_RENDER], .deviation = deviation.value[EV_RENDER]};
     snprintf(p->label, sizeof p->label, "%s", label);
     g->series[g->count - 1].points++;
 }
@@ -71,7 +71,7 @@ static void put_point(figure *g, const ev_report *r, int column, double x, const
 static void begin_series(figure *g, const char *name)
 {
     snprintf(g->name[g->count], EV_NAME, "%s", name);
-    g->series[g->count++] = (ev_series){0};
+    g->series[g->count++] = (cl_series){0};
 }
 
 static ts_code finish(figure *g, const char *folder, const char *stem, ts_status *st)

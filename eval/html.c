@@ -1,5 +1,5 @@
 #include "eval/html.h"
-#include "eval/plot.h"
+#include "cli/plot.h"
 #include "eval/text.h"
 #include "tensor/conv/conv.h"
 #include <math.h>
@@ -54,7 +54,7 @@ static void put_name(const ev_report *r, int column, FILE *f)
 {
     char name[EV_NAME];
     if (r->methods == 1) fprintf(f, "R<sub>%d</sub>", r->step[column]);
-    else ev_put_text(f, ev_report_name(r, column, name));
+    else cl_put_text(f, ev_report_name(r, column, name));
 }
 
 /* The columns that tables show, and whether any of them has a metric in the set. */
@@ -79,7 +79,7 @@ static void table(const ev_report *r, const shown *s, int set, FILE *f)
     bool has[EV_METRICS];
     if (n == 0) return;
     fputs("<h2>", f);
-    ev_put_text(f, set < 0 ? "all sets" : r->set_name[set]);
+    cl_put_text(f, set < 0 ? "all sets" : r->set_name[set]);
     fprintf(f, "</h2>\n<table><tr><th>%d material%s</th><th>seconds</th><th>GFLOP/s peak</th><th>MB</th>", n,
             n == 1 ? "" : "s");
     for (int k = 0; k < EV_METRICS; k++)
@@ -111,13 +111,13 @@ static void table(const ev_report *r, const shown *s, int set, FILE *f)
 static void plot(const ev_report *r, FILE *f)
 {
     const int lines = r->methods > 1 ? r->methods : r->sets;
-    ev_point *point = calloc((size_t)lines * (size_t)r->columns, sizeof *point);
-    ev_series *series = calloc((size_t)lines, sizeof *series);
+    cl_point *point = calloc((size_t)lines * (size_t)r->columns, sizeof *point);
+    cl_series *series = calloc((size_t)lines, sizeof *series);
     for (int s = 0; s < lines && point && series; s++) {
         const ev_subject *m = &r->method[r->methods > 1 ? s : 0];
         const int set = r->methods > 1 ? -1 : s;
-        ev_point *p = point + (size_t)s * (size_t)r->columns;
-        series[s] = (ev_series){r->methods > 1 ? m->label : r->set_name[s], p, m->points, false};
+        cl_point *p = point + (size_t)s * (size_t)r->columns;
+        series[s] = (cl_series){r->methods > 1 ? m->label : r->set_name[s], p, m->points, false};
         for (int t = 0; t < m->points; t++) {
             ev_row mean, deviation;
             const int step = r->step[m->first + t];
@@ -131,7 +131,7 @@ static void plot(const ev_report *r, FILE *f)
         }
     }
     fputs("<h2>Time against error</h2>\n", f);
-    ev_plot_write(f, &(ev_axes){"seconds for one photograph", "RMSE of the renderings", true}, series,
+    cl_plot_write(f, &(cl_axes){"seconds for one photograph", "RMSE of the renderings", true}, series,
                   point && series ? lines : 0);
     free(point);
     free(series);
@@ -175,9 +175,9 @@ static void material(const ev_report *r, const shown *s, const ev_result *m, FIL
     fputs("<article", f);
     sort_keys(r, m, f);
     fputs("><h3>", f);
-    ev_put_text(f, m->material);
+    cl_put_text(f, m->material);
     fputs(" <small>", f);
-    ev_put_text(f, r->set_name[m->set]);
+    cl_put_text(f, r->set_name[m->set]);
     fputs("</small></h3>\n<table><tr><th></th>", f);
     for (int i = 0; i < columns; i++) {
         fputs("<th>", f);
@@ -203,7 +203,7 @@ static void material(const ev_report *r, const shown *s, const ev_result *m, FIL
         fputs("<figure>", f);
         if (r->methods > 1) {
             fputs("<figcaption>", f);
-            ev_put_text(f, r->method[i].label);
+            cl_put_text(f, r->method[i].label);
             fputs("</figcaption>", f);
         }
         fputs("<img alt=\"\" src=\"data:image/png;base64,", f);
@@ -220,7 +220,7 @@ static void choice(const ev_report *r, FILE *f)
     fputs(" <select id=\"method\">", f);
     for (int i = 0; i < r->methods; i++) {
         fprintf(f, "<option value=\"%d\">", i);
-        ev_put_text(f, r->method[i].label);
+        cl_put_text(f, r->method[i].label);
         fputs("</option>", f);
     }
     fputs("</select>", f);
@@ -234,7 +234,7 @@ void ev_html_write(const ev_report *r, FILE *f)
     fprintf(f, "</head><body>\n<h1>lgd-eval</h1>\n<p>%d &#215; %d pixels, %d thread%s%s, %s, %s convolutions; model ",
             r->size, r->size, r->threads, r->threads == 1 ? "" : "s", r->pinned ? ", pinned" : "", r->isa,
             r->exact ? "direct" : "Winograd");
-    ev_put_text(f, r->model);
+    cl_put_text(f, r->model);
     fprintf(f,
             ". Mean and standard deviation over the materials; seconds: median over them, of %d run%s each; peak: "
             "multiply-adds in registers, measured beside the method; MB: its weights, moments"

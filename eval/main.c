@@ -157,8 +157,8 @@ static int evaluate(work *w, ts_status *st)
     const ts_code code = c->pareto ? ev_pareto(r, sizes, 3, w->model, c->out, st) : ev_run_all(r, st);
     cl_progress_end(&w->bar);
     if (code == TS_INTERRUPTED)
-        return cl_failed("interrupted after %" PRId64 " of %" PRId64 " %s: no results are written", w->done, w->total,
-                         r->methods != 1 ? "estimates" : "materials");
+        return cl_stopped("interrupted after %" PRId64 " of %" PRId64 " %s: no results are written", w->done, w->total,
+                          r->methods != 1 ? "estimates" : "materials");
     if (code) return cl_failed("%s", st->message);
     return c->pareto ? CL_OK : finish(w, st);
 }

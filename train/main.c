@@ -103,6 +103,7 @@ static int train(const tr_config *config, const char *folder, bool resume)
     const ts_code code = tr_run(t, &st);
     cl_progress_end(&s.progress);
     tr_destroy(&t);
+    if (code == TS_INTERRUPTED) return cl_stopped("%s", st.message);
     if (code != TS_OK) return cl_failed("%s", st.message);
     cl_note("done: %s/best.safetensors and last.safetensors", folder);
     return CL_OK;

@@ -240,10 +240,12 @@ static ts_code after_step(tr_trainer *t, const tr_row *row, ts_status *st)
     }
     if (c->validate.every && (end || t->step % c->validate.every == 0)) {
         tr_validation v;
-        if (tr_validate(t, &v, st) != TS_OK || tr_log_validation(t, &v, st) != TS_OK) return st->code;
+        if (tr_validate(t, &v, st) != TS_OK || tr_log_validation(t, &v, st) != TS_OK || tr_curve_write(t, st) != TS_OK)
+            return st->code;
         if (t->listener.validated) t->listener.validated(&v, t->listener.user);
     }
-    return end || t->step % c->train.checkpoint_every == 0 ? tr_save_checkpoint(t, st) : TS_OK;
+    if (!end && t->step % c->train.checkpoint_every != 0) return TS_OK;
+    return tr_save_checkpoint(t, st) != TS_OK ? st->code : tr_curve_write(t, st);
 }
 
 ts_code tr_run(tr_trainer *t, ts_status *st)

@@ -41,6 +41,7 @@ void lgd_item_read(const lgd_command *c, bool published, lgd_item *item)
                               &item->st))
         return;
     item->photo_side = facts.width < facts.height ? facts.width : facts.height;
+    snprintf(item->profile, sizeof item->profile, "%s", facts.profile);
     if (c->fov > 0) snprintf(item->fov_from, sizeof item->fov_from, "--fov");
     item->fov = c->fov > 0 ? c->fov
                            : io_lens_fov(&facts.lens, facts.width, facts.height, item->fov_from, sizeof item->fov_from);

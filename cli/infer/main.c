@@ -1,5 +1,6 @@
 /* lgd-infer: maps from flash photographs. */
 #include "cli/cli.h"
+#include "cli/infer/operands.h"
 #include "cli/infer/options.h"
 #include "cli/infer/pipeline.h"
 #include "infer/model_path.h"
@@ -21,6 +22,9 @@ typedef struct run {
     double shown;           /* photographs that the bar has, and parts of such */
     int jobs, done, failed; /* photographs: all, with complete files, without */
     int steps;              /* refinement steps of each */
+    FILE *poor;             /* a line for each photograph whose maps should be looked at, into text */
+    char *text;
+    size_t size;
 } run;
 
 static int show(lgd_item *item, double done, void *user)
@@ -34,9 +38,11 @@ static int show(lgd_item *item, double done, void *user)
     return cl_interrupted();
 }
 
-/* Says what makes a photograph a poor one: the maps will be guesses. */
-static void look_at(const lgd_item *item, int size)
+/* Says what makes a photograph a poor one: the maps will be guesses. why: of those that should be looked at, in short.
+ */
+static const char *look_at(const lgd_item *item, int size)
 {
+    const char *why = NULL;
     const char *name = item->job->photo;
     const int64_t values = (int64_t)size * size * 3;
     int64_t dark = 0, full = 0, over = 0;
@@ -48,13 +54,17 @@ static void look_at(const lgd_item *item, int size)
     }
     if (size > item->photo_side)
         cl_note("%s: note: upsampled: its square has %d pixels a side and --size is %d", name, item->photo_side, size);
-    if (dark == values) cl_note("%s: warning: the photograph is black: its maps mean nothing", name);
-    else if (full * 10 > values * 9)
+    if (dark == values) {
+        why = "black";
+        cl_note("%s: warning: the photograph is black: its maps mean nothing", name);
+    } else if (full * 10 > values * 9) {
+        why = "overexposed";
         cl_note("%s: warning: the photograph is overexposed (%.0f%% of the values): its maps mean little", name,
                 100.0 * (double)full / (double)values);
-    else if (over > 0)
+    } else if (over > 0)
         cl_note("%s: note: %.1f%% of the values are above 1 and count as 1", name,
                 100.0 * (double)over / (double)values);
+    return why;
 }
 
 /* What was assumed of the camera. */
@@ -94,37 +104,66 @@ static void name_removed(const lgd_item *item)
     cl_note("%s: note: removed from the folder, because they are of another estimate:%s", item->job->photo, names);
 }
 
-static void report(run *r, const lgd_item *item)
+/* How near the maps come to the photograph. */
+static void say_difference(const run *r, const lgd_item *item)
 {
-    cl_progress_end(&r->bar);
+    const char *hint = r->command->iterations == -1 && item->last > FAR ? "; --iterations auto may come nearer"
+                                                                        : ""; /* each step halves what is left */
+    if (item->steps > 0)
+        cl_note("%s: difference from the photograph %.4f at first -> %.4f after %d step%s%s", item->job->photo,
+                item->first, item->last, item->steps, item->steps == 1 ? "" : "s", hint);
+    else cl_note("%s: difference from the photograph %.4f at first", item->job->photo, item->first);
+}
+
+static void say_all(run *r, const lgd_item *item)
+{
     if (item->photos > 0 && item->photos < item->capture.images)
         cl_note("%s: note: the first %d of its %d photographs are used: these weights read no more", item->job->photo,
                 item->photos, item->capture.images);
-    if (item->image) look_at(item, r->command->size);
     if (item->mask) look_at_mask(r->command, item);
+    if (*item->profile)
+        cl_note("%s: warning: its colour profile (%s) cannot be used: sRGB is assumed", item->job->photo,
+                item->profile);
+    const char *why = item->image ? look_at(item, r->command->size) : NULL;
+    if (item->st.code) return;
+    if (!why && item->last > FAR) why = "its maps do not look like it";
+    if (why && r->poor) fprintf(r->poor, "%s: %s\n", item->job->photo, why);
+    if (r->command->outputs & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC | LGD_OUT_ORM))
+        cl_note("%s: base colour and metalness miss diffuse by %.4f and F0 by %.4f (RMS, linear)", item->job->photo,
+                item->written.lost.diffuse, item->written.lost.specular);
+    say_fov(item);
+    if (fabs(item->power - 1) >= 0.005)
+        cl_note("%s: light power %.2f of the %s", item->job->photo, item->power,
+                item->capture.images ? "capture's" : "default");
+    say_difference(r, item);
+}
+
+static void report(run *r, const lgd_item *item)
+{
+    cl_progress_end(&r->bar);
+    if (!r->command->quiet) say_all(r, item);
     if (item->st.code) {
         cl_failed("%s", item->st.message);
         r->failed++;
         return;
     }
     r->done++;
+    if (r->command->quiet) return;
     if (item->written.removed) name_removed(item);
-    if (r->command->outputs & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC | LGD_OUT_ORM) && !r->command->quiet)
-        cl_note("%s: base colour and metalness miss diffuse by %.4f and F0 by %.4f (RMS, linear)", item->job->photo,
-                item->written.lost.diffuse, item->written.lost.specular);
     printf("%s\n", item->job->folder);
     fflush(stdout); /* a reader at the other end of a pipe gets each folder when it is there */
-    if (r->command->quiet) return;
-    say_fov(item);
-    if (fabs(item->power - 1) >= 0.005)
-        cl_note("%s: light power %.2f of the %s", item->job->photo, item->power,
-                item->capture.images ? "capture's" : "default");
-    const char *hint = r->command->iterations == -1 && item->last > FAR ? "; --iterations auto may come nearer"
-                                                                        : ""; /* each step halves what is left */
-    if (item->steps > 0)
-        cl_note("%s: reconstruction RMSE %.4f (R_0) -> %.4f (R_%d)%s", item->job->photo, item->first, item->last,
-                item->steps, hint);
-    else cl_note("%s: reconstruction RMSE %.4f (R_0)", item->job->photo, item->first);
+}
+
+/* How many, how long, which to look at. */
+static void sum_up(run *r, double seconds)
+{
+    cl_note("%d of %d photographs done in %.1f s%s", r->done, r->jobs, seconds,
+            r->poor && fflush(r->poor) == 0 && r->size > 0 ? "; look at:" : "");
+    for (char *line = r->text, *next; line && *line; line = next) {
+        next = strchr(line, '\n');
+        if (next) *next++ = 0;
+        cl_note("  %s", line);
+    }
 }
 
 static void finished(const lgd_item *item, void *user)
@@ -139,21 +178,27 @@ static void finished(const lgd_item *item, void *user)
 
 static int all(run *r, lgd_pipeline *pipeline)
 {
+    const double start = cl_seconds();
+    r->poor = open_memstream(&r->text, &r->size); /* without it no names are told */
     r->bar = cl_progress_start("step", (int64_t)r->jobs * (r->steps + 1));
     lgd_pipeline_run(pipeline, r->model, &(lgd_listener){show, finished, cl_interrupted, r});
     cl_progress_end(&r->bar);
+    if (!r->command->quiet && r->jobs > 1) sum_up(r, cl_seconds() - start);
+    if (r->poor) fclose(r->poor);
+    free(r->text);
     if (cl_interrupted() && r->done + r->failed < r->jobs)
-        return cl_failed("interrupted: %d of %d photographs are done", r->done, r->jobs);
+        return cl_stopped("interrupted: %d of %d photographs are done", r->done, r->jobs);
     if (r->failed > 0 && r->jobs > 1) return cl_failed("%d of %d photographs failed", r->failed, r->jobs);
     return r->failed > 0 ? CL_FAILED : CL_OK;
 }
 
 static void print_help(void)
 {
-    puts("Usage: lgd-infer [options] PHOTO... -o DIR\n"
+    puts("Usage: lgd-infer [options] PHOTO|FOLDER|@LIST... -o DIR\n"
          "       lgd-infer [options] --capture WHERE -o DIR\n"
          "Estimates the material of a flat surface from a photograph taken straight on with a flash beside the lens.\n"
-         "The largest centred square is used.\n");
+         "The largest centred square is used. FOLDER stands for the photographs in it, LIST is a file that names one a "
+         "line.\n");
     cl_argument_help(lgd_infer_arguments, stdout);
     puts("\n"
          "DIR/STEM/ gets diffuse.png, specular.png (sRGB), roughness.png, normal.png (linear), maps.exr (all channels, "
@@ -162,19 +207,32 @@ static void print_help(void)
          "(four light\n"
          "positions). A photograph's files appear together when they are complete. Each finished folder is printed on "
          "standard\n"
-         "output; the reconstruction RMSE before and after refinement goes to standard error. Two photographs with the "
-         "same STEM\n"
+         "output; what was assumed and the difference of the maps' rendering from the photograph (RMSE of linear "
+         "values),\n"
+         "at first and after the steps, go to standard error. Two photographs with the same STEM\n"
          "are refused before any work.\n"
-         "Exit status: 0 done, 1 a photograph failed (the others are done), 2 wrong usage.");
+         "Exit status: 0 done, 1 a photograph failed (the others are done), 2 wrong usage, 130 interrupted (what is "
+         "complete stays).");
 }
+
+static void say_failed(const char *message) { cl_failed("%s", message); }
 
 static int work(const lgd_command *c)
 {
     ts_status st = {0};
+    lgd_operands operands = {0};
     lgd_error error;
     lgd_plan plan;
     char weights[LGD_PATH_MAX];
-    if (lgd_plan_make(c->photo, c->photos, c->out, &plan, &st) != TS_OK) return cl_usage("%s", st.message);
+    if (!*c->capture && lgd_operands_expand(c->photo, c->photos, say_failed, &operands, &st) != TS_OK)
+        return cl_failed("%s", st.message);
+    char *const *photo = *c->capture ? c->photo : operands.photo;
+    const int photos = *c->capture ? c->photos : operands.photos, missing = operands.failed;
+    if (photos == 0) return CL_FAILED;
+    if (lgd_plan_make(photo, photos, c->out, &plan, &st) != TS_OK) {
+        lgd_operands_free(&operands);
+        return cl_usage("%s", st.message);
+    }
     ts_threads_set(c->threads);
     run r = {.command = c, .jobs = plan.jobs, .lock = PTHREAD_MUTEX_INITIALIZER};
     int code = CL_FAILED;
@@ -190,10 +248,12 @@ static int work(const lgd_command *c)
     else {
         r.steps = lgd_command_steps(c, r.model);
         code = all(&r, pipeline);
+        if (code == CL_OK && missing) code = CL_FAILED;
     }
     lgd_pipeline_end(&pipeline);
     lgd_free(&r.model);
     lgd_plan_free(&plan);
+    lgd_operands_free(&operands);
     return code;
 }
 

@@ -76,7 +76,7 @@ const cl_argument lgd_infer_arguments[] = {
      "specular (default), or metallic: base colour and metalness instead of diffuse and specular; the error of the\n"
      "conversion is printed"},
     {MAX_PIXELS, "max-pixels", "N", "refuse photographs with more pixels (default 268435456)"},
-    {'q', "quiet", NULL, "print warnings and errors only"},
+    {'q', "quiet", NULL, "print errors only"},
     {HELP, "help", NULL, "print this help"},
     {VERSION, "version", NULL, "print the version"},
     {0, NULL, NULL, NULL}};

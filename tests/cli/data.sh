@@ -91,7 +91,7 @@ data_interrupted() {
     while [ "$(find "$T/o" -name '*.jpg' 2>/dev/null | wc -l)" -lt 2 ]; do kill -0 $pid 2>/dev/null || fail "it ended: $(cat "$T/err")"; done
     kill -TERM $pid
     wait $pid
-    [ $? -eq 1 ] || fail "does not exit with 1"
+    [ $? -eq 130 ] || fail "does not exit with 130"
     says "$T/err" "interrupted"
     [ "$(find "$T/o" ! -name '*.jpg' -type f | wc -l)" -eq 0 ] || fail "temporary files are left: $(ls "$T/o")"
 }

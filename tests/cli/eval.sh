@@ -121,7 +121,7 @@ interrupted() {
     while [ -z "$(ls "$T/o/images" 2>/dev/null)" ] && [ $n -lt 600 ]; do sleep 0.1; n=$((n + 1)); done
     kill -INT $pid
     wait $pid
-    [ $? -eq 1 ] || fail "exit status is not 1"
+    [ $? -eq 130 ] || fail "exit status is not 130"
     says "$T/err" "interrupted"
     [ "$(ls -A "$T/o")" = images ] || fail "half a result: $(ls -A "$T/o")"
 }

@@ -37,6 +37,7 @@ run_makes_its_files() {
     says "$T/out" "validation at step 10: render RMSE"
     says "$T/err" "step 10/10"
     lines "$T/run/log.csv" 11
+    for name in "first estimate, training" "last step, training" "first estimate, validation" "last step, validation" "</svg>"; do says "$T/run/curve.svg" "$name"; done
     lines "$T/run/val.csv" 3
     for f in best.safetensors last.safetensors checkpoint.safetensors config.ini; do [ -s "$T/run/$f" ] || fail "no $f"; done
     [ -z "$(find "$T/run" -name '.*')" ] || fail "temporary files are left"
@@ -160,7 +161,7 @@ interrupt_saves_and_resume_is_exact() {
         kill -$signal $job
         if [ $signal = HUP ]; then kill -HUP $job 2>/dev/null; fi # a closed terminal sends it twice
         wait $job
-        [ $? -eq 1 ] || fail "SIG$signal: exit status is not 1: $(tail -n 1 "$T/err")"
+        [ $? -eq 130 ] || fail "SIG$signal: exit status is not 130: $(tail -n 1 "$T/err")"
         says "$T/err" "interrupted at step"
         expect 0 train "$@" --resume
         cmp -s "$T/whole/checkpoint.safetensors" "$T/run/checkpoint.safetensors" || fail "SIG$signal: the checkpoint differs"

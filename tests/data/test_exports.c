@@ -1,5 +1,6 @@
 /* What is made of the maps for other people's tools: heights, metalness. */
 #include "data/height.h"
+#include "data/label.h"
 #include "data/metallic.h"
 #include "data/occlusion.h"
 #include "data/seamless.h"
@@ -214,4 +215,23 @@ TEST(metallic_conversion_and_its_error)
     CHECK(e.diffuse + e.specular > 0.05, "no error is reported for what cannot be expressed: %g and %g", e.diffuse,
           e.specular);
     io_material_free(&m);
+}
+
+/* Every letter is another picture, and none leaves its place. */
+TEST(label_letters_differ)
+{
+    static const char letters[] = "abcdefghijklmnopqrstuvwxyz0123456789-";
+    static float seen[sizeof letters - 1][IO_LABEL_HEIGHT * 8 * 3];
+    for (size_t k = 0; k < sizeof letters - 1; k++) {
+        const char text[2] = {letters[k], 0};
+        io_image image = {.width = 8, .height = IO_LABEL_HEIGHT, .channels = 3, .data = seen[k]};
+        io_label(&image, 1, 3, text);
+        float sum = 0;
+        for (int i = 0; i < IO_LABEL_HEIGHT * 8 * 3; i++) sum += seen[k][i];
+        CHECK(sum >= 3 * 5, "'%s' is hardly there", text);
+        for (size_t j = 0; j < k; j++)
+            CHECK(memcmp(seen[j], seen[k], sizeof seen[k]), "'%s' is '%c'", text, letters[j]);
+        io_label(&image, -3, -3, text);
+        io_label(&image, 6, 9, text);
+    }
 }

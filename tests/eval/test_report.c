@@ -1,6 +1,6 @@
 /* The report's files: what they say and that they are what they claim to be. */
 #include "eval/html.h"
-#include "eval/plot.h"
+#include "cli/plot.h"
 #include "eval/text.h"
 #include "tests/test.h"
 #include <math.h>
@@ -167,15 +167,15 @@ TEST(report_of_several_methods)
 
 TEST(report_plot)
 {
-    const ev_point some[] = {
+    const cl_point some[] = {
         {0.1, 0.2, 0, "a"}, {1, 0.1, 0, ""}, {0, 0.1, 0, "zero"}, {1, NAN, 0, "none"}, {INFINITY, 1, 0, ""}};
-    const ev_series series[] = {{"s", some, 5, false}, {"one", some, 1, false}, {"none", some + 3, 1, false}};
+    const cl_series series[] = {{"s", some, 5, false}, {"one", some, 1, false}, {"none", some + 3, 1, false}};
     for (int n = 0; n <= 3; n++) {
         char *text = NULL;
         size_t size;
         FILE *f = open_memstream(&text, &size);
         CHECK(f, "open_memstream");
-        ev_plot_write(f, &(ev_axes){"x <", "y", true}, n == 3 ? series + 1 : series, n == 3 ? 1 : n);
+        cl_plot_write(f, &(cl_axes){"x <", "y", true}, n == 3 ? series + 1 : series, n == 3 ? 1 : n);
         fclose(f);
         CHECK(!strstr(text, "nan") && !strstr(text, "inf") && !strstr(text, "zero"), "%s", text);
         CHECK(strstr(text, "nothing was measured") ? n == 0
@@ -190,13 +190,13 @@ TEST(report_plot)
 
 TEST(report_plot_has_a_linear_axis_too)
 {
-    const ev_point some[] = {{-1, 0.2, 0, ""}, {0, 0.1, 0, "zero"}, {24, 0.3, 0, ""}};
-    const ev_series series[] = {{"s", some, 3, false}, {"level", some, 1, true}};
+    const cl_point some[] = {{-1, 0.2, 0, ""}, {0, 0.1, 0, "zero"}, {24, 0.3, 0, ""}};
+    const cl_series series[] = {{"s", some, 3, false}, {"level", some, 1, true}};
     char *text = NULL;
     size_t size;
     FILE *f = open_memstream(&text, &size);
     CHECK(f, "open_memstream");
-    ev_plot_write(f, &(ev_axes){"T", "y", false}, series, 2);
+    cl_plot_write(f, &(cl_axes){"T", "y", false}, series, 2);
     fclose(f);
     CHECK(strstr(text, " 70,195.0 550,195.0"), "a level goes from side to side: %s", text);
     CHECK(count(text, "<circle") == 6 && strstr(text, "zero") && strstr(text, ">10</text>") &&
@@ -207,15 +207,15 @@ TEST(report_plot_has_a_linear_axis_too)
 
 TEST(report_plot_labels_keep_apart)
 {
-    const ev_point near[] = {{0.2, 0.2, 0, "label 0"},  {0.2, 0.2, 0, "label 1"}, {0.2, 0.2, 0, "label 2"},
+    const cl_point near[] = {{0.2, 0.2, 0, "label 0"},  {0.2, 0.2, 0, "label 1"}, {0.2, 0.2, 0, "label 2"},
                              {0.21, 0.2, 0, "label 3"}, {0.2, 0.2, 0, "label 4"}, {0.9, 0.9, 0, ""},
                              {-0.9, 0, 0, ""}};
-    const ev_series series[] = {{"s", near, 7, false}};
+    const cl_series series[] = {{"s", near, 7, false}};
     char *text = NULL;
     size_t size;
     FILE *f = open_memstream(&text, &size);
     CHECK(f, "open_memstream");
-    ev_plot_write(f, &(ev_axes){"x", "y", false}, series, 1);
+    cl_plot_write(f, &(cl_axes){"x", "y", false}, series, 1);
     fclose(f);
     double x[6], y[6];
     int labels = 0;

@@ -1,0 +1,129 @@
+#include "cli/infer/operands.h"
+#include "data/file.h"
+#include <dirent.h>
+#include <errno.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+#define LIST_LIMIT ((size_t)1 << 26) /* bytes of a list: a larger file is none */
+
+static const char *const endings[] = {"jpg", "jpeg", "png", "heic", "heif", "avif", "webp", "tif", "tiff",
+                                      "exr", "hdr",  "bmp", "tga",  "ppm",  "pgm",  "dng",  "jp2", "jxl"};
+
+static ts_code add(lgd_operands *all, const char *name, ts_status *st)
+{
+    if (all->photos == all->capacity) {
+        const int capacity = all->capacity ? 2 * all->capacity : 64;
+        char **more = realloc(all->photo, (size_t)capacity * sizeof *more);
+        if (!more) return ts_fail(st, TS_NOMEM, "out of memory for %d photographs", capacity);
+        all->photo = more;
+        all->capacity = capacity;
+    }
+    if (!(all->photo[all->photos] = strdup(name)))
+        return ts_fail(st, TS_NOMEM, "out of memory for %d photographs", all->photos);
+    all->photos++;
+    return TS_OK;
+}
+
+static bool is_image(const char *name)
+{
+    const char *dot = strrchr(name, '.');
+    if (name[0] == '.' || !dot) return false;
+    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
+        if (strcasecmp(dot + 1, endings[i]) == 0) return true;
+    return false;
+}
+
+static int by_name(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
+
+static ts_code add_folder(lgd_operands *all, const char *folder, ts_status *st)
+{
+    const int first = all->photos;
+    const size_t length = strlen(folder);
+    DIR *d = opendir(folder);
+    if (!d) return ts_fail(st, TS_IO, "%s: cannot be read: %s", folder, strerror(errno));
+    ts_code code = TS_OK;
+    for (struct dirent *e; !code && (e = readdir(d));) {
+        char *path = NULL;
+        struct stat info;
+        if (!is_image(e->d_name)) continue;
+        if (asprintf(&path, "%s%s%s", folder, length && folder[length - 1] == '/' ? "" : "/", e->d_name) < 0) {
+            path = NULL; /* undefined after a failure */
+            code = ts_fail(st, TS_NOMEM, "%s: out of memory", folder);
+        } else if (stat(path, &info) == 0 && S_ISREG(info.st_mode)) code = add(all, path, st);
+        free(path);
+    }
+    closedir(d);
+    if (!code && all->photos == first)
+        code = ts_fail(st, TS_IO, "%s: there is no photograph in this folder: name one with JPEG, PNG or HEIC files",
+                       folder);
+    if (!code) qsort(all->photo + first, (size_t)(all->photos - first), sizeof *all->photo, by_name);
+    return code;
+}
+
+static ts_code add_operand(lgd_operands *all, const char *name, ts_status *st)
+{
+    struct stat info;
+    return stat(name, &info) == 0 && S_ISDIR(info.st_mode) ? add_folder(all, name, st) : add(all, name, st);
+}
+
+/* A failure of one is reported; what is returned ends the work. */
+static ts_code take(lgd_operands *all, const char *name, void (*failed)(const char *message), ts_status *st)
+{
+    ts_status own = {0};
+    if (add_operand(all, name, &own) == TS_NOMEM) return ts_fail(st, TS_NOMEM, "%s", own.message);
+    if (own.code) {
+        failed(own.message);
+        all->failed++;
+    }
+    return TS_OK;
+}
+
+/* A byte-order mark, carriage returns and blank lines are passed over. */
+static ts_code take_list(lgd_operands *all, const char *list, void (*failed)(const char *message), ts_status *st)
+{
+    char *text = NULL;
+    size_t size = 0;
+    int names = 0;
+    ts_status own = {0};
+    ts_code code = TS_OK;
+    if (io_read_bytes(list, LIST_LIMIT, &text, &size, &own) == TS_OK) {
+        char *line = text + (size >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0 ? 3 : 0);
+        for (char *next; line && !code; line = next) {
+            if ((next = strchr(line, '\n'))) *next++ = 0;
+            const size_t length = strlen(line);
+            if (length && line[length - 1] == '\r') line[length - 1] = 0;
+            if (*line) names++, code = take(all, line, failed, st);
+        }
+        if (!names && !code) ts_fail(&own, TS_IO, "%s: the list has no names: write one photograph a line", list);
+    }
+    if (own.code) {
+        failed(own.message);
+        all->failed++;
+    }
+    free(text);
+    return code;
+}
+
+ts_code lgd_operands_expand(char *const *operand, int count, void (*failed)(const char *message), lgd_operands *all,
+                            ts_status *st)
+{
+    ts_code code = TS_OK;
+    *all = (lgd_operands){0};
+    for (int i = 0; i < count && !code; i++)
+        code = operand[i][0] == '@' && operand[i][1] ? take_list(all, operand[i] + 1, failed, st)
+                                                     : take(all, operand[i], failed, st);
+    if (code) lgd_operands_free(all);
+    return code;
+}
+
+void lgd_operands_free(lgd_operands *all)
+{
+    for (int i = 0; i < all->photos; i++) free(all->photo[i]);
+    free(all->photo);
+    *all = (lgd_operands){0};
+}
