@@ -84,8 +84,9 @@ ROOMS := tensor tensor/conv autograd render nn nn/weights data data/image data/m
 LIB_C := $(filter-out %main.c,$(wildcard $(ROOMS:%=%/*.c)))
 KERNELS := $(wildcard tensor/kernels/*.c render/kernels/*.c)
 OPS := $(sort $(wildcard autograd/op_*.c render/op_*.c))
+PAGES := $(sort $(wildcard infer/page/*.* eval/page/*.*))
 OBJ := $(BUILD)/obj
-LIB_OBJ := $(LIB_C:%.c=$(OBJ)/%.o) $(OBJ)/gen/op_list.o \
+LIB_OBJ := $(LIB_C:%.c=$(OBJ)/%.o) $(OBJ)/gen/op_list.o $(OBJ)/gen/pages.o \
   $(foreach isa,$(ISAS),$(KERNELS:%.c=$(OBJ)/%.$(isa).o))
 # Everything but the programs' main functions: what the programs are linked with.
 INTERNAL := $(OBJ)/internal.a
@@ -171,7 +172,7 @@ $(call changed,prefix,$(PREFIX))
 $(OBJ)/data/folders.o: $(BUILD)/gen/prefix
 $(OBJ)/data/folders.o: CPPFLAGS_ALL += -DLGD_PREFIX='"$(PREFIX)"'
 
-$(OBJ)/%.o: %.c $(BUILD)/gen/flags | $(BUILD)/gen/ops.h
+$(OBJ)/%.o: %.c $(BUILD)/gen/flags | $(BUILD)/gen/ops.h $(BUILD)/gen/pages.h
 	$(call step,CC,$<)
 	@mkdir -p $(@D)
 	$(Q)$(CC) $(CPPFLAGS_ALL) $(if $(filter data/image/% nn/weights/%,$<),$(PKG_CFLAGS)) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
@@ -213,6 +214,18 @@ $(BUILD)/gen/op_list.c: $(OPS) Makefile
 	  for f in $(basename $(notdir $(OPS))); do echo "extern const ag_op $$f;"; done; \
 	  echo 'const ag_op *const ag_op_list[] = {'; \
 	  for f in $(basename $(notdir $(OPS))); do echo "    &$$f,"; done; echo '    0};'; } > $@
+
+# The files that web pages are made of, as strings: infer/page/view.css is page_view_css.
+page_name = page_$(subst .,_,$(notdir $(1)))
+$(BUILD)/gen/pages.h: $(PAGES) Makefile
+	@mkdir -p $(@D)
+	@{ echo '/* Made by make from infer/page/ and eval/page/. */'; \
+	  $(foreach f,$(PAGES),echo 'extern const char $(call page_name,$f)[];';) } > $@.new
+	@cmp -s $@.new $@ && rm $@.new || mv $@.new $@
+$(BUILD)/gen/pages.c: $(PAGES) Makefile
+	@mkdir -p $(@D)
+	@{ echo '#include "pages.h"'; $(foreach f,$(PAGES),echo 'const char $(call page_name,$f)[] ='; \
+	  od -An -v -to1 $f | sed 's/ *\([0-7][0-7][0-7]\)/\\\1/g;s/.*/"&"/'; echo ';';) } > $@
 
 deps:
 	@sh .ci/deps.sh $(PKG) $(PKG_IMAGE)

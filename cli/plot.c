@@ -1,4 +1,5 @@
 #include "cli/plot.h"
+#include "data/html.h"
 #include <math.h>
 #include <string.h>
 
@@ -9,17 +10,6 @@ enum { WIDTH = 760, HEIGHT = 420, LEFT = 70, RIGHT = 210, TOP = 20, BOTTOM = 50,
 static const char *const colours[] = {"#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00",
                                       "#56b4e9", "#000000", "#8c564b", "#7f7f7f", "#9467bd"};
 #define COLOUR(s) colours[(size_t)(s) % (sizeof colours / sizeof *colours)]
-
-void cl_put_text(FILE *f, const char *text)
-{
-    for (; *text; text++) switch (*text) {
-        case '&': fputs("&amp;", f); break;
-        case '<': fputs("&lt;", f); break;
-        case '>': fputs("&gt;", f); break;
-        case '"': fputs("&quot;", f); break;
-        default: fputc(*text, f);
-        }
-}
 
 typedef struct frame {
     double x0, x1, y0, y1; /* of x its place */
@@ -96,10 +86,10 @@ static void draw_axes(FILE *f, const frame *r, const char *x_title, const char *
         for (double x = ceil(r->x0 / unit) * unit + 0.0; x <= r->x1; x += unit) tick(f, r, x, true); /* + 0: no -0 */
     }
     fprintf(f, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">", (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 10);
-    cl_put_text(f, x_title);
+    io_put_text(f, x_title);
     fprintf(f, "</text>\n<text transform=\"translate(16 %d) rotate(-90)\" text-anchor=\"middle\">",
             (TOP + HEIGHT - BOTTOM) / 2);
-    cl_put_text(f, y_title);
+    io_put_text(f, y_title);
     fputs("</text>\n", f);
 }
 
@@ -127,7 +117,7 @@ static void put_label(FILE *f, labels *all, double x, double y, const char *text
         if (!free || all->count == (int)(sizeof all->box / sizeof *all->box)) continue;
         all->box[all->count].x = at_x, all->box[all->count].y = at_y, all->box[all->count++].width = width;
         fprintf(f, "<text x=\"%.1f\" y=\"%.1f\" font-size=\"10\">", at_x, at_y);
-        cl_put_text(f, text);
+        io_put_text(f, text);
         fputs("</text>", f);
         return;
     }
@@ -149,14 +139,14 @@ static void draw(FILE *f, const frame *r, const cl_series *series, int s, labels
         if (!shown(r, p)) continue;
         fprintf(f, "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%s\" fill=\"%s\"><title>", across(r, p->x), down(r, p->y),
                 radius, COLOUR(s));
-        cl_put_text(f, series->name);
+        io_put_text(f, series->name);
         fprintf(f, " %s: %.4g, %.4f &#177; %.4f</title></circle>", p->label, p->x, p->y, p->deviation);
         if (p->label[0]) put_label(f, all, across(r, p->x), down(r, p->y), p->label);
         fputs("\n", f);
     }
     fprintf(f, "<circle cx=\"%d\" cy=\"%d\" r=\"3.5\" fill=\"%s\"/><text x=\"%d\" y=\"%d\">", WIDTH - RIGHT + 14,
             legend, COLOUR(s), WIDTH - RIGHT + 24, legend + 4);
-    cl_put_text(f, series->name);
+    io_put_text(f, series->name);
     fputs("</text>\n", f);
 }
 

@@ -17,9 +17,6 @@ typedef struct cl_series {
     bool level; /* one point, drawn as a line from side to side: it does not depend on x */
 } cl_series;
 
-/* Text for HTML and SVG: & < > " as entities. */
-void cl_put_text(FILE *f, const char *text);
-
 typedef struct cl_axes {
     const char *x_title, *y_title;
     bool log_x;

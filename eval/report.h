@@ -1,7 +1,7 @@
 /* Scores of all materials, as a table, CSV files and a report. */
 #ifndef EV_REPORT_H
 #define EV_REPORT_H
-#include "eval/metrics/metrics.h"
+#include "eval/sheet.h"
 #include <stdio.h>
 
 /* A method's results: columns first .. first + points - 1 of every material. */
@@ -19,6 +19,7 @@ typedef struct ev_result {
     double *peak;        /* a method each: FLOP/s that the machine could do beside it */
     unsigned char **png; /* a method each: a picture for the report, or NULL; owned */
     size_t *png_size;
+    ev_sheet_shape sheet; /* of the pictures */
 } ev_result;
 
 typedef struct ev_report {

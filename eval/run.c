@@ -153,6 +153,7 @@ static ts_code one(ev_run *r, bench *b, int set, int m, int64_t number, const ev
     memcpy(to->row + s->first, b->row, (size_t)s->points * sizeof *to->row);
     memcpy(to->seconds + s->first, b->seconds, (size_t)s->points * sizeof *to->seconds);
     to->peak[m] = ts_fma_peak();
+    to->sheet = ev_sheet_shape_of(c);
     to->png[m] = png;
     to->png_size[m] = png_size;
     return TS_OK;

@@ -4,6 +4,7 @@
 #include "render/render.h"
 #include "tensor/resize.h"
 #include <math.h>
+#include <stdio.h>
 
 enum { ROWS = 3, RENDERINGS = 3, COLUMNS = 1 + LGD_MAP_PANELS + RENDERINGS, PHOTO_COLUMNS = 1 + LGD_MAP_PANELS + 1 };
 
@@ -84,6 +85,32 @@ ts_code ev_sheet_write(const char *path, const ev_case *c, const float *first, c
     if (!code) code = io_write_png(path, &sheet, 8, true, st);
     io_image_free(&sheet);
     return code;
+}
+
+ev_sheet_shape ev_sheet_shape_of(const ev_case *c)
+{
+    if (only_photo(c)) return (ev_sheet_shape){EV_SHEET_ALONE, columns_of(c), c->peer ? 2 : 1, 1};
+    return (ev_sheet_shape){c->capture ? EV_SHEET_CAPTURE : EV_SHEET_MAPS, columns_of(c), ROWS, c->inputs};
+}
+
+const char *ev_sheet_column(const ev_sheet_shape *shape, int column, char label[EV_SHEET_LABEL])
+{
+    static const char *const maps[] = {"diffuse", "specular", "roughness", "normal"};
+    if (shape->kind == EV_SHEET_CAPTURE)
+        snprintf(label, EV_SHEET_LABEL, "photo %d%s", column + 1, column < shape->inputs ? ", input" : "");
+    else if (column == 0) return shape->kind == EV_SHEET_ALONE ? "photograph" : "flash picture";
+    else if (column <= LGD_MAP_PANELS) return maps[column - 1];
+    else if (shape->kind == EV_SHEET_ALONE) return "rendered, as bright";
+    else snprintf(label, EV_SHEET_LABEL, "rendering %d", column - LGD_MAP_PANELS);
+    return label;
+}
+
+const char *ev_sheet_row(const ev_sheet_shape *shape, int row)
+{
+    static const char *const compared[] = {"truth", "estimate", "difference, \303\2274"},
+                             *const alone[] = {"estimate", "peer"};
+    if (shape->kind == EV_SHEET_CAPTURE && row == 0) return "photograph";
+    return shape->kind == EV_SHEET_ALONE ? alone[row] : compared[row];
 }
 
 /* The third row from the first two, as they are shown. */

@@ -1,23 +1,11 @@
 /* glTF 2.0 documents, and the same with their images as one binary file (section 4 of the specification). */
 #include "data/file.h"
+#include "data/html.h"
 #include "infer/export.h"
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static void base64(FILE *f, const unsigned char *bytes, size_t n)
-{
-    static const char digit[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    for (size_t i = 0; i < n; i += 3) {
-        const uint32_t v = (uint32_t)bytes[i] << 16 | (i + 1 < n ? (uint32_t)bytes[i + 1] << 8 : 0) |
-            (i + 2 < n ? bytes[i + 2] : 0);
-        fputc(digit[v >> 18], f);
-        fputc(digit[v >> 12 & 63], f);
-        fputc(i + 1 < n ? digit[v >> 6 & 63] : '=', f);
-        fputc(i + 2 < n ? digit[v & 63] : '=', f);
-    }
-}
 
 /* Little-endian, as glTF wants it on any machine. */
 static unsigned char *put_float(unsigned char *to, float v)
@@ -116,7 +104,7 @@ static void print_gltf(FILE *f, const lgd_gltf *kind, const size_t *size)
     if (!size) {
         square(bytes);
         fputs(", \"uri\": \"data:application/octet-stream;base64,", f);
-        base64(f, bytes, sizeof bytes);
+        io_put_base64(f, bytes, sizeof bytes);
         fputc('"', f);
     }
     fputs("}]\n}\n", f);

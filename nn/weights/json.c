@@ -1,4 +1,5 @@
 #include "nn/weights/json.h"
+#include "tensor/utf8.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -35,23 +36,6 @@ bool json_end(json_reader *r)
     skip(r);
     if (r->at < r->size) json_fail(r, "something follows the end of the JSON text");
     return !r->failed;
-}
-
-/* No overlong forms, surrogates or values above U+10FFFF (RFC 3629, section 4). */
-int json_utf8(const unsigned char *s, size_t n)
-{
-    unsigned char c = s[0], lo = 0x80, hi = 0xbf;
-    if (c < 0x80) return 1;
-    int length = c >= 0xc2 && c <= 0xdf ? 2 : (c & 0xf0) == 0xe0 ? 3 : c >= 0xf0 && c <= 0xf4 ? 4 : 0;
-    if (!length || (size_t)length > n) return 0;
-    if (c == 0xe0) lo = 0xa0;
-    if (c == 0xed) hi = 0x9f;
-    if (c == 0xf0) lo = 0x90;
-    if (c == 0xf4) hi = 0x8f;
-    if (s[1] < lo || s[1] > hi) return 0;
-    for (int i = 2; i < length; i++)
-        if (s[i] < 0x80 || s[i] > 0xbf) return 0;
-    return length;
 }
 
 static bool hex4(json_reader *r, unsigned *code)
@@ -126,7 +110,7 @@ const char *json_string(json_reader *r)
             if (!found && !put_unicode(r)) return NULL;
             continue;
         }
-        int n = c < 0x20 ? 0 : json_utf8((const unsigned char *)r->text + r->at, r->size - r->at);
+        int n = c < 0x20 ? 0 : ts_utf8((const unsigned char *)r->text + r->at, r->size - r->at);
         if (!n) {
             json_fail(r, c < 0x20 ? "a control character in a string" : "not UTF-8");
             return NULL;
@@ -165,7 +149,7 @@ int64_t json_escape(const char *s, char *out)
     for (size_t i = 0; i < n;) {
         unsigned char c = (unsigned char)s[i];
         char code[8];
-        int length = json_utf8((const unsigned char *)s + i, n - i), written = length;
+        int length = ts_utf8((const unsigned char *)s + i, n - i), written = length;
         if (!length) return -1;
         if (c == '"' || c == '\\') written = snprintf(code, sizeof code, "\\%c", c);
         else if (c < 0x20) written = snprintf(code, sizeof code, "\\u%04x", c);

@@ -30,9 +30,6 @@ bool json_integer(json_reader *r, int64_t *value);
 /* Only white space is left. */
 bool json_end(json_reader *r);
 
-/* Length of the UTF-8 character at s (n > 0 bytes are there), 0 when it is not one. */
-int json_utf8(const unsigned char *s, size_t n);
-
 /* Bytes of s as the inside of a JSON string; out may be NULL to measure. Returns the number of bytes, -1 when s is not
  * UTF-8. */
 int64_t json_escape(const char *s, char *out);

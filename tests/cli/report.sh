@@ -42,3 +42,20 @@ opens_and_sorts() {
 }
 
 check report_opens_and_sorts opens_and_sorts
+
+# A phone's width, and the names of what pictures show: of known maps, a capture, a photograph.
+names_columns_and_fits_a_phone() {
+    command -v chromium >/dev/null || command -v chromium-browser >/dev/null || command -v google-chrome >/dev/null ||
+        skip "no chromium is installed"
+    command -v python3 >/dev/null || skip "python3 is not installed"
+    [ -f "$MODEL" ] || fail "$MODEL is absent: the weights that the project ships"
+    mkdir "$T/photos"
+    cp demo/flash.jpg "$T/photos"
+    expect 0 "$BIN/lgd-data" --format captures --count 1 --size 32 -o "$T/c"
+    expect 0 "$BIN/lgd-eval" --fast --size 32 -i 1 --threads 1 --told --set procedural:3,1 --set "multiview:$T/c" -o "$T/known"
+    expect 0 "$BIN/lgd-eval" --fast --size 32 -i 1 --threads 1 --set "photos:$T/photos" -o "$T/photo"
+    TMPDIR=$T timeout 200 python3 tests/browser/page.py report "$T/known/report.html" "$T/photo/report.html" >"$T/out" 2>"$T/err" ||
+        fail "$(tail -n 1 "$T/err")"
+}
+
+check report_names_columns_and_fits_a_phone names_columns_and_fits_a_phone

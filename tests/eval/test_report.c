@@ -1,6 +1,7 @@
 /* The report's files: what they say and that they are what they claim to be. */
 #include "eval/html.h"
 #include "cli/plot.h"
+#include "data/html.h"
 #include "eval/text.h"
 #include "tests/test.h"
 #include <math.h>
@@ -62,6 +63,7 @@ static void make(ev_report *r, int methods)
         if (i != 1) continue;
         to->png[0] = (unsigned char *)strdup(png);
         to->png_size[0] = strlen(png);
+        to->sheet = (ev_sheet_shape){EV_SHEET_MAPS, 8, 3, 1};
     }
 }
 
@@ -76,6 +78,8 @@ TEST(report_html)
     CHECK(strstr(text, "data:image/png;base64,YW55IGJ5dGVz\""), "the picture is not there");
     CHECK(count(text, "http://") == 1 && count(text, "https://") == 0, "something is loaded"); /* SVG's namespace */
     CHECK(!strstr(text, "nan") && !strstr(text, "inf"), "a number is none");
+    CHECK(!strstr(text, "{{") && count(text, "<span>") == 8 + 3 && strstr(text, "<span>rendering 3</span></div>"),
+          "the names of the picture's columns and rows");
     CHECK(count(text, "data-ssim=\"\"") == 1 && count(text, "data-exposure=\"\"") == 3 &&
               strstr(text, "data-render=\"0.250000\""),
           "the sort keys");
@@ -234,7 +238,7 @@ TEST(report_plot_labels_keep_apart)
 
 static void put_json(const char *text, FILE *f) { ev_json_string(f, text); }
 static void put_csv(const char *text, FILE *f) { ev_csv_field(f, text); }
-static void put_html(const char *text, FILE *f) { ev_put_text(f, text); }
+static void put_html(const char *text, FILE *f) { io_put_text(f, text); }
 
 /* File names are bytes: what is no UTF-8 is written as hexadecimal digits, the rest as it is. */
 TEST(report_names_are_utf8)
