@@ -20,7 +20,8 @@ static const char *const meaning[LGD_OUTPUTS] = {
     "MaterialX 1.39: the material",
     "glTF 2.0 as one file: a square with the material",
     "linear, 16 bit: red ambient occlusion, green roughness, blue metalness",
-    "linear, 8 bit: ambient occlusion of the height, 1 is open"};
+    "linear, 8 bit: ambient occlusion of the height, 1 is open",
+    "a page for browsers: the material under a light that follows the pointer"};
 
 static void print_scene(FILE *f, const lgd_photo *p, const lgd_order *order)
 {

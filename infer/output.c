@@ -3,6 +3,7 @@
 #include "infer/derived.h"
 #include "infer/export.h"
 #include "infer/meta.h"
+#include "infer/page.h"
 #include "render/render.h"
 #include "render/scene.h"
 #include "tensor/maps.h"
@@ -19,13 +20,13 @@
 
 enum { PATH_LENGTH = 4096 };
 
-const char *const lgd_output_names[LGD_OUTPUTS] = {"diffuse", "specular",  "roughness", "normal",   "exr",
-                                                   "render",  "preview",   "basecolor", "metallic", "height",
-                                                   "gltf",    "materialx", "glb",       "orm",      "ao"};
-const char *const lgd_files[LGD_FILES] = {"diffuse.png",  "specular.png", "roughness.png", "normal.png",
-                                          "maps.exr",     "render.png",   "preview.png",   "basecolor.png",
-                                          "metallic.png", "height.png",   "material.gltf", "material.mtlx",
-                                          "material.glb", "orm.png",      "occlusion.png", "meta.txt"};
+const char *const lgd_output_names[LGD_OUTPUTS] = {"diffuse", "specular",  "roughness", "normal", "exr",  "render",
+                                                   "preview", "basecolor", "metallic",  "height", "gltf", "materialx",
+                                                   "glb",     "orm",       "ao",        "page"};
+const char *const lgd_files[LGD_FILES] = {
+    "diffuse.png",  "specular.png",  "roughness.png", "normal.png", "maps.exr",      "render.png",
+    "preview.png",  "basecolor.png", "metallic.png",  "height.png", "material.gltf", "material.mtlx",
+    "material.glb", "orm.png",       "occlusion.png", "view.html",  "meta.txt"};
 
 ts_code lgd_output_parse(const char *list, unsigned *which, ts_status *st)
 {
@@ -122,21 +123,24 @@ static ts_code write_render(const char *folder, const io_material *m, const lgd_
     return write_strip(folder, "render.png", &s, st);
 }
 
-/* Seen from as far away as the photograph. */
+rd_view lgd_preview_view(int index, const lgd_photo *photo)
+{
+    rd_view view = rd_preview_view(index, LGD_PREVIEW_LIGHTS);
+    view.camera[2] = photo->camera[2];
+    return view;
+}
+
 static ts_code write_preview(const char *folder, const io_material *m, const lgd_photo *photo, ts_status *st)
 {
     strip s = {.m = m, .panels = LGD_PREVIEW_LIGHTS};
-    for (int i = 0; i < s.panels; i++) {
-        s.view[i] = rd_preview_view(i, s.panels);
-        s.view[i].camera[2] = photo->camera[2];
-    }
+    for (int i = 0; i < s.panels; i++) s.view[i] = lgd_preview_view(i, photo);
     return write_strip(folder, "preview.png", &s, st);
 }
 
 /* What is made in one go; bits of which. Slow ones first, so that two threads end together. */
-static const unsigned portions[] = {LGD_OUT_EXR,    LGD_DERIVED,       LGD_OUT_PREVIEW, LGD_OUT_NORMAL,
-                                    LGD_OUT_RENDER, LGD_OUT_ROUGHNESS, LGD_OUT_DIFFUSE, LGD_OUT_SPECULAR,
-                                    LGD_OUT_GLTF,   LGD_OUT_MATERIALX};
+static const unsigned portions[] = {LGD_OUT_EXR,      LGD_OUT_PAGE,   LGD_DERIVED,       LGD_OUT_PREVIEW,
+                                    LGD_OUT_NORMAL,   LGD_OUT_RENDER, LGD_OUT_ROUGHNESS, LGD_OUT_DIFFUSE,
+                                    LGD_OUT_SPECULAR, LGD_OUT_GLTF,   LGD_OUT_MATERIALX};
 enum { PORTIONS = sizeof portions / sizeof *portions };
 
 /* The bits of data/material.h. */
@@ -157,7 +161,7 @@ static unsigned map_bits(unsigned which)
 
 /* What is written, of a photograph. */
 typedef struct task {
-    const char *folder;
+    const char *folder, *stem;
     const io_material *m, *estimate;
     const lgd_photo *photo;
     const lgd_order *order;
@@ -172,6 +176,9 @@ static ts_code write_portion(const task *t, unsigned which, lgd_output_result *f
     case 0: return TS_OK;
     case LGD_OUT_RENDER: return write_render(t->folder, t->estimate, t->photo, st);
     case LGD_OUT_PREVIEW: return write_preview(t->folder, t->m, t->photo, st);
+    case LGD_OUT_PAGE:
+        return join(path, t->folder, "view.html", st) ? st->code
+                                                      : lgd_write_page(path, t->stem, t->m, t->photo, t->order, st);
     case LGD_OUT_GLTF:
         return join(path, t->folder, "material.gltf", st) ? st->code : lgd_write_gltf(path, &t->gltf, st);
     case LGD_OUT_MATERIALX:
@@ -289,7 +296,7 @@ ts_code lgd_output_write(const char *parent, const char *stem, const io_material
     /* inside the folder when it exists: it may lie on another file system than its parent */
     if (ts_hidden_folder(there ? folder : parent, &hidden, &lock, st) != TS_OK) return st->code;
     mark_of(m, order->directx, mark);
-    const task t = {hidden, m, estimate, photo, order, {order->metallic, order->repeats}, mark};
+    const task t = {hidden, stem, m, estimate, photo, order, {order->metallic, order->repeats}, mark};
     ts_code code = write_all(&t, r, st);
     bool moves = there;
     if (!code && !there && rename(hidden, folder) != 0) {

@@ -22,9 +22,10 @@ enum {
     LGD_OUT_MATERIALX = 1 << 11, /* material.mtlx */
     LGD_OUT_GLB = 1 << 12,       /* material.glb: the same as one file */
     LGD_OUT_ORM = 1 << 13,       /* orm.png, linear, 16 bit: occlusion, roughness, metalness */
-    LGD_OUT_AO = 1 << 14         /* occlusion.png, linear, 8 bit (data/occlusion.h) */
+    LGD_OUT_AO = 1 << 14,        /* occlusion.png, linear, 8 bit (data/occlusion.h) */
+    LGD_OUT_PAGE = 1 << 15       /* view.html: a page that lights the material (infer/page.h) */
 };
-enum { LGD_OUTPUTS = 15, LGD_FILES = LGD_OUTPUTS + 1, LGD_PREVIEW_LIGHTS = 4 };
+enum { LGD_OUTPUTS = 16, LGD_FILES = LGD_OUTPUTS + 1, LGD_PREVIEW_LIGHTS = 4 };
 #define LGD_OUT_DEFAULT 0x7fu
 extern const char *const lgd_output_names[LGD_OUTPUTS];
 extern const char *const lgd_files[LGD_FILES]; /* the file of each, then meta.txt */

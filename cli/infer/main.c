@@ -1,5 +1,6 @@
 /* lgd-infer: maps from flash photographs. */
 #include "cli/cli.h"
+#include "cli/infer/index.h"
 #include "cli/infer/operands.h"
 #include "cli/infer/options.h"
 #include "cli/infer/pipeline.h"
@@ -25,6 +26,8 @@ typedef struct run {
     FILE *poor;             /* a line for each photograph whose maps should be looked at, into text */
     char *text;
     size_t size;
+    lgd_index index;
+    ts_status index_st;
 } run;
 
 static int show(lgd_item *item, double done, void *user)
@@ -173,6 +176,7 @@ static void finished(const lgd_item *item, void *user)
     pthread_mutex_lock(&r->lock);
     r->shown += 1 - item->shown; /* of one that failed or ended early too */
     report(r, item);
+    if (!r->index_st.code) lgd_index_add(&r->index, item, &r->index_st);
     pthread_mutex_unlock(&r->lock);
 }
 
@@ -217,6 +221,15 @@ static void print_help(void)
 
 static void say_failed(const char *message) { cl_failed("%s", message); }
 
+/* Once everything is done, or nothing could be. */
+static int end_index(run *r, int code)
+{
+    const bool any = r->index.materials + r->index.failed > 0;
+    if (lgd_index_end(&r->index, r->command->out, &r->index_st) != TS_OK) return cl_failed("%s", r->index_st.message);
+    if (any && !r->command->quiet) cl_note("%s/%s shows all of them", r->command->out, LGD_INDEX_NAME);
+    return code;
+}
+
 static int work(const lgd_command *c)
 {
     ts_status st = {0};
@@ -235,6 +248,13 @@ static int work(const lgd_command *c)
     }
     ts_threads_set(c->threads);
     run r = {.command = c, .jobs = plan.jobs, .lock = PTHREAD_MUTEX_INITIALIZER};
+    /* Of a lone photograph its page is enough. */
+    if (c->outputs & LGD_OUT_PAGE && (photos > 1 || strcmp(photo[0], c->photo[0]) != 0) &&
+        lgd_index_start(&r.index, &plan, c->out, &st) != TS_OK) {
+        lgd_plan_free(&plan);
+        lgd_operands_free(&operands);
+        return cl_usage("%s", st.message);
+    }
     int code = CL_FAILED;
     bool published = false;
     lgd_pipeline *pipeline = NULL;
@@ -250,6 +270,7 @@ static int work(const lgd_command *c)
         code = all(&r, pipeline);
         if (code == CL_OK && missing) code = CL_FAILED;
     }
+    code = end_index(&r, code);
     lgd_pipeline_end(&pipeline);
     lgd_free(&r.model);
     lgd_plan_free(&plan);

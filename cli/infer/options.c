@@ -66,7 +66,8 @@ const cl_argument lgd_infer_arguments[] = {
      "files to write, separated by commas: diffuse, specular, roughness, normal, exr, render, preview (default: all\n"
      "of these), basecolor, metallic, height, ao (ambient occlusion), orm (occlusion, roughness and metalness in "
      "one),\n"
-     "gltf, glb (glTF as one file), materialx; those of another estimate in DIR/STEM/ are removed"},
+     "gltf, glb (glTF as one file), materialx, page (view.html lights the material in a browser; of several\n"
+     "photographs index.html too); those of another estimate in DIR/STEM/ are removed"},
     {AO, "ao", NULL, "also write occlusion.png: ambient occlusion of the height"},
     {SEAMLESS, "seamless", NULL,
      "all maps repeat without a visible border: the same seam is cut through all of them; 7/8 of the square remain"},

@@ -1,0 +1,142 @@
+#include "cli/infer/index.h"
+#include "data/file.h"
+#include "data/html.h"
+#include "infer/page.h"
+#include "infer/panels.h"
+#include "pages.h"
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+enum { PANEL = 128, LIGHT = 1 /* upper left, of the preview's */ };
+
+static ts_code check(const lgd_plan *plan, const char *folder, ts_status *st)
+{
+    struct stat there, photo;
+    char *path = NULL;
+    ts_code code = TS_OK;
+    if (asprintf(&path, "%s/%s", folder, LGD_INDEX_NAME) < 0) return ts_fail(st, TS_NOMEM, "out of memory");
+    const bool exists = stat(path, &there) == 0;
+    if (exists && S_ISDIR(there.st_mode)) code = ts_fail(st, TS_INVALID, "%s: is in the way: it is a folder", path);
+    for (int i = 0; i < plan->jobs && !code; i++) {
+        const char *name = plan->job[i].photo;
+        if (strcmp(plan->job[i].stem, LGD_INDEX_NAME) == 0)
+            code = ts_fail(st, TS_INVALID, "%s would be written to %s, which is the page of all: rename it", name,
+                           path);
+        else if (exists && stat(name, &photo) == 0 && photo.st_dev == there.st_dev && photo.st_ino == there.st_ino)
+            code = ts_fail(st, TS_INVALID, "%s would replace the photograph %s: use another output folder", path, name);
+    }
+    free(path);
+    return code;
+}
+
+ts_code lgd_index_start(lgd_index *index, const lgd_plan *plan, const char *folder, ts_status *st)
+{
+    *index = (lgd_index){.cards = NULL};
+    if (check(plan, folder, st) != TS_OK) return st->code;
+    index->cards = open_memstream(&index->text, &index->size);
+    return index->cards ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for %s", LGD_INDEX_NAME);
+}
+
+/* The photograph beside the maps under one light, as a PNG. */
+static ts_code picture(const lgd_item *item, unsigned char **bytes, size_t *size, ts_status *st)
+{
+    const int side = item->m.size, panel = side < PANEL ? side : PANEL;
+    const io_image maps = {side, side, MAP_CHANNELS, item->m.maps},
+                   photo = {side, side, 3, (float *)item->image}; /* only read */
+    const rd_view view = lgd_preview_view(LIGHT, &item->photo[0]);
+    io_image small = {0}, square = {0}, both = {0}, scratch = {0};
+    ts_code code = io_centre_square(&maps, panel, &small, st);
+    if (!code) code = io_centre_square(&photo, panel, &square, st);
+    if (!code) code = io_image_create(&both, 2 * panel, panel, 3, st);
+    if (!code) code = io_image_create(&scratch, panel, panel, 3, st);
+    if (!code) {
+        const io_material m = {.size = panel, .maps = small.data};
+        lgd_panel_put(&both, panel, 0, 0, square.data);
+        lgd_panel_render(&both, 1, 0, &m, &view, scratch.data);
+        code = io_png_bytes(&both, 8, true, bytes, size, st);
+    }
+    io_image_free(&small);
+    io_image_free(&square);
+    io_image_free(&both);
+    io_image_free(&scratch);
+    return code;
+}
+
+static void put_heading(FILE *f, const char *name)
+{
+    fputs("<h2>", f);
+    io_put_text(f, name);
+    fputs("</h2>\n", f);
+}
+
+ts_code lgd_index_add(lgd_index *index, const lgd_item *item, ts_status *st)
+{
+    FILE *f = index->cards;
+    unsigned char *bytes = NULL;
+    size_t size = 0;
+    if (!f) return TS_OK;
+    if (item->st.code) {
+        index->failed++;
+        fputs("<div class=\"card failed\">\n", f);
+        put_heading(f, item->job->stem);
+        fputs("<p>", f);
+        io_put_text(f, item->st.message);
+        fputs("</p>\n</div>\n", f);
+        return TS_OK;
+    }
+    if (picture(item, &bytes, &size, st) != TS_OK) return st->code;
+    index->materials++;
+    fputs("<a class=\"card\" href=\"", f);
+    io_put_url_part(f, item->job->stem);
+    fprintf(f,
+            "/%s\">\n<img alt=\"The photograph, and the material under a light from the upper left\" src=\"data:image/"
+            "png;base64,",
+            "view.html");
+    io_put_base64(f, bytes, size);
+    fputs("\">\n", f);
+    put_heading(f, item->job->stem);
+    fprintf(f, "<p>Difference from the photograph %.4f</p>\n</a>\n", item->last);
+    free(bytes);
+    return TS_OK;
+}
+
+static void put_summary(FILE *f, void *user)
+{
+    const lgd_index *index = user;
+    fprintf(f, "%d material%s. Left the photograph, right the material under another light; choose one to light it.",
+            index->materials, index->materials == 1 ? "" : "s");
+    if (index->failed) fprintf(f, " %d photograph%s failed.", index->failed, index->failed == 1 ? "" : "s");
+}
+
+static void put_cards(FILE *f, void *user) { fputs(((const lgd_index *)user)->text, f); }
+
+ts_code lgd_index_end(lgd_index *index, const char *folder, ts_status *st)
+{
+    static const io_slot slots[] = {{"style", page_index_css, NULL},
+                                    {"summary", NULL, put_summary},
+                                    {"cards", NULL, put_cards},
+                                    {"about", "Made by lgd-infer " LGD_VERSION ".", NULL},
+                                    {NULL, NULL, NULL}};
+    char *path = NULL, *text = NULL;
+    size_t size = 0;
+    if (!index->cards) return TS_OK;
+    bool whole = fclose(index->cards) == 0 && index->text;
+    FILE *f = whole ? open_memstream(&text, &size) : NULL;
+    if (f) {
+        io_put_page(f, page_index_html, slots, index);
+        whole = fclose(f) == 0;
+    }
+    ts_code code = st->code;
+    if (!code && (!f || !whole || asprintf(&path, "%s/%s", folder, LGD_INDEX_NAME) < 0)) {
+        path = NULL; /* undefined after a failure */
+        code = ts_fail(st, TS_NOMEM, "out of memory for %s/%s", folder, LGD_INDEX_NAME);
+    }
+    if (!code && index->materials + index->failed > 0) /* not interrupted before the first */
+        code = io_write_bytes(path, text, size, st);
+    free(path);
+    free(text);
+    free(index->text);
+    *index = (lgd_index){.cards = NULL};
+    return code;
+}

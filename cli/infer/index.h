@@ -1,0 +1,24 @@
+/* index.html: the materials of a call, each with a link to its page. */
+#ifndef LGD_INDEX_H
+#define LGD_INDEX_H
+#include "cli/infer/item.h"
+#include <stdio.h>
+
+#define LGD_INDEX_NAME "index.html"
+
+typedef struct lgd_index {
+    FILE *cards; /* of what was added, into text; NULL: no index is wanted, and the functions do nothing */
+    char *text;
+    size_t size;
+    int materials, failed;
+} lgd_index;
+
+/* TS_INVALID where folder/index.html would replace one of the plan's photographs, or is where a folder is or will be.
+ * The caller ends the index after success. */
+ts_code lgd_index_start(lgd_index *index, const lgd_plan *plan, const char *folder, ts_status *st);
+/* A finished item, with its photograph and a rendering; of a failed one its message. */
+ts_code lgd_index_add(lgd_index *index, const lgd_item *item, ts_status *st);
+/* Writes folder/index.html, one file whose pictures are in it, unless nothing was added or st has a failure
+ * already. Frees the index. */
+ts_code lgd_index_end(lgd_index *index, const char *folder, ts_status *st);
+#endif
