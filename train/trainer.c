@@ -172,7 +172,8 @@ static ts_code build(tr_trainer *t, bool resume, ts_status *st)
         return st->code;
     t->tape = ag_tape_create(true, st);
     if (!t->tape || (c->validate.every && tr_validator_create(t, st) != TS_OK)) return st->code;
-    const io_procedural source = {.seed = (uint64_t)c->data.seed, .families = c->data.families};
+    const io_procedural source = {
+        .seed = (uint64_t)c->data.seed, .families = c->data.families, .hues = (float)c->data.hues};
     t->loader = io_loader_create(&source, c->data.patch, c->train.batch, (uint64_t)t->step, c->data.prefetch,
                                  c->data.threads, st);
     if (!t->loader || (!resume && set_aside(t, st) != TS_OK) || tr_log_open(t, st) != TS_OK) return st->code;

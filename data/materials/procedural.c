@@ -1,5 +1,6 @@
 #include "data/materials/procedural.h"
 #include "data/materials/family.h"
+#include "data/materials/hues.h"
 #include "tensor/scratch.h"
 #include <math.h>
 #include <stdio.h>
@@ -144,6 +145,8 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
     }
     c.used = 0;
     if (a < CLASSIC) wear_calm(&c);
+    ts_rng hues = ts_rng_make(p->seed, TS_STREAM_HUES, index);
+    if (ts_rng_uniform(&hues) < p->hues) cv_other_hues(&c, &hues);
     cv_write(&c, m->maps);
     snprintf(m->name, sizeof m->name, mixed ? "%05llu_%s_%s" : "%05llu_%s", (unsigned long long)index, families[a].name,
              families[b].name);

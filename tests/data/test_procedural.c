@@ -53,6 +53,41 @@ TEST(procedural_bytes_depend_on_seed_and_index_alone)
     free(parallel);
 }
 
+TEST(procedural_other_hues_change_diffuse_colours_alone)
+{
+    enum { COUNT = 48, SIZE = 16 };
+    const io_procedural plain = {.seed = 5}, hued = {.seed = 5, .hues = 1}, half = {.seed = 5, .hues = 0.5f};
+    int changed = 0, halves = 0, bluer = 0, before = 0;
+    for (int i = 0; i < COUNT; i++) {
+        io_material a = material(SIZE), b = material(SIZE), c = material(SIZE);
+        io_procedural_make(&plain, (uint64_t)i, &a);
+        io_procedural_make(&hued, (uint64_t)i, &b);
+        io_procedural_make(&half, (uint64_t)i, &c);
+        CHECK(!memcmp(c.maps, a.maps, values(SIZE) * sizeof(float)) ||
+                  !memcmp(c.maps, b.maps, values(SIZE) * sizeof(float)),
+              "material %d is neither plain nor of other hues", i);
+        changed += memcmp(a.maps, b.maps, values(SIZE) * sizeof(float)) != 0;
+        halves += memcmp(a.maps, c.maps, values(SIZE) * sizeof(float)) != 0;
+        float blue[2] = {0, 0};
+        for (int k = 0; k < SIZE * SIZE; k++) {
+            const float *from = a.maps + k * MAP_CHANNELS, *to = b.maps + k * MAP_CHANNELS;
+            CHECK(!memcmp(from + MAP_NORMAL, to + MAP_NORMAL, (MAP_CHANNELS - MAP_NORMAL) * sizeof(float)),
+                  "material %d: F0, roughness or normals changed with the hues", i);
+            for (int v = 0; v < 3; v++)
+                CHECK(to[MAP_DIFFUSE + v] >= -1 && to[MAP_DIFFUSE + v] <= 0.9f, "material %d: diffuse %g", i,
+                      (double)to[MAP_DIFFUSE + v]);
+            blue[0] += from[MAP_DIFFUSE + 2] - from[MAP_DIFFUSE], blue[1] += to[MAP_DIFFUSE + 2] - to[MAP_DIFFUSE];
+        }
+        before += blue[0] > 0, bluer += blue[1] > 0;
+        io_material_free(&a);
+        io_material_free(&b);
+        io_material_free(&c);
+    }
+    CHECK(changed > COUNT / 2 && halves > COUNT / 6 && halves < changed, "%d and %d of %d changed", changed, halves,
+          COUNT);
+    CHECK(bluer > before + COUNT / 8, "%d materials are more blue than red, %d before", bluer, before);
+}
+
 TEST(procedural_values_are_in_range)
 {
     static const int sizes[] = {1, 2, 7, 48, 64, 97};
