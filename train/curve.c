@@ -100,7 +100,8 @@ static ts_code write(tr_trainer *t, curve *c, ts_status *st)
     for (int i = 0; i < 4; i++)
         if (c[i].points) series[count++] = (cl_series){.name = c[i].name, .point = c[i].point, .points = c[i].points};
     FILE *f = open_memstream(&text, &size);
-    if (f) cl_plot_write(f, &(cl_axes){"step", "training: log-L1 of renderings; validation: RMSE", false}, series, count);
+    if (f)
+        cl_plot_write(f, &(cl_axes){"step", "training: log-L1 of renderings; validation: RMSE", false}, series, count);
     tr_path(t, "curve.svg", path);
     if (!f || fclose(f) != 0 || !text) code = ts_fail(st, TS_NOMEM, "%s: out of memory", path);
     else code = io_write_bytes(path, text, size, st);

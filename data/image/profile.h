@@ -1,4 +1,4 @@
-/* Colour profiles of any kind, by lcms2: what io_space_icc cannot say as curves and a matrix, such as look-up tables. */
+/* Colour profiles of any kind, by lcms2: look-up tables and all else that is not curves and a matrix. */
 #ifndef IO_PROFILE_H
 #define IO_PROFILE_H
 #include <stdbool.h>

@@ -197,7 +197,7 @@ killed_before_a_checkpoint() {
     await "$T/err"
     kill -TERM $job
     wait $job
-    [ $? -eq 1 ] || fail "it does not go on: $(tail -n 1 "$T/err")"
+    [ $? -eq 130 ] || fail "it does not go on: $(tail -n 1 "$T/err")"
     says "$T/err" "interrupted at step"
     rm "$T/run/checkpoint.safetensors"
     cp "$T/run/best.safetensors" "$T/best"

@@ -104,7 +104,8 @@ static void chunk(bytes *b, const char *type, const void *data, size_t size)
 }
 
 /* 4 x 2 pixels of (200, 100, 50), the lower half with an alpha of 128, by cwebp -lossless -exact. */
-static const uint8_t lossless[] = {0x2f, 0x03, 0x40, 0x00, 0x10, 0x0f, 0x30, 0x64, 0x83, 0x3c, 0x32, 0xff, 0x03, 0x8c, 0x07, 0xcc, 0x43, 0x44, 0xff, 0x23};
+static const uint8_t lossless[] = {0x2f, 0x03, 0x40, 0x00, 0x10, 0x0f, 0x30, 0x64, 0x83, 0x3c,
+                                   0x32, 0xff, 0x03, 0x8c, 0x07, 0xcc, 0x43, 0x44, 0xff, 0x23};
 
 /* Turned by EXIF, with "Exif" before the header as some write or without as the format says; alpha over black in linear
  * light, as of a PNG. */
@@ -128,8 +129,8 @@ TEST(webp_is_turned_and_transparent_as_png)
             for (int c = 0; c < 3; c++) {
                 static const float stored[3] = {200, 100, 50};
                 const float want = io_srgb_to_linear(stored[c] / 255) * (i % 2 ? 1 : 128.0f / 255);
-                CHECK(fabsf(image.data[3 * i + c] - want) < 0.01f * want + 2e-3f, "prefix %d, pixel %d: %g, not %g", prefix,
-                      i, (double)image.data[3 * i + c], (double)want);
+                CHECK(fabsf(image.data[3 * i + c] - want) < 0.01f * want + 2e-3f, "prefix %d, pixel %d: %g, not %g",
+                      prefix, i, (double)image.data[3 * i + c], (double)want);
             }
         io_image_free(&image);
     }
