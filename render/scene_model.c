@@ -79,28 +79,6 @@ void rd_scene_photograph(rd_grid grid, const float *maps, int channels, const fl
     }
 }
 
-/* w rises, so that halving an interval of y finds it; the last steps are Newton's. */
-static float untone(double tone, double value)
-{
-    if (!(value > 0 && value < 1)) return (float)value;
-    const double w = sqrt(value);
-    double low = 0, high = 1, y = w;
-    for (int i = 0; i < 12; i++) {
-        const double at = y * (1 + tone * (1 - y) * (y - 0.5)), slope = 1 + tone * ((3 - 3 * y) * y - 0.5);
-        if (at > w) high = y;
-        else low = y;
-        const double to = y - (at - w) / slope;
-        y = to >= low && to <= high ? to : (low + high) / 2;
-    }
-    return (float)(y * y);
-}
-
-void rd_scene_untone(int64_t count, const float *in, float tone, int threads, float *out)
-{
-#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static)
-    for (int64_t i = 0; i < count; i++) out[i] = tone == 0 ? in[i] : untone((double)tone, (double)in[i]);
-}
-
 /* Solves (I + q A q) z = right for n symmetric equations by Cholesky's factor, which is left in the lower triangle of
  * a. */
 enum { K = RD_SCENE_NUMBERS };

@@ -25,10 +25,6 @@ void rd_scene_value(const double maps[MAP_CHANNELS], const double point[2], cons
 void rd_scene_photograph(rd_grid grid, const float *maps, int channels, const float number[RD_SCENE_NUMBERS],
                          bool clamp, float *image);
 
-/* The tone curve undone, on so many threads (0: the process's number): values in [0, 1] of a photograph become those
- * that the curve was applied to. Others stay. in may be out. */
-void rd_scene_untone(int64_t count, const float *in, float tone, int threads, float *out);
-
 /* The photographs [N, S, S, 3] of maps [N, S, S, 9 or more], whole patches, in the scenes numbers [N, 1, 1,
  * RD_SCENE_NUMBERS]; clamp: at 1, without a gradient there. Either input may have a gradient
  * (render/op_scene_render.c). */

@@ -59,24 +59,6 @@ TEST(scene_photograph_equals_its_double_twin)
     free(maps), free(image), free(other);
 }
 
-TEST(scene_tone_is_undone)
-{
-    enum { STEPS = 1001 };
-    float *maps = floats(STEPS), *out = floats(STEPS);
-    for (int t = -3; t <= 3; t++) {
-        const double tone = 0.5 * t;
-        for (int i = 0; i < STEPS; i++) {
-            const double y = i / (STEPS - 1.0), w = y + tone * y * (1 - y) * (y - 0.5);
-            maps[i] = (float)(w * w);
-        }
-        rd_scene_untone(STEPS, maps, (float)tone, 0, out);
-        for (int i = 0; i < STEPS; i++)
-            CHECK(fabs(sqrt((double)out[i]) - i / (STEPS - 1.0)) < 2e-6, "tone %g: %g, not %g", tone,
-                  sqrt((double)out[i]), i / (STEPS - 1.0));
-    }
-    free(maps), free(out);
-}
-
 /* seen of a pixel's maps and a scene's numbers, as in render/posterior.h. */
 static void seen_of(const double maps[C], const double point[2], const double number[K], double seen[3])
 {
