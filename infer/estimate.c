@@ -24,7 +24,8 @@ enum {
 typedef struct given_photos {
     const float *image[NN_MAX_IMAGES];
     rd_view views[NN_MAX_IMAGES];
-    int order[NN_MAX_IMAGES]; /* the caller's number of each */
+    unsigned char known[NN_MAX_IMAGES]; /* what of the views is true, nn_known */
+    int order[NN_MAX_IMAGES];           /* the caller's number of each */
     int count, side;
     const float *r0, *deviation; /* deviation: of a model that says it */
 } given_photos;
@@ -139,6 +140,7 @@ static ts_code refine(const lgd_estimator *e, const given_photos *p, const lgd_o
     if (choose) w.best = malloc(w.values * sizeof *w.best);
     lgd_tiles t = {.image = p->image,
                    .views = p->views,
+                   .known = p->known,
                    .given = p->count,
                    .r0 = p->r0,
                    .deviation = p->deviation,
@@ -248,6 +250,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     const nn_arch *a = &e->net->arch;
     lgd_options o = *given;
     given_photos p = in_order(photo, photos, side, o.fov);
+    for (int k = 0; k < photos; k++) p.known[k] = (unsigned char)known(given);
     float *r0 = NULL;
     o.tolerance = tolerance(a, given);
     int steps = o.iterations == -1 ? a->iterations : o.iterations;

@@ -69,7 +69,7 @@ static ts_code make(ag_tape *tape, const nn_model *model, const float *image, in
     rd_scene_prior prior;
     scene_prior(guess.scene->t.data, view, known, &prior);
     memcpy(g->number, prior.mean, sizeof g->number);
-    const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior};
+    const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior(known)};
     rd_scene_fit(rd_grid_on(rd_grid_full(size), threads), g->r0, model->arch.channels, g->deviation, small->t.data,
                  &prior, &how, g->number, NULL);
     return TS_OK;

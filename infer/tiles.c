@@ -51,6 +51,7 @@ static nn_input input(const work *w, rd_grid g, ts_tensor image)
     return (nn_input){.image = image,
                       .grid = g,
                       .views = w->t->views,
+                      .known = w->t->known,
                       .given = w->t->given,
                       .orientations = w->t->orientations,
                       .r0 = w->t->r0};

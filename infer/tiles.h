@@ -6,13 +6,14 @@
 #include "nn/model.h"
 
 typedef struct lgd_tiles {
-    const float *const *image; /* [given] of [side][side][3], linear; clamped to [0, 1] on the way */
-    const rd_view *views;      /* [given] */
-    int given;                 /* photographs, 1 .. arch.images */
-    const unsigned char *mask; /* [side][side] or NULL: tiles without a nonzero pixel keep what the coarse steps left
-                                  (R_0), and of the others only the area that holds such is sure to be refined */
-    int side, tile, steps;     /* tile: pixels of a tile's side */
-    int orientations;          /* as in nn_input, */
+    const float *const *image;  /* [given] of [side][side][3], linear; clamped to [0, 1] on the way */
+    const rd_view *views;       /* [given] */
+    const unsigned char *known; /* [given] of nn_known, what of views is true; NULL: all of it */
+    int given;                  /* photographs, 1 .. arch.images */
+    const unsigned char *mask;  /* [side][side] or NULL: tiles without a nonzero pixel keep what the coarse steps left
+                                   (R_0), and of the others only the area that holds such is sure to be refined */
+    int side, tile, steps;      /* tile: pixels of a tile's side */
+    int orientations;           /* as in nn_input, */
     const float
         *deviation;  /* NN_DESCENT_POSTERIOR: of r0's errors, [side][side][NN_SPREADS] of nn_arch_side; else NULL */
     const float *r0; /* and this too */

@@ -212,7 +212,9 @@ typedef struct nn_state {
  *     NN_DESCENT_GRADIENT  e; D begins as -0.003 times the identity: an untrained loop is plain descent
  *     NN_DESCENT_POSTERIOR the step to the most probable maps; D is the identity
  *     NN_DESCENT_NONE      0, as published */
-extern const ts_prior nn_step_prior; /* of NN_DESCENT_POSTERIOR */
+/* Of NN_DESCENT_POSTERIOR: how colours hang together, and how far a rendering of the right maps is from a photograph of
+ * which known (nn_known) is true. */
+ts_prior nn_step_prior(int known);
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
 /* RMSE(R_t) = nn_rmse_of what nn_add_squares leaves: squares[i] += the squared differences between photograph i of in

@@ -109,9 +109,15 @@ static void newton_step(const ag_tape *tape, const nn_model *model, const nn_inp
     }
 }
 
-/* The correlations of the prior: q of the diffuse values and of F0's. And the noise of a photograph: as the Newton step
- * has it, and what renderer and lens leave out. */
-const ts_prior nn_step_prior = {.hue = {0.1f, 0.1f}, .model = 0.03f, .noise = 0.002f};
+/* The noise is the Newton step's. What is more: a photograph whose light's power is known was taken with care, and
+ * renderer and lens leave out little; of another neither tone curve nor vignetting nor other light is known, and what
+ * they change goes with the value. */
+ts_prior nn_step_prior(int known)
+{
+    const bool careful = known & NN_KNOWN_POWER;
+    return (ts_prior){
+        .hue = {0.1f, 0.1f}, .model = careful ? 0.03f : 0.1f, .noise = 0.002f, .gain = careful ? 0 : 0.5f};
+}
 
 /* The step to the most probable maps of one photograph each: to is [N, H, W, channels]. */
 static bool posterior_step(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps,
@@ -122,7 +128,7 @@ static bool posterior_step(ag_tape *tape, const nn_model *model, const nn_input 
         return ag_fail(tape, TS_INVALID, "the step to the most probable maps needs the prior of one material"), false;
     const rd_view view = nn_view_of(model, in, 0);
     const float *image = in->image.data;
-    const rd_prior prior = {state->mean, state->deviation, nn_step_prior};
+    const rd_prior prior = {state->mean, state->deviation, nn_step_prior(in->known ? in->known[0] : NN_KNOWN_ALL)};
     rd_posterior_step(rd_grid_on(in->grid, ag_compute(tape)->threads), maps->data, s.c, &view, &image, 1, &prior, to,
                       NULL);
     return true;

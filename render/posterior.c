@@ -45,10 +45,11 @@ void rd_observe(const double maps[MAP_CHANNELS], const double point[2], const rd
     rd_radiance(maps, point, view, value, by);
     for (int c = 0; c < 3; c++) {
         rd_observation *o = &observation[c];
-        const double target = (double)image[c], model = (double)prior->model;
+        const double target = (double)image[c], positive = fmax(target, 0), model = (double)prior->model,
+                     gain = (double)prior->gain * positive;
         const bool burnt = value[c] > 1 && image[c] >= TS_NEWTON_BURNT;
         o->residual = target - (value[c] > 1 ? 1 + log(value[c]) : value[c]);
-        o->variance = model * model + (double)prior->noise * fmax(target, 0);
+        o->variance = model * model + (double)prior->noise * positive + gain * gain;
         for (int i = 0; i < MAP_CHANNELS; i++) o->by[i] = burnt ? 0 : by[c][i] / fmax(value[c], 1);
     }
 }

@@ -4,9 +4,10 @@
 #define TS_POSTERIOR_H
 #include "render/kernels/shade.h"
 
+/* The variance of a photograph's value I is model^2 + noise i + (gain i)^2, i = max(I, 0). */
 typedef struct ts_prior {
-    float hue[2];       /* of the diffuse values and of F0's, in [0, 1] */
-    float model, noise; /* the variance of a photograph's value I is model^2 + noise max(I, 0) */
+    float hue[2]; /* of the diffuse values and of F0's, in [0, 1] */
+    float model, noise, gain;
 } ts_prior;
 /* Standard deviations of the prior are taken as TS_PRIOR_WIDEST where they are larger, and as 0 where they are not
  * above 0; variances of a photograph's value as TS_PRIOR_FINEST where they are smaller. */

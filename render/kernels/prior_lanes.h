@@ -46,7 +46,9 @@ V_INLINE void whiten(int c, const spread *a, const vf by[ROW], vf h[MAP_CHANNELS
 
 V_INLINE vf variance_of(vf target, const ts_prior *prior)
 {
-    return v_max(v_max(target, v_set(0)) * prior->noise + prior->model * prior->model, v_set(TS_PRIOR_FINEST));
+    const vf value = v_max(target, v_set(0));
+    return v_max(value * (prior->noise + prior->gain * prior->gain * value) + prior->model * prior->model,
+                 v_set(TS_PRIOR_FINEST));
 }
 
 /* J Sigma J' + S = L D L' of a photograph's three values, by Gram and Schmidt's method on the rows of (J A, S^1/2),

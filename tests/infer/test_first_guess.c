@@ -1,6 +1,7 @@
 /* Estimates of a model that guesses the scene and steps to the most probable maps. */
 #include "infer/estimate.h"
 #include "infer/first_guess.h"
+#include "infer/tiles.h"
 #include "tests/support/networks.h"
 
 enum { PLACE = 64, WIDE = 600 };
@@ -48,6 +49,44 @@ TEST(first_guess_steps_explain_the_photograph)
     for (int i = 0; i < PLACE * PLACE * 9; i++) CHECK(r4[i] >= -1 && r4[i] <= 1, "a map of %g", (double)r4[i]);
     free(r0);
     free(r4);
+    free(in.image.data);
+    nn_model_free(&m);
+}
+
+/* The same scene, its power said to be known or not: a photograph of unknown exposure moves the maps less. */
+TEST(first_guess_trusts_a_careful_photograph_more)
+{
+    nn_model *m = network();
+    const nn_input in = photographs(1, PLACE, 82, NULL);
+    const rd_view view = rd_flash();
+    const float *image = in.image.data;
+    enum { VALUES = PLACE * PLACE * 9 };
+    float *maps = malloc(3 * VALUES * sizeof *maps), *deviation = malloc(PLACE * PLACE * NN_SPREADS * sizeof(float));
+    for (int i = 0; i < PLACE * PLACE * NN_SPREADS; i++) deviation[i] = 0.1f;
+    for (int k = 0; k < 3; k++) {
+        const unsigned char known = k == 2 ? NN_KNOWN_ALL & ~NN_KNOWN_POWER : NN_KNOWN_ALL;
+        float *r0 = calloc(VALUES, sizeof *r0);
+        lgd_tiles t = {.image = &image,
+                       .views = &view,
+                       .known = &known,
+                       .given = 1,
+                       .r0 = r0,
+                       .deviation = deviation,
+                       .side = PLACE,
+                       .tile = PLACE,
+                       .steps = k > 0};
+        ts_status st = {0};
+        ag_tape *tape = tape_create(false);
+        ag_freeze(tape, true);
+        CHECK(!lgd_tiles_run(tape, m, &t, maps + k * VALUES, &st), "%s", st.message);
+        ag_tape_destroy(&tape);
+        free(r0);
+    }
+    double moved[2] = {0};
+    for (int k = 0; k < 2; k++)
+        for (int i = 0; i < VALUES; i++) moved[k] += fabs((double)(maps[(k + 1) * VALUES + i] - maps[i]));
+    CHECK(moved[1] > 0 && moved[1] < 0.8 * moved[0], "moved %g with the power known, %g without", moved[0], moved[1]);
+    free(maps), free(deviation);
     free(in.image.data);
     nn_model_free(&m);
 }

@@ -27,7 +27,7 @@ static job begin(uint64_t seed, int count)
              .step = floats(PIXELS * C),
              .after = floats(PIXELS * G),
              .count = count,
-             .scale = {{0.2f, 0.1f}, 0.1f, 0.5f}};
+             .scale = {{0.2f, 0.1f}, 0.1f, 0.5f, 0.3f}};
     ts_rng rng = ts_rng_make(seed, TS_STREAM_TEST, (uint64_t)count);
     rd_capture_draw(&rng, count, j.views);
     for (int p = 0; p < PIXELS * C; p++) {
@@ -176,7 +176,7 @@ TEST(posterior_is_newtons_step_for_equal_priors)
             job j = begin(33, count);
             float damping[C], *newton = floats(PIXELS * C);
             static const float of[G] = {0.5f, 4, 1, 2};
-            j.scale = (ts_prior){{1, 1}, sqrtf(TS_NEWTON_NOISE), 1};
+            j.scale = (ts_prior){{1, 1}, sqrtf(TS_NEWTON_NOISE), 1, 0};
             for (int i = 0; i < C; i++) damping[i] = of[group_of[i]];
             for (int i = 0; i < PIXELS * G; i++) j.deviation[i] = 1 / sqrtf(of[i % G]);
             memcpy(j.mean, j.maps, PIXELS * C * sizeof(float));
@@ -211,7 +211,7 @@ TEST(posterior_without_a_prior_fits_the_photograph)
     ts_rng rng = ts_rng_make(35, TS_STREAM_TEST, 1);
     j.views[0].power = 0.5f; /* nothing is clamped */
     rd_render(rd_grid_full(SIDE), j.truth, C, j.views, true, j.image[0]);
-    j.scale = (ts_prior){{1, 1}, 1e-4f, 0};
+    j.scale = (ts_prior){{1, 1}, 1e-4f, 0, 0};
     for (int i = 0; i < PIXELS * G; i++) j.deviation[i] = 100;
     for (int i = 0; i < PIXELS * C; i++) j.maps[i] = j.truth[i] + ts_rng_range(&rng, -0.02f, 0.02f);
     double rmse[3];
@@ -351,7 +351,8 @@ TEST(posterior_is_finite_everywhere)
             part.count = 1 + round % MOST;
             part.scale = (ts_prior){{ts_rng_uniform(&rng), (float)ts_rng_int(&rng, 2)},
                                     ts_rng_int(&rng, 2) ? 0 : 0.1f,
-                                    ts_rng_int(&rng, 2) ? 0 : 1};
+                                    ts_rng_int(&rng, 2) ? 0 : 1,
+                                    ts_rng_int(&rng, 2) ? 0 : 0.5f};
             for (int i = 0; i < PIXELS * C; i++) {
                 j.maps[i] = ts_rng_int(&rng, 3) ? extreme[ts_rng_int(&rng, EXTREMES)] : ts_rng_range(&rng, -1, 1);
                 j.mean[i] = ts_rng_int(&rng, 3) ? j.maps[i] : ts_rng_range(&rng, -1, 1);
