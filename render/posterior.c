@@ -58,10 +58,12 @@ void rd_posterior_pixel(const double maps[MAP_CHANNELS], const double point[2], 
                         const float (*image)[3], int count, const ts_prior *prior, double mean[MAP_CHANNELS],
                         double covariance[MAP_CHANNELS][MAP_CHANNELS])
 {
+    double at[MAP_CHANNELS];
+    for (int i = 0; i < MAP_CHANNELS; i++) at[i] = fmin(fmax(maps[i], -1), 1);
     for (int k = 0; k < 3 * count; k++) {
         rd_observation all[3], *o = &all[k % 3];
         double across[MAP_CHANNELS], total, error;
-        rd_observe(maps, point, &views[k / 3], image[k / 3], prior, all);
+        rd_observe(at, point, &views[k / 3], image[k / 3], prior, all);
         total = o->variance, error = o->residual;
         for (int i = 0; i < MAP_CHANNELS; i++) {
             across[i] = 0;
@@ -69,7 +71,7 @@ void rd_posterior_pixel(const double maps[MAP_CHANNELS], const double point[2], 
         }
         for (int i = 0; i < MAP_CHANNELS; i++) {
             total += o->by[i] * across[i];
-            error -= o->by[i] * (mean[i] - maps[i]);
+            error -= o->by[i] * (mean[i] - at[i]);
         }
         for (int i = 0; i < MAP_CHANNELS; i++) {
             mean[i] += across[i] * error / total;

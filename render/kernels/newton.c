@@ -90,13 +90,14 @@ static void step(const ts_shade_view *views, const float *const *images, int cou
         const float *maps = row->maps + (int64_t)i * row->channels;
         surface s;
         equations q;
-        vf x[MAP_CHANNELS], now[MAP_CHANNELS];
-        decode(views->guards, maps, row->channels, n, &s);
+        vf x[MAP_CHANNELS], now[MAP_CHANNELS], at[MAP_CHANNELS];
+        v_load_pixels(maps, row->channels, n, MAP_CHANNELS, now);
+        within(now, at);
+        decode_values(views->guards, at, &s);
         add(views, true, damping, row, i, n, images[0], &s, &q);
         for (int v = 1; v < count; v++) add(views + v, false, damping, row, i, n, images[v], &s, &q);
         solve(&q, x);
-        v_load_pixels(maps, row->channels, n, MAP_CHANNELS, now);
-        for (int c = 0; c < MAP_CHANNELS; c++) x[c] = v_min(v_max(now[c] + x[c], v_set(-1)), v_set(1)) - now[c];
+        for (int c = 0; c < MAP_CHANNELS; c++) x[c] = v_min(v_max(at[c] + x[c], v_set(-1)), v_set(1)) - now[c];
         v_store_pixels(to + (int64_t)i * row->channels, row->channels, n, MAP_CHANNELS, x);
     }
 }

@@ -11,8 +11,9 @@ struct ts_newton_kernels {
      *     e = seen - image,  J = d seen / d maps
      *     seen = radiance up to 1, 1 + log(radiance) above; above 1 and where image >= TS_NEWTON_BURNT: e = 0, J = 0
      *
-     * The step is cut where maps + step would leave [-1, 1]. images[v][count, 3], in [0, 1], belongs to views[v];
-     * damping[MAP_CHANNELS] > 0. Channels beyond the maps' are not written. */
+     * where seen and J are of the maps cut to [-1, 1]. The step leads from the maps as they are and is cut where they
+     * would end outside [-1, 1]. images[v][count, 3], in [0, 1], belongs to views[v]; damping[MAP_CHANNELS] > 0.
+     * Channels beyond the maps' are not written. */
     void (*step)(const ts_shade_view *views, const float *const *images, int count, const ts_shade_row *row,
                  const float *damping, float *step);
 };

@@ -11,6 +11,14 @@ enum { SHARED = 3, ROW = 2 + SHARED }; /* a colour's diffuse, its specular, what
 #define BRIGHTEST 1e30f /* of a radiance, which may be infinite there */
 static const int shared_map[SHARED] = {MAP_ROUGHNESS, MAP_NORMAL, MAP_NORMAL + 1};
 
+/* The maps that a step starts from: those in [-1, 1]. Outside, the radiance has no slope, and what a map tells nothing
+ * of is not solved for. Steps that are cut end at the edge, but for rounding, which would then decide what is solved
+ * for: single values differed by 0.016 between instruction sets. */
+V_INLINE void within(const vf now[MAP_CHANNELS], vf at[MAP_CHANNELS])
+{
+    for (int c = 0; c < MAP_CHANNELS; c++) at[c] = v_min(v_max(now[c], v_set(-1)), v_set(1));
+}
+
 /* A row of the factor L D L' without its 1, and of L D z. row: the derivatives by the row's own unknown and by the
  * count after it; the factor takes its share of them and of the error, and what is left weighs less. */
 V_INLINE void take_up(vf *d, vf *z, vf *l, vf *row, int count, vf *error, vf *weight)

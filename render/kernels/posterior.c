@@ -163,21 +163,21 @@ static void step(const ts_shade_view *views, const float *const *images, int cou
     set_hue(prior, &a);
     for (int i = 0; i < row->count; i += VL) {
         const int n = lanes_left(row, i);
-        const int64_t at = (int64_t)i * row->channels;
-        const float *maps = row->maps + at;
+        const int64_t first = (int64_t)i * row->channels;
+        const float *maps = row->maps + first;
         surface s;
         estimate e;
-        vf x[MAP_CHANNELS] = {0}, now[MAP_CHANNELS], m[MAP_CHANNELS], left[MAP_GROUPS];
-        decode(views->guards, maps, row->channels, n, &s);
+        vf x[MAP_CHANNELS] = {0}, now[MAP_CHANNELS], at[MAP_CHANNELS], m[MAP_CHANNELS], left[MAP_GROUPS];
         v_load_pixels(maps, row->channels, n, MAP_CHANNELS, now);
-        v_load_pixels(mean + at, row->channels, n, MAP_CHANNELS, m);
-        for (int c = 0; c < MAP_CHANNELS; c++) m[c] -= now[c];
+        within(now, at);
+        decode_values(views->guards, at, &s);
+        v_load_pixels(mean + first, row->channels, n, MAP_CHANNELS, m);
+        for (int c = 0; c < MAP_CHANNELS; c++) m[c] -= at[c];
         load_deviation(deviation + (int64_t)i * MAP_GROUPS, n, &a);
         const bool told = learn(views, images, count, row, i, n, &s, prior, &a, m, after != NULL, &e);
         if (told) widen(&a, e.z, x);
-        for (int c = 0; c < MAP_CHANNELS; c++)
-            x[c] = v_min(v_max(now[c] + (m[c] + x[c]), v_set(-1)), v_set(1)) - now[c];
-        v_store_pixels(to + at, row->channels, n, MAP_CHANNELS, x);
+        for (int c = 0; c < MAP_CHANNELS; c++) x[c] = v_min(v_max(at[c] + (m[c] + x[c]), v_set(-1)), v_set(1)) - now[c];
+        v_store_pixels(to + first, row->channels, n, MAP_CHANNELS, x);
         if (!after) continue;
         for (int g = 0; g < MAP_GROUPS; g++) {
             left[g] = a.deviation[g];

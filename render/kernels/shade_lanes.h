@@ -37,10 +37,9 @@ typedef struct surface {
     bool guarded; /* in any lane */
 } surface;
 
-V_INLINE void decode(const ts_shade_guards *guards, const float *maps, int channels, int n, surface *s)
+/* x: encoded maps; they become what is in [-1, 1], which NaN is not. */
+V_INLINE void decode_values(const ts_shade_guards *guards, vf x[MAP_CHANNELS], surface *s)
 {
-    vf x[MAP_CHANNELS];
-    v_load_pixels(maps, channels, n, MAP_CHANNELS, x);
     for (int i = 0; i < MAP_CHANNELS; i++) {
         vi inside = (x[i] >= v_set(-1)) & (x[i] <= v_set(1));
         x[i] = v_min(v_max(x[i], v_set(-1)), v_set(1)); /* NaN becomes -1 */
@@ -79,6 +78,13 @@ V_INLINE void decode(const ts_shade_guards *guards, const float *maps, int chann
         s->n[h] = (direction){nx[h], ny[h], nz[h]};
     }
     s->nx = d_join(nx), s->ny = d_join(ny), s->nz = d_join(nz), s->inverse = d_join(inverse);
+}
+
+V_INLINE void decode(const ts_shade_guards *guards, const float *maps, int channels, int n, surface *s)
+{
+    vf x[MAP_CHANNELS];
+    v_load_pixels(maps, channels, n, MAP_CHANNELS, x);
+    decode_values(guards, x, s);
 }
 
 /* One view at VL pixels, for any material. */

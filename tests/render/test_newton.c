@@ -58,6 +58,36 @@ TEST(newton_solves_the_equations)
     free(truth), free(maps), free(step);
 }
 
+/* Maps outside [-1, 1], at its ends and a rounding beyond lead where those that are cut lead: rounding decides nothing.
+ */
+TEST(newton_starts_inside)
+{
+    float *truth = floats(PIXELS * C), *maps = floats(PIXELS * C), *cut = floats(PIXELS * C), *image[MOST], damping[C];
+    float *step = floats(PIXELS * C), *inside = floats(PIXELS * C);
+    const rd_grid grid = rd_grid_full(SIDE);
+    for (int i = 0; i < C; i++) damping[i] = 0.1f;
+    for (int isa = TS_BASE; isa <= (int)ts_isa_best(); isa++) {
+        ts_isa_use((ts_isa)isa);
+        for (int count = 1; count <= MOST; count += 4) {
+            ts_rng rng = ts_rng_make(12, TS_STREAM_TEST, (uint64_t)count);
+            rd_view views[MOST];
+            rd_capture_draw(&rng, count, views);
+            plain_maps(&rng, truth), plain_maps(&rng, maps);
+            take_photographs(grid, truth, views, count, image);
+            push_out(&rng, PIXELS, maps, cut);
+            rd_newton_step(grid, maps, C, views, (const float *const *)image, count, damping, step);
+            rd_newton_step(grid, cut, C, views, (const float *const *)image, count, damping, inside);
+            for (int i = 0; i < PIXELS * C; i++)
+                CHECK(fabsf((maps[i] + step[i]) - (cut[i] + inside[i])) <= 1e-6f,
+                      "%s, %d photographs: channel %d of pixel %d goes from %.9g to %g, from %g to %g",
+                      ts_isa_name((ts_isa)isa), count, i % C, i / C, (double)maps[i], (double)(maps[i] + step[i]),
+                      (double)cut[i], (double)(cut[i] + inside[i]));
+            for (int k = 0; k < count; k++) free(image[k]);
+        }
+    }
+    free(truth), free(maps), free(cut), free(step), free(inside);
+}
+
 TEST(newton_rests_at_the_truth)
 {
     float *truth = floats(PIXELS * C), *step = floats(PIXELS * C), *image[MOST], damping[C];

@@ -5,7 +5,9 @@
 #include "render/render.h"
 #include "render/kernels/newton.h"
 #include "tensor/maps.h"
+#include "tensor/rng.h"
 #include <math.h>
+#include <stdbool.h>
 
 /* Of the pixel at point, whose maps are given: a = J' W J + damping, b = -J' W e over image[0 .. count-1]'s values at
  * pixel. */
@@ -15,7 +17,7 @@ static inline void normal_equations(const float *maps, const double point[2], co
 {
     double m[MAP_CHANNELS];
     for (int i = 0; i < MAP_CHANNELS; i++) {
-        m[i] = (double)maps[i];
+        m[i] = fmin(fmax((double)maps[i], -1), 1);
         b[i] = 0;
         for (int j = 0; j < MAP_CHANNELS; j++) a[i][j] = i == j ? (double)damping[i] : 0;
     }
@@ -31,6 +33,20 @@ static inline void normal_equations(const float *maps, const double point[2], co
                 for (int j = 0; j < MAP_CHANNELS; j++) a[i][j] += w * slope * slope * by[c][i] * by[c][j];
             }
         }
+    }
+}
+
+/* Every fourth value is put to an end of [-1, 1], or a rounding or more beyond; cut: what of it is in [-1, 1]. */
+static inline void push_out(ts_rng *rng, int pixels, float *maps, float *cut)
+{
+    static const float beyond[] = {0, 1.2e-7f, 1e-6f, 1e-3f, 0.3f};
+    for (int i = 0; i < pixels * MAP_CHANNELS; i++) {
+        const int channel = i % MAP_CHANNELS;
+        const bool normal = channel == MAP_NORMAL || channel == MAP_NORMAL + 1;
+        if (!normal && !ts_rng_int(rng, 4))
+            maps[i] = (1 + beyond[ts_rng_int(rng, 5)]) *
+                (channel != MAP_ROUGHNESS && ts_rng_int(rng, 2) ? -1.0f : 1.0f);
+        cut[i] = fminf(fmaxf(maps[i], -1), 1);
     }
 }
 
