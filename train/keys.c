@@ -187,9 +187,8 @@ const tr_key tr_keys[] = {
      "to bf16, which is faster on CPUs with AMX or AMD's AVX512-BF16 and slower on others; weights, their gradients, "
      "Adam, sums and validation stay f32"},
     {"train", "exact", TR_BOOL, AT(train.exact), 0, 1, "no", NULL, false,
-     "compute convolutions and their gradients directly; no: by Winograd's algorithm where it is faster, which differs "
-     "by "
-     "less than 1e-4"},
+     "compute convolutions and their gradients directly; no: by Winograd's algorithm where it is faster, whose "
+     "errors are near 1e-5 of the largest value"},
     {"train", "seed", TR_INT64, AT(train.seed), 0, 1e15, "1", NULL, false,
      "seed of the initial weights, the loss's views and the drawn iterations"},
     {"train", "checkpoint_every", TR_INT64, AT(train.checkpoint_every), 1, 1e9, "500", NULL, true,

@@ -37,10 +37,11 @@ const cl_argument lgd_infer_arguments[] = {
      "the first estimate is the mean over N orientations of the photograph: 1 (as it is), 2 (and a quarter turn; the\n"
      "default), 4 (all quarter turns) or 8 (and their mirror images)"},
     {EXACT, "exact", NULL,
-     "compute convolutions directly; the default, Winograd's algorithm where it is faster, differs by less than 1e-4"},
+     "compute convolutions directly; the default is Winograd's algorithm where it is faster: the maps differ by less\n"
+     "than 1e-5 (RMS), single values by less than 1e-3"},
     {PRECISION, "precision", "f32|bf16",
      "precision of the products in convolutions (default f32); bf16 is faster on CPUs with AMX or AMD's AVX512-BF16,\n"
-     "slower on others; the maps differ by less than 0.005 (RMS)"},
+     "slower on others; the maps differ by less than 0.005 (RMS), single values by up to 0.2"},
     {CAPTURE, "capture", "WHERE",
      "instead of PHOTO: several photographs of one sample under known lights, listed in an INI file or in a folder\n"
      "in MaterialGAN's layout; the default model is then multi"},
