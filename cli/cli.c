@@ -104,6 +104,24 @@ bool cl_parse_real(const char *text, double lo, double hi, double *value)
     return true;
 }
 
+bool cl_parse_size(const char *text, double *bytes)
+{
+    static const char units[] = "KMG";
+    char number[32];
+    const size_t length = strlen(text);
+    const char *unit = length ? strchr(units, text[length - 1]) : NULL;
+    if (!unit) return cl_parse_real(text, 1, 1e18, bytes);
+    if (length >= sizeof number) return false;
+    memcpy(number, text, length - 1);
+    number[length - 1] = 0;
+    double v;
+    if (!cl_parse_real(number, 0, 1e9, &v)) return false;
+    for (const char *u = units; u <= unit; u++) v *= 1024;
+    if (v < 1) return false;
+    *bytes = v;
+    return true;
+}
+
 int cl_finish(int code)
 {
     if (fflush(stdout) != 0 || ferror(stdout)) {

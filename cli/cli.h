@@ -29,6 +29,8 @@ void cl_note(const char *format, ...) __attribute__((format(printf, 1, 2)));
 /* Whole-string numbers in the C locale, within [lo, hi]; false otherwise. */
 bool cl_parse_int(const char *text, int64_t lo, int64_t hi, int64_t *value);
 bool cl_parse_real(const char *text, double lo, double hi, double *value);
+/* Bytes: a number, or one with K, M or G (powers of 1024) behind it; at least 1. */
+bool cl_parse_size(const char *text, double *bytes);
 
 /* Flushes stdout; a failed write (closed pipe, full disk) prints one line and returns CL_FAILED, otherwise code. */
 int cl_finish(int code);

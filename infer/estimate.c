@@ -1,9 +1,10 @@
 #include "infer/estimate.h"
 #include "data/material.h"
 #include "infer/first_guess.h"
-#include "infer/memory.h"
 #include "infer/power.h"
 #include "infer/tiles.h"
+#include "nn/need.h"
+#include "tensor/budget.h"
 #include "tensor/resize.h"
 #include "tensor/threads.h"
 #include <math.h>
@@ -103,12 +104,11 @@ static int before_tile(double done, void *user)
     return w->options->tile ? w->options->tile(done, w->options->user) : 0;
 }
 
-/* What a step of h holds at once: maps, their gradient and change, the carried states, and for each of its two cells
- * the convolution, both gates' inputs and the new state. g works at its own size and needs less. */
-static double step_bytes(const nn_arch *a, int side)
+/* What a step holds at once at so many pixels a side: maps, their gradient and change, the carried states, and for each
+ * of its two cells the convolution, both gates' inputs and the new state. */
+static double step_bytes(const nn_arch *a, int side, int width, int gru)
 {
-    const double cells = a->h_width > 0 ? 2.0 * (a->h_width + 8.0 * a->h_gru)
-                                        : 0; /* the coarse steps' are at a size of their own */
+    const double cells = width > 0 ? 2.0 * (width + 8.0 * gru) : 0;
     return (3.0 * a->images + (3.0 + 2.0 * a->images) * a->channels + cells) * sizeof(float) * side * side;
 }
 
@@ -123,15 +123,27 @@ static int tile_side(const lgd_estimator *e, int side, const lgd_options *o)
     return o->tolerance > 0 ? TILE_EARLY : TILE;
 }
 
+/* What an estimate holds at once, at most: g, or a step; beside them the whole photograph's maps. */
+static double most_bytes(const nn_arch *a, int side, int tile, int orientations)
+{
+    const int part = tile < side ? tile : side, coarse = a->coarse_size < side ? a->coarse_size : side;
+    double most = fmax(nn_guess_bytes(a, orientations), step_bytes(a, part, a->h_width, a->h_gru));
+    if (a->coarse_steps > 0) most = fmax(most, step_bytes(a, coarse, a->coarse_width, a->coarse_gru));
+    return most + 2.0 * a->channels * sizeof(float) * side * side;
+}
+
+double lgd_model_bytes(const lgd_model *model, int side, const lgd_options *o)
+{
+    const lgd_estimator e = {.net = lgd_model_net(model)};
+    return most_bytes(&e.net->arch, side, tile_side(&e, side, o), o->orientations);
+}
+
 /* choose: the number of steps that paid, of the given most, is found on the way and left in *steps. */
 static ts_code refine(const lgd_estimator *e, const given_photos *p, const lgd_options *o, bool choose, int *steps,
                       float *maps, ts_status *st)
 {
-    const int side = p->side, channels = e->net->arch.channels, tile = tile_side(e, side, o);
+    const int side = p->side, channels = e->net->arch.channels;
     const int64_t pixels = (int64_t)side * side;
-    const double more = step_bytes(&e->net->arch, tile < side ? tile : side) -
-        (double)ts_arena_peak(ag_arena(e->tape)); /* than earlier calls left */
-    if (more > 0 && lgd_memory_check(more, st) != TS_OK) return ts_context(st, "%d x %d pixels", side, side);
     watch w = {
         .e = e, .options = o, .best_step = *steps, .channels = channels, .values = (size_t)pixels * (size_t)channels};
     float *raw = channels == MAP_CHANNELS ? maps
@@ -146,7 +158,7 @@ static ts_code refine(const lgd_estimator *e, const given_photos *p, const lgd_o
                    .deviation = p->deviation,
                    .mask = o->mask,
                    .side = side,
-                   .tile = tile,
+                   .tile = tile_side(e, side, o),
                    .steps = *steps,
                    .orientations = o->orientations,
                    .tolerance = o->tolerance,
@@ -259,6 +271,11 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     /* Once: memory that one stage has touched is there for the next, and touching it first costs as much as computing.
      */
     ag_reset(e->tape);
+    const double more = most_bytes(a, side, tile_side(e, side, &o), o.orientations) -
+        (double)ts_arena_peak(ag_arena(e->tape)); /* than earlier calls left */
+    if (more > 0 && ts_budget_check(more, st) != TS_OK)
+        return ts_context(st, "%d x %d pixels, of which the network reads %d x %d", side, side, nn_arch_side(a),
+                          nn_arch_side(a));
     lgd_first_guess guess = {0};
     ts_code code = TS_OK;
     if (a->descent == NN_DESCENT_POSTERIOR) code = first_guess(e, &p, &o, &guess, st);

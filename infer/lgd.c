@@ -77,6 +77,8 @@ static ts_code take_options(const lgd_options *given, lgd_options *o, ts_status 
 
 int lgd_trained_iterations(const lgd_model *model) { return model->net->arch.iterations; }
 
+const nn_model *lgd_model_net(const lgd_model *model) { return model->net; }
+
 int lgd_most_photos(const lgd_model *model) { return model->net->arch.images; }
 
 lgd_photo lgd_flash_photo(const float *image)

@@ -1,4 +1,5 @@
 #include "tensor/threads.h"
+#include "tensor/cgroup.h"
 #include <omp.h>
 #include <sched.h>
 #include <stdatomic.h>
@@ -44,27 +45,13 @@ static int quota_in(const char *max_path, const char *quota_path, const char *pe
     return (int)((quota + period - 1) / period);
 }
 
-/* The process's own cgroup v2 path, where it is not a container's root. */
-static int quota_of_self(void)
+static void take_quota(const char *folder, void *user)
 {
-    char line[512], path[600];
-    int least = 0;
-    FILE *f = fopen("/proc/self/cgroup", "re");
-    if (!f) return 0;
-    while (fgets(line, sizeof line, f)) {
-        if (strncmp(line, "0::", 3) != 0) continue;
-        line[strcspn(line, "\n")] = 0;
-        /* A limit may stand at any level above. */
-        for (char *end = line + strlen(line); end > line + 3; end = strrchr(line + 3, '/')) {
-            *end = 0;
-            snprintf(path, sizeof path, "/sys/fs/cgroup%s/cpu.max", line + 3);
-            const int q = quota_in(path, "", "");
-            if (q && (!least || q < least)) least = q;
-            if (!strchr(line + 3, '/')) break;
-        }
-    }
-    fclose(f);
-    return least;
+    char path[700];
+    int *least = user;
+    snprintf(path, sizeof path, "%s/cpu.max", folder);
+    const int quota = quota_in(path, "/sys/fs/cgroup/cpu/cpu.cfs_quota_us", "/sys/fs/cgroup/cpu/cpu.cfs_period_us");
+    if (quota && quota < *least) *least = quota;
 }
 
 int ts_threads_allowed(void)
@@ -72,11 +59,7 @@ int ts_threads_allowed(void)
     int n = 1;
     cpu_set_t set;
     if (sched_getaffinity(0, sizeof set, &set) == 0) n = CPU_COUNT(&set);
-    const int root = quota_in("/sys/fs/cgroup/cpu.max", "/sys/fs/cgroup/cpu/cpu.cfs_quota_us",
-                              "/sys/fs/cgroup/cpu/cpu.cfs_period_us");
-    const int self = quota_of_self();
-    if (root && root < n) n = root;
-    if (self && self < n) n = self;
+    ts_cgroup_each(take_quota, &n);
     return n < 1 ? 1 : n;
 }
 

@@ -106,6 +106,13 @@ const char *lgd_item_assumption(const lgd_item *item)
     return item->photo[0].camera[2] == lgd_flash_photo(NULL).camera[2] ? "assumed: " : "estimated: ";
 }
 
+double lgd_item_bytes(const lgd_command *c, const lgd_model *model)
+{
+    const lgd_options options = {
+        .size = sizeof options, .orientations = c->orientations, .tolerance = fmax(c->tolerance, 0)};
+    return lgd_model_bytes(model, c->size, &options);
+}
+
 void lgd_item_write(const lgd_command *c, lgd_item *item)
 {
     char from[sizeof item->fov_from + 32];

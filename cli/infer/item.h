@@ -41,6 +41,7 @@ void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, l
 /* Of an estimated item: "assumed: " where its field of view is the default, "estimated: " where the model guessed it,
  * or "". */
 const char *lgd_item_assumption(const lgd_item *item);
+double lgd_item_bytes(const lgd_command *c, const lgd_model *model); /* that an estimate takes, at most */
 void lgd_item_write(const lgd_command *c, lgd_item *item);
 void lgd_item_free(lgd_item *item);
 #endif

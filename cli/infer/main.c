@@ -8,6 +8,7 @@
 #include "infer/output.h"
 #include "infer/photograph.h"
 #include "render/scene.h"
+#include "tensor/budget.h"
 #include "tensor/threads.h"
 #include <math.h>
 #include <pthread.h>
@@ -247,6 +248,7 @@ static int work(const lgd_command *c)
         return cl_usage("%s", st.message);
     }
     ts_threads_set(c->threads);
+    ts_budget_set(c->max_memory);
     run r = {.command = c, .jobs = plan.jobs, .lock = PTHREAD_MUTEX_INITIALIZER};
     /* Of a lone photograph its page is enough. */
     if (c->outputs & LGD_OUT_PAGE && (photos > 1 || strcmp(photo[0], c->photo[0]) != 0) &&

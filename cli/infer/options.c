@@ -21,6 +21,7 @@ enum {
     EXACT,
     PRECISION,
     MAX_PIXELS,
+    MAX_MEMORY,
     HELP = 'h',
     VERSION = 'V'
 };
@@ -78,6 +79,9 @@ const cl_argument lgd_infer_arguments[] = {
      "specular (default), or metallic: base colour and metalness instead of diffuse and specular; the error of the\n"
      "conversion is printed"},
     {MAX_PIXELS, "max-pixels", "N", "refuse photographs with more pixels (default 268435456)"},
+    {MAX_MEMORY, "max-memory", "SIZE",
+     "refuse what needs more memory at once: a number of bytes, or with K, M or G behind it (default: three\n"
+     "quarters of what the machine has or its control group allows)"},
     {'q', "quiet", NULL, "print errors only"},
     {HELP, "help", NULL, "print this help"},
     {VERSION, "version", NULL, "print the version"},
@@ -122,6 +126,11 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
         case HELP: c->help = true; break;
         case VERSION: c->version = true; break;
         case MAX_PIXELS: code = whole("max-pixels", value, 1, INT64_C(1) << 40, &c->max_pixels, st); break;
+        case MAX_MEMORY:
+            if (!cl_parse_size(value, &c->max_memory))
+                code = ts_fail(st, TS_INVALID, "--max-memory: '%s' is not a size such as 4G, 500M or 2000000000",
+                               value);
+            break;
         case 's':
             code = whole("size", value, 1, 8192, &n, st);
             c->size = (int)n;

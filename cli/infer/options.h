@@ -11,6 +11,7 @@ typedef struct lgd_command {
     char capture[4096]; /* what is read in place of a photograph, without slashes at its end; or empty */
     int size, iterations /* -1: as trained; LGD_AUTO */, threads;
     int64_t max_pixels;
+    double max_memory; /* bytes; 0: tensor/budget.h's default */
     double tolerance;
     int orientations; /* 1, 2, 4 or 8 */
     double fov;       /* degrees across the square; 0: from the file */

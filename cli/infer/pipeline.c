@@ -1,5 +1,5 @@
 #include "cli/infer/pipeline.h"
-#include "infer/memory.h"
+#include "tensor/budget.h"
 #include "tensor/threads.h"
 #include <pthread.h>
 #include <stdlib.h>
@@ -136,11 +136,10 @@ static void *lane(void *user)
 /* Photographs that are computed at once: one for each thread, and fewer where the memory would not do. */
 static int most_at_once(int jobs, int size)
 {
-    const double each = 64e6 + 200.0 * size * size; /* bytes, more than were seen */
-    ts_status full = {0};
+    const double each = 64e6 + 200.0 * size * size; /* bytes, of a shipped model more than were seen */
     int lanes = jobs < LANES ? jobs : LANES;
     if (lanes > ts_threads()) lanes = ts_threads();
-    while (lanes > 1 && lgd_memory_check(lanes * each, &full) != TS_OK) lanes--;
+    while (lanes > 1 && ts_budget_check(lanes * each, NULL) != TS_OK) lanes--;
     return lanes;
 }
 
@@ -174,6 +173,8 @@ void lgd_pipeline_run(lgd_pipeline *p, lgd_model *model, const lgd_listener *lis
     int others = 0;
     p->model = model;
     p->listener = listener;
+    const double each = lgd_item_bytes(p->command, model);
+    while (p->lanes > 1 && ts_budget_check(p->lanes * each, NULL) != TS_OK) p->lanes--;
     while (others < p->lanes - 1 && pthread_create(&other[others], NULL, lane, p) == 0)
         others++; /* fewer do the same work */
     while ((item = next(p, true))) {

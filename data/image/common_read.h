@@ -3,13 +3,17 @@
 #define IO_COMMON_READ_H
 #include "data/image/oiio.h"
 
-/* True: image is what oi_read would give, the same values, and the caller's to free. False: the file has
- * another format, or is unusual, too large or damaged; image is empty. The caller then asks oi_read, which also reports
- * the error. */
-bool io_read_png_file(const char *path, int64_t max_pixels,
-                      oi_image *image); /* 8 and 16 bits, grey or RGB, with alpha or without */
-bool io_read_jpeg_file(const char *path, int64_t max_pixels,
-                       oi_image *image); /* grey and YCbCr or RGB, EXIF orientation, ICC profile */
+/* *read: image is what oi_read would give, the same values, and the caller's to free. Otherwise image is empty: the
+ * file has another format, or is unusual or damaged, and the caller asks oi_read, which also reports the error. What
+ * claims more than max_pixels, or pixels that need more memory than there is, is refused here: TS_UNSUPPORTED,
+ * TS_NOMEM. */
+ts_code io_read_png_file(const char *path, int64_t max_pixels, oi_image *image, bool *read,
+                         ts_status *st); /* 8 and 16 bits, grey or RGB, with alpha or without */
+ts_code io_read_jpeg_file(const char *path, int64_t max_pixels, oi_image *image, bool *read,
+                          ts_status *st); /* grey and YCbCr or RGB, EXIF orientation, ICC profile */
+
+/* TS_UNSUPPORTED where there are more than max_pixels, TS_NOMEM where a decoder's bytes are not to be had. */
+ts_code io_check_claim(const char *path, double width, double height, int64_t max_pixels, double bytes, ts_status *st);
 
 /* Reads a JPEG's Exif segment (from its "Exif\0\0" on). False: it does not follow the standard. What is odd about the
  * lens is only not said. */

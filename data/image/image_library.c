@@ -63,12 +63,12 @@ static const oi_library *loaded(const char *name, ts_status *st)
     return library;
 }
 
-ts_code oi_read(const char *path, int64_t max_pixels, oi_image *image, ts_status *st)
+ts_code oi_read(const char *path, int64_t max_pixels, double max_bytes, oi_image *image, ts_status *st)
 {
     memset(image, 0, sizeof *image);
     const oi_library *l = loaded(path, st);
     if (!l) return failure.code;
-    const ts_code code = l->read(path, max_pixels, image, st);
+    const ts_code code = l->read(path, max_pixels, max_bytes, image, st);
     if (code != TS_OK) oi_free(image);
     return code;
 }

@@ -14,7 +14,10 @@ typedef struct reading {
     FILE *file;
     JOCTET *profile;
     oi_image *image;
+    const char *path;
     int64_t max_pixels;
+    ts_status *st; /* of what is refused */
+    ts_code refused;
 } reading;
 
 static void on_error(j_common_ptr jpeg) { longjmp(((reading *)jpeg->client_data)->back, 1); }
@@ -66,6 +69,18 @@ static bool pixels(reading *r)
     return true;
 }
 
+/* What the library and we take for it: the pixels, and of a file whose components or bits come in several scans all its
+ * coefficients. */
+static double bytes_of(reading *r)
+{
+    double coefficients = 0;
+    if (jpeg_has_multiple_scans(&r->jpeg))
+        for (int c = 0; c < r->jpeg.num_components; c++)
+            coefficients += (double)r->jpeg.comp_info[c].width_in_blocks * r->jpeg.comp_info[c].height_in_blocks *
+                sizeof(JBLOCK);
+    return coefficients + (double)r->jpeg.image_width * r->jpeg.image_height * r->jpeg.num_components;
+}
+
 static bool work(reading *r)
 {
     if (setjmp(r->back)) return false;
@@ -75,11 +90,11 @@ static bool work(reading *r)
         if (marker < 3 || marker == 13) jpeg_save_markers(&r->jpeg, JPEG_APP0 + marker, 0xffff);
     jpeg_save_markers(&r->jpeg, JPEG_COM, 0xffff);
     if (jpeg_read_header(&r->jpeg, TRUE) != JPEG_HEADER_OK) return false;
+    r->refused = io_check_claim(r->path, r->jpeg.image_width, r->jpeg.image_height, r->max_pixels, bytes_of(r), r->st);
+    if (r->refused) return false;
     const J_COLOR_SPACE space = r->jpeg.jpeg_color_space;
     if (space != JCS_GRAYSCALE && space != JCS_YCbCr && space != JCS_RGB) return false;
-    if ((int64_t)r->jpeg.image_width * r->jpeg.image_height > r->max_pixels || r->jpeg.data_precision != 8 ||
-        !markers(r))
-        return false;
+    if (r->jpeg.data_precision != 8 || !markers(r)) return false;
     oi_image *image = r->image;
     image->width = (int)r->jpeg.image_width;
     image->height = (int)r->jpeg.image_height;
@@ -98,9 +113,9 @@ static bool work(reading *r)
     return jpeg_finish_decompress(&r->jpeg) && r->errors.num_warnings == 0;
 }
 
-bool io_read_jpeg_file(const char *path, int64_t max_pixels, oi_image *image)
+ts_code io_read_jpeg_file(const char *path, int64_t max_pixels, oi_image *image, bool *read, ts_status *st)
 {
-    reading r = {.image = image, .max_pixels = max_pixels, .file = fopen(path, "rbe")};
+    reading r = {.image = image, .path = path, .max_pixels = max_pixels, .st = st, .file = fopen(path, "rbe")};
     memset(image, 0, sizeof *image);
     int a = r.file ? getc(r.file) : 0, b = r.file ? getc(r.file) : 0;
     bool done = false;
@@ -116,5 +131,6 @@ bool io_read_jpeg_file(const char *path, int64_t max_pixels, oi_image *image)
     if (r.file) fclose(r.file);
     free(r.profile);
     if (!done) oi_free(image);
-    return done;
+    *read = done;
+    return r.refused;
 }

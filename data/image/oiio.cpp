@@ -115,7 +115,7 @@ static void divide_by_alpha(oi_image *image)
     image->associated = false;
 }
 
-static ts_code read_file(const char *path, int64_t max_pixels, oi_image *image, ts_status *st)
+static ts_code read_file(const char *path, int64_t max_pixels, double max_bytes, oi_image *image, ts_status *st)
 {
     ImageSpec config;
     config.attribute("oiio:UnassociatedAlpha", 1); /* the library would multiply encoded values by alpha */
@@ -147,6 +147,11 @@ static ts_code read_file(const char *path, int64_t max_pixels, oi_image *image, 
     image->height = spec.height;
     image->channels = last - first + 1;
     image->type = OI_F32;
+    const double bytes = (double)sizeof(float) * spec.width * spec.height * image->channels;
+    if (bytes > max_bytes)
+        return ts_fail(st, TS_NOMEM,
+                       "%s: %d x %d pixels: about %.3g GB of memory are needed and %.3g GB may be taken (--max-memory)",
+                       path, spec.width, spec.height, bytes * 1e-9, max_bytes * 1e-9);
     image->data = calloc((size_t)spec.width * spec.height * image->channels, sizeof(float));
     if (!image->data) return ts_fail(st, TS_NOMEM, "%s: no memory for %d x %d pixels", path, spec.width, spec.height);
     if (!in->read_image(0, 0, first, last + 1, TypeDesc::FLOAT, image->data))
@@ -158,9 +163,9 @@ static ts_code read_file(const char *path, int64_t max_pixels, oi_image *image, 
     return TS_OK;
 }
 
-static ts_code read(const char *path, int64_t max_pixels, oi_image *image, ts_status *st)
+static ts_code read(const char *path, int64_t max_pixels, double max_bytes, oi_image *image, ts_status *st)
 {
-    return guarded(path, st, [&] { return read_file(path, max_pixels, image, st); });
+    return guarded(path, st, [&] { return read_file(path, max_pixels, max_bytes, image, st); });
 }
 
 static ts_code encode(const char *name, const oi_encoding *e, const uint8_t *pixels, unsigned char **bytes,

@@ -45,8 +45,9 @@ static inline float oi_value(const oi_image *image, size_t i)
     }
 }
 
-/* The size is checked against max_pixels before memory is taken. On success the caller calls oi_free. */
-ts_code oi_read(const char *path, int64_t max_pixels, oi_image *image, ts_status *st);
+/* The size is checked against max_pixels, and the memory of its pixels against max_bytes, before memory is taken. On
+ * success the caller calls oi_free. */
+ts_code oi_read(const char *path, int64_t max_pixels, double max_bytes, oi_image *image, ts_status *st);
 void oi_free(oi_image *image);
 
 /* Encodes a JPEG in memory; pixels are uint8_t [height][width][channels]. bytes is malloced and the caller's. name is
@@ -66,7 +67,7 @@ bool oi_knows_extension(const char *extension);
 typedef struct oi_library {
     const char *build;
     void (*start)(int threads);
-    ts_code (*read)(const char *path, int64_t max_pixels, oi_image *image, ts_status *st);
+    ts_code (*read)(const char *path, int64_t max_pixels, double max_bytes, oi_image *image, ts_status *st);
     ts_code (*encode_jpeg)(const char *name, const oi_encoding *e, const uint8_t *pixels, unsigned char **bytes,
                            size_t *size, ts_status *st);
     bool (*knows_extension)(const char *extension);

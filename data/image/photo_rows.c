@@ -1,19 +1,33 @@
 #include "data/image/photo_rows.h"
 #include "data/image/common_read.h"
 #include "data/file.h"
+#include "data/image/header.h"
 #include "data/image/png_file.h"
+#include "tensor/budget.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
+ts_code io_check_claim(const char *path, double width, double height, int64_t max_pixels, double bytes, ts_status *st)
+{
+    if (width * height > (double)max_pixels)
+        return ts_fail(st, TS_UNSUPPORTED, "%s: %.0f x %.0f pixels are more than the limit of %lld (--max-pixels)",
+                       path, width, height, (long long)max_pixels);
+    if (ts_budget_check(bytes, st) != TS_OK) return ts_context(st, "%s: %.0f x %.0f pixels", path, width, height);
+    return TS_OK;
+}
+
 ts_code io_read_raw(const char *path, int64_t max_pixels, oi_image *raw, ts_status *st)
 {
+    bool read = false;
+    *raw = (oi_image){0};
     ts_code code = io_check_file(path, st);
-    if (code == TS_OK) code = io_check_png(path, st);
-    if (code != TS_OK || io_read_png_file(path, max_pixels, raw) || io_read_jpeg_file(path, max_pixels, raw))
-        return code;
-    code = oi_read(path, max_pixels, raw, st);
-    if (!code) io_webp_exif(path, raw);
+    if (!code) code = io_check_png(path, st);
+    if (!code) code = io_read_png_file(path, max_pixels, raw, &read, st);
+    if (!code && !read) code = io_read_jpeg_file(path, max_pixels, raw, &read, st);
+    if (!code && !read) code = io_check_header(path, max_pixels, st);
+    if (!code && !read) code = oi_read(path, max_pixels, ts_budget_left(), raw, st);
+    if (!code && !read) io_webp_exif(path, raw);
     return code;
 }
 

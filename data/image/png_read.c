@@ -11,7 +11,10 @@ typedef struct reading {
     png_structp png;
     png_infop info;
     oi_image *image;
+    const char *path;
     int64_t max_pixels;
+    ts_status *st; /* of what is refused */
+    ts_code refused;
     int bits;
     volatile bool odd; /* set by what libpng warns about */
 } reading;
@@ -48,10 +51,9 @@ static bool supported(reading *r)
 {
     png_bytep exif;
     png_uint_32 exif_size;
-    const int64_t pixels = (int64_t)png_get_image_width(r->png, r->info) * png_get_image_height(r->png, r->info);
     const bool profile = png_get_valid(r->png, r->info, PNG_INFO_iCCP),
                other = png_get_valid(r->png, r->info, PNG_INFO_gAMA | PNG_INFO_cHRM | PNG_INFO_sRGB);
-    return pixels <= r->max_pixels && r->bits >= 8 && png_get_color_type(r->png, r->info) != PNG_COLOR_TYPE_PALETTE &&
+    return r->bits >= 8 && png_get_color_type(r->png, r->info) != PNG_COLOR_TYPE_PALETTE &&
         !png_get_valid(r->png, r->info, PNG_INFO_tRNS) &&
         png_get_interlace_type(r->png, r->info) == PNG_INTERLACE_NONE &&
         !png_get_eXIf_1(r->png, r->info, &exif_size, &exif) && !(profile && other) && plain_texts(r);
@@ -88,10 +90,14 @@ static bool work(reading *r)
 {
     if (setjmp(png_jmpbuf(r->png))) return false;
     png_init_io(r->png, r->file);
+    png_set_user_limits(r->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX); /* ours are told below, in our words */
     png_read_info(r->png, r->info);
     oi_image *image = r->image;
     r->bits = png_get_bit_depth(r->png, r->info);
-    if (!supported(r)) return false;
+    r->refused = io_check_claim(
+        r->path, png_get_image_width(r->png, r->info), png_get_image_height(r->png, r->info), r->max_pixels,
+        (double)png_get_rowbytes(r->png, r->info) * png_get_image_height(r->png, r->info), r->st);
+    if (r->refused || !supported(r)) return false;
     image->width = (int)png_get_image_width(r->png, r->info);
     image->height = (int)png_get_image_height(r->png, r->info);
     image->channels = png_get_channels(r->png, r->info);
@@ -105,9 +111,9 @@ static bool work(reading *r)
     return plain_texts(r) && !r->odd; /* texts may stand behind the pixels too */
 }
 
-bool io_read_png_file(const char *path, int64_t max_pixels, oi_image *image)
+ts_code io_read_png_file(const char *path, int64_t max_pixels, oi_image *image, bool *read, ts_status *st)
 {
-    reading r = {.image = image, .max_pixels = max_pixels};
+    reading r = {.image = image, .path = path, .max_pixels = max_pixels, .st = st};
     memset(image, 0, sizeof *image);
     r.file = fopen(path, "rbe");
     png_byte head[8];
@@ -122,5 +128,6 @@ bool io_read_png_file(const char *path, int64_t max_pixels, oi_image *image)
     }
     if (r.file) fclose(r.file);
     if (!done) oi_free(image);
-    return done;
+    *read = done;
+    return r.refused;
 }

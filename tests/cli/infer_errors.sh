@@ -214,6 +214,19 @@ too_many_pixels() {
     expect 0 infer --max-pixels 100 "$T/p.ppm" -o "$T/o"
 }
 
+max_memory() {
+    model
+    photo "$T/p.ppm" 40 40
+    expect 2 infer --max-memory 4T "$T/p.ppm" -o "$T/o"
+    says "$T/err" "--max-memory: '4T'"
+    expect 1 infer --max-memory 1M "$T/p.ppm" -o "$T/o"
+    says "$T/err" "p.ppm: "
+    says "$T/err" "(--max-memory)"
+    lines "$T/err" 1
+    [ -z "$(ls -A "$T/o")" ] || fail "left over: $(ls -A "$T/o")"
+    expect 0 infer --max-memory 1G "$T/p.ppm" -o "$T/o"
+}
+
 check infer_bad_photographs_do_not_stop_the_rest bad_ones_do_not_stop
 check infer_same_stem same_stem
 check infer_odd_stems odd_stems
@@ -227,3 +240,4 @@ check infer_weights_of_another_kind weights
 check infer_model_lookup model_lookup
 check infer_without_the_image_library without_the_image_library
 check infer_too_many_pixels too_many_pixels
+check infer_max_memory max_memory

@@ -19,6 +19,10 @@ TEST(cli_numbers_are_whole_strings_in_range)
     for (size_t k = 0; k < sizeof bad / sizeof *bad; k++)
         CHECK(!cl_parse_int(bad[k], 0, 100, &i), "'%s' must be refused", bad[k]);
     CHECK(cl_parse_real("1e-3", 0, 1, &d) && d == 1e-3, "1e-3");
+    CHECK(cl_parse_size("123", &d) && d == 123 && cl_parse_size("0.5G", &d) && d == 512 * 1048576.0, "0.5G is %g", d);
+    const char *bad_size[] = {"", "G", "-1K", "0", "0K", "1T", "1 G", "1GG", "nanK"};
+    for (size_t k = 0; k < sizeof bad_size / sizeof *bad_size; k++)
+        CHECK(!cl_parse_size(bad_size[k], &d), "'%s' must be refused", bad_size[k]);
     CHECK(cl_parse_real("1e-310", 0, 1, &d) && d > 0, "a denormal is a number");
     const char *const bad_real[] = {"", "nan", "inf", "1,5", "0.5x", "2", "-0.1", " 0.5"};
     for (size_t k = 0; k < sizeof bad_real / sizeof *bad_real; k++)

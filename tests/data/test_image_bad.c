@@ -3,6 +3,7 @@
 #include "data/file.h"
 #include "data/image/image.h"
 #include "tests/support/make_images.h"
+#include "tensor/budget.h"
 #include "tests/test.h"
 #include <dirent.h>
 #include <math.h>
@@ -81,23 +82,50 @@ TEST(header_bombs)
         put32le(&b, 40), put32le(&b, 1000000), put32le(&b, 1000000), put16le(&b, 1), put16le(&b, packed ? 8 : 24),
             put32le(&b, (uint32_t)packed);
         for (int i = 0; i < 9; i++) put32le(&b, 0);
-        refused(bytes_save(&b, folder, "bomb.bmp"), "1000000 x 1000000"); /* by the reader itself */
+        refused(bytes_save(&b, folder, "bomb.bmp"), "1000000 x 1000000");
     }
     b = tiff_file(&(tiff_page){1000000, 1000000, 3, 8, 2, 1, -1, 1, NULL}, 1);
     refused(bytes_save(&b, folder, "bomb.tif"), "--max-pixels");
     b = exr_file(1000000, 1000000, NULL, NULL);
-    refused(bytes_save(&b, folder, "bomb.exr"), "");
+    refused(bytes_save(&b, folder, "bomb.exr"), "--max-pixels");
     const char *text[] = {"P6\n1000000 1000000\n255\nabc",
                           "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1000000 +X 1000000\nabcd",
                           "GIF89a\xff\xff\xff\xff\x80\1\0\1\1\1\2\2\2,\1\1\1\1\xff\xff\xff\xff\1\2\2D\1\0;",
-                          "P6\n2000000000 2000000000\n255\n"};
-    const char *name[] = {"bomb.ppm", "bomb.hdr", "bomb.gif", "bomb2.ppm"};
-    for (int i = 0; i < 4; i++) {
+                          "P6\n2000000000 2000000000\n255\n",
+                          "P7\nWIDTH 1000000\nHEIGHT 1000000 # as wide\nDEPTH 3\nMAXVAL 255\nTUPLTYPE RGB\nENDHDR\n",
+                          "P4 # bits\n# and more\n1000000\n1000000 0"};
+    const char *name[] = {"bomb.ppm", "bomb.hdr", "bomb.gif", "bomb2.ppm", "bomb.pam", "bomb.pbm"};
+    for (int i = 0; i < 6; i++) {
         put(&b, text[i], strlen(text[i]));
-        refused(bytes_save(&b, folder, name[i]), i == 2 ? "" : "--max-pixels");
+        refused(bytes_save(&b, folder, name[i]), "--max-pixels");
     }
     long taken = peak_kilobytes() - before;
     CHECK(taken < 64 << 10, "%ld KiB were taken for files of a hundred bytes", taken);
+}
+
+/* A progressive file's coefficients are all held at once: 20000 x 12000 pixels of them, claimed by a hundred bytes. */
+TEST(coefficient_bomb)
+{
+    static const uint8_t start[] = {0xff, 0xd8}, frame[] = {0xff, 0xc2, 0, 17, 8,    0x2e, 0xe0, 0x4e, 0x20, 3,
+                                                            1,    0x11, 0, 2,  0x11, 0,    3,    0x11, 0},
+                         scan[] = {0xff, 0xda, 0, 12, 3, 1, 0, 2, 0, 3, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xd9};
+    bytes b = {0};
+    put(&b, start, sizeof start);
+    for (int i = 0; i < 3; i++) { /* tables of the quantisation: all 1 */
+        put(&b, "\xff\xdb", 2), put16(&b, 67), put8(&b, (unsigned)i);
+        for (int k = 0; k < 64; k++) put8(&b, 1);
+    }
+    put(&b, frame, sizeof frame), put(&b, scan, sizeof scan);
+    const char *path = bytes_save(&b, test_folder(), "progressive.jpg");
+    ts_budget_set(1e9);
+    const long before = peak_kilobytes();
+    refused(path, "20000 x 12000 pixels: about 2.16 GB");
+    CHECK(peak_kilobytes() - before < 16 << 10, "%ld KiB were taken first", peak_kilobytes() - before);
+    /* the float pixels of what goes to the image library */
+    b = tiff_file(&(tiff_page){4, 4, 3, 8, 2, 1, -1, 1, "0123456789ab0123456789ab0123456789ab0123456789ab"}, 1);
+    path = bytes_save(&b, test_folder(), "small.tif");
+    ts_budget_set(191);
+    refused(path, "4 x 4 pixels: about 1.92e-07 GB");
 }
 
 /* Every third prefix of a small file of each format. A whole number of scan lines may be missing: still an error. */

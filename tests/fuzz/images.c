@@ -1,4 +1,5 @@
 #include "data/image/common_read.h"
+#include "data/image/header.h"
 #include "data/image/image.h"
 #include "data/image/png_file.h"
 #include "tests/fuzz/fuzz.h"
@@ -36,9 +37,14 @@ void fuzz_photo(const uint8_t *data, size_t size)
     oi_image raw;
     io_image image;
     ts_status st = {0};
-    if (!io_check_png(path, &st) &&
-        (io_read_png_file(path, MOST_PIXELS, &raw) || io_read_jpeg_file(path, MOST_PIXELS, &raw))) {
+    bool read = false;
+    if (!io_check_png(path, &st) && !io_read_png_file(path, MOST_PIXELS, &raw, &read, &st) && !read)
+        io_read_jpeg_file(path, MOST_PIXELS, &raw, &read, &st);
+    io_check_header(path, MOST_PIXELS, &st);
+    if (st.code && (read || !*st.message || strchr(st.message, '\n'))) abort();
+    if (read) {
         oi_free(&raw); /* what these do not take goes to OpenImageIO, which is not meant here */
+        st = (ts_status){0};
         if (io_read_photo(path, MOST_PIXELS, &image, &st)) abort();
         for (int i = 0; i < image.width * image.height * image.channels; i++)
             if (!(image.data[i] >= 0)) abort(); /* a promise: no NaN, nothing negative */
@@ -55,7 +61,7 @@ void fuzz_image(const uint8_t *data, size_t size)
     oi_image raw;
     io_image image;
     ts_status st = {0};
-    if (oi_read(path, MOST_PIXELS, &raw, &st)) {
+    if (oi_read(path, MOST_PIXELS, 1e9, &raw, &st)) {
         if (!*st.message || strchr(st.message, '\n')) abort();
     } else oi_free(&raw);
     st = (ts_status){0};

@@ -1,7 +1,8 @@
 /* The public C API. */
-#include "infer/memory.h"
+#include "tensor/budget.h"
 #include "render/scene.h"
 #include "tests/support/inference.h"
+#include <sys/resource.h>
 #include <pthread.h>
 
 /* Winograd's way, where the network is wide enough for it. */
@@ -346,9 +347,42 @@ TEST(infer_ten_channels_give_nine_maps)
     lgd_free(&m);
 }
 
+static long peak_kilobytes(void)
+{
+    struct rusage usage;
+    getrusage(RUSAGE_SELF, &usage);
+    return usage.ru_maxrss;
+}
+
 TEST(infer_more_memory_than_there_is_is_refused)
 {
     ts_status st = {0};
-    CHECK(lgd_memory_check(1, &st) == TS_OK, "one byte: %s", st.message);
-    CHECK(lgd_memory_check(1e18, &st) == TS_NOMEM && strstr(st.message, "1000000000.0 GB"), "'%s'", st.message);
+    CHECK(ts_budget_check(1, &st) == TS_OK, "one byte: %s", st.message);
+    CHECK(ts_budget_check(1e18, &st) == TS_NOMEM && strstr(st.message, "about 1e+09 GB") &&
+              strstr(st.message, "--max-memory"),
+          "'%s'", st.message);
+    const double before = ts_budget_left();
+    ts_budget_set(before / 2);
+    CHECK(ts_budget_left() == before / 2 && ts_budget_check(before * 0.75, &st) == TS_NOMEM, "half of what there was");
+    ts_budget_set(1e18);
+    CHECK(ts_budget_check(1e17, &st) == TS_NOMEM && strstr(st.message, "are free"), "'%s'", st.message);
+}
+
+/* A few bytes of metadata ask for gigabytes: g_size is 4096 where the photograph has 16 pixels a side. */
+TEST(infer_refuses_what_metadata_asks_for)
+{
+    static float image[SIDE * SIDE * 3], maps[VALUES];
+    nn_arch a = tiny();
+    a.g_size = 4096, a.g_width = a.g_width_max = 64;
+    lgd_model *m = load(a);
+    make_image(image, SIDE);
+    ts_budget_set(2e9);
+    const long before = peak_kilobytes();
+    lgd_error e;
+    const lgd_options o = {.size = sizeof o, .iterations = 0, .orientations = 2};
+    CHECK(lgd_estimate(m, image, SIDE, &o, maps, &e) == TS_NOMEM && strstr(e.message, "4096 x 4096") &&
+              strstr(e.message, "--max-memory"),
+          "'%s'", e.message);
+    CHECK(peak_kilobytes() - before < 64 << 10, "%ld KiB were taken first", peak_kilobytes() - before);
+    lgd_free(&m);
 }

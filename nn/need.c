@@ -1,0 +1,53 @@
+/* What g holds at once, counted as nn/unet.c and nn/detail.c allocate it. */
+#include "nn/layers.h"
+#include "nn/need.h"
+#include "tensor/maps.h"
+#include <math.h>
+
+/* A block's values in floats a pixel: what it reads, the two convolutions, the norm and the sum; and its result once
+ * more, which moves out of the scope. */
+static double block_values(double in, double middle, double out) { return in + middle + 4 * out; }
+
+static double unet_floats(const nn_arch *a)
+{
+    const double pixels = (double)a->g_size * a->g_size, w0 = nn_level_width(a, 0), reads = nn_g_reads(a);
+    /* what is read: the photographs side by side, as squares, with coordinates and conditions, each a copy */
+    double held = pixels * (reads + (a->g_unshuffle > 1 ? 2 * reads : 0) + (a->conditions ? reads : 0) + w0), most = held;
+    for (int i = 0; i < a->g_levels; i++) {
+        const double here = pixels / exp2(2 * (i + 1)), in = nn_level_width(a, i), out = nn_level_width(a, i + 1);
+        most = fmax(most, held + here * block_values(in, out, out));
+        held += here * out;
+    }
+    double deep = nn_level_width(a, a->g_levels);
+    for (int i = a->g_levels - 1; i >= 0; i--) {
+        const double here = pixels / exp2(2 * i), skip = nn_level_width(a, i), in = skip + deep,
+                     out = i > 0 ? nn_level_width(a, i - 1) : w0;
+        most = fmax(most, held + here * block_values(deep + in, in / 2, out));
+        held += here * out;
+        deep = out;
+    }
+    held += pixels * 4 * a->channels;
+    return fmax(most, held);
+}
+
+/* Beside the U-Net's: nn_detail's squares, then the full size. */
+static double detail_floats(const nn_arch *a)
+{
+    enum { FINE = 12, FINER = 16 };
+    if (a->g_unshuffle == 1) return 0;
+    const double pixels = (double)a->g_size * a->g_size, squares = (double)a->g_unshuffle * a->g_unshuffle;
+    const double first = pixels * (a->g_detail * (3 + 3.0 * a->g_trunk) + nn_level_width(a, 0) + 3 * FINE * squares);
+    const double writes = nn_detail_writes(a);
+    const double second = pixels * squares * (2 * FINE + 10 + FINER + 3 * writes + 6 * a->channels);
+    return fmax(first, second);
+}
+
+double nn_guess_bytes(const nn_arch *a, int orientations)
+{
+    const double side = nn_arch_side(a), photo = 3.0 * a->images, maps = a->channels + (a->spread ? NN_SPREADS : 0);
+    const bool turned = orientations > 1 && a->images == 1 && a->compat == NN_COMPAT_NONE;
+    /* the photographs at g's size and encoded; of several orientations their maps' mean */
+    const double once = side * side * (3 * photo + (turned ? 2 * maps : 0));
+    const double batch = unet_floats(a) + detail_floats(a) + side * side * photo;
+    return (once + (turned ? orientations : 1) * batch) * sizeof(float);
+}

@@ -1,0 +1,44 @@
+/* The memory of g, counted before it is taken, against what it takes. */
+#include "nn/need.h"
+#include "tests/support/networks.h"
+
+static void fits(const char *what, const nn_arch *a, int orientations)
+{
+    nn_model *m = create(a, 5);
+    const int side = nn_arch_side(a) / 2; /* resampled to g's size */
+    nn_input in = photographs(a->images, side, 6, NULL);
+    in.given = a->images;
+    in.orientations = orientations;
+    ag_tape *tape = tape_create(false);
+    nn_guess g;
+    CHECK(nn_guess_from(tape, m, &in, &g), "%s: %s", what, ag_status(tape)->message);
+    const double taken = (double)ts_arena_peak(ag_arena(tape)), counted = nn_guess_bytes(a, orientations);
+    CHECK(taken <= counted && counted < 2 * taken, "%s: %.0f bytes are counted and %.0f taken", what, counted, taken);
+    ag_tape_destroy(&tape);
+    nn_model_free(&m);
+    free(in.image.data);
+}
+
+TEST(need_of_g_is_counted)
+{
+    const int levels[] = {1, 3, 6};
+    for (int i = 0; i < 3; i++)
+        for (int wide = 0; wide < 2; wide++) {
+            nn_arch a = tiny();
+            a.g_levels = levels[i], a.g_size = 128, a.g_width = wide ? 24 : 2, a.g_width_max = wide ? 96 : 512;
+            fits("U-Net", &a, 1);
+            fits("two orientations", &a, 2);
+            a.conditions = true;
+            fits("conditions", &a, 1);
+            a.images = 5;
+            fits("five photographs", &a, 1);
+        }
+    for (int detail = 4; detail <= 64; detail *= 4)
+        for (int trunk = 0; trunk <= 4; trunk += 4) {
+            nn_arch a = tiny();
+            a.g_unshuffle = 4, a.g_size = 32, a.g_levels = 3, a.g_detail = detail, a.g_trunk = trunk;
+            fits("detail", &a, 1);
+            a.spread = a.scene = a.conditions = true;
+            fits("detail, spread, scene and conditions", &a, 2);
+        }
+}
