@@ -9,6 +9,7 @@
 #: make bench-deps   PyTorch, for the comparison in make bench
 #: make stress       the numerics far from ordinary input; STRESS=shading runs one part
 #: make fuzz         the readers under libFuzzer; FUZZ=torch for one of them, FUZZ_SECONDS=600 for each
+#: make faults       every program with each call that can fail failing, one at a time; then with LeakSanitizer
 #: make asan         make test with the address and undefined-behaviour sanitizers, in build-asan/
 #: make clean        deletes what make has built
 #: Variables: V=1 prints the commands, YES=1 installs packages without asking, -j1 is one job (default: one a CPU),
@@ -96,7 +97,8 @@ IMAGE_LIB := $(BUILD)/lib/lgd/liblgd_image.so
 BIN := $(PROGRAMS:%=$(BUILD)/bin/lgd-%)
 STRESS_C := $(filter-out %main.c,$(wildcard tests/stress/*.c))
 FUZZ_C := $(filter-out %main.c,$(wildcard tests/fuzz/*.c))
-TEST_C := $(wildcard tests/*.c) $(filter-out tests/stress/%.c tests/fuzz/%.c,$(wildcard tests/*/*.c)) $(STRESS_C) $(FUZZ_C)
+FAULTS := $(BUILD)/bin/lgd-faults $(BUILD)/lib/lgd-faults.so
+TEST_C := $(wildcard tests/*.c) $(filter-out tests/stress/%.c tests/fuzz/%.c tests/faults/%.c,$(wildcard tests/*/*.c)) $(STRESS_C) $(FUZZ_C)
 BENCH_C := $(wildcard bench/*.c)
 TEST_BIN := $(BUILD)/bin/lgd-test
 BENCH_BIN := $(BUILD)/bin/lgd-bench
@@ -126,6 +128,17 @@ $(TEST_BIN): $(TEST_C:%.c=$(OBJ)/%.o) $(INTERNAL) | $(IMAGE_LIB)
 	$(call step,LD,$@)
 	@mkdir -p $(@D)
 	$(Q)$(CC) -o $@ $(filter %.o %.a,$^) $(WRAP) $(LDLIBS_ALL)
+
+# Without the sanitizers: it calls what they replace.
+$(BUILD)/bin/lgd-faults: tests/faults/main.c $(BUILD)/gen/flags
+	$(call step,LD,$@)
+	@mkdir -p $(@D)
+	$(Q)$(CC) $(CPPFLAGS_ALL) -std=c11 -O1 -g $(WARN) -o $@ $<
+
+$(BUILD)/lib/lgd-faults.so: tests/faults/shim.c $(BUILD)/gen/flags
+	$(call step,LD,$@)
+	@mkdir -p $(@D)
+	$(Q)$(CC) $(CPPFLAGS_ALL) -std=c11 -O1 -g $(WARN) -fPIC -shared -o $@ $< -ldl -lpthread
 
 $(STRESS_BIN): $(OBJ)/tests/stress/main.o $(STRESS_C:%.c=$(OBJ)/%.o) $(INTERNAL)
 	$(call step,LD,$@)
@@ -189,13 +202,14 @@ $(OBJ)/%.o: %.cpp $(BUILD)/gen/flags
 
 # One kernel source, once per instruction set. Contraction to FMA is part of what a kernel is, but for those whose bytes
 # must not depend on the machine.
+CONTRACT ?= fast
 CONTRACT_noise := off
 define KERNEL_RULE
 $(OBJ)/%.$(1).o: %.c $(BUILD)/gen/flags
 	$$(call step,CC,$$< [$(1)])
 	@mkdir -p $$(@D)
 	$$(Q)$$(CC) $$(CPPFLAGS_ALL) $$(CFLAGS_ALL) $$(ISA_FLAGS_$(1)) $$(WHOLE_JUMPS) \
-	  -ffp-contract=$$(or $$(CONTRACT_$$(*F)),fast) -DTS_ISA_SUFFIX=$(1) -MMD -MP -c -o $$@ $$<
+	  -ffp-contract=$$(or $$(CONTRACT_$$(*F)),$(CONTRACT)) -DTS_ISA_SUFFIX=$(1) -MMD -MP -c -o $$@ $$<
 endef
 $(foreach isa,$(ISAS),$(eval $(call KERNEL_RULE,$(isa))))
 
@@ -231,7 +245,7 @@ deps:
 	@sh .ci/deps.sh $(PKG) $(PKG_IMAGE)
 
 test: deps
-	@$(MAKE) --no-print-directory programs $(TEST_BIN)
+	@$(MAKE) --no-print-directory programs $(TEST_BIN) $(FAULTS)
 	@BUILD=$(BUILD) TESTDATA=$(TESTDATA) FIXTURES=$(FIXTURES) sh tests/run.sh
 
 bench: deps
@@ -247,6 +261,14 @@ bench-deps:
 
 stress: $(STRESS_BIN)
 	@OMP_WAIT_POLICY=passive $(STRESS_BIN) $(STRESS)
+
+# Leaks are looked for in a build of its own: AddressSanitizer's malloc cannot be made to fail so.
+faults: programs $(FAULTS)
+	@BUILD=$(BUILD) sh tests/faults/run.sh $(FAULT_OPTIONS)
+	@$(MAKE) --no-print-directory BUILD=$(BUILD)-leaks OPT='-O1 -g -fno-omit-frame-pointer' SANITIZE=-fsanitize=leak \
+	  programs $(FAULTS:$(BUILD)/%=$(BUILD)-leaks/%)
+	@LSAN_OPTIONS=exitcode=23:suppressions=tests/faults/leaks.txt BUILD=$(BUILD)-leaks ONLY_ONCE=1 \
+	  sh tests/faults/run.sh $(FAULT_OPTIONS)
 
 # clang's libFuzzer with the address and undefined sanitizers, FUZZ_SECONDS for each target. The readers are compiled for
 # it; what else they need comes from the library as it is. OpenImageIO's libraries take seconds to load, and its PNG
@@ -317,8 +339,8 @@ uninstall:
 	-rmdir $(TO)/share/lgd $(TO)/lib/lgd
 
 clean:
-	rm -rf $(BUILD) $(BUILD)-asan
+	rm -rf $(BUILD) $(BUILD)-asan $(BUILD)-leaks
 
-.PHONY: all programs help deps test test-blender bench bench-deps stress fuzz asan demo install uninstall clean
+.PHONY: all programs help deps test test-blender bench bench-deps stress fuzz faults asan demo install uninstall clean
 .SECONDARY:
 -include $(shell find $(OBJ) $(BUILD)/fuzz/obj -name '*.d' 2>/dev/null)

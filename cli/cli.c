@@ -1,6 +1,7 @@
 #include "cli/cli.h"
 #include "tensor/cpu.h"
 #include "tensor/new_file.h"
+#include "tensor/scratch.h"
 #include <ctype.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -28,9 +29,20 @@ void cl_open_streams(void)
     }
 }
 
+/* Called inside of parallel loops, whose other threads go on: nothing is freed, nothing more is written. */
+static void no_scratch(size_t bytes)
+{
+    char line[128];
+    const int n = snprintf(line, sizeof line, "%s: out of memory: a thread needs %zu bytes to compute in\n",
+                           program_name, bytes);
+    (void)!write(STDERR_FILENO, line, (size_t)n);
+    _exit(CL_FAILED);
+}
+
 int cl_init(const char *program)
 {
     program_name = program;
+    ts_scratch_fails(no_scratch);
     setlocale(LC_ALL, "C");
     signal(SIGPIPE, SIG_IGN);
     ts_status st = {0};

@@ -12,6 +12,15 @@ typedef struct scratch {
 
 static pthread_key_t key;
 static pthread_once_t once = PTHREAD_ONCE_INIT;
+static void (*on_failure)(size_t bytes);
+
+void ts_scratch_fails(void (*handler)(size_t bytes)) { on_failure = handler; }
+
+static _Noreturn void fail(size_t bytes)
+{
+    if (on_failure) on_failure(bytes);
+    abort();
+}
 
 static void free_scratch(void *p)
 {
@@ -22,7 +31,7 @@ static void free_scratch(void *p)
 
 static void make_key(void)
 {
-    if (pthread_key_create(&key, free_scratch) != 0) abort();
+    if (pthread_key_create(&key, free_scratch) != 0) fail(sizeof(scratch));
 }
 
 static atomic_size_t most[TS_SCRATCH_SLOTS]; /* the largest request of any thread */
@@ -33,7 +42,7 @@ static scratch *own_scratch(void)
     scratch *s = pthread_getspecific(key);
     if (!s) {
         s = calloc(1, sizeof *s);
-        if (!s || pthread_setspecific(key, s) != 0) abort();
+        if (!s || pthread_setspecific(key, s) != 0) fail(sizeof *s);
     }
     return s;
 }
@@ -43,7 +52,7 @@ static void grow(scratch *s, int slot, size_t bytes)
     if (s->size[slot] >= bytes) return;
     free(s->memory[slot]);
     s->memory[slot] = ts_memory(bytes);
-    if (!s->memory[slot]) abort();
+    if (!s->memory[slot]) fail(bytes);
     s->size[slot] = bytes;
 }
 

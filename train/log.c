@@ -51,7 +51,11 @@ static ts_code open_at(const tr_trainer *t, const char *name, const char *header
     } else {
         f = fopen(path, "we");
         if (!f) return failed(path, st);
-        fputs(header, f);
+        if (fputs(header, f) == EOF || fflush(f) != 0) {
+            const ts_code code = failed(path, st);
+            fclose(f);
+            return code;
+        }
     }
     *file = f;
     return TS_OK;

@@ -141,7 +141,8 @@ int main(int argc, char **argv)
     int sets = 0, option, code = cl_init("lgd-train");
     ts_status st = {0};
     char folder[1100];
-    if (!set || code != CL_OK) goto end;
+    if (code == CL_OK && !set) code = cl_failed("out of memory");
+    if (code != CL_OK) goto end;
     cl_trace();
     while ((option = getopt_long(argc, argv, "", options, NULL)) != -1) {
         int64_t threads;

@@ -1,4 +1,5 @@
 /* The run: what it owns, its folder, the loop over steps. */
+#include "data/file.h"
 #include "nn/weights/weights.h"
 #include "tensor/maps.h"
 #include "tensor/new_file.h"
@@ -111,11 +112,11 @@ static ts_code write_config(const tr_trainer *t, ts_status *st)
 {
     char path[TR_PATH];
     tr_path(t, "config.ini", path);
-    FILE *f = fopen(path, "we");
-    if (f) tr_config_print(&t->config, true, f);
-    const bool bad = !f || ferror(f);
-    if ((f && fclose(f) != 0) || bad) return ts_fail(st, TS_IO, "%s: %s", path, strerror(errno));
-    return TS_OK;
+    char *text = tr_config_text(&t->config, true, st);
+    if (!text) return st->code;
+    const ts_code code = io_write_bytes(path, text, strlen(text), st);
+    free(text);
+    return code;
 }
 
 nn_model *tr_model_create(const tr_config *c, ts_status *st)

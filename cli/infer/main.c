@@ -243,9 +243,10 @@ static int work(const lgd_command *c)
     char *const *photo = *c->capture ? c->photo : operands.photo;
     const int photos = *c->capture ? c->photos : operands.photos, missing = operands.failed;
     if (photos == 0) return CL_FAILED;
-    if (lgd_plan_make(photo, photos, c->out, &plan, &st) != TS_OK) {
+    const ts_code bad = lgd_plan_make(photo, photos, c->out, &plan, &st);
+    if (bad) {
         lgd_operands_free(&operands);
-        return cl_usage("%s", st.message);
+        return bad == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
     }
     ts_threads_set(c->threads);
     ts_budget_set(c->max_memory);
