@@ -38,10 +38,16 @@ if [ -d ../shared ]; then
     bind "$(cd ../shared && pwd -P)" /src/shared
     mount -o remount,bind,ro "$root/src/shared"
 fi
-# The files as they are here; what make has built there stays.
-mkdir -p "$root/src/lgd" && find "$root/src/lgd" -mindepth 1 -maxdepth 1 ! -name 'build*' -exec rm -rf {} +
+# The files as they are here. What is the same there stays as it is, so that make builds the rest alone.
+new=$root/src/new old=$root/src/lgd
+rm -rf "$new" && mkdir -p "$new" "$old" || exit 1
 git ls-files -co --exclude-standard | while read -r f; do [ ! -f "$f" ] || echo "$f"; done |
-    tar -cf - --verbatim-files-from -T - | tar -xf - -C "$root/src/lgd" || exit 1
+    tar -cf - --verbatim-files-from -T - | tar -xf - -C "$new" || exit 1
+(cd "$old" && find . \( -path './build*' -o -path ./.git \) -prune -o -type f -print) |
+    while read -r f; do [ -e "$new/$f" ] || rm "$old/$f"; done
+(cd "$new" && find . -type f) | while read -r f; do
+    cmp -s "$new/$f" "$old/$f" || { mkdir -p "$old/${f%/*}" && cp -p "$new/$f" "$old/$f" && touch "$old/$f"; }
+done
 # .ci/format.sh asks git which files there are.
 chroot "$root" /usr/bin/env -i HOME=/root PATH=/usr/sbin:/usr/bin:/sbin:/bin CI=1 LC_ALL=C.UTF-8 \
     sh -c 'cd /src/lgd && git init -q && git add -A && exec "$@"' sh "$@"

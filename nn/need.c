@@ -12,7 +12,8 @@ static double unet_floats(const nn_arch *a)
 {
     const double pixels = (double)a->g_size * a->g_size, w0 = nn_level_width(a, 0), reads = nn_g_reads(a);
     /* what is read: the photographs side by side, as squares, with coordinates and conditions, each a copy */
-    double held = pixels * (reads + (a->g_unshuffle > 1 ? 2 * reads : 0) + (a->conditions ? reads : 0) + w0), most = held;
+    double held = pixels * (reads + (a->g_unshuffle > 1 ? 2 * reads : 0) + (a->conditions ? reads : 0) + w0),
+           most = held;
     for (int i = 0; i < a->g_levels; i++) {
         const double here = pixels / exp2(2 * (i + 1)), in = nn_level_width(a, i), out = nn_level_width(a, i + 1);
         most = fmax(most, held + here * block_values(in, out, out));

@@ -29,9 +29,12 @@ static double sum_in(const char *path, const char *const *names, double unit)
     int found = 0;
     FILE *f = fopen(path, "re");
     if (!f) return -1;
-    while (fgets(line, sizeof line, f))
-        for (int i = 0; names[i]; i++)
-            if (sscanf(line, "%63s %lf", name, &value) == 2 && strcmp(name, names[i]) == 0) sum += value * unit, found++;
+    int wanted = 0;
+    while (names[wanted]) wanted++;
+    while (found < wanted && fgets(line, sizeof line, f))
+        for (int i = 0; i < wanted; i++)
+            if (sscanf(line, "%63s %lf", name, &value) == 2 && strcmp(name, names[i]) == 0)
+                sum += value * unit, found++;
     fclose(f);
     return found ? sum : -1;
 }

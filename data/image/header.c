@@ -1,5 +1,5 @@
-/* The size that a file's header claims, read before a library does: its releases refuse a claim with limits and words of
- * their own, or take memory first. What is not understood here is left to them. */
+/* The size that a file's header claims, read before a library does: its releases refuse a claim with limits and words
+ * of their own, or take memory first. What is not understood here is left to them. */
 #include "data/image/header.h"
 #include "data/image/common_read.h"
 #include <ctype.h>
@@ -103,7 +103,8 @@ static bool tiff(header *h)
     const int counts = large ? 8 : 2, entry = large ? 20 : 12, value = large ? 12 : 8;
     const uint64_t first = large ? number(h, h->head + 8, 8) : number(h, h->head + 4, 4);
     unsigned char p[20];
-    if (first > INT32_MAX || fseek(h->file, (long)first, SEEK_SET) || fread(p, (size_t)counts, 1, h->file) != 1) return true;
+    if (first > INT32_MAX || fseek(h->file, (long)first, SEEK_SET) || fread(p, (size_t)counts, 1, h->file) != 1)
+        return true;
     for (uint64_t left = number(h, p, counts); left > 0 && fread(p, (size_t)entry, 1, h->file) == 1; left--) {
         const uint64_t tag = number(h, p, 2), type = number(h, p + 2, 2);
         if (tag > LENGTH) break; /* they are sorted */

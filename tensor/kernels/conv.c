@@ -7,6 +7,9 @@
 #if VL == 16
 #define PIXELS 14
 #define ROWS 14
+#elif defined(__aarch64__) /* 32 registers, but a product takes its scalar from one too: 9 spill (.ci/aarch64.sh) */
+#define PIXELS 8
+#define ROWS 8
 #elif VL == 8
 #define PIXELS 6
 #define ROWS 6
@@ -325,6 +328,8 @@ static void finish(float *x, int64_t pixels, int channels, bool add, float leak,
 #define FOR_5(DO) DO(1) DO(2) DO(3) DO(4) DO(5)
 #if PIXELS == 14
 #define FOR_ALL(DO) FOR_5(DO) DO(6) DO(7) DO(8) DO(9) DO(10) DO(11) DO(12) DO(13) DO(14)
+#elif PIXELS == 8
+#define FOR_ALL(DO) FOR_5(DO) DO(6) DO(7) DO(8)
 #elif PIXELS == 6
 #define FOR_ALL(DO) FOR_5(DO) DO(6)
 #else

@@ -1,0 +1,78 @@
+#!/bin/sh
+# The build for 64-bit ARM by a cross compiler, run by qemu-user: that the inner loops of the convolution multiply and add
+# in registers (FMLA, nothing spilled), and that an estimate, with products that are not fused, is that of x86's base path
+# bit for bit. Skipped by name where Debian's crossbuild tools, qemu-user or the libraries are absent:
+#   dpkg --add-architecture arm64; apt-get update
+#   apt-get install gcc-aarch64-linux-gnu qemu-user
+# The four libraries need not be installed: they are downloaded and unpacked into build-aarch64/root.
+# Usage: .ci/aarch64.sh [PHOTO...]     default: photographs of TESTDATA
+cd "$(dirname "$0")/.." || exit 1
+: "${TESTDATA:=../shared/testdata}"
+skip() { echo "skip aarch64: $*"; exit 0; }
+cross=aarch64-linux-gnu
+for tool in $cross-gcc $cross-objdump qemu-aarch64 apt-get dpkg; do
+    command -v $tool >/dev/null || skip "$tool is not installed"
+done
+[ "$(uname -m)" = x86_64 ] || skip "the machine is no x86-64, whose base path is the measure"
+dpkg --print-foreign-architectures | grep -qx arm64 || skip "dpkg does not know arm64"
+mkdir -p build-aarch64/debs
+root=$(pwd)/build-aarch64/root
+if [ ! -e "$root/.complete" ]; then
+    packages=$(for p in libopenexr-dev libimath-dev libpng-dev libpng16-16 libjpeg62-turbo-dev libjpeg62-turbo zlib1g-dev zlib1g; do
+        echo $p:arm64
+    done; apt-cache depends libopenexr-dev:arm64 libimath-dev:arm64 libpng-dev:arm64 | sed -n 's/^  Depends: \(lib[A-Za-z0-9.+-]*\)\(:arm64\)*$/\1:arm64/p' |
+        grep -E '^lib(openexr|imath|png)')
+    (cd build-aarch64/debs && apt-get download -qq $(echo "$packages" | sort -u) 2>/dev/null) || skip "the libraries for arm64 cannot be downloaded"
+    for d in build-aarch64/debs/*.deb; do dpkg -x "$d" "$root" || exit 1; done
+    touch "$root/.complete"
+fi
+lib=$root/usr/lib/$cross
+build() { # FOLDER CONTRACT
+    PKG_CONFIG_LIBDIR=$lib/pkgconfig PKG_CONFIG_SYSROOT_DIR=$root make --no-print-directory BUILD="$1" CONTRACT="$2" \
+        CC=$cross-gcc CXX=$cross-g++ AR=$cross-ar OBJCOPY=$cross-objcopy CPPFLAGS="-I$root/usr/include -I$root/usr/include/$cross" \
+        LDLIBS="-L$lib -L$root/lib/$cross -Wl,-rpath-link,$lib:$root/lib/$cross" "$1/bin/lgd-infer" "$1/liblgd.a"
+}
+build build-aarch64/fused fast || exit 1
+build build-aarch64/plain off || exit 1
+make --no-print-directory programs || exit 1
+
+# A loop is what a branch leads back to. Of each kernel the innermost with the most FMLAs is its inner loop.
+$cross-objdump -d --no-show-raw-insn build-aarch64/fused/obj/tensor/kernels/conv.base.o | awk '
+    /^[0-9a-f]+ <.*>:$/ { name = $2; gsub(/[<>:]/, "", name); n = 0; next }
+    /^ *[0-9a-f]+:\t/ {
+        split($0, part, "\t")
+        n++
+        at[n] = part[1]; gsub(/[ :]/, "", at[n])
+        code[n] = part[2]; operands[n] = part[3]
+        if (code[n] !~ /^(b|b\..*|cbn?z)$/ || !match(operands[n], /[0-9a-f]+ </)) next
+        to = substr(operands[n], RSTART); sub(/ <.*/, "", to)
+        for (i = n; i > 0 && at[i] != to; i--) if (i < n && code[i] ~ /^(b|b\..*|cbn?z)$/ && code[i] != "b.eq") break
+        if (i == 0 || at[i] != to) next
+        fused = spilled = 0
+        for (k = i; k <= n; k++) {
+            if (code[k] == "fmla") fused++
+            if (code[k] ~ /^(ldr|str|ldp|stp|ldur|stur)$/ && operands[k] ~ /^[qsd][0-9]/ && operands[k] ~ /\[sp/) spilled++
+        }
+        if (fused > most[name]) { most[name] = fused; spills[name] = spilled }
+    }
+    END {
+        for (name in most) if (name ~ /^(tile|sum|near)_8_2$/) {
+            found++
+            printf "aarch64: %s: %d FMLA in its inner loop, %d spills\n", name, most[name], spills[name]
+            if (spills[name] || most[name] < 32) bad = 1
+        }
+        exit found != 3 || bad
+    }' || { echo "FAIL aarch64: the inner loops of the convolution are not FMLA on registers" >&2; exit 1; }
+
+[ $# -gt 0 ] || { [ -d "$TESTDATA/photos" ] || skip "no photograph is given, and $TESTDATA is absent"; set -- "$TESTDATA"/photos/028.png "$TESTDATA"/photos/h_0231_IMG_0794.jpg; }
+T=$(mktemp -d) || exit 1
+trap 'rm -rf "$T"' EXIT
+options="-q --size 64 --threads 1 --iterations 2 -m models/single.safetensors"
+arm() { folder=$1; shift; qemu-aarch64 -L /usr/$cross -E LD_LIBRARY_PATH="$lib:$root/lib/$cross" "$folder/bin/lgd-infer" $options "$@" >/dev/null; }
+LGD_ISA=base build/bin/lgd-infer $options "$@" -o "$T/x86" >/dev/null && arm build-aarch64/plain "$@" -o "$T/arm" &&
+    arm build-aarch64/fused "$@" -o "$T/fused" || { echo "FAIL aarch64: an estimate" >&2; exit 1; }
+diff -r "$T/x86" "$T/arm" || { echo "FAIL aarch64: the maps are not those of x86's base path" >&2; exit 1; }
+for f in "$T"/x86/*/diffuse.png; do
+    cmp -s "$f" "$T/fused${f#"$T/x86"}" || echo "aarch64: with fused products ${f#"$T/x86/"} differs in $(cmp -l "$f" "$T/fused${f#"$T/x86"}" | wc -l) bytes"
+done
+echo "ok aarch64: $# photographs as by x86's base path, bit for bit"
