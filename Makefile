@@ -267,7 +267,7 @@ faults: programs $(FAULTS)
 	@BUILD=$(BUILD) sh tests/faults/run.sh $(FAULT_OPTIONS)
 	@$(MAKE) --no-print-directory BUILD=$(BUILD)-leaks OPT='-O1 -g -fno-omit-frame-pointer' SANITIZE=-fsanitize=leak \
 	  programs $(FAULTS:$(BUILD)/%=$(BUILD)-leaks/%)
-	@LSAN_OPTIONS=exitcode=23:suppressions=tests/faults/leaks.txt BUILD=$(BUILD)-leaks ONLY_ONCE=1 \
+	@LSAN_OPTIONS=exitcode=23 BUILD=$(BUILD)-leaks ONLY_ONCE=1 \
 	  sh tests/faults/run.sh $(FAULT_OPTIONS)
 
 # clang's libFuzzer with the address and undefined sanitizers, FUZZ_SECONDS for each target. The readers are compiled for
