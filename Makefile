@@ -279,7 +279,8 @@ FUZZ_SECONDS ?= 600
 FUZZ_CC ?= clang
 FUZZED := $(addprefix nn/weights/,file.c tensor_convert.c json.c safetensors_read.c zip.c pickle.c torch_objects.c \
     torch_read.c) \
-  $(addprefix data/image/,png_file.c png_read.c jpeg_read.c exif.c colour.c image.c image_read.c image_library.c) \
+  $(addprefix data/image/,png_file.c png_read.c jpeg_read.c header.c exif.c colour.c image.c \
+    image_read.c image_library.c) \
   $(addprefix data/,capture.c capture_ini.c ini.c file.c name.c map_folder.c map_names.c material.c) \
   train/config.c train/config_text.c train/keys.c eval/set_ini.c $(FUZZ_C)
 FUZZ_FLAGS := -O1 -g -fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=all
