@@ -41,7 +41,7 @@ double rd_render_rmse(rd_grid grid, const float *maps_a, int channels_a, const f
     if (count < 1) return NAN;
     const size_t values = (size_t)grid.h * (size_t)grid.w * 3;
     float *image = malloc(2 * values * sizeof(float));
-    double *rows = malloc((size_t)grid.h * sizeof(double)), mean = NAN;
+    double *rows = malloc((size_t)grid.h * sizeof(double)), mean = -1;
     if (image && rows) {
         double sum = 0;
         for (int v = 0; v < count; v++) {

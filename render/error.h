@@ -7,7 +7,7 @@ enum { RD_EVAL_VIEWS = 20 };
 
 /* Mean over views of the RMSE (all pixels, rgb) between the renderings of two materials, each clamped to [0, 1] and
  * raised to 1/2.2. maps_a [h, w, channels_a], maps_b [h, w, channels_b]. Threaded; the same bytes for any number of
- * threads. NaN when memory for the renderings cannot be had (two images of the grid's size), or count < 1. */
+ * threads. -1 when memory for the renderings cannot be had (two images of the grid's size), NaN where count < 1. */
 double rd_render_rmse(rd_grid grid, const float *maps_a, int channels_a, const float *maps_b, int channels_b,
                       const rd_view *views, int count);
 

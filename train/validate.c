@@ -102,9 +102,12 @@ static ts_code add_errors(tr_trainer *t, int first, int n, tr_validation *out, t
     for (int i = 0; i < n; i++) {
         const float *target = v->maps + (size_t)(first + i) * pixels * MAP_CHANNELS;
         const size_t at = (size_t)i * pixels * (size_t)channels;
-        for (int k = 0; k <= out->iterations; k++)
-            out->render[k] += rd_render_rmse(grid, maps[k]->t.data + at, channels, target, MAP_CHANNELS,
-                                             v->views + (size_t)(first + i) * RD_EVAL_VIEWS, RD_EVAL_VIEWS);
+        for (int k = 0; k <= out->iterations; k++) {
+            const double rmse = rd_render_rmse(grid, maps[k]->t.data + at, channels, target, MAP_CHANNELS,
+                                               v->views + (size_t)(first + i) * RD_EVAL_VIEWS, RD_EVAL_VIEWS);
+            if (rmse < 0) return ts_fail(st, TS_NOMEM, "no memory for renderings of %d x %d pixels", size, size);
+            out->render[k] += rmse;
+        }
         const rd_map_error e = rd_map_rmse((int64_t)pixels, maps[out->iterations]->t.data + at, channels, target,
                                            MAP_CHANNELS);
         out->diffuse += e.diffuse;

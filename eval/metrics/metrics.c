@@ -218,6 +218,7 @@ ev_row ev_score(const ev_case *c, const float *maps, int channels)
     else
         row.value[EV_RENDER] = rd_render_rmse(rd_grid_full(truth->size), maps, channels, truth->maps, MAP_CHANNELS,
                                               c->views, RD_EVAL_VIEWS);
+    if (row.value[EV_RENDER] < 0) row.value[EV_RENDER] = NAN; /* no memory: the caller says so */
     if (c->perceptual || c->lpips) perceive(c, maps, channels, &row);
     return row;
 }
