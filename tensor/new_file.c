@@ -45,6 +45,16 @@ static int make_folder(const char *path)
     return errno = error, -1;
 }
 
+/* Locks what fd is open for. 0: path still names it; EEXIST: another process's sweep came before the lock; or errno. */
+static int lock_made(int fd, const char *path)
+{
+    struct stat made, named;
+    if (flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) return EEXIST;
+    if (fstat(fd, &made) != 0) return errno;
+    if (lstat(path, &named) != 0) return errno == ENOENT ? EEXIST : errno;
+    return is_same(&made, &named) ? 0 : EEXIST;
+}
+
 /* A locked new file or folder in folder; a descriptor, or -1 and errno. *path: malloced; NULL after a failure. The name
  * does not grow with that of the final file, which may be as long as the system allows. */
 static int make_hidden(const char *folder, bool is_folder, char **path)
@@ -58,17 +68,14 @@ static int make_hidden(const char *folder, bool is_folder, char **path)
             return errno = ENOMEM, -1;
         }
         const int fd = is_folder ? make_folder(*path) : open(*path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-        struct stat open_one, named;
-        const bool held = fd >= 0 && flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
-        if (fd >= 0 && !held && fstat(fd, &open_one) == 0 && lstat(*path, &named) == 0 && is_same(&open_one, &named))
-            return fd;
-        /* Another process's sweep came between the making and the lock, or the name is taken: another name. */
-        const int error = fd >= 0 ? EEXIST : errno;
+        const int error = fd < 0 ? errno : lock_made(fd, *path);
+        if (!error) return fd;
+        if (fd >= 0 && error != EEXIST) remove(*path); /* ours, and nobody's to come back for */
         if (fd >= 0) close(fd);
         free(*path);
         *path = NULL;
         errno = error;
-        if (error != EEXIST) return -1;
+        if (error != EEXIST) return -1; /* else another name */
     }
     return -1;
 }

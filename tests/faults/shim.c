@@ -1,7 +1,7 @@
 /* A library for LD_PRELOAD that makes one call fail: LGD_FAULT="CALL N" the N-th call of that name that the program
- * itself makes (not its libraries), "CALL N+" that and all later ones. LGD_FAULT_COUNT=FILE: writes at the end how many
- * calls of each name there were. LGD_FAULT_MARK=FILE is made when a call has failed so. tests/faults/main.c drives it.
- */
+ * itself makes, "CALL N+" that and all later ones. LGD_FAULT_LIBRARIES=1: that the libraries of images and of zlib make
+ * instead. LGD_FAULT_COUNT=FILE: writes at the end how many calls of each name there were. LGD_FAULT_MARK=FILE is made
+ * when a call has failed so. tests/faults/main.c drives it. */
 #include <dirent.h>
 #include <dlfcn.h>
 #include <errno.h>
@@ -21,122 +21,49 @@
 #include <unistd.h>
 
 enum {
-    CALL_open,
-    CALL_close,
-    CALL_read,
-    CALL_pread,
-    CALL_write,
-    CALL_fsync,
-    CALL_rename,
-    CALL_ftruncate,
-    CALL_flock,
-    CALL_fstat,
-    CALL_stat,
-    CALL_access,
-    CALL_mkdir,
-    CALL_realpath,
-    CALL_readlink,
-    CALL_opendir,
-    CALL_readdir,
-    CALL_scandir,
-    CALL_mmap,
-    CALL_fopen,
-    CALL_fclose,
-    CALL_fflush,
-    CALL_fread,
-    CALL_fgets,
-    CALL_fwrite,
-    CALL_fprintf,
-    CALL_fputs,
-    CALL_fputc,
-    CALL_printf,
-    CALL_puts,
-    CALL_fseek,
-    CALL_ftell,
-    CALL_malloc,
-    CALL_calloc,
-    CALL_realloc,
-    CALL_aligned_alloc,
-    CALL_strdup,
-    CALL_asprintf,
-    CALL_open_memstream,
-    CALL_newlocale,
-    CALL_setenv,
-    CALL_dlopen,
-    CALL_pthread_create,
-    CALL_pthread_key_create,
+#define FAULT(name, error) CALL_##name,
+#include "tests/faults/calls.h"
+#undef FAULT
     COUNT
 };
-#define ROW(name, error) [CALL_##name] = {#name, error}
 static const struct {
     const char *name;
     int error;
-} table[COUNT] = {ROW(open, EMFILE),
-                  ROW(close, EIO),
-                  ROW(read, EIO),
-                  ROW(pread, EIO),
-                  ROW(write, ENOSPC),
-                  ROW(fsync, EIO),
-                  ROW(rename, EIO),
-                  ROW(ftruncate, EIO),
-                  ROW(flock, ENOLCK),
-                  ROW(fstat, EIO),
-                  ROW(stat, EIO),
-                  ROW(access, EIO),
-                  ROW(mkdir, ENOSPC),
-                  ROW(realpath, ENOMEM),
-                  ROW(readlink, EIO),
-                  ROW(opendir, EMFILE),
-                  ROW(readdir, EIO),
-                  ROW(scandir, ENOMEM),
-                  ROW(mmap, ENOMEM),
-                  ROW(fopen, EMFILE),
-                  ROW(fclose, ENOSPC),
-                  ROW(fflush, ENOSPC),
-                  ROW(fread, EIO),
-                  ROW(fgets, EIO),
-                  ROW(fwrite, ENOSPC),
-                  ROW(fprintf, ENOSPC),
-                  ROW(fputs, ENOSPC),
-                  ROW(fputc, ENOSPC),
-                  ROW(printf, ENOSPC),
-                  ROW(puts, ENOSPC),
-                  ROW(fseek, EIO),
-                  ROW(ftell, EIO),
-                  ROW(malloc, ENOMEM),
-                  ROW(calloc, ENOMEM),
-                  ROW(realloc, ENOMEM),
-                  ROW(aligned_alloc, ENOMEM),
-                  ROW(strdup, ENOMEM),
-                  ROW(asprintf, ENOMEM),
-                  ROW(open_memstream, ENOMEM),
-                  ROW(newlocale, ENOMEM),
-                  ROW(setenv, ENOMEM),
-                  ROW(dlopen, ENOMEM),
-                  ROW(pthread_create, EAGAIN),
-                  ROW(pthread_key_create, EAGAIN)};
+} table[COUNT] = {
+#define FAULT(name, error) {#name, error},
+#include "tests/faults/calls.h"
+#undef FAULT
+};
 
 static _Atomic long calls[COUNT];
 static int chosen = -1;
 static long number;
 static bool on;
-static uintptr_t first, last; /* the program's own code */
+enum { RANGES = 16 };
+static struct {
+    uintptr_t first, last;
+} meant[RANGES]; /* the code whose calls can fail */
+static int ranges;
 
-static int find_program(struct dl_phdr_info *info, size_t size, void *user)
+static int find_code(struct dl_phdr_info *info, size_t size, void *libraries)
 {
-    (void)size, (void)user;
-    for (int i = 0; i < info->dlpi_phnum; i++) {
+    (void)size;
+    static const char *const names[] = {"/libpng", "/libjpeg", "/libz.", "/libOpenEXRCore"};
+    bool found = !libraries;
+    for (size_t i = 0; libraries && i < sizeof names / sizeof *names; i++)
+        found |= strstr(info->dlpi_name, names[i]) != NULL;
+    for (int i = 0; i < info->dlpi_phnum && found && ranges < RANGES; i++) {
         const ElfW(Phdr) *p = &info->dlpi_phdr[i];
         if (p->p_type != PT_LOAD || !(p->p_flags & PF_X)) continue;
-        first = info->dlpi_addr + p->p_vaddr;
-        last = first + p->p_memsz;
+        meant[ranges].first = info->dlpi_addr + p->p_vaddr;
+        meant[ranges++].last = info->dlpi_addr + p->p_vaddr + p->p_memsz;
     }
-    return 1; /* the program is the first */
+    return !libraries; /* the program is the first */
 }
 
 __attribute__((constructor)) static void begin(void)
 {
-    dl_iterate_phdr(find_program, NULL);
+    dl_iterate_phdr(find_code, getenv("LGD_FAULT_LIBRARIES"));
     const char *text = getenv("LGD_FAULT");
     for (int i = 0; text && i < COUNT; i++) {
         const size_t n = strlen(table[i].name);
@@ -159,7 +86,9 @@ __attribute__((destructor)) static void end(void)
 
 static bool fails(int call, const void *caller)
 {
-    if ((uintptr_t)caller < first || (uintptr_t)caller >= last) return false;
+    bool found = false;
+    for (int i = 0; i < ranges; i++) found |= (uintptr_t)caller >= meant[i].first && (uintptr_t)caller < meant[i].last;
+    if (!found) return false;
     const long n = ++calls[call];
     if (call != chosen || (on ? n < number : n != number)) return false;
     const char *mark = getenv("LGD_FAULT_MARK");
@@ -209,16 +138,22 @@ CALL2(int, ftruncate, -1, int, off_t)
 CALL2(int, flock, -1, int, int)
 CALL2(int, fstat, -1, int, struct stat *)
 CALL2(int, stat, -1, const char *, struct stat *)
+CALL2(int, lstat, -1, const char *, struct stat *)
+CALL4(int, fstatat, -1, int, const char *, struct stat *, int)
+CALL4(ssize_t, pwrite, -1, int, const void *, size_t, off_t)
 CALL2(int, access, -1, const char *, int)
 CALL2(int, mkdir, -1, const char *, mode_t)
 CALL2(char *, realpath, NULL, const char *, char *)
 CALL3(ssize_t, readlink, -1, const char *, char *, size_t)
 CALL1(DIR *, opendir, NULL, const char *)
+CALL1(DIR *, fdopendir, NULL, int)
 CALL1(struct dirent *, readdir, NULL, DIR *)
 CALL2(FILE *, fopen, NULL, const char *, const char *)
+CALL2(FILE *, fdopen, NULL, int, const char *)
 CALL3(int, fseek, -1, FILE *, long, int)
 CALL1(long, ftell, -1, FILE *)
 CALL1(char *, strdup, NULL, const char *)
+CALL2(char *, strndup, NULL, const char *, size_t)
 CALL2(FILE *, open_memstream, NULL, char **, size_t *)
 CALL3(locale_t, newlocale, (locale_t)0, int, const char *, locale_t)
 CALL3(int, setenv, -1, const char *, const char *, int)
@@ -226,6 +161,7 @@ CALL3(int, setenv, -1, const char *, const char *, int)
 typedef void (*ending)(void *);
 typedef void *(*beginning)(void *);
 CALL2(int, pthread_key_create, EAGAIN, pthread_key_t *, ending)
+CALL2(int, pthread_setspecific, ENOMEM, pthread_key_t, const void *)
 CALL4(int, pthread_create, EAGAIN, pthread_t *, const pthread_attr_t *, beginning, void *)
 
 typedef int (*filter)(const struct dirent *);
@@ -240,6 +176,27 @@ int open(const char *path, int flags, ...)
     const mode_t mode = flags & (O_CREAT | O_TMPFILE) ? va_arg(args, mode_t) : 0;
     va_end(args);
     return FAILS(open) ? -1 : real(path, flags, mode);
+}
+
+int openat(int folder, const char *path, int flags, ...)
+{
+    REAL(openat, int, int, const char *, int, ...)
+    va_list args;
+    va_start(args, flags);
+    const mode_t mode = flags & (O_CREAT | O_TMPFILE) ? va_arg(args, mode_t) : 0;
+    va_end(args);
+    return FAILS(openat) ? -1 : real(folder, path, flags, mode);
+}
+
+/* Every command here has one number. */
+int fcntl(int fd, int command, ...)
+{
+    REAL(fcntl, int, int, int, ...)
+    va_list args;
+    va_start(args, command);
+    const long number_given = va_arg(args, long);
+    va_end(args);
+    return FAILS(fcntl) ? -1 : real(fd, command, number_given);
 }
 
 /* Messages go out, so that they can be judged. */
@@ -317,6 +274,18 @@ int fputc(int c, FILE *f)
 {
     REAL(fputc, int, int, FILE *)
     return STREAM_FAILS(fputc, f) ? EOF : real(c, f);
+}
+
+int putc(int c, FILE *f)
+{
+    REAL(putc, int, int, FILE *)
+    return STREAM_FAILS(putc, f) ? EOF : real(c, f);
+}
+
+int getc(FILE *f)
+{
+    REAL(getc, int, FILE *)
+    return STREAM_FAILS(getc, f) ? EOF : real(f);
 }
 
 int puts(const char *text)
