@@ -1,7 +1,7 @@
 /* Maps as picture files in a folder, and the meta.txt that says what they mean. */
 #include "data/material.h"
 #include "data/image/exr.h"
-#include "data/file.h"
+#include "data/text.h"
 #include <limits.h>
 #include <stdio.h>
 #include <string.h>
@@ -63,15 +63,14 @@ void io_print_conventions(FILE *f, unsigned which, bool directx)
 
 ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_status *st)
 {
-    char path[PATH_MAX], text[512] = "";
+    char path[PATH_MAX];
+    io_text text;
     if (snprintf(path, sizeof path, "%s/meta.txt", folder) >= (int)sizeof path)
         return ts_fail(st, TS_INVALID, "%s: name too long", folder);
-    FILE *f = fmemopen(text, sizeof text, "w");
-    if (!f) return ts_fail(st, TS_NOMEM, "%s: out of memory", path);
-    io_print_conventions(f, which, directx);
-    if (which & IO_MAPS_EXR) fputs("maps.exr: diffuse, specular (F0), roughness and normal, linear\n", f);
-    fclose(f);
-    return io_write_bytes(path, text, strlen(text), st);
+    if (io_text_begin(&text, path, st) != TS_OK) return st->code;
+    io_print_conventions(text.f, which, directx);
+    if (which & IO_MAPS_EXR) fputs("maps.exr: diffuse, specular (F0), roughness and normal, linear\n", text.f);
+    return io_text_write(&text, path, st);
 }
 
 ts_code io_write_map_files(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st)

@@ -1,6 +1,7 @@
 /* glTF 2.0 documents, and the same with their images as one binary file (section 4 of the specification). */
 #include "data/file.h"
 #include "data/html.h"
+#include "data/text.h"
 #include "infer/export.h"
 #include <stdint.h>
 #include <stdio.h>
@@ -113,15 +114,12 @@ static void print_gltf(FILE *f, const lgd_gltf *kind, const size_t *size)
 /* The document as text, malloced; NULL with st. */
 static char *document(const char *path, const lgd_gltf *kind, const size_t *size, size_t *length, ts_status *st)
 {
-    char *text = NULL;
-    FILE *f = open_memstream(&text, length);
-    if (f) print_gltf(f, kind, size);
-    if (!f || fclose(f) != 0 || !text) {
-        free(text);
-        ts_fail(st, TS_NOMEM, "%s: no memory for its text", path);
-        return NULL;
-    }
-    return text;
+    io_text text;
+    if (io_text_begin(&text, path, st) != TS_OK) return NULL;
+    print_gltf(text.f, kind, size);
+    io_text_end(&text, path, st);
+    *length = text.size;
+    return text.bytes;
 }
 
 ts_code lgd_write_gltf(const char *path, const lgd_gltf *kind, ts_status *st)

@@ -1,5 +1,5 @@
 #include "infer/meta.h"
-#include "data/file.h"
+#include "data/text.h"
 #include "render/scene.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -61,16 +61,9 @@ static void print(FILE *f, const lgd_photo *photo, const lgd_order *order, const
 ts_code lgd_write_meta(const char *path, const lgd_photo *photo, const lgd_order *order, const lgd_output_result *facts,
                        const char *mark, ts_status *st)
 {
-    char *text = NULL;
-    size_t size = 0;
-    FILE *f = open_memstream(&text, &size);
-    if (f) {
-        print(f, photo, order, facts);
-        fputs(mark, f);
-    }
-    ts_code code = TS_OK;
-    if (!f || fclose(f) != 0 || !text) code = ts_fail(st, TS_NOMEM, "%s: no memory for its text", path);
-    else code = io_write_bytes(path, text, size, st);
-    free(text);
-    return code;
+    io_text text;
+    if (io_text_begin(&text, path, st) != TS_OK) return st->code;
+    print(text.f, photo, order, facts);
+    fputs(mark, text.f);
+    return io_text_write(&text, path, st);
 }

@@ -1,6 +1,7 @@
 #include "infer/page.h"
 #include "data/file.h"
 #include "data/html.h"
+#include "data/text.h"
 #include "pages.h"
 #include "render/brdf.h"
 #include <math.h>
@@ -122,17 +123,15 @@ ts_code lgd_write_page(const char *path, const char *name, const io_material *m,
         {"specular", NULL, put_specular}, {"high", NULL, put_high},       {"low", NULL, put_low},
         {"facts", NULL, put_facts},       {"about", NULL, put_about},     {NULL, NULL, NULL}};
     page p = {.name = name, .photo = photo, .order = order, .whole = m->size, .st = st};
-    char *text = NULL;
-    size_t size = 0;
+    io_text text = {0};
     ts_code code = fit(&p, m, st);
+    if (!code) code = io_text_begin(&text, path, st);
     if (!code) {
-        FILE *f = open_memstream(&text, &size);
-        if (f) io_put_page(f, page_view_html, slots, &p);
-        const bool whole = f && !ferror(f);
-        if ((f && fclose(f) != 0) || !whole || !text) code = ts_fail(st, TS_NOMEM, "%s: no memory for its text", path);
-        else code = st->code ? st->code : io_write_bytes(path, text, size, st);
+        io_put_page(text.f, page_view_html, slots, &p);
+        code = io_text_end(&text, path, st);
     }
-    free(text);
+    if (!code) code = st->code ? st->code : io_write_bytes(path, text.bytes, text.size, st);
+    free(text.bytes);
     io_image_free(&p.m);
     io_image_free(&p.image);
     io_image_free(&p.picture);

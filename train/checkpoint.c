@@ -3,6 +3,7 @@
  */
 #include "nn/weights/weights.h"
 #include "data/ini.h"
+#include "data/text.h"
 #include "tensor/cpu.h"
 #include "train/trainer_internal.h"
 #include <errno.h>
@@ -20,25 +21,21 @@ static bool all_finite(const float *x, size_t n)
     return fine;
 }
 
-char *tr_config_text(const tr_config *c, bool neutral, ts_status *st)
+/* The configuration without neutral keys, so that weights do not differ with the folder or the threads. Freed by the
+ * caller. */
+static char *config_text(const tr_config *c, ts_status *st)
 {
-    char *text = NULL;
-    size_t size = 0;
-    FILE *f = open_memstream(&text, &size);
-    if (f) tr_config_print(c, neutral, f);
-    const bool bad = !f || ferror(f);
-    if ((f && fclose(f) != 0) || bad || !text) {
-        free(text);
-        ts_fail(st, TS_NOMEM, "no memory for the configuration's text");
-        return NULL;
-    }
-    return text;
+    io_text text;
+    if (io_text_begin(&text, "the configuration", st) != TS_OK) return NULL;
+    tr_config_print(c, false, text.f);
+    io_text_end(&text, "the configuration", st);
+    return text.bytes;
 }
 
 ts_code tr_save_weights(tr_trainer *t, const char *name, ts_status *st)
 {
     char path[TR_PATH], step[32];
-    char *text = tr_config_text(&t->config, false, st);
+    char *text = config_text(&t->config, st);
     if (!text) return st->code;
     tr_path(t, name, path);
     snprintf(step, sizeof step, "%" PRId64, t->step);
@@ -73,7 +70,7 @@ ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
     /* Weights first: after a kill between the two the steps behind the checkpoint are made again. Before step 1 there
      * are none, so that a folder without a checkpoint has none either. */
     if (t->step > 0 && tr_save_weights(t, "last.safetensors", st) != TS_OK) return st->code;
-    char *text = tr_config_text(&t->config, false, st);
+    char *text = config_text(&t->config, st);
     if (!text) return st->code;
     tr_path(t, "checkpoint.safetensors", path);
     snprintf(number[0], sizeof number[0], "%" PRId64, t->step);

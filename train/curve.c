@@ -1,6 +1,7 @@
 /* curve.svg: how the run goes, drawn from its two logs. */
 #include "cli/plot.h"
 #include "data/file.h"
+#include "data/text.h"
 #include "train/trainer_internal.h"
 #include <math.h>
 #include <stdlib.h>
@@ -89,8 +90,8 @@ static ts_code add(tr_trainer *t, const char *log, const char *column, const cha
 static ts_code write(tr_trainer *t, curve *c, ts_status *st)
 {
     cl_series series[4];
-    char path[TR_PATH], *text = NULL;
-    size_t size = 0;
+    char path[TR_PATH];
+    io_text text;
     int count = 0;
     ts_code code = add(t, "log.csv", "render_0", "first estimate, training", &c[0], st);
     if (!code) code = add(t, "log.csv", "render_T", "last step, training", &c[1], st);
@@ -99,14 +100,10 @@ static ts_code write(tr_trainer *t, curve *c, ts_status *st)
     if (code) return code;
     for (int i = 0; i < 4; i++)
         if (c[i].points) series[count++] = (cl_series){.name = c[i].name, .point = c[i].point, .points = c[i].points};
-    FILE *f = open_memstream(&text, &size);
-    if (f)
-        cl_plot_write(f, &(cl_axes){"step", "training: log-L1 of renderings; validation: RMSE", false}, series, count);
     tr_path(t, "curve.svg", path);
-    if (!f || fclose(f) != 0 || !text) code = ts_fail(st, TS_NOMEM, "%s: out of memory", path);
-    else code = io_write_bytes(path, text, size, st);
-    free(text);
-    return code;
+    if (io_text_begin(&text, path, st) != TS_OK) return st->code;
+    cl_plot_write(text.f, &(cl_axes){"step", "training: log-L1 of renderings; validation: RMSE", false}, series, count);
+    return io_text_write(&text, path, st);
 }
 
 ts_code tr_curve_write(tr_trainer *t, ts_status *st)

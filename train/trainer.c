@@ -1,5 +1,5 @@
 /* The run: what it owns, its folder, the loop over steps. */
-#include "data/file.h"
+#include "data/text.h"
 #include "nn/weights/weights.h"
 #include "tensor/maps.h"
 #include "tensor/new_file.h"
@@ -112,11 +112,10 @@ static ts_code write_config(const tr_trainer *t, ts_status *st)
 {
     char path[TR_PATH];
     tr_path(t, "config.ini", path);
-    char *text = tr_config_text(&t->config, true, st);
-    if (!text) return st->code;
-    const ts_code code = io_write_bytes(path, text, strlen(text), st);
-    free(text);
-    return code;
+    io_text text;
+    if (io_text_begin(&text, path, st) != TS_OK) return st->code;
+    tr_config_print(&t->config, true, text.f);
+    return io_text_write(&text, path, st);
 }
 
 nn_model *tr_model_create(const tr_config *c, ts_status *st)

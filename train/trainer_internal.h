@@ -85,9 +85,6 @@ ts_code tr_validate(tr_trainer *t, tr_validation *out, ts_status *st);
 /* checkpoint.c: the trainer's state in the folder. tr_resume fails with TS_INVALID naming the key when the
  * configuration differs. */
 ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st);
-/* The configuration's text, NULL and st on failure; the caller frees it. neutral: with the keys that results do not
- * depend on, such as the folder and the threads. */
-char *tr_config_text(const tr_config *c, bool neutral, ts_status *st);
 ts_code tr_save_weights(tr_trainer *t, const char *name, ts_status *st);
 ts_code tr_resume(tr_trainer *t, ts_status *st);
 

@@ -32,10 +32,9 @@ static ts_code check(const lgd_plan *plan, const char *folder, ts_status *st)
 
 ts_code lgd_index_start(lgd_index *index, const lgd_plan *plan, const char *folder, ts_status *st)
 {
-    *index = (lgd_index){.cards = NULL};
+    *index = (lgd_index){0};
     if (check(plan, folder, st) != TS_OK) return st->code;
-    index->cards = open_memstream(&index->text, &index->size);
-    return index->cards ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for %s", LGD_INDEX_NAME);
+    return io_text_begin(&index->cards, LGD_INDEX_NAME, st);
 }
 
 /* The photograph beside the maps under one light, as a PNG. */
@@ -72,7 +71,7 @@ static void put_heading(FILE *f, const char *name)
 
 ts_code lgd_index_add(lgd_index *index, const lgd_item *item, ts_status *st)
 {
-    FILE *f = index->cards;
+    FILE *f = index->cards.f;
     unsigned char *bytes = NULL;
     size_t size = 0;
     if (!f) return TS_OK;
@@ -109,7 +108,7 @@ static void put_summary(FILE *f, void *user)
     if (index->failed) fprintf(f, " %d photograph%s failed.", index->failed, index->failed == 1 ? "" : "s");
 }
 
-static void put_cards(FILE *f, void *user) { fputs(((const lgd_index *)user)->text, f); }
+static void put_cards(FILE *f, void *user) { fputs(((const lgd_index *)user)->cards.bytes, f); }
 
 ts_code lgd_index_end(lgd_index *index, const char *folder, ts_status *st)
 {
@@ -118,25 +117,25 @@ ts_code lgd_index_end(lgd_index *index, const char *folder, ts_status *st)
                                     {"cards", NULL, put_cards},
                                     {"about", "Made by lgd-infer " LGD_VERSION ".", NULL},
                                     {NULL, NULL, NULL}};
-    char *path = NULL, *text = NULL;
-    size_t size = 0;
-    if (!index->cards) return TS_OK;
-    bool whole = fclose(index->cards) == 0 && index->text;
-    FILE *f = whole ? open_memstream(&text, &size) : NULL;
-    if (f) {
-        io_put_page(f, page_index_html, slots, index);
-        whole = fclose(f) == 0;
-    }
+    char *path = NULL;
+    io_text page = {0};
+    if (!index->cards.f) return TS_OK;
     ts_code code = st->code;
-    if (!code && (!f || !whole || asprintf(&path, "%s/%s", folder, LGD_INDEX_NAME) < 0)) {
-        path = NULL; /* undefined after a failure */
-        code = ts_fail(st, TS_NOMEM, "out of memory for %s/%s", folder, LGD_INDEX_NAME);
+    const ts_code whole = io_text_end(&index->cards, LGD_INDEX_NAME, code ? NULL : st);
+    if (!code) code = whole;
+    if (!code && index->materials + index->failed > 0) { /* not interrupted before the first */
+        if (asprintf(&path, "%s/%s", folder, LGD_INDEX_NAME) < 0) {
+            path = NULL; /* undefined after a failure */
+            code = ts_fail(st, TS_NOMEM, "out of memory for %s/%s", folder, LGD_INDEX_NAME);
+        }
+        if (!code) code = io_text_begin(&page, path, st);
+        if (!code) {
+            io_put_page(page.f, page_index_html, slots, index);
+            code = io_text_write(&page, path, st);
+        }
     }
-    if (!code && index->materials + index->failed > 0) /* not interrupted before the first */
-        code = io_write_bytes(path, text, size, st);
     free(path);
-    free(text);
-    free(index->text);
-    *index = (lgd_index){.cards = NULL};
+    free(index->cards.bytes);
+    *index = (lgd_index){0};
     return code;
 }

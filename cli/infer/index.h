@@ -2,14 +2,12 @@
 #ifndef LGD_INDEX_H
 #define LGD_INDEX_H
 #include "cli/infer/item.h"
-#include <stdio.h>
+#include "data/text.h"
 
 #define LGD_INDEX_NAME "index.html"
 
 typedef struct lgd_index {
-    FILE *cards; /* of what was added, into text; NULL: no index is wanted, and the functions do nothing */
-    char *text;
-    size_t size;
+    io_text cards; /* of what was added; cards.f NULL: no index is wanted, and the functions do nothing */
     int materials, failed;
 } lgd_index;
 

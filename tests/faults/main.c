@@ -8,8 +8,8 @@
  *   --every N    only every N-th failure of the calls for memory and of single characters and lines
  *   --call NAME  only that call
  *   --on         the call keeps failing from the chosen one on
- *   --steps      after a failure weights may be those of an earlier step, whole files nevertheless, and a log's last
- * row be cut, which a resumed run takes away
+ *   --steps      after a failure weights and curves may be those of an earlier step, whole files nevertheless, and a
+ *                log's last row be cut, which a resumed run takes away
  *   --lines N    a failure may say N lines more than a run without (1)
  *   --whole      after a failure FOLDER/out holds all or, in each folder below it, nothing */
 #include <dirent.h>
@@ -169,6 +169,16 @@ static bool whole_lines(const char *path)
     return f && last == '\n';
 }
 
+static bool whole_drawing(const char *path)
+{
+    static const char end[] = "</svg>\n";
+    char last[sizeof end] = "";
+    FILE *f = fopen(path, "rb");
+    const bool read = f && fseek(f, 1 - (long)sizeof end, SEEK_END) == 0 && fread(last, 1, sizeof end - 1, f) > 0;
+    if (f) fclose(f);
+    return read && strcmp(last, end) == 0;
+}
+
 /* A safetensors file's header says where the last tensor ends. */
 static bool whole_weights(const char *path, off_t size)
 {
@@ -216,6 +226,7 @@ static const char *look(const options *o, bool failed, int lines_before)
         snprintf(base, sizeof base, "%s/%s", path_of(o, "expected"), found.file[i].name);
         snprintf(path, sizeof path, "%s/%s", path_of(o, "out"), found.file[i].name);
         const bool same = has_times(found.file[i].name)             ? (failed && o->steps) || whole_lines(path)
+            : failed && o->steps && ends_with(path, ".svg")         ? whole_drawing(path)
             : failed && o->steps && ends_with(path, ".safetensors") ? whole_weights(path, found.file[i].size)
                                                                     : same_bytes(path, base);
         if (!same) return snprintf(why, sizeof why, "leaves another %s", found.file[i].name), why;
