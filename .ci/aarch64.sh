@@ -4,7 +4,7 @@
 # bit for bit. Skipped by name where Debian's crossbuild tools, qemu-user or the libraries are absent:
 #   dpkg --add-architecture arm64; apt-get update
 #   apt-get install gcc-aarch64-linux-gnu qemu-user
-# The four libraries need not be installed: they are downloaded and unpacked into build-aarch64/root.
+# The libraries need not be installed: they are downloaded and unpacked into build-aarch64/root.
 # Usage: .ci/aarch64.sh [PHOTO...]     default: photographs of TESTDATA
 cd "$(dirname "$0")/.." || exit 1
 : "${TESTDATA:=../shared/testdata}"
@@ -17,14 +17,14 @@ done
 dpkg --print-foreign-architectures | grep -qx arm64 || skip "dpkg does not know arm64"
 mkdir -p build-aarch64/debs
 root=$(pwd)/build-aarch64/root
-if [ ! -e "$root/.complete" ]; then
-    packages=$(for p in libopenexr-dev libimath-dev libpng-dev libpng16-16 libjpeg62-turbo-dev libjpeg62-turbo zlib1g-dev zlib1g; do
-        echo $p:arm64
-    done; apt-cache depends libopenexr-dev:arm64 libimath-dev:arm64 libpng-dev:arm64 | sed -n 's/^  Depends: \(lib[A-Za-z0-9.+-]*\)\(:arm64\)*$/\1:arm64/p' |
-        grep -E '^lib(openexr|imath|png)')
-    (cd build-aarch64/debs && apt-get download -qq $(echo "$packages" | sort -u) 2>/dev/null) || skip "the libraries for arm64 cannot be downloaded"
+# The numbers in the libraries' names differ between releases of Debian: what the -dev packages depend on.
+packages=$({ printf '%s:arm64\n' libopenexr-dev libimath-dev libpng-dev libjpeg62-turbo-dev liblcms2-dev zlib1g-dev
+    apt-cache depends libopenexr-dev:arm64 libimath-dev:arm64 libpng-dev:arm64 libjpeg62-turbo-dev:arm64 liblcms2-dev:arm64 zlib1g-dev:arm64 |
+        sed -n 's/^  Depends: \(lib[A-Za-z0-9.+-]*\|zlib1g\)\(:arm64\)*$/\1:arm64/p' | grep -E '^(lib(openexr|imath|png|jpeg|lcms)|zlib)'; } | sort -u)
+if [ "$packages" != "$(cat "$root/.complete" 2>/dev/null)" ]; then
+    (cd build-aarch64/debs && apt-get download -qq $packages 2>/dev/null) || skip "the libraries for arm64 cannot be downloaded"
     for d in build-aarch64/debs/*.deb; do dpkg -x "$d" "$root" || exit 1; done
-    touch "$root/.complete"
+    echo "$packages" >"$root/.complete"
 fi
 lib=$root/usr/lib/$cross
 build() { # FOLDER CONTRACT
