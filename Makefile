@@ -10,6 +10,7 @@
 #: make stress       the numerics far from ordinary input; STRESS=shading runs one part
 #: make fuzz         the readers under libFuzzer; FUZZ=torch for one of them, FUZZ_SECONDS=600 for each
 #: make faults       every program with each call that can fail failing, one at a time; then with LeakSanitizer
+#: make tsan         lgd-infer with many photographs, lgd-train's loader with ThreadSanitizer, in build-tsan/
 #: make asan         make test with the address and undefined-behaviour sanitizers, in build-asan/
 #: make clean        deletes what make has built
 #: Variables: V=1 prints the commands, YES=1 installs packages without asking, -j1 is one job (default: one a CPU),
@@ -306,6 +307,11 @@ fuzz: $(FUZZ:%=$(BUILD)/fuzz/bin/%) $(IMAGE_LIB)
 	  >$(BUILD)/fuzz/$$t.log 2>&1 || { tail -n 40 $(BUILD)/fuzz/$$t.log; exit 1; }; \
 	  sed -n 's/^stat::number_of_executed_units: */fuzz: clean, inputs: /p' $(BUILD)/fuzz/$$t.log; done
 
+# Threads of our own alone, OpenMP with one each: ThreadSanitizer does not see what libgomp's locks order.
+tsan:
+	@$(MAKE) --no-print-directory BUILD=$(BUILD)-tsan OPT='-O1 -g' SANITIZE=-fsanitize=thread programs
+	@BUILD=$(BUILD)-tsan sh tests/tsan/run.sh
+
 # The sanitizers' build lives beside the ordinary one.
 asan:
 	@ASAN_OPTIONS=allocator_may_return_null=1 $(MAKE) --no-print-directory BUILD=$(BUILD)-asan \
@@ -340,8 +346,8 @@ uninstall:
 	-rmdir $(TO)/share/lgd $(TO)/lib/lgd
 
 clean:
-	rm -rf $(BUILD) $(BUILD)-asan $(BUILD)-leaks
+	rm -rf $(BUILD) $(BUILD)-asan $(BUILD)-leaks $(BUILD)-tsan
 
-.PHONY: all programs help deps test test-blender bench bench-deps stress fuzz faults asan demo install uninstall clean
+.PHONY: all programs help deps test test-blender bench bench-deps stress fuzz faults tsan asan demo install uninstall clean
 .SECONDARY:
 -include $(shell find $(OBJ) $(BUILD)/fuzz/obj -name '*.d' 2>/dev/null)

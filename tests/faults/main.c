@@ -11,6 +11,7 @@
  *   --steps      after a failure weights and curves may be those of an earlier step, whole files nevertheless, and a
  *                log's last row be cut, which a resumed run takes away
  *   --lines N    a failure may say N lines more than a run without (1)
+ *   --libraries  the calls that the libraries of images and zlib make, not the program's own
  *   --whole      after a failure FOLDER/out holds all or, in each folder below it, nothing */
 #include <dirent.h>
 #include <errno.h>
@@ -32,7 +33,7 @@ enum { SECONDS = 60, LINE = 512, PATH = 4096, FILES = 256 };
 typedef struct options {
     int every, lines;
     const char *call;
-    bool on, steps, whole;
+    bool on, steps, whole, libraries;
     const char *shim, *folder;
     char **program;
 } options;
@@ -89,6 +90,7 @@ static int run(const options *o, const char *fault)
         if (fault) setenv("LGD_FAULT", fault, 1);
         else setenv("LGD_FAULT_COUNT", path_of(o, "counts"), 1);
         setenv("LGD_FAULT_MARK", path_of(o, "mark"), 1);
+        if (o->libraries) setenv("LGD_FAULT_LIBRARIES", "1", 1);
         setenv("LD_PRELOAD", o->shim, 1);
         execv(o->program[0], o->program);
         _exit(126);
@@ -289,6 +291,7 @@ static int parse(int argc, char **argv, options *o)
         else if (!strcmp(argv[at], "--on")) o->on = true;
         else if (!strcmp(argv[at], "--steps")) o->steps = true;
         else if (!strcmp(argv[at], "--whole")) o->whole = true;
+        else if (!strcmp(argv[at], "--libraries")) o->libraries = true;
         else return 2;
     }
     if (argc - at < 3 || o->every < 1) return 2;
@@ -308,8 +311,8 @@ int main(int argc, char **argv)
     if (parse(argc, argv, &o)) {
         fprintf(
             stderr,
-            "usage: lgd-faults [--every N] [--call NAME] [--on] [--steps] [--lines N] [--whole] SHIM FOLDER PROGRAM "
-            "ARGUMENTS...\n");
+            "usage: lgd-faults [--every N] [--call NAME] [--on] [--steps] [--lines N] [--libraries] [--whole] SHIM FOLDER "
+            "PROGRAM ARGUMENTS...\n");
         return 2;
     }
     const int status = run(&o, NULL);

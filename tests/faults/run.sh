@@ -61,8 +61,9 @@ INI
   mv "$T"/data/*/ "$T/material" && mv "$T"/data/*.jpg "$T/photo.jpg" && mv "$T"/data/*.png "$T/strip.png"; } >"$T/log" 2>&1 ||
     { cat "$T/log" >&2; exit 2; }
 cp "$T/material/diffuse.png" "$T/photo.png"
+cp "$T/photo.png" "$T/a.png" && cp "$T/photo.jpg" "$T/b.jpg" && cp "$T/strip.png" "$T/c.png"
 W=$T/begun/last.safetensors
-for s in infer formats train resume eval data strips convert torch; do mkdir -p "$T/$s"; done
+for s in infer many formats libraries train resume eval data strips convert torch; do mkdir -p "$T/$s"; done
 # A run that ended early, since a checkpoint could not be renamed.
 mkdir "$T/resume/out"
 LD_PRELOAD=$SHIM LGD_FAULT="rename 7" "$BIN/lgd-train" "$T/small.ini" --set output.folder="$T/resume/out/run" --threads 1 >"$T/log" 2>&1
@@ -71,6 +72,11 @@ mv "$T/resume/out" "$T/resume/start"
 scenario infer --whole -- "$BIN/lgd-infer" --size 16 --threads 1 -m "$W" "$T/photo.png" -o "$T/infer/out"
 scenario formats --whole -- "$BIN/lgd-infer" --size 16 --threads 1 -m "$W" --mask "$T/photo.png" --maps basecolor,metallic,height,gltf,materialx,render \
     -i 1 "$T/photo.jpg" -o "$T/formats/out"
+# A line a photograph that failed, and one that says how many.
+scenario many --whole --lines 4 -- "$BIN/lgd-infer" --size 16 --threads 2 -m "$W" --maps diffuse,exr,page "$T"/[abc].* \
+    -o "$T/many/out"
+scenario libraries --every 3 --whole --lines 2 --libraries -- "$BIN/lgd-infer" --size 16 --threads 1 -m "$W" --maps diffuse,exr "$T"/[ab].* \
+    -o "$T/libraries/out"
 scenario train --steps -- "$BIN/lgd-train" "$T/small.ini" --set output.folder="$T/train/out/run" --threads 1
 scenario resume --steps -- "$BIN/lgd-train" "$T/small.ini" --set output.folder="$T/resume/out/run" --resume --threads 1
 # A line a material that failed, and one that says how many.
