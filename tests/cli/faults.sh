@@ -1,16 +1,24 @@
 # Calls of the programs that fail, one at a time: a part of `make faults`.
 . tests/cli/lib.sh
 
+# faults SCENARIOS OPTION...
 faults() {
     [ -e "$BUILD/lib/lgd-faults.so" ] || skip "lgd-faults.so is not built"
     case $(cat "$BUILD/gen/flags") in *-fsanitize=*) skip "the sanitizers have a malloc of their own" ;; esac
-    ONLY_ONCE=1 SCENARIOS="$1" BUILD="$BUILD" sh tests/faults/run.sh --every "$2" >"$T/out" 2>&1 || fail "$(head -n 1 "$T/out")"
+    chosen=$1
+    shift
+    ONLY_ONCE=1 SCENARIOS=$chosen BUILD=$BUILD sh tests/faults/run.sh "$@" >"$T/out" 2>&1 || fail "$(head -n 1 "$T/out")"
     says "$T/out" " 0 scenarios with defects"
 }
-of_infer() { faults infer 40; }
-of_convert() { faults "convert torch" 20; }
-of_data() { faults strips 40; }
+of_infer() { faults infer --every 40; }
+of_convert() { faults "convert torch" --every 20; }
+of_data() { faults "data strips" --every 40; }
+# The first memory is refused; texts in memory and config.ini are cut.
+of_train() { faults train --call malloc --every 2000 && faults train --call fprintf --every 200 && faults train --call fputs --every 200; }
+of_threads() { faults many --call pthread_create; }
 
 check faults_of_infer of_infer
 check faults_of_convert of_convert
 check faults_of_data of_data
+check faults_of_train of_train
+check faults_of_several_threads of_threads
