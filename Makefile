@@ -81,7 +81,7 @@ ISA_FLAGS_avx512bf16 := $(ISA_FLAGS_avx512) -mavx512bf16
 ISA_FLAGS_amx := $(ISA_FLAGS_avx512bf16) -mamx-tile -mamx-bf16
 
 PROGRAMS := train infer eval data convert
-ROOMS := tensor tensor/conv autograd render nn nn/weights data data/image data/materials train infer eval eval/methods \
+ROOMS := tensor tensor/conv autograd render nn nn/weights data data/image data/materials data/rectify train infer eval eval/methods \
   eval/metrics cli cli/data cli/infer
 LIB_C := $(filter-out %main.c,$(wildcard $(ROOMS:%=%/*.c)))
 KERNELS := $(wildcard tensor/kernels/*.c render/kernels/*.c)

@@ -26,6 +26,22 @@ static ts_code read_mask(const lgd_command *c, int width, int height, unsigned c
     return code;
 }
 
+static void read_angle(const lgd_command *c, bool published, lgd_item *item)
+{
+    lgd_rectified *r = &item->angle;
+    if (published) {
+        ts_fail(&item->st, TS_UNSUPPORTED, "%s: the published weights know no angle: leave out --corners",
+                item->job->photo);
+        return;
+    }
+    if (lgd_rectify(item->job->photo, &c->angle, c->max_pixels, c->size, c->fov, item->threads, r, &item->st)) return;
+    item->square = r->square;
+    item->image = r->square.data;
+    item->photo_side = (int)ceil(r->side);
+    item->fov = LGD_FOV_OF_PHOTO;
+    snprintf(item->fov_from, sizeof item->fov_from, "%s", r->fov_from);
+}
+
 void lgd_item_read(const lgd_command *c, bool published, lgd_item *item)
 {
     if (*c->capture) {
@@ -34,6 +50,10 @@ void lgd_item_read(const lgd_command *c, bool published, lgd_item *item)
         item->image = item->capture.image;
         item->fov = LGD_FOV_OF_PHOTO;
         snprintf(item->fov_from, sizeof item->fov_from, "the capture");
+        return;
+    }
+    if (c->corners) {
+        read_angle(c, published, item);
         return;
     }
     io_photo_facts facts;
@@ -91,7 +111,7 @@ void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, l
                                  .tile = before_tile,
                                  .fov = item->fov,
                                  .taken = item->photo};
-    item->photo[0] = lgd_flash_photo(item->image);
+    item->photo[0] = c->corners ? item->angle.photo : lgd_flash_photo(item->image);
     item->photos = item->capture.images ? lgd_capture_photos(&item->capture, lgd_most_photos(model), item->photo) : 1;
     item->power = fixed ? c->power : 1;
     for (int k = 0; k < item->photos; k++) item->photo[k].power *= (float)item->power;
@@ -102,6 +122,7 @@ void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, l
 
 const char *lgd_item_assumption(const lgd_item *item)
 {
+    if (item->angle.assumed) return "assumed: ";
     if (item->fov != LGD_FOV_UNKNOWN) return "";
     return item->photo[0].camera[2] == lgd_flash_photo(NULL).camera[2] ? "assumed: " : "estimated: ";
 }

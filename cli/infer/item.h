@@ -13,6 +13,7 @@ typedef struct lgd_item {
     int index;           /* into the plan */
     ts_status st;        /* the first failure on the way; later stages leave the item alone */
     io_image square;     /* linear, command->size a side; not of a capture */
+    lgd_rectified angle; /* with corners; its square is item->square */
     io_capture capture;  /* images 0: there is none */
     const float *image;  /* the photograph, or the first of the capture: in one of these; NULL: not read */
     unsigned char *mask; /* [size][size] from command->mask, or NULL */

@@ -71,6 +71,16 @@ static const char *look_at(const lgd_item *item, int size)
     return why;
 }
 
+/* Where the corners put the camera. */
+static void say_angle(const lgd_item *item)
+{
+    const lgd_rectified *r = &item->angle;
+    cl_note("%s: camera at %.2f %.2f %.2f sides of the square, %.0f degrees from straight above (%s%.1f degrees across "
+            "the photograph: %s%s)",
+            item->job->photo, r->camera.at[0], r->camera.at[1], r->camera.at[2], io_pinhole_tilt(&r->camera),
+            r->assumed ? "warning: assumed " : "", r->fov, r->fov_from, r->assumed ? "; --fov DEG tells it" : "");
+}
+
 /* What was assumed of the camera. */
 static void say_fov(const lgd_item *item)
 {
@@ -135,7 +145,8 @@ static void say_all(run *r, const lgd_item *item)
     if (r->command->outputs & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC | LGD_OUT_ORM))
         cl_note("%s: base colour and metalness miss diffuse by %.4f and F0 by %.4f (RMS, linear)", item->job->photo,
                 item->written.lost.diffuse, item->written.lost.specular);
-    say_fov(item);
+    if (r->command->corners) say_angle(item);
+    else say_fov(item);
     if (fabs(item->power - 1) >= 0.005)
         cl_note("%s: light power %.2f of the %s", item->job->photo, item->power,
                 item->capture.images ? "capture's" : "default");
@@ -200,6 +211,7 @@ static int all(run *r, lgd_pipeline *pipeline)
 static void print_help(void)
 {
     puts("Usage: lgd-infer [options] PHOTO|FOLDER|@LIST... -o DIR\n"
+         "       lgd-infer [options] --corners X,Y X,Y X,Y X,Y PHOTO -o DIR\n"
          "       lgd-infer [options] --capture WHERE -o DIR\n"
          "Estimates the material of a flat surface from a photograph taken straight on with a flash beside the lens.\n"
          "The largest centred square is used. FOLDER stands for the photographs in it, LIST is a file that names one a "
@@ -243,6 +255,11 @@ static int work(const lgd_command *c)
     char *const *photo = *c->capture ? c->photo : operands.photo;
     const int photos = *c->capture ? c->photos : operands.photos, missing = operands.failed;
     if (photos == 0) return CL_FAILED;
+    if (c->corners && photos > 1) {
+        const int code = cl_usage("--corners is for one photograph: '%s' is one more", photo[1]);
+        lgd_operands_free(&operands);
+        return code;
+    }
     const ts_code bad = lgd_plan_make(photo, photos, c->out, &plan, &st);
     if (bad) {
         lgd_operands_free(&operands);

@@ -10,6 +10,7 @@ enum {
     CAPTURE,
     POWER,
     FOV,
+    CORNERS,
     MAPS,
     AO,
     SEAMLESS,
@@ -50,6 +51,10 @@ const cl_argument lgd_infer_arguments[] = {
      "field of view of the photographs, 1 .. 170 degrees across the side of the square that the maps cover (default: "
      "from\n"
      "the file's EXIF, else 54.2, with a warning)"},
+    {CORNERS, "corners", "X,Y X,Y X,Y X,Y",
+     "the photograph was taken at an angle: where the corners of a square on the sample are in it, top left, top\n"
+     "right, bottom right, bottom left, in pixels from the top left or in 0 .. 1 of width and height; the maps are of\n"
+     "that square, and --fov is across the photograph's shorter side"},
     {POWER, "light-power", "P",
      "power of the light, relative to the default light (of a capture: to the power it states): a number in\n"
      "0.01 .. 100, or auto = estimated from the photograph and printed (default auto; of a capture 1)"},
@@ -92,6 +97,16 @@ static ts_code whole(const char *name, const char *text, int64_t lo, int64_t hi,
     if (cl_parse_int(text, lo, hi, value)) return TS_OK;
     return ts_fail(st, TS_INVALID, "--%s: '%s' is not a whole number in %lld .. %lld", name, text, (long long)lo,
                    (long long)hi);
+}
+
+static ts_code take_corners(int argc, char **argv, const char *value, lgd_command *c, ts_status *st)
+{
+    const char *words[4] = {value};
+    int count = 1;
+    while (!strchr(value, ' ') && count < 4 && (words[count] = cl_argument_second(argc, argv))) count++;
+    c->corners = true;
+    if (lgd_angle_parse(words, count, &c->angle, st) != TS_OK) ts_context(st, "--corners");
+    return st->code;
 }
 
 static ts_code take_capture(const char *value, lgd_command *c, ts_status *st)
@@ -160,6 +175,7 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
                 code = ts_fail(st, TS_INVALID, "--fov: '%s' is not an angle in %g .. %g degrees", value, LGD_FOV_LEAST,
                                LGD_FOV_MOST);
             break;
+        case CORNERS: code = take_corners(argc, argv, value, c, st); break;
         case POWER:
             power_given = true;
             c->power = 0;
@@ -212,6 +228,9 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
     if (*c->capture && c->photos > 0)
         return ts_fail(st, TS_INVALID, "--capture lists its photographs: '%s' is one more", c->photo[0]);
     if (*c->capture && c->fov > 0) return ts_fail(st, TS_INVALID, "--capture says where its cameras are: no --fov");
+    if (*c->capture && c->corners) return ts_fail(st, TS_INVALID, "--corners is for a photograph: not with --capture");
+    if (c->corners && c->mask)
+        return ts_fail(st, TS_INVALID, "--mask is for photographs taken straight on: no --corners");
     if (*c->capture && c->mask)
         return ts_fail(st, TS_INVALID, "--mask needs the shape of a photograph: not with --capture");
     if (*c->capture) {

@@ -2,6 +2,7 @@
 #ifndef LGD_OPTIONS_H
 #define LGD_OPTIONS_H
 #include "cli/arguments.h"
+#include "infer/angle.h"
 #include "infer/lgd.h"
 #include <stdbool.h>
 #include <stdint.h>
@@ -14,10 +15,11 @@ typedef struct lgd_command {
     double max_memory; /* bytes; 0: tensor/budget.h's default */
     double tolerance;
     int orientations; /* 1, 2, 4 or 8 */
-    double fov;       /* degrees across the square; 0: from the file */
+    double fov;       /* degrees across the square, with corners across the shorter side; 0: from the file */
+    lgd_angle angle;  /* of the square in the photograph, where corners is true */
     double power;     /* of the light, in default ones; 0: estimated */
     unsigned outputs; /* LGD_OUT_... */
-    bool directx, metallic, seamless, half /* of maps.exr */, exact, bf16, quiet, help, version;
+    bool directx, metallic, seamless, half /* of maps.exr */, exact, bf16, quiet, help, version, corners;
     char **photo; /* into argv; with a capture, that alone */
     char *only[1];
     int photos;

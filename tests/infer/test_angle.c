@@ -1,0 +1,143 @@
+/* Photographs taken at an angle. */
+#include "data/rectify/homography.h"
+#include "data/rectify/least_squares.h"
+#include "data/rectify/warp.h"
+#include "infer/angle.h"
+#include "render/scene.h"
+#include "tensor/rng.h"
+#include "tests/support/angled.h"
+#include "tests/support/make_images.h"
+#include "tests/test.h"
+#include <math.h>
+#include <string.h>
+
+TEST(angle_homography_and_pose)
+{
+    ts_rng rng = ts_rng_make(1, TS_STREAM_TEST, 0);
+    ts_status st = {0};
+    for (int i = 0; i < 200; i++) {
+        const io_pinhole true_camera = angled_camera(
+            4000, 3000, 3005, 1.5 + (double)ts_rng_uniform(&rng), 60 * (double)ts_rng_uniform(&rng),
+            6.28 * (double)ts_rng_uniform(&rng), 6.28 * (double)ts_rng_uniform(&rng));
+        double pixel[4][2], to[2], rms;
+        for (int k = 0; k < 4; k++) CHECK(io_pinhole_see(&true_camera, angled_square[k], pixel[k]), "behind");
+        io_homography h;
+        CHECK(io_homography_fit(4, angled_square, (const double(*)[2])pixel, &h), "no homography");
+        const double inside[2] = {0.21, -0.37};
+        double want[2];
+        io_pinhole_see(&true_camera, inside, want);
+        io_homography_apply(&h, inside, to);
+        CHECK(hypot(to[0] - want[0], to[1] - want[1]) < 1e-6, "the homography misses by %g pixels",
+              hypot(to[0] - want[0], to[1] - want[1]));
+        io_pinhole c = {4000, 3000, 3005, 0, {{0}}, {0}};
+        CHECK(!io_pinhole_pose(4, angled_square, (const double(*)[2])pixel, &c, &rms, &st), "%s", st.message);
+        for (int k = 0; k < 3; k++)
+            CHECK(fabs(c.at[k] - true_camera.at[k]) < 1e-6, "camera %d: %g, not %g", k, c.at[k], true_camera.at[k]);
+    }
+}
+
+TEST(angle_least_squares)
+{
+    double singular[4] = {1, 1, 1, 1}, b[2] = {1, 1};
+    CHECK(!io_solve_symmetric(2, singular, b), "a singular system has a solution");
+    double a[4] = {4, 1, 1, 3}, x[2] = {1, 2};
+    CHECK(io_solve_symmetric(2, a, x) && fabs(x[0] - 1.0 / 11) < 1e-15 && fabs(x[1] - 7.0 / 11) < 1e-15, "%g %g", x[0],
+          x[1]);
+}
+
+/* A square of the pattern, seen at an angle, comes back as it is, and the camera with it. */
+TEST(angle_rectifies)
+{
+    char path[512], words[256];
+    ts_status st = {0};
+    snprintf(path, sizeof path, "%s/angled.png", test_folder());
+    for (int shares = 0; shares < 2; shares++) {
+        const io_pinhole camera = angled_camera(400, 300, 320, 2, 35, 0.7 + shares, 0.3);
+        double p[4][2];
+        angled_write(path, &camera);
+        for (int k = 0; k < 4; k++) {
+            io_pinhole_see(&camera, angled_square[k], p[k]);
+            if (shares) p[k][0] /= 400, p[k][1] /= 300;
+        }
+        snprintf(words, sizeof words, "%.6f,%.6f %.6f,%.6f %.6f,%.6f  %.6f,%.6f ", p[0][0], p[0][1], p[1][0], p[1][1],
+                 p[2][0], p[2][1], p[3][0], p[3][1]);
+        lgd_angle angle;
+        CHECK(!lgd_angle_parse((const char *[]){words}, 1, &angle, &st), "%s", st.message);
+        lgd_rectified r;
+        const double fov = io_fov_of_focal(320, 400, 300);
+        CHECK(!lgd_rectify(path, &angle, 1 << 20, 48, fov, 1, &r, &st), "%s", st.message);
+        double worst = 0;
+        for (int j = 0; j < 48; j++)
+            for (int i = 0; i < 48; i++)
+                for (int k = 0; k < 3; k++) {
+                    const double at[2] = {(i + 0.5) / 48 - 0.5, 0.5 - (j + 0.5) / 48};
+                    worst = fmax(worst, fabs((double)(r.square.data[(j * 48 + i) * 3 + k] - angled_pattern(at, k))));
+                }
+        CHECK(worst < 2e-3, "the square misses the pattern by %g", worst);
+        for (int k = 0; k < 3; k++)
+            CHECK(fabs((double)r.photo.camera[k] - camera.at[k]) < 1e-4, "camera %d: %g, not %g", k,
+                  (double)r.photo.camera[k], camera.at[k]);
+        /* as bright in the centre as under the default flash */
+        const double d = 2, bright = (double)r.photo.power * r.photo.light[2] / (d * d * d);
+        CHECK(fabs(bright / (double)(RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE)) - 1) < 1e-3, "%g",
+              bright);
+        CHECK(!r.assumed && strcmp(r.fov_from, "--fov") == 0, "%s", r.fov_from);
+        io_image_free(&r.square);
+        CHECK(!lgd_rectify(path, &angle, 1 << 20, 8, 0, 1, &r, &st) && r.assumed && strstr(r.fov_from, "no focal"),
+              "a default field of view is not said to be one: %s", r.fov_from);
+        io_image_free(&r.square);
+    }
+}
+
+static void squeezed(const double point[2], double pixel[2], const void *user)
+{
+    (void)user;
+    for (int k = 0; k < 2; k++) pixel[k] = 64 * point[k];
+}
+
+/* Stripes a pixel wide, shrunk eight times, are grey: nothing of them is left over. */
+TEST(angle_shrinks_by_area)
+{
+    char path[512];
+    ts_status st = {0};
+    io_image stripes, square;
+    io_photo_rows photo;
+    CHECK(!io_image_create(&stripes, 64, 64, 3, &st), "%s", st.message);
+    for (size_t i = 0; i < 64 * 64 * 3; i++) stripes.data[i] = i / 3 % 2 ? 1 : 0;
+    snprintf(path, sizeof path, "%s/stripes.png", test_folder());
+    CHECK(!io_write_png(path, &stripes, 8, true, &st), "%s", st.message);
+    CHECK(!io_photo_open(path, 1 << 20, true, &photo, &st), "%s", st.message);
+    CHECK(!io_warp(&photo, &(io_view_of){squeezed, NULL}, 8, 1, &square, &st), "%s", st.message);
+    for (int i = 0; i < 8 * 8 * 3; i++)
+        CHECK(fabsf(square.data[i] - 0.5f) < 1e-3f, "value %d is %g", i, (double)square.data[i]);
+    io_photo_close(&photo);
+    io_image_free(&stripes);
+    io_image_free(&square);
+}
+
+TEST(angle_corners_that_cannot_be)
+{
+    const struct {
+        const char *words, *says;
+    } cases[] = {{"10,10 90,90 90,10 10,90", "cross"},        {"10,10 10,90 90,90 90,10", "counter-clockwise"},
+                 {"10,10 50,50 90,90 10,90", "in a line"},    {"10,10 10,10 90,90 10,90", "in a line"},
+                 {"-5,10 90,10 90,90 10,90", "outside"},      {"10,10 90,10 90,90", "3 corners"},
+                 {"10,10 90,10 90,90 10,90 5,5", "four x,y"}, {"10,10 90,10 90,90 10", "four x,y"},
+                 {"10,10 90,10 90,90 nan,1", "four x,y"},     {"", "0 corners"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        ts_status st = {0};
+        lgd_angle angle;
+        CHECK(lgd_angle_parse(&cases[i].words, 1, &angle, &st) == TS_INVALID && strstr(st.message, cases[i].says),
+              "'%s': %s", cases[i].words, st.message);
+    }
+    char path[512];
+    ts_status st = {0};
+    lgd_rectified r;
+    const lgd_angle beyond = {{{10, 10}, {500, 10}, {500, 90}, {10, 90}}};
+    const io_pinhole camera = angled_camera(100, 100, 100, 1, 0, 0, 0);
+    snprintf(path, sizeof path, "%s/small.png", test_folder());
+    angled_write(path, &camera);
+    CHECK(lgd_rectify(path, &beyond, 1 << 20, 8, 50, 1, &r, &st) == TS_INVALID && strstr(st.message, "corner 2") &&
+              strstr(st.message, "small.png"),
+          "%s", st.message);
+}
