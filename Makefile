@@ -48,6 +48,8 @@ endif
 # What the programs read and write themselves, and what only the shared object needs that reads all other image formats.
 PKG := OpenEXR libpng libjpeg zlib lcms2
 PKG_IMAGE := OpenImageIO
+# Optional: the tags of a printed sheet (data/rectify/tags.c).
+PKG_TAGS := apriltag
 WARN := -Wall -Wextra -Wshadow
 CPPFLAGS_ALL = -I. -I$(BUILD)/gen -D_GNU_SOURCE -DLGD_VERSION='"$(VERSION)"' $(CPPFLAGS)
 CFLAGS_ALL = -std=c11 $(OPT) $(WARN) -Wmissing-prototypes -fopenmp -fno-math-errno -fno-trapping-math \
@@ -58,7 +60,9 @@ PKG_CFLAGS = $(shell pkg-config --cflags $(PKG))
 # OpenEXR's C core alone: the rest of it is C++.
 PKG_LIBS = $(filter-out -lOpenEXR-% -lOpenEXRUtil% -lIex% -lIlmThread% -lImath% -lOpenEXR -lIex -lImath -lIlmThread,\
   $(shell pkg-config --libs $(PKG)))
-LDLIBS_ALL = $(PKG_LIBS) -fopenmp -lpthread -ldl -lm $(SANITIZE) $(LDLIBS)
+HAVE_TAGS = $(shell pkg-config --exists $(PKG_TAGS) 2>/dev/null && echo yes)
+TAGS_LIBS = $(if $(HAVE_TAGS),$(shell pkg-config --libs $(PKG_TAGS)))
+LDLIBS_ALL = $(PKG_LIBS) $(TAGS_LIBS) -fopenmp -lpthread -ldl -lm $(SANITIZE) $(LDLIBS)
 # What liblgd needs: it reads weights, but no images.
 LIB_LIBS := -lz -fopenmp -lpthread -lm
 
@@ -80,9 +84,9 @@ ISA_FLAGS_avx512 := -mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx2 -mfma -mbm
 ISA_FLAGS_avx512bf16 := $(ISA_FLAGS_avx512) -mavx512bf16
 ISA_FLAGS_amx := $(ISA_FLAGS_avx512bf16) -mamx-tile -mamx-bf16
 
-PROGRAMS := train infer eval data convert
+PROGRAMS := train infer eval data convert capture
 ROOMS := tensor tensor/conv autograd render nn nn/weights data data/image data/materials data/rectify train infer eval eval/methods \
-  eval/metrics cli cli/data cli/infer
+  eval/metrics cli cli/capture cli/data cli/infer
 LIB_C := $(filter-out %main.c,$(wildcard $(ROOMS:%=%/*.c)))
 KERNELS := $(wildcard tensor/kernels/*.c render/kernels/*.c)
 OPS := $(sort $(wildcard autograd/op_*.c render/op_*.c))
@@ -120,7 +124,7 @@ $(BUILD)/bin/lgd-%: $(OBJ)/%/main.o $(INTERNAL)
 	@mkdir -p $(@D)
 	$(Q)$(CC) -o $@ $< $(INTERNAL) $(LDLIBS_ALL)
 
-$(BUILD)/bin/lgd-infer $(BUILD)/bin/lgd-convert: $(BUILD)/bin/lgd-%: $(OBJ)/cli/%/main.o $(INTERNAL)
+$(BUILD)/bin/lgd-infer $(BUILD)/bin/lgd-convert $(BUILD)/bin/lgd-capture: $(BUILD)/bin/lgd-%: $(OBJ)/cli/%/main.o $(INTERNAL)
 	$(call step,LD,$@)
 	@mkdir -p $(@D)
 	$(Q)$(CC) -o $@ $< $(INTERNAL) $(LDLIBS_ALL)
@@ -178,12 +182,16 @@ $(IMAGE_LIB): $(OBJ)/data/image/oiio.o $(OBJ)/tensor/status.o
 	@mkdir -p $(@D)
 	$(Q)$(CXX) -shared -Wl,-Bsymbolic -o $@ $^ $(shell pkg-config --libs $(PKG_IMAGE)) $(SANITIZE) $(LDLIBS)
 
-# Every object is rebuilt when the flags change, and data/folders.o when PREFIX does.
+# Every object is rebuilt when the flags change, and data/folders.o when PREFIX does, tags.o
+# when its library comes or goes.
 FLAGS_NOW := $(CC) $(CXX) $(WHOLE_JUMPS) $(OPT) $(SANITIZE) $(CFLAGS) $(CPPFLAGS) $(VERSION)
 changed = $(shell mkdir -p $(BUILD)/gen; echo '$(2)' | cmp -s - $(BUILD)/gen/$(1) || echo '$(2)' > $(BUILD)/gen/$(1))
 $(call changed,flags,$(FLAGS_NOW))
 $(call changed,prefix,$(PREFIX))
 $(OBJ)/data/folders.o: $(BUILD)/gen/prefix
+$(call changed,tags,$(HAVE_TAGS))
+$(OBJ)/data/rectify/tags.o: $(BUILD)/gen/tags
+$(OBJ)/data/rectify/tags.o: CPPFLAGS_ALL += $(if $(HAVE_TAGS),-DLGD_APRILTAG $(shell pkg-config --cflags $(PKG_TAGS)))
 $(OBJ)/data/folders.o: CPPFLAGS_ALL += -DLGD_PREFIX='"$(PREFIX)"'
 
 $(OBJ)/%.o: %.c $(BUILD)/gen/flags | $(BUILD)/gen/ops.h $(BUILD)/gen/pages.h
@@ -243,7 +251,7 @@ $(BUILD)/gen/pages.c: $(PAGES) Makefile
 	  od -An -v -to1 $f | sed 's/ *\([0-7][0-7][0-7]\)/\\\1/g;s/.*/"&"/'; echo ';';) } > $@
 
 deps:
-	@sh .ci/deps.sh $(PKG) $(PKG_IMAGE)
+	@sh .ci/deps.sh $(PKG) $(PKG_IMAGE) $(PKG_TAGS)
 
 test: deps
 	@$(MAKE) --no-print-directory programs $(TEST_BIN) $(FAULTS)

@@ -3,6 +3,7 @@
 # prints the names of what is missing and ends with 1. On a terminal it asks first, unless YES or CI is set.
 # Arguments: the pkg-config modules.
 missing=
+optional=
 have() { command -v "$1" >/dev/null 2>&1; }
 have "${CC:-gcc}" || missing="$missing gcc"
 have "${CXX:-g++}" || missing="$missing g++"
@@ -16,10 +17,17 @@ for module in "$@"; do
     libpng) missing="$missing libpng-dev" ;;
     zlib) missing="$missing zlib1g-dev" ;; # nn/weights/zip.c: compressed entries of PyTorch's files
     libjpeg) missing="$missing libjpeg-dev" ;;
+    apriltag) optional=" libapriltag-dev" ;; # lgd-infer --sheet and lgd-capture; the rest works without
     *) echo "deps: no package is known for $module" >&2; exit 1 ;;
     esac
 done
-[ -z "$missing" ] && exit 0
+# What is optional is installed where that is possible, and otherwise not asked for.
+without() { echo "deps: without$optional printed sheets (lgd-infer --sheet) are left out" >&2; exit 0; }
+if [ -z "$missing" ]; then
+    [ -z "$optional" ] && exit 0
+    have apt-get || without
+    if [ "$(id -u)" -ne 0 ] && ! { have sudo && sudo -n true 2>/dev/null; }; then without; fi
+fi
 if ! have apt-get; then
     echo "deps: missing (Debian's names):$missing; install them with your package manager and run make again" >&2
     exit 1
@@ -31,12 +39,13 @@ else
     echo "deps: missing:$missing; as root: apt-get install$missing" >&2
     exit 1
 fi
-echo "deps: the build needs these packages, which apt-get installs${run:+ through $run}:$missing" >&2
+echo "deps: the build needs these packages, which apt-get installs${run:+ through $run}:$missing$optional" >&2
 if [ -t 0 ] && [ -t 2 ] && [ -z "${YES:-}${CI:-}" ]; then
     printf 'deps: Enter installs them, Ctrl-C ends (make YES=1 does not ask) ' >&2
     read -r _ || exit 1
 fi
 export DEBIAN_FRONTEND=noninteractive
-if $run apt-get update -qq >&2 && $run apt-get install -y -qq --no-install-recommends $missing >&2; then exit 0; fi
+if $run apt-get update -qq >&2 && $run apt-get install -y -qq --no-install-recommends $missing $optional >&2; then exit 0; fi
+[ -z "$missing" ] && without
 echo "deps: could not install$missing (no network?); install them and run make again" >&2
 exit 1

@@ -3,6 +3,7 @@
 #include "cli/camera.h"
 #include "cli/cli.h"
 #include "cli/data/pictures.h"
+#include "cli/data/sheet_captures.h"
 #include "data/materials/compare.h"
 #include "data/materials/histogram.h"
 #include "data/sheet.h"
@@ -15,12 +16,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef enum format { FORMAT_NONE, FORMAT_FOLDERS, FORMAT_STRIPS, FORMAT_CAPTURES } format;
+typedef enum format { FORMAT_NONE, FORMAT_FOLDERS, FORMAT_STRIPS, FORMAT_CAPTURES, FORMAT_SHEETS } format;
 
 typedef struct options {
     const char *output, *testdata;
     io_procedural procedural;
-    int64_t first, count, size, threads, quality; /* count and size 0: not given */
+    int64_t first, count, size, threads, quality, width; /* count and size 0: not given */
     io_camera camera;
     format format;
     bool sheet, photographs, statistics, histograms;
@@ -36,6 +37,7 @@ enum {
     OPT_SHEET,
     OPT_PHOTOGRAPHS,
     OPT_QUALITY,
+    OPT_WIDTH,
     OPT_STATISTICS,
     OPT_HISTOGRAMS,
     OPT_TESTDATA,
@@ -55,6 +57,7 @@ static const struct option plain_options[] = {{"output", required_argument, NULL
                                               {"contact-sheet", no_argument, NULL, OPT_SHEET},
                                               {"photographs", no_argument, NULL, OPT_PHOTOGRAPHS},
                                               {"quality", required_argument, NULL, OPT_QUALITY},
+                                              {"photo-width", required_argument, NULL, OPT_WIDTH},
                                               {"statistics", no_argument, NULL, OPT_STATISTICS},
                                               {"histograms", no_argument, NULL, OPT_HISTOGRAMS},
                                               {"testdata", required_argument, NULL, OPT_TESTDATA},
@@ -76,6 +79,9 @@ static void print_help(void)
         "                        strips: DIR/NAME.png, five panels: photograph, normal, diffuse, roughness, specular;\n"
         "                        captures: DIR/NAME/ with nine photographs 00.png .. 08.png and their lights and "
         "cameras\n"
+        "                        sheet-captures: DIR/NAME/ with maps/, five photographs of the material in the window "
+        "of\n"
+        "                        lgd-capture's sheet, photo_1.jpg .. photo_5.jpg, and exact/: the same without faults\n"
         "      --photographs     DIR/NAME.jpg: renderings under the flash, with sensor noise, blur and JPEG\n"
         "      --contact-sheet   DIR/contact-sheet.png: a row for each family, with its name\n"
         "      --statistics      print a table that compares the maps with those of --testdata\n"
@@ -97,6 +103,7 @@ static void print_help(void)
     }
     printf("\nOther:\n"
            "      --quality N       of photographs' JPEG, 1 .. 100 (default 90)\n"
+           "      --photo-width N   of sheet-captures, 400 .. 8000 pixels (default 4000)\n"
            "      --testdata DIR    folder with maps/ (map folders) and strips/ to compare with\n"
            "      --threads N       number of threads (default: as many as the process may use)\n"
            "      --help, --version\n");
@@ -150,11 +157,15 @@ static int parse_options(int argc, char **argv, options *o)
             if (!strcmp(optarg, "folders")) o->format = FORMAT_FOLDERS;
             else if (!strcmp(optarg, "strips")) o->format = FORMAT_STRIPS;
             else if (!strcmp(optarg, "captures")) o->format = FORMAT_CAPTURES;
-            else code = cl_usage("--format: '%s' is none of 'folders', 'strips' and 'captures'", optarg);
+            else if (!strcmp(optarg, "sheet-captures")) o->format = FORMAT_SHEETS;
+            else
+                code = cl_usage("--format: '%s' is none of 'folders', 'strips', 'captures' and 'sheet-captures'",
+                                optarg);
             break;
         case OPT_SHEET: o->sheet = true; break;
         case OPT_PHOTOGRAPHS: o->photographs = true; break;
         case OPT_QUALITY: code = parse_number("quality", optarg, 1, 100, &o->quality); break;
+        case OPT_WIDTH: code = parse_number("photo-width", optarg, 400, 8000, &o->width); break;
         case OPT_STATISTICS: o->statistics = true; break;
         case OPT_HISTOGRAMS: o->histograms = true; break;
         case OPT_TESTDATA: o->testdata = optarg; break;
@@ -212,6 +223,14 @@ static ts_code write_material(const options *o, uint64_t index, io_material *m, 
         code = make_path(path, o, m->name, "", st);
         if (!code) code = cl_make_folder(path, st);
         if (!code) code = lgd_write_capture(path, m, st);
+    }
+    if (!code && o->format == FORMAT_SHEETS) {
+        code = make_path(path, o, m->name, "/maps", st);
+        if (!code) code = cl_make_folder(path, st);
+        if (!code) code = io_write_maps(path, m, IO_MAPS_ALL, false, st);
+        if (!code) code = make_path(path, o, m->name, "", st);
+        if (!code)
+            code = lgd_write_sheet_captures(path, m, o->procedural.seed, index, (int)o->width, (int)o->quality, st);
     }
     if (!code && o->photographs) {
         cl_photograph(&o->camera, o->procedural.seed, index, &flash, m->size, m->maps, photo->data);
@@ -339,7 +358,7 @@ static ts_code make_histograms(const options *o, ts_status *st)
 int main(int argc, char **argv)
 {
     cl_open_streams();
-    options o = {.quality = 90, .camera = cl_camera_default};
+    options o = {.quality = 90, .width = 4000, .camera = cl_camera_default};
     ts_status st = {0};
     int code = cl_init("lgd-data");
     if (!code) code = parse_options(argc, argv, &o);

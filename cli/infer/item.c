@@ -42,6 +42,20 @@ static void read_angle(const lgd_command *c, bool published, lgd_item *item)
     snprintf(item->fov_from, sizeof item->fov_from, "%s", r->fov_from);
 }
 
+static void read_sheet(const lgd_command *c, lgd_item *item)
+{
+    io_sheet_set *set = &item->sheet;
+    if (io_sheet_set_read(c->photo, c->photos, c->fov, c->max_pixels, item->threads, set, &item->st)) return;
+    if (set->good == 0) item->st = set->photo[0].st;
+    else if (lgd_sheet_capture(set, IO_CAPTURE_IMAGES, c->size, c->max_pixels, item->threads, &item->capture,
+                               &item->st))
+        return;
+    item->image = item->capture.image;
+    item->photo_side = c->size;
+    item->fov = LGD_FOV_OF_PHOTO;
+    snprintf(item->fov_from, sizeof item->fov_from, "the sheet, %d photographs", set->good);
+}
+
 void lgd_item_read(const lgd_command *c, bool published, lgd_item *item)
 {
     if (*c->capture) {
@@ -50,6 +64,10 @@ void lgd_item_read(const lgd_command *c, bool published, lgd_item *item)
         item->image = item->capture.image;
         item->fov = LGD_FOV_OF_PHOTO;
         snprintf(item->fov_from, sizeof item->fov_from, "the capture");
+        return;
+    }
+    if (c->sheet) {
+        read_sheet(c, item);
         return;
     }
     if (c->corners) {
@@ -157,6 +175,7 @@ void lgd_item_free(lgd_item *item)
 {
     io_image_free(&item->square);
     io_capture_free(&item->capture);
+    io_sheet_set_free(&item->sheet);
     io_material_free(&item->m);
     free(item->mask);
     item->mask = NULL;

@@ -7,6 +7,7 @@
 #include "infer/capture.h"
 #include "infer/lgd.h"
 #include "infer/output.h"
+#include "infer/sheet.h"
 
 typedef struct lgd_item {
     const lgd_job *job;
@@ -15,6 +16,7 @@ typedef struct lgd_item {
     io_image square;     /* linear, command->size a side; not of a capture */
     lgd_rectified angle; /* with corners; its square is item->square */
     io_capture capture;  /* images 0: there is none */
+    io_sheet_set sheet;  /* with --sheet: what was found in each photograph; capture has the windows */
     const float *image;  /* the photograph, or the first of the capture: in one of these; NULL: not read */
     unsigned char *mask; /* [size][size] from command->mask, or NULL */
     double fov;          /* of the photograph, in degrees across the square; LGD_FOV_UNKNOWN, LGD_FOV_OF_PHOTO */

@@ -29,6 +29,7 @@ typedef struct run {
     size_t size;
     lgd_index index;
     ts_status index_st;
+    bool left_out; /* photographs of a sheet that could not be used */
 } run;
 
 static int show(lgd_item *item, double done, void *user)
@@ -79,6 +80,28 @@ static void say_angle(const lgd_item *item)
             "the photograph: %s%s)",
             item->job->photo, r->camera.at[0], r->camera.at[1], r->camera.at[2], io_pinhole_tilt(&r->camera),
             r->assumed ? "warning: assumed " : "", r->fov, r->fov_from, r->assumed ? "; --fov DEG tells it" : "");
+}
+
+/* What the sheet told, unless quiet, and of which photographs it told nothing. False: there are such. Where it told
+ * nothing at all the item's own message is the first's. */
+static bool say_sheet(const lgd_item *item, bool quiet)
+{
+    const io_sheet_set *set = &item->sheet;
+    int order[IO_SOLVE_MOST];
+    for (int i = 0; i < set->photos; i++)
+        if (set->photo[i].st.code && (set->good > 0 || i > 0)) cl_failed("%s", set->photo[i].st.message);
+    if (!quiet && set->good > 0 && !item->st.code) {
+        const io_sheet_photo *p;
+        lgd_sheet_order(set, order);
+        p = &set->photo[order[0]];
+        cl_note(
+            "%s: %d of %d photographs; field of view %.1f degrees (%s), flash %.2f right and %.2f down of the lens in "
+            "sides of the window",
+            item->job->photo, set->good, set->photos,
+            io_fov_of_focal(p->sight.camera.focal, p->sight.camera.width, p->sight.camera.height),
+            set->sure ? "EXIF or --fov, refined" : "fitted: EXIF has no focal length", set->aside[0], set->aside[1]);
+    }
+    return set->good == set->photos;
 }
 
 /* What was assumed of the camera. */
@@ -156,6 +179,7 @@ static void say_all(run *r, const lgd_item *item)
 static void report(run *r, const lgd_item *item)
 {
     cl_progress_end(&r->bar);
+    r->left_out = !say_sheet(item, r->command->quiet) || r->left_out;
     if (!r->command->quiet) say_all(r, item);
     if (item->st.code) {
         cl_failed("%s", item->st.message);
@@ -205,13 +229,14 @@ static int all(run *r, lgd_pipeline *pipeline)
     if (cl_interrupted() && r->done + r->failed < r->jobs)
         return cl_stopped("interrupted: %d of %d photographs are done", r->done, r->jobs);
     if (r->failed > 0 && r->jobs > 1) return cl_failed("%d of %d photographs failed", r->failed, r->jobs);
-    return r->failed > 0 ? CL_FAILED : CL_OK;
+    return r->failed > 0 || r->left_out ? CL_FAILED : CL_OK;
 }
 
 static void print_help(void)
 {
     puts("Usage: lgd-infer [options] PHOTO|FOLDER|@LIST... -o DIR\n"
          "       lgd-infer [options] --corners X,Y X,Y X,Y X,Y PHOTO -o DIR\n"
+         "       lgd-infer [options] --sheet PHOTO... -o DIR\n"
          "       lgd-infer [options] --capture WHERE -o DIR\n"
          "Estimates the material of a flat surface from a photograph taken straight on with a flash beside the lens.\n"
          "The largest centred square is used. FOLDER stands for the photographs in it, LIST is a file that names one a "
@@ -243,8 +268,10 @@ static int end_index(run *r, int code)
     return code;
 }
 
-static int work(const lgd_command *c)
+static int work(const lgd_command *given)
 {
+    lgd_command own = *given;
+    const lgd_command *const c = &own;
     ts_status st = {0};
     lgd_operands operands = {0};
     lgd_error error;
@@ -252,15 +279,18 @@ static int work(const lgd_command *c)
     char weights[LGD_PATH_MAX];
     if (!*c->capture && lgd_operands_expand(c->photo, c->photos, say_failed, &operands, &st) != TS_OK)
         return cl_failed("%s", st.message);
-    char *const *photo = *c->capture ? c->photo : operands.photo;
-    const int photos = *c->capture ? c->photos : operands.photos, missing = operands.failed;
+    if (!*c->capture) own.photo = operands.photo, own.photos = operands.photos;
+    char *const *photo = c->photo;
+    const int photos = c->photos, missing = operands.failed;
     if (photos == 0) return CL_FAILED;
-    if (c->corners && photos > 1) {
-        const int code = cl_usage("--corners is for one photograph: '%s' is one more", photo[1]);
+    if ((c->corners && photos > 1) || (c->sheet && photos > IO_SOLVE_MOST)) {
+        const int most = c->corners ? 1 : IO_SOLVE_MOST;
+        const int code = cl_usage("--%s: '%s' is one photograph more than %d", c->corners ? "corners" : "sheet",
+                                  photo[most], most);
         lgd_operands_free(&operands);
         return code;
     }
-    const ts_code bad = lgd_plan_make(photo, photos, c->out, &plan, &st);
+    const ts_code bad = lgd_plan_make(photo, c->sheet ? 1 : photos, c->out, &plan, &st);
     if (bad) {
         lgd_operands_free(&operands);
         return bad == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
@@ -269,7 +299,7 @@ static int work(const lgd_command *c)
     ts_budget_set(c->max_memory);
     run r = {.command = c, .jobs = plan.jobs, .lock = PTHREAD_MUTEX_INITIALIZER};
     /* Of a lone photograph its page is enough. */
-    if (c->outputs & LGD_OUT_PAGE && (photos > 1 || strcmp(photo[0], c->photo[0]) != 0) &&
+    if (c->outputs & LGD_OUT_PAGE && !c->sheet && (photos > 1 || strcmp(photo[0], given->photo[0]) != 0) &&
         lgd_index_start(&r.index, &plan, c->out, &st) != TS_OK) {
         lgd_plan_free(&plan);
         lgd_operands_free(&operands);
@@ -278,7 +308,9 @@ static int work(const lgd_command *c)
     int code = CL_FAILED;
     bool published = false;
     lgd_pipeline *pipeline = NULL;
-    if (lgd_model_path(c->model, *c->capture ? "multi" : "single", weights, &st) != TS_OK) cl_failed("%s", st.message);
+    if (lgd_model_path(c->model, *c->capture || (c->sheet && c->photos > 1) ? "multi" : "single", weights, &st) !=
+        TS_OK)
+        cl_failed("%s", st.message);
     else if (lgd_weights_published(weights, &published, &st) != TS_OK) cl_failed("%s", st.message);
     else if (!(pipeline = lgd_pipeline_start(&plan, c, published, &st)))
         cl_failed("%s", st.message); /* decodes while the weights are read */

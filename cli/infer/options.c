@@ -11,6 +11,7 @@ enum {
     POWER,
     FOV,
     CORNERS,
+    SHEET,
     MAPS,
     AO,
     SEAMLESS,
@@ -55,6 +56,10 @@ const cl_argument lgd_infer_arguments[] = {
      "the photograph was taken at an angle: where the corners of a square on the sample are in it, top left, top\n"
      "right, bottom right, bottom left, in pixels from the top left or in 0 .. 1 of width and height; the maps are of\n"
      "that square, and --fov is across the photograph's shorter side"},
+    {SHEET, "sheet", NULL,
+     "the photographs are of one sample in the window of lgd-capture's printed sheet: DIR/STEM/ of the first gets the\n"
+     "maps of all; cameras, flash and exposure are found from the sheet; the default model is then multi, of one\n"
+     "photograph single; --fov is across the photographs' shorter side"},
     {POWER, "light-power", "P",
      "power of the light, relative to the default light (of a capture: to the power it states): a number in\n"
      "0.01 .. 100, or auto = estimated from the photograph and printed (default auto; of a capture 1)"},
@@ -176,6 +181,7 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
                                LGD_FOV_MOST);
             break;
         case CORNERS: code = take_corners(argc, argv, value, c, st); break;
+        case SHEET: c->sheet = true; break;
         case POWER:
             power_given = true;
             c->power = 0;
@@ -233,6 +239,12 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
         return ts_fail(st, TS_INVALID, "--mask is for photographs taken straight on: no --corners");
     if (*c->capture && c->mask)
         return ts_fail(st, TS_INVALID, "--mask needs the shape of a photograph: not with --capture");
+    if (c->sheet && (*c->capture || c->corners || c->mask))
+        return ts_fail(st, TS_INVALID, "--sheet finds the sample and the lights itself: not with --%s",
+                       *c->capture      ? "capture"
+                           : c->corners ? "corners"
+                                        : "mask");
+    if (c->sheet && !power_given) c->power = 1;
     if (*c->capture) {
         if (!power_given) c->power = 1;
         c->only[0] = c->capture;

@@ -19,8 +19,9 @@ typedef struct lgd_command {
     lgd_angle angle;  /* of the square in the photograph, where corners is true */
     double power;     /* of the light, in default ones; 0: estimated */
     unsigned outputs; /* LGD_OUT_... */
-    bool directx, metallic, seamless, half /* of maps.exr */, exact, bf16, quiet, help, version, corners;
-    char **photo; /* into argv; with a capture, that alone */
+    bool directx, metallic, seamless, half /* of maps.exr */, exact, bf16, quiet, help, version, corners,
+        sheet;    /* the photographs are of one sample under a printed sheet, one result */
+    char **photo; /* into argv; with a capture, that alone; with a sheet, all are one result's */
     char *only[1];
     int photos;
 } lgd_command;

@@ -58,9 +58,13 @@ static bool start(const io_homography *h, io_pinhole *c)
     if (column[2][2] < 0) scale = -scale; /* the centre is in front of the camera */
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < 3; i++) column[k][i] /= scale;
-    /* the nearest directions at a right angle to each other */
+    /* the nearest directions at a right angle to each other: of unit vectors, sum and difference are */
     double sum[3], difference[3];
-    for (int i = 0; i < 3; i++) sum[i] = column[0][i] + column[1][i], difference[i] = column[0][i] - column[1][i];
+    const double one = sqrt(dot(column[0], column[0])), two = sqrt(dot(column[1], column[1]));
+    for (int i = 0; i < 3; i++) {
+        sum[i] = column[0][i] / one + column[1][i] / two;
+        difference[i] = column[0][i] / one - column[1][i] / two;
+    }
     const double a = sqrt(2 * dot(sum, sum)), b = sqrt(2 * dot(difference, difference));
     if (!(a > 0) || !(b > 0)) return false;
     double r1[3], r2[3];

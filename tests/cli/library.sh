@@ -37,7 +37,7 @@ install_link_uninstall() {
     command -v pkg-config >/dev/null || skip "no pkg-config"
     expect 0 make --no-print-directory install BUILD="$BUILD" DESTDIR="$T/root" PREFIX=/usr/local
     root=$T/root/usr/local
-    for f in bin/lgd-infer bin/lgd-train bin/lgd-eval bin/lgd-data bin/lgd-convert lib/liblgd.a lib/liblgd.so lib/liblgd.so.0 \
+    for f in bin/lgd-infer bin/lgd-train bin/lgd-eval bin/lgd-data bin/lgd-convert bin/lgd-capture lib/liblgd.a lib/liblgd.so lib/liblgd.so.0 \
         lib/lgd/liblgd_image.so include/lgd.h share/lgd/single.safetensors lib/pkgconfig/lgd.pc; do
         [ -s "$root/$f" ] || fail "$f is not installed"
     done

@@ -31,6 +31,13 @@ TEST(angle_homography_and_pose)
               hypot(to[0] - want[0], to[1] - want[1]));
         io_pinhole c = {4000, 3000, 3005, 0, {{0}}, {0}};
         CHECK(!io_pinhole_pose(4, angled_square, (const double(*)[2])pixel, &c, &rms, &st), "%s", st.message);
+        io_pinhole other = {4000, 3000, 2000, 0, {{0}}, {0}}; /* of another lens: no perfect fit, but a rotation */
+        CHECK(!io_pinhole_pose(4, angled_square, (const double(*)[2])pixel, &other, &rms, &st), "%s", st.message);
+        for (int k = 0; k < 9; k++) {
+            double product = 0;
+            for (int n = 0; n < 3; n++) product += other.turn[k / 3][n] * other.turn[k % 3][n];
+            CHECK(fabs(product - (k / 3 == k % 3)) < 1e-9, "rows %d and %d of the turn: %g", k / 3, k % 3, product);
+        }
         for (int k = 0; k < 3; k++)
             CHECK(fabs(c.at[k] - true_camera.at[k]) < 1e-6, "camera %d: %g, not %g", k, c.at[k], true_camera.at[k]);
     }

@@ -1,0 +1,173 @@
+/* lgd-capture: prints the sheet for several photographs of one sample, and checks the photographs. */
+#include "cli/arguments.h"
+#include "cli/cli.h"
+#include "data/image/image.h"
+#include "data/rectify/sheet_set.h"
+#include "tensor/threads.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { PAPER = 256, FOV, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
+
+static const cl_argument arguments[] = {
+    {'o', "output", "FILE", "of sheet: where the drawing goes, a name that ends in .pdf or .svg (required)"},
+    {PAPER, "paper", "P", "of sheet: a4 (default) or letter"},
+    {FOV, "fov", "DEG", "of check: field of view across the photographs' shorter side (default: from EXIF)"},
+    {'t', "threads", "N", "number of threads, 1 .. 1024; 0 = all that are allowed (default 0)"},
+    {MAX_PIXELS, "max-pixels", "N", "refuse photographs with more pixels (default 268435456)"},
+    {HELP, "help", NULL, "print this help"},
+    {VERSION, "version", NULL, "print the version"},
+    {0, NULL, NULL, NULL}};
+
+typedef struct command {
+    const char *output;
+    const io_paper *paper;
+    double fov;
+    int64_t threads, max_pixels;
+    bool help, version;
+} command;
+
+static void print_help(void)
+{
+    puts("Usage: lgd-capture sheet [--paper a4|letter] -o FILE\n"
+         "       lgd-capture check PHOTO...\n"
+         "sheet draws the sheet to be printed: a window, to be cut out, in a frame of tags. lgd-infer --sheet finds "
+         "camera\n"
+         "and light of photographs of a sample in that window. check says what is wrong with such photographs, a line "
+         "for\n"
+         "each on standard output.\n");
+    cl_argument_help(arguments, stdout);
+    puts("\nExit status: 0 done and nothing wrong, 1 something is wrong, 2 wrong usage.");
+}
+
+static ts_code take_paper(const char *name, command *c, ts_status *st)
+{
+    for (c->paper = io_papers; c->paper->name; c->paper++)
+        if (!strcmp(c->paper->name, name)) return TS_OK;
+    return ts_fail(st, TS_INVALID, "--paper: '%s' is neither a4 nor letter", name);
+}
+
+static ts_code parse(int argc, char **argv, command *c, int *operands, ts_status *st)
+{
+    const char *value = NULL;
+    int key;
+    ts_code code = TS_OK;
+    while (!code && !c->help && !c->version &&
+           (key = cl_argument_next(argc, argv, arguments, &value, operands, st)) != CL_ARGUMENT_END)
+        switch (key) {
+        case 'o': c->output = value; break;
+        case PAPER: code = take_paper(value, c, st); break;
+        case FOV:
+            if (!cl_parse_real(value, IO_FOV_LEAST, IO_FOV_MOST, &c->fov))
+                code = ts_fail(st, TS_INVALID, "--fov: '%s' is not an angle in %g .. %g degrees", value, IO_FOV_LEAST,
+                               IO_FOV_MOST);
+            break;
+        case 't':
+            if (!cl_parse_int(value, 0, 1024, &c->threads))
+                code = ts_fail(st, TS_INVALID, "--threads: '%s' is not a whole number in 0 .. 1024", value);
+            break;
+        case MAX_PIXELS:
+            if (!cl_parse_int(value, 1, INT64_C(1) << 40, &c->max_pixels))
+                code = ts_fail(st, TS_INVALID, "--max-pixels: '%s' is not a whole number above 0", value);
+            break;
+        case HELP: c->help = true; break;
+        case VERSION: c->version = true; break;
+        default: code = st->code;
+        }
+    return code;
+}
+
+#define BLURRED 2.5 /* pixels of a window of 512: an edge that is as wide smears what the maps show */
+#define BURNT 0.1
+#define FLAT 1.0   /* pixels of 512 that the corners may be off */
+#define APART 10.0 /* degrees between cameras, seen from the sample */
+#define STEEP 55.0
+
+/* The angle at the sample between two cameras, degrees. */
+static double between(const io_pinhole *a, const io_pinhole *b)
+{
+    double ab = 0, aa = 0, bb = 0;
+    for (int k = 0; k < 3; k++) ab += a->at[k] * b->at[k], aa += a->at[k] * a->at[k], bb += b->at[k] * b->at[k];
+    return 57.29577951308232 * acos(fmin(ab / sqrt(aa * bb), 1));
+}
+
+/* A line about a photograph; true when nothing is wrong with it. */
+static bool say(const io_sheet_photo *p)
+{
+    const io_pinhole *c = &p->sight.camera;
+    if (p->st.code) {
+        printf("%s\n", p->st.message);
+        return false;
+    }
+    const double distance = sqrt(c->at[0] * c->at[0] + c->at[1] * c->at[1] + c->at[2] * c->at[2]);
+    const double off = p->sight.rms * distance / c->focal * 512, tilt = io_pinhole_tilt(c);
+    const bool missing = p->sight.tags.count<IO_SHEET_TAGS, blurred = p->edge> BLURRED, burnt = p->burnt > BURNT,
+               bent = off > FLAT, steep = tilt > STEEP;
+    printf("%s: %d of %d tags, %.0f degrees from straight above, %.1f sides away", p->path, p->sight.tags.count,
+           IO_SHEET_TAGS, tilt, distance);
+    if (missing) printf("; tags are missing: photograph the whole frame");
+    if (blurred) printf("; blurred (edges of %.1f pixels at 512): hold still, tap to focus", p->edge);
+    if (burnt) printf("; burnt out (%.0f%% of the window): less exposure", 100 * p->burnt);
+    if (bent) printf("; the tags are %.1f pixels (at 512) off a flat sheet: lay it flat", off);
+    if (steep) printf("; too steep: stay within %.0f degrees", STEEP);
+    printf(missing || blurred || burnt || bent || steep ? "\n" : "; fine\n");
+    return !(missing || blurred || burnt || bent || steep);
+}
+
+static int check(const command *c, char **paths, int count)
+{
+    io_sheet_set set;
+    ts_status st = {0};
+    if (io_sheet_set_read(paths, count, c->fov, c->max_pixels, 0, &set, &st) != TS_OK)
+        return cl_failed("%s", st.message);
+    bool fine = true;
+    double widest = 0;
+    for (int i = 0; i < count; i++) {
+        fine = say(&set.photo[i]) && fine;
+        for (int k = 0; k < i; k++)
+            if (!set.photo[i].st.code && !set.photo[k].st.code)
+                widest = fmax(widest, between(&set.photo[i].sight.camera, &set.photo[k].sight.camera));
+    }
+    if (set.good > 1 && widest < APART) {
+        fine = false;
+        printf("all photographs are from the same place (within %.0f degrees): go around the sample\n", widest);
+    }
+    if (set.good > 0 && !set.sure) cl_note("note: no photograph has a focal length in its EXIF: it is fitted");
+    io_sheet_set_free(&set);
+    return fine ? CL_OK : CL_FAILED;
+}
+
+static int work(const command *c, char **word, int words)
+{
+    ts_status st = {0};
+    if (words == 0) return cl_usage("what to do? sheet or check");
+    if (!strcmp(word[0], "sheet")) {
+        if (words > 1) return cl_usage("sheet: '%s' is one word too many", word[1]);
+        if (!c->output) return cl_usage("sheet: where to? Give -o FILE.pdf or -o FILE.svg");
+        const ts_code code = io_sheet_print(c->output, c->paper, &st);
+        return code == TS_INVALID ? cl_usage("%s", st.message) : code ? cl_failed("%s", st.message) : CL_OK;
+    }
+    if (strcmp(word[0], "check") != 0) return cl_usage("'%s' is neither sheet nor check", word[0]);
+    if (c->output) return cl_usage("check writes no file: no -o");
+    if (words == 1) return cl_usage("check: no photograph is given");
+    if (words - 1 > IO_SOLVE_MOST) return cl_usage("check: %d photographs at most", IO_SOLVE_MOST);
+    return check(c, word + 1, words - 1);
+}
+
+int main(int argc, char **argv)
+{
+    cl_open_streams();
+    command c = {.paper = io_papers, .max_pixels = IO_MAX_PIXELS_DEFAULT};
+    ts_status st = {0};
+    int operands = argc;
+    const int bad = cl_init("lgd-capture");
+    if (bad) return bad;
+    if (parse(argc, argv, &c, &operands, &st) != TS_OK) return cl_usage("%s", st.message);
+    ts_threads_set((int)c.threads);
+    int code = CL_OK;
+    if (c.help) print_help();
+    else if (c.version) cl_print_version();
+    else code = work(&c, argv + operands, argc - operands);
+    return cl_finish(code);
+}

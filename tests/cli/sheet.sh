@@ -1,0 +1,78 @@
+# lgd-capture and lgd-infer --sheet: a printed sheet, photographs of it, one result.
+. tests/cli/lib_infer.sh
+
+capture() { "$BIN/lgd-capture" "$@"; }
+
+tags() {
+    if ! capture sheet -o "$T/sheet.svg" 2>"$T/err"; then
+        if grep -q libapriltag "$T/err"; then skip "$(cat "$T/err")"; else fail "$(cat "$T/err")"; fi
+    fi
+}
+
+photographs() {
+    tags
+    expect 0 "$BIN/lgd-data" --format sheet-captures --seed 5 --count 1 --size 64 --photo-width 1000 --threads 1 -o "$T/s"
+    one=$(ls -d "$T"/s/*)
+}
+
+drawing() {
+    tags
+    [ "$(grep -c '<rect' "$T/sheet.svg")" -gt 300 ] || fail "few rectangles"
+    for paper in a4 letter; do
+        expect 0 capture sheet --paper $paper -o "$T/$paper.pdf"
+        [ "$(head -c 8 "$T/$paper.pdf")" = "%PDF-1.4" ] || fail "$paper.pdf is no PDF"
+        at=$(tail -n 2 "$T/$paper.pdf" | head -n 1)
+        [ "$(tail -c "+$((at + 1))" "$T/$paper.pdf" | head -n 1)" = xref ] || fail "the table is not at $at"
+    done
+    if cmp -s "$T/a4.pdf" "$T/letter.pdf"; then fail "the paper changes nothing"; fi
+    expect 2 capture sheet -o "$T/sheet.png"
+    expect 2 capture sheet --paper a5 -o "$T/sheet.pdf"
+    expect 2 capture sheet
+    expect 2 capture draw
+    expect 2 capture
+    expect 2 capture check
+    expect 1 capture sheet -o "$T/absent/sheet.pdf"
+    says "$T/err" absent
+}
+
+infers() {
+    model
+    photographs
+    expect 0 infer --sheet "$one/photo_1.jpg" "$one/photo_2.jpg" "$one/photo_3.jpg" -o "$T/o"
+    complete "$T/o/photo_1"
+    says "$T/err" "3 of 3 photographs"
+    says "$T/o/photo_1/meta.txt" "the sheet, 3 photographs"
+    expect 0 infer --sheet "$one/photo_1.jpg" -o "$T/p"
+    complete "$T/p/photo_1"
+}
+
+# One photograph is no use: it is named, the others are used, and the exit status tells.
+leaves_out() {
+    model
+    photographs
+    photo "$T/bare.ppm" 200 150
+    expect 1 infer --sheet "$one/photo_1.jpg" "$T/bare.ppm" -o "$T/o"
+    complete "$T/o/photo_1"
+    says "$T/err" "bare.ppm: no tag of the sheet is seen"
+    expect 1 infer --sheet "$T/bare.ppm" -o "$T/p"
+    lines "$T/err" 1
+    [ ! -e "$T/p/bare" ] || fail "maps of a photograph without a sheet"
+    expect 2 infer --sheet --corners 1,1 9,1 9,9 1,9 "$T/bare.ppm" -o "$T/p"
+}
+
+checks() {
+    photographs
+    expect 0 capture check "$one"/photo_1.jpg "$one"/photo_2.jpg "$one"/photo_3.jpg
+    [ "$(grep -c '; fine$' "$T/out")" -eq 3 ] || fail "not fine: $(cat "$T/out")"
+    cp "$one/photo_1.jpg" "$T/again.jpg"
+    expect 1 capture check "$one/photo_1.jpg" "$T/again.jpg"
+    says "$T/out" "from the same place"
+    photo "$T/bare.ppm" 200 150
+    expect 1 capture check "$one/photo_1.jpg" "$T/bare.ppm"
+    says "$T/out" "bare.ppm: no tag"
+}
+
+check sheet_drawing drawing
+check sheet_infers infers
+check sheet_leaves_out leaves_out
+check sheet_checks checks

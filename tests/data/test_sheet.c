@@ -1,0 +1,229 @@
+/* Photographs of a printed sheet, made and solved again. */
+#include "cli/data/sheet_captures.h"
+#include "data/capture.h"
+#include "data/materials/procedural.h"
+#include "data/rectify/sheet_set.h"
+#include "infer/angle.h"
+#include "infer/sheet.h"
+#include "tests/test.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIZE = 64, WIDTH = 1000 };
+
+static void need_tags(void)
+{
+    io_tag_image black[IO_SHEET_TAGS];
+    ts_status st = {0};
+    if (io_tag_images(black, &st) == TS_UNSUPPORTED) test_skip("%s", st.message);
+}
+
+static void make_set(const char *folder, int width, uint64_t index)
+{
+    ts_status st = {0};
+    io_material m = {0};
+    const io_procedural p = {.seed = 5};
+    CHECK(!io_material_create(&m, SIZE, &st), "%s", st.message);
+    io_procedural_make(&p, index, &m);
+    CHECK(!lgd_write_sheet_captures(folder, &m, 5, index, width, 92, &st), "%s", st.message);
+    io_material_free(&m);
+}
+
+static void name_photos(const char *folder, char path[LGD_SHEET_SHOTS][512], char *paths[LGD_SHEET_SHOTS])
+{
+    for (int i = 0; i < LGD_SHEET_SHOTS; i++) {
+        snprintf(path[i], 512, "%s/photo_%d.jpg", folder, i + 1);
+        paths[i] = path[i];
+    }
+}
+
+/* How far the solved camera sees the window's points from where the true one does, in pixels of a window of 512. */
+static double misregistered(const io_pinhole *solved, const io_pinhole *truth)
+{
+    double sum = 0, point[2], pixel[2], beside[2], there[2];
+    for (int i = 0; i < 81; i++) {
+        point[0] = i % 9 / 8.0 - 0.5, point[1] = i / 9 / 8.0 - 0.5;
+        io_pinhole_see(solved, point, pixel);
+        io_pinhole_see(truth, point, there);
+        /* a 512th of the window, seen there */
+        const double next[2] = {point[0] + 1 / 512.0, point[1]};
+        io_pinhole_see(truth, next, beside);
+        sum += pow(hypot(pixel[0] - there[0], pixel[1] - there[1]) / hypot(beside[0] - there[0], beside[1] - there[1]),
+                   2);
+    }
+    return sqrt(sum / 81);
+}
+
+static void check_set(int width, uint64_t index, double camera_mm, double pixels)
+{
+    char path[LGD_SHEET_SHOTS][512], *paths[LGD_SHEET_SHOTS];
+    ts_status st = {0};
+    io_sheet_set set;
+    lgd_sheet_shot shot[LGD_SHEET_SHOTS];
+    double worst = 0, worst_pixels = 0, worst_exposure = 0;
+    make_set(test_folder(), width, index);
+    name_photos(test_folder(), path, paths);
+    lgd_sheet_shots(5, index, width, shot);
+    CHECK(!io_sheet_set_read(paths, LGD_SHEET_SHOTS, 0, 1 << 26, 1, &set, &st), "%s", st.message);
+    CHECK(set.good == LGD_SHEET_SHOTS && set.sure, "%d are good: %s", set.good, set.photo[0].st.message);
+    for (int i = 0; i < LGD_SHEET_SHOTS; i++) {
+        const io_pinhole *c = &set.photo[i].sight.camera, *t = &shot[i].camera;
+        const double away = hypot(hypot(c->at[0] - t->at[0], c->at[1] - t->at[1]), c->at[2] - t->at[2]) *
+            IO_SHEET_WINDOW;
+        worst = fmax(worst, away);
+        worst_pixels = fmax(worst_pixels, misregistered(c, t));
+        const double relative = set.photo[i].exposure[1] / set.photo[0].exposure[1],
+                     want = shot[i].exposure / shot[0].exposure;
+        worst_exposure = fmax(worst_exposure, fabs(relative / want - 1));
+    }
+    const double aside[2] = {set.aside[0] * IO_SHEET_WINDOW, set.aside[1] * IO_SHEET_WINDOW};
+    printf(
+        "camera %.3f mm, window %.3f pixel of 512, exposure %.2f%%, flash %.2f %.2f mm, focal %.3f%%, radial %.4f of "
+        "%.4f\n",
+        worst, worst_pixels, 100 * worst_exposure, aside[0], aside[1],
+        100 * (set.photo[0].sight.camera.focal / shot[0].camera.focal - 1), set.photo[0].sight.camera.radial,
+        shot[0].camera.radial);
+    CHECK(worst < camera_mm, "a camera is off by %g mm", worst);
+    CHECK(worst_pixels < pixels, "a window is off by %g pixels of 512", worst_pixels);
+    CHECK(worst_exposure < 0.02, "an exposure is off by %g", worst_exposure);
+    CHECK(hypot(aside[0] - 20, aside[1]) < 2, "the flash is at %g %g mm, not 20 0", aside[0], aside[1]);
+    io_sheet_set_free(&set);
+}
+
+/* With a fourth of the pixels a side of what a phone has. */
+TEST(sheet_cameras_of_a_set)
+{
+    need_tags();
+    check_set(WIDTH, 0, 0.5, 0.3);
+}
+
+/* The pose, factor and distortion come back from corners without noise. */
+TEST(sheet_solve_is_exact)
+{
+    lgd_sheet_shot shot[LGD_SHEET_SHOTS];
+    io_sight sight[LGD_SHEET_SHOTS] = {0};
+    ts_status st = {0};
+    lgd_sheet_shots(3, 0, 4000, shot);
+    for (int i = 0; i < LGD_SHEET_SHOTS; i++) {
+        io_sight *s = &sight[i];
+        s->camera = (io_pinhole){.width = 4000, .height = 3000, .focal = 0.9 * shot[i].camera.focal};
+        s->tags.count = IO_SHEET_TAGS;
+        for (int t = 0; t < IO_SHEET_TAGS; t++) {
+            double point[4][2];
+            s->tags.id[t] = t;
+            io_tag_corners(t, point);
+            for (int k = 0; k < 4; k++) io_pinhole_see(&shot[i].camera, point[k], s->tags.corner[t][k]);
+        }
+        s->tags.corner[3][1][0] += 40; /* a tag that something hides in part */
+    }
+    CHECK(!io_solve(sight, LGD_SHEET_SHOTS, false, &st), "%s", st.message);
+    for (int i = 0; i < LGD_SHEET_SHOTS; i++) {
+        const io_pinhole *c = &sight[i].camera, *t = &shot[i].camera;
+        const double away = hypot(hypot(c->at[0] - t->at[0], c->at[1] - t->at[1]), c->at[2] - t->at[2]);
+        CHECK(sight[i].tags.count == IO_SHEET_TAGS - 1, "%d tags are left", sight[i].tags.count);
+        CHECK(away * IO_SHEET_WINDOW < 0.02, "camera %d is off by %g mm", i, away * IO_SHEET_WINDOW);
+        CHECK(fabs(c->focal / t->focal - 1) < 1e-4 && fabs(c->radial - t->radial) < 1e-3,
+              "focal %g of %g, radial %g of %g", c->focal, t->focal, c->radial, t->radial);
+    }
+}
+
+/* The windows come out as what is under them, as bright as their light makes them. */
+TEST(sheet_windows_of_a_set)
+{
+    need_tags();
+    char path[LGD_SHEET_SHOTS][512], exact_path[512], *paths[LGD_SHEET_SHOTS];
+    ts_status st = {0};
+    io_sheet_set set;
+    io_capture c, exact;
+    make_set(test_folder(), WIDTH, 1);
+    name_photos(test_folder(), path, paths);
+    snprintf(exact_path, sizeof exact_path, "%s/exact", test_folder());
+    CHECK(!io_read_capture(exact_path, SIZE, &exact, &st), "%s", st.message);
+    CHECK(!io_sheet_set_read(paths, LGD_SHEET_SHOTS, 0, 1 << 26, 1, &set, &st), "%s", st.message);
+    CHECK(!lgd_sheet_capture(&set, 3, SIZE, 1 << 26, 1, &c, &st), "%s", st.message);
+    CHECK(c.images == 3, "%d windows", c.images);
+    int order[IO_SOLVE_MOST];
+    lgd_sheet_order(&set, order);
+    CHECK(order[0] == 0, "photograph %d is the first", order[0] + 1);
+    for (int k = 0; k < 3; k++) {
+        const size_t values = SIZE * SIZE * 3;
+        const float *a = c.image + (size_t)k * values, *b = exact.image + (size_t)order[k] * values;
+        const float ratio = c.power[0] / exact.power[0];
+        double worst = 0;
+        for (int block = 0; block < 64;
+             block++) { /* means of 8 x 8 pixels: the picture of a pixel is a little blurred */
+            double sum = 0, bright = 0;
+            for (int i = 0; i < 64 * 3; i++) {
+                const int y = block / 8 * 8 + i / 24, x = block % 8 * 8 + i / 3 % 8;
+                const size_t at = ((size_t)y * SIZE + (size_t)x) * 3 + (size_t)(i % 3);
+                sum += (double)(a[at] - fminf(b[at] * ratio, 1));
+                bright += (double)a[at];
+            }
+            worst = fmax(worst, fabs(sum) / fmax(bright, 1));
+        }
+        CHECK(worst < 0.05, "window %d: a part is %g brighter or darker", k, worst);
+        for (int i = 0; i < 3; i++)
+            CHECK(fabsf(c.light[k][i] - exact.light[order[k]][i]) < 0.03f, "light %d: %g, not %g", k,
+                  (double)c.light[k][i], (double)exact.light[order[k]][i]);
+    }
+    io_capture_free(&c);
+    io_capture_free(&exact);
+    io_sheet_set_free(&set);
+}
+
+/* A copy of a photograph: so many side by side, grey from column x and row y on. */
+static void copy_photo(const char *from, const char *to, int times, double x0, double y0)
+{
+    io_image in, out;
+    ts_status st = {0};
+    CHECK(!io_read_photo(from, 1 << 26, &in, &st), "%s", st.message);
+    CHECK(!io_image_create(&out, in.width * times, in.height, 3, &st), "%s", st.message);
+    for (int y = 0; y < out.height; y++)
+        for (int x = 0; x < out.width; x++)
+            for (int k = 0; k < 3; k++)
+                out.data[((size_t)y * (size_t)out.width + (size_t)x) * 3 + (size_t)k] = x >= x0 || y >= y0
+                    ? 0.3f
+                    : in.data[((size_t)y * (size_t)in.width + (size_t)(x % in.width)) * 3 + (size_t)k];
+    CHECK(!io_write_png(to, &out, 8, true, &st), "%s", st.message);
+    io_image_free(&in);
+    io_image_free(&out);
+}
+
+/* The place between two tags in a photograph. */
+static void between_tags(const io_pinhole *c, int a, int b, double pixel[2])
+{
+    double p[2], q[2];
+    io_tag_centre(a, p);
+    io_tag_centre(b, q);
+    io_pinhole_see(c, (const double[2]){(p[0] + q[0]) / 2, (p[1] + q[1]) / 2}, pixel);
+}
+
+TEST(sheet_photographs_that_cannot_be_used)
+{
+    need_tags();
+    char path[LGD_SHEET_SHOTS][512], *paths[LGD_SHEET_SHOTS];
+    ts_status st = {0};
+    io_sheet_set set;
+    make_set(test_folder(), WIDTH, 2);
+    name_photos(test_folder(), path, paths);
+    lgd_sheet_shot shot[LGD_SHEET_SHOTS];
+    double right[2], low[2];
+    lgd_sheet_shots(5, 2, WIDTH, shot);
+    between_tags(&shot[0].camera, 2, 3, right);
+    between_tags(&shot[0].camera, 18, 19, low); /* tags 0, 1, 2 and 19 are left */
+    static const char *const file[] = {"none.png", "two.png", "hidden.png", "absent.png"};
+    static const char *const says[] = {"no tag", "one sheet alone", "whole frame", "absent.png"};
+    for (int i = 0; i < 3; i++) {
+        char to[512];
+        snprintf(to, sizeof to, "%s/%s", test_folder(), file[i]);
+        copy_photo(path[0], to, i == 1 ? 2 : 1, i == 2 ? right[0] : 1e9, i == 0 ? 0 : i == 2 ? low[1] : 1e9);
+    }
+    for (int i = 0; i < 4; i++) snprintf(path[i + 1], 512, "%s/%s", test_folder(), file[i]);
+    CHECK(!io_sheet_set_read(paths, 5, 0, 1 << 26, 1, &set, &st), "%s", st.message);
+    CHECK(set.good == 1 && !set.photo[0].st.code, "%d are good: %s", set.good, set.photo[0].st.message);
+    for (int i = 0; i < 4; i++)
+        CHECK(strstr(set.photo[i + 1].st.message, says[i]) && strstr(set.photo[i + 1].st.message, file[i]), "%s: %s",
+              file[i], set.photo[i + 1].st.message);
+    io_sheet_set_free(&set);
+}
