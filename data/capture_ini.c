@@ -1,6 +1,7 @@
 #include "data/capture_ini.h"
 #include "data/ini.h"
 #include "data/name.h"
+#include "data/rectify/corners.h"
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
@@ -27,18 +28,26 @@ static ts_code read_numbers(const char *path, const io_ini_entry *e, int count, 
 typedef struct photo {
     const char *section, *file;
     int line;
-    bool light, camera;
+    bool light, camera, angled;
+    io_corners corners;    /* where angled */
+    float exposure, focal; /* 0: not given */
 } photo;
+
+/* A number above 0. */
+static ts_code read_positive(const char *path, const io_ini_entry *e, float *to, ts_status *st)
+{
+    if (read_numbers(path, e, 1, to, st) != TS_OK) return st->code;
+    return *to > 0 ? TS_OK
+                   : ts_fail(st, TS_INVALID, "%s:%d: %s.%s is %s: it must be above 0", path, e->line, e->section,
+                             e->key, e->value);
+}
 
 static ts_code take_head(const char *path, const io_ini_entry *e, float *side, float *power, ts_status *st)
 {
     float *to = !strcmp(e->key, "side") ? side : !strcmp(e->key, "power") ? power : NULL;
     if (!to)
         return ts_fail(st, TS_INVALID, "%s:%d: [capture] has the keys side and power, not %s", path, e->line, e->key);
-    if (read_numbers(path, e, 1, to, st) != TS_OK) return st->code;
-    return *to > 0
-        ? TS_OK
-        : ts_fail(st, TS_INVALID, "%s:%d: capture.%s is %s: it must be above 0", path, e->line, e->key, e->value);
+    return read_positive(path, e, to, st);
 }
 
 static ts_code take_photo(const char *path, const io_ini_entry *e, photo *p, float light[3], float camera[3],
@@ -48,10 +57,18 @@ static ts_code take_photo(const char *path, const io_ini_entry *e, photo *p, flo
         p->file = e->value;
         return *e->value ? TS_OK : ts_fail(st, TS_INVALID, "%s:%d: %s.file is empty", path, e->line, e->section);
     }
+    if (!strcmp(e->key, "exposure")) return read_positive(path, e, &p->exposure, st);
+    if (!strcmp(e->key, "focal")) return read_positive(path, e, &p->focal, st);
+    if (!strcmp(e->key, "corners")) {
+        p->angled = true;
+        if (io_corners_parse(&e->value, 1, &p->corners, st) == TS_OK) return TS_OK;
+        return ts_context(st, "%s:%d: %s.corners", path, e->line, e->section);
+    }
     const bool is_light = !strcmp(e->key, "light");
     if (!is_light && strcmp(e->key, "camera") != 0)
-        return ts_fail(st, TS_INVALID, "%s:%d: a photograph has the keys file, light and camera, not %s", path, e->line,
-                       e->key);
+        return ts_fail(st, TS_INVALID,
+                       "%s:%d: a photograph has the keys file, light, camera, exposure, corners and focal, not %s",
+                       path, e->line, e->key);
     float *to = is_light ? light : camera;
     *(is_light ? &p->light : &p->camera) = true;
     if (read_numbers(path, e, 3, to, st) != TS_OK) return st->code;
@@ -79,11 +96,38 @@ static ts_code take(const char *path, const io_ini *ini, photo *photos, io_captu
         return ts_fail(st, TS_INVALID, "%s: lists no photograph: a section with file, light and camera for each", path);
     for (int k = 0; k < c->images; k++) {
         const char *missing = !photos[k].file ? "file"
+            : photos[k].angled                ? NULL
+            : photos[k].focal > 0             ? "corners, which focal is for"
             : !photos[k].light                ? "light"
             : !photos[k].camera               ? "camera"
                                               : NULL;
         if (missing)
             return ts_fail(st, TS_INVALID, "%s:%d: [%s] has no %s", path, photos[k].line, photos[k].section, missing);
+    }
+    return TS_OK;
+}
+
+/* The square that has the corners, and the camera that sees it so, where the file does not say another. */
+static ts_code read_angled(const char *name, const photo *p, int64_t max_pixels, int k, io_capture *c, io_image *square,
+                           ts_status *st)
+{
+    char why[128];
+    io_photo_rows rows;
+    io_pinhole camera;
+    *square = (io_image){0};
+    if (io_photo_open(name, max_pixels, true, &rows, st) != TS_OK) return st->code;
+    io_lens lens = rows.raw.lens;
+    if (p->focal > 0) lens = (io_lens){.focal_35mm = (double)p->focal};
+    const double fov = io_lens_fov(&lens, rows.width, rows.height, why, sizeof why);
+    ts_code code = fov > 0
+        ? TS_OK
+        : ts_fail(st, TS_INVALID, "%s; [%s] needs a focal length: focal = 26, in mm on 35 mm film", why, p->section);
+    if (!code) code = io_corners_rectify(&rows, &p->corners, fov, c->size, 0, square, &camera, NULL, st);
+    io_photo_close(&rows);
+    if (code) return ts_context(st, "%s", name);
+    for (int i = 0; i < 3; i++) {
+        if (!p->camera) c->camera[k][i] = (float)camera.at[i];
+        if (!p->light) c->light[k][i] = c->camera[k][i];
     }
     return TS_OK;
 }
@@ -97,9 +141,11 @@ static ts_code read_square(const char *path, const photo *p, int64_t max_pixels,
     if (snprintf(name, sizeof name, "%.*s%s", folder, path, p->file) >= PATH_MAX)
         return ts_fail(st, TS_INVALID, "%s:%d: the file's name is too long", path, p->line);
     io_image square;
-    const ts_code code = io_read_photo_square(name, max_pixels, c->size, 0, &square, NULL, st);
+    const ts_code code = p->angled ? read_angled(name, p, max_pixels, k, c, &square, st)
+                                   : io_read_photo_square(name, max_pixels, c->size, 0, &square, NULL, st);
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
-    if (!code) memcpy(c->image + (size_t)k * values, square.data, values * sizeof(float));
+    const float gain = p->exposure > 0 ? 1 / p->exposure : 1;
+    for (size_t i = 0; i < values && !code; i++) c->image[(size_t)k * values + i] = square.data[i] * gain;
     io_image_free(&square);
     return code;
 }

@@ -7,13 +7,16 @@
  *   file = left.jpg      ; relative to the INI file, or absolute
  *   light = -5, 0, 20    ; x right, y up, z toward the camera, from the sample's centre
  *   camera = 0, 0, 20
+ *   exposure = 1.3       ; so many times brighter than the others; default 1
+ *   corners = 10,10 90,12 88,90 8,85 ; data/rectify/corners.h; light and camera may then be left out
+ *   focal = 26           ; with corners: mm on 35 mm film, where EXIF has none
  */
 #ifndef IO_CAPTURE_INI_H
 #define IO_CAPTURE_INI_H
 #include "data/capture.h"
 
-/* The largest centred square of each photograph, as io_read_photo reads it, brought to size x size. usual: the power
- * when the file has none, for distances in patch widths. The caller frees after success; c is empty after a failure,
- * which names the file and the line or key. */
+/* The largest centred square of each photograph, or the one that has the corners, as io_read_photo reads it, brought to
+ * size x size. usual: the power when the file has none, for distances in patch widths. The caller frees after success;
+ * c is empty after a failure, which names the file and the line or key. */
 ts_code io_read_capture_ini(const char *path, int size, float usual, int64_t max_pixels, io_capture *c, ts_status *st);
 #endif

@@ -2,16 +2,8 @@
 #ifndef LGD_ANGLE_H
 #define LGD_ANGLE_H
 #include "data/image/image.h"
-#include "data/rectify/pinhole.h"
+#include "data/rectify/corners.h"
 #include "infer/lgd.h"
-
-typedef struct lgd_angle {
-    double corner[4][2]; /* top left, top right, bottom right, bottom left; pixels, or all in 0 .. 1: shares of the
-                            photograph's width and height */
-} lgd_angle;
-
-/* Four words "x,y", or one with all four between blanks. TS_INVALID; also where the lines between them cross. */
-ts_code lgd_angle_parse(const char *const *words, int count, lgd_angle *angle, ts_status *st);
 
 typedef struct lgd_rectified {
     io_image square; /* linear, size a side; the caller frees it */
@@ -27,7 +19,7 @@ typedef struct lgd_rectified {
 
 /* Reads the photograph and rectifies it. fov: degrees across its shorter side; 0: from EXIF. r is empty after a
  * failure, whose line names the photograph. */
-ts_code lgd_rectify(const char *path, const lgd_angle *angle, int64_t max_pixels, int size, double fov, int threads,
+ts_code lgd_rectify(const char *path, const io_corners *corners, int64_t max_pixels, int size, double fov, int threads,
                     lgd_rectified *r, ts_status *st);
 
 /* The photograph that the camera took of the square, the light at a place in its frame: right, down and forward of the

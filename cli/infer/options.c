@@ -110,7 +110,7 @@ static ts_code take_corners(int argc, char **argv, const char *value, lgd_comman
     int count = 1;
     while (!strchr(value, ' ') && count < 4 && (words[count] = cl_argument_second(argc, argv))) count++;
     c->corners = true;
-    if (lgd_angle_parse(words, count, &c->angle, st) != TS_OK) ts_context(st, "--corners");
+    if (io_corners_parse(words, count, &c->angle, st) != TS_OK) ts_context(st, "--corners");
     return st->code;
 }
 

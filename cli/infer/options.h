@@ -16,7 +16,7 @@ typedef struct lgd_command {
     double tolerance;
     int orientations; /* 1, 2, 4 or 8 */
     double fov;       /* degrees across the square, with corners across the shorter side; 0: from the file */
-    lgd_angle angle;  /* of the square in the photograph, where corners is true */
+    io_corners angle; /* of the square in the photograph, where corners is true */
     double power;     /* of the light, in default ones; 0: estimated */
     unsigned outputs; /* LGD_OUT_... */
     bool directx, metallic, seamless, half /* of maps.exr */, exact, bf16, quiet, help, version, corners,

@@ -1,4 +1,6 @@
 /* Photographs taken at an angle. */
+#include "data/capture_ini.h"
+#include "data/file.h"
 #include "data/rectify/homography.h"
 #include "data/rectify/least_squares.h"
 #include "data/rectify/warp.h"
@@ -68,8 +70,8 @@ TEST(angle_rectifies)
         }
         snprintf(words, sizeof words, "%.6f,%.6f %.6f,%.6f %.6f,%.6f  %.6f,%.6f ", p[0][0], p[0][1], p[1][0], p[1][1],
                  p[2][0], p[2][1], p[3][0], p[3][1]);
-        lgd_angle angle;
-        CHECK(!lgd_angle_parse((const char *[]){words}, 1, &angle, &st), "%s", st.message);
+        io_corners angle;
+        CHECK(!io_corners_parse((const char *[]){words}, 1, &angle, &st), "%s", st.message);
         lgd_rectified r;
         const double fov = io_fov_of_focal(320, 400, 300);
         CHECK(!lgd_rectify(path, &angle, 1 << 20, 48, fov, 1, &r, &st), "%s", st.message);
@@ -133,18 +135,65 @@ TEST(angle_corners_that_cannot_be)
                  {"10,10 90,10 90,90 nan,1", "four x,y"},     {"", "0 corners"}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
         ts_status st = {0};
-        lgd_angle angle;
-        CHECK(lgd_angle_parse(&cases[i].words, 1, &angle, &st) == TS_INVALID && strstr(st.message, cases[i].says),
+        io_corners angle;
+        CHECK(io_corners_parse(&cases[i].words, 1, &angle, &st) == TS_INVALID && strstr(st.message, cases[i].says),
               "'%s': %s", cases[i].words, st.message);
     }
     char path[512];
     ts_status st = {0};
     lgd_rectified r;
-    const lgd_angle beyond = {{{10, 10}, {500, 10}, {500, 90}, {10, 90}}};
+    const io_corners beyond = {{{10, 10}, {500, 10}, {500, 90}, {10, 90}}};
     const io_pinhole camera = angled_camera(100, 100, 100, 1, 0, 0, 0);
     snprintf(path, sizeof path, "%s/small.png", test_folder());
     angled_write(path, &camera);
     CHECK(lgd_rectify(path, &beyond, 1 << 20, 8, 50, 1, &r, &st) == TS_INVALID && strstr(st.message, "corner 2") &&
               strstr(st.message, "small.png"),
           "%s", st.message);
+}
+
+/* A capture.ini's corners, focal length and exposure. */
+TEST(angle_in_a_capture)
+{
+    char path[512], ini[512], text[1024], corners[256];
+    ts_status st = {0};
+    io_capture c;
+    const io_pinhole camera = angled_camera(400, 300, 320, 2, 30, 1, 0.1);
+    double p[4][2];
+    for (int k = 0; k < 4; k++) io_pinhole_see(&camera, angled_square[k], p[k]);
+    snprintf(path, sizeof path, "%s/angled.png", test_folder());
+    snprintf(ini, sizeof ini, "%s/capture.ini", test_folder());
+    angled_write(path, &camera);
+    snprintf(corners, sizeof corners, "%.4f,%.4f %.4f,%.4f %.4f,%.4f %.4f,%.4f", p[0][0], p[0][1], p[1][0], p[1][1],
+             p[2][0], p[2][1], p[3][0], p[3][1]);
+    const char *const form = "[capture]\nside = 2\n[a]\nfile = angled.png\ncorners = %s\nfocal = %.6f\n[b]\nfile = "
+                             "angled.png\ncorners = %s\nfocal = 27\nexposure = 0.5\ncamera = 0, 0, 5\n";
+    snprintf(text, sizeof text, form, corners, 320 / 500.0 * 43.266615305567875, corners);
+    CHECK(!io_write_bytes(ini, text, strlen(text), &st), "%s", st.message);
+    CHECK(!io_read_capture_ini(ini, 16, 5, 1 << 20, &c, &st), "%s", st.message);
+    for (int k = 0; k < 3; k++) {
+        CHECK(fabs((double)c.camera[0][k] - camera.at[k]) < 1e-4, "camera %d: %g, not %g", k, (double)c.camera[0][k],
+              camera.at[k]);
+        CHECK(c.light[0][k] == c.camera[0][k], "the light is not in the lens");
+        CHECK(c.camera[1][k] == (k == 2 ? 2.5f : 0), "a camera that is given is not taken");
+    }
+    for (int i = 0; i < 16 * 16 * 3; i++) {
+        const double at[2] = {(i / 3 % 16 + 0.5) / 16 - 0.5, 0.5 - (i / 48 + 0.5) / 16};
+        CHECK(fabsf(c.image[i] - angled_pattern(at, i % 3)) < 0.01f, "value %d: %g", i, (double)c.image[i]);
+        CHECK(fabsf(c.image[16 * 16 * 3 + i] - 2 * c.image[i]) < 1e-5f, "half the exposure does not count twice");
+    }
+    io_capture_free(&c);
+    static const struct {
+        const char *more, *says;
+    } wrong[] = {{"corners = 1,1 2,2\n", "a.corners"},
+                 {"corners = 0,0 900,0 900,90 0,90\nfocal = 26\n", "outside"},
+                 {"corners = 0,0 90,0 90,90 0,90\n", "focal = 26"},
+                 {"focal = 26\nlight = 0, 0, 1\ncamera = 0, 0, 1\n", "has no corners"},
+                 {"exposure = 0\n", "above 0"}};
+    for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
+        snprintf(text, sizeof text, "[a]\nfile = angled.png\n%s", wrong[i].more);
+        CHECK(!io_write_bytes(ini, text, strlen(text), &st), "%s", st.message);
+        CHECK(io_read_capture_ini(ini, 16, 5, 1 << 20, &c, &st) && strstr(st.message, wrong[i].says), "case %zu: %s", i,
+              st.message);
+        st = (ts_status){0};
+    }
 }
