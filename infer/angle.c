@@ -2,6 +2,7 @@
 #include "render/scene.h"
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 lgd_photo lgd_photo_by(const io_pinhole *camera, const double light[3], const float *image)
 {
@@ -25,7 +26,7 @@ ts_code lgd_rectify(const char *path, const io_corners *corners, int64_t max_pix
     io_photo_rows photo;
     *r = (lgd_rectified){.fov = fov};
     if (io_photo_open(path, max_pixels, true, &photo, st) != TS_OK) return st->code;
-    r->facts = (io_photo_facts){photo.width, photo.height, photo.raw.lens};
+    memcpy(r->profile, photo.unread, sizeof r->profile);
     if (fov > 0) snprintf(r->fov_from, sizeof r->fov_from, "--fov");
     else r->fov = io_lens_fov(&photo.raw.lens, photo.width, photo.height, r->fov_from, sizeof r->fov_from);
     r->assumed = !(r->fov > 0);

@@ -35,6 +35,7 @@ static void read_angle(const lgd_command *c, bool published, lgd_item *item)
         return;
     }
     if (lgd_rectify(item->job->photo, &c->angle, c->max_pixels, c->size, c->fov, item->threads, r, &item->st)) return;
+    snprintf(item->profile, sizeof item->profile, "%s", r->profile);
     item->square = r->square;
     item->image = r->square.data;
     item->photo_side = (int)ceil(r->side);

@@ -82,6 +82,11 @@ static void say_angle(const lgd_item *item)
             r->assumed ? "warning: assumed " : "", r->fov, r->fov_from, r->assumed ? "; --fov DEG tells it" : "");
 }
 
+static void say_profile(const char *photo, const char *profile)
+{
+    if (*profile) cl_note("%s: warning: its colour profile (%s) cannot be used: sRGB is assumed", photo, profile);
+}
+
 /* What the sheet told, unless quiet, and of which photographs it told nothing. False: there are such. Where it told
  * nothing at all the item's own message is the first's. */
 static bool say_sheet(const lgd_item *item, bool quiet)
@@ -90,6 +95,7 @@ static bool say_sheet(const lgd_item *item, bool quiet)
     int order[IO_SOLVE_MOST];
     for (int i = 0; i < set->photos; i++)
         if (set->photo[i].st.code && (set->good > 0 || i > 0)) cl_failed("%s", set->photo[i].st.message);
+    for (int i = 0; i < set->photos && !quiet; i++) say_profile(set->photo[i].path, set->photo[i].profile);
     if (!quiet && set->good > 0 && !item->st.code) {
         const io_sheet_photo *p;
         lgd_sheet_order(set, order);
@@ -158,9 +164,7 @@ static void say_all(run *r, const lgd_item *item)
         cl_note("%s: note: the first %d of its %d photographs are used: these weights read no more", item->job->photo,
                 item->photos, item->capture.images);
     if (item->mask) look_at_mask(r->command, item);
-    if (*item->profile)
-        cl_note("%s: warning: its colour profile (%s) cannot be used: sRGB is assumed", item->job->photo,
-                item->profile);
+    say_profile(item->job->photo, item->profile);
     const char *why = item->image ? look_at(item, r->command->size) : NULL;
     if (item->st.code) return;
     if (!why && item->last > FAR) why = "its maps do not look like it";

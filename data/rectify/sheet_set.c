@@ -13,6 +13,7 @@ static void find(io_sheet_photo *p, double fov, int64_t max_pixels, int threads)
     char why[128];
     io_photo_rows photo;
     if (io_photo_open(p->path, max_pixels, true, &photo, &p->st) != TS_OK) return;
+    memcpy(p->profile, photo.unread, sizeof p->profile);
     if (!(fov > 0)) fov = io_lens_fov(&photo.raw.lens, photo.width, photo.height, why, sizeof why);
     p->sight.camera = (io_pinhole){.width = photo.width, .height = photo.height};
     if (fov > 0) p->sight.camera.focal = io_focal_of(fov, photo.width, photo.height);

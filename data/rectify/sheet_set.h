@@ -8,6 +8,7 @@
 
 typedef struct io_sheet_photo {
     const char *path; /* the caller's */
+    char profile[96]; /* io_photo_facts.profile */
     ts_status st;     /* why it cannot be used, naming it; the rest is then only so far known */
     io_sight sight;
     io_whites whites;

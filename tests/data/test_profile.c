@@ -1,5 +1,6 @@
 /* Colour profiles that are look-up tables; WebP's orientation and alpha. */
 #include "data/image/image.h"
+#include "infer/angle.h"
 #include "tests/support/make_images.h"
 #include "tests/test.h"
 #include <lcms2.h>
@@ -93,6 +94,12 @@ TEST(profile_that_cannot_be_used_is_named)
           st.message);
     CHECK(strcmp(facts.profile, "exchanged") == 0, "'%s' is reported", facts.profile);
     CHECK(fabsf(square.data[0] - 0.25f) < 0.01f, "%g, not sRGB", (double)square.data[0]);
+    const io_corners corners = {{{2, 2}, {14, 2}, {14, 14}, {2, 14}}};
+    lgd_rectified r;
+    snprintf(path, sizeof path, "%s/b.jpg", test_folder());
+    CHECK(!lgd_rectify(path, &corners, 1 << 20, 4, 50, 1, &r, &st), "%s", st.message);
+    CHECK(strcmp(r.profile, "exchanged") == 0, "'%s' is reported of the rectified one", r.profile);
+    io_image_free(&r.square);
     io_image_free(&image);
     io_image_free(&square);
 }
