@@ -2,7 +2,7 @@
 #include "cli/arguments.h"
 #include "cli/cli.h"
 #include "data/image/image.h"
-#include "data/rectify/sheet_set.h"
+#include "data/rectify/sheet_check.h"
 #include "tensor/threads.h"
 #include <math.h>
 #include <stdio.h>
@@ -78,20 +78,6 @@ static ts_code parse(int argc, char **argv, command *c, int *operands, ts_status
     return code;
 }
 
-#define BLURRED 2.5 /* pixels of a window of 512: an edge that is as wide smears what the maps show */
-#define BURNT 0.1
-#define FLAT 1.0   /* pixels of 512 that the corners may be off */
-#define APART 10.0 /* degrees between cameras, seen from the sample */
-#define STEEP 55.0
-
-/* The angle at the sample between two cameras, degrees. */
-static double between(const io_pinhole *a, const io_pinhole *b)
-{
-    double ab = 0, aa = 0, bb = 0;
-    for (int k = 0; k < 3; k++) ab += a->at[k] * b->at[k], aa += a->at[k] * a->at[k], bb += b->at[k] * b->at[k];
-    return 57.29577951308232 * acos(fmin(ab / sqrt(aa * bb), 1));
-}
-
 /* A line about a photograph; true when nothing is wrong with it. */
 static bool say(const io_sheet_photo *p)
 {
@@ -101,18 +87,17 @@ static bool say(const io_sheet_photo *p)
         return false;
     }
     const double distance = sqrt(c->at[0] * c->at[0] + c->at[1] * c->at[1] + c->at[2] * c->at[2]);
-    const double off = p->sight.rms * distance / c->focal * 512, tilt = io_pinhole_tilt(c);
-    const bool missing = p->sight.tags.count<IO_SHEET_TAGS, blurred = p->edge> BLURRED, burnt = p->burnt > BURNT,
-               bent = off > FLAT, steep = tilt > STEEP;
+    const unsigned faults = io_sheet_faults(p);
     printf("%s: %d of %d tags, %.0f degrees from straight above, %.1f sides away", p->path, p->sight.tags.count,
-           IO_SHEET_TAGS, tilt, distance);
-    if (missing) printf("; tags are missing: photograph the whole frame");
-    if (blurred) printf("; blurred (edges of %.1f pixels at 512): hold still, tap to focus", p->edge);
-    if (burnt) printf("; burnt out (%.0f%% of the window): less exposure", 100 * p->burnt);
-    if (bent) printf("; the tags are %.1f pixels (at 512) off a flat sheet: lay it flat", off);
-    if (steep) printf("; too steep: stay within %.0f degrees", STEEP);
-    printf(missing || blurred || burnt || bent || steep ? "\n" : "; fine\n");
-    return !(missing || blurred || burnt || bent || steep);
+           IO_SHEET_TAGS, io_pinhole_tilt(c), distance);
+    if (faults & IO_FAULT_MISSING) printf("; tags are missing: photograph the whole frame");
+    if (faults & IO_FAULT_BLURRED) printf("; blurred (edges of %.1f pixels at 512): hold still, tap to focus", p->edge);
+    if (faults & IO_FAULT_BURNT) printf("; burnt out (%.0f%% of the window): less exposure", 100 * p->burnt);
+    if (faults & IO_FAULT_BENT)
+        printf("; the tags are %.1f pixels (at 512) off a flat sheet: lay it flat", io_sheet_bend(p));
+    if (faults & IO_FAULT_STEEP) printf("; too steep: stay within %.0f degrees", IO_SHEET_STEEP);
+    printf(faults ? "\n" : "; fine\n");
+    return !faults;
 }
 
 static int check(const command *c, char **paths, int count)
@@ -122,16 +107,11 @@ static int check(const command *c, char **paths, int count)
     if (io_sheet_set_read(paths, count, c->fov, c->max_pixels, 0, &set, &st) != TS_OK)
         return cl_failed("%s", st.message);
     bool fine = true;
-    double widest = 0;
-    for (int i = 0; i < count; i++) {
-        fine = say(&set.photo[i]) && fine;
-        for (int k = 0; k < i; k++)
-            if (!set.photo[i].st.code && !set.photo[k].st.code)
-                widest = fmax(widest, between(&set.photo[i].sight.camera, &set.photo[k].sight.camera));
-    }
-    if (set.good > 1 && widest < APART) {
+    for (int i = 0; i < count; i++) fine = say(&set.photo[i]) && fine;
+    if (set.good > 1 && io_sheet_apart(&set) < IO_SHEET_APART) {
         fine = false;
-        printf("all photographs are from the same place (within %.0f degrees): go around the sample\n", widest);
+        printf("all photographs are from the same place (within %.0f degrees): go around the sample\n",
+               ceil(io_sheet_apart(&set)));
     }
     if (set.good > 0 && !set.sure) cl_note("note: no photograph has a focal length in its EXIF: it is fitted");
     io_sheet_set_free(&set);

@@ -2,7 +2,7 @@
 #include "cli/data/sheet_captures.h"
 #include "data/capture.h"
 #include "data/materials/procedural.h"
-#include "data/rectify/sheet_set.h"
+#include "data/rectify/sheet_check.h"
 #include "infer/angle.h"
 #include "infer/sheet.h"
 #include "tests/test.h"
@@ -36,66 +36,6 @@ static void name_photos(const char *folder, char path[LGD_SHEET_SHOTS][512], cha
         snprintf(path[i], 512, "%s/photo_%d.jpg", folder, i + 1);
         paths[i] = path[i];
     }
-}
-
-/* How far the solved camera sees the window's points from where the true one does, in pixels of a window of 512. */
-static double misregistered(const io_pinhole *solved, const io_pinhole *truth)
-{
-    double sum = 0, point[2], pixel[2], beside[2], there[2];
-    for (int i = 0; i < 81; i++) {
-        point[0] = i % 9 / 8.0 - 0.5, point[1] = i / 9 / 8.0 - 0.5;
-        io_pinhole_see(solved, point, pixel);
-        io_pinhole_see(truth, point, there);
-        /* a 512th of the window, seen there */
-        const double next[2] = {point[0] + 1 / 512.0, point[1]};
-        io_pinhole_see(truth, next, beside);
-        sum += pow(hypot(pixel[0] - there[0], pixel[1] - there[1]) / hypot(beside[0] - there[0], beside[1] - there[1]),
-                   2);
-    }
-    return sqrt(sum / 81);
-}
-
-static void check_set(int width, uint64_t index, double camera_mm, double pixels)
-{
-    char path[LGD_SHEET_SHOTS][512], *paths[LGD_SHEET_SHOTS];
-    ts_status st = {0};
-    io_sheet_set set;
-    lgd_sheet_shot shot[LGD_SHEET_SHOTS];
-    double worst = 0, worst_pixels = 0, worst_exposure = 0;
-    make_set(test_folder(), width, index);
-    name_photos(test_folder(), path, paths);
-    lgd_sheet_shots(5, index, width, shot);
-    CHECK(!io_sheet_set_read(paths, LGD_SHEET_SHOTS, 0, 1 << 26, 1, &set, &st), "%s", st.message);
-    CHECK(set.good == LGD_SHEET_SHOTS && set.sure, "%d are good: %s", set.good, set.photo[0].st.message);
-    for (int i = 0; i < LGD_SHEET_SHOTS; i++) {
-        const io_pinhole *c = &set.photo[i].sight.camera, *t = &shot[i].camera;
-        const double away = hypot(hypot(c->at[0] - t->at[0], c->at[1] - t->at[1]), c->at[2] - t->at[2]) *
-            IO_SHEET_WINDOW;
-        worst = fmax(worst, away);
-        worst_pixels = fmax(worst_pixels, misregistered(c, t));
-        const double relative = set.photo[i].exposure[1] / set.photo[0].exposure[1],
-                     want = shot[i].exposure / shot[0].exposure;
-        worst_exposure = fmax(worst_exposure, fabs(relative / want - 1));
-    }
-    const double aside[2] = {set.aside[0] * IO_SHEET_WINDOW, set.aside[1] * IO_SHEET_WINDOW};
-    printf(
-        "camera %.3f mm, window %.3f pixel of 512, exposure %.2f%%, flash %.2f %.2f mm, focal %.3f%%, radial %.4f of "
-        "%.4f\n",
-        worst, worst_pixels, 100 * worst_exposure, aside[0], aside[1],
-        100 * (set.photo[0].sight.camera.focal / shot[0].camera.focal - 1), set.photo[0].sight.camera.radial,
-        shot[0].camera.radial);
-    CHECK(worst < camera_mm, "a camera is off by %g mm", worst);
-    CHECK(worst_pixels < pixels, "a window is off by %g pixels of 512", worst_pixels);
-    CHECK(worst_exposure < 0.02, "an exposure is off by %g", worst_exposure);
-    CHECK(hypot(aside[0] - 20, aside[1]) < 2, "the flash is at %g %g mm, not 20 0", aside[0], aside[1]);
-    io_sheet_set_free(&set);
-}
-
-/* With a fourth of the pixels a side of what a phone has. */
-TEST(sheet_cameras_of_a_set)
-{
-    need_tags();
-    check_set(WIDTH, 0, 0.5, 0.3);
 }
 
 /* The pose, factor and distortion come back from corners without noise. */
@@ -225,5 +165,64 @@ TEST(sheet_photographs_that_cannot_be_used)
     for (int i = 0; i < 4; i++)
         CHECK(strstr(set.photo[i + 1].st.message, says[i]) && strstr(set.photo[i + 1].st.message, file[i]), "%s: %s",
               file[i], set.photo[i + 1].st.message);
+    io_sheet_set_free(&set);
+}
+
+/* A copy that is blurred over 2 r + 1 pixels a side, gain times brighter, and white inside of the window. */
+static void spoil(const char *from, const char *to, const io_pinhole *camera, int r, float gain, bool white)
+{
+    io_image in, out;
+    ts_status st = {0};
+    double left[2], right[2];
+    io_pinhole_see(camera, (const double[2]){-0.4, 0.4}, left);
+    io_pinhole_see(camera, (const double[2]){0.4, -0.4}, right);
+    CHECK(!io_read_photo(from, 1 << 26, &in, &st), "%s", st.message);
+    CHECK(!io_image_create(&out, in.width, in.height, 3, &st), "%s", st.message);
+    for (int y = r; y < in.height - r; y++)
+        for (int x = r; x < in.width - r; x++)
+            for (int k = 0; k < 3; k++) {
+                const bool inside = x > left[0] && x < right[0] && y > left[1] && y < right[1];
+                float sum = 0;
+                for (int i = -r; i <= r; i++)
+                    for (int j = -r; j <= r; j++)
+                        sum += in.data[((size_t)(y + j) * (size_t)in.width + (size_t)(x + i)) * 3 + (size_t)k];
+                out.data[((size_t)y * (size_t)in.width + (size_t)x) * 3 + (size_t)k] = white && inside
+                    ? 1
+                    : fminf(gain * sum / (float)((2 * r + 1) * (2 * r + 1)), 1);
+            }
+    CHECK(!io_write_png(to, &out, 8, true, &st), "%s", st.message);
+    io_image_free(&in);
+    io_image_free(&out);
+}
+
+TEST(sheet_faults_are_named)
+{
+    need_tags();
+    char path[LGD_SHEET_SHOTS][512], *paths[LGD_SHEET_SHOTS];
+    ts_status st = {0};
+    io_sheet_set set;
+    lgd_sheet_shot shot[LGD_SHEET_SHOTS];
+    make_set(test_folder(), WIDTH, 2);
+    name_photos(test_folder(), path, paths);
+    lgd_sheet_shots(5, 2, WIDTH, shot);
+    char from[512];
+    snprintf(from, sizeof from, "%s", path[0]);
+    static const char *const file[] = {"blurred.png", "burnt.png", "white.png", "dark.png"};
+    for (int i = 0; i < 4; i++) {
+        snprintf(path[i + 1], 512, "%s/%s", test_folder(), file[i]);
+        spoil(from, path[i + 1], &shot[0].camera, i == 0 ? 2 : 0, i == 1 ? 6 : i == 3 ? 0.002f : 1, i == 2);
+    }
+    CHECK(!io_sheet_set_read(paths, 4, 54, 1 << 26, 1, &set, &st), "%s", st.message);
+    CHECK(!set.photo[0].st.code && io_sheet_faults(&set.photo[0]) == 0, "the good one: %u",
+          io_sheet_faults(&set.photo[0]));
+    CHECK(!set.photo[1].st.code && io_sheet_faults(&set.photo[1]) & IO_FAULT_BLURRED, "blurred: %s edges of %g",
+          set.photo[1].st.message, set.photo[1].edge);
+    CHECK(strstr(set.photo[2].st.message, "burnt out"), "burnt: %s", set.photo[2].st.message);
+    CHECK(!set.photo[3].st.code && io_sheet_faults(&set.photo[3]) == IO_FAULT_BURNT, "a white window: %s %u",
+          set.photo[3].st.message, io_sheet_faults(&set.photo[3]));
+    CHECK(io_sheet_apart(&set) < IO_SHEET_APART, "one place is %g degrees from itself", io_sheet_apart(&set));
+    io_sheet_set_free(&set);
+    CHECK(!io_sheet_set_read(paths + 4, 1, 54, 1 << 26, 1, &set, &st), "%s", st.message);
+    CHECK(set.good == 0 && *set.photo[0].st.message, "a dark one can be used");
     io_sheet_set_free(&set);
 }
