@@ -23,7 +23,7 @@ allowed() {
     infer) echo "infer nn nn/weights render data data/image data/rectify autograd tensor tensor/conv" ;;
     eval/metrics) echo "eval/metrics eval nn nn/weights render data data/image autograd tensor tensor/conv" ;;
     eval/methods) echo "eval/methods eval/metrics eval cli infer nn nn/weights render data data/materials autograd tensor tensor/conv" ;;
-    eval) echo "eval eval/methods eval/metrics cli infer nn nn/weights render data data/image data/materials autograd tensor tensor/conv" ;;
+    eval) echo "eval eval/methods eval/metrics cli infer nn nn/weights render data data/image data/materials data/rectify autograd tensor tensor/conv" ;;
     *) return 1 ;;
     esac
 }

@@ -44,7 +44,10 @@ static const cl_argument arguments[] = {
      "folders\nmultiview:FOLDER  a capture, or a folder of them: 00.png, 01.png ..., camera_pos.txt,\nlight_pos.txt, "
      "image_size.txt, light_power.txt; the input is the picture nearest to the sample's axis\n"
      "photos:FOLDER  photographs without known maps: what the flash leaves in theirs is measured\n"
-     "peers:FOLDER  images of nine panels: input, normal, diffuse, roughness, specular, then a peer's four maps"},
+     "peers:FOLDER  images of nine panels: input, normal, diffuse, roughness, specular, then a peer's four maps\n"
+     "sheets:FOLDER  what lgd-data --format sheet-captures wrote: lights and cameras are found in the photographs as\n"
+     "lgd-infer --sheet finds them\n"
+     "sheets-exact:FOLDER  the same materials from the windows without faults and the true lights and cameras"},
     {TOLD, "told", NULL, "captures, and with --camera: the methods know light and camera (default: they know neither)"},
     {UNTOLD, "untold", NULL,
      "generated materials, strips and map folders: the methods do not know the light's power; renderings are\n"

@@ -3,6 +3,7 @@
 #include "eval/contact.h"
 #include "eval/multiview.h"
 #include "eval/sheet.h"
+#include "infer/capture.h"
 #include "render/error.h"
 #include "tensor/cpu.h"
 #include "tensor/peak.h"
@@ -48,12 +49,35 @@ static ts_code load_photo(ev_run *r, bench *b, const ev_set *set, int i, ev_case
     return TS_OK;
 }
 
+/* A known material from photographs under a printed sheet, with the lights and cameras found there. */
+static ts_code load_under_sheet(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, ts_status *st)
+{
+    lgd_photo photo[NN_MAX_IMAGES];
+    if (ev_set_load_under_sheet(set, i, r->inputs, r->size, &b->truth, &b->capture, st) != TS_OK) return st->code;
+    b->name = b->truth.name;
+    ts_rng rng = ts_rng_make(r->seed, TS_STREAM_EVAL, ev_set_identity(set, i));
+    rd_eval_views(&rng, RD_EVAL_VIEWS, b->views);
+    *c = ev_case_of_maps(&b->truth, b->capture.image, b->views, r->perceptual);
+    c->inputs = lgd_capture_photos(&b->capture, r->inputs, photo);
+    for (int k = 0; k < c->inputs; k++) {
+        c->input[k] = (rd_view){.kind = RD_POINT, .power = photo[k].power};
+        memcpy(c->input[k].camera, photo[k].camera, sizeof photo[k].camera);
+        memcpy(c->input[k].light, photo[k].light, sizeof photo[k].light);
+    }
+    c->view = c->input[0];
+    c->fov = rd_fov_of((double)c->view.camera[2]);
+    c->fit = r->fit;
+    c->lpips = r->lpips;
+    return TS_OK;
+}
+
 static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, ts_status *st)
 {
     const uint64_t identity = ev_set_identity(set, i);
     const bool capture = set->kind == EV_MULTIVIEW;
     b->name = "";
     if (set->kind == EV_PHOTOS || set->kind == EV_PEERS) return load_photo(r, b, set, i, c, st);
+    if (set->kind == EV_UNDER_SHEET || set->kind == EV_UNDER_SHEET_EXACT) return load_under_sheet(r, b, set, i, c, st);
     if ((capture ? ev_set_load_capture(set, i, r->size, &b->capture, st)
                  : ev_set_load(set, i, r->size, &b->truth, st)) != TS_OK)
         return st->code;

@@ -3,6 +3,7 @@
 #include "data/name.h"
 #include "eval/panels.h"
 #include "eval/set_ini.h"
+#include "eval/under_sheet.h"
 #include <dirent.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -15,7 +16,8 @@
 
 enum { PATH_LENGTH = 4096, COUNT_MAX = 1000000 };
 
-static const char *const kind_name[EV_KINDS] = {"procedural", "strips", "maps", "multiview", "photos", "peers"};
+static const char *const kind_name[EV_KINDS] = {"procedural", "strips", "maps",   "multiview",
+                                                "photos",     "peers",  "sheets", "sheets-exact"};
 
 static int by_name(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
@@ -30,6 +32,8 @@ static bool belongs(const ev_set *set, const char *name)
         return false;
     if (set->kind == EV_MAPS) return S_ISDIR(info.st_mode);
     if (set->kind == EV_MULTIVIEW) return S_ISDIR(info.st_mode) && io_is_capture(path);
+    if (set->kind == EV_UNDER_SHEET || set->kind == EV_UNDER_SHEET_EXACT)
+        return S_ISDIR(info.st_mode) && ev_is_under_sheet(path);
     const char *dot = strrchr(name, '.');
     for (size_t i = 0; dot && i < sizeof images / sizeof *images; i++)
         if (strcasecmp(dot + 1, images[i]) == 0) return S_ISREG(info.st_mode);
@@ -61,7 +65,9 @@ static ts_code list_folder(ev_set *set, ts_status *st)
                            : set->kind == EV_STRIPS ? "strip image"
                            : set->kind == EV_PHOTOS ? "photograph"
                            : set->kind == EV_PEERS  ? "image of nine panels"
-                                                    : "capture (a folder with 00.png, camera_pos.txt ...)");
+                           : set->kind >= EV_UNDER_SHEET
+                           ? "folder with maps/ and photo_1.jpg, as lgd-data --format sheet-captures writes them"
+                           : "capture (a folder with 00.png, camera_pos.txt ...)");
     if (!code) qsort(set->entry, (size_t)set->count, sizeof *set->entry, by_name);
     return code;
 }
@@ -116,7 +122,7 @@ ts_code ev_set_open(const char *spec, const io_map_convention *given, ev_set *se
     if (set->kind == EV_KINDS || !colon[1])
         code = ts_fail(st, TS_INVALID,
                        "--set %s: should be procedural:SEED,COUNT, strips:FOLDER, maps:FOLDER, multiview:FOLDER, "
-                       "photos:FOLDER or peers:FOLDER",
+                       "photos:FOLDER, peers:FOLDER, sheets:FOLDER or sheets-exact:FOLDER",
                        spec);
     else {
         set->where = colon + 1;
@@ -144,7 +150,7 @@ uint64_t ev_set_identity(const ev_set *set, int i)
     if (set->kind == EV_PROCEDURAL)
         snprintf(text, sizeof text, "%s %" PRIu64 " %d", kind_name[set->kind], set->seed, i);
     else
-        snprintf(text, sizeof text, "%s %s", kind_name[set->kind],
+        snprintf(text, sizeof text, "%s %s", kind_name[set->kind == EV_UNDER_SHEET_EXACT ? EV_UNDER_SHEET : set->kind],
                  set->entry[i]);                  /* a lone capture has no views to draw */
     uint64_t hash = UINT64_C(0xcbf29ce484222325); /* FNV-1a */
     for (const char *c = text; *c; c++) hash = (hash ^ (unsigned char)*c) * UINT64_C(0x100000001b3);
@@ -227,4 +233,16 @@ ts_code ev_set_load_photo(const ev_set *set, int i, int size, float **image, dou
     snprintf(name, sizeof name, "%s.png", truth->name);
     code = entry_path(set, set->peers, name, path, st);
     return code || access(path, F_OK) != 0 ? code : ev_read_four_panels(path, size, peer, st);
+}
+
+ts_code ev_set_load_under_sheet(const ev_set *set, int i, int inputs, int size, io_material *truth, io_capture *c,
+                                ts_status *st)
+{
+    char path[PATH_LENGTH];
+    const ts_code code = entry_path(set, set->where, set->entry[i], path, st);
+    if (code) return code;
+    if (ev_load_under_sheet(path, &set->option, set->kind == EV_UNDER_SHEET_EXACT, inputs, size, truth, c, st) != TS_OK)
+        return st->code;
+    snprintf(truth->name, sizeof truth->name, "%s", set->entry[i]);
+    return TS_OK;
 }

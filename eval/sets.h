@@ -4,7 +4,17 @@
 #include "data/capture.h"
 #include "data/material.h"
 
-typedef enum ev_kind { EV_PROCEDURAL, EV_STRIPS, EV_MAPS, EV_MULTIVIEW, EV_PHOTOS, EV_PEERS, EV_KINDS } ev_kind;
+typedef enum ev_kind {
+    EV_PROCEDURAL,
+    EV_STRIPS,
+    EV_MAPS,
+    EV_MULTIVIEW,
+    EV_PHOTOS,
+    EV_PEERS,
+    EV_UNDER_SHEET,
+    EV_UNDER_SHEET_EXACT,
+    EV_KINDS
+} ev_kind;
 
 typedef struct ev_set {
     char *spec; /* as given: KIND:WHERE */
@@ -19,7 +29,8 @@ typedef struct ev_set {
 
 /* procedural:SEED,COUNT[,FAMILY...] (classic families without a list: io_family_mask), strips:FOLDER (a folder of strip
  * images), maps:FOLDER (a folder of map folders), multiview:FOLDER (a capture, or a folder of them), photos:FOLDER
- * (photographs) or peers:FOLDER (images of nine panels, eval/panels.h). Conventions of map folders come from given (the
+ * (photographs), peers:FOLDER (images of nine panels, eval/panels.h), sheets:FOLDER or sheets-exact:FOLDER (a folder of
+ * photographs under a printed sheet, eval/under_sheet.h). Conventions of map folders come from given (the
  * options, may be NULL), else from set.ini (eval/set_ini.h) in the map folder, else from set.ini in FOLDER. The caller
  * closes it after success. TS_INVALID for a wrong spec, TS_IO for a folder that cannot be read or holds nothing of that
  * kind. */
@@ -32,11 +43,16 @@ ts_code ev_set_load(const ev_set *set, int i, int size, io_material *m, ts_statu
 /* The same of an EV_MULTIVIEW set. */
 ts_code ev_set_load_capture(const ev_set *set, int i, int size, io_capture *c, ts_status *st);
 
+/* The same of EV_UNDER_SHEET and EV_UNDER_SHEET_EXACT: the maps, and `inputs` windows under known lights (at least). */
+ts_code ev_set_load_under_sheet(const ev_set *set, int i, int inputs, int size, io_material *truth, io_capture *c,
+                                ts_status *st);
+
 /* The same of EV_PHOTOS and EV_PEERS: image is linear, size x size x 3, malloced and the caller's. truth is empty
  * (size 0) of a photograph, peer where nothing has its name. fov: as the file says it (io_lens_fov), or 0. */
 ts_code ev_set_load_photo(const ev_set *set, int i, int size, float **image, double *fov, io_material *truth,
                           io_material *peer, ts_status *st);
 
-/* A number of the material, independent of its place in the set: the seed of its evaluation views. */
+/* A number of the material, independent of its place in the set: the seed of its evaluation views. The same of both
+ * kinds under a sheet. */
 uint64_t ev_set_identity(const ev_set *set, int i);
 #endif

@@ -2,6 +2,7 @@
 #include "tensor/threads.h"
 #include "tests/stress/stress.h"
 #include "tests/test.h"
+#include "data/rectify/tag_sheet.h"
 
 static void run(bool (*part)(const stress *))
 {
@@ -17,3 +18,10 @@ TEST(stress_training_with_spoilt_inputs) { run(stress_training); }
 TEST(stress_gradient_of_the_unrolled_loop) { run(stress_unrolled); }
 TEST(stress_long_sums_and_adam) { run(stress_sums); }
 TEST(stress_any_number_of_threads) { run(stress_threads); }
+TEST(stress_cameras_of_printed_sheets)
+{
+    io_tag_image black[IO_SHEET_TAGS];
+    ts_status st = {0};
+    if (io_tag_images(black, &st) == TS_UNSUPPORTED) test_skip("%s", st.message);
+    run(stress_sheets);
+}

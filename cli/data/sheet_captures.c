@@ -192,8 +192,9 @@ ts_code lgd_write_sheet_captures(const char *folder, const io_material *m, uint6
         rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &view, false, radiance);
         snprintf(path, sizeof path, "%s/photo_%d.jpg", folder, i + 1);
         code = take(path, &s, seed, index * LGD_SHEET_SHOTS + (uint64_t)i, quality, st);
-        /* as bright as the default flash makes the sample from two sides away */
-        const float power = 4 * RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE);
+        /* as bright as the default flash makes the sample from nearer by than any of the lights: nothing is clipped
+         * that is not under that flash */
+        const float power = 3 * RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE);
         memcpy(exact.camera[i], view.camera, sizeof view.camera);
         memcpy(exact.light[i], view.light, sizeof view.light);
         for (int c = 0; c < 3; c++) exact.power[c] = power;

@@ -72,7 +72,39 @@ checks() {
     says "$T/out" "bare.ppm: no tag"
 }
 
+# Materials under a sheet are evaluated from what is found in their photographs, and from the truth.
+measures() {
+    model
+    photographs
+    expect 0 "$BIN/lgd-eval" --fast --size 32 --threads 1 --method lgd:iterations=1 --set "sheets:$T/s" \
+        --set "sheets-exact:$T/s" -o "$T/e"
+    lines "$T/e/results.csv" 5
+    awk -F, -v last=1 '$4 == 1 { n++; v[n] = $9 } END { exit !(n == 2 && v[1] > 0 && v[1] < 0.3 && v[1] != v[2] && (v[1] - v[2]) ^ 2 < 0.03 ^ 2) }' \
+        "$T/e/results.csv" || fail "$(cat "$T/e/results.csv")"
+    cp "$one/photo_1.jpg" "$T/first.jpg"
+    photo "$one/photo_1.jpg" 200 150
+    expect 1 "$BIN/lgd-eval" --size 32 --set "sheets:$T/s" -o "$T/f"
+    says "$T/err" "photo_1.jpg: no tag"
+    expect 1 "$BIN/lgd-eval" --size 32 --set "sheets:$one" -o "$T/f"
+    says "$T/err" "there is no folder with maps/"
+}
+
+# A field of view that cannot be, wherever it is given.
+no_field_of_view() {
+    for degrees in 0 180; do
+        expect 2 infer --sheet --fov $degrees a.jpg -o "$T/o"
+        says "$T/err" "'$degrees' is not an angle"
+        lines "$T/err" 2
+        expect 2 infer --corners 1,1 9,1 9,9 1,9 --fov $degrees a.jpg -o "$T/o"
+        says "$T/err" "'$degrees' is not an angle"
+        expect 2 capture check --fov $degrees a.jpg
+        says "$T/err" "'$degrees' is not an angle"
+    done
+}
+
 check sheet_drawing drawing
+check sheet_measures measures
+check sheet_no_field_of_view no_field_of_view
 check sheet_infers infers
 check sheet_leaves_out leaves_out
 check sheet_checks checks

@@ -9,9 +9,9 @@
 static const struct {
     const char *name;
     bool (*run)(const stress *);
-} parts[] = {{"shading", stress_shading},  {"newton", stress_newton},     {"threads", stress_threads},
-             {"sums", stress_sums},        {"unrolled", stress_unrolled}, {"refinement", stress_refinement},
-             {"training", stress_training}};
+} parts[] = {{"shading", stress_shading}, {"newton", stress_newton},     {"threads", stress_threads},
+             {"sums", stress_sums},       {"unrolled", stress_unrolled}, {"refinement", stress_refinement},
+             {"sheets", stress_sheets},   {"training", stress_training}};
 
 static int help(void)
 {

@@ -7,7 +7,7 @@
 
 typedef struct stress {
     bool full;
-    const char *folder; /* an empty one, for the training run */
+    const char *folder; /* an empty one, for the training run and photographs */
 } stress;
 
 bool stress_shading(const stress *s);
@@ -17,6 +17,7 @@ bool stress_training(const stress *s);
 bool stress_unrolled(const stress *s);
 bool stress_sums(const stress *s);
 bool stress_threads(const stress *s);
+bool stress_sheets(const stress *s);
 
 /* Prints a row; returns whether measured <= bound (NaN is not). bound INFINITY: told, and only has to be finite. */
 bool stress_row(const char *what, double measured, double bound);
