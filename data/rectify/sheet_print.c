@@ -63,8 +63,9 @@ static void draw(const drawing *d, io_tag_image black[IO_SHEET_TAGS])
     rectangle(d, ruler, low - 2, line, 4);
     rectangle(d, ruler + RULER - line, low - 2, line, 4);
     if (!d->svg) fputs("f\n", d->f);
-    text(d, left + 4, top + IO_SHEET_WINDOW / 2, 5, "Cut out along the line. Lay the sheet flat on the sample.");
-    text(d, left + 4, top + IO_SHEET_WINDOW / 2 + 8, 5, "Photograph all of the frame, flash on, this side up.");
+    static const char *const words[] = {"Cut out along the line.", "Lay the sheet flat on the sample.",
+                                        "Photograph the whole frame with the flash."};
+    for (int k = 0; k < 3; k++) text(d, left + 6, top + IO_SHEET_WINDOW / 2 + 8 * (k - 1), 4.5, words[k]);
     text(d, ruler, low + 6, 4, "100 mm when printed at full size (other sizes work too)");
 }
 
