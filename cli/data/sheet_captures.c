@@ -78,6 +78,7 @@ typedef struct scene {
     const float *radiance; /* [size][size][3] of the window, of power 1 */
     int size;
     io_tag_image *black; /* [IO_SHEET_TAGS] */
+    double centre[IO_SHEET_TAGS][2];
 } scene;
 
 /* What lies at a point beside the window. */
@@ -88,9 +89,8 @@ static const float *albedo_at(const scene *s, const double p[2])
     const double half = IO_TAG_CELLS / 2.0 * IO_TAG_CELL, out = fmax(fabs(p[0]), fabs(p[1]));
     if (out < IO_SHEET_RING - half || out > IO_SHEET_RING + half) return white;
     for (int id = 0; id < IO_SHEET_TAGS; id++) {
-        double centre[2];
-        io_tag_centre(id, centre);
-        const double x = (p[0] - centre[0] + half) / IO_TAG_CELL, y = (centre[1] + half - p[1]) / IO_TAG_CELL;
+        const double x = (p[0] - s->centre[id][0] + half) / IO_TAG_CELL,
+                     y = (s->centre[id][1] + half - p[1]) / IO_TAG_CELL;
         if (x >= 0 && y >= 0 && x < IO_TAG_CELLS && y < IO_TAG_CELLS)
             return s->black[id][(int)y][(int)x] ? black_ink : white;
     }
@@ -188,7 +188,8 @@ ts_code lgd_write_sheet_captures(const char *folder, const io_material *m, uint6
     exact.side = (float)(IO_SHEET_WINDOW / 10);
     for (int i = 0; i < LGD_SHEET_SHOTS && !code; i++) {
         const rd_view view = view_of(&shot[i]);
-        const scene s = {&shot[i], radiance, m->size, black};
+        scene s = {.shot = &shot[i], .radiance = radiance, .size = m->size, .black = black};
+        for (int id = 0; id < IO_SHEET_TAGS; id++) io_tag_centre(id, s.centre[id]);
         rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &view, false, radiance);
         snprintf(path, sizeof path, "%s/photo_%d.jpg", folder, i + 1);
         code = take(path, &s, seed, index * LGD_SHEET_SHOTS + (uint64_t)i, quality, st);

@@ -2,6 +2,7 @@
 #include "data/seamless.h"
 #include "infer/estimate.h"
 #include "infer/photograph.h"
+#include "nn/model.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -48,8 +49,7 @@ static void read_sheet(const lgd_command *c, lgd_item *item)
     io_sheet_set *set = &item->sheet;
     if (io_sheet_set_read(c->photo, c->photos, c->fov, c->max_pixels, item->threads, set, &item->st)) return;
     if (set->good == 0) item->st = set->photo[0].st;
-    else if (lgd_sheet_capture(set, IO_CAPTURE_IMAGES, c->size, c->max_pixels, item->threads, &item->capture,
-                               &item->st))
+    else if (lgd_sheet_capture(set, NN_MAX_IMAGES, c->size, c->max_pixels, item->threads, &item->capture, &item->st))
         return;
     item->image = item->capture.image;
     item->photo_side = c->size;

@@ -160,7 +160,10 @@ static void say_difference(const run *r, const lgd_item *item)
 
 static void say_all(run *r, const lgd_item *item)
 {
-    if (item->photos > 0 && item->photos < item->capture.images)
+    if (item->photos > 0 && item->photos < item->sheet.good)
+        cl_note("%s: note: %d of its %d photographs are used, the most different: these weights read no more",
+                item->job->photo, item->photos, item->sheet.good);
+    else if (item->photos > 0 && item->photos < item->capture.images)
         cl_note("%s: note: the first %d of its %d photographs are used: these weights read no more", item->job->photo,
                 item->photos, item->capture.images);
     if (item->mask) look_at_mask(r->command, item);

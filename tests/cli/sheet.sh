@@ -18,6 +18,9 @@ photographs() {
 drawing() {
     tags
     [ "$(grep -c '<rect' "$T/sheet.svg")" -gt 300 ] || fail "few rectangles"
+    # No word goes over the window's line or the paper's edge, with any font (0.6 of the size for a letter is much).
+    awk -F'[\">=<]+' '/^<text/ { n++; if ($3 + 0.6 * $9 * length($10) > ($5 < 210 ? 165 : 210)) exit 1 } END { if (n != 4) exit 1 }' \
+        "$T/sheet.svg" || fail "words that go too far: $(grep '<text' "$T/sheet.svg")"
     for paper in a4 letter; do
         expect 0 capture sheet --paper $paper -o "$T/$paper.pdf"
         [ "$(head -c 8 "$T/$paper.pdf")" = "%PDF-1.4" ] || fail "$paper.pdf is no PDF"
@@ -41,6 +44,7 @@ infers() {
     expect 0 infer --sheet "$one/photo_1.jpg" "$one/photo_2.jpg" "$one/photo_3.jpg" -o "$T/o"
     complete "$T/o/photo_1"
     says "$T/err" "3 of 3 photographs"
+    says "$T/err" "1 of its 3 photographs are used, the most different"
     says "$T/o/photo_1/meta.txt" "the sheet, 3 photographs"
     expect 0 infer --sheet "$one/photo_1.jpg" -o "$T/p"
     complete "$T/p/photo_1"
@@ -62,8 +66,10 @@ leaves_out() {
 
 checks() {
     photographs
-    expect 0 capture check "$one"/photo_1.jpg "$one"/photo_2.jpg "$one"/photo_3.jpg
+    expect 0 capture check "$one"/photo_1.jpg "$one"/photo_3.jpg "$one"/photo_4.jpg
     [ "$(grep -c '; fine$' "$T/out")" -eq 3 ] || fail "not fine: $(cat "$T/out")"
+    expect 1 capture check "$one/photo_1.jpg" "$one/photo_2.jpg" # two tags of the second are outside of its picture
+    says "$T/out" "tags are missing"
     cp "$one/photo_1.jpg" "$T/again.jpg"
     expect 1 capture check "$one/photo_1.jpg" "$T/again.jpg"
     says "$T/out" "from the same place"
