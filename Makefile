@@ -4,7 +4,7 @@
 #: make test         the same, then every test
 #: make deps         installs what the build needs (Debian, Ubuntu); the three above do so first
 #: make test-blender material.glb in Blender's renderer, with PYTHON= that has bpy; skipped without
-#: make install      into PREFIX (/usr/local), below DESTDIR when given; make uninstall takes it away again
+#: make install      into PREFIX (/usr/local), below DESTDIR when given, libraries into LIBDIR; make uninstall takes it away
 #: make bench        times; BENCH="conv_ infer" runs the benchmarks whose names contain these words
 #: make bench-deps   PyTorch, for the comparison in make bench
 #: make stress       the numerics far from ordinary input; STRESS=shading runs one part
@@ -23,7 +23,9 @@ ifeq ($(origin CXX),default)
 CXX := g++
 endif
 OBJCOPY ?= objcopy
+STRIP ?= strip
 PREFIX ?= /usr/local
+LIBDIR ?= $(PREFIX)/lib
 TESTDATA ?= ../shared/testdata
 FIXTURES ?= ../shared/fixtures
 BUILD ?= build
@@ -62,9 +64,9 @@ PKG_LIBS = $(filter-out -lOpenEXR-% -lOpenEXRUtil% -lIex% -lIlmThread% -lImath% 
   $(shell pkg-config --libs $(PKG)))
 HAVE_TAGS = $(shell pkg-config --exists $(PKG_TAGS) 2>/dev/null && echo yes)
 TAGS_LIBS = $(if $(HAVE_TAGS),$(shell pkg-config --libs $(PKG_TAGS)))
-LDLIBS_ALL = $(PKG_LIBS) $(TAGS_LIBS) -fopenmp -lpthread -ldl -lm $(SANITIZE) $(LDLIBS)
-# What liblgd needs: it reads weights, but no images.
-LIB_LIBS := -lz -fopenmp -lpthread -lm
+LDLIBS_ALL = $(TAGS_LIBS) $(LIB_LIBS)
+# What liblgd needs: it knows no sheets, so no tags.
+LIB_LIBS = $(PKG_LIBS) -fopenmp -lpthread -ldl -lm $(SANITIZE) $(LDLIBS)
 
 MACHINE := $(shell $(CC) -dumpmachine)
 ifneq (,$(filter x86_64%,$(MACHINE)))
@@ -114,7 +116,9 @@ WRAP := -Wl,--wrap=io_loader_next -Wl,--wrap=tr_photographs
 all: deps
 	@$(MAKE) --no-print-directory programs
 
-programs: $(BIN) $(LIB) $(SHARED) $(IMAGE_LIB)
+programs: $(BIN) library
+
+library: $(LIB) $(SHARED) $(IMAGE_LIB)
 
 help:
 	@sed -n 's/^#: //p' Makefile
@@ -160,10 +164,10 @@ $(INTERNAL): $(LIB_OBJ)
 	@rm -f $@
 	$(Q)$(AR) rcs $@ $^
 
-# The library: infer/lgd.o and what it uses, in one object whose only global symbols are those that lgd.h marks LGD_API.
+# The library: infer/lgd.o, infer/files.o and what they use, in one object whose only global symbols are those that lgd.h marks LGD_API.
 $(OBJ)/liblgd.o: $(INTERNAL)
 	$(call step,LD,$@)
-	$(Q)$(CC) -r -nostdlib -o $@ $(OBJ)/infer/lgd.o $(INTERNAL)
+	$(Q)$(CC) -r -nostdlib -o $@ $(OBJ)/infer/lgd.o $(OBJ)/infer/files.o $(INTERNAL)
 	$(Q)$(OBJCOPY) --localize-hidden $@
 
 $(LIB): $(OBJ)/liblgd.o
@@ -173,7 +177,7 @@ $(LIB): $(OBJ)/liblgd.o
 
 $(SHARED): $(OBJ)/liblgd.o
 	$(call step,LD,$@)
-	$(Q)$(CC) -shared -Wl,-soname,$(SONAME) -Wl,--no-undefined -o $@ $< $(LIB_LIBS) $(SANITIZE) $(LDLIBS)
+	$(Q)$(CC) -shared -Wl,-soname,$(SONAME) -Wl,--no-undefined -o $@ $< $(LIB_LIBS)
 	@ln -sf $(@F) $(BUILD)/$(SONAME) && ln -sf $(SONAME) $(BUILD)/liblgd.so
 
 # OpenImageIO, behind the table in data/image/oiio.h. Loaded when an image needs it, never linked.
@@ -187,12 +191,12 @@ $(IMAGE_LIB): $(OBJ)/data/image/oiio.o $(OBJ)/tensor/status.o
 FLAGS_NOW := $(CC) $(CXX) $(WHOLE_JUMPS) $(OPT) $(SANITIZE) $(CFLAGS) $(CPPFLAGS) $(VERSION)
 changed = $(shell mkdir -p $(BUILD)/gen; echo '$(2)' | cmp -s - $(BUILD)/gen/$(1) || echo '$(2)' > $(BUILD)/gen/$(1))
 $(call changed,flags,$(FLAGS_NOW))
-$(call changed,prefix,$(PREFIX))
+$(call changed,prefix,$(PREFIX) $(LIBDIR))
 $(OBJ)/data/folders.o: $(BUILD)/gen/prefix
 $(call changed,tags,$(HAVE_TAGS))
 $(OBJ)/data/rectify/tags.o: $(BUILD)/gen/tags
 $(OBJ)/data/rectify/tags.o: CPPFLAGS_ALL += $(if $(HAVE_TAGS),-DLGD_APRILTAG $(shell pkg-config --cflags $(PKG_TAGS)))
-$(OBJ)/data/folders.o: CPPFLAGS_ALL += -DLGD_PREFIX='"$(PREFIX)"'
+$(OBJ)/data/folders.o: CPPFLAGS_ALL += -DLGD_PREFIX='"$(PREFIX)"' -DLGD_LIBDIR='"$(LIBDIR)"'
 
 $(OBJ)/%.o: %.c $(BUILD)/gen/flags | $(BUILD)/gen/ops.h $(BUILD)/gen/pages.h
 	$(call step,CC,$<)
@@ -331,31 +335,37 @@ demo: deps
 
 # Where make install puts things.
 TO := $(DESTDIR)$(PREFIX)
+TO_LIB := $(DESTDIR)$(LIBDIR)
 MODELS := $(wildcard models/*.safetensors)
 
 install: all
-	install -d $(TO)/bin $(TO)/lib/pkgconfig $(TO)/lib/lgd $(TO)/include $(TO)/share/lgd
+	install -d $(TO)/bin $(TO_LIB)/pkgconfig $(TO_LIB)/lgd $(TO)/include $(TO)/share/lgd
 	install -m 755 $(BIN) $(TO)/bin
-	install -m 644 $(LIB) $(TO)/lib
-	install -m 755 $(SHARED) $(TO)/lib
-	ln -sf $(notdir $(SHARED)) $(TO)/lib/$(SONAME)
-	ln -sf $(SONAME) $(TO)/lib/liblgd.so
-	install -m 755 $(IMAGE_LIB) $(TO)/lib/lgd
+	install -m 644 $(LIB) $(SHARED) $(TO_LIB)
+	ln -sf $(notdir $(SHARED)) $(TO_LIB)/$(SONAME)
+	ln -sf $(SONAME) $(TO_LIB)/liblgd.so
+	install -m 644 $(IMAGE_LIB) $(TO_LIB)/lgd
+	$(STRIP) --remove-section=.comment --remove-section=.note $(BIN:$(BUILD)/%=$(TO)/%)
+	$(STRIP) --strip-unneeded --remove-section=.comment --remove-section=.note \
+	  $(TO_LIB)/$(notdir $(SHARED)) $(TO_LIB)/lgd/liblgd_image.so
+	$(STRIP) --strip-debug $(TO_LIB)/liblgd.a
 	install -m 644 infer/lgd.h $(TO)/include
 	install -m 644 $(MODELS) $(TO)/share/lgd
-	@printf '%s\n' 'prefix=$(PREFIX)' 'Name: lgd' 'Description: material of a surface from one flash photograph' \
-	  'Version: $(VERSION)' 'Cflags: -I$${prefix}/include' 'Libs: -L$${prefix}/lib -llgd' 'Libs.private: $(LIB_LIBS)' \
-	  > $(TO)/lib/pkgconfig/lgd.pc
+	@printf '%s\n' 'prefix=$(PREFIX)' 'libdir=$(LIBDIR:$(PREFIX)/%=$${prefix}/%)' 'Name: lgd' \
+	  'Description: material of a surface from one flash photograph' 'Version: $(VERSION)' \
+	  'Cflags: -I$${prefix}/include' 'Libs: -L$${libdir} -llgd' \
+	  'Libs.private: $(PKG_LIBS) -fopenmp -lpthread -ldl -lm' > $(TO_LIB)/pkgconfig/lgd.pc
 	@[ -n "$(DESTDIR)" ] || ldconfig 2>/dev/null || true # the loader's list of libraries, where we may write it
 
 uninstall:
-	rm -f $(PROGRAMS:%=$(TO)/bin/lgd-%) $(TO)/lib/liblgd.a $(TO)/lib/liblgd.so* $(TO)/lib/lgd/liblgd_image.so \
-	  $(TO)/lib/pkgconfig/lgd.pc $(TO)/include/lgd.h $(MODELS:models/%=$(TO)/share/lgd/%)
-	-rmdir $(TO)/share/lgd $(TO)/lib/lgd
+	rm -f $(PROGRAMS:%=$(TO)/bin/lgd-%) $(TO_LIB)/liblgd.a $(TO_LIB)/liblgd.so* $(TO_LIB)/lgd/liblgd_image.so \
+	  $(TO_LIB)/pkgconfig/lgd.pc $(TO)/include/lgd.h $(MODELS:models/%=$(TO)/share/lgd/%)
+	-rmdir $(TO)/share/lgd $(TO_LIB)/lgd
 
 clean:
 	rm -rf $(BUILD) $(BUILD)-asan $(BUILD)-leaks $(BUILD)-tsan
 
-.PHONY: all programs help deps test test-blender bench bench-deps stress fuzz faults tsan asan demo install uninstall clean
+.PHONY: all programs library help deps test test-blender bench bench-deps stress fuzz faults tsan asan demo install \
+  uninstall clean
 .SECONDARY:
 -include $(shell find $(OBJ) $(BUILD)/fuzz/obj -name '*.d' 2>/dev/null)

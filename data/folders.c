@@ -2,4 +2,4 @@
 #include "data/folders.h"
 
 const char io_data_folder[] = LGD_PREFIX "/share/lgd";
-const char io_library_folder[] = LGD_PREFIX "/lib";
+const char io_library_folder[] = LGD_LIBDIR;

@@ -1,11 +1,11 @@
 /* The public C API (infer/lgd.h): models and who computes with them, and what a caller may get wrong. */
 #include "infer/lgd.h"
-#include "data/material.h"
+#include "infer/api.h"
 #include "infer/estimate.h"
 #include "infer/tiles.h"
 #include "nn/weights/weights.h"
 #include "render/render.h"
-#include "tensor/threads.h"
+#include "tensor/maps.h"
 #include <math.h>
 #include <pthread.h>
 #include <stdint.h>
@@ -14,11 +14,8 @@
 #include <string.h>
 
 enum {
-    SIDE_MAX = 16384,      /* 9.7 GB of maps: a larger number is a mistake */
-    ITERATIONS_MAX = 1000, /* the same: nothing changes after some ten */
-    THREADS_MAX = 1024,
-    OPTIONS_LEAST = offsetof(lgd_options, iterations) + sizeof(int), /* a size below has no option at all */
-    OPTIONS_MOST = 4096                                              /* a larger one is a field that nobody set */
+    ITERATIONS_MAX = 1000, /* a larger number is a mistake: nothing changes after some ten */
+    OPTIONS_LEAST = offsetof(lgd_options, iterations) + sizeof(int) /* a size below has no option at all */
 };
 
 /* What a call computes in. */
@@ -34,18 +31,6 @@ struct lgd_model {
     workspace *idle;
 };
 
-/* Copies st into error. Returns its code. */
-static int report(lgd_error *error, const ts_status *st)
-{
-    if (error) {
-        error->code = st->code;
-        memcpy(error->message, st->message, sizeof error->message);
-    }
-    return st->code;
-}
-
-_Static_assert(sizeof((lgd_error *)0)->message == sizeof((ts_status *)0)->message, "messages are copied whole");
-
 const char *lgd_version(void) { return LGD_VERSION; }
 
 void lgd_options_init(lgd_options *options, size_t size)
@@ -56,28 +41,11 @@ void lgd_options_init(lgd_options *options, size_t size)
     memcpy(options, &o, size < sizeof o ? size : sizeof o);
 }
 
-/* The caller's options, of the lgd.h that it was compiled with, as those of this one. */
-static ts_code take_options(const lgd_options *given, lgd_options *o, ts_status *st)
-{
-    lgd_options_init(o, sizeof *o);
-    if (!given) return TS_OK;
-    const size_t size = given->size;
-    if (size < OPTIONS_LEAST || size > OPTIONS_MOST)
-        return ts_fail(st, TS_INVALID, "lgd_estimate: options.size is %zu: begin with lgd_options_default()", size);
-    for (size_t i = sizeof *o; i < size; i++)
-        if (((const unsigned char *)given)[i])
-            return ts_fail(st, TS_UNSUPPORTED,
-                           "lgd_estimate: the options (%zu bytes) set a field that lgd %s (%zu bytes) does not have: "
-                           "link with a newer liblgd or leave the field zero",
-                           size, LGD_VERSION, sizeof *o);
-    memcpy(o, given, size < sizeof *o ? size : sizeof *o);
-    o->size = sizeof *o;
-    return TS_OK;
-}
-
 int lgd_trained_iterations(const lgd_model *model) { return model->net->arch.iterations; }
 
 const nn_model *lgd_model_net(const lgd_model *model) { return model->net; }
+
+int lgd_published(const lgd_model *model) { return model->net->arch.compat == NN_COMPAT_PUBLISHED; }
 
 int lgd_most_photos(const lgd_model *model) { return model->net->arch.images; }
 
@@ -131,7 +99,7 @@ lgd_model *lgd_load(const char *weights, lgd_error *error)
         if (model->idle) ag_freeze(model->first = model->idle->tape, true);
     }
     if (st.code) lgd_free(&model);
-    report(error, &st);
+    lgd_report(error, &st);
     return model;
 }
 
@@ -183,16 +151,16 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
                        model->net->arch.images);
     for (int k = 0; k < photos; k++)
         if (check_photo(&photo[k], k + 1, st) != TS_OK) return st->code;
-    if (side < 1 || side > SIDE_MAX)
-        return ts_fail(st, TS_INVALID, "lgd_estimate: side is %d and must lie in 1 .. %d", side, SIDE_MAX);
+    if (side < 1 || side > LGD_SIDE_MAX)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: side is %d and must lie in 1 .. %d", side, LGD_SIDE_MAX);
     if (o->iterations < LGD_AUTO || o->iterations > ITERATIONS_MAX)
         return ts_fail(
             st, TS_INVALID,
             "lgd_estimate: iterations is %d and must lie in 0 .. %d, or be -1 for as trained or %d for automatic",
             o->iterations, ITERATIONS_MAX, LGD_AUTO);
-    if (o->threads < 0 || o->threads > THREADS_MAX)
+    if (o->threads < 0 || o->threads > LGD_THREADS_MAX)
         return ts_fail(st, TS_INVALID, "lgd_estimate: threads is %d and must lie in 1 .. %d, or be 0 for all",
-                       o->threads, THREADS_MAX);
+                       o->threads, LGD_THREADS_MAX);
     if (!(o->tolerance >= 0 && o->tolerance <= 1) && o->tolerance != LGD_TOLERANCE_DEFAULT)
         return ts_fail(st, TS_INVALID, "lgd_estimate: tolerance is %g and must lie in 0 .. 1, or be %g for the default",
                        o->tolerance, LGD_TOLERANCE_DEFAULT);
@@ -216,8 +184,9 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
 ts_code lgd_model_estimate(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,
                            bool encoded, float *maps, ts_status *st)
 {
-    lgd_options o;
-    if (take_options(options, &o, st) != TS_OK || check_arguments(model, photo, photos, side, &o, maps, st) != TS_OK)
+    lgd_options o = lgd_options_default();
+    if (lgd_take_struct("lgd_estimate", options, OPTIONS_LEAST, &o, sizeof o, st) != TS_OK ||
+        check_arguments(model, photo, photos, side, &o, maps, st) != TS_OK)
         return st->code;
     workspace *w = take(model, st);
     if (!w) return st->code;
@@ -232,7 +201,7 @@ int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, in
 {
     ts_status st = {0};
     lgd_model_estimate(model, photo, photos, side, options, false, maps, &st);
-    return report(error, &st);
+    return lgd_report(error, &st);
 }
 
 int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps,
@@ -240,21 +209,6 @@ int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_optio
 {
     const lgd_photo photo = lgd_flash_photo(image);
     return lgd_estimate_photos(model, &photo, 1, side, options, maps, error);
-}
-
-/* maps as in infer/lgd.h, [side, side, 9], to the encoding of tensor/maps.h, the same shape. */
-static void encode(const float *maps, int side, float *encoded)
-{
-    const int64_t pixels = (int64_t)side * side;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int64_t i = 0; i < pixels; i++) {
-        const float *m = maps + i * MAP_CHANNELS;
-        const float x = m[MAP_NORMAL], y = m[MAP_NORMAL + 1];
-        io_texel t = {.normal = {x, y, sqrtf(fmaxf(1 - x * x - y * y, 0))}, .roughness = m[MAP_ROUGHNESS]};
-        memcpy(t.diffuse, m + MAP_DIFFUSE, sizeof t.diffuse);
-        memcpy(t.specular, m + MAP_SPECULAR, sizeof t.specular);
-        io_texel_put(encoded + i * MAP_CHANNELS, &t);
-    }
 }
 
 int lgd_render(const float *maps, int side, const float light[3], const float camera[3], float power, float *image,
@@ -265,7 +219,7 @@ int lgd_render(const float *maps, int side, const float light[3], const float ca
     bool finite = isfinite(power);
     if (!maps || !light || !camera || !image) {
         ts_fail(&st, TS_INVALID, "lgd_render: maps, light, camera and image must be given");
-        return report(error, &st);
+        return lgd_report(error, &st);
     }
     for (int i = 0; i < 3; i++) {
         view.light[i] = light[i];
@@ -274,18 +228,18 @@ int lgd_render(const float *maps, int side, const float light[3], const float ca
     }
     if (!finite || power < 0)
         ts_fail(&st, TS_INVALID, "lgd_render: light, camera and power must be finite and power not negative");
-    else if (side < 1 || side > SIDE_MAX)
-        ts_fail(&st, TS_INVALID, "lgd_render: side is %d and must lie in 1 .. %d", side, SIDE_MAX);
-    if (st.code) return report(error, &st);
+    else if (side < 1 || side > LGD_SIDE_MAX)
+        ts_fail(&st, TS_INVALID, "lgd_render: side is %d and must lie in 1 .. %d", side, LGD_SIDE_MAX);
+    if (st.code) return lgd_report(error, &st);
 
     const size_t pixels = (size_t)side * (size_t)side;
     float *encoded = malloc(pixels * MAP_CHANNELS * sizeof *encoded);
     if (!encoded) {
         ts_fail(&st, TS_NOMEM, "lgd_render: out of memory for %d x %d pixels", side, side);
-        return report(error, &st);
+        return lgd_report(error, &st);
     }
-    encode(maps, side, encoded);
+    lgd_encode(maps, side, 0, encoded);
     rd_render(rd_grid_full(side), encoded, MAP_CHANNELS, &view, false, image);
     free(encoded);
-    return report(error, &st);
+    return lgd_report(error, &st);
 }

@@ -1,4 +1,12 @@
-/* lgd: the material of a flat surface from one flash photograph. The public C API. */
+/* lgd: the material of a flat surface from one flash photograph. The public C API.
+ *
+ *     lgd_find_weights, lgd_load         a model
+ *     lgd_read_photo, or lgd_square      the photograph, from a file or from memory
+ *     lgd_estimate                       its maps
+ *     lgd_write_maps, or lgd_render      files, or another picture
+ *
+ * Functions that return int return 0, or nonzero with error set, which may be NULL, and what they fill unspecified.
+ * Structs that may grow begin with their size where the caller was compiled. Fields beyond it have their defaults. */
 #ifndef LGD_H
 #define LGD_H
 #include <stddef.h>
@@ -30,6 +38,11 @@ LGD_API void lgd_free(lgd_model **model);
 LGD_API int lgd_trained_iterations(const lgd_model *model); /* the number of steps T that the model was trained for */
 LGD_API int lgd_most_photos(
     const lgd_model *model); /* photographs that it reads at once: 1, or those of a multi-image model */
+LGD_API int lgd_published(const lgd_model *model); /* nonzero: the published network's weights (docs/published.md) */
+
+/* The file of the weights that a program reads with --model name: a file, or the name of a model that ships with lgd;
+ * NULL: $LGD_MODEL, else "single". path: size bytes, 4096 at best. */
+LGD_API int lgd_find_weights(const char *name, char *path, size_t size, lgd_error *error);
 
 /* LGD_AUTO: steps go on while each lowers the reconstruction RMSE by a thousandth or more, LGD_AUTO_MOST at most. The
  * result is R_t of the last such step. The steps of photographs in several tiles, and of those with mask or tolerance,
@@ -133,6 +146,65 @@ LGD_API int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int ph
  * [-1/2, 1/2]^2 at z = 0, y up): image is side x side x 3, linear. */
 LGD_API int lgd_render(const float *maps, int side, const float light[3], const float camera[3], float power,
                        float *image, lgd_error *error);
+
+/* All zero but size is the default. */
+typedef struct lgd_read_options {
+    size_t size;          /* sizeof(lgd_read_options) */
+    int published;        /* lgd_published() of the model that the photograph is for: it is resampled as the network's
+                           * authors do */
+    long long max_pixels; /* files with more are refused; 0: 2^28 */
+    int threads;          /* that the call computes on; 0: as many as the process may use */
+} lgd_read_options;
+
+/* What is known of a photograph beside its pixels. */
+typedef struct lgd_facts {
+    size_t size;       /* sizeof(lgd_facts), set by the caller; lgd_read_photo fills the others */
+    int width, height; /* of the whole photograph, upright */
+    double fov; /* degrees across its largest centred square, from EXIF: for lgd_options.fov; or LGD_FOV_UNKNOWN */
+    char fov_from[128]; /* where fov is known from, or why it is not */
+    char profile[96];   /* the name of a colour profile that cannot be used: sRGB was assumed; or empty */
+} lgd_facts;
+
+/* A photograph's largest centred square as side x side x 3 linear values (sRGB primaries; above 1 only from files that
+ * say so), top row first. Upright by its EXIF orientation; colour profiles are honoured, alpha lies on black. PNG and
+ * JPEG are read by this library, other formats by OpenImageIO in lgd/liblgd_image.so beside it. options and facts may
+ * be NULL. */
+LGD_API int lgd_read_photo(const char *path, int side, const lgd_read_options *options, float *image, lgd_facts *facts,
+                           lgd_error *error);
+
+/* An image as lgd_options.mask: side x side values, 1 where its largest centred square is not black. width x height:
+ * of the photograph, whose shape it must have; 0: it may have any. */
+LGD_API int lgd_read_mask(const char *path, int side, int width, int height, const lgd_read_options *options,
+                          unsigned char *mask, lgd_error *error);
+
+/* The same for a photograph in memory: height x width x 3 values, top row first. LGD_SRGB8: unsigned char, LGD_SRGB16:
+ * unsigned short, of sRGB; LGD_LINEAR: float. Not as published weights want it. */
+enum { LGD_SRGB8, LGD_SRGB16, LGD_LINEAR };
+LGD_API int lgd_square(const void *pixels, int encoding, int width, int height, int side, float *image,
+                       lgd_error *error);
+
+/* Numbers of maps.exr; LGD_EXR_AUTO: floats up to 512 x 512 pixels, else half floats. */
+enum { LGD_EXR_AUTO, LGD_EXR_HALF, LGD_EXR_FLOAT };
+
+/* All zero but size is the default. */
+typedef struct lgd_write_options {
+    size_t size;          /* sizeof(lgd_write_options) */
+    const char *maps;     /* what is written, a list as of lgd-infer --maps: "normal,height"; NULL: diffuse, specular,
+                           * roughness, normal, exr, preview, and render where the photograph's image is given */
+    int directx;          /* normals with y down; not with glTF and MaterialX */
+    int metallic;         /* base colour and metalness in place of diffuse and specular; not with MaterialX */
+    int seamless;         /* the maps are made to repeat; side must be 16 or more */
+    int exr;              /* LGD_EXR_... */
+    int threads;          /* 0: as many as the process may use */
+    const char *fov_from; /* where the field of view is known from, for meta.txt: NULL: "given" */
+} lgd_write_options;
+
+/* Writes maps as returned by lgd_estimate, and meta.txt, into folder, whose parent exists. All files appear together
+ * when they are complete; a failure leaves what was there. Files that an earlier call wrote there for other maps are
+ * removed. photo: with light and camera as they were taken (lgd_options.taken) and the image that was read, side x
+ * side, for render and page; NULL: lgd_flash_photo(NULL). options may be NULL. */
+LGD_API int lgd_write_maps(const char *folder, const float *maps, int side, const lgd_photo *photo,
+                           const lgd_write_options *options, lgd_error *error);
 
 LGD_API const char *lgd_version(void);
 

@@ -15,17 +15,13 @@ static ts_code take(const char *from, char path[LGD_PATH_MAX], ts_status *st)
     return TS_OK;
 }
 
-/* The file of a model that ships with the program. */
+/* The file of a model that ships with the program or the library. */
 static bool shipped(const char *name, char path[LGD_PATH_MAX])
 {
     char folder[LGD_PATH_MAX - 64 - LGD_NAME_MAX]; /* the rest is appended */
-    const ssize_t length = readlink("/proc/self/exe", folder, sizeof folder - 1);
-    if (length > 0) {
-        folder[length] = 0;
-        char *slash = strrchr(folder, '/');
-        if (slash) *slash = 0;
-        static const char *const folders[] = {"../share/lgd", "../../models"};
-        for (int i = 0; i < 2; i++) {
+    if (io_own_folder(folder, sizeof folder)) {
+        static const char *const folders[] = {"../share/lgd", "../../models", "../models"};
+        for (int i = 0; i < 3; i++) {
             snprintf(path, LGD_PATH_MAX, "%s/%s/%s.safetensors", folder, folders[i], name);
             if (access(path, F_OK) == 0) return true;
         }
@@ -46,8 +42,9 @@ ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_
     if (option && !is_name(option)) return take(option, path, st);
     if (option) name = option;
     if (shipped(name, path)) return TS_OK;
-    return ts_fail(st, TS_IO,
-                   "no %s.safetensors found in ../share/lgd or ../../models folders the program or in %s: name a file "
-                   "with --model or LGD_MODEL",
-                   name, io_data_folder);
+    return ts_fail(
+        st, TS_IO,
+        "no %s.safetensors found in ../share/lgd or ../../models beside the program's folder, ../models beside "
+        "the library's, or in %s: name a file with --model or LGD_MODEL",
+        name, io_data_folder);
 }

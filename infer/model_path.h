@@ -6,8 +6,9 @@
 enum { LGD_PATH_MAX = 4096 };
 
 /* Option (--model), else $LGD_MODEL: a file, or, without a slash or a dot and where there is no such file, the NAME of
- * a model that ships with the program; else NAME is name. The first of ../share/lgd/NAME.safetensors and
- * ../../models/NAME.safetensors beside the program's own folder, and the installation's data folder; TS_IO when nothing
- * is found. A file is taken as it is. */
+ * a model that ships with the program; else NAME is name. The first of ../share/lgd/NAME.safetensors,
+ * ../../models/NAME.safetensors and ../models/NAME.safetensors (of liblgd.so after make) beside the folder of the
+ * program or of liblgd.so, and the installation's data folder; TS_IO when nothing is found. A file is taken as it is.
+ */
 ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_MAX], ts_status *st);
 #endif

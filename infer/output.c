@@ -1,5 +1,6 @@
 #include "infer/output.h"
 #include "data/file.h"
+#include "data/seamless.h"
 #include "infer/derived.h"
 #include "infer/export.h"
 #include "infer/meta.h"
@@ -65,6 +66,15 @@ static ts_code join(char path[PATH_LENGTH], const char *folder, const char *name
 {
     if (snprintf(path, PATH_LENGTH, "%s/%s", folder, name) >= PATH_LENGTH)
         return ts_fail(st, TS_INVALID, "%.200s...: the name is too long", folder);
+    return TS_OK;
+}
+
+ts_code lgd_order_check(const lgd_order *order, ts_status *st)
+{
+    if (order->which & (LGD_OUT_GLTF | LGD_OUT_GLB | LGD_OUT_MATERIALX) && order->directx)
+        return ts_fail(st, TS_INVALID, "glTF and MaterialX need OpenGL normals, not DirectX's");
+    if (order->which & LGD_OUT_MATERIALX && order->metallic)
+        return ts_fail(st, TS_INVALID, "the MaterialX document refers to F0: not of the metallic workflow");
     return TS_OK;
 }
 
@@ -281,14 +291,13 @@ static ts_code move_locked(const char *hidden, const char *folder, const char *m
     return code;
 }
 
-ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const io_material *estimate,
-                         const lgd_photo *photo, const lgd_order *order, lgd_output_result *result, ts_status *st)
+/* m: what is written; estimate: what the photograph is compared with. */
+static ts_code write_folder(const char *parent, const char *stem, const io_material *m, const io_material *estimate,
+                            const lgd_photo *photo, const lgd_order *order, lgd_output_result *r, ts_status *st)
 {
     char folder[PATH_LENGTH], mark[MARK], *hidden;
-    lgd_output_result ignored, *r = result ? result : &ignored;
     struct stat info;
     int lock;
-    *r = (lgd_output_result){0};
     if (join(folder, parent, stem, st) != TS_OK) return st->code;
     const bool there = stat(folder, &info) == 0;
     if (there && !S_ISDIR(info.st_mode)) return ts_fail(st, TS_IO, "%s: is in the way: it is not a folder", folder);
@@ -309,5 +318,17 @@ ts_code lgd_output_write(const char *parent, const char *stem, const io_material
     free(hidden);
     if (!code) ts_sync_folder(folder);
     if (!code && !there) ts_sync_folder(parent);
+    return code;
+}
+
+ts_code lgd_output_write(const char *parent, const char *stem, const io_material *estimate, const lgd_photo *photo,
+                         const lgd_order *order, lgd_output_result *result, ts_status *st)
+{
+    lgd_output_result ignored, *r = result ? result : &ignored;
+    io_material tile = {0};
+    *r = (lgd_output_result){0};
+    ts_code code = order->repeats ? io_seamless(estimate, &tile, order->threads, st) : TS_OK;
+    if (!code) code = write_folder(parent, stem, order->repeats ? &tile : estimate, estimate, photo, order, r, st);
+    io_material_free(&tile);
     return code;
 }

@@ -32,6 +32,7 @@ extern const char *const lgd_files[LGD_FILES]; /* the file of each, then meta.tx
 
 /* A list such as "normal,height" as bits. TS_INVALID names the word. */
 ts_code lgd_output_parse(const char *list, unsigned *which, ts_status *st);
+enum { LGD_HALF_ABOVE = 512 }; /* pixels a side, by default: as floats a maps.exr of 1024 x 1024 has 54 MB */
 /* The same in the workflow, with the maps that documents refer to: of the metallic one base colour and orm.png. */
 unsigned lgd_output_complete(unsigned which, bool metallic);
 
@@ -43,10 +44,13 @@ typedef struct lgd_order {
     bool directx;         /* normals with y down */
     bool metallic;        /* what documents and material.glb refer to */
     bool half;            /* maps.exr */
-    bool repeats;         /* the maps are seamless (data/seamless.h) */
+    bool repeats;         /* the maps are made seamless (data/seamless.h) */
     int threads;          /* that files are made on */
     const char *fov_from; /* where photo's field of view is known from, for meta.txt */
 } lgd_order;
+
+/* TS_INVALID for what does not go together. */
+ts_code lgd_order_check(const lgd_order *order, ts_status *st);
 
 typedef struct lgd_output_result {
     float low, high;        /* the heights that 0 and 1 of height.png are, in sides of the square */
@@ -58,9 +62,9 @@ typedef struct lgd_output_result {
  * written to a hidden folder first and renamed when all are complete: a failure leaves what was there before, and
  * nothing else. When the folder has files of another estimate (of another photograph, or made otherwise: meta.txt names
  * the estimate), those of lgd_files that are not written now are removed. Several processes may write the same folder:
- * one's files stay. m: what is written; estimate: what the photograph is compared with in render.png, m itself where
- * the maps were not changed since. photo: of the material's size, with light and camera as they were taken. result: may
- * be NULL. */
-ts_code lgd_output_write(const char *parent, const char *stem, const io_material *m, const io_material *estimate,
-                         const lgd_photo *photo, const lgd_order *order, lgd_output_result *result, ts_status *st);
+ * one's files stay. photo: of the material's size, with light and camera as they were taken; it is compared with the
+ * estimate as it is, seamless or not. Its image may be NULL where neither render.png nor view.html is ordered. result:
+ * may be NULL. */
+ts_code lgd_output_write(const char *parent, const char *stem, const io_material *estimate, const lgd_photo *photo,
+                         const lgd_order *order, lgd_output_result *result, ts_status *st);
 #endif

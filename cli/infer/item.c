@@ -1,30 +1,41 @@
 #include "cli/infer/item.h"
-#include "data/seamless.h"
 #include "infer/estimate.h"
-#include "infer/photograph.h"
 #include "nn/model.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-/* The mask is cut and resampled as the photograph is; what is not black in a pixel makes it wanted. */
-static ts_code read_mask(const lgd_command *c, int width, int height, unsigned char **mask, ts_status *st)
+/* The last of an item's steps failed in a public function. */
+static void failed(lgd_item *item, const lgd_error *error) { ts_fail(&item->st, error->code, "%s", error->message); }
+
+static void *take(lgd_item *item, const lgd_command *c, size_t pixel)
 {
-    io_image whole = {0}, square = {0};
-    const size_t pixels = (size_t)c->size * (size_t)c->size;
-    ts_code code = io_read_mask(c->mask, c->max_pixels, &whole, st);
-    if (code) return code;
-    const double difference = (double)whole.width * height -
-        (double)whole.height * width; /* a pixel of rounding is none */
-    if (fabs(difference) > fmax(whole.width, whole.height) + fmax(width, height))
-        code = ts_fail(st, TS_INVALID, "the mask %s is %d x %d pixels and the photograph %d x %d: not the same shape",
-                       c->mask, whole.width, whole.height, width, height);
-    if (!code) code = io_centre_square(&whole, c->size, &square, st);
-    if (!code && !(*mask = malloc(pixels))) code = ts_fail(st, TS_NOMEM, "out of memory for the mask");
-    for (size_t i = 0; i < pixels && !code; i++) (*mask)[i] = square.data[i] > 0;
-    io_image_free(&whole);
-    io_image_free(&square);
-    return code;
+    void *room = malloc((size_t)c->size * (size_t)c->size * pixel);
+    if (!room) ts_fail(&item->st, TS_NOMEM, "%s: out of memory", item->job->photo);
+    return room;
+}
+
+static void read_photo(const lgd_command *c, bool published, lgd_item *item)
+{
+    const lgd_read_options o = {sizeof o, published, c->max_pixels, item->threads};
+    const char *photo = item->job->photo;
+    lgd_facts facts = {.size = sizeof facts};
+    lgd_error error;
+    if (!(item->square = take(item, c, 3 * sizeof *item->square))) return;
+    if (lgd_read_photo(photo, c->size, &o, item->square, &facts, &error)) {
+        failed(item, &error);
+        return;
+    }
+    item->image = item->square;
+    item->photo_side = facts.width < facts.height ? facts.width : facts.height;
+    item->fov = c->fov > 0 ? c->fov : facts.fov;
+    snprintf(item->fov_from, sizeof item->fov_from, "%s", c->fov > 0 ? "--fov" : facts.fov_from);
+    snprintf(item->profile, sizeof item->profile, "%s", facts.profile);
+    if (!c->mask || !(item->mask = take(item, c, 1))) return;
+    if (lgd_read_mask(c->mask, c->size, facts.width, facts.height, &o, item->mask, &error)) {
+        failed(item, &error);
+        ts_context(&item->st, "%s", photo);
+    }
 }
 
 static void read_angle(const lgd_command *c, bool published, lgd_item *item)
@@ -37,8 +48,7 @@ static void read_angle(const lgd_command *c, bool published, lgd_item *item)
     }
     if (lgd_rectify(item->job->photo, &c->angle, c->max_pixels, c->size, c->fov, item->threads, r, &item->st)) return;
     snprintf(item->profile, sizeof item->profile, "%s", r->profile);
-    item->square = r->square;
-    item->image = r->square.data;
+    item->image = item->square = r->square.data;
     item->photo_side = (int)ceil(r->side);
     item->fov = LGD_FOV_OF_PHOTO;
     snprintf(item->fov_from, sizeof item->fov_from, "%s", r->fov_from);
@@ -59,14 +69,6 @@ static void read_sheet(const lgd_command *c, lgd_item *item)
 
 void lgd_item_read(const lgd_command *c, bool published, lgd_item *item)
 {
-    if (*c->capture) {
-        if (lgd_read_capture(c->capture, c->size, c->max_pixels, &item->capture, &item->st) != TS_OK) return;
-        item->photo_side = c->size;
-        item->image = item->capture.image;
-        item->fov = LGD_FOV_OF_PHOTO;
-        snprintf(item->fov_from, sizeof item->fov_from, "the capture");
-        return;
-    }
     if (c->sheet) {
         read_sheet(c, item);
         return;
@@ -75,18 +77,15 @@ void lgd_item_read(const lgd_command *c, bool published, lgd_item *item)
         read_angle(c, published, item);
         return;
     }
-    io_photo_facts facts;
-    if (lgd_photograph_square(item->job->photo, published, c->max_pixels, c->size, item->threads, &item->square, &facts,
-                              &item->st))
+    if (!*c->capture) {
+        read_photo(c, published, item);
         return;
-    item->photo_side = facts.width < facts.height ? facts.width : facts.height;
-    snprintf(item->profile, sizeof item->profile, "%s", facts.profile);
-    if (c->fov > 0) snprintf(item->fov_from, sizeof item->fov_from, "--fov");
-    item->fov = c->fov > 0 ? c->fov
-                           : io_lens_fov(&facts.lens, facts.width, facts.height, item->fov_from, sizeof item->fov_from);
-    item->image = item->square.data;
-    if (c->mask && read_mask(c, facts.width, facts.height, &item->mask, &item->st))
-        ts_context(&item->st, "%s", item->job->photo);
+    }
+    if (lgd_read_capture(c->capture, c->size, c->max_pixels, &item->capture, &item->st) != TS_OK) return;
+    item->photo_side = c->size;
+    item->image = item->capture.image;
+    item->fov = LGD_FOV_OF_PHOTO;
+    snprintf(item->fov_from, sizeof item->fov_from, "the capture");
 }
 
 /* What the library's calls get as their user. */
@@ -164,17 +163,14 @@ void lgd_item_write(const lgd_command *c, lgd_item *item)
                              .repeats = c->seamless,
                              .threads = item->threads,
                              .fov_from = from};
-    io_material tile = {0};
-    if ((c->seamless && io_seamless(&item->m, &tile, item->threads, &item->st)) ||
-        lgd_output_write(c->out, item->job->stem, c->seamless ? &tile : &item->m, &item->m, &item->photo[0], &order,
-                         &item->written, &item->st))
+    if (lgd_output_write(c->out, item->job->stem, &item->m, &item->photo[0], &order, &item->written, &item->st))
         ts_context(&item->st, "%s", item->job->photo);
-    io_material_free(&tile);
 }
 
 void lgd_item_free(lgd_item *item)
 {
-    io_image_free(&item->square);
+    free(item->square);
+    item->square = NULL;
     io_capture_free(&item->capture);
     io_sheet_set_free(&item->sheet);
     io_material_free(&item->m);

@@ -13,8 +13,8 @@ typedef struct lgd_item {
     const lgd_job *job;
     int index;           /* into the plan */
     ts_status st;        /* the first failure on the way; later stages leave the item alone */
-    io_image square;     /* linear, command->size a side; not of a capture */
-    lgd_rectified angle; /* with corners; its square is item->square */
+    float *square;       /* linear, [size][size][3], or NULL: of a capture or a sheet */
+    lgd_rectified angle; /* with corners; its square's values are item->square */
     io_capture capture;  /* images 0: there is none */
     io_sheet_set sheet;  /* with --sheet: what was found in each photograph; capture has the windows */
     const float *image;  /* the photograph, or the first of the capture: in one of these; NULL: not read */

@@ -27,7 +27,6 @@ enum {
     HELP = 'h',
     VERSION = 'V'
 };
-enum { HALF_ABOVE = 512 }; /* pixels a side: as floats a maps.exr of 1024 x 1024 has 54 MB */
 
 const cl_argument lgd_infer_arguments[] = {
     {'o', "output", "DIR",
@@ -221,14 +220,12 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
         }
     }
     if (code || c->help || c->version) return code;
-    if (c->outputs & (LGD_OUT_GLTF | LGD_OUT_GLB | LGD_OUT_MATERIALX) && c->directx)
-        return ts_fail(st, TS_INVALID, "--normal dx: glTF and MaterialX need OpenGL normals");
-    if (c->outputs & LGD_OUT_MATERIALX && c->metallic)
-        return ts_fail(st, TS_INVALID, "--workflow metallic: the MaterialX document refers to F0");
+    const lgd_order order = {.which = c->outputs, .directx = c->directx, .metallic = c->metallic};
+    if (lgd_order_check(&order, st) != TS_OK) return ts_context(st, "--maps");
     if (c->seamless && c->size < IO_SEAMLESS_LEAST)
         return ts_fail(st, TS_INVALID, "--seamless needs a --size of %d at least", IO_SEAMLESS_LEAST);
     c->outputs = lgd_output_complete((c->outputs ? c->outputs : LGD_OUT_DEFAULT) | (ao ? LGD_OUT_AO : 0), c->metallic);
-    if (!exr_given) c->half = c->size > HALF_ABOVE;
+    if (!exr_given) c->half = c->size > LGD_HALF_ABOVE;
     c->photo = argv + operands;
     c->photos = argc - operands;
     if (*c->capture && c->photos > 0)

@@ -17,27 +17,27 @@ static pthread_once_t once = PTHREAD_ONCE_INIT;
 static const oi_library *library;
 static ts_status failure;
 
-/* ../lib/lgd beside the folder of the program: so it is after make and after make install; false where there is none.
- */
-static bool beside_program(char *path, size_t size)
+/* Beside the folder of the program or of liblgd.so: ../lib/lgd after make install, and after make of programs; lib/lgd
+ * of liblgd.so after make. False where there is none. */
+static bool beside_us(char *path, size_t size)
 {
-    char program[PATH_MAX - 64];
-    const ssize_t length = readlink("/proc/self/exe", program, sizeof program - 1);
-    if (length <= 0) return false;
-    program[length] = 0;
-    char *slash = strrchr(program, '/');
-    if (slash) *slash = 0;
-    return snprintf(path, size, "%s/../lib/lgd/" FILE_NAME, program) < (int)size && access(path, F_OK) == 0;
+    static const char *const folders[] = {"../lib/lgd", "lib/lgd"};
+    char own[PATH_MAX - 64];
+    if (!io_own_folder(own, sizeof own)) return false;
+    for (int i = 0; i < 2; i++)
+        if (snprintf(path, size, "%s/%s/" FILE_NAME, own, folders[i]) < (int)size && access(path, F_OK) == 0)
+            return true;
+    return false;
 }
 
 static void load(void)
 {
     char path[PATH_MAX];
-    if (!beside_program(path, sizeof path)) snprintf(path, sizeof path, "%s/lgd/" FILE_NAME, io_library_folder);
+    if (!beside_us(path, sizeof path)) snprintf(path, sizeof path, "%s/lgd/" FILE_NAME, io_library_folder);
     if (access(path, F_OK) != 0) {
         ts_fail(&failure, TS_IO,
                 "this image needs " FILE_NAME
-                ", which is neither in ../lib/lgd beside the program nor in %s/lgd: install it again",
+                ", which is neither in ../lib/lgd beside the program or library nor in %s/lgd: install it again",
                 io_library_folder);
         return;
     }

@@ -122,8 +122,8 @@ TEST(infer_output_is_complete_and_replaces)
     make_material(&m, &photo, SIZE);
     for (int round = 0; round < 2; round++) {
         const lgd_photo flash = lgd_flash_photo(photo.data);
-        CHECK(lgd_output_write(test_folder(), "x", &m, &m, &flash, &everything, NULL, &st) == TS_OK, "round %d: %s",
-              round, st.message);
+        CHECK(lgd_output_write(test_folder(), "x", &m, &flash, &everything, NULL, &st) == TS_OK, "round %d: %s", round,
+              st.message);
         snprintf(path, sizeof path, "%s/x", test_folder());
         CHECK(count_entries(path) == LGD_FILES && count_entries(test_folder()) == 1, "round %d: %d files", round,
               count_entries(path));
@@ -158,8 +158,7 @@ TEST(infer_output_failure_leaves_nothing)
     snprintf(path, sizeof path, "%s/x", test_folder());
     put_file(path);
     const lgd_photo flash = lgd_flash_photo(photo.data);
-    CHECK(lgd_output_write(test_folder(), "x", &m, &m, &flash, &everything, NULL, &st) == TS_IO &&
-              strstr(st.message, "/x"),
+    CHECK(lgd_output_write(test_folder(), "x", &m, &flash, &everything, NULL, &st) == TS_IO && strstr(st.message, "/x"),
           "a file in the way: %s", st.message);
     CHECK(count_entries(test_folder()) == 1, "something is left");
     st = (ts_status){0};
