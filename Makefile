@@ -5,6 +5,7 @@
 #: make deps         installs what the build needs (Debian, Ubuntu); the three above do so first
 #: make test-blender material.glb in Blender's renderer, with PYTHON= that has bpy; skipped without
 #: make install      into PREFIX (/usr/local), below DESTDIR when given, libraries into LIBDIR; make uninstall takes it away
+#: make wheel        the Python package as build/lgd-VERSION-….whl, with the library and the weights in it
 #: make bench        times; BENCH="conv_ infer" runs the benchmarks whose names contain these words
 #: make bench-deps   PyTorch, for the comparison in make bench
 #: make stress       the numerics far from ordinary input; STRESS=shading runs one part
@@ -29,6 +30,8 @@ LIBDIR ?= $(PREFIX)/lib
 TESTDATA ?= ../shared/testdata
 FIXTURES ?= ../shared/fixtures
 BUILD ?= build
+PYTHON ?= python3
+WHEELS ?= $(BUILD)
 OPT ?= -O3 -g
 SANITIZE ?=
 
@@ -268,6 +271,11 @@ bench: deps
 test-blender: programs
 	@BUILD=$(BUILD) sh tests/blender/run.sh
 
+# The Python package with liblgd.so and the weights in it.
+wheel: library
+	@mkdir -p $(WHEELS)
+	@LGD_WHEEL=own LGD_BUILD=$(BUILD) STRIP=$(STRIP) $(PYTHON) python/backend.py $(WHEELS)
+
 # PyTorch for the peer's column: bench/peer_torch.py
 bench-deps:
 	@BUILD=$(BUILD) sh .ci/bench-deps.sh
@@ -365,7 +373,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD) $(BUILD)-asan $(BUILD)-leaks $(BUILD)-tsan
 
-.PHONY: all programs library help deps test test-blender bench bench-deps stress fuzz faults tsan asan demo install \
+.PHONY: all programs library help deps test test-blender wheel bench bench-deps stress fuzz faults tsan asan demo install \
   uninstall clean
 .SECONDARY:
 -include $(shell find $(OBJ) $(BUILD)/fuzz/obj -name '*.d' 2>/dev/null)

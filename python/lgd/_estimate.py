@@ -1,0 +1,217 @@
+"""Models and what they estimate."""
+
+import ctypes
+import math
+import os
+import threading
+from typing import Callable, List, Optional, Sequence, Union
+
+import numpy as np
+
+from . import _library as c
+from ._maps import Maps, Path, Photo, check, cut_mask, floats, lib, read_photo, square
+
+Image = Union[Path, np.ndarray]
+# done: 0 .. 1; rmse: of the linear values, NaN where it is not known. What it raises ends the work.
+Progress = Callable[[float, float], None]
+
+
+class _Calls:
+    """The library's calls into Python. What these raise ends the work and is raised again behind it."""
+
+    def __init__(self, progress: Optional[Progress], steps: int):
+        self.progress, self.steps = progress, steps
+        self.raised: Optional[BaseException] = None
+        self.done = 0.0
+        self.rmse: List[float] = []
+        self.step, self.tile = c.Progress(self._step), c.Tile(self._tile)
+
+    def _tell(self, done: float, rmse: float) -> int:
+        try:
+            self.done = max(self.done, done)
+            if self.progress:
+                self.progress(self.done, rmse)
+        except BaseException as error:  # KeyboardInterrupt too
+            self.raised = error
+        return self.raised is not None
+
+    def _step(self, step: int, rmse: float, user: object) -> int:
+        self.rmse = self.rmse[:step] + [rmse]
+        return self._tell((step + 1) / (self.steps + 1), rmse)
+
+    def _tile(self, done: float, user: object) -> int:
+        return self._tell(done, math.nan)
+
+
+class Model:
+    """Weights: a file, or the name of a model that ships with lgd ("single", "multi"). Any number of threads may use
+    one model at once."""
+
+    def __init__(self, weights: Optional[Path] = None):
+        path, error = ctypes.create_string_buffer(4096), c.Failure()
+        name = None if weights is None else os.fsencode(weights)
+        check(lib.lgd_find_weights(name, path, len(path), error), error)
+        self.weights = os.fsdecode(path.value)
+        self._model = ctypes.c_void_p(lib.lgd_load(path.value, error))
+        if not self._model:
+            check(error.code, error)
+
+    def __del__(self) -> None:
+        if getattr(self, "_model", None):
+            lib.lgd_free(ctypes.byref(self._model))
+
+    @property
+    def iterations(self) -> int:
+        """Steps that the model was trained for."""
+        return lib.lgd_trained_iterations(self._model)
+
+    @property
+    def most_photos(self) -> int:
+        return lib.lgd_most_photos(self._model)
+
+    @property
+    def published(self) -> bool:
+        """Whether these are the weights of the published network."""
+        return bool(lib.lgd_published(self._model))
+
+
+_default: Optional[Model] = None
+_default_lock = threading.Lock()
+
+
+def _shipped() -> Model:
+    """The shipped model, which is loaded once."""
+    global _default
+    with _default_lock:
+        _default = _default or Model()
+        return _default
+
+
+def _run(
+    model: Model,
+    photos: Sequence[Photo],
+    fov: float,
+    mask: Optional[np.ndarray],
+    iterations: Union[int, str, None],
+    light_power: Union[float, str],
+    tolerance: Optional[float],
+    orientations: int,
+    exact: bool,
+    precision: str,
+    threads: int,
+    progress: Optional[Progress],
+) -> Maps:
+    if precision not in c.PRECISIONS:
+        raise ValueError(f"precision {precision!r} is none of {', '.join(c.PRECISIONS)}")
+    if isinstance(iterations, str) and iterations != "auto":
+        raise ValueError(f"iterations {iterations!r} is neither a number nor 'auto'")
+    if isinstance(light_power, str) and light_power != "auto":
+        raise ValueError(f"light_power {light_power!r} is neither a number nor 'auto'")
+    given = [Photo(np.ascontiguousarray(p.image, np.float32), p.light, p.camera, p.power) for p in photos]
+    side = given[0].image.shape[0] if given and given[0].image.ndim else 0
+    for p in given:
+        if p.image.shape != (side, side, 3):
+            raise ValueError(f"a photograph of shape {p.image.shape}: all must be (side, side, 3)")
+    steps = model.iterations if iterations is None else c.AUTO_MOST if iterations == "auto" else int(iterations)
+    calls, error, options = _Calls(progress, steps), c.Failure(), c.Options()
+    structs, taken = (c.PhotoStruct * len(given))(), (c.PhotoStruct * len(given))()
+    power = ctypes.c_double(1 if light_power == "auto" else float(light_power))
+    for k, p in enumerate(given):
+        structs[k] = p.struct()
+        structs[k].power *= power.value
+    lib.lgd_options_init(options, ctypes.sizeof(options))
+    options.iterations = -1 if iterations is None else c.AUTO if iterations == "auto" else steps
+    options.exact, options.precision = exact, c.PRECISIONS[precision]
+    options.orientations, options.threads, options.fov = orientations, threads, fov
+    options.progress, options.tile, options.taken = calls.step, calls.tile, taken
+    if tolerance is not None:
+        options.tolerance = tolerance
+    if light_power == "auto":
+        options.power = ctypes.pointer(power)
+    if mask is not None:
+        options.mask = mask.ctypes.data_as(ctypes.POINTER(ctypes.c_ubyte))
+    maps = np.empty((side, side, 9), np.float32)
+    code = lib.lgd_estimate_photos(model._model, structs, len(given), side, options, floats(maps), error)
+    if calls.raised:
+        raise calls.raised
+    check(code, error)
+    first = taken[0]
+    photo = Photo(given[0].image, tuple(first.light), tuple(first.camera), first.power)
+    return Maps(maps, photo, rmse=calls.rmse)
+
+
+def estimate(
+    image: Image,
+    *,
+    model: Optional[Model] = None,
+    fov: Optional[float] = None,
+    mask: Optional[Image] = None,
+    size: int = 256,
+    iterations: Union[int, str, None] = None,
+    light_power: Union[float, str] = "auto",
+    tolerance: Optional[float] = None,
+    orientations: int = 2,
+    exact: bool = False,
+    precision: str = "f32",
+    threads: int = 0,
+    progress: Optional[Progress] = None,
+) -> Maps:
+    """Maps of size x size pixels from one photograph.
+
+    model: by default single, the shipped one. image: a file; or an array, (height, width, 3): uint8 and uint16 are
+    sRGB, floats are linear. Its largest centred square is used. fov: degrees across that square; None: from the file's
+    EXIF, else what the model assumes or estimates. mask: a file, or an array of the photograph's height and width: only
+    where it is not black the maps are refined. iterations: None: as trained, or "auto". The rest is as lgd-infer --help
+    says.
+    """
+    model = model or _shipped()
+    if size < 1:
+        raise ValueError(f"size is {size} and must be 1 or more")
+    if isinstance(image, np.ndarray):
+        cut, why = square(image, size), "an array has no EXIF"
+        height, width, found = image.shape[0], image.shape[1], None
+    else:
+        cut, facts = read_photo(image, size, published=model.published, threads=threads)
+        width, height, found, why = facts.width, facts.height, facts.fov, facts.fov_from
+    wanted = None if mask is None else cut_mask(mask, size, width, height)
+    degrees = found if fov is None else fov
+    if fov is not None and fov <= 0:
+        raise ValueError(f"fov is {fov} degrees and must be above 0")
+    maps = _run(
+        model,
+        [Photo(cut)],
+        c.UNKNOWN if degrees is None else degrees,
+        wanted,
+        iterations,
+        light_power,
+        tolerance,
+        orientations,
+        exact,
+        precision,
+        threads,
+        progress,
+    )
+    if degrees is None:
+        how = "assumed" if maps.photo.camera == Photo(None).camera else "estimated"
+        maps.fov_from = f"{how}: {why}"
+    else:
+        maps.fov_from = why if fov is None else "given"
+    return maps
+
+
+def estimate_photos(
+    photos: Sequence[Photo],
+    *,
+    model: Model,
+    iterations: Union[int, str, None] = None,
+    light_power: Union[float, str] = 1.0,
+    threads: int = 0,
+    progress: Optional[Progress] = None,
+) -> Maps:
+    """Maps from 1 .. most_photos photographs under known lights. Their images are rectified to the sample, of one
+    size, float32."""
+    return _run(
+        model,
+        photos, c.OF_PHOTO if len(photos) == 1 else c.UNKNOWN, None, iterations, light_power, None, 2, False,
+        "f32", threads, progress,
+    )

@@ -1,0 +1,219 @@
+"""The Python package. Environment: PHOTO, a photograph; LGD_LIBRARY and LGD_MODEL, or an installed package."""
+
+import ctypes
+import math
+import os
+import pathlib
+import re
+import tempfile
+import threading
+import unittest
+
+import lgd
+import numpy as np
+from lgd import _library
+
+PHOTO = os.environ["PHOTO"]
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+SIZE = 32
+RNG = np.random.default_rng(1)
+
+
+def bump(width=40, height=30):
+    """A picture's levels, brighter in the middle."""
+    y, x = np.mgrid[0:height, 0:width]
+    grey = 200 - 120 * ((x / width - 0.5) ** 2 + (y / height - 0.5) ** 2)
+    return np.stack([grey, 0.9 * grey, 0.7 * grey], 2).astype(np.uint8)
+
+
+def quick(image, **options):
+    return lgd.estimate(image, **{"size": SIZE, "iterations": 1, "threads": 1, **options})
+
+
+class Structs(unittest.TestCase):
+    def test_fields_are_those_of_the_header(self):
+        header = re.sub(r"/\*.*?\*/", "", (ROOT / "infer" / "lgd.h").read_text(), flags=re.S)
+        for struct, name in [
+            (_library.Failure, "lgd_error"),
+            (_library.PhotoStruct, "lgd_photo"),
+            (_library.Options, "lgd_options"),
+            (_library.ReadOptions, "lgd_read_options"),
+            (_library.FactsStruct, "lgd_facts"),
+            (_library.WriteOptions, "lgd_write_options"),
+        ]:
+            body = re.search(r"struct %s \{(.*?)\n?\}" % name, header, re.S)[1]
+            fields = []
+            for line in body.split(";"):
+                called = re.search(r"\(\*(\w+)\)\(", line)
+                names = re.findall(r"(\w+)(?:\[\w+\])?\s*(?:,|$)", line.strip())
+                fields += [called[1]] if called else names
+            self.assertEqual([f[0] for f in struct._fields_], fields, name)
+
+    def test_the_library_has_options_of_that_size(self):
+        options, size = _library.Options(), ctypes.sizeof(_library.Options)
+        library = _library.load()
+        library.lgd_options_init(options, size)
+        self.assertEqual((options.size, options.iterations, options.orientations), (size, -1, 2))
+
+    def test_constants_are_those_of_the_header(self):
+        header = (ROOT / "infer" / "lgd.h").read_text()
+        self.assertIn("LGD_AUTO = %d, LGD_AUTO_MOST = %d" % (_library.AUTO, _library.AUTO_MOST), header)
+        self.assertIn("#define LGD_FOV_OF_PHOTO (%.1f)" % _library.OF_PHOTO, header)
+        self.assertIn("#define LGD_FOV_UNKNOWN %.1f" % _library.UNKNOWN, header)
+        self.assertIn("enum { LGD_SRGB8, LGD_SRGB16, LGD_LINEAR }", header)
+        self.assertIn("enum { LGD_EXR_AUTO, LGD_EXR_HALF, LGD_EXR_FLOAT }", header)
+        self.assertIn("enum { LGD_F32, LGD_BF16 }", header)
+
+
+class Estimates(unittest.TestCase):
+    def test_a_file(self):
+        maps = quick(PHOTO)
+        self.assertEqual(maps.array.shape, (SIZE, SIZE, 9))
+        self.assertEqual(maps.array.dtype, np.float32)
+        self.assertEqual((maps.size, maps.diffuse.shape, maps.specular.shape), (SIZE, (SIZE, SIZE, 3), (SIZE, SIZE, 3)))
+        self.assertEqual(maps.roughness.shape, (SIZE, SIZE))
+        np.testing.assert_allclose((maps.normal**2).sum(2), 1, atol=1e-5)
+        for values in (maps.diffuse, maps.specular, maps.roughness):
+            self.assertTrue((values >= 0).all() and (values <= 1).all())
+        self.assertEqual(len(maps.rmse), 2)
+        self.assertTrue(all(math.isfinite(r) for r in (maps.rmse[0], maps.rmse[-1])))
+
+    def test_an_array_is_as_its_file(self):
+        levels = bump()
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "p.ppm")
+            with open(path, "wb") as f:
+                f.write(b"P6\n40 30\n255\n" + levels.tobytes())
+            of_file = quick(pathlib.Path(path))
+        np.testing.assert_allclose(quick(levels).array, of_file.array, atol=1e-4)
+        np.testing.assert_allclose(quick(levels.astype(np.uint16) * 257).array, of_file.array, atol=1e-4)
+        v = levels / 255
+        linear = np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
+        np.testing.assert_allclose(quick(linear).array, of_file.array, atol=1e-4)
+        # strides of its own; grey
+        np.testing.assert_array_equal(quick(levels[:, ::-1]).array, quick(levels[:, ::-1].copy()).array)
+        np.testing.assert_array_equal(quick(levels[:, :, 0]).array, quick(np.repeat(levels[:, :, :1], 3, 2)).array)
+
+    def test_fov(self):
+        levels = bump()
+        self.assertAlmostEqual(quick(levels, fov=28).photo.fov, 28, places=3)
+        self.assertEqual(quick(levels, fov=28).fov_from, "given")
+        self.assertIn("an array has no EXIF", quick(levels).fov_from)
+        self.assertFalse(np.array_equal(quick(levels, fov=28).array, quick(levels, fov=70).array))
+        for wrong in (0, -1, 180):
+            with self.assertRaisesRegex((ValueError, lgd.Error), "fov is"):
+                quick(levels, fov=wrong)
+
+    def test_mask(self):
+        levels = bump()
+
+        def refined(image, **options):
+            return quick(image, iterations=6, **options)
+
+        mask = np.zeros(levels.shape[:2], bool)
+        whole, none = refined(levels, mask=~mask), refined(levels, mask=mask)
+        np.testing.assert_allclose(whole.array, refined(levels).array, atol=1e-4)
+        self.assertFalse(np.array_equal(none.array, whole.array))
+        with self.assertRaisesRegex(ValueError, r"must be that of the photograph, \(30, 40\)"):
+            quick(levels, mask=mask.T)
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "m.pgm")
+            with open(path, "wb") as f:
+                f.write(b"P5\n40 30\n255\n" + bytes(40 * 30))
+            np.testing.assert_array_equal(refined(levels, mask=path).array, none.array)
+
+    def test_progress(self):
+        seen = []
+        quick(PHOTO, iterations=3, progress=lambda done, rmse: seen.append((done, rmse)))
+        self.assertEqual([d for d, _ in seen], [0.25, 0.5, 0.75, 1])
+        self.assertTrue(math.isfinite(seen[0][1]) and math.isnan(seen[1][1]) and math.isfinite(seen[3][1]))
+
+    def test_what_progress_raises_ends_the_work(self):
+        calls = []
+
+        def stop(done, rmse):
+            calls.append(done)
+            raise KeyboardInterrupt
+
+        for options in ({}, {"mask": np.ones((30, 40), bool)}):
+            calls.clear()
+            with self.assertRaises(KeyboardInterrupt):
+                quick(bump(), iterations=5, progress=stop, **options)
+            self.assertEqual(len(calls), 1)
+
+    def test_several_threads_share_a_model(self):
+        model, results = lgd.Model(), [None] * 4
+
+        def work(k):
+            results[k] = quick(bump(), model=model).array
+
+        threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
+        for t in threads:
+            t.start()
+        for t in threads:
+            t.join()
+        for r in results[1:]:
+            np.testing.assert_array_equal(r, results[0])
+
+    def test_photos_with_known_lights(self):
+        model, image = lgd.Model(), RNG.uniform(0.2, 0.6, (SIZE, SIZE, 3)).astype(np.float32)
+        photo = lgd.Photo(image, light=(0.1, 0.2, 1.5), camera=(0, 0, 1.5), power=10)
+        maps = lgd.estimate_photos([photo], model=model, iterations=1)
+        self.assertEqual(maps.photo.light, tuple(np.float32((0.1, 0.2, 1.5))))
+        too_many = [photo] * (model.most_photos + 1)
+        with self.assertRaisesRegex(lgd.Error, "photographs: these weights read"):
+            lgd.estimate_photos(too_many, model=model)
+        with self.assertRaisesRegex(ValueError, "side, side, 3"):
+            lgd.estimate_photos([lgd.Photo(None)], model=model)
+
+    def test_what_is_wrong_is_said(self):
+        for options, kind, text in [
+            ({"image": "absent.jpg"}, lgd.Error, "absent.jpg"),
+            ({"image": np.zeros((4, 4, 2), np.uint8)}, ValueError, r"shape \(4, 4, 2\)"),
+            ({"image": np.zeros((4, 4, 3), np.int32)}, ValueError, "int32"),
+            ({"image": bump(), "size": 0}, ValueError, "size is 0"),
+            ({"image": bump(), "iterations": "often"}, ValueError, "often"),
+            ({"image": bump(), "iterations": 5000}, lgd.Error, "iterations is 5000"),
+            ({"image": bump(), "precision": "f16"}, ValueError, "f16"),
+            ({"image": bump(), "light_power": "all"}, ValueError, "all"),
+            ({"image": bump(), "orientations": 3}, lgd.Error, "orientations is 3"),
+            ({"image": bump(), "threads": -1}, lgd.Error, "threads is -1"),
+        ]:
+            with self.subTest(text), self.assertRaisesRegex(kind, text):
+                quick(**options)
+        with self.assertRaisesRegex(lgd.Error, "absent.safetensors"):
+            lgd.Model("absent.safetensors")
+
+
+class Files(unittest.TestCase):
+    def test_read_photo(self):
+        image, facts = lgd.read_photo(PHOTO, 16)
+        self.assertEqual((image.shape, image.dtype), ((16, 16, 3), np.float32))
+        self.assertTrue(facts.width > 0 and facts.height > 0 and facts.fov_from)
+
+    def test_saved_files(self):
+        maps = quick(PHOTO)
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "a", "b", "wall")
+            maps.save(path)
+            self.assertEqual(len(os.listdir(path)), 8)
+            maps.save(pathlib.Path(path), ["normal", "glb"], workflow="metallic")
+            self.assertLessEqual({"normal.png", "material.glb"}, set(os.listdir(path)))
+            for options, kind, text in [
+                ({"maps": "colour"}, lgd.Error, "'colour' is nothing"),
+                ({"workflow": "other"}, ValueError, "other"),
+                ({"exr": "double"}, ValueError, "double"),
+            ]:
+                with self.subTest(text), self.assertRaisesRegex(kind, text):
+                    maps.save(path, **options)
+
+    def test_a_rendering_under_the_photographs_light_is_the_photograph(self):
+        maps = quick(PHOTO, iterations=None)
+        apart = np.clip(maps.render(), 0, 1) - np.clip(maps.photo.image, 0, 1)
+        self.assertAlmostEqual(math.sqrt((apart**2).mean()), maps.rmse[-1], delta=1e-3)
+        dark = maps.render(light=(0, 0, 1.0), camera=np.array([0, 0, 1.0]), power=0)
+        self.assertEqual(dark.max(), 0)
+
+
+if __name__ == "__main__":
+    unittest.main()
