@@ -5,6 +5,7 @@
 #: make deps         installs what the build needs (Debian, Ubuntu); the three above do so first
 #: make test-blender material.glb in Blender's renderer, with PYTHON= that has bpy; skipped without
 #: make install      into PREFIX (/usr/local), below DESTDIR when given, libraries into LIBDIR; make uninstall takes it away
+#: make manuals      manual pages and completions of bash and zsh, from --help: make install brings them
 #: make wheel        the Python package as build/lgd-VERSION-….whl, with the library and the weights in it
 #: make bench        times; BENCH="conv_ infer" runs the benchmarks whose names contain these words
 #: make bench-deps   PyTorch, for the comparison in make bench
@@ -341,12 +342,41 @@ demo: deps
 	@$(MAKE) --no-print-directory programs
 	@BUILD=$(BUILD) sh .ci/demo.sh
 
+# What make install brings beside programs and libraries: made of the programs' --help.
+ABOUT_infer := maps of a material from a flash photograph
+ABOUT_train := trains the networks of lgd
+ABOUT_eval := measures and compares estimates of materials
+ABOUT_data := writes procedural materials and photographs of them
+ABOUT_convert := converts and lists files of weights
+MAN := $(PROGRAMS:%=share/man/man1/lgd-%.1)
+COMPLETIONS := $(PROGRAMS:%=share/bash-completion/completions/lgd-%) $(PROGRAMS:%=share/zsh/site-functions/_lgd-%)
+
+$(BUILD)/share/man/man1/lgd-%.1: $(BUILD)/bin/lgd-% Makefile
+	$(call step,MAN,$@)
+	@mkdir -p $(@D)
+	$(Q)LC_ALL=C.UTF-8 help2man --no-info --name '$(ABOUT_$*)' --output $@ $<
+
+$(BUILD)/share/bash-completion/completions/lgd-%: $(BUILD)/bin/lgd-% .ci/completions.sh
+	$(call step,GEN,$@)
+	@mkdir -p $(@D)
+	$(Q)sh .ci/completions.sh bash $< > $@.new && mv $@.new $@
+
+$(BUILD)/share/zsh/site-functions/_lgd-%: $(BUILD)/bin/lgd-% .ci/completions.sh
+	$(call step,GEN,$@)
+	@mkdir -p $(@D)
+	$(Q)sh .ci/completions.sh zsh $< > $@.new && mv $@.new $@
+
+manuals:
+	@sh .ci/deps.sh help2man
+	@$(MAKE) --no-print-directory $(MAN:%=$(BUILD)/%) $(COMPLETIONS:%=$(BUILD)/%)
+
 # Where make install puts things.
 TO := $(DESTDIR)$(PREFIX)
 TO_LIB := $(DESTDIR)$(LIBDIR)
 MODELS := $(wildcard models/*.safetensors)
 
 install: all
+	@$(MAKE) --no-print-directory manuals
 	install -d $(TO)/bin $(TO_LIB)/pkgconfig $(TO_LIB)/lgd $(TO)/include $(TO)/share/lgd
 	install -m 755 $(BIN) $(TO)/bin
 	install -m 644 $(LIB) $(SHARED) $(TO_LIB)
@@ -358,6 +388,7 @@ install: all
 	  $(TO_LIB)/$(notdir $(SHARED)) $(TO_LIB)/lgd/liblgd_image.so
 	$(STRIP) --strip-debug $(TO_LIB)/liblgd.a
 	install -m 644 infer/lgd.h $(TO)/include
+	for f in $(MAN) $(COMPLETIONS); do install -D -m 644 $(BUILD)/$$f $(TO)/$$f || exit 1; done
 	install -m 644 $(MODELS) $(TO)/share/lgd
 	@printf '%s\n' 'prefix=$(PREFIX)' 'libdir=$(LIBDIR:$(PREFIX)/%=$${prefix}/%)' 'Name: lgd' \
 	  'Description: material of a surface from one flash photograph' 'Version: $(VERSION)' \
@@ -367,13 +398,14 @@ install: all
 
 uninstall:
 	rm -f $(PROGRAMS:%=$(TO)/bin/lgd-%) $(TO_LIB)/liblgd.a $(TO_LIB)/liblgd.so* $(TO_LIB)/lgd/liblgd_image.so \
-	  $(TO_LIB)/pkgconfig/lgd.pc $(TO)/include/lgd.h $(MODELS:models/%=$(TO)/share/lgd/%)
+	  $(TO_LIB)/pkgconfig/lgd.pc $(TO)/include/lgd.h $(MODELS:models/%=$(TO)/share/lgd/%) \
+	  $(MAN:%=$(TO)/%) $(COMPLETIONS:%=$(TO)/%)
 	-rmdir $(TO)/share/lgd $(TO_LIB)/lgd
 
 clean:
 	rm -rf $(BUILD) $(BUILD)-asan $(BUILD)-leaks $(BUILD)-tsan
 
-.PHONY: all programs library help deps test test-blender wheel bench bench-deps stress fuzz faults tsan asan demo install \
-  uninstall clean
+.PHONY: all programs library help deps test test-blender wheel manuals bench bench-deps stress fuzz faults tsan asan \
+  demo install uninstall clean
 .SECONDARY:
 -include $(shell find $(OBJ) $(BUILD)/fuzz/obj -name '*.d' 2>/dev/null)

@@ -1,7 +1,7 @@
 #!/bin/sh
 # Installs what the build needs with the system's package manager, as root or through sudo; where that is not possible it
 # prints the names of what is missing and ends with 1. On a terminal it asks first, unless YES or CI is set.
-# Arguments: the pkg-config modules.
+# Arguments: the pkg-config modules, help2man.
 missing=
 optional=
 have() { command -v "$1" >/dev/null 2>&1; }
@@ -9,6 +9,10 @@ have "${CC:-gcc}" || missing="$missing gcc"
 have "${CXX:-g++}" || missing="$missing g++"
 have pkg-config || missing="$missing pkg-config"
 for module in "$@"; do
+    if [ "$module" = help2man ]; then # manual pages
+        have help2man || missing="$missing help2man"
+        continue
+    fi
     if have pkg-config && pkg-config --exists "$module"; then continue; fi
     case $module in
     OpenImageIO) missing="$missing libopenimageio-dev" ;;

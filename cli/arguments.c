@@ -51,7 +51,9 @@ void cl_argument_help(const cl_argument *table, FILE *out)
         if (table[i].key <= 255) snprintf(letter, sizeof letter, "-%c,", table[i].key);
         snprintf(left, sizeof left, "%3s --%s%s%s", letter, table[i].name, table[i].value ? " " : "",
                  table[i].value ? table[i].value : "");
-        fprintf(out, "  %-23s ", left);
+        /* two spaces at least tell the text from a value: help2man and .ci/completions.sh rely on them */
+        if (strlen(left) > 22) fprintf(out, "  %s\n%26s", left, "");
+        else fprintf(out, "  %-24s", left);
         for (const char *c = table[i].help; *c; c++) {
             fputc(*c, out);
             if (*c == '\n') fprintf(out, "%26s", "");

@@ -70,7 +70,7 @@ static void print_help(void)
 {
     printf(
         "Usage: lgd-data [options] -o DIR\n"
-        "       lgd-data --statistics --testdata DIR [options]\n"
+        "  or:  lgd-data --statistics --testdata DIR [options]\n"
         "Writes procedural materials number FIRST .. FIRST+COUNT-1 of the sequence of SEED.\n\n"
         "What to write (the default is --format folders):\n"
         "  -o, --output DIR      output folder; created when absent\n"
@@ -93,7 +93,7 @@ static void print_help(void)
         "      --size N          8 .. 2048 pixels, default 256; contact sheet, statistics and histograms 128\n"
         "      --families LIST   all (the default), classic (the first seventeen), or some of: ");
     for (int i = 0; i < io_family_count(); i++)
-        printf("%s%s%s", i ? "," : "", i % 9 == 0 ? "\n                        " : "", io_family_name(i));
+        printf("%s%s%s", i ? i % 8 ? ", " : "," : "", i % 8 ? "" : "\n                        ", io_family_name(i));
     printf("\n\nPhotographs, largest values of what each draws:\n");
     for (int i = 0; i < CL_CAMERA_OPTIONS; i++) {
         io_camera least = cl_camera_default;

@@ -1,8 +1,8 @@
 """Builds the wheel, for pip (PEP 517 and 660) and for `make wheel`. It needs Python and make alone.
 
-LGD_WHEEL=system: a wheel of Python files, which uses the liblgd.so of the system. LGD_WHEEL=own: liblgd.so, what it loads
-and the weights of `single` are in the wheel. Without it: own where the system has no liblgd.so.0. The library is that of
-the checkout that this folder is in, $LGD_BUILD or build/, which make brings up to date.
+LGD_WHEEL=system: a wheel of Python files, which uses the liblgd.so of the system. LGD_WHEEL=own: liblgd.so, what it
+loads and the weights of `single` are in the wheel. Without it: own where the system has no liblgd.so.0. The library is
+that of the checkout that this folder is in, $LGD_BUILD or build/, which make brings up to date.
 """
 
 import base64
@@ -44,8 +44,9 @@ def _own():
 def _metadata():
     readme = (HERE / "README.md").read_text()
     head = (
-        "Metadata-Version: 2.1\nName: lgd\nVersion: {}\nSummary: The material of a flat surface from one flash photograph\n"
-        "License: Apache-2.0\nRequires-Python: >=3.9\nRequires-Dist: numpy\nDescription-Content-Type: text/markdown\n\n{}"
+        "Metadata-Version: 2.1\nName: lgd\nVersion: {}\n"
+        "Summary: The material of a flat surface from one flash photograph\nLicense: Apache-2.0\n"
+        "Requires-Python: >=3.9\nRequires-Dist: numpy\nDescription-Content-Type: text/markdown\n\n{}"
     )
     return head.format(_version(), readme)
 

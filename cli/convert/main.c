@@ -10,7 +10,7 @@ enum { PREFIX = 256 };
 
 static const cl_argument arguments[] = {
     {'l', "list", NULL, "print name, type and shape of every tensor of IN, and write nothing"},
-    {'d', "dtype", "TYPE", "f32, f16 or bf16 for all floating-point tensors (default: each keeps its own)"},
+    {'d', "dtype", "f32|f16|bf16", "f32, f16 or bf16 for all floating-point tensors (default: each keeps its own)"},
     {PREFIX, "prefix", "TEXT", "only tensors whose names begin with TEXT, without it (as in: model. or module.)"},
     {'h', "help", NULL, "print this help"},
     {'V', "version", NULL, "print the version"},
@@ -26,7 +26,7 @@ typedef struct command {
 static void print_help(void)
 {
     puts("Usage: lgd-convert [options] IN OUT\n"
-         "       lgd-convert --list IN\n"
+         "  or:  lgd-convert --list IN\n"
          "Writes the tensors of IN to OUT. IN is a safetensors file or what torch.save wrote of a state dict (since "
          "PyTorch 1.6 a ZIP archive, or the\n"
          "older form); its first bytes say which. OUT is safetensors when its name ends with .safetensors, PyTorch's "

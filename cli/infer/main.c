@@ -242,9 +242,9 @@ static int all(run *r, lgd_pipeline *pipeline)
 static void print_help(void)
 {
     puts("Usage: lgd-infer [options] PHOTO|FOLDER|@LIST... -o DIR\n"
-         "       lgd-infer [options] --corners X,Y X,Y X,Y X,Y PHOTO -o DIR\n"
-         "       lgd-infer [options] --sheet PHOTO... -o DIR\n"
-         "       lgd-infer [options] --capture WHERE -o DIR\n"
+         "  or:  lgd-infer [options] --corners X,Y X,Y X,Y X,Y PHOTO -o DIR\n"
+         "  or:  lgd-infer [options] --sheet PHOTO... -o DIR\n"
+         "  or:  lgd-infer [options] --capture WHERE -o DIR\n"
          "Estimates the material of a flat surface from a photograph taken straight on with a flash beside the lens.\n"
          "The largest centred square is used. FOLDER stands for the photographs in it, LIST is a file that names one a "
          "line.\n");

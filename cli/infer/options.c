@@ -84,7 +84,7 @@ const cl_argument lgd_infer_arguments[] = {
      "all maps repeat without a visible border: the same seam is cut through all of them; 7/8 of the square remain"},
     {EXR, "exr", "half|float",
      "numbers of maps.exr: half floats, compressed, or floats (default: float up to 512 pixels, half above)"},
-    {WORKFLOW, "workflow", "W",
+    {WORKFLOW, "workflow", "specular|metallic",
      "specular (default), or metallic: base colour and metalness instead of diffuse and specular; the error of the\n"
      "conversion is printed"},
     {MAX_PIXELS, "max-pixels", "N", "refuse photographs with more pixels (default 268435456)"},

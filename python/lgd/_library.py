@@ -1,10 +1,10 @@
 """liblgd.so and the functions of lgd.h that the package calls."""
 
 import ctypes
-import ctypes.util
 import os
 import pathlib
-from ctypes import CFUNCTYPE, POINTER, c_char, c_char_p, c_double, c_float, c_int, c_longlong, c_size_t, c_ubyte, c_void_p
+from ctypes import CFUNCTYPE, POINTER, c_char, c_char_p, c_double, c_float, c_int, c_longlong, c_size_t
+from ctypes import c_ubyte, c_void_p
 
 OF_PHOTO = -1.0  # LGD_FOV_OF_PHOTO
 UNKNOWN = 0.0  # LGD_FOV_UNKNOWN
@@ -132,4 +132,4 @@ def load() -> ctypes.CDLL:
                 raise ImportError(f"{place} has no {name}: it is older than this package; install both again") from None
             function.restype, function.argtypes = result, arguments
         return library
-    raise ImportError("liblgd.so is not found; make install, or name the file in LGD_LIBRARY (" + "; ".join(tried) + ")")
+    raise ImportError("no liblgd.so: make install, or name the file in LGD_LIBRARY (" + "; ".join(tried) + ")")

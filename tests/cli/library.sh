@@ -47,10 +47,12 @@ is_as_of_the_program() {
 install_link_uninstall() {
     [ -z "$SANITIZED" ] || skip "the sanitizers' build is not installed"
     command -v pkg-config >/dev/null || skip "no pkg-config"
+    has_help2man
     expect 0 make --no-print-directory install BUILD="$BUILD" DESTDIR="$T/root" PREFIX=/usr/local
     root=$T/root/usr/local
-    for f in bin/lgd-infer bin/lgd-train bin/lgd-eval bin/lgd-data bin/lgd-convert bin/lgd-capture lib/liblgd.a lib/liblgd.so lib/liblgd.so.0 \
-        lib/lgd/liblgd_image.so include/lgd.h share/lgd/single.safetensors lib/pkgconfig/lgd.pc; do
+    for f in bin/lgd-infer bin/lgd-train bin/lgd-eval bin/lgd-data bin/lgd-convert bin/lgd-capture lib/liblgd.a lib/liblgd.so \
+        lib/liblgd.so.0 lib/lgd/liblgd_image.so include/lgd.h share/lgd/single.safetensors lib/pkgconfig/lgd.pc \
+        share/man/man1/lgd-infer.1 share/bash-completion/completions/lgd-train share/zsh/site-functions/_lgd-eval; do
         [ -s "$root/$f" ] || fail "$f is not installed"
     done
     for f in "$root"/bin/* "$root"/lib/liblgd.so "$root"/lib/lgd/*.so "$root"/lib/liblgd.a; do

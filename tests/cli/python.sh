@@ -85,6 +85,7 @@ check python_pip_install_brings_the_library installs_with_its_own_library
 
 installs_with_the_systems_library() {
     venv
+    has_help2man
     expect 0 make --no-print-directory install BUILD="$BUILD" DESTDIR="$T/root" PREFIX=/usr/local
     LD_LIBRARY_PATH=$T/root/usr/local/lib
     export LD_LIBRARY_PATH
