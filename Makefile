@@ -3,10 +3,12 @@
 #: make demo         the same, then demo/flash.jpg to maps in build/demo/
 #: make test         the same, then every test
 #: make deps         installs what the build needs (Debian, Ubuntu); the three above do so first
-#: make test-blender material.glb in Blender's renderer, with PYTHON= that has bpy; skipped without
-#: make install      into PREFIX (/usr/local), below DESTDIR when given, libraries into LIBDIR; make uninstall takes it away
+#: make test-blender material.glb and the add-on in Blender, with PYTHON= that has bpy; skipped without
+#: make install      into PREFIX (/usr/local), libraries into LIBDIR, below DESTDIR when given; make uninstall undoes it
 #: make manuals      manual pages and completions of bash and zsh, from --help: make install brings them
 #: make wheel        the Python package as build/lgd-VERSION-….whl, with the library and the weights in it
+#: make blender      the Blender add-on as build/lgd_material-VERSION.zip, with that wheel in it
+#: make deb          Debian packages into build/: lgd, liblgd0, liblgd-dev, lgd-models, python3-lgd
 #: make bench        times; BENCH="conv_ infer" runs the benchmarks whose names contain these words
 #: make bench-deps   PyTorch, for the comparison in make bench
 #: make stress       the numerics far from ordinary input; STRESS=shading runs one part
@@ -33,6 +35,7 @@ FIXTURES ?= ../shared/fixtures
 BUILD ?= build
 PYTHON ?= python3
 WHEELS ?= $(BUILD)
+DEBS ?= $(BUILD)
 OPT ?= -O3 -g
 SANITIZE ?=
 
@@ -277,6 +280,21 @@ wheel: library
 	@mkdir -p $(WHEELS)
 	@LGD_WHEEL=own LGD_BUILD=$(BUILD) STRIP=$(STRIP) $(PYTHON) python/backend.py $(WHEELS)
 
+# The add-on for Blender 4.2 and later, with that wheel in it.
+blender: wheel
+	@rm -rf $(WHEELS)/blender && mkdir -p $(WHEELS)/blender/lgd_material/wheels
+	@cp $(WHEELS)/lgd-$(VERSION)-*.whl $(WHEELS)/blender/lgd_material/wheels/
+	@cp python/blender/lgd_material/__init__.py LICENSE $(WHEELS)/blender/lgd_material/
+	@cd $(WHEELS)/blender/lgd_material && sed "s/@VERSION@/$(VERSION)/; s/@WHEEL@/$$(ls wheels)/" \
+	  $(CURDIR)/python/blender/lgd_material/blender_manifest.toml.in > blender_manifest.toml
+	@rm -f $(WHEELS)/lgd_material-$(VERSION).zip
+	@cd $(WHEELS)/blender && $(PYTHON) -m zipfile -c ../lgd_material-$(VERSION).zip lgd_material && rm -rf lgd_material
+	@echo $(WHEELS)/lgd_material-$(VERSION).zip
+
+# With the libraries of the machine that it is called on.
+deb: all
+	@BUILD=$(BUILD) MAKE='$(MAKE)' sh .ci/deb.sh $(VERSION) $(DEBS)
+
 # PyTorch for the peer's column: bench/peer_torch.py
 bench-deps:
 	@BUILD=$(BUILD) sh .ci/bench-deps.sh
@@ -405,7 +423,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD) $(BUILD)-asan $(BUILD)-leaks $(BUILD)-tsan
 
-.PHONY: all programs library help deps test test-blender wheel manuals bench bench-deps stress fuzz faults tsan asan \
-  demo install uninstall clean
+.PHONY: all programs library help deps test test-blender wheel blender manuals deb bench bench-deps stress fuzz faults tsan \
+  asan demo install uninstall clean
 .SECONDARY:
 -include $(shell find $(OBJ) $(BUILD)/fuzz/obj -name '*.d' 2>/dev/null)
