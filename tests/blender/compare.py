@@ -1,6 +1,7 @@
 """Imports material.glb, renders it with Cycles under the lights of preview.png and compares the two.
 
-Usage: compare.py FOLDER, with what lgd-infer --maps glb,preview,normal wrote. Prints a line for each light and ends
+Usage: compare.py FOLDER [PHOTO], with what lgd-infer --maps glb,preview,normal wrote of PHOTO; when that is given, the
+material is the one that the add-on makes of it. Prints a line for each light and ends
 with 1 when a mean ratio is off by more than 2%, the correlation of the high-pass is below .98, or light from above does
 not brighten what faces up."""
 import math
@@ -12,7 +13,7 @@ import mathutils
 import numpy as np
 
 LIGHTS, POWER, SAMPLES = 4, 329288 / 65536, 64
-FOLDER = sys.argv[1]
+FOLDER, PHOTO = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else None
 
 
 def image(path):
@@ -39,6 +40,14 @@ def scene(size):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.import_scene.gltf(filepath=os.path.join(FOLDER, "material.glb"))
     plane = [o for o in bpy.context.scene.objects if o.type == "MESH"][0]
+    if PHOTO:
+        import lgd_material
+
+        lgd_material.register()
+        bpy.context.view_layer.objects.active = plane
+        bpy.ops.import_image.lgd_material(filepath=PHOTO, size=size)
+        if plane.active_material.name.split(".")[0] != os.path.splitext(os.path.basename(PHOTO))[0]:
+            raise SystemExit(f"the material is {plane.active_material.name}: WRONG")
     # glTF has y up, Blender z: the importer has turned the square upright
     plane.rotation_mode = "QUATERNION"
     plane.matrix_world = mathutils.Matrix.Rotation(math.radians(-90), 4, "X") @ plane.matrix_world
