@@ -261,7 +261,7 @@ static ts_code sheet_task(const options *o, int64_t number, io_material *m, io_i
 {
     (void)st;
     int column = (int)(number % sheet->columns), row = (int)(number / sheet->columns);
-    io_procedural p = {o->procedural.seed, UINT64_C(1) << row_family(o, row)};
+    io_procedural p = {.seed = o->procedural.seed, .families = UINT64_C(1) << row_family(o, row)};
     rd_view flash = rd_flash();
     io_procedural_make(&p, (uint64_t)(o->first + number), m);
     rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &flash, true, photo->data);

@@ -309,10 +309,10 @@ int main(int argc, char **argv)
     long n;
     int lines = 0;
     if (parse(argc, argv, &o)) {
-        fprintf(
-            stderr,
-            "usage: lgd-faults [--every N] [--call NAME] [--on] [--steps] [--lines N] [--libraries] [--whole] SHIM FOLDER "
-            "PROGRAM ARGUMENTS...\n");
+        fprintf(stderr,
+                "usage: lgd-faults [--every N] [--call NAME] [--on] [--steps] [--lines N] [--libraries] [--whole] SHIM "
+                "FOLDER "
+                "PROGRAM ARGUMENTS...\n");
         return 2;
     }
     const int status = run(&o, NULL);

@@ -86,11 +86,10 @@ static void photographs(const char *what, way a, way b, double rms, double most)
         for (int i = 0; i < files; i++) {
             if (names[i]->d_name[0] == '.' || seen++ % every != every / 2) continue;
             io_image square = {0};
-            int width, height;
+            io_photo_facts facts;
             ts_status st = {0};
             snprintf(path, sizeof path, "%s/%s", folder, names[i]->d_name);
-            CHECK(!lgd_photograph_square(path, false, MOST_PIXELS, side, 1, &square, &width, &height, &st), "%s",
-                  st.message);
+            CHECK(!lgd_photograph_square(path, false, MOST_PIXELS, side, 1, &square, &facts, &st), "%s", st.message);
             estimate(&a, square.data, side), estimate(&b, square.data, side);
             compare(a.maps, b.maps, side * side, &d);
             io_image_free(&square);
