@@ -107,11 +107,12 @@ def _run(
         raise ValueError(f"iterations {iterations!r} is neither a number nor 'auto'")
     if isinstance(light_power, str) and light_power != "auto":
         raise ValueError(f"light_power {light_power!r} is neither a number nor 'auto'")
-    given = [Photo(np.ascontiguousarray(p.image, np.float32), p.light, p.camera, p.power) for p in photos]
-    side = given[0].image.shape[0] if given and given[0].image.ndim else 0
-    for p in given:
-        if p.image.shape != (side, side, 3):
-            raise ValueError(f"a photograph of shape {p.image.shape}: all must be (side, side, 3)")
+    given = [Photo(p.image, p.light, p.camera, p.power) for p in photos]
+    shapes = [np.shape(p.image) for p in given]
+    side = shapes[0][0] if shapes and shapes[0] else 0
+    for shape in shapes:
+        if shape != (side, side, 3):
+            raise ValueError(f"a photograph of shape {shape}: all must be (side, side, 3)")
     steps = model.iterations if iterations is None else c.AUTO_MOST if iterations == "auto" else int(iterations)
     calls, error, options = _Calls(progress, steps), c.Failure(), c.Options()
     structs, taken = (c.PhotoStruct * len(given))(), (c.PhotoStruct * len(given))()

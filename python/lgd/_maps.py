@@ -47,6 +47,8 @@ class Photo:
     power: float = 0.0
 
     def __post_init__(self) -> None:
+        if self.image is not None:
+            self.image = np.ascontiguousarray(self.image, np.float32)
         flash = lib.lgd_flash_photo(None)
         self.light = tuple(self.light) or tuple(flash.light)
         self.camera = tuple(self.camera) or tuple(flash.camera)
@@ -155,6 +157,8 @@ class Maps:
         parent = os.path.dirname(os.path.abspath(os.fspath(folder)))
         os.makedirs(parent, exist_ok=True)
         values, error, photo = self._values(), c.Failure(), self.photo.struct()
+        if self.photo.image is not None and self.photo.image.shape != values.shape[:2] + (3,):
+            raise ValueError(f"maps of shape {values.shape} and a photograph of shape {self.photo.image.shape}")
         options = c.WriteOptions(
             ctypes.sizeof(c.WriteOptions),
             None if names is None else names.encode(),

@@ -199,6 +199,11 @@ class Files(unittest.TestCase):
             self.assertEqual(len(os.listdir(path)), 8)
             maps.save(pathlib.Path(path), ["normal", "glb"], workflow="metallic")
             self.assertLessEqual({"normal.png", "material.glb"}, set(os.listdir(path)))
+            half = lgd.Maps(maps.array[::2, ::2], maps.photo)
+            with self.assertRaisesRegex(ValueError, "photograph of shape"):
+                half.save(path)
+            half.photo = lgd.Photo(maps.photo.image[::2, ::2])
+            half.save(os.path.join(folder, "half"), "render")
             for options, kind, text in [
                 ({"maps": "colour"}, lgd.Error, "'colour' is nothing"),
                 ({"workflow": "other"}, ValueError, "other"),
