@@ -302,13 +302,14 @@ bench-deps:
 stress: $(STRESS_BIN)
 	@OMP_WAIT_POLICY=passive $(STRESS_BIN) $(STRESS)
 
-# Leaks are looked for in a build of its own: AddressSanitizer's malloc cannot be made to fail so.
+# Leaks are looked for in the same objects with LeakSanitizer: AddressSanitizer's malloc cannot be made to fail so.
 faults: programs $(FAULTS)
 	@BUILD=$(BUILD) sh tests/faults/run.sh $(FAULT_OPTIONS)
-	@$(MAKE) --no-print-directory BUILD=$(BUILD)-leaks OPT='-O1 -g -fno-omit-frame-pointer' SANITIZE=-fsanitize=leak \
-	  programs $(FAULTS:$(BUILD)/%=$(BUILD)-leaks/%)
-	@LSAN_OPTIONS=exitcode=23 BUILD=$(BUILD)-leaks ONLY_ONCE=1 \
-	  sh tests/faults/run.sh $(FAULT_OPTIONS)
+	@mkdir -p $(BUILD)-leaks/bin && cp -r $(BUILD)/lib $(BUILD)/bin/lgd-faults $(BUILD)-leaks && \
+	  mv $(BUILD)-leaks/lgd-faults $(BUILD)-leaks/bin
+	$(Q)for p in $(PROGRAMS); do main=$(OBJ)/$$p/main.o; [ -e $$main ] || main=$(OBJ)/cli/$$p/main.o; \
+	  $(CC) -o $(BUILD)-leaks/bin/lgd-$$p $$main $(INTERNAL) $(LDLIBS_ALL) -fsanitize=leak || exit 1; done
+	@LSAN_OPTIONS=exitcode=23 BUILD=$(BUILD)-leaks ONLY_ONCE=1 sh tests/faults/run.sh $(FAULT_OPTIONS)
 
 # clang's libFuzzer with the address and undefined sanitizers, FUZZ_SECONDS for each target. The readers are compiled for
 # it; what else they need comes from the library as it is. OpenImageIO's libraries take seconds to load, and its PNG

@@ -310,7 +310,7 @@ static int work(const lgd_command *given)
         lgd_index_start(&r.index, &plan, c->out, &st) != TS_OK) {
         lgd_plan_free(&plan);
         lgd_operands_free(&operands);
-        return cl_usage("%s", st.message);
+        return st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
     }
     int code = CL_FAILED;
     bool published = false;

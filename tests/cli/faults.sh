@@ -15,7 +15,7 @@ of_convert() { faults "convert torch" --every 20; }
 of_data() { faults "data strips" --every 40; }
 # The first memory is refused; texts in memory and config.ini are cut.
 of_train() { faults train --call malloc --every 2000 && faults train --call fprintf --every 200 && faults train --call fputs --every 200; }
-of_threads() { faults many --call pthread_create; }
+of_threads() { faults many --call pthread_create && faults many --call open_memstream; }
 
 check faults_of_infer of_infer
 check faults_of_convert of_convert

@@ -334,7 +334,8 @@ static void *from_early(size_t size)
     return early_used <= sizeof early ? p : NULL;
 }
 
-static __thread bool asking;
+/* volatile: dlsym is declared to call nothing of ours */
+static __thread volatile bool asking;
 #define REAL_MEMORY(name, size, ...)              \
     static void *(*real)(__VA_ARGS__);            \
     if (!real && asking) return from_early(size); \
@@ -373,9 +374,12 @@ void free(void *p)
 {
     static void (*real)(void *);
     if ((char *)p >= early && (char *)p < early + sizeof early) return;
+    if (!real && asking) return; /* what dlsym frees while it is asked */
     if (!real) {
+        asking = true;
         void *found = dlsym(RTLD_NEXT, "free");
         memcpy(&real, &found, sizeof real);
+        asking = false;
     }
     real(p);
 }
