@@ -310,9 +310,8 @@ int main(int argc, char **argv)
     int lines = 0;
     if (parse(argc, argv, &o)) {
         fprintf(stderr,
-                "usage: lgd-faults [--every N] [--call NAME] [--on] [--steps] [--lines N] [--libraries] [--whole] SHIM "
-                "FOLDER "
-                "PROGRAM ARGUMENTS...\n");
+                "usage: lgd-faults [--every N] [--call NAME] [--on] [--steps] [--lines N] [--libraries] "
+                "[--whole] SHIM FOLDER PROGRAM ARGUMENTS...\n");
         return 2;
     }
     const int status = run(&o, NULL);
