@@ -367,6 +367,7 @@ ABOUT_train := trains the networks of lgd
 ABOUT_eval := measures and compares estimates of materials
 ABOUT_data := writes procedural materials and photographs of them
 ABOUT_convert := converts and lists files of weights
+ABOUT_capture := prints sheets to photograph materials with and checks photographs
 MAN := $(PROGRAMS:%=share/man/man1/lgd-%.1)
 COMPLETIONS := $(PROGRAMS:%=share/bash-completion/completions/lgd-%) $(PROGRAMS:%=share/zsh/site-functions/_lgd-%)
 

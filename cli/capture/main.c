@@ -12,7 +12,7 @@ enum { PAPER = 256, FOV, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
 
 static const cl_argument arguments[] = {
     {'o', "output", "FILE", "of sheet: where the drawing goes, a name that ends in .pdf or .svg (required)"},
-    {PAPER, "paper", "P", "of sheet: a4 (default) or letter"},
+    {PAPER, "paper", "a4|letter", "of sheet: its paper (default a4)"},
     {FOV, "fov", "DEG", "of check: field of view across the photographs' shorter side (default: from EXIF)"},
     {'t', "threads", "N", "number of threads, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {MAX_PIXELS, "max-pixels", "N", "refuse photographs with more pixels (default 268435456)"},

@@ -5,7 +5,7 @@ case "$BUILD ${MAKEFLAGS:-}" in *asan* | *fsanitize*) SANITIZED=1 ;; *) SANITIZE
 unpacked_works() {
     PATH=$T/root/usr/bin:$PATH
     export LD_LIBRARY_PATH="$T/root$libdir"
-    for p in infer train eval data convert; do
+    for p in infer train eval data convert capture; do
         expect 0 "lgd-$p" --version
         says "$T/out" "lgd-$p (lgd) "
         readelf -SW "$T/root/usr/bin/lgd-$p" | grep -qF .symtab && fail "lgd-$p is not stripped"
