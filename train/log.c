@@ -49,6 +49,7 @@ static ts_code open_at(const tr_trainer *t, const char *name, const char *header
             return code;
         }
     } else {
+        if (t->step > 0 && errno != ENOENT) return failed(path, st); /* it is there, and stays */
         f = fopen(path, "we");
         if (!f) return failed(path, st);
         if (fputs(header, f) == EOF || fflush(f) != 0) {

@@ -73,6 +73,8 @@ static ts_code check_folder(const tr_trainer *t, bool *resume, ts_status *st)
     char path[TR_PATH];
     tr_path(t, "checkpoint.safetensors", path);
     const bool there = access(path, F_OK) == 0;
+    /* a checkpoint that cannot be looked at is none that a run may begin without */
+    if (!there && errno != ENOENT) return ts_fail(st, TS_IO, "%s: %s", path, strerror(errno));
     if (there && !*resume)
         return ts_fail(st, TS_INVALID,
                        "%s: there is a run already (checkpoint.safetensors): --resume goes on with it, output.folder "

@@ -15,10 +15,13 @@ of_convert() { faults "convert torch" --every 20; }
 of_data() { faults "data strips" --every 40; }
 # The first memory is refused; texts in memory and config.ini are cut.
 of_train() { faults train --call malloc --every 2000 && faults train --call fprintf --every 200 && faults train --call fputs --every 200; }
+# A checkpoint or a log that cannot be opened now is not one that is not there.
+of_resume() { faults resume --call access && faults resume --call fopen; }
 of_threads() { faults many --call pthread_create && faults many --call open_memstream; }
 
 check faults_of_infer of_infer
 check faults_of_convert of_convert
 check faults_of_data of_data
 check faults_of_train of_train
+check faults_of_resume of_resume
 check faults_of_several_threads of_threads

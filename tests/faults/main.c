@@ -223,7 +223,7 @@ static const char *look(const options *o, bool failed, int lines_before)
     list(path_of(o, "out"), &found);
     for (int i = 0; i < found.files; i++) {
         const int k = find(&expected, found.file[i].name);
-        if (k < 0 && at_once && strstr(found.file[i].name, "/.lgd-")) continue;
+        if (k < 0 && at_once && strstr(found.file[i].name, ".lgd-")) continue;
         if (k < 0) return snprintf(why, sizeof why, "leaves %s", found.file[i].name), why;
         snprintf(base, sizeof base, "%s/%s", path_of(o, "expected"), found.file[i].name);
         snprintf(path, sizeof path, "%s/%s", path_of(o, "out"), found.file[i].name);
