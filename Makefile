@@ -2,7 +2,8 @@
 #: make              the programs, liblgd.a and liblgd.so, in build/
 #: make demo         the same, then demo/flash.jpg to maps in build/demo/
 #: make test         the same, then every test
-#: make deps         installs what the build needs (Debian, Ubuntu); the three above do so first
+#: make deps         installs what the build needs (Debian, Ubuntu) and Open MPI; make test does so first, and the two
+#:                   above it without MPI
 #: make test-blender material.glb and the add-on in Blender, with PYTHON= that has bpy; skipped without
 #: make install      into PREFIX (/usr/local), libraries into LIBDIR, below DESTDIR when given; make uninstall undoes it
 #: make manuals      manual pages and completions of bash and zsh, from --help: make install brings them
@@ -59,6 +60,9 @@ PKG := OpenEXR libpng libjpeg zlib lcms2
 PKG_IMAGE := OpenImageIO
 # Optional: the tags of a printed sheet (data/rectify/tags.c).
 PKG_TAGS := apriltag
+# Training in several processes (train/mpi/mpi.h): a shared object for each MPI library that is installed, none without.
+PKG_openmpi := ompi-c
+PKG_mpich := mpich
 WARN := -Wall -Wextra -Wshadow
 CPPFLAGS_ALL = -I. -I$(BUILD)/gen -D_GNU_SOURCE -DLGD_VERSION='"$(VERSION)"' $(CPPFLAGS)
 CFLAGS_ALL = -std=c11 $(OPT) $(WARN) -Wmissing-prototypes -fopenmp -fno-math-errno -fno-trapping-math \
@@ -94,9 +98,9 @@ ISA_FLAGS_avx512bf16 := $(ISA_FLAGS_avx512) -mavx512bf16
 ISA_FLAGS_amx := $(ISA_FLAGS_avx512bf16) -mamx-tile -mamx-bf16
 
 PROGRAMS := train infer eval data convert capture
-ROOMS := tensor tensor/conv autograd render nn nn/weights data data/image data/materials data/rectify train infer eval eval/methods \
-  eval/metrics cli cli/capture cli/data cli/infer
-LIB_C := $(filter-out %main.c,$(wildcard $(ROOMS:%=%/*.c)))
+ROOMS := tensor tensor/conv autograd render nn nn/weights data data/image data/materials data/rectify train train/mpi \
+  infer eval eval/methods eval/metrics cli cli/capture cli/data cli/infer
+LIB_C := $(filter-out %main.c train/mpi/mpi.c,$(wildcard $(ROOMS:%=%/*.c)))
 KERNELS := $(wildcard tensor/kernels/*.c render/kernels/*.c)
 OPS := $(sort $(wildcard autograd/op_*.c render/op_*.c))
 PAGES := $(sort $(wildcard infer/page/*.* eval/page/*.*))
@@ -108,6 +112,11 @@ INTERNAL := $(OBJ)/internal.a
 LIB := $(BUILD)/liblgd.a
 SHARED := $(BUILD)/liblgd.so.$(VERSION)
 IMAGE_LIB := $(BUILD)/lib/lgd/liblgd_image.so
+MPIS := $(foreach m,openmpi mpich,$(shell pkg-config --exists $(PKG_$(m)) 2>/dev/null && echo $(m)))
+MPI_LIBS = $(MPIS:%=$(BUILD)/lib/lgd/liblgd_%.so)
+# Of the library that a rule's stem names.
+MPI_CFLAGS = $(patsubst -I%,-isystem %,$(shell pkg-config --cflags-only-I $(PKG_$*)))
+MPI_LINKS = $(MPIS:%=$(BUILD)/mpi/link_%.so)
 BIN := $(PROGRAMS:%=$(BUILD)/bin/lgd-%)
 STRESS_C := $(filter-out %main.c,$(wildcard tests/stress/*.c))
 FUZZ_C := $(filter-out %main.c,$(wildcard tests/fuzz/*.c))
@@ -120,10 +129,10 @@ STRESS_BIN := $(BUILD)/bin/lgd-stress
 # tests/stress/training.c stands between the trainer and its data.
 WRAP := -Wl,--wrap=io_loader_next -Wl,--wrap=tr_photographs
 
-all: deps
+all: needs
 	@$(MAKE) --no-print-directory programs
 
-programs: $(BIN) library
+programs: $(BIN) library $(MPI_LIBS) $(MPI_LINKS)
 
 library: $(LIB) $(SHARED) $(IMAGE_LIB)
 
@@ -193,6 +202,23 @@ $(IMAGE_LIB): $(OBJ)/data/image/oiio.o $(OBJ)/tensor/status.o
 	@mkdir -p $(@D)
 	$(Q)$(CXX) -shared -Wl,-Bsymbolic -o $@ $^ $(shell pkg-config --libs $(PKG_IMAGE)) $(SANITIZE) $(LDLIBS)
 
+# MPI, behind the table in train/mpi/mpi.h. Loaded when mpirun has started the program, never linked.
+$(MPI_LIBS): $(BUILD)/lib/lgd/liblgd_%.so: $(OBJ)/train/mpi/mpi.%.o $(OBJ)/train/mpi/rounded.o $(OBJ)/tensor/status.o
+	$(call step,LD,$@)
+	@mkdir -p $(@D)
+	$(Q)$(CC) -shared -Wl,-Bsymbolic-functions -o $@ $^ $(shell pkg-config --libs $(PKG_$*)) $(SANITIZE) $(LDLIBS)
+
+$(MPIS:%=$(OBJ)/train/mpi/mpi.%.o): $(OBJ)/train/mpi/mpi.%.o: train/mpi/mpi.c $(BUILD)/gen/flags
+	$(call step,CC,$< [$*])
+	@mkdir -p $(@D)
+	$(Q)$(CC) $(CPPFLAGS_ALL) $(MPI_CFLAGS) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
+
+# A slow network for tests and the bench (bench/mpi/link.c).
+$(MPI_LINKS): $(BUILD)/mpi/link_%.so: bench/mpi/link.c $(BUILD)/gen/flags
+	$(call step,LD,$@)
+	@mkdir -p $(@D)
+	$(Q)$(CC) -shared -fPIC -std=c11 -D_GNU_SOURCE -O2 $(WARN) $(MPI_CFLAGS) -o $@ $< $(shell pkg-config --libs $(PKG_$*)) -lm
+
 # Every object is rebuilt when the flags change, and data/folders.o when PREFIX does, tags.o
 # when its library comes or goes.
 FLAGS_NOW := $(CC) $(CXX) $(WHOLE_JUMPS) $(OPT) $(SANITIZE) $(CFLAGS) $(CPPFLAGS) $(VERSION)
@@ -261,14 +287,17 @@ $(BUILD)/gen/pages.c: $(PAGES) Makefile
 	@{ echo '#include "pages.h"'; $(foreach f,$(PAGES),echo 'const char $(call page_name,$f)[] ='; \
 	  od -An -v -to1 $f | sed 's/ *\([0-7][0-7][0-7]\)/\\\1/g;s/.*/"&"/'; echo ';';) } > $@
 
-deps:
+needs:
 	@sh .ci/deps.sh $(PKG) $(PKG_IMAGE) $(PKG_TAGS)
+# With MPI, which a build does without: it trains in one process then.
+deps:
+	@sh .ci/deps.sh $(PKG) $(PKG_IMAGE) $(PKG_TAGS) $(PKG_openmpi)
 
 test: deps
 	@$(MAKE) --no-print-directory programs $(TEST_BIN) $(FAULTS)
 	@BUILD=$(BUILD) TESTDATA=$(TESTDATA) FIXTURES=$(FIXTURES) sh tests/run.sh
 
-bench: deps
+bench: needs
 	@$(MAKE) --no-print-directory programs $(BENCH_BIN)
 	@TESTDATA=$(TESTDATA) $(BENCH_BIN) $(BENCH)
 
@@ -357,7 +386,7 @@ asan:
 	@ASAN_OPTIONS=allocator_may_return_null=1 $(MAKE) --no-print-directory BUILD=$(BUILD)-asan \
 	  OPT='-O1 -g -fno-omit-frame-pointer' SANITIZE='-fsanitize=address,undefined -fno-sanitize-recover=all' test
 
-demo: deps
+demo: needs
 	@$(MAKE) --no-print-directory programs
 	@BUILD=$(BUILD) sh .ci/demo.sh
 
@@ -402,10 +431,10 @@ install: all
 	install -m 644 $(LIB) $(SHARED) $(TO_LIB)
 	ln -sf $(notdir $(SHARED)) $(TO_LIB)/$(SONAME)
 	ln -sf $(SONAME) $(TO_LIB)/liblgd.so
-	install -m 644 $(IMAGE_LIB) $(TO_LIB)/lgd
+	install -m 644 $(IMAGE_LIB) $(MPI_LIBS) $(TO_LIB)/lgd
 	$(STRIP) --remove-section=.comment --remove-section=.note $(BIN:$(BUILD)/%=$(TO)/%)
 	$(STRIP) --strip-unneeded --remove-section=.comment --remove-section=.note \
-	  $(TO_LIB)/$(notdir $(SHARED)) $(TO_LIB)/lgd/liblgd_image.so
+	  $(TO_LIB)/$(notdir $(SHARED)) $(TO_LIB)/lgd/*.so
 	$(STRIP) --strip-debug $(TO_LIB)/liblgd.a
 	install -m 644 infer/lgd.h $(TO)/include
 	for f in $(MAN) $(COMPLETIONS); do install -D -m 644 $(BUILD)/$$f $(TO)/$$f || exit 1; done
@@ -417,7 +446,7 @@ install: all
 	@[ -n "$(DESTDIR)" ] || ldconfig 2>/dev/null || true # the loader's list of libraries, where we may write it
 
 uninstall:
-	rm -f $(PROGRAMS:%=$(TO)/bin/lgd-%) $(TO_LIB)/liblgd.a $(TO_LIB)/liblgd.so* $(TO_LIB)/lgd/liblgd_image.so \
+	rm -f $(PROGRAMS:%=$(TO)/bin/lgd-%) $(TO_LIB)/liblgd.a $(TO_LIB)/liblgd.so* $(TO_LIB)/lgd/liblgd_*.so \
 	  $(TO_LIB)/pkgconfig/lgd.pc $(TO)/include/lgd.h $(MODELS:models/%=$(TO)/share/lgd/%) \
 	  $(MAN:%=$(TO)/%) $(COMPLETIONS:%=$(TO)/%)
 	-rmdir $(TO)/share/lgd $(TO_LIB)/lgd
@@ -425,7 +454,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD) $(BUILD)-asan $(BUILD)-leaks $(BUILD)-tsan
 
-.PHONY: all programs library help deps test test-blender wheel blender manuals deb bench bench-deps stress fuzz faults tsan \
+.PHONY: all needs programs library help deps test test-blender wheel blender manuals deb bench bench-deps stress fuzz faults tsan \
   asan demo install uninstall clean
 .SECONDARY:
 -include $(shell find $(OBJ) $(BUILD)/fuzz/obj -name '*.d' 2>/dev/null)

@@ -4,6 +4,7 @@
 # Arguments: the pkg-config modules, help2man.
 missing=
 optional=
+lost=
 have() { command -v "$1" >/dev/null 2>&1; }
 have "${CC:-gcc}" || missing="$missing gcc"
 have "${CXX:-g++}" || missing="$missing g++"
@@ -20,13 +21,14 @@ for module in "$@"; do
     lcms2) missing="$missing liblcms2-dev" ;; # colour profiles with look-up tables
     libpng) missing="$missing libpng-dev" ;;
     zlib) missing="$missing zlib1g-dev" ;; # nn/weights/zip.c: compressed entries of PyTorch's files
+    ompi-c) optional="$optional libopenmpi-dev openmpi-bin" lost="$lost lgd-train under mpirun" ;; # train/mpi/mpi.c, and mpirun for its tests
     libjpeg) missing="$missing libjpeg-dev" ;;
-    apriltag) optional=" libapriltag-dev" ;; # lgd-infer --sheet and lgd-capture; the rest works without
+    apriltag) optional="$optional libapriltag-dev" lost="$lost printed sheets (lgd-infer --sheet)" ;; # lgd-infer --sheet and lgd-capture; the rest works without
     *) echo "deps: no package is known for $module" >&2; exit 1 ;;
     esac
 done
 # What is optional is installed where that is possible, and otherwise not asked for.
-without() { echo "deps: without$optional printed sheets (lgd-infer --sheet) are left out" >&2; exit 0; }
+without() { echo "deps: without$optional left out:$lost" >&2; exit 0; }
 if [ -z "$missing" ]; then
     [ -z "$optional" ] && exit 0
     have apt-get || without

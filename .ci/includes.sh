@@ -19,7 +19,8 @@ allowed() {
     cli/data) echo "cli cli/data render data data/image data/rectify autograd tensor" ;;
     cli/infer|cli/convert) echo "cli cli/infer infer nn nn/weights render data data/image data/rectify autograd tensor tensor/conv" ;;
     cli/capture) echo "cli cli/capture render data data/image data/rectify autograd tensor" ;;
-    train) echo "train cli nn nn/weights render data data/image data/materials autograd tensor tensor/conv" ;;
+    train/mpi) echo "train/mpi tensor" ;;
+    train) echo "train train/mpi cli nn nn/weights render data data/image data/materials autograd tensor tensor/conv" ;;
     infer) echo "infer nn nn/weights render data data/image data/rectify autograd tensor tensor/conv" ;;
     eval/metrics) echo "eval/metrics eval nn nn/weights render data data/image autograd tensor tensor/conv" ;;
     eval/methods) echo "eval/methods eval/metrics eval cli infer nn nn/weights render data data/materials autograd tensor tensor/conv" ;;

@@ -93,9 +93,11 @@ bool ag_checkpoint(ag_tape *tape, ag_body body, const void *user, size_t size, i
         plain[i] = in[i] ? ag_detach(tape, in[i]) : NULL;
     }
     tape->gradients = false;
+    tape->watch.part = true;
     const ts_mark mark = ag_scope_begin(tape);
     body(tape, plain, out, p->user);
     ag_scope_end(tape, mark, out, outs);
+    tape->watch.part = false;
     tape->gradients = true;
     if (tape->status.code || !put(tape, p, &part_op, p->token)) return false;
     for (int i = 0; i < outs; i++) {

@@ -46,6 +46,8 @@ void ag_tape_destroy(ag_tape **tape)
     ag_packs_release(&(*tape)->packs);
     ts_arena_destroy(&(*tape)->moving);
     free((*tape)->node);
+    free((*tape)->watch.grad);
+    free((*tape)->watch.place);
     free(*tape);
     *tape = NULL;
 }
@@ -55,6 +57,7 @@ void ag_reset(ag_tape *tape)
     ts_arena_reset(tape->arena);
     ts_scratch_level(tape->compute.threads);
     tape->nodes = 0;
+    tape->watch.count = 0;
     tape->into = NULL;
     tape->status = (ts_status){0};
     if (!tape->frozen) ag_packs_forget(tape->packs);
@@ -131,8 +134,39 @@ static ag_value *new_leaf(ag_tape *tape, ts_tensor t, float *grad)
 }
 
 ag_value *ag_constant(ag_tape *tape, ts_tensor t) { return new_leaf(tape, t, NULL); }
+
+void ag_watch(ag_tape *tape, ag_walked walked, void *user)
+{
+    tape->watch.walked = walked;
+    tape->watch.user = user;
+}
+
+/* Operations that use a parameter are put on the tape after it: its gradient is complete when all from there on have
+ * been gone through. Of several leaves with one gradient the first counts. */
+static void note_place(ag_tape *tape, float *grad)
+{
+    for (int i = 0; i < tape->watch.count; i++)
+        if (tape->watch.grad[i] == grad) return;
+    if (tape->watch.count == tape->watch.capacity) {
+        const int more = tape->watch.capacity ? 2 * tape->watch.capacity : 64;
+        float **g = realloc(tape->watch.grad, (size_t)more * sizeof *g);
+        if (g) tape->watch.grad = g;
+        size_t *p = realloc(tape->watch.place, (size_t)more * sizeof *p);
+        if (p) tape->watch.place = p;
+        if (!g || !p) {
+            no_memory(tape, "the list of parameters");
+            return;
+        }
+        tape->watch.capacity = more;
+    }
+    tape->watch.place[tape->watch.count] = tape->nodes;
+    tape->watch.grad[tape->watch.count++] = grad;
+}
+
 ag_value *ag_parameter(ag_tape *tape, ts_tensor t, float *grad)
 {
+    if (grad && tape->watch.walked && (tape->gradients || tape->watch.part) && !tape->watch.walking)
+        note_place(tape, grad);
     return new_leaf(tape, t, tape->gradients ? grad : NULL);
 }
 
@@ -225,15 +259,26 @@ float *ag_grad_add(ag_tape *tape, ag_value *v)
     return g;
 }
 
+/* Of the parameters that only nodes from number node on use; a part's own nodes come after all that are on the tape. */
+static void tell(ag_tape *tape, size_t node)
+{
+    int count = 0;
+    while (count < tape->watch.left && tape->watch.place[tape->watch.left - count - 1] >= node) count++;
+    tape->watch.left -= count;
+    tape->watch.walked(tape->watch.grad + tape->watch.left, count, tape->watch.user);
+}
+
 void ag_walk(ag_tape *tape, size_t first)
 {
     for (size_t i = tape->nodes; i-- > first;) {
         ag_node *node = tape->node[i];
-        if (!node->out->grad_ready) continue; /* the loss does not depend on it */
-        if (ag_traced()) ag_run_traced(tape, node, true);
-        else node->op->backward(tape, node);
-        if (tape->status.code != TS_OK) break;
-        node->out->grad_ready = false; /* passed on; a second backward starts it anew */
+        if (node->out->grad_ready) { /* else the loss does not depend on it */
+            if (ag_traced()) ag_run_traced(tape, node, true);
+            else node->op->backward(tape, node);
+            if (tape->status.code != TS_OK) break;
+            node->out->grad_ready = false; /* passed on; a second backward starts it anew */
+        }
+        if (tape->watch.walked) tell(tape, i);
     }
 }
 
@@ -247,7 +292,10 @@ ts_code ag_backward(ag_tape *tape, ag_value *loss)
     float *seed = tape->status.code == TS_OK ? ag_grad_add(tape, loss) : NULL;
     if (!seed) return tape->status.code;
     seed[0] += 1.0f;
+    tape->watch.left = tape->watch.count;
+    tape->watch.walking = true;
     ag_walk(tape, 0);
+    tape->watch.walking = false;
     return tape->status.code;
 }
 

@@ -103,6 +103,12 @@ float *ag_grad_add(ag_tape *tape, ag_value *v);
  * again, for another loss or the same one: the gradients of all calls add up. */
 ts_code ag_backward(ag_tape *tape, ag_value *loss);
 
+/* Called by ag_backward after each operation that it has gone through: grad[0 .. count - 1], as ag_parameter was given
+ * them, are complete, nothing that is left of the tape adds to them. Every gradient of ag_parameter is told of once in
+ * an ag_backward; count may be 0. For what is put on the tape from then on; NULL: nobody is told. */
+typedef void (*ag_walked)(float *const *grad, int count, void *user);
+void ag_watch(ag_tape *tape, ag_walked walked, void *user);
+
 /* A part of a network of which a tape with gradients keeps the results alone: body puts its operations on the tape, is
  * called once for the results, without recording, and once more in ag_backward for the gradient (Chen et al., "Training
  * Deep Nets with Sublinear Memory Cost", 2016). The same numbers as without. in[i] may be NULL and reaches body so,

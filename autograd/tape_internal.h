@@ -20,6 +20,16 @@ struct ag_tape {
     ag_node **node;  /* grown by doubling and never shrunk */
     size_t nodes, node_capacity;
     ts_status status;
+    struct { /* ag_watch */
+        ag_walked walked;
+        void *user;
+        float **grad;  /* of the parameters on the tape, in the order in which they first came */
+        size_t *place; /* of each: every node that uses it has this number or a later one */
+        int count, capacity;
+        int left;  /* in ag_backward: of which nobody has been told */
+        bool part; /* the body of a part runs for its results, in backward again for the gradient */
+        bool walking;
+    } watch;
 };
 
 /* A leaf; grad (NULL: none is wanted) is where its gradient goes. */

@@ -30,7 +30,8 @@ ts_code bench_batches(const char *path, ts_status *st)
     float *images = malloc(pixels * 3 * sizeof *images);
     rd_view *views = malloc((size_t)batch * RD_LOSS_VIEWS * sizeof *views),
             *captures = malloc((size_t)batch * sizeof *captures);
-    io_loader *loader = io_loader_create(&source, patch, batch, 0, c.data.prefetch, c.data.threads, st);
+    io_loader *loader = io_loader_create(&source, patch, (io_share){batch, 0, batch}, 0, c.data.prefetch,
+                                         c.data.threads, st);
     if (!st->code && (!images || !views || !captures)) ts_fail(st, TS_NOMEM, "no memory for %d photographs", batch);
     for (int64_t step = 0; step < c.train.steps && !st->code; step++) {
         const float *maps = io_loader_next(loader, st);

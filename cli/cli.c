@@ -16,7 +16,7 @@
 #include <time.h>
 #include <unistd.h>
 
-static const char *program_name = "lgd";
+static const char *program_name = "lgd", *speaker = "";
 
 void cl_open_streams(void)
 {
@@ -50,10 +50,13 @@ int cl_init(const char *program)
     return CL_OK;
 }
 
+void cl_speak_as(const char *who) { speaker = who; }
+
 static void say(const char *format, va_list args)
 {
+    if (!speaker) return;
     fflush(stdout);
-    fprintf(stderr, "%s: ", program_name);
+    fprintf(stderr, "%s: %s%s", program_name, speaker, *speaker ? ": " : "");
     vfprintf(stderr, format, args);
     fputc('\n', stderr);
 }
@@ -64,7 +67,7 @@ int cl_usage(const char *format, ...)
     va_start(args, format);
     say(format, args);
     va_end(args);
-    fprintf(stderr, "Try '%s --help'.\n", program_name);
+    if (speaker) fprintf(stderr, "Try '%s --help'.\n", program_name);
     return CL_USAGE;
 }
 

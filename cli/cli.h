@@ -18,6 +18,10 @@ void cl_open_streams(void);
  * CL_USAGE. */
 int cl_init(const char *program);
 
+/* Of several processes of one command: messages begin with "program: who: " from now on (who empty: with "program: ").
+ * NULL: there are none until the next call. who is kept. */
+void cl_speak_as(const char *who);
+
 /* "program: message" on stderr. cl_usage adds "try 'program --help'" and returns CL_USAGE; cl_failed returns CL_FAILED.
  */
 int cl_usage(const char *format, ...) __attribute__((format(printf, 1, 2)));

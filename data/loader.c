@@ -8,7 +8,9 @@
  * that the caller reads. */
 struct io_loader {
     io_procedural procedural;
-    int size, batch, slots, threads;
+    int size, slots, threads;
+    io_share share;
+    int batch;      /* materials of it that are made here */
     uint64_t first; /* the number of the first batch */
     uint64_t taken; /* materials that threads have begun, from the first batch on */
     uint64_t given; /* batches that the caller has asked for */
@@ -42,7 +44,7 @@ static void *work(void *argument)
         }
         l->taken++;
         size_t slot = (size_t)(batch % (uint64_t)l->slots), item = (size_t)(task % (uint64_t)l->batch);
-        uint64_t index = l->first * (uint64_t)l->batch + task;
+        uint64_t index = (l->first + batch) * (uint64_t)l->share.batch + (uint64_t)l->share.from + item;
         pthread_mutex_unlock(&l->lock);
         io_material m = {.size = l->size, .maps = l->maps + (slot * (size_t)l->batch + item) * values};
         io_procedural_make(&l->procedural, index, &m);
@@ -61,12 +63,17 @@ static void *work(void *argument)
     return NULL;
 }
 
-io_loader *io_loader_create(const io_procedural *p, int size, int batch, uint64_t first, int depth, int threads,
+io_loader *io_loader_create(const io_procedural *p, int size, io_share share, uint64_t first, int depth, int threads,
                             ts_status *st)
 {
-    if (size < 1 || size > 16384 || batch < 1 || depth < 1 || depth > 1024 || threads < 1 || threads > 1024) {
-        ts_fail(st, TS_INVALID, "loader: size %d, batch %d, depth %d and threads %d must be at least 1", size, batch,
-                depth, threads);
+    const int batch = share.count;
+    if (share.from < 0 || batch < 1 || share.from > share.batch - batch) {
+        ts_fail(st, TS_INVALID, "loader: materials %d to %d are not of a batch of %d", share.from,
+                share.from + batch - 1, share.batch);
+        return NULL;
+    }
+    if (size < 1 || size > 16384 || depth < 1 || depth > 1024 || threads < 1 || threads > 1024) {
+        ts_fail(st, TS_INVALID, "loader: size %d, depth %d and threads %d must be at least 1", size, depth, threads);
         return NULL;
     }
     io_loader *l = calloc(1, sizeof *l);
@@ -76,6 +83,7 @@ io_loader *io_loader_create(const io_procedural *p, int size, int batch, uint64_
     }
     l->procedural = *p;
     l->size = size;
+    l->share = share;
     l->batch = batch;
     l->slots = depth + 1;
     l->first = first;

@@ -304,7 +304,7 @@ ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index)
     if (p->rank == 4) s = (ts_shape){p->dim[0], p->dim[1], p->dim[2], p->dim[3]};
     int part = NN_G;
     while (index >= layers_of(model)->first[part + 1]) part++;
-    float *grad = model->grad && ag_gradients(tape) && !model->fixed[part] ? model->grad + p->offset : NULL;
+    float *grad = model->grad && !model->fixed[part] ? model->grad + p->offset : NULL;
     return ag_parameter(tape, ts_view(model->value + p->offset, s), grad);
 }
 

@@ -21,9 +21,7 @@ static bool all_finite(const float *x, size_t n)
     return fine;
 }
 
-/* The configuration without neutral keys, so that weights do not differ with the folder or the threads. Freed by the
- * caller. */
-static char *config_text(const tr_config *c, ts_status *st)
+char *tr_config_text(const tr_config *c, ts_status *st)
 {
     io_text text;
     if (io_text_begin(&text, "the configuration", st) != TS_OK) return NULL;
@@ -34,8 +32,9 @@ static char *config_text(const tr_config *c, ts_status *st)
 
 ts_code tr_save_weights(tr_trainer *t, const char *name, ts_status *st)
 {
+    if (!tr_leads(t)) return TS_OK;
     char path[TR_PATH], step[32];
-    char *text = config_text(&t->config, st);
+    char *text = tr_config_text(&t->config, st);
     if (!text) return st->code;
     tr_path(t, name, path);
     snprintf(step, sizeof step, "%" PRId64, t->step);
@@ -57,9 +56,9 @@ static int blocks(const tr_trainer *t, nn_block out[4])
     return n;
 }
 
-ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
+static ts_code save(tr_trainer *t, ts_status *st)
 {
-    char path[TR_PATH], number[7][32];
+    char path[TR_PATH], number[8][32];
     nn_block block[4];
     const int n = blocks(t, block);
     for (int i = 0; i < n; i++)
@@ -70,7 +69,7 @@ ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
     /* Weights first: after a kill between the two the steps behind the checkpoint are made again. Before step 1 there
      * are none, so that a folder without a checkpoint has none either. */
     if (t->step > 0 && tr_save_weights(t, "last.safetensors", st) != TS_OK) return st->code;
-    char *text = config_text(&t->config, st);
+    char *text = tr_config_text(&t->config, st);
     if (!text) return st->code;
     tr_path(t, "checkpoint.safetensors", path);
     snprintf(number[0], sizeof number[0], "%" PRId64, t->step);
@@ -80,6 +79,7 @@ ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
     snprintf(number[4], sizeof number[4], "%.17g", t->best);
     snprintf(number[5], sizeof number[5], "%" PRId64, t->best_step);
     snprintf(number[6], sizeof number[6], "%.17g", t->mean_norm);
+    snprintf(number[7], sizeof number[7], "%d", t->ranks.count);
     const nn_meta meta[] = {{"format", format_name},
                             {"step", number[0]},
                             {"adam_step", number[1]},
@@ -89,9 +89,19 @@ ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
                             {"best_step", number[5]},
                             {"mean_norm", number[6]},
                             {"isa", ts_isa_name(ts_isa_now())},
-                            {"config", text}};
-    const ts_code code = nn_safetensors_write(path, block, n, meta, (int)(sizeof meta / sizeof *meta), st);
+                            {"config", text},
+                            {"ranks", number[7]}}; /* of one process there is none */
+    const int metas = (int)(sizeof meta / sizeof *meta) - (t->ranks.count == 1);
+    const ts_code code = nn_safetensors_write(path, block, n, meta, metas, st);
     free(text);
+    return code;
+}
+
+ts_code tr_save_checkpoint(tr_trainer *t, ts_status *st)
+{
+    const size_t bytes = t->model->count * sizeof(float);
+    ts_code code = tr_same_bytes(&t->ranks, t->model->value, bytes, "its weights are no longer", st);
+    if (!code) code = tr_agree(&t->ranks, tr_leads(t) ? save(t, st) : TS_OK, st);
     t->saved = !code;
     return code;
 }
@@ -168,6 +178,13 @@ ts_code tr_resume(tr_trainer *t, ts_status *st)
                 "%s: warning: was made with the instruction set %s and goes on with %s: what follows differs from that "
                 "of a run that was not interrupted (LGD_ISA chooses one)",
                 path, isa, now);
+    const char *ranks = nn_file_meta(file, "ranks");
+    const int then = ranks ? atoi(ranks) : 1;
+    if (!code && then != t->ranks.count)
+        tr_note(t,
+                "%s: was made by %d and goes on with %d rank%s: what follows differs by rounding from that of a run "
+                "that was not interrupted",
+                path, then, t->ranks.count, t->ranks.count > 1 ? "s" : "");
     nn_file_close(&file);
     t->saved = !code;
     return code;

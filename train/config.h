@@ -4,6 +4,7 @@
 #include "data/materials/procedural.h"
 #include "nn/model.h"
 #include "tensor/conv/conv.h"
+#include "train/mpi/mpi.h"
 #include <stdio.h>
 
 /* The camera of the validation's photographs: [data]'s, or that of its keys' defaults. */
@@ -35,6 +36,8 @@ typedef struct tr_config {
         int64_t seed, checkpoint_every, log_every;
         int max_skipped;
         char init[1024], init_rest[1024];
+        tr_reduce reduce; /* of several ranks */
+        double bucket;    /* MiB */
     } train;
     struct { /* [validate] */
         int64_t every, seed;

@@ -7,6 +7,7 @@ static const char *const compat_names[] = {"none", "published", NULL};          
 static const char *const descent_names[] = {"none", "gradient", "newton", "posterior", NULL}; /* as nn_descent */
 static const char *const precision_names[] = {"f32", "bf16", NULL};                           /* as ts_precision */
 static const char *const rmse_names[] = {"start", "batch", NULL};                             /* as nn_rmse */
+static const char *const reduce_names[] = {"f32", "bf16", NULL};                              /* as tr_reduce */
 static const char *const camera_names[] = {"data", "default", NULL};                          /* as tr_camera */
 
 #define AT(field) offsetof(tr_config, field)
@@ -202,6 +203,11 @@ const tr_key tr_keys[] = {
      "weights file to start from: its parameters of the same name and shape are taken"},
     {"train", "init_rest", TR_TEXT, AT(train.init_rest), 0, sizeof((tr_config *)0)->train.init_rest, "", NULL, true,
      "weights file for the parameters that train.init lacks, for example the coarse steps of another run"},
+    {"train", "reduce", TR_CHOICE, AT(train.reduce), 0, TR_REDUCE_BF16, "f32", reduce_names, false,
+     "how gradients are summed over the ranks of mpirun: as f32, or rounded to bf16 and summed as f32, which is half "
+     "the bytes and off by at most a 256th of the sum of their magnitudes; one process sums nothing"},
+    {"train", "bucket", TR_REAL, AT(train.bucket), 0, 4096, "1", NULL, false,
+     "MiB of gradients that are sent to other ranks at once, while the rest is being computed; at least a parameter"},
 
     {"validate", "every", TR_INT64, AT(validate.every), 0, 1e9, "500", NULL, false,
      "steps between validations (and one at the end); 0: never"},

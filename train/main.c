@@ -24,13 +24,14 @@ static const char usage[] =
     "  --help                   print this\n"
     "  --version                print the version\n"
     "\n"
+    "mpirun -np N lgd-train CONFIG.ini shares every batch out to N processes (docs/scaling.md).\n"
     "Ctrl-C, SIGTERM and SIGHUP finish the step, save a checkpoint and exit with status 1.\n";
 
 typedef struct shown {
     cl_progress progress;
     int64_t first, log_every;
-    double loss, seconds; /* sums since the last line */
-    int steps, samples;
+    double loss, seconds, waited; /* sums since the last line */
+    int steps, samples, ranks;
 } shown;
 
 static void show_step(const tr_row *row, void *user)
@@ -41,6 +42,7 @@ static void show_step(const tr_row *row, void *user)
     s->steps += !row->skip;
     s->samples += row->batch;
     s->seconds += row->seconds;
+    s->waited += row->waited;
     const int64_t done = row->step - s->first;
     const bool line = row->step % s->log_every == 0 || row->step == row->total;
     const double mean = s->steps ? s->loss / s->steps : NAN, speed = s->seconds > 0 ? s->samples / s->seconds : 0;
@@ -51,11 +53,12 @@ static void show_step(const tr_row *row, void *user)
     } else if (line) {
         /* From the last lines' speed: a step of the second phase takes several times as long as one of the first. */
         const long left = s->steps ? lround(s->seconds / s->steps * (double)(row->total - row->step)) : 0;
-        cl_note("step %lld/%lld  %s  loss %.4f  rate %.2e  %.1f samples/s  ETA %ld:%02ld:%02ld", (long long)row->step,
-                (long long)row->total, row->pretraining ? "g alone" : "g and h", mean, row->rate, speed, left / 3600,
-                left / 60 % 60, left % 60);
+        if (s->ranks > 1) snprintf(extra, sizeof extra, "  waiting %.1f%%", 100 * s->waited / s->seconds);
+        cl_note("step %lld/%lld  %s  loss %.4f  rate %.2e  %.1f samples/s%s  ETA %ld:%02ld:%02ld", (long long)row->step,
+                (long long)row->total, row->pretraining ? "g alone" : "g and h", mean, row->rate, speed,
+                s->ranks > 1 ? extra : "", left / 3600, left / 60 % 60, left % 60);
     }
-    if (line) s->loss = s->seconds = 0, s->steps = s->samples = 0;
+    if (line) s->loss = s->seconds = s->waited = 0, s->steps = s->samples = 0;
 }
 
 /* The results of a run are its validations: they go to standard output. */
@@ -83,29 +86,42 @@ static bool stop(void *user)
     return cl_interrupted();
 }
 
-static int train(const tr_config *config, const char *folder, bool resume)
+/* The exit status. Of several ranks those say why that know it. */
+static int failed(const ts_status *st)
+{
+    const bool stopped = st->code == TS_INTERRUPTED;
+    if (!*st->message) return stopped ? CL_INTERRUPTED : CL_FAILED;
+    return stopped ? cl_stopped("%s", st->message) : cl_failed("%s", st->message);
+}
+
+/* Rank 0's folder. */
+static ts_code find_folder(const char *folder, bool resume, ts_status *st)
+{
+    if (!resume) return cl_make_folder(folder, st);
+    return access(folder, F_OK) == 0 ? TS_OK : ts_fail(st, TS_IO, "%s: there is no run to resume", folder);
+}
+
+static int train(const tr_config *config, const char *folder, bool resume, const tr_ranks *ranks)
 {
     ts_status st = {0};
-    shown s = {.log_every = config->train.log_every};
+    shown s = {.log_every = config->train.log_every, .ranks = ranks->count};
     const tr_listener listener = {
         .step = show_step, .validated = show_validation, .note = show_note, .stop = stop, .user = &s};
-    if (resume && access(folder, F_OK) != 0) return cl_failed("%s: there is no run to resume", folder);
-    if (!resume && cl_make_folder(folder, &st) != TS_OK) return cl_failed("%s", st.message);
+    if (tr_agree(ranks, ranks->rank ? TS_OK : find_folder(folder, resume, &st), &st) != TS_OK) return failed(&st);
     cl_catch_interrupt();
-    tr_trainer *t = tr_create(config, folder, resume, &listener, &st);
-    if (!t) return cl_failed("%s", st.message);
+    tr_trainer *t = tr_create(config, folder, resume, ranks, &listener, &st);
+    if (!t) return failed(&st);
     const int64_t total = config->train.pretrain_steps + config->train.steps;
     s.first = tr_step_now(t);
     s.progress = cl_progress_start("train", total - s.first);
-    if (resume && s.first > 0)
+    if (resume && s.first > 0 && ranks->rank == 0)
         cl_note("%s: %s step %lld of %lld", folder, s.first < total ? "going on from" : "complete at",
                 (long long)s.first, (long long)total);
     const ts_code code = tr_run(t, &st);
     cl_progress_end(&s.progress);
     tr_destroy(&t);
-    if (code == TS_INTERRUPTED) return cl_stopped("%s", st.message);
-    if (code != TS_OK) return cl_failed("%s", st.message);
-    cl_note("done: %s/best.safetensors and last.safetensors", folder);
+    if (code != TS_OK) return failed(&st);
+    if (ranks->rank == 0) cl_note("done: %s/best.safetensors and last.safetensors", folder);
     return CL_OK;
 }
 
@@ -132,15 +148,55 @@ static const struct option options[] = {
     {0},
 };
 
+/* Results are rank 0's to print; of messages, each says which rank's it is. Before ranks can agree on who speaks, the
+ * first on every host does. */
+static void speak_as_rank(int rank, bool silent)
+{
+    static char name[32];
+    snprintf(name, sizeof name, "rank %d", rank);
+    cl_speak_as(silent ? NULL : rank ? name : "");
+}
+
+/* The configuration as file (NULL: none) and options have it. An exit status. */
+static int configure(const char *file, const char *const *set, int sets, const char *const init[2], tr_config *config)
+{
+    ts_status st = {0};
+    *config = tr_config_default();
+    if (file && tr_config_read(config, file, &st) != TS_OK)
+        return st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
+    for (int i = 0; i < sets && st.code == TS_OK; i++) tr_config_set_assignment(config, set[i], &st);
+    if (init[0] && st.code == TS_OK) tr_config_set(config, "--init", "train", "init", init[0], &st);
+    if (init[1] && st.code == TS_OK) tr_config_set(config, "--init", "train", "init_rest", init[1], &st);
+    if (st.code == TS_OK) tr_config_check(config, &st);
+    return st.code == TS_OK ? CL_OK : cl_usage("%s", st.message);
+}
+
+/* As one process, or as one of those that a launcher has started. */
+static int run(const tr_config *config, const char *file, bool resume, bool threads_given)
+{
+    tr_ranks ranks;
+    ts_status st = {0};
+    char folder[1100];
+    if (tr_ranks_start(&ranks, &st) != TS_OK) return cl_failed("%s", st.message);
+    speak_as_rank(ranks.rank, false);
+    if (ranks.count > 1 && !threads_given) ts_threads_set(ranks.world.threads);
+    if (*config->output.folder) snprintf(folder, sizeof folder, "%s", config->output.folder);
+    else tr_default_folder(file, folder, sizeof folder);
+    const int code = cl_finish(train(config, folder, resume, &ranks));
+    tr_ranks_end(&ranks, code);
+    return code;
+}
+
 int main(int argc, char **argv)
 {
     cl_open_streams();
-    bool resume = false, print = false;
+    speak_as_rank(tr_launched_rank(), !tr_launched_first());
+    if (tr_launched_rank() > 0 && !freopen("/dev/null", "w", stdout)) return CL_FAILED;
+    bool resume = false, print = false, threads_given = false;
     const char *init[2] = {NULL, NULL}, *initial = NULL;
     const char **set = malloc((size_t)argc * sizeof *set);
     int sets = 0, option, code = cl_init("lgd-train");
     ts_status st = {0};
-    char folder[1100];
     if (code == CL_OK && !set) code = cl_failed("out of memory");
     if (code != CL_OK) goto end;
     cl_trace();
@@ -164,6 +220,7 @@ int main(int argc, char **argv)
                 goto end;
             }
             ts_threads_set((int)threads);
+            threads_given = true;
             break;
         case HELP_CONFIG:
             tr_config_help(stdout);
@@ -195,19 +252,9 @@ int main(int argc, char **argv)
         code = cl_usage("--initial writes what a run begins with and --resume goes on with one: choose one of them");
         goto end;
     }
-    tr_config config = tr_config_default();
-    if (files && tr_config_read(&config, argv[optind], &st) != TS_OK) {
-        code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
-        goto end;
-    }
-    for (int i = 0; i < sets && st.code == TS_OK; i++) tr_config_set_assignment(&config, set[i], &st);
-    if (init[0] && st.code == TS_OK) tr_config_set(&config, "--init", "train", "init", init[0], &st);
-    if (init[1] && st.code == TS_OK) tr_config_set(&config, "--init", "train", "init_rest", init[1], &st);
-    if (st.code == TS_OK) tr_config_check(&config, &st);
-    if (st.code != TS_OK) {
-        code = cl_usage("%s", st.message);
-        goto end;
-    }
+    tr_config config;
+    code = configure(files ? argv[optind] : NULL, set, sets, init, &config);
+    if (code != CL_OK) goto end;
     if (print) {
         tr_config_print(&config, true, stdout);
         code = cl_finish(CL_OK);
@@ -218,9 +265,7 @@ int main(int argc, char **argv)
         goto end;
     }
     spin_briefly(argv);
-    if (*config.output.folder) snprintf(folder, sizeof folder, "%s", config.output.folder);
-    else tr_default_folder(argv[optind], folder, sizeof folder);
-    code = cl_finish(train(&config, folder, resume));
+    code = run(&config, argv[optind], resume, threads_given);
 end:
     free(set);
     return code;

@@ -60,7 +60,7 @@ static ag_value *guess_loss(tr_trainer *t, const nn_input *in, ag_value *target,
                             c->train.spread_weight, &row->spread);
     if (guess.scene && c->train.scene_weight > 0) {
         static const signed char own[RD_SCENE_NUMBERS] = {0, 1, 2, 3, 4, 5, 6, 7};
-        ag_value *truth = ag_constant(tape, ts_view(t->scenes, (ts_shape){c->train.batch, 1, 1, RD_SCENE_NUMBERS}));
+        ag_value *truth = ag_constant(tape, ts_view(t->scenes, (ts_shape){t->batch, 1, 1, RD_SCENE_NUMBERS}));
         ag_value *numbers = ag_channels(tape, guess.scene, 0, RD_SCENE_NUMBERS),
                  *scale = ag_channels(tape, guess.scene, RD_SCENE_NUMBERS, RD_SCENE_NUMBERS);
         loss = add_weighted(tape, loss, ag_laplace(tape, numbers, scale, truth, own, 1), c->train.scene_weight,
@@ -107,10 +107,11 @@ static ts_tensor cut(tr_trainer *t, const ts_tensor *whole, rd_grid g)
 
 /* What g may read of each photograph, and what it is to guess. The place of a light is known where the camera's is, in
  * half of the photographs; a camera whose field of view alone is known stands above the centre. */
-static void describe(tr_trainer *t, int photographs)
+static void describe(tr_trainer *t, int given)
 {
     ts_rng rng = ts_rng_make((uint64_t)t->config.train.seed, TS_STREAM_KNOWN, (uint64_t)t->step);
-    for (int i = 0; i < photographs; i++) {
+    for (int i = 0; i < t->first * given; i++) ts_rng_uniform(&rng); /* other ranks' */
+    for (int i = 0; i < t->batch * given; i++) {
         const tr_shot *s = &t->shots[i];
         const bool light = ts_rng_uniform(&rng) < 0.5f && s->told_view;
         rd_scene_numbers(&s->view, s->ambient, s->tone, t->scenes + (size_t)i * RD_SCENE_NUMBERS);
@@ -124,7 +125,7 @@ static void describe(tr_trainer *t, int photographs)
 static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *row)
 {
     const tr_config *c = &t->config;
-    const int batch = c->train.batch, size = c->data.patch;
+    const int batch = t->batch, size = c->data.patch;
     ag_value *maps[TR_MOST_ITERATIONS + 1];
     ts_tensor goals = ts_view((float *)(uintptr_t)target, (ts_shape){batch, size, size, MAP_CHANNELS});
     nn_input in = {.image = ts_view(t->images, (ts_shape){batch * given, size, size, 3}),
@@ -215,14 +216,100 @@ static double gradient_norm(const nn_model *model)
     return sqrt(squares);
 }
 
+/* The materials of this rank in this step, their photographs and the views of their loss: functions of each material's
+ * number in the run, whatever the number of ranks. NULL and st on failure. */
+static const float *draw(tr_trainer *t, int given, ts_status *st)
+{
+    const tr_config *c = &t->config;
+    const float *target = io_loader_next(t->loader, st);
+    if (!target) return ts_context(st, "procedural materials"), NULL;
+    const uint64_t index = (uint64_t)t->step * (uint64_t)c->train.batch + (uint64_t)t->first;
+    tr_capture_views((uint64_t)c->data.seed, index, t->batch, given, t->captures);
+    tr_photographs(c, (uint64_t)c->data.seed, index, t->batch, c->data.patch, target, t->captures, given, t->images,
+                   t->shots);
+    if (c->arch.conditions || c->arch.scene) describe(t, given);
+    ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_SCENE, (uint64_t)t->step);
+    for (int i = -t->first; i < t->batch; i++) /* other ranks' are drawn over */
+        rd_loss_views(&rng, t->views + (i < 0 ? 0 : i) * RD_LOSS_VIEWS);
+    return target;
+}
+
+/* What the ranks' losses are summed as, each with its rank's share of the batch as weight, and how many ranks were told
+ * to stop. */
+typedef struct losses {
+    double loss, render_start, map_start, render_end, map_end, spread, scene, stop;
+} losses;
+
+static ts_code begin_losses(tr_trainer *t, const tr_row *row, double weight, losses *l, ts_status *st)
+{
+    *l = (losses){.loss = weight * row->loss,
+                  .render_start = weight * row->render_start,
+                  .map_start = weight * row->map_start,
+                  .render_end = weight * row->render_end,
+                  .map_end = weight * row->map_end,
+                  .spread = weight * row->spread,
+                  .scene = weight * row->scene,
+                  .stop = t->listener.stop && t->listener.stop(t->listener.user)};
+    tr_reduce_begin(&t->reducer);
+    return t->ranks.mpi->begin_sum(&l->loss, sizeof *l / sizeof l->loss, st);
+}
+
+/* Waits for the gradients and losses of all ranks. One whose loss is not finite has begun the same sums. */
+static ts_code end_losses(tr_trainer *t, tr_row *row, const losses *l, ts_status *st)
+{
+    const double start = tr_seconds();
+    if (tr_reduce_finish(&t->reducer, st) != TS_OK) return st->code;
+    row->waited = tr_seconds() - start;
+    row->loss = l->loss;
+    row->render_start = l->render_start, row->map_start = l->map_start;
+    row->render_end = l->render_end, row->map_end = l->map_end;
+    row->spread = l->spread, row->scene = l->scene;
+    t->stop = l->stop > 0;
+    return TS_OK;
+}
+
+/* The loss, and its gradient in the model's block, of all ranks. */
+static ts_code differentiate(tr_trainer *t, const float *target, int given, tr_row *row, ts_status *st)
+{
+    const double weight = (double)t->batch / t->config.train.batch;
+    losses sums;
+    ag_value *loss = forward(t, target, given, row);
+    if (loss) row->loss = (double)loss->t.data[0];
+    if (loss && t->ranks.mpi) {
+        if (begin_losses(t, row, weight, &sums, st) != TS_OK) return st->code;
+        loss = ag_scale(t->tape, loss, (float)weight);
+    }
+    if (loss && isfinite(row->loss)) ag_backward(t->tape, loss);
+    if (ag_status(t->tape)->code) {
+        *st = *ag_status(t->tape);
+        return st->code;
+    }
+    if (t->ranks.mpi && end_losses(t, row, &sums, st) != TS_OK) return st->code;
+    if (isfinite(row->loss)) row->norm = gradient_norm(t->model);
+    return TS_OK;
+}
+
+static void update(tr_trainer *t, const tr_row *row, const double factor[NN_COARSE + 1])
+{
+    const double clip = t->config.train.clip;
+    const float scale = clip > 0 && row->norm > clip ? (float)(clip / row->norm) : 1.0f;
+    nn_adam_next(&t->adam);
+    for (int part = NN_G; part <= NN_COARSE; part++) {
+        size_t first, last;
+        nn_model_range(t->model, (nn_part)part, &first, &last);
+        if (!t->model->fixed[part] && last > first)
+            nn_adam_step(&t->adam, t->model, first, last, (float)(row->rate * factor[part]), scale);
+    }
+    t->mean_norm = t->adam.step == 1 ? row->norm : NORM_DECAY * t->mean_norm + (1 - NORM_DECAY) * row->norm;
+}
+
 ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
 {
     const tr_config *c = &t->config;
-    const int batch = c->train.batch;
     const double start = tr_seconds();
     *row = (tr_row){.total = tr_total(c),
                     .pretraining = tr_pretraining(c, t->step),
-                    .batch = batch,
+                    .batch = c->train.batch,
                     .loss = NAN,
                     .norm = NAN,
                     .render_start = NAN,
@@ -232,29 +319,16 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
                     .render_end = NAN,
                     .map_end = NAN};
     begin_phase(t);
-    const float *target = io_loader_next(t->loader, st);
-    if (!target) return ts_context(st, "procedural materials");
     const int given = draw_given(c, t->step);
-    const uint64_t index = (uint64_t)t->step * (uint64_t)batch;
-    tr_capture_views((uint64_t)c->data.seed, index, batch, given, t->captures);
-    tr_photographs(c, (uint64_t)c->data.seed, index, batch, c->data.patch, target, t->captures, given, t->images,
-                   t->shots);
-    if (c->arch.conditions || c->arch.scene) describe(t, batch * given);
-    ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_SCENE, (uint64_t)t->step);
-    for (int i = 0; i < batch; i++) rd_loss_views(&rng, t->views + i * RD_LOSS_VIEWS);
+    const float *target = draw(t, given, st);
+    if (!target) return st->code;
 
     double factor[NN_COARSE + 1]; /* of the rate, for each part */
     rate_factors(c, row->pretraining, factor);
     for (int part = NN_G; part <= NN_COARSE; part++) t->model->fixed[part] = factor[part] == 0;
     ag_reset(t->tape);
     ag_compute_set(t->tape, (ts_compute){.exact = c->train.exact, .precision = c->train.precision});
-    ag_value *loss = forward(t, target, given, row);
-    if (loss) row->loss = (double)loss->t.data[0];
-    if (loss && isfinite(row->loss) && ag_backward(t->tape, loss) == TS_OK) row->norm = gradient_norm(t->model);
-    if (ag_status(t->tape)->code) {
-        *st = *ag_status(t->tape);
-        return st->code;
-    }
+    if (differentiate(t, target, given, row, st) != TS_OK) return st->code;
     row->rate = rate_now(c, t->step);
     row->skip = why_skip(t, row);
     if (row->skip) {
@@ -262,20 +336,13 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
         t->skipped++;
         t->in_a_row++;
     } else {
-        const double clip = c->train.clip;
-        const float scale = clip > 0 && row->norm > clip ? (float)(clip / row->norm) : 1.0f;
-        nn_adam_next(&t->adam);
-        for (int part = NN_G; part <= NN_COARSE; part++) {
-            size_t first, last;
-            nn_model_range(t->model, (nn_part)part, &first, &last);
-            if (!t->model->fixed[part] && last > first)
-                nn_adam_step(&t->adam, t->model, first, last, (float)(row->rate * factor[part]), scale);
-        }
-        t->mean_norm = t->adam.step == 1 ? row->norm : NORM_DECAY * t->mean_norm + (1 - NORM_DECAY) * row->norm;
+        update(t, row, factor);
         t->in_a_row = 0;
     }
     row->step = ++t->step;
     row->skipped_total = t->skipped;
     row->seconds = tr_seconds() - start;
+    t->waited += row->waited;
+    t->busy += row->seconds;
     return TS_OK;
 }

@@ -1,6 +1,7 @@
 /* The run: what it owns, its folder, the loop over steps. */
 #include "data/text.h"
 #include "nn/weights/weights.h"
+#include "tensor/cpu.h"
 #include "tensor/maps.h"
 #include "tensor/new_file.h"
 #include "train/trainer_internal.h"
@@ -152,12 +153,15 @@ ts_code tr_initial(const tr_config *config, const char *path, ts_status *st)
     return code;
 }
 
-static ts_code build(tr_trainer *t, bool resume, ts_status *st)
+/* What a rank has before it knows where the run stands; the folder is rank 0's. *resume: whether it goes on. */
+static ts_code prepare(tr_trainer *t, bool *resume, ts_status *st)
 {
     const tr_config *c = &t->config;
-    const size_t batch = (size_t)c->train.batch, pixels = (size_t)c->data.patch * (size_t)c->data.patch;
-    if (lock_folder(t, st) != TS_OK || check_folder(t, &resume, st) != TS_OK) return st->code;
-    ts_sweep(t->folder);
+    const size_t batch = (size_t)t->batch, pixels = (size_t)c->data.patch * (size_t)c->data.patch;
+    if (tr_leads(t)) {
+        if (lock_folder(t, st) != TS_OK || check_folder(t, resume, st) != TS_OK) return st->code;
+        ts_sweep(t->folder);
+    }
     const size_t photographs = batch * (size_t)c->arch.images;
     t->images = malloc(photographs * pixels * 3 * sizeof(float));
     t->captures = malloc(photographs * sizeof *t->captures);
@@ -168,22 +172,90 @@ static ts_code build(tr_trainer *t, bool resume, ts_status *st)
     if (!t->images || !t->captures || !t->scenes || !t->known || !t->shots || !t->views)
         return ts_fail(st, TS_NOMEM, "no memory for %zu photographs", photographs);
     t->model = tr_model_create(c, st);
-    if (!t->model || nn_model_train(t->model, st) != TS_OK || (!resume && init_weights(t->model, c, t, st) != TS_OK))
+    if (!t->model || nn_model_train(t->model, st) != TS_OK ||
+        (tr_leads(t) && !*resume && init_weights(t->model, c, t, st) != TS_OK))
         return st->code;
-    if (nn_adam_create(&t->adam, t->model, (float)c->train.ema, st) != TS_OK || (resume && tr_resume(t, st) != TS_OK))
-        return st->code;
+    if (nn_adam_create(&t->adam, t->model, (float)c->train.ema, st) != TS_OK) return st->code;
+    if (tr_leads(t) && *resume && tr_resume(t, st) != TS_OK) return st->code;
     t->tape = ag_tape_create(true, st);
     if (!t->tape || (c->validate.every && tr_validator_create(t, st) != TS_OK)) return st->code;
+    if (!t->ranks.mpi) return TS_OK;
+    ag_watch(t->tape, tr_reduce_walked, &t->reducer);
+    return tr_reducer_create(&t->reducer, t->ranks.mpi, t->model, (size_t)(c->train.bucket * (1 << 20)),
+                             c->train.reduce, st);
+}
+
+/* Rank 0's weights, moments and counters to all. */
+static void share_state(tr_trainer *t)
+{
+    const tr_mpi *mpi = t->ranks.mpi;
+    float *const block[] = {t->model->value, t->adam.m, t->adam.v, t->adam.ema};
+    int64_t count[] = {t->step, t->adam.step, t->skipped, t->in_a_row, t->best_step, t->saved};
+    double real[] = {t->best, t->mean_norm};
+    if (!mpi) return;
+    for (int i = 0; i < 4; i++)
+        if (block[i]) mpi->broadcast(block[i], t->model->count * sizeof(float));
+    mpi->broadcast(count, sizeof count);
+    mpi->broadcast(real, sizeof real);
+    t->step = count[0], t->adam.step = count[1], t->skipped = count[2], t->in_a_row = (int)count[3];
+    t->best_step = count[4], t->saved = count[5];
+    t->best = real[0], t->mean_norm = real[1];
+}
+
+static ts_code begin(tr_trainer *t, bool resume, ts_status *st)
+{
+    const tr_config *c = &t->config;
     const io_procedural source = {
         .seed = (uint64_t)c->data.seed, .families = c->data.families, .hues = (float)c->data.hues};
-    t->loader = io_loader_create(&source, c->data.patch, c->train.batch, (uint64_t)t->step, c->data.prefetch,
-                                 c->data.threads, st);
-    if (!t->loader || (!resume && set_aside(t, st) != TS_OK) || tr_log_open(t, st) != TS_OK) return st->code;
+    const io_share share = {c->train.batch, t->first, t->batch};
+    t->loader = io_loader_create(&source, c->data.patch, share, (uint64_t)t->step, c->data.prefetch, c->data.threads,
+                                 st);
+    if (!t->loader || !tr_leads(t)) return st->code;
+    if ((!resume && set_aside(t, st) != TS_OK) || tr_log_open(t, st) != TS_OK) return st->code;
     return write_config(t, st);
 }
 
-tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, const tr_listener *listener,
-                      ts_status *st)
+/* An error that all ranks have is rank 0's to say. */
+static ts_code all_fail(const tr_trainer *t, ts_status *st)
+{
+    if (!tr_leads(t)) *st->message = 0;
+    return st->code;
+}
+
+/* One program, one configuration, one instruction set: otherwise the ranks' weights drift apart. */
+static ts_code check_ranks(const tr_trainer *t, ts_status *st)
+{
+    const tr_config *c = &t->config;
+    const char *isa = ts_isa_name(ts_isa_now());
+    if (!t->ranks.mpi) return TS_OK;
+    char *text = tr_config_text(c, st);
+    ts_code code = tr_agree(&t->ranks, st->code, st);
+    if (!code)
+        code = tr_same_bytes(&t->ranks, isa, strlen(isa), "its CPU's instruction set (LGD_ISA chooses one) is not", st);
+    if (!code) code = tr_same_bytes(&t->ranks, text, strlen(text), "its configuration is not", st);
+    free(text);
+    if (code) return code;
+    if (t->ranks.count > c->train.batch)
+        ts_fail(st, TS_INVALID, "train.batch is %d: %d ranks cannot share it (start fewer)", c->train.batch,
+                t->ranks.count);
+    else if (c->coder.code == 0 && c->arch.rmse == NN_RMSE_BATCH)
+        ts_fail(st, TS_INVALID,
+                "model.rmse = batch takes an error over the whole batch, which several ranks do not have: set it "
+                "to start, or train in one process");
+    return st->code ? all_fail(t, st) : TS_OK;
+}
+
+static ts_code build(tr_trainer *t, bool resume, ts_status *st)
+{
+    if (check_ranks(t, st) != TS_OK) return st->code;
+    t->batch = tr_share(&t->ranks, t->config.train.batch, &t->first);
+    if (tr_agree(&t->ranks, prepare(t, &resume, st), st) != TS_OK) return st->code;
+    share_state(t);
+    return tr_agree(&t->ranks, begin(t, resume, st), st);
+}
+
+tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, const tr_ranks *ranks,
+                      const tr_listener *listener, ts_status *st)
 {
     tr_trainer *t = calloc(1, sizeof *t);
     if (!t) {
@@ -193,14 +265,18 @@ tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, 
     t->config = *config;
     t->lock = -1;
     t->best = INFINITY;
+    t->ranks = ranks ? *ranks : (tr_ranks){.count = 1};
     if (listener) t->listener = *listener;
+    if (!tr_leads(t)) t->listener = (tr_listener){.stop = t->listener.stop, .user = t->listener.user};
     ts_code code = TS_OK;
     if (strlen(folder) >= sizeof t->folder)
         code = ts_fail(st, TS_INVALID, "the folder's name is longer than %zu bytes", sizeof t->folder - 1);
     else strcpy(t->folder, folder);
     if (code == TS_OK) code = tr_config_check(config, st);
     if (code == TS_OK) code = build(t, resume, st);
-    if (code != TS_OK) tr_destroy(&t);
+    if (code != TS_OK) {
+        tr_destroy(&t);
+    }
     return t;
 }
 
@@ -211,6 +287,7 @@ void tr_destroy(tr_trainer **trainer)
     io_loader_destroy(&t->loader);
     tr_log_close(t);
     tr_validator_free(&t->validator);
+    tr_reducer_free(&t->reducer);
     ag_tape_destroy(&t->tape);
     nn_adam_free(&t->adam);
     nn_model_free(&t->model);
@@ -231,35 +308,61 @@ static ts_code after_step(tr_trainer *t, const tr_row *row, ts_status *st)
     const tr_config *c = &t->config;
     const bool end = t->step == tr_total(c);
     t->saved = false;
-    if (tr_log_row(t, row, st) != TS_OK) return st->code;
+    if (tr_leads(t) && tr_log_row(t, row, st) != TS_OK) return st->code;
     if (t->listener.step) t->listener.step(row, t->listener.user);
     if (row->skip) tr_note(t, "step %" PRId64 " is skipped: its %s (%d in a row)", t->step, row->skip, t->in_a_row);
     if (t->in_a_row > c->train.max_skipped) {
         tr_log_flush(t, st);
-        return ts_fail(st, TS_NUMERIC,
-                       "%d steps in a row had no loss and gradient to learn from: stopped at step %" PRId64
-                       ", the last checkpoint is kept (try a smaller train.rate)",
-                       t->in_a_row, t->step);
+        ts_fail(st, TS_NUMERIC,
+                "%d steps in a row had no loss and gradient to learn from: stopped at step %" PRId64
+                ", the last checkpoint is kept (try a smaller train.rate)",
+                t->in_a_row, t->step);
+        return all_fail(t, st);
     }
     if (c->validate.every && (end || t->step % c->validate.every == 0)) {
         tr_validation v;
-        if (tr_validate(t, &v, st) != TS_OK || tr_log_validation(t, &v, st) != TS_OK || tr_curve_write(t, st) != TS_OK)
-            return st->code;
+        if (tr_validate(t, &v, st) != TS_OK) return st->code;
+        if (tr_leads(t) && (tr_log_validation(t, &v, st) != TS_OK || tr_curve_write(t, st) != TS_OK)) return st->code;
         if (t->listener.validated) t->listener.validated(&v, t->listener.user);
     }
     if (!end && t->step % c->train.checkpoint_every != 0) return TS_OK;
-    return tr_save_checkpoint(t, st) != TS_OK ? st->code : tr_curve_write(t, st);
+    if (tr_save_checkpoint(t, st) != TS_OK || !tr_leads(t)) return st->code;
+    return tr_curve_write(t, st);
+}
+
+/* Whether the run is to end here; all ranks know it from the last step's sums. */
+static bool stops(tr_trainer *t, bool first)
+{
+    const bool told = t->listener.stop && t->listener.stop(t->listener.user);
+    if (!t->ranks.mpi) return told;
+    return first ? tr_first_failed(&t->ranks, told) >= 0 : t->stop;
+}
+
+static void note_waiting(const tr_trainer *t, int64_t steps)
+{
+    if (t->ranks.mpi && steps > 0)
+        tr_note(t, "a step took %.2f ms, of which it waited %.2f ms (%.1f%%) for the gradients of %d ranks",
+                1e3 * t->busy / (double)steps, 1e3 * t->waited / (double)steps, 100 * t->waited / t->busy,
+                t->ranks.count);
 }
 
 ts_code tr_run(tr_trainer *t, ts_status *st)
 {
-    while (t->step < tr_total(&t->config)) {
+    const int64_t begin_at = t->step;
+    if (t->ranks.mpi)
+        tr_note(t, "%s; gradients are summed as %s", t->ranks.world.where,
+                t->config.train.reduce == TR_REDUCE_BF16 ? "bf16" : "f32");
+    for (bool first = true; t->step < tr_total(&t->config); first = false) {
         tr_row row;
-        const bool stop = t->listener.stop && t->listener.stop(t->listener.user);
+        const bool stop = stops(t, first);
         /* before step 1 too: a run that is killed at once can be resumed */
         if ((stop || t->step == 0) && !t->saved && tr_save_checkpoint(t, st) != TS_OK) return st->code;
-        if (stop) return ts_fail(st, TS_INTERRUPTED, "interrupted at step %" PRId64 ", go on with --resume", t->step);
+        if (stop) {
+            ts_fail(st, TS_INTERRUPTED, "interrupted at step %" PRId64 ", go on with --resume", t->step);
+            return all_fail(t, st);
+        }
         if (tr_step(t, &row, st) != TS_OK || after_step(t, &row, st) != TS_OK) return st->code;
     }
+    note_waiting(t, t->step - begin_at);
     return TS_OK;
 }

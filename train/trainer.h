@@ -4,12 +4,17 @@
  * Two phases. The first, pretrain_steps long, trains g alone on R_0's loss; the second trains g and h on R_T's and
  * R_0's. Each has its own warm-up, cosine and Adam moments, since the two losses differ.
  *
+ * Several ranks (train/ranks.h) make one run: train.batch is the batch of all, of which each makes its share, the same
+ * materials for any number of ranks; gradients are summed, and every rank makes the same update. Rank 0 alone has the
+ * folder. The same number of ranks makes the same bytes; another one the same numbers to rounding.
+ *
  * The folder's files: config.ini (as it runs), log.csv (a row a step), val.csv (a row a validation), best.safetensors
  * (weights with the least validated error in the phase), last.safetensors (weights at the last checkpoint after
  * step 1), checkpoint.safetensors (what --resume reads; there before step 1), lock. */
 #ifndef TR_TRAINER_H
 #define TR_TRAINER_H
 #include "train/config.h"
+#include "train/ranks.h"
 
 /* One step as log.csv has it. NaN in a part: that loss has no weight or does not exist in this phase. */
 typedef struct tr_row {
@@ -21,6 +26,7 @@ typedef struct tr_row {
     double spread, scene; /* likelihoods of R_0's errors and of the scene (model.spread, model.scene) */
     double norm, rate;
     double seconds; /* that the step took */
+    double waited;  /* of them, for other ranks' gradients */
     int batch;
     int64_t skipped_total;
 } tr_row;
@@ -36,7 +42,8 @@ typedef struct tr_validation {
     double seconds;
 } tr_validation;
 
-/* Callbacks, on the calling thread; any may be NULL. note: one line. stop: asked between steps. */
+/* Callbacks, on the calling thread; any may be NULL. note: one line. stop: asked between steps. Of several ranks, rank
+ * 0 has all of them and the others stop: all ranks stop when one of them is told to. */
 typedef struct tr_listener {
     void (*step)(const tr_row *row, void *user);
     void (*validated)(const tr_validation *v, void *user);
@@ -47,11 +54,14 @@ typedef struct tr_listener {
 
 typedef struct tr_trainer tr_trainer;
 
-/* Takes the folder (which exists) for this run; another trainer in it, a checkpoint in it without resume, and one of
+/* ranks: NULL for one process; outlives the trainer. All ranks call each function below together. Where another rank
+ * has the message of a failure, this one's is empty.
+ *
+ * Takes the folder (which exists) for this run; another trainer in it, a checkpoint in it without resume, and one of
  * another configuration with resume are errors. In a folder without a checkpoint the run begins, with resume too; what
  * a run has left there beside weights is renamed. NULL and st set on failure. */
-tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, const tr_listener *listener,
-                      ts_status *st);
+tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, const tr_ranks *ranks,
+                      const tr_listener *listener, ts_status *st);
 
 /* Writes the weights that a run of this configuration starts from. */
 ts_code tr_initial(const tr_config *config, const char *path, ts_status *st);

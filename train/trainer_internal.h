@@ -3,6 +3,7 @@
 #define TR_PARTS_H
 #include "data/loader.h"
 #include "nn/adam.h"
+#include "train/reduce.h"
 #include "train/trainer.h"
 
 enum { TR_PATH = 1200 }; /* a folder and one of our names */
@@ -16,13 +17,18 @@ typedef struct tr_shot {
     bool told_view, told_power; /* whether the model is told them */
 } tr_shot;
 
-/* The fixed materials of validation. */
+/* Of a material: of its renderings under R_0 ... R_T, then of the last maps. */
+enum { TR_ERRORS = TR_MOST_ITERATIONS + 5 };
+
+/* The fixed materials of validation: this rank's share of them. */
 typedef struct tr_validator {
+    int first, count;
     float *maps;       /* [count][size][size][9], owned */
     float *images;     /* [count][arch.images][size][size][3], owned */
     rd_view *captures; /* [count][arch.images], owned */
     tr_shot *shots;    /* [count][arch.images], owned */
     rd_view *views;    /* [count][RD_EVAL_VIEWS], owned */
+    double *errors;    /* [validate.count][TR_ERRORS] of all, owned */
     nn_model *model;   /* holds what is validated: the moving average, or a copy of the weights */
     ag_tape *tape;     /* without gradients */
 } tr_validator;
@@ -31,15 +37,21 @@ struct tr_trainer {
     tr_config config;
     char folder[1024];
     tr_listener listener;
-    int lock; /* descriptor, -1: none */
+    tr_ranks ranks;
+    tr_reducer reducer; /* of several ranks */
+    int first, batch;   /* this rank's share of train.batch */
+    bool stop;          /* a rank was told to stop when the last step's losses were summed */
+    double waited;      /* seconds, of all steps here */
+    double busy;        /* seconds of all steps here */
+    int lock;           /* descriptor, -1: none */
     nn_model *model;
     nn_adam adam;
     ag_tape *tape;
     io_loader *loader;
-    float *images;        /* [batch][given][patch][patch][3], given <= arch.images */
-    rd_view *captures;    /* [batch][given] */
-    tr_shot *shots;       /* [batch][given] */
-    float *scenes;        /* [batch][given][RD_SCENE_NUMBERS] */
+    float *images;     /* [batch][given][patch][patch][3], given <= arch.images; batch: the share's, here and below */
+    rd_view *captures; /* [batch][given] */
+    tr_shot *shots;    /* [batch][given] */
+    float *scenes;     /* [batch][given][RD_SCENE_NUMBERS] */
     unsigned char *known; /* [batch][given] of nn_known */
     rd_view *views;       /* [batch][RD_LOSS_VIEWS] */
     tr_validator validator;
@@ -56,6 +68,7 @@ struct tr_trainer {
 void tr_path(const tr_trainer *t, const char *name, char path[TR_PATH]);
 void tr_note(const tr_trainer *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
 int64_t tr_total(const tr_config *c);
+static inline bool tr_leads(const tr_trainer *t) { return t->ranks.rank == 0; }
 bool tr_pretraining(const tr_config *c, int64_t step); /* whether the step after that many belongs to the first phase */
 double tr_seconds(void);
 const float *tr_weights(const tr_trainer *t); /* what is validated and saved */
@@ -81,6 +94,10 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st);
 ts_code tr_validator_create(tr_trainer *t, ts_status *st);
 void tr_validator_free(tr_validator *v);
 ts_code tr_validate(tr_trainer *t, tr_validation *out, ts_status *st);
+
+/* The configuration without neutral keys, so that weights do not differ with the folder or the threads. Freed by the
+ * caller. NULL and st on failure. */
+char *tr_config_text(const tr_config *c, ts_status *st);
 
 /* checkpoint.c: the trainer's state in the folder. tr_resume fails with TS_INVALID naming the key when the
  * configuration differs. */

@@ -9,21 +9,21 @@
 
 enum { TOGETHER = 8 }; /* images that go through the network at once */
 
-static bool make_materials(const tr_config *c, float *maps)
+static bool make_materials(const tr_config *c, int first, int count, float *maps)
 {
     const io_procedural source = {.seed = (uint64_t)c->validate.seed, .families = c->data.families};
     const int size = c->validate.size;
     const size_t values = (size_t)size * (size_t)size * MAP_CHANNELS;
     bool fine = true;
 #pragma omp parallel for num_threads(ts_threads()) schedule(dynamic, 1) reduction(&& : fine)
-    for (int i = 0; i < c->validate.count; i++) {
+    for (int i = 0; i < count; i++) {
         io_material m;
         ts_status st = {0};
         if (io_material_create(&m, size, &st) != TS_OK) {
             fine = false;
             continue;
         }
-        io_procedural_make(&source, (uint64_t)i, &m);
+        io_procedural_make(&source, (uint64_t)(first + i), &m);
         memcpy(maps + (size_t)i * values, m.maps, values * sizeof(float));
         io_material_free(&m);
     }
@@ -34,25 +34,31 @@ ts_code tr_validator_create(tr_trainer *t, ts_status *st)
 {
     const tr_config *c = &t->config;
     tr_validator *v = &t->validator;
-    const size_t count = (size_t)c->validate.count, pixels = (size_t)c->validate.size * (size_t)c->validate.size;
+    v->count = tr_share(&t->ranks, c->validate.count, &v->first);
+    /* of more ranks than materials some have none; a block of nothing is none */
+    const size_t count = (size_t)(v->count > 0 ? v->count : 1),
+                 pixels = (size_t)c->validate.size * (size_t)c->validate.size;
     v->maps = malloc(count * pixels * MAP_CHANNELS * sizeof(float));
     const size_t given = (size_t)c->arch.images;
     v->images = malloc(count * given * pixels * 3 * sizeof(float));
     v->captures = malloc(count * given * sizeof *v->captures);
     v->shots = malloc(count * given * sizeof *v->shots);
     v->views = malloc(count * RD_EVAL_VIEWS * sizeof *v->views);
-    if (!v->maps || !v->images || !v->captures || !v->shots || !v->views || !make_materials(c, v->maps))
+    v->errors = malloc((size_t)c->validate.count * TR_ERRORS * sizeof *v->errors);
+    if (!v->maps || !v->images || !v->captures || !v->shots || !v->views || !v->errors ||
+        !make_materials(c, v->first, v->count, v->maps))
         return ts_fail(st, TS_NOMEM, "no memory for the validation materials");
     v->model = tr_model_create(c, st);
     v->tape = v->model ? ag_tape_create(false, st) : NULL;
     if (!v->tape) return st->code;
-    tr_capture_views((uint64_t)c->validate.seed, 0, c->validate.count, c->arch.images, v->captures);
+    const uint64_t first = (uint64_t)v->first;
+    tr_capture_views((uint64_t)c->validate.seed, first, v->count, c->arch.images, v->captures);
     tr_config camera = *c;
     if (c->validate.camera == TR_CAMERA_DEFAULT) camera.data = tr_config_default().data;
-    tr_photographs(&camera, (uint64_t)c->validate.seed, 0, c->validate.count, c->validate.size, v->maps, v->captures,
+    tr_photographs(&camera, (uint64_t)c->validate.seed, first, v->count, c->validate.size, v->maps, v->captures,
                    c->arch.images, v->images, v->shots);
-    for (int i = 0; i < c->validate.count; i++) {
-        ts_rng rng = ts_rng_make((uint64_t)c->validate.seed, TS_STREAM_EVAL, (uint64_t)i);
+    for (int i = 0; i < v->count; i++) {
+        ts_rng rng = ts_rng_make((uint64_t)c->validate.seed, TS_STREAM_EVAL, first + (uint64_t)i);
         rd_eval_views(&rng, RD_EVAL_VIEWS, v->views + (size_t)i * RD_EVAL_VIEWS);
     }
     return TS_OK;
@@ -65,6 +71,7 @@ void tr_validator_free(tr_validator *v)
     free(v->captures);
     free(v->shots);
     free(v->views);
+    free(v->errors);
     nn_model_free(&v->model);
     ag_tape_destroy(&v->tape);
     *v = (tr_validator){0};
@@ -73,8 +80,8 @@ void tr_validator_free(tr_validator *v)
 /* Of a photograph that comes from anywhere. */
 static const unsigned char nothing[TOGETHER * NN_MAX_IMAGES];
 
-/* Adds the errors of n materials from number first on to out. */
-static ts_code add_errors(tr_trainer *t, int first, int n, tr_validation *out, ts_status *st)
+/* Measures n materials from number first of the share on, of R_0 ... R_iterations. */
+static ts_code measure(tr_trainer *t, int first, int n, int iterations, ts_status *st)
 {
     const tr_validator *v = &t->validator;
     const int size = t->config.validate.size, channels = t->config.arch.channels;
@@ -94,7 +101,7 @@ static ts_code add_errors(tr_trainer *t, int first, int n, tr_validation *out, t
         maps[0] = nn_decode(v->tape, v->model,
                             nn_encode(v->tape, v->model,
                                       ag_constant(v->tape, ts_view(truth, (ts_shape){n, size, size, MAP_CHANNELS}))));
-    } else nn_lgd(v->tape, v->model, &in, out->iterations, true, maps, NULL);
+    } else nn_lgd(v->tape, v->model, &in, iterations, true, maps, NULL);
     if (ag_status(v->tape)->code != TS_OK) {
         *st = *ag_status(v->tape);
         return st->code;
@@ -102,18 +109,16 @@ static ts_code add_errors(tr_trainer *t, int first, int n, tr_validation *out, t
     for (int i = 0; i < n; i++) {
         const float *target = v->maps + (size_t)(first + i) * pixels * MAP_CHANNELS;
         const size_t at = (size_t)i * pixels * (size_t)channels;
-        for (int k = 0; k <= out->iterations; k++) {
-            const double rmse = rd_render_rmse(grid, maps[k]->t.data + at, channels, target, MAP_CHANNELS,
-                                               v->views + (size_t)(first + i) * RD_EVAL_VIEWS, RD_EVAL_VIEWS);
-            if (rmse < 0) return ts_fail(st, TS_NOMEM, "no memory for renderings of %d x %d pixels", size, size);
-            out->render[k] += rmse;
+        double *error = v->errors + (size_t)(v->first + first + i) * TR_ERRORS;
+        for (int k = 0; k <= iterations; k++) {
+            error[k] = rd_render_rmse(grid, maps[k]->t.data + at, channels, target, MAP_CHANNELS,
+                                      v->views + (size_t)(first + i) * RD_EVAL_VIEWS, RD_EVAL_VIEWS);
+            if (error[k] < 0) return ts_fail(st, TS_NOMEM, "no memory for renderings of %d x %d pixels", size, size);
         }
-        const rd_map_error e = rd_map_rmse((int64_t)pixels, maps[out->iterations]->t.data + at, channels, target,
+        const rd_map_error e = rd_map_rmse((int64_t)pixels, maps[iterations]->t.data + at, channels, target,
                                            MAP_CHANNELS);
-        out->diffuse += e.diffuse;
-        out->specular += e.specular;
-        out->roughness += e.roughness;
-        out->normal += e.normal;
+        memcpy(error + TR_MOST_ITERATIONS + 1, (double[]){e.diffuse, e.specular, e.roughness, e.normal},
+               4 * sizeof *error);
     }
     return TS_OK;
 }
@@ -121,16 +126,28 @@ static ts_code add_errors(tr_trainer *t, int first, int n, tr_validation *out, t
 ts_code tr_validate(tr_trainer *t, tr_validation *out, ts_status *st)
 {
     const tr_config *c = &t->config;
+    tr_validator *v = &t->validator;
     const int count = c->validate.count;
     /* Where an RMSE over the batch scales the gradient, a material's result must not depend on its neighbours. */
     const int together = c->arch.rmse == NN_RMSE_BATCH ? 1 : TOGETHER;
     const double start = tr_seconds();
     /* A step of the first phase has been made last: there is no refiner to speak of. */
     *out = (tr_validation){.step = t->step, .iterations = tr_pretraining(c, t->step - 1) ? 0 : c->arch.iterations};
-    memcpy(t->validator.model->value, tr_weights(t), t->model->count * sizeof(float));
-    for (int i = 0; i < count; i += together) {
-        const ts_code code = add_errors(t, i, count - i < together ? count - i : together, out, st);
-        if (code != TS_OK) return ts_context(st, "validation");
+    memcpy(v->model->value, tr_weights(t), t->model->count * sizeof(float));
+    memset(v->errors, 0, (size_t)count * TR_ERRORS * sizeof *v->errors);
+    ts_code code = TS_OK;
+    for (int i = 0; i < v->count && !code; i += together)
+        code = measure(t, i, v->count - i < together ? v->count - i : together, out->iterations, st);
+    if (tr_agree(&t->ranks, code, st) != TS_OK) return ts_context(st, "validation");
+    /* The others' are zeros here: the sums are what one process has. */
+    if (t->ranks.mpi) t->ranks.mpi->sum(v->errors, count * TR_ERRORS);
+    for (int i = 0; i < count; i++) {
+        const double *error = v->errors + (size_t)i * TR_ERRORS, *map = error + TR_MOST_ITERATIONS + 1;
+        for (int k = 0; k <= out->iterations; k++) out->render[k] += error[k];
+        out->diffuse += map[0];
+        out->specular += map[1];
+        out->roughness += map[2];
+        out->normal += map[3];
     }
     for (int k = 0; k <= out->iterations; k++) out->render[k] /= count;
     out->diffuse /= count;
@@ -144,5 +161,5 @@ ts_code tr_validate(tr_trainer *t, tr_validation *out, ts_status *st)
         t->best_step = t->step;
     }
     out->seconds = tr_seconds() - start;
-    return out->best ? tr_save_weights(t, "best.safetensors", st) : TS_OK;
+    return tr_agree(&t->ranks, out->best ? tr_save_weights(t, "best.safetensors", st) : TS_OK, st);
 }

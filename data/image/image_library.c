@@ -1,15 +1,11 @@
 /* Loads the shared object that has OpenImageIO behind it, once, when the first call needs it. */
-#include "data/folders.h"
 #include "data/image/oiio.h"
+#include "data/library.h"
 #include "tensor/threads.h"
-#include <dlfcn.h>
-#include <limits.h>
 #include <pthread.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <unistd.h>
 
 #define FILE_NAME "liblgd_image.so"
 
@@ -17,38 +13,15 @@ static pthread_once_t once = PTHREAD_ONCE_INIT;
 static const oi_library *library;
 static ts_status failure;
 
-/* Beside the folder of the program or of liblgd.so: ../lib/lgd after make install, and after make of programs; lib/lgd
- * of liblgd.so after make. False where there is none. */
-static bool beside_us(char *path, size_t size)
-{
-    static const char *const folders[] = {"../lib/lgd", "lib/lgd"};
-    char own[PATH_MAX - 64];
-    if (!io_own_folder(own, sizeof own)) return false;
-    for (int i = 0; i < 2; i++)
-        if (snprintf(path, size, "%s/%s/" FILE_NAME, own, folders[i]) < (int)size && access(path, F_OK) == 0)
-            return true;
-    return false;
-}
-
 static void load(void)
 {
-    char path[PATH_MAX];
-    if (!beside_us(path, sizeof path)) snprintf(path, sizeof path, "%s/lgd/" FILE_NAME, io_library_folder);
-    if (access(path, F_OK) != 0) {
-        ts_fail(&failure, TS_IO,
-                "this image needs " FILE_NAME
-                ", which is neither in ../lib/lgd beside the program or library nor in %s/lgd: install it again",
-                io_library_folder);
+    const oi_library *found = io_library_load(FILE_NAME, OI_LIBRARY, &failure);
+    if (!found) {
+        ts_context(&failure, "this image needs " FILE_NAME " (install it again)");
         return;
     }
-    void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
-    if (!handle) {
-        ts_fail(&failure, TS_IO, "%s", dlerror());
-        return;
-    }
-    const oi_library *found = dlsym(handle, OI_LIBRARY);
-    if (!found || strcmp(found->build, OI_BUILD) != 0) {
-        ts_fail(&failure, TS_UNSUPPORTED, "%s: belongs to another version of this program", path);
+    if (strcmp(found->build, OI_BUILD) != 0) {
+        ts_fail(&failure, TS_UNSUPPORTED, FILE_NAME " belongs to another version of this program: install it again");
         return;
     }
     found->start(ts_threads());

@@ -57,6 +57,17 @@ deps_name_what_is_missing() {
 }
 check deps_name_what_is_missing deps_name_what_is_missing
 
+# What the build does without is no error where it cannot be installed.
+deps_go_on_without_mpi() {
+    mkdir "$T/bin"
+    for tool in sh gcc g++; do ln -s "$(command -v $tool)" "$T/bin/"; done
+    printf '#!/bin/sh\nexit 1\n' >"$T/bin/pkg-config"
+    chmod +x "$T/bin/pkg-config"
+    CC=gcc CXX=g++ PATH="$T/bin" expect 0 "$T/bin/sh" .ci/deps.sh ompi-c
+    says "$T/err" "without libopenmpi-dev openmpi-bin left out: lgd-train under mpirun"
+}
+check deps_go_on_without_mpi deps_go_on_without_mpi
+
 # A machine on which nothing is installed, with an apt-get that writes down how it is called.
 bare_machine() {
     mkdir "$T/bin"

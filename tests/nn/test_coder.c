@@ -59,7 +59,7 @@ TEST(coder_learns_to_give_maps_back)
         st = (ts_status){0};
         CHECK(tr_config_set_assignment(&c, keys[i], &st) == TS_OK, "%s", st.message);
     }
-    tr_trainer *t = tr_create(&c, folder("latent"), false, NULL, &st);
+    tr_trainer *t = tr_create(&c, folder("latent"), false, NULL, NULL, &st);
     CHECK(t, "%s", st.message);
     double loss[60];
     for (int i = 0; i < 60; i++) {
@@ -81,7 +81,7 @@ TEST(trainer_with_g_rate_0_leaves_g_alone)
     tr_config c = small();
     ts_status st = {0};
     CHECK(tr_config_set_assignment(&c, "train.g_rate=0", &st) == TS_OK, "%s", st.message);
-    tr_trainer *t = tr_create(&c, folder("fixed"), false, NULL, &st);
+    tr_trainer *t = tr_create(&c, folder("fixed"), false, NULL, NULL, &st);
     CHECK(t, "%s", st.message);
     float *before = malloc(t->model->count * sizeof *before);
     size_t first, last;

@@ -113,7 +113,7 @@ static bool train(const stress *s, ts_precision precision)
     char folder[1200];
     snprintf(folder, sizeof folder, "%s/%s", s->folder, ts_precision_name(precision));
     mkdir(folder, 0777);
-    tr_trainer *t = poison.maps ? tr_create(&c, folder, false, &listener, &st) : NULL;
+    tr_trainer *t = poison.maps ? tr_create(&c, folder, false, NULL, &listener, &st) : NULL;
     if (!t) {
         free(poison.maps);
         return printf("%s\n", st.message), false;
@@ -130,7 +130,7 @@ static bool train(const stress *s, ts_precision precision)
     ok = bound(precision, "no input was spoilt", poison.spoilt == 0) && ok;
     ok = bound(precision, "weights on disk that are not finite", !finite_weights(folder, "last.safetensors")) && ok;
     st = (ts_status){0};
-    t = tr_create(&c, folder, true, NULL, &st); /* which refuses a checkpoint with a value that is not finite */
+    t = tr_create(&c, folder, true, NULL, NULL, &st); /* which refuses a checkpoint with a value that is not finite */
     if (!t) printf("%s\n", st.message);
     ok = bound(precision, "a checkpoint that does not resume", !t) && ok;
     tr_destroy(&t);

@@ -266,7 +266,7 @@ TEST(photographs_of_validation_have_the_camera_that_is_asked_for)
         c.validate.camera = i == 1 ? TR_CAMERA_DEFAULT : TR_CAMERA_DATA;
         static tr_trainer t;
         ts_status st = {0};
-        t = (tr_trainer){.config = c};
+        t = (tr_trainer){.config = c, .ranks = {.count = 1}};
         CHECK(tr_validator_create(&t, &st) == TS_OK, "%s", st.message);
         if (i == 0) memcpy(usual, t.validator.images, sizeof usual);
         CHECK((memcmp(usual, t.validator.images, sizeof usual) == 0) == (i < 2), "validation %d", i);

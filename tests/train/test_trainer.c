@@ -50,7 +50,7 @@ static ts_code run(const tr_config *c, const char *where, bool resume, watch *w,
 {
     const tr_listener l = {.step = on_step, .validated = on_validation, .note = on_note, .stop = on_stop, .user = w};
     *st = (ts_status){0};
-    w->trainer = tr_create(c, where, resume, &l, st);
+    w->trainer = tr_create(c, where, resume, NULL, &l, st);
     if (!w->trainer) return st->code;
     const ts_code code = tr_run(w->trainer, st);
     tr_destroy(&w->trainer);
@@ -238,7 +238,7 @@ static void learn(ts_precision precision, const char *where, double *first, doub
     c.train.precision = precision;
     c.validate.every = 0;
     double early = 0, late = 0;
-    tr_trainer *t = tr_create(&c, where, false, NULL, &st);
+    tr_trainer *t = tr_create(&c, where, false, NULL, NULL, &st);
     CHECK(t, "%s", st.message);
     for (int i = 0; i < 60; i++) {
         tr_row row;
@@ -311,13 +311,13 @@ TEST(trainer_locks_its_folder)
     const tr_config c = small();
     ts_status st = {0};
     const char *where = folder("run");
-    tr_trainer *t = tr_create(&c, where, false, NULL, &st);
+    tr_trainer *t = tr_create(&c, where, false, NULL, NULL, &st);
     CHECK(t, "%s", st.message);
-    tr_trainer *second = tr_create(&c, where, false, NULL, &st);
+    tr_trainer *second = tr_create(&c, where, false, NULL, NULL, &st);
     CHECK(!second && st.code == TS_INVALID && strstr(st.message, "another lgd-train"), "%s", st.message);
     tr_destroy(&t);
     st = (ts_status){0};
-    t = tr_create(&c, where, false, NULL, &st);
+    t = tr_create(&c, where, false, NULL, NULL, &st);
     CHECK(t, "the lock outlived its trainer: %s", st.message);
     tr_destroy(&t);
 }
@@ -362,7 +362,7 @@ TEST(trainer_starts_from_given_weights)
     snprintf(c.train.init, sizeof c.train.init, "%s/last.safetensors", folder("first"));
     nn_model *given = nn_model_load(c.train.init, &st);
     CHECK(given, "%s", st.message);
-    tr_trainer *t = tr_create(&c, folder("second"), false, NULL, &st);
+    tr_trainer *t = tr_create(&c, folder("second"), false, NULL, NULL, &st);
     CHECK(t, "%s", st.message);
     CHECK(!memcmp(t->model->value, given->value, given->count * sizeof(float)),
           "the run does not begin with the given weights");
@@ -371,6 +371,6 @@ TEST(trainer_starts_from_given_weights)
     tr_destroy(&t);
     nn_model_free(&given);
     strcpy(other.train.init, "/nonexistent/x.safetensors");
-    t = tr_create(&other, folder("third"), false, NULL, &st);
+    t = tr_create(&other, folder("third"), false, NULL, NULL, &st);
     CHECK(!t && strstr(st.message, "/nonexistent/x.safetensors"), "%s", st.message);
 }

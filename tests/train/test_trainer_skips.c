@@ -21,7 +21,7 @@ TEST(trainer_skips_steps_that_are_not_finite)
     c.train.pretrain_steps = 0; /* no change of phase on the way, which begins Adam anew */
     int notes = 0;
     const tr_listener l = {.note = on_note, .user = &notes};
-    tr_trainer *t = tr_create(&c, where, false, &l, &st);
+    tr_trainer *t = tr_create(&c, where, false, NULL, &l, &st);
     CHECK(t, "%s", st.message);
     CHECK(tr_step(t, &row, &st) == TS_OK && !row.skip, "%s", st.message);
     for (size_t i = 0; i < t->model->count; i++) t->model->value[i] *= 1e30f;
@@ -59,7 +59,7 @@ TEST(trainer_skips_a_spike)
     tr_row row;
     c.train.pretrain_steps = 0;
     c.train.steps = 1000;
-    tr_trainer *t = tr_create(&c, folder("run"), false, NULL, &st);
+    tr_trainer *t = tr_create(&c, folder("run"), false, NULL, NULL, &st);
     CHECK(t, "%s", st.message);
     CHECK(tr_step(t, &row, &st) == TS_OK && !row.skip, "%s", st.message);
     CHECK(t->mean_norm == row.norm, "the mean norm is %g after a first of %g", t->mean_norm, row.norm);
