@@ -39,6 +39,7 @@ rmdir "$work/lgd/usr/share/zsh/site-functions"
 gzip -9n "$work"/lgd/usr/share/man/man1/*.1
 take liblgd-dev "$libdir/liblgd.so" "$libdir/liblgd.a" "$libdir/pkgconfig" /usr/include
 for file in "$root$libdir"/liblgd.so.*; do take liblgd0 "$libdir/${file##*/}"; done
+rm -f "$root$libdir"/lgd/liblgd_openmpi.so "$root$libdir"/lgd/liblgd_mpich.so # or the package would need both MPIs
 take liblgd0 "$libdir/lgd"
 take lgd-models /usr/share/lgd
 left=$(find "$root" ! -type d)
