@@ -137,6 +137,21 @@ bool cl_parse_size(const char *text, double *bytes)
     return true;
 }
 
+bool cl_parse_shard(const char *text, int *shard, int *shards)
+{
+    char part[16];
+    int64_t i, n;
+    const char *slash = strchr(text, '/');
+    const size_t length = slash ? (size_t)(slash - text) : 0;
+    if (length == 0 || length >= sizeof part) return false;
+    memcpy(part, text, length);
+    part[length] = 0;
+    if (!cl_parse_int(slash + 1, 1, 1000000, &n) || !cl_parse_int(part, 1, n, &i)) return false;
+    *shard = (int)i;
+    *shards = (int)n;
+    return true;
+}
+
 int cl_finish(int code)
 {
     if (fflush(stdout) != 0 || ferror(stdout)) {

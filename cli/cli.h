@@ -35,6 +35,8 @@ bool cl_parse_int(const char *text, int64_t lo, int64_t hi, int64_t *value);
 bool cl_parse_real(const char *text, double lo, double hi, double *value);
 /* Bytes: a number, or one with K, M or G (powers of 1024) behind it; at least 1. */
 bool cl_parse_size(const char *text, double *bytes);
+/* "I/N" with I in 1 .. N and N up to a million. */
+bool cl_parse_shard(const char *text, int *shard, int *shards);
 
 /* Flushes stdout; a failed write (closed pipe, full disk) prints one line and returns CL_FAILED, otherwise code. */
 int cl_finish(int code);

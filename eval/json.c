@@ -1,20 +1,13 @@
 /* results.json. */
+#include "data/json.h"
 #include "eval/html.h"
-#include "eval/text.h"
 #include "tensor/conv/conv.h"
-#include <math.h>
-
-static void put_number(FILE *f, double v)
-{
-    if (isfinite(v)) fprintf(f, "%.9g", v);
-    else fputs("null", f);
-}
 
 static void put_row(FILE *f, const ev_row *row)
 {
     for (int k = 0; k < EV_METRICS; k++) {
         fprintf(f, "%s\"%s\": ", k ? ", " : "{", ev_metric_name[k]);
-        put_number(f, row->value[k]);
+        io_put_json_number(f, row->value[k]);
     }
     fputc('}', f);
 }
@@ -23,29 +16,29 @@ static void put_row(FILE *f, const ev_row *row)
 static void put_column(const ev_report *r, int column, FILE *f)
 {
     fputs("{\"method\": ", f);
-    ev_json_string(f, r->method[ev_report_method(r, column)].label);
+    io_put_json(f, r->method[ev_report_method(r, column)].label);
     fprintf(f, ", \"step\": %d, ", r->step[column]);
 }
 
 void ev_json_write(const ev_report *r, FILE *f)
 {
     fprintf(f, "{\n\"version\": \"%s\",\n\"model\": ", LGD_VERSION);
-    ev_json_string(f, r->model);
+    io_put_json(f, r->model);
     fprintf(f,
             ",\n\"size\": %d,\n\"threads\": %d,\n\"pinned\": %s,\n\"repeat\": %d,\n\"isa\": \"%s\",\n\"convolutions\": "
             "\"%s\",\n\"methods\": [",
             r->size, r->threads, r->pinned ? "true" : "false", r->repeat, r->isa, r->exact ? "direct" : "Winograd");
     for (int m = 0; m < r->methods; m++) {
         fputs(m ? ",\n{\"label\": " : "\n{\"label\": ", f);
-        ev_json_string(f, r->method[m].label);
+        io_put_json(f, r->method[m].label);
         fprintf(f, ", \"bytes\": %zu, \"peak_flops\": ", r->method[m].bytes);
-        put_number(f, ev_report_peak(r, -1, m));
+        io_put_json_number(f, ev_report_peak(r, -1, m));
         fputc('}', f);
     }
     fputs("],\n\"sets\": [", f);
     for (int s = 0; s < r->sets; s++) {
         fputs(s ? ",\n{\"name\": " : "\n{\"name\": ", f);
-        ev_json_string(f, r->set_name[s]);
+        io_put_json(f, r->set_name[s]);
         fputs(", \"steps\": [", f);
         for (int c = 0; c < r->columns; c++) {
             ev_row mean, deviation;
@@ -53,9 +46,9 @@ void ev_json_write(const ev_report *r, FILE *f)
             fputs(c ? ",\n  " : "\n  ", f);
             put_column(r, c, f);
             fprintf(f, "\"materials\": %d, \"seconds\": ", n);
-            put_number(f, ev_report_seconds(r, s, c));
+            io_put_json_number(f, ev_report_seconds(r, s, c));
             fputs(", \"peak_flops\": ", f);
-            put_number(f, ev_report_peak(r, s, ev_report_method(r, c)));
+            io_put_json_number(f, ev_report_peak(r, s, ev_report_method(r, c)));
             fputs(", \"mean\": ", f);
             put_row(f, &mean);
             fputs(", \"deviation\": ", f);
@@ -68,13 +61,13 @@ void ev_json_write(const ev_report *r, FILE *f)
     for (int i = 0; i < r->results; i++) {
         const ev_result *m = &r->result[i];
         fprintf(f, "%s\n{\"set\": %d, \"name\": ", i ? "," : "", m->set);
-        ev_json_string(f, m->material);
+        io_put_json(f, m->material);
         fputs(", \"steps\": [", f);
         for (int c = 0; c < r->columns; c++) {
             fputs(c ? ",\n  " : "\n  ", f);
             put_column(r, c, f);
             fputs("\"seconds\": ", f);
-            put_number(f, m->seconds[c]);
+            io_put_json_number(f, m->seconds[c]);
             fputs(", \"error\": ", f);
             put_row(f, &m->row[c]);
             fputc('}', f);

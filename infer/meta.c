@@ -64,6 +64,17 @@ ts_code lgd_write_meta(const char *path, const lgd_photo *photo, const lgd_order
     io_text text;
     if (io_text_begin(&text, path, st) != TS_OK) return st->code;
     print(text.f, photo, order, facts);
+    if (order->record) fputs(order->record, text.f);
     fputs(mark, text.f);
     return io_text_write(&text, path, st);
+}
+
+char *lgd_meta_read(const char *folder)
+{
+    char *path = NULL, *text = NULL;
+    size_t size;
+    if (asprintf(&path, "%s/meta.txt", folder) < 0) return NULL;
+    if (io_read_bytes(path, 1 << 16, &text, &size, NULL) != TS_OK) text = NULL;
+    free(path);
+    return text;
 }

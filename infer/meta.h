@@ -4,8 +4,11 @@
 #include "infer/output.h"
 
 /* The conventions that io_read_map_folder reads, then a line for each file that is ordered, then the scene: the field
- * of view and where it is known from, camera and light in patch widths, and the light's power (infer/lgd.h); mark, a
- * line more. */
+ * of view and where it is known from, camera and light in patch widths, and the light's power (infer/lgd.h); the
+ * order's record; mark, a line more. */
 ts_code lgd_write_meta(const char *path, const lgd_photo *photo, const lgd_order *order, const lgd_output_result *facts,
                        const char *mark, ts_status *st);
+
+/* folder/meta.txt, which the caller frees; NULL when there is none that can be read. */
+char *lgd_meta_read(const char *folder);
 #endif

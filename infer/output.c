@@ -7,6 +7,7 @@
 #include "infer/page.h"
 #include "render/render.h"
 #include "render/scene.h"
+#include "tensor/hash.h"
 #include "tensor/maps.h"
 #include "tensor/new_file.h"
 #include <errno.h>
@@ -233,39 +234,44 @@ enum { MARK = 40 };
 /* The line of meta.txt that says which estimate the folder's files are of: a hash of the maps. */
 static void mark_of(const io_material *m, bool directx, char mark[MARK])
 {
-    const uint64_t values = (uint64_t)m->size * (uint64_t)m->size * MAP_CHANNELS;
-    uint64_t h = 0x9e3779b97f4a7c15u + directx;
-    for (uint64_t i = 0; i < values; i++) { /* splitmix64 of each value, chained */
-        uint32_t bits;
-        memcpy(&bits, &m->maps[i], sizeof bits);
-        h = (h ^ bits) + 0x9e3779b97f4a7c15u;
-        h = (h ^ h >> 30) * 0xbf58476d1ce4e5b9u;
-        h = (h ^ h >> 27) * 0x94d049bb133111ebu;
-        h ^= h >> 31;
-    }
-    snprintf(mark, MARK, "estimate: %016" PRIx64 "\n", h);
+    const size_t values = (size_t)m->size * (size_t)m->size * MAP_CHANNELS;
+    snprintf(mark, MARK, "estimate: %016" PRIx64 "\n", ts_hash(m->maps, values * sizeof *m->maps, directx));
 }
 
 /* Whether the folder's files are of the estimate with that mark. */
 static bool is_marked(const char *folder, const char *mark)
 {
-    char path[PATH_LENGTH], *text;
-    size_t size;
-    if (join(path, folder, "meta.txt", NULL) != TS_OK || io_read_bytes(path, 1 << 16, &text, &size, NULL) != TS_OK)
-        return false;
-    const bool marked = strstr(text, mark) != NULL;
+    char *text = lgd_meta_read(folder);
+    const bool marked = text && strstr(text, mark);
     free(text);
     return marked;
 }
 
-/* Every complete file from the hidden folder over the one in folder. Where that has another estimate's files, those
- * that were not replaced are removed; *removed gets their bits. */
+bool lgd_output_is(const char *folder, unsigned which, const char *record, char **meta)
+{
+    char path[PATH_LENGTH], *text = lgd_meta_read(folder);
+    bool is = text && strstr(text, record);
+    for (int k = 0; k < LGD_OUTPUTS && is; k++)
+        is = !(which >> k & 1) || (join(path, folder, lgd_files[k], NULL) == TS_OK && access(path, F_OK) == 0);
+    if (is) *meta = text;
+    else free(text);
+    return is;
+}
+
+/* Every complete file from the hidden folder over the one in folder, meta.txt last; until then there is none, so that
+ * what a killed process leaves is not taken for whole. Where the folder has another estimate's files, those that were
+ * not replaced are removed; *removed gets their bits. */
 static ts_code move_files(const char *hidden, const char *folder, const char *mark, unsigned *removed, ts_status *st)
 {
     char from[PATH_LENGTH], to[PATH_LENGTH];
     const bool same = is_marked(folder, mark);
     unsigned moved = 0;
+    const int meta = LGD_FILES - 1;
+    if (join(to, folder, lgd_files[meta], st) != TS_OK) return st->code;
+    if (unlink(to) != 0 && errno != ENOENT)
+        return ts_fail(st, TS_IO, "%s: cannot be replaced: %s", to, strerror(errno));
     for (int i = 0; i < LGD_FILES; i++) {
+        if (i == meta) ts_sync_folder(folder);
         if (join(from, hidden, lgd_files[i], st) != TS_OK || join(to, folder, lgd_files[i], st) != TS_OK)
             return st->code;
         if (access(from, F_OK) != 0) continue; /* not asked for */

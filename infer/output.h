@@ -47,6 +47,7 @@ typedef struct lgd_order {
     bool repeats;         /* the maps are made seamless (data/seamless.h) */
     int threads;          /* that files are made on */
     const char *fov_from; /* where photo's field of view is known from, for meta.txt */
+    const char *record;   /* lines more for meta.txt, or NULL */
 } lgd_order;
 
 /* TS_INVALID for what does not go together. */
@@ -67,4 +68,8 @@ typedef struct lgd_output_result {
  * may be NULL. */
 ts_code lgd_output_write(const char *parent, const char *stem, const io_material *estimate, const lgd_photo *photo,
                          const lgd_order *order, lgd_output_result *result, ts_status *st);
+
+/* Whether folder holds all files of which, and a meta.txt, which is written last, with the lines of record in it: then
+ * *meta is its text, which the caller frees. */
+bool lgd_output_is(const char *folder, unsigned which, const char *record, char **meta);
 #endif

@@ -8,7 +8,11 @@
 #include <string.h>
 #include <sys/stat.h>
 
-enum { PANEL = 128, LIGHT = 1 /* upper left, of the preview's */ };
+enum {
+    PANEL = 128,
+    LIGHT = 1,     /* upper left, of the preview's */
+    PICTURES = 500 /* at most 50 MB: later materials have a name alone */
+};
 
 static ts_code check(const lgd_plan *plan, const char *folder, ts_status *st)
 {
@@ -84,18 +88,22 @@ ts_code lgd_index_add(lgd_index *index, const lgd_item *item, ts_status *st)
         fputs("</p>\n</div>\n", f);
         return TS_OK;
     }
-    if (picture(item, &bytes, &size, st) != TS_OK) return st->code;
+    const bool shown = !item->was_done && index->materials < PICTURES; /* what was done lies on the disk alone */
+    if (shown && picture(item, &bytes, &size, st) != TS_OK) return st->code;
     index->materials++;
     fputs("<a class=\"card\" href=\"", f);
     io_put_url_part(f, item->job->stem);
-    fprintf(f,
-            "/%s\">\n<img alt=\"The photograph, and the material under a light from the upper left\" src=\"data:image/"
-            "png;base64,",
-            "view.html");
-    io_put_base64(f, bytes, size);
-    fputs("\">\n", f);
+    fputs("/view.html\">\n", f);
+    if (shown) {
+        fputs("<img alt=\"The photograph, and the material under a light from the upper left\" "
+              "src=\"data:image/png;base64,",
+              f);
+        io_put_base64(f, bytes, size);
+        fputs("\">\n", f);
+    }
     put_heading(f, item->job->stem);
-    fprintf(f, "<p>Difference from the photograph %.4f</p>\n</a>\n", item->last);
+    if (item->was_done) fputs("<p>Complete from an earlier call</p>\n</a>\n", f);
+    else fprintf(f, "<p>Difference from the photograph %.4f</p>\n</a>\n", item->last);
     free(bytes);
     return TS_OK;
 }

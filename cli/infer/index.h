@@ -14,7 +14,8 @@ typedef struct lgd_index {
 /* TS_INVALID where folder/index.html would replace one of the plan's photographs, or is where a folder is or will be.
  * The caller ends the index after success. */
 ts_code lgd_index_start(lgd_index *index, const lgd_plan *plan, const char *folder, ts_status *st);
-/* A finished item, with its photograph and a rendering; of a failed one its message. */
+/* A finished item, with its photograph and a rendering, of the first five hundred that this call has made; of a failed
+ * one its message. */
 ts_code lgd_index_add(lgd_index *index, const lgd_item *item, ts_status *st);
 /* Writes folder/index.html, one file whose pictures are in it, unless nothing was added or st has a failure
  * already. Frees the index. */

@@ -1,9 +1,18 @@
 #include "cli/infer/item.h"
+#include "cli/infer/record.h"
 #include "infer/estimate.h"
 #include "nn/model.h"
+#include "tensor/hash.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+
+const char *const lgd_warning_names[LGD_WARNINGS] = {"black",
+                                                     "overexposed",
+                                                     "field of view assumed",
+                                                     "colour profile not used",
+                                                     "mask black",
+                                                     "maps do not look like the photograph"};
 
 /* The last of an item's steps failed in a public function. */
 static void failed(lgd_item *item, const lgd_error *error) { ts_fail(&item->st, error->code, "%s", error->message); }
@@ -67,8 +76,14 @@ static void read_sheet(const lgd_command *c, lgd_item *item)
     snprintf(item->fov_from, sizeof item->fov_from, "the sheet, %d photographs", set->good);
 }
 
-void lgd_item_read(const lgd_command *c, bool published, lgd_item *item)
+void lgd_item_read(const lgd_command *c, const char *recipe, bool published, lgd_item *item)
 {
+    if (!c->sheet && !*c->capture) {
+        ts_status none = {0}; /* what cannot be read fails below, with the reader's words */
+        const bool hashed = ts_hash_file(item->job->photo, &item->hash, &none) == TS_OK;
+        item->was_done = c->skip_existing && hashed && lgd_record_is_done(c, item, recipe, &item->result);
+        if (item->was_done) return;
+    }
     if (c->sheet) {
         read_sheet(c, item);
         return;
@@ -111,6 +126,40 @@ static int before_tile(double done, void *user)
     return t->progress(t->item, done, t->user);
 }
 
+const char *lgd_item_fov_is(const lgd_item *item)
+{
+    const char *how = lgd_item_assumption(item);
+    return !*how ? "known" : *how == 'e' ? "estimated" : "assumed";
+}
+
+/* What makes a photograph a poor one: the maps will be guesses. */
+static void look_at(const lgd_command *c, lgd_item *item)
+{
+    const int64_t pixels = (int64_t)c->size * c->size, values = pixels * 3;
+    int64_t dark = 0, full = 0, over = 0, wanted = 0;
+    for (int64_t i = 0; i < values; i++) {
+        const float v = item->image[i];
+        dark += v < 1e-3f; /* three of 255 sRGB levels */
+        full += v > 0.999f;
+        over += v > 1.001f; /* more than resampling rounds to */
+    }
+    while (item->mask && wanted < pixels && !item->mask[wanted]) wanted++;
+    item->full = (double)full / (double)values;
+    item->over = (double)over / (double)values;
+    item->warnings = (dark == values               ? LGD_WARN_BLACK
+                          : full * 10 > values * 9 ? LGD_WARN_FULL
+                                                   : 0) |
+        (*lgd_item_fov_is(item) == 'a' ? LGD_WARN_FOV : 0) | (*item->profile ? LGD_WARN_PROFILE : 0) |
+        (item->mask && wanted == pixels ? LGD_WARN_MASK : 0) | (item->last > LGD_FAR ? LGD_WARN_DIFFERENT : 0);
+}
+
+const char *lgd_item_assumption(const lgd_item *item)
+{
+    if (item->angle.assumed) return "assumed: ";
+    if (item->fov != LGD_FOV_UNKNOWN) return "";
+    return item->photo[0].camera[2] == lgd_flash_photo(NULL).camera[2] ? "assumed: " : "estimated: ";
+}
+
 void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, lgd_item_progress progress, void *user)
 {
     const bool fixed = c->power > 0;
@@ -136,13 +185,7 @@ void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, l
     if (io_material_create(&item->m, c->size, &item->st) != TS_OK ||
         lgd_model_estimate(model, item->photo, item->photos, c->size, &options, true, item->m.maps, &item->st))
         ts_context(&item->st, "%s", item->job->photo);
-}
-
-const char *lgd_item_assumption(const lgd_item *item)
-{
-    if (item->angle.assumed) return "assumed: ";
-    if (item->fov != LGD_FOV_UNKNOWN) return "";
-    return item->photo[0].camera[2] == lgd_flash_photo(NULL).camera[2] ? "assumed: " : "estimated: ";
+    look_at(c, item);
 }
 
 double lgd_item_bytes(const lgd_command *c, const lgd_model *model)
@@ -152,8 +195,15 @@ double lgd_item_bytes(const lgd_command *c, const lgd_model *model)
     return lgd_model_bytes(model, c->size, &options);
 }
 
-void lgd_item_write(const lgd_command *c, lgd_item *item)
+void lgd_item_write(const lgd_command *c, const char *recipe, lgd_item *item)
 {
+    char *record = lgd_record(c, item, recipe);
+    item->result = lgd_record_result(record);
+    if (!record || !item->result) {
+        ts_fail(&item->st, TS_NOMEM, "%s: out of memory", item->job->photo);
+        free(record);
+        return;
+    }
     char from[sizeof item->fov_from + 32];
     snprintf(from, sizeof from, "%s%s", lgd_item_assumption(item), item->fov_from);
     const lgd_order order = {.which = c->outputs,
@@ -162,9 +212,11 @@ void lgd_item_write(const lgd_command *c, lgd_item *item)
                              .half = c->half,
                              .repeats = c->seamless,
                              .threads = item->threads,
-                             .fov_from = from};
+                             .fov_from = from,
+                             .record = record};
     if (lgd_output_write(c->out, item->job->stem, &item->m, &item->photo[0], &order, &item->written, &item->st))
         ts_context(&item->st, "%s", item->job->photo);
+    free(record);
 }
 
 void lgd_item_free(lgd_item *item)
@@ -175,5 +227,7 @@ void lgd_item_free(lgd_item *item)
     io_sheet_set_free(&item->sheet);
     io_material_free(&item->m);
     free(item->mask);
+    free(item->result);
     item->mask = NULL;
+    item->result = NULL;
 }

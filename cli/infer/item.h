@@ -8,10 +8,27 @@
 #include "infer/lgd.h"
 #include "infer/output.h"
 #include "infer/sheet.h"
+#include <stdint.h>
+
+/* Why maps may mean little; a bit each in the order of lgd_warning_names. */
+enum {
+    LGD_WARN_BLACK = 1 << 0,    /* the photograph is black */
+    LGD_WARN_FULL = 1 << 1,     /* more than nine tenths of its values are overexposed */
+    LGD_WARN_FOV = 1 << 2,      /* its field of view is assumed */
+    LGD_WARN_PROFILE = 1 << 3,  /* its colour profile cannot be used */
+    LGD_WARN_MASK = 1 << 4,     /* the mask is black all over */
+    LGD_WARN_DIFFERENT = 1 << 5 /* the maps do not look like it: a difference above LGD_FAR */
+};
+enum { LGD_WARNINGS = 6 };
+extern const char *const lgd_warning_names[LGD_WARNINGS];
+#define LGD_FAR                                                                                                     \
+    0.01 /* reconstruction RMSE after the trained steps from which a highlight may be seen where the photograph has \
+            none */
 
 typedef struct lgd_item {
     const lgd_job *job;
     int index;           /* into the plan */
+    uint64_t hash;       /* of the photograph's file (tensor/hash.h); of a capture 0 */
     ts_status st;        /* the first failure on the way; later stages leave the item alone */
     float *square;       /* linear, [size][size][3], or NULL: of a capture or a sheet */
     lgd_rectified angle; /* with corners; its square's values are item->square */
@@ -30,21 +47,28 @@ typedef struct lgd_item {
     int steps;          /* t of that */
     double power;       /* of the light that was taken, in those that the photographs name */
     lgd_output_result written;
-    int threads;  /* to compute and write it on, the calling thread's own (tensor/threads.h) */
-    double shown; /* the progress function's: how much of it the progress bar has, 0 .. 1 */
-    int stage;    /* the pipeline's */
+    bool was_done;     /* its folder was complete already: nothing is read, estimated or written */
+    char *result;      /* members for results.jsonl (cli/infer/record.h), once there are complete files */
+    double full, over; /* parts of the photograph's values: not below white, and above it */
+    unsigned warnings; /* LGD_WARN_ */
+    double seconds;    /* of reading, estimating and writing */
+    int threads;       /* to compute and write it on, the calling thread's own (tensor/threads.h) */
+    double shown;      /* the progress function's: how much of it the progress bar has, 0 .. 1 */
+    int stage;         /* the pipeline's */
 } lgd_item;
 
 /* Called while an item is estimated, with the part that is done; nonzero: stop. */
 typedef int (*lgd_item_progress)(lgd_item *item, double done, void *user);
 
-/* Each sets the item's st on failure. published: as infer/photograph.h says. */
-void lgd_item_read(const lgd_command *c, bool published, lgd_item *item);
+/* Each sets the item's st on failure. published: as infer/photograph.h says. recipe: lgd_recipe's. */
+void lgd_item_read(const lgd_command *c, const char *recipe, bool published, lgd_item *item);
 void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, lgd_item_progress progress, void *user);
 /* Of an estimated item: "assumed: " where its field of view is the default, "estimated: " where the model guessed it,
  * or "". */
 const char *lgd_item_assumption(const lgd_item *item);
 double lgd_item_bytes(const lgd_command *c, const lgd_model *model); /* that an estimate takes, at most */
-void lgd_item_write(const lgd_command *c, lgd_item *item);
+/* "known", "estimated" or "assumed". */
+const char *lgd_item_fov_is(const lgd_item *item);
+void lgd_item_write(const lgd_command *c, const char *recipe, lgd_item *item);
 void lgd_item_free(lgd_item *item);
 #endif

@@ -1,9 +1,11 @@
 /* lgd-infer: maps from flash photographs. */
 #include "cli/cli.h"
 #include "cli/infer/index.h"
+#include "cli/infer/manifest.h"
 #include "cli/infer/operands.h"
 #include "cli/infer/options.h"
 #include "cli/infer/pipeline.h"
+#include "cli/infer/record.h"
 #include "infer/model_path.h"
 #include "infer/output.h"
 #include "infer/photograph.h"
@@ -21,15 +23,17 @@ typedef struct run {
     lgd_model *model;
     pthread_mutex_t lock; /* of the bar and of what is printed */
     cl_progress bar;
-    double shown;           /* photographs that the bar has, and parts of such */
-    int jobs, done, failed; /* photographs: all, with complete files, without */
-    int steps;              /* refinement steps of each */
-    FILE *poor;             /* a line for each photograph whose maps should be looked at, into text */
+    double shown;                  /* photographs that the bar has, and parts of such */
+    int jobs, done, failed, there; /* photographs: all, with complete files, without, done by an earlier call */
+    int steps;                     /* refinement steps of each */
+    FILE *poor;                    /* a line for each photograph whose maps should be looked at, into text */
     char *text;
     size_t size;
     lgd_index index;
     ts_status index_st;
     bool left_out; /* photographs of a sheet that could not be used */
+    lgd_manifest *manifest; /* or NULL */
+    ts_status manifest_st;
 } run;
 
 static int show(lgd_item *item, double done, void *user)
@@ -47,29 +51,20 @@ static int show(lgd_item *item, double done, void *user)
  */
 static const char *look_at(const lgd_item *item, int size)
 {
-    const char *why = NULL;
     const char *name = item->job->photo;
-    const int64_t values = (int64_t)size * size * 3;
-    int64_t dark = 0, full = 0, over = 0;
-    for (int64_t i = 0; i < values; i++) {
-        const float v = item->image[i];
-        dark += v < 1e-3f; /* three of 255 sRGB levels */
-        full += v > 0.999f;
-        over += v > 1.001f; /* more than resampling rounds to */
-    }
     if (size > item->photo_side)
         cl_note("%s: note: upsampled: its square has %d pixels a side and --size is %d", name, item->photo_side, size);
-    if (dark == values) {
-        why = "black";
+    if (item->warnings & LGD_WARN_BLACK) {
         cl_note("%s: warning: the photograph is black: its maps mean nothing", name);
-    } else if (full * 10 > values * 9) {
-        why = "overexposed";
+        return lgd_warning_names[0];
+    }
+    if (item->warnings & LGD_WARN_FULL) {
         cl_note("%s: warning: the photograph is overexposed (%.0f%% of the values): its maps mean little", name,
-                100.0 * (double)full / (double)values);
-    } else if (over > 0)
-        cl_note("%s: note: %.1f%% of the values are above 1 and count as 1", name,
-                100.0 * (double)over / (double)values);
-    return why;
+                100 * item->full);
+        return lgd_warning_names[1];
+    }
+    if (item->over > 0) cl_note("%s: note: %.1f%% of the values are above 1 and count as 1", name, 100 * item->over);
+    return NULL;
 }
 
 /* Where the corners put the camera. */
@@ -124,20 +119,6 @@ static void say_fov(const lgd_item *item)
                 fov, item->fov_from);
 }
 
-#define FAR                                                                                                         \
-    0.01 /* reconstruction RMSE after the trained steps from which a highlight may be seen where the photograph has \
-            none */
-
-/* A mask of another photograph, or black and white exchanged. */
-static void look_at_mask(const lgd_command *c, const lgd_item *item)
-{
-    const int64_t pixels = (int64_t)c->size * c->size;
-    int64_t i = 0;
-    while (i < pixels && !item->mask[i]) i++;
-    if (i == pixels)
-        cl_note("%s: warning: the mask %s is black all over its square: nothing is refined", item->job->photo, c->mask);
-}
-
 static void name_removed(const lgd_item *item)
 {
     char names[256] = "";
@@ -150,8 +131,8 @@ static void name_removed(const lgd_item *item)
 /* How near the maps come to the photograph. */
 static void say_difference(const run *r, const lgd_item *item)
 {
-    const char *hint = r->command->iterations == -1 && item->last > FAR ? "; --iterations auto may come nearer"
-                                                                        : ""; /* each step halves what is left */
+    const char *hint = r->command->iterations == -1 && item->last > LGD_FAR ? "; --iterations auto may come nearer"
+                                                                            : ""; /* each step halves what is left */
     if (item->steps > 0)
         cl_note("%s: difference from the photograph %.4f at first -> %.4f after %d step%s%s", item->job->photo,
                 item->first, item->last, item->steps, item->steps == 1 ? "" : "s", hint);
@@ -166,11 +147,13 @@ static void say_all(run *r, const lgd_item *item)
     else if (item->photos > 0 && item->photos < item->capture.images)
         cl_note("%s: note: the first %d of its %d photographs are used: these weights read no more", item->job->photo,
                 item->photos, item->capture.images);
-    if (item->mask) look_at_mask(r->command, item);
+    if (item->warnings & LGD_WARN_MASK) /* of another photograph, or black and white exchanged */
+        cl_note("%s: warning: the mask %s is black all over its square: nothing is refined", item->job->photo,
+                r->command->mask);
     say_profile(item->job->photo, item->profile);
     const char *why = item->image ? look_at(item, r->command->size) : NULL;
     if (item->st.code) return;
-    if (!why && item->last > FAR) why = "its maps do not look like it";
+    if (!why && item->last > LGD_FAR) why = "its maps do not look like it";
     if (why && r->poor) fprintf(r->poor, "%s: %s\n", item->job->photo, why);
     if (r->command->outputs & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC | LGD_OUT_ORM))
         cl_note("%s: base colour and metalness miss diffuse by %.4f and F0 by %.4f (RMS, linear)", item->job->photo,
@@ -186,6 +169,10 @@ static void say_all(run *r, const lgd_item *item)
 static void report(run *r, const lgd_item *item)
 {
     cl_progress_end(&r->bar);
+    if (item->was_done) {
+        r->there++;
+        return;
+    }
     r->left_out = !say_sheet(item, r->command->quiet) || r->left_out;
     if (!r->command->quiet) say_all(r, item);
     if (item->st.code) {
@@ -203,6 +190,7 @@ static void report(run *r, const lgd_item *item)
 /* How many, how long, which to look at. */
 static void sum_up(run *r, double seconds)
 {
+    if (r->there) cl_note("%d of %d photographs were complete already", r->there, r->jobs);
     cl_note("%d of %d photographs done in %.1f s%s", r->done, r->jobs, seconds,
             r->poor && fflush(r->poor) == 0 && r->size > 0 ? "; look at:" : "");
     for (char *line = r->text, *next; line && *line; line = next) {
@@ -219,6 +207,7 @@ static void finished(const lgd_item *item, void *user)
     pthread_mutex_lock(&r->lock);
     r->shown += 1 - item->shown; /* of one that failed or ended early too */
     report(r, item);
+    if (r->manifest && !r->manifest_st.code) lgd_manifest_add(r->manifest, item, &r->manifest_st);
     if (!r->index_st.code) lgd_index_add(&r->index, item, &r->index_st);
     pthread_mutex_unlock(&r->lock);
 }
@@ -230,11 +219,11 @@ static int all(run *r, lgd_pipeline *pipeline)
     r->bar = cl_progress_start("step", (int64_t)r->jobs * (r->steps + 1));
     lgd_pipeline_run(pipeline, r->model, &(lgd_listener){show, finished, cl_interrupted, r});
     cl_progress_end(&r->bar);
-    if (!r->command->quiet && r->jobs > 1) sum_up(r, cl_seconds() - start);
+    if (!r->command->quiet && (r->jobs > 1 || r->there)) sum_up(r, cl_seconds() - start);
     if (r->poor) fclose(r->poor);
     free(r->text);
-    if (cl_interrupted() && r->done + r->failed < r->jobs)
-        return cl_stopped("interrupted: %d of %d photographs are done", r->done, r->jobs);
+    if (cl_interrupted() && r->done + r->failed + r->there < r->jobs)
+        return cl_stopped("interrupted: %d of %d photographs are done", r->done + r->there, r->jobs);
     if (r->failed > 0 && r->jobs > 1) return cl_failed("%d of %d photographs failed", r->failed, r->jobs);
     return r->failed > 0 || r->left_out ? CL_FAILED : CL_OK;
 }
@@ -259,7 +248,7 @@ static void print_help(void)
          "output; what was assumed and the difference of the maps' rendering from the photograph (RMSE of linear "
          "values),\n"
          "at first and after the steps, go to standard error. Two photographs with the same STEM\n"
-         "are refused before any work.\n"
+         "are refused before any work. Of several, DIR/results.jsonl gets a line for each.\n"
          "Exit status: 0 done, 1 a photograph failed (the others are done), 2 wrong usage, 130 interrupted (what is "
          "complete stays).");
 }
@@ -275,6 +264,25 @@ static int end_index(run *r, int code)
     return code;
 }
 
+static int end_manifest(run *r, int code)
+{
+    ts_status own = {0}, *st = r->manifest_st.code ? &r->manifest_st : &own;
+    lgd_manifest_close(&r->manifest, &own);
+    return st->code ? cl_failed("%s", st->message) : code;
+}
+
+/* The part of the work; its pages and its list. several: not a lone photograph, whose own page and meta.txt are
+ * enough. */
+static ts_code settle(run *r, lgd_plan *plan, bool several, ts_status *st)
+{
+    const lgd_command *c = r->command;
+    if (several && lgd_manifest_check(plan, c->out, st) != TS_OK) return st->code;
+    if (c->shards) lgd_plan_keep(plan, c->shard, c->shards);
+    r->jobs = plan->jobs;
+    /* No part knows the others' materials. */
+    return c->outputs & LGD_OUT_PAGE && several && !c->shards ? lgd_index_start(&r->index, plan, c->out, st) : TS_OK;
+}
+
 static int work(const lgd_command *given)
 {
     lgd_command own = *given;
@@ -283,7 +291,7 @@ static int work(const lgd_command *given)
     lgd_operands operands = {0};
     lgd_error error;
     lgd_plan plan;
-    char weights[LGD_PATH_MAX];
+    char weights[LGD_PATH_MAX], *recipe = NULL;
     if (!*c->capture && lgd_operands_expand(c->photo, c->photos, say_failed, &operands, &st) != TS_OK)
         return cl_failed("%s", st.message);
     if (!*c->capture) own.photo = operands.photo, own.photos = operands.photos;
@@ -304,10 +312,10 @@ static int work(const lgd_command *given)
     }
     ts_threads_set(c->threads);
     ts_budget_set(c->max_memory);
-    run r = {.command = c, .jobs = plan.jobs, .lock = PTHREAD_MUTEX_INITIALIZER};
-    /* Of a lone photograph its page is enough. */
-    if (c->outputs & LGD_OUT_PAGE && !c->sheet && (photos > 1 || strcmp(photo[0], given->photo[0]) != 0) &&
-        lgd_index_start(&r.index, &plan, c->out, &st) != TS_OK) {
+    /* A sheet is one material. */
+    const bool several = !c->sheet && (photos > 1 || strcmp(photo[0], given->photo[0]) != 0);
+    run r = {.command = c, .lock = PTHREAD_MUTEX_INITIALIZER};
+    if (settle(&r, &plan, several, &st) != TS_OK) {
         lgd_plan_free(&plan);
         lgd_operands_free(&operands);
         return st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
@@ -318,22 +326,26 @@ static int work(const lgd_command *given)
     if (lgd_model_path(c->model, *c->capture || (c->sheet && c->photos > 1) ? "multi" : "single", weights, &st) !=
         TS_OK)
         cl_failed("%s", st.message);
-    else if (lgd_weights_published(weights, &published, &st) != TS_OK) cl_failed("%s", st.message);
-    else if (!(pipeline = lgd_pipeline_start(&plan, c, published, &st)))
+    else if (lgd_weights_published(weights, &published, &st) != TS_OK || !(recipe = lgd_recipe(c, weights, &st)))
+        cl_failed("%s", st.message);
+    else if (!(pipeline = lgd_pipeline_start(&plan, c, recipe, published, &st)))
         cl_failed("%s", st.message); /* decodes while the weights are read */
     else if (!(r.model = lgd_load(weights, &error))) cl_failed("%s", error.message);
-    else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK)
+    else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK ||
+             (several && !(r.manifest = lgd_manifest_open(&plan, c->out, &st))))
         cl_failed("%s", st.message);
     else {
         r.steps = lgd_command_steps(c, r.model);
         code = all(&r, pipeline);
         if (code == CL_OK && missing) code = CL_FAILED;
+        code = end_manifest(&r, code);
     }
     code = end_index(&r, code);
     lgd_pipeline_end(&pipeline);
     lgd_free(&r.model);
     lgd_plan_free(&plan);
     lgd_operands_free(&operands);
+    free(recipe);
     return code;
 }
 

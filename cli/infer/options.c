@@ -24,6 +24,8 @@ enum {
     PRECISION,
     MAX_PIXELS,
     MAX_MEMORY,
+    SKIP_EXISTING,
+    SHARD,
     HELP = 'h',
     VERSION = 'V'
 };
@@ -91,6 +93,11 @@ const cl_argument lgd_infer_arguments[] = {
     {MAX_MEMORY, "max-memory", "SIZE",
      "refuse what needs more memory at once: a number of bytes, or with K, M or G behind it (default: three\n"
      "quarters of what the machine has or its control group allows)"},
+    {SKIP_EXISTING, "skip-existing", NULL,
+     "leave out photographs whose DIR/STEM/ is complete and made from the same bytes by the same weights and options"},
+    {SHARD, "shard", "I/N",
+     "do part I of N of the photographs, 1 .. N; the name STEM decides which part, so that any number of calls with\n"
+     "the same DIR share the work"},
     {'q', "quiet", NULL, "print errors only"},
     {HELP, "help", NULL, "print this help"},
     {VERSION, "version", NULL, "print the version"},
@@ -169,6 +176,11 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
                 code = ts_fail(st, TS_INVALID, "--orientations: '%s' is not 1, 2, 4 or 8", value);
             break;
         case EXACT: c->exact = true; break;
+        case SKIP_EXISTING: c->skip_existing = true; break;
+        case SHARD:
+            if (!cl_parse_shard(value, &c->shard, &c->shards))
+                code = ts_fail(st, TS_INVALID, "--shard: '%s' is not I/N with I in 1 .. N", value);
+            break;
         case PRECISION:
             c->bf16 = strcmp(value, "bf16") == 0;
             if (!c->bf16 && strcmp(value, "f32") != 0)
@@ -242,6 +254,9 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
                            : c->corners ? "corners"
                                         : "mask");
     if (c->sheet && !power_given) c->power = 1;
+    if ((*c->capture || c->sheet) && (c->skip_existing || c->shards))
+        return ts_fail(st, TS_INVALID, "--%s is one material: no --%s", c->sheet ? "sheet" : "capture",
+                       c->shards ? "shard" : "skip-existing");
     if (*c->capture) {
         if (!power_given) c->power = 1;
         c->only[0] = c->capture;

@@ -19,7 +19,8 @@ typedef struct lgd_command {
     io_corners angle; /* of the square in the photograph, where corners is true */
     double power;     /* of the light, in default ones; 0: estimated */
     unsigned outputs; /* LGD_OUT_... */
-    bool directx, metallic, seamless, half /* of maps.exr */, exact, bf16, quiet, help, version, corners,
+    int shard, shards; /* of the photographs the part shard of 1 .. shards; 0: all */
+    bool skip_existing, directx, metallic, seamless, half /* of maps.exr */, exact, bf16, quiet, help, version, corners,
         sheet;    /* the photographs are of one sample under a printed sheet, one result */
     char **photo; /* into argv; with a capture, that alone; with a sheet, all are one result's */
     char *only[1];

@@ -1,4 +1,5 @@
 #include "cli/infer/pipeline.h"
+#include "cli/cli.h"
 #include "tensor/budget.h"
 #include "tensor/threads.h"
 #include <pthread.h>
@@ -13,6 +14,7 @@ enum { IDLE, DECODING, DECODED, COMPUTING, FINISHED }; /* an item's stages */
 struct lgd_pipeline {
     const lgd_plan *plan;
     const lgd_command *command;
+    const char *recipe;
     lgd_model *model;
     const lgd_listener *listener;
     pthread_t decoder;
@@ -76,7 +78,9 @@ static void *decode_all(void *user)
     lgd_pipeline *p = user;
     lgd_item *item;
     while ((item = begin_decoding(p))) {
-        lgd_item_read(p->command, p->published, item);
+        const double start = cl_seconds();
+        lgd_item_read(p->command, p->recipe, p->published, item);
+        item->seconds = cl_seconds() - start;
         move(p, item, DECODED);
     }
     return NULL;
@@ -94,10 +98,12 @@ static void work_on(lgd_pipeline *p, lgd_item *item)
 {
     item->threads = threads_for(p, item->index);
     const lgd_listener *l = p->listener;
+    const double start = cl_seconds();
     if (l->stop()) end_early(p);
-    else if (!item->st.code) lgd_item_estimate(p->command, p->model, item, l->progress, l->user);
+    else if (!item->st.code && !item->was_done) lgd_item_estimate(p->command, p->model, item, l->progress, l->user);
     if (l->stop()) item->st = (ts_status){.code = TS_INTERRUPTED, .message = "interrupted"};
-    if (!item->st.code) lgd_item_write(p->command, item);
+    if (!item->st.code && !item->was_done) lgd_item_write(p->command, p->recipe, item);
+    item->seconds += cl_seconds() - start;
     move(p, item, FINISHED);
 }
 
@@ -143,12 +149,14 @@ static int most_at_once(int jobs, int size)
     return lanes;
 }
 
-lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *command, bool published, ts_status *st)
+lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *command, const char *recipe, bool published,
+                                 ts_status *st)
 {
     lgd_pipeline *p = calloc(1, sizeof *p);
     if (!p) return ts_fail(st, TS_NOMEM, "out of memory"), NULL;
     *p = (lgd_pipeline){.plan = plan,
                         .command = command,
+                        .recipe = recipe,
                         .published = published,
                         .lock = PTHREAD_MUTEX_INITIALIZER,
                         .changed = PTHREAD_COND_INITIALIZER,

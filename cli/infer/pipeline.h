@@ -5,9 +5,10 @@
 
 typedef struct lgd_pipeline lgd_pipeline;
 
-/* Starts reading at once, in the plan's order, published: as infer/photograph.h says; plan and command outlive the
- * pipeline. NULL with st on failure. */
-lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *command, bool published, ts_status *st);
+/* Starts reading at once, in the plan's order, published: as infer/photograph.h says; plan, command and recipe
+ * (lgd_recipe's) outlive the pipeline. NULL with st on failure. */
+lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *command, const char *recipe, bool published,
+                                 ts_status *st);
 
 /* What the pipeline reports to. progress is called by several threads at once, each time for another item; finished for
  * every photograph in the plan's order, when its files are complete or its st says why not, by the thread that calls

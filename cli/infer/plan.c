@@ -1,5 +1,6 @@
 #include "cli/infer/plan.h"
 #include "infer/output.h"
+#include "tensor/hash.h"
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -78,7 +79,11 @@ static ts_code check_overwriting(const lgd_plan *plan, ts_status *st)
                          k < 0 ? "" : lgd_files[k]) >= (int)sizeof path)
                 code = ts_fail(st, TS_INVALID, "%s: the name of the output folder is too long", plan->job[i].photo);
             struct stat info;
-            if (code || stat(path, &info) != 0) continue;
+            if (!code && stat(path, &info) != 0) {
+                if (k < 0) break; /* without a folder there is nothing in it */
+                continue;
+            }
+            if (code) continue;
             const identity key = {info.st_dev, info.st_ino, NULL},
                            *hit = bsearch(&key, id, (size_t)known, sizeof *id, by_identity);
             if (hit && !S_ISDIR(info.st_mode))
@@ -112,12 +117,27 @@ ts_code lgd_plan_make(char *const *photos, int count, const char *out, lgd_plan 
     return code;
 }
 
+static void free_job(lgd_job *job)
+{
+    free(job->stem);
+    free(job->folder);
+}
+
+void lgd_plan_keep(lgd_plan *plan, int shard, int shards)
+{
+    int kept = 0;
+    for (int i = 0; i < plan->jobs; i++) {
+        lgd_job *job = &plan->job[i];
+        if (ts_hash(job->stem, strlen(job->stem), 0) % (uint64_t)shards == (uint64_t)(shard - 1))
+            plan->job[kept++] = *job;
+        else free_job(job);
+    }
+    plan->jobs = kept;
+}
+
 void lgd_plan_free(lgd_plan *plan)
 {
-    for (int i = 0; plan->job && i < plan->jobs; i++) {
-        free(plan->job[i].stem);
-        free(plan->job[i].folder);
-    }
+    for (int i = 0; plan->job && i < plan->jobs; i++) free_job(&plan->job[i]);
     free(plan->job);
     *plan = (lgd_plan){0};
 }

@@ -18,5 +18,9 @@ typedef struct lgd_plan {
  * and refused when it is one of these itself. Two photographs with the same stem are refused, both named; so is a
  * photograph that one of the outputs would replace. TS_INVALID. The caller frees the plan after success. */
 ts_code lgd_plan_make(char *const *photos, int count, const char *out, lgd_plan *plan, ts_status *st);
+
+/* Leaves the jobs of part shard, 1 .. shards, in their order. The STEM alone decides, whatever other photographs there
+ * are. */
+void lgd_plan_keep(lgd_plan *plan, int shard, int shards);
 void lgd_plan_free(lgd_plan *plan);
 #endif

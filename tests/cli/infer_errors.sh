@@ -14,7 +14,7 @@ bad_ones_do_not_stop() {
     lines "$T/out" 2
     for f in b.jpg c.png folder.png e.ppm; do says "$T/err" "$T/$f"; done
     says "$T/err" "3 of 5"
-    [ "$(ls -A "$T/o" | tr '\n' ' ')" = "a d " ] || fail "left over: $(ls -A "$T/o")"
+    [ "$(ls -A "$T/o" | tr '\n' ' ')" = "a d results.jsonl " ] || fail "left over: $(ls -A "$T/o")"
 }
 
 same_stem() {

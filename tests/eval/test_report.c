@@ -2,6 +2,7 @@
 #include "eval/html.h"
 #include "cli/plot.h"
 #include "data/html.h"
+#include "data/json.h"
 #include "eval/text.h"
 #include "tests/test.h"
 #include <math.h>
@@ -236,7 +237,7 @@ TEST(report_plot_labels_keep_apart)
     free(text);
 }
 
-static void put_json(const char *text, FILE *f) { ev_json_string(f, text); }
+static void put_json(const char *text, FILE *f) { io_put_json(f, text); }
 static void put_csv(const char *text, FILE *f) { ev_csv_field(f, text); }
 static void put_html(const char *text, FILE *f) { io_put_text(f, text); }
 

@@ -1,0 +1,114 @@
+#include "cli/infer/record.h"
+#include "data/json.h"
+#include "render/scene.h"
+#include "tensor/hash.h"
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define RESULT "result: {"
+
+static void put_outputs(FILE *f, unsigned which)
+{
+    const char *comma = "";
+    for (int k = 0; k < LGD_OUTPUTS; k++)
+        if (which >> k & 1) fprintf(f, "%s%s", comma, lgd_output_names[k]), comma = ",";
+}
+
+char *lgd_recipe(const lgd_command *c, const char *weights, ts_status *st)
+{
+    uint64_t hash, mask = 0;
+    char *text = NULL;
+    size_t size = 0;
+    const char *slash = strrchr(weights, '/');
+    if (ts_hash_file(weights, &hash, st) != TS_OK || (c->mask && ts_hash_file(c->mask, &mask, st) != TS_OK))
+        return NULL;
+    FILE *f = open_memstream(&text, &size);
+    if (f) {
+        fputs("weights: ", f);
+        io_put_json(f, slash ? slash + 1 : weights);
+        fprintf(f, " %016" PRIx64 "\noptions: lgd-infer " LGD_VERSION " size %d, iterations %d, orientations %d", hash,
+                c->size, c->iterations, c->orientations);
+        fprintf(f, ", tolerance %.9g, fov %.9g, light-power %.9g, %s, %s, normal %s, %s, exr %s%s", c->tolerance, c->fov,
+                c->power, c->bf16 ? "bf16" : "f32", c->exact ? "exact" : "Winograd", c->directx ? "dx" : "gl",
+                c->metallic ? "metallic" : "specular", c->half ? "half" : "float", c->seamless ? ", seamless" : "");
+        for (int k = 0; k < 4 && c->corners; k++)
+            fprintf(f, "%s %.9g,%.9g", k ? "" : ", corners", c->angle.at[k][0], c->angle.at[k][1]);
+        if (c->mask) fprintf(f, ", mask %016" PRIx64, mask);
+        fputs(", maps ", f);
+        put_outputs(f, c->outputs);
+        fputc('\n', f);
+    }
+    if (!f || fclose(f) != 0 || !text) {
+        free(text);
+        ts_fail(st, TS_NOMEM, "out of memory");
+        return NULL;
+    }
+    return text;
+}
+
+/* What tells one way of making the files from another. */
+static void put_key(FILE *f, const lgd_item *item, const char *recipe)
+{
+    fprintf(f, "photograph: %016" PRIx64 "\n%s", item->hash, recipe);
+}
+
+static void put_warnings(FILE *f, const lgd_item *item)
+{
+    const char *comma = "";
+    fputs("\"warnings\": [", f);
+    for (int i = 0; i < LGD_WARNINGS; i++)
+        if (item->warnings >> i & 1) {
+            fputs(comma, f);
+            io_put_json(f, lgd_warning_names[i]);
+            comma = ", ";
+        }
+    fputs("]}", f);
+}
+
+char *lgd_record(const lgd_command *c, const lgd_item *item, const char *recipe)
+{
+    char *text = NULL;
+    size_t size = 0;
+    FILE *f = open_memstream(&text, &size);
+    if (!f) return NULL;
+    if (!*c->capture && !c->sheet) put_key(f, item, recipe); /* several files: no hash tells which */
+    fprintf(f, RESULT "\"hash\": \"%016" PRIx64 "\", \"steps\": %d, \"rmse_first\": ", item->hash, item->steps);
+    io_put_json_number(f, item->first);
+    fputs(", \"rmse\": ", f);
+    io_put_json_number(f, item->last);
+    fputs(", \"fov\": ", f);
+    io_put_json_number(f, rd_fov_of((double)item->photo[0].camera[2]));
+    fprintf(f, ", \"fov_is\": \"%s\", \"power\": ", lgd_item_fov_is(item));
+    io_put_json_number(f, item->power);
+    fputs(", ", f);
+    put_warnings(f, item);
+    fputc('\n', f);
+    if (fclose(f) == 0) return text;
+    free(text);
+    return NULL;
+}
+
+char *lgd_record_result(const char *text)
+{
+    const char *at = text ? strstr(text, "\n" RESULT) : NULL;
+    if (!at && text && strncmp(text, RESULT, sizeof RESULT - 1) == 0) at = text - 1;
+    if (!at) return NULL;
+    at += sizeof RESULT;
+    return strndup(at, strcspn(at, "\n"));
+}
+
+bool lgd_record_is_done(const lgd_command *c, const lgd_item *item, const char *recipe, char **result)
+{
+    char *key = NULL, *meta = NULL;
+    size_t size = 0;
+    FILE *f = open_memstream(&key, &size);
+    if (f) put_key(f, item, recipe);
+    *result = NULL;
+    if (f && fclose(f) == 0 && lgd_output_is(item->job->folder, c->outputs, key, &meta))
+        *result = lgd_record_result(meta);
+    free(meta);
+    free(key);
+    return *result != NULL;
+}
