@@ -5,6 +5,7 @@
 #: make deps         installs what the build needs (Debian, Ubuntu) and Open MPI; make test does so first, and the two
 #:                   above it without MPI
 #: make test-blender material.glb and the add-on in Blender, with PYTHON= that has bpy; skipped without
+#: make test-folders 10,000 photographs under kill -9, and the memory over 100, 1,000 and 10,000: some minutes
 #: make install      into PREFIX (/usr/local), libraries into LIBDIR, below DESTDIR when given; make uninstall undoes it
 #: make manuals      manual pages and completions of bash and zsh, from --help: make install brings them
 #: make wheel        the Python package as build/lgd-VERSION-….whl, with the library and the weights in it
@@ -324,6 +325,10 @@ blender: wheel
 deb: all
 	@BUILD=$(BUILD) MAKE='$(MAKE)' sh .ci/deb.sh $(VERSION) $(DEBS)
 
+test-folders: programs
+	@BUILD=$(BUILD) sh tests/kill_folder.sh
+	@BUILD=$(BUILD) sh tests/folder_memory.sh
+
 # PyTorch for the peer's column: bench/peer_torch.py
 bench-deps:
 	@BUILD=$(BUILD) sh .ci/bench-deps.sh
@@ -454,7 +459,7 @@ uninstall:
 clean:
 	rm -rf $(BUILD) $(BUILD)-asan $(BUILD)-leaks $(BUILD)-tsan
 
-.PHONY: all needs programs library help deps test test-blender wheel blender manuals deb bench bench-deps stress fuzz faults tsan \
-  asan demo install uninstall clean
+.PHONY: all needs programs library help deps test test-folders test-blender wheel blender manuals deb bench bench-deps \
+  stress fuzz faults tsan asan demo install uninstall clean
 .SECONDARY:
 -include $(shell find $(OBJ) $(BUILD)/fuzz/obj -name '*.d' 2>/dev/null)

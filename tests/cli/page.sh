@@ -52,7 +52,7 @@ is_asked_for() {
     expect 0 infer --maps diffuse "$T/a.ppm" "$T/b.ppm" -o "$T/maps"
     [ ! -e "$T/maps/index.html" ] || fail "an index without pages"
     expect 0 infer -q --maps page "$T/a.ppm" "$T/b.ppm" -o "$T/o"
-    [ "$(ls "$T/o" | tr '\n' ' ')" = "a b index.html " ] || fail "files: $(ls "$T/o")"
+    [ "$(ls "$T/o" | tr '\n' ' ')" = "a b index.html results.jsonl " ] || fail "files: $(ls "$T/o")"
     if grep -q '{{' "$T/o/index.html" "$T/o/a/view.html"; then fail "a slot is not filled"; fi
     cp "$T/a.ppm" "$T/index.html.ppm"
     expect 2 infer --maps page "$T/index.html.ppm" "$T/a.ppm" -o "$T/p"

@@ -1,0 +1,78 @@
+#!/bin/sh
+# Kills lgd-infer over a folder of photographs with SIGKILL at random moments and begins it again, then checks that
+# every photograph is done exactly once: what was complete at a kill is never made again, and at the end results.jsonl
+# has a line of each. Usage: tests/kill_folder.sh [PHOTOGRAPHS [KILLS [PROCESSES]]], by default 10000, 10 and 1; of
+# several processes each does a part, and all are killed. Links to the 256 x 256 photographs of TESTDATA, or without it
+# to demo/flash.jpg. The last line says what was done.
+: "${BUILD:=build}" "${TESTDATA:=../shared/testdata}"
+count=${1:-10000} kills=${2:-10} parts=${3:-1}
+case $BUILD in /*) ;; *) BUILD=$(pwd)/$BUILD ;; esac
+case $TESTDATA in /*) ;; *) TESTDATA=$(pwd)/$TESTDATA ;; esac
+T=$(mktemp -d) || exit 1
+running=
+trap 'for p in $running; do kill -9 "$p" 2>/dev/null; done; rm -rf "$T"' EXIT
+trap 'exit 1' INT TERM
+no() { echo "kill_folder: $*" >&2; exit 1; }
+
+mkdir "$T/in" "$T/o"
+set -- "$TESTDATA"/photos/IMG_*.png
+[ -f "$1" ] || set -- "$(pwd)/demo/flash.jpg"
+i=0
+while [ $i -lt "$count" ]; do
+    for p in "$@"; do
+        [ $i -lt "$count" ] || break
+        ln -s "$p" "$T/in/p$i.${p##*.}"
+        i=$((i + 1))
+    done
+done
+
+# All parts at once; they end by themselves or are killed after some of the work.
+begin() {
+    running=
+    for part in $(seq "$parts"); do
+        "$BUILD/bin/lgd-infer" --skip-existing --shard "$part/$parts" --size 16 --iterations 0 --orientations 1 --maps diffuse --threads 1 \
+            "$T/in" -o "$T/o" >>"$T/names" 2>"$T/err.$part" &
+        running="$running $!"
+    done
+}
+# The folders that are complete, with what meta.txt is: its inode and time.
+complete() { find "$T/o" -mindepth 2 -maxdepth 2 -name meta.txt -printf '%h %i %T@\n' | sort; }
+random() { od -An -N4 -tu4 /dev/urandom | tr -d ' '; }
+
+killed=0
+: >"$T/names"
+: >"$T/seen"
+while [ $killed -lt "$kills" ]; do
+    had=$(complete | wc -l)
+    # The moment: when so many more are there, and up to 20 ms after.
+    left=$(((count - had) / (kills - killed + 1)))
+    until=$((had + 1 + $(random) % (left > 0 ? left : 1)))
+    begin
+    while [ "$(find "$T/o" -mindepth 2 -maxdepth 2 -name meta.txt | wc -l)" -lt $until ]; do
+        alive=
+        for p in $running; do if kill -0 "$p" 2>/dev/null; then alive=1; fi; done
+        sleep 0.02
+        [ "$alive" ] || no "the work ended before it was killed: $(head -n 1 "$T/err.1")"
+    done
+    sleep "0.0$(printf %02d $(($(random) % 20)))"
+    for p in $running; do kill -9 "$p" 2>/dev/null; done
+    for p in $running; do wait "$p" 2>/dev/null; done
+    running=
+    killed=$((killed + 1))
+    complete >"$T/now"
+    [ -z "$(comm -23 "$T/seen" "$T/now")" ] || no "made again: $(comm -23 "$T/seen" "$T/now" | head -n 1)"
+    mv "$T/now" "$T/seen"
+done
+at_last=$(wc -l <"$T/seen")
+begin
+for p in $running; do wait "$p" || no "the last run fails: $(tail -n 1 "$T"/err.*)"; done
+running=
+complete >"$T/now"
+[ -z "$(comm -23 "$T/seen" "$T/now")" ] || no "made again: $(comm -23 "$T/seen" "$T/now" | head -n 1)"
+[ "$(wc -l <"$T/now")" -eq "$count" ] || no "$(wc -l <"$T/now") of $count photographs are complete"
+[ "$(ls -A "$T/o" | wc -l)" -eq $((count + 1)) ] || no "left over: $(ls -A "$T/o" | grep -v '^p' | head -n 3)"
+[ -z "$(sort "$T/names" | uniq -d)" ] || no "done twice: $(sort "$T/names" | uniq -d | head -n 1)"
+[ "$(wc -l <"$T/o/results.jsonl")" -eq "$count" ] || no "results.jsonl has $(wc -l <"$T/o/results.jsonl") lines"
+[ "$(sed 's/^{"folder": "\([^"]*\)", .*, "warnings": .*}$/\1/' "$T/o/results.jsonl" | sort -u)" = "$(ls "$T/in" | sed 's/\.[^.]*$//' | sort)" ] || no "results.jsonl has other names"
+owed=$(grep -c '"seconds": null' "$T/o/results.jsonl")
+echo "$count photographs, $kills kills of $parts process(es), $at_last complete at the last: each done once, each once in results.jsonl ($owed lines made from meta.txt)"
