@@ -30,9 +30,10 @@ char *lgd_recipe(const lgd_command *c, const char *weights, ts_status *st)
         io_put_json(f, slash ? slash + 1 : weights);
         fprintf(f, " %016" PRIx64 "\noptions: lgd-infer " LGD_VERSION " size %d, iterations %d, orientations %d", hash,
                 c->size, c->iterations, c->orientations);
-        fprintf(f, ", tolerance %.9g, fov %.9g, light-power %.9g, %s, %s, normal %s, %s, exr %s%s", c->tolerance, c->fov,
-                c->power, c->bf16 ? "bf16" : "f32", c->exact ? "exact" : "Winograd", c->directx ? "dx" : "gl",
-                c->metallic ? "metallic" : "specular", c->half ? "half" : "float", c->seamless ? ", seamless" : "");
+        fprintf(f, ", tolerance %.9g, fov %.9g, light-power %.9g", c->tolerance, c->fov, c->power);
+        fprintf(f, ", %s, %s, normal %s, %s, exr %s%s", c->bf16 ? "bf16" : "f32", c->exact ? "exact" : "Winograd",
+                c->directx ? "dx" : "gl", c->metallic ? "metallic" : "specular", c->half ? "half" : "float",
+                c->seamless ? ", seamless" : "");
         for (int k = 0; k < 4 && c->corners; k++)
             fprintf(f, "%s %.9g,%.9g", k ? "" : ", corners", c->angle.at[k][0], c->angle.at[k][1]);
         if (c->mask) fprintf(f, ", mask %016" PRIx64, mask);

@@ -12,10 +12,11 @@ char *lgd_recipe(const lgd_command *c, const char *weights, ts_status *st);
  * lgd_record_result finds in its meta.txt. */
 bool lgd_record_is_done(const lgd_command *c, const lgd_item *item, const char *recipe, char **result);
 
-/* The lines for meta.txt of an estimated item: the photograph's hash, the recipe and "result: {…}", what of
- * the line in results.jsonl the estimate decides. NULL: no memory; the caller frees it. */
+/* The lines for meta.txt of an estimated item: the photograph's hash, the recipe and "result: {…}", what of the
+ * line in results.jsonl the estimate decides. NULL: no memory; the caller frees it. */
 char *lgd_record(const lgd_command *c, const lgd_item *item, const char *recipe);
 
-/* What stands behind "result: {" in the text, up to the closing brace; NULL: there is none, or no memory. The caller frees it. */
+/* What stands behind "result: {" in the text, up to the closing brace; NULL: there is none, or no memory. The caller
+ * frees it. */
 char *lgd_record_result(const char *text);
 #endif
