@@ -4,6 +4,7 @@
 #include "cli/cli.h"
 #include "eval/methods/method.h"
 #include "eval/set_ini.h"
+#include "eval/shards.h"
 #include "infer/lgd.h"
 #include <stdlib.h>
 #include <string.h>
@@ -31,7 +32,8 @@ enum {
     TOLD,
     UNTOLD,
     PEER_MAPS,
-    CAMERA
+    CAMERA,
+    SHARD
 };
 
 static const cl_argument arguments[] = {
@@ -95,6 +97,10 @@ static const cl_argument arguments[] = {
      "bf16, and tolerances"},
     {TUNE, "tune", NULL,
      "write only DIR/tune.csv: search the methods' settings (default: of those that need no weights)"},
+    {SHARD, "shard", "I/N",
+     "do part I of N of the materials, 1 .. N; the call with the same DIR that ends last writes the results of all, "
+     "as\n"
+     "one call would. Under mpirun every process does its part by itself"},
     {'t', "threads", "N", "number of threads, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {'q', "quiet", NULL, "print no progress"},
     {'h', "help", NULL, "print this help"},
@@ -166,7 +172,12 @@ ts_code ev_command_parse(int argc, char **argv, ev_command *c, ts_status *st)
         case LIGHT: code = parse_light(value, c->light, st); break;
         case CAMERA:
             c->photographed = true;
+            c->camera_spec = value;
             code = cl_camera_parse(value, &c->camera, st);
+            break;
+        case SHARD:
+            if (!cl_parse_shard(value, &c->shard, &c->shards))
+                code = ts_fail(st, TS_INVALID, "--shard: '%s' is not I/N with I in 1 .. N", value);
             break;
         case TOLD: c->light_known = true; break;
         case UNTOLD: c->light_unknown = true; break;
@@ -225,6 +236,9 @@ ts_code ev_command_parse(int argc, char **argv, ev_command *c, ts_status *st)
     if (c->pareto && (c->methods || c->iterations >= 0))
         return ts_fail(st, TS_INVALID,
                        "--pareto has its own methods and iterations: --method and --iterations do not go with it");
+    if (!c->shards) ev_shard_of_launcher(&c->shard, &c->shards);
+    if (c->pareto && c->shards)
+        return ts_fail(st, TS_INVALID, "--pareto measures times: it is one process's work, without --shard or mpirun");
     if ((c->tune || c->pareto) && c->images)
         return ts_fail(st, TS_INVALID, "--images does not go with --tune or --pareto");
     if (c->iterations_figure && c->iterations < 0) c->iterations = 24;

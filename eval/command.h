@@ -12,7 +12,9 @@ typedef struct ev_command {
     int64_t seed;
     const char *peer_maps;
     double noise, exposure, fov, light[2]; /* exposure and fov 0: not given */
-    io_camera camera;                      /* of known materials, where photographed */
+    const char *camera_spec;
+    io_camera camera;  /* of known materials, where photographed: camera_spec's */
+    int shard, shards; /* part shard of 1 .. shards of the materials; shards 0: all */
     io_map_convention convention;
     bool light_known, light_unknown, photographed, images, fast, exact, pin, tune, pareto, iterations_figure,
         methods_figure, quiet, help, version;

@@ -3,12 +3,14 @@
 #include "eval/command.h"
 #include "eval/figure.h"
 #include "eval/methods/tune.h"
+#include "eval/shards.h"
 #include "infer/model_path.h"
 #include "tensor/conv/conv.h"
 #include "tensor/threads.h"
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { PATH_LENGTH = 4096 };
 
@@ -113,6 +115,33 @@ static int finish(work *w, ts_status *st)
     return CL_OK;
 }
 
+/* A part of the evaluation. The process that finds all parts writes the results of all. */
+static int finish_part(work *w, ts_status *st)
+{
+    const ev_command *c = w->c;
+    const uint64_t print = ev_shards_print(c, &w->run, w->model);
+    const int own = w->run.failures;
+    int missing, first;
+    bool mine;
+    if (ev_shard_write(&w->run, print, c->out, st) != TS_OK) return cl_failed("%s", st->message);
+    const int lock = ev_shards_lock(c->out);
+    int code = CL_OK;
+    if (ev_shards_merge(&w->run, print, c->out, &missing, &first, &mine, st) != TS_OK)
+        code = cl_failed("%s", st->message);
+    else if (missing) {
+        if (mine && !c->quiet)
+            cl_note("part %d of %d is done; %d of the same options, weights and materials are missing, the first is "
+                    "part %d: who ends last writes the results",
+                    c->shard, c->shards, missing, first);
+        if (own > 0) code = cl_failed("%d estimates of part %d failed", own, c->shard);
+    } else {
+        code = finish(w, st);
+        if (!st->code) ev_shards_remove(&w->run, c->out); /* else the disk is full: no part has to be done again */
+    }
+    if (lock >= 0) close(lock);
+    return code;
+}
+
 /* Folders, memory and numbers. */
 static int evaluate(work *w, ts_status *st)
 {
@@ -149,6 +178,8 @@ static int evaluate(work *w, ts_status *st)
     r->pinned = c->pin;
     r->model = slash ? slash + 1 : w->model;
     r->images = c->images ? w->images : NULL;
+    r->shard = c->shard;
+    r->shards = c->shards;
     r->failed = show_failure;
     r->done = show_progress;
     r->user = w;
@@ -160,7 +191,7 @@ static int evaluate(work *w, ts_status *st)
         return cl_stopped("interrupted after %" PRId64 " of %" PRId64 " %s: no results are written", w->done, w->total,
                           r->methods != 1 ? "estimates" : "materials");
     if (code) return cl_failed("%s", st->message);
-    return c->pareto ? CL_OK : finish(w, st);
+    return c->pareto ? CL_OK : c->shards ? finish_part(w, st) : finish(w, st);
 }
 
 static int start(const ev_command *c)

@@ -2,6 +2,7 @@
 #ifndef EV_REPORT_H
 #define EV_REPORT_H
 #include "eval/sheet.h"
+#include <stdint.h>
 #include <stdio.h>
 
 /* A method's results: columns first .. first + points - 1 of every material. */
@@ -13,6 +14,8 @@ typedef struct ev_subject {
 
 typedef struct ev_result {
     int set;
+    int64_t number; /* of the material in all sets */
+    int method;     /* the first that has a result */
     char material[128];
     ev_row *row;         /* a column each; NaN: not estimated */
     double *seconds;     /* from the photograph to that step; NaN likewise */

@@ -11,7 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PATH_LENGTH = 4096, PICTURES = 256 /* in a report: some 80 MB */ };
+enum { PATH_LENGTH = 4096 };
 
 /* What one material needs. */
 typedef struct bench {
@@ -139,11 +139,13 @@ static ts_code sheet(const ev_run *r, const bench *b, const ev_case *c, int set,
 /* The method's photographs in one picture. */
 static ts_code contact_sheet(const ev_run *r, bench *b, int method, ts_status *st)
 {
-    char path[PATH_LENGTH];
+    char path[PATH_LENGTH], part[32] = "";
     const char *label = r->methods > 1 ? r->method[method].label : "";
     ts_code code = TS_OK;
+    if (r->shards) snprintf(part, sizeof part, "-%d-of-%d", r->shard, r->shards);
     if (r->images &&
-        snprintf(path, sizeof path, "%s/contact%s%s.png", r->images, *label ? "-" : "", label) >= (int)sizeof path)
+        snprintf(path, sizeof path, "%s/contact%s%s%s.png", r->images, *label ? "-" : "", label, part) >=
+            (int)sizeof path)
         code = ts_fail(st, TS_INVALID, "%s: the name is too long", r->images);
     if (r->images && !code) code = ev_contact_write(&b->contact, path, st);
     ev_contact_free(&b->contact);
@@ -161,13 +163,14 @@ static ts_code one(ev_run *r, bench *b, int set, int m, int64_t number, const ev
                                st);
     if (!code && r->images) code = sheet(r, b, c, set, m, st);
     if (!code && r->images) code = ev_contact_add(&b->contact, c, b->last, st);
-    if (!code && r->pictures && b->pictures < PICTURES) {
+    if (!code && r->pictures && b->pictures < EV_PICTURES) {
         code = ev_sheet_png(c, b->last, &png, &png_size, st);
         b->pictures++;
     }
     if (!code && b->at[number] < 0) {
         b->at[number] = ev_report_add(&r->report, set, b->name, st);
         if (b->at[number] < 0) code = st->code;
+        else r->report.result[b->at[number]].number = number, r->report.result[b->at[number]].method = m;
     }
     if (code) {
         free(png);
@@ -190,7 +193,7 @@ static ts_code all_materials(ev_run *r, bench *b, int m, int64_t total, ts_statu
     for (int s = 0; s < r->sets; s++)
         for (int i = 0; i < r->set[s].count; i++, number++) {
             ev_case c;
-            if (b->bad[number]) continue;
+            if (b->bad[number] || (r->shards && number % r->shards != r->shard - 1)) continue;
             *st = (ts_status){0};
             b->bad[number] = load(r, b, &r->set[s], i, &c, st) != TS_OK;
             if (!st->code && r->method[m].method->peer && !c.peer) continue;

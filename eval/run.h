@@ -24,6 +24,7 @@ typedef struct ev_run {
     ev_lpips *lpips;                   /* also LPIPS, unless NULL */
     const char *model;                 /* its name for the report */
     const char *images;                /* a folder for sheets, or NULL */
+    int shard, shards;                 /* do part shard of 1 .. shards of the materials; shards 0: all */
     void (*failed)(const char *message, void *user); /* of a material; the others go on */
     void (*done)(int64_t done, int64_t total, const char *name, void *user);
     void *user;
@@ -35,6 +36,8 @@ typedef struct ev_run {
     int *step;
     int inputs; /* pictures of each material: the most that a method reads */
 } ev_run;
+
+enum { EV_PICTURES = 256 /* in a report: some 80 MB */ };
 
 /* First opens each method, so that errors in weights show before any work. Then runs one after the other, each with its
  * own memory and caches; the first photograph runs once unmeasured. TS_INTERRUPTED after Ctrl-C. The caller frees the

@@ -9,7 +9,7 @@ evaluate() { "$BIN/lgd-eval" --size 32 --iterations 2 --threads 1 "$@"; }
 
 help_names_the_options() {
     expect 0 "$BIN/lgd-eval" --help
-    for o in method repeat pin tune figure pareto descent finetune fast set iterations model threads seed noise images size output procedural strips maps told untold peer-maps photos peers; do says "$T/out" "$o"; done
+    for o in method repeat pin tune figure pareto descent finetune fast set iterations model threads seed noise images size output procedural strips maps told untold peer-maps photos peers shard; do says "$T/out" "$o"; done
 }
 
 wrong_usage() {
