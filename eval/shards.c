@@ -78,7 +78,7 @@ static ts_code name_of(char path[PATH_LENGTH], const char *folder, int shard, in
 
 static void put_result(ts_new_file *f, const ev_report *r, const ev_result *from)
 {
-    entry e = {from->number,         from->method,     from->set,         (int64_t)from->sheet.kind,
+    entry e = {from->number,        from->method,     from->set,          (int64_t)from->sheet.kind,
                from->sheet.columns, from->sheet.rows, from->sheet.inputs, ""};
     snprintf(e.material, sizeof e.material, "%s", from->material);
     ts_new_file_put(f, &e, sizeof e);
@@ -125,8 +125,8 @@ static FILE *open_part(const ev_run *r, uint64_t print, const char *folder, int 
     FILE *f = name_of(path, folder, shard, r->shards, NULL) == TS_OK ? fopen(path, "re") : NULL;
     if (f &&
         !(get(f, h, sizeof *h) && memcmp(h->magic, MAGIC, sizeof h->magic) == 0 && h->print == print &&
-          h->shard == shard && h->shards == r->shards && h->methods == r->methods &&
-          h->columns == r->report.columns && h->results >= 0 && h->results <= INT_MAX)) {
+          h->shard == shard && h->shards == r->shards && h->methods == r->methods && h->columns == r->report.columns &&
+          h->results >= 0 && h->results <= INT_MAX)) {
         fclose(f);
         f = NULL;
     }

@@ -14,18 +14,20 @@
 #define COARSE_STOPS \
     0.4 /* first these, then the finer ones around the best of them, a quarter of what is left out anyway */
 #define STEP_STOPS 0.05
-enum { MOST_TRIED = 8 }; /* on either side of the middle */
+enum { MOST_TRIED = 8 /* on either side of the middle */, PORTION = 256 };
 
 /* How far the photographs' renderings are from them when every light is 2^stops times as strong: the loss of training,
- * which a few pixels in a highlight that is in another place do not decide; both as a camera clips them. */
-static double distance(size_t values, const float *log_photo, const float *rendered, double stops)
+ * which a few pixels in a highlight that is in another place do not decide; both as a camera clips them. Above enough
+ * the sum ends: terms are not negative, so that it would only grow. */
+static double distance(size_t values, const float *log_photo, const float *rendered, double stops, double enough)
 {
     const float factor = (float)exp2(stops);
     double sum = 0;
-    for (size_t i = 0; i < values; i++) {
-        const float bright = factor * rendered[i];
-        sum += fabs((double)(log_photo[i] - logf((bright < 1 ? bright : 1) + 0.01f)));
-    }
+    for (size_t from = 0; from < values && !(sum > enough); from += PORTION)
+        for (size_t i = from; i < values && i < from + PORTION; i++) {
+            const float bright = factor * rendered[i];
+            sum += fabs((double)(log_photo[i] - logf((bright < 1 ? bright : 1) + 0.01f)));
+        }
     return sum;
 }
 
@@ -36,8 +38,10 @@ static double nearest(size_t values, const float *log_photo, const float *render
     double far[2 * MOST_TRIED + 1];
     const int most = (int)lround(reach / step);
     int best = 0;
+    const double at_middle = distance(values, log_photo, rendered, middle, INFINITY);
 #pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(dynamic)
-    for (int i = 0; i <= 2 * most; i++) far[i] = distance(values, log_photo, rendered, middle + (i - most) * step);
+    for (int i = 0; i <= 2 * most; i++)
+        far[i] = i == most ? at_middle : distance(values, log_photo, rendered, middle + (i - most) * step, at_middle);
     for (int i = 1; i <= 2 * most; i++)
         if (far[i] < far[best]) best = i;
     return middle + (best - most) * step;
