@@ -1,0 +1,28 @@
+# What tests/kill_folder.sh and tests/folder_memory.sh share. Folders are about files, not about networks: $T/tiny.safetensors
+# are weights that take a millisecond, as training begins with them, and the photographs are one small picture.
+T=$(mktemp -d) || exit 1
+: "${BUILD:=build}"
+case $BUILD in /*) ;; *) BUILD=$(pwd)/$BUILD ;; esac
+export OMP_WAIT_POLICY=passive
+
+make_tiny() {
+    printf '%s\n' '[model]' 'g_width = 4' 'g_width_max = 8' 'g_levels = 2' 'g_size = 16' 'h_width = 8' 'h_gru = 4' 'iterations = 2' \
+        '[data]' 'patch = 16' '[train]' 'batch = 2' 'steps = 1' 'rate = 0' 'ema = 0' '[validate]' 'count = 2' 'size = 16' >"$T/tiny.ini"
+    "$BUILD/bin/lgd-train" "$T/tiny.ini" --set output.folder="$T/run" --threads 1 >"$T/log" 2>&1 &&
+        mv "$T/run/last.safetensors" "$T/tiny.safetensors" &&
+        "$BUILD/bin/lgd-infer" -q -m "$T/tiny.safetensors" --size "$1" -i 0 --maps diffuse demo/flash.jpg -o "$T/small" >>"$T/log" 2>&1
+}
+
+# $1 photographs in $T/in: one file's bytes so many times, and cut again.
+make_photos() {
+    rm -rf "$T/in"
+    mkdir "$T/in"
+    cp "$T/small/flash/diffuse.png" "$T/all"
+    size=$(wc -c <"$T/all")
+    while [ "$(wc -c <"$T/all")" -lt $(($1 * size)) ]; do
+        cat "$T/all" "$T/all" >"$T/twice"
+        mv "$T/twice" "$T/all"
+    done
+    head -c $(($1 * size)) "$T/all" | split -a 6 -d -b "$size" --additional-suffix=.png - "$T/in/p"
+    rm "$T/all"
+}
