@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 /* The primes of the algorithm's description. */
@@ -83,8 +84,13 @@ static ssize_t fill(int fd, unsigned char *buffer, size_t size)
 ts_code ts_hash_file(const char *path, uint64_t *hash, ts_status *st)
 {
     enum { PORTION = 1 << 18 }; /* whole stripes */
-    const int fd = open(path, O_RDONLY | O_CLOEXEC);
+    const int fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0) return ts_fail(st, TS_IO, "%s: cannot be read: %s", path, strerror(errno));
+    struct stat info;
+    if (fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) { /* what is read from a pipe is gone */
+        close(fd);
+        return ts_fail(st, TS_IO, "%s: is no regular file", path);
+    }
     unsigned char *buffer = malloc(PORTION);
     state s = begin(0);
     ssize_t n = 0;
