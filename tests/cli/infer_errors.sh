@@ -136,7 +136,8 @@ interrupted() {
         says "$T/err" "interrupted"
         done=$(wc -l <"$T/out.$s")
         [ "$done" -ge 1 ] && [ "$done" -lt 200 ] || fail "$s: $done photographs are done"
-        [ "$(ls -A "$T/$s" | wc -l)" -eq "$done" ] || fail "$s: $done are reported and there are: $(ls -A "$T/$s" | tr '\n' ' ')"
+        lines "$T/$s/results.jsonl" "$done"
+        [ "$(ls -A "$T/$s" | wc -l)" -eq $((done + 1)) ] || fail "$s: $done are reported and there are: $(ls -A "$T/$s" | tr '\n' ' ')"
         while read -r folder; do complete "$folder"; done <"$T/out.$s"
     done
 }
