@@ -123,6 +123,7 @@ static int finish_part(work *w, ts_status *st)
     const int own = w->run.failures;
     int missing, first;
     bool mine;
+    if (!print) return cl_failed("out of memory");
     if (ev_shard_write(&w->run, print, c->out, st) != TS_OK) return cl_failed("%s", st->message);
     const int lock = ev_shards_lock(c->out);
     int code = CL_OK;

@@ -1,4 +1,5 @@
 #include "eval/shards.h"
+#include "data/text.h"
 #include "tensor/cpu.h"
 #include "tensor/hash.h"
 #include "tensor/new_file.h"
@@ -44,11 +45,10 @@ bool ev_shard_of_launcher(int *shard, int *shards)
 
 uint64_t ev_shards_print(const ev_command *c, const ev_run *r, const char *model)
 {
-    char *text = NULL;
-    size_t size = 0;
-    uint64_t print = 0, weights = 0;
-    FILE *f = open_memstream(&text, &size);
-    if (!f) return 0;
+    io_text t;
+    uint64_t print, weights = 0;
+    if (io_text_begin(&t, "", NULL) != TS_OK) return 0;
+    FILE *f = t.f;
     if (ts_hash_file(model, &weights, NULL) != TS_OK) weights = 0; /* methods without weights need none */
     fprintf(f, LGD_VERSION " %s %d %d %lld %d %.17g %.17g %.17g %.17g %.17g %016llx", ts_isa_name(ts_isa_now()),
             c->size, c->iterations, (long long)c->seed, c->repeat, c->noise, c->exposure, c->fov, c->light[0],
@@ -64,8 +64,9 @@ uint64_t ev_shards_print(const ev_command *c, const ev_run *r, const char *model
                 set->option.colour, set->convention.normal, set->convention.workflow, set->convention.colour);
         for (int i = 0; i < set->count; i++) fprintf(f, "%llx ", (unsigned long long)ev_set_identity(set, i));
     }
-    if (fclose(f) == 0) print = ts_hash(text, size, 0);
-    free(text);
+    if (io_text_end(&t, "", NULL) != TS_OK) return 0;
+    print = ts_hash(t.bytes, t.size, 0);
+    free(t.bytes);
     return print;
 }
 

@@ -11,7 +11,7 @@
 bool ev_shard_of_launcher(int *shard, int *shards);
 
 /* A number of all that decides the results: options, methods, materials, weights, version, instruction set. Parts of
- * other numbers are not put together. model: the weights' file. */
+ * other numbers are not put together. model: the weights' file. 0: no memory. */
 uint64_t ev_shards_print(const ev_command *c, const ev_run *r, const char *model);
 
 /* Writes the report and failures of r, which did r->shard, to a file in folder. */

@@ -31,7 +31,7 @@ typedef struct run {
     size_t size;
     lgd_index index;
     ts_status index_st;
-    bool left_out; /* photographs of a sheet that could not be used */
+    bool left_out;          /* photographs of a sheet that could not be used */
     lgd_manifest *manifest; /* or NULL */
     ts_status manifest_st;
 } run;

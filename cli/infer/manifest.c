@@ -1,5 +1,6 @@
 #include "cli/infer/manifest.h"
 #include "data/json.h"
+#include "data/text.h"
 #include "tensor/hash.h"
 #include "tensor/new_file.h"
 #include <errno.h>
@@ -197,12 +198,12 @@ static void put_head(FILE *f, const lgd_job *job)
     io_put_json(f, job->stem);
 }
 
-/* What put_line makes of the item, in memory; NULL: none. */
+/* The line of a finished item, or of a photograph its beginning; NULL: no memory. */
 static char *line_of(const lgd_job *job, const lgd_item *item, size_t *size)
 {
-    char *text = NULL;
-    FILE *f = open_memstream(&text, size);
-    if (!f) return NULL;
+    io_text t;
+    if (io_text_begin(&t, LGD_MANIFEST_NAME, NULL) != TS_OK) return NULL;
+    FILE *f = t.f;
     put_head(f, job);
     if (item) {
         fputs(", \"file\": ", f);
@@ -215,9 +216,9 @@ static char *line_of(const lgd_job *job, const lgd_item *item, size_t *size)
             fputs("}\n", f);
         } else fprintf(f, ", %s\n", item->result);
     }
-    if (fclose(f) == 0) return text;
-    free(text);
-    return NULL;
+    if (io_text_end(&t, LGD_MANIFEST_NAME, NULL) != TS_OK) return NULL;
+    *size = t.size;
+    return t.bytes;
 }
 
 ts_code lgd_manifest_check(const lgd_plan *plan, const char *folder, ts_status *st)

@@ -14,11 +14,11 @@ typedef struct lgd_command {
     int64_t max_pixels;
     double max_memory; /* bytes; 0: tensor/budget.h's default */
     double tolerance;
-    int orientations; /* 1, 2, 4 or 8 */
-    double fov;       /* degrees across the square, with corners across the shorter side; 0: from the file */
-    io_corners angle; /* of the square in the photograph, where corners is true */
-    double power;     /* of the light, in default ones; 0: estimated */
-    unsigned outputs; /* LGD_OUT_... */
+    int orientations;  /* 1, 2, 4 or 8 */
+    double fov;        /* degrees across the square, with corners across the shorter side; 0: from the file */
+    io_corners angle;  /* of the square in the photograph, where corners is true */
+    double power;      /* of the light, in default ones; 0: estimated */
+    unsigned outputs;  /* LGD_OUT_... */
     int shard, shards; /* of the photographs the part shard of 1 .. shards; 0: all */
     bool skip_existing, directx, metallic, seamless, half /* of maps.exr */, exact, bf16, quiet, help, version, corners,
         sheet;    /* the photographs are of one sample under a printed sheet, one result */

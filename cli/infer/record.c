@@ -1,5 +1,6 @@
 #include "cli/infer/record.h"
 #include "data/json.h"
+#include "data/text.h"
 #include "render/scene.h"
 #include "tensor/hash.h"
 #include <inttypes.h>
@@ -19,34 +20,27 @@ static void put_outputs(FILE *f, unsigned which)
 char *lgd_recipe(const lgd_command *c, const char *weights, ts_status *st)
 {
     uint64_t hash, mask = 0;
-    char *text = NULL;
-    size_t size = 0;
+    io_text t;
     const char *slash = strrchr(weights, '/');
     if (ts_hash_file(weights, &hash, st) != TS_OK || (c->mask && ts_hash_file(c->mask, &mask, st) != TS_OK))
         return NULL;
-    FILE *f = open_memstream(&text, &size);
-    if (f) {
-        fputs("weights: ", f);
-        io_put_json(f, slash ? slash + 1 : weights);
-        fprintf(f, " %016" PRIx64 "\noptions: lgd-infer " LGD_VERSION " size %d, iterations %d, orientations %d", hash,
-                c->size, c->iterations, c->orientations);
-        fprintf(f, ", tolerance %.9g, fov %.9g, light-power %.9g", c->tolerance, c->fov, c->power);
-        fprintf(f, ", %s, %s, normal %s, %s, exr %s%s", c->bf16 ? "bf16" : "f32", c->exact ? "exact" : "Winograd",
-                c->directx ? "dx" : "gl", c->metallic ? "metallic" : "specular", c->half ? "half" : "float",
-                c->seamless ? ", seamless" : "");
-        for (int k = 0; k < 4 && c->corners; k++)
-            fprintf(f, "%s %.9g,%.9g", k ? "" : ", corners", c->angle.at[k][0], c->angle.at[k][1]);
-        if (c->mask) fprintf(f, ", mask %016" PRIx64, mask);
-        fputs(", maps ", f);
-        put_outputs(f, c->outputs);
-        fputc('\n', f);
-    }
-    if (!f || fclose(f) != 0 || !text) {
-        free(text);
-        ts_fail(st, TS_NOMEM, "out of memory");
-        return NULL;
-    }
-    return text;
+    if (io_text_begin(&t, "the record", st) != TS_OK) return NULL;
+    FILE *f = t.f;
+    fputs("weights: ", f);
+    io_put_json(f, slash ? slash + 1 : weights);
+    fprintf(f, " %016" PRIx64 "\noptions: lgd-infer " LGD_VERSION " size %d, iterations %d, orientations %d", hash,
+            c->size, c->iterations, c->orientations);
+    fprintf(f, ", tolerance %.9g, fov %.9g, light-power %.9g", c->tolerance, c->fov, c->power);
+    fprintf(f, ", %s, %s, normal %s, %s, exr %s%s", c->bf16 ? "bf16" : "f32", c->exact ? "exact" : "Winograd",
+            c->directx ? "dx" : "gl", c->metallic ? "metallic" : "specular", c->half ? "half" : "float",
+            c->seamless ? ", seamless" : "");
+    for (int k = 0; k < 4 && c->corners; k++)
+        fprintf(f, "%s %.9g,%.9g", k ? "" : ", corners", c->angle.at[k][0], c->angle.at[k][1]);
+    if (c->mask) fprintf(f, ", mask %016" PRIx64, mask);
+    fputs(", maps ", f);
+    put_outputs(f, c->outputs);
+    fputc('\n', f);
+    return io_text_end(&t, "the record", st) == TS_OK ? t.bytes : NULL;
 }
 
 /* What tells one way of making the files from another. */
@@ -70,10 +64,9 @@ static void put_warnings(FILE *f, const lgd_item *item)
 
 char *lgd_record(const lgd_command *c, const lgd_item *item, const char *recipe)
 {
-    char *text = NULL;
-    size_t size = 0;
-    FILE *f = open_memstream(&text, &size);
-    if (!f) return NULL;
+    io_text t;
+    if (io_text_begin(&t, "", NULL) != TS_OK) return NULL;
+    FILE *f = t.f;
     if (!*c->capture && !c->sheet) put_key(f, item, recipe); /* several files: no hash tells which */
     fprintf(f, RESULT "\"hash\": \"%016" PRIx64 "\", \"steps\": %d, \"rmse_first\": ", item->hash, item->steps);
     io_put_json_number(f, item->first);
@@ -86,9 +79,7 @@ char *lgd_record(const lgd_command *c, const lgd_item *item, const char *recipe)
     fputs(", ", f);
     put_warnings(f, item);
     fputc('\n', f);
-    if (fclose(f) == 0) return text;
-    free(text);
-    return NULL;
+    return io_text_end(&t, "", NULL) == TS_OK ? t.bytes : NULL;
 }
 
 char *lgd_record_result(const char *text)
@@ -102,14 +93,14 @@ char *lgd_record_result(const char *text)
 
 bool lgd_record_is_done(const lgd_command *c, const lgd_item *item, const char *recipe, char **result)
 {
-    char *key = NULL, *meta = NULL;
-    size_t size = 0;
-    FILE *f = open_memstream(&key, &size);
-    if (f) put_key(f, item, recipe);
+    char *meta = NULL;
+    io_text key;
     *result = NULL;
-    if (f && fclose(f) == 0 && lgd_output_is(item->job->folder, c->outputs, key, &meta))
+    if (io_text_begin(&key, "", NULL) != TS_OK) return false;
+    put_key(key.f, item, recipe);
+    if (io_text_end(&key, "", NULL) == TS_OK && lgd_output_is(item->job->folder, c->outputs, key.bytes, &meta))
         *result = lgd_record_result(meta);
     free(meta);
-    free(key);
+    free(key.bytes);
     return *result != NULL;
 }
