@@ -1,4 +1,5 @@
 #include "infer/meta.h"
+#include "data/file.h"
 #include "data/text.h"
 #include "render/scene.h"
 #include <stdio.h>
