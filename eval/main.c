@@ -207,7 +207,8 @@ static int start(const ev_command *c)
             code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
         else w->set[s].peers = c->peer_maps;
     ts_threads_set(c->threads);
-    if (code == CL_OK && lgd_model_path(c->model, "single", w->model, &st) != TS_OK) code = cl_failed("%s", st.message);
+    if (code == CL_OK && lgd_model_path(c->model, LGD_DEFAULT_MODEL, w->model, &st) != TS_OK)
+        code = cl_failed("%s", st.message);
     if (code == CL_OK && (c->tune ? parse_tuning(w, &st) : c->pareto ? TS_OK : parse_methods(w, &st)) != TS_OK)
         code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
     if (code == CL_OK) code = evaluate(w, &st);

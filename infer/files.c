@@ -18,7 +18,8 @@ int lgd_find_weights(const char *name, char *path, size_t size, lgd_error *error
     ts_status st = {0};
     char found[LGD_PATH_MAX];
     if (!path || size == 0) ts_fail(&st, TS_INVALID, "lgd_find_weights: path must be given");
-    else if (lgd_model_path(name, "single", found, &st) == TS_OK && snprintf(path, size, "%s", found) >= (int)size)
+    else if (lgd_model_path(name, LGD_DEFAULT_MODEL, found, &st) == TS_OK &&
+             snprintf(path, size, "%s", found) >= (int)size)
         ts_fail(&st, TS_INVALID, "lgd_find_weights: %zu bytes are too few for %s", size, found);
     return lgd_report(error, &st);
 }

@@ -41,7 +41,7 @@ LGD_API int lgd_most_photos(
 LGD_API int lgd_published(const lgd_model *model); /* nonzero: the published network's weights (docs/published.md) */
 
 /* The file of the weights that a program reads with --model name: a file, or the name of a model that ships with lgd;
- * NULL: $LGD_MODEL, else "single". path: size bytes, 4096 at best. */
+ * NULL: $LGD_MODEL, else "phone". path: size bytes, 4096 at best. */
 LGD_API int lgd_find_weights(const char *name, char *path, size_t size, lgd_error *error);
 
 /* LGD_AUTO: steps go on while each lowers the reconstruction RMSE by a thousandth or more, LGD_AUTO_MOST at most. The
@@ -76,7 +76,7 @@ typedef struct lgd_options {
                     * instruction sets (docs/performance.md) */
     int precision; /* LGD_F32; LGD_BF16: inputs and weights of convolutions are rounded to bf16, for CPUs with AMX or
                     * AVX512-BF16 (much slower on others). Sums, renderer and maps stay f32. Maps differ by
-                    * less than 0.005 (RMS), single values by up to 0.2 (docs/performance.md) */
+                    * less than 0.005 (RMS), single values by up to 0.8 (docs/performance.md) */
     int orientations; /* R_0 is the mean over so many orientations of the photograph: 1 or 0: as it is, 2: and turned by
                        * a quarter, 4: all quarter turns, 8: and their mirror images. Only for a single photograph with
                        * light and camera above its centre, and not with published weights */

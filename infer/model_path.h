@@ -5,6 +5,9 @@
 
 enum { LGD_PATH_MAX = 4096 };
 
+/* The model for one photograph of which nothing needs to be known. */
+#define LGD_DEFAULT_MODEL "phone"
+
 /* Option (--model), else $LGD_MODEL: a file, or, without a slash or a dot and where there is no such file, the NAME of
  * a model that ships with the program; else NAME is name. The first of ../share/lgd/NAME.safetensors,
  * ../../models/NAME.safetensors and ../models/NAME.safetensors (of liblgd.so after make) beside the folder of the

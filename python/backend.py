@@ -1,7 +1,7 @@
 """Builds the wheel, for pip (PEP 517 and 660) and for `make wheel`. It needs Python and make alone.
 
 LGD_WHEEL=system: a wheel of Python files, which uses the liblgd.so of the system. LGD_WHEEL=own: liblgd.so, what it
-loads and the weights of `single` are in the wheel. Without it: own where the system has no liblgd.so.0. The library is
+loads and the weights of `phone` are in the wheel. Without it: own where the system has no liblgd.so.0. The library is
 that of the checkout that this folder is in, $LGD_BUILD or build/, which make brings up to date.
 """
 
@@ -65,7 +65,7 @@ def _library(folder):
         strip = [os.environ.get("STRIP", "strip"), "--strip-unneeded", "-o", str(stripped), str(source)]
         subprocess.run(strip, check=True)
         made.append((stripped, place))
-    return made + [(ROOT / "models" / "single.safetensors", "share/lgd/single.safetensors")]
+    return made + [(ROOT / "models" / "phone.safetensors", "share/lgd/phone.safetensors")]
 
 
 def _write(directory, tag, files, texts):

@@ -87,9 +87,14 @@ ts_code ts_hash_file(const char *path, uint64_t *hash, ts_status *st)
     const int fd = open(path, O_RDONLY | O_NONBLOCK | O_CLOEXEC);
     if (fd < 0) return ts_fail(st, TS_IO, "%s: cannot be read: %s", path, strerror(errno));
     struct stat info;
-    if (fstat(fd, &info) != 0 || !S_ISREG(info.st_mode)) { /* what is read from a pipe is gone */
+    if (fstat(fd, &info) != 0) {
+        ts_fail(st, TS_IO, "%s: cannot be read: %s", path, strerror(errno));
         close(fd);
-        return ts_fail(st, TS_IO, "%s: is no regular file", path);
+        return TS_IO;
+    }
+    if (!S_ISREG(info.st_mode)) { /* what is read from a pipe is gone */
+        close(fd);
+        return ts_fail(st, TS_UNSUPPORTED, "%s: is no regular file", path);
     }
     unsigned char *buffer = malloc(PORTION);
     state s = begin(0);

@@ -8,6 +8,6 @@
 
 uint64_t ts_hash(const void *data, size_t size, uint64_t seed);
 
-/* Of a whole regular file, seed 0. TS_IO names it. */
+/* Of a whole file, seed 0. TS_UNSUPPORTED: it is no regular file; TS_IO, TS_NOMEM; messages name it. */
 ts_code ts_hash_file(const char *path, uint64_t *hash, ts_status *st);
 #endif

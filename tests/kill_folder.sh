@@ -31,8 +31,10 @@ killed=0
 : >"$T/names"
 : >"$T/seen"
 while [ $killed -lt "$kills" ]; do
-    # The moment: when so many more lines are there, and up to 20 ms after.
+    # The moment: when so many more lines are there, and up to 20 ms after. On a fast machine all may be done before the
+    # last kill.
     had=$(noted)
+    [ "$had" -lt "$count" ] || break
     share=$(((count - had) / (kills - killed + 1)))
     until=$((had + 1 + $(random) % (share > 0 ? share : 1)))
     begin
@@ -51,6 +53,7 @@ while [ $killed -lt "$kills" ]; do
     [ -z "$(comm -23 "$T/seen" "$T/now")" ] || no "made again: $(comm -23 "$T/seen" "$T/now" | head -n 1)"
     mv "$T/now" "$T/seen"
 done
+[ $killed -gt 0 ] || no "nothing was killed"
 at_last=$(wc -l <"$T/seen")
 begin
 for p in $running; do wait "$p" || no "the last run fails: $(tail -n 1 "$T"/err.*)"; done
@@ -64,4 +67,4 @@ complete >"$T/now"
 sed 's/^{"folder": "\([^"]*\)", .*, "warnings": .*}$/\1/' "$T/o/results.jsonl" | sort >"$T/listed"
 ls "$T/in" | sed 's/\.png$//' | sort | cmp -s - "$T/listed" || no "results.jsonl has other names"
 owed=$(grep -c '"seconds": null' "$T/o/results.jsonl")
-echo "$count photographs, $kills kills of $parts process(es), $at_last complete at the last: each done once, each once in results.jsonl ($owed lines made from meta.txt)"
+echo "$count photographs, $killed kills of $parts process(es), $at_last complete at the last: each done once, each once in results.jsonl ($owed lines made from meta.txt)"

@@ -76,31 +76,29 @@ static void read_sheet(const lgd_command *c, lgd_item *item)
     snprintf(item->fov_from, sizeof item->fov_from, "the sheet, %d photographs", set->good);
 }
 
+static void read_input(const lgd_command *c, bool published, lgd_item *item)
+{
+    if (c->sheet) read_sheet(c, item);
+    else if (c->corners) read_angle(c, published, item);
+    else if (!*c->capture) read_photo(c, published, item);
+    else if (!lgd_read_capture(c->capture, c->size, c->max_pixels, &item->capture, &item->st)) {
+        item->photo_side = c->size;
+        item->image = item->capture.image;
+        item->fov = LGD_FOV_OF_PHOTO;
+        snprintf(item->fov_from, sizeof item->fov_from, "the capture");
+    }
+}
+
 void lgd_item_read(const lgd_command *c, const char *recipe, bool published, lgd_item *item)
 {
-    if (!c->sheet && !*c->capture) {
-        ts_status none = {0}; /* what cannot be read fails below, with the reader's words */
-        const bool hashed = ts_hash_file(item->job->photo, &item->hash, &none) == TS_OK;
-        item->was_done = c->skip_existing && hashed && lgd_record_is_done(c, item, recipe, &item->result);
-        if (item->was_done) return;
-    }
-    if (c->sheet) {
-        read_sheet(c, item);
-        return;
-    }
-    if (c->corners) {
-        read_angle(c, published, item);
-        return;
-    }
-    if (!*c->capture) {
-        read_photo(c, published, item);
-        return;
-    }
-    if (lgd_read_capture(c->capture, c->size, c->max_pixels, &item->capture, &item->st) != TS_OK) return;
-    item->photo_side = c->size;
-    item->image = item->capture.image;
-    item->fov = LGD_FOV_OF_PHOTO;
-    snprintf(item->fov_from, sizeof item->fov_from, "the capture");
+    ts_status st = {0};
+    const bool one = !c->sheet && !*c->capture;
+    const ts_code hash = one ? ts_hash_file(item->job->photo, &item->hash, &st) : TS_OK;
+    item->was_done = one && !hash && c->skip_existing && lgd_record_is_done(c, item, recipe, &item->result);
+    if (item->was_done) return;
+    read_input(c, published, item);
+    /* A pipe has no hash. Of a file that cannot be read the reader has the better words. */
+    if (hash && hash != TS_UNSUPPORTED && !item->st.code) item->st = st;
 }
 
 /* What the library's calls get as their user. */

@@ -323,8 +323,8 @@ static int work(const lgd_command *given)
     int code = CL_FAILED;
     bool published = false;
     lgd_pipeline *pipeline = NULL;
-    if (lgd_model_path(c->model, *c->capture || (c->sheet && c->photos > 1) ? "multi" : "single", weights, &st) !=
-        TS_OK)
+    if (lgd_model_path(c->model, *c->capture || (c->sheet && c->photos > 1) ? "multi" : LGD_DEFAULT_MODEL, weights,
+                       &st) != TS_OK)
         cl_failed("%s", st.message);
     else if (lgd_weights_published(weights, &published, &st) != TS_OK || !(recipe = lgd_recipe(c, weights, &st)))
         cl_failed("%s", st.message);

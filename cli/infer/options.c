@@ -45,22 +45,22 @@ const cl_argument lgd_infer_arguments[] = {
      "than 1e-5 (RMS), single values by less than 1e-3"},
     {PRECISION, "precision", "f32|bf16",
      "precision of the products in convolutions (default f32); bf16 is faster on CPUs with AMX or AMD's AVX512-BF16,\n"
-     "slower on others; the maps differ by less than 0.005 (RMS), single values by up to 0.2"},
+     "slower on others; the maps differ by less than 0.005 (RMS), single values by up to 0.8"},
     {CAPTURE, "capture", "WHERE",
      "instead of PHOTO: several photographs of one sample under known lights, listed in an INI file or in a folder\n"
      "in MaterialGAN's layout; the default model is then multi"},
     {FOV, "fov", "DEG",
      "field of view of the photographs, 1 .. 170 degrees across the side of the square that the maps cover (default: "
      "from\n"
-     "the file's EXIF, else 54.2, with a warning)"},
+     "the file's EXIF, else the model's guess, or 54.2 with a warning)"},
     {CORNERS, "corners", "X,Y X,Y X,Y X,Y",
      "the photograph was taken at an angle: where the corners of a square on the sample are in it, top left, top\n"
      "right, bottom right, bottom left, in pixels from the top left or in 0 .. 1 of width and height; the maps are of\n"
      "that square, and --fov is across the photograph's shorter side"},
     {SHEET, "sheet", NULL,
      "the photographs are of one sample in the window of lgd-capture's printed sheet: DIR/STEM/ of the first gets the\n"
-     "maps of all; cameras, flash and exposure are found from the sheet; the default model is then multi, of one\n"
-     "photograph single; --fov is across the photographs' shorter side"},
+     "maps of all; cameras, flash and exposure are found from the sheet; the default model is then multi, but of\n"
+     "one photograph; --fov is across the photographs' shorter side"},
     {POWER, "light-power", "P",
      "power of the light, relative to the default light (of a capture: to the power it states): a number in\n"
      "0.01 .. 100, or auto = estimated from the photograph and printed (default auto; of a capture 1)"},
@@ -72,7 +72,8 @@ const cl_argument lgd_infer_arguments[] = {
      "photographs up to 512 pixels are one tile; 0 = never (default: 0.003 for models whose network works at the\n"
      "photograph's size, not with --iterations or --exact; 0 for others, such as the shipped ones)"},
     {'m', "model", "FILE",
-     "weights: a file, or the name of a shipped model, single (default) or multi (default: $LGD_MODEL)"},
+     "weights: a file, or the name of a shipped model: phone (the default), single for pictures whose light and "
+     "camera are the default ones, multi for several (default: $LGD_MODEL)"},
     {'t', "threads", "N", "number of threads, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {NORMAL, "normal", "gl|dx", "y of normal.png: up (gl, OpenGL, default) or down (dx, DirectX)"},
     {MAPS, "maps", "LIST",

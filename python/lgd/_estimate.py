@@ -44,8 +44,8 @@ class _Calls:
 
 
 class Model:
-    """Weights: a file, or the name of a model that ships with lgd ("single", "multi"). Any number of threads may use
-    one model at once."""
+    """Weights: a file, or the name of a model that ships with lgd ("phone", "single", "multi"). Any number of threads
+    may use one model at once."""
 
     def __init__(self, weights: Optional[Path] = None):
         path, error = ctypes.create_string_buffer(4096), c.Failure()
@@ -159,8 +159,8 @@ def estimate(
 ) -> Maps:
     """Maps of size x size pixels from one photograph.
 
-    model: by default single, the shipped one. image: a file; or an array, (height, width, 3): uint8 and uint16 are
-    sRGB, floats are linear. Its largest centred square is used. fov: degrees across that square; None: from the file's
+    model: by default phone, the shipped one for photographs. image: a file; or an array, (height, width, 3): uint8 and
+    uint16 are sRGB, floats are linear. Its largest centred square is used. fov: degrees across that square; None: from the file's
     EXIF, else what the model assumes or estimates. mask: a file, or an array of the photograph's height and width: only
     where it is not black the maps are refined. iterations: None: as trained, or "auto". The rest is as lgd-infer --help
     says.

@@ -20,7 +20,7 @@ unpacked_works() {
     says "$T/root$libdir/pkgconfig/lgd.pc" "libdir=\${prefix}${libdir#/usr}"
     python3 -c 'import numpy' 2>/dev/null || return 0
     export PYTHONPATH="$T/root/usr/lib/python3/dist-packages" PYTHONDONTWRITEBYTECODE=1
-    cd "$T" && LGD_MODEL="$T/root/usr/share/lgd/single.safetensors" expect 0 python3 -c 'import lgd, sys
+    cd "$T" && LGD_MODEL="$T/root/usr/share/lgd/phone.safetensors" expect 0 python3 -c 'import lgd, sys
 print(lgd.__file__, lgd.estimate(sys.argv[1], size=16, iterations=1, threads=1).array.shape)' "$ROOT/demo/flash.jpg"
     says "$T/out" "$T/root/usr/lib/python3/dist-packages/lgd/__init__.py (16, 16, 9)"
 }

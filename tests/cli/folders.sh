@@ -146,7 +146,7 @@ lists_at_once() {
 
 killed_and_begun_again() {
     model
-    TMPDIR=$T expect 0 sh tests/kill_folder.sh 40 4 2
+    TMPDIR=$T expect 0 sh tests/kill_folder.sh 120 4 2
 }
 
 check folders_parts parts

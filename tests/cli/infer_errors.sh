@@ -178,12 +178,12 @@ model_lookup() {
         says "$T/err" "LGD_MODEL"
         lines "$T/err" 1
     fi
-    cp "$MODEL" "$T/i/share/lgd/single.safetensors"
+    cp "$MODEL" "$T/i/share/lgd/phone.safetensors"
     expect 0 "$T/i/bin/lgd-infer" -i 0 -s 8 "$T/p.ppm" -o "$T/o"
     mkdir -p "$T/j/build/bin" "$T/j/models"
     cp "$BIN/lgd-infer" "$T/j/build/bin"
     cp -R "$BUILD/lib" "$T/j/build"
-    cp "$MODEL" "$T/j/models/single.safetensors"
+    cp "$MODEL" "$T/j/models/phone.safetensors"
     expect 0 "$T/j/build/bin/lgd-infer" -i 0 -s 8 "$T/p.ppm" -o "$T/o"
 }
 

@@ -39,8 +39,8 @@ is_as_of_the_program() {
     for f in diffuse.png specular.png render.png preview.png; do
         same "$T/program/flash/$f" "$T/shared/$f" "$f is another than lgd-infer's"
     done
-    grep -v '^estimate: \|^field of view: ' "$T/program/flash/meta.txt" >"$T/meta"
-    grep -v '^estimate: \|^field of view: ' "$T/shared/meta.txt" >"$T/meta_shared"
+    grep -v '^estimate: \|^field of view: \|^photograph: \|^weights: \|^options: \|^result: ' "$T/program/flash/meta.txt" >"$T/meta"
+    grep -v '^estimate: \|^field of view: \|^photograph: \|^weights: \|^options: \|^result: ' "$T/shared/meta.txt" >"$T/meta_shared"
     cmp -s "$T/meta" "$T/meta_shared" || fail "meta.txt is another: $(diff "$T/meta" "$T/meta_shared" | head -n 2)"
 }
 
@@ -51,7 +51,7 @@ install_link_uninstall() {
     expect 0 make --no-print-directory install BUILD="$BUILD" DESTDIR="$T/root" PREFIX=/usr/local
     root=$T/root/usr/local
     for f in bin/lgd-infer bin/lgd-train bin/lgd-eval bin/lgd-data bin/lgd-convert bin/lgd-capture lib/liblgd.a lib/liblgd.so \
-        lib/liblgd.so.0 lib/lgd/liblgd_image.so include/lgd.h share/lgd/single.safetensors lib/pkgconfig/lgd.pc \
+        lib/liblgd.so.0 lib/lgd/liblgd_image.so include/lgd.h share/lgd/phone.safetensors lib/pkgconfig/lgd.pc \
         share/man/man1/lgd-infer.1 share/bash-completion/completions/lgd-train share/zsh/site-functions/_lgd-eval; do
         [ -s "$root/$f" ] || fail "$f is not installed"
     done
@@ -82,7 +82,7 @@ install_link_uninstall() {
     expect 1 "$T/with_shared" "$T/absent.jpg" "$T/none"
     says "$T/out" "absent.jpg"
     unset LD_LIBRARY_PATH
-    LGD_MODEL=$root/share/lgd/single.safetensors
+    LGD_MODEL=$root/share/lgd/phone.safetensors
     export LGD_MODEL
     expect 0 "$T/with_static" demo/flash.jpg "$T/static"
     same "$T/first" "$T/out" "the two libraries differ"

@@ -1,6 +1,6 @@
 # Manual pages and completions: every option of --help is in them, and they do what they should.
 . tests/cli/lib.sh
-PROGRAMS=$(cd "$BIN" && for p in lgd-*; do case $p in lgd-test | lgd-bench | lgd-stress) ;; *) echo "$p" ;; esac; done)
+PROGRAMS=$(cd "$BIN" && for p in lgd-*; do case $p in lgd-test | lgd-bench | lgd-stress | lgd-faults) ;; *) echo "$p" ;; esac; done)
 SHARE=$BUILD/share
 
 made() {

@@ -123,7 +123,7 @@ goes_on_as_whole() {
 signals_save() {
     launcher "$1"
     config
-    sed -i 's/^pretrain_steps.*/pretrain_steps = 150/' "$T/small.ini"
+    sed -i 's/^pretrain_steps.*/pretrain_steps = 1500/' "$T/small.ini"
     expect 0 train 2 whole
     plain=$LAUNCH
     for signal in TERM INT HUP; do

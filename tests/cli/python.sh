@@ -47,8 +47,8 @@ maps.save(sys.argv[2])' "$PHOTO" "$T/p"
     for f in diffuse.png specular.png render.png preview.png; do
         cmp -s "$T/o/flash/$f" "$T/p/$f" || fail "$f is another than lgd-infer's"
     done
-    grep -v '^estimate: ' "$T/o/flash/meta.txt" >"$T/theirs"
-    grep -v '^estimate: ' "$T/p/meta.txt" >"$T/ours"
+    grep -v '^estimate: \|^photograph: \|^weights: \|^options: \|^result: ' "$T/o/flash/meta.txt" >"$T/theirs"
+    grep -v '^estimate: \|^photograph: \|^weights: \|^options: \|^result: ' "$T/p/meta.txt" >"$T/ours"
     cmp -s "$T/theirs" "$T/ours" || fail "meta.txt: $(diff "$T/theirs" "$T/ours" | head -n 2 | tr '\n' ' ')"
 }
 check python_writes_what_lgd_infer_writes is_as_lgd_infer

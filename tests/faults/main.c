@@ -159,7 +159,7 @@ static bool ends_with(const char *name, const char *end)
 /* Tables and reports hold times: they have to end with a line. */
 static bool has_times(const char *name)
 {
-    return ends_with(name, ".csv") || ends_with(name, ".html") || ends_with(name, ".json");
+    return ends_with(name, ".csv") || ends_with(name, ".html") || ends_with(name, ".json") || ends_with(name, ".jsonl");
 }
 
 static bool whole_lines(const char *path)

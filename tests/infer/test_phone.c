@@ -1,0 +1,60 @@
+/* The model for photographs, phone: laws of plain surfaces that any good estimate keeps. */
+#include "infer/lgd.h"
+#include "render/render.h"
+#include "tensor/maps.h"
+#include "tests/test.h"
+#include <math.h>
+#include <stdlib.h>
+
+enum { SIDE = 256, PIXELS = SIDE * SIDE };
+
+/* Maps of a plain dielectric, photographed with its flash from so many sides away, so bright as from the usual place.
+ */
+static void plain(const float diffuse[3], float roughness, float distance, float *maps, float *image)
+{
+    rd_view view = rd_flash();
+    view.power *= (distance / view.light[2]) * (distance / view.light[2]);
+    view.light[2] = view.camera[2] = distance;
+    for (int p = 0; p < PIXELS; p++) {
+        float *m = maps + p * MAP_CHANNELS;
+        for (int c = 0; c < 3; c++) m[MAP_DIFFUSE + c] = 2 * diffuse[c] - 1, m[MAP_SPECULAR + c] = 2 * 0.04f - 1;
+        m[MAP_NORMAL] = m[MAP_NORMAL + 1] = 0;
+        m[MAP_ROUGHNESS] = 2 * roughness - 1;
+    }
+    rd_render(rd_grid_full(SIDE), maps, MAP_CHANNELS, &view, true, image);
+}
+
+/* Colours that training's palettes do not have beside those that they have. */
+TEST(phone_keeps_hues)
+{
+    static const float colours[][3] = {{0.6f, 0.02f, 0.2f},  {0.02f, 0.1f, 0.5f}, {0.05f, 0.4f, 0.4f},
+                                       {0.25f, 0.5f, 0.05f}, {0.5f, 0.35f, 0.2f}, {0.4f, 0.4f, 0.4f}};
+    float *maps = malloc(sizeof *maps * PIXELS * MAP_CHANNELS), *image = malloc(sizeof *image * PIXELS * 3);
+    lgd_error e;
+    lgd_model *model = lgd_load("models/phone.safetensors", &e);
+    CHECK(model, "%s", e.message);
+    double power;
+    lgd_options o = lgd_options_default();
+    o.power = &power;
+    o.fov = LGD_FOV_UNKNOWN;
+    for (int i = 0; i < (int)(sizeof colours / sizeof *colours); i++) {
+        double mean[3] = {0, 0, 0}, sum = 0, relief = 0;
+        plain(colours[i], i % 2 ? 0.35f : 0.6f, i % 3 ? 1 : 1.8f, maps, image);
+        CHECK(!lgd_estimate(model, image, SIDE, &o, maps, &e), "%s", e.message);
+        for (int p = 0; p < PIXELS; p++) {
+            const float *m = maps + p * MAP_CHANNELS;
+            for (int c = 0; c < 3; c++) mean[c] += (double)m[MAP_DIFFUSE + c];
+            relief += pow((double)m[MAP_NORMAL], 2) + pow((double)m[MAP_NORMAL + 1], 2);
+        }
+        for (int c = 0; c < 3; c++) sum += mean[c];
+        const double of = (double)(colours[i][0] + colours[i][1] + colours[i][2]);
+        printf("  colour %d: shares %.2f %.2f %.2f, relief %.3f, power %.2f\n", i, mean[0] / sum, mean[1] / sum,
+               mean[2] / sum, sqrt(relief / PIXELS), power);
+        for (int c = 0; c < 3; c++)
+            CHECK(fabs(mean[c] / sum - (double)colours[i][c] / of) < 0.1,
+                  "colour %d: channel %d has %.2f of it, not %.2f", i, c, mean[c] / sum, (double)colours[i][c] / of);
+        CHECK(sqrt(relief / PIXELS) < 0.05, "colour %d: relief %.3f of a plain surface", i, sqrt(relief / PIXELS));
+    }
+    lgd_free(&model);
+    free(maps), free(image);
+}
