@@ -127,6 +127,8 @@ signals_save() {
     expect 0 train 2 whole
     plain=$LAUNCH
     for signal in TERM INT HUP; do
+        # Open MPI's mpirun makes SIGTERM of SIGINT and may end before it has passed on what the ranks then say.
+        [ "$1:$signal" = openmpi:INT ] && continue
         rm -rf "$T/part"
         # Open MPI leaves what it ends a second; with this it also waits as long for ranks that are gone.
         if [ "$1" = openmpi ]; then LAUNCH="$plain --mca odls_base_sigkill_timeout 10"; fi
@@ -144,14 +146,14 @@ signals_save() {
         cp -r "$T/part" "$T/other-$signal"
         expect 0 train 2 part --resume
         same_weights whole part
-        lines "$T/part/log.csv" 163
+        lines "$T/part/log.csv" 1513
     done
     expect 0 train 3 other-TERM --resume
     says "$T/err" "was made by 2 and goes on with 3 ranks"
     goes_on_as_whole other-TERM
-    expect 0 alone other-INT --resume
+    expect 0 alone other-HUP --resume
     says "$T/err" "goes on with 1 rank:"
-    goes_on_as_whole other-INT
+    goes_on_as_whole other-HUP
 }
 
 # kill -9 of a rank ends the job, with a line that says which; the checkpoint is whole and going on makes the same bytes.
