@@ -25,7 +25,7 @@ static const char usage[] =
     "  --version                print the version\n"
     "\n"
     "mpirun -np N lgd-train CONFIG.ini shares every batch out to N processes (docs/scaling.md).\n"
-    "Ctrl-C, SIGTERM and SIGHUP finish the step, save a checkpoint and exit with status 1.\n";
+    "Ctrl-C, SIGTERM and SIGHUP finish the step, save a checkpoint and exit with status 130.\n";
 
 typedef struct shown {
     cl_progress progress;
