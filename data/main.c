@@ -33,6 +33,8 @@ enum {
     OPT_COUNT,
     OPT_SIZE,
     OPT_FAMILIES,
+    OPT_HUES,
+    OPT_RELIEF,
     OPT_FORMAT,
     OPT_SHEET,
     OPT_PHOTOGRAPHS,
@@ -53,6 +55,8 @@ static const struct option plain_options[] = {{"output", required_argument, NULL
                                               {"count", required_argument, NULL, OPT_COUNT},
                                               {"size", required_argument, NULL, OPT_SIZE},
                                               {"families", required_argument, NULL, OPT_FAMILIES},
+                                              {"hues", required_argument, NULL, OPT_HUES},
+                                              {"relief", required_argument, NULL, OPT_RELIEF},
                                               {"format", required_argument, NULL, OPT_FORMAT},
                                               {"contact-sheet", no_argument, NULL, OPT_SHEET},
                                               {"photographs", no_argument, NULL, OPT_PHOTOGRAPHS},
@@ -94,7 +98,10 @@ static void print_help(void)
         "      --families LIST   all (the default), classic (the first seventeen), or some of: ");
     for (int i = 0; i < io_family_count(); i++)
         printf("%s%s%s", i ? i % 8 ? ", " : "," : "", i % 8 ? "" : "\n                        ", io_family_name(i));
-    printf("\n\nPhotographs, largest values of what each draws:\n");
+    printf("\n"
+           "      --hues X          share of the materials with other hues, 0 .. 1 (default 0)\n"
+           "      --relief X        share of the materials with another relief, 0 .. 1 (default 0)\n");
+    printf("\nPhotographs, largest values of what each draws:\n");
     for (int i = 0; i < CL_CAMERA_OPTIONS; i++) {
         io_camera least = cl_camera_default;
         const cl_camera_option *k = &cl_camera_options[i];
@@ -153,6 +160,8 @@ static int parse_options(int argc, char **argv, options *o)
         case OPT_COUNT: code = parse_number("count", optarg, 1, 10000000, &o->count); break;
         case OPT_SIZE: code = parse_number("size", optarg, 8, 2048, &o->size); break;
         case OPT_FAMILIES: code = parse_families(optarg, &o->procedural.families); break;
+        case OPT_HUES: code = parse_share("hues", optarg, 1, &o->procedural.hues); break;
+        case OPT_RELIEF: code = parse_share("relief", optarg, 1, &o->procedural.relief); break;
         case OPT_FORMAT:
             if (!strcmp(optarg, "folders")) o->format = FORMAT_FOLDERS;
             else if (!strcmp(optarg, "strips")) o->format = FORMAT_STRIPS;
@@ -261,7 +270,8 @@ static ts_code sheet_task(const options *o, int64_t number, io_material *m, io_i
 {
     (void)st;
     int column = (int)(number % sheet->columns), row = (int)(number / sheet->columns);
-    io_procedural p = {.seed = o->procedural.seed, .families = UINT64_C(1) << row_family(o, row)};
+    io_procedural p = o->procedural;
+    p.families = UINT64_C(1) << row_family(o, row);
     rd_view flash = rd_flash();
     io_procedural_make(&p, (uint64_t)(o->first + number), m);
     rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &flash, true, photo->data);

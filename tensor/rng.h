@@ -26,7 +26,8 @@ enum {
     TS_STREAM_PHONE,
     TS_STREAM_KNOWN,
     TS_STREAM_HUES,
-    TS_STREAM_SHEET
+    TS_STREAM_SHEET,
+    TS_STREAM_RELIEF
 };
 
 uint32_t ts_rng_u32(ts_rng *r);

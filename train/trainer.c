@@ -205,8 +205,10 @@ static void share_state(tr_trainer *t)
 static ts_code begin(tr_trainer *t, bool resume, ts_status *st)
 {
     const tr_config *c = &t->config;
-    const io_procedural source = {
-        .seed = (uint64_t)c->data.seed, .families = c->data.families, .hues = (float)c->data.hues};
+    const io_procedural source = {.seed = (uint64_t)c->data.seed,
+                                  .families = c->data.families,
+                                  .hues = (float)c->data.hues,
+                                  .relief = (float)c->data.relief};
     const io_share share = {c->train.batch, t->first, t->batch};
     t->loader = io_loader_create(&source, c->data.patch, share, (uint64_t)t->step, c->data.prefetch, c->data.threads,
                                  st);

@@ -1,6 +1,7 @@
 #include "data/materials/procedural.h"
 #include "data/materials/family.h"
 #include "data/materials/hues.h"
+#include "data/materials/relief.h"
 #include "tensor/scratch.h"
 #include <math.h>
 #include <stdio.h>
@@ -117,6 +118,19 @@ static void mix(io_canvas *c, const float *base)
     cv_drop(c, mark);
 }
 
+/* Material number index, painted on c, gets another relief; base has room for a second material. */
+static void exchange_relief(const io_procedural *p, uint64_t index, uint64_t allowed, io_canvas *c, float *base)
+{
+    c->rng = ts_rng_make(p->seed, TS_STREAM_RELIEF, index);
+    if (!cv_chance(c, p->relief)) return;
+    const cv_relief relief = cv_draw_relief(c);
+    io_canvas other = *c;
+    painted_at(&other, base);
+    if (relief.exchanged) families[draw_family(&other.rng, allowed)].paint(&other);
+    c->rng = other.rng;
+    cv_other_relief(c, &relief, other.height, other.roughness);
+}
+
 void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
 {
     io_canvas c = {.size = m->size, .count = m->size * m->size, .pixel = 1.0f / (float)m->size};
@@ -145,6 +159,8 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
     }
     c.used = 0;
     if (a < CLASSIC) wear_calm(&c);
+    c.used = 0;
+    exchange_relief(p, index, allowed, &c, mixed ? first : second);
     ts_rng hues = ts_rng_make(p->seed, TS_STREAM_HUES, index);
     if (ts_rng_uniform(&hues) < p->hues) cv_other_hues(&c, &hues);
     cv_write(&c, m->maps);

@@ -18,6 +18,7 @@ typedef struct io_procedural {
     uint64_t seed;
     uint64_t families; /* bit i: family i may be drawn; 0 = all */
     float hues;        /* share of the materials that get other hues (materials/hues.h); the rest stay as they are */
+    float relief;      /* share of those whose relief is made anew (materials/relief.h) */
 } io_procedural;
 
 /* Material number index. m->size and m->maps are the caller's (io_material_create). Serial, thread safe. */

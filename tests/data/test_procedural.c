@@ -53,6 +53,47 @@ TEST(procedural_bytes_depend_on_seed_and_index_alone)
     free(parallel);
 }
 
+TEST(procedural_other_relief_leaves_colours)
+{
+    enum { COUNT = 64, SIZE = 32 };
+    const io_procedural plain = {.seed = 5}, other = {.seed = 5, .relief = 1}, half = {.seed = 5, .relief = 0.5f};
+    int halves = 0, gloss = 0;
+    double slopes[2] = {0, 0};
+    for (int i = 0; i < COUNT; i++) {
+        io_material a = material(SIZE), b = material(SIZE), c = material(SIZE);
+        io_procedural_make(&plain, (uint64_t)i, &a);
+        io_procedural_make(&other, (uint64_t)i, &b);
+        io_procedural_make(&half, (uint64_t)i, &c);
+        CHECK(!memcmp(c.maps, a.maps, values(SIZE) * sizeof(float)) ||
+                  !memcmp(c.maps, b.maps, values(SIZE) * sizeof(float)),
+              "material %d is neither plain nor of another relief", i);
+        halves += memcmp(a.maps, c.maps, values(SIZE) * sizeof(float)) != 0;
+        bool relief = false, rougher = false;
+        for (int k = 0; k < SIZE * SIZE; k++) {
+            const float *from = a.maps + k * MAP_CHANNELS, *to = b.maps + k * MAP_CHANNELS;
+            CHECK(!memcmp(from + MAP_DIFFUSE, to + MAP_DIFFUSE, 3 * sizeof(float)) &&
+                      !memcmp(from + MAP_SPECULAR, to + MAP_SPECULAR, 3 * sizeof(float)),
+                  "material %d: diffuse or F0 changed with the relief", i);
+            relief = relief || memcmp(from + MAP_NORMAL, to + MAP_NORMAL, 2 * sizeof(float)) != 0;
+            rougher = rougher || from[MAP_ROUGHNESS] != to[MAP_ROUGHNESS];
+            for (int v = 0; v < 2; v++) {
+                const float n = to[MAP_NORMAL + v], was = from[MAP_NORMAL + v];
+                CHECK(n > -1 && n < 1, "material %d: normal %g", i, (double)n);
+                slopes[0] += (double)was * (double)was, slopes[1] += (double)n * (double)n;
+            }
+        }
+        CHECK(relief || slopes[0] == 0, "material %d keeps its relief", i);
+        gloss += rougher;
+        io_material_free(&a);
+        io_material_free(&b);
+        io_material_free(&c);
+    }
+    CHECK(halves > COUNT / 4 && halves < 3 * COUNT / 4, "%d of %d at a share of a half", halves, COUNT);
+    CHECK(gloss > COUNT / 16 && gloss < COUNT / 2, "the roughness of %d of %d is another's", gloss, COUNT);
+    CHECK(slopes[1] > 0.5 * slopes[0] && slopes[1] < 2 * slopes[0], "relief %g in place of %g", sqrt(slopes[1]),
+          sqrt(slopes[0]));
+}
+
 TEST(procedural_other_hues_change_diffuse_colours_alone)
 {
     enum { COUNT = 48, SIZE = 16 };
