@@ -27,6 +27,7 @@ ts_code bench_batches(const char *path, ts_status *st)
     const size_t pixels = (size_t)batch * (size_t)patch * (size_t)patch;
     const io_procedural source = {.seed = (uint64_t)c.data.seed,
                                   .families = c.data.families,
+                                  .often = c.data.often,
                                   .hues = (float)c.data.hues,
                                   .relief = (float)c.data.relief};
     float *images = malloc(pixels * 3 * sizeof *images);

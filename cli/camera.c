@@ -10,6 +10,7 @@ const cl_camera_option cl_camera_options[CL_CAMERA_OPTIONS] = {
     {"noise-spread", 3, AT(noise_spread), "read and shot noise each up to this many stops stronger or weaker"},
     {"blur", 4, AT(blur), "largest sigma in pixels at 256"},
     {"exposure", 3, AT(exposure), "up to this many stops brighter or darker"},
+    {"meter", 1, AT(meter), "most that the mean of the picture may be, by less exposure; 0: any"},
     {"vignette", 0.9, AT(vignette), "largest share of light lost in the corners"},
     {"white-balance", 0.9, AT(white_balance), "red and blue up to this share stronger or weaker"},
     {"tilt", 30, AT(tilt), "largest angle of the camera in degrees"},
@@ -105,7 +106,9 @@ cl_shot cl_expose(const io_camera *camera, uint64_t seed, uint64_t index, const 
     shot.view.power = rig.power;
     rd_render(rd_grid_full(size), maps, MAP_CHANNELS, &shot.view, false, image);
     if (camera->ambient > 0) shot.ambient = add_ambient(camera, seed, index, size, maps, &shot.view, image);
-    shot.view.power *= io_camera_exposure(camera, seed, index);
+    const float metered = io_camera_meter(camera, seed, index, size, image);
+    for (size_t i = 0; metered < 1 && i < (size_t)size * (size_t)size * 3; i++) image[i] *= metered;
+    shot.view.power *= metered * io_camera_exposure(camera, seed, index);
     return shot;
 }
 

@@ -124,6 +124,22 @@ float io_camera_exposure(const io_camera *c, uint64_t seed, uint64_t index)
     return c->exposure > 0 ? exp2f(c->exposure * draw(seed, index).exposure) : 1;
 }
 
+float io_camera_meter(const io_camera *c, uint64_t seed, uint64_t index, int size, const float *image)
+{
+    const size_t count = (size_t)size * (size_t)size * 3;
+    const float exposure = io_camera_exposure(c, seed, index);
+    float factor = 1;
+    /* A clamped pixel does not darken with the factor: each round comes nearer from above. */
+    for (int round = 0; c->meter > 0 && round < 4; round++) {
+        double sum = 0;
+        for (size_t i = 0; i < count; i++) sum += (double)nz_min(image[i] * exposure * factor, 1);
+        const float mean = (float)(sum / (double)count);
+        if (mean <= c->meter) break;
+        factor *= c->meter / mean;
+    }
+    return factor;
+}
+
 /* The 8-bit codes of io_linear_to_srgb without its powf for every value: guess[] by the linear value's leading 12 bits,
  * where a code spans more than one step, then the exact threshold. */
 enum { GUESSES = 4096 };

@@ -12,6 +12,7 @@ typedef struct io_camera {
     float blur;          /* largest sigma in pixels at 256^2 */
     bool quantise;       /* 8 bits sRGB, as a file has */
     float exposure;      /* up to this many stops brighter or darker */
+    float meter;         /* most that the mean of the clamped picture may be, by less exposure; 0: not metered */
     float vignette;      /* largest share of the light lost in the corners, with the squared distance from the centre */
     float white_balance; /* red and blue are each up to this share stronger or weaker */
     int jpeg;            /* lowest JPEG quality (to 98), in half of the photographs with halved chroma; 0: none */
@@ -54,6 +55,10 @@ void io_camera_told(const io_camera *c, uint64_t seed, uint64_t index, bool *vie
 /* The factor of the light that the exposure stands for, which io_camera_apply multiplies in: for a loss that is to know
  * it. */
 float io_camera_exposure(const io_camera *c, uint64_t seed, uint64_t index);
+
+/* The factor, at most 1, on an unclamped linear rendering [size][size][3] that brings the mean of what io_camera_apply
+ * would expose and clamp to c->meter: a phone's metering spares the photographer a white picture. */
+float io_camera_meter(const io_camera *c, uint64_t seed, uint64_t index, int size, const float *image);
 
 /* image: a linear rendering that is NOT clamped, [size][size][3], in place. In this order: exposure, vignette and white
  * balance; highlights roll off or clip at 1; blur; noise; tone curve; sharpening; JPEG or rounding to 8 bits. The

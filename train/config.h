@@ -15,10 +15,10 @@ typedef struct tr_config {
     nn_coder coder; /* [coder] */
     struct {        /* [data] */
         int64_t seed;
-        uint64_t families; /* bits as in io_procedural; 0: all */
+        uint64_t families, often; /* bits as in io_procedural; 0: all */
         double hues, relief;
         double noise, noise_spread, blur, exposure, vignette, white_balance, tilt, off_centre; /* as in io_camera */
-        double fov_min, fov_max, flash, ambient, tone, sharpen, told_view, told_power;
+        double fov_min, fov_max, meter, flash, ambient, tone, sharpen, told_view, told_power;
         bool quantise;
         int jpeg, patch, prefetch, threads;
     } data;

@@ -12,6 +12,7 @@ static io_camera camera_of(const tr_config *c)
                        .blur = (float)c->data.blur,
                        .quantise = c->data.quantise,
                        .exposure = (float)c->data.exposure,
+                       .meter = (float)c->data.meter,
                        .vignette = (float)c->data.vignette,
                        .white_balance = (float)c->data.white_balance,
                        .jpeg = c->data.jpeg,

@@ -207,6 +207,7 @@ static ts_code begin(tr_trainer *t, bool resume, ts_status *st)
     const tr_config *c = &t->config;
     const io_procedural source = {.seed = (uint64_t)c->data.seed,
                                   .families = c->data.families,
+                                  .often = c->data.often,
                                   .hues = (float)c->data.hues,
                                   .relief = (float)c->data.relief};
     const io_share share = {c->train.batch, t->first, t->batch};

@@ -55,17 +55,19 @@ uint64_t io_family_mask(const char *name)
     return family < 0 ? 0 : UINT64_C(1) << family;
 }
 
-static int draw_family(ts_rng *rng, uint64_t allowed)
+static float weight(int family, uint64_t often) { return families[family].weight * (often >> family & 1 ? 3 : 1); }
+
+static int draw_family(ts_rng *rng, uint64_t allowed, uint64_t often)
 {
     float total = 0;
     int last = 0;
     for (int i = 0; i < io_family_count(); i++)
-        if (allowed >> i & 1) total += families[i].weight;
+        if (allowed >> i & 1) total += weight(i, often);
     float u = ts_rng_uniform(rng) * total;
     for (int i = 0; i < io_family_count(); i++) {
         if (!(allowed >> i & 1)) continue;
         last = i;
-        u -= families[i].weight;
+        u -= weight(i, often);
         if (u < 0) break;
     }
     return last;
@@ -126,7 +128,7 @@ static void exchange_relief(const io_procedural *p, uint64_t index, uint64_t all
     const cv_relief relief = cv_draw_relief(c);
     io_canvas other = *c;
     painted_at(&other, base);
-    if (relief.exchanged) families[draw_family(&other.rng, allowed)].paint(&other);
+    if (relief.exchanged) families[draw_family(&other.rng, allowed, p->often)].paint(&other);
     c->rng = other.rng;
     cv_other_relief(c, &relief, other.height, other.roughness);
 }
@@ -146,7 +148,7 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
     }
     c.rng = ts_rng_make(p->seed, TS_STREAM_MATERIAL, index);
     uint64_t all = io_family_mask("all"), allowed = p->families & all ? p->families & all : all;
-    int a = draw_family(&c.rng, allowed), b = draw_family(&c.rng, allowed);
+    int a = draw_family(&c.rng, allowed, p->often), b = draw_family(&c.rng, allowed, p->often);
     bool mixed = cv_chance(&c, 0.27f);
     painted_at(&c, first);
     families[a].paint(&c);

@@ -17,6 +17,7 @@ uint64_t io_family_mask(const char *name);
 typedef struct io_procedural {
     uint64_t seed;
     uint64_t families; /* bit i: family i may be drawn; 0 = all */
+    uint64_t often;    /* families that are drawn three times as often as the rest; 0 = none */
     float hues;        /* share of the materials that get other hues (materials/hues.h); the rest stay as they are */
     float relief;      /* share of those whose relief is made anew (materials/relief.h) */
 } io_procedural;

@@ -1,0 +1,115 @@
+/* What training varies of the procedural materials: families, hues, relief. */
+#include "data/materials/procedural.h"
+#include "tests/test.h"
+#include <math.h>
+#include <string.h>
+
+static io_material material(int size)
+{
+    io_material m = {0};
+    CHECK(io_material_create(&m, size, NULL) == TS_OK, "no memory for a material of %d", size);
+    return m;
+}
+
+static size_t values(int size) { return (size_t)size * (size_t)size * MAP_CHANNELS; }
+
+static int drawn(const io_procedural *p, const char *family, int count)
+{
+    int found = 0;
+    io_material m = material(8);
+    for (int i = 0; i < count; i++) {
+        io_procedural_make(p, (uint64_t)i, &m);
+        found += !strncmp(m.name + 6, family, strlen(family));
+    }
+    io_material_free(&m);
+    return found;
+}
+
+TEST(procedural_families_are_drawn_more_often)
+{
+    const uint64_t two = io_family_mask("wood") | io_family_mask("stone");
+    const io_procedural even = {.seed = 5, .families = two},
+                        more = {.seed = 5, .families = two, .often = io_family_mask("wood")},
+                        both = {.seed = 5, .families = two, .often = two};
+    enum { COUNT = 400 };
+    const int half = drawn(&even, "wood", COUNT), most = drawn(&more, "wood", COUNT);
+    CHECK(half > 160 && half < 240, "%d of %d are wood", half, COUNT);
+    CHECK(most > 270 && most < 330, "%d of %d are wood, drawn three times as often", most, COUNT);
+    CHECK(drawn(&both, "wood", COUNT) == half, "all three times as often is not the same as none");
+}
+
+TEST(procedural_other_relief_leaves_colours)
+{
+    enum { COUNT = 64, SIZE = 32 };
+    const io_procedural plain = {.seed = 5}, other = {.seed = 5, .relief = 1}, half = {.seed = 5, .relief = 0.5f};
+    int halves = 0, gloss = 0;
+    double slopes[2] = {0, 0};
+    for (int i = 0; i < COUNT; i++) {
+        io_material a = material(SIZE), b = material(SIZE), c = material(SIZE);
+        io_procedural_make(&plain, (uint64_t)i, &a);
+        io_procedural_make(&other, (uint64_t)i, &b);
+        io_procedural_make(&half, (uint64_t)i, &c);
+        CHECK(!memcmp(c.maps, a.maps, values(SIZE) * sizeof(float)) ||
+                  !memcmp(c.maps, b.maps, values(SIZE) * sizeof(float)),
+              "material %d is neither plain nor of another relief", i);
+        halves += memcmp(a.maps, c.maps, values(SIZE) * sizeof(float)) != 0;
+        bool relief = false, rougher = false;
+        for (int k = 0; k < SIZE * SIZE; k++) {
+            const float *from = a.maps + k * MAP_CHANNELS, *to = b.maps + k * MAP_CHANNELS;
+            CHECK(!memcmp(from + MAP_DIFFUSE, to + MAP_DIFFUSE, 3 * sizeof(float)) &&
+                      !memcmp(from + MAP_SPECULAR, to + MAP_SPECULAR, 3 * sizeof(float)),
+                  "material %d: diffuse or F0 changed with the relief", i);
+            relief = relief || memcmp(from + MAP_NORMAL, to + MAP_NORMAL, 2 * sizeof(float)) != 0;
+            rougher = rougher || from[MAP_ROUGHNESS] != to[MAP_ROUGHNESS];
+            for (int v = 0; v < 2; v++) {
+                const float n = to[MAP_NORMAL + v], was = from[MAP_NORMAL + v];
+                CHECK(n > -1 && n < 1, "material %d: normal %g", i, (double)n);
+                slopes[0] += (double)was * (double)was, slopes[1] += (double)n * (double)n;
+            }
+        }
+        CHECK(relief || slopes[0] == 0, "material %d keeps its relief", i);
+        gloss += rougher;
+        io_material_free(&a);
+        io_material_free(&b);
+        io_material_free(&c);
+    }
+    CHECK(halves > COUNT / 4 && halves < 3 * COUNT / 4, "%d of %d at a share of a half", halves, COUNT);
+    CHECK(gloss > COUNT / 16 && gloss < COUNT / 2, "the roughness of %d of %d is another's", gloss, COUNT);
+    CHECK(slopes[1] > 0.5 * slopes[0] && slopes[1] < 2 * slopes[0], "relief %g in place of %g", sqrt(slopes[1]),
+          sqrt(slopes[0]));
+}
+
+TEST(procedural_other_hues_change_diffuse_colours_alone)
+{
+    enum { COUNT = 48, SIZE = 16 };
+    const io_procedural plain = {.seed = 5}, hued = {.seed = 5, .hues = 1}, half = {.seed = 5, .hues = 0.5f};
+    int changed = 0, halves = 0, bluer = 0, before = 0;
+    for (int i = 0; i < COUNT; i++) {
+        io_material a = material(SIZE), b = material(SIZE), c = material(SIZE);
+        io_procedural_make(&plain, (uint64_t)i, &a);
+        io_procedural_make(&hued, (uint64_t)i, &b);
+        io_procedural_make(&half, (uint64_t)i, &c);
+        CHECK(!memcmp(c.maps, a.maps, values(SIZE) * sizeof(float)) ||
+                  !memcmp(c.maps, b.maps, values(SIZE) * sizeof(float)),
+              "material %d is neither plain nor of other hues", i);
+        changed += memcmp(a.maps, b.maps, values(SIZE) * sizeof(float)) != 0;
+        halves += memcmp(a.maps, c.maps, values(SIZE) * sizeof(float)) != 0;
+        float blue[2] = {0, 0};
+        for (int k = 0; k < SIZE * SIZE; k++) {
+            const float *from = a.maps + k * MAP_CHANNELS, *to = b.maps + k * MAP_CHANNELS;
+            CHECK(!memcmp(from + MAP_NORMAL, to + MAP_NORMAL, (MAP_CHANNELS - MAP_NORMAL) * sizeof(float)),
+                  "material %d: F0, roughness or normals changed with the hues", i);
+            for (int v = 0; v < 3; v++)
+                CHECK(to[MAP_DIFFUSE + v] >= -1 && to[MAP_DIFFUSE + v] <= 0.9f, "material %d: diffuse %g", i,
+                      (double)to[MAP_DIFFUSE + v]);
+            blue[0] += from[MAP_DIFFUSE + 2] - from[MAP_DIFFUSE], blue[1] += to[MAP_DIFFUSE + 2] - to[MAP_DIFFUSE];
+        }
+        before += blue[0] > 0, bluer += blue[1] > 0;
+        io_material_free(&a);
+        io_material_free(&b);
+        io_material_free(&c);
+    }
+    CHECK(changed > COUNT / 2 && halves > COUNT / 6 && halves < changed, "%d and %d of %d changed", changed, halves,
+          COUNT);
+    CHECK(bluer > before + COUNT / 8, "%d materials are more blue than red, %d before", bluer, before);
+}
