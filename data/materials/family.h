@@ -38,4 +38,6 @@ void io_family_bark(io_canvas *c);     /* furrows and plates, moss */
 void io_family_pebbles(io_canvas *c);  /* rounded stones of several sizes on sand */
 void io_family_creased(io_canvas *c);  /* crumpled foil, paper, film */
 void io_family_stamped(io_canvas *c);  /* metal and other sheet stamped with a pattern */
+void io_family_granite(io_canvas *c);  /* grains of several minerals, polished, honed or flamed */
+void io_family_printed(io_canvas *c);  /* paper, card, wrapping: bold shapes without relief */
 #endif

@@ -30,7 +30,8 @@ static const struct {
     {"foam", 0.7f, io_family_foam},       {"polished", 1.5f, io_family_polished},
     {"alloy", 1.8f, io_family_alloy},     {"bark", 1, io_family_bark},
     {"pebbles", 1.2f, io_family_pebbles}, {"creased", 1.2f, io_family_creased},
-    {"stamped", 1, io_family_stamped},
+    {"stamped", 1, io_family_stamped},    {"granite", 1, io_family_granite},
+    {"printed", 1, io_family_printed},
 };
 
 int io_family_count(void) { return (int)(sizeof families / sizeof *families); }
