@@ -66,7 +66,7 @@ PKG_openmpi := ompi-c
 PKG_mpich := mpich
 WARN := -Wall -Wextra -Wshadow
 CPPFLAGS_ALL = -I. -I$(BUILD)/gen -D_GNU_SOURCE -DLGD_VERSION='"$(VERSION)"' $(CPPFLAGS)
-CFLAGS_ALL = -std=c11 $(OPT) $(WARN) -Wmissing-prototypes -fopenmp -fno-math-errno -fno-trapping-math \
+CFLAGS_ALL = -std=c11 $(OPT) $(WARN) -Wmissing-prototypes -fno-math-errno -fno-trapping-math \
   -ffp-contract=off -fPIC -fvisibility=hidden $(SANITIZE) $(CFLAGS)
 CXXFLAGS_ALL = -std=c++17 $(OPT) $(WARN) -fPIC $(SANITIZE) $(CXXFLAGS)
 # Looked up only when something is compiled or linked with them, so that `make deps` and `make help` work without.
@@ -78,7 +78,7 @@ HAVE_TAGS = $(shell pkg-config --exists $(PKG_TAGS) 2>/dev/null && echo yes)
 TAGS_LIBS = $(if $(HAVE_TAGS),$(shell pkg-config --libs $(PKG_TAGS)))
 LDLIBS_ALL = $(TAGS_LIBS) $(LIB_LIBS)
 # What liblgd needs: it knows no sheets, so no tags.
-LIB_LIBS = $(PKG_LIBS) -fopenmp -lpthread -ldl -lm $(SANITIZE) $(LDLIBS)
+LIB_LIBS = $(PKG_LIBS) -lpthread -ldl -lm $(SANITIZE) $(LDLIBS)
 
 MACHINE := $(shell $(CC) -dumpmachine)
 ifneq (,$(filter x86_64%,$(MACHINE)))
@@ -127,7 +127,7 @@ BENCH_C := $(wildcard bench/*.c)
 TEST_BIN := $(BUILD)/bin/lgd-test
 BENCH_BIN := $(BUILD)/bin/lgd-bench
 STRESS_BIN := $(BUILD)/bin/lgd-stress
-# tests/stress/training.c stands between the trainer and its data.
+# tests/stress/training.c stands between the trainer and its data, tests/tensor/test_team.c between a team and its workers.
 WRAP := -Wl,--wrap=io_loader_next -Wl,--wrap=tr_photographs
 
 all: needs
@@ -150,6 +150,7 @@ $(BUILD)/bin/lgd-infer $(BUILD)/bin/lgd-convert $(BUILD)/bin/lgd-capture: $(BUIL
 	@mkdir -p $(@D)
 	$(Q)$(CC) -o $@ $< $(INTERNAL) $(LDLIBS_ALL)
 
+$(TEST_BIN): WRAP += -Wl,--wrap=pthread_create
 $(TEST_BIN): $(TEST_C:%.c=$(OBJ)/%.o) $(INTERNAL) | $(IMAGE_LIB)
 	$(call step,LD,$@)
 	@mkdir -p $(@D)
@@ -194,7 +195,7 @@ $(LIB): $(OBJ)/liblgd.o
 
 $(SHARED): $(OBJ)/liblgd.o
 	$(call step,LD,$@)
-	$(Q)$(CC) -shared -Wl,-soname,$(SONAME) -Wl,--no-undefined -o $@ $< $(LIB_LIBS)
+	$(Q)$(CC) -shared -Wl,-soname,$(SONAME) -Wl,--no-undefined -Wl,-z,nodelete -o $@ $< $(LIB_LIBS)
 	@ln -sf $(@F) $(BUILD)/$(SONAME) && ln -sf $(SONAME) $(BUILD)/liblgd.so
 
 # OpenImageIO, behind the table in data/image/oiio.h. Loaded when an image needs it, never linked.
@@ -334,7 +335,7 @@ bench-deps:
 	@BUILD=$(BUILD) sh .ci/bench-deps.sh
 
 stress: $(STRESS_BIN)
-	@OMP_WAIT_POLICY=passive $(STRESS_BIN) $(STRESS)
+	@$(STRESS_BIN) $(STRESS)
 
 # Leaks are looked for in the same objects with LeakSanitizer: AddressSanitizer's malloc cannot be made to fail so.
 faults: programs $(FAULTS)
@@ -370,7 +371,7 @@ $(BUILD)/fuzz/bin/%: tests/fuzz/main.c $(FUZZ_OBJ) $(INTERNAL)
 	$(call step,LD,$@)
 	@mkdir -p $(@D)
 	$(Q)$(FUZZ_CC) $(CPPFLAGS_ALL) -std=c11 $(WARN) $(FUZZ_FLAGS) -fsanitize=fuzzer -DFUZZ_TARGET=fuzz_$* -o $@ \
-	  $(filter %.c %.o %.a,$^) -rdynamic $(PKG_LIBS) -lgomp -lpthread -ldl -lm
+	  $(filter %.c %.o %.a,$^) -rdynamic $(PKG_LIBS) -lpthread -ldl -lm
 
 fuzz: $(FUZZ:%=$(BUILD)/fuzz/bin/%) $(IMAGE_LIB)
 	@mkdir -p $(BUILD)/fuzz/lib/lgd && cp $(IMAGE_LIB) $(BUILD)/fuzz/lib/lgd
@@ -381,7 +382,6 @@ fuzz: $(FUZZ:%=$(BUILD)/fuzz/bin/%) $(IMAGE_LIB)
 	  >$(BUILD)/fuzz/$$t.log 2>&1 || { tail -n 40 $(BUILD)/fuzz/$$t.log; exit 1; }; \
 	  sed -n 's/^stat::number_of_executed_units: */fuzz: clean, inputs: /p' $(BUILD)/fuzz/$$t.log; done
 
-# Threads of our own alone, OpenMP with one each: ThreadSanitizer does not see what libgomp's locks order.
 tsan:
 	@$(MAKE) --no-print-directory BUILD=$(BUILD)-tsan OPT='-O1 -g' SANITIZE=-fsanitize=thread programs
 	@BUILD=$(BUILD)-tsan sh tests/tsan/run.sh
@@ -447,7 +447,7 @@ install: all
 	@printf '%s\n' 'prefix=$(PREFIX)' 'libdir=$(LIBDIR:$(PREFIX)/%=$${prefix}/%)' 'Name: lgd' \
 	  'Description: material of a surface from one flash photograph' 'Version: $(VERSION)' \
 	  'Cflags: -I$${prefix}/include' 'Libs: -L$${libdir} -llgd' \
-	  'Libs.private: $(PKG_LIBS) -fopenmp -lpthread -ldl -lm' > $(TO_LIB)/pkgconfig/lgd.pc
+	  'Libs.private: $(PKG_LIBS) -lpthread -ldl -lm' > $(TO_LIB)/pkgconfig/lgd.pc
 	@[ -n "$(DESTDIR)" ] || ldconfig 2>/dev/null || true # the loader's list of libraries, where we may write it
 
 uninstall:

@@ -2,6 +2,7 @@
 #ifndef AG_OP_H
 #define AG_OP_H
 #include "autograd/tape.h"
+#include "tensor/team.h"
 #include "tensor/threads.h"
 
 /* No error so far and all inputs are there. Sets the error "op: input i is missing" otherwise. */
@@ -10,20 +11,53 @@ bool ag_ready(ag_tape *tape, const char *op, int count, ag_value *const *in);
 /* Threads of a loop of an operation on the tape. */
 static inline int ag_threads(const ag_tape *tape) { return ts_threads_of(ag_compute(tape)->threads); }
 
+/* What a loop over a gradient is given. */
+typedef struct ag_back {
+    const ag_node *node;
+    float *dx;
+    bool accumulate; /* dx += in place of dx = */
+    int input;       /* whose gradient it is, where a loop is for several */
+} ag_back;
+
 /* to[n,h,w,:] = a[n,h,w,:] followed by b[n,h,w,:] (op_concat.c). */
 void ag_join(ag_tape *tape, const ag_value *a, const ag_value *b, float *to);
 
 /* The recorded operation that made v, or NULL. */
 const ag_node *ag_node_of(const ag_tape *tape, const ag_value *v);
 
-/* Loops over values or pixels run in chunks whose size does not depend on the number of threads:
- *     for (int64_t i = 0; i < n; i += AG_CHUNK) f(ag_part(n, i, AG_CHUNK), x + i);
+/* Loops over values or pixels run in chunks whose size does not depend on the number of threads: ts_for with this step
+ * where each value is on its own, ts_tasks or ts_for over the chunks' numbers where a chunk has a sum.
  * 64 KiB: several chunks for every thread at training sizes, and a chunk stays in the L2 cache between the passes over
  * it. */
 enum { AG_CHUNK = 1 << 14 };
 static inline int64_t ag_part(int64_t n, int64_t first, int64_t chunk) { return n - first < chunk ? n - first : chunk; }
 /* The same in pixels of c channels. */
 static inline int64_t ag_pixel_chunk(int c) { return c < AG_CHUNK ? AG_CHUNK / c : 1; }
+
+/* The chunks of all images of a shape, each of the pixels of one, and what a loop over them is given. */
+typedef struct ag_chunks {
+    const ag_node *node;
+    int64_t pixels, chunk, parts, tasks; /* of an image; pixels of a chunk; chunks of an image; of all */
+    int c;
+    void *part, *stat; /* sums of each chunk, values of each image, as the operation has them */
+    float *dx;
+    bool accumulate;
+} ag_chunks;
+static inline ag_chunks ag_chunks_of(const ag_node *node, ts_shape s, int64_t chunk)
+{
+    const int64_t pixels = (int64_t)s.h * s.w, parts = (pixels + chunk - 1) / chunk;
+    return (ag_chunks){.node = node, .pixels = pixels, .chunk = chunk, .parts = parts, .tasks = parts * s.n, .c = s.c};
+}
+/* Of chunk t: its image, how many pixels it has, where its first value is. */
+static inline int64_t ag_chunk_image(const ag_chunks *a, int64_t t) { return t / a->parts; }
+static inline int64_t ag_chunk_count(const ag_chunks *a, int64_t t)
+{
+    return ag_part(a->pixels, t % a->parts * a->chunk, a->chunk);
+}
+static inline int64_t ag_chunk_at(const ag_chunks *a, int64_t t)
+{
+    return (t / a->parts * a->pixels + t % a->parts * a->chunk) * a->c;
+}
 
 /* Whether a program watches (autograd/trace.h); and what it is told of the convolution that runs. */
 bool ag_traced(void);

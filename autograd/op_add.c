@@ -9,28 +9,30 @@
 ag_value *ag_add(ag_tape *tape, ag_value *a, ag_value *b);
 #endif
 
+static void forward_range(const void *job, int64_t begin, int64_t end)
+{
+    const ag_node *node = job;
+    ts_elementwise_k()->add(end - begin, node->in[0]->t.data + begin, node->in[1]->t.data + begin,
+                            node->out->t.data + begin);
+}
+
 static void forward(ag_tape *tape, ag_node *node)
 {
-    (void)tape;
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
-    const float *a = node->in[0]->t.data, *b = node->in[1]->t.data;
-    float *y = node->out->t.data;
-    const int64_t n = ts_count(node->out->t.shape);
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (n > AG_CHUNK)
-    for (int64_t i = 0; i < n; i += AG_CHUNK) k->add(ag_part(n, i, AG_CHUNK), a + i, b + i, y + i);
+    ts_for(ag_threads(tape), ts_count(node->out->t.shape), AG_CHUNK, forward_range, node);
+}
+
+static void backward_range(const void *job, int64_t begin, int64_t end)
+{
+    const ag_back *b = job;
+    ts_elementwise_k()->scale(end - begin, 1.0f, b->node->out->grad + begin, b->dx + begin, b->accumulate);
 }
 
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
-    const float *dy = node->out->grad;
-    const int64_t n = ts_count(node->out->t.shape);
     for (int j = 0; j < 2; j++) {
-        bool accumulate;
-        float *dx = ag_grad_target(tape, node->in[j], &accumulate);
-        if (!dx) continue;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (n > AG_CHUNK)
-        for (int64_t i = 0; i < n; i += AG_CHUNK) k->scale(ag_part(n, i, AG_CHUNK), 1.0f, dy + i, dx + i, accumulate);
+        ag_back b = {.node = node};
+        b.dx = ag_grad_target(tape, node->in[j], &b.accumulate);
+        if (b.dx) ts_for(ag_threads(tape), ts_count(node->out->t.shape), AG_CHUNK, backward_range, &b);
     }
 }
 

@@ -13,49 +13,55 @@ ag_value *ag_add_leaky(ag_tape *tape, ag_value *x, ag_value *g, float leak);
 
 static float leak_of(const ag_node *node) { return *(const float *)node->attr; }
 
+static void forward_chunks(const void *job, int64_t begin, int64_t end)
+{
+    const ag_chunks *a = job;
+    for (int64_t t = begin; t < end; t++) {
+        const int64_t at = ag_chunk_at(a, t);
+        ts_elementwise_k()->add_leaky(ag_chunk_count(a, t), a->c, a->node->in[0]->t.data + at,
+                                      a->node->in[1]->t.data + ag_chunk_image(a, t) * a->c, leak_of(a->node),
+                                      a->node->out->t.data + at);
+    }
+}
+
 static void forward(ag_tape *tape, ag_node *node)
 {
-    (void)tape;
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
     const ts_shape s = node->out->t.shape;
-    const int c = s.c;
-    const float leak = leak_of(node), *x = node->in[0]->t.data, *g = node->in[1]->t.data;
-    float *y = node->out->t.data;
-    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_pixel_chunk(c), parts = (pixels + chunk - 1) / chunk,
-                  tasks = parts * s.n;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
-    for (int64_t t = 0; t < tasks; t++) {
-        const int64_t n = t / parts, p = t % parts * chunk, at = (n * pixels + p) * c;
-        k->add_leaky(ag_part(pixels, p, chunk), c, x + at, g + n * c, leak, y + at);
+    const ag_chunks a = ag_chunks_of(node, s, ag_pixel_chunk(s.c));
+    ts_for(ag_threads(tape), a.tasks, 1, forward_chunks, &a);
+}
+
+static void backward_chunks(const void *job, int64_t begin, int64_t end)
+{
+    const ag_chunks *a = job;
+    for (int64_t t = begin; t < end; t++) {
+        const int64_t at = ag_chunk_at(a, t);
+        ts_elementwise_k()->add_leaky_backward(ag_chunk_count(a, t), a->c, a->node->out->t.data + at,
+                                               a->node->out->grad + at, leak_of(a->node), a->dx ? a->dx + at : NULL,
+                                               a->accumulate, a->part ? (double *)a->part + t * a->c : NULL);
     }
 }
 
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
     const ts_shape s = node->out->t.shape;
     const int c = s.c;
-    const float leak = leak_of(node), *y = node->out->t.data, *dy = node->out->grad;
-    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_sum_chunk(pixels, c), parts = (pixels + chunk - 1) / chunk,
-                  tasks = parts * s.n;
-    bool accumulate = false, g_accumulate;
-    float *dx = ag_grad_target(tape, node->in[0], &accumulate), *dg = ag_grad_target(tape, node->in[1], &g_accumulate);
-    if (!dx && !dg) return;
+    ag_chunks a = ag_chunks_of(node, s, ag_sum_chunk((int64_t)s.h * s.w, c));
+    bool g_accumulate;
+    a.dx = ag_grad_target(tape, node->in[0], &a.accumulate);
+    float *dg = ag_grad_target(tape, node->in[1], &g_accumulate);
+    if (!a.dx && !dg) return;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
-    double *part = ts_arena_zalloc(ag_arena(tape), (size_t)tasks * (size_t)c, sizeof(double)); /* [N][parts][C] */
+    double *part = ts_arena_zalloc(ag_arena(tape), (size_t)a.tasks * (size_t)c, sizeof(double)); /* [N][parts][C] */
     if (!part) {
         ag_fail(tape, TS_NOMEM, "add_leaky: no memory for the sums");
         return;
     }
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
-    for (int64_t t = 0; t < tasks; t++) {
-        const int64_t p = t % parts * chunk, at = (t / parts * pixels + p) * c;
-        k->add_leaky_backward(ag_part(pixels, p, chunk), c, y + at, dy + at, leak, dx ? dx + at : NULL, accumulate,
-                              dg ? part + t * c : NULL);
-    }
+    if (dg) a.part = part;
+    ts_for(ag_threads(tape), a.tasks, 1, backward_chunks, &a);
     for (int64_t i = 0; dg && i < (int64_t)s.n * c; i++) {
         double sum = 0;
-        for (int64_t t = 0; t < parts; t++) sum += part[(i / c * parts + t) * c + i % c];
+        for (int64_t t = 0; t < a.parts; t++) sum += part[(i / c * a.parts + t) * c + i % c];
         dg[i] = (float)(g_accumulate ? dg[i] + sum : sum);
     }
     ts_arena_release(ag_arena(tape), mark);

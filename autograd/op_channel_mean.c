@@ -11,57 +11,59 @@
 ag_value *ag_channel_mean(ag_tape *tape, ag_value *x);
 #endif
 
+static void sum_chunks(const void *job, int64_t begin, int64_t end)
+{
+    const ag_chunks *a = job;
+    for (int64_t t = begin; t < end; t++)
+        ts_norm_k()->sums(ag_chunk_count(a, t), a->c, a->node->in[0]->t.data + ag_chunk_at(a, t),
+                          (double *)a->part + t * a->c);
+}
+
 static void forward(ag_tape *tape, ag_node *node)
 {
-    const struct ts_norm_kernels *k = ts_norm_k();
     const ts_shape s = node->in[0]->t.shape;
     const int c = s.c;
-    const float *x = node->in[0]->t.data;
     float *y = node->out->t.data;
-    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_sum_chunk(pixels, c), parts = (pixels + chunk - 1) / chunk,
-                  tasks = parts * s.n;
+    ag_chunks a = ag_chunks_of(node, s, ag_sum_chunk((int64_t)s.h * s.w, c));
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
-    double *part = ts_arena_zalloc(ag_arena(tape), (size_t)tasks * (size_t)c, sizeof(double)); /* [N][parts][C] */
+    double *part = ts_arena_zalloc(ag_arena(tape), (size_t)a.tasks * (size_t)c, sizeof(double)); /* [N][parts][C] */
     if (!part) {
         ag_fail(tape, TS_NOMEM, "channel_mean: no memory for the sums");
         return;
     }
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
-    for (int64_t t = 0; t < tasks; t++) {
-        const int64_t p = t % parts * chunk;
-        k->sums(ag_part(pixels, p, chunk), c, x + (t / parts * pixels + p) * c, part + t * c);
-    }
+    a.part = part;
+    ts_for(ag_threads(tape), a.tasks, 1, sum_chunks, &a);
     for (int64_t i = 0; i < (int64_t)s.n * c; i++) {
         double sum = 0;
-        for (int64_t t = 0; t < parts; t++) sum += part[(i / c * parts + t) * c + i % c];
-        y[i] = (float)(sum / (double)pixels);
+        for (int64_t t = 0; t < a.parts; t++) sum += part[(i / c * a.parts + t) * c + i % c];
+        y[i] = (float)(sum / (double)a.pixels);
     }
     ts_arena_release(ag_arena(tape), mark);
 }
 
+static void spread_chunks(const void *job, int64_t begin, int64_t end)
+{
+    const ag_chunks *a = job;
+    for (int64_t t = begin; t < end; t++)
+        ts_elementwise_k()->broadcast(ag_chunk_count(a, t), a->c, (const float *)a->stat + ag_chunk_image(a, t) * a->c,
+                                      a->dx + ag_chunk_at(a, t), a->accumulate);
+}
+
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
     const ts_shape s = node->in[0]->t.shape;
-    const int c = s.c;
-    const float *dy = node->out->grad;
-    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_pixel_chunk(c), parts = (pixels + chunk - 1) / chunk,
-                  tasks = parts * s.n;
-    bool accumulate;
-    float *dx = ag_grad_target(tape, node->in[0], &accumulate);
-    if (!dx) return;
+    ag_chunks a = ag_chunks_of(node, s, ag_pixel_chunk(s.c));
+    a.dx = ag_grad_target(tape, node->in[0], &a.accumulate);
+    if (!a.dx) return;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
-    float *each = ts_arena_alloc(ag_arena(tape), (size_t)s.n * (size_t)c * sizeof(float)); /* dy / P: [N][C] */
+    float *each = ts_arena_alloc(ag_arena(tape), (size_t)s.n * (size_t)s.c * sizeof(float)); /* dy / P: [N][C] */
     if (!each) {
         ag_fail(tape, TS_NOMEM, "channel_mean: no memory for the gradient");
         return;
     }
-    k->scale((int64_t)s.n * c, (float)(1.0 / (double)pixels), dy, each, false);
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
-    for (int64_t t = 0; t < tasks; t++) {
-        const int64_t n = t / parts, p = t % parts * chunk;
-        k->broadcast(ag_part(pixels, p, chunk), c, each + n * c, dx + (n * pixels + p) * c, accumulate);
-    }
+    ts_elementwise_k()->scale((int64_t)s.n * s.c, (float)(1.0 / (double)a.pixels), node->out->grad, each, false);
+    a.stat = each;
+    ts_for(ag_threads(tape), a.tasks, 1, spread_chunks, &a);
     ts_arena_release(ag_arena(tape), mark);
 }
 

@@ -12,33 +12,39 @@ ag_value *ag_channels(ag_tape *tape, ag_value *x, int first, int count);
 
 static int first_of(const ag_node *node) { return *(const int *)node->attr; }
 
-static void forward(ag_tape *tape, ag_node *node)
+static void forward_pixels(const void *job, int64_t begin, int64_t end)
 {
-    (void)tape;
-    const int first = first_of(node);
-    const int c = node->in[0]->t.shape.c, d = node->out->t.shape.c;
-    const int64_t pixels = ts_pixels(node->out->t.shape);
+    const ag_node *node = job;
+    const int first = first_of(node), c = node->in[0]->t.shape.c, d = node->out->t.shape.c;
     const float *x = node->in[0]->t.data;
     float *y = node->out->t.data;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels * d > AG_CHUNK)
-    for (int64_t p = 0; p < pixels; p++) memcpy(y + p * d, x + p * c + first, (size_t)d * sizeof *y);
+    for (int64_t p = begin; p < end; p++) memcpy(y + p * d, x + p * c + first, (size_t)d * sizeof *y);
+}
+
+static void forward(ag_tape *tape, ag_node *node)
+{
+    const ts_shape s = node->out->t.shape;
+    ts_for(ag_threads(tape), ts_pixels(s), ag_pixel_chunk(s.c), forward_pixels, node);
+}
+
+static void backward_pixels(const void *job, int64_t begin, int64_t end)
+{
+    const ag_back *b = job;
+    const int first = first_of(b->node), c = b->node->in[0]->t.shape.c, d = b->node->out->t.shape.c;
+    const float *dy = b->node->out->grad;
+    for (int64_t p = begin; p < end; p++)
+        for (int i = 0; i < c; i++) {
+            const float g = i >= first && i < first + d ? dy[p * d + i - first] : 0;
+            b->dx[p * c + i] = b->accumulate ? b->dx[p * c + i] + g : g;
+        }
 }
 
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const int first = first_of(node);
-    const int c = node->in[0]->t.shape.c, d = node->out->t.shape.c;
-    const int64_t pixels = ts_pixels(node->out->t.shape);
-    const float *dy = node->out->grad;
-    bool accumulate;
-    float *dx = ag_grad_target(tape, node->in[0], &accumulate);
-    if (!dx) return;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels * d > AG_CHUNK)
-    for (int64_t p = 0; p < pixels; p++)
-        for (int i = 0; i < c; i++) {
-            const float g = i >= first && i < first + d ? dy[p * d + i - first] : 0;
-            dx[p * c + i] = accumulate ? dx[p * c + i] + g : g;
-        }
+    const ts_shape s = node->out->t.shape;
+    ag_back b = {.node = node};
+    b.dx = ag_grad_target(tape, node->in[0], &b.accumulate);
+    if (b.dx) ts_for(ag_threads(tape), ts_pixels(s), ag_pixel_chunk(s.c), backward_pixels, &b);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)

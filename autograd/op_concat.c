@@ -10,16 +10,24 @@
 ag_value *ag_concat(ag_tape *tape, ag_value *a, ag_value *b);
 #endif
 
+typedef struct joining {
+    const ag_value *a, *b;
+    float *to;
+} joining;
+
+static void join_pixels(const void *job, int64_t begin, int64_t end)
+{
+    const joining *j = job;
+    const struct ts_elementwise_kernels *k = ts_elementwise_k();
+    const int ca = j->a->t.shape.c, cb = j->b->t.shape.c, c = ca + cb;
+    k->copy(end - begin, ca, j->a->t.data + begin * ca, ca, j->to + begin * c, c, false);
+    k->copy(end - begin, cb, j->b->t.data + begin * cb, cb, j->to + begin * c + ca, c, false);
+}
+
 void ag_join(ag_tape *tape, const ag_value *a, const ag_value *b, float *to)
 {
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
-    const int ca = a->t.shape.c, cb = b->t.shape.c, c = ca + cb;
-    const int64_t pixels = ts_pixels(a->t.shape), chunk = ag_pixel_chunk(c);
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels > chunk)
-    for (int64_t p = 0; p < pixels; p += chunk) {
-        k->copy(ag_part(pixels, p, chunk), ca, a->t.data + p * ca, ca, to + p * c, c, false);
-        k->copy(ag_part(pixels, p, chunk), cb, b->t.data + p * cb, cb, to + p * c + ca, c, false);
-    }
+    ts_for(ag_threads(tape), ts_pixels(a->t.shape), ag_pixel_chunk(a->t.shape.c + b->t.shape.c), join_pixels,
+           &(joining){a, b, to});
 }
 
 static void forward(ag_tape *tape, ag_node *node)
@@ -28,20 +36,21 @@ static void forward(ag_tape *tape, ag_node *node)
     ag_join(tape, node->in[0], node->in[1], node->out->t.data);
 }
 
+static void backward_pixels(const void *job, int64_t begin, int64_t end)
+{
+    const ag_back *b = job;
+    const int c = b->node->out->t.shape.c, m = b->node->in[b->input]->t.shape.c;
+    const float *dy = b->node->out->grad + (b->input ? b->node->in[0]->t.shape.c : 0);
+    ts_elementwise_k()->copy(end - begin, m, dy + begin * c, c, b->dx + begin * m, m, b->accumulate);
+}
+
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
-    const int c = node->out->t.shape.c;
-    const float *dy = node->out->grad;
-    const int64_t pixels = ts_pixels(node->out->t.shape), chunk = ag_pixel_chunk(c);
-    for (int j = 0; j < 2; j++, dy += node->in[0]->t.shape.c) {
-        const int m = node->in[j]->t.shape.c;
-        bool accumulate;
-        float *dx = ag_grad_target(tape, node->in[j], &accumulate);
-        if (!dx) continue;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels > chunk)
-        for (int64_t p = 0; p < pixels; p += chunk)
-            k->copy(ag_part(pixels, p, chunk), m, dy + p * c, c, dx + p * m, m, accumulate);
+    const ts_shape s = node->out->t.shape;
+    for (int j = 0; j < 2; j++) {
+        ag_back b = {.node = node, .input = j};
+        b.dx = ag_grad_target(tape, node->in[j], &b.accumulate);
+        if (b.dx) ts_for(ag_threads(tape), ts_pixels(s), ag_pixel_chunk(s.c), backward_pixels, &b);
     }
 }
 

@@ -63,18 +63,20 @@ static void forward(ag_tape *tape, ag_node *node)
     ts_arena_release(ag_arena(tape), mark);
 }
 
+static void leaky_range(const void *job, int64_t begin, int64_t end)
+{
+    const ag_node *node = job;
+    const conv_attr *a = node->attr;
+    float *dy = node->out->grad + begin;
+    ts_elementwise_k()->leaky_backward(end - begin, node->out->t.data + begin, dy, a->leak, dy, false);
+}
+
 static void backward(ag_tape *tape, ag_node *node)
 {
     const conv_attr *a = node->attr;
     float *dy = node->out->grad;
-    if (a->leak != 1.0f) { /* in place: nobody reads this gradient afterwards */
-        const struct ts_elementwise_kernels *k = ts_elementwise_k();
-        const float *y = node->out->t.data;
-        const int64_t n = ts_count(node->out->t.shape);
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (n > AG_CHUNK)
-        for (int64_t i = 0; i < n; i += AG_CHUNK)
-            k->leaky_backward(ag_part(n, i, AG_CHUNK), y + i, dy + i, a->leak, dy + i, false);
-    }
+    if (a->leak != 1.0f) /* in place: nobody reads this gradient afterwards */
+        ts_for(ag_threads(tape), ts_count(node->out->t.shape), AG_CHUNK, leaky_range, node);
     float *dweight = ag_grad_add(tape, node->in[WEIGHT]), *dbias = ag_grad_add(tape, node->in[BIAS]);
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
     const float *x = dweight || dbias ? input(tape, node) : NULL;

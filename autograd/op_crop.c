@@ -15,37 +15,46 @@ typedef struct attributes {
     int y0, x0;
 } attributes;
 
-static void forward(ag_tape *tape, ag_node *node)
+static void forward_rows(const void *job, int64_t begin, int64_t end)
 {
-    (void)tape;
+    const ag_node *node = job;
     const attributes *a = node->attr;
     const ts_shape s = node->in[0]->t.shape, d = node->out->t.shape;
     const int64_t row = (int64_t)d.w * d.c;
     const float *x = node->in[0]->t.data + ((int64_t)a->y0 * s.w + a->x0) * s.c;
     float *y = node->out->t.data;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (ts_count(d) > AG_CHUNK)
-    for (int i = 0; i < d.n * d.h; i++)
-        memcpy(y + i * row, x + ((int64_t)(i / d.h) * s.h + i % d.h) * s.w * s.c, (size_t)row * sizeof(float));
+    for (int64_t i = begin; i < end; i++)
+        memcpy(y + i * row, x + (i / d.h * s.h + i % d.h) * s.w * s.c, (size_t)row * sizeof(float));
+}
+
+static void forward(ag_tape *tape, ag_node *node)
+{
+    const ts_shape d = node->out->t.shape;
+    ts_for(ag_threads(tape), (int64_t)d.n * d.h, ag_pixel_chunk(d.w * d.c), forward_rows, node);
+}
+
+static void backward_rows(const void *job, int64_t begin, int64_t end)
+{
+    const ag_back *b = job;
+    const attributes *a = b->node->attr;
+    const ts_shape s = b->node->in[0]->t.shape, d = b->node->out->t.shape;
+    const int64_t row = (int64_t)s.w * s.c, left = (int64_t)a->x0 * s.c, width = (int64_t)d.w * s.c;
+    for (int64_t i = begin; i < end; i++) {
+        const int64_t y = i % s.h - a->y0;
+        float *to = b->dx + i * row;
+        if (!b->accumulate) memset(to, 0, (size_t)row * sizeof(float));
+        if (y < 0 || y >= d.h) continue;
+        const float *from = b->node->out->grad + (i / s.h * d.h + y) * width;
+        for (int64_t j = 0; j < width; j++) to[left + j] += from[j];
+    }
 }
 
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const attributes *a = node->attr;
-    const ts_shape s = node->in[0]->t.shape, d = node->out->t.shape;
-    const int64_t row = (int64_t)s.w * s.c, left = (int64_t)a->x0 * s.c, width = (int64_t)d.w * s.c;
-    const float *dy = node->out->grad;
-    bool accumulate;
-    float *dx = ag_grad_target(tape, node->in[0], &accumulate);
-    if (!dx) return;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (ts_count(s) > AG_CHUNK)
-    for (int i = 0; i < s.n * s.h; i++) {
-        const int y = i % s.h - a->y0;
-        float *to = dx + i * row;
-        if (!accumulate) memset(to, 0, (size_t)row * sizeof(float));
-        if (y < 0 || y >= d.h) continue;
-        const float *from = dy + ((int64_t)(i / s.h) * d.h + y) * width;
-        for (int64_t j = 0; j < width; j++) to[left + j] += from[j];
-    }
+    const ts_shape s = node->in[0]->t.shape;
+    ag_back b = {.node = node};
+    b.dx = ag_grad_target(tape, node->in[0], &b.accumulate);
+    if (b.dx) ts_for(ag_threads(tape), (int64_t)s.n * s.h, ag_pixel_chunk(s.w * s.c), backward_rows, &b);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)

@@ -13,36 +13,50 @@
 ag_value *ag_instance_norm(ag_tape *tape, ag_value *x, float epsilon);
 #endif
 
+static void moments_of_chunks(const void *job, int64_t begin, int64_t end)
+{
+    const ag_chunks *a = job;
+    for (int64_t t = begin; t < end; t++) {
+        double *part = (double *)a->part + t * 2 * a->c;
+        ts_norm_k()->moments(ag_chunk_count(a, t), a->c, a->node->in[0]->t.data + ag_chunk_at(a, t), part, part + a->c);
+    }
+}
+
+static void normalise_chunks(const void *job, int64_t begin, int64_t end)
+{
+    const ag_chunks *a = job;
+    for (int64_t t = begin; t < end; t++) {
+        const float *stat = (const float *)a->stat + ag_chunk_image(a, t) * 3 * a->c;
+        ts_norm_k()->normalise(ag_chunk_count(a, t), a->c, a->node->in[0]->t.data + ag_chunk_at(a, t), stat,
+                               stat + a->c, stat + 2 * a->c, a->node->out->t.data + ag_chunk_at(a, t));
+    }
+}
+
 static void forward(ag_tape *tape, ag_node *node)
 {
-    const struct ts_norm_kernels *k = ts_norm_k();
     const ts_shape s = node->out->t.shape;
     const int c = s.c;
     const size_t nc = (size_t)s.n * (size_t)c;
-    const float epsilon = *(const float *)node->attr, *x = node->in[0]->t.data;
-    float *y = node->out->t.data;
-    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_sum_chunk(pixels, c), parts = (pixels + chunk - 1) / chunk,
-                  tasks = parts * s.n;
+    const float epsilon = *(const float *)node->attr;
+    ag_chunks a = ag_chunks_of(node, s, ag_sum_chunk((int64_t)s.h * s.w, c));
     float *q = node->out->needs_grad ? ts_arena_alloc(ag_arena(tape), nc * sizeof(float)) : NULL;
     node->saved = q;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
     double *part = ts_arena_alloc(ag_arena(tape),
-                                  (size_t)tasks * 2 * (size_t)c * sizeof(double)); /* [N][parts][mean, m2][C] */
-    float *stat = ts_arena_alloc(ag_arena(tape), nc * 3 * sizeof(float));          /* [N][high, low, q][C] */
+                                  (size_t)a.tasks * 2 * (size_t)c * sizeof(double)); /* [N][parts][mean, m2][C] */
+    float *stat = ts_arena_alloc(ag_arena(tape), nc * 3 * sizeof(float));            /* [N][high, low, q][C] */
     if (!part || !stat || (node->out->needs_grad && !q)) {
         ag_fail(tape, TS_NOMEM, "instance_norm: no memory for the sums");
         return;
     }
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
-    for (int64_t t = 0; t < tasks; t++) {
-        const int64_t n = t / parts, p = t % parts * chunk;
-        k->moments(ag_part(pixels, p, chunk), c, x + (n * pixels + p) * c, part + t * 2 * c, part + t * 2 * c + c);
-    }
+    a.part = part;
+    a.stat = stat;
+    ts_for(ag_threads(tape), a.tasks, 1, moments_of_chunks, &a);
     for (int64_t i = 0; i < (int64_t)nc; i++) {
         const int64_t n = i / c, j = i % c;
         double mean = 0, m2 = 0, count = 0; /* Chan, Golub, LeVeque 1979: moments of parts into those of the whole */
-        for (int64_t t = 0; t < parts; t++) {
-            const double *from = part + (n * parts + t) * 2 * c + j, m = (double)ag_part(pixels, t * chunk, chunk),
+        for (int64_t t = 0; t < a.parts; t++) {
+            const double *from = part + (n * a.parts + t) * 2 * c + j, m = (double)ag_chunk_count(&a, t),
                          d = from[0] - mean;
             count += m;
             mean += d * m / count;
@@ -51,54 +65,60 @@ static void forward(ag_tape *tape, ag_node *node)
         float *to = stat + n * 3 * c + j;
         to[0] = (float)mean;
         to[c] = (float)(mean - to[0]);
-        to[2 * c] = (float)(1 / sqrt(m2 / (double)pixels + epsilon));
+        to[2 * c] = (float)(1 / sqrt(m2 / (double)a.pixels + epsilon));
         if (q) q[i] = to[2 * c];
     }
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
-    for (int64_t t = 0; t < tasks; t++) {
-        const int64_t n = t / parts, p = t % parts * chunk, at = (n * pixels + p) * c;
-        k->normalise(ag_part(pixels, p, chunk), c, x + at, stat + n * 3 * c, stat + n * 3 * c + c,
-                     stat + n * 3 * c + 2 * c, y + at);
-    }
+    ts_for(ag_threads(tape), a.tasks, 1, normalise_chunks, &a);
     ts_arena_release(ag_arena(tape), mark);
+}
+
+static void sums_of_chunks(const void *job, int64_t begin, int64_t end)
+{
+    const ag_chunks *a = job;
+    for (int64_t t = begin; t < end; t++) {
+        const int64_t at = ag_chunk_at(a, t);
+        double *part = (double *)a->part + t * 2 * a->c;
+        ts_norm_k()->gradient_sums(ag_chunk_count(a, t), a->c, a->node->out->t.data + at, a->node->out->grad + at, part,
+                                   part + a->c);
+    }
+}
+
+static void gradient_of_chunks(const void *job, int64_t begin, int64_t end)
+{
+    const ag_chunks *a = job;
+    for (int64_t t = begin; t < end; t++) {
+        const int64_t at = ag_chunk_at(a, t), n = ag_chunk_image(a, t);
+        const float *mean = (const float *)a->stat + n * 2 * a->c, *q = a->node->saved;
+        ts_norm_k()->gradient(ag_chunk_count(a, t), a->c, a->node->out->t.data + at, a->node->out->grad + at, mean,
+                              mean + a->c, q + n * a->c, a->dx + at, a->accumulate);
+    }
 }
 
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const struct ts_norm_kernels *k = ts_norm_k();
     const ts_shape s = node->out->t.shape;
     const int c = s.c;
     const size_t nc = (size_t)s.n * (size_t)c;
-    const float *y = node->out->t.data, *dy = node->out->grad, *q = node->saved;
-    const int64_t pixels = (int64_t)s.h * s.w, chunk = ag_sum_chunk(pixels, c), parts = (pixels + chunk - 1) / chunk,
-                  tasks = parts * s.n;
-    bool accumulate;
-    float *dx = ag_grad_target(tape, node->in[0], &accumulate);
-    if (!dx) return;
+    ag_chunks a = ag_chunks_of(node, s, ag_sum_chunk((int64_t)s.h * s.w, c));
+    a.dx = ag_grad_target(tape, node->in[0], &a.accumulate);
+    if (!a.dx) return;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
-    double *part = ts_arena_zalloc(ag_arena(tape), (size_t)tasks * 2 * (size_t)c,
+    double *part = ts_arena_zalloc(ag_arena(tape), (size_t)a.tasks * 2 * (size_t)c,
                                    sizeof(double));                       /* [N][parts][dy, dy y][C] */
     float *mean = ts_arena_alloc(ag_arena(tape), nc * 2 * sizeof(float)); /* [N][dy, dy y][C] */
     if (!part || !mean) {
         ag_fail(tape, TS_NOMEM, "instance_norm: no memory for the sums");
         return;
     }
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
-    for (int64_t t = 0; t < tasks; t++) {
-        const int64_t p = t % parts * chunk, at = (t / parts * pixels + p) * c;
-        k->gradient_sums(ag_part(pixels, p, chunk), c, y + at, dy + at, part + t * 2 * c, part + t * 2 * c + c);
-    }
+    a.part = part;
+    a.stat = mean;
+    ts_for(ag_threads(tape), a.tasks, 1, sums_of_chunks, &a);
     for (int64_t i = 0; i < (int64_t)s.n * 2 * c; i++) {
         double sum = 0;
-        for (int64_t t = 0; t < parts; t++) sum += part[(i / (2 * c) * parts + t) * 2 * c + i % (2 * c)];
-        mean[i] = (float)(sum / (double)pixels);
+        for (int64_t t = 0; t < a.parts; t++) sum += part[(i / (2 * c) * a.parts + t) * 2 * c + i % (2 * c)];
+        mean[i] = (float)(sum / (double)a.pixels);
     }
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (tasks > 1)
-    for (int64_t t = 0; t < tasks; t++) {
-        const int64_t n = t / parts, p = t % parts * chunk, at = (n * pixels + p) * c;
-        k->gradient(ag_part(pixels, p, chunk), c, y + at, dy + at, mean + n * 2 * c, mean + n * 2 * c + c, q + n * c,
-                    dx + at, accumulate);
-    }
+    ts_for(ag_threads(tape), a.tasks, 1, gradient_of_chunks, &a);
     ts_arena_release(ag_arena(tape), mark);
 }
 

@@ -27,11 +27,32 @@ typedef struct laplace_attr {
 
 static float held(float s) { return fminf(fmaxf(s, LEAST), LARGEST); }
 
+typedef struct laplace_job {
+    const ag_node *node;
+    int64_t pixels, chunk;
+    double *sums;
+    float up, *dx, *ds;
+} laplace_job;
+
+static void sum_chunk(const void *job, int64_t k)
+{
+    const laplace_job *j = job;
+    const laplace_attr *a = j->node->attr;
+    const float *x = j->node->in[0]->t.data, *s = j->node->in[1]->t.data, *t = j->node->in[2]->t.data;
+    const int c = j->node->in[0]->t.shape.c, g = j->node->in[1]->t.shape.c;
+    double part = 0;
+    for (int64_t p = k * j->chunk; p < k * j->chunk + ag_part(j->pixels, k * j->chunk, j->chunk); p++) {
+        float inverse[MOST];
+        for (int i = 0; i < g; i++) inverse[i] = expf(-held(s[p * g + i])) / a->unit;
+        for (int i = 0; i < c; i++)
+            part += (double)(fabsf(x[p * c + i] - t[p * c + i]) * inverse[a->group[i]] + held(s[p * g + a->group[i]]));
+    }
+    j->sums[k] = part;
+}
+
 static void forward(ag_tape *tape, ag_node *node)
 {
-    const laplace_attr *a = node->attr;
-    const float *x = node->in[0]->t.data, *s = node->in[1]->t.data, *t = node->in[2]->t.data;
-    const int c = node->in[0]->t.shape.c, g = node->in[1]->t.shape.c;
+    const int c = node->in[0]->t.shape.c;
     const int64_t pixels = ts_pixels(node->in[0]->t.shape), chunk = ag_pixel_chunk(c),
                   chunks = (pixels + chunk - 1) / chunk;
     double *sums = ts_arena_alloc(ag_arena(tape), (size_t)chunks * sizeof *sums), sum = 0;
@@ -39,41 +60,39 @@ static void forward(ag_tape *tape, ag_node *node)
         ag_fail(tape, TS_NOMEM, "laplace: no memory for %lld sums", (long long)chunks);
         return;
     }
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (chunks > 1)
-    for (int64_t k = 0; k < chunks; k++) {
-        double part = 0;
-        for (int64_t p = k * chunk; p < k * chunk + ag_part(pixels, k * chunk, chunk); p++) {
-            float inverse[MOST];
-            for (int i = 0; i < g; i++) inverse[i] = expf(-held(s[p * g + i])) / a->unit;
-            for (int i = 0; i < c; i++)
-                part += (double)(fabsf(x[p * c + i] - t[p * c + i]) * inverse[a->group[i]] +
-                                 held(s[p * g + a->group[i]]));
-        }
-        sums[k] = part;
-    }
+    ts_tasks(ag_threads(tape), chunks, sum_chunk,
+             &(laplace_job){.node = node, .pixels = pixels, .chunk = chunk, .sums = sums});
     for (int64_t k = 0; k < chunks; k++) sum += sums[k];
     node->out->t.data[0] = (float)(sum / ((double)pixels * c));
 }
 
-static void backward(ag_tape *tape, ag_node *node)
+static void backward_pixels(const void *job, int64_t begin, int64_t end)
 {
-    const laplace_attr *a = node->attr;
-    const float *x = node->in[0]->t.data, *s = node->in[1]->t.data, *t = node->in[2]->t.data;
-    const int c = node->in[0]->t.shape.c, g = node->in[1]->t.shape.c;
-    const int64_t pixels = ts_pixels(node->in[0]->t.shape), chunk = ag_pixel_chunk(c);
-    const float up = node->out->grad[0] / (float)(pixels * c);
-    float *dx = ag_grad_add(tape, node->in[0]), *ds = ag_grad_add(tape, node->in[1]);
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels > chunk)
-    for (int64_t p = 0; p < pixels; p++) {
+    const laplace_job *j = job;
+    const laplace_attr *a = j->node->attr;
+    const float *x = j->node->in[0]->t.data, *s = j->node->in[1]->t.data, *t = j->node->in[2]->t.data, up = j->up;
+    const int c = j->node->in[0]->t.shape.c, g = j->node->in[1]->t.shape.c;
+    for (int64_t p = begin; p < end; p++) {
         float inverse[MOST];
         for (int i = 0; i < g; i++) inverse[i] = expf(-held(s[p * g + i])) / a->unit;
         for (int i = 0; i < c; i++) {
-            const int j = a->group[i];
-            const float e = x[p * c + i] - t[p * c + i], now = s[p * g + j];
-            if (dx) dx[p * c + i] += e > 0 ? up * inverse[j] : e < 0 ? -up * inverse[j] : 0;
-            if (ds && now > LEAST && now < LARGEST) ds[p * g + j] += up * (1 - fabsf(e) * inverse[j]);
+            const int m = a->group[i];
+            const float e = x[p * c + i] - t[p * c + i], now = s[p * g + m];
+            if (j->dx) j->dx[p * c + i] += e > 0 ? up * inverse[m] : e < 0 ? -up * inverse[m] : 0;
+            if (j->ds && now > LEAST && now < LARGEST) j->ds[p * g + m] += up * (1 - fabsf(e) * inverse[m]);
         }
     }
+}
+
+static void backward(ag_tape *tape, ag_node *node)
+{
+    const int c = node->in[0]->t.shape.c;
+    const int64_t pixels = ts_pixels(node->in[0]->t.shape);
+    ts_for(ag_threads(tape), pixels, ag_pixel_chunk(c), backward_pixels,
+           &(laplace_job){.node = node,
+                          .up = node->out->grad[0] / (float)(pixels * c),
+                          .dx = ag_grad_add(tape, node->in[0]),
+                          .ds = ag_grad_add(tape, node->in[1])});
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)

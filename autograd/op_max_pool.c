@@ -10,31 +10,39 @@
 ag_value *ag_max_pool(ag_tape *tape, ag_value *x);
 #endif
 
-static void forward(ag_tape *tape, ag_node *node)
+static void forward_lines(const void *job, int64_t begin, int64_t end)
 {
-    (void)tape;
-    const struct ts_pool_kernels *k = ts_pool_k();
+    const ag_node *node = job;
     const ts_shape s = node->out->t.shape;
     const float *x = node->in[0]->t.data;
-    float *y = node->out->t.data;
-    const int64_t lines = (int64_t)s.n * s.h, row = 2 * (int64_t)s.w * s.c;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static)
-    for (int64_t i = 0; i < lines; i++) k->max(s.w, s.c, x + 2 * i * row, x + (2 * i + 1) * row, y + i * s.w * s.c);
+    const int64_t row = 2 * (int64_t)s.w * s.c;
+    for (int64_t i = begin; i < end; i++)
+        ts_pool_k()->max(s.w, s.c, x + 2 * i * row, x + (2 * i + 1) * row, node->out->t.data + i * s.w * s.c);
+}
+
+static void forward(ag_tape *tape, ag_node *node)
+{
+    const ts_shape s = node->out->t.shape;
+    ts_for(ag_threads(tape), (int64_t)s.n * s.h, 1, forward_lines, node);
+}
+
+static void backward_lines(const void *job, int64_t begin, int64_t end)
+{
+    const ag_back *b = job;
+    const ts_shape s = b->node->out->t.shape;
+    const float *x = b->node->in[0]->t.data;
+    const int64_t row = 2 * (int64_t)s.w * s.c;
+    for (int64_t i = begin; i < end; i++)
+        ts_pool_k()->max_backward(s.w, s.c, x + 2 * i * row, x + (2 * i + 1) * row, b->node->out->grad + i * s.w * s.c,
+                                  b->dx + 2 * i * row, b->dx + (2 * i + 1) * row, b->accumulate);
 }
 
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const struct ts_pool_kernels *k = ts_pool_k();
     const ts_shape s = node->out->t.shape;
-    const float *x = node->in[0]->t.data, *dy = node->out->grad;
-    const int64_t lines = (int64_t)s.n * s.h, row = 2 * (int64_t)s.w * s.c;
-    bool accumulate;
-    float *dx = ag_grad_target(tape, node->in[0], &accumulate);
-    if (!dx) return;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static)
-    for (int64_t i = 0; i < lines; i++)
-        k->max_backward(s.w, s.c, x + 2 * i * row, x + (2 * i + 1) * row, dy + i * s.w * s.c, dx + 2 * i * row,
-                        dx + (2 * i + 1) * row, accumulate);
+    ag_back b = {.node = node};
+    b.dx = ag_grad_target(tape, node->in[0], &b.accumulate);
+    if (b.dx) ts_for(ag_threads(tape), (int64_t)s.n * s.h, 1, backward_lines, &b);
 }
 
 /* Value q (0 .. 3 in reading order) of the block of output value i. */

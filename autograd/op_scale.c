@@ -11,27 +11,28 @@ ag_value *ag_scale(ag_tape *tape, ag_value *x, float s);
 
 static float factor(const ag_node *node) { return *(const float *)node->attr; }
 
+static void forward_range(const void *job, int64_t begin, int64_t end)
+{
+    const ag_node *node = job;
+    ts_elementwise_k()->scale(end - begin, factor(node), node->in[0]->t.data + begin, node->out->t.data + begin, false);
+}
+
 static void forward(ag_tape *tape, ag_node *node)
 {
-    (void)tape;
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
-    const float s = factor(node), *x = node->in[0]->t.data;
-    float *y = node->out->t.data;
-    const int64_t n = ts_count(node->out->t.shape);
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (n > AG_CHUNK)
-    for (int64_t i = 0; i < n; i += AG_CHUNK) k->scale(ag_part(n, i, AG_CHUNK), s, x + i, y + i, false);
+    ts_for(ag_threads(tape), ts_count(node->out->t.shape), AG_CHUNK, forward_range, node);
+}
+
+static void backward_range(const void *job, int64_t begin, int64_t end)
+{
+    const ag_back *b = job;
+    ts_elementwise_k()->scale(end - begin, factor(b->node), b->node->out->grad + begin, b->dx + begin, b->accumulate);
 }
 
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
-    const float s = factor(node), *dy = node->out->grad;
-    const int64_t n = ts_count(node->out->t.shape);
-    bool accumulate;
-    float *dx = ag_grad_target(tape, node->in[0], &accumulate);
-    if (!dx) return;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (n > AG_CHUNK)
-    for (int64_t i = 0; i < n; i += AG_CHUNK) k->scale(ag_part(n, i, AG_CHUNK), s, dy + i, dx + i, accumulate);
+    ag_back b = {.node = node};
+    b.dx = ag_grad_target(tape, node->in[0], &b.accumulate);
+    if (b.dx) ts_for(ag_threads(tape), ts_count(node->out->t.shape), AG_CHUNK, backward_range, &b);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)

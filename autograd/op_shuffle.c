@@ -20,22 +20,36 @@ typedef struct shuffle_attr {
 } shuffle_attr;
 
 /* large: [N,H,W,C]; deep: its pixels are those of small [N,H/r,W/r,C r r]. */
-static void move(int threads, ts_shape large, int r, bool to_deep, const float *from, float *to, bool accumulate)
+typedef struct moving {
+    ts_shape large;
+    int r;
+    bool to_deep, accumulate;
+    const float *from;
+    float *to;
+} moving;
+
+static void move_rows(const void *job, int64_t begin, int64_t end)
 {
-    const int64_t run = (int64_t)r * large.c, row = (int64_t)large.w * large.c;
-    const int across = large.w / r;
-#pragma omp parallel for num_threads(threads) schedule(static) if (ts_count(large) > AG_CHUNK)
-    for (int y = 0; y < large.n * large.h; y++) {
-        const int64_t deep = (int64_t)(y / r) * across * run * r + y % r * run;
+    const moving *m = job;
+    const int64_t run = (int64_t)m->r * m->large.c, row = (int64_t)m->large.w * m->large.c;
+    const int across = m->large.w / m->r;
+    for (int64_t y = begin; y < end; y++) {
+        const int64_t deep = y / m->r * across * run * m->r + y % m->r * run;
         for (int x = 0; x < across; x++) {
-            const int64_t a = y * row + x * run, b = deep + x * run * r;
-            const float *s = from + (to_deep ? a : b);
-            float *d = to + (to_deep ? b : a);
-            if (!accumulate) memcpy(d, s, (size_t)run * sizeof *d);
+            const int64_t a = y * row + x * run, b = deep + x * run * m->r;
+            const float *s = m->from + (m->to_deep ? a : b);
+            float *d = m->to + (m->to_deep ? b : a);
+            if (!m->accumulate) memcpy(d, s, (size_t)run * sizeof *d);
             else
                 for (int64_t i = 0; i < run; i++) d[i] += s[i];
         }
     }
+}
+
+static void move(int threads, ts_shape large, int r, bool to_deep, const float *from, float *to, bool accumulate)
+{
+    ts_for(threads, (int64_t)large.n * large.h, ag_pixel_chunk(large.w * large.c), move_rows,
+           &(moving){large, r, to_deep, accumulate, from, to});
 }
 
 static void forward(ag_tape *tape, ag_node *node)

@@ -6,8 +6,8 @@
 #include "tensor/cpu.h"
 #include "tensor/kernels/conv.h"
 #include "tensor/kernels/peak.h"
+#include "tensor/team.h"
 #include "tensor/threads.h"
-#include <omp.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -40,20 +40,31 @@ bool bench_cpu(void) { return processor_time; }
 static double now(void)
 {
     struct timespec t;
-    if (!processor_time) return omp_get_wtime();
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
-    return ((double)t.tv_sec + 1e-9 * (double)t.tv_nsec) / ts_threads();
+    clock_gettime(processor_time ? CLOCK_PROCESS_CPUTIME_ID : CLOCK_MONOTONIC, &t);
+    const double seconds = (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+    return processor_time ? seconds / ts_threads() : seconds;
+}
+
+typedef struct peak_job {
+    double (*run)(long rounds);
+    double *flop; /* of a thread */
+} peak_job;
+
+static void run_peak(const void *job, int k)
+{
+    const peak_job *j = job;
+    const double flop = j->run(2000000);
+    if (k == 0) *j->flop = flop;
 }
 
 static double peak_of(double (*run)(long rounds))
 {
     double best = 0;
     for (int i = 0; i < 4; i++) {
-        double flop = 0;
+        double flop;
         const double begin = now();
-#pragma omp parallel num_threads(ts_threads()) reduction(+ : flop)
-        flop += run(2000000);
-        const double speed = flop / (now() - begin);
+        const int threads = ts_each_thread(0, run_peak, &(peak_job){run, &flop});
+        const double speed = threads * flop / (now() - begin);
         if (speed > best) best = speed;
     }
     return best;
@@ -61,37 +72,44 @@ static double peak_of(double (*run)(long rounds))
 
 static double peak(void) { return peak_of(ts_peak_k()->run); }
 
-/* The largest tile over and over, of as few k as a part of a sum has channels. */
-static double inner_loop(void)
+enum { MOST_THREADS = 1024 };
+
+/* The largest tile over and over, of as few k as a part of a sum has channels. Each thread's own speed: convolutions
+ * deal out their work as threads come for it. */
+static void run_inner_loop(const void *speeds, int thread)
 {
     enum { DEPTH = 96, TIMES = 400 };
     static _Alignas(64) float input[TS_TILE_PIXELS * DEPTH],
         weights[DEPTH * 2 * 16]; /* zeros; no vector has more than 16 lanes */
     const struct ts_conv_kernels *k = ts_conv_k();
     const ts_segment segment = {0, 0, DEPTH};
-    double speed = 0; /* each thread's own: convolutions deal out their work as threads come for it */
-#pragma omp parallel num_threads(ts_threads()) reduction(+ : speed)
-    {
-        float out[TS_TILE_PIXELS * 2 * 16];
-        ts_tile t = {.segment = &segment,
-                     .segments = 1,
-                     .a_stride = DEPTH,
-                     .y_stride = 2 * k->lanes,
-                     .w = weights,
-                     .leak = 1,
-                     .channels = 2 * k->lanes,
-                     .fetch = {weights, weights}};
-        for (int i = 0; i < 3; i++) {
-            const int pixel = i * TS_TILE_GROUP < k->pixels ? i * TS_TILE_GROUP : 0;
-            t.a[i] = input + pixel * t.a_stride;
-            t.y[i] = out + pixel * t.y_stride;
-        }
-#pragma omp barrier
-        const double begin = now();
-        for (int i = 0; i < TIMES; i++) k->tile[1][k->pixels](&t);
-        speed = 2.0 * TIMES * DEPTH * k->pixels * 2 * k->lanes / (now() - begin);
+    float out[TS_TILE_PIXELS * 2 * 16];
+    ts_tile t = {.segment = &segment,
+                 .segments = 1,
+                 .a_stride = DEPTH,
+                 .y_stride = 2 * k->lanes,
+                 .w = weights,
+                 .leak = 1,
+                 .channels = 2 * k->lanes,
+                 .fetch = {weights, weights}};
+    for (int i = 0; i < 3; i++) {
+        const int pixel = i * TS_TILE_GROUP < k->pixels ? i * TS_TILE_GROUP : 0;
+        t.a[i] = input + pixel * t.a_stride;
+        t.y[i] = out + pixel * t.y_stride;
     }
-    return speed;
+    double *const *speed = speeds;
+    const double begin = now();
+    for (int i = 0; i < TIMES; i++) k->tile[1][k->pixels](&t);
+    if (thread < MOST_THREADS) (*speed)[thread] = 2.0 * TIMES * DEPTH * k->pixels * 2 * k->lanes / (now() - begin);
+}
+
+static double inner_loop(void)
+{
+    static double of[MOST_THREADS];
+    double *speed = of, sum = 0;
+    const int threads = ts_each_thread(0, run_inner_loop, &speed);
+    for (int i = 0; i < threads; i++) sum += of[i];
+    return sum;
 }
 
 bool bench_bf16(bench_time *t)
@@ -190,8 +208,8 @@ int main(int argc, char **argv)
     if (argc == 2 && strcmp(argv[1], "--help") == 0) {
         printf("usage: lgd-bench [--list | --cpu | --batches CONFIG.ini] [NAME...]\nRuns the benchmarks whose name "
                "contains one of the words; all of them without a word. --cpu: processor\n"
-               "time over the number of threads in place of wall time, for a machine that others use too (set "
-               "OMP_WAIT_POLICY=passive).\n--batches writes what lgd-train would train with to standard output "
+               "time over the number of threads in place of wall time, for a machine that others use too."
+               "\n--batches writes what lgd-train would train with to standard output "
                "(bench/batches.h).\n");
         return 0;
     }

@@ -35,6 +35,9 @@ bool bench_cpu(void);
 /* A row: label, milliseconds, GFLOP/s and the fraction of the peak, at the median and at the best, and of the inner
  * loop (flop = 0: no such columns). */
 void bench_row(const char *label, bench_time t, double flop);
+/* A row: the time of a call alone, and how many times as long it takes beside as many busy processes as there are
+ * threads, and twice as many, on the same CPUs; measured in turn. */
+void bench_load(const char *label, void (*f)(void *user), void *user);
 /* A row with a figure in another unit, for example 150.2 "Mpixel/s". */
 void bench_row_unit(const char *label, bench_time t, double value, const char *unit);
 void bench_heading(const char *text);

@@ -5,7 +5,8 @@
 #include "bench/bench.h"
 #include "ops.h"
 #include "tensor/kernels/adam.h"
-#include "tensor/threads.h"
+#include "tensor/memory.h"
+#include "tensor/team.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -81,14 +82,14 @@ typedef struct block {
 
 enum { PARAMETERS = 1 << 22, PART = 1 << 16 };
 
-static void adam(void *user)
+static void adam_range(const void *user, int64_t begin, int64_t end)
 {
-    block *b = user;
-    const struct ts_adam_kernels *k = ts_adam_k();
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int i = 0; i < PARAMETERS; i += PART)
-        k->step(PART, b->p + i, b->g + i, b->m + i, b->v + i, 0.9f, 0.999f, 1e-3f, 1e-8f, 1.0f);
+    const block *b = user;
+    for (int64_t i = begin; i < end; i += PART)
+        ts_adam_k()->step(PART, b->p + i, b->g + i, b->m + i, b->v + i, 0.9f, 0.999f, 1e-3f, 1e-8f, 1.0f);
 }
+
+static void adam(void *user) { ts_for(0, PARAMETERS, PART, adam_range, user); }
 
 static void norm(void *user)
 {
@@ -98,9 +99,8 @@ static void norm(void *user)
 
 static void copy(void *user)
 {
-    block *b = user;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int i = 0; i < PARAMETERS; i += PART) memcpy(b->m + i, b->g + i, PART * sizeof(float));
+    const block *b = user;
+    ts_memory_copy(b->m, b->g, PARAMETERS * sizeof(float), 0);
 }
 
 BENCH(ops)

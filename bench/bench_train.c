@@ -149,7 +149,7 @@ static void measure(subject *s)
            plain, few, many, (many - few) / (24 - trained), states);
 }
 
-static void train(const char *config, const char *heading)
+static void train(const char *config, const char *heading, void (*rows)(subject *s))
 {
     ts_status st = {0};
     subject s = {.c = tr_config_default(), .tape = ag_tape_create(true, &st)};
@@ -183,7 +183,7 @@ static void train(const char *config, const char *heading)
                       .grid = {.h = side, .w = side, .side = patch},
                       .view = rd_flash()};
     if (side < patch) s.in.whole = ts_view(s.images, (ts_shape){(int)batch, patch, patch, 3});
-    measure(&s);
+    rows(&s);
     if (ag_status(s.tape)->code) printf("  %s\n", ag_status(s.tape)->message);
     ag_tape_destroy(&s.tape);
     nn_model_free(&s.model);
@@ -195,7 +195,17 @@ BENCH(train)
 {
     train("configs/single.ini",
           "a training step of configs/single.ini: g, the coarse steps with their Newton steps (which the peer does not "
-          "have; its gradient is of the photograph at g's size), losses, all gradients that are asked for, Adam");
+          "have; its gradient is of the photograph at g's size), losses, all gradients that are asked for, Adam",
+          measure);
 }
-BENCH(train_g) { train("configs/single-g.ini", "a training step of configs/single-g.ini: g alone"); }
-BENCH(train_both) { train("configs/ablation/t6.ini", "a training step of configs/ablation/t6.ini: g and h together"); }
+BENCH(train_g) { train("configs/single-g.ini", "a training step of configs/single-g.ini: g alone", measure); }
+BENCH(train_both)
+{
+    train("configs/ablation/t6.ini", "a training step of configs/ablation/t6.ini: g and h together", measure);
+}
+
+static void beside_others(subject *s) { bench_load("configs/single-g.ini", step, s); }
+BENCH(load_train)
+{
+    train("configs/single-g.ini", "a training step on a machine that does other things too", beside_others);
+}

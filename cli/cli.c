@@ -2,6 +2,7 @@
 #include "tensor/cpu.h"
 #include "tensor/new_file.h"
 #include "tensor/scratch.h"
+#include "tensor/threads.h"
 #include <ctype.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -46,7 +47,7 @@ int cl_init(const char *program)
     setlocale(LC_ALL, "C");
     signal(SIGPIPE, SIG_IGN);
     ts_status st = {0};
-    if (ts_isa_init(&st) != TS_OK) return cl_usage("%s", st.message);
+    if (ts_isa_init(&st) != TS_OK || ts_threads_check(&st) != TS_OK) return cl_usage("%s", st.message);
     return CL_OK;
 }
 

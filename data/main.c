@@ -8,10 +8,12 @@
 #include "data/materials/histogram.h"
 #include "data/sheet.h"
 #include "render/render.h"
+#include "tensor/team.h"
 #include "tensor/threads.h"
 #include <errno.h>
 #include <getopt.h>
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -279,37 +281,52 @@ static ts_code sheet_task(const options *o, int64_t number, io_material *m, io_i
     return TS_OK;
 }
 
+typedef struct running {
+    const options *o;
+    task *f;
+    int size;
+    io_sheet *sheet;
+    pthread_mutex_t *lock; /* of what follows */
+    int64_t *done, *failed;
+    cl_progress *progress;
+    ts_status *st;
+} running;
+
+static void run_tasks(const void *job, ts_queue *queue)
+{
+    const running *r = job;
+    ts_status mine = {0};
+    io_material m = {0};
+    io_image photo = {0};
+    int64_t i, end;
+    if (!ts_next(queue, &i, &end)) return;
+    ts_code ready = io_material_create(&m, r->size, &mine);
+    if (!ready) ready = io_image_create(&photo, r->size, r->size, 3, &mine);
+    do {
+        pthread_mutex_lock(r->lock);
+        const bool skip = *r->failed < i || cl_interrupted();
+        pthread_mutex_unlock(r->lock);
+        if (skip) continue;
+        const ts_code code = ready ? ready : r->f(r->o, i, &m, &photo, r->sheet, &mine);
+        pthread_mutex_lock(r->lock);
+        if (code && i < *r->failed) {
+            *r->failed = i;
+            *r->st = mine;
+        }
+        cl_progress_show(r->progress, ++*r->done, NULL);
+        pthread_mutex_unlock(r->lock);
+    } while (ts_next(queue, &i, &end));
+    io_material_free(&m);
+    io_image_free(&photo);
+}
+
 /* Runs count tasks on all threads; the first failure (in the order of their numbers) is reported. */
 static ts_code run(const options *o, const char *what, task *f, int64_t count, int size, io_sheet *sheet, ts_status *st)
 {
     int64_t done = 0, failed = count;
+    pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
     cl_progress progress = cl_progress_start(what, count);
-#pragma omp parallel num_threads(ts_threads())
-    {
-        ts_status mine = {0};
-        io_material m = {0};
-        io_image photo = {0};
-        ts_code ready = io_material_create(&m, size, &mine);
-        if (!ready) ready = io_image_create(&photo, size, size, 3, &mine);
-#pragma omp for schedule(dynamic, 1)
-        for (int64_t i = 0; i < count; i++) {
-            bool skip;
-#pragma omp critical(lgd_data)
-            skip = failed < i || cl_interrupted();
-            if (skip) continue;
-            ts_code code = ready ? ready : f(o, i, &m, &photo, sheet, &mine);
-#pragma omp critical(lgd_data)
-            {
-                if (code && i < failed) {
-                    failed = i;
-                    *st = mine;
-                }
-                cl_progress_show(&progress, ++done, NULL);
-            }
-        }
-        io_material_free(&m);
-        io_image_free(&photo);
-    }
+    ts_share_tasks(0, count, 1, run_tasks, &(running){o, f, size, sheet, &lock, &done, &failed, &progress, st});
     cl_progress_end(&progress);
     if (st->code == TS_OK && cl_interrupted())
         ts_fail(st, TS_INTERRUPTED, "interrupted after %lld of %lld materials", (long long)done, (long long)count);

@@ -1,5 +1,5 @@
 #include "data/occlusion.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <math.h>
 #include <stddef.h>
 
@@ -66,10 +66,21 @@ static float visible(const relief *r, int i, int j)
     return fminf(fmaxf(sum / SLICES, 0), 1);
 }
 
+typedef struct occlusion_job {
+    const relief *r;
+    float *to;
+} occlusion_job;
+
+static void occlude_rows(const void *job, int64_t begin, int64_t end)
+{
+    const occlusion_job *o = job;
+    for (int64_t i = begin; i < end; i++)
+        for (int j = 0; j < o->r->size; j++)
+            o->to[(size_t)i * (size_t)o->r->size + (size_t)j] = visible(o->r, (int)i, j);
+}
+
 void io_occlusion(int size, const float *height, bool repeats, float *occlusion, int threads)
 {
     const relief r = {size, height, repeats};
-#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static)
-    for (int i = 0; i < size; i++)
-        for (int j = 0; j < size; j++) occlusion[(size_t)i * (size_t)size + (size_t)j] = visible(&r, i, j);
+    ts_for(threads, size, 1, occlude_rows, &(occlusion_job){&r, occlusion});
 }

@@ -1,5 +1,5 @@
 #include "data/seamless.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -19,18 +19,29 @@ static const float *pixel(const float *maps, const axis *a, int x, int y)
     return maps + ((size_t)x * a->along + (size_t)y * a->across) * C;
 }
 
+typedef struct difference_job {
+    const float *in;
+    const axis *a;
+    float *cost;
+} difference_job;
+
+static void difference_rows(const void *job, int64_t begin, int64_t end)
+{
+    const difference_job *j = job;
+    const axis *a = j->a;
+    for (int64_t y = begin; y < end; y++)
+        for (int x = 0; x < a->overlap; x++) {
+            const float *p = pixel(j->in, a, x, (int)y), *q = pixel(j->in, a, x + a->n - a->overlap, (int)y);
+            float sum = 0;
+            for (int c = 0; c < C; c++) sum += (p[c] - q[c]) * (p[c] - q[c]);
+            j->cost[(size_t)y * (size_t)a->overlap + (size_t)x] = sum;
+        }
+}
+
 /* cost [m][overlap]: how far the two that lie over each other differ. */
 static void differences(const float *in, const axis *a, float *cost)
 {
-    const int kept = a->n - a->overlap;
-#pragma omp parallel for num_threads(ts_threads_of(a->threads)) schedule(static)
-    for (int y = 0; y < a->m; y++)
-        for (int x = 0; x < a->overlap; x++) {
-            const float *p = pixel(in, a, x, y), *q = pixel(in, a, x + kept, y);
-            float sum = 0;
-            for (int c = 0; c < C; c++) sum += (p[c] - q[c]) * (p[c] - q[c]);
-            cost[(size_t)y * (size_t)a->overlap + (size_t)x] = sum;
-        }
+    ts_for(a->threads, a->m, 1, difference_rows, &(difference_job){in, a, cost});
 }
 
 /* The cheapest path through rows first .. first + count - 1 (modulo m) that moves at most one column a row. from: the
@@ -103,18 +114,66 @@ static void box(const float *from, size_t step, int count, int r, bool closed, f
     }
 }
 
+typedef struct coarse_job {
+    const float *in;
+    const axis *a;
+    int first, width, r;
+    float *other, *low;
+} coarse_job;
+
+static void box_rows(const void *job, int64_t begin, int64_t end)
+{
+    const coarse_job *j = job;
+    for (int64_t y = begin; y < end; y++) {
+        const size_t at = (size_t)y * (size_t)j->width * C;
+        float *line = j->low + at;
+        for (int x = 0; x < j->width; x++)
+            memcpy(line + (size_t)x * C, pixel(j->in, j->a, j->first + x, (int)y), C * sizeof *line);
+        box(line, 1, j->width, j->r, false, j->other + at);
+    }
+}
+
+static void box_columns(const void *job, int64_t begin, int64_t end)
+{
+    const coarse_job *j = job;
+    for (int64_t x = begin; x < end; x++)
+        box(j->other + (size_t)x * C, (size_t)j->width, j->a->m, j->r, j->a->closed, j->low + (size_t)x * C);
+}
+
 /* low [m][width][C]: the coarse part of columns first .. first + width - 1; other is as large. */
 static void coarse(const float *in, const axis *a, int first, int width, float *other, float *low)
 {
-    const int r = a->overlap / 4 > 0 ? a->overlap / 4 : 1;
-#pragma omp parallel for num_threads(ts_threads_of(a->threads)) schedule(static)
-    for (int y = 0; y < a->m; y++) {
-        float *line = low + (size_t)y * (size_t)width * C;
-        for (int x = 0; x < width; x++) memcpy(line + (size_t)x * C, pixel(in, a, first + x, y), C * sizeof *line);
-        box(line, 1, width, r, false, other + (size_t)y * (size_t)width * C);
-    }
-#pragma omp parallel for num_threads(ts_threads_of(a->threads)) schedule(static)
-    for (int x = 0; x < width; x++) box(other + (size_t)x * C, (size_t)width, a->m, r, a->closed, low + (size_t)x * C);
+    const coarse_job j = {in, a, first, width, a->overlap / 4 > 0 ? a->overlap / 4 : 1, other, low};
+    ts_for(a->threads, a->m, 1, box_rows, &j);
+    ts_for(a->threads, width, 1, box_columns, &j);
+}
+
+typedef struct fold_job {
+    const float *in, *low, *high;
+    const axis *a, *to;
+    const int *cut;
+    int margin;
+    float *out;
+} fold_job;
+
+static void fold_rows(const void *job, int64_t begin, int64_t end)
+{
+    const fold_job *j = job;
+    const axis *a = j->a;
+    const int kept = a->n - a->overlap, w = a->overlap, width = w + j->margin;
+    for (int64_t row = begin; row < end; row++)
+        for (int x = 0, y = (int)row; x < kept; x++) {
+            const float *p = pixel(j->in, a, x, y);
+            float *o = (float *)(uintptr_t)pixel(j->out, j->to, x, y);
+            memcpy(o, p, C * sizeof *o);
+            if (x >= w) continue;
+            const float *q = pixel(j->in, a, x + kept, y), t = ((float)x + 0.5f) / (float)w,
+                        share = t * t * (3 - 2 * t);
+            const float *lp = j->low + ((size_t)y * (size_t)width + (size_t)x) * C,
+                        *lq = j->high + ((size_t)y * (size_t)width + (size_t)(x + j->margin)) * C;
+            for (int c = 0; c < C; c++)
+                o[c] = share * lp[c] + (1 - share) * lq[c] + (x >= j->cut[y] ? p[c] - lp[c] : q[c] - lq[c]);
+        }
 }
 
 /* out: n - overlap pixels along the axis, laid out [along][m] or [m][along] as the axis of out says. */
@@ -128,20 +187,7 @@ static bool fold(const float *in, const axis *a, const axis *to, float *out)
     if (fine) {
         coarse(in, a, 0, width, memory + 2 * strip, low);
         coarse(in, a, kept - margin, width, memory + 2 * strip, high);
-#pragma omp parallel for num_threads(ts_threads_of(a->threads)) schedule(static)
-        for (int y = 0; y < a->m; y++)
-            for (int x = 0; x < kept; x++) {
-                const float *p = pixel(in, a, x, y);
-                float *o = (float *)(uintptr_t)pixel(out, to, x, y);
-                memcpy(o, p, C * sizeof *o);
-                if (x >= w) continue;
-                const float *q = pixel(in, a, x + kept, y), t = ((float)x + 0.5f) / (float)w,
-                            share = t * t * (3 - 2 * t);
-                const float *lp = low + ((size_t)y * (size_t)width + (size_t)x) * C,
-                            *lq = high + ((size_t)y * (size_t)width + (size_t)(x + margin)) * C;
-                for (int c = 0; c < C; c++)
-                    o[c] = share * lp[c] + (1 - share) * lq[c] + (x >= cut[y] ? p[c] - lp[c] : q[c] - lq[c]);
-            }
+        ts_for(a->threads, a->m, 1, fold_rows, &(fold_job){in, low, high, a, to, cut, margin, out});
     }
     free(cut);
     free(memory);
@@ -184,29 +230,46 @@ static int calmest(const float *maps, int n, bool rows)
     return best;
 }
 
+typedef struct resample_job {
+    const float *from;
+    float *to;
+    int n, begin, size, lines;
+    size_t step, line_in, line_out;
+} resample_job;
+
+static void resample_columns(const void *job, int64_t begin, int64_t end)
+{
+    const resample_job *j = job;
+    for (int64_t i = begin; i < end; i++) {
+        const float u = ((float)i + 0.5f) * (float)j->n / (float)j->size;
+        const int below = (int)floorf(u), first = below + j->begin;
+        const float t = u - (float)below;
+        for (int l = 0; l < j->lines; l++) {
+            const float *v[4];
+            for (int k = 0; k < 4; k++)
+                v[k] = j->from + (within(first + k - 1, j->n, true) * j->step + (size_t)l * j->line_in) * C;
+            for (int c = 0; c < C; c++)
+                j->to[((size_t)i * j->step + (size_t)l * j->line_out) * C + (size_t)c] = cubic(v[0][c], v[1][c],
+                                                                                               v[2][c], v[3][c], t);
+        }
+    }
+}
+
 /* in [n][n] that repeats to out [size][size], beginning in the middle of column begin[0] and row begin[1]; between
  * [n][size] is scratch. */
 static void resample(const float *in, int n, const int begin[2], int size, int threads, float *between, float *out)
 {
     for (int pass = 0; pass < 2; pass++) {
-        const float *from = pass ? between : in;
-        float *to = pass ? out : between;
-        const int lines = pass ? size : n;
-        const size_t step = pass ? (size_t)size : 1, line_in = pass ? 1 : (size_t)n, line_out = pass ? 1 : (size_t)size;
-#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static)
-        for (int i = 0; i < size; i++) {
-            const float u = ((float)i + 0.5f) * (float)n / (float)size;
-            const int below = (int)floorf(u), first = below + begin[pass];
-            const float t = u - (float)below;
-            for (int l = 0; l < lines; l++) {
-                const float *v[4];
-                for (int k = 0; k < 4; k++)
-                    v[k] = from + (within(first + k - 1, n, true) * step + (size_t)l * line_in) * C;
-                for (int c = 0; c < C; c++)
-                    to[((size_t)i * step + (size_t)l * line_out) * C + (size_t)c] = cubic(v[0][c], v[1][c], v[2][c],
-                                                                                          v[3][c], t);
-            }
-        }
+        const resample_job j = {pass ? between : in,
+                                pass ? out : between,
+                                n,
+                                begin[pass],
+                                size,
+                                pass ? size : n,
+                                pass ? (size_t)size : 1,
+                                pass ? 1 : (size_t)n,
+                                pass ? 1 : (size_t)size};
+        ts_for(threads, size, 1, resample_columns, &j);
     }
 }
 

@@ -1,6 +1,6 @@
 #include "infer/api.h"
 #include "data/material.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <math.h>
 #include <string.h>
 
@@ -36,16 +36,26 @@ ts_code lgd_take_struct(const char *call, const void *given, size_t least, void 
     return TS_OK;
 }
 
-void lgd_encode(const float *maps, int side, int threads, float *encoded)
+typedef struct encoding {
+    const float *maps;
+    float *encoded;
+} encoding;
+
+static void encode_pixels(const void *job, int64_t begin, int64_t end)
 {
-    const int64_t pixels = (int64_t)side * side;
-#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static)
-    for (int64_t i = 0; i < pixels; i++) {
-        const float *m = maps + i * MAP_CHANNELS;
+    const encoding *e = job;
+    for (int64_t i = begin; i < end; i++) {
+        const float *m = e->maps + i * MAP_CHANNELS;
         const float x = m[MAP_NORMAL], y = m[MAP_NORMAL + 1];
         io_texel t = {.normal = {x, y, sqrtf(fmaxf(1 - x * x - y * y, 0))}, .roughness = m[MAP_ROUGHNESS]};
         memcpy(t.diffuse, m + MAP_DIFFUSE, sizeof t.diffuse);
         memcpy(t.specular, m + MAP_SPECULAR, sizeof t.specular);
-        io_texel_put(encoded + i * MAP_CHANNELS, &t);
+        io_texel_put(e->encoded + i * MAP_CHANNELS, &t);
     }
+}
+
+void lgd_encode(const float *maps, int side, int threads, float *encoded)
+{
+    enum { STEP = 1 << 10 };
+    ts_for(threads, (int64_t)side * side, STEP, encode_pixels, &(encoding){maps, encoded});
 }

@@ -1,6 +1,7 @@
 #include "infer/clip.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <float.h>
+#include <stdatomic.h>
 
 void lgd_clip(int64_t count, const float *from, float *to)
 {
@@ -10,10 +11,23 @@ void lgd_clip(int64_t count, const float *from, float *to)
     }
 }
 
+typedef struct inspection {
+    const float *from;
+    atomic_bool *fine;
+} inspection;
+
+static void inspect(const void *job, int64_t begin, int64_t end)
+{
+    const inspection *i = job;
+    bool fine = true;
+    for (int64_t k = begin; k < end; k++) fine = fine && i->from[k] >= 0 && i->from[k] <= 1;
+    if (!fine) atomic_store(i->fine, false);
+}
+
 bool lgd_clipped(int64_t count, const float *from, int threads)
 {
-    bool fine = true;
-#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static) reduction(&& : fine)
-    for (int64_t i = 0; i < count; i++) fine = fine && from[i] >= 0 && from[i] <= 1;
+    enum { STEP = 1 << 12 };
+    atomic_bool fine = true;
+    ts_for(threads, count, STEP, inspect, &(inspection){from, &fine});
     return fine;
 }

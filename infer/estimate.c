@@ -6,8 +6,10 @@
 #include "nn/need.h"
 #include "tensor/budget.h"
 #include "tensor/resize.h"
+#include "tensor/team.h"
 #include "tensor/threads.h"
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -50,18 +52,24 @@ static given_photos in_order(const lgd_photo *photo, int photos, int side, doubl
     return p;
 }
 
-/* The network's maps to the caller's values, one conversion for each; from may be maps. False when one is not finite.
- */
-static bool convert(const float *from, int channels, int64_t pixels, bool encoded, int threads, float *maps)
+typedef struct conversion {
+    const float *from;
+    int channels;
+    bool encoded;
+    float *maps;
+    atomic_bool *finite;
+} conversion;
+
+static void convert_pixels(const void *job, int64_t begin, int64_t end)
 {
+    const conversion *c = job;
     bool finite = true;
-#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static) reduction(&& : finite)
-    for (int64_t i = 0; i < pixels; i++) {
-        const float *x = from + i * channels;
-        float *m = maps + i * MAP_CHANNELS;
-        for (int c = 0; c < MAP_CHANNELS; c++) finite = finite && isfinite(x[c]);
+    for (int64_t i = begin; i < end; i++) {
+        const float *x = c->from + i * c->channels;
+        float *m = c->maps + i * MAP_CHANNELS;
+        for (int k = 0; k < MAP_CHANNELS; k++) finite = finite && isfinite(x[k]);
         const io_texel t = io_texel_get(x);
-        if (encoded) {
+        if (c->encoded) {
             io_texel_put(m, &t);
             continue;
         }
@@ -71,6 +79,16 @@ static bool convert(const float *from, int channels, int64_t pixels, bool encode
         m[MAP_ROUGHNESS] = t.roughness;
         memcpy(m + MAP_SPECULAR, t.specular, sizeof t.specular);
     }
+    if (!finite) atomic_store(c->finite, false);
+}
+
+/* The network's maps to the caller's values, one conversion for each; from may be maps. False when one is not finite.
+ */
+static bool convert(const float *from, int channels, int64_t pixels, bool encoded, int threads, float *maps)
+{
+    enum { STEP = 1 << 10 };
+    atomic_bool finite = true;
+    ts_for(threads, pixels, STEP, convert_pixels, &(conversion){from, channels, encoded, maps, &finite});
     return finite;
 }
 

@@ -10,6 +10,7 @@
 #include "tensor/hash.h"
 #include "tensor/maps.h"
 #include "tensor/new_file.h"
+#include "tensor/team.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -213,14 +214,26 @@ static ts_code write_glb(const task *t, unsigned written, ts_status *st)
     return code;
 }
 
+typedef struct writing {
+    const task *t;
+    unsigned which;
+    lgd_output_result *facts;
+    ts_status *failure; /* of each portion */
+} writing;
+
+static void write_one(const void *job, int64_t i)
+{
+    const writing *w = job;
+    write_portion(w->t, w->which & portions[i], w->facts, &w->failure[i]);
+}
+
 /* Of several failures the first portion's is reported. */
 static ts_code write_all(const task *t, lgd_output_result *facts, ts_status *st)
 {
     ts_status failure[PORTIONS] = {{0}};
     const bool glb = t->order->which & LGD_OUT_GLB;
     const unsigned which = t->order->which | (glb ? referred(t->order->metallic) : 0);
-#pragma omp parallel for num_threads(t->order->threads) schedule(dynamic)
-    for (int i = 0; i < PORTIONS; i++) write_portion(t, which & portions[i], facts, &failure[i]);
+    ts_tasks(t->order->threads, PORTIONS, write_one, &(writing){t, which, facts, failure});
     for (int i = 0; i < PORTIONS; i++)
         if (failure[i].code) return ts_fail(st, failure[i].code, "%s", failure[i].message);
     if (glb && write_glb(t, which, st) != TS_OK) return st->code;

@@ -2,7 +2,7 @@
 #include "infer/clip.h"
 #include "render/render.h"
 #include "tensor/resize.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -31,6 +31,21 @@ static double distance(size_t values, const float *log_photo, const float *rende
     return sum;
 }
 
+typedef struct search {
+    size_t values;
+    const float *log_photo, *rendered;
+    double middle, step, at_middle, *far;
+    int most;
+} search;
+
+static void try(const void *job, int64_t i)
+{
+    const search *s = job;
+    s->far[i] = i == s->most
+        ? s->at_middle
+        : distance(s->values, s->log_photo, s->rendered, s->middle + ((int)i - s->most) * s->step, s->at_middle);
+}
+
 /* The stops around middle at which it is least. */
 static double nearest(size_t values, const float *log_photo, const float *rendered, double middle, double reach,
                       double step, int threads)
@@ -39,9 +54,7 @@ static double nearest(size_t values, const float *log_photo, const float *render
     const int most = (int)lround(reach / step);
     int best = 0;
     const double at_middle = distance(values, log_photo, rendered, middle, INFINITY);
-#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(dynamic)
-    for (int i = 0; i <= 2 * most; i++)
-        far[i] = i == most ? at_middle : distance(values, log_photo, rendered, middle + (i - most) * step, at_middle);
+    ts_tasks(threads, 2 * most + 1, try, &(search){values, log_photo, rendered, middle, step, at_middle, far, most});
     for (int i = 1; i <= 2 * most; i++)
         if (far[i] < far[best]) best = i;
     return middle + (best - most) * step;

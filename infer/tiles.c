@@ -2,7 +2,7 @@
 #include "infer/clip.h"
 #include "nn/window.h"
 #include "tensor/resample.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -33,15 +33,27 @@ static void start(const work *w, int t, rd_grid g, float *maps)
     ts_resample(1, w->channels, &down, &across, w->coarse[t]->t.data, maps, false, w->threads);
 }
 
+typedef struct rows_job {
+    const work *w;
+    rd_grid g;
+    const float *from;
+    float *to;
+} rows_job;
+
+static void clip_rows(const void *job, int64_t begin, int64_t end)
+{
+    const rows_job *j = job;
+    const size_t side = (size_t)j->w->t->side, row = 3 * (size_t)j->g.w;
+    for (int64_t i = begin; i < end; i++)
+        lgd_clip((int64_t)row,
+                 j->w->t->image[i / j->g.h] + ((size_t)(j->g.y0 + i % j->g.h) * side + (size_t)j->g.x0) * 3,
+                 j->to + (size_t)i * row);
+}
+
 /* The given photographs in a window, one after the other. */
 static void photographs(const work *w, rd_grid g, float *to)
 {
-    const int64_t row = 3 * (int64_t)g.w;
-#pragma omp parallel for collapse(2) num_threads(ts_threads_of(w->threads)) schedule(static)
-    for (int k = 0; k < w->t->given; k++)
-        for (int y = 0; y < g.h; y++)
-            lgd_clip(row, w->t->image[k] + ((size_t)(g.y0 + y) * (size_t)w->t->side + (size_t)g.x0) * 3,
-                     to + ((int64_t)k * g.h + y) * row);
+    ts_for(w->threads, (int64_t)w->t->given * g.h, 1, clip_rows, &(rows_job){.w = w, .g = g, .to = to});
 }
 
 static rd_grid whole(const work *w) { return rd_grid_on(rd_grid_full(w->t->side), w->threads); }
@@ -170,13 +182,18 @@ static rd_grid wanted(const lgd_tiles *t, rd_grid a)
                    : (rd_grid){0, a.w, a.y0, a.x0, a.side, a.threads};
 }
 
+static void put_rows(const void *job, int64_t begin, int64_t end)
+{
+    const rows_job *j = job;
+    const size_t channels = (size_t)j->w->channels, row = (size_t)j->g.w * channels, side = (size_t)j->w->t->side;
+    for (int64_t y = begin; y < end; y++)
+        memcpy(j->to + ((size_t)(j->g.y0 + y) * side + (size_t)j->g.x0) * channels, j->from + (size_t)y * row,
+               row * sizeof *j->to);
+}
+
 static void put(const work *w, rd_grid g, const float *from)
 {
-    const size_t channels = (size_t)w->channels, row = (size_t)g.w * channels;
-#pragma omp parallel for num_threads(ts_threads_of(w->threads)) schedule(static)
-    for (int y = 0; y < g.h; y++)
-        memcpy(w->maps + ((size_t)(g.y0 + y) * (size_t)w->t->side + (size_t)g.x0) * channels, from + (size_t)y * row,
-               row * sizeof *from);
+    ts_for(w->threads, g.h, 1, put_rows, &(rows_job){w, g, from, w->maps});
 }
 
 /* Of several tiles one: what the coarse steps leave everywhere, and what is refined over it. */

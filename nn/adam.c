@@ -1,6 +1,6 @@
 #include "nn/adam.h"
 #include "tensor/kernels/adam.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include "tensor/memory.h"
 #include <math.h>
 #include <stdlib.h>
@@ -38,15 +38,26 @@ void nn_adam_free(nn_adam *adam)
     *adam = (nn_adam){0};
 }
 
+typedef struct norm_job {
+    const float *grad;
+    size_t first, last, each;
+    double *part;
+} norm_job;
+
+static void squares_of_parts(const void *job, int64_t begin, int64_t end)
+{
+    const norm_job *j = job;
+    for (int64_t p = begin; p < end; p++) {
+        const size_t from = j->first + (size_t)p * j->each, to = from + j->each < j->last ? from + j->each : j->last;
+        j->part[p] = from < to ? ts_adam_k()->sum_of_squares(to - from, j->grad + from) : 0;
+    }
+}
+
 double nn_gradient_norm(const nn_model *model, size_t first, size_t last)
 {
     double part[PARTS], sum = 0;
     size_t each = ((last - first) / PARTS + 16) / 16 * 16;
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int p = 0; p < PARTS; p++) {
-        size_t from = first + (size_t)p * each, to = from + each < last ? from + each : last;
-        part[p] = from < to ? ts_adam_k()->sum_of_squares(to - from, model->grad + from) : 0;
-    }
+    ts_for(0, PARTS, 1, squares_of_parts, &(norm_job){model->grad, first, last, each, part});
     for (int p = 0; p < PARTS; p++) sum += part[p];
     return sqrt(sum);
 }
@@ -61,6 +72,27 @@ float nn_learning_rate(float rate, float floor, int64_t step, int64_t warmup, in
 
 void nn_adam_next(nn_adam *adam) { adam->step++; }
 
+typedef struct step_job {
+    const nn_adam *adam;
+    nn_model *model;
+    size_t first;
+    float corrected, epsilon, scale, decay;
+} step_job;
+
+static void step_range(const void *job, int64_t begin, int64_t end)
+{
+    const step_job *j = job;
+    const nn_adam *adam = j->adam;
+    for (size_t at = j->first + (size_t)begin, last = j->first + (size_t)end; at < last; at += CHUNK) {
+        const size_t count = last - at < CHUNK ? last - at : CHUNK; /* which stays in the cache */
+        float *value = j->model->value + at, *grad = j->model->grad + at;
+        ts_adam_k()->step(count, value, grad, adam->m + at, adam->v + at, adam->beta1, adam->beta2, j->corrected,
+                          j->epsilon, j->scale);
+        if (adam->ema) ts_adam_k()->average(count, adam->ema + at, value, j->decay);
+        memset(grad, 0, count * sizeof *grad);
+    }
+}
+
 void nn_adam_step(const nn_adam *adam, nn_model *model, size_t first, size_t last, float rate, float scale)
 {
     /* The moments start at zero, which the corrections make up for (Kingma and Ba, section 3). The average's memory is
@@ -68,14 +100,6 @@ void nn_adam_step(const nn_adam *adam, nn_model *model, size_t first, size_t las
     double n = (double)adam->step, root = sqrt(1 - pow(adam->beta2, n)), ramp = (1 + n) / (10 + n);
     float corrected = (float)(rate * root / (1 - pow(adam->beta1, n))), epsilon = (float)(adam->epsilon * root);
     float decay = ramp < adam->ema_decay ? (float)ramp : adam->ema_decay;
-    int64_t chunks = (int64_t)((last - first + CHUNK - 1) / CHUNK);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int64_t c = 0; c < chunks; c++) {
-        size_t at = first + (size_t)c * CHUNK, count = last - at < CHUNK ? last - at : CHUNK;
-        float *value = model->value + at, *grad = model->grad + at;
-        ts_adam_k()->step(count, value, grad, adam->m + at, adam->v + at, adam->beta1, adam->beta2, corrected, epsilon,
-                          scale);
-        if (adam->ema) ts_adam_k()->average(count, adam->ema + at, value, decay);
-        memset(grad, 0, count * sizeof *grad);
-    }
+    ts_for(0, (int64_t)(last - first), CHUNK, step_range,
+           &(step_job){adam, model, first, corrected, epsilon, scale, decay});
 }

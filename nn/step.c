@@ -6,8 +6,10 @@
 #include "render/render.h"
 #include "tensor/kernels/elementwise.h"
 #include "tensor/maps.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <string.h>
+
+enum { STEP = 1 << 12 }; /* values at a time, at least */
 
 bool nn_gradient_buffers(ag_tape *tape, const ag_value *maps, int gru, float *buffer[2][3])
 {
@@ -39,12 +41,42 @@ bool nn_measure_start(ag_tape *tape, const nn_model *model, const nn_input *in, 
     return true;
 }
 
+typedef struct place_job {
+    int channels, images, k;
+    const float *from;
+    float *to;
+} place_job;
+
+static void place_pixels(const void *job, int64_t begin, int64_t end)
+{
+    const place_job *j = job;
+    for (int64_t i = begin; i < end; i++)
+        memcpy(j->to + (i * j->images + j->k) * j->channels, j->from + i * j->channels,
+               (size_t)j->channels * sizeof *j->to);
+}
+
 /* to [pixels, images channels] = from [pixels, channels] at photograph k's place. */
 static void place(int64_t pixels, int channels, int images, int k, const float *from, float *to, int threads)
 {
-#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static)
-    for (int64_t i = 0; i < pixels; i++)
-        memcpy(to + (i * images + k) * channels, from + i * channels, (size_t)channels * sizeof *to);
+    ts_for(threads, pixels, STEP, place_pixels, &(place_job){channels, images, k, from, to});
+}
+
+typedef struct values_job {
+    float *to, scale;
+    int64_t row;
+} values_job;
+
+static void scale_values(const void *job, int64_t begin, int64_t end)
+{
+    const values_job *j = job;
+    for (int64_t i = begin; i < end; i++) j->to[i] *= j->scale;
+}
+
+static void asinh_rows(const void *job, int64_t begin, int64_t end)
+{
+    const values_job *j = job;
+    for (int64_t y = begin; y < end; y++)
+        ts_elementwise_k()->asinh(j->row, NN_GRADIENT_SCALE, j->to + y * j->row, j->to + y * j->row);
 }
 
 /* dL/dR_t of every photograph, not encoded: to is [N, H, W, images channels]. */
@@ -79,9 +111,8 @@ static bool gradients(ag_tape *tape, const nn_model *model, const nn_input *in, 
     ts_arena_release(ag_arena(tape), mark);
     if (batch) { /* d RMSE of the whole batch has 1 / (3 N H W) where rd_flash_gradient has 1 / (3 256^2) */
         const float scale = (float)(256.0 * 256.0 / ((double)s.n * s.h * s.w));
-        const int64_t values = s.n * pixels * images * s.c;
-#pragma omp parallel for num_threads(ts_threads_of(ag_compute(tape)->threads)) schedule(static)
-        for (int64_t i = 0; i < values; i++) to[i] *= scale;
+        ts_for(ag_compute(tape)->threads, s.n * pixels * images * s.c, STEP, scale_values,
+               &(values_job){.to = to, .scale = scale});
     }
     return true;
 }
@@ -147,9 +178,7 @@ bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_
     }
     if (!gradients(tape, model, in, maps, rmse0, gradient)) return false;
     if (model->arch.encoding != NN_GRADIENT_ASINH) return true;
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
-#pragma omp parallel for num_threads(ts_threads_of(ag_compute(tape)->threads)) schedule(static)
-    for (int64_t y = 0; y < rows; y++) k->asinh(row, NN_GRADIENT_SCALE, gradient + y * row, gradient + y * row);
+    ts_for(ag_compute(tape)->threads, rows, 1, asinh_rows, &(values_job){.to = gradient, .row = row});
     return true;
 }
 

@@ -4,7 +4,7 @@
 #include "render/tone.h"
 #include "tensor/kernels/vmath_arrays.h"
 #include "tensor/maps.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -14,22 +14,34 @@ static float limit(float x)
     return x > 1 ? 1 : x;
 }
 
+typedef struct difference_job {
+    int w;
+    float *a, *b;
+    double *rows;
+} difference_job;
+
+static void difference_of_rows(const void *job, int64_t begin, int64_t end)
+{
+    const difference_job *j = job;
+    const size_t count = (size_t)j->w * 3;
+    for (int64_t y = begin; y < end; y++) {
+        float *a = j->a + (size_t)y * count, *b = j->b + (size_t)y * count;
+        double sum = 0;
+        ts_vmath_arrays_k()->gamma((int64_t)count, a, a);
+        ts_vmath_arrays_k()->gamma((int64_t)count, b, b);
+        for (size_t i = 0; i < count; i++) {
+            const double d = (double)a[i] - (double)b[i];
+            sum += d * d;
+        }
+        j->rows[y] = sum;
+    }
+}
+
 /* Sum of squared differences of the images, which are gamma-encoded in place; row sums in index order make it
  * independent of the threads. */
 static double gamma_difference(int h, int w, float *a, float *b, double *rows)
 {
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int y = 0; y < h; y++) {
-        const size_t at = (size_t)y * (size_t)w * 3;
-        double sum = 0;
-        ts_vmath_arrays_k()->gamma((int64_t)w * 3, a + at, a + at);
-        ts_vmath_arrays_k()->gamma((int64_t)w * 3, b + at, b + at);
-        for (size_t i = at; i < at + (size_t)w * 3; i++) {
-            const double d = (double)a[i] - (double)b[i];
-            sum += d * d;
-        }
-        rows[y] = sum;
-    }
+    ts_for(0, h, 1, difference_of_rows, &(difference_job){w, a, b, rows});
     double sum = 0;
     for (int y = 0; y < h; y++) sum += rows[y];
     return sum;

@@ -42,6 +42,17 @@ static void forward(ag_tape *tape, ag_node *node)
     node->saved = rmse;
 }
 
+typedef struct sum_job {
+    const float *gradient;
+    float scale, *sum;
+} sum_job;
+
+static void add_range(const void *job, int64_t begin, int64_t end)
+{
+    const sum_job *j = job;
+    for (int64_t i = begin; i < end; i++) j->sum[i] += j->scale * j->gradient[i];
+}
+
 static void backward(ag_tape *tape, ag_node *node)
 {
     const ts_tensor *maps = &node->in[0]->t, *image = &node->in[1]->t;
@@ -60,9 +71,7 @@ static void backward(ag_tape *tape, ag_node *node)
     for (int n = 0; n < s.n; n++) {
         rd_flash_gradient(rd_grid_on(rd_grid_full(s.h), ag_threads(tape)), maps->data + n * count, s.c, node->attr,
                           image->data + n * image->stride_n, rmse[n], gradient, NULL);
-        float *sum = to + n * count;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (count > AG_CHUNK)
-        for (int64_t i = 0; i < count; i++) sum[i] += scale * gradient[i];
+        ts_for(ag_threads(tape), count, AG_CHUNK, add_range, &(sum_job){gradient, scale, to + n * count});
     }
 }
 

@@ -47,39 +47,53 @@ static float weight_of(const ag_node *node, int64_t i)
     return w->given ? w->of[i % MAP_CHANNELS] : 1;
 }
 
+typedef struct loss_job {
+    const ag_node *node;
+    double *sums;
+    float up, *to;
+    bool add;
+} loss_job;
+
+static void sum_chunk(const void *job, int64_t k)
+{
+    const loss_job *j = job;
+    const float *a = j->node->in[0]->t.data, *b = j->node->in[1]->t.data;
+    const int64_t count = ts_count(j->node->in[0]->t.shape), first = k * AG_CHUNK,
+                  last = first + ag_part(count, first, AG_CHUNK);
+    double part = 0;
+    for (int64_t i = first; i < last; i++) part += (double)weight_of(j->node, i) * fabs((double)a[i] - (double)b[i]);
+    j->sums[k] = part;
+}
+
 static void forward(ag_tape *tape, ag_node *node)
 {
-    const float *a = node->in[0]->t.data, *b = node->in[1]->t.data;
     int64_t count = ts_count(node->in[0]->t.shape), chunks = (count + AG_CHUNK - 1) / AG_CHUNK;
     double *sums = ts_arena_alloc(ag_arena(tape), (size_t)chunks * sizeof *sums), sum = 0;
     if (!sums) {
         ag_fail(tape, TS_NOMEM, "map_loss: no memory for %lld sums", (long long)chunks);
         return;
     }
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (chunks > 1)
-    for (int64_t k = 0; k < chunks; k++) {
-        int64_t first = k * AG_CHUNK, last = first + ag_part(count, first, AG_CHUNK);
-        double part = 0;
-        for (int64_t i = first; i < last; i++) part += (double)weight_of(node, i) * fabs((double)a[i] - (double)b[i]);
-        sums[k] = part;
-    }
+    ts_tasks(ag_threads(tape), chunks, sum_chunk, &(loss_job){.node = node, .sums = sums});
     for (int64_t k = 0; k < chunks; k++) sum += sums[k];
     node->out->t.data[0] = (float)(sum / (double)count);
 }
 
+static void backward_range(const void *job, int64_t begin, int64_t end)
+{
+    const loss_job *j = job;
+    const float *a = j->node->in[0]->t.data, *b = j->node->in[1]->t.data;
+    for (int64_t i = begin; i < end; i++) {
+        const float w = j->up * weight_of(j->node, i), g = a[i] > b[i] ? w : a[i] < b[i] ? -w : 0;
+        j->to[i] = j->add ? j->to[i] + g : g;
+    }
+}
+
 static void backward(ag_tape *tape, ag_node *node)
 {
-    bool add;
-    float *to = ag_grad_target(tape, node->in[0], &add);
-    if (!to) return;
-    const float *a = node->in[0]->t.data, *b = node->in[1]->t.data;
-    int64_t count = ts_count(node->in[0]->t.shape);
-    float up = (float)((double)node->out->grad[0] / (double)count);
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (count > AG_CHUNK)
-    for (int64_t i = 0; i < count; i++) {
-        const float w = up * weight_of(node, i), g = a[i] > b[i] ? w : a[i] < b[i] ? -w : 0;
-        to[i] = add ? to[i] + g : g;
-    }
+    const int64_t count = ts_count(node->in[0]->t.shape);
+    loss_job j = {.node = node, .up = (float)((double)node->out->grad[0] / (double)count)};
+    j.to = ag_grad_target(tape, node->in[0], &j.add);
+    if (j.to) ts_for(ag_threads(tape), count, AG_CHUNK, backward_range, &j);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)

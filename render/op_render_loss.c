@@ -36,11 +36,34 @@ ag_value *ag_render_loss(ag_tape *tape, ag_value *maps, ag_value *target, const 
     return ag_apply(tape, &op_render_loss, 2, in, (ts_shape){1, 1, 1, 1}, &attr, sizeof attr);
 }
 
+typedef struct loss_job {
+    const ag_node *node;
+    const ts_shade_view *views;
+    float mean, *gradient;
+    double *sums;
+} loss_job;
+
+static void loss_of_rows(const void *job, int64_t begin, int64_t end)
+{
+    const loss_job *j = job;
+    const ts_tensor *maps = &j->node->in[0]->t, *target = &j->node->in[1]->t;
+    const ts_shape s = maps->shape;
+    const rd_grid grid = rd_grid_full(s.h);
+    const int per_image = ((const attributes *)j->node->attr)->per_image;
+    for (int64_t i = begin; i < end; i++) {
+        const int64_t image = i / s.h, at = image * s.h * s.w * s.c;
+        const int y = (int)(i % s.h);
+        const ts_shade_row a = rd_shade_row(grid, y, maps->data + at, s.c),
+                           b = rd_shade_row(grid, y, target->data + at, s.c);
+        j->sums[i] = ts_shade_k()->log_loss(j->views + image * per_image, per_image, &a, &b, j->mean,
+                                            j->gradient ? j->gradient + i * s.w * s.c : NULL);
+    }
+}
+
 static void forward(ag_tape *tape, ag_node *node)
 {
     const attributes *attr = node->attr;
-    const ts_tensor *maps = &node->in[0]->t, *target = &node->in[1]->t;
-    ts_shape s = maps->shape;
+    ts_shape s = node->in[0]->t.shape;
     int per_image = attr->per_image, rows = s.n * s.h;
     size_t count = (size_t)ts_count(s);
     double *sums = ts_arena_alloc(ag_arena(tape), (size_t)rows * sizeof *sums);
@@ -52,30 +75,25 @@ static void forward(ag_tape *tape, ag_node *node)
     }
     for (int i = 0; i < s.n * per_image; i++) views[i] = rd_shade_view(&attr->views[i]);
     double mean = 1 / (3.0 * s.n * s.h * s.w * per_image);
-    rd_grid grid = rd_grid_full(s.h);
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static)
-    for (int i = 0; i < rows; i++) {
-        int image = i / s.h, y = i % s.h;
-        int64_t at = (int64_t)image * s.h * s.w * s.c;
-        ts_shade_row a = rd_shade_row(grid, y, maps->data + at, s.c), b = rd_shade_row(grid, y, target->data + at, s.c);
-        sums[i] = ts_shade_k()->log_loss(views + (int64_t)image * per_image, per_image, &a, &b, (float)mean,
-                                         gradient ? gradient + (int64_t)i * s.w * s.c : NULL);
-    }
+    ts_for(ag_threads(tape), rows, 1, loss_of_rows, &(loss_job){node, views, (float)mean, gradient, sums});
     double sum = 0;
     for (int i = 0; i < rows; i++) sum += sums[i];
     node->out->t.data[0] = (float)(sum * mean);
     node->saved = gradient;
 }
 
+static void backward_range(const void *job, int64_t begin, int64_t end)
+{
+    const ag_back *b = job;
+    const float up = b->node->out->grad[0], *from = b->node->saved;
+    for (int64_t i = begin; i < end; i++) b->dx[i] = b->accumulate ? b->dx[i] + up * from[i] : up * from[i];
+}
+
 static void backward(ag_tape *tape, ag_node *node)
 {
-    bool add;
-    float *to = ag_grad_target(tape, node->in[0], &add), up = node->out->grad[0];
-    const float *from = node->saved;
-    if (!to) return;
-    int64_t count = ts_count(node->in[0]->t.shape);
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (count > AG_CHUNK)
-    for (int64_t i = 0; i < count; i++) to[i] = add ? to[i] + up * from[i] : up * from[i];
+    ag_back b = {.node = node};
+    b.dx = ag_grad_target(tape, node->in[0], &b.accumulate);
+    if (b.dx) ts_for(ag_threads(tape), ts_count(node->in[0]->t.shape), AG_CHUNK, backward_range, &b);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)

@@ -27,24 +27,39 @@ ag_value *ag_rmse_loss(ag_tape *tape, ag_value *maps, ag_value *target, int firs
     return ag_apply(tape, &op_rmse_loss, 2, in, (ts_shape){1, 1, 1, 1}, &(range){first, count}, sizeof(range));
 }
 
-/* The sum of squared differences of rows' parts of an image, in an order that does not depend on the threads. */
-static double squares(const ag_node *node, int64_t image, int threads, double *row)
+typedef struct loss_job {
+    const ag_node *node;
+    int64_t image;
+    double *row, up;
+    const float *rmse;
+    float *to;
+    bool add;
+} loss_job;
+
+static void squares_of_rows(const void *job, int64_t begin, int64_t end)
 {
-    const ts_shape s = node->in[0]->t.shape;
-    const range *r = node->attr;
-    const float *a = node->in[0]->t.data, *b = node->in[1]->t.data;
-    double sum = 0;
-#pragma omp parallel for num_threads(threads) schedule(static)
-    for (int y = 0; y < s.h; y++) {
-        const int64_t at = (image * s.h + y) * s.w * s.c + r->first;
+    const loss_job *j = job;
+    const ts_shape s = j->node->in[0]->t.shape;
+    const range *r = j->node->attr;
+    const float *a = j->node->in[0]->t.data, *b = j->node->in[1]->t.data;
+    for (int64_t y = begin; y < end; y++) {
+        const int64_t at = (j->image * s.h + y) * s.w * s.c + r->first;
         double part = 0;
         for (int64_t x = 0; x < s.w; x++)
             for (int c = 0; c < r->count; c++) {
                 const double d = (double)a[at + x * s.c + c] - (double)b[at + x * s.c + c];
                 part += d * d;
             }
-        row[y] = part;
+        j->row[y] = part;
     }
+}
+
+/* The sum of squared differences of rows' parts of an image, in an order that does not depend on the threads. */
+static double squares(const ag_node *node, int64_t image, int threads, double *row)
+{
+    const ts_shape s = node->in[0]->t.shape;
+    double sum = 0;
+    ts_for(threads, s.h, 1, squares_of_rows, &(loss_job){.node = node, .image = image, .row = row});
     for (int y = 0; y < s.h; y++) sum += row[y];
     return sum;
 }
@@ -70,26 +85,30 @@ static void forward(ag_tape *tape, ag_node *node)
     node->out->t.data[0] = (float)(sum / n);
 }
 
-static void backward(ag_tape *tape, ag_node *node)
+static void backward_rows(const void *job, int64_t begin, int64_t end)
 {
-    bool add;
-    float *to = ag_grad_target(tape, node->in[0], &add);
-    const float *rmse = to ? rmse_of(tape, node) : NULL;
-    if (!rmse) return;
-    const ts_shape s = node->in[0]->t.shape;
-    const range *r = node->attr;
-    const float *a = node->in[0]->t.data, *b = node->in[1]->t.data;
-    const double up = (double)node->out->grad[0] / ((double)s.n * s.h * s.w * r->count);
-    const int64_t rows = (int64_t)s.n * s.h;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static)
-    for (int64_t y = 0; y < rows; y++) {
-        const float w = (float)(up / (double)rmse[y / s.h]);
+    const loss_job *j = job;
+    const ts_shape s = j->node->in[0]->t.shape;
+    const range *r = j->node->attr;
+    const float *a = j->node->in[0]->t.data, *b = j->node->in[1]->t.data;
+    for (int64_t y = begin; y < end; y++) {
+        const float w = (float)(j->up / (double)j->rmse[y / s.h]);
         for (int64_t i = y * s.w * s.c; i < (y + 1) * s.w * s.c; i++) {
             const int c = (int)(i % s.c) - r->first;
             const float g = c >= 0 && c < r->count ? w * (a[i] - b[i]) : 0;
-            to[i] = add ? to[i] + g : g;
+            j->to[i] = j->add ? j->to[i] + g : g;
         }
     }
+}
+
+static void backward(ag_tape *tape, ag_node *node)
+{
+    const ts_shape s = node->in[0]->t.shape;
+    const range *r = node->attr;
+    loss_job j = {.node = node, .up = (double)node->out->grad[0] / ((double)s.n * s.h * s.w * r->count)};
+    j.to = ag_grad_target(tape, node->in[0], &j.add);
+    j.rmse = j.to ? rmse_of(tape, node) : NULL;
+    if (j.rmse) ts_for(ag_threads(tape), (int64_t)s.n * s.h, 1, backward_rows, &j);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)

@@ -33,14 +33,35 @@ static void forward(ag_tape *tape, ag_node *node)
                             out->data + n * out->stride_n);
 }
 
+typedef struct backward_job {
+    const ag_node *node;
+    int n;
+    ts_scene scene;
+    double *sums; /* [rows][RD_SCENE_NUMBERS] */
+    float *to;    /* NULL, or the gradient of image n's maps */
+} backward_job;
+
+static void backward_rows(const void *job, int64_t begin, int64_t end)
+{
+    const backward_job *j = job;
+    const ts_tensor *maps = &j->node->in[0]->t;
+    const ts_shape s = maps->shape;
+    const float limit = *(const bool *)j->node->attr ? 1.0f : INFINITY;
+    const size_t count = (size_t)s.w * (size_t)s.c;
+    for (int64_t y = begin; y < end; y++) {
+        const ts_shade_row row = rd_shade_row(rd_grid_full(s.h), (int)y, maps->data + j->n * maps->stride_n, s.c);
+        float *gradient = j->to ? ts_scratch(0, count * sizeof *gradient) : NULL;
+        ts_scene_k()->backward(&j->scene, &row, limit, j->node->out->grad + ((int64_t)j->n * s.h + y) * s.w * 3,
+                               j->sums + y * RD_SCENE_NUMBERS, gradient);
+        for (size_t i = 0; j->to && i < count; i++) j->to[(size_t)y * count + i] += gradient[i];
+    }
+}
+
 /* A sum a row, added in order: the same for any number of threads. */
 static void backward(ag_tape *tape, ag_node *node)
 {
     const ts_tensor *maps = &node->in[0]->t;
     const ts_shape s = maps->shape;
-    const rd_grid grid = rd_grid_full(s.h);
-    const float limit = *(const bool *)node->attr ? 1.0f : INFINITY;
-    const size_t count = (size_t)s.w * (size_t)s.c;
     float *to = ag_grad_add(tape, node->in[0]), *by = ag_grad_add(tape, node->in[1]);
     double *sums = ts_arena_alloc(ag_arena(tape), (size_t)s.h * RD_SCENE_NUMBERS * sizeof *sums);
     if (!sums) {
@@ -48,17 +69,13 @@ static void backward(ag_tape *tape, ag_node *node)
         return;
     }
     for (int n = 0; n < s.n; n++) {
-        const ts_scene scene = rd_scene_of(node->in[1]->t.data + n * RD_SCENE_NUMBERS);
+        const backward_job job = {.node = node,
+                                  .n = n,
+                                  .scene = rd_scene_of(node->in[1]->t.data + n * RD_SCENE_NUMBERS),
+                                  .sums = sums,
+                                  .to = to ? to + n * maps->stride_n : NULL};
         memset(sums, 0, (size_t)s.h * RD_SCENE_NUMBERS * sizeof *sums);
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static)
-        for (int y = 0; y < s.h; y++) {
-            const ts_shade_row row = rd_shade_row(grid, y, maps->data + n * maps->stride_n, s.c);
-            float *gradient = to ? ts_scratch(0, count * sizeof *gradient) : NULL;
-            ts_scene_k()->backward(&scene, &row, limit, node->out->grad + ((int64_t)n * s.h + y) * s.w * 3,
-                                   sums + y * RD_SCENE_NUMBERS, gradient);
-            float *sum = to ? to + n * maps->stride_n + (int64_t)y * s.w * s.c : NULL;
-            for (size_t i = 0; to && i < count; i++) sum[i] += gradient[i];
-        }
+        ts_for(ag_threads(tape), s.h, 1, backward_rows, &job);
         for (int i = 0; by && i < RD_SCENE_NUMBERS; i++) {
             double sum = 0;
             for (int y = 0; y < s.h; y++) sum += sums[y * RD_SCENE_NUMBERS + i];

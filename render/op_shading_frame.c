@@ -22,16 +22,13 @@ static void frame(int64_t pixel, int side, double f[2])
     f[1] = y * inverse;
 }
 
-static void forward(ag_tape *tape, ag_node *node)
+static void forward_pixels(const void *job, int64_t begin, int64_t end)
 {
-    (void)tape;
+    const ag_node *node = job;
     const ts_shape s = node->out->t.shape;
-    const int64_t pixels = ts_pixels(s);
-    const float *x = node->in[0]->t.data;
     float *y = node->out->t.data;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels * s.c > AG_CHUNK)
-    for (int64_t p = 0; p < pixels; p++) {
-        const float *from = x + p * (s.c + 2);
+    for (int64_t p = begin; p < end; p++) {
+        const float *from = node->in[0]->t.data + p * (s.c + 2);
         double f[2];
         frame(p, s.w, f);
         memcpy(y + p * s.c, from, (size_t)s.c * sizeof *y);
@@ -40,23 +37,32 @@ static void forward(ag_tape *tape, ag_node *node)
     }
 }
 
-static void backward(ag_tape *tape, ag_node *node)
+static void forward(ag_tape *tape, ag_node *node)
 {
     const ts_shape s = node->out->t.shape;
-    const int64_t pixels = ts_pixels(s);
-    const float *dy = node->out->grad;
-    float *dx = ag_grad_add(tape, node->in[0]);
-    if (!dx) return;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels * s.c > AG_CHUNK)
-    for (int64_t p = 0; p < pixels; p++) {
-        const float *from = dy + p * s.c;
-        float *to = dx + p * (s.c + 2);
+    ts_for(ag_threads(tape), ts_pixels(s), ag_pixel_chunk(s.c), forward_pixels, node);
+}
+
+static void backward_pixels(const void *job, int64_t begin, int64_t end)
+{
+    const ag_back *b = job;
+    const ts_shape s = b->node->out->t.shape;
+    for (int64_t p = begin; p < end; p++) {
+        const float *from = b->node->out->grad + p * s.c;
+        float *to = b->dx + p * (s.c + 2);
         double f[2];
         frame(p, s.w, f);
         for (int i = 0; i < s.c; i++) to[i] += from[i];
         to[s.c] += from[MAP_NORMAL] * (float)f[0] + from[MAP_NORMAL + 1] * (float)f[1];
         to[s.c + 1] += from[MAP_NORMAL + 1] * (float)f[0] - from[MAP_NORMAL] * (float)f[1];
     }
+}
+
+static void backward(ag_tape *tape, ag_node *node)
+{
+    const ts_shape s = node->out->t.shape;
+    const ag_back b = {.node = node, .dx = ag_grad_add(tape, node->in[0]), .accumulate = true};
+    if (b.dx) ts_for(ag_threads(tape), ts_pixels(s), ag_pixel_chunk(s.c), backward_pixels, &b);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)

@@ -2,24 +2,38 @@
 #include "render/brdf.h"
 #include "render/rows.h"
 #include "render/kernels/newton.h"
-#include "tensor/threads.h"
 #include <math.h>
+#include <stddef.h>
+
+typedef struct step_job {
+    rd_grid grid;
+    const float *maps, *const *image;
+    int channels, count;
+    const ts_shade_view *view;
+    const rd_prior *prior;
+    float *step, *after;
+} step_job;
+
+static void step_rows(const void *job, int64_t begin, int64_t end)
+{
+    const step_job *j = job;
+    for (int64_t y = begin; y < end; y++) {
+        const int64_t at = y * j->grid.w;
+        const ts_shade_row row = rd_shade_row(j->grid, (int)y, j->maps, j->channels);
+        const float *part[RD_CAPTURE_VIEWS];
+        for (int k = 0; k < j->count; k++) part[k] = j->image[k] + at * 3;
+        ts_posterior_k()->step(j->view, part, j->count, &row, &j->prior->scale, j->prior->mean + at * j->channels,
+                               j->prior->deviation + at * MAP_GROUPS, j->step + at * j->channels,
+                               j->after ? j->after + at * MAP_GROUPS : NULL);
+    }
+}
 
 void rd_posterior_step(rd_grid grid, const float *maps, int channels, const rd_view *views, const float *const *image,
                        int count, const rd_prior *prior, float *step, float *after)
 {
     ts_shade_view v[RD_CAPTURE_VIEWS];
     for (int k = 0; k < count; k++) v[k] = rd_shade_view(&views[k]);
-#pragma omp parallel for num_threads(ts_threads_of(grid.threads)) schedule(static)
-    for (int y = 0; y < grid.h; y++) {
-        const int64_t at = (int64_t)y * grid.w;
-        const ts_shade_row row = rd_shade_row(grid, y, maps, channels);
-        const float *part[RD_CAPTURE_VIEWS];
-        for (int k = 0; k < count; k++) part[k] = image[k] + at * 3;
-        ts_posterior_k()->step(v, part, count, &row, &prior->scale, prior->mean + at * channels,
-                               prior->deviation + at * MAP_GROUPS, step + at * channels,
-                               after ? after + at * MAP_GROUPS : NULL);
-    }
+    ts_for(grid.threads, grid.h, 1, step_rows, &(step_job){grid, maps, image, channels, count, v, prior, step, after});
 }
 
 void rd_prior_covariance(const double deviation[MAP_GROUPS], const ts_prior *prior,

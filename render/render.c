@@ -4,7 +4,6 @@
 #include "render/rows.h"
 #include "render/kernels/newton.h"
 #include "tensor/scratch.h"
-#include "tensor/threads.h"
 #include <math.h>
 
 ts_shade_view rd_shade_view(const rd_view *view)
@@ -43,13 +42,48 @@ ts_shade_row rd_shade_row(rd_grid grid, int y, const float *maps, int channels)
                           .maps = maps + (int64_t)y * grid.w * channels};
 }
 
+/* What a loop over the rows of a grid is given. */
+typedef struct rows_job {
+    rd_grid grid;
+    const float *maps;
+    int channels, count;
+    const ts_shade_view *view;
+    const float *const *image;
+    float value; /* the limit, or the scale */
+    const float *damping;
+    double *sums;
+    float *to;
+} rows_job;
+
+static void render_rows(const void *job, int64_t begin, int64_t end)
+{
+    const rows_job *j = job;
+    for (int64_t y = begin; y < end; y++) {
+        const ts_shade_row row = rd_shade_row(j->grid, (int)y, j->maps, j->channels);
+        ts_shade_k()->render(j->view, &row, j->value, j->to + y * j->grid.w * 3);
+    }
+}
+
 void rd_render(rd_grid grid, const float *maps, int channels, const rd_view *view, bool clamp, float *image)
 {
-    ts_shade_view v = rd_shade_view(view);
-#pragma omp parallel for num_threads(ts_threads_of(grid.threads)) schedule(static)
-    for (int y = 0; y < grid.h; y++) {
-        ts_shade_row row = rd_shade_row(grid, y, maps, channels);
-        ts_shade_k()->render(&v, &row, clamp ? 1.0f : INFINITY, image + (int64_t)y * grid.w * 3);
+    const ts_shade_view v = rd_shade_view(view);
+    ts_for(grid.threads, grid.h, 1, render_rows,
+           &(rows_job){.grid = grid,
+                       .maps = maps,
+                       .channels = channels,
+                       .view = &v,
+                       .value = clamp ? 1.0f : INFINITY,
+                       .to = image});
+}
+
+static void flash_rows(const void *job, int64_t begin, int64_t end)
+{
+    const rows_job *j = job;
+    for (int64_t y = begin; y < end; y++) {
+        const int64_t at = y * j->grid.w;
+        const ts_shade_row row = rd_shade_row(j->grid, (int)y, j->maps, j->channels);
+        j->sums[y] = ts_shade_k()->flash(j->view, &row, j->image[0] + at * 3, j->value,
+                                         j->to ? j->to + at * j->channels : NULL);
     }
 }
 
@@ -58,15 +92,17 @@ void rd_render(rd_grid grid, const float *maps, int channels, const rd_view *vie
 static double flash(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image,
                     double scale, float *gradient)
 {
-    ts_shade_view v = rd_shade_view(view);
+    const ts_shade_view v = rd_shade_view(view);
     double *sums = ts_scratch(0, (size_t)grid.h * sizeof(double)), sum = 0;
-#pragma omp parallel for num_threads(ts_threads_of(grid.threads)) schedule(static)
-    for (int y = 0; y < grid.h; y++) {
-        int64_t at = (int64_t)y * grid.w;
-        ts_shade_row row = rd_shade_row(grid, y, maps, channels);
-        sums[y] = ts_shade_k()->flash(&v, &row, image + at * 3, (float)scale,
-                                      gradient ? gradient + at * channels : NULL);
-    }
+    ts_for(grid.threads, grid.h, 1, flash_rows,
+           &(rows_job){.grid = grid,
+                       .maps = maps,
+                       .channels = channels,
+                       .view = &v,
+                       .image = &image,
+                       .value = (float)scale,
+                       .sums = sums,
+                       .to = gradient});
     for (int y = 0; y < grid.h; y++) sum += sums[y];
     return sqrt(sum / (3.0 * grid.h * grid.w));
 }
@@ -87,17 +123,30 @@ void rd_flash_gradient(rd_grid grid, const float *maps, int channels, const rd_v
     if (rmse) *rmse = now;
 }
 
+static void newton_rows(const void *job, int64_t begin, int64_t end)
+{
+    const rows_job *j = job;
+    for (int64_t y = begin; y < end; y++) {
+        const int64_t at = y * j->grid.w;
+        const ts_shade_row row = rd_shade_row(j->grid, (int)y, j->maps, j->channels);
+        const float *part[RD_CAPTURE_VIEWS];
+        for (int k = 0; k < j->count; k++) part[k] = j->image[k] + at * 3;
+        ts_newton_k()->step(j->view, part, j->count, &row, j->damping, j->to + at * j->channels);
+    }
+}
+
 void rd_newton_step(rd_grid grid, const float *maps, int channels, const rd_view *views, const float *const *image,
                     int count, const float *damping, float *step)
 {
     ts_shade_view v[RD_CAPTURE_VIEWS];
     for (int k = 0; k < count; k++) v[k] = rd_shade_view(&views[k]);
-#pragma omp parallel for num_threads(ts_threads_of(grid.threads)) schedule(static)
-    for (int y = 0; y < grid.h; y++) {
-        const int64_t at = (int64_t)y * grid.w;
-        const ts_shade_row row = rd_shade_row(grid, y, maps, channels);
-        const float *part[RD_CAPTURE_VIEWS];
-        for (int k = 0; k < count; k++) part[k] = image[k] + at * 3;
-        ts_newton_k()->step(v, part, count, &row, damping, step + at * channels);
-    }
+    ts_for(grid.threads, grid.h, 1, newton_rows,
+           &(rows_job){.grid = grid,
+                       .maps = maps,
+                       .channels = channels,
+                       .count = count,
+                       .view = v,
+                       .image = image,
+                       .damping = damping,
+                       .to = step});
 }

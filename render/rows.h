@@ -2,6 +2,7 @@
 #ifndef RD_ROWS_H
 #define RD_ROWS_H
 #include "render/scene.h"
+#include "tensor/team.h"
 #include "render/kernels/shade.h"
 
 ts_shade_view rd_shade_view(const rd_view *view);

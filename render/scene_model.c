@@ -2,7 +2,6 @@
 #include "render/brdf.h"
 #include "render/rows.h"
 #include "tensor/scratch.h"
-#include "tensor/threads.h"
 #include <math.h>
 #include <string.h>
 
@@ -68,15 +67,28 @@ void rd_scene_value(const double maps[MAP_CHANNELS], const double point[2], cons
                                ambient * (s.specular[c] + (1 - s.specular[c]) * s.diffuse[c]));
 }
 
+typedef struct photograph_job {
+    rd_grid grid;
+    const float *maps;
+    int channels;
+    ts_scene scene;
+    float limit, *image;
+} photograph_job;
+
+static void photograph_rows(const void *job, int64_t begin, int64_t end)
+{
+    const photograph_job *j = job;
+    for (int64_t y = begin; y < end; y++) {
+        const ts_shade_row row = rd_shade_row(j->grid, (int)y, j->maps, j->channels);
+        ts_scene_k()->render(&j->scene, &row, j->limit, j->image + y * j->grid.w * 3);
+    }
+}
+
 void rd_scene_photograph(rd_grid grid, const float *maps, int channels, const float number[RD_SCENE_NUMBERS],
                          bool clamp, float *image)
 {
-    const ts_scene scene = rd_scene_of(number);
-#pragma omp parallel for num_threads(ts_threads_of(grid.threads)) schedule(static)
-    for (int y = 0; y < grid.h; y++) {
-        const ts_shade_row row = rd_shade_row(grid, y, maps, channels);
-        ts_scene_k()->render(&scene, &row, clamp ? 1.0f : INFINITY, image + (int64_t)y * grid.w * 3);
-    }
+    ts_for(grid.threads, grid.h, 1, photograph_rows,
+           &(photograph_job){grid, maps, channels, rd_scene_of(number), clamp ? 1.0f : INFINITY, image});
 }
 
 /* Solves (I + q A q) z = right for n symmetric equations by Cholesky's factor, which is left in the lower triangle of
@@ -109,6 +121,28 @@ static void upper(double a[K][K], double x[K])
     }
 }
 
+typedef struct sums_job {
+    rd_grid grid;
+    const float *maps, *deviation, *image;
+    int channels, first;
+    const rd_scene_how *how;
+    ts_scene scene;
+    ts_scene_sums *part;
+} sums_job;
+
+static void sums_of_rows(const void *job, int64_t begin, int64_t end)
+{
+    const sums_job *j = job;
+    for (int64_t i = begin; i < end; i++) {
+        const int y = j->first + (int)i * j->how->every;
+        const int64_t at = (int64_t)y * j->grid.w;
+        const ts_shade_row row = rd_shade_row(j->grid, y, j->maps, j->channels);
+        j->part[i] = (ts_scene_sums){.misfit = 0};
+        ts_scene_k()->normal(&j->scene, &row, j->image + at * 3, &j->how->scale, j->deviation + at * MAP_GROUPS,
+                             &j->part[i]);
+    }
+}
+
 /* The sums over the rows that are read, added in their order. */
 static ts_scene_sums sums_of(rd_grid grid, const float *maps, int channels, const float *deviation, const float *image,
                              const rd_scene_how *how, bool least, const float number[K])
@@ -118,14 +152,8 @@ static ts_scene_sums sums_of(rd_grid grid, const float *maps, int channels, cons
               rows = (grid.h - first + how->every - 1) / how->every;
     scene.least = least;
     ts_scene_sums *part = ts_scratch(0, (size_t)rows * sizeof *part), all = {.misfit = 0};
-#pragma omp parallel for num_threads(ts_threads_of(grid.threads)) schedule(static)
-    for (int i = 0; i < rows; i++) {
-        const int y = first + i * how->every;
-        const int64_t at = (int64_t)y * grid.w;
-        const ts_shade_row row = rd_shade_row(grid, y, maps, channels);
-        part[i] = (ts_scene_sums){.misfit = 0};
-        ts_scene_k()->normal(&scene, &row, image + at * 3, &how->scale, deviation + at * MAP_GROUPS, &part[i]);
-    }
+    ts_for(grid.threads, rows, 1, sums_of_rows,
+           &(sums_job){grid, maps, deviation, image, channels, first, how, scene, part});
     for (int i = 0; i < rows; i++) {
         for (int j = 0; j < TS_SCENE_PAIRS; j++) all.matrix[j] += part[i].matrix[j];
         for (int j = 0; j < K; j++) all.right[j] += part[i].right[j];

@@ -1,6 +1,6 @@
 #define _DEFAULT_SOURCE /* madvise */
 #include "tensor/memory.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -20,15 +20,24 @@ void *ts_memory(size_t bytes)
 
 enum { PART = 128 << 10 };
 
+typedef struct block {
+    char *to;
+    const char *from; /* NULL: zeros */
+} block;
+
+static void fill(const void *job, int64_t begin, int64_t end)
+{
+    const block *b = job;
+    if (b->from) memcpy(b->to + begin, b->from + begin, (size_t)(end - begin));
+    else memset(b->to + begin, 0, (size_t)(end - begin));
+}
+
 void ts_memory_copy(void *to, const void *from, size_t bytes, int threads)
 {
-#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static) if (bytes > 2 * PART)
-    for (size_t i = 0; i < bytes; i += PART)
-        memcpy((char *)to + i, (const char *)from + i, bytes - i < PART ? bytes - i : PART);
+    ts_for(bytes > 2 * PART ? threads : 1, (int64_t)bytes, PART, fill, &(block){to, from});
 }
 
 void ts_memory_clear(void *to, size_t bytes, int threads)
 {
-#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static) if (bytes > 2 * PART)
-    for (size_t i = 0; i < bytes; i += PART) memset((char *)to + i, 0, bytes - i < PART ? bytes - i : PART);
+    ts_for(bytes > 2 * PART ? threads : 1, (int64_t)bytes, PART, fill, &(block){to, NULL});
 }

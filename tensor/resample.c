@@ -1,7 +1,7 @@
 #include "tensor/resample.h"
 #include "tensor/kernels/resample.h"
 #include "tensor/scratch.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <math.h>
 
 static ts_taps make_taps(ts_arena *arena, int in, int out, size_t weights)
@@ -101,21 +101,35 @@ ts_taps ts_taps_transpose(ts_arena *arena, const ts_taps *t)
     return r;
 }
 
-void ts_resample(int n, int c, const ts_taps *rows, const ts_taps *columns, const float *x, float *y, bool accumulate,
-                 int threads)
+typedef struct resampling {
+    int c;
+    const ts_taps *rows, *columns;
+    const float *x;
+    float *y;
+    bool accumulate;
+} resampling;
+
+static void resample_lines(const void *job, int64_t begin, int64_t end)
 {
+    const resampling *r = job;
     const struct ts_resample_kernels *k = ts_resample_k();
-    const int64_t row = (int64_t)columns->in * c, image = row * rows->in, lines = (int64_t)n * rows->out;
-#pragma omp parallel for num_threads(ts_threads_of(threads)) schedule(static)
-    for (int64_t line = 0; line < lines; line++) {
+    const ts_taps *rows = r->rows, *columns = r->columns;
+    const int64_t row = (int64_t)columns->in * r->c, image = row * rows->in;
+    for (int64_t line = begin; line < end; line++) {
         const int j = (int)(line % rows->out), at = rows->offset[j], count = rows->offset[j + 1] - at;
-        const float *from = x + line / rows->out * image + rows->first[j] * row;
+        const float *from = r->x + line / rows->out * image + rows->first[j] * row;
         if (count != 1 || rows->weight[at] != 1.0f) {
             float *mixed = ts_scratch(0, (size_t)row * sizeof(float));
             k->rows(row, count, rows->weight + at, from, row, mixed);
             from = mixed;
         }
-        k->pixels(columns->out, c, columns->first, columns->offset, columns->weight, from, y + line * columns->out * c,
-                  accumulate);
+        k->pixels(columns->out, r->c, columns->first, columns->offset, columns->weight, from,
+                  r->y + line * columns->out * r->c, r->accumulate);
     }
+}
+
+void ts_resample(int n, int c, const ts_taps *rows, const ts_taps *columns, const float *x, float *y, bool accumulate,
+                 int threads)
+{
+    ts_for(threads, (int64_t)n * rows->out, 1, resample_lines, &(resampling){c, rows, columns, x, y, accumulate});
 }

@@ -1,5 +1,6 @@
 #include "tensor/scratch.h"
 #include "tensor/memory.h"
+#include "tensor/team.h"
 #include "tensor/threads.h"
 #include <pthread.h>
 #include <stdatomic.h>
@@ -68,11 +69,23 @@ void *ts_scratch(int slot, size_t bytes)
     return s->memory[slot];
 }
 
+static void level(const void *job, int k)
+{
+    (void)job, (void)k;
+    scratch *s = own_scratch();
+    for (int i = 0; i < TS_SCRATCH_SLOTS; i++) grow(s, i, atomic_load(&most[i]));
+}
+
 void ts_scratch_level(int threads)
 {
-#pragma omp parallel num_threads(ts_threads_of(threads))
-    {
-        scratch *s = own_scratch();
-        for (int i = 0; i < TS_SCRATCH_SLOTS; i++) grow(s, i, atomic_load(&most[i]));
+    level(NULL, 0);
+    static atomic_size_t level_of[TS_SCRATCH_SLOTS];
+    static atomic_int threads_of;
+    bool same = atomic_load(&threads_of) >= ts_threads_of(threads);
+    for (int i = 0; i < TS_SCRATCH_SLOTS; i++) {
+        const size_t now = atomic_load(&most[i]);
+        same = atomic_exchange(&level_of[i], now) == now && same;
     }
+    if (same) return; /* nobody waits for anybody */
+    atomic_store(&threads_of, ts_each_thread(threads, level, NULL));
 }

@@ -1,6 +1,6 @@
 #include "tensor/threads.h"
 #include "tensor/cgroup.h"
-#include <omp.h>
+#include "tensor/team.h"
 #include <sched.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -9,21 +9,29 @@
 
 static atomic_int wanted;
 
+typedef struct pinning {
+    const cpu_set_t *all;
+    atomic_int *bound;
+} pinning;
+
+static void pin(const void *job, int k)
+{
+    const pinning *p = job;
+    cpu_set_t one;
+    int cpu = 0;
+    while (!CPU_ISSET(cpu, p->all) || k-- > 0) cpu++;
+    CPU_ZERO(&one);
+    CPU_SET(cpu, &one);
+    if (sched_setaffinity(0, sizeof one, &one) == 0) atomic_fetch_add(p->bound, 1); /* of the calling thread alone */
+}
+
 bool ts_threads_pin(void)
 {
     cpu_set_t all;
     const int threads = ts_threads();
     if (sched_getaffinity(0, sizeof all, &all) != 0 || CPU_COUNT(&all) < threads) return false;
-    int bound = 0;
-#pragma omp parallel num_threads(threads) reduction(+ : bound)
-    {
-        int left = omp_get_thread_num(), cpu = 0;
-        while (!CPU_ISSET(cpu, &all) || left-- > 0) cpu++;
-        cpu_set_t one;
-        CPU_ZERO(&one);
-        CPU_SET(cpu, &one);
-        bound += sched_setaffinity(0, sizeof one, &one) == 0; /* of the calling thread alone */
-    }
+    atomic_int bound = 0;
+    ts_each_thread(threads, pin, &(pinning){&all, &bound});
     return bound == threads;
 }
 
@@ -54,12 +62,40 @@ static void take_quota(const char *folder, void *user)
     if (quota && quota < *least) *least = quota;
 }
 
+enum { MOST_THREADS = 1024 };
+
+/* The first number of a variable of OpenMP's ("4", "4,2"): 0 where it is not set, -1 where it is no number of threads.
+ */
+static int from_environment(const char *name)
+{
+    const char *text = getenv(name);
+    char *end;
+    if (!text || !*text) return 0;
+    const long n = strtol(text, &end, 10);
+    while (*end == ' ') end++;
+    return n < 1 || end == text || (*end && *end != ',') ? -1 : n < MOST_THREADS ? (int)n : MOST_THREADS;
+}
+
+ts_code ts_threads_check(ts_status *st)
+{
+    static const char *const names[] = {"OMP_NUM_THREADS", "OMP_THREAD_LIMIT"};
+    for (int i = 0; i < 2; i++)
+        if (from_environment(names[i]) < 0)
+            return ts_fail(st, TS_INVALID,
+                           "%s is \"%s\", which is no number of threads: set it to 1 or more, or unset it", names[i],
+                           getenv(names[i]));
+    return TS_OK;
+}
+
 int ts_threads_allowed(void)
 {
     int n = 1;
     cpu_set_t set;
     if (sched_getaffinity(0, sizeof set, &set) == 0) n = CPU_COUNT(&set);
     ts_cgroup_each(take_quota, &n);
+    const int asked = from_environment("OMP_NUM_THREADS"), limit = from_environment("OMP_THREAD_LIMIT");
+    if (asked > 0) n = asked;
+    if (limit > 0 && limit < n) n = limit;
     return n < 1 ? 1 : n;
 }
 

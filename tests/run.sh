@@ -4,7 +4,6 @@
 set -u
 : "${BUILD:=build}" "${TESTDATA:=../shared/testdata}" "${FIXTURES:=../shared/fixtures}"
 export BUILD TESTDATA FIXTURES
-export OMP_WAIT_POLICY=passive # tests are many short parallel loops on machines that are often busy
 results=$(mktemp) || exit 1
 trap 'rm -f "$results"' EXIT
 

@@ -125,15 +125,6 @@ static int train(const tr_config *config, const char *folder, bool resume, const
     return CL_OK;
 }
 
-/* libgomp's threads spin for about 10 ms at every barrier before they sleep, which starves the loader's thread and, on
- * a machine with other work, the threads that they wait for (a tenth of the speed). libgomp reads its settings before
- * main, so the program sets one and starts itself again. The user's own setting is kept. */
-static void spin_briefly(char **argv)
-{
-    if (ts_threads() < 2 || getenv("GOMP_SPINCOUNT") || getenv("OMP_WAIT_POLICY")) return;
-    if (setenv("GOMP_SPINCOUNT", "2000", 1) == 0) execv("/proc/self/exe", argv); /* on failure the run is only slower */
-}
-
 enum { SET = 256, RESUME, INIT, INITIAL, THREADS, HELP_CONFIG, PRINT_CONFIG, HELP, VERSION };
 static const struct option options[] = {
     {"set", required_argument, NULL, SET},
@@ -264,7 +255,6 @@ int main(int argc, char **argv)
         code = cl_finish(tr_initial(&config, initial, &st) == TS_OK ? CL_OK : cl_failed("%s", st.message));
         goto end;
     }
-    spin_briefly(argv);
     code = run(&config, argv[optind], resume, threads_given);
 end:
     free(set);

@@ -1,7 +1,7 @@
 /* Photographs of materials, with the camera's faults: the networks' input. */
 #include "cli/camera.h"
 #include "tensor/maps.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include "train/trainer_internal.h"
 #include <string.h>
 
@@ -28,6 +28,20 @@ static io_camera camera_of(const tr_config *c)
                        .told_power = (float)c->data.told_power};
 }
 
+typedef struct taking {
+    const io_camera *camera;
+    uint64_t seed, first;
+    int size;
+    float *images;
+} taking;
+
+static void take(const void *job, int64_t i)
+{
+    const taking *t = job;
+    io_camera_apply(t->camera, t->seed, t->first + (uint64_t)i, t->size,
+                    t->images + (size_t)i * (size_t)t->size * (size_t)t->size * 3);
+}
+
 void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
                     const rd_view *views, int number, float *images, tr_shot *shots)
 {
@@ -44,9 +58,7 @@ void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count
         shots[i] = (tr_shot){.view = s.view, .ambient = s.ambient, .tone = s.tone};
         io_camera_told(&camera, seed, which, &shots[i].told_view, &shots[i].told_power);
     }
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int i = 0; i < count * number; i++)
-        io_camera_apply(&camera, seed, first + (uint64_t)i, size, images + (size_t)i * pixels * 3);
+    ts_tasks(0, (int64_t)count * number, take, &(taking){&camera, seed, first, size, images});
 }
 
 void tr_capture_views(uint64_t seed, uint64_t index, int count, int number, rd_view *views)

@@ -1,32 +1,43 @@
 /* Validation: the errors of R_0 … R_T on procedural materials that training never sees. */
 #include "render/error.h"
 #include "tensor/maps.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include "train/trainer_internal.h"
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { TOGETHER = 8 }; /* images that go through the network at once */
 
+typedef struct making {
+    const tr_config *c;
+    int first;
+    float *maps;
+    atomic_bool *fine;
+} making;
+
+static void make_material(const void *job, int64_t i)
+{
+    const making *j = job;
+    const io_procedural source = {.seed = (uint64_t)j->c->validate.seed, .families = j->c->data.families};
+    const int size = j->c->validate.size;
+    const size_t values = (size_t)size * (size_t)size * MAP_CHANNELS;
+    io_material m;
+    ts_status st = {0};
+    if (io_material_create(&m, size, &st) != TS_OK) {
+        atomic_store(j->fine, false);
+        return;
+    }
+    io_procedural_make(&source, (uint64_t)(j->first + i), &m);
+    memcpy(j->maps + (size_t)i * values, m.maps, values * sizeof(float));
+    io_material_free(&m);
+}
+
 static bool make_materials(const tr_config *c, int first, int count, float *maps)
 {
-    const io_procedural source = {.seed = (uint64_t)c->validate.seed, .families = c->data.families};
-    const int size = c->validate.size;
-    const size_t values = (size_t)size * (size_t)size * MAP_CHANNELS;
-    bool fine = true;
-#pragma omp parallel for num_threads(ts_threads()) schedule(dynamic, 1) reduction(&& : fine)
-    for (int i = 0; i < count; i++) {
-        io_material m;
-        ts_status st = {0};
-        if (io_material_create(&m, size, &st) != TS_OK) {
-            fine = false;
-            continue;
-        }
-        io_procedural_make(&source, (uint64_t)(first + i), &m);
-        memcpy(maps + (size_t)i * values, m.maps, values * sizeof(float));
-        io_material_free(&m);
-    }
+    atomic_bool fine = true;
+    ts_tasks(0, count, make_material, &(making){c, first, maps, &fine});
     return fine;
 }
 

@@ -1,8 +1,20 @@
 #include "data/image/image_read.h"
 #include "data/image/image.h"
 #include "data/image/photo_rows.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <math.h>
+
+typedef struct reading {
+    const io_photo_rows *p;
+    float *to;
+} reading;
+
+static void read_rows(const void *job, int64_t begin, int64_t end)
+{
+    const reading *r = job;
+    for (int64_t y = begin; y < end; y++)
+        io_photo_row(r->p, 0, (int)y, r->p->width, r->to + (size_t)y * (size_t)r->p->width * 3);
+}
 
 static ts_code read_colour(const char *path, int64_t max_pixels, bool upright, io_image *image, ts_status *st)
 {
@@ -12,9 +24,7 @@ static ts_code read_colour(const char *path, int64_t max_pixels, bool upright, i
     if (code) return code;
     code = io_image_create(image, p.width, p.height, 3, st);
     if (code) ts_context(st, "%s", path);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int y = 0; y < (code ? 0 : p.height); y++)
-        io_photo_row(&p, 0, y, p.width, image->data + (size_t)y * (size_t)p.width * 3);
+    if (!code) ts_for(0, p.height, 1, read_rows, &(reading){&p, image->data});
     io_photo_close(&p);
     return code;
 }

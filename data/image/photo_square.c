@@ -3,6 +3,7 @@
 #include "data/image/image.h"
 #include "data/image/photo_rows.h"
 #include "tensor/resample.h"
+#include "tensor/team.h"
 #include "tensor/threads.h"
 #include <string.h>
 
@@ -44,6 +45,20 @@ static void make(const cut *c, int begin, int end, float *rows, float *to)
     }
 }
 
+typedef struct resampling {
+    const cut *c;
+    int size, each; /* rows of the square; of a part */
+    size_t most;    /* floats of the photograph that a part holds at once */
+    float *rows, *to;
+} resampling;
+
+static void make_part(const void *job, int64_t k)
+{
+    const resampling *r = job;
+    const int begin = (int)k * r->each, end = begin + r->each;
+    make(r->c, begin < r->size ? begin : r->size, end < r->size ? end : r->size, r->rows + (size_t)k * r->most, r->to);
+}
+
 static ts_code resample(const io_photo_rows *photo, const cut *c, int most_threads, ts_arena *arena, io_image *square,
                         ts_status *st)
 {
@@ -57,10 +72,7 @@ static ts_code resample(const io_photo_rows *photo, const cut *c, int most_threa
     }
     float *rows = ts_arena_alloc(arena, (size_t)threads * most * (size_t)c->side * 3 * sizeof *rows);
     if (!rows) return ts_fail(st, TS_NOMEM, "no memory for a square of %d x %d pixels", photo->width, photo->height);
-#pragma omp parallel for num_threads(threads) schedule(static, 1)
-    for (int k = 0; k < threads; k++)
-        make(c, k * each < size ? k * each : size, (k + 1) * each < size ? (k + 1) * each : size,
-             rows + (size_t)k * most * (size_t)c->side * 3, square->data);
+    ts_tasks(threads, threads, make_part, &(resampling){c, size, each, most * (size_t)c->side * 3, rows, square->data});
     return TS_OK;
 }
 

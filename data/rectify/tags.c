@@ -1,11 +1,13 @@
 #include "data/rectify/tags.h"
 
 #ifdef LGD_APRILTAG
+#include "tensor/team.h"
 #include "tensor/threads.h"
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
 #include <errno.h>
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -26,29 +28,35 @@ ts_code io_tag_images(io_tag_image black[IO_SHEET_TAGS], ts_status *st)
     return TS_OK;
 }
 
+typedef struct grey_job {
+    const io_photo_rows *photo;
+    uint8_t *grey;
+    atomic_bool *fine;
+} grey_job;
+
+static void grey_rows(const void *job, int64_t begin, int64_t end)
+{
+    const grey_job *j = job;
+    const size_t width = (size_t)j->photo->width;
+    float *row = malloc(width * 3 * sizeof *row);
+    if (!row) atomic_store(j->fine, false);
+    for (int64_t y = begin; y < end && row; y++) {
+        io_photo_row(j->photo, 0, (int)y, j->photo->width, row);
+        for (size_t x = 0; x < width; x++) {
+            const float light = 0.25f * row[3 * x] + 0.5f * row[3 * x + 1] + 0.25f * row[3 * x + 2];
+            j->grey[(size_t)y * width + x] = (uint8_t)(255 * sqrtf(fminf(fmaxf(light, 0), 1)) + 0.5f);
+        }
+    }
+    free(row);
+}
+
 /* The photograph's light as 8 bits of its square root: near to how it is encoded, whatever the file. */
 static uint8_t *grey_of(const io_photo_rows *photo, int threads)
 {
     const size_t width = (size_t)photo->width, height = (size_t)photo->height;
     uint8_t *grey = malloc(width * height);
-    bool fine = grey != NULL;
-    if (fine) {
-#pragma omp parallel num_threads(ts_threads_of(threads)) reduction(&& : fine)
-        {
-            float *row = malloc(width * 3 * sizeof *row);
-            fine = row != NULL;
-#pragma omp for schedule(static)
-            for (int y = 0; y < photo->height; y++) {
-                if (!row) continue;
-                io_photo_row(photo, 0, y, photo->width, row);
-                for (size_t x = 0; x < width; x++) {
-                    const float light = 0.25f * row[3 * x] + 0.5f * row[3 * x + 1] + 0.25f * row[3 * x + 2];
-                    grey[(size_t)y * width + x] = (uint8_t)(255 * sqrtf(fminf(fmaxf(light, 0), 1)) + 0.5f);
-                }
-            }
-            free(row);
-        }
-    }
+    atomic_bool fine = grey != NULL;
+    if (grey) ts_for(threads, photo->height, 1, grey_rows, &(grey_job){photo, grey, &fine});
     if (fine) return grey;
     free(grey);
     return NULL;

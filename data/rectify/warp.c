@@ -1,5 +1,5 @@
 #include "data/rectify/warp.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <math.h>
 #include <stdlib.h>
 
@@ -91,6 +91,29 @@ static void resample(const part *p, const io_view_of *view, int size, int row, f
     }
 }
 
+typedef struct warp_job {
+    const io_photo_rows *photo;
+    const part *p;
+    const io_view_of *view;
+    int size;
+    float *to;
+} warp_job;
+
+static void read_rows(const void *job, int64_t begin, int64_t end)
+{
+    const warp_job *j = job;
+    const part *p = j->p;
+    for (int64_t y = begin; y < end; y++)
+        io_photo_row(j->photo, p->x, p->y + (int)y, p->width, p->data + (size_t)y * (size_t)p->width * 3);
+}
+
+static void resample_rows(const void *job, int64_t begin, int64_t end)
+{
+    const warp_job *j = job;
+    for (int64_t i = begin; i < end; i++)
+        resample(j->p, j->view, j->size, (int)i, j->to + (size_t)i * (size_t)j->size * 3);
+}
+
 ts_code io_warp(const io_photo_rows *photo, const io_view_of *view, int size, int threads, io_image *square,
                 ts_status *st)
 {
@@ -101,14 +124,9 @@ ts_code io_warp(const io_photo_rows *photo, const io_view_of *view, int size, in
     if (!p.data) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", p.width, p.height);
     const ts_code code = io_image_create(square, size, size, 3, st);
     if (!code) {
-#pragma omp parallel num_threads(ts_threads_of(threads))
-        {
-#pragma omp for schedule(static)
-            for (int y = 0; y < p.height; y++)
-                io_photo_row(photo, p.x, p.y + y, p.width, p.data + (size_t)y * (size_t)p.width * 3);
-#pragma omp for schedule(static)
-            for (int j = 0; j < size; j++) resample(&p, view, size, j, square->data + (size_t)j * (size_t)size * 3);
-        }
+        const warp_job j = {photo, &p, view, size, square->data};
+        ts_for(threads, p.height, 1, read_rows, &j);
+        ts_for(threads, size, 1, resample_rows, &j);
     }
     free(p.data);
     return code;

@@ -1,6 +1,6 @@
 #include "eval/metrics/filter.h"
 #include "tensor/scratch.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -36,22 +36,41 @@ static void weigh(int w, int taps, const double *tap, const double *const *from,
     }
 }
 
-void ev_filter(int h, int w, const double *in, const ev_taps *across, const ev_taps *down, double *work, double *out)
+typedef struct filtering {
+    int h, w;
+    const double *in;
+    const ev_taps *across, *down;
+    double *work, *out;
+} filtering;
+
+static void filter_across(const void *job, int64_t begin, int64_t end)
 {
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int y = 0; y < h; y++) {
-        const int r = across->radius;
-        const double *row = in + (int64_t)y * w, *from[2 * EV_TAPS_MAX + 1];
+    const filtering *f = job;
+    const int r = f->across->radius, w = f->w;
+    for (int64_t y = begin; y < end; y++) {
+        const double *row = f->in + y * w, *from[2 * EV_TAPS_MAX + 1];
         double *padded = ts_scratch(0, ((size_t)w + 2 * EV_TAPS_MAX) * sizeof *padded);
         for (int x = 0; x < r; x++) padded[x] = row[0], padded[r + w + x] = row[w - 1];
         memcpy(padded + r, row, (size_t)w * sizeof *row);
         for (int i = 0; i <= 2 * r; i++) from[i] = padded + i;
-        weigh(w, 2 * r + 1, across->tap, from, work + (int64_t)y * w);
+        weigh(w, 2 * r + 1, f->across->tap, from, f->work + y * w);
     }
-#pragma omp parallel for num_threads(ts_threads()) schedule(static)
-    for (int y = 0; y < h; y++) {
+}
+
+static void filter_down(const void *job, int64_t begin, int64_t end)
+{
+    const filtering *f = job;
+    for (int64_t y = begin; y < end; y++) {
         const double *from[2 * EV_TAPS_MAX + 1];
-        for (int j = 0; j <= 2 * down->radius; j++) from[j] = work + (int64_t)nearest(y + j - down->radius, h) * w;
-        weigh(w, 2 * down->radius + 1, down->tap, from, out + (int64_t)y * w);
+        for (int j = 0; j <= 2 * f->down->radius; j++)
+            from[j] = f->work + (int64_t)nearest((int)y + j - f->down->radius, f->h) * f->w;
+        weigh(f->w, 2 * f->down->radius + 1, f->down->tap, from, f->out + y * f->w);
     }
+}
+
+void ev_filter(int h, int w, const double *in, const ev_taps *across, const ev_taps *down, double *work, double *out)
+{
+    const filtering f = {h, w, in, across, down, work, out};
+    ts_for(0, h, 1, filter_across, &f);
+    ts_for(0, h, 1, filter_down, &f);
 }

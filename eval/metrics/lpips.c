@@ -2,11 +2,13 @@
 #include "nn/weights/file.h"
 #include "tensor/memory.h"
 #include "tensor/conv/gemm.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+enum { STEP = 64 }; /* pixels at a time, at least */
 
 /* Krizhevsky's network as torchvision has it ("features"): convolution with bias, ReLU; before the second and third a 3
  * x 3 maximum of stride 2. */
@@ -126,6 +128,32 @@ static void window_row(const pair *x, int l, int out_h, int out_w, int row, floa
     }
 }
 
+typedef struct layer_job {
+    const pair *x;
+    int l, out_h, out_w;
+    size_t row;
+    float *windows;
+    const pair *y;
+    const float *bias;
+} layer_job;
+
+static void window_rows(const void *job, int64_t begin, int64_t end)
+{
+    const layer_job *j = job;
+    for (int64_t r = begin; r < end; r++)
+        window_row(j->x, j->l, j->out_h, j->out_w, (int)r, j->windows + (size_t)r * j->row);
+}
+
+static void relu_pixels(const void *job, int64_t begin, int64_t end)
+{
+    const layer_job *j = job;
+    const size_t out = (size_t)j->y->channels;
+    for (int64_t r = begin; r < end; r++) {
+        float *v = j->y->data + (size_t)r * out;
+        for (size_t c = 0; c < out; c++) v[c] = v[c] + j->bias[c] > 0 ? v[c] + j->bias[c] : 0;
+    }
+}
+
 /* Windows as rows of a matrix, times the weights; + bias, ReLU. */
 static bool convolve(ev_lpips *net, int l, const pair *x, pair *y, int slot)
 {
@@ -135,14 +163,10 @@ static bool convolve(ev_lpips *net, int l, const pair *x, pair *y, int slot)
     float *windows = work(net, 2, (size_t)rows * row);
     *y = (pair){out_h, out_w, layer[l].out, work(net, slot, (size_t)rows * (size_t)out_w * out)};
     if (!windows || !y->data) return false;
-#pragma omp parallel for schedule(static) num_threads(ts_threads())
-    for (int r = 0; r < rows; r++) window_row(x, l, out_h, out_w, r, windows + (size_t)r * row);
+    const layer_job j = {x, l, out_h, out_w, row, windows, y, net->bias[l]};
+    ts_for(0, rows, 1, window_rows, &j);
     ts_gemm(false, true, rows * out_w, layer[l].out, (int)window(l), 1, windows, net->weight[l], 0, y->data, 0);
-#pragma omp parallel for schedule(static) num_threads(ts_threads())
-    for (int r = 0; r < rows * out_w; r++) {
-        float *v = y->data + (size_t)r * out;
-        for (size_t c = 0; c < out; c++) v[c] = v[c] + net->bias[l][c] > 0 ? v[c] + net->bias[l][c] : 0;
-    }
+    ts_for(0, (int64_t)rows * out_w, STEP, relu_pixels, &j);
     return true;
 }
 
@@ -177,24 +201,36 @@ static double norm(const float *v, int channels)
     return sqrt(sum) + 1e-10;
 }
 
-/* One term; NaN without memory. */
-static double distance(const pair *y, const float *head)
+typedef struct distance_job {
+    const pair *y;
+    const float *head;
+    double *row;
+} distance_job;
+
+static void distance_of_rows(const void *job, int64_t begin, int64_t end)
 {
+    const distance_job *j = job;
+    const pair *y = j->y;
     const size_t channels = (size_t)y->channels, picture = (size_t)y->h * (size_t)y->w * channels;
-    double *row = malloc((size_t)y->h * sizeof *row), sum = 0;
-    if (!row) return NAN;
-#pragma omp parallel for schedule(static) num_threads(ts_threads())
-    for (int r = 0; r < y->h; r++) {
-        row[r] = 0;
+    for (int64_t r = begin; r < end; r++) {
+        j->row[r] = 0;
         for (int x = 0; x < y->w; x++) {
             const float *a = y->data + ((size_t)r * (size_t)y->w + (size_t)x) * channels, *b = a + picture;
             const double na = norm(a, y->channels), nb = norm(b, y->channels);
             for (size_t c = 0; c < channels; c++) {
                 const double d = (double)a[c] / na - (double)b[c] / nb;
-                row[r] += (double)head[c] * d * d;
+                j->row[r] += (double)j->head[c] * d * d;
             }
         }
     }
+}
+
+/* One term; NaN without memory. */
+static double distance(const pair *y, const float *head)
+{
+    double *row = malloc((size_t)y->h * sizeof *row), sum = 0;
+    if (!row) return NAN;
+    ts_for(0, y->h, 1, distance_of_rows, &(distance_job){y, head, row});
     for (int r = 0; r < y->h; r++) sum += row[r];
     free(row);
     return sum / ((double)y->h * y->w);

@@ -1,8 +1,9 @@
 /* The numbers of a tensor, from whatever type, order and layout they have in a file. */
 #include "nn/weights/file_internal.h"
 #include "tensor/kernels/elementwise.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -169,6 +170,30 @@ bool nn_tensor_plain(const nn_tensor *e)
     return n == 1 && (stride[0] == 1 || dim[0] == 1) && (!e->swapped || types[e->dtype].size == 1);
 }
 
+typedef struct conversion {
+    const nn_tensor *e;
+    const unsigned char *from;
+    int64_t step, run;
+    nn_dtype to;
+    unsigned char *out;
+    bool finite; /* whether it is asked */
+    atomic_bool *good, *all;
+} conversion;
+
+static void convert_chunks(const void *job, int64_t begin, int64_t end)
+{
+    const conversion *c = job;
+    for (int64_t i = begin; i < end; i += CHUNK) {
+        float part[CHUNK];
+        const int m = (int)(end - i < CHUNK ? end - i : CHUNK);
+        unsigned char *out = c->out + i * types[c->to].size;
+        float *there = c->to == NN_F32 ? (float *)(void *)out : part;
+        load(c->e, c->from + i * c->step, c->step, m, there);
+        if (c->finite && !all_finite(there, m)) atomic_store(c->all, false); /* while it is in the first cache */
+        if (c->to != NN_F32 && !store(part, c->to, m, out)) atomic_store(c->good, false);
+    }
+}
+
 /* finite: NULL, or false where a number is not, as F32 (to). */
 static bool copy(const nn_tensor *e, nn_dtype to, void *out, bool *finite)
 {
@@ -178,19 +203,13 @@ static bool copy(const nn_tensor *e, nn_dtype to, void *out, bool *finite)
     unsigned char *o = out;
     const int n = collapse(e, dim, stride), size = types[e->dtype].size;
     const int64_t step = stride[n - 1] * size, run = dim[n - 1];
-    bool good = true, all = true;
+    atomic_bool good = true, all = true;
     for (int j = 0; j >= 0;) {
         const bool as_is = to == e->dtype && !finite;
         if (as_is) copy_as_is(e, p, step, run, o);
-#pragma omp parallel for num_threads(ts_threads()) schedule(static) reduction(&& : good, all) if (run > 64 * CHUNK)
-        for (int64_t i = 0; i < (as_is ? 0 : run); i += CHUNK) {
-            float part[CHUNK];
-            const int m = (int)(run - i < CHUNK ? run - i : CHUNK);
-            float *there = to == NN_F32 ? (float *)(void *)(o + i * types[to].size) : part;
-            load(e, p + i * step, step, m, there);
-            if (finite) all = all_finite(there, m) && all; /* while it is in the first cache */
-            if (to != NN_F32) good = store(part, to, m, o + i * types[to].size) && good;
-        }
+        else
+            ts_for(run > 64 * CHUNK ? 0 : 1, run, CHUNK, convert_chunks,
+                   &(conversion){e, p, step, run, to, o, finite != NULL, &good, &all});
         o += run * types[to].size;
         for (j = n - 2; j >= 0 && ++at[j] == dim[j]; j--) { /* to the next run, like an odometer */
             at[j] = 0;

@@ -2,9 +2,11 @@
 #include "nn/weights/weights.h"
 #include "nn/layers.h"
 #include "nn/weights/published.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <float.h>
 #include <math.h>
+#include <pthread.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,13 +15,23 @@ void nn_param_dims(const nn_param *p, int64_t dim[4])
     for (int i = 0; i < 4; i++) dim[i] = p->dim[i];
 }
 
+typedef struct search {
+    const float *v;
+    atomic_bool *bad;
+} search;
+
+static void find_bad(const void *job, int64_t begin, int64_t end)
+{
+    const search *s = job;
+    int bad = 0;
+    for (int64_t i = begin; i < end; i++) bad |= !(fabsf(s->v[i]) <= FLT_MAX);
+    if (bad) atomic_store(s->bad, true);
+}
+
 bool nn_all_finite(const float *v, size_t count)
 {
-    int bad = 0;
-#pragma omp parallel for simd num_threads(ts_threads()) schedule(static) reduction(|                   \
-                                                                                   : bad) if (parallel \
-                                                                                              : count > 1 << 16)
-    for (size_t i = 0; i < count; i++) bad |= !(fabsf(v[i]) <= FLT_MAX);
+    atomic_bool bad = false;
+    ts_for(0, (int64_t)count, 1 << 16, find_bad, &(search){v, &bad});
     return !bad;
 }
 
@@ -29,24 +41,37 @@ static bool of_network(const char *name)
         !strncmp(name, "a.", 2) || nn_published_tensor(name);
 }
 
+typedef struct reading {
+    const nn_file *f;
+    nn_model *m;
+    pthread_mutex_t *lock; /* of what follows */
+    int *failed;
+    ts_status *st;
+} reading;
+
+static void read_value(const void *job, int64_t i)
+{
+    const reading *r = job;
+    const nn_param *p = &r->m->param[i];
+    ts_status own = {0};
+    int64_t dim[4];
+    nn_param_dims(p, dim);
+    if (nn_file_read_finite(r->f, p->name, p->rank, dim, r->m->value + p->offset, &own) == TS_OK) return;
+    pthread_mutex_lock(r->lock);
+    if (i < *r->failed) {
+        *r->failed = (int)i;
+        *r->st = own;
+    }
+    pthread_mutex_unlock(r->lock);
+}
+
 /* A tensor by each thread at a time: they wait for each other once, not at every tensor, while another thread may be
  * decoding. Of several that fail st names the first. */
 static ts_code read_values(const nn_file *f, nn_model *m, ts_status *st)
 {
     int failed = m->params;
-#pragma omp parallel for num_threads(ts_threads()) schedule(dynamic)
-    for (int i = 0; i < m->params; i++) {
-        const nn_param *p = &m->param[i];
-        ts_status own = {0};
-        int64_t dim[4];
-        nn_param_dims(p, dim);
-        if (nn_file_read_finite(f, p->name, p->rank, dim, m->value + p->offset, &own) == TS_OK) continue;
-#pragma omp critical
-        if (i < failed) {
-            failed = i;
-            *st = own;
-        }
-    }
+    pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+    ts_tasks(0, m->params, read_value, &(reading){f, m, &lock, &failed, st});
     return failed < m->params ? st->code : TS_OK;
 }
 

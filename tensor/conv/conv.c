@@ -1,7 +1,7 @@
 /* Convolution: checks, packed weights, and the entries, which hand a plan to the way that conv_choose.c names. */
 #include "tensor/conv/conv.h"
 #include "tensor/conv/plan.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 
 ts_code ts_conv_check(const ts_conv *c, ts_status *st)
 {
@@ -40,6 +40,36 @@ size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
     return panels + (narrow == TS_CONV_BY_LANES ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
 }
 
+typedef struct pack_job {
+    bool forward;
+    int ic, oc, taps, parts;
+    ptrdiff_t o_step, i_step;
+    const float *weight;
+    float *packed;
+} pack_job;
+
+static void pack_part(const pack_job *j, int panel, int part)
+{
+    const int width = conv_vectors(j->oc, panel) * conv_lanes(), o0 = panel * 2 * conv_lanes(),
+              count = j->oc - o0 < width ? j->oc - o0 : width;
+    float *to = j->packed + (ptrdiff_t)o0 * j->ic * j->taps;
+    int begin, end;
+    conv_part(j->ic, j->parts, part, &begin, &end);
+    for (int i = begin; i < end; i++)
+        for (int t = 0; t < j->taps; t++) {
+            const float *from = j->weight + i * j->i_step + o0 * j->o_step + (j->forward ? t : j->taps - 1 - t);
+            float *row = to + ((ptrdiff_t)t * j->ic + i) * width;
+            for (int o = 0; o < count; o++) row[o] = from[o * j->o_step];
+            for (int o = count; o < width; o++) row[o] = 0;
+        }
+}
+
+static void pack_parts(const void *job, int64_t begin, int64_t end)
+{
+    const pack_job *j = job;
+    for (int64_t i = begin; i < end; i++) pack_part(j, (int)(i / j->parts), (int)(i % j->parts));
+}
+
 /* packed: [panel][ky][kx][input][channel of the panel, zeros where there is none] */
 void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float *packed)
 {
@@ -53,7 +83,6 @@ void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float 
     }
     const bool forward = use == TS_CONV_FORWARD;
     const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), taps = c->k * c->k;
-    const int panel_width = 2 * conv_lanes(), panels = conv_panels(oc);
     /* weight[o][c][tap]: strides of the packed input and output channel */
     const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * taps : taps,
                     i_step = forward ? taps : (ptrdiff_t)c->ic * taps;
@@ -63,22 +92,8 @@ void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float 
     float *behind = packed + conv_panels_count(ic, oc, c->k);
     if (narrow == TS_CONV_BY_COL2IM) conv_pack_col2im(ic, oc, c->k, !forward, weight, i_step, o_step, behind);
     if (narrow == TS_CONV_BY_LANES) conv_pack_lanes(ic, oc, c->k, !forward, weight, i_step, o_step, behind);
-#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(c->compute.threads))
-    for (int panel = 0; panel < panels; panel++)
-        for (int part = 0; part < parts; part++) {
-            const int width = conv_vectors(oc, panel) * panel_width / 2, o0 = panel * panel_width,
-                      count = oc - o0 < width ? oc - o0 : width;
-            float *to = packed + (ptrdiff_t)o0 * ic * taps;
-            int begin, end;
-            conv_part(ic, parts, part, &begin, &end);
-            for (int i = begin; i < end; i++)
-                for (int t = 0; t < taps; t++) {
-                    const float *from = weight + i * i_step + o0 * o_step + (forward ? t : taps - 1 - t);
-                    float *row = to + ((ptrdiff_t)t * ic + i) * width;
-                    for (int o = 0; o < count; o++) row[o] = from[o * o_step];
-                    for (int o = count; o < width; o++) row[o] = 0;
-                }
-        }
+    ts_for(c->compute.threads, (int64_t)conv_panels(oc) * parts, 1, pack_parts,
+           &(pack_job){forward, ic, oc, taps, parts, o_step, i_step, weight, packed});
 }
 
 static void run(const conv_plan *p, ts_conv_way way)

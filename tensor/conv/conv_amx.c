@@ -5,7 +5,7 @@
 #include "tensor/conv/plan.h"
 #include "tensor/kernels/amx_conv.h"
 #include "tensor/scratch.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <string.h>
 
 enum {
@@ -35,6 +35,39 @@ size_t conv_amx_count(int ic, int oc, int k, int dilation)
     return (size_t)panels_of(oc) * (size_t)(k * row_steps(conv_bf16_depth(ic), k, dilation)) * STEP_FLOATS;
 }
 
+typedef struct pack_job {
+    bool forward;
+    int k, ic, oc, depth, steps, run, run_steps;
+    ptrdiff_t o_step, i_step;
+    const float *weight;
+    float *packed;
+} pack_job;
+
+static void pack_row(const pack_job *j, int panel, int row)
+{
+    float pair[2 * STEP_FLOATS] = {0};
+    const int taps = j->k * j->k, ky = row / j->steps, o0 = panel * TS_AMX_BLOCK,
+              count = j->oc - o0 < TS_AMX_BLOCK ? j->oc - o0 : TS_AMX_BLOCK;
+    for (int i = 0; i < TS_AMX_PAIRS; i++) {
+        const int at = row % j->steps % j->run_steps * TS_AMX_PAIRS + i,
+                  kx = row % j->steps / j->run_steps + at / j->depth, first = 2 * (at % j->depth);
+        if (at >= j->run) break;
+        const int tap = j->forward ? ky * j->k + kx : taps - 1 - (ky * j->k + kx);
+        for (int half = 0; half < 2 && first + half < j->ic; half++) {
+            const float *from = j->weight + (first + half) * j->i_step + o0 * j->o_step + tap;
+            for (int o = 0; o < count; o++) pair[2 * (i * TS_AMX_BLOCK + o) + half] = from[o * j->o_step];
+        }
+    }
+    ts_conv_k()->pairs(pair, 1, 2 * STEP_FLOATS, j->packed + ((ptrdiff_t)panel * j->k * j->steps + row) * STEP_FLOATS,
+                       STEP_FLOATS);
+}
+
+static void pack_rows(const void *job, int64_t begin, int64_t end)
+{
+    const pack_job *j = job;
+    for (int64_t i = begin; i < end; i++) pack_row(j, (int)(i / (j->k * j->steps)), (int)(i % (j->k * j->steps)));
+}
+
 void conv_amx_pack(const ts_conv *c, bool forward, const float *weight, float *packed)
 {
     const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), k = c->k, taps = k * k,
@@ -44,25 +77,8 @@ void conv_amx_pack(const ts_conv *c, bool forward, const float *weight, float *p
     const int steps = row_steps(depth, k, c->dilation), panels = panels_of(oc);
     const int run = merged(c->dilation) ? k * depth : depth,
               run_steps = (run + TS_AMX_PAIRS - 1) / TS_AMX_PAIRS; /* pairs without a gap, and their steps */
-#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(c->compute.threads))
-    for (int panel = 0; panel < panels; panel++)
-        for (int row = 0; row < k * steps; row++) {
-            float pair[2 * STEP_FLOATS] = {0};
-            const int ky = row / steps, o0 = panel * TS_AMX_BLOCK,
-                      count = oc - o0 < TS_AMX_BLOCK ? oc - o0 : TS_AMX_BLOCK;
-            for (int i = 0; i < TS_AMX_PAIRS; i++) {
-                const int at = row % steps % run_steps * TS_AMX_PAIRS + i, kx = row % steps / run_steps + at / depth,
-                          first = 2 * (at % depth);
-                if (at >= run) break;
-                const int tap = forward ? ky * k + kx : taps - 1 - (ky * k + kx);
-                for (int half = 0; half < 2 && first + half < ic; half++) {
-                    const float *from = weight + (first + half) * i_step + o0 * o_step + tap;
-                    for (int o = 0; o < count; o++) pair[2 * (i * TS_AMX_BLOCK + o) + half] = from[o * o_step];
-                }
-            }
-            ts_conv_k()->pairs(pair, 1, 2 * STEP_FLOATS, packed + ((ptrdiff_t)panel * k * steps + row) * STEP_FLOATS,
-                               STEP_FLOATS);
-        }
+    ts_for(c->compute.threads, (int64_t)panels * k * steps, 1, pack_rows,
+           &(pack_job){forward, k, ic, oc, depth, steps, run, run_steps, o_step, i_step, weight, packed});
 }
 
 /* Pixels [0, count) of a line into y, whose row holds the first columns of every so many of them. window: readable 32
@@ -199,6 +215,22 @@ static void place_steps(const conv_plan *p, int columns, ptrdiff_t *at)
                 (ptrdiff_t)sizeof(float);
 }
 
+typedef struct run_job {
+    const frame *f;
+    int bands, groups, panels;
+} run_job;
+
+static void run_unit(const void *job, int64_t unit)
+{
+    const run_job *j = job;
+    const conv_plan *p = j->f->p;
+    const int g = (int)(unit % j->groups), i = (int)(unit / j->groups % j->bands);
+    int begin, end, panel0, panel1;
+    conv_part(p->h, j->bands, i, &begin, &end);
+    conv_part(j->panels, j->groups, g, &panel0, &panel1);
+    run_band(j->f, (int)(unit / j->groups / j->bands), begin, end, panel0, panel1);
+}
+
 void conv_run_amx(const conv_plan *p)
 {
     frame f = {.p = p, .reach = (p->k - 1) * p->dilation, .out_w = p->w + 2 * p->fold};
@@ -215,15 +247,7 @@ void conv_run_amx(const conv_plan *p)
     if (bands > (p->h + least - 1) / least) bands = (p->h + least - 1) / least;
     int groups = p->n * bands < UNITS ? (UNITS + p->n * bands - 1) / (p->n * bands) : 1;
     if (groups > panels) groups = panels;
-#pragma omp parallel for collapse(3) schedule(dynamic) num_threads(ts_threads_of(p->threads))
-    for (int n = 0; n < p->n; n++)
-        for (int i = 0; i < bands; i++)
-            for (int g = 0; g < groups; g++) {
-                int begin, end, panel0, panel1;
-                conv_part(p->h, bands, i, &begin, &end);
-                conv_part(panels, groups, g, &panel0, &panel1);
-                run_band(&f, n, begin, end, panel0, panel1);
-            }
+    ts_tasks(p->threads, (int64_t)p->n * bands * groups, run_unit, &(run_job){&f, bands, groups, panels});
 }
 
 void conv_amx_pixels(const conv_plan *p, int count)

@@ -4,7 +4,7 @@
 #include "tensor/conv/plan.h"
 #include "tensor/kernels/amx_conv.h"
 #include "tensor/scratch.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <string.h>
 
 enum {
@@ -25,6 +25,7 @@ typedef struct job {
     const ptrdiff_t *at; /* of steps, in x */
     float *sums;         /* [chunk][tap][ic][oc] */
     ptrdiff_t size;      /* of a chunk's */
+    float *dweight;
 } job;
 
 static int round_up(int n, int to) { return (n + to - 1) / to * to; }
@@ -141,11 +142,29 @@ static void reduce_part(const job *g, int o0, int o1, int c0, int c1, float *dwe
         }
 }
 
+static void run_unit(const void *made, int64_t unit)
+{
+    const job *g = made;
+    run_chunk(g, (int)(unit / g->groups), (int)(unit % g->groups));
+}
+
+static void reduce_parts(const void *made, int64_t begin, int64_t end)
+{
+    const job *g = made;
+    const int parts = (g->c->ic + REDUCE_INPUTS - 1) / REDUCE_INPUTS, oc = g->c->oc, ic = g->c->ic;
+    for (int64_t at = begin; at < end; at++) {
+        const int o = (int)(at / parts) * TS_AMX_BLOCK, i = (int)(at % parts) * REDUCE_INPUTS;
+        reduce_part(g, o, o + TS_AMX_BLOCK < oc ? o + TS_AMX_BLOCK : oc, i,
+                    i + REDUCE_INPUTS < ic ? i + REDUCE_INPUTS : ic, g->dweight);
+    }
+}
+
 void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight)
 {
     job g = {.c = c,
              .x = x,
              .dy = dy,
+             .dweight = dweight,
              .reach = (c->k - 1) * c->dilation,
              .ic = round_up(c->ic, TS_AMX_SIDE),
              .oc = round_up(c->oc, TS_AMX_SIDE)};
@@ -163,15 +182,8 @@ void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float 
     for (int s = 0; s < steps; s++) at[s] = s * (ptrdiff_t)(STEP_PIXELS * sizeof(uint16_t));
     g.at = at;
     g.sums = ts_scratch(2, sizeof(float) * (size_t)(g.size * g.chunks));
-#pragma omp parallel num_threads(ts_threads_of(c->compute.threads))
-    {
-#pragma omp for collapse(2) schedule(dynamic)
-        for (int chunk = 0; chunk < g.chunks; chunk++)
-            for (int group = 0; group < g.groups; group++) run_chunk(&g, chunk, group);
-#pragma omp for collapse(2) schedule(static)
-        for (int o = 0; o < c->oc; o += TS_AMX_BLOCK)
-            for (int i = 0; i < c->ic; i += REDUCE_INPUTS)
-                reduce_part(&g, o, o + TS_AMX_BLOCK < c->oc ? o + TS_AMX_BLOCK : c->oc, i,
-                            i + REDUCE_INPUTS < c->ic ? i + REDUCE_INPUTS : c->ic, dweight);
-    }
+    ts_tasks(c->compute.threads, (int64_t)g.chunks * g.groups, run_unit, &g);
+    ts_for(c->compute.threads,
+           (int64_t)((c->oc + TS_AMX_BLOCK - 1) / TS_AMX_BLOCK) * ((c->ic + REDUCE_INPUTS - 1) / REDUCE_INPUTS), 1,
+           reduce_parts, &g);
 }

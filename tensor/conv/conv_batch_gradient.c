@@ -3,7 +3,7 @@
  * multiplied. */
 #include "tensor/conv/plan.h"
 #include "tensor/scratch.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <string.h>
 
 enum {
@@ -71,51 +71,75 @@ static void fetch(const float *dweight, ptrdiff_t row, int begin, int end, int l
         for (int i = 0; i < length; i += 16) __builtin_prefetch(dweight + o * row + i, 1, 2);
 }
 
-void conv_batch_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight)
+typedef struct gradient_job {
+    const ts_conv *c;
+    const float *x, *dy;
+    float *dweight;
+    int parts; /* of the inputs */
+} gradient_job;
+
+/* What a thread has of its own. */
+typedef struct own {
+    operands s;
+    float *sums; /* [input][tap][lane] */
+    joined *of;  /* [tap], for panels of this width */
+    int width;
+} own;
+
+static void run_unit(const gradient_job *g, own *o, int panel, int part)
 {
     const struct ts_conv_kernels *kernels = ts_conv_k();
-    const int lanes2 = 2 * kernels->lanes, panels = conv_panels(c->oc), taps = c->k * c->k;
-    const int parts = (c->ic + kernels->rows - 1) / kernels->rows;
-    const int piece = (panels * parts + PIECES - 1) / PIECES; /* of neighbouring parts, which share lines of dweight */
+    const ts_conv *c = g->c;
+    const int lanes2 = 2 * kernels->lanes, taps = c->k * c->k, vectors = conv_vectors(c->oc, panel),
+              width = vectors * kernels->lanes, o0 = panel * lanes2, count = c->oc - o0 < width ? c->oc - o0 : width;
     const ptrdiff_t pixels = (ptrdiff_t)c->h * c->w * c->n, row = (ptrdiff_t)c->ic * taps;
-#pragma omp parallel num_threads(ts_threads_of(c->compute.threads))
-    {
-        const operands s = gather(c, x, dy);
-        float *sums = ts_scratch(2, sizeof(float) * (size_t)(taps * kernels->rows * lanes2)); /* [input][tap][lane] */
-        joined *of = ts_scratch(3, sizeof(joined) * (size_t)taps);
-        int joined_width = 0;
-#pragma omp for collapse(2) schedule(dynamic, piece)
-        for (int panel = 0; panel < panels; panel++)
-            for (int part = 0; part < parts; part++) {
-                const int vectors = conv_vectors(c->oc, panel), width = vectors * kernels->lanes, o0 = panel * lanes2;
-                const int count = c->oc - o0 < width ? c->oc - o0 : width;
-                int begin, end;
-                conv_part(c->ic, parts, part, &begin, &end);
-                float *to = dweight + o0 * row + (ptrdiff_t)begin * taps;
-                if (width != joined_width)
-                    for (int tap = 0; tap < taps; tap++) join(c, &s, tap, width, &of[tap]);
-                joined_width = width;
-                memset(sums, 0, sizeof(float) * (size_t)(taps * (end - begin) * lanes2));
-                for (int tap = 0; tap < taps; tap++) {
-                    const joined *j = &of[tap];
-                    const int rows_pass = j->count < PASS_PIXELS ? PASS_PIXELS / (j->count > 0 ? j->count : 1) : 1;
-                    fetch(to, row, count * tap / taps, count * (tap + 1) / taps, (end - begin) * taps);
-                    for (int r = 0; r < j->rows; r += rows_pass) {
-                        const ts_sum t = {.a = s.x + begin,
-                                          .b = s.dy + pixels * o0,
-                                          .a_row = j->x + r,
-                                          .b_row = j->dy + r,
-                                          .rows = j->rows - r < rows_pass ? j->rows - r : rows_pass,
-                                          .count = j->count,
-                                          .a_stride = s.pixel,
-                                          .b_stride = width,
-                                          .c = sums + tap * lanes2,
-                                          .c_stride = (ptrdiff_t)taps * lanes2,
-                                          .fetch = (const char *)sums};
-                        kernels->sum[vectors - 1][end - begin](&t);
-                    }
-                }
-                kernels->collect(sums, lanes2, count, (end - begin) * taps, true, 1, to, row);
-            }
+    int begin, end;
+    conv_part(c->ic, g->parts, part, &begin, &end);
+    float *to = g->dweight + o0 * row + (ptrdiff_t)begin * taps;
+    if (width != o->width)
+        for (int tap = 0; tap < taps; tap++) join(c, &o->s, tap, width, &o->of[tap]);
+    o->width = width;
+    memset(o->sums, 0, sizeof(float) * (size_t)(taps * (end - begin) * lanes2));
+    for (int tap = 0; tap < taps; tap++) {
+        const joined *j = &o->of[tap];
+        const int rows_pass = j->count < PASS_PIXELS ? PASS_PIXELS / (j->count > 0 ? j->count : 1) : 1;
+        fetch(to, row, count * tap / taps, count * (tap + 1) / taps, (end - begin) * taps);
+        for (int r = 0; r < j->rows; r += rows_pass) {
+            const ts_sum t = {.a = o->s.x + begin,
+                              .b = o->s.dy + pixels * o0,
+                              .a_row = j->x + r,
+                              .b_row = j->dy + r,
+                              .rows = j->rows - r < rows_pass ? j->rows - r : rows_pass,
+                              .count = j->count,
+                              .a_stride = o->s.pixel,
+                              .b_stride = width,
+                              .c = o->sums + tap * lanes2,
+                              .c_stride = (ptrdiff_t)taps * lanes2,
+                              .fetch = (const char *)o->sums};
+            kernels->sum[vectors - 1][end - begin](&t);
+        }
     }
+    kernels->collect(o->sums, lanes2, count, (end - begin) * taps, true, 1, to, row);
+}
+
+static void run_units(const void *job, ts_queue *queue)
+{
+    const gradient_job *g = job;
+    const int taps = g->c->k * g->c->k;
+    int64_t begin, end;
+    if (!ts_next(queue, &begin, &end)) return;
+    own o = {.s = gather(g->c, g->x, g->dy),
+             .sums = ts_scratch(2, sizeof(float) * (size_t)(taps * ts_conv_k()->rows * 2 * conv_lanes())),
+             .of = ts_scratch(3, sizeof(joined) * (size_t)taps)};
+    do
+        for (int64_t i = begin; i < end; i++) run_unit(g, &o, (int)(i / g->parts), (int)(i % g->parts));
+    while (ts_next(queue, &begin, &end));
+}
+
+void conv_batch_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight)
+{
+    const int panels = conv_panels(c->oc), parts = (c->ic + ts_conv_k()->rows - 1) / ts_conv_k()->rows;
+    const int piece = (panels * parts + PIECES - 1) / PIECES; /* of neighbouring parts, which share lines of dweight */
+    ts_share_tasks(c->compute.threads, (int64_t)panels * parts, piece, run_units,
+                   &(gradient_job){c, x, dy, dweight, parts});
 }

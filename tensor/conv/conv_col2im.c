@@ -3,7 +3,7 @@
  * belong (GEMM and col2im). */
 #include "tensor/conv/plan.h"
 #include "tensor/scratch.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <string.h>
 
 enum {
@@ -80,7 +80,7 @@ static void add_columns(const job *g, const float *products, int left, int right
 }
 
 /* Adds the products of input row r to all rows of output that it reaches. */
-static void add_rows(const job *g, const sums *s, const float *products, int left, int right, int r)
+static void add_parts(const job *g, const sums *s, const float *products, int left, int right, int r)
 {
     const conv_plan *p = g->p;
     const int above = p->replicate && r == 0 ? g->reach : 0, below = p->replicate && r == p->h - 1 ? g->reach : 0;
@@ -113,7 +113,7 @@ static void run_band(const job *g, int image, int begin, int end, float *above, 
             conv_part(p->w, g->chunks, i, &left, &right);
             products.x = p->x + (((ptrdiff_t)image * p->h + r) * p->w + left) * p->ic;
             conv_run_pixels(&products, 0, right - left, 0, panels);
-            add_rows(g, &s, products.y, left, right, r);
+            add_parts(g, &s, products.y, left, right, r);
         }
         for (; done < last && (done <= r - reach || r == end - 1); done++) {
             if (begin > 0 && done < begin + reach)
@@ -152,11 +152,44 @@ static job make_job(const conv_plan *p)
     return g;
 }
 
+typedef struct run_job {
+    const conv_plan *p;
+    const job *g;
+    float *shared; /* between a band and the next, of which each has a part */
+    int rows;
+    ptrdiff_t part;
+} run_job;
+
+static void run_unit(const void *made, int64_t unit)
+{
+    const run_job *r = made;
+    const int i = (int)(unit % r->g->bands);
+    float *below = r->shared + 2 * r->part * unit;
+    int begin, end;
+    conv_part(r->p->h, r->g->bands, i, &begin, &end);
+    run_band(r->g, (int)(unit / r->g->bands), begin, end, i > 0 ? below - r->part : NULL, below);
+}
+
+static void add_shared(const void *made, int64_t from, int64_t to)
+{
+    const run_job *a = made;
+    const job *g = a->g;
+    for (int64_t at = from; at < to; at++) {
+        const int r = (int)(at % a->rows), i = (int)(at / a->rows % (g->bands - 1)),
+                  n = (int)(at / a->rows / (g->bands - 1));
+        float *sum = a->shared + 2 * a->part * ((ptrdiff_t)n * g->bands + i) + r * g->row;
+        int begin, end;
+        conv_part(a->p->h, g->bands, i, &begin, &end);
+        for (ptrdiff_t j = 0; j < g->row; j++) sum[j] += sum[j + a->part];
+        put_row(g, sum, n, end - g->reach + r);
+    }
+}
+
 void conv_run_col2im(const conv_plan *p)
 {
     job g = make_job(p);
     const int rows = 2 * g.reach;
-    const ptrdiff_t part = g.row * rows; /* between a band and the next, of which each has such a part */
+    const ptrdiff_t part = g.row * rows;
     float *shared = ts_scratch(
         2, sizeof(float) * ((size_t)(2 * part) * (size_t)p->n * (size_t)g.bands + (size_t)g.products.oc));
     if (p->bias) { /* each output has one product with the tap in the middle */
@@ -165,25 +198,7 @@ void conv_run_col2im(const conv_plan *p)
         memcpy(bias + p->k * p->k / 2 * p->oc, p->bias, sizeof(float) * (size_t)p->oc);
         g.products.bias = bias;
     }
-#pragma omp parallel num_threads(ts_threads_of(p->threads))
-    {
-#pragma omp for collapse(2) schedule(dynamic)
-        for (int n = 0; n < p->n; n++)
-            for (int i = 0; i < g.bands; i++) {
-                float *below = shared + 2 * part * ((ptrdiff_t)n * g.bands + i);
-                int begin, end;
-                conv_part(p->h, g.bands, i, &begin, &end);
-                run_band(&g, n, begin, end, i > 0 ? below - part : NULL, below);
-            }
-#pragma omp for collapse(3) schedule(static)
-        for (int n = 0; n < p->n; n++)
-            for (int i = 0; i < g.bands - 1; i++)
-                for (int r = 0; r < rows; r++) {
-                    float *sum = shared + 2 * part * ((ptrdiff_t)n * g.bands + i) + r * g.row;
-                    int begin, end;
-                    conv_part(p->h, g.bands, i, &begin, &end);
-                    for (ptrdiff_t j = 0; j < g.row; j++) sum[j] += sum[j + part];
-                    put_row(&g, sum, n, end - g.reach + r);
-                }
-    }
+    const run_job r = {p, &g, shared, rows, part};
+    ts_tasks(p->threads, (int64_t)p->n * g.bands, run_unit, &r);
+    ts_for(p->threads, (int64_t)p->n * (g.bands - 1) * rows, 1, add_shared, &r);
 }

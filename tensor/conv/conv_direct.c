@@ -3,6 +3,7 @@
  */
 #include "tensor/conv/plan.h"
 #include "tensor/scratch.h"
+#include "tensor/team.h"
 #include "tensor/threads.h"
 #include <string.h>
 
@@ -216,6 +217,23 @@ static void run_band(const conv_plan *p, weight_part part, const band *b)
     }
 }
 
+typedef struct run_job {
+    const conv_plan *p;
+    weight_part part;
+    int bands, groups, panels, ahead; /* ahead: of the group that fetches, the one that is fetched; 0: none is */
+} run_job;
+
+static void run_unit(const void *job, int64_t unit)
+{
+    const run_job *j = job;
+    const conv_plan *p = j->p;
+    const int i = (int)(unit % j->bands), n = (int)(unit / j->bands % p->n), g = (int)(unit / j->bands / p->n);
+    band b = {.image = n, .next = j->ahead && g + j->ahead < j->panels ? g + j->ahead : -1};
+    conv_part(p->h, j->bands, i, &b.begin, &b.end);
+    conv_part(j->panels, j->groups, g, &b.panel_begin, &b.panel_end);
+    run_band(p, j->part, &b);
+}
+
 void conv_run_direct(const conv_plan *p)
 {
     const weight_part part = choose_weight_part(p);
@@ -226,21 +244,12 @@ void conv_run_direct(const conv_plan *p)
     int groups = p->n * bands < 8 ? (8 + p->n * bands - 1) / (p->n * bands) : 1;
     /* More weights than values: a part of them stays in the second cache while all images pass by, and where it is a
      * panel those who come to it next have it fetched. */
-    const int parts = (panels + part.panels - 1) / part.panels, ahead = ts_threads_of(p->threads);
+    const int parts = (panels + part.panels - 1) / part.panels;
     const bool weighty = (ptrdiff_t)p->k * p->k * p->oc > (ptrdiff_t)p->n * p->h * p->w;
     if (weighty && groups < parts) groups = parts;
     if (groups > panels) groups = panels;
     if (weighty && p->h <= WHOLE_ROWS && groups * p->n >= 8) bands = 1;
-#pragma omp parallel for collapse(3) schedule(dynamic) num_threads(ts_threads_of(p->threads))
-    for (int g = 0; g < groups; g++)
-        for (int n = 0; n < p->n; n++)
-            for (int i = 0; i < bands; i++) {
-                band b = {.image = n,
-                          .next = weighty && part.ky == p->k && bands == 1 && groups == panels && g + ahead < panels
-                              ? g + ahead
-                              : -1};
-                conv_part(p->h, bands, i, &b.begin, &b.end);
-                conv_part(panels, groups, g, &b.panel_begin, &b.panel_end);
-                run_band(p, part, &b);
-            }
+    const bool fetch = weighty && part.ky == p->k && bands == 1 && groups == panels;
+    ts_tasks(p->threads, (int64_t)groups * p->n * bands, run_unit,
+             &(run_job){p, part, bands, groups, panels, fetch ? ts_threads_of(p->threads) : 0});
 }

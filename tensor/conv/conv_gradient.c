@@ -2,7 +2,7 @@
  * registers while pixels pass by. */
 #include "tensor/conv/plan.h"
 #include "tensor/scratch.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <string.h>
 
 enum {
@@ -24,9 +24,9 @@ typedef struct job {
     bool direct_dy;          /* dy's panels are read where they are */
     int lines, taps, length; /* lines, lines per kernel row, inputs per line */
     int m, n, padded;
-    ptrdiff_t pixel, size; /* floats per pixel of x and per chunk */
-    float *sums, *bias_sums;
-    int chunks, groups; /* groups of (panel of n, line) share a chunk's pixels */
+    ptrdiff_t pixel, size;             /* floats per pixel of x and per chunk */
+    float *sums, *bias_sums, *weights; /* weights: the result, NULL: not wanted */
+    int chunks, groups;                /* groups of (panel of n, line) share a chunk's pixels */
 } job;
 
 /* FMAs per pixel of an m x n tile, counting what tails and short chains leave idle. */
@@ -254,26 +254,36 @@ static void reduce_part(const job *g, int o0, int o1, int c0, int c1, float *dwe
     }
 }
 
+static void run_unit(const void *made, int64_t unit)
+{
+    const job *g = made;
+    const int groups = g->weights ? g->groups : 1;
+    run_chunk(g, (int)(unit / groups), (int)(unit % groups), g->weights != NULL);
+}
+
+static void reduce_parts(const void *made, int64_t begin, int64_t end)
+{
+    const job *g = made;
+    const ts_conv *c = g->c;
+    const int c_parts = (c->ic + REDUCE_INPUTS - 1) / REDUCE_INPUTS;
+    for (int64_t at = begin; at < end; at++) {
+        const int o = (int)(at / c_parts) * REDUCE_OUTPUTS, i = (int)(at % c_parts) * REDUCE_INPUTS;
+        reduce_part(g, o, o + REDUCE_OUTPUTS < c->oc ? o + REDUCE_OUTPUTS : c->oc, i,
+                    i + REDUCE_INPUTS < c->ic ? i + REDUCE_INPUTS : c->ic, g->weights);
+    }
+}
+
 void conv_direct_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
 {
     job made = make_job(c, x, dy), *g = &made;
     const size_t count = (size_t)(g->size * g->chunks) + (size_t)(c->oc * g->chunks);
+    g->weights = dweight;
     g->sums = ts_scratch(2, sizeof(float) * count);
     g->bias_sums = dbias ? g->sums + g->size * g->chunks : NULL;
     const int groups = dweight ? g->groups : 1, o_parts = dweight ? (c->oc + REDUCE_OUTPUTS - 1) / REDUCE_OUTPUTS : 0;
     const int c_parts = (c->ic + REDUCE_INPUTS - 1) / REDUCE_INPUTS;
-#pragma omp parallel num_threads(ts_threads_of(c->compute.threads))
-    {
-#pragma omp for collapse(2) schedule(dynamic)
-        for (int chunk = 0; chunk < g->chunks; chunk++)
-            for (int group = 0; group < groups; group++) run_chunk(g, chunk, group, dweight != NULL);
-#pragma omp for collapse(2) schedule(static)
-        for (int o = 0; o < o_parts; o++)
-            for (int i = 0; i < c_parts; i++)
-                reduce_part(g, o * REDUCE_OUTPUTS, (o + 1) * REDUCE_OUTPUTS < c->oc ? (o + 1) * REDUCE_OUTPUTS : c->oc,
-                            i * REDUCE_INPUTS, (i + 1) * REDUCE_INPUTS < c->ic ? (i + 1) * REDUCE_INPUTS : c->ic,
-                            dweight);
-    }
+    ts_tasks(c->compute.threads, (int64_t)g->chunks * groups, run_unit, g);
+    ts_for(c->compute.threads, (int64_t)o_parts * c_parts, 1, reduce_parts, g);
     for (int i = 0; dbias && i < g->chunks; i++)
         for (int o = 0; o < c->oc; o++) dbias[o] += g->bias_sums[(ptrdiff_t)i * c->oc + o];
 }

@@ -3,6 +3,7 @@
  * second cache, and a tile of output channels x pixels stays in registers over all taps and inputs. */
 #include "tensor/conv/plan.h"
 #include "tensor/scratch.h"
+#include "tensor/team.h"
 #include "tensor/threads.h"
 #include <string.h>
 
@@ -152,15 +153,22 @@ static void run_band(const conv_plan *p, int image, int begin, int end)
     }
 }
 
+typedef struct run_job {
+    const conv_plan *p;
+    int bands;
+} run_job;
+
+static void run_unit(const void *job, int64_t unit)
+{
+    const run_job *j = job;
+    int begin, end;
+    conv_part(j->p->h, j->bands, (int)(unit % j->bands), &begin, &end);
+    run_band(j->p, (int)(unit / j->bands), begin, end);
+}
+
 void conv_run_lanes(const conv_plan *p)
 {
     int bands = (4 * ts_threads_of(p->threads) + p->n - 1) / p->n; /* each makes the rows around it anew */
     if (bands > (p->h + 7) / 8) bands = (p->h + 7) / 8;
-#pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads_of(p->threads))
-    for (int n = 0; n < p->n; n++)
-        for (int i = 0; i < bands; i++) {
-            int begin, end;
-            conv_part(p->h, bands, i, &begin, &end);
-            run_band(p, n, begin, end);
-        }
+    ts_tasks(p->threads, (int64_t)p->n * bands, run_unit, &(run_job){p, bands});
 }

@@ -5,7 +5,7 @@
 #include "tensor/kernels/elementwise.h"
 #include "tensor/kernels/winograd.h"
 #include "tensor/scratch.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <string.h>
 
 enum {
@@ -57,25 +57,39 @@ winograd_grid winograd_grid_gradient(const ts_conv *c, int fold)
 
 size_t conv_winograd_count(int ic, int oc) { return (size_t)conv_panels_count(ic, oc, 1) * WINOGRAD_AREA; }
 
+typedef struct pack_job {
+    bool forward;
+    int ic, oc;
+    ptrdiff_t plane, o_step, i_step;
+    const float *weight;
+    float *packed;
+} pack_job;
+
+static void pack_inputs(const void *job, int64_t begin, int64_t end)
+{
+    const pack_job *j = job;
+    const int lanes = conv_lanes();
+    for (int64_t at = begin; at < end; at++) {
+        const int panel = (int)(at / j->ic), i = (int)(at % j->ic), vectors = conv_vectors(j->oc, panel),
+                  width = vectors * lanes, o0 = panel * 2 * lanes;
+        float tap[9 * 2 * 16] = {0}; /* no vector has more than 16 lanes */
+        for (int o = 0; o < width && o0 + o < j->oc; o++) {
+            const float *from = j->weight + i * j->i_step + (o0 + o) * j->o_step;
+            for (int t = 0; t < 9; t++) tap[t * width + o] = from[j->forward ? t : 8 - t];
+        }
+        ts_winograd_k()->weights(tap, vectors, j->packed + (ptrdiff_t)o0 * j->ic + (ptrdiff_t)i * width, j->plane);
+    }
+}
+
 /* packed: [36][panel][input][channel of the panel] = G g G' */
 void conv_winograd_pack(const ts_conv *c, bool forward, const float *weight, float *packed)
 {
-    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), panels = conv_panels(oc),
-              lanes = conv_lanes();
+    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c);
     const ptrdiff_t plane = conv_panels_count(ic, oc, 1);
     /* weight[o][c][tap]: strides of the packed input and output channel */
     const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * 9 : 9, i_step = forward ? 9 : (ptrdiff_t)c->ic * 9;
-#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(c->compute.threads))
-    for (int panel = 0; panel < panels; panel++)
-        for (int i = 0; i < ic; i++) {
-            const int vectors = conv_vectors(oc, panel), width = vectors * lanes, o0 = panel * 2 * lanes;
-            float tap[9 * 2 * 16] = {0}; /* no vector has more than 16 lanes */
-            for (int o = 0; o < width && o0 + o < oc; o++) {
-                const float *from = weight + i * i_step + (o0 + o) * o_step;
-                for (int t = 0; t < 9; t++) tap[t * width + o] = from[forward ? t : 8 - t];
-            }
-            ts_winograd_k()->weights(tap, vectors, packed + (ptrdiff_t)o0 * ic + (ptrdiff_t)i * width, plane);
-        }
+    ts_for(c->compute.threads, (int64_t)conv_panels(oc) * ic, 1, pack_inputs,
+           &(pack_job){forward, ic, oc, plane, o_step, i_step, weight, packed});
 }
 
 void winograd_locate(const winograd_grid *g, int64_t first, int count, winograd_place *place)
@@ -163,35 +177,48 @@ static void put_targets(const winograd_grid *g, winograd_place tile, float *y,
     for (int i = 0; i < WINOGRAD_SIDE * WINOGRAD_SIDE; i++) pixel[i] = at[i] < 0 ? NULL : y + at[i];
 }
 
+typedef struct run_job {
+    const winograd_grid *g;
+    const float *x, *packed, *bias;
+    float leak;
+    bool add;
+    float *y;
+} run_job;
+
+static void run_tiles(const void *job, int64_t group)
+{
+    const run_job *j = job;
+    const winograd_grid *g = j->g;
+    const ptrdiff_t in = winograd_plane(TILES, g->ic), out = winograd_plane(TILES, g->oc);
+    const struct ts_winograd_kernels *kernels = ts_winograd_k();
+    const int64_t first = group * TILES;
+    const int count = (int)(g->tiles - first < TILES ? g->tiles - first : TILES);
+    float *v = ts_scratch(0, sizeof(float) * (size_t)(in * WINOGRAD_AREA)),
+          *m = ts_scratch(1, sizeof(float) * (size_t)(out * WINOGRAD_AREA));
+    float *nothing = ts_scratch(2, sizeof(float) * (size_t)g->ic);
+    memset(nothing, 0, sizeof(float) * (size_t)g->ic);
+    const float *from[2][WINOGRAD_AREA];
+    winograd_place place[TILES + 1];
+    winograd_locate(g, first, count, place);
+    place[count] = place[count - 1];
+    winograd_sources(g, j->x, nothing, place[0], from[0]);
+    for (int i = 0; i < count; i++) {
+        winograd_sources(g, j->x, nothing, place[i + 1], from[(i + 1) & 1]);
+        kernels->input(from[i & 1], from[(i + 1) & 1], g->ic, v + (ptrdiff_t)i * g->ic, in);
+    }
+    multiply(g, j->packed, v, count, m);
+    float *to[2][WINOGRAD_SIDE * WINOGRAD_SIDE];
+    put_targets(g, place[0], j->y, to[0]);
+    for (int i = 0; i < count; i++) {
+        put_targets(g, place[i + 1], j->y, to[(i + 1) & 1]);
+        kernels->output(m + (ptrdiff_t)i * g->oc, out, g->oc, j->bias, j->leak, j->add, to[i & 1], to[(i + 1) & 1]);
+    }
+}
+
 static void run(const winograd_grid *g, const float *x, const float *packed, const float *bias, float leak, bool add,
                 float *y)
 {
-    const ptrdiff_t in = winograd_plane(TILES, g->ic), out = winograd_plane(TILES, g->oc);
-    const struct ts_winograd_kernels *kernels = ts_winograd_k();
-#pragma omp parallel for schedule(dynamic) num_threads(ts_threads_of(g->threads))
-    for (int64_t first = 0; first < g->tiles; first += TILES) {
-        const int count = (int)(g->tiles - first < TILES ? g->tiles - first : TILES);
-        float *v = ts_scratch(0, sizeof(float) * (size_t)(in * WINOGRAD_AREA)),
-              *m = ts_scratch(1, sizeof(float) * (size_t)(out * WINOGRAD_AREA));
-        float *nothing = ts_scratch(2, sizeof(float) * (size_t)g->ic);
-        memset(nothing, 0, sizeof(float) * (size_t)g->ic);
-        const float *from[2][WINOGRAD_AREA];
-        winograd_place place[TILES + 1];
-        winograd_locate(g, first, count, place);
-        place[count] = place[count - 1];
-        winograd_sources(g, x, nothing, place[0], from[0]);
-        for (int i = 0; i < count; i++) {
-            winograd_sources(g, x, nothing, place[i + 1], from[(i + 1) & 1]);
-            kernels->input(from[i & 1], from[(i + 1) & 1], g->ic, v + (ptrdiff_t)i * g->ic, in);
-        }
-        multiply(g, packed, v, count, m);
-        float *to[2][WINOGRAD_SIDE * WINOGRAD_SIDE];
-        put_targets(g, place[0], y, to[0]);
-        for (int i = 0; i < count; i++) {
-            put_targets(g, place[i + 1], y, to[(i + 1) & 1]);
-            kernels->output(m + (ptrdiff_t)i * g->oc, out, g->oc, bias, leak, add, to[i & 1], to[(i + 1) & 1]);
-        }
-    }
+    ts_tasks(g->threads, (g->tiles + TILES - 1) / TILES, run_tiles, &(run_job){g, x, packed, bias, leak, add, y});
 }
 
 void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
@@ -218,6 +245,23 @@ static void fold_row(const ts_conv *c, int fold, int channels, const float *larg
     }
 }
 
+typedef struct fold_job {
+    const ts_conv *c;
+    int fold, channels;
+    ptrdiff_t image;
+    const float *larger;
+    bool add;
+    float *dx;
+} fold_job;
+
+static void fold_rows(const void *job, int64_t begin, int64_t end)
+{
+    const fold_job *j = job;
+    for (int64_t at = begin; at < end; at++)
+        fold_row(j->c, j->fold, j->channels, j->larger + at / j->c->h * j->image, (int)(at % j->c->h), j->add,
+                 j->dx + at * j->c->w * j->channels);
+}
+
 void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
 {
     const int fold = c->pad == TS_PAD_REPLICATE ? c->dilation : 0, channels = ts_conv_variables(c);
@@ -229,9 +273,6 @@ void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const flo
     const ptrdiff_t image = (ptrdiff_t)g.out_h * g.out_w * channels;
     float *larger = ts_scratch(3, sizeof(float) * (size_t)(image * c->n));
     run(&g, dy, packed, NULL, 1, false, larger);
-#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(c->compute.threads))
-    for (int n = 0; n < c->n; n++)
-        for (int i = 0; i < c->h; i++)
-            fold_row(c, fold, channels, larger + n * image, i, accumulate,
-                     dx + ((ptrdiff_t)n * c->h + i) * c->w * channels);
+    ts_for(c->compute.threads, (int64_t)c->n * c->h, 1, fold_rows,
+           &(fold_job){c, fold, channels, image, larger, accumulate, dx});
 }

@@ -4,7 +4,7 @@
 #include "tensor/conv/conv_winograd.h"
 #include "tensor/kernels/winograd.h"
 #include "tensor/scratch.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <string.h>
 
 enum {
@@ -21,6 +21,7 @@ typedef struct job {
     int group, chunks;
     ptrdiff_t in, out, plane, size; /* planes of V and of M; of the sums; and all those of a chunk */
     float *sums;                    /* [chunk][36][input][padded] */
+    float *dweight;
 } job;
 
 static job make_job(const ts_conv *c, const float *x, const float *dy)
@@ -109,25 +110,28 @@ static void run_chunk(const job *j, int chunk)
     }
 }
 
+static void run_task(const void *made, int64_t chunk) { run_chunk(made, (int)chunk); }
+
+static void reduce_inputs(const void *made, int64_t begin, int64_t end)
+{
+    const job *j = made;
+    const int lanes = conv_lanes(), ic = j->g.ic, oc = j->g.oc;
+    for (int64_t at = begin; at < end; at++) {
+        const int o0 = (int)(at / ic) * lanes, i = (int)(at % ic);
+        float tap[9 * 16]; /* no vector has more than 16 lanes */
+        ts_winograd_k()->weights_gradient(j->sums + (ptrdiff_t)i * j->padded + o0, j->plane, j->chunks, j->size, tap);
+        for (int o = 0; o < lanes && o0 + o < oc; o++) {
+            float *to = j->dweight + ((ptrdiff_t)(o0 + o) * ic + i) * 9;
+            for (int t = 0; t < 9; t++) to[t] += tap[t * lanes + o];
+        }
+    }
+}
+
 void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const float *dy, float *dweight)
 {
     job j = make_job(c, x, dy);
-    const int lanes = conv_lanes();
+    j.dweight = dweight;
     j.sums = ts_scratch(2, sizeof(float) * (size_t)(j.size * j.chunks));
-#pragma omp parallel num_threads(ts_threads_of(c->compute.threads))
-    {
-#pragma omp for schedule(dynamic)
-        for (int chunk = 0; chunk < j.chunks; chunk++) run_chunk(&j, chunk);
-#pragma omp for collapse(2) schedule(static)
-        for (int o0 = 0; o0 < j.padded; o0 += lanes)
-            for (int i = 0; i < c->ic; i++) {
-                float tap[9 * 16]; /* no vector has more than 16 lanes */
-                ts_winograd_k()->weights_gradient(j.sums + (ptrdiff_t)i * j.padded + o0, j.plane, j.chunks, j.size,
-                                                  tap);
-                for (int o = 0; o < lanes && o0 + o < c->oc; o++) {
-                    float *to = dweight + ((ptrdiff_t)(o0 + o) * c->ic + i) * 9;
-                    for (int t = 0; t < 9; t++) to[t] += tap[t * lanes + o];
-                }
-            }
-    }
+    ts_tasks(c->compute.threads, j.chunks, run_task, &j);
+    ts_for(c->compute.threads, (int64_t)(j.padded / conv_lanes()) * c->ic, 1, reduce_inputs, &j);
 }

@@ -2,7 +2,7 @@
 #include "tensor/conv/gemm.h"
 #include "tensor/conv/plan.h"
 #include "tensor/scratch.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 
 enum {
     ROWS = 8 * TS_TILE_PIXELS, /* of C in one unit of work */
@@ -15,23 +15,38 @@ static inline float value(const float *m, bool transposed, ptrdiff_t row_length,
     return transposed ? m[j * row_length + i] : m[i * row_length + j];
 }
 
+typedef struct pack_job {
+    bool tb;
+    int n, k, parts;
+    float alpha;
+    const float *b;
+    float *packed;
+} pack_job;
+
+static void pack_part(const pack_job *p, int panel, int part)
+{
+    const int lanes = conv_lanes(), j0 = panel * 2 * lanes, width = conv_vectors(p->n, panel) * lanes,
+              count = p->n - j0 < width ? p->n - j0 : width;
+    int begin, end;
+    conv_part(p->k, p->parts, part, &begin, &end);
+    for (int i = begin; i < end; i++) {
+        float *to = p->packed + (ptrdiff_t)j0 * p->k + (ptrdiff_t)i * width;
+        for (int j = 0; j < count; j++) to[j] = p->alpha * value(p->b, p->tb, p->tb ? p->k : p->n, i, j0 + j);
+        for (int j = count; j < width; j++) to[j] = 0;
+    }
+}
+
+static void pack_parts(const void *job, int64_t begin, int64_t end)
+{
+    const pack_job *p = job;
+    for (int64_t i = begin; i < end; i++) pack_part(p, (int)(i / p->parts), (int)(i % p->parts));
+}
+
 /* alpha op(B) as [panel][k][lane] */
 static void pack_b(bool tb, int n, int k, float alpha, const float *b, float *packed, int threads)
 {
-    const int lanes = conv_lanes(), panels = conv_panels(n), parts = k > 64 ? 16 : 1;
-#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(threads))
-    for (int panel = 0; panel < panels; panel++)
-        for (int part = 0; part < parts; part++) {
-            const int j0 = panel * 2 * lanes, width = conv_vectors(n, panel) * lanes,
-                      count = n - j0 < width ? n - j0 : width;
-            int begin, end;
-            conv_part(k, parts, part, &begin, &end);
-            for (int i = begin; i < end; i++) {
-                float *to = packed + (ptrdiff_t)j0 * k + (ptrdiff_t)i * width;
-                for (int j = 0; j < count; j++) to[j] = alpha * value(b, tb, tb ? k : n, i, j0 + j);
-                for (int j = count; j < width; j++) to[j] = 0;
-            }
-        }
+    const int parts = k > 64 ? 16 : 1;
+    ts_for(threads, (int64_t)conv_panels(n) * parts, 1, pack_parts, &(pack_job){tb, n, k, parts, alpha, b, packed});
 }
 
 typedef struct product {
@@ -39,6 +54,7 @@ typedef struct product {
     int m, n, k;
     const float *a, *packed;
     float beta, *c;
+    int groups, panels;
 } product;
 
 /* Rows [row, row + rows) of C, k in [k0, k1), panels [panel0, panel1). */
@@ -82,32 +98,36 @@ static void run_part(const product *p, int row, int rows, int k0, int k1, int pa
     }
 }
 
+static void run_unit(const void *job, int64_t unit)
+{
+    const product *p = job;
+    int panel0, panel1;
+    conv_part(p->panels, p->groups, (int)(unit % p->groups), &panel0, &panel1);
+    const int row = (int)(unit / p->groups) * ROWS, rows = p->m - row < ROWS ? p->m - row : ROWS;
+    for (int k0 = 0; k0 < p->k; k0 += DEPTH)
+        run_part(p, row, rows, k0, p->k - k0 < DEPTH ? p->k : k0 + DEPTH, panel0, panel1);
+}
+
 void ts_gemm(bool ta, bool tb, int m, int n, int k, float alpha, const float *a, const float *b, float beta, float *c,
              int threads)
 {
     const int lanes = conv_lanes(), panels = conv_panels(n), units = (m + ROWS - 1) / ROWS;
     float *packed = ts_scratch(2, sizeof(float) * (size_t)k * (size_t)((n + lanes - 1) / lanes * lanes));
     pack_b(tb, n, k, alpha, b, packed, threads);
-    const product p = {.ta = ta,
-                       .scale = beta != 0 && beta != 1,
-                       .m = m,
-                       .n = n,
-                       .k = k,
-                       .a = a,
-                       .packed = packed,
-                       .beta = beta,
-                       .c = c};
+    product p = {.ta = ta,
+                 .scale = beta != 0 && beta != 1,
+                 .m = m,
+                 .n = n,
+                 .k = k,
+                 .a = a,
+                 .packed = packed,
+                 .beta = beta,
+                 .c = c};
     int groups = units < 8 ? (8 + units - 1) / units : 1;
     if (groups > panels) groups = panels;
-#pragma omp parallel for collapse(2) schedule(dynamic) num_threads(ts_threads_of(threads))
-    for (int i = 0; i < units; i++)
-        for (int g = 0; g < groups; g++) {
-            int panel0, panel1;
-            conv_part(panels, groups, g, &panel0, &panel1);
-            const int row = i * ROWS, rows = m - row < ROWS ? m - row : ROWS;
-            for (int k0 = 0; k0 < k; k0 += DEPTH)
-                run_part(&p, row, rows, k0, k - k0 < DEPTH ? k : k0 + DEPTH, panel0, panel1);
-        }
+    p.panels = panels;
+    p.groups = groups;
+    ts_tasks(threads, (int64_t)units * groups, run_unit, &p);
 }
 
 void ts_gemm_naive(bool ta, bool tb, int m, int n, int k, float alpha, const float *a, const float *b, float beta,

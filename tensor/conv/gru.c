@@ -1,7 +1,7 @@
 #include "tensor/conv/gru_internal.h"
 #include "tensor/kernels/elementwise.h"
 #include "tensor/scratch.h"
-#include "tensor/threads.h"
+#include "tensor/team.h"
 #include <string.h>
 
 enum {
@@ -49,23 +49,40 @@ static void gates_forward(conv_plan p, const float *x, int count, float *y)
     conv_run_pixels(&p, 0, count, 0, conv_panels(p.oc));
 }
 
+typedef struct forward_job {
+    const ts_gru *g;
+    conv_plan input, hidden;
+    const float *x, *old, *hh_bias;
+    float *y, *saved;
+} forward_job;
+
+static void forward_band(const forward_job *j, int64_t p)
+{
+    const ts_gru *g = j->g;
+    const int gates = 3 * g->c, count = (int)(g->pixels - p < GRU_BAND ? g->pixels - p : GRU_BAND);
+    float *ih = ts_scratch(0, sizeof(float) * (size_t)(GRU_BAND * gates)),
+          *hh = ts_scratch(1, sizeof(float) * (size_t)(GRU_BAND * gates));
+    gates_forward(j->input, j->x + p * g->ic, count, ih);
+    const float *old = j->old ? j->old + p * g->c : NULL;
+    if (old) gates_forward(j->hidden, old, count, hh);
+    /* A zero state leaves of the hidden gates their bias. */
+    ts_elementwise_k()->gru(count, g->c, ih, old ? hh : j->hh_bias, old ? gates : 0, old, j->y + p * g->c,
+                            j->saved ? j->saved + p * 4 * g->c : NULL);
+}
+
+static void forward_bands(const void *job, ts_queue *queue)
+{
+    for (int64_t begin, end; ts_next(queue, &begin, &end);)
+        for (int64_t i = begin; i < end; i++) forward_band(job, i * GRU_BAND);
+}
+
 void ts_gru_forward(const ts_gru *g, const float *x, const float *old, const float *ih_packed, const float *ih_bias,
                     const float *hh_packed, const float *hh_bias, float *y, float *saved)
 {
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
-    const int gates = 3 * g->c;
-    const conv_plan input = gates_of(g, g->ic, ih_packed, ih_bias), hidden = gates_of(g, g->c, hh_packed, hh_bias);
-#pragma omp parallel for schedule(dynamic, 4) num_threads(ts_threads_of(g->threads))
-    for (int64_t p = 0; p < g->pixels; p += GRU_BAND) {
-        const int count = (int)(g->pixels - p < GRU_BAND ? g->pixels - p : GRU_BAND);
-        float *ih = ts_scratch(0, sizeof(float) * (size_t)(GRU_BAND * gates)),
-              *hh = ts_scratch(1, sizeof(float) * (size_t)(GRU_BAND * gates));
-        gates_forward(input, x + p * g->ic, count, ih);
-        if (old) gates_forward(hidden, old + p * g->c, count, hh);
-        /* A zero state leaves of the hidden gates their bias. */
-        k->gru(count, g->c, ih, old ? hh : hh_bias, old ? gates : 0, old ? old + p * g->c : NULL, y + p * g->c,
-               saved ? saved + p * 4 * g->c : NULL);
-    }
+    enum { BANDS = 4 }; /* at a time */
+    ts_share_tasks(g->threads, (g->pixels + GRU_BAND - 1) / GRU_BAND, BANDS, forward_bands,
+                   &(forward_job){g, gates_of(g, g->ic, ih_packed, ih_bias), gates_of(g, g->c, hh_packed, hh_bias), x,
+                                  old, hh_bias, y, saved});
 }
 
 /* y[p] (+)= the sum over runs of channels of a[p]: a band's data gradient. */
@@ -172,6 +189,42 @@ static void reduce_bias(const double *first, ptrdiff_t part, int parts, int c, c
     }
 }
 
+typedef struct backward_job {
+    const ts_gru *g;
+    const float *x, *old, *ih_packed, *hh_packed, *saved, *dy;
+    const ts_gru_gradients *to;
+    int parts;
+    ptrdiff_t input, size; /* of a part: floats of its first sums; all of it, in doubles */
+    double *memory;
+} backward_job;
+
+static void backward_part(const void *job, int64_t part)
+{
+    const backward_job *j = job;
+    const ts_gru *g = j->g;
+    double *own = j->memory + part * j->size;
+    float *weights = (float *)(void *)(own + 4 * g->c);
+    memset(own, 0, sizeof(double) * (size_t)j->size);
+    const sums s = {weights, weights + j->input, j->to->ih_bias || j->to->hh_bias ? own : NULL};
+    const int64_t begin = g->pixels * part / j->parts, end = g->pixels * (part + 1) / j->parts;
+    for (int64_t p = begin; p < end; p += GRU_BAND)
+        run_band(g, p, (int)(end - p < GRU_BAND ? end - p : GRU_BAND), j->x, j->old, j->ih_packed, j->hh_packed,
+                 j->saved, j->dy, j->to, s);
+}
+
+static void reduce_rows(const void *job, int64_t begin, int64_t end)
+{
+    const backward_job *j = job;
+    const int c = j->g->c, ic = j->g->ic, gates = 3 * c;
+    const float *first = (const float *)(const void *)(j->memory + 4 * c);
+    for (int64_t m = begin; m < end; m++) {
+        if (j->to->ih_weight)
+            reduce_row(first + m * padded(ic), 2 * j->size, j->parts, ic, j->to->ih_weight + (m + 2 * c) % gates * ic);
+        if (j->to->hh_weight && j->old)
+            reduce_row(first + j->input + m * padded(c), 2 * j->size, j->parts, c, j->to->hh_weight + m * c);
+    }
+}
+
 void ts_gru_backward(const ts_gru *g, const float *x, const float *old, const float *ih_packed, const float *hh_packed,
                      const float *saved, const float *dy, const ts_gru_gradients *to)
 {
@@ -179,31 +232,10 @@ void ts_gru_backward(const ts_gru *g, const float *x, const float *old, const fl
     const int64_t most = g->pixels / PART_PIXELS;
     const int parts = most < 1 ? 1 : most > PARTS ? PARTS : (int)most;
     const ptrdiff_t input = (ptrdiff_t)gates * padded(g->ic), hidden = (ptrdiff_t)gates * padded(c);
-    const ptrdiff_t doubles = 4 * c, size = doubles + (input + hidden + 1) / 2; /* of a part, in doubles */
+    const ptrdiff_t size = 4 * c + (input + hidden + 1) / 2;
     double *memory = ts_scratch(2, sizeof(double) * (size_t)(size * parts));
-#pragma omp parallel num_threads(ts_threads_of(g->threads))
-    {
-#pragma omp for schedule(dynamic)
-        for (int part = 0; part < parts; part++) {
-            double *own = memory + part * size;
-            float *weights = (float *)(void *)(own + doubles);
-            memset(own, 0, sizeof(double) * (size_t)size);
-            const sums s = {weights, weights + input, to->ih_bias || to->hh_bias ? own : NULL};
-            const int64_t begin = g->pixels * part / parts, end = g->pixels * (part + 1) / parts;
-            for (int64_t p = begin; p < end; p += GRU_BAND)
-                run_band(g, p, (int)(end - p < GRU_BAND ? end - p : GRU_BAND), x, old, ih_packed, hh_packed, saved, dy,
-                         to, s);
-        }
-#pragma omp for schedule(static)
-        for (int m = 0; m < gates; m++) {
-            const float *first = (const float *)(const void *)(memory + doubles);
-            if (to->ih_weight)
-                reduce_row(first + (ptrdiff_t)m * padded(g->ic), 2 * size, parts, g->ic,
-                           to->ih_weight + (ptrdiff_t)((m + 2 * c) % gates) * g->ic);
-            if (to->hh_weight && old)
-                reduce_row(first + input + (ptrdiff_t)m * padded(c), 2 * size, parts, c,
-                           to->hh_weight + (ptrdiff_t)m * c);
-        }
-    }
+    const backward_job j = {g, x, old, ih_packed, hh_packed, saved, dy, to, parts, input, size, memory};
+    ts_tasks(g->threads, parts, backward_part, &j);
+    ts_for(g->threads, gates, 1, reduce_rows, &j);
     if (to->ih_bias || to->hh_bias) reduce_bias(memory, size, parts, c, to);
 }

@@ -35,6 +35,15 @@ isa_is_checked() {
 }
 check isa_is_checked isa_is_checked
 
+threads_of_the_environment_are_checked() {
+    for p in $PROGRAMS; do
+        OMP_NUM_THREADS=many expect 2 "$BIN/lgd-$p" --help
+        says "$T/err" 'OMP_NUM_THREADS is "many"'
+        OMP_NUM_THREADS=2,1 OMP_THREAD_LIMIT='' expect 0 "$BIN/lgd-$p" --help
+    done
+}
+check threads_of_the_environment_are_checked threads_of_the_environment_are_checked
+
 help_to_a_full_disk_fails() {
     [ -w /dev/full ] || skip "no /dev/full"
     for p in $PROGRAMS; do

@@ -2,6 +2,7 @@
 #include "data/materials/noise.h"
 #include "data/materials/procedural.h"
 #include "data/materials/statistics.h"
+#include "tensor/team.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
@@ -24,6 +25,23 @@ TEST(procedural_families_are_named)
     CHECK(io_family_find("velociraptor") == -1 && io_family_find("") == -1, "a name that is none was found");
 }
 
+typedef struct making {
+    const io_procedural *p;
+    int size, count;
+    float *to;
+} making;
+
+/* Another order, other threads, other sizes between. */
+static void make_after_another(const void *job, int64_t task)
+{
+    const making *j = job;
+    const int i = j->count - 1 - (int)task;
+    io_material other = material(8 + 4 * i), m = {.size = j->size, .maps = j->to + (size_t)i * values(j->size)};
+    io_procedural_make(j->p, (uint64_t)(7 * i), &other);
+    io_procedural_make(j->p, (uint64_t)i, &m);
+    io_material_free(&other);
+}
+
 TEST(procedural_bytes_depend_on_seed_and_index_alone)
 {
     enum { COUNT = 24, SIZE = 32 };
@@ -34,13 +52,7 @@ TEST(procedural_bytes_depend_on_seed_and_index_alone)
         io_material m = {.size = SIZE, .maps = forward + (size_t)i * values(SIZE)};
         io_procedural_make(&p, (uint64_t)i, &m);
     }
-#pragma omp parallel for num_threads(3) schedule(dynamic, 1)
-    for (int i = COUNT - 1; i >= 0; i--) { /* another order, other threads, other sizes between */
-        io_material other = material(8 + 4 * i), m = {.size = SIZE, .maps = parallel + (size_t)i * values(SIZE)};
-        io_procedural_make(&p, (uint64_t)(7 * i), &other);
-        io_procedural_make(&p, (uint64_t)i, &m);
-        io_material_free(&other);
-    }
+    ts_tasks(3, COUNT, make_after_another, &(making){&p, SIZE, COUNT, parallel});
     CHECK(!memcmp(forward, parallel, COUNT * values(SIZE) * sizeof *forward), "the bytes depend on threads or order");
     for (int i = 1; i < COUNT; i++)
         CHECK(memcmp(forward, forward + (size_t)i * values(SIZE), values(SIZE) * sizeof *forward),

@@ -6,10 +6,10 @@
 #include "render/error.h"
 #include "render/render.h"
 #include "tensor/peak.h"
+#include "tensor/team.h"
 #include "tensor/threads.h"
 #include "tests/test.h"
 #include <math.h>
-#include <omp.h>
 #include <sched.h>
 #include <stdlib.h>
 #include <string.h>
@@ -200,6 +200,12 @@ TEST(methods_mean_is_as_bright_as_the_photograph)
     }
 }
 
+static void look(const void *job, int k)
+{
+    cpu_set_t *const *of = job;
+    sched_getaffinity(0, sizeof **of, &(*of)[k]);
+}
+
 TEST(methods_threads_are_pinned_to_a_cpu_each)
 {
     cpu_set_t all, now;
@@ -211,8 +217,7 @@ TEST(methods_threads_are_pinned_to_a_cpu_each)
     ts_threads_set(threads);
     CHECK(ts_threads_pin(), "%d threads are not pinned", threads);
     cpu_set_t of[2];
-#pragma omp parallel num_threads(threads)
-    sched_getaffinity(0, sizeof of[0], &of[omp_get_thread_num()]);
+    CHECK(ts_each_thread(threads, look, &(cpu_set_t *){of}) == threads, "not %d threads", threads);
     for (int i = 0; i < threads; i++) CHECK(CPU_COUNT(&of[i]) == 1, "thread %d has %d CPUs", i, CPU_COUNT(&of[i]));
     CHECK(threads == 1 || !CPU_EQUAL(&of[0], &of[1]), "two threads share a CPU");
 }

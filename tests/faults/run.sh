@@ -6,7 +6,7 @@ set -u
 : "${BUILD:=build}"
 case $BUILD in /*) ;; *) BUILD=$(pwd)/$BUILD ;; esac
 BIN=$BUILD/bin SHIM=$BUILD/lib/lgd-faults.so
-export OMP_WAIT_POLICY=passive LC_ALL=C
+export LC_ALL=C
 T=$(mktemp -d) || exit 1
 trap 'rm -rf "$T"' EXIT
 bad=0 injected=0

@@ -46,7 +46,6 @@ static nn_model *published(void)
             if (!strcmp(p->name, "main_net.rnn.layers.2.input_fun.conv_layer.weight")) scale *= 8;
         }
         const uint64_t hash = name_hash(p->name);
-#pragma omp parallel for
         for (int64_t j = 0; j < (int64_t)p->count; j++)
             m->value[p->offset + (size_t)j] = (float)scale * formula(hash, (uint64_t)j);
     }

@@ -167,6 +167,27 @@ TEST(threads_and_scratch)
     CHECK(ts_threads() == 3, "set");
     ts_threads_set(0);
     CHECK(ts_threads() == ts_threads_allowed(), "default");
+    unsetenv("OMP_NUM_THREADS"), unsetenv("OMP_THREAD_LIMIT");
+    const int here = ts_threads_allowed();
+    setenv("OMP_NUM_THREADS", "5,2", 1);
+    CHECK(ts_threads_allowed() == 5, "OMP_NUM_THREADS=5,2: %d", ts_threads_allowed());
+    setenv("OMP_THREAD_LIMIT", "3", 1);
+    ts_threads_set(0);
+    CHECK(ts_threads() == 3, "OMP_THREAD_LIMIT=3: %d", ts_threads());
+    ts_threads_set(4);
+    CHECK(ts_threads() == 4, "a number that is asked for is above the environment's: %d", ts_threads());
+    unsetenv("OMP_THREAD_LIMIT");
+    static const char *const none[] = {"0", "-1", "two", "2x", ","};
+    for (int i = 0; i < 5; i++) {
+        ts_status st = {0};
+        setenv("OMP_NUM_THREADS", none[i], 1);
+        CHECK(ts_threads_check(&st) == TS_INVALID && strstr(st.message, "OMP_NUM_THREADS") &&
+                  ts_threads_allowed() == here,
+              "OMP_NUM_THREADS=%s: %s", none[i], st.message);
+    }
+    setenv("OMP_NUM_THREADS", "", 1);
+    CHECK(ts_threads_check(NULL) == TS_OK && ts_threads_allowed() == here, "an empty OMP_NUM_THREADS");
+    unsetenv("OMP_NUM_THREADS");
     ts_threads_set(2);
     CHECK(ts_threads_of(5) == 5 && ts_threads_of(0) == 2, "a loop's own number, and the process's");
     pthread_t other;
