@@ -44,6 +44,35 @@ is_as_of_the_program() {
     cmp -s "$T/meta" "$T/meta_shared" || fail "meta.txt is another: $(diff "$T/meta" "$T/meta_shared" | head -n 2)"
 }
 
+# Workers that wait for the next loop when a program gives the library back go on in its code.
+unloaded_with_workers_waiting() {
+    [ -z "$SANITIZED" ] || skip "the sanitizers' libraries are not loaded later"
+    cat >"$T/unload.c" <<'EOT'
+#include "infer/lgd.h"
+#include <dlfcn.h>
+#include <stdio.h>
+#include <string.h>
+static float maps[64 * 64 * 9], image[64 * 64 * 3];
+int main(int count, char **words)
+{
+    const float light[3] = {0, 0, 1};
+    for (int i = 0; i < 50 && count == 2; i++) {
+        int (*render)(const float *, int, const float *, const float *, float, float *, lgd_error *);
+        void *library = dlopen(words[1], RTLD_NOW), *f = library ? dlsym(library, "lgd_render") : NULL;
+        if (!f) return puts(dlerror()), 1;
+        memcpy(&render, &f, sizeof render);
+        lgd_error e;
+        if (render(maps, 64, light, light, 1, image, &e)) return puts(e.message), 1;
+        dlclose(library);
+    }
+    return 0;
+}
+EOT
+    expect 0 ${CC:-gcc} -I. -o "$T/unload" "$T/unload.c" -ldl
+    OMP_NUM_THREADS=4 expect 0 "$T/unload" "$BUILD/liblgd.so"
+}
+check library_unloaded_with_workers_waiting unloaded_with_workers_waiting
+
 install_link_uninstall() {
     [ -z "$SANITIZED" ] || skip "the sanitizers' build is not installed"
     command -v pkg-config >/dev/null || skip "no pkg-config"
