@@ -106,7 +106,7 @@ BENCH(load_estimate)
     const size_t pixels = (size_t)SIDE * SIDE;
     call c = {.image = malloc(pixels * 3 * sizeof(float)), .maps = malloc(pixels * CHANNELS * sizeof(float))};
     bench_heading("an estimate on a machine that does other things too");
-    if (!c.image || !c.maps || lgd_model_path(NULL, "single", path, &st) || !(c.model = lgd_load(path, &e)))
+    if (!c.image || !c.maps || lgd_model_path(NULL, LGD_DEFAULT_MODEL, path, &st) || !(c.model = lgd_load(path, &e)))
         printf("  not measured: %s\n", st.code ? st.message : e.message);
     else {
         for (size_t i = 0; i < pixels * 3; i++) c.image[i] = (float)(i % 97) / 97;
