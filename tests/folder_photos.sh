@@ -3,7 +3,6 @@
 T=$(mktemp -d) || exit 1
 : "${BUILD:=build}"
 case $BUILD in /*) ;; *) BUILD=$(pwd)/$BUILD ;; esac
-export OMP_WAIT_POLICY=passive
 
 make_tiny() {
     printf '%s\n' '[model]' 'g_width = 4' 'g_width_max = 8' 'g_levels = 2' 'g_size = 16' 'h_width = 8' 'h_gru = 4' 'iterations = 2' \

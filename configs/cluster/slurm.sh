@@ -10,7 +10,6 @@
 #SBATCH --signal=TERM@600
 #SBATCH --requeue
 #SBATCH --open-mode=append
-export OMP_PLACES=cores OMP_PROC_BIND=close
 # --resume begins a run where there is none to go on with, if its folder is there.
 resume=
 if [ "${SLURM_RESTART_COUNT:-0}" -gt 0 ]; then resume=--resume; fi

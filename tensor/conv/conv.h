@@ -1,5 +1,5 @@
 /* 2-D convolution on [N, H, W, C] images: stride 1, odd square kernels, dilation 1 or 2, same-size output, and its
- * gradients. Threaded with OpenMP over fixed chunks: the same bytes for any number of threads. Weights are [OC, IC, K,
+ * gradients. Threads share fixed chunks: the same bytes for any number of threads. Weights are [OC, IC, K,
  * K] in files and in parameter blocks and are packed for the kernels by ts_conv_pack. Every function trusts its shape
  * (validated by ts_conv_check). */
 #ifndef TS_CONV_H

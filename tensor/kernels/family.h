@@ -5,7 +5,7 @@
  *     const struct ts_NAME_kernels TS_TABLE(NAME) = { .entry = function, ... };
  * with static functions above. The family's header (tensor/kernels/NAME.h) declares the struct and says
  *     TS_FAMILY(NAME)
- * which gives ts_NAME_k(): the table of the ISA in use. Kernels are serial; OpenMP loops outside wrap them. */
+ * which gives ts_NAME_k(): the table of the ISA in use. Kernels are serial; the loops of tensor/team.h wrap them. */
 #ifndef TS_FAMILY_H
 #define TS_FAMILY_H
 #include "tensor/cpu.h"

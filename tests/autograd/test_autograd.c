@@ -15,8 +15,8 @@
 #endif
 #if defined(__GLIBC__) && !defined(__SANITIZE_ADDRESS__)
 #define COUNTS_ALLOCATIONS 1
-/* The C library's allocator with a counter in front, for the whole test program. What the OpenMP runtime takes for
- * itself is its own affair: only calls from the program's own text count. */
+/* The C library's allocator with a counter in front, for the whole test program. What libraries take for
+ * themselves is their own affair: only calls from the program's own text count. */
 static _Atomic long allocations;
 extern char __executable_start, etext;
 static void count_call(const void *from)

@@ -3,7 +3,7 @@
 
 TRAIN=$BIN/lgd-train
 # In containers one process may not read another's memory; messages go through shared memory instead.
-export OMPI_MCA_btl_vader_single_copy_mechanism=none OMPI_MCA_btl_smsc=none OMP_WAIT_POLICY=passive
+export OMPI_MCA_btl_vader_single_copy_mechanism=none OMPI_MCA_btl_smsc=none
 
 # LAUNCH: the launcher of $1 and its options for a machine of any size, as root too; skips where there is none.
 launcher() {
