@@ -1,6 +1,7 @@
 #include "tensor/threads.h"
 #include "tensor/cgroup.h"
 #include "tensor/team.h"
+#include <limits.h>
 #include <sched.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -87,16 +88,21 @@ ts_code ts_threads_check(ts_status *st)
     return TS_OK;
 }
 
-int ts_threads_allowed(void)
+int ts_threads_of_share(int cpus, int processes)
 {
-    int n = 1;
-    cpu_set_t set;
-    if (sched_getaffinity(0, sizeof set, &set) == 0) n = CPU_COUNT(&set);
-    ts_cgroup_each(take_quota, &n);
     const int asked = from_environment("OMP_NUM_THREADS"), limit = from_environment("OMP_THREAD_LIMIT");
+    int quota = INT_MAX, n = cpus;
+    ts_cgroup_each(take_quota, &quota);
+    if (quota / processes < n) n = quota / processes;
     if (asked > 0) n = asked;
     if (limit > 0 && limit < n) n = limit;
     return n < 1 ? 1 : n;
+}
+
+int ts_threads_allowed(void)
+{
+    cpu_set_t set;
+    return ts_threads_of_share(sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1, 1);
 }
 
 void ts_threads_set(int n) { atomic_store(&wanted, n >= 1 ? n : ts_threads_allowed()); }

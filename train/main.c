@@ -170,7 +170,7 @@ static int run(const tr_config *config, const char *file, bool resume, bool thre
     char folder[1100];
     if (tr_ranks_start(&ranks, &st) != TS_OK) return cl_failed("%s", st.message);
     speak_as_rank(ranks.rank, false);
-    if (ranks.count > 1 && !threads_given) ts_threads_set(ranks.world.threads);
+    if (ranks.count > 1 && !threads_given) ts_threads_set(ts_threads_of_share(ranks.world.cpus, ranks.world.local));
     if (*config->output.folder) snprintf(folder, sizeof folder, "%s", config->output.folder);
     else tr_default_folder(file, folder, sizeof folder);
     const int code = cl_finish(train(config, folder, resume, &ranks));

@@ -79,7 +79,7 @@ static void sum(double *values, int count)
 }
 
 /* Launchers bind ranks to CPUs of their own, or let all of a host run on all of its CPUs. */
-static int threads_of(MPI_Comm host)
+static int cpus_of(MPI_Comm host)
 {
     cpu_set_t mine, all;
     int cpus = 1, total = 0;
@@ -134,7 +134,8 @@ static ts_code start(tr_world *w, ts_status *st)
     *w = (tr_world){.rank = rank, .count = ranks};
     MPI_Comm host;
     MPI_Comm_split_type(MPI_COMM_WORLD, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &host);
-    w->threads = threads_of(host);
+    w->cpus = cpus_of(host);
+    MPI_Comm_size(host, &w->local);
     MPI_Comm_free(&host);
     place mine = {.pid = getpid()}, *all = malloc((size_t)ranks * sizeof *all);
     if (!all) return ts_fail(st, TS_NOMEM, "no memory for the names of %d ranks", ranks);

@@ -19,7 +19,8 @@ typedef enum tr_reduce {
 
 typedef struct tr_world {
     int rank, count;
-    int threads;     /* this rank's share of the CPUs that it may run on with others */
+    int cpus;        /* this rank's share of the CPUs that it may run on with others */
+    int local;       /* ranks on its host, this one too */
     char where[480]; /* for a message: ranks, host and PIDs of each host, as many as fit */
 } tr_world;
 
@@ -40,6 +41,6 @@ typedef struct tr_mpi {
     void (*complete)(void); /* waits for all that was begun */
 } tr_mpi;
 
-#define TR_MPI_BUILD LGD_VERSION " 1"
+#define TR_MPI_BUILD LGD_VERSION " 2"
 #define TR_MPI_TABLE "tr_mpi_table"
 #endif
