@@ -2,6 +2,7 @@
 #include "tensor/cpu.h"
 #include "tensor/new_file.h"
 #include "tensor/scratch.h"
+#include "tensor/team.h"
 #include "tensor/threads.h"
 #include <ctype.h>
 #include <errno.h>
@@ -40,10 +41,21 @@ static void no_scratch(size_t bytes)
     _exit(CL_FAILED);
 }
 
+/* Called by any thread, so that the line is one write. */
+static void fewer_threads(int threads, int wanted)
+{
+    char line[192];
+    if (!speaker) return;
+    const int n = snprintf(line, sizeof line, "%s: %s%sthe system refuses threads (see ulimit -u): %d of %d compute\n",
+                           program_name, speaker, *speaker ? ": " : "", threads, wanted);
+    (void)!write(STDERR_FILENO, line, (size_t)n);
+}
+
 int cl_init(const char *program)
 {
     program_name = program;
     ts_scratch_fails(no_scratch);
+    ts_team_refused(fewer_threads);
     setlocale(LC_ALL, "C");
     signal(SIGPIPE, SIG_IGN);
     ts_status st = {0};

@@ -61,6 +61,7 @@ static atomic_uint posted;          /* loops so far, which workers watch */
 static atomic_llong refused_until;  /* nanoseconds */
 static pthread_mutex_t growing = PTHREAD_MUTEX_INITIALIZER, each_alone = PTHREAD_MUTEX_INITIALIZER;
 static _Thread_local bool inside; /* of a loop */
+static void (*on_refusal)(int threads, int wanted);
 
 static void futex_wait(atomic_uint *word, unsigned value)
 {
@@ -161,6 +162,8 @@ static void *work(void *user)
     return NULL;
 }
 
+void ts_team_refused(void (*handler)(int threads, int wanted)) { on_refusal = handler; }
+
 static void before_fork(void) { pthread_mutex_lock(&growing); }
 
 static void after_fork(void) { pthread_mutex_unlock(&growing); }
@@ -180,14 +183,15 @@ static void in_child(void)
 /* So many workers, or as many as the system grants. Signals are for the program's own threads. */
 static void grow(int wanted)
 {
-    static bool watched;
-    static atomic_bool once;
+    static bool watched, once;
+    static atomic_bool told;
     sigset_t all, before;
     pthread_attr_t attr;
     if (atomic_load(&refused_until) > nanoseconds() || pthread_attr_init(&attr)) return;
     pthread_attr_setdetachstate(&attr, PTHREAD_CREATE_DETACHED);
-    if (!atomic_exchange(&once, true)) watched = pthread_atfork(before_fork, after_fork, in_child) == 0;
     pthread_mutex_lock(&growing);
+    if (!once) watched = pthread_atfork(before_fork, after_fork, in_child) == 0;
+    once = true;
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
     for (int i; watched && (i = atomic_load(&size)) < wanted; atomic_store(&size, i + 1)) {
@@ -196,9 +200,11 @@ static void grow(int wanted)
         atomic_store(&refused_until, nanoseconds() + (long long)(AGAIN * 1e9));
         break;
     }
+    const int there = atomic_load(&size);
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     pthread_mutex_unlock(&growing);
     pthread_attr_destroy(&attr);
+    if (there < wanted && on_refusal && !atomic_exchange(&told, true)) on_refusal(there + 1, wanted + 1);
 }
 
 /* Sees to it that so many workers look at what is posted, as far as there are such that are not busy. */
