@@ -53,6 +53,21 @@ maps.save(sys.argv[2])' "$PHOTO" "$T/p"
 }
 check python_writes_what_lgd_infer_writes is_as_lgd_infer
 
+# What multiprocessing does on Linux before Python 3.14: the child computes as the parent does, which has workers waiting.
+forks() {
+    numpy
+    export PYTHONPATH="$ROOT/python" PYTHONDONTWRITEBYTECODE=1 LGD_LIBRARY="$BUILD/liblgd.so"
+    expect 0 "$PYTHON" -c 'import lgd, os, sys
+def bytes_of(): return lgd.estimate(sys.argv[1], size=32, iterations=1, threads=3).array.tobytes()
+before = bytes_of()
+for _ in range(3):
+    child = os.fork()
+    if child == 0: os._exit(bytes_of() != before)
+    assert bytes_of() == before
+    assert os.waitpid(child, 0)[1] == 0' "$PHOTO"
+}
+check python_package_in_a_forked_process forks
+
 # A venv that sees the numpy of its Python, so that nothing is fetched.
 venv() {
     numpy
