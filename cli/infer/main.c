@@ -2,7 +2,7 @@
 #include "cli/cli.h"
 #include "cli/infer/index.h"
 #include "cli/infer/manifest.h"
-#include "cli/infer/operands.h"
+#include "cli/operands.h"
 #include "cli/infer/options.h"
 #include "cli/infer/pipeline.h"
 #include "cli/infer/record.h"
@@ -288,11 +288,11 @@ static int work(const lgd_command *given)
     lgd_command own = *given;
     const lgd_command *const c = &own;
     ts_status st = {0};
-    lgd_operands operands = {0};
+    cl_operands operands = {0};
     lgd_error error;
     lgd_plan plan;
     char weights[LGD_PATH_MAX], *recipe = NULL;
-    if (!*c->capture && lgd_operands_expand(c->photo, c->photos, say_failed, &operands, &st) != TS_OK)
+    if (!*c->capture && cl_operands_expand(c->photo, c->photos, say_failed, &operands, &st) != TS_OK)
         return cl_failed("%s", st.message);
     if (!*c->capture) own.photo = operands.photo, own.photos = operands.photos;
     char *const *photo = c->photo;
@@ -300,14 +300,14 @@ static int work(const lgd_command *given)
     if (photos == 0) return CL_FAILED;
     if ((c->corners && photos > 1) || (c->sheet && photos > IO_SOLVE_MOST)) {
         const int most = c->corners ? 1 : IO_SOLVE_MOST;
-        const int code = cl_usage("--%s: '%s' is one photograph more than %d", c->corners ? "corners" : "sheet",
-                                  photo[most], most);
-        lgd_operands_free(&operands);
+        const int code = cl_usage("--%s takes %d photograph%s at most: '%s' is one too many",
+                                  c->corners ? "corners" : "sheet", most, most > 1 ? "s" : "", photo[most]);
+        cl_operands_free(&operands);
         return code;
     }
     const ts_code bad = lgd_plan_make(photo, c->sheet ? 1 : photos, c->out, &plan, &st);
     if (bad) {
-        lgd_operands_free(&operands);
+        cl_operands_free(&operands);
         return bad == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
     }
     ts_threads_set(c->threads);
@@ -317,7 +317,7 @@ static int work(const lgd_command *given)
     run r = {.command = c, .lock = PTHREAD_MUTEX_INITIALIZER};
     if (settle(&r, &plan, several, &st) != TS_OK) {
         lgd_plan_free(&plan);
-        lgd_operands_free(&operands);
+        cl_operands_free(&operands);
         return st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
     }
     int code = CL_FAILED;
@@ -344,7 +344,7 @@ static int work(const lgd_command *given)
     lgd_pipeline_end(&pipeline);
     lgd_free(&r.model);
     lgd_plan_free(&plan);
-    lgd_operands_free(&operands);
+    cl_operands_free(&operands);
     free(recipe);
     return code;
 }

@@ -76,6 +76,14 @@ checks() {
     photo "$T/bare.ppm" 200 150
     expect 1 capture check "$one/photo_1.jpg" "$T/bare.ppm"
     says "$T/out" "bare.ppm: no tag"
+    mkdir "$T/folder" "$T/empty"
+    cp "$one/photo_1.jpg" "$one/photo_3.jpg" "$T/folder"
+    expect 0 capture check "$T/folder"
+    [ "$(grep -c '; fine$' "$T/out")" -eq 2 ] || fail "not both of the folder: $(cat "$T/out")"
+    expect 1 capture check "$T/folder" "$T/empty"
+    says "$T/err" "$T/empty: there is no photograph in this folder"
+    [ "$(grep -c '; fine$' "$T/out")" -eq 2 ] || fail "an empty folder stops the rest: $(cat "$T/out")"
+    expect 1 capture check "$T/empty"
 }
 
 # Materials under a sheet are evaluated from what is found in their photographs, and from the truth.
