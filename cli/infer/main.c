@@ -240,8 +240,8 @@ static void print_help(void)
     cl_argument_help(lgd_infer_arguments, stdout);
     puts("\n"
          "DIR/STEM/ gets diffuse.png, specular.png (sRGB), roughness.png, normal.png (linear), maps.exr (all channels, "
-         "linear\n"
-         "float), meta.txt (what these mean), render.png (the photograph beside the re-rendered one) and preview.png "
+         "linear),\n"
+         "meta.txt (what these mean), render.png (the photograph beside the re-rendered one) and preview.png "
          "(four light\n"
          "positions). A photograph's files appear together when they are complete. Each finished folder is printed on "
          "standard\n"

@@ -233,8 +233,9 @@ TEST(render_view_tilted)
         CHECK(!memcmp(view.camera, view.light, sizeof view.light), "%d degrees: the light has left the lens", degrees);
         rd_render(rd_grid_full(1), matt, 9, &straight, false, a);
         rd_render(rd_grid_full(1), matt, 9, &view, false, b);
+        /* F of F0 = 0 is not quite 0, and its share grows with the angle */
         for (int c = 0; c < 3; c++)
-            CHECK(fabsf(a[c] - b[c]) < 1e-5f, "%d degrees: %g in the middle, not %g", degrees, (double)b[c],
+            CHECK(fabsf(a[c] - b[c]) < 1e-4f * a[c], "%d degrees: %g in the middle, not %g", degrees, (double)b[c],
                   (double)a[c]);
     }
 }
