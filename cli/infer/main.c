@@ -212,12 +212,12 @@ static void finished(const lgd_item *item, void *user)
     pthread_mutex_unlock(&r->lock);
 }
 
-static int all(run *r, lgd_pipeline *pipeline)
+static int all(run *r, lgd_pipeline *pipeline, const char *recipe)
 {
     const double start = cl_seconds();
     r->poor = open_memstream(&r->text, &r->size); /* without it no names are told */
     r->bar = cl_progress_start("step", (int64_t)r->jobs * (r->steps + 1));
-    lgd_pipeline_run(pipeline, r->model, &(lgd_listener){show, finished, cl_interrupted, r});
+    lgd_pipeline_run(pipeline, r->model, recipe, &(lgd_listener){show, finished, cl_interrupted, r});
     cl_progress_end(&r->bar);
     if (!r->command->quiet && (r->jobs > 1 || r->there)) sum_up(r, cl_seconds() - start);
     if (r->poor) fclose(r->poor);
@@ -326,17 +326,19 @@ static int work(const lgd_command *given)
     if (lgd_model_path(c->model, *c->capture || (c->sheet && c->photos > 1) ? "multi" : LGD_DEFAULT_MODEL, weights,
                        &st) != TS_OK)
         cl_failed("%s", st.message);
-    else if (lgd_weights_published(weights, &published, &st) != TS_OK || !(recipe = lgd_recipe(c, weights, &st)))
+    else if (lgd_weights_published(weights, &published, &st) != TS_OK ||
+             (c->skip_existing && !(recipe = lgd_recipe(c, weights, &st))))
         cl_failed("%s", st.message);
     else if (!(pipeline = lgd_pipeline_start(&plan, c, recipe, published, &st)))
-        cl_failed("%s", st.message); /* decodes while the weights are read */
+        cl_failed("%s", st.message); /* decodes while the weights are read, once to be hashed */
+    else if (!recipe && !(recipe = lgd_recipe(c, weights, &st))) cl_failed("%s", st.message);
     else if (!(r.model = lgd_load(weights, &error))) cl_failed("%s", error.message);
     else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK ||
              (several && !(r.manifest = lgd_manifest_open(&plan, c->out, &st))))
         cl_failed("%s", st.message);
     else {
         r.steps = lgd_command_steps(c, r.model);
-        code = all(&r, pipeline);
+        code = all(&r, pipeline, recipe);
         if (code == CL_OK && missing) code = CL_FAILED;
         code = end_manifest(&r, code);
     }

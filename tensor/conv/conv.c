@@ -1,4 +1,4 @@
-/* Convolution: checks, packed weights, and the entries, which hand a plan to the way that conv_choose.c names. */
+/* Convolution: checks, and the entries, which hand a plan to the way that conv_choose.c names. */
 #include "tensor/conv/conv.h"
 #include "tensor/conv/plan.h"
 #include "tensor/threads.h"
@@ -25,60 +25,6 @@ ts_code ts_conv_check(const ts_conv *c, ts_status *st)
         return ts_fail(st, TS_INVALID, "convolution of %d x %d x %d x %d to %d channels with side %d is too large",
                        c->n, c->h, c->w, c->ic, c->oc, c->k);
     return TS_OK;
-}
-
-size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
-{
-    if (use == TS_CONV_WINOGRAD) return conv_winograd_count(c->ic, c->oc);
-    if (use == TS_CONV_DATA_GRADIENT_WINOGRAD) return conv_winograd_count(c->oc, ts_conv_variables(c));
-    if (use == TS_CONV_FORWARD_BF16) return conv_bf16_count(c, c->ic, c->oc);
-    if (use == TS_CONV_DATA_GRADIENT_BF16) return conv_bf16_count(c, c->oc, ts_conv_variables(c));
-    const int ic = use == TS_CONV_FORWARD ? c->ic : c->oc, oc = use == TS_CONV_FORWARD ? c->oc : ts_conv_variables(c);
-    const size_t panels = (size_t)conv_panels_count(ic, oc, c->k);
-    const ts_conv_way narrow = conv_choose_narrow(ic, oc, c->k);
-    if (narrow == TS_CONV_BY_COL2IM) return panels + (size_t)conv_col2im_count(ic, oc, c->k);
-    return panels + (narrow == TS_CONV_BY_LANES ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
-}
-
-/* packed: [panel][ky][kx][input][channel of the panel, zeros where there is none] */
-void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float *packed)
-{
-    if (use == TS_CONV_WINOGRAD || use == TS_CONV_DATA_GRADIENT_WINOGRAD) {
-        conv_winograd_pack(c, use == TS_CONV_WINOGRAD, weight, packed);
-        return;
-    }
-    if (use == TS_CONV_FORWARD_BF16 || use == TS_CONV_DATA_GRADIENT_BF16) {
-        conv_pack_bf16(c, use == TS_CONV_FORWARD_BF16, weight, packed);
-        return;
-    }
-    const bool forward = use == TS_CONV_FORWARD;
-    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), taps = c->k * c->k;
-    const int panel_width = 2 * conv_lanes(), panels = conv_panels(oc);
-    /* weight[o][c][tap]: strides of the packed input and output channel */
-    const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * taps : taps,
-                    i_step = forward ? taps : (ptrdiff_t)c->ic * taps;
-    const int parts = ic > 16 ? 16 : ic;
-    /* Behind the panels once more, for the ways of few output channels. */
-    const ts_conv_way narrow = conv_choose_narrow(ic, oc, c->k);
-    float *behind = packed + conv_panels_count(ic, oc, c->k);
-    if (narrow == TS_CONV_BY_COL2IM) conv_pack_col2im(ic, oc, c->k, !forward, weight, i_step, o_step, behind);
-    if (narrow == TS_CONV_BY_LANES) conv_pack_lanes(ic, oc, c->k, !forward, weight, i_step, o_step, behind);
-#pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(c->compute.threads))
-    for (int panel = 0; panel < panels; panel++)
-        for (int part = 0; part < parts; part++) {
-            const int width = conv_vectors(oc, panel) * panel_width / 2, o0 = panel * panel_width,
-                      count = oc - o0 < width ? oc - o0 : width;
-            float *to = packed + (ptrdiff_t)o0 * ic * taps;
-            int begin, end;
-            conv_part(ic, parts, part, &begin, &end);
-            for (int i = begin; i < end; i++)
-                for (int t = 0; t < taps; t++) {
-                    const float *from = weight + i * i_step + o0 * o_step + (forward ? t : taps - 1 - t);
-                    float *row = to + ((ptrdiff_t)t * ic + i) * width;
-                    for (int o = 0; o < count; o++) row[o] = from[o * o_step];
-                    for (int o = count; o < width; o++) row[o] = 0;
-                }
-        }
 }
 
 static void run(const conv_plan *p, ts_conv_way way)

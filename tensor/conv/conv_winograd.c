@@ -58,23 +58,25 @@ winograd_grid winograd_grid_gradient(const ts_conv *c, int fold)
 size_t conv_winograd_count(int ic, int oc) { return (size_t)conv_panels_count(ic, oc, 1) * WINOGRAD_AREA; }
 
 /* packed: [36][panel][input][channel of the panel] = G g G' */
-void conv_winograd_pack(const ts_conv *c, bool forward, const float *weight, float *packed)
+void conv_winograd_pack(const ts_conv *c, bool forward, const conv_weights *w, float *packed)
 {
-    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), panels = conv_panels(oc),
-              lanes = conv_lanes();
+    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), panels = conv_panels(oc);
+    const int step = conv_turned_inputs(9), parts = (ic + step - 1) / step;
     const ptrdiff_t plane = conv_panels_count(ic, oc, 1);
-    /* weight[o][c][tap]: strides of the packed input and output channel */
-    const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * 9 : 9, i_step = forward ? 9 : (ptrdiff_t)c->ic * 9;
 #pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(c->compute.threads))
     for (int panel = 0; panel < panels; panel++)
-        for (int i = 0; i < ic; i++) {
-            const int vectors = conv_vectors(oc, panel), width = vectors * lanes, o0 = panel * 2 * lanes;
-            float tap[9 * 2 * 16] = {0}; /* no vector has more than 16 lanes */
-            for (int o = 0; o < width && o0 + o < oc; o++) {
-                const float *from = weight + i * i_step + (o0 + o) * o_step;
-                for (int t = 0; t < 9; t++) tap[t * width + o] = from[forward ? t : 8 - t];
+        for (int part = 0; part < parts; part++) {
+            float turned[2 * 16 * CONV_TURNED]; /* no vector has more than 16 lanes */
+            const int begin = part * step, count = ic - begin < step ? ic - begin : step;
+            const int width = conv_turn(c, w, forward, panel, begin, count, turned);
+            float *to = packed + (ptrdiff_t)panel * 2 * conv_lanes() * ic;
+            for (int i = 0; i < count; i++) {
+                float *tap = turned + i * 9 * width, mirrored[9 * 2 * 16];
+                for (int t = 0; t < 9 && !forward; t++)
+                    memcpy(mirrored + t * width, tap + (8 - t) * width, sizeof *tap * (size_t)width);
+                ts_winograd_k()->weights(forward ? tap : mirrored, width / conv_lanes(),
+                                         to + (ptrdiff_t)(begin + i) * width, plane);
             }
-            ts_winograd_k()->weights(tap, vectors, packed + (ptrdiff_t)o0 * ic + (ptrdiff_t)i * width, plane);
         }
 }
 
