@@ -50,10 +50,10 @@ static void tag(const drawing *d, int id, const io_tag_image black)
 
 static void draw(const drawing *d, io_tag_image black[IO_SHEET_TAGS])
 {
-    const double line = 0.2, left = (d->paper->width - IO_SHEET_WINDOW) / 2,
+    const double line = 0.3, left = (d->paper->width - IO_SHEET_WINDOW) / 2,
                  top = (d->paper->height - IO_SHEET_WINDOW) / 2;
     for (int id = 0; id < IO_SHEET_TAGS; id++) tag(d, id, (const bool(*)[IO_TAG_CELLS])black[id]);
-    /* the window's outline, to be cut away with it */
+    /* the window's outline, to be cut away with it; wider than a pixel of a screen, 25.4/96, where browsers round */
     rectangle(d, left, top, IO_SHEET_WINDOW, line);
     rectangle(d, left, top + IO_SHEET_WINDOW - line, IO_SHEET_WINDOW, line);
     rectangle(d, left, top, line, IO_SHEET_WINDOW);
