@@ -57,7 +57,7 @@ MAKEFLAGS += -j$(shell nproc 2>/dev/null || echo 2)
 endif
 
 # What the programs read and write themselves, and what only the shared object needs that reads all other image formats.
-PKG := OpenEXR libpng libjpeg zlib lcms2
+PKG := OpenEXR libpng libjpeg zlib libdeflate lcms2
 PKG_IMAGE := OpenImageIO
 # Optional: the tags of a printed sheet (data/rectify/tags.c).
 PKG_TAGS := apriltag
@@ -344,7 +344,8 @@ faults: programs $(FAULTS)
 	  mv $(BUILD)-leaks/lgd-faults $(BUILD)-leaks/bin
 	$(Q)for p in $(PROGRAMS); do main=$(OBJ)/$$p/main.o; [ -e $$main ] || main=$(OBJ)/cli/$$p/main.o; \
 	  $(CC) -o $(BUILD)-leaks/bin/lgd-$$p $$main $(INTERNAL) $(LDLIBS_ALL) -fsanitize=leak || exit 1; done
-	@LSAN_OPTIONS=exitcode=23 BUILD=$(BUILD)-leaks ONLY_ONCE=1 sh tests/faults/run.sh $(FAULT_OPTIONS)
+	@LSAN_OPTIONS=exitcode=23:print_suppressions=0:suppressions=tests/faults/leaks.txt \
+	  BUILD=$(BUILD)-leaks ONLY_ONCE=1 sh tests/faults/run.sh $(FAULT_OPTIONS)
 
 # clang's libFuzzer with the address and undefined sanitizers, FUZZ_SECONDS for each target. The readers are compiled for
 # it; what else they need comes from the library as it is. OpenImageIO's libraries take seconds to load, and its PNG

@@ -16,6 +16,8 @@ struct ag_packs {
     pack *pack; /* grown by doubling and never shrunk */
     size_t count, capacity;
     int holders;
+    ag_halves halves;
+    void *user;
 };
 
 ag_packs *ag_packs_create(ts_status *st)
@@ -62,6 +64,14 @@ void ag_packs_forget(ag_packs *p)
     pthread_mutex_unlock(&p->lock);
 }
 
+void ag_packs_halves(ag_packs *p, ag_halves halves, void *user)
+{
+    pthread_mutex_lock(&p->lock);
+    p->halves = halves;
+    p->user = user;
+    pthread_mutex_unlock(&p->lock);
+}
+
 static bool is(const pack *p, const ts_conv *c, ts_conv_use use, const float *weight)
 {
     const ts_conv *has = &p->conv;
@@ -86,7 +96,9 @@ static const float *find(ag_packs *p, const ts_conv *c, ts_conv_use use, const f
         if (is(&p->pack[i], c, use, weight)) return p->pack[i].packed;
     float *packed = ts_arena_alloc(p->arena, ts_conv_packed_count(c, use) * sizeof(float));
     if (!packed || !grow(p)) return NULL;
-    ts_conv_pack(c, use, weight, packed);
+    const void *half = p->halves ? p->halves(weight, p->user) : NULL;
+    if (!half) ts_conv_pack(c, use, weight, packed);
+    else if (!ts_conv_pack_half(c, use, half, packed)) return NULL;
     p->pack[p->count++] = (pack){weight, use, *c, packed};
     return packed;
 }

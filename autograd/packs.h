@@ -1,8 +1,8 @@
 /* Packed weights of convolutions, for the tapes that share them. */
 #ifndef AG_PACKS_H
 #define AG_PACKS_H
+#include "autograd/tape.h"
 #include "tensor/conv/conv.h"
-#include "tensor/status.h"
 
 typedef struct ag_packs ag_packs;
 
@@ -14,6 +14,9 @@ void ag_packs_release(ag_packs **p);
 
 /* Forgets all of them, keeps the memory. No other holder may be using one. */
 void ag_packs_forget(ag_packs *p);
+
+/* From now on a weight of which halves returns other than NULL is packed from that (ts_conv_pack_half) and not read. */
+void ag_packs_halves(ag_packs *p, ag_halves halves, void *user);
 
 /* Those of weight for that use, packed at the first request; they stay where they are until forgotten. The key is
  * weight's address, use and c but for n, h and w. Threads may ask at once. NULL when memory is out. */

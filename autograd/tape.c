@@ -306,6 +306,8 @@ const float *ag_packed(ag_tape *tape, const ts_conv *c, ts_conv_use use, const f
     return packed;
 }
 
+void ag_halves_from(ag_tape *tape, ag_halves halves, void *user) { ag_packs_halves(tape->packs, halves, user); }
+
 ts_mark ag_scope_begin(ag_tape *tape) { return ts_arena_mark(tape->arena); }
 
 void ag_scope_end(ag_tape *tape, ts_mark mark, ag_value **keep, int count)

@@ -125,6 +125,10 @@ bool ag_checkpoint(ag_tape *tape, ag_body body, const void *user, size_t size, i
  * address, use and shape. */
 const float *ag_packed(ag_tape *tape, const ts_conv *c, ts_conv_use use, const float *weight);
 void ag_freeze(ag_tape *tape, bool frozen);
+/* Weights of convolutions that are in memory as IEEE 754 halves: halves returns where, or NULL for others. The floats
+ * of such a weight are never read; its address is its name. For tapes that share packed weights too. */
+typedef const void *(*ag_halves)(const float *weight, void *user);
+void ag_halves_from(ag_tape *tape, ag_halves halves, void *user);
 
 /* A scope for a tape without gradients: ag_scope_end gives back what was allocated since begin, except that the values
  * in keep[0 .. count-1] survive (they are moved; the pointers in keep are updated). On a tape with gradients both do

@@ -2,7 +2,7 @@
 #include <getopt.h>
 #include <string.h>
 
-enum { OPTIONS_MAX = 32 };
+enum { OPTIONS_MAX = 64 };
 
 int cl_argument_next(int argc, char **argv, const cl_argument *table, const char **value, int *operands, ts_status *st)
 {

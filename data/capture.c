@@ -126,6 +126,8 @@ static ts_code read_picture(const char *folder, int number, io_capture *c, int s
 ts_code io_read_capture(const char *folder, int size, io_capture *c, ts_status *st)
 {
     *c = (io_capture){0};
+    if (!io_is_capture(folder))
+        return ts_fail(st, TS_IO, "%s: is no folder of a capture: it has no %s", folder, camera_file);
     int lights = 0, rows = read_table(folder, side_file, 1, 1, &c->side, st);
     ts_code code = rows < 0 ? st->code : TS_OK;
     if (!code && (rows != 1 || !(c->side > 0)))

@@ -29,6 +29,7 @@ enum {
     EXPOSURE,
     LIGHT,
     FOV,
+    TILT,
     TOLD,
     UNTOLD,
     PEER_MAPS,
@@ -78,6 +79,9 @@ static const cl_argument arguments[] = {
     {FOV, "fov", "DEG",
      "the photographs' field of view, 1 .. 170 degrees across their side; the methods know it unless they say\n"
      "view=unknown; not of captures and photographs, which have theirs (default 54.2)"},
+    {TILT, "tilt", "DEG",
+     "camera and flash are DEG off the normal, 0 .. 60, on the side of the photographs' lower edge; the photographs\n"
+     "are rectified, as by lgd-infer --corners; known to the methods as --fov is (default 0)"},
     {LIGHT, "light", "X,Y",
      "position of the flash, X, Y patch widths from the centre, -4 .. 4 each, known to the methods (default 0,0)"},
     {IMAGES, "images", NULL,
@@ -168,6 +172,10 @@ ts_code ev_command_parse(int argc, char **argv, ev_command *c, ts_status *st)
             if (!cl_parse_real(value, LGD_FOV_LEAST, LGD_FOV_MOST, &c->fov))
                 code = ts_fail(st, TS_INVALID, "--fov: '%s' is not an angle in %g .. %g degrees", value, LGD_FOV_LEAST,
                                LGD_FOV_MOST);
+            break;
+        case TILT:
+            if (!cl_parse_real(value, 0, 60, &c->tilt))
+                code = ts_fail(st, TS_INVALID, "--tilt: '%s' is not an angle in 0 .. 60 degrees", value);
             break;
         case LIGHT: code = parse_light(value, c->light, st); break;
         case CAMERA:

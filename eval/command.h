@@ -11,7 +11,7 @@ typedef struct ev_command {
     int sets, methods, iterations, threads, size, repeat;
     int64_t seed;
     const char *peer_maps;
-    double noise, exposure, fov, light[2]; /* exposure and fov 0: not given */
+    double noise, exposure, fov, tilt, light[2]; /* exposure and fov 0: not given */
     const char *camera_spec;
     io_camera camera;  /* of known materials, where photographed: camera_spec's */
     int shard, shards; /* part shard of 1 .. shards of the materials; shards 0: all */

@@ -173,6 +173,7 @@ static int evaluate(work *w, ts_status *st)
     r->light_known = c->light_known;
     r->flash = rd_view_from(rd_flash(), c->fov > 0 ? rd_fov_distance(c->fov) : (double)RD_FLASH_DISTANCE);
     for (int k = 0; k < 2; k++) r->flash.light[k] = (float)c->light[k];
+    r->flash = rd_view_tilted(r->flash, c->tilt);
     r->perceptual = !c->fast && !c->tune;
     r->exact = c->exact;
     r->pictures = !c->tune;

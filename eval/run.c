@@ -8,6 +8,7 @@
 #include "tensor/cpu.h"
 #include "tensor/peak.h"
 #include "tensor/threads.h"
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -98,7 +99,7 @@ static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, t
     rd_eval_views(&rng, RD_EVAL_VIEWS, b->views);
     *c = ev_case_of_maps(&b->truth, b->image, b->views, r->perceptual);
     c->view = r->flash;
-    c->fov = rd_fov_of((double)r->flash.camera[2]);
+    c->fov = rd_fov_of(hypot((double)r->flash.camera[1], (double)r->flash.camera[2]));
     c->inputs = r->inputs;
     c->exposure = r->exposure;
     c->fit = r->fit;

@@ -50,8 +50,8 @@ uint64_t ev_shards_print(const ev_command *c, const ev_run *r, const char *model
     if (io_text_begin(&t, "", NULL) != TS_OK) return 0;
     FILE *f = t.f;
     if (ts_hash_file(model, &weights, NULL) != TS_OK) weights = 0; /* methods without weights need none */
-    fprintf(f, LGD_VERSION " %s %d %d %lld %d %.17g %.17g %.17g %.17g %.17g %016llx", ts_isa_name(ts_isa_now()),
-            c->size, c->iterations, (long long)c->seed, c->repeat, c->noise, c->exposure, c->fov, c->light[0],
+    fprintf(f, LGD_VERSION " %s %d %d %lld %d %.17g %.17g %.17g %.17g %.17g %.17g %016llx", ts_isa_name(ts_isa_now()),
+            c->size, c->iterations, (long long)c->seed, c->repeat, c->noise, c->exposure, c->fov, c->tilt, c->light[0],
             c->light[1], (unsigned long long)weights);
     fprintf(f, " %d%d%d%d%d%d%d%d %s\n%s\n%s\n%s\n", c->light_known, c->light_unknown, c->photographed, c->fast,
             c->exact, c->tune, c->iterations_figure, c->methods_figure, c->camera_spec ? c->camera_spec : "",

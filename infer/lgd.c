@@ -94,9 +94,12 @@ lgd_model *lgd_load(const char *weights, lgd_error *error)
     if (!weights) ts_fail(&st, TS_INVALID, "lgd_load: no weights file is given");
     else if (!(model = calloc(1, sizeof *model))) ts_fail(&st, TS_NOMEM, "%s: out of memory", weights);
     else {
-        *model = (lgd_model){.lock = PTHREAD_MUTEX_INITIALIZER, .net = nn_model_load(weights, &st)};
+        *model = (lgd_model){.lock = PTHREAD_MUTEX_INITIALIZER, .net = nn_model_open(weights, &st)};
         if (model->net) model->idle = make_workspace(ag_tape_create(false, &st), &st);
-        if (model->idle) ag_freeze(model->first = model->idle->tape, true);
+        if (model->idle) {
+            ag_freeze(model->first = model->idle->tape, true);
+            ag_halves_from(model->first, nn_model_halves, model->net);
+        }
     }
     if (st.code) lgd_free(&model);
     lgd_report(error, &st);

@@ -29,9 +29,10 @@ typedef struct lgd_error {
     char message[512];
 } lgd_error;
 
-/* Reads a weights file (safetensors or PyTorch). NULL and error on failure. The caller frees the model, when no call
- * uses it. Any number of threads may call lgd_estimate with one model at once. Each such call has memory of its own (30
- * MB at 256 x 256 pixels), which the model keeps for later calls up to 512 pixels a side. */
+/* Reads a weights file (safetensors or PyTorch). NULL and error on failure. The file stays mapped: it may be replaced
+ * or removed meanwhile, but not be written over in place. The caller frees the model, when no call uses it. Any number
+ * of threads may call lgd_estimate with one model at once. Each such call has memory of its own (30 MB at 256 x 256
+ * pixels), which the model keeps for later calls up to 512 pixels a side. */
 LGD_API lgd_model *lgd_load(const char *weights, lgd_error *error);
 LGD_API void lgd_free(lgd_model **model);
 
@@ -76,7 +77,8 @@ typedef struct lgd_options {
                     * instruction sets (docs/performance.md) */
     int precision; /* LGD_F32; LGD_BF16: inputs and weights of convolutions are rounded to bf16, for CPUs with AMX or
                     * AVX512-BF16 (much slower on others). Sums, renderer and maps stay f32. Maps differ by
-                    * less than 0.005 (RMS), single values by up to 0.8 (docs/performance.md) */
+                    * less than 0.005 (RMS), fewer than one value in 10,000 by more than 0.05, single ones by up to
+                    * 0.8 (docs/performance.md) */
     int orientations; /* R_0 is the mean over so many orientations of the photograph: 1 or 0: as it is, 2: and turned by
                        * a quarter, 4: all quarter turns, 8: and their mirror images. Only for a single photograph with
                        * light and camera above its centre, and not with published weights */

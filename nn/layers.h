@@ -115,6 +115,7 @@ nn_model *nn_coder_plan(const nn_coder *c, ts_status *st);
 nn_layer nn_plan_conv(nn_model *m, const char *name, int oc, int ic, double gain);
 nn_model *nn_model_zero(nn_model *plan, ts_status *st);
 
-/* Memory for the parameters of a plan (nn_model_plan), zero only between them: the caller writes all of them. */
-ts_code nn_model_allocate(nn_model *model, ts_status *st);
+/* Memory for the parameters of a plan (nn_model_plan), zero only between them: the caller writes all of them. sparse:
+ * zero nowhere, for a caller that writes few. */
+ts_code nn_model_allocate(nn_model *model, bool sparse, ts_status *st);
 #endif

@@ -1,5 +1,6 @@
 /* The list of parameters and the blocks that hold them. */
 #include "nn/layers.h"
+#include "nn/weights/file.h"
 #include "nn/weights/published.h"
 #include "ops.h"
 #include "tensor/memory.h"
@@ -223,16 +224,16 @@ nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
 
 static size_t offset_of(const nn_model *m, int index) { return index < m->params ? m->param[index].offset : m->count; }
 
-static float *block(size_t count, const char *what, ts_status *st)
+static float *block(size_t count, bool sparse, const char *what, ts_status *st)
 {
-    float *p = ts_memory(count * sizeof *p);
+    float *p = sparse ? ts_memory_sparse(count * sizeof *p) : ts_memory(count * sizeof *p);
     if (!p) ts_fail(st, TS_NOMEM, "no memory for the model's %s (%.0f MB)", what, (double)count * sizeof *p / 1e6);
     return p;
 }
 
 static float *zero_block(size_t count, const char *what, ts_status *st)
 {
-    float *p = block(count, what, st);
+    float *p = block(count, false, what, st);
     if (p) ts_memory_clear(p, count * sizeof *p, 0);
     return p;
 }
@@ -245,10 +246,10 @@ nn_model *nn_model_zero(nn_model *plan, ts_status *st)
 
 nn_model *nn_model_create(const nn_arch *arch, ts_status *st) { return nn_model_zero(nn_model_plan(arch, st), st); }
 
-ts_code nn_model_allocate(nn_model *m, ts_status *st)
+ts_code nn_model_allocate(nn_model *m, bool sparse, ts_status *st)
 {
-    m->value = block(m->count, "parameters", st);
-    for (int i = 0; m->value && i < m->params; i++) {
+    m->value = block(m->count, sparse, "parameters", st);
+    for (int i = 0; m->value && !sparse && i < m->params; i++) {
         const size_t end = m->param[i].offset + m->param[i].count;
         memset(m->value + end, 0, (offset_of(m, i + 1) - end) * sizeof *m->value);
     }
@@ -262,6 +263,7 @@ void nn_model_free(nn_model **model)
     if (m->layers) free(layers_of(m)->start);
     free(m->layers);
     free(m->param);
+    nn_file_close(&m->file);
     free(m->value);
     free(m->grad);
     free(m);
@@ -272,6 +274,14 @@ ts_code nn_model_train(nn_model *model, ts_status *st)
 {
     if (!model->grad) model->grad = zero_block(model->count, "gradients", st);
     return model->grad ? TS_OK : TS_NOMEM;
+}
+
+const void *nn_model_halves(const float *weight, void *model)
+{
+    const nn_model *m = model;
+    for (int i = 0; i < m->params; i++)
+        if (m->value + m->param[i].offset == weight) return m->param[i].half;
+    return NULL;
 }
 
 const nn_param *nn_model_find(const nn_model *model, const char *name)

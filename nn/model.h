@@ -85,6 +85,7 @@ typedef struct nn_param {
     char name[96];
     int rank, dim[4];     /* convolution [oc, ic, k, k], linear [out, in], bias [out] */
     size_t offset, count; /* floats into the blocks */
+    const void *half;     /* NULL, or where its values are as halves: not in the block (nn_model_open) */
 } nn_param;
 
 typedef struct nn_model {
@@ -92,11 +93,12 @@ typedef struct nn_model {
     nn_coder coder; /* code is not 0: an auto-encoder (nn/coder.h), and arch says nothing */
     nn_param *param;
     int params;
-    size_t count;  /* floats in a block (each parameter starts at a multiple of 16) */
-    float *value;  /* one aligned block */
-    float *grad;   /* the same, or NULL until nn_model_train */
-    bool fixed[3]; /* nn_part: its parameters are constants, no gradient is computed for them */
-    void *layers;  /* nn's own */
+    size_t count;         /* floats in a block (each parameter starts at a multiple of 16) */
+    float *value;         /* one aligned block */
+    float *grad;          /* the same, or NULL until nn_model_train */
+    bool fixed[3];        /* nn_part: its parameters are constants, no gradient is computed for them */
+    void *layers;         /* nn's own */
+    struct nn_file *file; /* or NULL: what its halves are in */
 } nn_model;
 
 /* The list of parameters, without values: value is NULL. The caller frees. NULL and st on failure. */
@@ -122,6 +124,9 @@ ts_code nn_model_train(nn_model *model, ts_status *st);
 /* Kaiming for what a leaky ReLU or SELU follows, orthogonal for the recurrent weights, sigma 1e-3 for h's last layer,
  * zero biases. */
 void nn_model_init(nn_model *model, uint64_t seed);
+
+/* Where the values of the parameter at weight are as halves, or NULL: what ag_halves_from asks. */
+const void *nn_model_halves(const float *weight, void *model);
 
 const nn_param *nn_model_find(const nn_model *model, const char *name);
 /* The parameters of a part alone: [first, last) in floats of the block. */

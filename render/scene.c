@@ -33,6 +33,22 @@ rd_view rd_view_from(rd_view view, double distance)
     return view;
 }
 
+static void tilt(float at[3], double c, double s)
+{
+    const double y = (double)at[1], z = (double)at[2];
+    at[1] = (float)(y * c - z * s);
+    at[2] = (float)(y * s + z * c);
+}
+
+rd_view rd_view_tilted(rd_view view, double degrees)
+{
+    const double c = cos(degrees / DEGREES), s = sin(degrees / DEGREES);
+    tilt(view.camera, c, s);
+    tilt(view.light, c, s);
+    view.power = (float)((double)view.power / c);
+    return view;
+}
+
 static float stops(const rd_view *view)
 {
     const float reference = RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE);

@@ -44,6 +44,9 @@ double rd_fov_distance(double fov);
 /* The same view with camera and light at that height, the power as much greater as the light's height has been squared:
  * the sample is as bright as before. */
 rd_view rd_view_from(rd_view view, double distance);
+/* The same view with camera and light turned by 0 .. 89 degrees about the sample's x axis, towards its lower edge, the
+ * power greater by 1 / cos: a matt sample under the flash is as bright in its middle as before. */
+rd_view rd_view_tilted(rd_view view, double degrees);
 
 /* What is global about a photograph, as numbers of about the size of 1: the logarithm of the camera's height over
  * RD_FLASH_DISTANCE; the light's place beside the camera, x and y, in RD_SCENE_OFFSET patch widths; the camera's place

@@ -18,6 +18,18 @@ void *ts_memory(size_t bytes)
     return p;
 }
 
+void *ts_memory_sparse(size_t bytes)
+{
+    const size_t page = 4096;
+    if (bytes > SIZE_MAX - page) return NULL;
+    const size_t whole = (bytes + page - 1) / page * page;
+    void *p = aligned_alloc(page, whole);
+#ifdef MADV_NOHUGEPAGE
+    if (p) (void)madvise(p, whole, MADV_NOHUGEPAGE); /* a hint */
+#endif
+    return p;
+}
+
 enum { PART = 128 << 10 };
 
 typedef struct block {

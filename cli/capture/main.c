@@ -1,6 +1,7 @@
 /* lgd-capture: prints the sheet for several photographs of one sample, and checks the photographs. */
 #include "cli/arguments.h"
 #include "cli/cli.h"
+#include "cli/operands.h"
 #include "data/image/image.h"
 #include "data/rectify/sheet_check.h"
 #include "tensor/threads.h"
@@ -31,12 +32,12 @@ typedef struct command {
 static void print_help(void)
 {
     puts("Usage: lgd-capture sheet [--paper a4|letter] -o FILE\n"
-         "       lgd-capture check PHOTO...\n"
+         "       lgd-capture check PHOTO|FOLDER|@LIST...\n"
          "sheet draws the sheet to be printed: a window, to be cut out, in a frame of tags. lgd-infer --sheet finds "
          "camera\n"
          "and light of photographs of a sample in that window. check says what is wrong with such photographs, a line "
          "for\n"
-         "each on standard output.\n");
+         "each on standard output. FOLDER stands for the photographs in it, LIST is a file that names one a line.\n");
     cl_argument_help(arguments, stdout);
     puts("\nExit status: 0 done and nothing wrong, 1 something is wrong, 2 wrong usage.");
 }
@@ -118,6 +119,23 @@ static int check(const command *c, char **paths, int count)
     return fine ? CL_OK : CL_FAILED;
 }
 
+static void say_failed(const char *message) { cl_failed("%s", message); }
+
+static int check_operands(const command *c, char **word, int words)
+{
+    cl_operands all;
+    ts_status st = {0};
+    if (cl_operands_expand(word, words, say_failed, &all, &st) != TS_OK) return cl_failed("%s", st.message);
+    int code = all.failed ? CL_FAILED : CL_OK;
+    if (all.photos > IO_SOLVE_MOST) code = cl_usage("check: %d photographs at most, not %d", IO_SOLVE_MOST, all.photos);
+    else if (all.photos > 0) {
+        const int found = check(c, all.photo, all.photos);
+        if (found) code = found;
+    }
+    cl_operands_free(&all);
+    return code;
+}
+
 static int work(const command *c, char **word, int words)
 {
     ts_status st = {0};
@@ -131,8 +149,7 @@ static int work(const command *c, char **word, int words)
     if (strcmp(word[0], "check") != 0) return cl_usage("'%s' is neither sheet nor check", word[0]);
     if (c->output) return cl_usage("check writes no file: no -o");
     if (words == 1) return cl_usage("check: no photograph is given");
-    if (words - 1 > IO_SOLVE_MOST) return cl_usage("check: %d photographs at most", IO_SOLVE_MOST);
-    return check(c, word + 1, words - 1);
+    return check_operands(c, word + 1, words - 1);
 }
 
 int main(int argc, char **argv)

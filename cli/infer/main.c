@@ -2,7 +2,7 @@
 #include "cli/cli.h"
 #include "cli/infer/index.h"
 #include "cli/infer/manifest.h"
-#include "cli/infer/operands.h"
+#include "cli/operands.h"
 #include "cli/infer/options.h"
 #include "cli/infer/pipeline.h"
 #include "cli/infer/record.h"
@@ -212,12 +212,12 @@ static void finished(const lgd_item *item, void *user)
     pthread_mutex_unlock(&r->lock);
 }
 
-static int all(run *r, lgd_pipeline *pipeline)
+static int all(run *r, lgd_pipeline *pipeline, const char *recipe)
 {
     const double start = cl_seconds();
     r->poor = open_memstream(&r->text, &r->size); /* without it no names are told */
     r->bar = cl_progress_start("step", (int64_t)r->jobs * (r->steps + 1));
-    lgd_pipeline_run(pipeline, r->model, &(lgd_listener){show, finished, cl_interrupted, r});
+    lgd_pipeline_run(pipeline, r->model, recipe, &(lgd_listener){show, finished, cl_interrupted, r});
     cl_progress_end(&r->bar);
     if (!r->command->quiet && (r->jobs > 1 || r->there)) sum_up(r, cl_seconds() - start);
     if (r->poor) fclose(r->poor);
@@ -240,8 +240,8 @@ static void print_help(void)
     cl_argument_help(lgd_infer_arguments, stdout);
     puts("\n"
          "DIR/STEM/ gets diffuse.png, specular.png (sRGB), roughness.png, normal.png (linear), maps.exr (all channels, "
-         "linear\n"
-         "float), meta.txt (what these mean), render.png (the photograph beside the re-rendered one) and preview.png "
+         "linear),\n"
+         "meta.txt (what these mean), render.png (the photograph beside the re-rendered one) and preview.png "
          "(four light\n"
          "positions). A photograph's files appear together when they are complete. Each finished folder is printed on "
          "standard\n"
@@ -288,11 +288,11 @@ static int work(const lgd_command *given)
     lgd_command own = *given;
     const lgd_command *const c = &own;
     ts_status st = {0};
-    lgd_operands operands = {0};
+    cl_operands operands = {0};
     lgd_error error;
     lgd_plan plan;
     char weights[LGD_PATH_MAX], *recipe = NULL;
-    if (!*c->capture && lgd_operands_expand(c->photo, c->photos, say_failed, &operands, &st) != TS_OK)
+    if (!*c->capture && cl_operands_expand(c->photo, c->photos, say_failed, &operands, &st) != TS_OK)
         return cl_failed("%s", st.message);
     if (!*c->capture) own.photo = operands.photo, own.photos = operands.photos;
     char *const *photo = c->photo;
@@ -300,14 +300,14 @@ static int work(const lgd_command *given)
     if (photos == 0) return CL_FAILED;
     if ((c->corners && photos > 1) || (c->sheet && photos > IO_SOLVE_MOST)) {
         const int most = c->corners ? 1 : IO_SOLVE_MOST;
-        const int code = cl_usage("--%s: '%s' is one photograph more than %d", c->corners ? "corners" : "sheet",
-                                  photo[most], most);
-        lgd_operands_free(&operands);
+        const int code = cl_usage("--%s takes %d photograph%s at most: '%s' is one too many",
+                                  c->corners ? "corners" : "sheet", most, most > 1 ? "s" : "", photo[most]);
+        cl_operands_free(&operands);
         return code;
     }
     const ts_code bad = lgd_plan_make(photo, c->sheet ? 1 : photos, c->out, &plan, &st);
     if (bad) {
-        lgd_operands_free(&operands);
+        cl_operands_free(&operands);
         return bad == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
     }
     ts_threads_set(c->threads);
@@ -317,7 +317,7 @@ static int work(const lgd_command *given)
     run r = {.command = c, .lock = PTHREAD_MUTEX_INITIALIZER};
     if (settle(&r, &plan, several, &st) != TS_OK) {
         lgd_plan_free(&plan);
-        lgd_operands_free(&operands);
+        cl_operands_free(&operands);
         return st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
     }
     int code = CL_FAILED;
@@ -326,17 +326,19 @@ static int work(const lgd_command *given)
     if (lgd_model_path(c->model, *c->capture || (c->sheet && c->photos > 1) ? "multi" : LGD_DEFAULT_MODEL, weights,
                        &st) != TS_OK)
         cl_failed("%s", st.message);
-    else if (lgd_weights_published(weights, &published, &st) != TS_OK || !(recipe = lgd_recipe(c, weights, &st)))
+    else if (lgd_weights_published(weights, &published, &st) != TS_OK ||
+             (c->skip_existing && !(recipe = lgd_recipe(c, weights, &st))))
         cl_failed("%s", st.message);
     else if (!(pipeline = lgd_pipeline_start(&plan, c, recipe, published, &st)))
-        cl_failed("%s", st.message); /* decodes while the weights are read */
+        cl_failed("%s", st.message); /* decodes while the weights are read, once to be hashed */
+    else if (!recipe && !(recipe = lgd_recipe(c, weights, &st))) cl_failed("%s", st.message);
     else if (!(r.model = lgd_load(weights, &error))) cl_failed("%s", error.message);
     else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK ||
              (several && !(r.manifest = lgd_manifest_open(&plan, c->out, &st))))
         cl_failed("%s", st.message);
     else {
         r.steps = lgd_command_steps(c, r.model);
-        code = all(&r, pipeline);
+        code = all(&r, pipeline, recipe);
         if (code == CL_OK && missing) code = CL_FAILED;
         code = end_manifest(&r, code);
     }
@@ -344,7 +346,7 @@ static int work(const lgd_command *given)
     lgd_pipeline_end(&pipeline);
     lgd_free(&r.model);
     lgd_plan_free(&plan);
-    lgd_operands_free(&operands);
+    cl_operands_free(&operands);
     free(recipe);
     return code;
 }

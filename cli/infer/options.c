@@ -50,9 +50,8 @@ const cl_argument lgd_infer_arguments[] = {
      "instead of PHOTO: several photographs of one sample under known lights, listed in an INI file or in a folder\n"
      "in MaterialGAN's layout; the default model is then multi"},
     {FOV, "fov", "DEG",
-     "field of view of the photographs, 1 .. 170 degrees across the side of the square that the maps cover (default: "
-     "from\n"
-     "the file's EXIF, else the model's guess, or 54.2 with a warning)"},
+     "field of view of the photographs, 1 .. 170 degrees across the side of the square that the maps cover\n"
+     "(default: from the file's EXIF, else the model's guess, or 54.2 with a warning)"},
     {CORNERS, "corners", "X,Y X,Y X,Y X,Y",
      "the photograph was taken at an angle: where the corners of a square on the sample are in it, top left, top\n"
      "right, bottom right, bottom left, in pixels from the top left or in 0 .. 1 of width and height; the maps are of\n"
@@ -72,8 +71,8 @@ const cl_argument lgd_infer_arguments[] = {
      "photographs up to 512 pixels are one tile; 0 = never (default: 0.003 for models whose network works at the\n"
      "photograph's size, not with --iterations or --exact; 0 for others, such as the shipped ones)"},
     {'m', "model", "FILE",
-     "weights: a file, or the name of a shipped model: phone (the default), single for pictures whose light and "
-     "camera are the default ones, multi for several (default: $LGD_MODEL)"},
+     "weights: a file, or the name of a shipped model: phone, single for pictures whose light and camera are the\n"
+     "default ones, multi for several (default: $LGD_MODEL, else phone)"},
     {'t', "threads", "N", "number of threads, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {NORMAL, "normal", "gl|dx", "y of normal.png: up (gl, OpenGL, default) or down (dx, DirectX)"},
     {MAPS, "maps", "LIST",

@@ -14,7 +14,7 @@ enum { IDLE, DECODING, DECODED, COMPUTING, FINISHED }; /* an item's stages */
 struct lgd_pipeline {
     const lgd_plan *plan;
     const lgd_command *command;
-    const char *recipe;
+    const char *read_recipe, *recipe; /* of reading: NULL where nothing may be complete already */
     lgd_model *model;
     const lgd_listener *listener;
     pthread_t decoder;
@@ -79,7 +79,7 @@ static void *decode_all(void *user)
     lgd_item *item;
     while ((item = begin_decoding(p))) {
         const double start = cl_seconds();
-        lgd_item_read(p->command, p->recipe, p->published, item);
+        lgd_item_read(p->command, p->read_recipe, p->published, item);
         item->seconds = cl_seconds() - start;
         move(p, item, DECODED);
     }
@@ -156,7 +156,7 @@ lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *comman
     if (!p) return ts_fail(st, TS_NOMEM, "out of memory"), NULL;
     *p = (lgd_pipeline){.plan = plan,
                         .command = command,
-                        .recipe = recipe,
+                        .read_recipe = recipe,
                         .published = published,
                         .lock = PTHREAD_MUTEX_INITIALIZER,
                         .changed = PTHREAD_COND_INITIALIZER,
@@ -174,12 +174,13 @@ lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *comman
     return p;
 }
 
-void lgd_pipeline_run(lgd_pipeline *p, lgd_model *model, const lgd_listener *listener)
+void lgd_pipeline_run(lgd_pipeline *p, lgd_model *model, const char *recipe, const lgd_listener *listener)
 {
     pthread_t other[LANES];
     lgd_item *item;
     int others = 0;
     p->model = model;
+    p->recipe = recipe;
     p->listener = listener;
     const double each = lgd_item_bytes(p->command, model);
     while (p->lanes > 1 && ts_budget_check(p->lanes * each, NULL) != TS_OK) p->lanes--;

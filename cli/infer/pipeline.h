@@ -5,8 +5,9 @@
 
 typedef struct lgd_pipeline lgd_pipeline;
 
-/* Starts reading at once, in the plan's order, published: as infer/photograph.h says; plan, command and recipe
- * (lgd_recipe's) outlive the pipeline. NULL with st on failure. */
+/* Starts reading at once, in the plan's order, published: as infer/photograph.h says; plan and command outlive the
+ * pipeline. recipe: lgd_recipe's where photographs may be complete already (skip_existing), or NULL. NULL with st on
+ * failure. */
 lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *command, const char *recipe, bool published,
                                  ts_status *st);
 
@@ -21,8 +22,8 @@ typedef struct lgd_listener {
     void *user;
 } lgd_listener;
 
-/* Estimates and writes everything. Once for a pipeline. */
-void lgd_pipeline_run(lgd_pipeline *p, lgd_model *model, const lgd_listener *listener);
+/* Estimates and writes everything. Once for a pipeline. recipe: lgd_recipe's. */
+void lgd_pipeline_run(lgd_pipeline *p, lgd_model *model, const char *recipe, const lgd_listener *listener);
 
 /* Waits for what is under way. Nulls the pointer. */
 void lgd_pipeline_end(lgd_pipeline **p);

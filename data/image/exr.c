@@ -47,11 +47,15 @@ typedef struct stream {
     int fd; /* what is read */
 } stream;
 
+/* The stream that this thread has open. exr_get_user_data would take the context's lock, which a file that is written
+ * holds when something fails. */
+static _Thread_local stream *opened;
+
 static void on_error(exr_const_context_t context, exr_result_t code, const char *message)
 {
-    void *user = NULL;
-    if (!context || exr_get_user_data(context, &user) != EXR_ERR_SUCCESS || !user) return;
-    stream *s = user;
+    (void)context;
+    stream *s = opened;
+    if (!s) return;
     if (!s->message[0])
         snprintf(s->message, sizeof s->message, "%s", message ? message : exr_get_error_code_as_string(code));
     for (char *p = s->message; *p; p++)
@@ -174,10 +178,12 @@ ts_code io_write_maps_exr(const char *path, const io_material *m, bool directx, 
     init.error_handler_fn = on_error;
     init.user_data = &s;
     init.write_fn = on_write;
+    opened = &s;
     exr_result_t r = exr_start_write(&f, path, EXR_WRITE_FILE_DIRECTLY, &init);
     if (!r) r = write_header(f, m->size, directx, half);
     if (!r) r = write_chunks(f, m, directx, lines, row);
     exr_result_t finish = exr_finish(&f);
+    opened = NULL;
     if (!r) r = finish;
     free(row);
     ts_code code = r ? ts_fail(st, TS_IO, "%s: %s", path, s.message[0] ? s.message : exr_get_error_code_as_string(r))
@@ -290,11 +296,13 @@ ts_code io_read_maps_exr(const char *path, io_material *m, ts_status *st)
     init.user_data = &s; /* the library's own file reader would take this place */
     init.read_fn = on_read;
     init.size_fn = on_size;
+    opened = &s;
     exr_result_t r = exr_start_read(&f, path, &init);
     code = r ? ts_fail(st, TS_FORMAT, "%s: no EXR file: %s", path,
                        s.message[0] ? s.message : exr_get_error_code_as_string(r))
              : read_maps(path, f, &s, m, st);
     exr_finish(&f);
+    opened = NULL;
     close(s.fd);
     if (code != TS_OK) io_material_free(m);
     return code;

@@ -120,7 +120,13 @@ static ts_code read_file(const char *path, int64_t max_pixels, double max_bytes,
     ImageSpec config;
     config.attribute("oiio:UnassociatedAlpha", 1); /* the library would multiply encoded values by alpha */
     auto in = ImageInput::open(path, &config);
-    if (!in) return ts_fail(st, TS_FORMAT, "%s: %s", path, one_line(OIIO::geterror()).c_str());
+    if (!in) {
+        const std::string why = one_line(OIIO::geterror());
+        if (why.find("could not find a format reader") != std::string::npos)
+            return ts_fail(st, TS_FORMAT,
+                           "%s: is no image, or one in a format that is not read: save it as PNG or JPEG", path);
+        return ts_fail(st, TS_FORMAT, "%s: cannot be read: %s", path, why.c_str());
+    }
     ImageSpec spec = in->spec();
     if (spec.width < 1 || spec.height < 1 || spec.nchannels < 1)
         return ts_fail(st, TS_FORMAT, "%s: claims %d x %d pixels of %d channels", path, spec.width, spec.height,

@@ -1,12 +1,11 @@
 /* PNG files from rows that are made while they are written: a picture of many panels never lies in memory as floats. */
 #include "data/file.h"
 #include "data/image/image.h"
-#include <png.h>
+#include "data/image/png_pack.h"
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include <zlib.h>
 
 /* The least float whose sRGB-encoded value rounds to each of the 256 levels, and the level of the middle of each of
  * GUESSES steps: eight bits without a power for every value, and the same bytes as with it. */
@@ -45,7 +44,7 @@ static unsigned srgb_level(float v)
 
 /* Values in [0, 1] (NaN to 0) to integers, rounded to nearest, big-endian. The alpha of four channels is never encoded.
  */
-static void quantise(const float *values, size_t pixels, int channels, int bits, bool srgb, png_byte *out)
+static void quantise(const float *values, size_t pixels, int channels, int bits, bool srgb, unsigned char *out)
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     if (srgb && bits == 8) pthread_once(&once, make_levels);
@@ -54,84 +53,34 @@ static void quantise(const float *values, size_t pixels, int channels, int bits,
             float v = *values++;
             v = v > 0 ? v < 1 ? v : 1 : 0;
             const bool curve = srgb && c < 3;
-            if (bits == 8) *out++ = (png_byte)(curve ? srgb_level(v) : (unsigned)(v * 255 + 0.5f));
+            if (bits == 8) *out++ = (unsigned char)(curve ? srgb_level(v) : (unsigned)(v * 255 + 0.5f));
             else {
                 const unsigned level = curve ? level_of(v, 65535) : (unsigned)(v * 65535 + 0.5f);
-                *out++ = (png_byte)(level >> 8);
-                *out++ = (png_byte)(level & 255);
+                *out++ = (unsigned char)(level >> 8);
+                *out++ = (unsigned char)(level & 255);
             }
         }
 }
 
-typedef struct writing {
-    png_structp png;
-    png_infop info;
-    unsigned char *bytes;
-    size_t size, capacity;
-    float *values; /* [rows][width][channels] */
-    png_byte *row;
-    char message[128];
-    ts_code code; /* of the row maker */
-} writing;
-
-static void on_error(png_structp png, png_const_charp message)
-{
-    writing *w = png_get_error_ptr(png);
-    strncpy(w->message, message, sizeof w->message - 1);
-    png_longjmp(png, 1);
-}
-
-static void on_warning(png_structp png, png_const_charp message)
-{
-    (void)png;
-    (void)message;
-}
-
-static void on_write(png_structp png, png_bytep data, size_t size)
-{
-    writing *w = png_get_io_ptr(png);
-    if (w->size + size > w->capacity) {
-        const size_t capacity = (w->size + size) * 3 / 2 + 65536;
-        unsigned char *bytes = realloc(w->bytes, capacity);
-        if (!bytes) png_error(png, "out of memory");
-        w->bytes = bytes;
-        w->capacity = capacity;
-    }
-    memcpy(w->bytes + w->size, data, size);
-    w->size += size;
-}
-
-static void on_flush(png_structp png) { (void)png; }
-
 enum { ROWS = 16 }; /* made at once */
 
-static bool work(writing *w, const io_rows *rows, int bits, bool srgb, ts_status *st)
+static ts_code make_all(const io_rows *rows, int bits, bool srgb, io_png_pack *pack, ts_status *st)
 {
-    static const int type[] = {PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_COLOR_TYPE_RGB,
-                               PNG_COLOR_TYPE_RGB_ALPHA};
     const size_t width = (size_t)rows->width, values = width * (size_t)rows->channels;
-    if (setjmp(png_jmpbuf(w->png))) return false;
-    png_set_write_fn(w->png, w, on_write, on_flush);
-    png_set_IHDR(w->png, w->info, (png_uint_32)rows->width, (png_uint_32)rows->height, bits, type[rows->channels - 1],
-                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-    /* Rows predicted from their neighbours hardly repeat themselves: runs and Huffman codes alone are smaller than
-     * matches and take half the time. */
-    png_set_filter(w->png, PNG_FILTER_TYPE_BASE, PNG_FILTER_PAETH);
-    png_set_compression_level(w->png, 1);
-    png_set_compression_strategy(w->png, Z_RLE);
-    if (srgb) png_set_sRGB_gAMA_and_cHRM(w->png, w->info, PNG_sRGB_INTENT_ABSOLUTE);
-    png_write_info(w->png, w->info);
-    for (int y = 0; y < rows->height; y += ROWS) {
+    float *made = malloc(values * ROWS * sizeof *made);
+    unsigned char *row = malloc(values * (size_t)(bits / 8));
+    ts_code code = made && row ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for a picture's rows");
+    for (int y = 0; y < rows->height && !code; y += ROWS) {
         const int count = rows->height - y < ROWS ? rows->height - y : ROWS;
-        w->code = rows->make(y, count, w->values, rows->user, st);
-        if (w->code) return false;
-        for (int i = 0; i < count; i++) {
-            quantise(w->values + (size_t)i * values, width, rows->channels, bits, srgb, w->row);
-            png_write_row(w->png, w->row);
+        code = rows->make(y, count, made, rows->user, st);
+        for (int i = 0; i < count && !code; i++) {
+            quantise(made + (size_t)i * values, width, rows->channels, bits, srgb, row);
+            code = io_png_pack_row(pack, row, st);
         }
     }
-    png_write_end(w->png, w->info);
-    return true;
+    free(made);
+    free(row);
+    return code;
 }
 
 /* The file in memory; name is for messages. bytes is malloced and the caller's. */
@@ -144,23 +93,11 @@ static ts_code encode(const char *name, const io_rows *rows, int bits, bool srgb
     if (rows->width < 1 || rows->height < 1 || rows->channels < 1 || rows->channels > 4)
         return ts_fail(st, TS_INVALID, "%s: PNG of %d x %d pixels with %d channels", name, rows->width, rows->height,
                        rows->channels);
-    const size_t values = (size_t)rows->width * (size_t)rows->channels;
-    writing w = {.values = malloc(values * ROWS * sizeof(float)), .row = malloc(values * (size_t)(bits / 8))};
-    bool done = false;
-    if (w.values && w.row && (w.png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &w, on_error, on_warning))) {
-        png_set_user_limits(w.png, 0x7fffffff, 0x7fffffff);
-        w.info = png_create_info_struct(w.png);
-        done = w.info && work(&w, rows, bits, srgb, st);
-        png_destroy_write_struct(&w.png, &w.info);
-    }
-    ts_code code = done ? TS_OK : w.code;
-    if (!done && !code)
-        code = w.message[0] ? ts_fail(st, TS_IO, "%s: %s", name, w.message)
-                            : ts_fail(st, TS_NOMEM, "%s: out of memory", name);
-    free(w.values);
-    free(w.row);
-    if (code) free(w.bytes);
-    else *bytes = w.bytes, *size = w.size;
+    io_png_pack *pack = io_png_pack_begin(name, rows->width, rows->height, rows->channels, bits, srgb, st);
+    if (!pack) return TS_NOMEM;
+    ts_code code = make_all(rows, bits, srgb, pack, st);
+    if (!code) code = io_png_pack_end(pack, bytes, size, st);
+    io_png_pack_free(&pack);
     return code;
 }
 

@@ -50,10 +50,10 @@ static void tag(const drawing *d, int id, const io_tag_image black)
 
 static void draw(const drawing *d, io_tag_image black[IO_SHEET_TAGS])
 {
-    const double line = 0.2, left = (d->paper->width - IO_SHEET_WINDOW) / 2,
+    const double line = 0.3, left = (d->paper->width - IO_SHEET_WINDOW) / 2,
                  top = (d->paper->height - IO_SHEET_WINDOW) / 2;
     for (int id = 0; id < IO_SHEET_TAGS; id++) tag(d, id, (const bool(*)[IO_TAG_CELLS])black[id]);
-    /* the window's outline, to be cut away with it */
+    /* the window's outline, to be cut away with it; wider than a pixel of a screen, 25.4/96, where browsers round */
     rectangle(d, left, top, IO_SHEET_WINDOW, line);
     rectangle(d, left, top + IO_SHEET_WINDOW - line, IO_SHEET_WINDOW, line);
     rectangle(d, left, top, line, IO_SHEET_WINDOW);
@@ -80,13 +80,15 @@ static void write_svg(FILE *f, const io_paper *paper, io_tag_image black[IO_SHEE
     fputs("</g>\n</svg>\n", f);
 }
 
-/* ISO 32000-1: five objects and the table of where they begin. */
-static void write_pdf(FILE *f, const io_paper *paper, const char *content, size_t size)
+/* ISO 32000-1: five objects and the table of where they begin. False when the stream does not say where. */
+static bool write_pdf(FILE *f, const io_paper *paper, const char *content, size_t size)
 {
     long at[6] = {0};
+    bool placed = true;
     fputs("%PDF-1.4\n", f);
     for (int k = 1; k <= 5; k++) {
         at[k] = ftell(f);
+        placed &= at[k] >= 0;
         fprintf(f, "%d 0 obj\n", k);
         if (k == 1) fputs("<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>\n", f);
         if (k == 2) fputs("<< /Type /Pages /Kids [3 0 R] /Count 1 >>\n", f);
@@ -108,6 +110,7 @@ static void write_pdf(FILE *f, const io_paper *paper, const char *content, size_
     fputs("xref\n0 6\n0000000000 65535 f \n", f);
     for (int k = 1; k <= 5; k++) fprintf(f, "%010ld 00000 n \n", at[k]);
     fprintf(f, "trailer\n<< /Size 6 /Root 1 0 R >>\nstartxref\n%ld\n%%%%EOF\n", table);
+    return placed && table >= 0;
 }
 
 ts_code io_sheet_print(const char *path, const io_paper *paper, ts_status *st)
@@ -126,8 +129,9 @@ ts_code io_sheet_print(const char *path, const io_paper *paper, ts_status *st)
     else if (f) draw(&(drawing){f, paper, false}, black);
     if (f && fclose(f) == 0 && content) {
         FILE *whole = svg ? NULL : open_memstream(&file, &total);
-        if (whole) write_pdf(whole, paper, content, size);
-        written = svg || (whole && fclose(whole) == 0 && file);
+        const bool placed = whole && write_pdf(whole, paper, content, size);
+        const bool closed = whole && fclose(whole) == 0;
+        written = svg || (placed && closed && file);
     }
     const ts_code code = written ? io_write_bytes(path, svg ? content : file, svg ? size : total, st)
                                  : ts_fail(st, TS_NOMEM, "%s: out of memory", path);

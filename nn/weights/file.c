@@ -91,12 +91,25 @@ static ts_code map_file(nn_file *f, ts_status *st)
     return f->map ? TS_OK : TS_IO;
 }
 
+void nn_file_fetch(const nn_file *file)
+{
+#ifdef MADV_POPULATE_READ
+    (void)madvise((void *)(uintptr_t)file->map, file->size,
+                  MADV_POPULATE_READ); /* a hint: pages come when they are read */
+#else
+    (void)file;
+#endif
+}
+
+enum { NAMES = 64 << 10 }; /* bytes of most files' names and metadata */
+
 static nn_file *open_with(const char *path, ts_code (*parse)(nn_file *f, ts_status *st), ts_status *st)
 {
     nn_file *f = calloc(1, sizeof *f);
     if (f) f->path = strdup(path);
     if (!f || !f->path) ts_fail(st, TS_NOMEM, "%s: no memory to open it", path);
-    else if ((f->arena = ts_arena_create(0, st)) && !map_file(f, st) && !parse(f, st) && !sort_names(f, st)) return f;
+    else if ((f->arena = ts_arena_create(NAMES, st)) && !map_file(f, st) && !parse(f, st) && !sort_names(f, st))
+        return f;
     nn_file_close(&f);
     return NULL;
 }
@@ -158,7 +171,7 @@ void nn_shape_text(int rank, const int64_t *dim, char *out, size_t size)
     if (at < size) snprintf(out + at, size - at, "]");
 }
 
-static const nn_tensor *find_real(const nn_file *file, const char *name, int rank, const int64_t *dim, ts_status *st)
+const nn_tensor *nn_file_find_real(const nn_file *file, const char *name, int rank, const int64_t *dim, ts_status *st)
 {
     const nn_tensor *e = nn_file_find(file, name);
     if (!e) return ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" is missing", file->path, name), NULL;
@@ -177,7 +190,7 @@ static const nn_tensor *find_real(const nn_file *file, const char *name, int ran
 
 ts_code nn_file_read(const nn_file *file, const char *name, int rank, const int64_t *dim, float *out, ts_status *st)
 {
-    const nn_tensor *e = find_real(file, name, rank, dim, st);
+    const nn_tensor *e = nn_file_find_real(file, name, rank, dim, st);
     if (!e) return TS_FORMAT;
     nn_tensor_copy(e, NN_F32, out);
     return TS_OK;
@@ -186,7 +199,7 @@ ts_code nn_file_read(const nn_file *file, const char *name, int rank, const int6
 ts_code nn_file_read_finite(const nn_file *file, const char *name, int rank, const int64_t *dim, float *out,
                             ts_status *st)
 {
-    const nn_tensor *e = find_real(file, name, rank, dim, st);
+    const nn_tensor *e = nn_file_find_real(file, name, rank, dim, st);
     if (!e) return TS_FORMAT;
     return nn_tensor_finite(e, out)
         ? TS_OK

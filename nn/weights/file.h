@@ -66,6 +66,11 @@ bool nn_file_has(const nn_file *file, const char *name);
 const char *nn_file_meta(const nn_file *file, const char *key); /* NULL when absent */
 const char *nn_file_meta_key(const nn_file *file, int i);       /* in the file's order, NULL past the last */
 
+/* Tensor name, which must have that shape; NULL and st otherwise, and where it is not of real numbers. */
+const nn_tensor *nn_file_find_real(const nn_file *file, const char *name, int rank, const int64_t *dim, ts_status *st);
+/* Reads the file's pages before they are asked for one by one. */
+void nn_file_fetch(const nn_file *file);
+
 /* Copies tensor name into out (as many floats as dim says, row-major); TS_FORMAT when it is missing, has another shape
  * or is not of real numbers. F64 is rounded. */
 ts_code nn_file_read(const nn_file *file, const char *name, int rank, const int64_t *dim, float *out, ts_status *st);
@@ -81,6 +86,9 @@ bool nn_tensor_copy(const nn_tensor *e, nn_dtype to, void *out);
 bool nn_tensor_finite(const nn_tensor *e, float *out);
 /* Row-major without gaps, little endian: data may be used as it is. */
 bool nn_tensor_plain(const nn_tensor *e);
+/* Its numbers where they are F16 in that order, not aligned; or NULL. And whether those are finite. */
+const void *nn_tensor_halves(const nn_tensor *e);
+bool nn_halves_finite(const nn_tensor *e);
 /* "[64, 3, 3, 3]" */
 void nn_shape_text(int rank, const int64_t *dim, char *out, size_t size);
 

@@ -91,6 +91,19 @@ static bool all_finite(const float *v, int n)
     return !bad;
 }
 
+/* The same of halves. */
+static bool all_finite_half(const unsigned char *p, int64_t n)
+{
+    const uint16_t most = 0x7c00;
+    int bad = 0;
+    for (int64_t i = 0; i < n; i++) {
+        uint16_t v;
+        memcpy(&v, p + 2 * i, 2);
+        bad |= (v & most) == most;
+    }
+    return !bad;
+}
+
 static void load(const nn_tensor *e, const unsigned char *p, int64_t step, int n, float *out)
 {
     uint16_t half[CHUNK];
@@ -229,6 +242,13 @@ bool nn_tensor_finite(const nn_tensor *e, float *out)
     copy(e, NN_F32, out, &finite);
     return finite;
 }
+
+const void *nn_tensor_halves(const nn_tensor *e)
+{
+    return e->dtype == NN_F16 && e->count && nn_tensor_plain(e) ? e->data : NULL;
+}
+
+bool nn_halves_finite(const nn_tensor *e) { return all_finite_half(e->data, e->count); }
 
 const void *nn_tensor_bytes(const nn_tensor *e, nn_dtype to, const char *path, void **work, size_t *work_size,
                             ts_status *st)

@@ -41,9 +41,23 @@ static bool of_network(const char *name)
         !strncmp(name, "a.", 2) || nn_published_tensor(name);
 }
 
+/* A convolution's weights that can be packed from the file stay there. False: they are to be read; or st. */
+static bool leave_halves(const nn_file *f, nn_param *p, const int64_t dim[4], ts_status *st)
+{
+    const nn_tensor *e = p->rank == 4 ? nn_file_find_real(f, p->name, p->rank, dim, st) : NULL;
+    const void *half = e ? nn_tensor_halves(e) : NULL;
+    if (!half) return false;
+    if (!nn_halves_finite(e))
+        return ts_fail(st, TS_NUMERIC, "%s: tensor \"%s\" holds a value that is not finite", nn_file_path(f), p->name),
+               false;
+    p->half = half;
+    return true;
+}
+
 typedef struct reading {
     const nn_file *f;
     nn_model *m;
+    bool leave;
     pthread_mutex_t *lock; /* of what follows */
     int *failed;
     ts_status *st;
@@ -52,11 +66,12 @@ typedef struct reading {
 static void read_value(const void *job, int64_t i)
 {
     const reading *r = job;
-    const nn_param *p = &r->m->param[i];
+    nn_param *p = &r->m->param[i];
     ts_status own = {0};
     int64_t dim[4];
     nn_param_dims(p, dim);
-    if (nn_file_read_finite(r->f, p->name, p->rank, dim, r->m->value + p->offset, &own) == TS_OK) return;
+    if (r->leave && leave_halves(r->f, p, dim, &own)) return;
+    if (!own.code && nn_file_read_finite(r->f, p->name, p->rank, dim, r->m->value + p->offset, &own) == TS_OK) return;
     pthread_mutex_lock(r->lock);
     if (i < *r->failed) {
         *r->failed = (int)i;
@@ -67,17 +82,17 @@ static void read_value(const void *job, int64_t i)
 
 /* A tensor by each thread at a time: they wait for each other once, not at every tensor, while another thread may be
  * decoding. Of several that fail st names the first. */
-static ts_code read_values(const nn_file *f, nn_model *m, ts_status *st)
+static ts_code read_values(const nn_file *f, nn_model *m, bool leave, ts_status *st)
 {
     int failed = m->params;
     pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
-    ts_tasks(0, m->params, read_value, &(reading){f, m, &lock, &failed, st});
+    ts_tasks(0, m->params, read_value, &(reading){f, m, leave, &lock, &failed, st});
     return failed < m->params ? st->code : TS_OK;
 }
 
 /* The plan with its parameters: all that are in the file, and no other tensors of a network. Frees the plan on failure.
  */
-static nn_model *fill(nn_model *m, const nn_file *f, ts_status *st)
+static nn_model *fill(nn_model *m, const nn_file *f, bool leave, ts_status *st)
 {
     for (int i = 0; m && i < nn_file_count(f); i++) {
         const char *name = nn_file_name(f, i);
@@ -92,7 +107,7 @@ static nn_model *fill(nn_model *m, const nn_file *f, ts_status *st)
             ts_fail(st, TS_FORMAT, "%s: tensor \"%s\" is missing", nn_file_path(f), m->param[i].name);
             nn_model_free(&m);
         }
-    if (m && (nn_model_allocate(m, st) || read_values(f, m, st))) nn_model_free(&m);
+    if (m && (nn_model_allocate(m, leave, st) || read_values(f, m, leave, st))) nn_model_free(&m);
     return m;
 }
 
@@ -101,8 +116,22 @@ nn_model *nn_model_load(const char *path, ts_status *st)
     nn_arch arch;
     nn_model *m = NULL;
     nn_file *f = nn_file_open(path, st);
-    if (f && !nn_arch_from_file(f, &arch, st)) m = fill(nn_model_plan(&arch, st), f, st);
+    if (f && !nn_arch_from_file(f, &arch, st)) m = fill(nn_model_plan(&arch, st), f, false, st);
     nn_file_close(&f);
+    return m;
+}
+
+nn_model *nn_model_open(const char *path, ts_status *st)
+{
+    nn_arch arch;
+    nn_model *m = NULL;
+    nn_file *f = nn_file_open(path, st);
+    if (f && !nn_arch_from_file(f, &arch, st)) {
+        nn_file_fetch(f);
+        m = fill(nn_model_plan(&arch, st), f, true, st);
+    }
+    if (m) m->file = f;
+    else nn_file_close(&f);
     return m;
 }
 
@@ -111,7 +140,7 @@ nn_model *nn_coder_load(const char *path, ts_status *st)
     nn_coder coder;
     nn_model *m = NULL;
     nn_file *f = nn_file_open(path, st);
-    if (f && !nn_coder_from_file(f, &coder, st)) m = fill(nn_coder_plan(&coder, st), f, st);
+    if (f && !nn_coder_from_file(f, &coder, st)) m = fill(nn_coder_plan(&coder, st), f, false, st);
     nn_file_close(&f);
     return m;
 }

@@ -1,4 +1,4 @@
-/* Convolution: checks, packed weights, and the entries, which hand a plan to the way that conv_choose.c names. */
+/* Convolution: checks, and the entries, which hand a plan to the way that conv_choose.c names. */
 #include "tensor/conv/conv.h"
 #include "tensor/conv/plan.h"
 #include "tensor/team.h"
@@ -25,75 +25,6 @@ ts_code ts_conv_check(const ts_conv *c, ts_status *st)
         return ts_fail(st, TS_INVALID, "convolution of %d x %d x %d x %d to %d channels with side %d is too large",
                        c->n, c->h, c->w, c->ic, c->oc, c->k);
     return TS_OK;
-}
-
-size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
-{
-    if (use == TS_CONV_WINOGRAD) return conv_winograd_count(c->ic, c->oc);
-    if (use == TS_CONV_DATA_GRADIENT_WINOGRAD) return conv_winograd_count(c->oc, ts_conv_variables(c));
-    if (use == TS_CONV_FORWARD_BF16) return conv_bf16_count(c, c->ic, c->oc);
-    if (use == TS_CONV_DATA_GRADIENT_BF16) return conv_bf16_count(c, c->oc, ts_conv_variables(c));
-    const int ic = use == TS_CONV_FORWARD ? c->ic : c->oc, oc = use == TS_CONV_FORWARD ? c->oc : ts_conv_variables(c);
-    const size_t panels = (size_t)conv_panels_count(ic, oc, c->k);
-    const ts_conv_way narrow = conv_choose_narrow(ic, oc, c->k);
-    if (narrow == TS_CONV_BY_COL2IM) return panels + (size_t)conv_col2im_count(ic, oc, c->k);
-    return panels + (narrow == TS_CONV_BY_LANES ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
-}
-
-typedef struct pack_job {
-    bool forward;
-    int ic, oc, taps, parts;
-    ptrdiff_t o_step, i_step;
-    const float *weight;
-    float *packed;
-} pack_job;
-
-static void pack_part(const pack_job *j, int panel, int part)
-{
-    const int width = conv_vectors(j->oc, panel) * conv_lanes(), o0 = panel * 2 * conv_lanes(),
-              count = j->oc - o0 < width ? j->oc - o0 : width;
-    float *to = j->packed + (ptrdiff_t)o0 * j->ic * j->taps;
-    int begin, end;
-    conv_part(j->ic, j->parts, part, &begin, &end);
-    for (int i = begin; i < end; i++)
-        for (int t = 0; t < j->taps; t++) {
-            const float *from = j->weight + i * j->i_step + o0 * j->o_step + (j->forward ? t : j->taps - 1 - t);
-            float *row = to + ((ptrdiff_t)t * j->ic + i) * width;
-            for (int o = 0; o < count; o++) row[o] = from[o * j->o_step];
-            for (int o = count; o < width; o++) row[o] = 0;
-        }
-}
-
-static void pack_parts(const void *job, int64_t begin, int64_t end)
-{
-    const pack_job *j = job;
-    for (int64_t i = begin; i < end; i++) pack_part(j, (int)(i / j->parts), (int)(i % j->parts));
-}
-
-/* packed: [panel][ky][kx][input][channel of the panel, zeros where there is none] */
-void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float *packed)
-{
-    if (use == TS_CONV_WINOGRAD || use == TS_CONV_DATA_GRADIENT_WINOGRAD) {
-        conv_winograd_pack(c, use == TS_CONV_WINOGRAD, weight, packed);
-        return;
-    }
-    if (use == TS_CONV_FORWARD_BF16 || use == TS_CONV_DATA_GRADIENT_BF16) {
-        conv_pack_bf16(c, use == TS_CONV_FORWARD_BF16, weight, packed);
-        return;
-    }
-    const bool forward = use == TS_CONV_FORWARD;
-    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), taps = c->k * c->k;
-    /* weight[o][c][tap]: strides of the packed input and output channel */
-    const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * taps : taps,
-                    i_step = forward ? taps : (ptrdiff_t)c->ic * taps;
-    const int parts = ic > 16 ? 16 : ic;
-    /* Behind the panels once more, for the ways of few output channels. */
-    const ts_conv_way narrow = conv_choose_narrow(ic, oc, c->k);
-    float *behind = packed + conv_panels_count(ic, oc, c->k);
-    if (narrow == TS_CONV_BY_COL2IM) conv_pack_col2im(ic, oc, c->k, !forward, weight, i_step, o_step, behind);
-    if (narrow == TS_CONV_BY_LANES) conv_pack_lanes(ic, oc, c->k, !forward, weight, i_step, o_step, behind);
-    ts_for(c->compute.threads, (int64_t)conv_panels(oc) * parts, 1, pack_parts,
-           &(pack_job){forward, ic, oc, taps, parts, o_step, i_step, weight, packed});
 }
 
 static void run(const conv_plan *p, ts_conv_way way)

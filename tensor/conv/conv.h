@@ -56,6 +56,8 @@ ts_code ts_conv_check(const ts_conv *c, ts_status *st);
 /* floats; does not depend on n, h, w. Packed weights are for the ISA in use (tensor/cpu.h). */
 size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use);
 void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight /* [oc][ic][k][k] */, float *packed);
+/* The same of IEEE 754 halves, in this machine's byte order and aligned to nothing; false: no memory. */
+bool ts_conv_pack_half(const ts_conv *c, ts_conv_use use, const void *weight, float *packed);
 
 /* y[n,i,j,o] = act(bias[o] + sum_{ky,kx,c} x[n, i + d(ky-k/2), j + d(kx-k/2), c] weight[o,c,ky,kx]),
  * act(v) = v > 0 ? v : leak v (0 <= leak <= 1; 1: the identity, 0: ReLU). bias may be NULL. x and y contiguous, not

@@ -58,38 +58,42 @@ winograd_grid winograd_grid_gradient(const ts_conv *c, int fold)
 size_t conv_winograd_count(int ic, int oc) { return (size_t)conv_panels_count(ic, oc, 1) * WINOGRAD_AREA; }
 
 typedef struct pack_job {
+    const ts_conv *c;
+    const conv_weights *w;
     bool forward;
-    int ic, oc;
-    ptrdiff_t plane, o_step, i_step;
-    const float *weight;
+    int ic, step, parts;
+    ptrdiff_t plane;
     float *packed;
 } pack_job;
 
-static void pack_inputs(const void *job, int64_t begin, int64_t end)
+static void pack_part(const pack_job *j, int panel, int part)
 {
-    const pack_job *j = job;
-    const int lanes = conv_lanes();
-    for (int64_t at = begin; at < end; at++) {
-        const int panel = (int)(at / j->ic), i = (int)(at % j->ic), vectors = conv_vectors(j->oc, panel),
-                  width = vectors * lanes, o0 = panel * 2 * lanes;
-        float tap[9 * 2 * 16] = {0}; /* no vector has more than 16 lanes */
-        for (int o = 0; o < width && o0 + o < j->oc; o++) {
-            const float *from = j->weight + i * j->i_step + (o0 + o) * j->o_step;
-            for (int t = 0; t < 9; t++) tap[t * width + o] = from[j->forward ? t : 8 - t];
-        }
-        ts_winograd_k()->weights(tap, vectors, j->packed + (ptrdiff_t)o0 * j->ic + (ptrdiff_t)i * width, j->plane);
+    float turned[2 * 16 * CONV_TURNED]; /* no vector has more than 16 lanes */
+    const int begin = part * j->step, count = j->ic - begin < j->step ? j->ic - begin : j->step;
+    const int width = conv_turn(j->c, j->w, j->forward, panel, begin, count, turned);
+    float *to = j->packed + (ptrdiff_t)panel * 2 * conv_lanes() * j->ic;
+    for (int i = 0; i < count; i++) {
+        float *tap = turned + i * 9 * width, mirrored[9 * 2 * 16];
+        for (int t = 0; t < 9 && !j->forward; t++)
+            memcpy(mirrored + t * width, tap + (8 - t) * width, sizeof *tap * (size_t)width);
+        ts_winograd_k()->weights(j->forward ? tap : mirrored, width / conv_lanes(), to + (ptrdiff_t)(begin + i) * width,
+                                 j->plane);
     }
 }
 
+static void pack_parts(const void *job, int64_t begin, int64_t end)
+{
+    const pack_job *j = job;
+    for (int64_t i = begin; i < end; i++) pack_part(j, (int)(i / j->parts), (int)(i % j->parts));
+}
+
 /* packed: [36][panel][input][channel of the panel] = G g G' */
-void conv_winograd_pack(const ts_conv *c, bool forward, const float *weight, float *packed)
+void conv_winograd_pack(const ts_conv *c, bool forward, const conv_weights *w, float *packed)
 {
     const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c);
-    const ptrdiff_t plane = conv_panels_count(ic, oc, 1);
-    /* weight[o][c][tap]: strides of the packed input and output channel */
-    const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * 9 : 9, i_step = forward ? 9 : (ptrdiff_t)c->ic * 9;
-    ts_for(c->compute.threads, (int64_t)conv_panels(oc) * ic, 1, pack_inputs,
-           &(pack_job){forward, ic, oc, plane, o_step, i_step, weight, packed});
+    const int step = conv_turned_inputs(9), parts = (ic + step - 1) / step;
+    ts_for(c->compute.threads, (int64_t)conv_panels(oc) * parts, 1, pack_parts,
+           &(pack_job){c, w, forward, ic, step, parts, conv_panels_count(ic, oc, 1), packed});
 }
 
 void winograd_locate(const winograd_grid *g, int64_t first, int count, winograd_place *place)

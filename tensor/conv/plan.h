@@ -103,6 +103,18 @@ void conv_run_tile(ts_tile *t, int vectors, const float *a, float *y, int pixels
 /* Side 1, serial: pixels [first, first + count) of panels [panel0, panel1); p->x is as tiles read it. */
 void conv_run_pixels(const conv_plan *p, ptrdiff_t first, ptrdiff_t count, int panel0, int panel1);
 
+/* Weights to be packed, [oc][ic][k][k]: as floats, or as halves that are aligned to nothing. */
+typedef struct conv_weights {
+    const float *full;
+    const unsigned char *half;
+} conv_weights;
+
+/* Inputs [input, input + inputs) of a panel: to [input][tap][width], zeros where there is no channel; returns width, of
+ * whole vectors. Of the forward or the gradient's way; inputs: at most conv_turned_inputs. */
+enum { CONV_TURNED = 225 }; /* taps of inputs that are turned at once: those of the largest kernel */
+static inline int conv_turned_inputs(int taps) { return taps < 144 ? 144 / taps : 1; }
+int conv_turn(const ts_conv *c, const conv_weights *w, bool forward, int panel, int input, int inputs, float *to);
+
 void conv_run_direct(const conv_plan *p);
 void conv_run_pointwise(const conv_plan *p);
 void conv_run_batch(const conv_plan *p);
@@ -137,7 +149,7 @@ void conv_pack_lanes(int ic, int oc, int k, bool mirrored, const float *weight, 
                      float *packed);
 
 size_t conv_winograd_count(int ic, int oc);
-void conv_winograd_pack(const ts_conv *c, bool forward, const float *weight, float *packed);
+void conv_winograd_pack(const ts_conv *c, bool forward, const conv_weights *w, float *packed);
 
 /* dweight += for at most CONV_BATCH_PIXELS pixels an image. */
 void conv_batch_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight);

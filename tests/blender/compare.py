@@ -41,9 +41,11 @@ def scene(size):
     bpy.ops.import_scene.gltf(filepath=os.path.join(FOLDER, "material.glb"))
     plane = [o for o in bpy.context.scene.objects if o.type == "MESH"][0]
     if PHOTO:
-        import lgd_material
+        import addon_utils
 
-        lgd_material.register()
+        # as Blender does, which disables it again at exit. As a module, bpy 4.5 waits forever there for a thread of its
+        # own where any class is still registered that Blender does not know to be an add-on's
+        addon_utils.enable("lgd_material")
         bpy.context.view_layer.objects.active = plane
         bpy.ops.import_image.lgd_material(filepath=PHOTO, size=size)
         if plane.active_material.name.split(".")[0] != os.path.splitext(os.path.basename(PHOTO))[0]:

@@ -22,6 +22,7 @@ mistakes() {
     expect 2 infer --corners 10,5 40,8 42,35 "$T/a.ppm" -o "$T/o"
     says "$T/err" a.ppm
     expect 2 infer --corners 10,5 40,8 42,35 8,30 "$T/a.ppm" "$T/b.ppm" -o "$T/o"
+    says "$T/err" "--corners takes 1 photograph at most: '$T/b.ppm' is one too many"
     says "$T/err" b.ppm
     expect 1 infer --corners 10,5 70,8 72,35 8,30 "$T/a.ppm" -o "$T/o"
     says "$T/err" outside

@@ -92,6 +92,10 @@ END
     expect 2 infer --capture "$T/c.ini" "$T/a.ppm" -o "$T/bad"
     says "$T/err" --capture
     expect 2 infer --capture "" -o "$T/bad"
+    mkdir "$T/folder"
+    cp "$T/a.ppm" "$T/folder"
+    expect 1 infer --capture "$T/folder" -o "$T/bad"
+    says "$T/err" "$T/folder: is no folder of a capture: it has no camera_pos.txt"
 }
 
 check capture_folder folder

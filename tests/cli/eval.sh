@@ -190,6 +190,23 @@ field_of_view() {
     done
 }
 
+# A tilted camera: a method that knows it makes something else of the photograph than one that does not.
+tilt() {
+    for degrees in -1 90 x; do
+        expect 2 "$BIN/lgd-eval" --set procedural:1,1 --tilt=$degrees -o "$T/o"
+        says "$T/err" "--tilt: '$degrees' is not an angle in 0 .. 60 degrees"
+    done
+    model
+    for tilt in 0 20; do
+        expect 0 evaluate --tilt $tilt --set procedural:1,1 --method lgd:label=set --method lgd:view=told,label=told \
+            --method lgd:view=unknown,label=unknown -o "$T/$tilt"
+        awk -F, -v tilt=$tilt '$5 == 2 { v[$4] = $10 } function near(a, b) { return a > 0 && (a - b) ^ 2 < 1e-8 }
+            END { exit !(near(v["told"], v["unknown"]) && near(v["set"], v["told"]) == (tilt == 0)) }' \
+            "$T/$tilt/results.csv" || fail "at $tilt degrees: $(cat "$T/$tilt/results.csv")"
+    done
+    if cmp -s "$T/0/results.csv" "$T/20/results.csv"; then fail "--tilt changes nothing"; fi
+}
+
 told() {
     for o in --normal=up --workflow=mixed --colour=p3; do
         expect 2 "$BIN/lgd-eval" --set "maps:$T" $o -o "$T/o"
@@ -320,6 +337,7 @@ untold() {
 
 check eval_captures captures
 check eval_field_of_view field_of_view
+check eval_tilt tilt
 check eval_photographs photographs
 check eval_untold untold
 check eval_lpips lpips

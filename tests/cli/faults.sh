@@ -11,6 +11,7 @@ faults() {
     says "$T/out" " 0 scenarios with defects"
 }
 of_infer() { faults infer --every 40; }
+of_sheet() { faults sheet --call ftell; }
 of_convert() { faults "convert torch" --every 20; }
 of_data() { faults "data strips" --every 40; }
 # The first memory is refused; texts in memory and config.ini are cut.
@@ -18,10 +19,14 @@ of_train() { faults train --call malloc --every 2000 && faults train --call fpri
 # A checkpoint or a log that cannot be opened now is not one that is not there.
 of_resume() { faults resume --call access && faults resume --call fopen; }
 of_threads() { faults many --call pthread_create && faults many --call open_memstream; }
+# What libpng, libjpeg, zlib and OpenEXR are refused: an error must not wait for a lock that its file holds.
+of_libraries() { faults libraries --call malloc; }
 
 check faults_of_infer of_infer
 check faults_of_convert of_convert
 check faults_of_data of_data
+check faults_of_sheet of_sheet
 check faults_of_train of_train
 check faults_of_resume of_resume
 check faults_of_several_threads of_threads
+check faults_of_libraries of_libraries

@@ -144,6 +144,15 @@ lists_at_once() {
     [ -z "$(find "$T/o" -name '.*')" ] || fail "left over: $(find "$T/o" -name '.*' | head -n 3)"
 }
 
+# Of photographs that the default model's maps look like, the summary says nothing; of noise it does.
+looks_like_it() {
+    for f in m_pink 057; do [ -f "$TESTDATA/photos/$f.png" ] || skip "no $TESTDATA/photos"; done
+    { printf 'P3 64 64 255\n'; awk 'BEGIN { for (v = 1; i++ < 3 * 64 * 64;) print int((v = v * 16807 % 2147483647) / 8388608) }'; } >"$T/noise.ppm"
+    LGD_MODEL='' expect 0 "$BIN/lgd-infer" -m phone --maps diffuse "$TESTDATA/photos/m_pink.png" "$TESTDATA/photos/057.png" "$T/noise.ppm" -o "$T/o"
+    says "$T/err" "lgd-infer:   $T/noise.ppm: its maps do not look like it"
+    [ "$(grep -c 'do not look like it' "$T/err")" = 1 ] || fail "$(grep 'do not look like it' "$T/err")"
+}
+
 killed_and_begun_again() {
     model
     TMPDIR=$T expect 0 sh tests/kill_folder.sh 120 4 2
@@ -154,3 +163,4 @@ check folders_existing existing
 check folders_lists lists
 check folders_lists_at_once lists_at_once
 check folders_killed killed_and_begun_again
+check folders_look_at looks_like_it

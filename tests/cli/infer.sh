@@ -64,13 +64,13 @@ folders_and_lists() {
 # What the trained steps leave far from the photograph is said, with what may help, and that helps.
 far_from_the_photograph() {
     model
-    { printf 'P3 64 64 255\n'; awk 'BEGIN { for (i = 0; i < 64 * 64; i++) print int(i / 64 / 8) % 2 == int(i % 64 / 8) % 2 ? "255 20 20" : "3 3 3" }'; } > "$T/chequer.ppm"
-    expect 0 "$BIN/lgd-infer" -s 64 --maps diffuse "$T/chequer.ppm" -o "$T/o"
+    { printf 'P3 64 64 255\n'; awk 'BEGIN { for (v = 1; i++ < 3 * 64 * 64;) print int((v = v * 16807 % 2147483647) / 8388608) }'; } >"$T/noise.ppm"
+    expect 0 "$BIN/lgd-infer" -s 64 --maps diffuse "$T/noise.ppm" -o "$T/o"
     says "$T/err" "; --iterations auto may come nearer"
     left=$(sed -n 's/.*-> \([0-9.]*\) .*/\1/p' "$T/err")
-    expect 0 "$BIN/lgd-infer" -s 64 --maps diffuse -i auto "$T/chequer.ppm" -o "$T/o"
+    expect 0 "$BIN/lgd-infer" -s 64 --maps diffuse -i auto "$T/noise.ppm" -o "$T/o"
     if grep -q "may come nearer" "$T/err"; then fail "it is said of --iterations auto itself"; fi
-    awk -v a="$left" -v b="$(sed -n 's/.*-> \([0-9.]*\) .*/\1/p' "$T/err")" 'BEGIN { exit !(b < a && a > 0.01) }' || fail "$left before, after: $(cat "$T/err")"
+    awk -v a="$left" -v b="$(sed -n 's/.*-> \([0-9.]*\) .*/\1/p' "$T/err")" 'BEGIN { exit !(b < a && a > 0.05) }' || fail "$left before, after: $(cat "$T/err")"
 }
 
 threads_agree() {

@@ -8,12 +8,16 @@ bad_ones_do_not_stop() {
     echo "no photograph" >"$T/b.jpg"
     mkdir "$T/folder.png"
     head -c 200 "$T/a.ppm" >"$T/e.ppm"
-    expect 1 infer "$T/a.ppm" "$T/b.jpg" "$T/c.png" "$T/folder.png" "$T/e.ppm" "$T/d.ppm" -o "$T/o"
+    cp "$T/b.jpg" "$T/notes.txt"
+    expect 1 infer "$T/a.ppm" "$T/b.jpg" "$T/c.png" "$T/folder.png" "$T/e.ppm" "$T/notes.txt" "$T/gone/" \
+        "$T/d.ppm" -o "$T/o"
     complete "$T/o/a"
     complete "$T/o/d"
     lines "$T/out" 2
     for f in b.jpg c.png folder.png e.ppm; do says "$T/err" "$T/$f"; done
-    says "$T/err" "3 of 5"
+    says "$T/err" "$T/notes.txt: is no image, or one in a format that is not read"
+    says "$T/err" "$T/gone/: No such file or directory"
+    says "$T/err" "4 of 6"
     [ "$(ls -A "$T/o" | tr '\n' ' ')" = "a d results.jsonl " ] || fail "left over: $(ls -A "$T/o")"
 }
 

@@ -21,6 +21,8 @@ drawing() {
     # No word goes over the window's line or the paper's edge, with any font (0.6 of the size for a letter is much).
     awk -F'[\">=<]+' '/^<text/ { n++; if ($3 + 0.6 * $9 * length($10) > ($5 < 210 ? 165 : 210)) exit 1 } END { if (n != 4) exit 1 }' \
         "$T/sheet.svg" || fail "words that go too far: $(grep '<text' "$T/sheet.svg")"
+    # A line narrower than a pixel of a screen, 25.4/96 mm, may be left out there.
+    awk -F'"' '/^<rect x/ { n++; if ($6 < 25.4 / 96 || $8 < 25.4 / 96) exit 1 } END { if (n < 300) exit 1 }' "$T/sheet.svg" || fail "thin lines"
     for paper in a4 letter; do
         expect 0 capture sheet --paper $paper -o "$T/$paper.pdf"
         [ "$(head -c 8 "$T/$paper.pdf")" = "%PDF-1.4" ] || fail "$paper.pdf is no PDF"
@@ -76,6 +78,14 @@ checks() {
     photo "$T/bare.ppm" 200 150
     expect 1 capture check "$one/photo_1.jpg" "$T/bare.ppm"
     says "$T/out" "bare.ppm: no tag"
+    mkdir "$T/folder" "$T/empty"
+    cp "$one/photo_1.jpg" "$one/photo_3.jpg" "$T/folder"
+    expect 0 capture check "$T/folder"
+    [ "$(grep -c '; fine$' "$T/out")" -eq 2 ] || fail "not both of the folder: $(cat "$T/out")"
+    expect 1 capture check "$T/folder" "$T/empty"
+    says "$T/err" "$T/empty: there is no photograph in this folder"
+    [ "$(grep -c '; fine$' "$T/out")" -eq 2 ] || fail "an empty folder stops the rest: $(cat "$T/out")"
+    expect 1 capture check "$T/empty"
 }
 
 # Materials under a sheet are evaluated from what is found in their photographs, and from the truth.

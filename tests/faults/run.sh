@@ -63,7 +63,7 @@ INI
 cp "$T/material/diffuse.png" "$T/photo.png"
 cp "$T/photo.png" "$T/a.png" && cp "$T/photo.jpg" "$T/b.jpg" && cp "$T/strip.png" "$T/c.png"
 W=$T/begun/last.safetensors
-for s in infer many formats libraries train resume eval data strips convert torch; do mkdir -p "$T/$s"; done
+for s in infer many formats libraries train resume eval data strips convert torch sheet; do mkdir -p "$T/$s"; done
 # A run that ended early, since a checkpoint could not be renamed.
 mkdir "$T/resume/out"
 LD_PRELOAD=$SHIM LGD_FAULT="rename 7" "$BIN/lgd-train" "$T/small.ini" --set output.folder="$T/resume/out/run" --threads 1 >"$T/log" 2>&1
@@ -85,6 +85,7 @@ scenario data -- "$BIN/lgd-data" -o "$T/data/out" --count 2 --size 16 --threads 
 scenario strips -- "$BIN/lgd-data" -o "$T/strips/out" --count 1 --size 16 --format strips --threads 1
 scenario convert -- "$BIN/lgd-convert" "$W" "$T/convert/out/w.pth"
 scenario torch -- "$BIN/lgd-convert" tests/corpus/torch/deflated.pth "$T/torch/out/w.safetensors"
+scenario sheet -- "$BIN/lgd-capture" sheet -o "$T/sheet/out/sheet.pdf"
 
 echo "$injected failures injected, $bad scenarios with defects"
 [ "$bad" -eq 0 ]

@@ -52,13 +52,16 @@ static void estimate(way *w, const float *image, int side)
     CHECK(!lgd_estimate(w->model, image, side, &o, w->maps, &e), "%s", e.message);
 }
 
-/* Of all photographs: the largest RMS of a photograph's map, and the largest difference of a value. */
+/* Of all photographs: the largest RMS of a photograph's map, the largest difference of a value, and the largest share
+ * of a photograph's values that differ by more than FAR. */
+#define FAR 0.05
 typedef struct difference {
-    double rms[PARTS], most[PARTS];
+    double rms[PARTS], most[PARTS], far;
 } difference;
 
 static void compare(const float *a, const float *b, int pixels, difference *d)
 {
+    int far = 0;
     for (int k = 0; k < PARTS; k++) {
         double squares = 0;
         for (int p = 0; p < pixels; p++)
@@ -66,9 +69,11 @@ static void compare(const float *a, const float *b, int pixels, difference *d)
                 const double off = fabs((double)a[p * MAP_CHANNELS + c] - (double)b[p * MAP_CHANNELS + c]);
                 squares += off * off;
                 d->most[k] = fmax(d->most[k], off);
+                far += off > FAR;
             }
         d->rms[k] = fmax(d->rms[k], sqrt(squares / (pixels * (parts[k].end - parts[k].first))));
     }
+    d->far = fmax(d->far, far / ((double)pixels * MAP_CHANNELS));
 }
 
 /* a against b: every photograph at 256 pixels, every third at 512. */
@@ -81,7 +86,7 @@ static void photographs(const char *what, const char *weights, way a, way b, dou
     const int files = scandir(folder, &names, NULL, alphasort);
     CHECK(files > 0, "%s cannot be read", folder);
     for (int side = 256, every = 1; side <= 512; side *= 2, every = 3) {
-        difference d = {{0}, {0}};
+        difference d = {{0}, {0}, 0};
         int seen = 0, compared = 0;
         begin(&a, side), begin(&b, side);
         for (int i = 0; i < files; i++) {
@@ -99,9 +104,10 @@ static void photographs(const char *what, const char *weights, way a, way b, dou
         end(&a), end(&b);
         printf("  %s, %s, %d photographs at %d:", what, weights, compared, side);
         for (int k = 0; k < PARTS; k++) printf(" %s %.2g, %.2g at most;", parts[k].name, d.rms[k], d.most[k]);
-        puts("");
+        printf(" %.2g of a photograph's values by more than %g\n", d.far, FAR);
         CHECK(compared * every >= 26, "%d photographs", compared);
         CHECK(d.most[0] > 0, "%s: the same bytes", what);
+        CHECK(d.far < 1e-4, "%s at %d: %.2g of a photograph's values differ by more than %g", what, side, d.far, FAR);
         for (int k = 0; k < PARTS; k++)
             CHECK(d.rms[k] < rms && d.most[k] < most, "%s at %d: %s differs by %.2g (RMS), by %.2g at most", what, side,
                   parts[k].name, d.rms[k], d.most[k]);

@@ -217,6 +217,29 @@ TEST(render_view_from_farther)
     }
 }
 
+/* A camera on a circle over the sample, and what is matt as bright in the middle as before. */
+TEST(render_view_tilted)
+{
+    const rd_view near = rd_flash(), same = rd_view_tilted(near, 0);
+    CHECK(!memcmp(&near, &same, sizeof near), "no tilt changes the default view");
+    static const float matt[9] = {0.5f, 0.2f, -0.4f, 0, 0, 0.9f, -1, -1, -1};
+    float a[3], b[3];
+    for (int degrees = 5; degrees < 70; degrees += 13) {
+        const double d = rd_fov_distance(40), turn = degrees * 0.017453292519943295;
+        const rd_view straight = rd_view_from(near, d), view = rd_view_tilted(straight, degrees);
+        CHECK(fabs((double)view.camera[2] - d * cos(turn)) < 1e-6 &&
+                  fabs((double)view.camera[1] + d * sin(turn)) < 1e-6,
+              "%d degrees: at %g, %g", degrees, (double)view.camera[1], (double)view.camera[2]);
+        CHECK(!memcmp(view.camera, view.light, sizeof view.light), "%d degrees: the light has left the lens", degrees);
+        rd_render(rd_grid_full(1), matt, 9, &straight, false, a);
+        rd_render(rd_grid_full(1), matt, 9, &view, false, b);
+        /* F of F0 = 0 is not quite 0, and its share grows with the angle */
+        for (int c = 0; c < 3; c++)
+            CHECK(fabsf(a[c] - b[c]) < 1e-4f * a[c], "%d degrees: %g in the middle, not %g", degrees, (double)b[c],
+                  (double)a[c]);
+    }
+}
+
 TEST(render_views)
 {
     ts_rng rng = ts_rng_make(9, TS_STREAM_TEST, 0);

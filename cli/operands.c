@@ -1,4 +1,4 @@
-#include "cli/infer/operands.h"
+#include "cli/operands.h"
 #include "data/file.h"
 #include <dirent.h>
 #include <errno.h>
@@ -14,7 +14,7 @@
 static const char *const endings[] = {"jpg", "jpeg", "png", "heic", "heif", "avif", "webp", "tif", "tiff",
                                       "exr", "hdr",  "bmp", "tga",  "ppm",  "pgm",  "dng",  "jp2", "jxl"};
 
-static ts_code add(lgd_operands *all, const char *name, ts_status *st)
+static ts_code add(cl_operands *all, const char *name, ts_status *st)
 {
     if (all->photos == all->capacity) {
         const int capacity = all->capacity ? 2 * all->capacity : 64;
@@ -40,7 +40,7 @@ static bool is_image(const char *name)
 
 static int by_name(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
-static ts_code add_folder(lgd_operands *all, const char *folder, ts_status *st)
+static ts_code add_folder(cl_operands *all, const char *folder, ts_status *st)
 {
     const int first = all->photos;
     const size_t length = strlen(folder);
@@ -65,14 +65,18 @@ static ts_code add_folder(lgd_operands *all, const char *folder, ts_status *st)
     return code;
 }
 
-static ts_code add_operand(lgd_operands *all, const char *name, ts_status *st)
+static ts_code add_operand(cl_operands *all, const char *name, ts_status *st)
 {
     struct stat info;
-    return stat(name, &info) == 0 && S_ISDIR(info.st_mode) ? add_folder(all, name, st) : add(all, name, st);
+    const size_t length = strlen(name);
+    const bool there = stat(name, &info) == 0;
+    if (there && S_ISDIR(info.st_mode)) return add_folder(all, name, st);
+    if (!there && length && name[length - 1] == '/') return ts_fail(st, TS_IO, "%s: %s", name, strerror(errno));
+    return add(all, name, st);
 }
 
 /* A failure of one is reported; what is returned ends the work. */
-static ts_code take(lgd_operands *all, const char *name, void (*failed)(const char *message), ts_status *st)
+static ts_code take(cl_operands *all, const char *name, void (*failed)(const char *message), ts_status *st)
 {
     ts_status own = {0};
     if (add_operand(all, name, &own) == TS_NOMEM) return ts_fail(st, TS_NOMEM, "%s", own.message);
@@ -84,7 +88,7 @@ static ts_code take(lgd_operands *all, const char *name, void (*failed)(const ch
 }
 
 /* A byte-order mark, carriage returns and blank lines are passed over. */
-static ts_code take_list(lgd_operands *all, const char *list, void (*failed)(const char *message), ts_status *st)
+static ts_code take_list(cl_operands *all, const char *list, void (*failed)(const char *message), ts_status *st)
 {
     char *text = NULL;
     size_t size = 0;
@@ -109,21 +113,21 @@ static ts_code take_list(lgd_operands *all, const char *list, void (*failed)(con
     return code;
 }
 
-ts_code lgd_operands_expand(char *const *operand, int count, void (*failed)(const char *message), lgd_operands *all,
-                            ts_status *st)
+ts_code cl_operands_expand(char *const *operand, int count, void (*failed)(const char *message), cl_operands *all,
+                           ts_status *st)
 {
     ts_code code = TS_OK;
-    *all = (lgd_operands){0};
+    *all = (cl_operands){0};
     for (int i = 0; i < count && !code; i++)
         code = operand[i][0] == '@' && operand[i][1] ? take_list(all, operand[i] + 1, failed, st)
                                                      : take(all, operand[i], failed, st);
-    if (code) lgd_operands_free(all);
+    if (code) cl_operands_free(all);
     return code;
 }
 
-void lgd_operands_free(lgd_operands *all)
+void cl_operands_free(cl_operands *all)
 {
     for (int i = 0; i < all->photos; i++) free(all->photo[i]);
     free(all->photo);
-    *all = (lgd_operands){0};
+    *all = (cl_operands){0};
 }
