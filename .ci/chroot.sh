@@ -34,6 +34,7 @@ bind() {
 }
 bind /proc /proc
 bind /dev /dev
+[ ! -d /dev/pts ] || bind /dev/pts /dev/pts # tests ask on terminals
 if [ "$packages" != "$(cat "$root/.complete")" ]; then # made for another list
     cp /etc/resolv.conf "$root/etc/resolv.conf"
     chroot "$root" /usr/bin/env DEBIAN_FRONTEND=noninteractive PATH=/usr/sbin:/usr/bin:/sbin:/bin sh -c \

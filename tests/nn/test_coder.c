@@ -48,10 +48,10 @@ TEST(coder_learns_to_give_maps_back)
 {
     tr_config c = small();
     ts_status st = {0};
-    static const char *const keys[] = {"coder.code=4",           "model.h_width=0",   "model.iterations=0",
-                                       "train.pretrain_steps=0", "train.window=0",    "train.steps=60",
-                                       "coder.width=4",          "coder.width_max=8", "coder.levels=2",
-                                       "train.rate=0.01",        "train.ema=0",       "validate.every=30"};
+    static const char *const keys[] = {
+        "coder.code=4",   "model.h_width=0",   "model.iterations=0",   "train.pretrain_steps=0", "train.window=0",
+        "train.steps=60", "coder.width=4",     "coder.width_max=8",    "coder.levels=2",         "train.rate=0.01",
+        "train.ema=0",    "validate.every=30", "data.families=classic"};
     CHECK(tr_config_check(&c, &st) == TS_OK, "%s", st.message);
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
         if (i == 3)
