@@ -6,8 +6,9 @@
 #include <stdlib.h>
 
 /* Threads that wait for each other between the loops of one small photograph do less than as many that each have one of
- * their own. Of large ones there is one in all: the memory counts more than the time. */
-enum { LANES = 8, AHEAD = 2, LARGE = 1024 };
+ * their own. Of large ones there is one in all: the memory counts more than the time. While maps are written a thread
+ * waits for the disk: another takes its place. */
+enum { LANES = 8, AHEAD = 2, WRITING = 1, LARGE = 1024 };
 
 enum { IDLE, DECODING, DECODED, COMPUTING, FINISHED }; /* an item's stages */
 
@@ -20,10 +21,11 @@ struct lgd_pipeline {
     pthread_t decoder;
     bool published, decoding;
     int lanes, items;     /* photographs that are computed at once, and in all */
+    int writing;          /* threads more than lanes */
     pthread_mutex_t lock; /* of what follows */
     pthread_cond_t changed;
-    lgd_item item[LANES + AHEAD];
-    int begun, reported; /* decodings, and items that are reported */
+    lgd_item item[LANES + AHEAD + WRITING];
+    int begun, computed, reported; /* decodings, items that are computed now, and those that are reported */
     bool all_begun, stopped;
 };
 
@@ -101,6 +103,10 @@ static void work_on(lgd_pipeline *p, lgd_item *item)
     const double start = cl_seconds();
     if (l->stop()) end_early(p);
     else if (!item->st.code && !item->was_done) lgd_item_estimate(p->command, p->model, item, l->progress, l->user);
+    pthread_mutex_lock(&p->lock);
+    p->computed--;
+    pthread_cond_broadcast(&p->changed);
+    pthread_mutex_unlock(&p->lock);
     if (l->stop()) item->st = (ts_status){.code = TS_INTERRUPTED, .message = "interrupted"};
     if (!item->st.code && !item->was_done) lgd_item_write(p->command, p->recipe, item);
     item->seconds += cl_seconds() - start;
@@ -120,11 +126,13 @@ static lgd_item *next(lgd_pipeline *p, bool reports)
             item = finished;
             break;
         }
-        if ((item = first_at(p, DECODED))) {
+        if (p->computed < p->lanes && (item = first_at(p, DECODED))) {
             item->stage = COMPUTING;
+            p->computed++;
             break;
         }
-        if (p->all_begun && (reports ? p->reported == p->begun : !first_at(p, DECODING))) break;
+        const bool none = !first_at(p, DECODING) && !first_at(p, DECODED); /* to come, or to be waited for */
+        if (p->all_begun && (reports ? p->reported == p->begun : none)) break;
         pthread_cond_wait(&p->changed, &p->lock);
     }
     pthread_mutex_unlock(&p->lock);
@@ -164,7 +172,8 @@ lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *comman
                         .items = 1};
     if (command->size <= LARGE) {
         p->lanes = most_at_once(plan->jobs, command->size);
-        p->items = p->lanes + AHEAD;
+        p->writing = plan->jobs > p->lanes ? WRITING : 0;
+        p->items = p->lanes + AHEAD + p->writing;
     }
     p->decoding = pthread_create(&p->decoder, NULL, decode_all, p) == 0;
     if (!p->decoding) {
@@ -176,7 +185,7 @@ lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *comman
 
 void lgd_pipeline_run(lgd_pipeline *p, lgd_model *model, const char *recipe, const lgd_listener *listener)
 {
-    pthread_t other[LANES];
+    pthread_t other[LANES + WRITING];
     lgd_item *item;
     int others = 0;
     p->model = model;
@@ -184,7 +193,7 @@ void lgd_pipeline_run(lgd_pipeline *p, lgd_model *model, const char *recipe, con
     p->listener = listener;
     const double each = lgd_item_bytes(p->command, model);
     while (p->lanes > 1 && ts_budget_check(p->lanes * each, NULL) != TS_OK) p->lanes--;
-    while (others < p->lanes - 1 && pthread_create(&other[others], NULL, lane, p) == 0)
+    while (others < p->lanes + p->writing - 1 && pthread_create(&other[others], NULL, lane, p) == 0)
         others++; /* fewer do the same work */
     while ((item = next(p, true))) {
         if (item->stage == FINISHED) {
