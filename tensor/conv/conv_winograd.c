@@ -26,9 +26,10 @@ static winograd_grid with_tiles(winograd_grid g)
     return g;
 }
 
-winograd_grid winograd_grid_forward(const ts_conv *c)
+winograd_grid winograd_grid_forward(const ts_conv *c, bool bf16)
 {
     return with_tiles((winograd_grid){.threads = c->compute.threads,
+                                      .bf16 = bf16,
                                       .n = c->n,
                                       .h = c->h,
                                       .w = c->w,
@@ -41,9 +42,10 @@ winograd_grid winograd_grid_forward(const ts_conv *c)
                                       .replicate = c->pad == TS_PAD_REPLICATE});
 }
 
-winograd_grid winograd_grid_gradient(const ts_conv *c, int fold)
+winograd_grid winograd_grid_gradient(const ts_conv *c, int fold, bool bf16)
 {
     return with_tiles((winograd_grid){.threads = c->compute.threads,
+                                      .bf16 = bf16,
                                       .n = c->n,
                                       .h = c->h,
                                       .w = c->w,
@@ -55,27 +57,35 @@ winograd_grid winograd_grid_gradient(const ts_conv *c, int fold)
                                       .first = -c->dilation - fold});
 }
 
-size_t conv_winograd_count(int ic, int oc) { return (size_t)conv_panels_count(ic, oc, 1) * WINOGRAD_AREA; }
+/* Inputs as products count them. */
+static int depth_of(int ic, bool bf16) { return bf16 ? conv_bf16_depth(ic) : ic; }
 
-/* packed: [36][panel][input][channel of the panel] = G g G' */
-void conv_winograd_pack(const ts_conv *c, bool forward, const conv_weights *w, float *packed)
+size_t conv_winograd_count(int ic, int oc, bool bf16)
 {
-    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), panels = conv_panels(oc);
-    const int step = conv_turned_inputs(9), parts = (ic + step - 1) / step;
-    const ptrdiff_t plane = conv_panels_count(ic, oc, 1);
+    return (size_t)conv_panels_count(depth_of(ic, bf16), oc, 1) * WINOGRAD_AREA;
+}
+
+/* packed: [36][panel][input, or pair of inputs][channel of the panel] = G g G' */
+void conv_winograd_pack(const ts_conv *c, bool forward, bool bf16, const conv_weights *w, float *packed)
+{
+    const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), panels = conv_panels(oc),
+              depth = depth_of(ic, bf16);
+    const int step = conv_turned_inputs(9), parts = (ic + step - 1) / step; /* even: no pair is parted */
+    const ptrdiff_t plane = conv_panels_count(depth, oc, 1);
 #pragma omp parallel for collapse(2) schedule(static) num_threads(ts_threads_of(c->compute.threads))
     for (int panel = 0; panel < panels; panel++)
         for (int part = 0; part < parts; part++) {
             float turned[2 * 16 * CONV_TURNED]; /* no vector has more than 16 lanes */
             const int begin = part * step, count = ic - begin < step ? ic - begin : step;
             const int width = conv_turn(c, w, forward, panel, begin, count, turned);
-            float *to = packed + (ptrdiff_t)panel * 2 * conv_lanes() * ic;
+            float *to = packed + (ptrdiff_t)panel * 2 * conv_lanes() * depth;
             for (int i = 0; i < count; i++) {
+                const ts_winograd_form form = !bf16 ? TS_WINOGRAD_F32 : i % 2 ? TS_WINOGRAD_ODD : TS_WINOGRAD_EVEN;
+                const ptrdiff_t row = bf16 ? (begin + i) / 2 : begin + i;
                 float *tap = turned + i * 9 * width, mirrored[9 * 2 * 16];
                 for (int t = 0; t < 9 && !forward; t++)
                     memcpy(mirrored + t * width, tap + (8 - t) * width, sizeof *tap * (size_t)width);
-                ts_winograd_k()->weights(forward ? tap : mirrored, width / conv_lanes(),
-                                         to + (ptrdiff_t)(begin + i) * width, plane);
+                ts_winograd_k()->weights[form](forward ? tap : mirrored, width / conv_lanes(), to + row * width, plane);
             }
         }
 }
@@ -133,26 +143,27 @@ void winograd_targets(const winograd_grid *g, winograd_place at, ptrdiff_t pixel
 static void multiply(const winograd_grid *g, const float *u, const float *v, int count, float *m)
 {
     const int panels = conv_panels(g->oc), step = ts_conv_k()->pixels, groups = (count + step - 1) / step;
-    const ptrdiff_t weights = conv_panels_count(g->ic, g->oc, 1), in = winograd_plane(TILES, g->ic),
+    const int depth = depth_of(g->ic, g->bf16);
+    const ptrdiff_t weights = conv_panels_count(depth, g->oc, 1), in = winograd_plane(TILES, depth),
                     out = winograd_plane(TILES, g->oc);
-    const ts_segment segment = {0, 0, g->ic};
-    ts_tile t = {.segment = &segment, .segments = 1, .a_stride = g->ic, .y_stride = g->oc, .leak = 1};
+    const ts_segment segment = {0, 0, depth};
+    ts_tile t = {.segment = &segment, .segments = 1, .a_stride = depth, .y_stride = g->oc, .leak = 1};
     for (int q = 0; q < WINOGRAD_AREA; q++)
         for (int panel = 0; panel < panels; panel++) {
             const int o0 = panel * 2 * conv_lanes(), vectors = conv_vectors(g->oc, panel);
-            const ptrdiff_t size = (ptrdiff_t)g->ic * vectors * conv_lanes();
-            t.w = u + q * weights + (ptrdiff_t)o0 * g->ic;
+            const ptrdiff_t size = (ptrdiff_t)depth * vectors * conv_lanes();
+            t.w = u + q * weights + (ptrdiff_t)o0 * depth;
             t.channels = g->oc - o0;
             /* Each group fetches its part of the next panel, a half of it by each of two. */
             const float *next = q == WINOGRAD_AREA - 1 && panel == panels - 1 ? u : t.w + size;
-            t.fetch_step[0] = t.fetch_step[1] = size * (ptrdiff_t)sizeof(float) / groups / 2 / ((g->ic + 3) / 4);
+            t.fetch_step[0] = t.fetch_step[1] = size * (ptrdiff_t)sizeof(float) / groups / 2 / ((depth + 3) / 4);
             for (int i = 0; i < groups; i++) {
                 int begin, end;
                 conv_part(count, groups, i, &begin, &end);
                 t.fetch[0] = next + i * (size / groups);
                 t.fetch[1] = t.fetch[0] + size / groups / 2;
-                conv_run_tile(&t, vectors, v + q * in + (ptrdiff_t)begin * g->ic,
-                              m + q * out + o0 + (ptrdiff_t)begin * g->oc, end - begin, false);
+                conv_run_tile(&t, vectors, v + q * in + (ptrdiff_t)begin * depth,
+                              m + q * out + o0 + (ptrdiff_t)begin * g->oc, end - begin, g->bf16);
             }
         }
 }
@@ -168,11 +179,17 @@ static void put_targets(const winograd_grid *g, winograd_place tile, float *y,
 static void run(const winograd_grid *g, const float *x, const float *packed, const float *bias, float leak, bool add,
                 float *y)
 {
-    const ptrdiff_t in = winograd_plane(TILES, g->ic), out = winograd_plane(TILES, g->oc);
+    const int depth = depth_of(g->ic, g->bf16);
+    const ptrdiff_t in = winograd_plane(TILES, depth), out = winograd_plane(TILES, g->oc);
     const struct ts_winograd_kernels *kernels = ts_winograd_k();
-#pragma omp parallel for schedule(dynamic) num_threads(ts_threads_of(g->threads))
-    for (int64_t first = 0; first < g->tiles; first += TILES) {
-        const int count = (int)(g->tiles - first < TILES ? g->tiles - first : TILES);
+    const ts_winograd_form form = g->bf16 ? TS_WINOGRAD_CHANNELS : TS_WINOGRAD_F32;
+    /* As many to each thread; a tile's values do not depend on those that it is computed with. */
+    const int threads = ts_threads_of(g->threads);
+    const int64_t groups = ((g->tiles + TILES - 1) / TILES + threads - 1) / threads * threads;
+    const int step = (int)((g->tiles + groups - 1) / groups);
+#pragma omp parallel for schedule(dynamic) num_threads(threads)
+    for (int64_t first = 0; first < g->tiles; first += step) {
+        const int count = (int)(g->tiles - first < step ? g->tiles - first : step);
         float *v = ts_scratch(0, sizeof(float) * (size_t)(in * WINOGRAD_AREA)),
               *m = ts_scratch(1, sizeof(float) * (size_t)(out * WINOGRAD_AREA));
         float *nothing = ts_scratch(2, sizeof(float) * (size_t)g->ic);
@@ -184,23 +201,35 @@ static void run(const winograd_grid *g, const float *x, const float *packed, con
         winograd_sources(g, x, nothing, place[0], from[0]);
         for (int i = 0; i < count; i++) {
             winograd_sources(g, x, nothing, place[i + 1], from[(i + 1) & 1]);
-            kernels->input(from[i & 1], from[(i + 1) & 1], g->ic, v + (ptrdiff_t)i * g->ic, in);
+            kernels->input[form](from[i & 1], from[(i + 1) & 1], g->ic, v + (ptrdiff_t)i * depth, in);
         }
         multiply(g, packed, v, count, m);
         float *to[2][WINOGRAD_SIDE * WINOGRAD_SIDE];
         put_targets(g, place[0], y, to[0]);
         for (int i = 0; i < count; i++) {
             put_targets(g, place[i + 1], y, to[(i + 1) & 1]);
-            kernels->output(m + (ptrdiff_t)i * g->oc, out, g->oc, bias, leak, add, to[i & 1], to[(i + 1) & 1]);
+            kernels->output[g->bf16](m + (ptrdiff_t)i * g->oc, out, g->oc, bias, leak, add, to[i & 1], to[(i + 1) & 1]);
         }
     }
+}
+
+static void forward(const ts_conv *c, bool bf16, const float *x, const float *packed, const float *bias, float leak,
+                    float *y)
+{
+    const winograd_grid g = winograd_grid_forward(c, bf16);
+    run(&g, x, packed, bias, leak, false, y);
 }
 
 void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
                               float *y)
 {
-    const winograd_grid g = winograd_grid_forward(c);
-    run(&g, x, packed, bias, leak, false, y);
+    forward(c, false, x, packed, bias, leak, y);
+}
+
+void ts_conv_forward_winograd_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
+                                   float *y)
+{
+    forward(c, true, x, packed, bias, leak, y);
 }
 
 /* Row i of dx (+)= the rows of the larger domain that padding folds onto it. */
@@ -220,10 +249,10 @@ static void fold_row(const ts_conv *c, int fold, int channels, const float *larg
     }
 }
 
-void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
+static void data_gradient(const ts_conv *c, bool bf16, const float *dy, const float *packed, float *dx, bool accumulate)
 {
     const int fold = c->pad == TS_PAD_REPLICATE ? c->dilation : 0, channels = ts_conv_variables(c);
-    winograd_grid g = winograd_grid_gradient(c, fold);
+    winograd_grid g = winograd_grid_gradient(c, fold, bf16);
     if (!fold) {
         run(&g, dy, packed, NULL, 1, accumulate, dx);
         return;
@@ -236,4 +265,15 @@ void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const flo
         for (int i = 0; i < c->h; i++)
             fold_row(c, fold, channels, larger + n * image, i, accumulate,
                      dx + ((ptrdiff_t)n * c->h + i) * c->w * channels);
+}
+
+void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
+{
+    data_gradient(c, false, dy, packed, dx, accumulate);
+}
+
+void ts_conv_data_gradient_winograd_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx,
+                                         bool accumulate)
+{
+    data_gradient(c, true, dy, packed, dx, accumulate);
 }
