@@ -3,6 +3,7 @@
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
+#include "tensor/kernels/elementwise.h"
 #include <string.h>
 
 #ifdef AG_API
@@ -15,30 +16,33 @@ static int first_of(const ag_node *node) { return *(const int *)node->attr; }
 static void forward(ag_tape *tape, ag_node *node)
 {
     (void)tape;
+    const struct ts_elementwise_kernels *k = ts_elementwise_k();
     const int first = first_of(node);
     const int c = node->in[0]->t.shape.c, d = node->out->t.shape.c;
-    const int64_t pixels = ts_pixels(node->out->t.shape);
+    const int64_t pixels = ts_pixels(node->out->t.shape), chunk = ag_pixel_chunk(c);
     const float *x = node->in[0]->t.data;
     float *y = node->out->t.data;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels * d > AG_CHUNK)
-    for (int64_t p = 0; p < pixels; p++) memcpy(y + p * d, x + p * c + first, (size_t)d * sizeof *y);
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels > chunk)
+    for (int64_t p = 0; p < pixels; p += chunk)
+        k->copy(ag_part(pixels, p, chunk), d, x + p * c + first, c, y + p * d, d, false);
 }
 
 static void backward(ag_tape *tape, ag_node *node)
 {
+    const struct ts_elementwise_kernels *k = ts_elementwise_k();
     const int first = first_of(node);
     const int c = node->in[0]->t.shape.c, d = node->out->t.shape.c;
-    const int64_t pixels = ts_pixels(node->out->t.shape);
+    const int64_t pixels = ts_pixels(node->out->t.shape), chunk = ag_pixel_chunk(c);
     const float *dy = node->out->grad;
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[0], &accumulate);
     if (!dx) return;
-#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels * d > AG_CHUNK)
-    for (int64_t p = 0; p < pixels; p++)
-        for (int i = 0; i < c; i++) {
-            const float g = i >= first && i < first + d ? dy[p * d + i - first] : 0;
-            dx[p * c + i] = accumulate ? dx[p * c + i] + g : g;
-        }
+#pragma omp parallel for num_threads(ag_threads(tape)) schedule(static) if (pixels > chunk)
+    for (int64_t p = 0; p < pixels; p += chunk) {
+        const int64_t part = ag_part(pixels, p, chunk);
+        if (!accumulate) memset(dx + p * c, 0, sizeof *dx * (size_t)(part * c));
+        k->copy(part, d, dy + p * d, d, dx + p * c + first, c, true);
+    }
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)
