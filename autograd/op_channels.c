@@ -3,6 +3,7 @@
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
+#include "tensor/kernels/elementwise.h"
 #include <string.h>
 
 #ifdef AG_API
@@ -15,36 +16,33 @@ static int first_of(const ag_node *node) { return *(const int *)node->attr; }
 static void forward_pixels(const void *job, int64_t begin, int64_t end)
 {
     const ag_node *node = job;
-    const int first = first_of(node), c = node->in[0]->t.shape.c, d = node->out->t.shape.c;
-    const float *x = node->in[0]->t.data;
-    float *y = node->out->t.data;
-    for (int64_t p = begin; p < end; p++) memcpy(y + p * d, x + p * c + first, (size_t)d * sizeof *y);
+    const int c = node->in[0]->t.shape.c, d = node->out->t.shape.c;
+    ts_elementwise_k()->copy(end - begin, d, node->in[0]->t.data + begin * c + first_of(node), c,
+                             node->out->t.data + begin * d, d, false);
 }
 
 static void forward(ag_tape *tape, ag_node *node)
 {
     const ts_shape s = node->out->t.shape;
-    ts_for(ag_threads(tape), ts_pixels(s), ag_pixel_chunk(s.c), forward_pixels, node);
+    ts_for(ag_threads(tape), ts_pixels(s), ag_pixel_chunk(node->in[0]->t.shape.c), forward_pixels, node);
 }
 
 static void backward_pixels(const void *job, int64_t begin, int64_t end)
 {
     const ag_back *b = job;
-    const int first = first_of(b->node), c = b->node->in[0]->t.shape.c, d = b->node->out->t.shape.c;
-    const float *dy = b->node->out->grad;
-    for (int64_t p = begin; p < end; p++)
-        for (int i = 0; i < c; i++) {
-            const float g = i >= first && i < first + d ? dy[p * d + i - first] : 0;
-            b->dx[p * c + i] = b->accumulate ? b->dx[p * c + i] + g : g;
-        }
+    const int c = b->node->in[0]->t.shape.c, d = b->node->out->t.shape.c;
+    float *dx = b->dx + begin * c;
+    if (!b->accumulate) memset(dx, 0, sizeof *dx * (size_t)((end - begin) * c));
+    ts_elementwise_k()->copy(end - begin, d, b->node->out->grad + begin * d, d, dx + first_of(b->node), c, true);
 }
 
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const ts_shape s = node->out->t.shape;
     ag_back b = {.node = node};
     b.dx = ag_grad_target(tape, node->in[0], &b.accumulate);
-    if (b.dx) ts_for(ag_threads(tape), ts_pixels(s), ag_pixel_chunk(s.c), backward_pixels, &b);
+    if (b.dx)
+        ts_for(ag_threads(tape), ts_pixels(node->out->t.shape), ag_pixel_chunk(node->in[0]->t.shape.c), backward_pixels,
+               &b);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)

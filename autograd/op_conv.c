@@ -42,9 +42,25 @@ static void weight_gradient(const ts_conv *c, const float *x, const float *dy, f
     const ts_conv_way way = dweight ? ts_conv_choose(c, TS_CONV_WEIGHTS) : TS_CONV_DIRECTLY;
     const bool amx = way == TS_CONV_BY_AMX, winograd = way == TS_CONV_BY_WINOGRAD;
     if (amx) ts_conv_weight_gradient_bf16(c, x, dy, dweight);
-    if (winograd) ts_conv_weight_gradient_winograd(c, x, dy, dweight);
+    if (winograd)
+        (c->compute.precision == TS_BF16 ? ts_conv_weight_gradient_winograd_bf16
+                                         : ts_conv_weight_gradient_winograd)(c, x, dy, dweight);
     ts_conv_weight_gradient(c, x, dy, amx || winograd ? NULL : dweight, dbias);
 }
+
+typedef void forward_function(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
+                              float *y);
+static forward_function *const forwards[TS_CONV_USES] = {[TS_CONV_FORWARD] = ts_conv_forward,
+                                                         [TS_CONV_WINOGRAD] = ts_conv_forward_winograd,
+                                                         [TS_CONV_FORWARD_BF16] = ts_conv_forward_bf16,
+                                                         [TS_CONV_WINOGRAD_BF16] = ts_conv_forward_winograd_bf16};
+
+typedef void data_gradient_function(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
+static data_gradient_function *const data_gradients[TS_CONV_USES] = {
+    [TS_CONV_DATA_GRADIENT] = ts_conv_data_gradient,
+    [TS_CONV_DATA_GRADIENT_WINOGRAD] = ts_conv_data_gradient_winograd,
+    [TS_CONV_DATA_GRADIENT_BF16] = ts_conv_data_gradient_bf16,
+    [TS_CONV_DATA_GRADIENT_WINOGRAD_BF16] = ts_conv_data_gradient_winograd_bf16};
 
 static void forward(ag_tape *tape, ag_node *node)
 {
@@ -55,11 +71,7 @@ static void forward(ag_tape *tape, ag_node *node)
     if (!packed) return;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
     const float *x = input(tape, node), *bias = node->in[BIAS] ? node->in[BIAS]->t.data : NULL;
-    if (x)
-        (use == TS_CONV_FORWARD_BF16 ? ts_conv_forward_bf16
-             : use == TS_CONV_FORWARD
-             ? ts_conv_forward
-             : ts_conv_forward_winograd)(&a->conv, x, packed, bias, a->leak, node->out->t.data);
+    if (x) forwards[use](&a->conv, x, packed, bias, a->leak, node->out->t.data);
     ts_arena_release(ag_arena(tape), mark);
 }
 
@@ -87,10 +99,7 @@ static void backward(ag_tape *tape, ag_node *node)
     const ts_conv_use use = ts_conv_packing(&a->conv, TS_CONV_INPUT);
     if (ag_traced()) ag_trace_way(tape, ts_conv_way_name(ts_conv_choose(&a->conv, TS_CONV_INPUT)));
     const float *packed = dx ? ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data) : NULL;
-    if (packed)
-        (use == TS_CONV_DATA_GRADIENT_BF16  ? ts_conv_data_gradient_bf16
-             : use == TS_CONV_DATA_GRADIENT ? ts_conv_data_gradient
-                                            : ts_conv_data_gradient_winograd)(&a->conv, dy, packed, dx, accumulate);
+    if (packed) data_gradients[use](&a->conv, dy, packed, dx, accumulate);
 }
 
 /* Where a tap falls; -1: on a zero. */

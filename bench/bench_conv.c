@@ -10,7 +10,7 @@
 typedef struct work {
     ts_conv c;
     float *x, *y, *weight, *bias, *packed, *packed_gradient, *packed_winograd, *packed_gradient_winograd, *packed_bf16,
-        *packed_gradient_bf16;
+        *packed_gradient_bf16, *packed_winograd_bf16, *packed_gradient_winograd_bf16;
 } work;
 
 static float *values(size_t count, float scale)
@@ -36,14 +36,19 @@ static work make(ts_conv c)
               c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_WINOGRAD), 1) : NULL,
               c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT_WINOGRAD), 1) : NULL,
               values(ts_conv_packed_count(&c, TS_CONV_FORWARD_BF16), 1),
-              values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT_BF16), 1)};
+              values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT_BF16), 1),
+              c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_WINOGRAD_BF16), 1) : NULL,
+              c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT_WINOGRAD_BF16), 1) : NULL};
     ts_conv_pack(&c, TS_CONV_FORWARD_BF16, w.weight, w.packed_bf16);
     ts_conv_pack(&c, TS_CONV_DATA_GRADIENT_BF16, w.weight, w.packed_gradient_bf16);
     ts_conv_pack(&c, TS_CONV_FORWARD, w.weight, w.packed);
     ts_conv_pack(&c, TS_CONV_DATA_GRADIENT, w.weight, w.packed_gradient);
-    if (c.k == 3)
-        ts_conv_pack(&c, TS_CONV_WINOGRAD, w.weight, w.packed_winograd),
-            ts_conv_pack(&c, TS_CONV_DATA_GRADIENT_WINOGRAD, w.weight, w.packed_gradient_winograd);
+    if (c.k == 3) {
+        ts_conv_pack(&c, TS_CONV_WINOGRAD, w.weight, w.packed_winograd);
+        ts_conv_pack(&c, TS_CONV_DATA_GRADIENT_WINOGRAD, w.weight, w.packed_gradient_winograd);
+        ts_conv_pack(&c, TS_CONV_WINOGRAD_BF16, w.weight, w.packed_winograd_bf16);
+        ts_conv_pack(&c, TS_CONV_DATA_GRADIENT_WINOGRAD_BF16, w.weight, w.packed_gradient_winograd_bf16);
+    }
     return w;
 }
 
@@ -51,7 +56,7 @@ static void discard(work *w)
 {
     free(w->x), free(w->y), free(w->weight), free(w->bias), free(w->packed), free(w->packed_gradient),
         free(w->packed_winograd), free(w->packed_gradient_winograd), free(w->packed_bf16);
-    free(w->packed_gradient_bf16);
+    free(w->packed_gradient_bf16), free(w->packed_winograd_bf16), free(w->packed_gradient_winograd_bf16);
 }
 
 static void forward(void *user)
@@ -108,6 +113,24 @@ static void weight_gradient_bf16(void *user)
     ts_conv_weight_gradient_bf16(&w->c, w->x, w->y, w->weight);
 }
 
+static void winograd_bf16(void *user)
+{
+    work *w = user;
+    ts_conv_forward_winograd_bf16(&w->c, w->x, w->packed_winograd_bf16, w->bias, 0.2f, w->y);
+}
+
+static void data_gradient_winograd_bf16(void *user)
+{
+    work *w = user;
+    ts_conv_data_gradient_winograd_bf16(&w->c, w->y, w->packed_gradient_winograd_bf16, w->x, false);
+}
+
+static void weight_gradient_winograd_bf16(void *user)
+{
+    work *w = user;
+    ts_conv_weight_gradient_winograd_bf16(&w->c, w->x, w->y, w->weight);
+}
+
 static void forward_naive(void *user)
 {
     work *w = user;
@@ -119,13 +142,15 @@ static void row(const char *what, ts_conv c, void (*f)(void *user))
     char label[96];
     snprintf(label, sizeof label, "%s n%d %dx%d %d->%d %dx%d%s%s", what, c.n, c.h, c.w, c.ic, c.oc, c.k, c.k,
              c.dilation > 1 ? " d2" : "", c.pad == TS_PAD_REPLICATE ? " rep" : "");
-    const bool back = f == data_gradient || f == data_gradient_winograd || f == data_gradient_bf16;
+    const bool back = f == data_gradient || f == data_gradient_winograd || f == data_gradient_bf16 ||
+        f == data_gradient_winograd_bf16;
+    const bool bf16 = f == forward_bf16 || f == data_gradient_bf16 || f == weight_gradient_bf16 || f == winograd_bf16 ||
+        f == data_gradient_winograd_bf16 || f == weight_gradient_winograd_bf16;
     if (back && c.constants)
         snprintf(label + strlen(label), sizeof label - strlen(label), " (of %d)", ts_conv_variables(&c));
     work w = make(c);
     bench_time t = bench_measure(f, &w);
-    if ((f == forward_bf16 || f == data_gradient_bf16 || f == weight_gradient_bf16) && !bench_bf16(&t))
-        snprintf(label + strlen(label), sizeof label - strlen(label), ", emulated");
+    if (bf16 && !bench_bf16(&t)) snprintf(label + strlen(label), sizeof label - strlen(label), ", emulated");
     bench_row(label, t, 2.0 * c.n * c.h * c.w * (back ? ts_conv_variables(&c) : c.ic) * c.oc * c.k * c.k);
     discard(&w);
 }
@@ -243,6 +268,28 @@ BENCH(conv_bf16)
         if (ts_conv_choose(&rounded, TS_CONV_WEIGHTS) != TS_CONV_BY_AMX) continue;
         row("weight gradient", published[i], weight_gradient);
         row("bf16 weight gradient", published[i], weight_gradient_bf16);
+    }
+}
+
+/* Layers of configs/single-phone.ini. */
+BENCH(conv_winograd_bf16)
+{
+    static const ts_conv shape[] = {{8, 64, 64, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}},
+                                    {8, 64, 64, 96, 64, 3, 1, TS_PAD_ZERO, 0, {0}},
+                                    {8, 32, 32, 128, 64, 3, 1, TS_PAD_ZERO, 0, {0}},
+                                    {8, 16, 16, 256, 128, 3, 1, TS_PAD_ZERO, 0, {0}},
+                                    {8, 256, 256, 17, 16, 3, 1, TS_PAD_ZERO, 5, {0}}};
+    bench_heading("Winograd's way in bf16, below it in f32 and the direct way of bf16");
+    for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
+        row("Winograd forward", shape[i], winograd);
+        row("bf16 forward", shape[i], forward_bf16);
+        row("bf16 Winograd forward", shape[i], winograd_bf16);
+        row("Winograd data gradient", shape[i], data_gradient_winograd);
+        row("bf16 data gradient", shape[i], data_gradient_bf16);
+        row("bf16 Winograd data gradient", shape[i], data_gradient_winograd_bf16);
+        row("weight gradient", shape[i], weight_gradient);
+        row("Winograd weight gradient", shape[i], weight_gradient_winograd);
+        row("bf16 Winograd weight gradient", shape[i], weight_gradient_winograd_bf16);
     }
 }
 

@@ -189,10 +189,10 @@ const tr_key tr_keys[] = {
      "keep only the maps and h's states of each refinement step, and compute the rest again for the gradient: less "
      "memory, a third more time, the same numbers"},
     {"train", "precision", TR_CHOICE, AT(train.precision), 0, TS_PRECISION_COUNT - 1, "f32", precision_names, false,
-     "operands of convolutions, forward and for the gradients of their inputs (with AMX of weights too): f32, or "
-     "rounded "
-     "to bf16, which is faster on CPUs with AMX or AMD's AVX512-BF16 and slower on others; weights, their gradients, "
-     "Adam, sums and validation stay f32"},
+     "operands of convolutions, forward and for the gradients of their inputs (by Winograd's algorithm, or with AMX, "
+     "of "
+     "weights too): f32, or rounded to bf16, which is faster on CPUs with AMX or AMD's AVX512-BF16 and slower on "
+     "others; weights, their gradients, Adam, sums and validation stay f32"},
     {"train", "exact", TR_BOOL, AT(train.exact), 0, 1, "no", NULL, false,
      "compute convolutions and their gradients directly; no: by Winograd's algorithm where it is faster, whose "
      "errors are near 1e-5 of the largest value"},

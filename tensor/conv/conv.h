@@ -20,14 +20,17 @@ typedef struct ts_conv {
 } ts_conv;
 
 /* Which order the packed weights are in: for the output and for the gradient of the input; both by Winograd's way; both
- * as pairs of bf16 values. */
+ * as pairs of bf16 values; both. */
 typedef enum ts_conv_use {
     TS_CONV_FORWARD,
     TS_CONV_DATA_GRADIENT,
     TS_CONV_WINOGRAD,
     TS_CONV_DATA_GRADIENT_WINOGRAD,
     TS_CONV_FORWARD_BF16,
-    TS_CONV_DATA_GRADIENT_BF16
+    TS_CONV_DATA_GRADIENT_BF16,
+    TS_CONV_WINOGRAD_BF16,
+    TS_CONV_DATA_GRADIENT_WINOGRAD_BF16,
+    TS_CONV_USES
 } ts_conv_use;
 
 typedef enum ts_conv_direction { TS_CONV_OUTPUT, TS_CONV_INPUT, TS_CONV_WEIGHTS } ts_conv_direction;
@@ -81,6 +84,16 @@ void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packe
 void ts_conv_forward_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
                           float *y);
 void ts_conv_data_gradient_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
+
+/* Both by Winograd's way with what it multiplies rounded to bf16, transforms and sums in f32, and the gradient of the
+ * weights too. Transforms magnify the rounding of numbers that do not resemble their neighbours': the RMS of errors is
+ * 1.1% of the results' RMS, in place of the direct way's 0.24%, where inputs are random, and the same 0.24% where they
+ * are as smooth as images (tensor/kernels/winograd.h). */
+void ts_conv_forward_winograd_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
+                                   float *y);
+void ts_conv_data_gradient_winograd_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx,
+                                         bool accumulate);
+void ts_conv_weight_gradient_winograd_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight);
 
 /* dweight[oc][ic][k][k] += with x and dy rounded so, where ts_conv_choose says TS_CONV_BY_AMX. */
 void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight);

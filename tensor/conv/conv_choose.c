@@ -46,19 +46,27 @@ ts_conv_way conv_choose_narrow(int ic, int oc, int k)
 
 /* 36 products in place of 144 pay for the transformations. Tiles that are mostly outside cost what that saves, and
  * fewer than 64 tiles save less than the transformation of the weights costs. */
-static bool winograd_pays(const ts_conv *c, int ic, int oc)
+static bool tiles_pay(const ts_conv *c)
 {
-    const int64_t tiles = winograd_grid_forward(c).tiles;
-    return c->k == 3 && ic >= 16 && oc >= 24 && tiles >= 64 &&
-        2 * tiles * WINOGRAD_SIDE * WINOGRAD_SIDE <= 3 * (int64_t)c->n * c->h * c->w;
+    const int64_t tiles = winograd_grid_forward(c, false).tiles;
+    return c->k == 3 && tiles >= 64 && 2 * tiles * WINOGRAD_SIDE * WINOGRAD_SIDE <= 3 * (int64_t)c->n * c->h * c->w;
+}
+
+static bool winograd_pays(const ts_conv *c, int ic, int oc) { return ic >= 16 && oc >= 24 && tiles_pay(c); }
+
+/* There must be a sum for each of some threads. Direct products are of f32, so that those of bf16 pay for fewer
+ * channels. */
+static bool winograd_pays_for_weights(const ts_conv *c, bool bf16)
+{
+    const int64_t tiles = winograd_grid_forward(c, false).tiles;
+    if (!bf16) return winograd_pays(c, c->ic, c->oc) && tiles >= 4 * WINOGRAD_CHUNK_TILES;
+    return c->ic >= 9 && c->oc >= 9 && tiles_pay(c) && (tiles >= 4 * WINOGRAD_CHUNK_TILES || c->oc >= 64);
 }
 
 static ts_conv_way choose_weights(const ts_conv *c, bool bf16)
 {
     if (bf16 && conv_amx_present()) return TS_CONV_BY_AMX;
-    if (!c->compute.exact && winograd_pays(c, c->ic, c->oc) &&
-        winograd_grid_forward(c).tiles >= 4 * WINOGRAD_CHUNK_TILES) /* a sum each for the threads */
-        return TS_CONV_BY_WINOGRAD;
+    if (!c->compute.exact && winograd_pays_for_weights(c, bf16)) return TS_CONV_BY_WINOGRAD;
     if (c->k > 1 && c->h * c->w <= CONV_BATCH_PIXELS) return TS_CONV_BY_BATCH; /* padding is never multiplied */
     return TS_CONV_DIRECTLY;
 }
@@ -69,7 +77,7 @@ ts_conv_way ts_conv_choose(const ts_conv *c, ts_conv_direction direction)
     if (direction == TS_CONV_WEIGHTS) return choose_weights(c, bf16);
     const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c);
     if (bf16 && conv_amx_present()) return TS_CONV_BY_AMX; /* 8 to 16 times the products of f32 */
-    if (!bf16 && !c->compute.exact && winograd_pays(c, ic, oc)) return TS_CONV_BY_WINOGRAD; /* half the time */
+    if (!c->compute.exact && winograd_pays(c, ic, oc)) return TS_CONV_BY_WINOGRAD; /* half the time, of bf16 too */
     if (c->k == 1) return TS_CONV_BY_PIXELS; /* all images are one row: no window */
     if (small_maps(c)) return TS_CONV_BY_BATCH;
     if (bf16) return TS_CONV_DIRECTLY; /* pairs have no narrow way */
@@ -82,9 +90,10 @@ ts_conv_way ts_conv_choose(const ts_conv *c, ts_conv_direction direction)
 
 ts_conv_use ts_conv_packing(const ts_conv *c, ts_conv_direction direction)
 {
-    const bool forward = direction == TS_CONV_OUTPUT;
-    if (c->compute.precision == TS_BF16) return forward ? TS_CONV_FORWARD_BF16 : TS_CONV_DATA_GRADIENT_BF16;
-    if (ts_conv_choose(c, direction) == TS_CONV_BY_WINOGRAD)
-        return forward ? TS_CONV_WINOGRAD : TS_CONV_DATA_GRADIENT_WINOGRAD;
-    return forward ? TS_CONV_FORWARD : TS_CONV_DATA_GRADIENT;
+    static const ts_conv_use uses[2][2][2] = {
+        {{TS_CONV_DATA_GRADIENT, TS_CONV_DATA_GRADIENT_BF16},
+         {TS_CONV_DATA_GRADIENT_WINOGRAD, TS_CONV_DATA_GRADIENT_WINOGRAD_BF16}},
+        {{TS_CONV_FORWARD, TS_CONV_FORWARD_BF16}, {TS_CONV_WINOGRAD, TS_CONV_WINOGRAD_BF16}}};
+    return uses[direction == TS_CONV_OUTPUT][ts_conv_choose(c, direction) == TS_CONV_BY_WINOGRAD]
+               [c->compute.precision == TS_BF16];
 }

@@ -8,8 +8,11 @@
 
 size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
 {
-    if (use == TS_CONV_WINOGRAD) return conv_winograd_count(c->ic, c->oc);
-    if (use == TS_CONV_DATA_GRADIENT_WINOGRAD) return conv_winograd_count(c->oc, ts_conv_variables(c));
+    const bool winograd_bf16 = use == TS_CONV_WINOGRAD_BF16 || use == TS_CONV_DATA_GRADIENT_WINOGRAD_BF16;
+    if (use == TS_CONV_WINOGRAD || use == TS_CONV_WINOGRAD_BF16)
+        return conv_winograd_count(c->ic, c->oc, winograd_bf16);
+    if (use == TS_CONV_DATA_GRADIENT_WINOGRAD || winograd_bf16)
+        return conv_winograd_count(c->oc, ts_conv_variables(c), winograd_bf16);
     if (use == TS_CONV_FORWARD_BF16) return conv_bf16_count(c, c->ic, c->oc);
     if (use == TS_CONV_DATA_GRADIENT_BF16) return conv_bf16_count(c, c->oc, ts_conv_variables(c));
     const int ic = use == TS_CONV_FORWARD ? c->ic : c->oc, oc = use == TS_CONV_FORWARD ? c->oc : ts_conv_variables(c);
@@ -95,14 +98,18 @@ static void pack_panels(const ts_conv *c, const conv_weights *w, bool forward, f
 /* Whether the weights are read by conv_turn alone. */
 static bool only_turned(const ts_conv *c, ts_conv_use use)
 {
-    return use == TS_CONV_WINOGRAD ||
+    return use == TS_CONV_WINOGRAD || use == TS_CONV_WINOGRAD_BF16 ||
         (use == TS_CONV_FORWARD && conv_choose_narrow(c->ic, c->oc, c->k) == TS_CONV_DIRECTLY);
 }
 
 static void pack(const ts_conv *c, ts_conv_use use, const conv_weights *w, float *packed)
 {
     if (use == TS_CONV_WINOGRAD || use == TS_CONV_DATA_GRADIENT_WINOGRAD) {
-        conv_winograd_pack(c, use == TS_CONV_WINOGRAD, w, packed);
+        conv_winograd_pack(c, use == TS_CONV_WINOGRAD, false, w, packed);
+        return;
+    }
+    if (use == TS_CONV_WINOGRAD_BF16 || use == TS_CONV_DATA_GRADIENT_WINOGRAD_BF16) {
+        conv_winograd_pack(c, use == TS_CONV_WINOGRAD_BF16, true, w, packed);
         return;
     }
     if (use == TS_CONV_FORWARD_BF16 || use == TS_CONV_DATA_GRADIENT_BF16) {

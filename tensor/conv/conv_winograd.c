@@ -6,6 +6,7 @@
 #include "tensor/kernels/winograd.h"
 #include "tensor/scratch.h"
 #include "tensor/team.h"
+#include "tensor/threads.h"
 #include <string.h>
 
 enum {
@@ -26,9 +27,10 @@ static winograd_grid with_tiles(winograd_grid g)
     return g;
 }
 
-winograd_grid winograd_grid_forward(const ts_conv *c)
+winograd_grid winograd_grid_forward(const ts_conv *c, bool bf16)
 {
     return with_tiles((winograd_grid){.threads = c->compute.threads,
+                                      .bf16 = bf16,
                                       .n = c->n,
                                       .h = c->h,
                                       .w = c->w,
@@ -41,9 +43,10 @@ winograd_grid winograd_grid_forward(const ts_conv *c)
                                       .replicate = c->pad == TS_PAD_REPLICATE});
 }
 
-winograd_grid winograd_grid_gradient(const ts_conv *c, int fold)
+winograd_grid winograd_grid_gradient(const ts_conv *c, int fold, bool bf16)
 {
     return with_tiles((winograd_grid){.threads = c->compute.threads,
+                                      .bf16 = bf16,
                                       .n = c->n,
                                       .h = c->h,
                                       .w = c->w,
@@ -55,13 +58,19 @@ winograd_grid winograd_grid_gradient(const ts_conv *c, int fold)
                                       .first = -c->dilation - fold});
 }
 
-size_t conv_winograd_count(int ic, int oc) { return (size_t)conv_panels_count(ic, oc, 1) * WINOGRAD_AREA; }
+/* Inputs as products count them. */
+static int depth_of(int ic, bool bf16) { return bf16 ? conv_bf16_depth(ic) : ic; }
+
+size_t conv_winograd_count(int ic, int oc, bool bf16)
+{
+    return (size_t)conv_panels_count(depth_of(ic, bf16), oc, 1) * WINOGRAD_AREA;
+}
 
 typedef struct pack_job {
     const ts_conv *c;
     const conv_weights *w;
-    bool forward;
-    int ic, step, parts;
+    bool forward, bf16;
+    int ic, step, parts; /* an even step: no pair is parted */
     ptrdiff_t plane;
     float *packed;
 } pack_job;
@@ -71,13 +80,14 @@ static void pack_part(const pack_job *j, int panel, int part)
     float turned[2 * 16 * CONV_TURNED]; /* no vector has more than 16 lanes */
     const int begin = part * j->step, count = j->ic - begin < j->step ? j->ic - begin : j->step;
     const int width = conv_turn(j->c, j->w, j->forward, panel, begin, count, turned);
-    float *to = j->packed + (ptrdiff_t)panel * 2 * conv_lanes() * j->ic;
+    float *to = j->packed + (ptrdiff_t)panel * 2 * conv_lanes() * depth_of(j->ic, j->bf16);
     for (int i = 0; i < count; i++) {
+        const ts_winograd_form form = !j->bf16 ? TS_WINOGRAD_F32 : i % 2 ? TS_WINOGRAD_ODD : TS_WINOGRAD_EVEN;
+        const ptrdiff_t row = j->bf16 ? (begin + i) / 2 : begin + i;
         float *tap = turned + i * 9 * width, mirrored[9 * 2 * 16];
         for (int t = 0; t < 9 && !j->forward; t++)
             memcpy(mirrored + t * width, tap + (8 - t) * width, sizeof *tap * (size_t)width);
-        ts_winograd_k()->weights(j->forward ? tap : mirrored, width / conv_lanes(), to + (ptrdiff_t)(begin + i) * width,
-                                 j->plane);
+        ts_winograd_k()->weights[form](j->forward ? tap : mirrored, width / conv_lanes(), to + row * width, j->plane);
     }
 }
 
@@ -87,13 +97,13 @@ static void pack_parts(const void *job, int64_t begin, int64_t end)
     for (int64_t i = begin; i < end; i++) pack_part(j, (int)(i / j->parts), (int)(i % j->parts));
 }
 
-/* packed: [36][panel][input][channel of the panel] = G g G' */
-void conv_winograd_pack(const ts_conv *c, bool forward, const conv_weights *w, float *packed)
+/* packed: [36][panel][input, or pair of inputs][channel of the panel] = G g G' */
+void conv_winograd_pack(const ts_conv *c, bool forward, bool bf16, const conv_weights *w, float *packed)
 {
     const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c);
     const int step = conv_turned_inputs(9), parts = (ic + step - 1) / step;
     ts_for(c->compute.threads, (int64_t)conv_panels(oc) * parts, 1, pack_parts,
-           &(pack_job){c, w, forward, ic, step, parts, conv_panels_count(ic, oc, 1), packed});
+           &(pack_job){c, w, forward, bf16, ic, step, parts, conv_panels_count(depth_of(ic, bf16), oc, 1), packed});
 }
 
 void winograd_locate(const winograd_grid *g, int64_t first, int count, winograd_place *place)
@@ -149,26 +159,27 @@ void winograd_targets(const winograd_grid *g, winograd_place at, ptrdiff_t pixel
 static void multiply(const winograd_grid *g, const float *u, const float *v, int count, float *m)
 {
     const int panels = conv_panels(g->oc), step = ts_conv_k()->pixels, groups = (count + step - 1) / step;
-    const ptrdiff_t weights = conv_panels_count(g->ic, g->oc, 1), in = winograd_plane(TILES, g->ic),
+    const int depth = depth_of(g->ic, g->bf16);
+    const ptrdiff_t weights = conv_panels_count(depth, g->oc, 1), in = winograd_plane(TILES, depth),
                     out = winograd_plane(TILES, g->oc);
-    const ts_segment segment = {0, 0, g->ic};
-    ts_tile t = {.segment = &segment, .segments = 1, .a_stride = g->ic, .y_stride = g->oc, .leak = 1};
+    const ts_segment segment = {0, 0, depth};
+    ts_tile t = {.segment = &segment, .segments = 1, .a_stride = depth, .y_stride = g->oc, .leak = 1};
     for (int q = 0; q < WINOGRAD_AREA; q++)
         for (int panel = 0; panel < panels; panel++) {
             const int o0 = panel * 2 * conv_lanes(), vectors = conv_vectors(g->oc, panel);
-            const ptrdiff_t size = (ptrdiff_t)g->ic * vectors * conv_lanes();
-            t.w = u + q * weights + (ptrdiff_t)o0 * g->ic;
+            const ptrdiff_t size = (ptrdiff_t)depth * vectors * conv_lanes();
+            t.w = u + q * weights + (ptrdiff_t)o0 * depth;
             t.channels = g->oc - o0;
             /* Each group fetches its part of the next panel, a half of it by each of two. */
             const float *next = q == WINOGRAD_AREA - 1 && panel == panels - 1 ? u : t.w + size;
-            t.fetch_step[0] = t.fetch_step[1] = size * (ptrdiff_t)sizeof(float) / groups / 2 / ((g->ic + 3) / 4);
+            t.fetch_step[0] = t.fetch_step[1] = size * (ptrdiff_t)sizeof(float) / groups / 2 / ((depth + 3) / 4);
             for (int i = 0; i < groups; i++) {
                 int begin, end;
                 conv_part(count, groups, i, &begin, &end);
                 t.fetch[0] = next + i * (size / groups);
                 t.fetch[1] = t.fetch[0] + size / groups / 2;
-                conv_run_tile(&t, vectors, v + q * in + (ptrdiff_t)begin * g->ic,
-                              m + q * out + o0 + (ptrdiff_t)begin * g->oc, end - begin, false);
+                conv_run_tile(&t, vectors, v + q * in + (ptrdiff_t)begin * depth,
+                              m + q * out + o0 + (ptrdiff_t)begin * g->oc, end - begin, g->bf16);
             }
         }
 }
@@ -187,16 +198,19 @@ typedef struct run_job {
     float leak;
     bool add;
     float *y;
+    int step; /* tiles of a task */
 } run_job;
 
 static void run_tiles(const void *job, int64_t group)
 {
     const run_job *j = job;
     const winograd_grid *g = j->g;
-    const ptrdiff_t in = winograd_plane(TILES, g->ic), out = winograd_plane(TILES, g->oc);
+    const int depth = depth_of(g->ic, g->bf16);
+    const ptrdiff_t in = winograd_plane(TILES, depth), out = winograd_plane(TILES, g->oc);
     const struct ts_winograd_kernels *kernels = ts_winograd_k();
-    const int64_t first = group * TILES;
-    const int count = (int)(g->tiles - first < TILES ? g->tiles - first : TILES);
+    const ts_winograd_form form = g->bf16 ? TS_WINOGRAD_CHANNELS : TS_WINOGRAD_F32;
+    const int64_t first = group * j->step;
+    const int count = (int)(g->tiles - first < j->step ? g->tiles - first : j->step);
     float *v = ts_scratch(0, sizeof(float) * (size_t)(in * WINOGRAD_AREA)),
           *m = ts_scratch(1, sizeof(float) * (size_t)(out * WINOGRAD_AREA));
     float *nothing = ts_scratch(2, sizeof(float) * (size_t)g->ic);
@@ -208,28 +222,45 @@ static void run_tiles(const void *job, int64_t group)
     winograd_sources(g, j->x, nothing, place[0], from[0]);
     for (int i = 0; i < count; i++) {
         winograd_sources(g, j->x, nothing, place[i + 1], from[(i + 1) & 1]);
-        kernels->input(from[i & 1], from[(i + 1) & 1], g->ic, v + (ptrdiff_t)i * g->ic, in);
+        kernels->input[form](from[i & 1], from[(i + 1) & 1], g->ic, v + (ptrdiff_t)i * depth, in);
     }
     multiply(g, j->packed, v, count, m);
     float *to[2][WINOGRAD_SIDE * WINOGRAD_SIDE];
     put_targets(g, place[0], j->y, to[0]);
     for (int i = 0; i < count; i++) {
         put_targets(g, place[i + 1], j->y, to[(i + 1) & 1]);
-        kernels->output(m + (ptrdiff_t)i * g->oc, out, g->oc, j->bias, j->leak, j->add, to[i & 1], to[(i + 1) & 1]);
+        kernels->output[g->bf16](m + (ptrdiff_t)i * g->oc, out, g->oc, j->bias, j->leak, j->add, to[i & 1],
+                                 to[(i + 1) & 1]);
     }
 }
 
 static void run(const winograd_grid *g, const float *x, const float *packed, const float *bias, float leak, bool add,
                 float *y)
 {
-    ts_tasks(g->threads, (g->tiles + TILES - 1) / TILES, run_tiles, &(run_job){g, x, packed, bias, leak, add, y});
+    /* As many to each thread; a tile's values do not depend on those that it is computed with. */
+    const int threads = ts_threads_of(g->threads);
+    const int64_t groups = ((g->tiles + TILES - 1) / TILES + threads - 1) / threads * threads;
+    const int step = (int)((g->tiles + groups - 1) / groups);
+    ts_tasks(g->threads, (g->tiles + step - 1) / step, run_tiles, &(run_job){g, x, packed, bias, leak, add, y, step});
+}
+
+static void forward(const ts_conv *c, bool bf16, const float *x, const float *packed, const float *bias, float leak,
+                    float *y)
+{
+    const winograd_grid g = winograd_grid_forward(c, bf16);
+    run(&g, x, packed, bias, leak, false, y);
 }
 
 void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
                               float *y)
 {
-    const winograd_grid g = winograd_grid_forward(c);
-    run(&g, x, packed, bias, leak, false, y);
+    forward(c, false, x, packed, bias, leak, y);
+}
+
+void ts_conv_forward_winograd_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
+                                   float *y)
+{
+    forward(c, true, x, packed, bias, leak, y);
 }
 
 /* Row i of dx (+)= the rows of the larger domain that padding folds onto it. */
@@ -266,10 +297,10 @@ static void fold_rows(const void *job, int64_t begin, int64_t end)
                  j->dx + at * j->c->w * j->channels);
 }
 
-void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
+static void data_gradient(const ts_conv *c, bool bf16, const float *dy, const float *packed, float *dx, bool accumulate)
 {
     const int fold = c->pad == TS_PAD_REPLICATE ? c->dilation : 0, channels = ts_conv_variables(c);
-    winograd_grid g = winograd_grid_gradient(c, fold);
+    winograd_grid g = winograd_grid_gradient(c, fold, bf16);
     if (!fold) {
         run(&g, dy, packed, NULL, 1, accumulate, dx);
         return;
@@ -279,4 +310,15 @@ void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const flo
     run(&g, dy, packed, NULL, 1, false, larger);
     ts_for(c->compute.threads, (int64_t)c->n * c->h, 1, fold_rows,
            &(fold_job){c, fold, channels, image, larger, accumulate, dx});
+}
+
+void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
+{
+    data_gradient(c, false, dy, packed, dx, accumulate);
+}
+
+void ts_conv_data_gradient_winograd_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx,
+                                         bool accumulate)
+{
+    data_gradient(c, true, dy, packed, dx, accumulate);
 }

@@ -18,12 +18,13 @@ typedef struct winograd_grid {
     bool replicate;
     int rows, columns; /* tiles of one interleaved image */
     int64_t tiles;     /* of all */
+    bool bf16;         /* products of bf16, of pairs of channels in place of channels */
     int threads;
 } winograd_grid;
 
 /* Of a convolution; of the gradient of its input on the domain that is larger by fold on each side. */
-winograd_grid winograd_grid_forward(const ts_conv *c);
-winograd_grid winograd_grid_gradient(const ts_conv *c, int fold);
+winograd_grid winograd_grid_forward(const ts_conv *c, bool bf16);
+winograd_grid winograd_grid_gradient(const ts_conv *c, int fold, bool bf16);
 
 typedef struct winograd_place {
     int image, i, j; /* first output pixel; the others are dilation apart */

@@ -11,70 +11,94 @@ enum {
     CHUNKS = 8,
     GROUP_TILES = 64,        /* transformed together: long runs for the sums, */
     GROUP_BYTES = 896 << 10, /* as many as stay in the second cache */
-    GROUP_TILES_LEAST = 28
+    GROUP_TILES_LEAST = 28,
+    UNITS = 4 /* of work, at least, where the shape allows: parts of the outputs transform x anew */
 };
 
 typedef struct job {
     winograd_grid g;
     const float *x, *dy;
-    int padded; /* output channels in whole vectors */
-    int group, chunks;
+    int padded;                     /* output channels in whole vectors */
+    int group, chunks, parts;       /* tiles transformed together; chunks of tiles; parts of the panels of outputs */
     ptrdiff_t in, out, plane, size; /* planes of V and of M; of the sums; and all those of a chunk */
     float *sums;                    /* [chunk][36][input][padded] */
     float *dweight;
 } job;
 
-static job make_job(const ts_conv *c, const float *x, const float *dy)
+/* Of bf16, V and M hold pairs of tiles. */
+static int rows_of(const job *j, int tiles) { return j->g.bf16 ? (tiles + 1) / 2 : tiles; }
+
+static job make_job(const ts_conv *c, bool bf16, const float *x, const float *dy)
 {
-    job j = {.g = winograd_grid_forward(c), .x = x, .dy = dy};
+    job j = {.g = winograd_grid_forward(c, bf16), .x = x, .dy = dy};
     const int lanes = conv_lanes();
     j.padded = (c->oc + lanes - 1) / lanes * lanes;
     j.group = GROUP_BYTES / (WINOGRAD_AREA * (int)sizeof(float) * (c->ic + j.padded));
     if (j.group > GROUP_TILES) j.group = GROUP_TILES;
     if (j.group < GROUP_TILES_LEAST) j.group = GROUP_TILES_LEAST;
+    if (bf16) j.group *= 2;
     const int64_t chunks = j.g.tiles / WINOGRAD_CHUNK_TILES;
     j.chunks = chunks > CHUNKS ? CHUNKS : chunks < 1 ? 1 : (int)chunks;
-    j.in = winograd_plane(j.group, c->ic);
-    j.out = winograd_plane(j.group, j.padded);
+    j.parts = (UNITS + j.chunks - 1) / j.chunks;
+    if (j.parts > conv_panels(c->oc)) j.parts = conv_panels(c->oc);
+    j.in = winograd_plane(rows_of(&j, j.group), c->ic);
+    j.out = winograd_plane(rows_of(&j, j.group), j.padded);
     j.plane = (ptrdiff_t)c->ic * j.padded;
     j.size = j.plane * WINOGRAD_AREA;
     return j;
 }
 
-static void put_sources(const job *j, winograd_place tile, const float *nothing,
+/* Panels [panel, end) of the outputs, which begin with channel o0 and are count channels. */
+typedef struct part {
+    int panel, end, o0, count;
+} part;
+
+static part make_part(const job *j, int i)
+{
+    part a;
+    conv_part(conv_panels(j->g.oc), j->parts, i, &a.panel, &a.end);
+    a.o0 = a.panel * 2 * conv_lanes();
+    a.count = a.end * 2 * conv_lanes() < j->g.oc ? (a.end - a.panel) * 2 * conv_lanes() : j->g.oc - a.o0;
+    return a;
+}
+
+static void put_sources(const job *j, part of, winograd_place tile, const float *nothing,
                         const float *pixel[WINOGRAD_SIDE * WINOGRAD_SIDE])
 {
     ptrdiff_t at[WINOGRAD_SIDE * WINOGRAD_SIDE];
     winograd_targets(&j->g, tile, at);
-    for (int i = 0; i < WINOGRAD_SIDE * WINOGRAD_SIDE; i++) pixel[i] = at[i] < 0 ? nothing : j->dy + at[i];
+    for (int i = 0; i < WINOGRAD_SIDE * WINOGRAD_SIDE; i++) pixel[i] = at[i] < 0 ? nothing : j->dy + at[i] + of.o0;
 }
 
-/* V and M of some tiles. */
-static void transform(const job *j, int64_t first, int count, const float *nothing, float *v, float *m)
+/* V, and M of a part of the outputs, of some tiles. */
+static void transform(const job *j, part of, int64_t first, int count, const float *nothing, float *v, float *m)
 {
     const struct ts_winograd_kernels *k = ts_winograd_k();
     const winograd_grid *g = &j->g;
     const float *x[2][WINOGRAD_AREA], *dy[2][WINOGRAD_SIDE * WINOGRAD_SIDE];
-    winograd_place place[GROUP_TILES + 1];
+    winograd_place place[2 * GROUP_TILES + 1];
     winograd_locate(g, first, count, place);
     place[count] = place[count - 1];
     winograd_sources(g, j->x, nothing, place[0], x[0]);
-    put_sources(j, place[0], nothing, dy[0]);
+    put_sources(j, of, place[0], nothing, dy[0]);
     for (int i = 0; i < count; i++) {
         winograd_sources(g, j->x, nothing, place[i + 1], x[(i + 1) & 1]);
-        put_sources(j, place[i + 1], nothing, dy[(i + 1) & 1]);
-        k->input(x[i & 1], x[(i + 1) & 1], g->ic, v + (ptrdiff_t)i * g->ic, j->in);
-        k->output_gradient(dy[i & 1], dy[(i + 1) & 1], g->oc, m + (ptrdiff_t)i * j->padded, j->out);
+        put_sources(j, of, place[i + 1], nothing, dy[(i + 1) & 1]);
+        const ts_winograd_form form = !g->bf16 ? TS_WINOGRAD_F32 : i % 2 ? TS_WINOGRAD_ODD : TS_WINOGRAD_EVEN;
+        const ptrdiff_t row = g->bf16 ? i / 2 : i;
+        k->input[form](x[i & 1], x[(i + 1) & 1], g->ic, v + row * g->ic, j->in);
+        k->output_gradient[form](dy[i & 1], dy[(i + 1) & 1], of.count, m + of.o0 + row * j->padded, j->out);
     }
 }
 
-static void add_products(const job *j, int count, const float *v, const float *m, float *sums)
+/* first: nothing has been put into sums yet. */
+static void add_products(const job *j, part of, int count, bool first, const float *v, const float *m, float *sums)
 {
     const struct ts_conv_kernels *k = ts_conv_k();
-    const int ic = j->g.ic, parts = (ic + k->rows - 1) / k->rows, panels = conv_panels(j->g.oc);
+    const int ic = j->g.ic, parts = (ic + k->rows - 1) / k->rows;
     const ptrdiff_t start = 0;
     for (int q = 0; q < WINOGRAD_AREA; q++)
-        for (int panel = 0; panel < panels; panel++) {
+        for (int panel = of.panel; panel < of.end; panel++) {
             const int o0 = panel * 2 * k->lanes, vectors = conv_vectors(j->g.oc, panel);
             for (int b = 0; b < parts; b++) {
                 int begin, end;
@@ -84,17 +108,18 @@ static void add_products(const job *j, int count, const float *v, const float *m
                                   .a_row = &start,
                                   .b_row = &start,
                                   .rows = 1,
-                                  .count = count,
+                                  .count = rows_of(j, count),
                                   .a_stride = ic,
                                   .b_stride = j->padded,
+                                  .begin = first,
                                   .c = sums + q * j->plane + (ptrdiff_t)begin * j->padded + o0,
                                   .c_stride = j->padded};
-                k->sum_near[vectors - 1][end - begin](&t);
+                (j->g.bf16 ? k->sum_bf16 : k->sum_near)[vectors - 1][end - begin](&t);
             }
         }
 }
 
-static void run_chunk(const job *j, int chunk)
+static void run_chunk(const job *j, int chunk, part of)
 {
     const int64_t begin = j->g.tiles * chunk / j->chunks, end = j->g.tiles * (chunk + 1) / j->chunks;
     const int channels = j->g.ic > j->g.oc ? j->g.ic : j->g.oc;
@@ -102,15 +127,18 @@ static void run_chunk(const job *j, int chunk)
           *m = ts_scratch(1, sizeof(float) * (size_t)(j->out * WINOGRAD_AREA));
     float *nothing = ts_scratch(3, sizeof(float) * (size_t)channels), *sums = j->sums + chunk * j->size;
     memset(nothing, 0, sizeof(float) * (size_t)channels);
-    memset(sums, 0, sizeof(float) * (size_t)j->size);
     for (int64_t first = begin; first < end; first += j->group) {
         const int count = (int)(end - first < j->group ? end - first : j->group);
-        transform(j, first, count, nothing, v, m);
-        add_products(j, count, v, m, sums);
+        transform(j, of, first, count, nothing, v, m);
+        add_products(j, of, count, first == begin, v, m, sums);
     }
 }
 
-static void run_task(const void *made, int64_t chunk) { run_chunk(made, (int)chunk); }
+static void run_task(const void *made, int64_t i)
+{
+    const job *j = made;
+    run_chunk(j, (int)(i / j->parts), make_part(j, (int)(i % j->parts)));
+}
 
 static void reduce_inputs(const void *made, int64_t begin, int64_t end)
 {
@@ -119,7 +147,8 @@ static void reduce_inputs(const void *made, int64_t begin, int64_t end)
     for (int64_t at = begin; at < end; at++) {
         const int o0 = (int)(at / ic) * lanes, i = (int)(at % ic);
         float tap[9 * 16]; /* no vector has more than 16 lanes */
-        ts_winograd_k()->weights_gradient(j->sums + (ptrdiff_t)i * j->padded + o0, j->plane, j->chunks, j->size, tap);
+        ts_winograd_k()->weights_gradient[j->g.bf16](j->sums + (ptrdiff_t)i * j->padded + o0, j->plane, j->chunks,
+                                                     j->size, tap);
         for (int o = 0; o < lanes && o0 + o < oc; o++) {
             float *to = j->dweight + ((ptrdiff_t)(o0 + o) * ic + i) * 9;
             for (int t = 0; t < 9; t++) to[t] += tap[t * lanes + o];
@@ -127,11 +156,21 @@ static void reduce_inputs(const void *made, int64_t begin, int64_t end)
     }
 }
 
-void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const float *dy, float *dweight)
+static void weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight)
 {
-    job j = make_job(c, x, dy);
+    job j = make_job(c, bf16, x, dy);
     j.dweight = dweight;
     j.sums = ts_scratch(2, sizeof(float) * (size_t)(j.size * j.chunks));
-    ts_tasks(c->compute.threads, j.chunks, run_task, &j);
+    ts_tasks(c->compute.threads, (int64_t)j.chunks * j.parts, run_task, &j);
     ts_for(c->compute.threads, (int64_t)(j.padded / conv_lanes()) * c->ic, 1, reduce_inputs, &j);
+}
+
+void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const float *dy, float *dweight)
+{
+    weight_gradient(c, false, x, dy, dweight);
+}
+
+void ts_conv_weight_gradient_winograd_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight)
+{
+    weight_gradient(c, true, x, dy, dweight);
 }

@@ -148,8 +148,8 @@ void conv_pack_col2im(int ic, int oc, int k, bool mirrored, const float *weight,
 void conv_pack_lanes(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step,
                      float *packed);
 
-size_t conv_winograd_count(int ic, int oc);
-void conv_winograd_pack(const ts_conv *c, bool forward, const conv_weights *w, float *packed);
+size_t conv_winograd_count(int ic, int oc, bool bf16);
+void conv_winograd_pack(const ts_conv *c, bool forward, bool bf16, const conv_weights *w, float *packed);
 
 /* dweight += for at most CONV_BATCH_PIXELS pixels an image. */
 void conv_batch_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight);

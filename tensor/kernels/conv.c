@@ -170,22 +170,23 @@ INLINE void tile(const ts_tile *t, const int pixels, const int vectors, const bo
         store_lanes(t->y[p / TS_TILE_GROUP] + p % TS_TILE_GROUP * ys + v * VL, acc[p][v], mask[v]);
 }
 
-/* One pixel: rows x vectors multiplications. */
-#define PIXEL                                                                         \
-    {                                                                                 \
-        vf y[2];                                                                      \
-        UNROLL for (int v = 0; v < vectors; v++) y[v] = v_load(b + v * VL);           \
-        UNROLL for (int m = 0; m < rows; m++)                                         \
-        {                                                                             \
-            vf x = v_set(a[m]);                                                       \
-            UNROLL for (int v = 0; v < vectors; v++) acc[m][v] += x * y[v];           \
-        }                                                                             \
-        if (!near) __builtin_prefetch(b + ahead), __builtin_prefetch(b + ahead + VL); \
-        a += as;                                                                      \
-        b += bs;                                                                      \
+/* One pixel, or pair of them: rows x vectors multiplications. */
+#define PIXEL                                                                                    \
+    {                                                                                            \
+        vf y[2];                                                                                 \
+        UNROLL for (int v = 0; v < vectors; v++) y[v] = v_load(b + v * VL);                      \
+        UNROLL for (int m = 0; m < rows; m++)                                                    \
+        {                                                                                        \
+            const vf x = bf16 ? (vf)v_seti(((const pair *)(const void *)a)[m]) : v_set(a[m]);    \
+            UNROLL for (int v = 0; v < vectors; v++) acc[m][v] = bf16 ? dot2(acc[m][v], x, y[v]) \
+                                                                      : acc[m][v] + x * y[v];    \
+        }                                                                                        \
+        if (!near) __builtin_prefetch(b + ahead), __builtin_prefetch(b + ahead + VL);            \
+        a += as;                                                                                 \
+        b += bs;                                                                                 \
     }
 
-INLINE void sum(const ts_sum *t, const int rows, const int vectors, const bool near)
+INLINE void sum(const ts_sum *t, const int rows, const int vectors, const bool near, const bool bf16)
 {
     vf acc[ROWS][2];
     if (t->begin) UNROLL for (int m = 0; m < rows; m++) UNROLL for (int v = 0; v < vectors; v++) acc[m][v] = (vf){0};
@@ -335,15 +336,17 @@ static void finish(float *x, int64_t pixels, int channels, bool add, float leak,
 #else
 #define FOR_ALL(DO) FOR_5(DO)
 #endif
-#define FUNCTIONS(n)                                                     \
-    static void tile_##n##_1(const ts_tile *t) { tile(t, n, 1, false); } \
-    static void tile_##n##_2(const ts_tile *t) { tile(t, n, 2, false); } \
-    static void bf16_##n##_1(const ts_tile *t) { tile(t, n, 1, true); }  \
-    static void bf16_##n##_2(const ts_tile *t) { tile(t, n, 2, true); }  \
-    static void sum_##n##_1(const ts_sum *t) { sum(t, n, 1, false); }    \
-    static void sum_##n##_2(const ts_sum *t) { sum(t, n, 2, false); }    \
-    static void near_##n##_1(const ts_sum *t) { sum(t, n, 1, true); }    \
-    static void near_##n##_2(const ts_sum *t) { sum(t, n, 2, true); }
+#define FUNCTIONS(n)                                                            \
+    static void tile_##n##_1(const ts_tile *t) { tile(t, n, 1, false); }        \
+    static void tile_##n##_2(const ts_tile *t) { tile(t, n, 2, false); }        \
+    static void bf16_##n##_1(const ts_tile *t) { tile(t, n, 1, true); }         \
+    static void bf16_##n##_2(const ts_tile *t) { tile(t, n, 2, true); }         \
+    static void sum_##n##_1(const ts_sum *t) { sum(t, n, 1, false, false); }    \
+    static void sum_##n##_2(const ts_sum *t) { sum(t, n, 2, false, false); }    \
+    static void near_##n##_1(const ts_sum *t) { sum(t, n, 1, true, false); }    \
+    static void near_##n##_2(const ts_sum *t) { sum(t, n, 2, true, false); }    \
+    static void sum_bf16_##n##_1(const ts_sum *t) { sum(t, n, 1, true, true); } \
+    static void sum_bf16_##n##_2(const ts_sum *t) { sum(t, n, 2, true, true); }
 FOR_ALL(FUNCTIONS)
 
 #define TILE_1(n) [n] = tile_##n##_1,
@@ -354,6 +357,8 @@ FOR_ALL(FUNCTIONS)
 #define SUM_2(n) [n] = sum_##n##_2,
 #define NEAR_1(n) [n] = near_##n##_1,
 #define NEAR_2(n) [n] = near_##n##_2,
+#define SUM_BF16_1(n) [n] = sum_bf16_##n##_1,
+#define SUM_BF16_2(n) [n] = sum_bf16_##n##_2,
 const struct ts_conv_kernels TS_TABLE(conv) = {
     .lanes = VL,
     .pixels = PIXELS,
@@ -362,6 +367,7 @@ const struct ts_conv_kernels TS_TABLE(conv) = {
     .tile_bf16 = {{FOR_ALL(BF16_1)}, {FOR_ALL(BF16_2)}},
     .sum = {{FOR_ALL(SUM_1)}, {FOR_ALL(SUM_2)}},
     .sum_near = {{FOR_ALL(NEAR_1)}, {FOR_ALL(NEAR_2)}},
+    .sum_bf16 = {{FOR_ALL(SUM_BF16_1)}, {FOR_ALL(SUM_BF16_2)}},
     .pairs = pairs,
     .columns = columns,
     .panel = panel,

@@ -5,7 +5,7 @@
  * each float of a and w holds a pair of bf16 values of neighbouring k, the even one in the low half, and a product is
  * the sum of two: made from the halves as floats, or by vdpbf16ps, which takes denormals for zeros. Sums are f32;
  * segments count pairs. sum: c[m][o] += sum_p a[p][m] b[p][o] for a block of m and o over many pixels p: the gradient
- * of weights. */
+ * of weights. sum_bf16: the same where each float of a and b holds the bf16 values of a pair of pixels. */
 #ifndef TS_KERNELS_CONV_H
 #define TS_KERNELS_CONV_H
 #include "tensor/kernels/family.h"
@@ -67,6 +67,7 @@ struct ts_conv_kernels {
     ts_sum_function *sum[2][TS_SUM_ROWS + 1]; /* [vectors - 1][m] */
     ts_sum_function
         *sum_near[2][TS_SUM_ROWS + 1]; /* the same of what lies in the first cache: nothing is fetched ahead */
+    ts_sum_function *sum_bf16[2][TS_SUM_ROWS + 1]; /* sum_near of pairs of pixels */
     /* to[p stride + i] = channels 2i and 2i + 1 of pixel p, rounded to the nearest bf16, ties to even, NaNs quiet; the
      * last pair of an odd number of channels ends with a zero */
     void (*pairs)(const float *x, int64_t pixels, int channels, float *to, ptrdiff_t stride);

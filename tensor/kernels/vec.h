@@ -64,6 +64,17 @@ static inline vu v_bf16(vf x)
     return (vu)v_select(x == x, (vf)(bits + 0x7fff + (bits >> 16 & 1)), (vf)(bits | 0x00400000));
 }
 
+/* The same as halves, denormals being whatever the instruction set makes of them. */
+typedef uint16_t vu16 __attribute__((vector_size(VL * 2)));
+static inline vu16 v_bf16_half(vf x)
+{
+#if defined(__AVX512BF16__)
+    return (vu16)_mm512_cvtneps_pbh((__m512)x);
+#else
+    return __builtin_convertvector(v_bf16(x) >> 16, vu16);
+#endif
+}
+
 static inline vf v_sqrt(vf x)
 {
 #if defined(__AVX512F__)

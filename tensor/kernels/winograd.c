@@ -5,32 +5,66 @@
 #define INLINE static inline __attribute__((always_inline))
 #define UNROLL _Pragma("GCC unroll 6")
 
-/* to = B' d */
-INLINE void six(const vf d[6], vf to[6])
+/* Polynomials are multiplied at 0, p, -p, q, -q and infinity. The functions below are inlined with constants: where p
+ * is 1 nothing is left of a product with it. */
+typedef struct points {
+    double p, q;
+} points;
+INLINE points points_of(ts_winograd_form form)
 {
-    const vf four = v_set(4), five = v_set(5), two = v_set(2);
-    const vf a = d[4] - four * d[2], b = d[3] - four * d[1], c = d[4] - d[2], e = two * (d[3] - d[1]);
-    to[0] = four * d[0] - five * d[2] + d[4];
+    return form == TS_WINOGRAD_F32 ? (points){1, 2} : (points){0.6875, 1.5};
+}
+#define POINTS const double p = at.p, q = at.q, p2 = p * p, q2 = q * q
+#define SET(x) v_set((float)(x))
+
+/* to = B' d */
+INLINE void six(points at, const vf d[6], vf to[6])
+{
+    POINTS;
+    const vf a = d[4] - SET(q2) * d[2], b = SET(p) * (d[3] - SET(q2) * d[1]), c = d[4] - SET(p2) * d[2],
+             e = SET(q) * (d[3] - SET(p2) * d[1]);
+    to[0] = SET(p2 * q2) * d[0] - SET(p2 + q2) * d[2] + d[4];
     to[1] = a + b;
     to[2] = a - b;
     to[3] = c + e;
     to[4] = c - e;
-    to[5] = four * d[1] - five * d[3] + d[5];
+    to[5] = SET(p2 * q2) * d[1] - SET(p2 + q2) * d[3] + d[5];
 }
 
 /* to = A' m */
-INLINE void four(const vf m[6], vf to[4])
+INLINE void four(points at, const vf m[6], vf to[4])
 {
+    POINTS;
     const vf a = m[1] + m[2], b = m[1] - m[2], c = m[3] + m[4], d = m[3] - m[4];
     to[0] = m[0] + a + c;
-    to[1] = b + v_set(2) * d;
-    to[2] = a + v_set(4) * c;
-    to[3] = b + v_set(8) * d + m[5];
+    to[1] = SET(p) * b + SET(q) * d;
+    to[2] = SET(p2) * a + SET(q2) * c;
+    to[3] = SET(p2 * p) * b + SET(q2 * q) * d + m[5];
 }
 
-static void input(const float *const pixel[36], const float *const next[36], int channels, float *v, ptrdiff_t plane)
+/* x, or its first values, as the float, or in the halves of floats that form names. */
+INLINE void put(ts_winograd_form form, float *to, vf x, int64_t left)
 {
-    for (int c = 0; c < channels; c += VL) {
+    if (form == TS_WINOGRAD_F32) {
+        v_store_part(to, x, left);
+        return;
+    }
+    if (form == TS_WINOGRAD_CHANNELS) {
+        const vu16 rounded = v_bf16_half(x);
+        if (left >= VL) memcpy(to, &rounded, sizeof rounded);
+        else memcpy(to, &rounded, (size_t)((left + 1) / 2) * sizeof *to);
+        return;
+    }
+    const vu rounded = __builtin_convertvector(v_bf16_half(x), vu);
+    if (form == TS_WINOGRAD_EVEN) v_store_part(to, (vf)rounded, left);
+    else v_store_part(to, (vf)((vu)v_load_part(to, left) | rounded << 16), left);
+}
+
+INLINE void input(const ts_winograd_form form, const float *const pixel[36], const float *const next[36], int channels,
+                  float *v, ptrdiff_t plane)
+{
+    const points at = points_of(form);
+    for (int c = 0; c < channels; c += VL, v += form == TS_WINOGRAD_CHANNELS ? VL / 2 : VL) {
         vf half[6][6]; /* [column][row of B' d] */
         UNROLL for (int j = 0; j < 6; j++)
         {
@@ -38,21 +72,22 @@ static void input(const float *const pixel[36], const float *const next[36], int
             UNROLL for (int i = 0; i < 6; i++) d[i] = v_load_part(pixel[6 * i + j] + c, channels - c);
             /* The two left columns are the right ones of this tile, as a rule. */
             if (j >= 2) UNROLL for (int i = 0; i < 6; i++) __builtin_prefetch(next[6 * i + j] + c);
-            six(d, half[j]);
+            six(at, d, half[j]);
         }
         UNROLL for (int i = 0; i < 6; i++)
         {
             vf d[6], to[6];
             UNROLL for (int j = 0; j < 6; j++) d[j] = half[j][i];
-            six(d, to);
-            UNROLL for (int j = 0; j < 6; j++) v_store_part(v + (6 * i + j) * plane + c, to[j], channels - c);
+            six(at, d, to);
+            UNROLL for (int j = 0; j < 6; j++) put(form, v + (6 * i + j) * plane, to[j], channels - c);
         }
     }
 }
 
-static void output(const float *m, ptrdiff_t plane, int channels, const float *bias, float leak, bool add,
-                   float *const y[16], float *const next[16])
+INLINE void output(const ts_winograd_form form, const float *m, ptrdiff_t plane, int channels, const float *bias,
+                   float leak, bool add, float *const y[16], float *const next[16])
 {
+    const points at = points_of(form);
     for (int c = 0; c < channels; c += VL) {
         vf half[6][4];
         const vf init = bias ? v_load_part(bias + c, channels - c) : (vf){0};
@@ -60,13 +95,13 @@ static void output(const float *m, ptrdiff_t plane, int channels, const float *b
         {
             vf d[6];
             UNROLL for (int i = 0; i < 6; i++) d[i] = v_load_part(m + (6 * i + j) * plane + c, channels - c);
-            four(d, half[j]);
+            four(at, d, half[j]);
         }
         UNROLL for (int i = 0; i < 4; i++)
         {
             vf d[6], to[4];
             UNROLL for (int j = 0; j < 6; j++) d[j] = half[j][i];
-            four(d, to);
+            four(at, d, to);
             UNROLL for (int j = 0; j < 4; j++)
             {
                 if (next[4 * i + j]) __builtin_prefetch(next[4 * i + j] + c, 1);
@@ -79,11 +114,13 @@ static void output(const float *m, ptrdiff_t plane, int channels, const float *b
 }
 
 /* to = G w */
-INLINE void from_three(const vf w[3], vf to[6])
+INLINE void from_three(points at, const vf w[3], vf to[6])
 {
-    const vf a = v_set(1.0f / 6) * (w[0] + w[2]), b = v_set(1.0f / 6) * w[1],
-             c = v_set(1.0f / 24) * w[0] + v_set(1.0f / 6) * w[2], d = v_set(1.0f / 12) * w[1];
-    to[0] = v_set(0.25f) * w[0];
+    POINTS;
+    const double at_p = 1 / (2 * p2 * (q2 - p2)), at_q = 1 / (2 * q2 * (q2 - p2)), squares = 1 / (2 * (q2 - p2));
+    const vf a = SET(at_p) * (w[0] + SET(p2) * w[2]), b = SET(p * at_p) * w[1],
+             c = SET(at_q) * w[0] + SET(squares) * w[2], d = SET(q * at_q) * w[1];
+    to[0] = SET(1 / (p2 * q2)) * w[0];
     to[1] = -(a + b);
     to[2] = b - a;
     to[3] = c + d;
@@ -91,30 +128,33 @@ INLINE void from_three(const vf w[3], vf to[6])
     to[5] = w[2];
 }
 
-static void weights(const float *tap, int vectors, float *u, ptrdiff_t plane)
+INLINE void weights(const ts_winograd_form form, const float *tap, int vectors, float *u, ptrdiff_t plane)
 {
+    const points at = points_of(form);
     for (int o = 0; o < vectors * VL; o += VL) {
         vf half[3][6]; /* [column][row of G g] */
         UNROLL for (int j = 0; j < 3; j++)
         {
             vf w[3];
             UNROLL for (int i = 0; i < 3; i++) w[i] = v_load(tap + (3 * i + j) * vectors * VL + o);
-            from_three(w, half[j]);
+            from_three(at, w, half[j]);
         }
         UNROLL for (int i = 0; i < 6; i++)
         {
             vf w[3], to[6];
             UNROLL for (int j = 0; j < 3; j++) w[j] = half[j][i];
-            from_three(w, to);
-            UNROLL for (int j = 0; j < 6; j++) v_store(u + (6 * i + j) * plane + o, to[j]);
+            from_three(at, w, to);
+            UNROLL for (int j = 0; j < 6; j++) put(form, u + (6 * i + j) * plane + o, to[j], VL);
         }
     }
 }
 
 /* to = A y */
-INLINE void from_four(const vf y[4], vf to[6])
+INLINE void from_four(points at, const vf y[4], vf to[6])
 {
-    const vf a = y[0] + y[2], b = y[1] + y[3], c = y[0] + v_set(4) * y[2], d = v_set(2) * y[1] + v_set(8) * y[3];
+    POINTS;
+    const vf a = y[0] + SET(p2) * y[2], b = SET(p) * y[1] + SET(p2 * p) * y[3], c = y[0] + SET(q2) * y[2],
+             d = SET(q) * y[1] + SET(q2 * q) * y[3];
     to[0] = y[0];
     to[1] = a + b;
     to[2] = a - b;
@@ -123,9 +163,10 @@ INLINE void from_four(const vf y[4], vf to[6])
     to[5] = y[3];
 }
 
-static void output_gradient(const float *const dy[16], const float *const next[16], int channels, float *m,
-                            ptrdiff_t plane)
+INLINE void output_gradient(const ts_winograd_form form, const float *const dy[16], const float *const next[16],
+                            int channels, float *m, ptrdiff_t plane)
 {
+    const points at = points_of(form);
     for (int c = 0; c < channels; c += VL) {
         vf half[4][6]; /* [column][row of A dy] */
         UNROLL for (int j = 0; j < 4; j++)
@@ -136,29 +177,33 @@ static void output_gradient(const float *const dy[16], const float *const next[1
                 d[i] = v_load_part(dy[4 * i + j] + c, channels - c);
                 __builtin_prefetch(next[4 * i + j] + c);
             }
-            from_four(d, half[j]);
+            from_four(at, d, half[j]);
         }
         UNROLL for (int i = 0; i < 6; i++)
         {
             vf d[4], to[6];
             UNROLL for (int j = 0; j < 4; j++) d[j] = half[j][i];
-            from_four(d, to);
-            UNROLL for (int j = 0; j < 6; j++) v_store(m + (6 * i + j) * plane + c, to[j]);
+            from_four(at, d, to);
+            UNROLL for (int j = 0; j < 6; j++) put(form, m + (6 * i + j) * plane + c, to[j], VL);
         }
     }
 }
 
 /* to = G' u */
-INLINE void three(const vf u[6], vf to[3])
+INLINE void three(points at, const vf u[6], vf to[3])
 {
+    POINTS;
+    const double at_p = 1 / (2 * p2 * (q2 - p2)), at_q = 1 / (2 * q2 * (q2 - p2)), squares = 1 / (2 * (q2 - p2));
     const vf a = u[1] + u[2], b = u[2] - u[1], c = u[3] + u[4], d = u[3] - u[4];
-    to[0] = v_set(0.25f) * u[0] - v_set(1.0f / 6) * a + v_set(1.0f / 24) * c;
-    to[1] = v_set(1.0f / 6) * b + v_set(1.0f / 12) * d;
-    to[2] = v_set(1.0f / 6) * (c - a) + u[5];
+    to[0] = SET(1 / (p2 * q2)) * u[0] - SET(at_p) * a + SET(at_q) * c;
+    to[1] = SET(p * at_p) * b + SET(q * at_q) * d;
+    to[2] = SET(squares) * (c - a) + u[5];
 }
 
-static void weights_gradient(const float *u, ptrdiff_t plane, int sums, ptrdiff_t sum, float *tap)
+INLINE void weights_gradient(const ts_winograd_form form, const float *u, ptrdiff_t plane, int sums, ptrdiff_t sum,
+                             float *tap)
 {
+    const points at = points_of(form);
     vf half[6][3]; /* [column][row of G' u] */
     UNROLL for (int j = 0; j < 6; j++)
     {
@@ -168,19 +213,56 @@ static void weights_gradient(const float *u, ptrdiff_t plane, int sums, ptrdiff_
             d[i] = v_load(u + (6 * i + j) * plane);
             for (int s = 1; s < sums; s++) d[i] += v_load(u + s * sum + (6 * i + j) * plane);
         }
-        three(d, half[j]);
+        three(at, d, half[j]);
     }
     UNROLL for (int i = 0; i < 3; i++)
     {
         vf d[6], to[3];
         UNROLL for (int j = 0; j < 6; j++) d[j] = half[j][i];
-        three(d, to);
+        three(at, d, to);
         UNROLL for (int j = 0; j < 3; j++) v_store(tap + (3 * i + j) * VL, to[j]);
     }
 }
 
-const struct ts_winograd_kernels TS_TABLE(winograd) = {.input = input,
-                                                       .output = output,
-                                                       .weights = weights,
-                                                       .output_gradient = output_gradient,
-                                                       .weights_gradient = weights_gradient};
+#define INPUT(name, form)                                                                                       \
+    static void input_##name(const float *const pixel[36], const float *const next[36], int channels, float *v, \
+                             ptrdiff_t plane)                                                                   \
+    {                                                                                                           \
+        input(form, pixel, next, channels, v, plane);                                                           \
+    }
+#define WEIGHTS(name, form)                                                                                            \
+    static void weights_##name(const float *tap, int vectors, float *u, ptrdiff_t plane)                               \
+    {                                                                                                                  \
+        weights(form, tap, vectors, u, plane);                                                                         \
+    }                                                                                                                  \
+    static void output_gradient_##name(const float *const dy[16], const float *const next[16], int channels, float *m, \
+                                       ptrdiff_t plane)                                                                \
+    {                                                                                                                  \
+        output_gradient(form, dy, next, channels, m, plane);                                                           \
+    }
+#define PRODUCTS(name, form)                                                                                          \
+    static void output_##name(const float *m, ptrdiff_t plane, int channels, const float *bias, float leak, bool add, \
+                              float *const y[16], float *const next[16])                                              \
+    {                                                                                                                 \
+        output(form, m, plane, channels, bias, leak, add, y, next);                                                   \
+    }                                                                                                                 \
+    static void weights_gradient_##name(const float *u, ptrdiff_t plane, int sums, ptrdiff_t sum, float *tap)         \
+    {                                                                                                                 \
+        weights_gradient(form, u, plane, sums, sum, tap);                                                             \
+    }
+INPUT(f32, TS_WINOGRAD_F32)
+INPUT(channels, TS_WINOGRAD_CHANNELS)
+INPUT(even, TS_WINOGRAD_EVEN)
+INPUT(odd, TS_WINOGRAD_ODD)
+WEIGHTS(f32, TS_WINOGRAD_F32)
+WEIGHTS(even, TS_WINOGRAD_EVEN)
+WEIGHTS(odd, TS_WINOGRAD_ODD)
+PRODUCTS(f32, TS_WINOGRAD_F32)
+PRODUCTS(bf16, TS_WINOGRAD_CHANNELS)
+
+const struct ts_winograd_kernels TS_TABLE(winograd) = {
+    .input = {input_f32, input_channels, input_even, input_odd},
+    .output = {output_f32, output_bf16},
+    .weights = {weights_f32, NULL, weights_even, weights_odd},
+    .output_gradient = {output_gradient_f32, NULL, output_gradient_even, output_gradient_odd},
+    .weights_gradient = {weights_gradient_f32, weights_gradient_bf16}};
