@@ -55,7 +55,7 @@ static void posterior(void *user)
     job *j = user;
     rd_view views[RD_CAPTURE_VIEWS];
     const float *image[RD_CAPTURE_VIEWS];
-    const rd_prior prior = {j->target, j->deviation, {{0.1f, 0.1f}, 0.1f, 0.5f}};
+    const rd_prior prior = {j->target, j->deviation, {.hue = {0.1f, 0.1f}, .model = 0.1f, .noise = 0.5f}};
     for (int k = 0; k < j->photographs; k++) views[k] = rd_capture_view(k), image[k] = j->image;
     rd_posterior_step(rd_grid_full(j->side), j->maps, MAP_CHANNELS, views, image, j->photographs, &prior, j->gradient,
                       j->after);
@@ -66,7 +66,7 @@ static void scene(void *user)
 {
     job *j = user;
     const rd_scene_prior prior = {{0}, {0.3f, 1, 1, 0.5f, 0.5f, 1, 1, 0.3f}};
-    const rd_scene_how how = {4, 16, 100, {{0.1f, 0.1f}, 0.1f, 0.02f}};
+    const rd_scene_how how = {4, 16, 100, {.hue = {0.1f, 0.1f}, .model = 0.1f, .noise = 0.02f}};
     float number[RD_SCENE_NUMBERS] = {0}, after[RD_SCENE_NUMBERS];
     rd_scene_fit(rd_grid_full(j->side), j->maps, MAP_CHANNELS, j->deviation, j->image, &prior, &how, number, after);
 }
