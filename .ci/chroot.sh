@@ -33,6 +33,7 @@ bind() {
     mounted="$root$2 $mounted"
 }
 bind /proc /proc
+[ ! -d /sys ] || bind /sys /sys # Open MPI reads it
 bind /dev /dev
 [ ! -d /dev/pts ] || bind /dev/pts /dev/pts # tests ask on terminals
 if [ "$packages" != "$(cat "$root/.complete")" ]; then # made for another list

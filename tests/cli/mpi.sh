@@ -100,7 +100,7 @@ begin() {
     folder=$2
     shift 2
     # shellcheck disable=SC2086
-    $LAUNCH -np "$n" "$TRAIN" "$T/small.ini" --set output.folder="$T/$folder" --threads 1 --set train.checkpoint_every=1 "$@" >"$T/out" 2>"$T/err" &
+    env --default-signal=HUP $LAUNCH -np "$n" "$TRAIN" "$T/small.ini" --set output.folder="$T/$folder" --threads 1 --set train.checkpoint_every=1 "$@" >"$T/out" 2>"$T/err" &
     job=$!
     for _ in $(seq 1 1200); do
         [ -s "$T/$folder/last.safetensors" ] && return

@@ -154,8 +154,9 @@ interrupt_saves_and_resume_is_exact() {
     mv "$T/run" "$T/whole"
     for signal in INT TERM HUP; do
         rm -rf "$T/run"
-        # A job in the background has SIGINT ignored; the program's handler is set all the same.
-        "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 "$@" --set train.checkpoint_every=1 >"$T/out" 2>"$T/err" &
+        # A job in the background has SIGINT ignored; the program's handler is set all the same. One that began under
+        # nohup has SIGHUP ignored, which the program keeps.
+        env --default-signal=HUP "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 "$@" --set train.checkpoint_every=1 >"$T/out" 2>"$T/err" &
         job=$!
         await "$T/run/last.safetensors"
         kill -$signal $job

@@ -23,7 +23,8 @@ static void make_set(const char *folder, int width, uint64_t index)
 {
     ts_status st = {0};
     io_material m = {0};
-    const io_procedural p = {.seed = 5};
+    /* matt and coarse: the window shows no burnt-out highlight and no line as fine as a pixel */
+    const io_procedural p = {.seed = 5, .families = io_family_mask("pebbles")};
     CHECK(!io_material_create(&m, SIZE, &st), "%s", st.message);
     io_procedural_make(&p, index, &m);
     CHECK(!lgd_write_sheet_captures(folder, &m, 5, index, width, 92, &st), "%s", st.message);
