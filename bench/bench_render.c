@@ -65,10 +65,10 @@ static void posterior(void *user)
 static void scene(void *user)
 {
     job *j = user;
-    const rd_scene_prior prior = {{0}, {0.3f, 1, 1, 0.5f, 0.5f, 1, 1, 0.3f}};
+    const rd_scene_prior prior = {{0}, {0.3f, 1, 1, 0.5f, 0.5f, 1, 1, 0.3f, 0.2f}};
     const rd_scene_how how = {4, 16, 100, {.hue = {0.1f, 0.1f}, .model = 0.1f, .noise = 0.02f}};
-    float number[RD_SCENE_NUMBERS] = {0}, after[RD_SCENE_NUMBERS];
-    rd_scene_fit(rd_grid_full(j->side), j->maps, MAP_CHANNELS, j->deviation, j->image, &prior, &how, number, after);
+    float unknown[RD_SCENE_UNKNOWNS] = {0}, after[RD_SCENE_UNKNOWNS];
+    rd_scene_fit(rd_grid_full(j->side), j->maps, MAP_CHANNELS, j->deviation, j->image, &prior, &how, unknown, after);
 }
 
 static void loss(void *user)

@@ -9,6 +9,9 @@
 
 /* Of F0's error, what is not a level of the whole material: the part that a pixel may change by itself. */
 #define F0_DETAIL 0.35f
+/* Of the roughness' error, relative to the roughness, what the fit may explain by a level of the whole material. It is
+ * less than is true (a half): where the maps lack relief the fit leans to rougher materials. */
+#define ROUGHNESS_LEVEL 0.3
 #define LAPLACE 1.41421356f /* a Laplace density's standard deviation over its mean absolute error */
 
 /* The numbers that are known have no error: the prior keeps them. */
@@ -34,6 +37,17 @@ static void scene_prior(const float *said, const rd_view *view, int known, rd_sc
     }
     prior->mean[RD_SCENE_AMBIENT] = fmaxf(prior->mean[RD_SCENE_AMBIENT], 0);
     prior->mean[RD_SCENE_TONE] = prior->deviation[RD_SCENE_TONE] = 0; /* the steps have no tone curve */
+}
+
+static void level_prior(const lgd_first_guess *g, size_t pixels, int channels, rd_scene_prior *prior)
+{
+    double rough = 0, off = 0;
+    for (size_t i = 0; i < pixels; i++) {
+        rough += fmax((double)g->r0[i * (size_t)channels + MAP_ROUGHNESS], -1) + 1;
+        off += (double)g->deviation[i * NN_SPREADS + GROUP_ROUGHNESS];
+    }
+    prior->mean[RD_SCENE_ROUGHNESS] = 0;
+    prior->deviation[RD_SCENE_ROUGHNESS] = (float)(ROUGHNESS_LEVEL * fmin(off / fmax(rough, 1e-6), 1));
 }
 
 static ts_code make(ag_tape *tape, const nn_model *model, const float *image, int side, const rd_view *view, int known,
@@ -68,10 +82,14 @@ static ts_code make(ag_tape *tape, const nn_model *model, const float *image, in
             expf(fminf(fmaxf(guess.spread->t.data[i], -6), 4));
     rd_scene_prior prior;
     scene_prior(guess.scene->t.data, view, known, &prior);
-    memcpy(g->number, prior.mean, sizeof g->number);
-    const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior(known)};
+    level_prior(g, pixels, model->arch.channels, &prior);
+    float unknown[RD_SCENE_UNKNOWNS];
+    memcpy(unknown, prior.mean, sizeof unknown);
+    const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 64, .scale = nn_step_prior(known)};
     rd_scene_fit(rd_grid_on(rd_grid_full(size), threads), g->r0, model->arch.channels, g->deviation, small->t.data,
-                 &prior, &how, g->number, NULL);
+                 &prior, &how, unknown, NULL);
+    memcpy(g->number, unknown, sizeof g->number);
+    rd_scene_roughen((int64_t)pixels, g->r0, model->arch.channels, unknown[RD_SCENE_ROUGHNESS], g->r0);
     return TS_OK;
 }
 

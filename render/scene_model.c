@@ -7,7 +7,8 @@
 
 #define PI 3.14159265358979323846
 
-_Static_assert((int)TS_SCENE_NUMBERS == (int)RD_SCENE_NUMBERS, "a kernel knows the numbers of a scene");
+_Static_assert((int)TS_SCENE_NUMBERS == (int)RD_SCENE_NUMBERS && (int)TS_SCENE_UNKNOWNS == (int)RD_SCENE_UNKNOWNS,
+               "a kernel knows the numbers of a scene and the level of the roughness");
 
 static double irradiance(double exposure)
 {
@@ -93,7 +94,7 @@ void rd_scene_photograph(rd_grid grid, const float *maps, int channels, const fl
 
 /* Solves (I + q A q) z = right for n symmetric equations by Cholesky's factor, which is left in the lower triangle of
  * a. */
-enum { K = RD_SCENE_NUMBERS };
+enum { K = RD_SCENE_UNKNOWNS };
 static void factor(double a[K][K])
 {
     for (int j = 0; j < K; j++)
@@ -121,9 +122,17 @@ static void upper(double a[K][K], double x[K])
     }
 }
 
+void rd_scene_roughen(int64_t pixels, const float *maps, int channels, float level, float *to)
+{
+    const float factor = expf(level);
+    if (to != maps) memcpy(to, maps, (size_t)(pixels * channels) * sizeof *to);
+    for (int64_t i = MAP_ROUGHNESS; i < pixels * channels; i += channels) to[i] = fminf((to[i] + 1) * factor - 1, 1);
+}
+
 typedef struct sums_job {
     rd_grid grid;
     const float *maps, *deviation, *image;
+    float level;
     int channels, first;
     const rd_scene_how *how;
     ts_scene scene;
@@ -136,7 +145,10 @@ static void sums_of_rows(const void *job, int64_t begin, int64_t end)
     for (int64_t i = begin; i < end; i++) {
         const int y = j->first + (int)i * j->how->every;
         const int64_t at = (int64_t)y * j->grid.w;
-        const ts_shade_row row = rd_shade_row(j->grid, y, j->maps, j->channels);
+        float *maps = ts_scratch(1, (size_t)(j->grid.w * j->channels) * sizeof *maps);
+        rd_scene_roughen(j->grid.w, j->maps + at * j->channels, j->channels, j->level, maps);
+        ts_shade_row row = rd_shade_row(j->grid, y, j->maps, j->channels);
+        row.maps = maps;
         j->part[i] = (ts_scene_sums){.misfit = 0};
         ts_scene_k()->normal(&j->scene, &row, j->image + at * 3, &j->how->scale, j->deviation + at * MAP_GROUPS,
                              &j->part[i]);
@@ -145,15 +157,15 @@ static void sums_of_rows(const void *job, int64_t begin, int64_t end)
 
 /* The sums over the rows that are read, added in their order. */
 static ts_scene_sums sums_of(rd_grid grid, const float *maps, int channels, const float *deviation, const float *image,
-                             const rd_scene_how *how, bool least, const float number[K])
+                             const rd_scene_how *how, bool least, const float unknown[K])
 {
-    ts_scene scene = rd_scene_of(number);
+    ts_scene scene = rd_scene_of(unknown);
     const int first = how->every / 2 < grid.h ? how->every / 2 : 0,
               rows = (grid.h - first + how->every - 1) / how->every;
     scene.least = least;
     ts_scene_sums *part = ts_scratch(0, (size_t)rows * sizeof *part), all = {.misfit = 0};
     ts_for(grid.threads, rows, 1, sums_of_rows,
-           &(sums_job){grid, maps, deviation, image, channels, first, how, scene, part});
+           &(sums_job){grid, maps, deviation, image, unknown[RD_SCENE_ROUGHNESS], channels, first, how, scene, part});
     for (int i = 0; i < rows; i++) {
         for (int j = 0; j < TS_SCENE_PAIRS; j++) all.matrix[j] += part[i].matrix[j];
         for (int j = 0; j < K; j++) all.right[j] += part[i].right[j];
@@ -169,18 +181,18 @@ static float bounded(int i, double t)
 }
 
 void rd_scene_fit(rd_grid grid, const float *maps, int channels, const float *deviation, const float *image,
-                  const rd_scene_prior *prior, const rd_scene_how *how, float number[K], float after[K])
+                  const rd_scene_prior *prior, const rd_scene_how *how, float unknown[K], float after[K])
 {
     const double worth = fmin((double)how->every / fmax((double)how->correlated, 1), 1);
     for (int step = 0; step < how->steps; step++) {
         const ts_scene_sums sums = sums_of(grid, maps, channels, deviation, image, how, step >= (how->steps + 1) / 2,
-                                           number);
+                                           unknown);
         double a[K][K], z[K], to[K], longest = RD_SCENE_STRIDE;
         for (int i = 0, at = 0; i < K; i++)
             for (int j = i; j < K; j++, at++) a[i][j] = a[j][i] = worth * sums.matrix[at];
         for (int i = 0; i < K; i++) {
             z[i] = worth * sums.right[i];
-            for (int j = 0; j < K; j++) z[i] += a[i][j] * ((double)number[j] - (double)prior->mean[j]);
+            for (int j = 0; j < K; j++) z[i] += a[i][j] * ((double)unknown[j] - (double)prior->mean[j]);
             z[i] *= (double)prior->deviation[i];
         }
         for (int i = 0; i < K; i++)
@@ -189,10 +201,10 @@ void rd_scene_fit(rd_grid grid, const float *maps, int channels, const float *de
         factor(a);
         lower(a, 0, z), upper(a, z);
         for (int i = 0; i < K; i++) {
-            to[i] = (double)prior->mean[i] + (double)prior->deviation[i] * z[i] - (double)number[i];
+            to[i] = (double)prior->mean[i] + (double)prior->deviation[i] * z[i] - (double)unknown[i];
             longest = fmax(longest, fabs(to[i]));
         }
-        for (int i = 0; i < K; i++) number[i] = bounded(i, (double)number[i] + to[i] * (RD_SCENE_STRIDE / longest));
+        for (int i = 0; i < K; i++) unknown[i] = bounded(i, (double)unknown[i] + to[i] * (RD_SCENE_STRIDE / longest));
         for (int i = 0; i < K && after; i++) {
             double unit[K] = {0}, sum = 0;
             unit[i] = 1;

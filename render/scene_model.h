@@ -30,9 +30,17 @@ void rd_scene_photograph(rd_grid grid, const float *maps, int channels, const fl
  * (render/op_scene_render.c). */
 ag_value *ag_scene_render(ag_tape *tape, ag_value *maps, ag_value *numbers, bool clamp);
 
-/* What is known of a scene beforehand: independent numbers with Gaussian errors. A deviation of 0 keeps a number. */
+/* What a network says of a material's roughness may be off as a whole: the level, the logarithm of a factor on all of
+ * it, is found together with the numbers of the scene. */
+enum { RD_SCENE_ROUGHNESS = RD_SCENE_NUMBERS, RD_SCENE_UNKNOWNS };
+
+/* to = maps [pixels, channels], the roughness at a level; it ends at 1. to may be maps. */
+void rd_scene_roughen(int64_t pixels, const float *maps, int channels, float level, float *to);
+
+/* What is known beforehand of a scene's numbers and the level: they are independent and have Gaussian errors. A
+ * deviation of 0 keeps an unknown. */
 typedef struct rd_scene_prior {
-    float mean[RD_SCENE_NUMBERS], deviation[RD_SCENE_NUMBERS];
+    float mean[RD_SCENE_UNKNOWNS], deviation[RD_SCENE_UNKNOWNS];
 } rd_scene_prior;
 
 typedef struct rd_scene_how {
@@ -42,27 +50,27 @@ typedef struct rd_scene_how {
     ts_prior scale;   /* q of the maps' prior, and of a photograph's values the variance */
 } rd_scene_how;
 
-/* Gauss and Newton's method on the numbers of a photograph's scene, for maps that are uncertain. With e = image - seen
- * (as in render/posterior.h: a logarithm above 1, nothing where both are burnt out), J_t = d seen / d t,
- * J = d seen / d maps and the covariance Sigma of a pixel's maps, the sums over the pixels that are read are
- *     V = (J Sigma J' + S)^-1,   A = w sum J_t' V J_t,   b = w sum J_t' V e,   w = min(every / correlated, 1).
- * S has the variance model^2 + noise min(value, 1) of the rendering's value: with the photograph's, what is darker by
- * chance would weigh more. With the prior's mean m and its deviations in the diagonal matrix Q a step goes to
- *     t = m + Q z,   (I + Q A Q) z = Q (b + A (t_before - m)),
- * at most RD_SCENE_STRIDE in any number. The ambient light is not let below 0, nor the tone curve's strength out of
+/* Gauss and Newton's method on the numbers of a photograph's scene and the roughness' level of maps that are uncertain.
+ * With e = image - seen (as in render/posterior.h: a logarithm above 1, nothing where both are burnt out), J_t = d seen
+ * / d t, J = d seen / d maps and the covariance Sigma of a pixel's maps, the sums over the pixels that are read are V =
+ * (J Sigma J' + S)^-1,   A = w sum J_t' V J_t,   b = w sum J_t' V e,   w = min(every / correlated, 1). S has the
+ * variance model^2 + noise min(value, 1) of the rendering's value: with the photograph's, what is darker by chance
+ * would weigh more. With the prior's mean m and its deviations in the diagonal matrix Q a step goes to t = m + Q z, (I
+ * + Q A Q) z = Q (b + A (t_before - m)), at most RD_SCENE_STRIDE in any number. The ambient light is not let below 0,
+ * nor the tone curve's strength out of
  * +-RD_SCENE_TONE_MOST.
  * In the first half of the steps, values of the photograph that are burnt out tell nothing; from then on they tell that
  * the rendering is no darker. Where much is burnt out and the maps are uncertain, exposure and tone curve lean to what
  * by chance is not. The maps are the mean of what the material may be: of maps that were fitted to this photograph the
  * errors depend on it, which is not foreseen.
- * number begins with the caller's values. after (may be NULL): the square roots of the diagonal of
+ * unknown begins with the caller's values. after (may be NULL): the square roots of the diagonal of
  * Q (I + Q A Q)^-1 Q at the last step. deviation: of the maps, [h, w, MAP_GROUPS]; image: [h, w, 3]. Threaded; the same
  * bytes for any number of threads. */
 #define RD_SCENE_STRIDE 1.0
 #define RD_SCENE_TONE_MOST 1.5f
 void rd_scene_fit(rd_grid grid, const float *maps, int channels, const float *deviation, const float *image,
-                  const rd_scene_prior *prior, const rd_scene_how *how, float number[RD_SCENE_NUMBERS],
-                  float after[RD_SCENE_NUMBERS]);
+                  const rd_scene_prior *prior, const rd_scene_how *how, float unknown[RD_SCENE_UNKNOWNS],
+                  float after[RD_SCENE_UNKNOWNS]);
 
 /* What the kernels need of them. */
 ts_scene rd_scene_of(const float number[RD_SCENE_NUMBERS]);

@@ -139,7 +139,7 @@ static void normal(const ts_scene *scene, const ts_shade_row *row, const float *
                    const float *deviation, ts_scene_sums *sums)
 {
     spread a;
-    vf matrix[TS_SCENE_PAIRS] = {{0}}, right[TS_SCENE_NUMBERS] = {{0}}, misfit = {0};
+    vf matrix[TS_SCENE_PAIRS] = {{0}}, right[TS_SCENE_UNKNOWNS] = {{0}}, misfit = {0};
     set_hue(prior, &a);
     for (int i = 0; i < row->count; i += VL) {
         const int n = lanes_left(row, i);
@@ -148,7 +148,7 @@ static void normal(const ts_scene *scene, const ts_shade_row *row, const float *
         sight t;
         motion m;
         gram g;
-        vf by[3][TS_SCENE_NUMBERS], error[3], variance[3];
+        vf by[3][TS_SCENE_UNKNOWNS], error[3], variance[3];
         decode(scene->view.guards, row->maps + (int64_t)i * row->channels, row->channels, n, &s);
         if (!look(&scene->view, TS_SHADE_POSITIONS, row, i, n, true, image, &s, &t)) continue;
         load_deviation(deviation + (int64_t)i * MAP_GROUPS, n, &a);
@@ -163,17 +163,18 @@ static void normal(const ts_scene *scene, const ts_shade_row *row, const float *
             by_numbers(c, scene, &s, &t.r, &t.k, &m, by[c]);
             for (int j = 0; j < TONE; j++) by[c][j] = v_min(v_max(slope * by[c][j], v_set(-STEEPEST)), v_set(STEEPEST));
             by[c][TONE] = above * tone;
+            by[c][TS_SCENE_NUMBERS] = maps[2] * (2.0f * s.roughness);
             error[c] = v_select(burnt_out(value, t.target[c]), v_set(0), t.target[c] - seen);
             variance[c] = variance_of(v_min(value, v_set(1)), prior);
             if (scene->least) continue;
             const vf keep = v_select(t.target[c] >= v_set(TS_NEWTON_BURNT), v_set(0), v_set(1));
             error[c] *= keep;
             for (int j = own_at(c); j < MAP_CHANNELS; j++) g.u[c][j] *= keep;
-            for (int j = 0; j < TS_SCENE_NUMBERS; j++) by[c][j] *= keep;
+            for (int j = 0; j < TS_SCENE_UNKNOWNS; j++) by[c][j] *= keep;
         }
         orthogonalise(variance, &g);
         forward(&g, error);
-        for (int j = 0; j < TS_SCENE_NUMBERS; j++) {
+        for (int j = 0; j < TS_SCENE_UNKNOWNS; j++) {
             vf column[3] = {by[0][j], by[1][j], by[2][j]};
             forward(&g, column);
             for (int c = 0; c < 3; c++) by[c][j] = column[c];
@@ -182,16 +183,16 @@ static void normal(const ts_scene *scene, const ts_shade_row *row, const float *
         for (int c = 0; c < 3; c++) {
             const vf weight = v_select(live, g.inverse[c], v_set(0));
             misfit += weight * error[c] * error[c];
-#pragma GCC unroll 8
-            for (int j = 0, at = 0; j < TS_SCENE_NUMBERS; j++) {
+#pragma GCC unroll 9
+            for (int j = 0, at = 0; j < TS_SCENE_UNKNOWNS; j++) {
                 const vf weighted = weight * by[c][j];
                 right[j] += weighted * error[c];
-                for (int k = j; k < TS_SCENE_NUMBERS; k++, at++) matrix[at] += weighted * by[c][k];
+                for (int k = j; k < TS_SCENE_UNKNOWNS; k++, at++) matrix[at] += weighted * by[c][k];
             }
         }
     }
     for (int j = 0; j < TS_SCENE_PAIRS; j++) sums->matrix[j] += (double)v_sum(matrix[j]);
-    for (int j = 0; j < TS_SCENE_NUMBERS; j++) sums->right[j] += (double)v_sum(right[j]);
+    for (int j = 0; j < TS_SCENE_UNKNOWNS; j++) sums->right[j] += (double)v_sum(right[j]);
     sums->misfit += (double)v_sum(misfit);
 }
 

@@ -4,8 +4,12 @@
 #include "render/kernels/posterior.h"
 #include "render/kernels/shade.h"
 
-/* The derivatives by the numbers of rd_scene_number, in their order. */
-enum { TS_SCENE_NUMBERS = 8, TS_SCENE_PAIRS = TS_SCENE_NUMBERS * (TS_SCENE_NUMBERS + 1) / 2 };
+/* The derivatives by the numbers of rd_scene_number, in their order, and by the level of the roughness after them. */
+enum {
+    TS_SCENE_NUMBERS = 8,
+    TS_SCENE_UNKNOWNS = TS_SCENE_NUMBERS + 1,
+    TS_SCENE_PAIRS = TS_SCENE_UNKNOWNS * (TS_SCENE_UNKNOWNS + 1) / 2
+};
 
 typedef struct ts_scene {
     ts_shade_view view; /* TS_SHADE_POSITIONS; light and camera at the same height */
@@ -17,7 +21,7 @@ typedef struct ts_scene {
 
 /* Sums over pixels of the normal equations, the upper triangle of the matrix by rows. */
 typedef struct ts_scene_sums {
-    double matrix[TS_SCENE_PAIRS], right[TS_SCENE_NUMBERS], misfit;
+    double matrix[TS_SCENE_PAIRS], right[TS_SCENE_UNKNOWNS], misfit;
 } ts_scene_sums;
 
 struct ts_scene_kernels {
@@ -28,7 +32,7 @@ struct ts_scene_kernels {
     void (*backward)(const ts_scene *scene, const ts_shade_row *row, float limit, const float *up, double *sums,
                      float *gradient);
     /* Adds J_t' V J_t, J_t' V e and e' V e, where V = (J Sigma J' + S)^-1, J = d seen / d maps, J_t = d seen / d
-     * numbers, e = image - seen. */
+     * numbers and level, e = image - seen. */
     void (*normal)(const ts_scene *scene, const ts_shade_row *row, const float *image, const ts_prior *prior,
                    const float *deviation, ts_scene_sums *sums);
 };
