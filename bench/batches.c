@@ -40,7 +40,7 @@ ts_code bench_batches(const char *path, ts_status *st)
         const float *maps = io_loader_next(loader, st);
         if (!maps) break;
         const uint64_t index = (uint64_t)step * (uint64_t)batch;
-        tr_capture_views((uint64_t)c.data.seed, index, batch, 1, captures);
+        tr_capture_views(c.data.sheet, (uint64_t)c.data.seed, index, batch, 1, captures);
         tr_photographs(&c, (uint64_t)c.data.seed, index, batch, patch, maps, captures, 1, images, NULL);
         ts_rng rng = ts_rng_make((uint64_t)c.train.seed, TS_STREAM_SCENE, (uint64_t)step);
         for (int i = 0; i < batch; i++) rd_loss_views(&rng, views + i * RD_LOSS_VIEWS);

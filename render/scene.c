@@ -145,29 +145,51 @@ rd_view rd_capture_view(int index)
     return view;
 }
 
-/* Whether a comes before b. Differences below a hundred-thousandth of the patch are rounding of positions. */
-static bool before(const rd_view *a, const rd_view *b)
+/* What the order depends on; differences below a hundred-thousandth are rounding of positions. */
+typedef struct standing {
+    double distance; /* of light and camera */
+    double aslant;   /* tangent of the camera's angle with the normal */
+    double angle;    /* direction of the light from the cameras' mean */
+} standing;
+#define ROUNDING 1e-5
+
+static standing standing_of(const rd_view *v, const double mean[2])
 {
-    double distance[2], angle[2];
-    const rd_view *v[2] = {a, b};
-    for (int i = 0; i < 2; i++) {
-        const double x = (double)v[i]->light[0] - (double)v[i]->camera[0],
-                     y = (double)v[i]->light[1] - (double)v[i]->camera[1];
-        const double z = (double)v[i]->light[2] - (double)v[i]->camera[2];
-        distance[i] = sqrt(x * x + y * y + z * z);
-        angle[i] = distance[i] < 1e-5 ? 0 : atan2(y, x);
-        if (angle[i] < -1e-5) angle[i] += 2 * M_PI;
-    }
-    return fabs(distance[0] - distance[1]) > 1e-5 ? distance[0] < distance[1] : angle[0] < angle[1];
+    const double x = (double)v->light[0] - (double)v->camera[0], y = (double)v->light[1] - (double)v->camera[1],
+                 z = (double)v->light[2] - (double)v->camera[2];
+    const double right = (double)v->light[0] - mean[0], up = (double)v->light[1] - mean[1];
+    standing p = {.distance = sqrt(x * x + y * y + z * z),
+                  .aslant = hypot((double)v->camera[0], (double)v->camera[1]) / (double)v->camera[2],
+                  .angle = hypot(right, up) < ROUNDING ? 0 : atan2(up, right)};
+    if (p.angle < -ROUNDING) p.angle += 2 * M_PI;
+    return p;
+}
+
+static bool before(const standing *a, const standing *b, bool first)
+{
+    if (fabs(a->distance - b->distance) > ROUNDING) return a->distance < b->distance;
+    if (first && fabs(a->aslant - b->aslant) > ROUNDING) return a->aslant < b->aslant;
+    return a->angle < b->angle;
 }
 
 void rd_capture_order(const rd_view *views, int count, int order[])
 {
+    standing of[RD_CAPTURE_MOST];
+    double mean[2] = {0, 0};
+    int first = 0;
+    for (int i = 0; i < count; i++)
+        for (int k = 0; k < 2; k++) mean[k] += (double)views[i].camera[k] / count;
     for (int i = 0; i < count; i++) {
-        int at = i;
-        for (; at > 0 && before(&views[i], &views[order[at - 1]]); at--) order[at] = order[at - 1];
+        of[i] = standing_of(&views[i], mean);
+        if (before(&of[i], &of[first], true)) first = i;
+    }
+    for (int i = 0, n = 0; i < count; i++) {
+        if (i == first) continue;
+        int at = ++n;
+        for (; at > 1 && before(&of[i], &of[order[at - 1]], false); at--) order[at] = order[at - 1];
         order[at] = i;
     }
+    if (count) order[0] = first;
 }
 
 void rd_capture_draw(ts_rng *rng, int count, rd_view views[])
@@ -181,6 +203,40 @@ void rd_capture_draw(ts_rng *rng, int count, rd_view views[])
         place[from] = kept;
     }
     for (int i = 0; i < count; i++) drawn[i] = rd_capture_view(place[i]);
+    rd_capture_order(drawn, count, order);
+    for (int i = 0; i < count; i++) views[i] = drawn[order[i]];
+}
+
+void rd_sheet_draw(ts_rng *rng, int count, rd_view views[])
+{
+    enum { AROUND = 4 };
+    const float degree = TAU / 360, start = ts_rng_range(rng, 0, TAU), side = ts_rng_range(rng, 0, TAU),
+                beside = ts_rng_range(rng, 0.03f, 0.25f);
+    rd_view drawn[RD_CAPTURE_MOST] = {{0}};
+    int order[RD_CAPTURE_MOST];
+    float power = 0;
+    for (int i = 0; i < count; i++) {
+        rd_view *v = &drawn[i];
+        const float tilt = degree * (i ? ts_rng_range(rng, 12, 45) : ts_rng_range(rng, 0, 8));
+        const float around = start + TAU * (float)i / AROUND + ts_rng_range(rng, -0.4f, 0.4f);
+        const float far = ts_rng_range(rng, 1.6f, 2.2f), roll = side + ts_rng_range(rng, -0.2f, 0.2f);
+        const float axis[3] = {sinf(tilt) * cosf(around), sinf(tilt) * sinf(around), cosf(tilt)};
+        /* across the axis: the part of x that is, and what is upright to both */
+        const float across = sqrtf(1 - axis[0] * axis[0]);
+        const float right[3] = {across, -axis[0] * axis[1] / across, -axis[0] * axis[2] / across};
+        const float up[3] = {0, axis[2] / across, -axis[1] / across};
+        v->kind = RD_POINT;
+        float distance2 = 0;
+        for (int k = 0; k < 3; k++) {
+            v->camera[k] = far * axis[k];
+            v->light[k] = v->camera[k] + beside * (cosf(roll) * right[k] + sinf(roll) * up[k]);
+            distance2 += v->light[k] * v->light[k];
+        }
+        if (i == 0)
+            power = RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE) * distance2 * sqrtf(distance2) /
+                v->light[2];
+        v->power = power;
+    }
     rd_capture_order(drawn, count, order);
     for (int i = 0; i < count; i++) views[i] = drawn[order[i]];
 }

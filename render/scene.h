@@ -95,8 +95,17 @@ rd_view rd_capture_view(int index);
  * subset equally likely, in the order of rd_capture_order. */
 void rd_capture_draw(ts_rng *rng, int count, rd_view views[]);
 
-/* The order in which models read the photographs of a capture: by the light's distance from the camera, the flash
- * first; equal ones by the light's direction from the camera, from x toward y. order[0 .. count-1]: indices into
- * views. The result does not depend on the order of the views. */
+/* The views of count <= RD_CAPTURE_VIEWS photographs of a printed sheet (docs/capturing.md), in the order of
+ * rd_capture_order: one from within 8 degrees of straight above, the others around it at 12 to 45, all from 1.6 to 2.2
+ * patch widths. The flash is beside the lens, as far (0.03 to 0.25 patch widths) and in about the same direction on the
+ * phone in all of them; the first one's lights a matt sample's middle as brightly as the default flash does, and the
+ * others have its power. */
+void rd_sheet_draw(ts_rng *rng, int count, rd_view views[]);
+
+/* The order in which models read count <= RD_CAPTURE_MOST photographs of a capture: by the light's distance from the
+ * camera, the flash first; of equal ones, that from nearest to straight above is the first of all, and the others come
+ * by the light's direction from the cameras' mean place, from x toward y. order[0 .. count-1]: indices into views. The
+ * result does not depend on the order of the views. */
+enum { RD_CAPTURE_MOST = 16 };
 void rd_capture_order(const rd_view *views, int count, int order[]);
 #endif

@@ -27,7 +27,8 @@ enum {
     TS_STREAM_KNOWN,
     TS_STREAM_HUES,
     TS_STREAM_SHEET,
-    TS_STREAM_RELIEF
+    TS_STREAM_RELIEF,
+    TS_STREAM_WINDOWS /* under a printed sheet */
 };
 
 uint32_t ts_rng_u32(ts_rng *r);

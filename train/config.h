@@ -19,6 +19,7 @@ typedef struct tr_config {
         double hues, relief;
         double noise, noise_spread, blur, exposure, vignette, white_balance, tilt, off_centre; /* as in io_camera */
         double fov_min, fov_max, meter, flash, ambient, tone, sharpen, told_view, told_power;
+        double sheet, pose, shift, bracket; /* as in io_under_sheet */
         bool quantise;
         int jpeg, patch, prefetch, threads;
     } data;

@@ -127,6 +127,18 @@ const tr_key tr_keys[] = {
      "share of the photographs whose field of view the model is told"},
     {"data", "told_power", TR_REAL, AT(data.told_power), 0, 1, "1", NULL, false,
      "share of the photographs whose light's power the model is told"},
+    {"data", "sheet", TR_REAL, AT(data.sheet), 0, 1, "0", NULL, false,
+     "share of the materials whose photographs are those of a printed sheet (docs/capturing.md): exposure, meter, "
+     "white_balance, tilt, off_centre, fov_min, fov_max and flash, which a sheet tells, are then 0, and the next three "
+     "hold"},
+    {"data", "pose", TR_REAL, AT(data.pose), 0, 0.1, "0", NULL, false,
+     "largest distance of camera and flash from where a sheet's tags put them, in patch widths"},
+    {"data", "shift", TR_REAL, AT(data.shift), 0, 16, "0", NULL, false,
+     "a sheet's windows are at most this far beside their places, and again as far bent by what is left of the lens's "
+     "distortion; in pixels of 512"},
+    {"data", "bracket", TR_REAL, AT(data.bracket), 0, 0.9, "0", NULL, false,
+     "a sheet's photographs are up to this share brighter or darker, which its paper tells: noise and what clips "
+     "differ"},
     {"data", "jpeg", TR_INT, AT(data.jpeg), 0, 98, "75", NULL, false,
      "lowest quality of the photographs' JPEG, drawn up to 98, half of them with halved chroma; 0: no JPEG"},
     {"data", "quantise", TR_BOOL, AT(data.quantise), 0, 1, "yes", NULL, false,

@@ -1,5 +1,6 @@
 /* Photographs of materials, with the camera's faults: the networks' input. */
 #include "cli/camera.h"
+#include "data/under_sheet.h"
 #include "tensor/maps.h"
 #include "tensor/team.h"
 #include "train/trainer_internal.h"
@@ -28,43 +29,101 @@ static io_camera camera_of(const tr_config *c)
                        .told_power = (float)c->data.told_power};
 }
 
+static io_under_sheet under_sheet_of(const tr_config *c)
+{
+    return (io_under_sheet){
+        .pose = (float)c->data.pose, .shift = (float)c->data.shift, .bracket = (float)c->data.bracket};
+}
+
+/* The same camera, of which the sheet has told place and exposure. */
+static io_camera measured(io_camera c)
+{
+    c.exposure = c.meter = c.white_balance = c.tilt = c.off_centre = c.fov_min = c.fov_max = c.flash = 0;
+    return c;
+}
+
+bool tr_under_sheet(double share, uint64_t seed, uint64_t index)
+{
+    ts_rng rng = ts_rng_make(seed, TS_STREAM_SHEET, index);
+    return share > 0 && (double)ts_rng_uniform(&rng) < share;
+}
+
 typedef struct taking {
     const io_camera *camera;
+    const io_under_sheet *sheet;
+    double share; /* of the materials that are under a sheet */
     uint64_t seed, first;
-    int size;
+    int size, number;
     float *images;
 } taking;
 
 static void take(const void *job, int64_t i)
 {
     const taking *t = job;
-    io_camera_apply(t->camera, t->seed, t->first + (uint64_t)i, t->size,
-                    t->images + (size_t)i * (size_t)t->size * (size_t)t->size * 3);
+    const uint64_t which = t->first + (uint64_t)i;
+    const size_t values = (size_t)t->size * (size_t)t->size * 3;
+    float *image = t->images + (size_t)i * values;
+    if (!tr_under_sheet(t->share, t->seed, which / (uint64_t)t->number)) {
+        io_camera_apply(t->camera, t->seed, which, t->size, image);
+        return;
+    }
+    const io_camera camera = measured(*t->camera);
+    const float gain = io_under_sheet_exposure(t->sheet, t->seed, which), most = 1;
+    io_under_sheet_shift(t->sheet, t->seed, which, t->size, image);
+    for (size_t k = 0; k < values; k++) image[k] *= gain;
+    io_camera_apply(&camera, t->seed, which, t->size, image);
+    for (size_t k = 0; k < values; k++) image[k] = image[k] / gain < most ? image[k] / gain : most;
+}
+
+/* The radiance of a photograph of a printed sheet, whose camera and flash are planned to be where they are thought. */
+static tr_shot shoot(const io_camera *camera, const io_under_sheet *sheet, uint64_t seed, uint64_t which,
+                     const rd_view *planned, int size, const float *maps, float *image)
+{
+    const io_camera known = measured(*camera);
+    rd_view view = *planned;
+    io_rig rig = {.power = planned->power};
+    memcpy(rig.camera, planned->camera, sizeof rig.camera);
+    memcpy(rig.light, planned->light, sizeof rig.light);
+    io_under_sheet_move(sheet, seed, which, &rig);
+    memcpy(view.camera, rig.camera, sizeof rig.camera);
+    memcpy(view.light, rig.light, sizeof rig.light);
+    const cl_shot s = cl_expose(&known, seed, which, &view, size, maps, image);
+    return (tr_shot){.view = s.view, .ambient = s.ambient, .tone = s.tone};
 }
 
 void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
                     const rd_view *views, int number, float *images, tr_shot *shots)
 {
     const io_camera camera = camera_of(c);
+    const io_under_sheet sheet = under_sheet_of(c);
     const rd_view flash = rd_flash();
+    const double share = views ? c->data.sheet : 0; /* the flash for all is no sheet's */
     const size_t pixels = (size_t)size * (size_t)size;
     const uint64_t first = index * (uint64_t)number;
     for (int i = 0; i < count * number; i++) {
         const uint64_t which = first + (uint64_t)i;
-        const cl_shot s = cl_expose(&camera, seed, which, views ? &views[i] : &flash, size,
-                                    maps + (size_t)(i / number) * pixels * MAP_CHANNELS,
-                                    images + (size_t)i * pixels * 3);
+        const float *material = maps + (size_t)(i / number) * pixels * MAP_CHANNELS;
+        float *image = images + (size_t)i * pixels * 3;
+        const rd_view *view = views ? &views[i] : &flash;
+        tr_shot shot;
+        if (tr_under_sheet(share, seed, index + (uint64_t)(i / number)))
+            shot = shoot(&camera, &sheet, seed, which, view, size, material, image);
+        else {
+            const cl_shot s = cl_expose(&camera, seed, which, view, size, material, image);
+            shot = (tr_shot){.view = s.view, .ambient = s.ambient, .tone = s.tone};
+        }
         if (!shots) continue;
-        shots[i] = (tr_shot){.view = s.view, .ambient = s.ambient, .tone = s.tone};
-        io_camera_told(&camera, seed, which, &shots[i].told_view, &shots[i].told_power);
+        io_camera_told(&camera, seed, which, &shot.told_view, &shot.told_power);
+        shots[i] = shot;
     }
-    ts_tasks(0, (int64_t)count * number, take, &(taking){&camera, seed, first, size, images});
+    ts_tasks(0, (int64_t)count * number, take, &(taking){&camera, &sheet, share, seed, first, size, number, images});
 }
 
-void tr_capture_views(uint64_t seed, uint64_t index, int count, int number, rd_view *views)
+void tr_capture_views(double sheet, uint64_t seed, uint64_t index, int count, int number, rd_view *views)
 {
     for (int i = 0; i < count; i++) {
         ts_rng rng = ts_rng_make(seed, TS_STREAM_CAPTURE, index + (uint64_t)i);
-        rd_capture_draw(&rng, number, views + i * number);
+        if (tr_under_sheet(sheet, seed, index + (uint64_t)i)) rd_sheet_draw(&rng, number, views + i * number);
+        else rd_capture_draw(&rng, number, views + i * number);
     }
 }

@@ -224,7 +224,7 @@ static const float *draw(tr_trainer *t, int given, ts_status *st)
     const float *target = io_loader_next(t->loader, st);
     if (!target) return ts_context(st, "procedural materials"), NULL;
     const uint64_t index = (uint64_t)t->step * (uint64_t)c->train.batch + (uint64_t)t->first;
-    tr_capture_views((uint64_t)c->data.seed, index, t->batch, given, t->captures);
+    tr_capture_views(c->data.sheet, (uint64_t)c->data.seed, index, t->batch, given, t->captures);
     tr_photographs(c, (uint64_t)c->data.seed, index, t->batch, c->data.patch, target, t->captures, given, t->images,
                    t->shots);
     if (c->arch.conditions || c->arch.scene) describe(t, given);

@@ -78,14 +78,16 @@ const float *tr_weights(const tr_trainer *t); /* what is validated and saved */
 nn_model *tr_model_create(const tr_config *c, ts_status *st);
 
 /* photograph.c: number photographs of each material [count][size][size][9], with the faults of [data]; images
- * [count][number][size][size][3], under views [count][number] of kind RD_POINT whose camera looks straight down (NULL:
- * the flash for all); index: of the first material, for the camera's faults, of which every photograph has its own.
+ * [count][number][size][size][3], under views [count][number] as tr_capture_views draws them (NULL: the flash for
+ * all); index: of the first material, for the camera's faults, of which every photograph has its own.
  * shots [count][number]: the truth of each; NULL: not wanted. */
 void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
                     const rd_view *views, int number, float *images, tr_shot *shots);
+/* Whether the photographs of material number index are those of a printed sheet, of which there is this share. */
+bool tr_under_sheet(double share, uint64_t seed, uint64_t index);
 /* The views of number photographs of each of count materials, [count][number], drawn for each material
- * (rd_capture_draw): one is the flash. */
-void tr_capture_views(uint64_t seed, uint64_t index, int count, int number, rd_view *views);
+ * (rd_capture_draw, one being the flash, or rd_sheet_draw for the share `sheet` of the materials). */
+void tr_capture_views(double sheet, uint64_t seed, uint64_t index, int count, int number, rd_view *views);
 
 /* step.c. One step; t->step counts it. Returns an error only where the run cannot go on (a skipped step is none). */
 ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st);

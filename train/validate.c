@@ -63,9 +63,9 @@ ts_code tr_validator_create(tr_trainer *t, ts_status *st)
     v->tape = v->model ? ag_tape_create(false, st) : NULL;
     if (!v->tape) return st->code;
     const uint64_t first = (uint64_t)v->first;
-    tr_capture_views((uint64_t)c->validate.seed, first, v->count, c->arch.images, v->captures);
     tr_config camera = *c;
     if (c->validate.camera == TR_CAMERA_DEFAULT) camera.data = tr_config_default().data;
+    tr_capture_views(camera.data.sheet, (uint64_t)c->validate.seed, first, v->count, c->arch.images, v->captures);
     tr_photographs(&camera, (uint64_t)c->validate.seed, first, v->count, c->validate.size, v->maps, v->captures,
                    c->arch.images, v->images, v->shots);
     for (int i = 0; i < v->count; i++) {

@@ -132,15 +132,133 @@ TEST(capture_order_is_that_of_the_views)
     }
 }
 
+/* All cameras with the flash beside the lens: the light's distance from the camera, and its direction, which is the
+ * phone's roll, say nothing of where the phone was. */
+TEST(capture_order_of_a_sheet_is_from_above_then_around)
+{
+    ts_rng r = ts_rng_make(5, TS_STREAM_TEST, 0);
+    for (int trial = 0; trial < 200; trial++) {
+        const int count = 2 + trial % 4;
+        rd_view views[NUMBER + 2], shuffled[NUMBER + 2];
+        int order[NUMBER + 2];
+        double mean[2] = {0, 0}, last = -1e-4;
+        rd_sheet_draw(&r, count, views);
+        for (int i = 0; i < count; i++) {
+            const int to = ts_rng_int(&r, i + 1);
+            for (int k = 0; k < 2; k++) mean[k] += (double)views[i].camera[k] / count;
+            shuffled[i] = shuffled[to];
+            shuffled[to] = views[i];
+        }
+        rd_capture_order(shuffled, count, order);
+        for (int i = 0; i < count; i++) {
+            const rd_view *v = &shuffled[order[i]];
+            const double slope = hypot((double)v->camera[0], (double)v->camera[1]) / (double)v->camera[2];
+            CHECK(!memcmp(views[i].camera, v->camera, sizeof v->camera), "view %d of %d depends on the order", i,
+                  count);
+            CHECK((i == 0) == (slope < 0.15), "the camera of view %d of %d has a slope of %g", i, count, slope);
+            if (i == 0) continue;
+            double angle = atan2((double)v->light[1] - mean[1], (double)v->light[0] - mean[0]);
+            if (angle < 0) angle += 6.283185307179586;
+            CHECK(angle >= last, "view %d is at %g, the one before at %g", i, angle, last);
+            last = angle;
+        }
+    }
+}
+
+TEST(sheet_views_are_a_phones_around_the_sheet)
+{
+    ts_rng r = ts_rng_make(6, TS_STREAM_TEST, 0);
+    const double usual = (double)RD_FLASH_POWER / pow((double)RD_FLASH_DISTANCE, 2);
+    for (int trial = 0; trial < 200; trial++) {
+        rd_view v[5];
+        double aside = 0;
+        rd_sheet_draw(&r, 5, v);
+        for (int i = 0; i < 5; i++) {
+            double far = 0, light = 0, beside = 0, along = 0;
+            for (int k = 0; k < 3; k++) {
+                const double c = (double)v[i].camera[k], l = (double)v[i].light[k];
+                far += c * c, light += l * l, beside += (l - c) * (l - c), along += (l - c) * c;
+            }
+            far = sqrt(far), light = sqrt(light), beside = sqrt(beside);
+            const double tilt = acos((double)v[i].camera[2] / far) * 57.29577951308232;
+            CHECK(far > 1.59 && far < 2.21 && tilt < 45.1 && (i == 0 ? tilt < 8.1 : tilt > 11.9),
+                  "camera %d is %g patch widths away at %g degrees", i, far, tilt);
+            CHECK(fabs(along) < 1e-5 && beside > 0.029 && beside < 0.251 && (i == 0 || fabs(beside - aside) < 1e-5),
+                  "light %d is %g beside the lens, the first one %g", i, beside, aside);
+            aside = beside;
+            CHECK(v[i].power == v[0].power, "the flash is of different powers");
+            if (i == 0)
+                CHECK(fabs((double)v[0].power * (double)v[0].light[2] / pow(light, 3) / usual - 1) < 1e-5,
+                      "the middle is %g times as bright as under the default flash",
+                      (double)v[0].power * (double)v[0].light[2] / pow(light, 3) / usual);
+        }
+    }
+}
+
+/* Of the given share of materials; the others' photographs are what they are without a sheet. */
+TEST(photographs_of_a_sheet_are_a_share_and_change_no_others)
+{
+    make();
+    tr_config c = tr_config_default();
+    rd_view views[COUNT][NUMBER], plain[COUNT][NUMBER];
+    int under = 0;
+    for (uint64_t i = 0; i < 1000; i++) under += tr_under_sheet(0.3, 1, i);
+    CHECK(abs(under - 300) < 60 && !tr_under_sheet(0, 1, 7) && tr_under_sheet(1, 1, 7), "%d of 1000 for 0.3", under);
+    tr_capture_views(0, 1, 7, COUNT, NUMBER, plain[0]);
+    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], plain[0], NUMBER, again[0][0], NULL);
+    c.data.sheet = 0.6, c.data.pose = 0.01, c.data.shift = 2, c.data.bracket = 0.3;
+    tr_capture_views(c.data.sheet, 1, 7, COUNT, NUMBER, views[0]);
+    tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, many[0][0], NULL);
+    under = 0;
+    for (int i = 0; i < COUNT; i++) {
+        const bool sheet = tr_under_sheet(c.data.sheet, 1, 7 + (uint64_t)i);
+        under += sheet;
+        CHECK(sheet == (memcmp(plain[i], views[i], sizeof plain[i]) != 0) &&
+                  sheet == (memcmp(again[i], many[i], sizeof many[i]) != 0),
+              "material %d is %sunder the sheet", i, sheet ? "" : "not ");
+    }
+    CHECK(under > 0 && under < COUNT, "%d of %d are under the sheet", under, COUNT);
+}
+
+/* Without faults a sheet's photographs are the renderings under the views that are told, and each key adds its own. */
+TEST(photographs_of_a_sheet_have_the_faults_of_their_keys)
+{
+    make();
+    rd_view views[COUNT][NUMBER];
+    tr_shot shots[COUNT][NUMBER];
+    for (int fault = 0; fault < 4; fault++) {
+        tr_config c = without_faults();
+        double most = 0;
+        c.data.sheet = 1;
+        c.data.exposure = 1, c.data.tilt = 10, c.data.off_centre = 0.1, c.data.white_balance = 0.2; /* a sheet tells */
+        if (fault == 1) c.data.pose = 0.05;
+        if (fault == 2) c.data.shift = 16;
+        if (fault == 3) c.data.bracket = 0.9, c.data.noise = 1, c.data.noise_spread = 0;
+        tr_capture_views(1, 1, 7, COUNT, NUMBER, views[0]);
+        tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, many[0][0], shots[0]);
+        for (int i = 0; i < COUNT; i++)
+            for (int k = 0; k < NUMBER; k++) {
+                double far = 0;
+                for (int d = 0; d < 3; d++)
+                    far += pow((double)shots[i][k].view.camera[d] - (double)views[i][k].camera[d], 2);
+                CHECK(fault == 1 ? far > 0 && far <= 0.05 * 0.05 : far == 0, "fault %d: the camera moved by %g", fault,
+                      sqrt(far));
+                rd_render(rd_grid_full(SIZE), maps[i], MAP_CHANNELS, &shots[i][k].view, true, one[0]);
+                for (int p = 0; p < PIXELS * 3; p++) most = fmax(most, fabs((double)one[0][p] - (double)many[i][k][p]));
+            }
+        CHECK(fault < 2 ? most < 1e-6 : most > 1e-3, "fault %d: the photographs are %g off", fault, most);
+    }
+}
+
 TEST(capture_views_are_the_flash_or_different_configurations)
 {
     rd_view flash = rd_flash(), views[COUNT][NUMBER], alone[NUMBER];
-    tr_capture_views(1, 7, COUNT, 1, views[0]);
+    tr_capture_views(0, 1, 7, COUNT, 1, views[0]);
     CHECK(!memcmp(views[0][0].light, flash.light, sizeof flash.light) &&
               !memcmp(views[0][2].light, flash.light, sizeof flash.light),
           "one photograph is not the flash's");
-    tr_capture_views(1, 7, COUNT, NUMBER, views[0]);
-    tr_capture_views(1, 9, 1, NUMBER, alone);
+    tr_capture_views(0, 1, 7, COUNT, NUMBER, views[0]);
+    tr_capture_views(0, 1, 9, 1, NUMBER, alone);
     bool differ = false;
     for (int k = 0; k < NUMBER; k++) {
         CHECK(!memcmp(alone[k].light, views[2][k].light, sizeof alone[k].light),
@@ -182,7 +300,7 @@ TEST(photographs_are_the_renderings_of_their_shots)
     rd_view views[COUNT][NUMBER];
     tr_shot shots[COUNT][NUMBER];
     int told = 0;
-    tr_capture_views(1, 7, COUNT, NUMBER, views[0]);
+    tr_capture_views(0, 1, 7, COUNT, NUMBER, views[0]);
     tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, many[0][0], shots[0]);
     for (int i = 0; i < COUNT; i++)
         for (int k = 0; k < NUMBER; k++) {
