@@ -6,7 +6,7 @@
 #include "infer/angle.h"
 #include "infer/capture.h"
 #include "infer/lgd.h"
-#include "infer/output.h"
+#include "infer/order.h"
 #include "infer/sheet.h"
 #include <stdint.h>
 

@@ -1,5 +1,6 @@
 #include "cli/infer/stages.h"
 #include "cli/infer/record.h"
+#include "infer/output.h"
 #include "infer/estimate.h"
 #include "nn/model.h"
 #include "tensor/hash.h"
