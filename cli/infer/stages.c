@@ -1,7 +1,7 @@
 #include "cli/infer/stages.h"
 #include "cli/infer/record.h"
+#include "infer/api_model.h"
 #include "infer/output.h"
-#include "infer/estimate.h"
 #include "nn/model.h"
 #include "tensor/hash.h"
 #include <math.h>
