@@ -108,6 +108,8 @@ typedef struct conv_weights {
     const float *full;
     const unsigned char *half;
 } conv_weights;
+/* Numbers at .. at + count - 1 of them, at most CONV_TURNED, as floats. */
+void conv_take(const conv_weights *w, ptrdiff_t at, int count, float *to);
 
 /* Inputs [input, input + inputs) of a panel: to [input][tap][width], zeros where there is no channel; returns width, of
  * whole vectors. Of the forward or the gradient's way; inputs: at most conv_turned_inputs. */
