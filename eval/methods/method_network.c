@@ -1,5 +1,5 @@
 /* unet, unet-joint, lgd, lgd-nograd, frozen: networks that only run. They differ in the weights that they ask for. */
-#include "eval/methods/method.h"
+#include "eval/methods/method_internal.h"
 #include "infer/estimate.h"
 #include "infer/tiles.h"
 #include "tensor/threads.h"
@@ -105,10 +105,6 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
     {                                                    \
         .key = "model", .type = EV_WEIGHTS, .help = text \
     }
-#define MODEL(text)                                                     \
-    {                                                                   \
-        .key = "model", .type = EV_WEIGHTS, .initial = "", .help = text \
-    }
 #define ITERATIONS                                                                                 \
     {                                                                                              \
         .key = "iterations", .type = EV_WHOLE, .lo = 0, .hi = 1000,                                \
@@ -122,7 +118,8 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
     }
 
 static const ev_setting unet[] = {MODEL_GIVEN("weights of a g that was trained alone"), {0}};
-static const ev_setting joint[] = {MODEL("weights of g and h (default: the program's)"), EV_ORIENTATIONS, {0}};
+static const ev_setting joint[] = {
+    EV_MODEL("model", "weights of g and h (default: the program's)"), EV_ORIENTATIONS, {0}};
 #define PHOTOS                                                                \
     {                                                                         \
         .key = "photos", .type = EV_WHOLE, .lo = 1, .hi = NN_MAX_IMAGES,      \
@@ -148,7 +145,7 @@ static const ev_setting joint[] = {MODEL("weights of g and h (default: the progr
 #define REFINER \
     ITERATIONS, TOLERANCE, EV_ORIENTATIONS, PHOTOS, POWER, VIEW, PRECISION, { 0 }
 
-static const ev_setting lgd[] = {MODEL("weights of g and h (default: the program's)"), REFINER};
+static const ev_setting lgd[] = {EV_MODEL("model", "weights of g and h (default: the program's)"), REFINER};
 static const ev_setting nograd[] = {MODEL_GIVEN("weights trained with model.gradient = no"), REFINER};
 static const ev_setting frozen[] = {MODEL_GIVEN("weights trained with train.g_rate = 0"), REFINER};
 

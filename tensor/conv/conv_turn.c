@@ -1,5 +1,5 @@
-/* The weights of a panel's outputs are read as they stand, some inputs of each, and turned round in the first cache: from
- * number to number they would be a page apart. */
+/* The weights of a panel's outputs are read as they stand, some inputs of each, and turned round in the first cache:
+ * from number to number they would be a page apart. */
 #include "tensor/conv/plan.h"
 #include "tensor/kernels/elementwise.h"
 #include <string.h>
