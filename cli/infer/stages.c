@@ -13,9 +13,9 @@ static void failed(lgd_item *item, const lgd_error *error) { ts_fail(&item->st, 
 
 static void *take(lgd_item *item, const lgd_command *c, size_t pixel)
 {
-    void *room = malloc((size_t)c->size * (size_t)c->size * pixel);
-    if (!room) ts_fail(&item->st, TS_NOMEM, "%s: out of memory", item->job->photo);
-    return room;
+    void *buffer = malloc((size_t)c->size * (size_t)c->size * pixel);
+    if (!buffer) ts_fail(&item->st, TS_NOMEM, "%s: out of memory", item->job->photo);
+    return buffer;
 }
 
 static void read_photo(const lgd_command *c, bool published, lgd_item *item)

@@ -58,7 +58,7 @@ enum { POWER_GIVEN, POWER_AUTO, POWER_KNOWN };
 enum { VIEW_SET, VIEW_TOLD, VIEW_UNKNOWN };
 
 /* The photographs as the method is told of them, and its field of view. */
-static double tell(const ev_estimator *e, const ev_case *c, int count, lgd_photo photo[])
+static double photographs(const ev_estimator *e, const ev_case *c, int count, lgd_photo photo[])
 {
     const int power = (int)ev_number(e, "power"), view = (int)ev_number(e, "view");
     const size_t pixels = (size_t)c->size * (size_t)c->size;
@@ -84,7 +84,7 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
     const lgd_estimator estimator = {.net = e->net, .tape = e->tape, .seen = seen, .user = user};
     double factor;
     lgd_photo photo[NN_MAX_IMAGES];
-    const double fov = tell(e, c, count, photo);
+    const double fov = photographs(e, c, count, photo);
     const lgd_options options = {.size = sizeof options,
                                  .iterations = steps(e),
                                  .exact = e->exact,

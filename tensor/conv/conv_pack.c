@@ -30,14 +30,14 @@ typedef struct panels_job {
 
 static void pack_part(const panels_job *j, int panel, int part)
 {
-    float turned[2 * 16 * CONV_TURNED];
+    float transposed[2 * 16 * CONV_TRANSPOSED];
     const int begin = part * j->step, count = j->ic - begin < j->step ? j->ic - begin : j->step;
-    const int width = conv_turn(j->c, j->w, j->forward, panel, begin, count, turned);
+    const int width = conv_transpose(j->c, j->w, j->forward, panel, begin, count, transposed);
     float *to = j->packed + (ptrdiff_t)panel * 2 * conv_lanes() * j->ic * j->taps;
     for (int t = 0; t < j->taps; t++)
         for (int i = 0; i < count; i++)
             memcpy(to + ((ptrdiff_t)t * j->ic + begin + i) * width,
-                   turned + (i * j->taps + (j->forward ? t : j->taps - 1 - t)) * width, sizeof *to * (size_t)width);
+                   transposed + (i * j->taps + (j->forward ? t : j->taps - 1 - t)) * width, sizeof *to * (size_t)width);
 }
 
 static void pack_parts(const void *job, int64_t begin, int64_t end)
@@ -50,12 +50,12 @@ static void pack_parts(const void *job, int64_t begin, int64_t end)
 static void pack_panels(const ts_conv *c, const conv_weights *w, bool forward, float *packed)
 {
     const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), taps = c->k * c->k;
-    const int step = conv_turned_inputs(taps), parts = (ic + step - 1) / step;
+    const int step = conv_transposed_inputs(taps), parts = (ic + step - 1) / step;
     ts_for(c->compute.threads, (int64_t)conv_panels(oc) * parts, 1, pack_parts,
            &(panels_job){c, w, forward, ic, taps, step, parts, packed});
 }
 
-/* Whether the weights are read by conv_turn alone. */
+/* Whether the weights are read by conv_transpose alone. */
 static bool only_turned(const ts_conv *c, ts_conv_use use)
 {
     return use == TS_CONV_WINOGRAD || use == TS_CONV_WINOGRAD_BF16 ||
@@ -100,8 +100,8 @@ bool ts_conv_pack_half(const ts_conv *c, ts_conv_use use, const void *weight, fl
     if (!only_turned(c, use)) {
         const ptrdiff_t count = (ptrdiff_t)c->oc * c->ic * c->k * c->k;
         if (!(full = malloc(sizeof *full * (size_t)count))) return false;
-        for (ptrdiff_t i = 0; i < count; i += CONV_TURNED)
-            conv_take(&w, i, (int)(count - i < CONV_TURNED ? count - i : CONV_TURNED), full + i);
+        for (ptrdiff_t i = 0; i < count; i += CONV_TRANSPOSED)
+            conv_take(&w, i, (int)(count - i < CONV_TRANSPOSED ? count - i : CONV_TRANSPOSED), full + i);
         w = (conv_weights){.full = full};
     }
     pack(c, use, &w, packed);

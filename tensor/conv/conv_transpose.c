@@ -1,4 +1,4 @@
-/* The weights of a panel's outputs are read as they stand, some inputs of each, and turned round in the first cache:
+/* The weights of a panel's outputs are read as they stand, some inputs of each, and transposed in the first cache:
  * from number to number they would be a page apart. */
 #include "tensor/conv/plan.h"
 #include "tensor/kernels/elementwise.h"
@@ -6,7 +6,7 @@
 
 void conv_take(const conv_weights *w, ptrdiff_t at, int count, float *to)
 {
-    uint16_t part[CONV_TURNED]; /* a file's halves are not aligned */
+    uint16_t part[CONV_TRANSPOSED]; /* a file's halves are not aligned */
     if (w->full) {
         memcpy(to, w->full + at, sizeof *to * (size_t)count);
         return;
@@ -15,11 +15,11 @@ void conv_take(const conv_weights *w, ptrdiff_t at, int count, float *to)
     ts_elementwise_k()->from_half(count, part, to);
 }
 
-int conv_turn(const ts_conv *c, const conv_weights *w, bool forward, int panel, int input, int inputs, float *to)
+int conv_transpose(const ts_conv *c, const conv_weights *w, bool forward, int panel, int input, int inputs, float *to)
 {
     const int oc = forward ? c->oc : ts_conv_variables(c), width = conv_vectors(oc, panel) * conv_lanes(),
               o0 = panel * 2 * conv_lanes(), count = oc - o0 < width ? oc - o0 : width, taps = c->k * c->k;
-    float rows[2 * 16 * CONV_TURNED]; /* no vector has more than 16 lanes */
+    float rows[2 * 16 * CONV_TRANSPOSED]; /* no vector has more than 16 lanes */
     /* weight[o][i][tap], or of the gradient, whose inputs are the outputs, weight[i][o][tap] */
     const int columns = forward ? inputs * taps : taps;
     if (!forward && taps == 1) { /* in order already */
