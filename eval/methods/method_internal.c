@@ -1,9 +1,7 @@
 #include "eval/methods/method_internal.h"
 #include "cli/cli.h"
-#include "infer/estimate.h"
 #include "nn/weights/weights.h"
 #include "tensor/memory.h"
-#include "tensor/threads.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -75,37 +73,22 @@ ts_code ev_open_train(ev_estimator *e, ts_status *st)
     return TS_OK;
 }
 
-typedef struct kept_maps {
-    float *maps;
-    int64_t pixels;
-} kept_maps;
-
-/* R_0 as the network has it: what the estimator returns is clamped. */
-static bool keep_maps(int step, const float *maps, int channels, void *user)
-{
-    const kept_maps *to = user;
-    for (int64_t i = 0; i < to->pixels && step == 0; i++)
-        memcpy(to->maps + i * MAP_CHANNELS, maps + i * channels, MAP_CHANNELS * sizeof *maps);
-    return true;
-}
-
 ts_code ev_start_r0(ev_estimator *e, const ev_case *c, float *maps, ts_status *st)
 {
-    kept_maps to = {maps, (int64_t)c->size * c->size};
-    const lgd_estimator estimator = {.net = e->net, .tape = e->tape, .seen = keep_maps, .user = &to};
-    const lgd_options options = {.size = sizeof options,
-                                 .exact = e->exact,
-                                 .orientations = ev_orientations(e),
-                                 .threads = ts_threads(),
-                                 .fov = LGD_FOV_OF_PHOTO};
-    lgd_photo photo = {.image = c->image, .power = c->view.power};
-    memcpy(photo.light, c->view.light, sizeof photo.light);
-    memcpy(photo.camera, c->view.camera, sizeof photo.camera);
-    float *clamped = malloc((size_t)to.pixels * MAP_CHANNELS * sizeof *clamped);
-    const ts_code code = clamped ? lgd_estimator_run(&estimator, &photo, 1, c->size, &options, clamped, st)
-                                 : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", c->size, c->size);
-    free(clamped);
-    return code;
+    const int64_t pixels = (int64_t)c->size * c->size;
+    ag_reset(e->tape);
+    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){1, c->size, c->size, 3}),
+                         .grid = rd_grid_full(c->size),
+                         .view = c->view,
+                         .orientations = ev_orientations(e)};
+    const ag_value *out = nn_predict(e->tape, e->net, &in);
+    if (!out) {
+        *st = *ag_status(e->tape);
+        return st->code;
+    }
+    for (int64_t i = 0; i < pixels; i++)
+        memcpy(maps + i * MAP_CHANNELS, out->t.data + i * out->t.shape.c, MAP_CHANNELS * sizeof *maps);
+    return TS_OK;
 }
 
 ts_code ev_start(ev_estimator *e, const ev_case *c, float *maps, ts_status *st)

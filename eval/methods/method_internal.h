@@ -50,8 +50,8 @@ ts_code ev_open_net(ev_estimator *e, const char *key, ts_status *st);
 /* The same where "start" says R_0, else nothing. */
 ts_code ev_open_start(ev_estimator *e, const char *key, ts_status *st);
 ts_code ev_open_train(ev_estimator *e, ts_status *st);
-/* R_0 of e->net for the first photograph under c->view, by the one estimator (infer/estimate.h): [size, size,
- * MAP_CHANNELS]. */
+/* g's own maps of the first photograph under c->view, [size, size, MAP_CHANNELS]: what the estimator (infer/estimate.h)
+ * fits before its steps is not in them. */
 ts_code ev_start_r0(ev_estimator *e, const ev_case *c, float *maps, ts_status *st);
 /* The mean of procedural materials; and one material for every pixel. */
 ts_code ev_mean(float mean[MAP_CHANNELS], ts_status *st);
