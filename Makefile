@@ -182,10 +182,10 @@ $(INTERNAL): $(LIB_OBJ)
 	@rm -f $@
 	$(Q)$(AR) rcs $@ $^
 
-# The library: infer/lgd.o, infer/files.o and what they use, in one object whose only global symbols are those that lgd.h marks LGD_API.
+# The library: infer/api_model.o, infer/api_files.o and what they use, in one object whose only global symbols are those that lgd.h marks LGD_API.
 $(OBJ)/liblgd.o: $(INTERNAL)
 	$(call step,LD,$@)
-	$(Q)$(CC) -r -nostdlib -o $@ $(OBJ)/infer/lgd.o $(OBJ)/infer/files.o $(INTERNAL)
+	$(Q)$(CC) -r -nostdlib -o $@ $(OBJ)/infer/api_model.o $(OBJ)/infer/api_files.o $(INTERNAL)
 	$(Q)$(OBJCOPY) --localize-hidden $@
 
 $(LIB): $(OBJ)/liblgd.o

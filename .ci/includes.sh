@@ -16,7 +16,7 @@ allowed() {
     data/rectify) echo "data/rectify data/image data tensor" ;;
     data) echo "data data/image data/materials data/rectify tensor tensor/conv" ;;
     cli) echo "cli render data autograd tensor" ;;
-    cli/data) echo "cli cli/data render data data/image data/rectify autograd tensor" ;;
+    cli/data) echo "cli cli/data render data data/image data/materials data/rectify autograd tensor" ;;
     cli/infer|cli/convert) echo "cli cli/infer infer nn nn/weights render data data/image data/rectify autograd tensor tensor/conv" ;;
     cli/capture) echo "cli cli/capture render data data/image data/rectify autograd tensor" ;;
     train/mpi) echo "train/mpi tensor" ;;

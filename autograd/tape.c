@@ -260,7 +260,7 @@ float *ag_grad_add(ag_tape *tape, ag_value *v)
 }
 
 /* Of the parameters that only nodes from number node on use; a part's own nodes come after all that are on the tape. */
-static void tell(ag_tape *tape, size_t node)
+static void report_gradient(ag_tape *tape, size_t node)
 {
     int count = 0;
     while (count < tape->watch.left && tape->watch.place[tape->watch.left - count - 1] >= node) count++;
@@ -278,7 +278,7 @@ void ag_walk(ag_tape *tape, size_t first)
             if (tape->status.code != TS_OK) break;
             node->out->grad_ready = false; /* passed on; a second backward starts it anew */
         }
-        if (tape->watch.walked) tell(tape, i);
+        if (tape->watch.walked) report_gradient(tape, i);
     }
 }
 

@@ -6,6 +6,7 @@
 #include "tensor/cpu.h"
 #include "tensor/kernels/conv.h"
 #include "tensor/kernels/peak.h"
+#include "tensor/peak.h"
 #include "tensor/team.h"
 #include "tensor/threads.h"
 #include <stdbool.h>
@@ -45,32 +46,7 @@ static double now(void)
     return processor_time ? seconds / ts_threads() : seconds;
 }
 
-typedef struct peak_job {
-    double (*run)(long rounds);
-    double *flop; /* of a thread */
-} peak_job;
-
-static void run_peak(const void *job, int k)
-{
-    const peak_job *j = job;
-    const double flop = j->run(2000000);
-    if (k == 0) *j->flop = flop;
-}
-
-static double peak_of(double (*run)(long rounds))
-{
-    double best = 0;
-    for (int i = 0; i < 4; i++) {
-        double flop;
-        const double begin = now();
-        const int threads = ts_each_thread(0, run_peak, &(peak_job){run, &flop});
-        const double speed = threads * flop / (now() - begin);
-        if (speed > best) best = speed;
-    }
-    return best;
-}
-
-static double peak(void) { return peak_of(ts_peak_k()->run); }
+static double peak(void) { return ts_peak_of(ts_peak_k()->run, now); }
 
 enum { MOST_THREADS = 1024 };
 
@@ -115,7 +91,7 @@ static double inner_loop(void)
 bool bench_bf16(bench_time *t)
 {
     if (!ts_peak_k()->run_bf16) return false;
-    t->peak = peak_of(ts_peak_k()->run_bf16);
+    t->peak = ts_peak_of(ts_peak_k()->run_bf16, now);
     t->loop = 0;
     return true;
 }

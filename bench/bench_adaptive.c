@@ -4,7 +4,7 @@
 #include "bench/bench.h"
 #include "eval/metrics/metrics.h"
 #include "eval/sets.h"
-#include "infer/estimate.h"
+#include "infer/api_model.h"
 #include "infer/model_path.h"
 #include "render/error.h"
 #include <stdio.h>

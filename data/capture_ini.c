@@ -150,7 +150,8 @@ static ts_code read_square(const char *path, const photo *p, int64_t max_pixels,
     return code;
 }
 
-ts_code io_read_capture_ini(const char *path, int size, float usual, int64_t max_pixels, io_capture *c, ts_status *st)
+ts_code io_read_capture_ini(const char *path, int size, float default_power, int64_t max_pixels, io_capture *c,
+                            ts_status *st)
 {
     io_ini ini;
     *c = (io_capture){0};
@@ -168,7 +169,7 @@ ts_code io_read_capture_ini(const char *path, int size, float usual, int64_t max
         code = read_square(path, &photos[k], max_pixels, k, c, st);
     }
     c->side = places.side;
-    for (int i = 0; i < 3 && !code; i++) c->power[i] = power > 0 ? power / (places.side * places.side) : usual;
+    for (int i = 0; i < 3 && !code; i++) c->power[i] = power > 0 ? power / (places.side * places.side) : default_power;
     if (code) io_capture_free(c);
     else io_name_from_path(path, c->name, sizeof c->name);
     io_ini_free(&ini);

@@ -16,7 +16,8 @@
 #include "data/capture.h"
 
 /* The largest centred square of each photograph, or the one that has the corners, as io_read_photo reads it, brought to
- * size x size. usual: the power when the file has none, for distances in patch widths. The caller frees after success;
- * c is empty after a failure, which names the file and the line or key. */
-ts_code io_read_capture_ini(const char *path, int size, float usual, int64_t max_pixels, io_capture *c, ts_status *st);
+ * size x size. default_power: the power when the file has none, for distances in patch widths. The caller frees after
+ * success; c is empty after a failure, which names the file and the line or key. */
+ts_code io_read_capture_ini(const char *path, int size, float default_power, int64_t max_pixels, io_capture *c,
+                            ts_status *st);
 #endif

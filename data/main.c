@@ -2,10 +2,10 @@
  * others' materials. */
 #include "cli/camera.h"
 #include "cli/cli.h"
+#include "cli/data/histograms.h"
 #include "cli/data/pictures.h"
 #include "cli/data/sheet_captures.h"
 #include "data/materials/compare.h"
-#include "data/materials/histogram.h"
 #include "data/sheet.h"
 #include "render/render.h"
 #include "tensor/team.h"
@@ -356,30 +356,13 @@ static ts_code make_sheet(const options *o, ts_status *st)
 static ts_code compare(const options *o, ts_status *st)
 {
     const int count = o->count ? (int)o->count : 512, size = o->size ? (int)o->size : 128;
-    return io_compare(&o->procedural, count, o->testdata, size, stdout, st);
+    return io_compare(&o->procedural, (uint64_t)o->first, count, o->testdata, size, stdout, st);
 }
 
 static ts_code make_histograms(const options *o, ts_status *st)
 {
-    static io_histogram ours, theirs;
-    int count = o->count ? (int)o->count : 512, size = o->size ? (int)o->size : 128;
-    char path[4096];
-    io_material m = {0};
-    ts_code code = io_histogram_folder(o->testdata, size, &theirs, st);
-    if (!code) code = io_material_create(&m, size, st);
-    for (int i = 0; !code && i < count; i++) {
-        if (cl_interrupted()) code = ts_fail(st, TS_INTERRUPTED, "interrupted after %d of %d materials", i, count);
-        io_procedural_make(&o->procedural, (uint64_t)(o->first + i), &m);
-        io_histogram_add(&ours, m.maps, size);
-    }
-    io_material_free(&m);
-    if (!code) code = make_path(path, o, "histograms", ".csv", st);
-    if (!code) code = io_histogram_csv(path, &theirs, &ours, "testdata", "procedural", st);
-    if (!code) code = make_path(path, o, "histograms", ".svg", st);
-    if (!code) code = io_histogram_svg(path, &theirs, &ours, "testdata", "procedural", st);
-    for (int k = 0; !code && k < IO_HISTOGRAMS; k++)
-        printf("%-10s %5.1f%% in common\n", io_histogram_name(k), 100 * io_histogram_overlap(&theirs, &ours, k));
-    return code;
+    const int count = o->count ? (int)o->count : 512, size = o->size ? (int)o->size : 128;
+    return lgd_write_histograms(o->output, &o->procedural, (uint64_t)o->first, count, o->testdata, size, st);
 }
 
 int main(int argc, char **argv)

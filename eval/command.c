@@ -2,9 +2,9 @@
 #include "cli/arguments.h"
 #include "cli/camera.h"
 #include "cli/cli.h"
+#include "eval/launcher.h"
 #include "eval/methods/method.h"
 #include "eval/set_ini.h"
-#include "eval/shards.h"
 #include "infer/lgd.h"
 #include <stdlib.h>
 #include <string.h>

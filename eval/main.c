@@ -6,6 +6,7 @@
 #include "eval/shards.h"
 #include "infer/model_path.h"
 #include "tensor/conv/conv.h"
+#include "tensor/pin.h"
 #include "tensor/threads.h"
 #include <inttypes.h>
 #include <stdlib.h>

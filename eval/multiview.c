@@ -1,6 +1,6 @@
 #include "eval/multiview.h"
 #include "eval/metrics/flip.h"
-#include "eval/ssim.h"
+#include "eval/metrics/ssim.h"
 #include "render/render.h"
 #include "render/tone.h"
 #include <math.h>

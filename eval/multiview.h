@@ -3,7 +3,9 @@
 #ifndef EV_MULTIVIEW_H
 #define EV_MULTIVIEW_H
 #include "data/capture.h"
-#include "eval/metrics/metrics.h"
+#include "eval/metrics/lpips.h"
+#include "eval/metrics/row.h"
+#include "render/scene.h"
 
 /* Makes the picture whose camera is nearest to the sample's axis the first; the others keep their order. */
 void ev_capture_nearest_first(io_capture *c);

@@ -6,10 +6,6 @@
 #include "eval/command.h"
 #include "eval/run.h"
 
-/* Which part of how many this process is by the environment of mpirun (Open MPI, MPICH and Slurm's PMI); false: it was
- * not started so, or alone. */
-bool ev_shard_of_launcher(int *shard, int *shards);
-
 /* A number of all that decides the results: options, methods, materials, weights, version, instruction set. Parts of
  * other numbers are not put together. model: the weights' file. 0: no memory. */
 uint64_t ev_shards_print(const ev_command *c, const ev_run *r, const char *model);

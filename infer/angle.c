@@ -15,8 +15,8 @@ lgd_photo lgd_photo_by(const io_pinhole *camera, const double light[3], const fl
         p.camera[k] = (float)camera->at[k];
         p.light[k] = (float)at[k];
     }
-    const double usual = RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE);
-    p.power = (float)(usual * distance2 * sqrt(distance2) / at[2]);
+    const double at_default = RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE);
+    p.power = (float)(at_default * distance2 * sqrt(distance2) / at[2]);
     return p;
 }
 

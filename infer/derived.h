@@ -1,7 +1,8 @@
 /* The maps that are computed from the estimated ones: height, occlusion, base colour and metalness. */
 #ifndef LGD_DERIVED_H
 #define LGD_DERIVED_H
-#include "infer/output.h"
+#include "data/material.h"
+#include "infer/order.h"
 
 enum { LGD_DERIVED = LGD_OUT_HEIGHT | LGD_OUT_AO | LGD_OUT_ORM | LGD_OUT_BASECOLOR | LGD_OUT_METALLIC };
 

@@ -150,10 +150,9 @@ static double most_bytes(const nn_arch *a, int side, int tile, int orientations)
     return most + 2.0 * a->channels * sizeof(float) * side * side;
 }
 
-double lgd_model_bytes(const lgd_model *model, int side, const lgd_options *o)
+double lgd_estimator_bytes(const lgd_estimator *e, int side, const lgd_options *o)
 {
-    const lgd_estimator e = {.net = lgd_model_net(model)};
-    return most_bytes(&e.net->arch, side, tile_side(&e, side, o), o->orientations);
+    return most_bytes(&e->net->arch, side, tile_side(e, side, o), o->orientations);
 }
 
 /* choose: the number of steps that paid, of the given most, is found on the way and left in *steps. */

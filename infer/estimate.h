@@ -21,11 +21,6 @@ typedef struct lgd_estimator {
 ts_code lgd_estimator_run(const lgd_estimator *e, const lgd_photo *photo, int photos, int side, const lgd_options *o,
                           float *maps, ts_status *st);
 
-/* The same with a model that others may be using, arguments checked. */
-ts_code lgd_model_estimate(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,
-                           bool encoded, float *maps, ts_status *st);
-
-/* Bytes that such an estimate holds at once, at most, beside its photographs and maps. */
-double lgd_model_bytes(const lgd_model *model, int side, const lgd_options *options);
-const nn_model *lgd_model_net(const lgd_model *model); /* the model's */
+/* Bytes that such an estimate holds at once, at most, beside its photographs and maps. Needs no tape. */
+double lgd_estimator_bytes(const lgd_estimator *e, int side, const lgd_options *o);
 #endif

@@ -1,7 +1,8 @@
 /* meta.txt: what the files of a folder mean, and what was assumed of the photograph. */
 #ifndef LGD_META_H
 #define LGD_META_H
-#include "infer/output.h"
+#include "infer/lgd.h"
+#include "infer/order.h"
 
 /* The conventions that io_read_map_folder reads, then a line for each file that is ordered, then the scene: the field
  * of view and where it is known from, camera and light in patch widths, and the light's power (infer/lgd.h); the

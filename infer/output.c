@@ -5,8 +5,7 @@
 #include "infer/export.h"
 #include "infer/meta.h"
 #include "infer/page.h"
-#include "render/render.h"
-#include "render/scene.h"
+#include "infer/preview.h"
 #include "tensor/hash.h"
 #include "tensor/maps.h"
 #include "tensor/new_file.h"
@@ -23,60 +22,11 @@
 
 enum { PATH_LENGTH = 4096 };
 
-const char *const lgd_output_names[LGD_OUTPUTS] = {"diffuse", "specular",  "roughness", "normal", "exr",  "render",
-                                                   "preview", "basecolor", "metallic",  "height", "gltf", "materialx",
-                                                   "glb",     "orm",       "ao",        "page"};
-const char *const lgd_files[LGD_FILES] = {
-    "diffuse.png",  "specular.png",  "roughness.png", "normal.png", "maps.exr",      "render.png",
-    "preview.png",  "basecolor.png", "metallic.png",  "height.png", "material.gltf", "material.mtlx",
-    "material.glb", "orm.png",       "occlusion.png", "view.html",  "meta.txt"};
-
-ts_code lgd_output_parse(const char *list, unsigned *which, ts_status *st)
-{
-    *which = 0;
-    for (const char *at = list;; at++) {
-        const size_t n = strcspn(at, ",");
-        int k = 0;
-        while (k < LGD_OUTPUTS && (strlen(lgd_output_names[k]) != n || strncmp(at, lgd_output_names[k], n) != 0)) k++;
-        if (k == LGD_OUTPUTS)
-            return ts_fail(st, TS_INVALID, "'%.*s' is nothing that can be written", (int)(n < 40 ? n : 40), at);
-        *which |= 1u << k;
-        at += n;
-        if (!*at) break;
-    }
-    return TS_OK;
-}
-
-/* The maps that glTF and MaterialX documents refer to. */
-static unsigned referred(bool metallic)
-{
-    return metallic ? LGD_OUT_BASECOLOR | LGD_OUT_ORM | LGD_OUT_NORMAL
-                    : LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR | LGD_OUT_ROUGHNESS | LGD_OUT_NORMAL;
-}
-
-unsigned lgd_output_complete(unsigned which, bool metallic)
-{
-    const unsigned f0 = which & (LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR);
-    if (metallic) /* what was asked of the one workflow is given in the other */
-        which = (which & ~f0) | (f0 & LGD_OUT_DIFFUSE ? LGD_OUT_BASECOLOR : 0) |
-            (f0 & LGD_OUT_SPECULAR ? LGD_OUT_METALLIC : 0);
-    return which & (LGD_OUT_GLTF | LGD_OUT_MATERIALX) ? which | referred(metallic) : which;
-}
-
 /* folder/name; TS_INVALID when it is too long. */
 static ts_code join(char path[PATH_LENGTH], const char *folder, const char *name, ts_status *st)
 {
     if (snprintf(path, PATH_LENGTH, "%s/%s", folder, name) >= PATH_LENGTH)
         return ts_fail(st, TS_INVALID, "%.200s...: the name is too long", folder);
-    return TS_OK;
-}
-
-ts_code lgd_order_check(const lgd_order *order, ts_status *st)
-{
-    if (order->which & (LGD_OUT_GLTF | LGD_OUT_GLB | LGD_OUT_MATERIALX) && order->directx)
-        return ts_fail(st, TS_INVALID, "glTF and MaterialX need OpenGL normals, not DirectX's");
-    if (order->which & LGD_OUT_MATERIALX && order->metallic)
-        return ts_fail(st, TS_INVALID, "the MaterialX document refers to F0: not of the metallic workflow");
     return TS_OK;
 }
 
@@ -89,64 +39,6 @@ ts_code lgd_output_check(const char *folder, ts_status *st)
     ts_hidden_folder_remove(hidden, &lock);
     free(hidden);
     return TS_OK;
-}
-
-/* A picture of square panels whose rows are rendered while they are written. photo: the first panel, or NULL. */
-typedef struct strip {
-    const io_material *m;
-    const lgd_photo *photo;
-    rd_view view[LGD_PREVIEW_LIGHTS];
-    int panels;
-} strip;
-
-static ts_code make_rows(int y, int count, float *values, void *user, ts_status *st)
-{
-    const strip *s = user;
-    const int size = s->m->size;
-    const size_t panel = (size_t)size * 3, row = panel * (size_t)s->panels, first = (size_t)y * (size_t)size;
-    float *picture = malloc((size_t)count * panel * sizeof *picture);
-    if (!picture) return ts_fail(st, TS_NOMEM, "out of memory");
-    for (int k = 0; k < s->panels; k++) {
-        const float *from = k == 0 && s->photo ? s->photo->image + first * 3 : picture;
-        if (from == picture)
-            rd_render((rd_grid){.h = count, .w = size, .y0 = y, .side = size, .threads = 1},
-                      s->m->maps + first * MAP_CHANNELS, MAP_CHANNELS, &s->view[k], true, picture);
-        for (int i = 0; i < count; i++)
-            memcpy(values + (size_t)i * row + (size_t)k * panel, from + (size_t)i * panel, panel * sizeof *values);
-    }
-    free(picture);
-    return TS_OK;
-}
-
-static ts_code write_strip(const char *folder, const char *name, strip *s, ts_status *st)
-{
-    char path[PATH_LENGTH];
-    const io_rows rows = {s->panels * s->m->size, s->m->size, 3, make_rows, s};
-    const ts_code code = join(path, folder, name, st);
-    return code ? code : io_write_png_rows(path, &rows, 8, true, st);
-}
-
-static ts_code write_render(const char *folder, const io_material *m, const lgd_photo *photo, ts_status *st)
-{
-    strip s = {.m = m, .photo = photo, .panels = 2};
-    s.view[1] = (rd_view){.kind = RD_POINT, .power = photo->power};
-    memcpy(s.view[1].light, photo->light, sizeof photo->light);
-    memcpy(s.view[1].camera, photo->camera, sizeof photo->camera);
-    return write_strip(folder, "render.png", &s, st);
-}
-
-rd_view lgd_preview_view(int index, const lgd_photo *photo)
-{
-    rd_view view = rd_preview_view(index, LGD_PREVIEW_LIGHTS);
-    view.camera[2] = photo->camera[2];
-    return view;
-}
-
-static ts_code write_preview(const char *folder, const io_material *m, const lgd_photo *photo, ts_status *st)
-{
-    strip s = {.m = m, .panels = LGD_PREVIEW_LIGHTS};
-    for (int i = 0; i < s.panels; i++) s.view[i] = lgd_preview_view(i, photo);
-    return write_strip(folder, "preview.png", &s, st);
 }
 
 /* What is made in one go; bits of which. Slow ones first, so that two threads end together. */
@@ -186,8 +78,10 @@ static ts_code write_portion(const task *t, unsigned which, lgd_output_result *f
     char path[PATH_LENGTH];
     switch (which) {
     case 0: return TS_OK;
-    case LGD_OUT_RENDER: return write_render(t->folder, t->estimate, t->photo, st);
-    case LGD_OUT_PREVIEW: return write_preview(t->folder, t->m, t->photo, st);
+    case LGD_OUT_RENDER:
+        return join(path, t->folder, "render.png", st) ? st->code : lgd_write_render(path, t->estimate, t->photo, st);
+    case LGD_OUT_PREVIEW:
+        return join(path, t->folder, "preview.png", st) ? st->code : lgd_write_preview(path, t->m, t->photo, st);
     case LGD_OUT_PAGE:
         return join(path, t->folder, "view.html", st) ? st->code
                                                       : lgd_write_page(path, t->stem, t->m, t->photo, t->order, st);
@@ -232,7 +126,7 @@ static ts_code write_all(const task *t, lgd_output_result *facts, ts_status *st)
 {
     ts_status failure[PORTIONS] = {{0}};
     const bool glb = t->order->which & LGD_OUT_GLB;
-    const unsigned which = t->order->which | (glb ? referred(t->order->metallic) : 0);
+    const unsigned which = t->order->which | (glb ? lgd_output_referred(t->order->metallic) : 0);
     ts_tasks(t->order->threads, PORTIONS, write_one, &(writing){t, which, facts, failure});
     for (int i = 0; i < PORTIONS; i++)
         if (failure[i].code) return ts_fail(st, failure[i].code, "%s", failure[i].message);

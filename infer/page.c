@@ -2,6 +2,7 @@
 #include "data/file.h"
 #include "data/html.h"
 #include "data/text.h"
+#include "infer/preview.h"
 #include "pages.h"
 #include "render/brdf.h"
 #include <math.h>

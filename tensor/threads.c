@@ -1,6 +1,5 @@
 #include "tensor/threads.h"
 #include "tensor/cgroup.h"
-#include "tensor/team.h"
 #include <limits.h>
 #include <sched.h>
 #include <stdatomic.h>
@@ -9,32 +8,6 @@
 #include <string.h>
 
 static atomic_int wanted;
-
-typedef struct pinning {
-    const cpu_set_t *all;
-    atomic_int *bound;
-} pinning;
-
-static void pin(const void *job, int k)
-{
-    const pinning *p = job;
-    cpu_set_t one;
-    int cpu = 0;
-    while (!CPU_ISSET(cpu, p->all) || k-- > 0) cpu++;
-    CPU_ZERO(&one);
-    CPU_SET(cpu, &one);
-    if (sched_setaffinity(0, sizeof one, &one) == 0) atomic_fetch_add(p->bound, 1); /* of the calling thread alone */
-}
-
-bool ts_threads_pin(void)
-{
-    cpu_set_t all;
-    const int threads = ts_threads();
-    if (sched_getaffinity(0, sizeof all, &all) != 0 || CPU_COUNT(&all) < threads) return false;
-    atomic_int bound = 0;
-    ts_each_thread(threads, pin, &(pinning){&all, &bound});
-    return bound == threads;
-}
 
 /* CPUs' worth of quota in a cgroup v2 or v1 hierarchy as a container sees it, or 0 for none. */
 static int quota_in(const char *max_path, const char *quota_path, const char *period_path)

@@ -1,12 +1,12 @@
 # What tests/kill_folder.sh and tests/folder_memory.sh share. Folders are about files, not about networks: $T/tiny.safetensors
 # are weights that take a millisecond, as training begins with them, and the photographs are one small picture.
 T=$(mktemp -d) || exit 1
+. tests/support/small_model.sh
 : "${BUILD:=build}"
 case $BUILD in /*) ;; *) BUILD=$(pwd)/$BUILD ;; esac
 
 make_tiny() {
-    printf '%s\n' '[model]' 'g_width = 4' 'g_width_max = 8' 'g_levels = 2' 'g_size = 16' 'h_width = 8' 'h_gru = 4' 'iterations = 2' \
-        '[data]' 'patch = 16' '[train]' 'batch = 2' 'steps = 1' 'rate = 0' 'ema = 0' '[validate]' 'count = 2' 'size = 16' >"$T/tiny.ini"
+    first_weights >"$T/tiny.ini"
     "$BUILD/bin/lgd-train" "$T/tiny.ini" --set output.folder="$T/run" --threads 1 >"$T/log" 2>&1 &&
         mv "$T/run/last.safetensors" "$T/tiny.safetensors" &&
         "$BUILD/bin/lgd-infer" -q -m "$T/tiny.safetensors" --size "$1" -i 0 --maps diffuse demo/flash.jpg -o "$T/small" >>"$T/log" 2>&1

@@ -65,6 +65,7 @@ struct tr_trainer {
     int64_t best_step;
 };
 
+/* state.c */
 void tr_path(const tr_trainer *t, const char *name, char path[TR_PATH]);
 void tr_note(const tr_trainer *t, const char *format, ...) __attribute__((format(printf, 2, 3)));
 int64_t tr_total(const tr_config *c);

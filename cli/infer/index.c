@@ -1,8 +1,8 @@
 #include "cli/infer/index.h"
 #include "data/file.h"
 #include "data/html.h"
-#include "infer/page.h"
 #include "infer/panels.h"
+#include "infer/preview.h"
 #include "pages.h"
 #include <stdlib.h>
 #include <string.h>

@@ -1,10 +1,4 @@
 #include "cli/infer/item.h"
-#include "cli/infer/record.h"
-#include "infer/estimate.h"
-#include "nn/model.h"
-#include "tensor/hash.h"
-#include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 
 const char *const lgd_warning_names[LGD_WARNINGS] = {"black",
@@ -14,143 +8,6 @@ const char *const lgd_warning_names[LGD_WARNINGS] = {"black",
                                                      "mask black",
                                                      "maps do not look like the photograph"};
 
-/* The last of an item's steps failed in a public function. */
-static void failed(lgd_item *item, const lgd_error *error) { ts_fail(&item->st, error->code, "%s", error->message); }
-
-static void *take(lgd_item *item, const lgd_command *c, size_t pixel)
-{
-    void *room = malloc((size_t)c->size * (size_t)c->size * pixel);
-    if (!room) ts_fail(&item->st, TS_NOMEM, "%s: out of memory", item->job->photo);
-    return room;
-}
-
-static void read_photo(const lgd_command *c, bool published, lgd_item *item)
-{
-    const lgd_read_options o = {sizeof o, published, c->max_pixels, item->threads};
-    const char *photo = item->job->photo;
-    lgd_facts facts = {.size = sizeof facts};
-    lgd_error error;
-    if (!(item->square = take(item, c, 3 * sizeof *item->square))) return;
-    if (lgd_read_photo(photo, c->size, &o, item->square, &facts, &error)) {
-        failed(item, &error);
-        return;
-    }
-    item->image = item->square;
-    item->photo_side = facts.width < facts.height ? facts.width : facts.height;
-    item->fov = c->fov > 0 ? c->fov : facts.fov;
-    snprintf(item->fov_from, sizeof item->fov_from, "%s", c->fov > 0 ? "--fov" : facts.fov_from);
-    snprintf(item->profile, sizeof item->profile, "%s", facts.profile);
-    if (!c->mask || !(item->mask = take(item, c, 1))) return;
-    if (lgd_read_mask(c->mask, c->size, facts.width, facts.height, &o, item->mask, &error)) {
-        failed(item, &error);
-        ts_context(&item->st, "%s", photo);
-    }
-}
-
-static void read_angle(const lgd_command *c, bool published, lgd_item *item)
-{
-    lgd_rectified *r = &item->angle;
-    if (published) {
-        ts_fail(&item->st, TS_UNSUPPORTED, "%s: the published weights know no angle: leave out --corners",
-                item->job->photo);
-        return;
-    }
-    if (lgd_rectify(item->job->photo, &c->angle, c->max_pixels, c->size, c->fov, item->threads, r, &item->st)) return;
-    snprintf(item->profile, sizeof item->profile, "%s", r->profile);
-    item->image = item->square = r->square.data;
-    item->photo_side = (int)ceil(r->side);
-    item->fov = LGD_FOV_OF_PHOTO;
-    snprintf(item->fov_from, sizeof item->fov_from, "%s", r->fov_from);
-}
-
-static void read_sheet(const lgd_command *c, lgd_item *item)
-{
-    io_sheet_set *set = &item->sheet;
-    if (io_sheet_set_read(c->photo, c->photos, c->fov, c->max_pixels, item->threads, set, &item->st)) return;
-    if (set->good == 0) item->st = set->photo[0].st;
-    else if (lgd_sheet_capture(set, NN_MAX_IMAGES, c->size, c->max_pixels, item->threads, &item->capture, &item->st))
-        return;
-    item->image = item->capture.image;
-    item->photo_side = c->size;
-    item->fov = LGD_FOV_OF_PHOTO;
-    snprintf(item->fov_from, sizeof item->fov_from, "the sheet, %d photographs", set->good);
-}
-
-static void read_input(const lgd_command *c, bool published, lgd_item *item)
-{
-    if (c->sheet) read_sheet(c, item);
-    else if (c->corners) read_angle(c, published, item);
-    else if (!*c->capture) read_photo(c, published, item);
-    else if (!lgd_read_capture(c->capture, c->size, c->max_pixels, &item->capture, &item->st)) {
-        item->photo_side = c->size;
-        item->image = item->capture.image;
-        item->fov = LGD_FOV_OF_PHOTO;
-        snprintf(item->fov_from, sizeof item->fov_from, "the capture");
-    }
-}
-
-void lgd_item_read(const lgd_command *c, const char *recipe, bool published, lgd_item *item)
-{
-    ts_status st = {0};
-    const bool one = !c->sheet && !*c->capture;
-    const ts_code hash = one ? ts_hash_file(item->job->photo, &item->hash, &st) : TS_OK;
-    item->was_done = one && !hash && c->skip_existing && lgd_record_is_done(c, item, recipe, &item->result);
-    if (item->was_done) return;
-    read_input(c, published, item);
-    /* A pipe has no hash. Of a file that cannot be read the reader has the better words. */
-    if (hash && hash != TS_UNSUPPORTED && !item->st.code) item->st = st;
-}
-
-/* What the library's calls get as their user. */
-typedef struct task {
-    lgd_item *item;
-    int steps; /* that will be made, at most */
-    lgd_item_progress progress;
-    void *user;
-} task;
-
-static int after_step(int step, double rmse, void *user)
-{
-    const task *t = user;
-    if (step == 0) t->item->first = rmse;
-    t->item->last = rmse;
-    t->item->steps = step;
-    return t->progress(t->item, (step + 1.0) / (t->steps + 1), t->user);
-}
-
-static int before_tile(double done, void *user)
-{
-    const task *t = user;
-    return t->progress(t->item, done, t->user);
-}
-
-const char *lgd_item_fov_is(const lgd_item *item)
-{
-    const char *how = lgd_item_assumption(item);
-    return !*how ? "known" : *how == 'e' ? "estimated" : "assumed";
-}
-
-/* What makes a photograph a poor one: the maps will be guesses. */
-static void look_at(const lgd_command *c, lgd_item *item)
-{
-    const int64_t pixels = (int64_t)c->size * c->size, values = pixels * 3;
-    int64_t dark = 0, full = 0, over = 0, wanted = 0;
-    for (int64_t i = 0; i < values; i++) {
-        const float v = item->image[i];
-        dark += v < 1e-3f; /* three of 255 sRGB levels */
-        full += v > 0.999f;
-        over += v > 1.001f; /* more than resampling rounds to */
-    }
-    while (item->mask && wanted < pixels && !item->mask[wanted]) wanted++;
-    item->full = (double)full / (double)values;
-    item->over = (double)over / (double)values;
-    item->warnings = (dark == values               ? LGD_WARN_BLACK
-                          : full * 10 > values * 9 ? LGD_WARN_FULL
-                                                   : 0) |
-        (*lgd_item_fov_is(item) == 'a' ? LGD_WARN_FOV : 0) | (*item->profile ? LGD_WARN_PROFILE : 0) |
-        (item->mask && wanted == pixels ? LGD_WARN_MASK : 0) | (item->last > LGD_FAR ? LGD_WARN_DIFFERENT : 0);
-}
-
 const char *lgd_item_assumption(const lgd_item *item)
 {
     if (item->angle.assumed) return "assumed: ";
@@ -158,63 +15,10 @@ const char *lgd_item_assumption(const lgd_item *item)
     return item->photo[0].camera[2] == lgd_flash_photo(NULL).camera[2] ? "assumed: " : "estimated: ";
 }
 
-void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, lgd_item_progress progress, void *user)
+const char *lgd_item_fov_is(const lgd_item *item)
 {
-    const bool fixed = c->power > 0;
-    task t = {item, lgd_command_steps(c, model), progress, user};
-    const lgd_options options = {.size = sizeof options,
-                                 .iterations = c->iterations,
-                                 .threads = item->threads,
-                                 .progress = after_step,
-                                 .user = &t,
-                                 .power = fixed ? NULL : &item->power,
-                                 .exact = c->exact,
-                                 .precision = c->bf16 ? LGD_BF16 : LGD_F32,
-                                 .orientations = c->orientations,
-                                 .mask = item->mask,
-                                 .tolerance = c->tolerance,
-                                 .tile = before_tile,
-                                 .fov = item->fov,
-                                 .taken = item->photo};
-    item->photo[0] = c->corners ? item->angle.photo : lgd_flash_photo(item->image);
-    item->photos = item->capture.images ? lgd_capture_photos(&item->capture, lgd_most_photos(model), item->photo) : 1;
-    item->power = fixed ? c->power : 1;
-    for (int k = 0; k < item->photos; k++) item->photo[k].power *= (float)item->power;
-    if (io_material_create(&item->m, c->size, &item->st) != TS_OK ||
-        lgd_model_estimate(model, item->photo, item->photos, c->size, &options, true, item->m.maps, &item->st))
-        ts_context(&item->st, "%s", item->job->photo);
-    look_at(c, item);
-}
-
-double lgd_item_bytes(const lgd_command *c, const lgd_model *model)
-{
-    const lgd_options options = {
-        .size = sizeof options, .orientations = c->orientations, .tolerance = fmax(c->tolerance, 0)};
-    return lgd_model_bytes(model, c->size, &options);
-}
-
-void lgd_item_write(const lgd_command *c, const char *recipe, lgd_item *item)
-{
-    char *record = lgd_record(c, item, recipe);
-    item->result = lgd_record_result(record);
-    if (!record || !item->result) {
-        ts_fail(&item->st, TS_NOMEM, "%s: out of memory", item->job->photo);
-        free(record);
-        return;
-    }
-    char from[sizeof item->fov_from + 32];
-    snprintf(from, sizeof from, "%s%s", lgd_item_assumption(item), item->fov_from);
-    const lgd_order order = {.which = c->outputs,
-                             .directx = c->directx,
-                             .metallic = c->metallic,
-                             .half = c->half,
-                             .repeats = c->seamless,
-                             .threads = item->threads,
-                             .fov_from = from,
-                             .record = record};
-    if (lgd_output_write(c->out, item->job->stem, &item->m, &item->photo[0], &order, &item->written, &item->st))
-        ts_context(&item->st, "%s", item->job->photo);
-    free(record);
+    const char *how = lgd_item_assumption(item);
+    return !*how ? "known" : *how == 'e' ? "estimated" : "assumed";
 }
 
 void lgd_item_free(lgd_item *item)

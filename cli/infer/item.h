@@ -1,12 +1,12 @@
-/* A photograph on its way: read, estimated, written. */
+/* A photograph on its way, and what is known of it so far. */
 #ifndef LGD_ITEM_H
 #define LGD_ITEM_H
-#include "cli/infer/options.h"
 #include "cli/infer/plan.h"
 #include "data/material.h"
+#include "infer/angle.h"
 #include "infer/capture.h"
 #include "infer/lgd.h"
-#include "infer/output.h"
+#include "infer/order.h"
 #include "infer/sheet.h"
 #include <stdint.h>
 
@@ -57,18 +57,10 @@ typedef struct lgd_item {
     int stage;         /* the pipeline's */
 } lgd_item;
 
-/* Called while an item is estimated, with the part that is done; nonzero: stop. */
-typedef int (*lgd_item_progress)(lgd_item *item, double done, void *user);
-
-/* Each sets the item's st on failure. published: as infer/photograph.h says. recipe: lgd_recipe's. */
-void lgd_item_read(const lgd_command *c, const char *recipe, bool published, lgd_item *item);
-void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, lgd_item_progress progress, void *user);
 /* Of an estimated item: "assumed: " where its field of view is the default, "estimated: " where the model guessed it,
  * or "". */
 const char *lgd_item_assumption(const lgd_item *item);
-double lgd_item_bytes(const lgd_command *c, const lgd_model *model); /* that an estimate takes, at most */
 /* "known", "estimated" or "assumed". */
 const char *lgd_item_fov_is(const lgd_item *item);
-void lgd_item_write(const lgd_command *c, const char *recipe, lgd_item *item);
 void lgd_item_free(lgd_item *item);
 #endif

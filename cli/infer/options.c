@@ -2,7 +2,7 @@
 #include "cli/cli.h"
 #include "data/image/image.h"
 #include "data/seamless.h"
-#include "infer/output.h"
+#include "infer/order.h"
 #include <string.h>
 
 enum {

@@ -1,7 +1,7 @@
 /* Many photographs: several at once, each estimated and written on threads of its own, while the next are read. */
 #ifndef LGD_PIPELINE_H
 #define LGD_PIPELINE_H
-#include "cli/infer/item.h"
+#include "cli/infer/stages.h"
 
 typedef struct lgd_pipeline lgd_pipeline;
 

@@ -1,5 +1,5 @@
 #include "cli/infer/plan.h"
-#include "infer/output.h"
+#include "infer/order.h"
 #include "tensor/hash.h"
 #include <stdbool.h>
 #include <stdio.h>

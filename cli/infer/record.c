@@ -1,6 +1,7 @@
 #include "cli/infer/record.h"
 #include "data/json.h"
 #include "data/text.h"
+#include "infer/output.h"
 #include "render/scene.h"
 #include "tensor/hash.h"
 #include <inttypes.h>

@@ -3,6 +3,7 @@
 #ifndef LGD_RECORD_H
 #define LGD_RECORD_H
 #include "cli/infer/item.h"
+#include "cli/infer/options.h"
 
 /* The lines of meta.txt that are the same for all photographs of a call: the weights and their hash, and every option
  * that changes a byte of what is written. NULL and st on failure; the caller frees it. */

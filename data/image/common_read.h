@@ -12,9 +12,6 @@ ts_code io_read_png_file(const char *path, int64_t max_pixels, oi_image *image, 
 ts_code io_read_jpeg_file(const char *path, int64_t max_pixels, oi_image *image, bool *read,
                           ts_status *st); /* grey and YCbCr or RGB, EXIF orientation, ICC profile */
 
-/* TS_UNSUPPORTED where there are more than max_pixels, TS_NOMEM where a decoder's bytes are not to be had. */
-ts_code io_check_claim(const char *path, double width, double height, int64_t max_pixels, double bytes, ts_status *st);
-
 /* Reads a JPEG's Exif segment (from its "Exif\0\0" on). False: it does not follow the standard. What is odd about the
  * lens is only not said. */
 bool io_exif(const unsigned char *segment, size_t size, int *orientation, bool *adobe, io_lens *lens);

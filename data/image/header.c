@@ -1,8 +1,9 @@
 /* The size that a file's header claims, read before a library does: its releases refuse a claim with limits and words
  * of their own, or take memory first. What is not understood here is left to them. */
 #include "data/image/header.h"
-#include "data/image/common_read.h"
+#include "tensor/budget.h"
 #include <ctype.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -135,6 +136,15 @@ static bool openexr(header *h)
         at += size;
     }
     return true;
+}
+
+ts_code io_check_claim(const char *path, double width, double height, int64_t max_pixels, double bytes, ts_status *st)
+{
+    if (width * height > (double)max_pixels)
+        return ts_fail(st, TS_UNSUPPORTED, "%s: %.0f x %.0f pixels are more than the limit of %lld (--max-pixels)",
+                       path, width, height, (long long)max_pixels);
+    if (ts_budget_check(bytes, st) != TS_OK) return ts_context(st, "%s: %.0f x %.0f pixels", path, width, height);
+    return TS_OK;
 }
 
 ts_code io_check_header(const char *path, int64_t max_pixels, ts_status *st)

@@ -1,5 +1,6 @@
 /* Ordinary JPEG files, without the image library (data/image/common_read.h). */
 #include "data/image/common_read.h"
+#include "data/image/header.h"
 #include "tensor/memory.h"
 #include <setjmp.h>
 #include <stdio.h>

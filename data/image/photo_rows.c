@@ -8,15 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-ts_code io_check_claim(const char *path, double width, double height, int64_t max_pixels, double bytes, ts_status *st)
-{
-    if (width * height > (double)max_pixels)
-        return ts_fail(st, TS_UNSUPPORTED, "%s: %.0f x %.0f pixels are more than the limit of %lld (--max-pixels)",
-                       path, width, height, (long long)max_pixels);
-    if (ts_budget_check(bytes, st) != TS_OK) return ts_context(st, "%s: %.0f x %.0f pixels", path, width, height);
-    return TS_OK;
-}
-
 ts_code io_read_raw(const char *path, int64_t max_pixels, oi_image *raw, ts_status *st)
 {
     bool read = false;

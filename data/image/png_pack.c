@@ -37,7 +37,7 @@ static void put32(unsigned char *to, uint32_t v)
     for (int i = 0; i < 4; i++) to[i] = (unsigned char)(v >> (24 - 8 * i));
 }
 
-static bool room(io_png_pack *p, size_t more)
+static bool reserve(io_png_pack *p, size_t more)
 {
     if (p->size + more <= p->capacity) return true;
     const size_t capacity = p->size + more + p->capacity / 2;
@@ -94,7 +94,7 @@ io_png_pack *io_png_pack_begin(const char *name, int width, int height, int chan
     p->at_once = p->total <= AT_ONCE;
     p->above = calloc(step + stride, 1);
     p->rows = malloc(p->at_once ? p->total : stride + 1);
-    if (!p->above || !p->rows || !room(p, 4096) ||
+    if (!p->above || !p->rows || !reserve(p, 4096) ||
         (!p->at_once && deflateInit2(&p->stream, 1, Z_DEFLATED, 15, 9, Z_RLE) != Z_OK)) {
         no_memory(p, st);
         io_png_pack_free(&p);
@@ -118,7 +118,7 @@ static ts_code stream(io_png_pack *p, unsigned char *from, size_t size, int flus
     p->stream.avail_in = (uInt)size;
     for (;;) {
         if (!p->stream.next_out) {
-            if (!room(p, PART + CHUNK)) return no_memory(p, st);
+            if (!reserve(p, PART + CHUNK)) return no_memory(p, st);
             p->stream.next_out = p->file + p->size + 8;
             p->stream.avail_out = PART;
         }
@@ -148,7 +148,7 @@ static ts_code compress_at_once(io_png_pack *p, ts_status *st)
     /* Higher levels find no more in filtered rows, and take longer. */
     struct libdeflate_compressor *c = libdeflate_alloc_compressor(1);
     const size_t most = c ? libdeflate_zlib_compress_bound(c, p->total) : 0;
-    if (!c || !room(p, most + 2 * CHUNK)) {
+    if (!c || !reserve(p, most + 2 * CHUNK)) {
         libdeflate_free_compressor(c);
         return no_memory(p, st);
     }
@@ -161,7 +161,7 @@ static ts_code compress_at_once(io_png_pack *p, ts_status *st)
 ts_code io_png_pack_end(io_png_pack *p, unsigned char **bytes, size_t *size, ts_status *st)
 {
     ts_code code = p->at_once ? compress_at_once(p, st) : stream(p, p->rows, 0, Z_FINISH, st);
-    if (!code && !room(p, CHUNK)) code = no_memory(p, st);
+    if (!code && !reserve(p, CHUNK)) code = no_memory(p, st);
     if (code) return code;
     end_chunk(p, "IEND", 0);
     *bytes = p->file;

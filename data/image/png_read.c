@@ -1,5 +1,6 @@
 /* Ordinary PNG files, without the image library (data/image/common_read.h). */
 #include "data/image/common_read.h"
+#include "data/image/header.h"
 #include "tensor/memory.h"
 #include <png.h>
 #include <stdio.h>

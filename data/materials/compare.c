@@ -38,17 +38,18 @@ static void print_joint(const io_joint_set *ours, const io_joint_set *theirs, FI
     }
 }
 
-ts_code io_compare(const io_procedural *p, int count, const char *folder, int size, FILE *f, ts_status *st)
+ts_code io_compare(const io_procedural *p, uint64_t first, int count, const char *folder, int size, FILE *f,
+                   ts_status *st)
 {
     io_feature_set ours = {0}, theirs = {0};
     io_joint_set our_joint = {0}, their_joint = {0};
     io_material m = {0};
     ts_code code = io_features_folder(folder, size, &theirs, st);
     if (!code) code = io_joint_folder(folder, size, &their_joint, st);
-    if (!code) code = io_features_procedural(p, count, size, &ours, st);
+    if (!code) code = io_features_procedural(p, first, count, size, &ours, st);
     if (!code) code = io_material_create(&m, size, st);
     for (int i = 0; !code && i < count; i++) {
-        io_procedural_make(p, (uint64_t)i, &m);
+        io_procedural_make(p, first + (uint64_t)i, &m);
         code = io_joint_add(&our_joint, &m, st);
     }
     if (!code) {

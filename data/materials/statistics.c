@@ -76,7 +76,8 @@ void io_feature_set_free(io_feature_set *set)
     *set = (io_feature_set){0};
 }
 
-ts_code io_features_procedural(const io_procedural *p, int count, int size, io_feature_set *set, ts_status *st)
+ts_code io_features_procedural(const io_procedural *p, uint64_t first, int count, int size, io_feature_set *set,
+                               ts_status *st)
 {
     *set = (io_feature_set){.values = calloc((size_t)count, sizeof *set->values)};
     io_material m = {0};
@@ -86,7 +87,7 @@ ts_code io_features_procedural(const io_procedural *p, int count, int size, io_f
         return st ? st->code : TS_NOMEM;
     }
     for (; set->count < count; set->count++) {
-        io_procedural_make(p, (uint64_t)set->count, &m);
+        io_procedural_make(p, first + (uint64_t)set->count, &m);
         io_features(m.maps, size, set->values[set->count]);
     }
     io_material_free(&m);

@@ -27,8 +27,9 @@ typedef struct io_feature_set {
 } io_feature_set;
 void io_feature_set_free(io_feature_set *set);
 
-/* Materials 0 .. count-1 of p. */
-ts_code io_features_procedural(const io_procedural *p, int count, int size, io_feature_set *set, ts_status *st);
+/* Materials first .. first+count-1 of p. */
+ts_code io_features_procedural(const io_procedural *p, uint64_t first, int count, int size, io_feature_set *set,
+                               ts_status *st);
 /* Every map folder in folder/maps and every strip in folder/strips, in the order of their names; at least two. */
 ts_code io_features_folder(const char *folder, int size, io_feature_set *set, ts_status *st);
 

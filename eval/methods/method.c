@@ -1,7 +1,5 @@
-#include "eval/methods/method.h"
+#include "eval/methods/method_internal.h"
 #include "cli/cli.h"
-#include "nn/weights/weights.h"
-#include "tensor/memory.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -11,25 +9,6 @@ const ev_method *const ev_methods[] = {&ev_method_mean,    &ev_method_unet,     
                                        &ev_method_lgd,     &ev_method_lgd_nograd, &ev_method_frozen,
                                        &ev_method_descent, &ev_method_newton,     &ev_method_finetune,
                                        &ev_method_latent,  &ev_method_peer,       NULL};
-
-static int find(const ev_method *m, const char *key)
-{
-    for (int i = 0; m->settings[i].key; i++)
-        if (!strcmp(m->settings[i].key, key)) return i;
-    return -1;
-}
-
-/* The index of a word among words separated by blanks, -1: none. */
-static int word_index(const char *words, const char *word)
-{
-    const size_t n = strlen(word);
-    for (int i = 0; *words; i++) {
-        const size_t length = strcspn(words, " ");
-        if (length == n && !strncmp(words, word, n)) return i;
-        words += length + strspn(words + length, " ");
-    }
-    return -1;
-}
 
 static ts_code check(const char *spec, const ev_setting *s, const char *value, ts_status *st)
 {
@@ -45,7 +24,7 @@ static ts_code check(const char *spec, const ev_setting *s, const char *value, t
         return ts_fail(st, TS_INVALID, "--method %s: %s is a number in %g .. %g, not '%s'", spec, s->key, s->lo, s->hi,
                        value);
     case EV_WORD:
-        if (word_index(s->words, value) >= 0) return TS_OK;
+        if (ev_word(s->words, value) >= 0) return TS_OK;
         return ts_fail(st, TS_INVALID, "--method %s: %s is one of: %s; not '%s'", spec, s->key, s->words, value);
     case EV_WEIGHTS: break;
     }
@@ -92,7 +71,7 @@ ts_code ev_method_parse(const char *spec, const char *model, int iterations, ev_
             strcpy(e->label, equals);
             continue;
         }
-        const int i = find(e->method, pair);
+        const int i = ev_find(e->method->settings, pair);
         if (i < 0) return unknown(spec, e->method, pair, st);
         if (e->value[i]) return ts_fail(st, TS_INVALID, "--method %s: %s is given twice", spec, pair);
         if (check(spec, &e->method->settings[i], equals, st) != TS_OK) return st->code;
@@ -129,30 +108,6 @@ void ev_method_help(FILE *f)
             fputc('\n', f);
         }
     }
-}
-
-const char *ev_text(const ev_estimator *e, const char *key)
-{
-    const int i = find(e->method, key);
-    return i < 0 ? NULL : e->value[i];
-}
-
-bool ev_given(const ev_estimator *e, const char *key) { return ev_text(e, key) != NULL; }
-
-double ev_number(const ev_estimator *e, const char *key)
-{
-    const char *text = ev_text(e, key);
-    const ev_setting *s = &e->method->settings[find(e->method, key)];
-    double v = 0;
-    if (!text) return -1;
-    if (s->type == EV_WORD) return word_index(s->words, text);
-    cl_parse_real(text, s->lo, s->hi, &v);
-    return v;
-}
-
-int ev_orientations(const ev_estimator *e)
-{
-    return find(e->method, "orientations") >= 0 ? 1 << (int)ev_number(e, "orientations") : 1;
 }
 
 ts_code ev_open(ev_estimator *e, ts_status *st)
@@ -210,70 +165,4 @@ size_t ev_bytes(const ev_estimator *e)
     if (e->tape) sum += ts_arena_peak(ag_arena(e->tape));
     if (e->train) sum += ts_arena_peak(ag_arena(e->train));
     return sum;
-}
-
-ts_code ev_open_net(ev_estimator *e, const char *key, ts_status *st)
-{
-    e->net = nn_model_load(ev_text(e, key), st);
-    if (e->net) e->tape = ag_tape_create(false, st);
-    if (!e->tape) return st->code;
-    ag_compute_set(e->tape, (ts_compute){.exact = e->exact});
-    ag_freeze(e->tape, true);
-    return TS_OK;
-}
-
-ts_code ev_open_train(ev_estimator *e, ts_status *st)
-{
-    e->train = ag_tape_create(true, st);
-    if (!e->train) return st->code;
-    ag_compute_set(e->train, (ts_compute){.exact = e->exact});
-    return TS_OK;
-}
-
-ts_code ev_start_r0(ev_estimator *e, const ev_case *c, float *maps, ts_status *st)
-{
-    const int64_t pixels = (int64_t)c->size * c->size;
-    ag_reset(e->tape);
-    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){1, c->size, c->size, 3}),
-                         .grid = rd_grid_full(c->size),
-                         .view = c->view,
-                         .orientations = ev_orientations(e)};
-    const ag_value *out = nn_predict(e->tape, e->net, &in);
-    if (!out) {
-        *st = *ag_status(e->tape);
-        return st->code;
-    }
-    for (int64_t i = 0; i < pixels; i++)
-        memcpy(maps + i * MAP_CHANNELS, out->t.data + i * out->t.shape.c, MAP_CHANNELS * sizeof *maps);
-    return TS_OK;
-}
-
-ts_code ev_block(ev_estimator *e, size_t count, ts_status *st)
-{
-    count = (count + 15) / 16 * 16;
-    if (e->count != count) {
-        free(e->x);
-        free(e->gradient);
-        nn_adam_free(&e->adam);
-        e->x = ts_memory(count * sizeof *e->x);
-        e->gradient = ts_memory(count * sizeof *e->gradient);
-        const nn_model numbers = {.count = count, .value = e->x}; /* all that Adam looks at */
-        if (!e->x || !e->gradient || nn_adam_create(&e->adam, &numbers, 0, st) != TS_OK)
-            return ts_fail(st, TS_NOMEM, "out of memory for %zu numbers", count);
-        e->count = count;
-        e->bytes = 2 * count * sizeof *e->x;
-    }
-    memset(e->gradient, 0, count * sizeof *e->gradient);
-    memset(e->x, 0, count * sizeof *e->x);
-    memset(e->adam.m, 0, count * sizeof *e->x);
-    memset(e->adam.v, 0, count * sizeof *e->x);
-    e->adam.step = 0;
-    return TS_OK;
-}
-
-void ev_block_step(ev_estimator *e, float rate)
-{
-    nn_model numbers = {.count = e->count, .value = e->x, .grad = e->gradient};
-    nn_adam_next(&e->adam);
-    nn_adam_step(&e->adam, &numbers, 0, e->count, rate, 1);
 }

@@ -1,5 +1,5 @@
 /* The compared methods behind one interface: a photograph in, maps out, each step seen, time and memory accounted. A
- * file eval/method_NAME.c each. */
+ * file method_NAME.c each. */
 #ifndef EV_METHOD_H
 #define EV_METHOD_H
 #include "eval/metrics/metrics.h"
@@ -77,27 +77,4 @@ int ev_points(const ev_estimator *e, int step[EV_POINTS]);
  * scratch. */
 size_t ev_bytes(const ev_estimator *e);
 
-/* For the methods' files: a setting's value; of EV_WORD the index. */
-double ev_number(const ev_estimator *e, const char *key);
-const char *ev_text(const ev_estimator *e, const char *key);
-bool ev_given(const ev_estimator *e, const char *key);
-/* Of the methods that have this key: nn_input.orientations; of the others 1. */
-#define EV_ORIENTATIONS                                                                                       \
-    {                                                                                                         \
-        .key = "orientations", .type = EV_WORD, .words = "1 2 4 8", .initial = "1",                           \
-        .help = "of the photograph that R_0 is the mean of, as lgd-infer --orientations (whose default is 2)" \
-    }
-int ev_orientations(const ev_estimator *e);
-/* e->net from the key's weights, and the tape without gradients. */
-ts_code ev_open_net(ev_estimator *e, const char *key, ts_status *st);
-ts_code ev_open_train(ev_estimator *e, ts_status *st);
-/* R_0 of e->net as [size, size, MAP_CHANNELS]. */
-ts_code ev_start_r0(ev_estimator *e, const ev_case *c, float *maps, ts_status *st);
-/* The mean of procedural materials, every pixel the same. */
-ts_code ev_start_mean(const ev_case *c, float *maps, ts_status *st);
-/* e->x and e->gradient of so many numbers, and Adam for them; nothing is done where they exist. Moments and gradient
- * are zeroed. */
-ts_code ev_block(ev_estimator *e, size_t count, ts_status *st);
-/* One update of e->x from e->gradient, which is zeroed. */
-void ev_block_step(ev_estimator *e, float rate);
 #endif

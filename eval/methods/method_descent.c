@@ -1,23 +1,17 @@
 /* descent: Adam on the maps themselves, minimising the squared error between the photographs and their re-renderings
  * (the paper's equation 3). */
-#include "eval/methods/method.h"
+#include "eval/methods/method_internal.h"
 #include "render/render.h"
 #include <stdlib.h>
 
-static int steps(const ev_estimator *e) { return (int)ev_number(e, "steps"); }
-static int photos(const ev_estimator *e) { return (int)ev_number(e, "photos"); }
-
-static ts_code open(ev_estimator *e, ts_status *st)
-{
-    return ev_number(e, "start") == 0 ? ev_open_net(e, "model", st) : TS_OK;
-}
+static ts_code open(ev_estimator *e, ts_status *st) { return ev_open_start(e, "model", st); }
 
 /* The sum over the photographs of d (error^2 / 2) / d maps, but for a factor that is the same for all: Adam does not
  * see it. part: a buffer for one's. */
 static void gradient(ev_estimator *e, const ev_case *c, float *part)
 {
     const int64_t pixels = (int64_t)c->size * c->size, count = pixels * MAP_CHANNELS;
-    for (int k = 0; k < photos(e); k++) {
+    for (int k = 0; k < ev_photos(e); k++) {
         float *to = k ? part : e->gradient;
         rd_flash_gradient(rd_grid_full(c->size), e->x, MAP_CHANNELS, &c->input[k], c->image + k * pixels * 3, 1, to,
                           NULL);
@@ -30,11 +24,11 @@ static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, 
     const int64_t count = (int64_t)c->size * c->size * MAP_CHANNELS;
     const float rate = (float)ev_number(e, "rate");
     if (ev_block(e, (size_t)count, st) != TS_OK) return st->code;
-    if ((e->net ? ev_start_r0(e, c, e->x, st) : ev_start_mean(c, e->x, st)) != TS_OK) return st->code;
-    float *part = photos(e) > 1 ? malloc((size_t)count * sizeof *part) : NULL;
-    if (photos(e) > 1 && !part)
+    if (ev_start(e, c, e->x, st) != TS_OK) return st->code;
+    float *part = ev_photos(e) > 1 ? malloc((size_t)count * sizeof *part) : NULL;
+    if (ev_photos(e) > 1 && !part)
         return ts_fail(st, TS_NOMEM, "no memory for the gradient of %d x %d pixels", c->size, c->size);
-    for (int t = 0; seen(t, e->x, MAP_CHANNELS, user) && t < steps(e); t++) {
+    for (int t = 0; seen(t, e->x, MAP_CHANNELS, user) && t < ev_steps(e); t++) {
         gradient(e, c, part);
         ev_block_step(e, rate);
         /* Beyond its range a value has no gradient that would bring it back. */
@@ -44,42 +38,18 @@ static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, 
     return TS_OK;
 }
 
-static const ev_setting settings[] = {
-    {.key = "start",
-     .type = EV_WORD,
-     .words = "r0 constant",
-     .initial = "r0",
-     .grid = "r0 constant",
-     .help = "R_0 of the model, or the mean of procedural materials"},
-    {.key = "rate",
-     .type = EV_REAL,
-     .lo = 0,
-     .hi = 10,
-     .initial = "0.01",
-     .grid = "0.001 0.003 0.01 0.03 0.1",
-     .help = "Adam's rate"},
-    {.key = "steps",
-     .type = EV_WHOLE,
-     .lo = 0,
-     .hi = 100000,
-     .initial = "100",
-     .grid = "0 1 2 5 10 20 50 100 200 500",
-     .steps = true,
-     .help = "number of steps"},
-    {.key = "photos",
-     .type = EV_WHOLE,
-     .lo = 1,
-     .hi = RD_CAPTURE_VIEWS,
-     .initial = "1",
-     .help = "number of photographs"},
-    EV_ORIENTATIONS,
-    {.key = "model", .type = EV_WEIGHTS, .initial = "", .help = "weights for R_0 (default: the program's)"},
-    {0}};
+static const ev_setting settings[] = {EV_START_MAPS,
+                                      EV_ADAM_RATE("0.01", "0.001 0.003 0.01 0.03 0.1"),
+                                      EV_STEPS("100", "0 1 2 5 10 20 50 100 200 500"),
+                                      EV_PHOTOS,
+                                      EV_ORIENTATIONS,
+                                      EV_MODEL_R0("model"),
+                                      {0}};
 const ev_method ev_method_descent = {.name = "descent",
                                      .help = "Adam on the maps (equation 3)",
                                      .settings = settings,
                                      .few = true,
-                                     .steps = steps,
-                                     .photos = photos,
+                                     .steps = ev_steps,
+                                     .photos = ev_photos,
                                      .open = open,
                                      .run = run};

@@ -1,11 +1,9 @@
 /* finetune: Adam on g's weights for each photograph, minimising the RMSE between it and the re-rendering of g's maps
  * (the paper's equation 6). */
-#include "eval/methods/method.h"
+#include "eval/methods/method_internal.h"
 #include "render/losses.h"
 #include "tensor/memory.h"
 #include <string.h>
-
-static int steps(const ev_estimator *e) { return (int)ev_number(e, "steps"); }
 
 static ts_code open(ev_estimator *e, ts_status *st)
 {
@@ -32,10 +30,10 @@ static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, 
     memset(e->adam.v, 0, e->adam.count * sizeof *e->adam.v);
     e->adam.step = 0;
     bool on = true;
-    for (int t = 0; on && t <= steps(e); t++) {
+    for (int t = 0; on && t <= ev_steps(e); t++) {
         ag_reset(e->train);
         ag_value *maps = nn_predict(e->train, e->net, &in);
-        on = maps && seen(t, maps->t.data, maps->t.shape.c, user) && t < steps(e);
+        on = maps && seen(t, maps->t.data, maps->t.shape.c, user) && t < ev_steps(e);
         if (!on) break;
         ag_value *loss = ag_flash_loss(e->train, maps, ag_constant(e->train, in.image), &c->view);
         on = loss && ag_backward(e->train, loss) == TS_OK;
@@ -48,28 +46,14 @@ static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, 
     return st->code;
 }
 
-static const ev_setting settings[] = {
-    {.key = "rate",
-     .type = EV_REAL,
-     .lo = 0,
-     .hi = 10,
-     .initial = "0.0001",
-     .grid = "0.00001 0.00003 0.0001 0.0003 0.001",
-     .help = "Adam's rate"},
-    {.key = "steps",
-     .type = EV_WHOLE,
-     .lo = 0,
-     .hi = 100000,
-     .initial = "20",
-     .grid = "0 1 2 5 10 20 50 100",
-     .steps = true,
-     .help = "number of steps"},
-    {.key = "model", .type = EV_WEIGHTS, .initial = "", .help = "weights whose g is tuned (default: the program's)"},
-    {0}};
+static const ev_setting settings[] = {EV_ADAM_RATE("0.0001", "0.00001 0.00003 0.0001 0.0003 0.001"),
+                                      EV_STEPS("20", "0 1 2 5 10 20 50 100"),
+                                      EV_MODEL("model", "weights whose g is tuned (default: the program's)"),
+                                      {0}};
 const ev_method ev_method_finetune = {.name = "finetune",
                                       .help = "Adam on g's weights at test time (equation 6)",
                                       .settings = settings,
                                       .few = true,
-                                      .steps = steps,
+                                      .steps = ev_steps,
                                       .open = open,
                                       .run = run};

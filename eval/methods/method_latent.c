@@ -1,18 +1,16 @@
 /* latent: Adam in the code of an auto-encoder of maps, minimising the RMSE between photograph and re-rendering (the
  * paper's equation 5). */
-#include "eval/methods/method.h"
+#include "eval/methods/method_internal.h"
 #include "nn/weights/weights.h"
 #include "render/losses.h"
 #include <string.h>
-
-static int steps(const ev_estimator *e) { return (int)ev_number(e, "steps"); }
 
 static ts_code open(ev_estimator *e, ts_status *st)
 {
     const char *path = ev_text(e, "model");
     e->coder = nn_coder_load(path, st);
     if (!e->coder) return st->code;
-    if (ev_number(e, "start") == 0 && ev_open_net(e, "g", st) != TS_OK) return st->code;
+    if (ev_open_start(e, "g", st) != TS_OK) return st->code;
     if (ev_open_train(e, st) != TS_OK) return st->code;
     ag_freeze(e->train, true); /* only the code changes */
     return TS_OK;
@@ -22,7 +20,7 @@ static ts_code open(ev_estimator *e, ts_status *st)
 static ts_code encode(ev_estimator *e, const ev_case *c, float *maps, ts_status *st)
 {
     const ts_shape s = {1, c->size, c->size, MAP_CHANNELS};
-    if ((e->net ? ev_start_r0(e, c, maps, st) : ev_start_mean(c, maps, st)) != TS_OK) return st->code;
+    if (ev_start(e, c, maps, st) != TS_OK) return st->code;
     ag_reset(e->train);
     const ag_value *code = nn_encode(e->train, e->coder, ag_constant(e->train, ts_view(maps, s)));
     if (!code) {
@@ -48,10 +46,10 @@ static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, 
     const ts_tensor image = ts_view((float *)(uintptr_t)c->image, (ts_shape){1, c->size, c->size, 3}),
                     x = ts_view(e->x, (ts_shape){1, side, side, e->coder->coder.code});
     bool on = true;
-    for (int t = 0; on && t <= steps(e); t++) {
+    for (int t = 0; on && t <= ev_steps(e); t++) {
         ag_reset(e->train);
         ag_value *decoded = nn_decode(e->train, e->coder, ag_parameter(e->train, x, e->gradient));
-        on = decoded && seen(t, decoded->t.data, decoded->t.shape.c, user) && t < steps(e);
+        on = decoded && seen(t, decoded->t.data, decoded->t.shape.c, user) && t < ev_steps(e);
         if (!on) break;
         ag_value *loss = ag_flash_loss(e->train, decoded, ag_constant(e->train, image), &c->view);
         on = loss && ag_backward(e->train, loss) == TS_OK;
@@ -62,34 +60,16 @@ static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, 
 }
 
 static const ev_setting settings[] = {
-    {.key = "start",
-     .type = EV_WORD,
-     .words = "r0 constant",
-     .initial = "r0",
-     .grid = "r0 constant",
-     .help = "the code of g's R_0, or of the mean of procedural materials"},
-    {.key = "rate",
-     .type = EV_REAL,
-     .lo = 0,
-     .hi = 10,
-     .initial = "0.03",
-     .grid = "0.0003 0.001 0.003 0.01 0.03 0.1",
-     .help = "Adam's rate"},
-    {.key = "steps",
-     .type = EV_WHOLE,
-     .lo = 0,
-     .hi = 100000,
-     .initial = "50",
-     .grid = "0 1 2 5 10 20 50 100 200",
-     .steps = true,
-     .help = "number of steps"},
+    EV_START("the code of g's R_0, or of the mean of procedural materials"),
+    EV_ADAM_RATE("0.03", "0.0003 0.001 0.003 0.01 0.03 0.1"),
+    EV_STEPS("50", "0 1 2 5 10 20 50 100 200"),
     {.key = "model", .type = EV_WEIGHTS, .help = "weights of an auto-encoder (configs/ablation/latent.ini trains one)"},
-    {.key = "g", .type = EV_WEIGHTS, .initial = "", .help = "weights for R_0 (default: the program's)"},
+    EV_MODEL_R0("g"),
     {0}};
 const ev_method ev_method_latent = {.name = "latent",
                                     .help = "Adam in an auto-encoder's code (equation 5)",
                                     .settings = settings,
                                     .few = true,
-                                    .steps = steps,
+                                    .steps = ev_steps,
                                     .open = open,
                                     .run = run};

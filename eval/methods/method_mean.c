@@ -1,48 +1,9 @@
 /* mean: one constant material, the floor that everything must beat. */
-#include "data/materials/procedural.h"
-#include "eval/methods/method.h"
+#include "eval/methods/method_internal.h"
 #include "render/render.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* Of the training data: its first materials, small, since only their mean is wanted. */
-static ts_code procedural_mean(float mean[MAP_CHANNELS], ts_status *st)
-{
-    enum { MATERIALS = 64, SIDE = 32 };
-    static float known[MAP_CHANNELS];
-    static bool done;
-    const io_procedural source = {.seed = 1};
-    double sum[MAP_CHANNELS] = {0};
-    io_material m;
-    if (!done && io_material_create(&m, SIDE, st) != TS_OK) return st->code;
-    if (!done) {
-        for (int i = 0; i < MATERIALS; i++) {
-            io_procedural_make(&source, (uint64_t)i, &m);
-            for (int p = 0; p < SIDE * SIDE * MAP_CHANNELS; p++)
-                sum[p % MAP_CHANNELS] += (double)m.maps[p] / (MATERIALS * SIDE * SIDE);
-        }
-        for (int k = 0; k < MAP_CHANNELS; k++) known[k] = (float)sum[k];
-        io_material_free(&m);
-        done = true;
-    }
-    memcpy(mean, known, sizeof known);
-    return TS_OK;
-}
-
-static void fill(const ev_case *c, const float mean[MAP_CHANNELS], float *maps)
-{
-    for (int64_t i = 0; i < (int64_t)c->size * c->size; i++)
-        memcpy(maps + i * MAP_CHANNELS, mean, MAP_CHANNELS * sizeof *maps);
-}
-
-ts_code ev_start_mean(const ev_case *c, float *maps, ts_status *st)
-{
-    float mean[MAP_CHANNELS];
-    if (procedural_mean(mean, st) != TS_OK) return st->code;
-    fill(c, mean, maps);
-    return TS_OK;
-}
 
 static void mean_colour(const float *image, int64_t pixels, double mean[3])
 {
@@ -62,7 +23,7 @@ static ts_code fit(const ev_case *c, float mean[MAP_CHANNELS], float *maps, ts_s
     memcpy(black, mean, sizeof black);
     for (int k = 0; k < 3; k++) black[MAP_DIFFUSE + k] = -1;
     for (int pass = 0; pass < 2; pass++) {
-        fill(c, pass ? black : mean, maps);
+        ev_fill(c, pass ? black : mean, maps);
         rd_render(rd_grid_full(c->size), maps, MAP_CHANNELS, &c->view, false, image);
         mean_colour(image, pixels, pass ? specular : all);
     }
@@ -90,13 +51,13 @@ enum { FIT_NO, FIT_YES, FIT_COLOUR };
 static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
 {
     float mean[MAP_CHANNELS];
-    ts_code code = procedural_mean(mean, st);
+    ts_code code = ev_mean(mean, st);
     if (!code) code = ev_block(e, (size_t)c->size * (size_t)c->size * MAP_CHANNELS, st);
     const int how = (int)ev_number(e, "fit");
     if (how == FIT_COLOUR) photo_colour(c, mean);
     if (!code && how == FIT_YES) code = fit(c, mean, e->x, st);
     if (code) return code;
-    fill(c, mean, e->x);
+    ev_fill(c, mean, e->x);
     seen(0, e->x, MAP_CHANNELS, user);
     return TS_OK;
 }

@@ -1,5 +1,5 @@
 /* unet, unet-joint, lgd, lgd-nograd, frozen: networks that only run. They differ in the weights that they ask for. */
-#include "eval/methods/method.h"
+#include "eval/methods/method_internal.h"
 #include "infer/estimate.h"
 #include "infer/tiles.h"
 #include "tensor/threads.h"
@@ -58,7 +58,7 @@ enum { POWER_GIVEN, POWER_AUTO, POWER_KNOWN };
 enum { VIEW_SET, VIEW_TOLD, VIEW_UNKNOWN };
 
 /* The photographs as the method is told of them, and its field of view. */
-static double tell(const ev_estimator *e, const ev_case *c, int count, lgd_photo photo[])
+static double photographs(const ev_estimator *e, const ev_case *c, int count, lgd_photo photo[])
 {
     const int power = (int)ev_number(e, "power"), view = (int)ev_number(e, "view");
     const size_t pixels = (size_t)c->size * (size_t)c->size;
@@ -84,7 +84,7 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
     const lgd_estimator estimator = {.net = e->net, .tape = e->tape, .seen = seen, .user = user};
     double factor;
     lgd_photo photo[NN_MAX_IMAGES];
-    const double fov = tell(e, c, count, photo);
+    const double fov = photographs(e, c, count, photo);
     const lgd_options options = {.size = sizeof options,
                                  .iterations = steps(e),
                                  .exact = e->exact,
@@ -105,10 +105,6 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
     {                                                    \
         .key = "model", .type = EV_WEIGHTS, .help = text \
     }
-#define MODEL(text)                                                     \
-    {                                                                   \
-        .key = "model", .type = EV_WEIGHTS, .initial = "", .help = text \
-    }
 #define ITERATIONS                                                                                 \
     {                                                                                              \
         .key = "iterations", .type = EV_WHOLE, .lo = 0, .hi = 1000,                                \
@@ -122,7 +118,8 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
     }
 
 static const ev_setting unet[] = {MODEL_GIVEN("weights of a g that was trained alone"), {0}};
-static const ev_setting joint[] = {MODEL("weights of g and h (default: the program's)"), EV_ORIENTATIONS, {0}};
+static const ev_setting joint[] = {
+    EV_MODEL("model", "weights of g and h (default: the program's)"), EV_ORIENTATIONS, {0}};
 #define PHOTOS                                                                \
     {                                                                         \
         .key = "photos", .type = EV_WHOLE, .lo = 1, .hi = NN_MAX_IMAGES,      \
@@ -148,7 +145,7 @@ static const ev_setting joint[] = {MODEL("weights of g and h (default: the progr
 #define REFINER \
     ITERATIONS, TOLERANCE, EV_ORIENTATIONS, PHOTOS, POWER, VIEW, PRECISION, { 0 }
 
-static const ev_setting lgd[] = {MODEL("weights of g and h (default: the program's)"), REFINER};
+static const ev_setting lgd[] = {EV_MODEL("model", "weights of g and h (default: the program's)"), REFINER};
 static const ev_setting nograd[] = {MODEL_GIVEN("weights trained with model.gradient = no"), REFINER};
 static const ev_setting frozen[] = {MODEL_GIVEN("weights trained with train.g_rate = 0"), REFINER};
 

@@ -3,7 +3,7 @@
 #include "eval/metrics/flip.h"
 #include "eval/metrics/residue.h"
 #include "eval/multiview.h"
-#include "eval/ssim.h"
+#include "eval/metrics/ssim.h"
 #include "render/error.h"
 #include "render/render.h"
 #include "render/tone.h"

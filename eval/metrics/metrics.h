@@ -3,39 +3,11 @@
 #define EV_METRICS_H
 #include "data/capture.h"
 #include "data/material.h"
-#include "eval/metrics/bands.h"
 #include "eval/metrics/lpips.h"
+#include "eval/metrics/row.h"
 #include "nn/model.h"
 
-enum {
-    EV_DIFFUSE,
-    EV_SPECULAR,
-    EV_ROUGHNESS,
-    EV_NORMAL,
-    EV_RENDER,
-    EV_ANGLE,
-    EV_SSIM,
-    EV_FLIP,
-    EV_EXPOSURE,
-    EV_LPIPS,
-    EV_FLAT,
-    EV_OVER_FLAT,
-    EV_BAND,
-    EV_RESIDUE_DIFFUSE = EV_BAND + EV_BANDS,
-    EV_RESIDUE_SPECULAR,
-    EV_RESIDUE_ROUGHNESS,
-    EV_RESIDUE_HUE,
-    EV_RELIEF,
-    EV_METRICS
-};
 extern const char *const ev_metric_name[EV_METRICS];
-
-typedef struct ev_row {
-    double value[EV_METRICS]; /* RMSE; EV_ANGLE: degrees; EV_SSIM, EV_FLIP, EV_LPIPS: the mean over the renderings;
-                               * EV_EXPOSURE: of captures, and of a fit; EV_FLAT: a flat map's EV_NORMAL, EV_OVER_FLAT
-                               * the quotient of the two; EV_BAND ..: correlation of the normals (bands.h); the rest
-                               * residue.h, of photographs alone. NaN: not measured */
-} ev_row;
 
 /* What one material is evaluated with: known maps, a capture, or only a photograph. */
 typedef struct ev_case {

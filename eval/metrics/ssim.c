@@ -1,4 +1,4 @@
-#include "eval/ssim.h"
+#include "eval/metrics/ssim.h"
 #include "eval/metrics/filter.h"
 #include <math.h>
 #include <stdint.h>

@@ -89,19 +89,3 @@ ts_code nn_safetensors_put(ts_new_file *o, const nn_tensor *tensor, int tensors,
     free(t.data);
     return code;
 }
-
-ts_code nn_safetensors_write(const char *path, const nn_block *blocks, int count, const nn_meta *meta, int metas,
-                             ts_status *st)
-{
-    nn_tensor *tensor = malloc(((size_t)count + 1) * sizeof *tensor);
-    if (!tensor) return ts_fail(st, TS_NOMEM, "%s: no memory to write it", path);
-    for (int i = 0; i < count; i++) {
-        tensor[i] = (nn_tensor){
-            .name = blocks[i].name, .rank = blocks[i].rank, .data = (const unsigned char *)blocks[i].data};
-        for (int j = 0; j < blocks[i].rank; j++) tensor[i].dim[j] = blocks[i].dim[j];
-        nn_tensor_shape(&tensor[i]);
-    }
-    ts_code code = nn_file_write(path, NN_FORM_SAFETENSORS, tensor, count, NN_DTYPES, meta, metas, st);
-    free(tensor);
-    return code;
-}

@@ -1,5 +1,6 @@
 /* A model to a file and back. */
 #include "nn/weights/weights.h"
+#include "nn/weights/file_internal.h"
 #include "nn/layers.h"
 #include "nn/weights/published.h"
 #include "tensor/team.h"
@@ -143,6 +144,22 @@ nn_model *nn_coder_load(const char *path, ts_status *st)
     if (f && !nn_coder_from_file(f, &coder, st)) m = fill(nn_coder_plan(&coder, st), f, false, st);
     nn_file_close(&f);
     return m;
+}
+
+ts_code nn_safetensors_write(const char *path, const nn_block *blocks, int count, const nn_meta *meta, int metas,
+                             ts_status *st)
+{
+    nn_tensor *tensor = malloc(((size_t)count + 1) * sizeof *tensor);
+    if (!tensor) return ts_fail(st, TS_NOMEM, "%s: no memory to write it", path);
+    for (int i = 0; i < count; i++) {
+        tensor[i] = (nn_tensor){
+            .name = blocks[i].name, .rank = blocks[i].rank, .data = (const unsigned char *)blocks[i].data};
+        for (int j = 0; j < blocks[i].rank; j++) tensor[i].dim[j] = blocks[i].dim[j];
+        nn_tensor_shape(&tensor[i]);
+    }
+    ts_code code = nn_file_write(path, NN_FORM_SAFETENSORS, tensor, count, NN_DTYPES, meta, metas, st);
+    free(tensor);
+    return code;
 }
 
 ts_code nn_model_save(const nn_model *model, const float *values, const char *path, const nn_meta *extra, int extras,

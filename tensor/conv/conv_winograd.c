@@ -77,14 +77,14 @@ typedef struct pack_job {
 
 static void pack_part(const pack_job *j, int panel, int part)
 {
-    float turned[2 * 16 * CONV_TURNED]; /* no vector has more than 16 lanes */
+    float transposed[2 * 16 * CONV_TRANSPOSED]; /* no vector has more than 16 lanes */
     const int begin = part * j->step, count = j->ic - begin < j->step ? j->ic - begin : j->step;
-    const int width = conv_turn(j->c, j->w, j->forward, panel, begin, count, turned);
+    const int width = conv_transpose(j->c, j->w, j->forward, panel, begin, count, transposed);
     float *to = j->packed + (ptrdiff_t)panel * 2 * conv_lanes() * depth_of(j->ic, j->bf16);
     for (int i = 0; i < count; i++) {
         const ts_winograd_form form = !j->bf16 ? TS_WINOGRAD_F32 : i % 2 ? TS_WINOGRAD_ODD : TS_WINOGRAD_EVEN;
         const ptrdiff_t row = j->bf16 ? (begin + i) / 2 : begin + i;
-        float *tap = turned + i * 9 * width, mirrored[9 * 2 * 16];
+        float *tap = transposed + i * 9 * width, mirrored[9 * 2 * 16];
         for (int t = 0; t < 9 && !j->forward; t++)
             memcpy(mirrored + t * width, tap + (8 - t) * width, sizeof *tap * (size_t)width);
         ts_winograd_k()->weights[form](j->forward ? tap : mirrored, width / conv_lanes(), to + row * width, j->plane);
@@ -101,7 +101,7 @@ static void pack_parts(const void *job, int64_t begin, int64_t end)
 void conv_winograd_pack(const ts_conv *c, bool forward, bool bf16, const conv_weights *w, float *packed)
 {
     const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c);
-    const int step = conv_turned_inputs(9), parts = (ic + step - 1) / step;
+    const int step = conv_transposed_inputs(9), parts = (ic + step - 1) / step;
     ts_for(c->compute.threads, (int64_t)conv_panels(oc) * parts, 1, pack_parts,
            &(pack_job){c, w, forward, bf16, ic, step, parts, conv_panels_count(depth_of(ic, bf16), oc, 1), packed});
 }

@@ -108,12 +108,14 @@ typedef struct conv_weights {
     const float *full;
     const unsigned char *half;
 } conv_weights;
+/* Numbers at .. at + count - 1 of them, at most CONV_TRANSPOSED, as floats. */
+void conv_take(const conv_weights *w, ptrdiff_t at, int count, float *to);
 
 /* Inputs [input, input + inputs) of a panel: to [input][tap][width], zeros where there is no channel; returns width, of
- * whole vectors. Of the forward or the gradient's way; inputs: at most conv_turned_inputs. */
-enum { CONV_TURNED = 225 }; /* taps of inputs that are turned at once: those of the largest kernel */
-static inline int conv_turned_inputs(int taps) { return taps < 144 ? 144 / taps : 1; }
-int conv_turn(const ts_conv *c, const conv_weights *w, bool forward, int panel, int input, int inputs, float *to);
+ * whole vectors. Of the forward or the gradient's way; inputs: at most conv_transposed_inputs. */
+enum { CONV_TRANSPOSED = 225 }; /* taps of inputs that are transposed at once: those of the largest kernel */
+static inline int conv_transposed_inputs(int taps) { return taps < 144 ? 144 / taps : 1; }
+int conv_transpose(const ts_conv *c, const conv_weights *w, bool forward, int panel, int input, int inputs, float *to);
 
 void conv_run_direct(const conv_plan *p);
 void conv_run_pointwise(const conv_plan *p);

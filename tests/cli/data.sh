@@ -97,6 +97,13 @@ data_interrupted() {
 }
 check data_interrupted data_interrupted
 
+# $T/out: both sides are the same materials, those of --testdata through files: only 8 and 16 bits lie between.
+same_materials() {
+    awk '/^(relief|F0|roughness) / && NF == 11 { n++; for (k = 2; k <= 6; k++) if (($k - $(k + 5))^2 > 1e-4) exit 1 } END { exit n != 3 }' \
+        "$T/out" || fail "quantiles: $(tail -n 16 "$T/out")"
+    awk '/^distance of/ { if ($NF > 0.1) exit 1 }' "$T/out" || fail "$(grep '^distance of' "$T/out")"
+}
+
 data_statistics() {
     expect 1 "$DATA" --statistics --testdata "$T/none"
     says "$T/err" "$T/none"
@@ -105,11 +112,12 @@ data_statistics() {
     expect 0 "$DATA" -o "$T/own/strips" --first 24 --count 24 --size 32 --format strips
     expect 0 "$DATA" --statistics --testdata "$T/own" --count 48 --size 32
     says "$T/out" "distance of 48 procedural materials from 48"
-    # Quantiles of both sides, which are the same materials.
-    awk '/^(relief|F0|roughness) / && NF == 11 { n++; for (k = 2; k <= 6; k++) if (($k - $(k + 5))^2 > 1e-4) exit 1 } END { exit n != 3 }' \
-        "$T/out" || fail "$(tail -n 16 "$T/out")"
-    # The same materials through files: only 8 and 16 bits lie between.
-    awk '/^distance of/ { if ($NF > 0.1) exit 1 }' "$T/out" || fail "$(grep '^distance of' "$T/out")"
+    same_materials
+    mkdir "$T/later"
+    mv "$T/own/strips" "$T/later"
+    expect 0 "$DATA" --statistics --testdata "$T/later" --first 24 --count 24 --size 32
+    says "$T/out" "distance of 24 procedural materials from 24"
+    same_materials
     [ -w /dev/full ] || return 0
     "$DATA" --statistics --testdata "$T/own" --count 4 --size 32 >/dev/full 2>"$T/err"
     [ $? -eq 1 ] || fail "a full disk goes unnoticed"

@@ -1,5 +1,6 @@
 # What the tests of lgd-infer share: the shipped weights, a photograph without test data, the files of a result.
 . tests/cli/lib.sh
+. tests/support/small_model.sh
 MODEL=${LGD_TEST_MODEL:-$ROOT/models/single.safetensors}
 export LGD_MODEL="$MODEL"
 FILES="diffuse.png maps.exr meta.txt normal.png preview.png render.png roughness.png specular.png"
@@ -16,8 +17,7 @@ photo() {
 
 # Weights whose h refines at the photograph's size, which the shipped ones do not have: those that training starts with, as $T/h.safetensors.
 make_weights_with_h() {
-    printf '%s\n' '[model]' 'g_width = 4' 'g_width_max = 8' 'g_levels = 2' 'g_size = 16' 'h_width = 8' 'h_gru = 4' 'iterations = 24' \
-        '[data]' 'patch = 16' '[train]' 'batch = 2' 'steps = 1' 'rate = 0' 'ema = 0' '[validate]' 'count = 2' 'size = 16' >"$T/h.ini"
+    first_weights 24 >"$T/h.ini"
     expect 0 "$BIN/lgd-train" "$T/h.ini" --set output.folder="$T/h" --threads 1
     mv "$T/h/last.safetensors" "$T/h.safetensors"
 }

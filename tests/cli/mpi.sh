@@ -1,5 +1,6 @@
 # lgd-train in several processes, with each MPI library whose mpirun is installed.
 . tests/cli/lib.sh
+. tests/support/small_model.sh
 
 TRAIN=$BIN/lgd-train
 # In containers one process may not read another's memory; messages go through shared memory instead.
@@ -23,17 +24,8 @@ launcher() {
 
 # Twelve steps of g alone and twelve of g and h; buckets of some parameters each.
 config() {
-    cat >"$T/small.ini" <<'INI'
-[model]
-g_width = 4
-g_width_max = 8
-g_levels = 2
-g_size = 16
-h_width = 8
-h_gru = 4
-iterations = 2
-[data]
-patch = 16
+    small_model >"$T/small.ini"
+    cat >>"$T/small.ini" <<'INI'
 [train]
 batch = 6
 pretrain_steps = 12

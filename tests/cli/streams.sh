@@ -45,8 +45,9 @@ timeless() {
     cut -d , -f 1-12,14- "$1/log.csv" >"$1/log" && rm "$1/log.csv" "$1/config.ini"
 }
 train_keeps_its_log() {
-    printf '%s\n' '[model]' 'g_width = 4' 'g_width_max = 8' 'g_levels = 2' 'g_size = 16' 'h_width = 8' 'h_gru = 4' 'iterations = 2' '[data]' 'patch = 16' \
-        '[train]' 'batch = 2' 'pretrain_steps = 2' 'steps = 2' 'log_every = 1' 'checkpoint_every = 2' '[validate]' 'every = 2' 'count = 2' 'size = 16' >"$T/small.ini"
+    { small_model
+      printf '%s\n' '[train]' 'batch = 2' 'pretrain_steps = 2' 'steps = 2' 'log_every = 1' 'checkpoint_every = 2' \
+          '[validate]' 'every = 2' 'count = 2' 'size = 16'; } >"$T/small.ini"
     expect 0 "$BIN/lgd-train" "$T/small.ini" --set output.folder="$T/r" --threads 1
     way=
     timeless "$T/r"

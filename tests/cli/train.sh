@@ -1,21 +1,13 @@
 # lgd-train on the command line.
 . tests/cli/lib.sh
+. tests/support/small_model.sh
 
 TRAIN=$BIN/lgd-train
 
 # A run of ten small steps; more arguments go to the program. Such small work is fastest on one thread.
 config() {
-    cat >"$T/small.ini" <<'INI'
-[model]
-g_width = 4
-g_width_max = 8
-g_levels = 2
-g_size = 16
-h_width = 8
-h_gru = 4
-iterations = 2
-[data]
-patch = 16
+    small_model >"$T/small.ini"
+    cat >>"$T/small.ini" <<'INI'
 [train]
 batch = 2
 pretrain_steps = 4

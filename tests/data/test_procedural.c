@@ -164,7 +164,8 @@ TEST(procedural_families_differ)
     io_feature_set *set = calloc((size_t)n, sizeof *set);
     for (int f = 0; f < n; f++) {
         io_procedural p = {.seed = 3, .families = UINT64_C(1) << f};
-        CHECK(io_features_procedural(&p, COUNT, SIZE, &set[f], NULL) == TS_OK, "no features of %s", io_family_name(f));
+        CHECK(io_features_procedural(&p, 0, COUNT, SIZE, &set[f], NULL) == TS_OK, "no features of %s",
+              io_family_name(f));
     }
     double own = 0;
     for (int f = 0; f < n; f++) own += io_feature_halves(&set[f], 10, 1) / n;
@@ -215,7 +216,7 @@ TEST(procedural_covers_what_materials_are)
     int metals = 0, dark = 0, light = 0, smooth = 0, rough = 0, flat = 0, deep = 0;
     io_procedural p = {.seed = 1};
     io_feature_set set;
-    CHECK(io_features_procedural(&p, COUNT, SIZE, &set, NULL) == TS_OK, "no features");
+    CHECK(io_features_procedural(&p, 0, COUNT, SIZE, &set, NULL) == TS_OK, "no features");
     for (int i = 0; i < COUNT; i++) {
         const double *v = set.values[i]; /* the order of io_feature_name */
         metals += v[19] > 0.3;
@@ -243,7 +244,7 @@ TEST(procedural_statistics_resemble_artists_maps)
     io_feature_set theirs, ours;
     io_procedural p = {.seed = 1};
     CHECK(io_features_folder(folder, SIZE, &theirs, &st) == TS_OK, "%s", st.message);
-    CHECK(io_features_procedural(&p, 200, SIZE, &ours, &st) == TS_OK, "%s", st.message);
+    CHECK(io_features_procedural(&p, 0, 200, SIZE, &ours, &st) == TS_OK, "%s", st.message);
     double distance = io_feature_distance(&ours, &theirs, NULL), halves = io_feature_halves(&theirs, 100, 1);
     CHECK(distance <= 2 * halves, "distance %.3f, more than twice the %.3f between halves of %s", distance, halves,
           folder);

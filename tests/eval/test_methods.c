@@ -6,6 +6,7 @@
 #include "render/error.h"
 #include "render/render.h"
 #include "tensor/peak.h"
+#include "tensor/pin.h"
 #include "tensor/team.h"
 #include "tensor/threads.h"
 #include "tests/test.h"

@@ -1,6 +1,6 @@
 /* SSIM, FLIP and the angle of normals against their definitions, written here once more and as plainly as possible. */
 #include "eval/metrics/flip.h"
-#include "eval/ssim.h"
+#include "eval/metrics/ssim.h"
 #include "render/error.h"
 #include "tensor/maps.h"
 #include "tensor/rng.h"

@@ -3,6 +3,7 @@
 # Usage: sh tests/faults/run.sh [OPTION... of lgd-faults]; SCENARIOS="infer train" chooses.
 # Environment: BUILD; ONLY_ONCE=1: without the second round, in which calls keep failing.
 set -u
+. tests/support/small_model.sh
 : "${BUILD:=build}"
 case $BUILD in /*) ;; *) BUILD=$(pwd)/$BUILD ;; esac
 BIN=$BUILD/bin SHIM=$BUILD/lib/lgd-faults.so
@@ -33,17 +34,8 @@ scenario() {
 OPTIONS=$*
 
 # What the programs read: weights as training starts with, a material, its photograph, a configuration.
-cat >"$T/small.ini" <<'INI'
-[model]
-g_width = 4
-g_width_max = 8
-g_levels = 2
-g_size = 16
-h_width = 8
-h_gru = 4
-iterations = 2
-[data]
-patch = 16
+small_model >"$T/small.ini"
+cat >>"$T/small.ini" <<'INI'
 [train]
 batch = 2
 pretrain_steps = 1

@@ -3,6 +3,7 @@
 #include "infer/model_path.h"
 #include "cli/infer/options.h"
 #include "infer/output.h"
+#include "infer/preview.h"
 #include "cli/infer/plan.h"
 #include "tensor/rng.h"
 #include "tests/test.h"

@@ -3,6 +3,7 @@
 # fail, and lgd-train's loader with several makers. Prints a line each; a report is printed and ends with 1.
 # Environment: BUILD.
 set -u
+. tests/support/small_model.sh
 : "${BUILD:=build-tsan}"
 T=$(mktemp -d) || exit 1
 trap 'rm -rf "$T"' EXIT
@@ -27,17 +28,8 @@ watched() {
         echo "ok tsan: $name"
     fi
 }
-cat >"$T/small.ini" <<'INI'
-[model]
-g_width = 4
-g_width_max = 8
-g_levels = 2
-g_size = 16
-h_width = 8
-h_gru = 4
-iterations = 2
-[data]
-patch = 16
+small_model >"$T/small.ini"
+cat >>"$T/small.ini" <<'INI'
 threads = 4
 prefetch = 3
 [train]

@@ -1,5 +1,5 @@
 /* The public C API (infer/lgd.h): models and who computes with them, and what a caller may get wrong. */
-#include "infer/lgd.h"
+#include "infer/api_model.h"
 #include "infer/api.h"
 #include "infer/estimate.h"
 #include "infer/tiles.h"
@@ -42,8 +42,6 @@ void lgd_options_init(lgd_options *options, size_t size)
 }
 
 int lgd_trained_iterations(const lgd_model *model) { return model->net->arch.iterations; }
-
-const nn_model *lgd_model_net(const lgd_model *model) { return model->net; }
 
 int lgd_published(const lgd_model *model) { return model->net->arch.compat == NN_COMPAT_PUBLISHED; }
 
@@ -197,6 +195,12 @@ ts_code lgd_model_estimate(lgd_model *model, const lgd_photo *photo, int photos,
     lgd_estimator_run(&e, photo, photos, side, &o, maps, st);
     give_back(model, w);
     return st->code;
+}
+
+double lgd_model_bytes(const lgd_model *model, int side, const lgd_options *options)
+{
+    const lgd_estimator e = {.net = model->net};
+    return lgd_estimator_bytes(&e, side, options);
 }
 
 int lgd_estimate_photos(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,

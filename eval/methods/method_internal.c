@@ -1,0 +1,127 @@
+#include "eval/methods/method_internal.h"
+#include "cli/cli.h"
+#include "nn/weights/weights.h"
+#include "tensor/memory.h"
+#include <stdlib.h>
+#include <string.h>
+
+int ev_find(const ev_setting *settings, const char *key)
+{
+    for (int i = 0; settings[i].key; i++)
+        if (!strcmp(settings[i].key, key)) return i;
+    return -1;
+}
+
+int ev_word(const char *words, const char *word)
+{
+    const size_t n = strlen(word);
+    for (int i = 0; *words; i++) {
+        const size_t length = strcspn(words, " ");
+        if (length == n && !strncmp(words, word, n)) return i;
+        words += length + strspn(words + length, " ");
+    }
+    return -1;
+}
+
+const char *ev_text(const ev_estimator *e, const char *key)
+{
+    const int i = ev_find(e->method->settings, key);
+    return i < 0 ? NULL : e->value[i];
+}
+
+bool ev_given(const ev_estimator *e, const char *key) { return ev_text(e, key) != NULL; }
+
+double ev_number(const ev_estimator *e, const char *key)
+{
+    const char *text = ev_text(e, key);
+    const ev_setting *s = &e->method->settings[ev_find(e->method->settings, key)];
+    double v = 0;
+    if (!text) return -1;
+    if (s->type == EV_WORD) return ev_word(s->words, text);
+    cl_parse_real(text, s->lo, s->hi, &v);
+    return v;
+}
+
+int ev_orientations(const ev_estimator *e)
+{
+    return ev_find(e->method->settings, "orientations") >= 0 ? 1 << (int)ev_number(e, "orientations") : 1;
+}
+
+int ev_steps(const ev_estimator *e) { return (int)ev_number(e, "steps"); }
+int ev_photos(const ev_estimator *e) { return (int)ev_number(e, "photos"); }
+
+ts_code ev_open_net(ev_estimator *e, const char *key, ts_status *st)
+{
+    e->net = nn_model_load(ev_text(e, key), st);
+    if (e->net) e->tape = ag_tape_create(false, st);
+    if (!e->tape) return st->code;
+    ag_compute_set(e->tape, (ts_compute){.exact = e->exact});
+    ag_freeze(e->tape, true);
+    return TS_OK;
+}
+
+ts_code ev_open_start(ev_estimator *e, const char *key, ts_status *st)
+{
+    return ev_number(e, "start") == 0 ? ev_open_net(e, key, st) : TS_OK;
+}
+
+ts_code ev_open_train(ev_estimator *e, ts_status *st)
+{
+    e->train = ag_tape_create(true, st);
+    if (!e->train) return st->code;
+    ag_compute_set(e->train, (ts_compute){.exact = e->exact});
+    return TS_OK;
+}
+
+ts_code ev_start_r0(ev_estimator *e, const ev_case *c, float *maps, ts_status *st)
+{
+    const int64_t pixels = (int64_t)c->size * c->size;
+    ag_reset(e->tape);
+    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){1, c->size, c->size, 3}),
+                         .grid = rd_grid_full(c->size),
+                         .view = c->view,
+                         .orientations = ev_orientations(e)};
+    const ag_value *out = nn_predict(e->tape, e->net, &in);
+    if (!out) {
+        *st = *ag_status(e->tape);
+        return st->code;
+    }
+    for (int64_t i = 0; i < pixels; i++)
+        memcpy(maps + i * MAP_CHANNELS, out->t.data + i * out->t.shape.c, MAP_CHANNELS * sizeof *maps);
+    return TS_OK;
+}
+
+ts_code ev_start(ev_estimator *e, const ev_case *c, float *maps, ts_status *st)
+{
+    return e->net ? ev_start_r0(e, c, maps, st) : ev_start_mean(c, maps, st);
+}
+
+ts_code ev_block(ev_estimator *e, size_t count, ts_status *st)
+{
+    count = (count + 15) / 16 * 16;
+    if (e->count != count) {
+        free(e->x);
+        free(e->gradient);
+        nn_adam_free(&e->adam);
+        e->x = ts_memory(count * sizeof *e->x);
+        e->gradient = ts_memory(count * sizeof *e->gradient);
+        const nn_model numbers = {.count = count, .value = e->x}; /* all that Adam looks at */
+        if (!e->x || !e->gradient || nn_adam_create(&e->adam, &numbers, 0, st) != TS_OK)
+            return ts_fail(st, TS_NOMEM, "out of memory for %zu numbers", count);
+        e->count = count;
+        e->bytes = 2 * count * sizeof *e->x;
+    }
+    memset(e->gradient, 0, count * sizeof *e->gradient);
+    memset(e->x, 0, count * sizeof *e->x);
+    memset(e->adam.m, 0, count * sizeof *e->x);
+    memset(e->adam.v, 0, count * sizeof *e->x);
+    e->adam.step = 0;
+    return TS_OK;
+}
+
+void ev_block_step(ev_estimator *e, float rate)
+{
+    nn_model numbers = {.count = e->count, .value = e->x, .grad = e->gradient};
+    nn_adam_next(&e->adam);
+    nn_adam_step(&e->adam, &numbers, 0, e->count, rate, 1);
+}

@@ -1,0 +1,16 @@
+/* Estimates with a model that others may be using, for programs: what lgd_estimate_photos of infer/lgd.h does, with a
+ * ts_status. */
+#ifndef LGD_API_MODEL_H
+#define LGD_API_MODEL_H
+#include "infer/lgd.h"
+#include "tensor/status.h"
+#include <stdbool.h>
+
+/* Checks the arguments. encoded: maps are in the encoding of tensor/maps.h (infer/estimate.h), else as infer/lgd.h has
+ * them. */
+ts_code lgd_model_estimate(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,
+                           bool encoded, float *maps, ts_status *st);
+
+/* Bytes that such an estimate holds at once, at most, beside its photographs and maps. */
+double lgd_model_bytes(const lgd_model *model, int side, const lgd_options *options);
+#endif

@@ -1,0 +1,43 @@
+/* The weights of a panel's outputs are read as they stand, some inputs of each, and transposed in the first cache:
+ * from number to number they would be a page apart. */
+#include "tensor/conv/plan.h"
+#include "tensor/kernels/elementwise.h"
+#include <string.h>
+
+void conv_take(const conv_weights *w, ptrdiff_t at, int count, float *to)
+{
+    uint16_t part[CONV_TRANSPOSED]; /* a file's halves are not aligned */
+    if (w->full) {
+        memcpy(to, w->full + at, sizeof *to * (size_t)count);
+        return;
+    }
+    memcpy(part, w->half + 2 * at, sizeof *part * (size_t)count);
+    ts_elementwise_k()->from_half(count, part, to);
+}
+
+int conv_transpose(const ts_conv *c, const conv_weights *w, bool forward, int panel, int input, int inputs, float *to)
+{
+    const int oc = forward ? c->oc : ts_conv_variables(c), width = conv_vectors(oc, panel) * conv_lanes(),
+              o0 = panel * 2 * conv_lanes(), count = oc - o0 < width ? oc - o0 : width, taps = c->k * c->k;
+    float rows[2 * 16 * CONV_TRANSPOSED]; /* no vector has more than 16 lanes */
+    /* weight[o][i][tap], or of the gradient, whose inputs are the outputs, weight[i][o][tap] */
+    const int columns = forward ? inputs * taps : taps;
+    if (!forward && taps == 1) { /* in order already */
+        for (int i = 0; i < inputs; i++) {
+            conv_take(w, (ptrdiff_t)(input + i) * c->ic + o0, count, to + i * width);
+            memset(to + i * width + count, 0, sizeof *to * (size_t)(width - count));
+        }
+        return width;
+    }
+    for (int i = 0; i < (forward ? 1 : inputs); i++) {
+        if (forward)
+            for (int o = 0; o < count; o++)
+                conv_take(w, ((ptrdiff_t)(o0 + o) * c->ic + input) * taps, columns, rows + o * columns);
+        else
+            for (int o = 0; o < count; o++)
+                conv_take(w, ((ptrdiff_t)(input + i) * c->ic + o0 + o) * taps, columns, rows + o * columns);
+        memset(rows + count * columns, 0, sizeof *rows * (size_t)((width - count) * columns));
+        ts_conv_k()->transpose(rows, width, columns, to + (ptrdiff_t)i * taps * width, width);
+    }
+    return width;
+}
