@@ -45,6 +45,8 @@ int lgd_trained_iterations(const lgd_model *model) { return model->net->arch.ite
 
 const nn_model *lgd_model_net(const lgd_model *model) { return model->net; }
 
+void lgd_model_single(lgd_model *model) { model->net->g_once = true; }
+
 int lgd_published(const lgd_model *model) { return model->net->arch.compat == NN_COMPAT_PUBLISHED; }
 
 int lgd_most_photos(const lgd_model *model) { return model->net->arch.images; }
