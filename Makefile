@@ -12,7 +12,7 @@
 #: make blender      the Blender add-on as build/lgd_material-VERSION.zip, with that wheel in it
 #: make deb          Debian packages into build/: lgd, liblgd0, liblgd-dev, lgd-models, python3-lgd
 #: make bench        times; BENCH="conv_ infer" runs the benchmarks whose names contain these words
-#: make bench-deps   PyTorch, for the comparison in make bench
+#: make bench-deps   PyTorch, torch.compile and OpenVINO, for the comparison in make bench
 #: make stress       the numerics far from ordinary input; STRESS=shading runs one part
 #: make fuzz         the readers under libFuzzer; FUZZ=torch for one of them, FUZZ_SECONDS=600 for each
 #: make faults       every program with each call that can fail failing, one at a time; then with LeakSanitizer
@@ -330,7 +330,7 @@ test-folders: programs
 	@BUILD=$(BUILD) sh tests/kill_folder.sh
 	@BUILD=$(BUILD) sh tests/folder_memory.sh
 
-# PyTorch for the peer's column: bench/peer_torch.py
+# The peers: bench/peer_torch.py
 bench-deps:
 	@BUILD=$(BUILD) sh .ci/bench-deps.sh
 

@@ -67,9 +67,9 @@ static void forward(ag_tape *tape, ag_node *node)
     const conv_attr *a = node->attr;
     const ts_conv_use use = ts_conv_packing(&a->conv, TS_CONV_OUTPUT);
     if (ag_traced()) ag_trace_way(tape, ts_conv_way_name(ts_conv_choose(&a->conv, TS_CONV_OUTPUT)));
+    const ts_mark mark = ts_arena_mark(ag_arena(tape));
     const float *packed = ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data);
     if (!packed) return;
-    const ts_mark mark = ts_arena_mark(ag_arena(tape));
     const float *x = input(tape, node), *bias = node->in[BIAS] ? node->in[BIAS]->t.data : NULL;
     if (x) forwards[use](&a->conv, x, packed, bias, a->leak, node->out->t.data);
     ts_arena_release(ag_arena(tape), mark);

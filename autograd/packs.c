@@ -90,15 +90,20 @@ static bool grow(ag_packs *p)
     return true;
 }
 
+/* packed: NULL is passed on. */
+static const float *fill(const ag_packs *p, const ts_conv *c, ts_conv_use use, const float *weight, float *packed)
+{
+    const void *half = packed && p->halves ? p->halves(weight, p->user) : NULL;
+    if (packed && !half) ts_conv_pack(c, use, weight, packed);
+    return half && !ts_conv_pack_half(c, use, half, packed) ? NULL : packed;
+}
+
 static const float *find(ag_packs *p, const ts_conv *c, ts_conv_use use, const float *weight)
 {
     for (size_t i = 0; i < p->count; i++)
         if (is(&p->pack[i], c, use, weight)) return p->pack[i].packed;
     float *packed = ts_arena_alloc(p->arena, ts_conv_packed_count(c, use) * sizeof(float));
-    if (!packed || !grow(p)) return NULL;
-    const void *half = p->halves ? p->halves(weight, p->user) : NULL;
-    if (!half) ts_conv_pack(c, use, weight, packed);
-    else if (!ts_conv_pack_half(c, use, half, packed)) return NULL;
+    if (!packed || !grow(p) || !fill(p, c, use, weight, packed)) return NULL;
     p->pack[p->count++] = (pack){weight, use, *c, packed};
     return packed;
 }
@@ -109,4 +114,9 @@ const float *ag_packs_find(ag_packs *p, const ts_conv *c, ts_conv_use use, const
     const float *packed = find(p, c, use, weight);
     pthread_mutex_unlock(&p->lock);
     return packed;
+}
+
+const float *ag_packs_pass(ag_packs *p, const ts_conv *c, ts_conv_use use, const float *weight, ts_arena *arena)
+{
+    return fill(p, c, use, weight, ts_arena_alloc(arena, ts_conv_packed_count(c, use) * sizeof(float)));
 }

@@ -21,4 +21,6 @@ void ag_packs_halves(ag_packs *p, ag_halves halves, void *user);
 /* Those of weight for that use, packed at the first request; they stay where they are until forgotten. The key is
  * weight's address, use and c but for n, h and w. Threads may ask at once. NULL when memory is out. */
 const float *ag_packs_find(ag_packs *p, const ts_conv *c, ts_conv_use use, const float *weight);
+/* The same packed into memory of arena and not kept. */
+const float *ag_packs_pass(ag_packs *p, const ts_conv *c, ts_conv_use use, const float *weight, ts_arena *arena);
 #endif

@@ -301,10 +301,13 @@ ts_code ag_backward(ag_tape *tape, ag_value *loss)
 
 const float *ag_packed(ag_tape *tape, const ts_conv *c, ts_conv_use use, const float *weight)
 {
-    const float *packed = ag_packs_find(tape->packs, c, use, weight);
+    const float *packed = tape->passing ? ag_packs_pass(tape->packs, c, use, weight, tape->arena)
+                                        : ag_packs_find(tape->packs, c, use, weight);
     if (!packed) no_memory(tape, "packed weights");
     return packed;
 }
+
+void ag_pass(ag_tape *tape, bool passing) { tape->passing = passing && !tape->gradients; }
 
 void ag_halves_from(ag_tape *tape, ag_halves halves, void *user) { ag_packs_halves(tape->packs, halves, user); }
 

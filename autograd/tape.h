@@ -125,6 +125,10 @@ bool ag_checkpoint(ag_tape *tape, ag_body body, const void *user, size_t size, i
  * address, use and shape. */
 const float *ag_packed(ag_tape *tape, const ts_conv *c, ts_conv_use use, const float *weight);
 void ag_freeze(ag_tape *tape, bool frozen);
+/* On a tape without gradients: weights that are asked for while passing are for one use. They are packed where the
+ * operation has its intermediate values, which the next one has again: that memory is neither cleared by the system for
+ * each layer nor far from the caches. */
+void ag_pass(ag_tape *tape, bool passing);
 /* Weights of convolutions that are in memory as IEEE 754 halves: halves returns where, or NULL for others. The floats
  * of such a weight are never read; its address is its name. For tapes that share packed weights too. */
 typedef const void *(*ag_halves)(const float *weight, void *user);

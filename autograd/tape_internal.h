@@ -13,7 +13,7 @@ typedef struct ag_held {
 struct ag_tape {
     ts_arena *arena, *moving; /* moving: what a scope keeps, while the arena is released */
     ag_packs *packs;
-    bool gradients, frozen;
+    bool gradients, frozen, passing;
     ts_compute compute;
     ag_value *into;  /* of the next operation */
     const char *way; /* of the convolution that runs, while it is traced */

@@ -45,11 +45,8 @@ void bench_heading(const char *text);
  * peak. Wall time only. */
 void bench_row_threads(void (*f)(void *user), void *user);
 
-/* Median seconds that the peer (bench/peer_torch.py, whose head lists the jobs) takes for a job; NaN without a
- * peer or when it fails, which is reported once. bench_row_peer: below a row, its floor (flop at the peak) and the
- * peer's time; bench_row_peer_bf16: the peer's time for the same in bf16, with its own autocast. */
-double bench_peer(const char *job);
-const char *bench_peer_name(void);
-void bench_row_peer(bench_time t, double flop, double peer);
-void bench_row_peer_bf16(bench_time t, const char *job);
+/* Below a row: its floor (flop at the peak), and what the peers take for the same work (bench/peer_torch.py, whose head
+ * lists the jobs; "bf16 " before one that has its networks in bf16, so that bf16 is held against bf16). One that is not
+ * there is named once, one that has not this work each time. */
+void bench_row_peers(bench_time t, double flop, const char *job);
 #endif

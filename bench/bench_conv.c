@@ -166,7 +166,7 @@ static void peer_row(const char *what, const char *job, ts_conv c, void (*f)(voi
     const double flop = times * 2.0 * c.n * c.h * c.w * c.ic * c.oc * c.k * c.k;
     const bench_time t = bench_measure(f, &w);
     bench_row(label, t, flop);
-    bench_row_peer(t, flop, bench_peer(text));
+    bench_row_peers(t, flop, text);
     discard(&w);
 }
 

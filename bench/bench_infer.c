@@ -9,7 +9,6 @@
 #include "render/render.h"
 #include "tensor/maps.h"
 #include "tensor/threads.h"
-#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -66,9 +65,11 @@ static void gradient(void *user)
     ag_scope_end(s->own, mark, NULL, 0);
 }
 
-static void measure(nn_arch arch, const char *heading)
+/* always_exact: lgd-infer computes such a network directly. The peers stand beside the way that it takes. */
+static void measure(nn_arch arch, bool always_exact, const char *heading)
 {
-    char label[128], job[256];
+    enum { ROUNDED = 5 };
+    char label[128], job[256] = "bf16 ";
     subject s = {.options = {.size = sizeof(lgd_options), .exact = 1}};
     s.model = nn_model_create(&arch, &s.st);
     s.tape = ag_tape_create(false, &s.st);
@@ -109,41 +110,39 @@ static void measure(nn_arch arch, const char *heading)
     bench_row_unit("  of which the renderer's gradient", t, SIDE * SIDE / t.seconds * 1e-6, "Mpixel/s");
     const int steps = s.options.iterations = arch.iterations;
     const double flop = g + coarse + (steps - arch.coarse_steps) * h - (arch.recurrent ? 1 : steps) * unused;
-    bench_peer_network("infer", &arch, steps, job, sizeof job);
+    bench_peer_network("infer", &arch, steps, job + ROUNDED, sizeof job - ROUNDED);
     snprintf(job + strlen(job), sizeof job - strlen(job), " %d", SIDE);
-    double peer = NAN;
     for (int exact = 1; exact >= 0; exact--) {
         s.options.exact = exact;
         snprintf(label, sizeof label, "g and %d steps, %s", steps, exact ? "direct" : "Winograd where it wins");
         t = bench_measure(whole, &s);
         bench_row(label, t, flop);
-        if (!exact) bench_row_peer(t, flop, peer = bench_peer(job));
+        if (exact == always_exact) bench_row_peers(t, flop, job + ROUNDED);
         if (exact) bench_row_threads(whole, &s);
         bench_row("  of which g and the steps", bench_measure(network, &s), flop);
     }
-    s.options.exact = 1;
+    s.options.exact = always_exact;
     s.options.precision = LGD_BF16;
     t = bench_measure(whole, &s);
     snprintf(label, sizeof label, "g and %d steps, bf16%s", steps, bench_bf16(&t) ? "" : ", emulated");
     bench_row(label, t, flop);
-    bench_row_peer(t, flop, peer);
-    bench_row_peer_bf16(t, job);
+    bench_row_peers(t, flop, job);
     if (s.st.code) printf("  %s\n", s.st.message);
     ag_tape_destroy(&s.tape);
     ag_tape_destroy(&s.own);
     nn_model_free(&s.model);
 }
 
-BENCH(infer) { measure(nn_arch_default(), "inference, 256 x 256, default architecture"); }
+BENCH(infer) { measure(nn_arch_default(), false, "inference, 256 x 256, default architecture"); }
 
-/* The shipped model's, whose Newton steps the peer does not have. */
+/* The shipped model's, whose Newton steps the peers do not have. */
 BENCH(infer_shipped)
 {
     ts_status st = {0};
     nn_arch a;
     nn_file *file = nn_file_open("models/single.safetensors", &st);
     if (!file || nn_arch_from_file(file, &a, &st)) printf("  %s\n", st.message);
-    else measure(a, "inference, 256 x 256, the architecture of models/single.safetensors");
+    else measure(a, false, "inference, 256 x 256, the architecture of models/single.safetensors");
     nn_file_close(&file);
 }
 
@@ -156,5 +155,5 @@ BENCH(infer_paper)
     a.h_width = 256, a.h_gru = 64, a.iterations = 6, a.recurrent = false, a.descent = NN_DESCENT_NONE,
     a.mean_before_norm = false;
     a.rmse = NN_RMSE_BATCH, a.encoding = NN_GRADIENT_RAW;
-    measure(a, "inference, 256 x 256, the published networks");
+    measure(a, true, "inference, 256 x 256, the published networks");
 }

@@ -69,7 +69,7 @@ static void material(void *user)
     io_procedural_make(&p, s->next++, &m);
 }
 
-/* The same network and steps for the peer. */
+/* The same network and steps for the peers. */
 static void peer_job(const subject *s, char *job, size_t size)
 {
     bench_peer_network("train", &s->model->arch, s->steps, job, (int)size);
@@ -121,16 +121,15 @@ static void measure(subject *s)
     ag_compute_set(s->tape, (ts_compute){0});
     const bench_time t = bench_measure(step, s);
     bench_row(label, t, flop);
-    char job[256];
-    peer_job(s, job, sizeof job);
-    const double peer = bench_peer(job);
-    bench_row_peer(t, flop, peer);
+    enum { ROUNDED = 5 };
+    char job[256] = "bf16 ";
+    peer_job(s, job + ROUNDED, sizeof job - ROUNDED);
+    bench_row_peers(t, flop, job + ROUNDED);
     bench_row_threads(step, s);
     ag_compute_set(s->tape, (ts_compute){.precision = TS_BF16});
     bench_time rounded = bench_measure(step, s);
     bench_row(bench_bf16(&rounded) ? "  in bf16" : "  in bf16, emulated", rounded, flop);
-    bench_row_peer(rounded, flop, peer);
-    bench_row_peer_bf16(rounded, job);
+    bench_row_peers(rounded, flop, job);
     ag_compute_set(s->tape, (ts_compute){0});
     bench_time part = bench_measure(losses, s);
     bench_row_unit(s->steps > 0 ? "  of which both losses, 9 renderings each" : "  of which the loss, 9 renderings",
@@ -194,8 +193,8 @@ static void train(const char *config, const char *heading, void (*rows)(subject 
 BENCH(train)
 {
     train("configs/single.ini",
-          "a training step of configs/single.ini: g, the coarse steps with their Newton steps (which the peer does not "
-          "have; its gradient is of the photograph at g's size), losses, all gradients that are asked for, Adam",
+          "a training step of configs/single.ini: g, the coarse steps with their Newton steps (which the peers do not "
+          "have; their gradient is of the photograph at g's size), losses, all gradients that are asked for, Adam",
           measure);
 }
 BENCH(train_g) { train("configs/single-g.ini", "a training step of configs/single-g.ini: g alone", measure); }

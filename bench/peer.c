@@ -1,4 +1,4 @@
-/* The peer: bench/peer_torch.py at the other end of two pipes, started at its first job. */
+/* The peers: bench/peer_torch.py at the other end of two pipes, started at its first job. */
 #include "bench/bench.h"
 #include "tensor/threads.h"
 #include <math.h>
@@ -13,7 +13,12 @@
 static FILE *to, *from;
 static pid_t child;
 static bool asked;
-static char name[128] = "PyTorch";
+
+static struct engine {
+    const char *word, *absent; /* of the jobs; what a line about one that is not there calls it */
+    char name[128];            /* "" where it is not there */
+} engines[] = {{"eager", "eager PyTorch", ""}, {"compile", "torch.compile", ""}, {"openvino", "OpenVINO", ""}};
+enum { ENGINES = sizeof engines / sizeof *engines };
 
 /* The one that make bench-deps made, and the system's. */
 static const char *const interpreters[] = {"build/venv/bin/python3", "/usr/bin/python3"};
@@ -55,13 +60,18 @@ static bool start_with(const char *interpreter)
     close(there[0]), close(back[1]);
     to = fdopen(there[1], "w");
     from = fdopen(back[0], "r");
-    const char *answer = ask("version");
+    char text[64];
+    snprintf(text, sizeof text, "threads %d", ts_threads());
+    const char *answer = ask(text);
     if (child < 0 || !*answer || *answer == '-') return stop(), false;
-    snprintf(name, sizeof name, "%s", answer);
-    char threads[32];
-    snprintf(threads, sizeof threads, "threads %d", ts_threads());
-    ask(threads);
     if (bench_cpu()) ask("clock cpu");
+    for (int i = 0; i < ENGINES; i++) {
+        struct engine *e = &engines[i];
+        snprintf(text, sizeof text, "%s version", e->word);
+        answer = ask(text);
+        if (*answer && *answer != '-') snprintf(e->name, sizeof e->name, "%s", answer);
+        else printf("  (%s: skipped, %s; make bench-deps gets it)\n", e->absent, *answer ? answer + 2 : "it ended");
+    }
     return true;
 }
 
@@ -69,37 +79,35 @@ static void start(void)
 {
     asked = true;
     if (start_with(interpreters[0]) || start_with(interpreters[1])) atexit(stop);
-    else printf("  (there is no PyTorch here: make bench-deps gets one; its column stays empty)\n");
+    else printf("  (peers skipped: there is no PyTorch here; make bench-deps gets it, torch.compile and OpenVINO)\n");
 }
 
-double bench_peer(const char *job)
+/* Median seconds that an engine takes for a job; NaN when it has none for it, which is said. */
+static double seconds_of(const struct engine *e, const char *job)
 {
-    if (!asked) start();
-    if (!to) return NAN;
-    const char *answer = ask(job);
+    char text[320];
+    snprintf(text, sizeof text, "%s %s", e->word, job);
+    const char *answer = ask(text);
     char *end;
     const double seconds = strtod(answer, &end);
     if (end != answer && *answer != '-') return seconds;
-    printf("  (%s: %s)\n", name, *answer ? answer + 2 : "it ended");
+    printf("    (%s: %s)\n", e->name, *answer ? answer + 2 : "it ended");
     if (!*answer) stop();
     return NAN;
 }
 
-const char *bench_peer_name(void) { return name; }
-
-void bench_row_peer_bf16(bench_time t, const char *job)
+void bench_row_peers(bench_time t, double flop, const char *job)
 {
-    char rounded[300];
-    snprintf(rounded, sizeof rounded, "bf16 %s", job);
-    const double peer = bench_peer(rounded);
-    if (isfinite(peer)) printf("    %s in bf16 %.3f ms: %.2f x ours\n", name, 1e3 * peer, peer / t.seconds);
-    fflush(stdout);
-}
-
-void bench_row_peer(bench_time t, double flop, double peer)
-{
-    printf("    floor %.3f ms", 1e3 * flop / t.peak);
-    if (isfinite(peer)) printf(", %s %.3f ms: %.2f x ours", name, 1e3 * peer, peer / t.seconds);
-    printf("\n");
+    double seconds[ENGINES], least = INFINITY;
+    if (!asked) start();
+    printf("    floor %.3f ms\n", 1e3 * flop / t.peak);
+    for (int i = 0; i < ENGINES; i++) {
+        seconds[i] = to && *engines[i].name ? seconds_of(&engines[i], job) : NAN;
+        if (seconds[i] < least) least = seconds[i];
+    }
+    for (int i = 0; i < ENGINES; i++)
+        if (isfinite(seconds[i]))
+            printf("    %s%s %.3f ms: %.2f x ours%s\n", engines[i].name, strncmp(job, "bf16 ", 5) == 0 ? ", bf16" : "",
+                   1e3 * seconds[i], seconds[i] / t.seconds, seconds[i] <= least ? ", the strongest" : "");
     fflush(stdout);
 }

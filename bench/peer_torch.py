@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""The peer of lgd-bench: our networks and single convolutions in PyTorch, on the CPU.
+"""The peers of lgd-bench: our networks and single convolutions in PyTorch, in torch.compile and in OpenVINO (peer_engines.py), on the CPU.
 
 Reads jobs from standard input, one a line, and answers each with its median time in seconds (or "-" and a reason):
-    version                                  the version, and nothing to do with time
     threads N
-    clock cpu                                processor time of all threads over their number, in place of wall time
-    conv N H W IC OC K DILATION PAD          forward, the better of both memory formats; PAD: zero or replicate
-    gradient N H W IC OC K DILATION PAD      gradients of input and weights together
-    infer G_WIDTH G_MAX G_LEVELS G_FIRST G_KERNEL G_SIZE H_WIDTH H_GRU CHANNELS RECURRENT T COARSE_T COARSE_SIZE COARSE_WIDTH COARSE_GRU SIDE
-    train (the same up to COARSE_GRU) BATCH PATCH WINDOW FIXED   T 0: g alone; FIXED 1: all but g; H_WIDTH 0: the coarse steps alone
-    bf16 infer ..., bf16 train ...           the same with the networks under autocast to bfloat16
-Weights are random: time does not depend on them. Renderer's gradients are included, by autograd.
+    clock cpu                                    processor time of all threads over their number, in place of wall time
+    ENGINE version                               eager, compile or openvino: its name, and nothing to do with time
+    ENGINE conv N H W IC OC K DILATION PAD       forward, PAD: zero or replicate
+    ENGINE gradient N H W IC OC K DILATION PAD   gradients of input and weights together; eager alone
+    ENGINE infer G_WIDTH G_MAX G_LEVELS G_FIRST G_KERNEL G_SIZE H_WIDTH H_GRU CHANNELS RECURRENT T COARSE_T COARSE_SIZE COARSE_WIDTH COARSE_GRU SIDE
+    ENGINE train (the same up to COARSE_GRU) BATCH PATCH WINDOW FIXED   T 0: g alone; FIXED 1: all but g; H_WIDTH 0: the coarse steps alone
+    ENGINE bf16 conv ..., infer ..., train ...   the same with the networks in bfloat16
+Weights are random: time does not depend on them. Renderer's gradients are included.
 """
 import math
 import sys
@@ -20,20 +20,19 @@ try:
     import torch
     import torch.nn.functional as F
     from torch import nn
+
+    import peer_engines as engines
 except ImportError:
     print("- there is no PyTorch here", flush=True)
     sys.exit(0)
 
 
-wall, clock, threads, rounded = time.perf_counter, time.perf_counter, 1, False
-
-
-def precision():
-    return torch.autocast("cpu", dtype=torch.bfloat16, enabled=rounded)
+wall, clock, threads = time.perf_counter, time.perf_counter, 1
 
 
 def median_time(f, least=0.7, most=10.0):
     """Warmed up, at least three runs."""
+    f()
     f()
     times, begin = [], wall()
     while len(times) < 3 or wall() - begin < least:
@@ -50,23 +49,36 @@ def padded(x, k, dilation, pad):
     return F.pad(x, (reach,) * 4, mode="replicate") if pad == "replicate" else x
 
 
-def convolution(n, h, w, ic, oc, k, dilation, pad, gradient):
+class Convolution(nn.Module):
+    def __init__(self, ic, oc, k, dilation, pad):
+        super().__init__()
+        self.conv = nn.Conv2d(ic, oc, k, padding=0 if pad == "replicate" else dilation * (k // 2), dilation=dilation)
+        self.border = k, dilation, pad
+
+    def forward(self, x):
+        return self.conv(padded(x, *self.border))
+
+
+def convolution(engine, n, h, w, ic, oc, k, dilation, pad):
     best = math.inf
-    for layout in (torch.channels_last, torch.contiguous_format):
+    for layout in engine.layouts:
         x = torch.randn(n, ic, h, w).contiguous(memory_format=layout)
-        weight = torch.randn(oc, ic, k, k).contiguous(memory_format=layout)
-        bias = torch.randn(oc)
-        zero = 0 if pad == "replicate" else dilation * (k // 2)
-        run = lambda: F.conv2d(padded(x, k, dilation, pad), weight, bias, padding=zero, dilation=dilation)
-        if gradient:
-            x.requires_grad_()
-            weight.requires_grad_()
-            y = run()
-            dy = torch.randn_like(y)
-            best = min(best, median_time(lambda: torch.autograd.grad(y, (x, weight), dy, retain_graph=True)))
-        else:
-            with torch.no_grad():
-                best = min(best, median_time(run))
+        with torch.no_grad(), engine.autocast():
+            run = engine.module(Convolution(ic, oc, k, dilation, pad).to(memory_format=layout).eval(), [x])
+            best = min(best, median_time(lambda: run(x)))
+    return best
+
+
+def gradient(engine, n, h, w, ic, oc, k, dilation, pad):
+    if type(engine) is not engines.Eager:
+        raise engines.Absent("a convolution's gradients alone are those of eager PyTorch")
+    best = math.inf
+    for layout in engine.layouts:
+        x = torch.randn(n, ic, h, w).contiguous(memory_format=layout).requires_grad_()
+        net = Convolution(ic, oc, k, dilation, pad).to(memory_format=layout)
+        y = net(x)
+        dy = torch.randn_like(y)
+        best = min(best, median_time(lambda: torch.autograd.grad(y, (x, net.conv.weight), dy, retain_graph=True)))
     return best
 
 
@@ -178,11 +190,20 @@ def rendered(maps, place, light, camera, near):
     return radiance(maps, l, v, math.pi / l[:, 2:3].clamp_min(1e-3))
 
 
+def error(maps, image, place):
+    return (flash(maps, place) - image).square().sum() / 2
+
+
 def gradient_of_loss(maps, image, place, rmse):
     r = maps.detach().requires_grad_()
     with torch.enable_grad():
-        loss = (flash(r, place) - image).square().sum() / 2
-        return torch.autograd.grad(loss, r)[0] * (1e5 / (3 * 65536) / rmse)
+        slope = torch.autograd.grad(error(r, image, place), r)[0]
+    return torch.asinh(10 * slope * (1e5 / (3 * 65536) / rmse))
+
+
+def gradient_of_function(maps, image, place, rmse):
+    """The same as torch.compile takes it."""
+    return torch.asinh(10 * torch.func.grad(error)(maps.detach(), image, place) * (1e5 / (3 * 65536) / rmse))
 
 
 class LGD(nn.Module):
@@ -192,6 +213,7 @@ class LGD(nn.Module):
         self.g = UNet(a["g_width"], a["g_max"], a["g_levels"], a["g_first"], a["g_kernel"], a["channels"])
         self.h = Refiner(a["h_width"], a["h_gru"], a["channels"], a["recurrent"]) if a["h_width"] else None
         self.coarse = Refiner(a["c_width"], a["c_gru"], a["channels"], a["recurrent"]) if a["c_steps"] else None
+        self.descent = gradient_of_loss
 
     def forward(self, whole, image, y0, x0):
         side, size, (h, w) = whole.shape[2], self.a["g_size"], image.shape[2:]
@@ -206,21 +228,20 @@ class LGD(nn.Module):
         if self.coarse is not None:
             small = min(self.a["c_size"], side)
             maps, x = (v if v.shape[2] == small else F.interpolate(v, size=(small, small), mode="bilinear") for v in (maps, whole))
-            maps = refined(self.coarse, self.a["c_gru"], self.a["c_steps"], maps, x, positions(small, small, small))
+            maps = refined(self.coarse, self.descent, self.a["c_gru"], self.a["c_steps"], maps, x, positions(small, small, small))
         maps = seen(maps)
         place = positions(side, side, side)[:, :, y0:y0 + h, x0:x0 + w]
-        return first, refined(self.h, self.a["h_gru"], self.a["steps"] - self.a["c_steps"], maps, image, place)
+        return first, refined(self.h, self.descent, self.a["h_gru"], self.a["steps"] - self.a["c_steps"], maps, image, place)
 
 
-def refined(h, gru, steps, maps, image, place):
+def refined(h, descent, gru, steps, maps, image, place):
     if h is None or not steps:
         return maps
     with torch.no_grad():
         rmse = (flash(maps, place) - image).square().mean((1, 2, 3), keepdim=True).sqrt()
     state = [torch.zeros(image.shape[0], gru, *image.shape[2:])] * 2
     for _ in range(steps):
-        gradient = torch.asinh(10 * gradient_of_loss(maps, image, place, rmse))
-        delta, state = h(torch.cat([maps, gradient], 1), state)
+        delta, state = h(torch.cat([maps, descent(maps, image, place, rmse)], 1), state)
         maps = maps + delta
     return maps
 
@@ -233,14 +254,14 @@ def network(words):
     return LGD(dict(zip(NAMES, map(int, words)))), [int(w) for w in words[len(NAMES):]]
 
 
-def infer(words):
+def infer(engine, words):
     best = math.inf
-    for layout in (torch.channels_last, torch.contiguous_format):
+    for layout in engine.layouts:
         net, (side,) = network(words)
-        net = net.to(memory_format=layout).eval()
         image = torch.rand(1, 3, side, side).contiguous(memory_format=layout)
-        with torch.no_grad(), precision():
-            best = min(best, median_time(lambda: net(image, image, 0, 0)))
+        with torch.no_grad(), engine.autocast():
+            run = engine.network(net.to(memory_format=layout).eval(), gradient_of_function, side)
+            best = min(best, median_time(lambda: run(image, image, 0, 0)))
     return best
 
 
@@ -253,27 +274,34 @@ def training_loss(maps, target, place, light, camera):
     return total
 
 
-def train(words):
+def train(engine, words):
     best = math.inf
-    for layout in (torch.channels_last, torch.contiguous_format):
+    for layout in engine.layouts:
         net, (batch, patch, window, fixed) = network(words)
         net = net.to(memory_format=layout)
         net.g.requires_grad_(not fixed)
-        adam = torch.optim.Adam((p for p in net.parameters() if p.requires_grad), 1e-4)
+        if type(engine) is engines.Compiled:
+            net.descent = gradient_of_function
+        adam = torch.optim.Adam([p for p in net.parameters() if p.requires_grad], 1e-4, fused=True)
         whole = torch.rand(batch, 3, patch, patch).contiguous(memory_format=layout)
         image, place = whole[:, :, :window, :window], positions(window, window, window)
         target = torch.rand(batch, net.a["channels"], window, window) - 0.5
         light, camera = torch.randn(9, batch, 3, 1, 1), torch.randn(9, batch, 3, 1, 1)
         light[:, :, 2], camera[:, :, 2] = light[:, :, 2].abs() + 0.3, camera[:, :, 2].abs() + 0.3
 
+        def loss():
+            with engine.autocast():
+                first, last = (maps.float() for maps in net(whole, image, 0, 0))
+            total = training_loss(last, target, place, light, camera)
+            if net.a["steps"] and not fixed:
+                total = total + training_loss(first, target, place, light, camera)
+            return total
+
+        forward = engine.function(loss)
+
         def step():
             adam.zero_grad(set_to_none=True)
-            with precision():
-                first, last = (maps.float() for maps in net(whole, image, 0, 0))
-            loss = training_loss(last, target, place, light, camera)
-            if net.a["steps"] and not fixed:
-                loss = loss + training_loss(first, target, place, light, camera)
-            loss.backward()
+            forward().backward()
             torch.nn.utils.clip_grad_norm_(net.parameters(), 1.0)
             adam.step()
 
@@ -282,12 +310,7 @@ def train(words):
 
 
 def answer(words):
-    global clock, threads, rounded
-    rounded = words[0] == "bf16"
-    if rounded:
-        words = words[1:]
-    if words[0] == "version":
-        return f"PyTorch {torch.__version__}"
+    global clock, threads
     if words[0] == "threads":
         threads = int(words[1])
         torch.set_num_threads(threads)
@@ -295,9 +318,15 @@ def answer(words):
     if words[0] == "clock":
         clock = lambda: time.process_time() / threads
         return "0"
-    if words[0] in ("conv", "gradient"):
-        return f"{convolution(*map(int, words[1:8]), words[8], words[0] == 'gradient'):.6g}"
-    return f"{(infer if words[0] == 'infer' else train)(words[1:]):.6g}"
+    rounded = words[1] == "bf16"
+    engine = engines.ENGINES[words[0]](threads, rounded)
+    work, *rest = words[1 + rounded:]
+    if work == "version":
+        return engine.name()
+    if work in ("conv", "gradient"):
+        return f"{(convolution if work == 'conv' else gradient)(engine, *map(int, rest[:7]), rest[7]):.6g}"
+    torch.compiler.reset()
+    return f"{(infer if work == 'infer' else train)(engine, rest):.6g}"
 
 
 def main():
@@ -306,8 +335,8 @@ def main():
             continue
         try:
             print(answer(line.split()), flush=True)
-        except (RuntimeError, ValueError, KeyError, MemoryError) as e:
-            print("- " + str(e).splitlines()[0], flush=True)
+        except Exception as e:  # a library's: whatever it is, the other engines go on
+            print("- " + (str(e).splitlines() or [type(e).__name__])[0], flush=True)
 
 
 if __name__ == "__main__":

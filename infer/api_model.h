@@ -13,4 +13,7 @@ ts_code lgd_model_estimate(lgd_model *model, const lgd_photo *photo, int photos,
 
 /* Bytes that such an estimate holds at once, at most, beside its photographs and maps. */
 double lgd_model_bytes(const lgd_model *model, int side, const lgd_options *options);
+
+/* Called before any estimate: there will be a single one. Its packed weights of g are not kept. */
+void lgd_model_single(lgd_model *model);
 #endif

@@ -99,6 +99,7 @@ typedef struct nn_model {
     bool fixed[3];        /* nn_part: its parameters are constants, no gradient is computed for them */
     void *layers;         /* nn's own */
     struct nn_file *file; /* or NULL: what its halves are in */
+    bool g_once;          /* g runs once: its packed weights are not kept (ag_pass) */
 } nn_model;
 
 /* The list of parameters, without values: value is NULL. The caller frees. NULL and st on failure. */

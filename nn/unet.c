@@ -43,7 +43,7 @@ static ag_value *seen_by(ag_tape *tape, const nn_model *model, ag_value *photo, 
     return conditions ? ag_concat(tape, x, repeated(tape, conditions, n)) : x;
 }
 
-bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, nn_guess *guess)
+static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, nn_guess *guess)
 {
     const nn_layers *l = model->layers;
     const int levels = model->arch.g_levels;
@@ -78,4 +78,12 @@ bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *co
     if (model->arch.g_unshuffle > 1) return nn_detail(tape, model, photo, seen, features, x, guess);
     guess->maps = ag_tanh(tape, x);
     return guess->maps != NULL;
+}
+
+bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, nn_guess *guess)
+{
+    ag_pass(tape, model->g_once);
+    const bool done = run(tape, model, photo, conditions, guess);
+    ag_pass(tape, false);
+    return done;
 }

@@ -6,6 +6,7 @@
 #include "cli/infer/options.h"
 #include "cli/infer/pipeline.h"
 #include "cli/infer/record.h"
+#include "infer/api_model.h"
 #include "infer/model_path.h"
 #include "infer/output.h"
 #include "infer/photograph.h"
@@ -337,6 +338,7 @@ static int work(const lgd_command *given)
              (several && !(r.manifest = lgd_manifest_open(&plan, c->out, &st))))
         cl_failed("%s", st.message);
     else {
+        if (plan.jobs == 1) lgd_model_single(r.model);
         r.steps = lgd_command_steps(c, r.model);
         code = all(&r, pipeline, recipe);
         if (code == CL_OK && missing) code = CL_FAILED;

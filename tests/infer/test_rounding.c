@@ -1,5 +1,5 @@
 /* What rounding may change in the maps of the weights that ship: real photographs at two sizes, computed in two ways.
- * The bounds are those that lgd.h, the README, --help and docs/performance.md state. LGD_ISA chooses the set. */
+ * The bounds are those that lgd.h, the README, --help and docs/accuracy.md state. LGD_ISA chooses the set. */
 #include "data/image/image.h"
 #include "infer/lgd.h"
 #include "infer/photograph.h"
