@@ -135,7 +135,7 @@ void conv_amx_steps(const conv_plan *p, const ptrdiff_t *at, int steps, int coun
 
 static inline int conv_bf16_depth(int channels) { return (channels + 1) / 2; }
 size_t conv_bf16_count(const ts_conv *c, int ic, int oc);
-void conv_pack_bf16(const ts_conv *c, bool forward, const float *weight, float *packed);
+void conv_pack_bf16(const ts_conv *c, bool forward, const conv_weights *w, float *packed);
 
 ptrdiff_t conv_panels_count(int ic, int oc, int k);
 /* To few channels weights are packed behind the panels once more, for this way: TS_CONV_BY_COL2IM, TS_CONV_BY_LANES, or
