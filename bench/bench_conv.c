@@ -263,9 +263,6 @@ BENCH(conv_bf16)
         row("bf16 forward", published[i], forward_bf16);
         row("data gradient", published[i], data_gradient);
         row("bf16 data gradient", published[i], data_gradient_bf16);
-        ts_conv rounded = published[i];
-        rounded.compute.precision = TS_BF16;
-        if (ts_conv_choose(&rounded, TS_CONV_WEIGHTS) != TS_CONV_BY_AMX) continue;
         row("weight gradient", published[i], weight_gradient);
         row("bf16 weight gradient", published[i], weight_gradient_bf16);
     }
@@ -288,6 +285,26 @@ BENCH(conv_winograd_bf16)
         row("bf16 data gradient", shape[i], data_gradient_bf16);
         row("bf16 Winograd data gradient", shape[i], data_gradient_winograd_bf16);
         row("weight gradient", shape[i], weight_gradient);
+        row("Winograd weight gradient", shape[i], weight_gradient_winograd);
+        row("bf16 weight gradient", shape[i], weight_gradient_bf16);
+        row("bf16 Winograd weight gradient", shape[i], weight_gradient_winograd_bf16);
+    }
+}
+
+/* Layers of configs/single-g.ini and, the last, of configs/single-phone.ini. */
+BENCH(weights_bf16)
+{
+    static const ts_conv shape[] = {
+        {8, 64, 64, 9, 9, 3, 1, TS_PAD_ZERO, 0, {0}},   {8, 64, 64, 16, 16, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {8, 64, 64, 32, 16, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 32, 32, 32, 32, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {8, 32, 32, 64, 32, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 16, 16, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {8, 8, 8, 256, 128, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 8, 8, 128, 128, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {8, 4, 4, 128, 128, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 64, 64, 64, 192, 1, 1, TS_PAD_ZERO, 0, {0}}};
+    bench_heading("gradients of weights in f32 and bf16, directly and by Winograd's way");
+    for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
+        row("weight gradient", shape[i], weight_gradient);
+        row("bf16 weight gradient", shape[i], weight_gradient_bf16);
+        if (shape[i].k != 3 || shape[i].h < 16) continue;
         row("Winograd weight gradient", shape[i], weight_gradient_winograd);
         row("bf16 Winograd weight gradient", shape[i], weight_gradient_winograd_bf16);
     }

@@ -88,6 +88,12 @@ ts_conv_way ts_conv_choose(const ts_conv *c, ts_conv_direction direction)
     return narrow;
 }
 
+bool ts_conv_rounds_weights(const ts_conv *c)
+{
+    return c->compute.precision == TS_BF16 &&
+        (ts_isa_now() >= TS_AVX512BF16 || ts_conv_choose(c, TS_CONV_WEIGHTS) == TS_CONV_BY_WINOGRAD);
+}
+
 ts_conv_use ts_conv_packing(const ts_conv *c, ts_conv_direction direction)
 {
     static const ts_conv_use uses[2][2][2] = {

@@ -152,7 +152,10 @@ size_t conv_winograd_count(int ic, int oc, bool bf16);
 void conv_winograd_pack(const ts_conv *c, bool forward, bool bf16, const conv_weights *w, float *packed);
 
 /* dweight += for at most CONV_BATCH_PIXELS pixels an image. */
-void conv_batch_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight);
-/* Either may be NULL. */
-void conv_direct_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias);
+void conv_batch_weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight);
+/* Either may be NULL; dbias is of dy as it is. */
+void conv_direct_weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight,
+                                 float *dbias);
+/* Where there is a matrix unit. */
+void conv_amx_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight);
 #endif
