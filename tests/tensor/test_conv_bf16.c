@@ -3,7 +3,6 @@
 #include "tensor/conv/conv.h"
 #include "tensor/cpu.h"
 #include "tensor/conv/gru.h"
-#include "tensor/kernels/conv.h"
 #include "tensor/kernels/pairs.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"
@@ -85,7 +84,7 @@ TEST(bf16_pairs_naive)
             CHECK(x && to, "no memory");
             for (int i = 0; i < pixels * channels; i++) x[i] = hard_to_round(&r);
             memset(to, 0x5a, count * sizeof(float));
-            ts_conv_k()->pairs(x, pixels, channels, to, depth + gap);
+            ts_pairs_k()->of_channels(x, pixels, channels, to, depth + gap);
             for (size_t i = 0; i < count; i++) {
                 const int p = (int)i / (depth + gap), d = (int)i % (depth + gap);
                 uint32_t want = 0x5a5a5a5a;
