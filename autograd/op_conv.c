@@ -40,12 +40,10 @@ static const float *input(ag_tape *tape, const ag_node *node)
 static void weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
 {
     const ts_conv_way way = dweight ? ts_conv_choose(c, TS_CONV_WEIGHTS) : TS_CONV_DIRECTLY;
-    const bool amx = way == TS_CONV_BY_AMX, winograd = way == TS_CONV_BY_WINOGRAD;
-    if (amx) ts_conv_weight_gradient_bf16(c, x, dy, dweight);
-    if (winograd)
-        (c->compute.precision == TS_BF16 ? ts_conv_weight_gradient_winograd_bf16
-                                         : ts_conv_weight_gradient_winograd)(c, x, dy, dweight);
-    ts_conv_weight_gradient(c, x, dy, amx || winograd ? NULL : dweight, dbias);
+    const bool winograd = way == TS_CONV_BY_WINOGRAD, bf16 = dweight && ts_conv_rounds_weights(c);
+    if (winograd) (bf16 ? ts_conv_weight_gradient_winograd_bf16 : ts_conv_weight_gradient_winograd)(c, x, dy, dweight);
+    else if (bf16) ts_conv_weight_gradient_bf16(c, x, dy, dweight);
+    ts_conv_weight_gradient(c, x, dy, winograd || bf16 ? NULL : dweight, dbias);
 }
 
 typedef void forward_function(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,

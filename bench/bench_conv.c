@@ -263,9 +263,6 @@ BENCH(conv_bf16)
         row("bf16 forward", published[i], forward_bf16);
         row("data gradient", published[i], data_gradient);
         row("bf16 data gradient", published[i], data_gradient_bf16);
-        ts_conv rounded = published[i];
-        rounded.compute.precision = TS_BF16;
-        if (ts_conv_choose(&rounded, TS_CONV_WEIGHTS) != TS_CONV_BY_AMX) continue;
         row("weight gradient", published[i], weight_gradient);
         row("bf16 weight gradient", published[i], weight_gradient_bf16);
     }
@@ -274,20 +271,42 @@ BENCH(conv_bf16)
 /* Layers of configs/single-phone.ini. */
 BENCH(conv_winograd_bf16)
 {
-    static const ts_conv shape[] = {{8, 64, 64, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}},
-                                    {8, 64, 64, 96, 64, 3, 1, TS_PAD_ZERO, 0, {0}},
-                                    {8, 32, 32, 128, 64, 3, 1, TS_PAD_ZERO, 0, {0}},
-                                    {8, 16, 16, 256, 128, 3, 1, TS_PAD_ZERO, 0, {0}},
-                                    {8, 256, 256, 17, 16, 3, 1, TS_PAD_ZERO, 5, {0}}};
-    bench_heading("Winograd's way in bf16, below it in f32 and the direct way of bf16");
+    static const ts_conv shape[] = {
+        {8, 64, 64, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}},  {8, 64, 64, 96, 64, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {8, 32, 32, 128, 64, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 16, 16, 256, 128, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {8, 64, 64, 16, 16, 3, 1, TS_PAD_ZERO, 0, {0}},  {8, 64, 64, 32, 16, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {8, 32, 32, 16, 32, 3, 1, TS_PAD_ZERO, 0, {0}},  {8, 256, 256, 17, 16, 3, 1, TS_PAD_ZERO, 5, {0}}};
+    bench_heading("Winograd's way and the direct one, in f32 and bf16");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
+        row("forward", shape[i], forward);
         row("Winograd forward", shape[i], winograd);
         row("bf16 forward", shape[i], forward_bf16);
         row("bf16 Winograd forward", shape[i], winograd_bf16);
+        row("data gradient", shape[i], data_gradient);
         row("Winograd data gradient", shape[i], data_gradient_winograd);
         row("bf16 data gradient", shape[i], data_gradient_bf16);
         row("bf16 Winograd data gradient", shape[i], data_gradient_winograd_bf16);
         row("weight gradient", shape[i], weight_gradient);
+        row("Winograd weight gradient", shape[i], weight_gradient_winograd);
+        row("bf16 weight gradient", shape[i], weight_gradient_bf16);
+        row("bf16 Winograd weight gradient", shape[i], weight_gradient_winograd_bf16);
+    }
+}
+
+/* Layers of configs/single-g.ini and, the last, of configs/single-phone.ini. */
+BENCH(weights_bf16)
+{
+    static const ts_conv shape[] = {
+        {8, 64, 64, 9, 9, 3, 1, TS_PAD_ZERO, 0, {0}},   {8, 64, 64, 16, 16, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {8, 64, 64, 32, 16, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 32, 32, 32, 32, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {8, 32, 32, 64, 32, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 16, 16, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {8, 8, 8, 256, 128, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 8, 8, 128, 128, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {8, 4, 4, 128, 128, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 64, 64, 64, 192, 1, 1, TS_PAD_ZERO, 0, {0}}};
+    bench_heading("gradients of weights in f32 and bf16, directly and by Winograd's way");
+    for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
+        row("weight gradient", shape[i], weight_gradient);
+        row("bf16 weight gradient", shape[i], weight_gradient_bf16);
+        if (shape[i].k != 3 || shape[i].h < 16) continue;
         row("Winograd weight gradient", shape[i], weight_gradient_winograd);
         row("bf16 Winograd weight gradient", shape[i], weight_gradient_winograd_bf16);
     }

@@ -116,8 +116,16 @@ void ts_conv_data_gradient_bf16(const ts_conv *c, const float *dy, const float *
 void ts_conv_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
 {
     if (dweight && choose_direct(c, TS_CONV_WEIGHTS, TS_F32) == TS_CONV_BY_BATCH) {
-        conv_batch_weight_gradient(c, x, dy, dweight);
+        conv_batch_weight_gradient(c, false, x, dy, dweight);
         dweight = NULL;
     }
-    if (dweight || dbias) conv_direct_weight_gradient(c, x, dy, dweight, dbias);
+    if (dweight || dbias) conv_direct_weight_gradient(c, false, x, dy, dweight, dbias);
+}
+
+void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight)
+{
+    const ts_conv_way way = choose_direct(c, TS_CONV_WEIGHTS, TS_BF16);
+    if (way == TS_CONV_BY_AMX) conv_amx_weight_gradient(c, x, dy, dweight);
+    else if (way == TS_CONV_BY_BATCH) conv_batch_weight_gradient(c, true, x, dy, dweight);
+    else conv_direct_weight_gradient(c, true, x, dy, dweight, NULL);
 }

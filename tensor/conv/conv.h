@@ -50,6 +50,8 @@ typedef enum ts_conv_way {
 ts_conv_way ts_conv_choose(const ts_conv *c, ts_conv_direction direction);
 /* What its weights are packed for; not for TS_CONV_WEIGHTS. */
 ts_conv_use ts_conv_packing(const ts_conv *c, ts_conv_direction direction);
+/* Whether gradients of weights are made of rounded values: of those of c->compute, where that costs no time. */
+bool ts_conv_rounds_weights(const ts_conv *c);
 const char *ts_conv_way_name(ts_conv_way way);
 
 static inline int ts_conv_variables(const ts_conv *c) { return c->ic - c->constants; }
@@ -95,7 +97,7 @@ void ts_conv_data_gradient_winograd_bf16(const ts_conv *c, const float *dy, cons
                                          bool accumulate);
 void ts_conv_weight_gradient_winograd_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight);
 
-/* dweight[oc][ic][k][k] += with x and dy rounded so, where ts_conv_choose says TS_CONV_BY_AMX. */
+/* dweight[oc][ic][k][k] += with x and dy rounded so. Pairs are of pixels, or of images, not of channels. */
 void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight);
 
 /* dweight[oc][ic][k][k] += , dbias[oc] += (either may be NULL). */

@@ -4,6 +4,7 @@
  * those that fall on the halo's columns are computed and thrown away. */
 #include "tensor/conv/plan.h"
 #include "tensor/kernels/amx_conv.h"
+#include "tensor/kernels/pairs.h"
 #include "tensor/scratch.h"
 #include "tensor/team.h"
 #include <string.h>
@@ -58,8 +59,8 @@ static void pack_row(const pack_job *j, int panel, int row)
             for (int o = 0; o < count; o++) pair[2 * (i * TS_AMX_BLOCK + o) + half] = from[o * j->o_step];
         }
     }
-    ts_conv_k()->pairs(pair, 1, 2 * STEP_FLOATS, j->packed + ((ptrdiff_t)panel * j->k * j->steps + row) * STEP_FLOATS,
-                       STEP_FLOATS);
+    ts_pairs_k()->of_channels(pair, 1, 2 * STEP_FLOATS,
+                              j->packed + ((ptrdiff_t)panel * j->k * j->steps + row) * STEP_FLOATS, STEP_FLOATS);
 }
 
 static void pack_rows(const void *job, int64_t begin, int64_t end)

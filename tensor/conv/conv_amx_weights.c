@@ -159,7 +159,7 @@ static void reduce_parts(const void *made, int64_t begin, int64_t end)
     }
 }
 
-void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight)
+void conv_amx_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight)
 {
     job g = {.c = c,
              .x = x,

@@ -1,5 +1,6 @@
 /* Packed weights of bf16 for the panels: pairs of channels in place of channels. */
 #include "tensor/conv/plan.h"
+#include "tensor/kernels/pairs.h"
 #include "tensor/team.h"
 
 size_t conv_bf16_count(const ts_conv *c, int ic, int oc)
@@ -9,44 +10,46 @@ size_t conv_bf16_count(const ts_conv *c, int ic, int oc)
 }
 
 typedef struct pack_job {
+    const ts_conv *c;
+    const conv_weights *w;
     bool forward;
-    int ic, oc, taps, depth;
-    ptrdiff_t o_step, i_step;
-    const float *weight;
+    int ic, taps, turned, step, parts; /* inputs that are turned at once, and of a part: whole pairs */
     float *packed;
 } pack_job;
 
-static void pack_pairs(const void *job, int64_t begin, int64_t end)
+static void pack_part(const pack_job *j, int panel, int part)
+{
+    float of[2 * 2 * 16 * CONV_TURNED]; /* [input][tap][width]; no vector has more than 16 lanes */
+    const int begin = part * j->step, count = j->ic - begin < j->step ? j->ic - begin : j->step;
+    int width = 0;
+    for (int i = 0; i < count; i += j->turned)
+        width = conv_turn(j->c, j->w, j->forward, panel, begin + i, count - i < j->turned ? count - i : j->turned,
+                          of + i * j->taps * width);
+    const ptrdiff_t depth = conv_bf16_depth(j->ic);
+    float *to = j->packed + (ptrdiff_t)panel * 2 * conv_lanes() * depth * j->taps;
+    for (int t = 0; t < j->taps; t++)
+        for (int i = 0; i < count; i += 2) {
+            const float *even = of + (i * j->taps + (j->forward ? t : j->taps - 1 - t)) * width;
+            ts_pairs_k()->of_two(even, i + 1 < count ? even + j->taps * width : NULL, 0, 1, width, width,
+                                 to + (t * depth + (begin + i) / 2) * width, 0);
+        }
+}
+
+static void pack_parts(const void *job, int64_t begin, int64_t end)
 {
     const pack_job *j = job;
-    for (int64_t at = begin; at < end; at++) {
-        const int panel = (int)(at / j->depth), i = (int)(at % j->depth), lanes = conv_lanes(),
-                  width = conv_vectors(j->oc, panel) * lanes, o0 = panel * 2 * lanes;
-        for (int t = 0; t < j->taps; t++) {
-            float two[2 * 2 * 16] = {0}; /* vectors have no more than 16 lanes */
-            for (int o = 0; o < width && o0 + o < j->oc; o++)
-                for (int half = 0; half < 2 && 2 * i + half < j->ic; half++)
-                    two[2 * o + half] = j->weight[(2 * i + half) * j->i_step + (o0 + o) * j->o_step +
-                                                  (j->forward ? t : j->taps - 1 - t)];
-            ts_conv_k()->pairs(two, width, 2,
-                               j->packed + (ptrdiff_t)o0 * j->depth * j->taps + ((ptrdiff_t)t * j->depth + i) * width,
-                               1);
-        }
-    }
+    for (int64_t i = begin; i < end; i++) pack_part(j, (int)(i / j->parts), (int)(i % j->parts));
 }
 
 /* packed: [panel][ky][kx][pair of inputs][channel of the panel, zeros where there is none] */
-void conv_pack_bf16(const ts_conv *c, bool forward, const float *weight, float *packed)
+void conv_pack_bf16(const ts_conv *c, bool forward, const conv_weights *w, float *packed)
 {
     if (conv_amx_present()) {
-        conv_amx_pack(c, forward, weight, packed);
+        conv_amx_pack(c, forward, w->full, packed);
         return;
     }
     const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), taps = c->k * c->k,
-              depth = conv_bf16_depth(ic);
-    /* weight[o][c][tap]: strides of the packed input and output channel */
-    const ptrdiff_t o_step = forward ? (ptrdiff_t)c->ic * taps : taps,
-                    i_step = forward ? taps : (ptrdiff_t)c->ic * taps;
-    ts_for(c->compute.threads, (int64_t)conv_panels(oc) * depth, 1, pack_pairs,
-           &(pack_job){forward, ic, oc, taps, depth, o_step, i_step, weight, packed});
+              turned = conv_turned_inputs(taps), step = turned > 2 ? turned & ~1 : 2, parts = (ic + step - 1) / step;
+    ts_for(c->compute.threads, (int64_t)conv_panels(oc) * parts, 1, pack_parts,
+           &(pack_job){c, w, forward, ic, taps, turned < step ? turned : step, step, parts, packed});
 }

@@ -1,6 +1,7 @@
 /* The weight gradient, directly: a matrix product over pixels. Blocks of (tap, input) x output stay in
- * registers while pixels pass by. */
+ * registers while pixels pass by; of bf16, pairs of neighbours in a row. */
 #include "tensor/conv/plan.h"
+#include "tensor/kernels/pairs.h"
 #include "tensor/scratch.h"
 #include "tensor/team.h"
 #include <string.h>
@@ -22,6 +23,7 @@ typedef struct job {
     const float *x, *dy;
     bool swapped;            /* n is the position in the line */
     bool direct_dy;          /* dy's panels are read where they are */
+    bool bf16;               /* x and dy are rounded and copied as pairs of pixels */
     int lines, taps, length; /* lines, lines per kernel row, inputs per line */
     int m, n, padded;
     ptrdiff_t pixel, size;             /* floats per pixel of x and per chunk */
@@ -37,9 +39,9 @@ static int64_t tile_cost(int m, int n)
     return cost > least ? cost : least;
 }
 
-static job make_job(const ts_conv *c, const float *x, const float *dy)
+static job make_job(const ts_conv *c, bool bf16, const float *x, const float *dy)
 {
-    job g = {.c = c, .x = x, .dy = dy};
+    job g = {.c = c, .x = x, .dy = dy, .bf16 = bf16};
     g.plan = (conv_plan){.n = c->n,
                          .h = c->h,
                          .w = c->w,
@@ -63,7 +65,7 @@ static job make_job(const ts_conv *c, const float *x, const float *dy)
     const int lanes = conv_lanes();
     g.padded = (g.n + lanes - 1) / lanes * lanes;
     g.size = (ptrdiff_t)g.lines * g.m * g.padded;
-    g.direct_dy = g.swapped || (c->oc % lanes == 0 && c->oc <= 8 * lanes);
+    g.direct_dy = !bf16 && (g.swapped || (c->oc % lanes == 0 && c->oc <= 8 * lanes));
     /* By shape alone, so that the sums do not depend on the number of threads. */
     const ptrdiff_t rows = (ptrdiff_t)c->n * c->h;
     ptrdiff_t chunks = rows * c->w / CHUNK_PIXELS;
@@ -94,6 +96,35 @@ static void pack_dy(const job *g, const pass *s, int panel, float *to)
                            oc - o0 < width ? oc - o0 : width, to);
 }
 
+static int pairs_of(int pixels) { return (pixels + 1) / 2; }
+
+/* Channels [from, from + width) of a pass's pixels of x or dy, as pairs of neighbours; zeros where there is none. */
+static void pack_pairs(const job *g, const pass *s, const float *x, int channels, int from, int width, float *to)
+{
+    const int pixels = s->right - s->left, there = channels - from < width ? channels - from : width;
+    for (int i = s->begin; i < s->end; i++, to += (ptrdiff_t)pairs_of(pixels) * width) {
+        const float *row = x + (((ptrdiff_t)s->image * g->c->h + i) * g->c->w + s->left) * channels + from;
+        ts_pairs_k()->of_two(row, row + channels, 2 * channels, pixels / 2, there, width, to, width);
+        if (pixels % 2)
+            ts_pairs_k()->of_two(row + (ptrdiff_t)(pixels - 1) * channels, NULL, 0, 1, there, width,
+                                 to + (ptrdiff_t)(pixels / 2) * width, 0);
+    }
+}
+
+/* As conv_window_fill, of pairs of each pixel and the one behind it. */
+static void fill_pairs(const job *g, conv_window *s, conv_window *line, int image, int first, int last)
+{
+    const ptrdiff_t n = (s->columns - 1) * s->pixel;
+    for (int r = s->next > first ? s->next : first; r <= last; r++) {
+        float *to = s->memory + r % s->rows * s->row;
+        line->next = r;
+        conv_window_fill(line, &g->plan, image, r, r);
+        ts_pairs_k()->of_two(line->memory, line->memory + s->pixel, 0, 1, n, n, to, 0);
+        ts_pairs_k()->of_two(line->memory + n, NULL, 0, 1, s->pixel, s->pixel, to + n, 0);
+    }
+    if (last >= s->next) s->next = last + 1;
+}
+
 /* All tiles of m of one line and one panel of n. */
 static void sum_line(const job *g, ts_sum *t, pass *s, int panel, float *c)
 {
@@ -113,7 +144,7 @@ static void sum_line(const job *g, ts_sum *t, pass *s, int panel, float *c)
         t->fetch = s->fetched < s->next_bytes[0] ? s->next[0] + s->fetched
                                                  : s->next[1] + (s->fetched - s->next_bytes[0]);
         s->fetched += s->fetch_each;
-        kernels->sum[vectors - 1][end - begin](t);
+        (g->bf16 ? kernels->sum_bf16 : kernels->sum)[vectors - 1][end - begin](t);
     }
     t->a = a;
 }
@@ -121,16 +152,27 @@ static void sum_line(const job *g, ts_sum *t, pass *s, int panel, float *c)
 static void run_pass(const job *g, pass *s, const conv_window *window, float *sums)
 {
     const ts_conv *c = g->c;
-    const int lanes = conv_lanes(), count = s->right - s->left;
+    const int lanes = conv_lanes(), pixels = s->right - s->left, count = g->bf16 ? pairs_of(pixels) : pixels;
+    const bool in_place = c->k == 1 && !g->bf16; /* x is read where it is */
+    const size_t rows_count = (size_t)(s->end - s->begin) * (size_t)count;
     float *packed_dy = g->direct_dy
         ? NULL
-        : ts_scratch(1, sizeof(float) * (size_t)(s->end - s->begin) * (size_t)(count * 2 * lanes));
+        : ts_scratch(1, sizeof(float) * rows_count * (size_t)(g->swapped ? c->oc : 2 * lanes));
     ptrdiff_t x_row[PASS_PIXELS], dy_row[PASS_PIXELS];
-    const float *x = c->k == 1 ? g->x : window->memory, *dy = g->direct_dy ? g->dy : packed_dy;
+    const float *x = in_place ? g->x : window->memory, *dy = g->direct_dy ? g->dy : packed_dy;
+    if (g->bf16 && c->k == 1) {
+        float *packed_x = ts_scratch(0, sizeof(float) * rows_count * (size_t)c->ic);
+        pack_pairs(g, s, g->x, c->ic, 0, c->ic, packed_x);
+        x = packed_x;
+    }
+    if (g->bf16 && g->swapped) pack_pairs(g, s, g->dy, c->oc, 0, c->oc, packed_dy);
     for (int item = s->item, panel_before = -1; item < s->item_end; item++) {
         const int panel = item / g->lines, line = item % g->lines, ky = line / g->taps, kx = line % g->taps;
-        const int width = conv_vectors(g->n, panel) * lanes;
-        if (packed_dy && panel != panel_before) pack_dy(g, s, panel, packed_dy);
+        const int width = g->swapped ? c->oc : conv_vectors(g->n, panel) * lanes;
+        if (packed_dy && panel != panel_before && !g->swapped) {
+            if (g->bf16) pack_pairs(g, s, g->dy, c->oc, panel * 2 * lanes, width, packed_dy);
+            else pack_dy(g, s, panel, packed_dy);
+        }
         panel_before = panel;
         int rows = 0;
         for (int i = s->begin; i < s->end; i++) {
@@ -138,18 +180,20 @@ static void run_pass(const job *g, pass *s, const conv_window *window, float *su
             if (g->plan.replicate) r = conv_clamp(r, c->h);
             else if (r < 0 || r >= c->h) continue;
             const ptrdiff_t at = ((ptrdiff_t)s->image * c->h + i) * c->w + s->left;
-            x_row[rows] = c->k == 1 ? at * c->ic
-                                    : conv_window_row(window, r) - x + (s->left + kx * c->dilation) * window->pixel;
+            x_row[rows] = in_place ? at * c->ic
+                : c->k == 1        ? (ptrdiff_t)(i - s->begin) * count * c->ic
+                                   : conv_window_row(window, r) - x + (s->left + kx * c->dilation) * window->pixel;
             dy_row[rows++] = g->direct_dy ? at * c->oc : (ptrdiff_t)(i - s->begin) * count * width;
         }
-        const ptrdiff_t dy_stride = g->direct_dy ? c->oc : width;
+        const ptrdiff_t dy_stride = g->direct_dy ? c->oc : width,
+                        x_stride = g->bf16 && c->k > 1 ? 2 * g->pixel : g->pixel;
         ts_sum t = {
             .rows = rows, .count = count, .begin = s->first, .fetch_step = s->fetch_each / (rows * (count / 2) + 1)};
         if (g->swapped) {
             t.a = dy, t.a_row = dy_row, t.a_stride = dy_stride;
-            t.b = x + panel * 2 * lanes, t.b_row = x_row, t.b_stride = g->pixel;
+            t.b = x + panel * 2 * lanes, t.b_row = x_row, t.b_stride = x_stride;
         } else {
-            t.a = x, t.a_row = x_row, t.a_stride = g->pixel;
+            t.a = x, t.a_row = x_row, t.a_stride = x_stride;
             t.b = g->direct_dy ? dy + panel * 2 * lanes : dy, t.b_row = dy_row, t.b_stride = dy_stride;
         }
         sum_line(g, &t, s, panel, sums + (ptrdiff_t)line * g->m * g->padded);
@@ -189,10 +233,13 @@ static void run_chunk(const job *g, int chunk, int group, bool weights)
     float *sums = g->sums + chunk * g->size,
           *bias = g->bias_sums && group == 0 ? g->bias_sums + (ptrdiff_t)chunk * c->oc : NULL;
     if (bias) memset(bias, 0, sizeof(float) * (size_t)c->oc);
-    conv_window window = {0};
+    conv_window window = {0}, line = {0};
     if (windowed) {
         window = conv_window_make(&g->plan, rows_pass + reach, g->plan.first, c->w + reach);
-        window.memory = ts_scratch(0, conv_window_size(&window) * sizeof(float));
+        line = conv_window_make(&g->plan, 1, g->plan.first, c->w + reach);
+        const size_t size = conv_window_size(&window), more = g->bf16 ? conv_window_size(&line) : 0;
+        window.memory = ts_scratch(0, (size + more) * sizeof(float));
+        line.memory = window.memory + size;
     }
     for (int row = begin, image_before = -1; row < end; row += s.end - s.begin) {
         s.image = row / c->h;
@@ -204,7 +251,8 @@ static void run_chunk(const job *g, int chunk, int group, bool weights)
         image_before = s.image;
         if (windowed) {
             const int low = s.begin + g->plan.first, high = s.end - 1 + g->plan.first + reach;
-            conv_window_fill(&window, &g->plan, s.image, conv_clamp(low, c->h), conv_clamp(high, c->h));
+            if (g->bf16) fill_pairs(g, &window, &line, s.image, conv_clamp(low, c->h), conv_clamp(high, c->h));
+            else conv_window_fill(&window, &g->plan, s.image, conv_clamp(low, c->h), conv_clamp(high, c->h));
         }
         if (weights) plan_fetch(g, &s, row + s.end - s.begin, s.end - s.begin, column_parts);
         for (int b = 0; weights && b < column_parts; b++) {
@@ -273,9 +321,10 @@ static void reduce_parts(const void *made, int64_t begin, int64_t end)
     }
 }
 
-void conv_direct_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
+void conv_direct_weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight,
+                                 float *dbias)
 {
-    job made = make_job(c, x, dy), *g = &made;
+    job made = make_job(c, bf16, x, dy), *g = &made;
     const size_t count = (size_t)(g->size * g->chunks) + (size_t)(c->oc * g->chunks);
     g->weights = dweight;
     g->sums = ts_scratch(2, sizeof(float) * count);

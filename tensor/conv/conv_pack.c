@@ -59,6 +59,7 @@ static void pack_panels(const ts_conv *c, const conv_weights *w, bool forward, f
 static bool only_turned(const ts_conv *c, ts_conv_use use)
 {
     return use == TS_CONV_WINOGRAD || use == TS_CONV_WINOGRAD_BF16 ||
+        (use == TS_CONV_FORWARD_BF16 && !conv_amx_present()) ||
         (use == TS_CONV_FORWARD && conv_choose_narrow(c->ic, c->oc, c->k) == TS_CONV_DIRECTLY);
 }
 
@@ -73,7 +74,7 @@ static void pack(const ts_conv *c, ts_conv_use use, const conv_weights *w, float
         return;
     }
     if (use == TS_CONV_FORWARD_BF16 || use == TS_CONV_DATA_GRADIENT_BF16) {
-        conv_pack_bf16(c, use == TS_CONV_FORWARD_BF16, w->full, packed);
+        conv_pack_bf16(c, use == TS_CONV_FORWARD_BF16, w, packed);
         return;
     }
     const bool forward = use == TS_CONV_FORWARD;

@@ -1,5 +1,6 @@
 /* Rows of input with their padding, and which taps meet which inputs. */
 #include "tensor/conv/plan.h"
+#include "tensor/kernels/pairs.h"
 #include <string.h>
 
 conv_window conv_window_make(const conv_plan *p, int rows, int left, int columns)
@@ -14,7 +15,7 @@ conv_window conv_window_make(const conv_plan *p, int rows, int left, int columns
 
 void conv_put_pixels(const conv_plan *p, const float *from, ptrdiff_t n, float *to, ptrdiff_t stride)
 {
-    if (p->bf16) ts_conv_k()->pairs(from, n, p->channels, to, stride);
+    if (p->bf16) ts_pairs_k()->of_channels(from, n, p->channels, to, stride);
     else if (stride == p->ic) memcpy(to, from, sizeof(float) * (size_t)n * (size_t)p->ic);
     else
         for (ptrdiff_t j = 0; j < n; j++) memcpy(to + j * stride, from + j * p->ic, sizeof(float) * (size_t)p->ic);

@@ -1,5 +1,6 @@
 #include "tensor/conv/gru_internal.h"
 #include "tensor/kernels/amx_conv.h"
+#include "tensor/kernels/pairs.h"
 #include "tensor/scratch.h"
 #include <string.h>
 
@@ -23,7 +24,7 @@ gru_rounded gru_round(const ts_gru *g, const float *d, int count)
                      .pairs = ts_scratch(1, sizeof(float) * (pairs + planes + (size_t)(PLANE / 2 * widest)))};
     r.planes = (uint16_t *)(void *)(r.pairs + pairs);
     r.others = r.pairs + pairs + planes;
-    ts_conv_k()->pairs(d, count, 4 * c, r.pairs, 2 * c);
+    ts_pairs_k()->of_channels(d, count, 4 * c, r.pairs, 2 * c);
     memset(r.pairs + (ptrdiff_t)count * 2 * c, 0, sizeof(float) * (pairs - (size_t)count * 2 * (size_t)c));
     memset(r.planes, 0, sizeof(float) * planes);
     ts_amx_k()->planes(d, 4 * c, count, 4 * c, r.planes, PLANE);

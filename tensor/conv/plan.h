@@ -137,7 +137,7 @@ void conv_amx_steps(const conv_plan *p, const ptrdiff_t *at, int steps, int coun
 
 static inline int conv_bf16_depth(int channels) { return (channels + 1) / 2; }
 size_t conv_bf16_count(const ts_conv *c, int ic, int oc);
-void conv_pack_bf16(const ts_conv *c, bool forward, const float *weight, float *packed);
+void conv_pack_bf16(const ts_conv *c, bool forward, const conv_weights *w, float *packed);
 
 ptrdiff_t conv_panels_count(int ic, int oc, int k);
 /* To few channels weights are packed behind the panels once more, for this way: TS_CONV_BY_COL2IM, TS_CONV_BY_LANES, or
@@ -154,7 +154,10 @@ size_t conv_winograd_count(int ic, int oc, bool bf16);
 void conv_winograd_pack(const ts_conv *c, bool forward, bool bf16, const conv_weights *w, float *packed);
 
 /* dweight += for at most CONV_BATCH_PIXELS pixels an image. */
-void conv_batch_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight);
-/* Either may be NULL. */
-void conv_direct_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias);
+void conv_batch_weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight);
+/* Either may be NULL; dbias is of dy as it is. */
+void conv_direct_weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight,
+                                 float *dbias);
+/* Where there is a matrix unit. */
+void conv_amx_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight);
 #endif

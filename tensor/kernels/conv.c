@@ -209,31 +209,6 @@ INLINE void sum(const ts_sum *t, const int rows, const int vectors, const bool n
         v_store(t->c + m * t->c_stride + v * VL, acc[m][v]);
 }
 
-#if VL == 16
-#define EVERY_OTHER(first)                                                                                         \
-    first, first + 2, first + 4, first + 6, first + 8, first + 10, first + 12, first + 14, first + 16, first + 18, \
-        first + 20, first + 22, first + 24, first + 26, first + 28, first + 30
-#elif VL == 8
-#define EVERY_OTHER(first) first, first + 2, first + 4, first + 6, first + 8, first + 10, first + 12, first + 14
-#else
-#define EVERY_OTHER(first) first, first + 2, first + 4, first + 6
-#endif
-
-static void pairs(const float *x, int64_t pixels, int channels, float *to, ptrdiff_t stride)
-{
-    int64_t run = channels; /* of values without a gap */
-    if (channels % 2 == 0 && stride == channels / 2) run *= pixels, pixels = 1;
-    for (; pixels > 0; pixels--, x += run, to += stride)
-        for (int64_t i = 0; i < run; i += 2 * VL) {
-            const int64_t left = run - i;
-            const vu a = v_bf16(v_load_part(x + i, left)),
-                     b = left > VL ? v_bf16(v_load_part(x + i + VL, left - VL)) : (vu){0};
-            const vu even = __builtin_shufflevector(a, b, EVERY_OTHER(0)),
-                     odd = __builtin_shufflevector(a, b, EVERY_OTHER(1));
-            v_store_part(to + i / 2, (vf)(even >> 16 | (odd & 0xffff0000)), (left + 1) / 2);
-        }
-}
-
 static void columns(const float *x, int64_t pixels, int channels, float *restrict sum)
 {
     const float *a = x, *b = x + channels, *c = b + channels, *d = c + channels;
@@ -368,7 +343,6 @@ const struct ts_conv_kernels TS_TABLE(conv) = {
     .sum = {{FOR_ALL(SUM_1)}, {FOR_ALL(SUM_2)}},
     .sum_near = {{FOR_ALL(NEAR_1)}, {FOR_ALL(NEAR_2)}},
     .sum_bf16 = {{FOR_ALL(SUM_BF16_1)}, {FOR_ALL(SUM_BF16_2)}},
-    .pairs = pairs,
     .columns = columns,
     .panel = panel,
     .transpose = transpose,

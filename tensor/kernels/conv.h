@@ -67,10 +67,7 @@ struct ts_conv_kernels {
     ts_sum_function *sum[2][TS_SUM_ROWS + 1]; /* [vectors - 1][m] */
     ts_sum_function
         *sum_near[2][TS_SUM_ROWS + 1]; /* the same of what lies in the first cache: nothing is fetched ahead */
-    ts_sum_function *sum_bf16[2][TS_SUM_ROWS + 1]; /* sum_near of pairs of pixels */
-    /* to[p stride + i] = channels 2i and 2i + 1 of pixel p, rounded to the nearest bf16, ties to even, NaNs quiet; the
-     * last pair of an odd number of channels ends with a zero */
-    void (*pairs)(const float *x, int64_t pixels, int channels, float *to, ptrdiff_t stride);
+    ts_sum_function *sum_bf16[2][TS_SUM_ROWS + 1];                             /* sum_near of pairs of pixels */
     void (*columns)(const float *x, int64_t pixels, int channels, float *sum); /* sum[o] += sum_p x[p][o] */
     void (*panel)(const float *x, ptrdiff_t stride, int64_t pixels, int channels,
                   float *to); /* [pixel][lane] of one or two vectors, zeros where there is no channel */
