@@ -117,7 +117,7 @@ TEST(config_each_key_sets_its_own_value)
         case TR_CHOICE: strcpy(value, strcmp(before, k->choice[0]) ? k->choice[0] : k->choice[1]); break;
         case TR_TEXT: strcpy(value, "some/where else"); break;
         case TR_FAMILIES: strcpy(value, io_family_name(0)); break;
-        case TR_REAL: strcpy(value, "0.125"); break;
+        case TR_REAL: strcpy(value, k->hi < 0.125 ? "0.0625" : "0.125"); break;
         default: snprintf(value, sizeof value, "%.0f", strtod(before, NULL) == k->hi ? k->lo : k->hi); break;
         }
         tr_config c = start;
