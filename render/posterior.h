@@ -9,8 +9,8 @@
  * values of different maps are independent, and so are the normal's x and y; the three values of the diffuse map and
  * the three of F0 have the covariance s^2 ((1 - q) 1 1' + q I), so that with a small q they only move together and keep
  * their hue. S is diagonal: a value I of a photograph has the variance model^2 + noise max(I, 0). seen is the radiance
- * up to 1 and 1 + log(radiance) above; where it is above 1 and the photograph is TS_NEWTON_BURNT at least, nothing is
- * learned. */
+ * up to 1 and 1 + log(radiance) above; where it is above 1 and the photograph is TS_NEWTON_BURNT at least, r and J
+ * fade, and from 1 + TS_PRIOR_FADE on nothing is learned. */
 #ifndef RD_POSTERIOR_H
 #define RD_POSTERIOR_H
 #include "render/scene.h"

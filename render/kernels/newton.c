@@ -33,12 +33,12 @@ V_INLINE void add_view(const ts_shade_view *view, ts_shade_kind kind, bool first
                        const ts_shade_row *row, int first, int n, const float *image, const surface *s, equations *q)
 {
     sight t;
-    if (!look(view, kind, row, first, n, false, image, s, &t)) {
+    if (!look(view, kind, row, first, n, false, 0, image, s, &t)) {
         if (first_view) begin(damping, q);
         return;
     }
     for (int c = 0; c < 3; c++) {
-        vf by[ROW], slope, error = residual(c, s, &t, by, &slope),
+        vf by[ROW], slope, error = residual(c, s, &t, 0, by, &slope),
                            weight = 1.0f / (v_max(t.target[c], v_set(0)) + TS_NEWTON_NOISE);
         pivot *own = q->own[c], *shared = q->shared;
         if (first_view) {

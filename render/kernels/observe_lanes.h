@@ -49,15 +49,23 @@ V_INLINE vi above_one(vf value) { return ~(value <= v_set(1)); }
 /* Where the photograph is burnt out as well, its value may stand for more: nothing follows from it. */
 V_INLINE vi burnt_out(vf value, vf photograph) { return above_one(value) & (photograph >= v_set(TS_NEWTON_BURNT)); }
 
-/* The radiance as the equations see it, and its slope: above 1 its logarithm, which leads back from a highlight of
- * thousands in a few steps, where the clamp has no slope; none where both are burnt out. */
-V_INLINE vf exposed(vf value, vf photograph, vf *slope)
+/* How much a value tells where both are burnt out: less from 1 on, nothing from 1 + fade on. With a fade of 0 one
+ * rounding more or less decides what a pixel's step is. */
+V_INLINE vf told(vf value, vf photograph, float fade)
+{
+    const vf left = fade > 0 ? v_max((1 + fade - value) * (1 / fade), v_set(0)) : v_set(0);
+    return v_select(burnt_out(value, photograph), left, v_set(1));
+}
+
+/* The radiance as the equations see it, and its slope times what is told: above 1 its logarithm, which leads back from
+ * a highlight of thousands in a few steps, where the clamp has no slope. */
+V_INLINE vf exposed(vf value, vf photograph, float fade, vf *slope)
 {
     const vi bright = above_one(value);
     *slope = v_set(1);
     if (!v_any(bright)) return value;
     const vf above = v_max(v_min(value, v_set(BRIGHTEST)), v_set(1));
-    *slope = v_select(burnt_out(value, photograph), v_set(0), 1.0f / above);
+    *slope = told(value, photograph, fade) / above;
     return v_select(bright, v_log(above) + v_set(1), value);
 }
 
@@ -86,7 +94,7 @@ typedef struct sight {
 /* False where none of the pixels tells anything: then only what does not depend on the maps is set. dark: those without
  * light do. */
 V_INLINE bool look(const ts_shade_view *view, ts_shade_kind kind, const ts_shade_row *row, int first, int n, bool dark,
-                   const float *image, const surface *s, sight *t)
+                   float fade, const float *image, const surface *s, sight *t)
 {
     const bool surrounded = view->ambient != 0;
     vf across[2][3];
@@ -96,8 +104,9 @@ V_INLINE bool look(const ts_shade_view *view, ts_shade_kind kind, const ts_shade
     if (!v_any(tells)) return false;
     shade(view, kind, surrounded, s, &t->e, &t->g, &t->r);
     v_load_pixels(image + (int64_t)first * 3, 3, n, 3, t->target);
-    tells &= ~(burnt_out(t->r.value[0], t->target[0]) & burnt_out(t->r.value[1], t->target[1]) &
-               burnt_out(t->r.value[2], t->target[2]));
+    vf most = told(t->r.value[0], t->target[0], fade);
+    for (int c = 1; c < 3; c++) most = v_max(most, told(t->r.value[c], t->target[c], fade));
+    tells &= most > v_set(0);
     if (!v_any(tells)) return false;
     couple(kind, s, &t->e, &t->g, &t->r, &t->k);
     for (int i = 0; i < 3; i++) {
@@ -109,9 +118,9 @@ V_INLINE bool look(const ts_shade_view *view, ts_shade_kind kind, const ts_shade
 }
 
 /* A colour's residual; slope: of exposed. */
-V_INLINE vf residual(int c, const surface *s, const sight *t, vf row[ROW], vf *slope)
+V_INLINE vf residual(int c, const surface *s, const sight *t, float fade, vf row[ROW], vf *slope)
 {
-    const vf seen = exposed(t->r.value[c], t->target[c], slope);
+    const vf seen = exposed(t->r.value[c], t->target[c], fade, slope);
     row_of(c, s, &t->e, &t->r, &t->k, (const vf(*)[2])t->normal, *slope, row);
     return t->target[c] - seen;
 }

@@ -19,7 +19,8 @@ static const int shared_group[SHARED] = {GROUP_ROUGHNESS, GROUP_NORMAL, GROUP_NO
 V_INLINE vf observe(int c, const surface *s, const sight *t, const spread *a, const vf m[MAP_CHANNELS],
                     vf h[MAP_CHANNELS])
 {
-    vf by[ROW], slope, error = residual(c, s, t, by, &slope);
+    vf by[ROW], slope, error = residual(c, s, t, TS_PRIOR_FADE, by, &slope);
+    error *= told(t->r.value[c], t->target[c], TS_PRIOR_FADE);
     error -= by[0] * m[MAP_DIFFUSE + c] + by[1] * m[MAP_SPECULAR + c];
     for (int i = 0; i < SHARED; i++) error -= by[2 + i] * m[shared_map[i]];
     whiten(c, a, by, h);
@@ -129,8 +130,9 @@ V_INLINE void widen(const spread *a, const vf z[MAP_CHANNELS], vf x[MAP_CHANNELS
 V_INLINE bool look_at(const ts_shade_view *view, const ts_shade_row *row, int first, int n, const float *image,
                       const surface *s, sight *t)
 {
-    return view->kind == TS_SHADE_COLLOCATED ? look(view, TS_SHADE_COLLOCATED, row, first, n, false, image, s, t)
-                                             : look(view, TS_SHADE_POSITIONS, row, first, n, false, image, s, t);
+    return view->kind == TS_SHADE_COLLOCATED
+        ? look(view, TS_SHADE_COLLOCATED, row, first, n, false, TS_PRIOR_FADE, image, s, t)
+        : look(view, TS_SHADE_POSITIONS, row, first, n, false, TS_PRIOR_FADE, image, s, t);
 }
 
 /* False where no photograph tells anything. */

@@ -150,14 +150,14 @@ static void normal(const ts_scene *scene, const ts_shade_row *row, const float *
         gram g;
         vf by[3][TS_SCENE_UNKNOWNS], error[3], variance[3];
         decode(scene->view.guards, row->maps + (int64_t)i * row->channels, row->channels, n, &s);
-        if (!look(&scene->view, TS_SHADE_POSITIONS, row, i, n, true, image, &s, &t)) continue;
+        if (!look(&scene->view, TS_SHADE_POSITIONS, row, i, n, true, 0, image, &s, &t)) continue;
         load_deviation(deviation + (int64_t)i * MAP_GROUPS, n, &a);
         move(scene, &t.e, &t.g, &m);
 #pragma GCC unroll 3
         for (int c = 0; c < 3; c++) {
             vf maps[ROW], curve, above, tone;
             const vf value = toned(scene->tone, t.r.value[c], &curve, &tone),
-                     seen = exposed(value, t.target[c], &above), slope = curve * above;
+                     seen = exposed(value, t.target[c], 0, &above), slope = curve * above;
             row_of(c, &s, &t.e, &t.r, &t.k, (const vf(*)[2])t.normal, slope, maps);
             whiten(c, &a, maps, g.u[c]);
             by_numbers(c, scene, &s, &t.r, &t.k, &m, by[c]);

@@ -102,6 +102,37 @@ TEST(posterior_learns_nothing_where_both_are_burnt_out)
     end(&j);
 }
 
+/* A rounding more or less in the radiance does not decide what a step is. */
+TEST(posterior_has_no_edge_where_burning_out_begins)
+{
+    static const float edge[] = {1, 1 + TS_PRIOR_FADE};
+    float *value = floats(PIXELS * 3);
+    double worst = 0, moved = 0;
+    for (int trial = 0; trial < 60; trial++) {
+        job j = begin(38, 1);
+        const int p = trial * 37 % PIXELS;
+        for (int i = 0; i < PIXELS * 3; i++) j.image[0][i] = 0.95f;
+        j.views[0].power = 1;
+        rd_render(rd_grid_full(SIDE), j.maps, C, &j.views[0], false, value);
+        const float power = edge[trial % 2] / value[p * 3 + trial % 3];
+        float step[2][C];
+        for (int side = 0; side < 2; side++) {
+            j.views[0].power = power * (side ? 1 + 2e-6f : 1 - 2e-6f);
+            run(&j);
+            memcpy(step[side], j.step + p * C, sizeof step[side]);
+        }
+        for (int i = 0; i < C; i++) {
+            worst = fmax(worst, fabs((double)step[1][i] - (double)step[0][i]));
+            moved = fmax(moved, fabs((double)(j.maps[p * C + i] + step[0][i] - j.mean[p * C + i])));
+        }
+        end(&j);
+    }
+    free(value);
+    printf("steps across the edges differ by %.2g, and go %.2g from the prior's mean\n", worst, moved);
+    CHECK(worst < 2e-4, "a step changes by %g at an edge", worst);
+    CHECK(moved > 0.01, "no photograph told anything");
+}
+
 TEST(posterior_moves_tied_colours_together)
 {
     job j = begin(37, 2);
