@@ -13,18 +13,18 @@ typedef struct pack_job {
     const ts_conv *c;
     const conv_weights *w;
     bool forward;
-    int ic, taps, turned, step, parts; /* inputs that are turned at once, and of a part: whole pairs */
+    int ic, taps, transposed, step, parts; /* inputs that are transposed at once, and of a part: whole pairs */
     float *packed;
 } pack_job;
 
 static void pack_part(const pack_job *j, int panel, int part)
 {
-    float of[2 * 2 * 16 * CONV_TURNED]; /* [input][tap][width]; no vector has more than 16 lanes */
+    float of[2 * 2 * 16 * CONV_TRANSPOSED]; /* [input][tap][width]; no vector has more than 16 lanes */
     const int begin = part * j->step, count = j->ic - begin < j->step ? j->ic - begin : j->step;
     int width = 0;
-    for (int i = 0; i < count; i += j->turned)
-        width = conv_turn(j->c, j->w, j->forward, panel, begin + i, count - i < j->turned ? count - i : j->turned,
-                          of + i * j->taps * width);
+    for (int i = 0; i < count; i += j->transposed)
+        width = conv_transpose(j->c, j->w, j->forward, panel, begin + i,
+                               count - i < j->transposed ? count - i : j->transposed, of + i * j->taps * width);
     const ptrdiff_t depth = conv_bf16_depth(j->ic);
     float *to = j->packed + (ptrdiff_t)panel * 2 * conv_lanes() * depth * j->taps;
     for (int t = 0; t < j->taps; t++)
@@ -49,7 +49,8 @@ void conv_pack_bf16(const ts_conv *c, bool forward, const conv_weights *w, float
         return;
     }
     const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c), taps = c->k * c->k,
-              turned = conv_turned_inputs(taps), step = turned > 2 ? turned & ~1 : 2, parts = (ic + step - 1) / step;
+              transposed = conv_transposed_inputs(taps), step = transposed > 2 ? transposed & ~1 : 2,
+              parts = (ic + step - 1) / step;
     ts_for(c->compute.threads, (int64_t)conv_panels(oc) * parts, 1, pack_parts,
-           &(pack_job){c, w, forward, ic, taps, turned < step ? turned : step, step, parts, packed});
+           &(pack_job){c, w, forward, ic, taps, transposed < step ? transposed : step, step, parts, packed});
 }
