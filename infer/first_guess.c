@@ -11,7 +11,7 @@
 #define F0_DETAIL 0.35f
 /* Of the roughness' error, relative to the roughness, what the fit may explain by a level of the whole material. It is
  * less than is true (a half): where the maps lack relief the fit leans to rougher materials. */
-#define ROUGHNESS_LEVEL 0.3
+#define ROUGHNESS_LEVEL 0.15
 #define LAPLACE 1.41421356f /* a Laplace density's standard deviation over its mean absolute error */
 
 /* The numbers that are known have no error: the prior keeps them. */
@@ -85,7 +85,7 @@ static ts_code make(ag_tape *tape, const nn_model *model, const float *image, in
     level_prior(g, pixels, model->arch.channels, &prior);
     float unknown[RD_SCENE_UNKNOWNS];
     memcpy(unknown, prior.mean, sizeof unknown);
-    const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 64, .scale = nn_step_prior(known)};
+    const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior(known)};
     rd_scene_fit(rd_grid_on(rd_grid_full(size), threads), g->r0, model->arch.channels, g->deviation, small->t.data,
                  &prior, &how, unknown, NULL);
     memcpy(g->number, unknown, sizeof g->number);
