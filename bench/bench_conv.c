@@ -268,6 +268,16 @@ BENCH(conv_bf16)
     }
 }
 
+/* Winograd's way where a layer may take it. */
+static void weight_rows(ts_conv shape)
+{
+    row("weight gradient", shape, weight_gradient);
+    row("bf16 weight gradient", shape, weight_gradient_bf16);
+    if (shape.k != 3 || shape.h < 16) return;
+    row("Winograd weight gradient", shape, weight_gradient_winograd);
+    row("bf16 Winograd weight gradient", shape, weight_gradient_winograd_bf16);
+}
+
 /* Layers of configs/single-phone.ini. */
 BENCH(conv_winograd_bf16)
 {
@@ -286,10 +296,7 @@ BENCH(conv_winograd_bf16)
         row("Winograd data gradient", shape[i], data_gradient_winograd);
         row("bf16 data gradient", shape[i], data_gradient_bf16);
         row("bf16 Winograd data gradient", shape[i], data_gradient_winograd_bf16);
-        row("weight gradient", shape[i], weight_gradient);
-        row("Winograd weight gradient", shape[i], weight_gradient_winograd);
-        row("bf16 weight gradient", shape[i], weight_gradient_bf16);
-        row("bf16 Winograd weight gradient", shape[i], weight_gradient_winograd_bf16);
+        weight_rows(shape[i]);
     }
 }
 
@@ -304,11 +311,7 @@ BENCH(weights_bf16)
         {8, 4, 4, 128, 128, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 64, 64, 64, 192, 1, 1, TS_PAD_ZERO, 0, {0}}};
     bench_heading("gradients of weights in f32 and bf16, directly and by Winograd's way");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
-        row("weight gradient", shape[i], weight_gradient);
-        row("bf16 weight gradient", shape[i], weight_gradient_bf16);
-        if (shape[i].k != 3 || shape[i].h < 16) continue;
-        row("Winograd weight gradient", shape[i], weight_gradient_winograd);
-        row("bf16 Winograd weight gradient", shape[i], weight_gradient_winograd_bf16);
+        weight_rows(shape[i]);
     }
 }
 

@@ -10,7 +10,7 @@
 /* Of F0's error, what is not a level of the whole material: the part that a pixel may change by itself. */
 #define F0_DETAIL 0.35f
 /* Of the roughness' error, relative to the roughness, what the fit may explain by a level of the whole material. It is
- * less than is true (a half): where the maps lack relief the fit leans to rougher materials. */
+ * less than is true, about 1: where the maps lack relief the fit leans to rougher materials. */
 #define ROUGHNESS_LEVEL 0.15
 #define LAPLACE 1.41421356f /* a Laplace density's standard deviation over its mean absolute error */
 
