@@ -1,5 +1,6 @@
 #include "data/camera.h"
 #include "data/develop.h"
+#include "data/glare.h"
 #include "data/image/image.h"
 #include "data/materials/noise.h"
 #include "tensor/rng.h"
@@ -39,6 +40,7 @@ typedef struct phone {
     float fov, flash, flash_turn, told_view, told_power;
     float ambient, side, side_turn, side_height, warmth;
     float contrast, pivot, bend, knee, sharpen, radius;
+    float flash_size, points_turn, glare;
 } phone;
 
 static phone draw_phone(uint64_t seed, uint64_t index)
@@ -61,6 +63,9 @@ static phone draw_phone(uint64_t seed, uint64_t index)
     p.knee = ts_rng_range(&r, -1, 1); /* every other photograph clips */
     p.sharpen = ts_rng_uniform(&r);
     p.radius = ts_rng_range(&r, 0.5f, 2);
+    p.flash_size = ts_rng_uniform(&r);
+    p.points_turn = ts_rng_range(&r, 0, 6.2831853f);
+    p.glare = ts_rng_uniform(&r);
     return p;
 }
 
@@ -108,6 +113,12 @@ io_ambient io_camera_ambient(const io_camera *c, uint64_t seed, uint64_t index)
         a.uniform[k] = share * (1 - p.side) * colour[k];
     }
     return a;
+}
+
+io_disk io_camera_flash(const io_camera *c, uint64_t seed, uint64_t index, float distance)
+{
+    const phone p = draw_phone(seed, index);
+    return (io_disk){.radius = c->flash_size * sqrtf(p.flash_size) * distance, .turn = p.points_turn};
 }
 
 io_tone io_camera_tone(const io_camera *c, uint64_t seed, uint64_t index)
@@ -222,6 +233,10 @@ void io_camera_apply(const io_camera *c, uint64_t seed, uint64_t index, int size
         gain *= exp2f(c->noise_spread * f.shot);
     }
     size_t count = (size_t)size * (size_t)size * 3;
+    if (c->glare > 0) {
+        const float drawn = draw_phone(seed, index).glare;
+        io_glare(size, c->glare * drawn * drawn, image); /* clean lenses are more common than touched ones */
+    }
     if (c->exposure > 0 || c->vignette > 0 || c->white_balance > 0) expose(c, &f, seed, index, size, image);
     const io_tone tone = io_camera_tone(c, seed, index);
     if (tone.knee < 1) io_tone_roll_off(&tone, count, image);

@@ -20,6 +20,8 @@ typedef struct io_camera {
     float off_centre;    /* farthest that the axis meets the patch from its centre, patch widths */
     float fov_min, fov_max;      /* field of view across the square, degrees; both 0: the distance that is given */
     float flash;                 /* largest offset of the light from the camera parallel to the sample, patch widths */
+    float flash_size;            /* largest radius of the flash's disk, as a share of its distance */
+    float glare;                 /* largest share of the light that the lens scatters */
     float ambient;               /* largest other light, as a share of the flash's at the centre of a matt sample */
     float tone;                  /* largest strength of the tone curve; half of the photographs roll off highlights */
     float sharpen;               /* largest amount of the unsharp mask */
@@ -46,6 +48,12 @@ typedef struct io_ambient {
 } io_ambient;
 io_ambient io_camera_ambient(const io_camera *c, uint64_t seed, uint64_t index);
 
+/* The flash is a disk parallel to the sample: the square of its radius, as a share of its distance, is uniform. */
+typedef struct io_disk {
+    float radius, turn; /* patch widths at this distance; radians: of whatever pattern its points have */
+} io_disk;
+io_disk io_camera_flash(const io_camera *c, uint64_t seed, uint64_t index, float distance);
+
 /* The tone curve and the shoulder that io_camera_apply puts in. */
 io_tone io_camera_tone(const io_camera *c, uint64_t seed, uint64_t index);
 
@@ -60,9 +68,9 @@ float io_camera_exposure(const io_camera *c, uint64_t seed, uint64_t index);
  * would expose and clamp to c->meter: a phone's metering spares the photographer a white picture. */
 float io_camera_meter(const io_camera *c, uint64_t seed, uint64_t index, int size, const float *image);
 
-/* image: a linear rendering that is NOT clamped, [size][size][3], in place. In this order: exposure, vignette and white
- * balance; highlights roll off or clip at 1; blur; noise; tone curve; sharpening; JPEG or rounding to 8 bits. The
- * result lies in [0, 1]. Serial, thread safe. */
+/* image: a linear rendering that is NOT clamped, [size][size][3], in place. In this order: glare; exposure, vignette
+ * and white balance; highlights roll off or clip at 1; blur; noise; tone curve; sharpening; JPEG or rounding to 8 bits.
+ * The result lies in [0, 1]. Serial, thread safe. */
 void io_camera_apply(const io_camera *c, uint64_t seed, uint64_t index, int size, float *image);
 
 /* What a baseline JPEG of this quality (1 .. 100, the tables of ITU-T T.81 annex K scaled as the Independent JPEG

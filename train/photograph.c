@@ -22,6 +22,8 @@ static io_camera camera_of(const tr_config *c)
                        .fov_min = (float)c->data.fov_min,
                        .fov_max = (float)c->data.fov_max,
                        .flash = (float)c->data.flash,
+                       .flash_size = (float)c->data.flash_size,
+                       .glare = (float)c->data.glare,
                        .ambient = (float)c->data.ambient,
                        .tone = (float)c->data.tone,
                        .sharpen = (float)c->data.sharpen,

@@ -32,7 +32,7 @@ check data_same_bytes_for_any_threads_and_range data_same_bytes_for_any_threads_
 
 data_camera() {
     expect 0 "$DATA" -o "$T/a" --count 2 --size 96 --photographs
-    for fault in "--fov-min 20 --fov-max 40" "--flash 0.2" "--ambient 0.5" "--tone 1" "--sharpen 3" "--noise-spread 2" "--exposure 2"; do
+    for fault in "--fov-min 20 --fov-max 40" "--flash 0.2" "--flash-size 0.02" "--glare 0.2" "--ambient 0.5" "--tone 1" "--sharpen 3" "--noise-spread 2" "--exposure 2"; do
         # shellcheck disable=SC2086
         expect 0 "$DATA" -o "$T/b" --count 2 --size 96 --photographs $fault
         diff -r "$T/a" "$T/b" >/dev/null && fail "$fault changes nothing"
