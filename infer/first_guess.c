@@ -1,5 +1,6 @@
 #include "infer/first_guess.h"
 #include "infer/clip.h"
+#include "infer/hidden_diffuse.h"
 #include "render/scene_model.h"
 #include "tensor/maps.h"
 #include "tensor/resize.h"
@@ -10,8 +11,10 @@
 /* Of F0's error, what is not a level of the whole material: the part that a pixel may change by itself. */
 #define F0_DETAIL 0.35f
 /* Of the roughness' error, relative to the roughness, what the fit may explain by a level of the whole material. It is
- * less than is true, about 1: where the maps lack relief the fit leans to rougher materials. */
+ * less than is true, about 1: where the maps lack relief the fit leans to rougher materials, and where the field of
+ * view is not known a narrower one looks like them. */
 #define ROUGHNESS_LEVEL 0.15
+#define ROUGHNESS_LEVEL_IN_KNOWN_VIEW 0.4
 #define LAPLACE 1.41421356f /* a Laplace density's standard deviation over its mean absolute error */
 
 /* The numbers that are known have no error: the prior keeps them. */
@@ -39,15 +42,40 @@ static void scene_prior(const float *said, const rd_view *view, int known, rd_sc
     prior->mean[RD_SCENE_TONE] = prior->deviation[RD_SCENE_TONE] = 0; /* the steps have no tone curve */
 }
 
-static void level_prior(const lgd_first_guess *g, size_t pixels, int channels, rd_scene_prior *prior)
+static void level_prior(const lgd_first_guess *g, size_t pixels, int channels, int known, rd_scene_prior *prior)
 {
+    const double part = known & NN_KNOWN_CAMERA ? ROUGHNESS_LEVEL_IN_KNOWN_VIEW : ROUGHNESS_LEVEL;
     double rough = 0, off = 0;
     for (size_t i = 0; i < pixels; i++) {
         rough += fmax((double)g->r0[i * (size_t)channels + MAP_ROUGHNESS], -1) + 1;
         off += (double)g->deviation[i * NN_SPREADS + GROUP_ROUGHNESS];
     }
     prior->mean[RD_SCENE_ROUGHNESS] = 0;
-    prior->deviation[RD_SCENE_ROUGHNESS] = (float)(ROUGHNESS_LEVEL * fmin(off / fmax(rough, 1e-6), 1));
+    prior->deviation[RD_SCENE_ROUGHNESS] = (float)(part * fmin(off / fmax(rough, 1e-6), 1));
+}
+
+/* Scene and level, found from R_0; R_0's diffuse where that scene's highlight hides it; both again. */
+static ts_code fit(rd_grid grid, const float *image, int channels, int known, const rd_scene_prior *prior,
+                   lgd_first_guess *g, ts_status *st)
+{
+    const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior(known)};
+    const int64_t pixels = (int64_t)grid.h * grid.w;
+    const size_t values = (size_t)pixels * (size_t)channels;
+    float unknown[RD_SCENE_UNKNOWNS], *rough = malloc(values * sizeof *rough);
+    if (!rough) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", grid.w, grid.h);
+    memcpy(unknown, prior->mean, sizeof unknown);
+    rd_scene_fit(grid, g->r0, channels, g->deviation, image, prior, &how, unknown, NULL);
+    rd_scene_roughen(pixels, g->r0, channels, unknown[RD_SCENE_ROUGHNESS], rough);
+    const ts_code code = lgd_fill_hidden_diffuse(grid, image, unknown, channels, rough, st);
+    if (!code) {
+        for (size_t i = 0; i < values; i += (size_t)channels)
+            memcpy(g->r0 + i + MAP_DIFFUSE, rough + i + MAP_DIFFUSE, 3 * sizeof *rough);
+        rd_scene_fit(grid, g->r0, channels, g->deviation, image, prior, &how, unknown, NULL);
+        memcpy(g->number, unknown, sizeof g->number);
+        rd_scene_roughen(pixels, g->r0, channels, unknown[RD_SCENE_ROUGHNESS], g->r0);
+    }
+    free(rough);
+    return code;
 }
 
 static ts_code make(ag_tape *tape, const nn_model *model, const float *image, int side, const rd_view *view, int known,
@@ -82,15 +110,8 @@ static ts_code make(ag_tape *tape, const nn_model *model, const float *image, in
             expf(fminf(fmaxf(guess.spread->t.data[i], -6), 4));
     rd_scene_prior prior;
     scene_prior(guess.scene->t.data, view, known, &prior);
-    level_prior(g, pixels, model->arch.channels, &prior);
-    float unknown[RD_SCENE_UNKNOWNS];
-    memcpy(unknown, prior.mean, sizeof unknown);
-    const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior(known)};
-    rd_scene_fit(rd_grid_on(rd_grid_full(size), threads), g->r0, model->arch.channels, g->deviation, small->t.data,
-                 &prior, &how, unknown, NULL);
-    memcpy(g->number, unknown, sizeof g->number);
-    rd_scene_roughen((int64_t)pixels, g->r0, model->arch.channels, unknown[RD_SCENE_ROUGHNESS], g->r0);
-    return TS_OK;
+    level_prior(g, pixels, model->arch.channels, known, &prior);
+    return fit(rd_grid_on(rd_grid_full(size), threads), small->t.data, model->arch.channels, known, &prior, g, st);
 }
 
 ts_code lgd_first_guess_make(ag_tape *tape, const nn_model *model, const float *image, int side, const rd_view *view,

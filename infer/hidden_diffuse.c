@@ -1,0 +1,158 @@
+#include "infer/hidden_diffuse.h"
+#include "tensor/maps.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { CELLS = 32 };        /* a side, at most */
+#define STIFFNESS 0.1       /* of the field between neighbours, beside a weight of 1 */
+#define WEIGHT_LEAST 1e-4   /* keeps the field defined where nothing is seen */
+#define ALBEDO_LEAST 0.004f /* whose logarithm is taken: one step of 8 bits */
+#define BURNT_OUT 2.94f     /* sum of a pixel's three values, of which noise leaves .98 */
+#define BURNT_OUT_TELLS 0.1f
+
+/* The whole square is full; matt holds its maps without F0. */
+typedef struct pictures {
+    float *matt, *full, *diffuse; /* [size, size, channels]; [size, size, 3] each */
+} pictures;
+
+typedef struct cells {
+    int side;
+    double weight[CELLS * CELLS], log_albedo[3][CELLS * CELLS], change[3][CELLS * CELLS];
+} cells;
+
+/* Sums over each cell, then means. */
+static void gather(const pictures *p, int size, int channels, const float *maps, const float *image, cells *c)
+{
+    int count[CELLS * CELLS] = {0};
+    double most = 0;
+    for (int i = 0; i < size * size; i++) {
+        const int at = i / size * c->side / size * c->side + i % size * c->side / size;
+        float full = 0, diffuse = 0, seen = 0;
+        for (int k = 0; k < 3; k++) {
+            full += p->full[3 * i + k], diffuse += p->diffuse[3 * i + k], seen += image[3 * i + k];
+            const float albedo = (maps[i * channels + MAP_DIFFUSE + k] + 1) / 2;
+            c->log_albedo[k][at] += (double)logf(fmaxf(albedo, ALBEDO_LEAST));
+        }
+        const float part = fminf(diffuse / fmaxf(full, 1e-6f), 1);
+        c->weight[at] += (double)(seen > BURNT_OUT ? BURNT_OUT_TELLS * part : part);
+        count[at]++;
+    }
+    for (int i = 0; i < c->side * c->side; i++) {
+        c->weight[i] /= count[i];
+        for (int k = 0; k < 3; k++) c->log_albedo[k][i] /= count[i];
+        most = fmax(most, c->weight[i]);
+    }
+    for (int i = 0; i < c->side * c->side; i++) c->weight[i] = pow(c->weight[i] / fmax(most, 1e-6), 3);
+}
+
+/* The lower band of the symmetric matrix: row i has entries i - side .. i, of which those of the neighbours before it
+ * and its own are not 0. */
+static void make_band(const cells *c, double *band)
+{
+    const int side = c->side, width = side + 1;
+    memset(band, 0, (size_t)(side * side * width) * sizeof *band);
+    for (int i = 0; i < side * side; i++) {
+        double *row = band + (size_t)i * (size_t)width;
+        const bool above = i >= side, below = i<side *(side - 1), left = i % side> 0, right = i % side < side - 1;
+        row[side] = c->weight[i] + WEIGHT_LEAST + STIFFNESS * (above + below + left + right);
+        if (above) row[0] = -STIFFNESS;
+        if (left) row[side - 1] += -STIFFNESS;
+    }
+}
+
+/* Cholesky's factor in place of the band. */
+static void factor(int count, int side, double *band)
+{
+    const int width = side + 1;
+    for (int i = 0; i < count; i++) {
+        double *row = band + (size_t)i * (size_t)width;
+        for (int j = i < side ? 0 : i - side; j <= i; j++) {
+            const double *other = band + (size_t)j * (size_t)width;
+            double sum = row[j - i + side];
+            for (int k = i < side ? 0 : i - side; k < j; k++) sum -= row[k - i + side] * other[k - j + side];
+            row[j - i + side] = j == i ? sqrt(sum) : sum / other[side];
+        }
+    }
+}
+
+static void solve(int count, int side, const double *band, double *x)
+{
+    const int width = side + 1;
+    for (int i = 0; i < count; i++) {
+        const double *row = band + (size_t)i * (size_t)width;
+        for (int k = i < side ? 0 : i - side; k < i; k++) x[i] -= row[k - i + side] * x[k];
+        x[i] /= row[side];
+    }
+    for (int i = count - 1; i >= 0; i--) {
+        const double *row = band + (size_t)i * (size_t)width;
+        x[i] /= row[side];
+        for (int k = i < side ? 0 : i - side; k < i; k++) x[k] -= row[k - i + side] * x[i];
+    }
+}
+
+static void find_changes(cells *c, double *band)
+{
+    const int count = c->side * c->side;
+    make_band(c, band);
+    factor(count, c->side, band);
+    for (int k = 0; k < 3; k++) {
+        double *b = c->change[k];
+        for (int i = 0; i < count; i++) b[i] = (c->weight[i] + WEIGHT_LEAST) * c->log_albedo[k][i];
+        solve(count, c->side, band, b);
+        for (int i = 0; i < count; i++) b[i] = (1 - c->weight[i]) * (b[i] - c->log_albedo[k][i]);
+    }
+}
+
+/* Pixel i lies between the centres of cells *cell and the one after it, *part of the way. */
+static void between(int i, int size, int side, int *cell, float *part)
+{
+    const float at = fminf(fmaxf(((float)i + 0.5f) * (float)side / (float)size - 0.5f, 0), (float)(side - 1));
+    *cell = (int)at < side - 1 ? (int)at : side > 1 ? side - 2 : 0;
+    *part = at - (float)*cell;
+}
+
+static void apply(const cells *c, int size, int channels, float *maps)
+{
+    const int next = c->side > 1;
+    for (int y = 0; y < size; y++) {
+        int row, column;
+        float down, right;
+        between(y, size, c->side, &row, &down);
+        for (int x = 0; x < size; x++) {
+            between(x, size, c->side, &column, &right);
+            float *map = maps + (size_t)(y * size + x) * (size_t)channels + MAP_DIFFUSE;
+            for (int k = 0; k < 3; k++) {
+                const double *a = c->change[k] + row * c->side + column, *b = a + next * c->side;
+                const float upper = (1 - right) * (float)a[0] + right * (float)a[next],
+                            lower = (1 - right) * (float)b[0] + right * (float)b[next];
+                map[k] = fminf((map[k] + 1) * expf((1 - down) * upper + down * lower) - 1, 1);
+            }
+        }
+    }
+}
+
+ts_code lgd_fill_hidden_diffuse(rd_grid grid, const float *image, const float number[RD_SCENE_NUMBERS], int channels,
+                                float *maps, ts_status *st)
+{
+    const int size = grid.w, side = size < CELLS ? size : CELLS;
+    const size_t pixels = (size_t)size * (size_t)size, values = pixels * (size_t)channels;
+    pictures p = {malloc(values * sizeof(float)), malloc(pixels * 3 * sizeof(float)),
+                  malloc(pixels * 3 * sizeof(float))};
+    cells *c = calloc(1, sizeof *c);
+    double *band = malloc((size_t)(side * side * (side + 1)) * sizeof *band);
+    ts_code code = TS_OK;
+    if (p.matt && p.full && p.diffuse && c && band) {
+        c->side = side;
+        memcpy(p.matt, maps, values * sizeof(float));
+        for (size_t i = 0; i < values; i += (size_t)channels)
+            for (size_t k = 0; k < 3; k++) p.matt[i + MAP_SPECULAR + k] = -1;
+        rd_scene_photograph(grid, maps, channels, number, false, p.full);
+        rd_scene_photograph(grid, p.matt, channels, number, false, p.diffuse);
+        gather(&p, size, channels, maps, image, c);
+        find_changes(c, band);
+        apply(c, size, channels, maps);
+    } else code = ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", size, size);
+    free(p.matt), free(p.full), free(p.diffuse), free(c), free(band);
+    return code;
+}

@@ -1,0 +1,81 @@
+/* Diffuse under a highlight. */
+#include "infer/hidden_diffuse.h"
+#include "tensor/maps.h"
+#include "tests/test.h"
+#include <math.h>
+#include <string.h>
+
+enum { SIDE = 128, PIXELS = SIDE * SIDE, C = MAP_CHANNELS };
+static const float scene[RD_SCENE_NUMBERS];
+static float maps[PIXELS * C], filled[PIXELS * C], image[PIXELS * 3];
+
+static float distance(int i)
+{
+    return hypotf((float)(i % SIDE) - 0.5f * (SIDE - 1), (float)(i / SIDE) - 0.5f * (SIDE - 1)) / SIDE;
+}
+
+/* A material of albedo .4, .3, .2 whose every other pixel is a fifth brighter, with a disk of a third of the albedo. */
+static void make(float roughness, float f0, float disk)
+{
+    const float albedo[3] = {0.4f, 0.3f, 0.2f};
+    for (int i = 0; i < PIXELS; i++) {
+        float *m = maps + i * C;
+        memset(m, 0, C * sizeof *m);
+        for (int k = 0; k < 3; k++) {
+            m[MAP_DIFFUSE + k] = 2 * albedo[k] * (i % 2 ? 1.2f : 1) * (distance(i) < disk ? 1 / 3.0f : 1) - 1;
+            m[MAP_SPECULAR + k] = 2 * f0 - 1;
+        }
+        m[MAP_ROUGHNESS] = 2 * roughness - 1;
+    }
+}
+
+static void fill(int threads, float *to)
+{
+    ts_status st = {0};
+    memcpy(to, maps, sizeof maps);
+    CHECK(!lgd_fill_hidden_diffuse(rd_grid_on(rd_grid_full(SIDE), threads), image, scene, C, to, &st), "%s",
+          st.message);
+}
+
+/* The disk ends where the highlight does: diffuse becomes that of the surroundings, and keeps its detail and hue. */
+TEST(hidden_diffuse_is_that_of_the_surroundings)
+{
+    make(0.25f, 0.3f, 0.08f);
+    fill(1, filled);
+    double sum = 0, contrast = 0;
+    int count = 0;
+    for (int i = 0; i < PIXELS; i += 2) {
+        if (distance(i) > 0.03f || i % SIDE == SIDE - 1) continue;
+        const float even = (filled[i * C] + 1) / 2, odd = (filled[(i + 1) * C] + 1) / 2,
+                    green = (filled[i * C + 1] + 1) / 2;
+        sum += (double)even, contrast += (double)(odd / even), count++;
+        CHECK(fabsf(green / even - 0.75f) < 0.02f, "a hue of %g", green / even);
+    }
+    CHECK(count > 5 && sum / count > 0.33 && sum / count < 0.43, "albedo .133 became %g, not .4", sum / count);
+    CHECK(fabs(contrast / count - 1.2) < 0.03, "contrast %g, not 1.2", contrast / count);
+    for (int i = 0; i < PIXELS; i++)
+        for (int k = MAP_NORMAL; k < C; k++)
+            CHECK(filled[i * C + k] == maps[i * C + k], "channel %d changed", k);
+}
+
+/* What is seen stays: a disk on a matt material is the material's own. */
+TEST(hidden_diffuse_leaves_what_is_seen)
+{
+    make(0.9f, 0.04f, 0.2f);
+    fill(1, filled);
+    for (int i = 0; i < PIXELS * C; i++)
+        CHECK(fabsf((filled[i] + 1) / (maps[i] + 1) - 1) < 0.05f, "%g became %g", maps[i], filled[i]);
+    make(0.25f, 0.3f, 0);
+    fill(1, filled);
+    for (int i = 0; i < PIXELS * C; i++)
+        CHECK(fabsf((filled[i] + 1) / (maps[i] + 1) - 1) < 0.02f, "without a disk %g became %g", maps[i], filled[i]);
+}
+
+TEST(hidden_diffuse_is_the_same_for_any_number_of_threads)
+{
+    static float again[PIXELS * C];
+    make(0.25f, 0.3f, 0.08f);
+    fill(1, filled);
+    fill(3, again);
+    CHECK(!memcmp(filled, again, sizeof again), "three threads make other bytes");
+}
