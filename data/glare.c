@@ -48,8 +48,9 @@ static void add_enlarged(int size, const float *from, float weight, float rest, 
             between(x, half, &beside, &next);
             for (int c = 0; c < 3; c++)
                 row[3 * x + c] = weight * row[3 * x + c] +
-                    rest * (0.5625f * a[3 * beside + c] + 0.1875f * (a[3 * next + c] + b[3 * beside + c]) +
-                            0.0625f * b[3 * next + c]);
+                    rest *
+                        (0.5625f * a[3 * beside + c] + 0.1875f * (a[3 * next + c] + b[3 * beside + c]) +
+                         0.0625f * b[3 * next + c]);
         }
     }
 }

@@ -54,8 +54,7 @@ TEST(hidden_diffuse_is_that_of_the_surroundings)
     CHECK(count > 5 && sum / count > 0.33 && sum / count < 0.43, "albedo .133 became %g, not .4", sum / count);
     CHECK(fabs(contrast / count - 1.2) < 0.03, "contrast %g, not 1.2", contrast / count);
     for (int i = 0; i < PIXELS; i++)
-        for (int k = MAP_NORMAL; k < C; k++)
-            CHECK(filled[i * C + k] == maps[i * C + k], "channel %d changed", k);
+        for (int k = MAP_NORMAL; k < C; k++) CHECK(filled[i * C + k] == maps[i * C + k], "channel %d changed", k);
 }
 
 /* What is seen stays: a disk on a matt material is the material's own. */
