@@ -66,12 +66,12 @@ near() {
 }
 same_weights() { cmp -s "$T/$1/last.safetensors" "$T/$2/last.safetensors" || fail "the weights of $1 and $2 differ"; }
 
-# One process, two and four make the same run; the same number makes the same bytes.
+# One process, two, three and four make the same run; the same number makes the same bytes.
 ranks_agree() {
     launcher "$1"
     config
     expect 0 alone one
-    for n in 2 4; do
+    for n in 2 3 4; do
         expect 0 train $n $n
         says "$T/err" "ranks 0-$((n - 1)) on "
         says "$T/err" "%) for the gradients of $n ranks"
