@@ -98,7 +98,9 @@ ISA_FLAGS_avx512 := -mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx2 -mfma -mbm
 ISA_FLAGS_avx512bf16 := $(ISA_FLAGS_avx512) -mavx512bf16
 ISA_FLAGS_amx := $(ISA_FLAGS_avx512bf16) -mamx-tile -mamx-bf16
 
-PROGRAMS := train infer eval data convert capture
+# Those whose main.c stands in cli/, and all.
+CLI := infer data convert capture
+PROGRAMS := train eval $(CLI)
 ROOMS := tensor tensor/conv autograd render nn nn/weights data data/image data/materials data/rectify train train/mpi \
   infer eval eval/methods eval/metrics cli cli/capture cli/data cli/infer
 LIB_C := $(filter-out %main.c train/mpi/mpi.c,$(wildcard $(ROOMS:%=%/*.c)))
@@ -145,7 +147,7 @@ $(BUILD)/bin/lgd-%: $(OBJ)/%/main.o $(INTERNAL)
 	@mkdir -p $(@D)
 	$(Q)$(CC) -o $@ $< $(INTERNAL) $(LDLIBS_ALL)
 
-$(BUILD)/bin/lgd-infer $(BUILD)/bin/lgd-convert $(BUILD)/bin/lgd-capture: $(BUILD)/bin/lgd-%: $(OBJ)/cli/%/main.o $(INTERNAL)
+$(CLI:%=$(BUILD)/bin/lgd-%): $(BUILD)/bin/lgd-%: $(OBJ)/cli/%/main.o $(INTERNAL)
 	$(call step,LD,$@)
 	@mkdir -p $(@D)
 	$(Q)$(CC) -o $@ $< $(INTERNAL) $(LDLIBS_ALL)

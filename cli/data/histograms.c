@@ -13,8 +13,8 @@ static ts_code write_files(const char *output, const io_histogram *theirs, const
     return code ? code : io_histogram_svg(svg, theirs, ours, "testdata", "procedural", st);
 }
 
-ts_code lgd_write_histograms(const char *output, const io_procedural *p, uint64_t first, int count,
-                             const char *testdata, int size, ts_status *st)
+ts_code cl_write_histograms(const char *output, const io_procedural *p, uint64_t first, int count, const char *testdata,
+                            int size, ts_status *st)
 {
     io_histogram ours = {0}, theirs = {0};
     io_material m = {0};

@@ -5,7 +5,7 @@
 #include <math.h>
 #include <string.h>
 
-ts_code lgd_write_capture(const char *folder, const io_material *m, ts_status *st)
+ts_code cl_write_capture(const char *folder, const io_material *m, ts_status *st)
 {
     enum { PICTURES = 9 };
     const size_t values = (size_t)m->size * (size_t)m->size * 3;

@@ -36,18 +36,18 @@ static void aim(io_pinhole *c, const double target[2], double roll)
             c->turn[2][(k + 2) % 3] * c->turn[0][(k + 1) % 3];
 }
 
-void lgd_sheet_shots(uint64_t seed, uint64_t index, int width, lgd_sheet_shot shot[LGD_SHEET_SHOTS])
+void cl_sheet_shots(uint64_t seed, uint64_t index, int width, cl_sheet_shot shot[CL_SHEET_SHOTS])
 {
     ts_rng r = ts_rng_make(seed, TS_STREAM_SHEET, index);
     const int height = width * 3 / 4;
     const double lens = 1 + (double)ts_rng_range(&r, -0.02f, 0.02f), radial = (double)ts_rng_range(&r, -0.03f, 0.03f);
     const double first = (double)ts_rng_range(&r, 0, 6.2831853f);
-    for (int k = 0; k < LGD_SHEET_SHOTS; k++) {
-        lgd_sheet_shot *s = &shot[k];
+    for (int k = 0; k < CL_SHEET_SHOTS; k++) {
+        cl_sheet_shot *s = &shot[k];
         const double tilt = DEGREE * (double)(k ? ts_rng_range(&r, 15, 40) : ts_rng_range(&r, 0, 5));
-        const double around = first + 2 * PI * k / (LGD_SHEET_SHOTS - 1) + (double)ts_rng_range(&r, -0.3f, 0.3f);
+        const double around = first + 2 * PI * k / (CL_SHEET_SHOTS - 1) + (double)ts_rng_range(&r, -0.3f, 0.3f);
         const double away = (double)ts_rng_range(&r, 210, 245) * MM;
-        *s = (lgd_sheet_shot){
+        *s = (cl_sheet_shot){
             .camera = {width,
                        height,
                        lens * FOCAL / 43.266615305567875 * hypot(width, height),
@@ -61,7 +61,7 @@ void lgd_sheet_shots(uint64_t seed, uint64_t index, int width, lgd_sheet_shot sh
     }
 }
 
-static rd_view view_of(const lgd_sheet_shot *s)
+static rd_view view_of(const cl_sheet_shot *s)
 {
     rd_view v = {.kind = RD_POINT, .power = 1};
     for (int k = 0; k < 3; k++) {
@@ -74,7 +74,7 @@ static rd_view view_of(const lgd_sheet_shot *s)
 }
 
 typedef struct scene {
-    const lgd_sheet_shot *shot;
+    const cl_sheet_shot *shot;
     const float *radiance; /* [size][size][3] of the window, of power 1 */
     int size;
     io_tag_image *black; /* [IO_SHEET_TAGS] */
@@ -169,30 +169,30 @@ static ts_code take(const char *path, const scene *s, uint64_t seed, uint64_t in
     return code;
 }
 
-ts_code lgd_write_sheet_captures(const char *folder, const io_material *m, uint64_t seed, uint64_t index, int width,
-                                 int quality, ts_status *st)
+ts_code cl_write_sheet_captures(const char *folder, const io_material *m, uint64_t seed, uint64_t index, int width,
+                                int quality, ts_status *st)
 {
     const size_t values = (size_t)m->size * (size_t)m->size * 3;
     char path[4096];
-    lgd_sheet_shot shot[LGD_SHEET_SHOTS];
+    cl_sheet_shot shot[CL_SHEET_SHOTS];
     io_tag_image black[IO_SHEET_TAGS];
     io_capture exact;
     float *radiance = malloc(values * sizeof *radiance);
     ts_code code = radiance ? io_tag_images(black, st) : ts_fail(st, TS_NOMEM, "out of memory");
-    if (!code) code = io_capture_create(&exact, LGD_SHEET_SHOTS, m->size, st);
+    if (!code) code = io_capture_create(&exact, CL_SHEET_SHOTS, m->size, st);
     if (code) {
         free(radiance);
         return code;
     }
-    lgd_sheet_shots(seed, index, width, shot);
+    cl_sheet_shots(seed, index, width, shot);
     exact.side = (float)(IO_SHEET_WINDOW / 10);
-    for (int i = 0; i < LGD_SHEET_SHOTS && !code; i++) {
+    for (int i = 0; i < CL_SHEET_SHOTS && !code; i++) {
         const rd_view view = view_of(&shot[i]);
         scene s = {.shot = &shot[i], .radiance = radiance, .size = m->size, .black = black};
         for (int id = 0; id < IO_SHEET_TAGS; id++) io_tag_centre(id, s.centre[id]);
         rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &view, false, radiance);
         snprintf(path, sizeof path, "%s/photo_%d.jpg", folder, i + 1);
-        code = take(path, &s, seed, index * LGD_SHEET_SHOTS + (uint64_t)i, quality, st);
+        code = take(path, &s, seed, index * CL_SHEET_SHOTS + (uint64_t)i, quality, st);
         /* as bright as the default flash makes the sample from nearer by than any of the lights: nothing is clipped
          * that is not under that flash */
         const float power = 3 * RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE);

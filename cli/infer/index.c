@@ -14,17 +14,17 @@ enum {
     PICTURES = 500 /* at most 50 MB: later materials have a name alone */
 };
 
-static ts_code check(const lgd_plan *plan, const char *folder, ts_status *st)
+static ts_code check(const cl_plan *plan, const char *folder, ts_status *st)
 {
     struct stat there, photo;
     char *path = NULL;
     ts_code code = TS_OK;
-    if (asprintf(&path, "%s/%s", folder, LGD_INDEX_NAME) < 0) return ts_fail(st, TS_NOMEM, "out of memory");
+    if (asprintf(&path, "%s/%s", folder, CL_INDEX_NAME) < 0) return ts_fail(st, TS_NOMEM, "out of memory");
     const bool exists = stat(path, &there) == 0;
     if (exists && S_ISDIR(there.st_mode)) code = ts_fail(st, TS_INVALID, "%s: is in the way: it is a folder", path);
     for (int i = 0; i < plan->jobs && !code; i++) {
         const char *name = plan->job[i].photo;
-        if (strcmp(plan->job[i].stem, LGD_INDEX_NAME) == 0)
+        if (strcmp(plan->job[i].stem, CL_INDEX_NAME) == 0)
             code = ts_fail(st, TS_INVALID, "%s would be written to %s, which is the page of all: rename it", name,
                            path);
         else if (exists && stat(name, &photo) == 0 && photo.st_dev == there.st_dev && photo.st_ino == there.st_ino)
@@ -34,15 +34,15 @@ static ts_code check(const lgd_plan *plan, const char *folder, ts_status *st)
     return code;
 }
 
-ts_code lgd_index_start(lgd_index *index, const lgd_plan *plan, const char *folder, ts_status *st)
+ts_code cl_index_start(cl_index *index, const cl_plan *plan, const char *folder, ts_status *st)
 {
-    *index = (lgd_index){0};
+    *index = (cl_index){0};
     if (check(plan, folder, st) != TS_OK) return st->code;
-    return io_text_begin(&index->cards, LGD_INDEX_NAME, st);
+    return io_text_begin(&index->cards, CL_INDEX_NAME, st);
 }
 
 /* The photograph beside the maps under one light, as a PNG. */
-static ts_code picture(const lgd_item *item, unsigned char **bytes, size_t *size, ts_status *st)
+static ts_code picture(const cl_item *item, unsigned char **bytes, size_t *size, ts_status *st)
 {
     const int side = item->m.size, panel = side < PANEL ? side : PANEL;
     const io_image maps = {side, side, MAP_CHANNELS, item->m.maps},
@@ -73,7 +73,7 @@ static void put_heading(FILE *f, const char *name)
     fputs("</h2>\n", f);
 }
 
-ts_code lgd_index_add(lgd_index *index, const lgd_item *item, ts_status *st)
+ts_code cl_index_add(cl_index *index, const cl_item *item, ts_status *st)
 {
     FILE *f = index->cards.f;
     unsigned char *bytes = NULL;
@@ -110,15 +110,15 @@ ts_code lgd_index_add(lgd_index *index, const lgd_item *item, ts_status *st)
 
 static void put_summary(FILE *f, void *user)
 {
-    const lgd_index *index = user;
+    const cl_index *index = user;
     fprintf(f, "%d material%s. Left the photograph, right the material under another light; choose one to light it.",
             index->materials, index->materials == 1 ? "" : "s");
     if (index->failed) fprintf(f, " %d photograph%s failed.", index->failed, index->failed == 1 ? "" : "s");
 }
 
-static void put_cards(FILE *f, void *user) { fputs(((const lgd_index *)user)->cards.bytes, f); }
+static void put_cards(FILE *f, void *user) { fputs(((const cl_index *)user)->cards.bytes, f); }
 
-ts_code lgd_index_end(lgd_index *index, const char *folder, ts_status *st)
+ts_code cl_index_end(cl_index *index, const char *folder, ts_status *st)
 {
     static const io_slot slots[] = {{"style", page_index_css, NULL},
                                     {"summary", NULL, put_summary},
@@ -129,12 +129,12 @@ ts_code lgd_index_end(lgd_index *index, const char *folder, ts_status *st)
     io_text page = {0};
     if (!index->cards.f) return TS_OK;
     ts_code code = st->code;
-    const ts_code whole = io_text_end(&index->cards, LGD_INDEX_NAME, code ? NULL : st);
+    const ts_code whole = io_text_end(&index->cards, CL_INDEX_NAME, code ? NULL : st);
     if (!code) code = whole;
     if (!code && index->materials + index->failed > 0) { /* not interrupted before the first */
-        if (asprintf(&path, "%s/%s", folder, LGD_INDEX_NAME) < 0) {
+        if (asprintf(&path, "%s/%s", folder, CL_INDEX_NAME) < 0) {
             path = NULL; /* undefined after a failure */
-            code = ts_fail(st, TS_NOMEM, "out of memory for %s/%s", folder, LGD_INDEX_NAME);
+            code = ts_fail(st, TS_NOMEM, "out of memory for %s/%s", folder, CL_INDEX_NAME);
         }
         if (!code) code = io_text_begin(&page, path, st);
         if (!code) {
@@ -144,6 +144,6 @@ ts_code lgd_index_end(lgd_index *index, const char *folder, ts_status *st)
     }
     free(path);
     free(index->cards.bytes);
-    *index = (lgd_index){0};
+    *index = (cl_index){0};
     return code;
 }

@@ -1,27 +1,27 @@
 #include "cli/infer/item.h"
 #include <stdlib.h>
 
-const char *const lgd_warning_names[LGD_WARNINGS] = {"black",
-                                                     "overexposed",
-                                                     "field of view assumed",
-                                                     "colour profile not used",
-                                                     "mask black",
-                                                     "maps do not look like the photograph"};
+const char *const cl_warning_names[CL_WARNINGS] = {"black",
+                                                   "overexposed",
+                                                   "field of view assumed",
+                                                   "colour profile not used",
+                                                   "mask black",
+                                                   "maps do not look like the photograph"};
 
-const char *lgd_item_assumption(const lgd_item *item)
+const char *cl_item_assumption(const cl_item *item)
 {
     if (item->angle.assumed) return "assumed: ";
     if (item->fov != LGD_FOV_UNKNOWN) return "";
     return item->photo[0].camera[2] == lgd_flash_photo(NULL).camera[2] ? "assumed: " : "estimated: ";
 }
 
-const char *lgd_item_fov_is(const lgd_item *item)
+const char *cl_item_fov_is(const cl_item *item)
 {
-    const char *how = lgd_item_assumption(item);
+    const char *how = cl_item_assumption(item);
     return !*how ? "known" : *how == 'e' ? "estimated" : "assumed";
 }
 
-void lgd_item_free(lgd_item *item)
+void cl_item_free(cl_item *item)
 {
     free(item->square);
     item->square = NULL;

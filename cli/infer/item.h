@@ -1,6 +1,6 @@
 /* A photograph on its way, and what is known of it so far. */
-#ifndef LGD_ITEM_H
-#define LGD_ITEM_H
+#ifndef CL_ITEM_H
+#define CL_ITEM_H
 #include "cli/infer/plan.h"
 #include "data/material.h"
 #include "infer/angle.h"
@@ -10,23 +10,23 @@
 #include "infer/sheet.h"
 #include <stdint.h>
 
-/* Why maps may mean little; a bit each in the order of lgd_warning_names. */
+/* Why maps may mean little; a bit each in the order of cl_warning_names. */
 enum {
-    LGD_WARN_BLACK = 1 << 0,    /* the photograph is black */
-    LGD_WARN_FULL = 1 << 1,     /* more than nine tenths of its values are overexposed */
-    LGD_WARN_FOV = 1 << 2,      /* its field of view is assumed */
-    LGD_WARN_PROFILE = 1 << 3,  /* its colour profile cannot be used */
-    LGD_WARN_MASK = 1 << 4,     /* the mask is black all over */
-    LGD_WARN_DIFFERENT = 1 << 5 /* the maps do not look like it: a difference above LGD_FAR */
+    CL_WARN_BLACK = 1 << 0,    /* the photograph is black */
+    CL_WARN_FULL = 1 << 1,     /* more than nine tenths of its values are overexposed */
+    CL_WARN_FOV = 1 << 2,      /* its field of view is assumed */
+    CL_WARN_PROFILE = 1 << 3,  /* its colour profile cannot be used */
+    CL_WARN_MASK = 1 << 4,     /* the mask is black all over */
+    CL_WARN_DIFFERENT = 1 << 5 /* the maps do not look like it: a difference above CL_FAR */
 };
-enum { LGD_WARNINGS = 6 };
-extern const char *const lgd_warning_names[LGD_WARNINGS];
-#define LGD_FAR                                                                                                   \
+enum { CL_WARNINGS = 6 };
+extern const char *const cl_warning_names[CL_WARNINGS];
+#define CL_FAR                                                                                                    \
     0.05 /* reconstruction RMSE from which the difference is seen. Of 32 photographs by others (docs/real.md) the \
             default model leaves one beyond it, whose highlights are missing */
 
-typedef struct lgd_item {
-    const lgd_job *job;
+typedef struct cl_item {
+    const cl_job *job;
     int index;           /* into the plan */
     uint64_t hash;       /* of the photograph's file (tensor/hash.h); of a capture 0 */
     ts_status st;        /* the first failure on the way; later stages leave the item alone */
@@ -55,12 +55,12 @@ typedef struct lgd_item {
     int threads;       /* to compute and write it on, the calling thread's own (tensor/threads.h) */
     double shown;      /* the progress function's: how much of it the progress bar has, 0 .. 1 */
     int stage;         /* the pipeline's */
-} lgd_item;
+} cl_item;
 
 /* Of an estimated item: "assumed: " where its field of view is the default, "estimated: " where the model guessed it,
  * or "". */
-const char *lgd_item_assumption(const lgd_item *item);
+const char *cl_item_assumption(const cl_item *item);
 /* "known", "estimated" or "assumed". */
-const char *lgd_item_fov_is(const lgd_item *item);
-void lgd_item_free(lgd_item *item);
+const char *cl_item_fov_is(const cl_item *item);
+void cl_item_free(cl_item *item);
 #endif

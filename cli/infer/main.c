@@ -20,7 +20,7 @@
 #include <string.h>
 
 typedef struct run {
-    const lgd_command *command;
+    const cl_command *command;
     lgd_model *model;
     pthread_mutex_t lock; /* of the bar and of what is printed */
     cl_progress bar;
@@ -30,14 +30,14 @@ typedef struct run {
     FILE *poor;                    /* a line for each photograph whose maps should be looked at, into text */
     char *text;
     size_t size;
-    lgd_index index;
+    cl_index index;
     ts_status index_st;
-    bool left_out;          /* photographs of a sheet that could not be used */
-    lgd_manifest *manifest; /* or NULL */
+    bool left_out;         /* photographs of a sheet that could not be used */
+    cl_manifest *manifest; /* or NULL */
     ts_status manifest_st;
 } run;
 
-static int show(lgd_item *item, double done, void *user)
+static int show(cl_item *item, double done, void *user)
 {
     run *r = user;
     pthread_mutex_lock(&r->lock);
@@ -50,26 +50,26 @@ static int show(lgd_item *item, double done, void *user)
 
 /* Says what makes a photograph a poor one: the maps will be guesses. why: of those that should be looked at, in short.
  */
-static const char *look_at(const lgd_item *item, int size)
+static const char *look_at(const cl_item *item, int size)
 {
     const char *name = item->job->photo;
     if (size > item->photo_side)
         cl_note("%s: note: upsampled: its square has %d pixels a side and --size is %d", name, item->photo_side, size);
-    if (item->warnings & LGD_WARN_BLACK) {
+    if (item->warnings & CL_WARN_BLACK) {
         cl_note("%s: warning: the photograph is black: its maps mean nothing", name);
-        return lgd_warning_names[0];
+        return cl_warning_names[0];
     }
-    if (item->warnings & LGD_WARN_FULL) {
+    if (item->warnings & CL_WARN_FULL) {
         cl_note("%s: warning: the photograph is overexposed (%.0f%% of the values): its maps mean little", name,
                 100 * item->full);
-        return lgd_warning_names[1];
+        return cl_warning_names[1];
     }
     if (item->over > 0) cl_note("%s: note: %.1f%% of the values are above 1 and count as 1", name, 100 * item->over);
     return NULL;
 }
 
 /* Where the corners put the camera. */
-static void say_angle(const lgd_item *item)
+static void say_angle(const cl_item *item)
 {
     const lgd_rectified *r = &item->angle;
     cl_note("%s: camera at %.2f %.2f %.2f sides of the square, %.0f degrees from straight above (%s%.1f degrees across "
@@ -85,7 +85,7 @@ static void say_profile(const char *photo, const char *profile)
 
 /* What the sheet told, unless quiet, and of which photographs it told nothing. False: there are such. Where it told
  * nothing at all the item's own message is the first's. */
-static bool say_sheet(const lgd_item *item, bool quiet)
+static bool say_sheet(const cl_item *item, bool quiet)
 {
     const io_sheet_set *set = &item->sheet;
     int order[IO_SOLVE_MOST];
@@ -107,10 +107,10 @@ static bool say_sheet(const lgd_item *item, bool quiet)
 }
 
 /* What was assumed of the camera. */
-static void say_fov(const lgd_item *item)
+static void say_fov(const cl_item *item)
 {
     const double fov = rd_fov_of((double)item->photo[0].camera[2]);
-    const char *how = lgd_item_assumption(item);
+    const char *how = cl_item_assumption(item);
     if (item->fov == LGD_FOV_OF_PHOTO) return;
     if (!*how) cl_note("%s: field of view %.1f degrees (%s)", item->job->photo, fov, item->fov_from);
     else if (*how == 'e')
@@ -120,7 +120,7 @@ static void say_fov(const lgd_item *item)
                 fov, item->fov_from);
 }
 
-static void name_removed(const lgd_item *item)
+static void name_removed(const cl_item *item)
 {
     char names[256] = "";
     for (int i = 0; i < LGD_FILES; i++)
@@ -130,17 +130,17 @@ static void name_removed(const lgd_item *item)
 }
 
 /* How near the maps come to the photograph. */
-static void say_difference(const run *r, const lgd_item *item)
+static void say_difference(const run *r, const cl_item *item)
 {
-    const char *hint = r->command->iterations == -1 && item->last > LGD_FAR ? "; --iterations auto may come nearer"
-                                                                            : ""; /* each step halves what is left */
+    const char *hint = r->command->iterations == -1 && item->last > CL_FAR ? "; --iterations auto may come nearer"
+                                                                           : ""; /* each step halves what is left */
     if (item->steps > 0)
         cl_note("%s: difference from the photograph %.4f at first -> %.4f after %d step%s%s", item->job->photo,
                 item->first, item->last, item->steps, item->steps == 1 ? "" : "s", hint);
     else cl_note("%s: difference from the photograph %.4f at first", item->job->photo, item->first);
 }
 
-static void say_all(run *r, const lgd_item *item)
+static void say_all(run *r, const cl_item *item)
 {
     if (item->photos > 0 && item->photos < item->sheet.good)
         cl_note("%s: note: %d of its %d photographs are used, the most different: these weights read no more",
@@ -148,13 +148,13 @@ static void say_all(run *r, const lgd_item *item)
     else if (item->photos > 0 && item->photos < item->capture.images)
         cl_note("%s: note: the first %d of its %d photographs are used: these weights read no more", item->job->photo,
                 item->photos, item->capture.images);
-    if (item->warnings & LGD_WARN_MASK) /* of another photograph, or black and white exchanged */
+    if (item->warnings & CL_WARN_MASK) /* of another photograph, or black and white exchanged */
         cl_note("%s: warning: the mask %s is black all over its square: nothing is refined", item->job->photo,
                 r->command->mask);
     say_profile(item->job->photo, item->profile);
     const char *why = item->image ? look_at(item, r->command->size) : NULL;
     if (item->st.code) return;
-    if (!why && item->last > LGD_FAR) why = "its maps do not look like it";
+    if (!why && item->last > CL_FAR) why = "its maps do not look like it";
     if (why && r->poor) fprintf(r->poor, "%s: %s\n", item->job->photo, why);
     if (r->command->outputs & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC | LGD_OUT_ORM))
         cl_note("%s: base colour and metalness miss diffuse by %.4f and F0 by %.4f (RMS, linear)", item->job->photo,
@@ -167,7 +167,7 @@ static void say_all(run *r, const lgd_item *item)
     say_difference(r, item);
 }
 
-static void report(run *r, const lgd_item *item)
+static void report(run *r, const cl_item *item)
 {
     cl_progress_end(&r->bar);
     if (item->was_done) {
@@ -201,24 +201,24 @@ static void sum_up(run *r, double seconds)
     }
 }
 
-static void finished(const lgd_item *item, void *user)
+static void finished(const cl_item *item, void *user)
 {
     run *r = user;
     if (item->st.code == TS_INTERRUPTED) return;
     pthread_mutex_lock(&r->lock);
     r->shown += 1 - item->shown; /* of one that failed or ended early too */
     report(r, item);
-    if (r->manifest && !r->manifest_st.code) lgd_manifest_add(r->manifest, item, &r->manifest_st);
-    if (!r->index_st.code) lgd_index_add(&r->index, item, &r->index_st);
+    if (r->manifest && !r->manifest_st.code) cl_manifest_add(r->manifest, item, &r->manifest_st);
+    if (!r->index_st.code) cl_index_add(&r->index, item, &r->index_st);
     pthread_mutex_unlock(&r->lock);
 }
 
-static int all(run *r, lgd_pipeline *pipeline, const char *recipe)
+static int all(run *r, cl_pipeline *pipeline, const char *recipe)
 {
     const double start = cl_seconds();
     r->poor = open_memstream(&r->text, &r->size); /* without it no names are told */
     r->bar = cl_progress_start("step", (int64_t)r->jobs * (r->steps + 1));
-    lgd_pipeline_run(pipeline, r->model, recipe, &(lgd_listener){show, finished, cl_interrupted, r});
+    cl_pipeline_run(pipeline, r->model, recipe, &(cl_listener){show, finished, cl_interrupted, r});
     cl_progress_end(&r->bar);
     if (!r->command->quiet && (r->jobs > 1 || r->there)) sum_up(r, cl_seconds() - start);
     if (r->poor) fclose(r->poor);
@@ -238,7 +238,7 @@ static void print_help(void)
          "Estimates the material of a flat surface from a photograph taken straight on with a flash beside the lens.\n"
          "The largest centred square is used. FOLDER stands for the photographs in it, LIST is a file that names one a "
          "line.\n");
-    cl_argument_help(lgd_infer_arguments, stdout);
+    cl_argument_help(cl_infer_arguments, stdout);
     puts("\n"
          "DIR/STEM/ gets diffuse.png, specular.png (sRGB), roughness.png, normal.png (linear), maps.exr (all channels, "
          "linear),\n"
@@ -260,38 +260,38 @@ static void say_failed(const char *message) { cl_failed("%s", message); }
 static int end_index(run *r, int code)
 {
     const bool any = r->index.materials + r->index.failed > 0;
-    if (lgd_index_end(&r->index, r->command->out, &r->index_st) != TS_OK) return cl_failed("%s", r->index_st.message);
-    if (any && !r->command->quiet) cl_note("%s/%s shows all of them", r->command->out, LGD_INDEX_NAME);
+    if (cl_index_end(&r->index, r->command->out, &r->index_st) != TS_OK) return cl_failed("%s", r->index_st.message);
+    if (any && !r->command->quiet) cl_note("%s/%s shows all of them", r->command->out, CL_INDEX_NAME);
     return code;
 }
 
 static int end_manifest(run *r, int code)
 {
     ts_status own = {0}, *st = r->manifest_st.code ? &r->manifest_st : &own;
-    lgd_manifest_close(&r->manifest, &own);
+    cl_manifest_close(&r->manifest, &own);
     return st->code ? cl_failed("%s", st->message) : code;
 }
 
 /* The part of the work; its pages and its list. several: not a lone photograph, whose own page and meta.txt are
  * enough. */
-static ts_code settle(run *r, lgd_plan *plan, bool several, ts_status *st)
+static ts_code settle(run *r, cl_plan *plan, bool several, ts_status *st)
 {
-    const lgd_command *c = r->command;
-    if (several && lgd_manifest_check(plan, c->out, st) != TS_OK) return st->code;
-    if (c->shards) lgd_plan_keep(plan, c->shard, c->shards);
+    const cl_command *c = r->command;
+    if (several && cl_manifest_check(plan, c->out, st) != TS_OK) return st->code;
+    if (c->shards) cl_plan_keep(plan, c->shard, c->shards);
     r->jobs = plan->jobs;
     /* No part knows the others' materials. */
-    return c->outputs & LGD_OUT_PAGE && several && !c->shards ? lgd_index_start(&r->index, plan, c->out, st) : TS_OK;
+    return c->outputs & LGD_OUT_PAGE && several && !c->shards ? cl_index_start(&r->index, plan, c->out, st) : TS_OK;
 }
 
-static int work(const lgd_command *given)
+static int work(const cl_command *given)
 {
-    lgd_command own = *given;
-    const lgd_command *const c = &own;
+    cl_command own = *given;
+    const cl_command *const c = &own;
     ts_status st = {0};
     cl_operands operands = {0};
     lgd_error error;
-    lgd_plan plan;
+    cl_plan plan;
     char weights[LGD_PATH_MAX], *recipe = NULL;
     if (!*c->capture && cl_operands_expand(c->photo, c->photos, say_failed, &operands, &st) != TS_OK)
         return cl_failed("%s", st.message);
@@ -306,7 +306,7 @@ static int work(const lgd_command *given)
         cl_operands_free(&operands);
         return code;
     }
-    const ts_code bad = lgd_plan_make(photo, c->sheet ? 1 : photos, c->out, &plan, &st);
+    const ts_code bad = cl_plan_make(photo, c->sheet ? 1 : photos, c->out, &plan, &st);
     if (bad) {
         cl_operands_free(&operands);
         return bad == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
@@ -317,37 +317,37 @@ static int work(const lgd_command *given)
     const bool several = !c->sheet && (photos > 1 || strcmp(photo[0], given->photo[0]) != 0);
     run r = {.command = c, .lock = PTHREAD_MUTEX_INITIALIZER};
     if (settle(&r, &plan, several, &st) != TS_OK) {
-        lgd_plan_free(&plan);
+        cl_plan_free(&plan);
         cl_operands_free(&operands);
         return st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
     }
     int code = CL_FAILED;
     bool published = false;
-    lgd_pipeline *pipeline = NULL;
+    cl_pipeline *pipeline = NULL;
     if (lgd_model_path(c->model, *c->capture || (c->sheet && c->photos > 1) ? "multi" : LGD_DEFAULT_MODEL, weights,
                        &st) != TS_OK)
         cl_failed("%s", st.message);
     else if (lgd_weights_published(weights, &published, &st) != TS_OK ||
-             (c->skip_existing && !(recipe = lgd_recipe(c, weights, &st))))
+             (c->skip_existing && !(recipe = cl_recipe(c, weights, &st))))
         cl_failed("%s", st.message);
-    else if (!(pipeline = lgd_pipeline_start(&plan, c, recipe, published, &st)))
+    else if (!(pipeline = cl_pipeline_start(&plan, c, recipe, published, &st)))
         cl_failed("%s", st.message); /* decodes while the weights are read, once to be hashed */
-    else if (!recipe && !(recipe = lgd_recipe(c, weights, &st))) cl_failed("%s", st.message);
+    else if (!recipe && !(recipe = cl_recipe(c, weights, &st))) cl_failed("%s", st.message);
     else if (!(r.model = lgd_load(weights, &error))) cl_failed("%s", error.message);
     else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK ||
-             (several && !(r.manifest = lgd_manifest_open(&plan, c->out, &st))))
+             (several && !(r.manifest = cl_manifest_open(&plan, c->out, &st))))
         cl_failed("%s", st.message);
     else {
         if (plan.jobs == 1) lgd_model_single(r.model);
-        r.steps = lgd_command_steps(c, r.model);
+        r.steps = cl_command_steps(c, r.model);
         code = all(&r, pipeline, recipe);
         if (code == CL_OK && missing) code = CL_FAILED;
         code = end_manifest(&r, code);
     }
     code = end_index(&r, code);
-    lgd_pipeline_end(&pipeline);
+    cl_pipeline_end(&pipeline);
     lgd_free(&r.model);
-    lgd_plan_free(&plan);
+    cl_plan_free(&plan);
     cl_operands_free(&operands);
     free(recipe);
     return code;
@@ -356,11 +356,11 @@ static int work(const lgd_command *given)
 int main(int argc, char **argv)
 {
     cl_open_streams();
-    lgd_command c;
+    cl_command c;
     ts_status st = {0};
     const int bad = cl_init("lgd-infer");
     if (bad) return bad;
-    if (lgd_command_parse(argc, argv, &c, &st) != TS_OK) return cl_usage("%s", st.message);
+    if (cl_command_parse(argc, argv, &c, &st) != TS_OK) return cl_usage("%s", st.message);
     cl_catch_interrupt();
     cl_trace();
     int code = CL_OK;

@@ -23,7 +23,7 @@ typedef struct known {
     bool there;
 } known;
 
-struct lgd_manifest {
+struct cl_manifest {
     char *path;
     int fd;
     known *photo; /* of the plan, by key */
@@ -52,14 +52,14 @@ static int by_key(const void *a, const void *b)
     return (x->key > y->key) - (x->key < y->key);
 }
 
-static known *find(const lgd_manifest *m, uint64_t key)
+static known *find(const cl_manifest *m, uint64_t key)
 {
     return bsearch(&(known){.key = key}, m->photo, (size_t)m->photos, sizeof *m->photo, by_key);
 }
 
 /* The file as its name leads to it, locked against other writers where the file system can. Another process may have
  * put a new one in its place while this one waited. */
-static ts_code hold(lgd_manifest *m, ts_status *st)
+static ts_code hold(cl_manifest *m, ts_status *st)
 {
     for (int tries = 0; tries < 1000; tries++) {
         struct stat held, named;
@@ -75,13 +75,13 @@ static ts_code hold(lgd_manifest *m, ts_status *st)
     return ts_fail(st, TS_IO, "%s: is replaced again and again", m->path);
 }
 
-static void let_go(lgd_manifest *m)
+static void let_go(cl_manifest *m)
 {
     if (m->fd >= 0) (void)!flock(m->fd, LOCK_UN);
 }
 
 /* Cuts off half a line that a killed process has left at the end. The file is held. */
-static ts_code cut(lgd_manifest *m, off_t *size, ts_status *st)
+static ts_code cut(cl_manifest *m, off_t *size, ts_status *st)
 {
     struct stat info;
     char c = '\n';
@@ -119,7 +119,7 @@ typedef struct lines {
 } lines;
 
 /* What the lines are, and what of them is of the plan. */
-static ts_code look(lgd_manifest *m, FILE *f, lines *l, ts_status *st)
+static ts_code look(cl_manifest *m, FILE *f, lines *l, ts_status *st)
 {
     char *line = NULL;
     size_t capacity = 0;
@@ -156,7 +156,7 @@ static void keep_last(lines *l)
 }
 
 /* A new file with the kept lines in place of the held one. */
-static ts_code replace(lgd_manifest *m, FILE *f, const lines *l, ts_status *st)
+static ts_code replace(cl_manifest *m, FILE *f, const lines *l, ts_status *st)
 {
     ts_new_file to;
     char *line = NULL;
@@ -173,7 +173,7 @@ static ts_code replace(lgd_manifest *m, FILE *f, const lines *l, ts_status *st)
 }
 
 /* The file with one line for each photograph, the last. */
-static ts_code tidy(lgd_manifest *m, ts_status *st)
+static ts_code tidy(cl_manifest *m, ts_status *st)
 {
     lines l = {0};
     off_t size;
@@ -192,17 +192,17 @@ static ts_code tidy(lgd_manifest *m, ts_status *st)
 }
 
 /* The beginning of a photograph's line, up to the key's end. */
-static void put_head(FILE *f, const lgd_job *job)
+static void put_head(FILE *f, const cl_job *job)
 {
     fputs(HEAD, f);
     io_put_json(f, job->stem);
 }
 
 /* The line of a finished item, or of a photograph its beginning; NULL: no memory. */
-static char *line_of(const lgd_job *job, const lgd_item *item, size_t *size)
+static char *line_of(const cl_job *job, const cl_item *item, size_t *size)
 {
     io_text t;
-    if (io_text_begin(&t, LGD_MANIFEST_NAME, NULL) != TS_OK) return NULL;
+    if (io_text_begin(&t, CL_MANIFEST_NAME, NULL) != TS_OK) return NULL;
     FILE *f = t.f;
     put_head(f, job);
     if (item) {
@@ -216,22 +216,22 @@ static char *line_of(const lgd_job *job, const lgd_item *item, size_t *size)
             fputs("}\n", f);
         } else fprintf(f, ", %s\n", item->result);
     }
-    if (io_text_end(&t, LGD_MANIFEST_NAME, NULL) != TS_OK) return NULL;
+    if (io_text_end(&t, CL_MANIFEST_NAME, NULL) != TS_OK) return NULL;
     *size = t.size;
     return t.bytes;
 }
 
-ts_code lgd_manifest_check(const lgd_plan *plan, const char *folder, ts_status *st)
+ts_code cl_manifest_check(const cl_plan *plan, const char *folder, ts_status *st)
 {
     char *path = NULL;
     struct stat there, photo;
-    if (asprintf(&path, "%s/%s", folder, LGD_MANIFEST_NAME) < 0) return ts_fail(st, TS_NOMEM, "out of memory");
+    if (asprintf(&path, "%s/%s", folder, CL_MANIFEST_NAME) < 0) return ts_fail(st, TS_NOMEM, "out of memory");
     const bool exists = stat(path, &there) == 0;
     ts_code code = TS_OK;
     if (exists && !S_ISREG(there.st_mode)) code = ts_fail(st, TS_INVALID, "%s: is in the way: it is no file", path);
     for (int i = 0; i < plan->jobs && !code; i++) {
         const char *name = plan->job[i].photo;
-        if (strcmp(plan->job[i].stem, LGD_MANIFEST_NAME) == 0)
+        if (strcmp(plan->job[i].stem, CL_MANIFEST_NAME) == 0)
             code = ts_fail(st, TS_INVALID, "%s would be written to %s, which lists the results: rename it", name, path);
         else if (exists && stat(name, &photo) == 0 && photo.st_dev == there.st_dev && photo.st_ino == there.st_ino)
             code = ts_fail(st, TS_INVALID, "%s would replace the photograph %s: use another output folder", path, name);
@@ -240,9 +240,9 @@ ts_code lgd_manifest_check(const lgd_plan *plan, const char *folder, ts_status *
     return code;
 }
 
-static void release(lgd_manifest **mm)
+static void release(cl_manifest **mm)
 {
-    lgd_manifest *m = *mm;
+    cl_manifest *m = *mm;
     if (!m) return;
     if (m->fd >= 0) close(m->fd);
     free(m->path);
@@ -251,22 +251,22 @@ static void release(lgd_manifest **mm)
     *mm = NULL;
 }
 
-lgd_manifest *lgd_manifest_open(const lgd_plan *plan, const char *folder, ts_status *st)
+cl_manifest *cl_manifest_open(const cl_plan *plan, const char *folder, ts_status *st)
 {
-    lgd_manifest *m = calloc(1, sizeof *m);
-    ts_code code = m ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for %s", LGD_MANIFEST_NAME);
+    cl_manifest *m = calloc(1, sizeof *m);
+    ts_code code = m ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory for %s", CL_MANIFEST_NAME);
     if (m) {
         m->fd = -1;
         m->photo = calloc((size_t)plan->jobs + 1, sizeof *m->photo);
-        if (!m->photo || asprintf(&m->path, "%s/%s", folder, LGD_MANIFEST_NAME) < 0) {
+        if (!m->photo || asprintf(&m->path, "%s/%s", folder, CL_MANIFEST_NAME) < 0) {
             m->path = NULL; /* undefined after a failure */
-            code = ts_fail(st, TS_NOMEM, "out of memory for %s", LGD_MANIFEST_NAME);
+            code = ts_fail(st, TS_NOMEM, "out of memory for %s", CL_MANIFEST_NAME);
         }
     }
     for (int i = 0; i < plan->jobs && !code; i++) {
         size_t size;
         char *head = line_of(&plan->job[i], NULL, &size);
-        if (!head) code = ts_fail(st, TS_NOMEM, "out of memory for %s", LGD_MANIFEST_NAME);
+        if (!head) code = ts_fail(st, TS_NOMEM, "out of memory for %s", CL_MANIFEST_NAME);
         else m->photo[m->photos++].key = ts_hash(head + sizeof HEAD - 1, size - (sizeof HEAD - 1), 0);
         free(head);
     }
@@ -278,7 +278,7 @@ lgd_manifest *lgd_manifest_open(const lgd_plan *plan, const char *folder, ts_sta
     return m;
 }
 
-ts_code lgd_manifest_add(lgd_manifest *m, const lgd_item *item, ts_status *st)
+ts_code cl_manifest_add(cl_manifest *m, const cl_item *item, ts_status *st)
 {
     size_t size;
     char *line = line_of(item->job, item, &size);
@@ -303,9 +303,9 @@ ts_code lgd_manifest_add(lgd_manifest *m, const lgd_item *item, ts_status *st)
     return code;
 }
 
-ts_code lgd_manifest_close(lgd_manifest **mm, ts_status *st)
+ts_code cl_manifest_close(cl_manifest **mm, ts_status *st)
 {
-    lgd_manifest *m = *mm;
+    cl_manifest *m = *mm;
     if (!m) return TS_OK;
     ts_code code = tidy(m, st);
     if (m->fd >= 0 && fsync(m->fd) != 0 && errno != EINVAL && errno != ENOTSUP && !code)

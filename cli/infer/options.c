@@ -30,7 +30,7 @@ enum {
     VERSION = 'V'
 };
 
-const cl_argument lgd_infer_arguments[] = {
+const cl_argument cl_infer_arguments[] = {
     {'o', "output", "DIR",
      "output folder (required); each photograph gets DIR/STEM/, STEM = its file name without extension"},
     {'s', "size", "N", "side of the maps in pixels, 1 .. 8192 (default 256)"},
@@ -110,7 +110,7 @@ static ts_code whole(const char *name, const char *text, int64_t lo, int64_t hi,
                    (long long)hi);
 }
 
-static ts_code take_corners(int argc, char **argv, const char *value, lgd_command *c, ts_status *st)
+static ts_code take_corners(int argc, char **argv, const char *value, cl_command *c, ts_status *st)
 {
     const char *words[4] = {value};
     int count = 1;
@@ -120,7 +120,7 @@ static ts_code take_corners(int argc, char **argv, const char *value, lgd_comman
     return st->code;
 }
 
-static ts_code take_capture(const char *value, lgd_command *c, ts_status *st)
+static ts_code take_capture(const char *value, cl_command *c, ts_status *st)
 {
     size_t n = strlen(value);
     while (n > 1 && value[n - 1] == '/') n--;
@@ -131,20 +131,20 @@ static ts_code take_capture(const char *value, lgd_command *c, ts_status *st)
     return TS_OK;
 }
 
-ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
+ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st)
 {
-    *c = (lgd_command){.size = 256,
-                       .iterations = -1,
-                       .orientations = LGD_ORIENTATIONS_DEFAULT,
-                       .tolerance = LGD_TOLERANCE_DEFAULT,
-                       .max_pixels = IO_MAX_PIXELS_DEFAULT};
+    *c = (cl_command){.size = 256,
+                      .iterations = -1,
+                      .orientations = LGD_ORIENTATIONS_DEFAULT,
+                      .tolerance = LGD_TOLERANCE_DEFAULT,
+                      .max_pixels = IO_MAX_PIXELS_DEFAULT};
     const char *value = NULL;
     int key, operands = argc;
     int64_t n = 0;
     ts_code code = TS_OK;
     bool power_given = false, exr_given = false, ao = false;
     while (!code && !c->help && !c->version &&
-           (key = cl_argument_next(argc, argv, lgd_infer_arguments, &value, &operands, st)) != CL_ARGUMENT_END) {
+           (key = cl_argument_next(argc, argv, cl_infer_arguments, &value, &operands, st)) != CL_ARGUMENT_END) {
         switch (key) {
         case 'o': c->out = value; break;
         case 'm': c->model = value; break;
@@ -269,7 +269,7 @@ ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st)
     return TS_OK;
 }
 
-int lgd_command_steps(const lgd_command *c, const lgd_model *model)
+int cl_command_steps(const cl_command *c, const lgd_model *model)
 {
     if (c->iterations == LGD_AUTO) return LGD_AUTO_MOST;
     return c->iterations < 0 ? lgd_trained_iterations(model) : c->iterations;

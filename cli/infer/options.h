@@ -1,13 +1,13 @@
 /* The command line of lgd-infer. */
-#ifndef LGD_OPTIONS_H
-#define LGD_OPTIONS_H
+#ifndef CL_OPTIONS_H
+#define CL_OPTIONS_H
 #include "cli/arguments.h"
 #include "infer/angle.h"
 #include "infer/lgd.h"
 #include <stdbool.h>
 #include <stdint.h>
 
-typedef struct lgd_command {
+typedef struct cl_command {
     const char *out, *model, *mask;
     char capture[4096]; /* what is read in place of a photograph, without slashes at its end; or empty */
     int size, iterations /* -1: as trained; LGD_AUTO */, threads;
@@ -25,13 +25,13 @@ typedef struct lgd_command {
     char **photo; /* into argv; with a capture, that alone; with a sheet, all are one result's */
     char *only[1];
     int photos;
-} lgd_command;
+} cl_command;
 
-extern const cl_argument lgd_infer_arguments[];
+extern const cl_argument cl_infer_arguments[];
 
 /* TS_INVALID and st on wrong usage. With help or version set nothing else is checked. */
-ts_code lgd_command_parse(int argc, char **argv, lgd_command *c, ts_status *st);
+ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st);
 
 /* Refinement steps of each photograph, at most. */
-int lgd_command_steps(const lgd_command *c, const lgd_model *model);
+int cl_command_steps(const cl_command *c, const lgd_model *model);
 #endif

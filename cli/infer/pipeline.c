@@ -12,33 +12,33 @@ enum { LANES = 8, AHEAD = 2, WRITING = 1, LARGE = 1024 };
 
 enum { IDLE, DECODING, DECODED, COMPUTING, FINISHED }; /* an item's stages */
 
-struct lgd_pipeline {
-    const lgd_plan *plan;
-    const lgd_command *command;
+struct cl_pipeline {
+    const cl_plan *plan;
+    const cl_command *command;
     const char *read_recipe, *recipe; /* of reading: NULL where nothing may be complete already */
     lgd_model *model;
-    const lgd_listener *listener;
+    const cl_listener *listener;
     pthread_t decoder;
     bool published, decoding;
     int lanes, items;     /* photographs that are computed at once, and in all */
     int writing;          /* threads more than lanes */
     pthread_mutex_t lock; /* of what follows */
     pthread_cond_t changed;
-    lgd_item item[LANES + AHEAD + WRITING];
+    cl_item item[LANES + AHEAD + WRITING];
     int begun, computed, reported; /* decodings, items that are computed now, and those that are reported */
     bool all_begun, stopped;
 };
 
 /* The first in the plan's order; NULL: there is none. */
-static lgd_item *first_at(lgd_pipeline *p, int stage)
+static cl_item *first_at(cl_pipeline *p, int stage)
 {
-    lgd_item *first = NULL;
+    cl_item *first = NULL;
     for (int i = 0; i < p->items; i++)
         if (p->item[i].stage == stage && (!first || p->item[i].index < first->index)) first = &p->item[i];
     return first;
 }
 
-static void move(lgd_pipeline *p, lgd_item *item, int stage)
+static void move(cl_pipeline *p, cl_item *item, int stage)
 {
     pthread_mutex_lock(&p->lock);
     item->stage = stage;
@@ -46,7 +46,7 @@ static void move(lgd_pipeline *p, lgd_item *item, int stage)
     pthread_mutex_unlock(&p->lock);
 }
 
-static void end_early(lgd_pipeline *p)
+static void end_early(cl_pipeline *p)
 {
     pthread_mutex_lock(&p->lock);
     p->stopped = true;
@@ -55,17 +55,17 @@ static void end_early(lgd_pipeline *p)
 }
 
 /* For the next photograph; NULL: there is none, or no more are wanted. */
-static lgd_item *begin_decoding(lgd_pipeline *p)
+static cl_item *begin_decoding(cl_pipeline *p)
 {
-    lgd_item *item = NULL;
+    cl_item *item = NULL;
     pthread_mutex_lock(&p->lock);
     while (p->begun < p->plan->jobs && !p->stopped && !(item = first_at(p, IDLE)))
         pthread_cond_wait(&p->changed, &p->lock);
     if (item) {
-        *item = (lgd_item){.job = &p->plan->job[p->begun],
-                           .index = p->begun,
-                           .stage = DECODING,
-                           .threads = p->plan->jobs > 1 ? 1 : 0}; /* of several the others have work */
+        *item = (cl_item){.job = &p->plan->job[p->begun],
+                          .index = p->begun,
+                          .stage = DECODING,
+                          .threads = p->plan->jobs > 1 ? 1 : 0}; /* of several the others have work */
         p->begun++;
     } else {
         p->all_begun = true;
@@ -77,11 +77,11 @@ static lgd_item *begin_decoding(lgd_pipeline *p)
 
 static void *decode_all(void *user)
 {
-    lgd_pipeline *p = user;
-    lgd_item *item;
+    cl_pipeline *p = user;
+    cl_item *item;
     while ((item = begin_decoding(p))) {
         const double start = cl_seconds();
-        lgd_item_read(p->command, p->read_recipe, p->published, item);
+        cl_item_read(p->command, p->read_recipe, p->published, item);
         item->seconds = cl_seconds() - start;
         move(p, item, DECODED);
     }
@@ -89,38 +89,38 @@ static void *decode_all(void *user)
 }
 
 /* The threads are dealt anew for every round of the lanes: the last may have fewer photographs. */
-static int threads_for(const lgd_pipeline *p, int index)
+static int threads_for(const cl_pipeline *p, int index)
 {
     const int left = p->plan->jobs - index / p->lanes * p->lanes, at_once = left < p->lanes ? left : p->lanes;
     return ts_threads() > at_once ? ts_threads() / at_once : 1;
 }
 
 /* From decoded to finished. A failed one too: results keep their order. */
-static void work_on(lgd_pipeline *p, lgd_item *item)
+static void work_on(cl_pipeline *p, cl_item *item)
 {
     item->threads = threads_for(p, item->index);
-    const lgd_listener *l = p->listener;
+    const cl_listener *l = p->listener;
     const double start = cl_seconds();
     if (l->stop()) end_early(p);
-    else if (!item->st.code && !item->was_done) lgd_item_estimate(p->command, p->model, item, l->progress, l->user);
+    else if (!item->st.code && !item->was_done) cl_item_estimate(p->command, p->model, item, l->progress, l->user);
     pthread_mutex_lock(&p->lock);
     p->computed--;
     pthread_cond_broadcast(&p->changed);
     pthread_mutex_unlock(&p->lock);
     if (l->stop()) item->st = (ts_status){.code = TS_INTERRUPTED, .message = "interrupted"};
-    if (!item->st.code && !item->was_done) lgd_item_write(p->command, p->recipe, item);
+    if (!item->st.code && !item->was_done) cl_item_write(p->command, p->recipe, item);
     item->seconds += cl_seconds() - start;
     move(p, item, FINISHED);
 }
 
 /* What the calling thread does next: an item to work on, or where it reports, the next to be reported. NULL: nothing is
  * left. */
-static lgd_item *next(lgd_pipeline *p, bool reports)
+static cl_item *next(cl_pipeline *p, bool reports)
 {
-    lgd_item *item = NULL;
+    cl_item *item = NULL;
     pthread_mutex_lock(&p->lock);
     for (;;) {
-        lgd_item *finished = reports ? first_at(p, FINISHED) : NULL;
+        cl_item *finished = reports ? first_at(p, FINISHED) : NULL;
         if (finished && finished->index == p->reported) {
             p->reported++;
             item = finished;
@@ -141,8 +141,8 @@ static lgd_item *next(lgd_pipeline *p, bool reports)
 
 static void *lane(void *user)
 {
-    lgd_pipeline *p = user;
-    lgd_item *item;
+    cl_pipeline *p = user;
+    cl_item *item;
     while ((item = next(p, false))) work_on(p, item);
     return NULL;
 }
@@ -157,19 +157,19 @@ static int most_at_once(int jobs, int size)
     return lanes;
 }
 
-lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *command, const char *recipe, bool published,
-                                 ts_status *st)
+cl_pipeline *cl_pipeline_start(const cl_plan *plan, const cl_command *command, const char *recipe, bool published,
+                               ts_status *st)
 {
-    lgd_pipeline *p = calloc(1, sizeof *p);
+    cl_pipeline *p = calloc(1, sizeof *p);
     if (!p) return ts_fail(st, TS_NOMEM, "out of memory"), NULL;
-    *p = (lgd_pipeline){.plan = plan,
-                        .command = command,
-                        .read_recipe = recipe,
-                        .published = published,
-                        .lock = PTHREAD_MUTEX_INITIALIZER,
-                        .changed = PTHREAD_COND_INITIALIZER,
-                        .lanes = 1,
-                        .items = 1};
+    *p = (cl_pipeline){.plan = plan,
+                       .command = command,
+                       .read_recipe = recipe,
+                       .published = published,
+                       .lock = PTHREAD_MUTEX_INITIALIZER,
+                       .changed = PTHREAD_COND_INITIALIZER,
+                       .lanes = 1,
+                       .items = 1};
     if (command->size <= LARGE) {
         p->lanes = most_at_once(plan->jobs, command->size);
         p->writing = plan->jobs > p->lanes ? WRITING : 0;
@@ -178,40 +178,40 @@ lgd_pipeline *lgd_pipeline_start(const lgd_plan *plan, const lgd_command *comman
     p->decoding = pthread_create(&p->decoder, NULL, decode_all, p) == 0;
     if (!p->decoding) {
         ts_fail(st, TS_NOMEM, "no more threads can be started here");
-        lgd_pipeline_end(&p);
+        cl_pipeline_end(&p);
     }
     return p;
 }
 
-void lgd_pipeline_run(lgd_pipeline *p, lgd_model *model, const char *recipe, const lgd_listener *listener)
+void cl_pipeline_run(cl_pipeline *p, lgd_model *model, const char *recipe, const cl_listener *listener)
 {
     pthread_t other[LANES + WRITING];
-    lgd_item *item;
+    cl_item *item;
     int others = 0;
     p->model = model;
     p->recipe = recipe;
     p->listener = listener;
-    const double each = lgd_item_bytes(p->command, model);
+    const double each = cl_item_bytes(p->command, model);
     while (p->lanes > 1 && ts_budget_check(p->lanes * each, NULL) != TS_OK) p->lanes--;
     while (others < p->lanes + p->writing - 1 && pthread_create(&other[others], NULL, lane, p) == 0)
         others++; /* fewer do the same work */
     while ((item = next(p, true))) {
         if (item->stage == FINISHED) {
             listener->finished(item, listener->user);
-            lgd_item_free(item);
+            cl_item_free(item);
             move(p, item, IDLE);
         } else work_on(p, item);
     }
     for (int i = 0; i < others; i++) pthread_join(other[i], NULL);
 }
 
-void lgd_pipeline_end(lgd_pipeline **pp)
+void cl_pipeline_end(cl_pipeline **pp)
 {
-    lgd_pipeline *p = *pp;
+    cl_pipeline *p = *pp;
     if (!p) return;
     end_early(p);
     if (p->decoding) pthread_join(p->decoder, NULL);
-    for (int i = 0; i < p->items; i++) lgd_item_free(&p->item[i]);
+    for (int i = 0; i < p->items; i++) cl_item_free(&p->item[i]);
     pthread_cond_destroy(&p->changed);
     pthread_mutex_destroy(&p->lock);
     free(p);

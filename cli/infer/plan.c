@@ -24,14 +24,14 @@ static char *stem_of(const char *path, bool *bad)
 
 static int by_stem(const void *a, const void *b)
 {
-    const lgd_job *x = *(const lgd_job *const *)a, *y = *(const lgd_job *const *)b;
+    const cl_job *x = *(const cl_job *const *)a, *y = *(const cl_job *const *)b;
     const int order = strcmp(x->stem, y->stem);
     return order ? order : (x > y) - (x < y);
 }
 
-static ts_code check_stems(const lgd_plan *plan, ts_status *st)
+static ts_code check_stems(const cl_plan *plan, ts_status *st)
 {
-    const lgd_job **sorted = malloc((size_t)plan->jobs * sizeof *sorted);
+    const cl_job **sorted = malloc((size_t)plan->jobs * sizeof *sorted);
     if (!sorted) return ts_fail(st, TS_NOMEM, "out of memory for %d photographs", plan->jobs);
     for (int i = 0; i < plan->jobs; i++) sorted[i] = &plan->job[i];
     qsort(sorted, (size_t)plan->jobs, sizeof *sorted, by_stem);
@@ -59,7 +59,7 @@ static int by_identity(const void *a, const void *b)
     return (x->inode > y->inode) - (x->inode < y->inode);
 }
 
-static ts_code check_overwriting(const lgd_plan *plan, ts_status *st)
+static ts_code check_overwriting(const cl_plan *plan, ts_status *st)
 {
     identity *id = malloc((size_t)plan->jobs * sizeof *id);
     if (!id) return ts_fail(st, TS_NOMEM, "out of memory for %d photographs", plan->jobs);
@@ -95,13 +95,13 @@ static ts_code check_overwriting(const lgd_plan *plan, ts_status *st)
     return code;
 }
 
-ts_code lgd_plan_make(char *const *photos, int count, const char *out, lgd_plan *plan, ts_status *st)
+ts_code cl_plan_make(char *const *photos, int count, const char *out, cl_plan *plan, ts_status *st)
 {
     ts_code code = TS_OK;
-    *plan = (lgd_plan){.job = calloc((size_t)count, sizeof(lgd_job)), .jobs = count};
+    *plan = (cl_plan){.job = calloc((size_t)count, sizeof(cl_job)), .jobs = count};
     if (!plan->job) code = ts_fail(st, TS_NOMEM, "out of memory for %d photographs", count);
     for (int i = 0; i < count && !code; i++) {
-        lgd_job *job = &plan->job[i];
+        cl_job *job = &plan->job[i];
         bool bad;
         job->photo = photos[i];
         job->stem = stem_of(photos[i], &bad);
@@ -113,21 +113,21 @@ ts_code lgd_plan_make(char *const *photos, int count, const char *out, lgd_plan 
     }
     if (!code) code = check_stems(plan, st);
     if (!code) code = check_overwriting(plan, st);
-    if (code) lgd_plan_free(plan);
+    if (code) cl_plan_free(plan);
     return code;
 }
 
-static void free_job(lgd_job *job)
+static void free_job(cl_job *job)
 {
     free(job->stem);
     free(job->folder);
 }
 
-void lgd_plan_keep(lgd_plan *plan, int shard, int shards)
+void cl_plan_keep(cl_plan *plan, int shard, int shards)
 {
     int kept = 0;
     for (int i = 0; i < plan->jobs; i++) {
-        lgd_job *job = &plan->job[i];
+        cl_job *job = &plan->job[i];
         if (ts_hash(job->stem, strlen(job->stem), 0) % (uint64_t)shards == (uint64_t)(shard - 1))
             plan->job[kept++] = *job;
         else free_job(job);
@@ -135,9 +135,9 @@ void lgd_plan_keep(lgd_plan *plan, int shard, int shards)
     plan->jobs = kept;
 }
 
-void lgd_plan_free(lgd_plan *plan)
+void cl_plan_free(cl_plan *plan)
 {
     for (int i = 0; plan->job && i < plan->jobs; i++) free_job(&plan->job[i]);
     free(plan->job);
-    *plan = (lgd_plan){0};
+    *plan = (cl_plan){0};
 }

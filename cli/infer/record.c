@@ -18,7 +18,7 @@ static void put_outputs(FILE *f, unsigned which)
         if (which >> k & 1) fprintf(f, "%s%s", comma, lgd_output_names[k]), comma = ",";
 }
 
-char *lgd_recipe(const lgd_command *c, const char *weights, ts_status *st)
+char *cl_recipe(const cl_command *c, const char *weights, ts_status *st)
 {
     uint64_t hash, mask = 0;
     io_text t;
@@ -45,25 +45,25 @@ char *lgd_recipe(const lgd_command *c, const char *weights, ts_status *st)
 }
 
 /* What tells one way of making the files from another. */
-static void put_key(FILE *f, const lgd_item *item, const char *recipe)
+static void put_key(FILE *f, const cl_item *item, const char *recipe)
 {
     fprintf(f, "photograph: %016" PRIx64 "\n%s", item->hash, recipe);
 }
 
-static void put_warnings(FILE *f, const lgd_item *item)
+static void put_warnings(FILE *f, const cl_item *item)
 {
     const char *comma = "";
     fputs("\"warnings\": [", f);
-    for (int i = 0; i < LGD_WARNINGS; i++)
+    for (int i = 0; i < CL_WARNINGS; i++)
         if (item->warnings >> i & 1) {
             fputs(comma, f);
-            io_put_json(f, lgd_warning_names[i]);
+            io_put_json(f, cl_warning_names[i]);
             comma = ", ";
         }
     fputs("]}", f);
 }
 
-char *lgd_record(const lgd_command *c, const lgd_item *item, const char *recipe)
+char *cl_record(const cl_command *c, const cl_item *item, const char *recipe)
 {
     io_text t;
     if (io_text_begin(&t, "", NULL) != TS_OK) return NULL;
@@ -75,7 +75,7 @@ char *lgd_record(const lgd_command *c, const lgd_item *item, const char *recipe)
     io_put_json_number(f, item->last);
     fputs(", \"fov\": ", f);
     io_put_json_number(f, rd_fov_of((double)item->photo[0].camera[2]));
-    fprintf(f, ", \"fov_is\": \"%s\", \"power\": ", lgd_item_fov_is(item));
+    fprintf(f, ", \"fov_is\": \"%s\", \"power\": ", cl_item_fov_is(item));
     io_put_json_number(f, item->power);
     fputs(", ", f);
     put_warnings(f, item);
@@ -83,7 +83,7 @@ char *lgd_record(const lgd_command *c, const lgd_item *item, const char *recipe)
     return io_text_end(&t, "", NULL) == TS_OK ? t.bytes : NULL;
 }
 
-char *lgd_record_result(const char *text)
+char *cl_record_result(const char *text)
 {
     const char *at = text ? strstr(text, "\n" RESULT) : NULL;
     if (!at && text && strncmp(text, RESULT, sizeof RESULT - 1) == 0) at = text - 1;
@@ -92,7 +92,7 @@ char *lgd_record_result(const char *text)
     return strndup(at, strcspn(at, "\n"));
 }
 
-bool lgd_record_is_done(const lgd_command *c, const lgd_item *item, const char *recipe, char **result)
+bool cl_record_is_done(const cl_command *c, const cl_item *item, const char *recipe, char **result)
 {
     char *meta = NULL;
     io_text key;
@@ -100,7 +100,7 @@ bool lgd_record_is_done(const lgd_command *c, const lgd_item *item, const char *
     if (io_text_begin(&key, "", NULL) != TS_OK) return false;
     put_key(key.f, item, recipe);
     if (io_text_end(&key, "", NULL) == TS_OK && lgd_output_is(item->job->folder, c->outputs, key.bytes, &meta))
-        *result = lgd_record_result(meta);
+        *result = cl_record_result(meta);
     free(meta);
     free(key.bytes);
     return *result != NULL;

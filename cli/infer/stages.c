@@ -9,16 +9,16 @@
 #include <stdlib.h>
 
 /* The last of an item's steps failed in a public function. */
-static void failed(lgd_item *item, const lgd_error *error) { ts_fail(&item->st, error->code, "%s", error->message); }
+static void failed(cl_item *item, const lgd_error *error) { ts_fail(&item->st, error->code, "%s", error->message); }
 
-static void *take(lgd_item *item, const lgd_command *c, size_t pixel)
+static void *take(cl_item *item, const cl_command *c, size_t pixel)
 {
     void *buffer = malloc((size_t)c->size * (size_t)c->size * pixel);
     if (!buffer) ts_fail(&item->st, TS_NOMEM, "%s: out of memory", item->job->photo);
     return buffer;
 }
 
-static void read_photo(const lgd_command *c, bool published, lgd_item *item)
+static void read_photo(const cl_command *c, bool published, cl_item *item)
 {
     const lgd_read_options o = {sizeof o, published, c->max_pixels, item->threads};
     const char *photo = item->job->photo;
@@ -41,7 +41,7 @@ static void read_photo(const lgd_command *c, bool published, lgd_item *item)
     }
 }
 
-static void read_angle(const lgd_command *c, bool published, lgd_item *item)
+static void read_angle(const cl_command *c, bool published, cl_item *item)
 {
     lgd_rectified *r = &item->angle;
     if (published) {
@@ -57,7 +57,7 @@ static void read_angle(const lgd_command *c, bool published, lgd_item *item)
     snprintf(item->fov_from, sizeof item->fov_from, "%s", r->fov_from);
 }
 
-static void read_sheet(const lgd_command *c, lgd_item *item)
+static void read_sheet(const cl_command *c, cl_item *item)
 {
     io_sheet_set *set = &item->sheet;
     if (io_sheet_set_read(c->photo, c->photos, c->fov, c->max_pixels, item->threads, set, &item->st)) return;
@@ -70,7 +70,7 @@ static void read_sheet(const lgd_command *c, lgd_item *item)
     snprintf(item->fov_from, sizeof item->fov_from, "the sheet, %d photographs", set->good);
 }
 
-static void read_input(const lgd_command *c, bool published, lgd_item *item)
+static void read_input(const cl_command *c, bool published, cl_item *item)
 {
     if (c->sheet) read_sheet(c, item);
     else if (c->corners) read_angle(c, published, item);
@@ -83,12 +83,12 @@ static void read_input(const lgd_command *c, bool published, lgd_item *item)
     }
 }
 
-void lgd_item_read(const lgd_command *c, const char *recipe, bool published, lgd_item *item)
+void cl_item_read(const cl_command *c, const char *recipe, bool published, cl_item *item)
 {
     ts_status st = {0};
     const bool one = !c->sheet && !*c->capture;
     const ts_code hash = one ? ts_hash_file(item->job->photo, &item->hash, &st) : TS_OK;
-    item->was_done = one && !hash && c->skip_existing && lgd_record_is_done(c, item, recipe, &item->result);
+    item->was_done = one && !hash && c->skip_existing && cl_record_is_done(c, item, recipe, &item->result);
     if (item->was_done) return;
     read_input(c, published, item);
     /* A pipe has no hash. Of a file that cannot be read the reader has the better words. */
@@ -97,9 +97,9 @@ void lgd_item_read(const lgd_command *c, const char *recipe, bool published, lgd
 
 /* What the library's calls get as their user. */
 typedef struct task {
-    lgd_item *item;
+    cl_item *item;
     int steps; /* that will be made, at most */
-    lgd_item_progress progress;
+    cl_item_progress progress;
     void *user;
 } task;
 
@@ -119,7 +119,7 @@ static int before_tile(double done, void *user)
 }
 
 /* What makes a photograph a poor one: the maps will be guesses. */
-static void look_at(const lgd_command *c, lgd_item *item)
+static void look_at(const cl_command *c, cl_item *item)
 {
     const int64_t pixels = (int64_t)c->size * c->size, values = pixels * 3;
     int64_t dark = 0, full = 0, over = 0, wanted = 0;
@@ -132,17 +132,17 @@ static void look_at(const lgd_command *c, lgd_item *item)
     while (item->mask && wanted < pixels && !item->mask[wanted]) wanted++;
     item->full = (double)full / (double)values;
     item->over = (double)over / (double)values;
-    item->warnings = (dark == values               ? LGD_WARN_BLACK
-                          : full * 10 > values * 9 ? LGD_WARN_FULL
+    item->warnings = (dark == values               ? CL_WARN_BLACK
+                          : full * 10 > values * 9 ? CL_WARN_FULL
                                                    : 0) |
-        (*lgd_item_fov_is(item) == 'a' ? LGD_WARN_FOV : 0) | (*item->profile ? LGD_WARN_PROFILE : 0) |
-        (item->mask && wanted == pixels ? LGD_WARN_MASK : 0) | (item->last > LGD_FAR ? LGD_WARN_DIFFERENT : 0);
+        (*cl_item_fov_is(item) == 'a' ? CL_WARN_FOV : 0) | (*item->profile ? CL_WARN_PROFILE : 0) |
+        (item->mask && wanted == pixels ? CL_WARN_MASK : 0) | (item->last > CL_FAR ? CL_WARN_DIFFERENT : 0);
 }
 
-void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, lgd_item_progress progress, void *user)
+void cl_item_estimate(const cl_command *c, lgd_model *model, cl_item *item, cl_item_progress progress, void *user)
 {
     const bool fixed = c->power > 0;
-    task t = {item, lgd_command_steps(c, model), progress, user};
+    task t = {item, cl_command_steps(c, model), progress, user};
     const lgd_options options = {.size = sizeof options,
                                  .iterations = c->iterations,
                                  .threads = item->threads,
@@ -167,24 +167,24 @@ void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, l
     look_at(c, item);
 }
 
-double lgd_item_bytes(const lgd_command *c, const lgd_model *model)
+double cl_item_bytes(const cl_command *c, const lgd_model *model)
 {
     const lgd_options options = {
         .size = sizeof options, .orientations = c->orientations, .tolerance = fmax(c->tolerance, 0)};
     return lgd_model_bytes(model, c->size, &options);
 }
 
-void lgd_item_write(const lgd_command *c, const char *recipe, lgd_item *item)
+void cl_item_write(const cl_command *c, const char *recipe, cl_item *item)
 {
-    char *record = lgd_record(c, item, recipe);
-    item->result = lgd_record_result(record);
+    char *record = cl_record(c, item, recipe);
+    item->result = cl_record_result(record);
     if (!record || !item->result) {
         ts_fail(&item->st, TS_NOMEM, "%s: out of memory", item->job->photo);
         free(record);
         return;
     }
     char from[sizeof item->fov_from + 32];
-    snprintf(from, sizeof from, "%s%s", lgd_item_assumption(item), item->fov_from);
+    snprintf(from, sizeof from, "%s%s", cl_item_assumption(item), item->fov_from);
     const lgd_order order = {.which = c->outputs,
                              .directx = c->directx,
                              .metallic = c->metallic,

@@ -1,15 +1,15 @@
 /* The way of a photograph: read, estimated, written. Each stage sets the item's st on failure. */
-#ifndef LGD_STAGES_H
-#define LGD_STAGES_H
+#ifndef CL_STAGES_H
+#define CL_STAGES_H
 #include "cli/infer/item.h"
 #include "cli/infer/options.h"
 
 /* Called while an item is estimated, with the part that is done; nonzero: stop. */
-typedef int (*lgd_item_progress)(lgd_item *item, double done, void *user);
+typedef int (*cl_item_progress)(cl_item *item, double done, void *user);
 
-/* published: as infer/photograph.h says. recipe: lgd_recipe's. */
-void lgd_item_read(const lgd_command *c, const char *recipe, bool published, lgd_item *item);
-void lgd_item_estimate(const lgd_command *c, lgd_model *model, lgd_item *item, lgd_item_progress progress, void *user);
-double lgd_item_bytes(const lgd_command *c, const lgd_model *model); /* that an estimate takes, at most */
-void lgd_item_write(const lgd_command *c, const char *recipe, lgd_item *item);
+/* published: as infer/photograph.h says. recipe: cl_recipe's. */
+void cl_item_read(const cl_command *c, const char *recipe, bool published, cl_item *item);
+void cl_item_estimate(const cl_command *c, lgd_model *model, cl_item *item, cl_item_progress progress, void *user);
+double cl_item_bytes(const cl_command *c, const lgd_model *model); /* that an estimate takes, at most */
+void cl_item_write(const cl_command *c, const char *recipe, cl_item *item);
 #endif

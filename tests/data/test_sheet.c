@@ -27,13 +27,13 @@ static void make_set(const char *folder, int width, uint64_t index)
     const io_procedural p = {.seed = 5, .families = io_family_mask("pebbles")};
     CHECK(!io_material_create(&m, SIZE, &st), "%s", st.message);
     io_procedural_make(&p, index, &m);
-    CHECK(!lgd_write_sheet_captures(folder, &m, 5, index, width, 92, &st), "%s", st.message);
+    CHECK(!cl_write_sheet_captures(folder, &m, 5, index, width, 92, &st), "%s", st.message);
     io_material_free(&m);
 }
 
-static void name_photos(const char *folder, char path[LGD_SHEET_SHOTS][512], char *paths[LGD_SHEET_SHOTS])
+static void name_photos(const char *folder, char path[CL_SHEET_SHOTS][512], char *paths[CL_SHEET_SHOTS])
 {
-    for (int i = 0; i < LGD_SHEET_SHOTS; i++) {
+    for (int i = 0; i < CL_SHEET_SHOTS; i++) {
         snprintf(path[i], 512, "%s/photo_%d.jpg", folder, i + 1);
         paths[i] = path[i];
     }
@@ -42,11 +42,11 @@ static void name_photos(const char *folder, char path[LGD_SHEET_SHOTS][512], cha
 /* The pose, factor and distortion come back from corners without noise. */
 TEST(sheet_solve_is_exact)
 {
-    lgd_sheet_shot shot[LGD_SHEET_SHOTS];
-    io_sight sight[LGD_SHEET_SHOTS] = {0};
+    cl_sheet_shot shot[CL_SHEET_SHOTS];
+    io_sight sight[CL_SHEET_SHOTS] = {0};
     ts_status st = {0};
-    lgd_sheet_shots(3, 0, 4000, shot);
-    for (int i = 0; i < LGD_SHEET_SHOTS; i++) {
+    cl_sheet_shots(3, 0, 4000, shot);
+    for (int i = 0; i < CL_SHEET_SHOTS; i++) {
         io_sight *s = &sight[i];
         s->camera = (io_pinhole){.width = 4000, .height = 3000, .focal = 0.9 * shot[i].camera.focal};
         s->tags.count = IO_SHEET_TAGS;
@@ -58,8 +58,8 @@ TEST(sheet_solve_is_exact)
         }
         s->tags.corner[3][1][0] += 40; /* a tag that something hides in part */
     }
-    CHECK(!io_solve(sight, LGD_SHEET_SHOTS, false, &st), "%s", st.message);
-    for (int i = 0; i < LGD_SHEET_SHOTS; i++) {
+    CHECK(!io_solve(sight, CL_SHEET_SHOTS, false, &st), "%s", st.message);
+    for (int i = 0; i < CL_SHEET_SHOTS; i++) {
         const io_pinhole *c = &sight[i].camera, *t = &shot[i].camera;
         const double away = hypot(hypot(c->at[0] - t->at[0], c->at[1] - t->at[1]), c->at[2] - t->at[2]);
         CHECK(sight[i].tags.count == IO_SHEET_TAGS - 1, "%d tags are left", sight[i].tags.count);
@@ -73,7 +73,7 @@ TEST(sheet_solve_is_exact)
 TEST(sheet_windows_of_a_set)
 {
     need_tags();
-    char path[LGD_SHEET_SHOTS][512], exact_path[512], *paths[LGD_SHEET_SHOTS];
+    char path[CL_SHEET_SHOTS][512], exact_path[512], *paths[CL_SHEET_SHOTS];
     ts_status st = {0};
     io_sheet_set set;
     io_capture c, exact;
@@ -81,7 +81,7 @@ TEST(sheet_windows_of_a_set)
     name_photos(test_folder(), path, paths);
     snprintf(exact_path, sizeof exact_path, "%s/exact", test_folder());
     CHECK(!io_read_capture(exact_path, SIZE, &exact, &st), "%s", st.message);
-    CHECK(!io_sheet_set_read(paths, LGD_SHEET_SHOTS, 0, 1 << 26, 1, &set, &st), "%s", st.message);
+    CHECK(!io_sheet_set_read(paths, CL_SHEET_SHOTS, 0, 1 << 26, 1, &set, &st), "%s", st.message);
     CHECK(!lgd_sheet_capture(&set, 3, SIZE, 1 << 26, 1, &c, &st), "%s", st.message);
     CHECK(c.images == 3, "%d windows", c.images);
     int order[IO_SOLVE_MOST];
@@ -143,14 +143,14 @@ static void between_tags(const io_pinhole *c, int a, int b, double pixel[2])
 TEST(sheet_photographs_that_cannot_be_used)
 {
     need_tags();
-    char path[LGD_SHEET_SHOTS][512], *paths[LGD_SHEET_SHOTS];
+    char path[CL_SHEET_SHOTS][512], *paths[CL_SHEET_SHOTS];
     ts_status st = {0};
     io_sheet_set set;
     make_set(test_folder(), WIDTH, 2);
     name_photos(test_folder(), path, paths);
-    lgd_sheet_shot shot[LGD_SHEET_SHOTS];
+    cl_sheet_shot shot[CL_SHEET_SHOTS];
     double right[2], low[2];
-    lgd_sheet_shots(5, 2, WIDTH, shot);
+    cl_sheet_shots(5, 2, WIDTH, shot);
     between_tags(&shot[0].camera, 2, 3, right);
     between_tags(&shot[0].camera, 18, 19, low); /* tags 0, 1, 2 and 19 are left */
     static const char *const file[] = {"none.png", "two.png", "hidden.png", "absent.png"};
@@ -199,13 +199,13 @@ static void spoil(const char *from, const char *to, const io_pinhole *camera, in
 TEST(sheet_faults_are_named)
 {
     need_tags();
-    char path[LGD_SHEET_SHOTS][512], *paths[LGD_SHEET_SHOTS];
+    char path[CL_SHEET_SHOTS][512], *paths[CL_SHEET_SHOTS];
     ts_status st = {0};
     io_sheet_set set;
-    lgd_sheet_shot shot[LGD_SHEET_SHOTS];
+    cl_sheet_shot shot[CL_SHEET_SHOTS];
     make_set(test_folder(), WIDTH, 2);
     name_photos(test_folder(), path, paths);
-    lgd_sheet_shots(5, 2, WIDTH, shot);
+    cl_sheet_shots(5, 2, WIDTH, shot);
     char from[512];
     snprintf(from, sizeof from, "%s", path[0]);
     static const char *const file[] = {"blurred.png", "burnt.png", "white.png", "dark.png"};

@@ -16,10 +16,10 @@
 
 static void expect_stem(const char *photo, const char *stem)
 {
-    lgd_plan p;
+    cl_plan p;
     ts_status st = {0};
     char *photos[] = {(char *)photo}, folder[256];
-    const ts_code code = lgd_plan_make(photos, 1, "OUT", &p, &st);
+    const ts_code code = cl_plan_make(photos, 1, "OUT", &p, &st);
     if (!stem) {
         CHECK(code == TS_INVALID && st.message[0], "'%s' is taken", photo);
         return;
@@ -28,7 +28,7 @@ static void expect_stem(const char *photo, const char *stem)
     snprintf(folder, sizeof folder, "OUT/%s", stem);
     CHECK(strcmp(p.job[0].stem, stem) == 0 && strcmp(p.job[0].folder, folder) == 0, "'%s' goes to %s", photo,
           p.job[0].folder);
-    lgd_plan_free(&p);
+    cl_plan_free(&p);
 }
 
 TEST(infer_stems)
@@ -53,13 +53,13 @@ TEST(infer_stems)
 TEST(infer_same_stem_is_refused_with_both_names)
 {
     char *photos[] = {"x/wall.jpg", "floor.png", "y/wall.png"};
-    lgd_plan p;
+    cl_plan p;
     ts_status st = {0};
-    CHECK(lgd_plan_make(photos, 3, "OUT", &p, &st) == TS_INVALID, "taken");
+    CHECK(cl_plan_make(photos, 3, "OUT", &p, &st) == TS_INVALID, "taken");
     CHECK(strstr(st.message, "x/wall.jpg") && strstr(st.message, "y/wall.png") && !strstr(st.message, "floor"), "%s",
           st.message);
-    CHECK(lgd_plan_make(photos, 2, "OUT", &p, &st) == TS_OK, "two stems: %s", st.message);
-    lgd_plan_free(&p);
+    CHECK(cl_plan_make(photos, 2, "OUT", &p, &st) == TS_OK, "two stems: %s", st.message);
+    cl_plan_free(&p);
 }
 
 static void put_file(const char *path)
@@ -78,16 +78,16 @@ TEST(infer_a_photograph_is_never_replaced)
     CHECK(mkdir(folder, 0777) == 0 && symlink("diffuse", linked) == 0, "set-up");
     put_file(photo);
     char *photos[] = {photo};
-    lgd_plan p;
+    cl_plan p;
     ts_status st = {0};
-    CHECK(lgd_plan_make(photos, 1, test_folder(), &p, &st) == TS_INVALID && strstr(st.message, photo), "taken: %s",
+    CHECK(cl_plan_make(photos, 1, test_folder(), &p, &st) == TS_INVALID && strstr(st.message, photo), "taken: %s",
           st.message);
-    CHECK(lgd_plan_make(photos, 1, out, &p, &st) == TS_INVALID, "taken through a link");
-    CHECK(lgd_plan_make(photos, 1, folder, &p, &st) == TS_OK, "its own folder is fine: %s", st.message);
-    lgd_plan_free(&p);
+    CHECK(cl_plan_make(photos, 1, out, &p, &st) == TS_INVALID, "taken through a link");
+    CHECK(cl_plan_make(photos, 1, folder, &p, &st) == TS_OK, "its own folder is fine: %s", st.message);
+    cl_plan_free(&p);
     snprintf(photo, sizeof photo, "%s/noextension", test_folder());
     put_file(photo);
-    CHECK(lgd_plan_make(photos, 1, test_folder(), &p, &st) == TS_INVALID, "a file would become a folder");
+    CHECK(cl_plan_make(photos, 1, test_folder(), &p, &st) == TS_INVALID, "a file would become a folder");
 }
 
 static const lgd_order everything = {.which = (1u << LGD_OUTPUTS) - 1, .threads = 2, .fov_from = "a test"};
@@ -171,7 +171,7 @@ TEST(infer_output_failure_leaves_nothing)
     io_material_free(&m);
 }
 
-static ts_code parse(lgd_command *c, ts_status *st, const char *a, const char *b, const char *d)
+static ts_code parse(cl_command *c, ts_status *st, const char *a, const char *b, const char *d)
 {
     static char program[] = "lgd-infer";
     char *argv[] = {program, (char *)a, (char *)b, (char *)d, NULL};
@@ -179,12 +179,12 @@ static ts_code parse(lgd_command *c, ts_status *st, const char *a, const char *b
     while (argv[argc]) argc++;
     *st = (ts_status){0};
     optind = 0; /* glibc: start anew */
-    return lgd_command_parse(argc, argv, c, st);
+    return cl_command_parse(argc, argv, c, st);
 }
 
 TEST(infer_command_line)
 {
-    lgd_command c;
+    cl_command c;
     ts_status st;
     CHECK(parse(&c, &st, "p.jpg", "-oOUT", "--size=17") == TS_OK && c.size == 17 && c.photos == 1 &&
               strcmp(c.out, "OUT") == 0,

@@ -35,9 +35,9 @@ static double misregistered(const io_pinhole *solved, const io_pinhole *truth)
     return sqrt(sum / (POINTS * POINTS));
 }
 
-static void compare(const io_sheet_set *set, const lgd_sheet_shot *shot, errors *e)
+static void compare(const io_sheet_set *set, const cl_sheet_shot *shot, errors *e)
 {
-    for (int i = 0; i < LGD_SHEET_SHOTS; i++) {
+    for (int i = 0; i < CL_SHEET_SHOTS; i++) {
         const io_pinhole *c = &set->photo[i].sight.camera, *t = &shot[i].camera;
         const double away = hypot(hypot(c->at[0] - t->at[0], c->at[1] - t->at[1]), c->at[2] - t->at[2]);
         const double relative = set->photo[i].exposure[1] / set->photo[0].exposure[1],
@@ -54,27 +54,27 @@ static void compare(const io_sheet_set *set, const lgd_sheet_shot *shot, errors 
 /* Set number index of the sequence. */
 static bool measure(const char *folder, int width, uint64_t index, errors *e, ts_status *st)
 {
-    char path[LGD_SHEET_SHOTS][4096], *paths[LGD_SHEET_SHOTS];
-    lgd_sheet_shot shot[LGD_SHEET_SHOTS];
+    char path[CL_SHEET_SHOTS][4096], *paths[CL_SHEET_SHOTS];
+    cl_sheet_shot shot[CL_SHEET_SHOTS];
     io_sheet_set set;
     io_material m = {0};
     const io_procedural p = {.seed = SEED};
-    for (int i = 0; i < LGD_SHEET_SHOTS; i++) {
+    for (int i = 0; i < CL_SHEET_SHOTS; i++) {
         snprintf(path[i], sizeof path[i], "%s/photo_%d.jpg", folder, i + 1);
         paths[i] = path[i];
     }
     ts_code code = io_material_create(&m, SIZE, st);
     if (!code) {
         io_procedural_make(&p, index, &m);
-        code = lgd_write_sheet_captures(folder, &m, SEED, index, width, 92, st);
+        code = cl_write_sheet_captures(folder, &m, SEED, index, width, 92, st);
     }
     io_material_free(&m);
-    if (!code) code = io_sheet_set_read(paths, LGD_SHEET_SHOTS, 0, IO_MAX_PIXELS_DEFAULT, 0, &set, st);
+    if (!code) code = io_sheet_set_read(paths, CL_SHEET_SHOTS, 0, IO_MAX_PIXELS_DEFAULT, 0, &set, st);
     if (code) return false;
-    const bool all = set.good == LGD_SHEET_SHOTS;
-    for (int i = 0; i < LGD_SHEET_SHOTS && !all; i++)
+    const bool all = set.good == CL_SHEET_SHOTS;
+    for (int i = 0; i < CL_SHEET_SHOTS && !all; i++)
         if (set.photo[i].st.code) *st = set.photo[i].st;
-    lgd_sheet_shots(SEED, index, width, shot);
+    cl_sheet_shots(SEED, index, width, shot);
     if (all) compare(&set, shot, e);
     io_sheet_set_free(&set);
     return all;
@@ -95,7 +95,7 @@ bool stress_sheets(const stress *s)
         }
         if (!ok) printf("set %d: %s\n", i, st.message);
     }
-    snprintf(what, sizeof what, "sheets: camera, mm (%d sets of %d photographs, %d pixels wide)", sets, LGD_SHEET_SHOTS,
+    snprintf(what, sizeof what, "sheets: camera, mm (%d sets of %d photographs, %d pixels wide)", sets, CL_SHEET_SHOTS,
              width);
     ok = stress_row(what, e.camera, 0.5) && ok;
     ok = stress_row("sheets: window, pixels of 512", e.window, 0.3) && ok;

@@ -233,7 +233,7 @@ static ts_code write_material(const options *o, uint64_t index, io_material *m, 
     if (!code && o->format == FORMAT_CAPTURES) {
         code = make_path(path, o, m->name, "", st);
         if (!code) code = cl_make_folder(path, st);
-        if (!code) code = lgd_write_capture(path, m, st);
+        if (!code) code = cl_write_capture(path, m, st);
     }
     if (!code && o->format == FORMAT_SHEETS) {
         code = make_path(path, o, m->name, "/maps", st);
@@ -241,7 +241,7 @@ static ts_code write_material(const options *o, uint64_t index, io_material *m, 
         if (!code) code = io_write_maps(path, m, IO_MAPS_ALL, false, st);
         if (!code) code = make_path(path, o, m->name, "", st);
         if (!code)
-            code = lgd_write_sheet_captures(path, m, o->procedural.seed, index, (int)o->width, (int)o->quality, st);
+            code = cl_write_sheet_captures(path, m, o->procedural.seed, index, (int)o->width, (int)o->quality, st);
     }
     if (!code && o->photographs) {
         cl_photograph(&o->camera, o->procedural.seed, index, &flash, m->size, m->maps, photo->data);
@@ -362,7 +362,7 @@ static ts_code compare(const options *o, ts_status *st)
 static ts_code make_histograms(const options *o, ts_status *st)
 {
     const int count = o->count ? (int)o->count : 512, size = o->size ? (int)o->size : 128;
-    return lgd_write_histograms(o->output, &o->procedural, (uint64_t)o->first, count, o->testdata, size, st);
+    return cl_write_histograms(o->output, &o->procedural, (uint64_t)o->first, count, o->testdata, size, st);
 }
 
 int main(int argc, char **argv)
