@@ -295,7 +295,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
                           nn_arch_side(a));
     lgd_first_guess guess = {0};
     ts_code code = TS_OK;
-    if (a->descent == NN_DESCENT_POSTERIOR) code = first_guess(e, &p, &o, &guess, st);
+    if (a->descent == NN_DESCENT_POSTERIOR && !e->g_alone) code = first_guess(e, &p, &o, &guess, st);
     else if (o.power) code = fit_power(e, &p, &o, &r0, st);
     if (!code && o.iterations == LGD_AUTO && !choose) code = count_steps(e, &p, o.orientations, &steps, st);
     for (int k = 0; k < photos && !code && o.taken; k++) {

@@ -11,7 +11,7 @@ static ts_code open(ev_estimator *e, ts_status *st) { return ev_open_start(e, "m
 static void gradient(ev_estimator *e, const ev_case *c, float *part)
 {
     const int64_t pixels = (int64_t)c->size * c->size, count = pixels * MAP_CHANNELS;
-    for (int k = 0; k < ev_photos(e); k++) {
+    for (int k = 0; k < ev_inputs(e, c); k++) {
         float *to = k ? part : e->gradient;
         rd_flash_gradient(rd_grid_full(c->size), e->x, MAP_CHANNELS, &c->input[k], c->image + k * pixels * 3, 1, to,
                           NULL);
@@ -25,8 +25,8 @@ static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, 
     const float rate = (float)ev_number(e, "rate");
     if (ev_block(e, (size_t)count, st) != TS_OK) return st->code;
     if (ev_start(e, c, e->x, st) != TS_OK) return st->code;
-    float *part = ev_photos(e) > 1 ? malloc((size_t)count * sizeof *part) : NULL;
-    if (ev_photos(e) > 1 && !part)
+    float *part = ev_inputs(e, c) > 1 ? malloc((size_t)count * sizeof *part) : NULL;
+    if (ev_inputs(e, c) > 1 && !part)
         return ts_fail(st, TS_NOMEM, "no memory for the gradient of %d x %d pixels", c->size, c->size);
     for (int t = 0; seen(t, e->x, MAP_CHANNELS, user) && t < ev_steps(e); t++) {
         gradient(e, c, part);

@@ -2,6 +2,7 @@
 #include "cli/cli.h"
 #include "nn/weights/weights.h"
 #include "tensor/memory.h"
+#include "tensor/threads.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -50,6 +51,12 @@ int ev_orientations(const ev_estimator *e)
 int ev_steps(const ev_estimator *e) { return (int)ev_number(e, "steps"); }
 int ev_photos(const ev_estimator *e) { return (int)ev_number(e, "photos"); }
 
+int ev_inputs(const ev_estimator *e, const ev_case *c)
+{
+    const int most = e->method->photos ? e->method->photos(e) : 1;
+    return most < c->inputs ? most : c->inputs;
+}
+
 ts_code ev_open_net(ev_estimator *e, const char *key, ts_status *st)
 {
     e->net = nn_model_load(ev_text(e, key), st);
@@ -73,22 +80,52 @@ ts_code ev_open_train(ev_estimator *e, ts_status *st)
     return TS_OK;
 }
 
+ts_code ev_run(ev_estimator *e, const ev_case *c, const ev_run_how *how, ev_seen seen, void *user, ts_status *st)
+{
+    const lgd_estimator estimator = {
+        .net = e->net, .tape = e->tape, .g_alone = how->g_alone, .seen = seen, .user = user};
+    lgd_options options = how->options;
+    options.size = sizeof options;
+    options.exact = e->exact;
+    options.orientations = ev_orientations(e);
+    options.threads = ts_threads();
+    float *maps = malloc((size_t)c->size * (size_t)c->size * MAP_CHANNELS * sizeof *maps);
+    const ts_code code = maps ? lgd_estimator_run(&estimator, how->photo, how->photos, c->size, &options, maps, st)
+                              : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", c->size, c->size);
+    free(maps);
+    return code;
+}
+
+void ev_photo_of(const rd_view *view, const float *image, lgd_photo *photo)
+{
+    *photo = (lgd_photo){.image = image, .power = view->power};
+    memcpy(photo->light, view->light, sizeof photo->light);
+    memcpy(photo->camera, view->camera, sizeof photo->camera);
+}
+
+ts_code ev_run_g(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
+{
+    ev_run_how how = {.photos = 1, .options = {.fov = LGD_FOV_OF_PHOTO}, .g_alone = true};
+    ev_photo_of(&c->view, c->image, &how.photo[0]);
+    return ev_run(e, c, &how, seen, user, st);
+}
+
+typedef struct copy_of {
+    float *maps;
+    int64_t pixels;
+} copy_of;
+
+static bool copy(int step, const float *maps, int channels, void *user)
+{
+    const copy_of *to = user;
+    for (int64_t i = 0; i < to->pixels; i++)
+        memcpy(to->maps + i * MAP_CHANNELS, maps + i * channels, MAP_CHANNELS * sizeof *maps);
+    return step > 0;
+}
+
 ts_code ev_start_r0(ev_estimator *e, const ev_case *c, float *maps, ts_status *st)
 {
-    const int64_t pixels = (int64_t)c->size * c->size;
-    ag_reset(e->tape);
-    const nn_input in = {.image = ts_view((float *)(uintptr_t)c->image, (ts_shape){1, c->size, c->size, 3}),
-                         .grid = rd_grid_full(c->size),
-                         .view = c->view,
-                         .orientations = ev_orientations(e)};
-    const ag_value *out = nn_predict(e->tape, e->net, &in);
-    if (!out) {
-        *st = *ag_status(e->tape);
-        return st->code;
-    }
-    for (int64_t i = 0; i < pixels; i++)
-        memcpy(maps + i * MAP_CHANNELS, out->t.data + i * out->t.shape.c, MAP_CHANNELS * sizeof *maps);
-    return TS_OK;
+    return ev_run_g(e, c, copy, &(copy_of){maps, (int64_t)c->size * c->size}, st);
 }
 
 ts_code ev_start(ev_estimator *e, const ev_case *c, float *maps, ts_status *st)

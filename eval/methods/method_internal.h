@@ -2,6 +2,7 @@
 #ifndef EV_METHOD_INTERNAL_H
 #define EV_METHOD_INTERNAL_H
 #include "eval/methods/method.h"
+#include "infer/estimate.h"
 
 /* The index of a key in a table, -1: none; of a word among words separated by blanks. */
 int ev_find(const ev_setting *settings, const char *key);
@@ -44,14 +45,29 @@ bool ev_given(const ev_estimator *e, const char *key);
     }
 int ev_steps(const ev_estimator *e);  /* of "steps" */
 int ev_photos(const ev_estimator *e); /* of "photos" */
+/* How many of the case's photographs the method reads: it may have fewer than the method can read. */
+int ev_inputs(const ev_estimator *e, const ev_case *c);
 int ev_orientations(const ev_estimator *e);
 /* e->net from the key's weights, and the tape without gradients. */
 ts_code ev_open_net(ev_estimator *e, const char *key, ts_status *st);
 /* The same where "start" says R_0, else nothing. */
 ts_code ev_open_start(ev_estimator *e, const char *key, ts_status *st);
 ts_code ev_open_train(ev_estimator *e, ts_status *st);
-/* g's own maps of the first photograph under c->view, [size, size, MAP_CHANNELS]: what the estimator (infer/estimate.h)
- * fits before its steps is not in them. */
+/* What the estimator (infer/estimate.h) is given beside what the method's settings say: exactness, orientations. */
+typedef struct ev_run_how {
+    lgd_photo photo[NN_MAX_IMAGES];
+    int photos;
+    lgd_options options; /* size, exact, orientations and threads are set by ev_run */
+    bool g_alone;        /* as in lgd_estimator */
+} ev_run_how;
+/* Estimates as lgd-infer does; each step is seen. */
+ts_code ev_run(ev_estimator *e, const ev_case *c, const ev_run_how *how, ev_seen seen, void *user, ts_status *st);
+/* image under view, whose light and camera are points. */
+void ev_photo_of(const rd_view *view, const float *image, lgd_photo *photo);
+/* g's own maps of the first photograph under c->view: step 0 is seen. What the estimator fits before its steps is not
+ * in them (lgd_estimator.g_alone). */
+ts_code ev_run_g(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st);
+/* The same maps, [size, size, MAP_CHANNELS]. */
 ts_code ev_start_r0(ev_estimator *e, const ev_case *c, float *maps, ts_status *st);
 /* The mean of procedural materials; and one material for every pixel. */
 ts_code ev_mean(float mean[MAP_CHANNELS], ts_status *st);

@@ -1,10 +1,6 @@
 /* unet, unet-joint, lgd, lgd-nograd, frozen: networks that only run. They differ in the weights that they ask for. */
 #include "eval/methods/method_internal.h"
-#include "infer/estimate.h"
 #include "infer/tiles.h"
-#include "tensor/threads.h"
-#include <stdlib.h>
-#include <string.h>
 
 static int steps(const ev_estimator *e)
 {
@@ -45,60 +41,36 @@ static ts_code open_nograd(ev_estimator *e, ts_status *st)
     return TS_OK;
 }
 
-static ts_code run_g(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
-{
-    if (ev_block(e, (size_t)c->size * (size_t)c->size * MAP_CHANNELS, st) != TS_OK ||
-        ev_start_r0(e, c, e->x, st) != TS_OK)
-        return st->code;
-    seen(0, e->x, MAP_CHANNELS, user);
-    return TS_OK;
-}
-
 enum { POWER_GIVEN, POWER_AUTO, POWER_KNOWN };
 enum { VIEW_SET, VIEW_TOLD, VIEW_UNKNOWN };
 
-/* The photographs as the method is told of them, and its field of view. */
-static double photographs(const ev_estimator *e, const ev_case *c, int count, lgd_photo photo[])
+/* The photographs and the field of view as the settings power and view let the method know them. */
+static void photographs(const ev_estimator *e, const ev_case *c, ev_run_how *how)
 {
     const int power = (int)ev_number(e, "power"), view = (int)ev_number(e, "view");
     const size_t pixels = (size_t)c->size * (size_t)c->size;
-    for (int k = 0; k < count; k++) {
+    for (int k = 0; k < how->photos; k++) {
         const float *image = c->image + (size_t)k * pixels * 3;
-        const float factor = power == POWER_KNOWN ? (float)c->exposure : 1;
-        photo[k] = lgd_flash_photo(image);
-        photo[k].power *= factor;
-        if (view != VIEW_SET) continue;
-        photo[k].power = c->input[k].power * factor;
-        memcpy(photo[k].light, c->input[k].light, sizeof photo[k].light);
-        memcpy(photo[k].camera, c->input[k].camera, sizeof photo[k].camera);
+        if (view == VIEW_SET) ev_photo_of(&c->input[k], image, &how->photo[k]);
+        else how->photo[k] = lgd_flash_photo(image);
+        if (power == POWER_KNOWN) how->photo[k].power *= (float)c->exposure;
     }
-    if (view == VIEW_TOLD) return c->fov;
-    return view == VIEW_SET && power != POWER_AUTO ? LGD_FOV_OF_PHOTO : LGD_FOV_UNKNOWN;
+    how->options.fov = view == VIEW_TOLD          ? c->fov
+        : view == VIEW_SET && power != POWER_AUTO ? LGD_FOV_OF_PHOTO
+                                                  : LGD_FOV_UNKNOWN;
 }
 
 /* As lgd-infer estimates. */
 static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
 {
-    const int power = (int)ev_number(e, "power"), count = photos(e);
-    const size_t pixels = (size_t)c->size * (size_t)c->size;
-    const lgd_estimator estimator = {.net = e->net, .tape = e->tape, .seen = seen, .user = user};
     double factor;
-    lgd_photo photo[NN_MAX_IMAGES];
-    const double fov = photographs(e, c, count, photo);
-    const lgd_options options = {.size = sizeof options,
-                                 .iterations = steps(e),
-                                 .exact = e->exact,
-                                 .precision = (int)ev_number(e, "precision"),
-                                 .orientations = ev_orientations(e),
-                                 .threads = ts_threads(),
-                                 .tolerance = ev_number(e, "tolerance"),
-                                 .power = power == POWER_AUTO ? &factor : NULL,
-                                 .fov = fov};
-    float *maps = malloc(pixels * MAP_CHANNELS * sizeof *maps);
-    const ts_code code = maps ? lgd_estimator_run(&estimator, photo, count, c->size, &options, maps, st)
-                              : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", c->size, c->size);
-    free(maps);
-    return code;
+    ev_run_how how = {.photos = ev_inputs(e, c),
+                      .options = {.iterations = steps(e),
+                                  .precision = (int)ev_number(e, "precision"),
+                                  .tolerance = ev_number(e, "tolerance"),
+                                  .power = (int)ev_number(e, "power") == POWER_AUTO ? &factor : NULL}};
+    photographs(e, c, &how);
+    return ev_run(e, c, &how, seen, user, st);
 }
 
 #define MODEL_GIVEN(text)                                \
@@ -150,12 +122,12 @@ static const ev_setting nograd[] = {MODEL_GIVEN("weights trained with model.grad
 static const ev_setting frozen[] = {MODEL_GIVEN("weights trained with train.g_rate = 0"), REFINER};
 
 const ev_method ev_method_unet = {
-    .name = "unet", .help = "g alone, feed-forward", .settings = unet, .open = open_g, .run = run_g};
+    .name = "unet", .help = "g alone, feed-forward", .settings = unet, .open = open_g, .run = ev_run_g};
 const ev_method ev_method_unet_joint = {.name = "unet-joint",
                                         .help = "R_0 of g and h that were trained together",
                                         .settings = joint,
                                         .open = open_g,
-                                        .run = run_g};
+                                        .run = ev_run_g};
 const ev_method ev_method_lgd = {.name = "lgd",
                                  .help = "g, then refinement steps that read the gradient",
                                  .settings = lgd,

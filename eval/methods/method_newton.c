@@ -8,15 +8,16 @@ static ts_code open(ev_estimator *e, ts_status *st) { return ev_open_start(e, "m
 static ts_code run(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
 {
     const int64_t pixels = (int64_t)c->size * c->size, count = pixels * MAP_CHANNELS;
+    const int inputs = ev_inputs(e, c);
     const float rate = (float)ev_number(e, "rate");
     const float *image[NN_MAX_IMAGES];
     float damping[MAP_CHANNELS];
-    for (int k = 0; k < ev_photos(e); k++) image[k] = c->image + k * pixels * 3;
+    for (int k = 0; k < inputs; k++) image[k] = c->image + k * pixels * 3;
     for (int i = 0; i < MAP_CHANNELS; i++) damping[i] = (float)ev_number(e, "damping") * (i >= MAP_SPECULAR ? 10 : 1);
     if (ev_block(e, (size_t)count, st) != TS_OK) return st->code;
     if (ev_start(e, c, e->x, st) != TS_OK) return st->code;
     for (int t = 0; seen(t, e->x, MAP_CHANNELS, user) && t < ev_steps(e); t++) {
-        rd_newton_step(rd_grid_full(c->size), e->x, MAP_CHANNELS, c->input, image, ev_photos(e), damping, e->gradient);
+        rd_newton_step(rd_grid_full(c->size), e->x, MAP_CHANNELS, c->input, image, inputs, damping, e->gradient);
         for (int64_t i = 0; i < count; i++) e->x[i] += rate * e->gradient[i];
     }
     return TS_OK;

@@ -38,14 +38,34 @@ static scene *make(uint64_t index)
     return s;
 }
 
+static nn_arch small(void)
+{
+    nn_arch a = nn_arch_default();
+    a.g_width = 4, a.g_width_max = 8, a.g_levels = 2, a.g_size = 16, a.h_width = 4, a.h_gru = 4, a.iterations = 3;
+    return a;
+}
+
+/* A file of random weights. */
+static const char *weights_of(const nn_arch *a, const char *name)
+{
+    static char path[300];
+    ts_status st = {0};
+    nn_model *m = nn_model_create(a, &st);
+    CHECK(m, "%s", st.message);
+    nn_model_init(m, 5);
+    snprintf(path, sizeof path, "%s/%s.safetensors", test_folder(), name);
+    CHECK(nn_model_save(m, m->value, path, NULL, 0, &st) == TS_OK, "%s", st.message);
+    nn_model_free(&m);
+    return path;
+}
+
 /* A small g and h, or an auto-encoder, of random weights. */
 static const char *weights(bool latent, bool gradient)
 {
     static char path[3][300];
     char *p = path[latent ? 2 : gradient];
     ts_status st = {0};
-    nn_arch a = nn_arch_default();
-    a.g_width = 4, a.g_width_max = 8, a.g_levels = 2, a.g_size = 16, a.h_width = 4, a.h_gru = 4, a.iterations = 3,
+    nn_arch a = small();
     a.gradient = gradient;
     const nn_coder coder = {.code = 4, .width = 4, .width_max = 8, .levels = 2};
     nn_model *m = latent ? nn_coder_create(&coder, &st) : nn_model_create(&a, &st);
@@ -180,6 +200,51 @@ TEST(methods_begin_with_what_they_say)
     CHECK(!memcmp(d.maps[0], m.maps[0], VALUES * sizeof(float)), "the constant is not mean's");
     for (int i = MAP_CHANNELS; i < VALUES; i++)
         CHECK(m.maps[0][i] == m.maps[0][i % MAP_CHANNELS], "mean is not constant");
+}
+
+/* R_0 of a method is g's own answer (finetune's step 0) where the estimator would fit scene and roughness first. */
+TEST(methods_begin_with_what_g_says_of_a_model_that_guesses_the_scene)
+{
+    ev_estimator g, descent, tuned, lgd;
+    seen_maps a, b, c, d;
+    const scene *s = make(5);
+    char spec[400];
+    nn_arch arch = small();
+    arch.g_unshuffle = 4, arch.g_detail = 6, arch.h_width = 0, arch.descent = NN_DESCENT_POSTERIOR;
+    arch.conditions = arch.spread = arch.scene = true;
+    const char *path = weights_of(&arch, "scene");
+    snprintf(spec, sizeof spec, "unet:model=%s", path), open(&g, spec), run(&g, s, &a);
+    snprintf(spec, sizeof spec, "descent:steps=0,model=%s", path), open(&descent, spec), run(&descent, s, &b);
+    snprintf(spec, sizeof spec, "finetune:steps=0,model=%s", path), open(&tuned, spec), run(&tuned, s, &c);
+    snprintf(spec, sizeof spec, "lgd:iterations=0,model=%s", path), open(&lgd, spec), run(&lgd, s, &d);
+    CHECK(!memcmp(a.maps[0], c.maps[0], VALUES * sizeof(float)), "unet is not what g says");
+    CHECK(!memcmp(b.maps[0], c.maps[0], VALUES * sizeof(float)), "descent does not begin with what g says");
+    CHECK(memcmp(d.maps[0], c.maps[0], VALUES * sizeof(float)) != 0, "lgd fits nothing");
+    ev_close(&g), ev_close(&descent), ev_close(&tuned), ev_close(&lgd);
+}
+
+TEST(methods_read_no_more_photographs_than_there_are)
+{
+    nn_arch arch = small();
+    arch.images = 2;
+    char lgd[400];
+    snprintf(lgd, sizeof lgd, "lgd:model=%s", weights_of(&arch, "two"));
+    const char *const spec[] = {lgd, "descent:steps=2,photos=2", "newton:steps=2,photos=2"};
+    static float image[2][SIZE * SIZE * 3]; /* what lies behind the one photograph is not of this case */
+    scene *s = make(5);
+    memcpy(image[0], s->image, sizeof image[0]);
+    s->c.image = image[0];
+    for (int i = 0; i < 3; i++) {
+        ev_estimator e;
+        seen_maps k[2];
+        open(&e, spec[i]);
+        for (int j = 0; j < 2; j++) {
+            for (int p = 0; p < SIZE * SIZE * 3; p++) image[1][p] = j ? 0.75f : 0.25f;
+            run(&e, s, &k[j]);
+        }
+        CHECK(!memcmp(k[0].maps[2], k[1].maps[2], VALUES * sizeof(float)), "%s reads a second photograph", spec[i]);
+        ev_close(&e);
+    }
 }
 
 TEST(methods_mean_is_as_bright_as_the_photograph)
