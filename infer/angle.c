@@ -10,7 +10,7 @@ lgd_photo lgd_photo_by(const io_pinhole *camera, const double light[3], const fl
     double at[3], distance2 = 0;
     for (int k = 0; k < 3; k++) {
         at[k] = camera->at[k];
-        for (int i = 0; i < 3; i++) at[k] += camera->turn[i][k] * light[i];
+        for (int i = 0; i < 3; i++) at[k] += camera->rotation[i][k] * light[i];
         distance2 += at[k] * at[k];
         p.camera[k] = (float)camera->at[k];
         p.light[k] = (float)at[k];

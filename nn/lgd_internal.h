@@ -1,6 +1,6 @@
 /* Inside nn only: the parts of the unrolled loop. */
-#ifndef NN_UNROLLED_H
-#define NN_UNROLLED_H
+#ifndef NN_LGD_INTERNAL_H
+#define NN_LGD_INTERNAL_H
 #include "nn/layers.h"
 #include "tensor/resample.h"
 

@@ -62,10 +62,11 @@ void rd_observe(const double maps[MAP_CHANNELS], const double point[2], const rd
         const double target = (double)image[c], positive = fmax(target, 0), model = (double)prior->model,
                      gain = (double)prior->gain * positive;
         const double fade = (double)TS_PRIOR_FADE,
-                     told = value[c] > 1 && image[c] >= TS_NEWTON_BURNT ? fmax((1 + fade - value[c]) / fade, 0) : 1;
-        o->residual = told * (target - (value[c] > 1 ? 1 + log(value[c]) : value[c]));
+                     confidence = value[c] > 1 && image[c] >= TS_NEWTON_BURNT ? fmax((1 + fade - value[c]) / fade, 0)
+                                                                              : 1;
+        o->residual = confidence * (target - (value[c] > 1 ? 1 + log(value[c]) : value[c]));
         o->variance = model * model + (double)prior->noise * positive + gain * gain;
-        for (int i = 0; i < MAP_CHANNELS; i++) o->by[i] = told * by[c][i] / fmax(value[c], 1);
+        for (int i = 0; i < MAP_CHANNELS; i++) o->by[i] = confidence * by[c][i] / fmax(value[c], 1);
     }
 }
 

@@ -16,7 +16,7 @@ typedef struct state {
     uint64_t lane[LANES], seed, total;
 } state;
 
-static uint64_t turn(uint64_t v, int bits) { return v << bits | v >> (64 - bits); }
+static uint64_t rotate_left(uint64_t v, int bits) { return v << bits | v >> (64 - bits); }
 
 static uint64_t take64(const unsigned char *p)
 {
@@ -30,7 +30,7 @@ static uint64_t take32(const unsigned char *p)
     return p[0] | (uint64_t)p[1] << 8 | (uint64_t)p[2] << 16 | (uint64_t)p[3] << 24;
 }
 
-static uint64_t mix(uint64_t lane, uint64_t input) { return turn(lane + input * p2, 31) * p1; }
+static uint64_t mix(uint64_t lane, uint64_t input) { return rotate_left(lane + input * p2, 31) * p1; }
 
 static state begin(uint64_t seed) { return (state){{seed + p1 + p2, seed + p2, seed, seed - p1}, seed, 0}; }
 
@@ -47,13 +47,14 @@ static uint64_t end(const state *s, const unsigned char *p, size_t rest)
 {
     uint64_t h = s->seed + p5;
     if (s->total) {
-        h = turn(s->lane[0], 1) + turn(s->lane[1], 7) + turn(s->lane[2], 12) + turn(s->lane[3], 18);
+        h = rotate_left(s->lane[0], 1) + rotate_left(s->lane[1], 7) + rotate_left(s->lane[2], 12) +
+            rotate_left(s->lane[3], 18);
         for (int i = 0; i < LANES; i++) h = (h ^ mix(0, s->lane[i])) * p1 + p4;
     }
     h += s->total + rest;
-    for (; rest >= 8; p += 8, rest -= 8) h = turn(h ^ mix(0, take64(p)), 27) * p1 + p4;
-    if (rest >= 4) h = turn(h ^ take32(p) * p1, 23) * p2 + p3, p += 4, rest -= 4;
-    for (; rest > 0; p++, rest--) h = turn(h ^ *p * p5, 11) * p1;
+    for (; rest >= 8; p += 8, rest -= 8) h = rotate_left(h ^ mix(0, take64(p)), 27) * p1 + p4;
+    if (rest >= 4) h = rotate_left(h ^ take32(p) * p1, 23) * p2 + p3, p += 4, rest -= 4;
+    for (; rest > 0; p++, rest--) h = rotate_left(h ^ *p * p5, 11) * p1;
     h = (h ^ h >> 33) * p2;
     h = (h ^ h >> 29) * p3;
     return h ^ h >> 32;

@@ -1,6 +1,6 @@
 /* Shared by the trainer's files. */
-#ifndef TR_PARTS_H
-#define TR_PARTS_H
+#ifndef TR_TRAINER_INTERNAL_H
+#define TR_TRAINER_INTERNAL_H
 #include "data/loader.h"
 #include "nn/adam.h"
 #include "train/reduce.h"

@@ -28,12 +28,13 @@ static void aim(io_pinhole *c, const double target[2], double roll)
     double ahead[3], along = 0, length = 0, size = 0;
     const double level[3] = {cos(roll), sin(roll), 0};
     for (int k = 0; k < 3; k++) ahead[k] = (k < 2 ? target[k] : 0) - c->at[k], size += ahead[k] * ahead[k];
-    for (int k = 0; k < 3; k++) c->turn[2][k] = ahead[k] / sqrt(size), along += level[k] * c->turn[2][k];
-    for (int k = 0; k < 3; k++) c->turn[0][k] = level[k] - along * c->turn[2][k], length += pow(c->turn[0][k], 2);
-    for (int k = 0; k < 3; k++) c->turn[0][k] /= sqrt(length);
+    for (int k = 0; k < 3; k++) c->rotation[2][k] = ahead[k] / sqrt(size), along += level[k] * c->rotation[2][k];
     for (int k = 0; k < 3; k++)
-        c->turn[1][k] = c->turn[2][(k + 1) % 3] * c->turn[0][(k + 2) % 3] -
-            c->turn[2][(k + 2) % 3] * c->turn[0][(k + 1) % 3];
+        c->rotation[0][k] = level[k] - along * c->rotation[2][k], length += pow(c->rotation[0][k], 2);
+    for (int k = 0; k < 3; k++) c->rotation[0][k] /= sqrt(length);
+    for (int k = 0; k < 3; k++)
+        c->rotation[1][k] = c->rotation[2][(k + 1) % 3] * c->rotation[0][(k + 2) % 3] -
+            c->rotation[2][(k + 2) % 3] * c->rotation[0][(k + 1) % 3];
 }
 
 void cl_sheet_shots(uint64_t seed, uint64_t index, int width, cl_sheet_shot shot[CL_SHEET_SHOTS])
@@ -66,7 +67,7 @@ static rd_view view_of(const cl_sheet_shot *s)
     rd_view v = {.kind = RD_POINT, .power = 1};
     for (int k = 0; k < 3; k++) {
         double light = s->camera.at[k];
-        for (int i = 0; i < 3; i++) light += s->camera.turn[i][k] * s->light[i];
+        for (int i = 0; i < 3; i++) light += s->camera.rotation[i][k] * s->light[i];
         v.camera[k] = (float)s->camera.at[k];
         v.light[k] = (float)light;
     }
@@ -122,7 +123,7 @@ static void look(const scene *s, double x, double y, float rgb[3])
     for (int i = 0; i < 4; i++)
         scale -= (scale * (1 + c->radial * seen2 * scale * scale) - 1) / (1 + 3 * c->radial * seen2 * scale * scale);
     for (int k = 0; k < 2; k++) q[k] *= scale;
-    for (int k = 0; k < 3; k++) d[k] = q[0] * c->turn[0][k] + q[1] * c->turn[1][k] + q[2] * c->turn[2][k];
+    for (int k = 0; k < 3; k++) d[k] = q[0] * c->rotation[0][k] + q[1] * c->rotation[1][k] + q[2] * c->rotation[2][k];
     for (int k = 0; k < 2; k++) p[k] = c->at[k] - d[k] * c->at[2] / d[2];
     if (fabs(p[0]) <= 0.5 && fabs(p[1]) <= 0.5) {
         window_at(s, p, rgb);

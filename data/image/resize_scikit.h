@@ -1,6 +1,6 @@
 /* Inside data only: the filter of scikit-image's transform.resize along one axis (data/image/image.h). */
-#ifndef IO_SCIKIT_H
-#define IO_SCIKIT_H
+#ifndef IO_RESIZE_SCIKIT_H
+#define IO_RESIZE_SCIKIT_H
 #include "tensor/resample.h"
 
 /* Lives in the arena; weight is NULL where memory was out. */

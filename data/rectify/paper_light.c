@@ -41,7 +41,8 @@ double io_paper_light(const io_pinhole *camera, const double aside[2], const dou
 {
     double d[3], distance2 = 0;
     for (int k = 0; k < 3; k++) {
-        d[k] = camera->at[k] + aside[0] * camera->turn[0][k] + aside[1] * camera->turn[1][k] - (k < 2 ? at[k] : 0);
+        d[k] = camera->at[k] + aside[0] * camera->rotation[0][k] + aside[1] * camera->rotation[1][k] -
+            (k < 2 ? at[k] : 0);
         distance2 += d[k] * d[k];
     }
     return fmax(d[2], 1e-6) / (distance2 * sqrt(distance2));

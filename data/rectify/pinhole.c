@@ -21,7 +21,7 @@ bool io_pinhole_see(const io_pinhole *c, const double point[2], double pixel[2])
 {
     const double d[3] = {point[0] - c->at[0], point[1] - c->at[1], -c->at[2]};
     double q[3];
-    for (int i = 0; i < 3; i++) q[i] = c->turn[i][0] * d[0] + c->turn[i][1] * d[1] + c->turn[i][2] * d[2];
+    for (int i = 0; i < 3; i++) q[i] = c->rotation[i][0] * d[0] + c->rotation[i][1] * d[1] + c->rotation[i][2] * d[2];
     const double x = q[0] / q[2], y = q[1] / q[2], seen = c->focal * (1 + c->radial * (x * x + y * y));
     pixel[0] = c->width / 2 + seen * x;
     pixel[1] = c->height / 2 + seen * y;
@@ -70,10 +70,10 @@ static bool start(const io_homography *h, io_pinhole *c)
     double r1[3], r2[3];
     for (int i = 0; i < 3; i++) r1[i] = sum[i] / a + difference[i] / b, r2[i] = sum[i] / a - difference[i] / b;
     for (int i = 0; i < 3; i++) up[i] = r1[(i + 1) % 3] * r2[(i + 2) % 3] - r1[(i + 2) % 3] * r2[(i + 1) % 3];
-    for (int i = 0; i < 3; i++) c->turn[i][0] = r1[i], c->turn[i][1] = r2[i], c->turn[i][2] = up[i];
+    for (int i = 0; i < 3; i++) c->rotation[i][0] = r1[i], c->rotation[i][1] = r2[i], c->rotation[i][2] = up[i];
     for (int k = 0; k < 3; k++) {
         c->at[k] = 0;
-        for (int i = 0; i < 3; i++) c->at[k] -= c->turn[i][k] * column[2][i];
+        for (int i = 0; i < 3; i++) c->at[k] -= c->rotation[i][k] * column[2][i];
     }
     return c->at[2] > 0;
 }
@@ -84,11 +84,11 @@ typedef struct fit {
     const io_pinhole *first;
 } fit;
 
-/* x: a turn, and the camera's place. */
+/* x: a rotation, and the camera's place. */
 static io_pinhole moved(const io_pinhole *first, const double x[6])
 {
     io_pinhole c = *first;
-    io_rotate(x, first->turn, c.turn);
+    io_rotate(x, first->rotation, c.rotation);
     memcpy(c.at, x + 3, sizeof c.at);
     return c;
 }

@@ -5,11 +5,11 @@
 #include "data/rectify/homography.h"
 
 typedef struct io_pinhole {
-    double width, height; /* of the picture in pixels; the axis meets its middle */
-    double focal;         /* in pixels */
-    double radial;        /* distortion: a ray at the tangent r from the axis is seen at r (1 + radial r^2) */
-    double turn[3][3];    /* rows: the picture's right, down and forward in the plane's coordinates */
-    double at[3];         /* the camera's place */
+    double width, height;  /* of the picture in pixels; the axis meets its middle */
+    double focal;          /* in pixels */
+    double radial;         /* distortion: a ray at the tangent r from the axis is seen at r (1 + radial r^2) */
+    double rotation[3][3]; /* rows: the picture's right, down and forward in the plane's coordinates */
+    double at[3];          /* the camera's place */
 } io_pinhole;
 
 /* Where the point (z = 0) is seen. False: behind the camera. */

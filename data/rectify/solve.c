@@ -9,7 +9,7 @@
 #define GUESS 0.3
 #define RADIAL 0.1
 
-enum { SHARED = 2, POSE = 6 }; /* unknowns: logarithm of the factor, distortion; then a turn and a place each */
+enum { SHARED = 2, POSE = 6 }; /* unknowns: logarithm of the factor, distortion; then a rotation and a place each */
 
 typedef struct fit {
     const io_sight *sight;
@@ -22,7 +22,7 @@ static io_pinhole camera_of(const io_sight *s, const double *shared, const doubl
     io_pinhole c = s->camera;
     c.focal *= exp(shared[0]);
     c.radial = shared[1];
-    io_rotate(pose, s->camera.turn, c.turn);
+    io_rotate(pose, s->camera.rotation, c.rotation);
     memcpy(c.at, pose + 3, sizeof c.at);
     return c;
 }

@@ -144,7 +144,7 @@ int ev_points(const ev_estimator *e, int step[EV_POINTS])
             if (t <= steps) step[n++] = t;
             p = end;
         }
-    else if (!e->method->few)
+    else if (!e->method->sampled)
         for (int i = 0; i <= steps && n < EV_POINTS; i++) step[n++] = i;
     else {
         static const int leading[] = {1, 2, 5};

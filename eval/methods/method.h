@@ -32,7 +32,7 @@ typedef struct ev_method {
     const char *name, *help;
     const ev_setting *settings;
     bool peer;                                       /* only of what has a peer's maps */
-    bool few;                                        /* of many steps some are scored: 1, 2, 5, 10 ... (false: all) */
+    bool sampled;                                    /* of many steps some are scored: 1, 2, 5, 10 ... (false: all) */
     int (*steps)(const ev_estimator *e);             /* after open; NULL: 0 */
     int (*photos)(const ev_estimator *e);            /* photographs that it reads, after open; NULL: 1 */
     ts_code (*open)(ev_estimator *e, ts_status *st); /* weights and tapes; on failure ev_close cleans up */

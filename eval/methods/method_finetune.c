@@ -53,7 +53,7 @@ static const ev_setting settings[] = {EV_ADAM_RATE("0.0001", "0.00001 0.00003 0.
 const ev_method ev_method_finetune = {.name = "finetune",
                                       .help = "Adam on g's weights at test time (equation 6)",
                                       .settings = settings,
-                                      .few = true,
+                                      .sampled = true,
                                       .steps = ev_steps,
                                       .open = open,
                                       .run = run};

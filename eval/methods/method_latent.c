@@ -69,7 +69,7 @@ static const ev_setting settings[] = {
 const ev_method ev_method_latent = {.name = "latent",
                                     .help = "Adam in an auto-encoder's code (equation 5)",
                                     .settings = settings,
-                                    .few = true,
+                                    .sampled = true,
                                     .steps = ev_steps,
                                     .open = open,
                                     .run = run};

@@ -51,21 +51,21 @@ V_INLINE vi burnt_out(vf value, vf photograph) { return above_one(value) & (phot
 
 /* How much a value tells where both are burnt out: less from 1 on, nothing from 1 + fade on. With a fade of 0 one
  * rounding more or less decides what a pixel's step is. */
-V_INLINE vf told(vf value, vf photograph, float fade)
+V_INLINE vf confidence(vf value, vf photograph, float fade)
 {
     const vf left = fade > 0 ? v_max((1 + fade - value) * (1 / fade), v_set(0)) : v_set(0);
     return v_select(burnt_out(value, photograph), left, v_set(1));
 }
 
-/* The radiance as the equations see it, and its slope times what is told: above 1 its logarithm, which leads back from
- * a highlight of thousands in a few steps, where the clamp has no slope. */
+/* The radiance as the equations see it, and its slope times the confidence: above 1 its logarithm, which leads back
+ * from a highlight of thousands in a few steps, where the clamp has no slope. */
 V_INLINE vf exposed(vf value, vf photograph, float fade, vf *slope)
 {
     const vi bright = above_one(value);
     *slope = v_set(1);
     if (!v_any(bright)) return value;
     const vf above = v_max(v_min(value, v_set(BRIGHTEST)), v_set(1));
-    *slope = told(value, photograph, fade) / above;
+    *slope = confidence(value, photograph, fade) / above;
     return v_select(bright, v_log(above) + v_set(1), value);
 }
 
@@ -104,8 +104,8 @@ V_INLINE bool look(const ts_shade_view *view, ts_shade_kind kind, const ts_shade
     if (!v_any(tells)) return false;
     shade(view, kind, surrounded, s, &t->e, &t->g, &t->r);
     v_load_pixels(image + (int64_t)first * 3, 3, n, 3, t->target);
-    vf most = told(t->r.value[0], t->target[0], fade);
-    for (int c = 1; c < 3; c++) most = v_max(most, told(t->r.value[c], t->target[c], fade));
+    vf most = confidence(t->r.value[0], t->target[0], fade);
+    for (int c = 1; c < 3; c++) most = v_max(most, confidence(t->r.value[c], t->target[c], fade));
     tells &= most > v_set(0);
     if (!v_any(tells)) return false;
     couple(kind, s, &t->e, &t->g, &t->r, &t->k);

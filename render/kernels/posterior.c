@@ -20,7 +20,7 @@ V_INLINE vf observe(int c, const surface *s, const sight *t, const spread *a, co
                     vf h[MAP_CHANNELS])
 {
     vf by[ROW], slope, error = residual(c, s, t, TS_PRIOR_FADE, by, &slope);
-    error *= told(t->r.value[c], t->target[c], TS_PRIOR_FADE);
+    error *= confidence(t->r.value[c], t->target[c], TS_PRIOR_FADE);
     error -= by[0] * m[MAP_DIFFUSE + c] + by[1] * m[MAP_SPECULAR + c];
     for (int i = 0; i < SHARED; i++) error -= by[2 + i] * m[shared_map[i]];
     whiten(c, a, by, h);
@@ -142,7 +142,7 @@ V_INLINE bool learn(const ts_shade_view *views, const float *const *images, int 
 {
     equations q;
     sight t;
-    bool told = false;
+    bool informed = false;
     if (count == 1) {
         if (!look_at(views, row, first, n, images[0], s, &t)) return false;
         settle(s, &t, prior, a, m, doubts, e);
@@ -150,12 +150,12 @@ V_INLINE bool learn(const ts_shade_view *views, const float *const *images, int 
     }
     for (int v = 0; v < count; v++) {
         if (!look_at(views + v, row, first, n, images[v], s, &t)) continue;
-        if (told) take(s, &t, false, prior, a, m, &q);
+        if (informed) take(s, &t, false, prior, a, m, &q);
         else take(s, &t, true, prior, a, m, &q);
-        told = true;
+        informed = true;
     }
-    if (told) solve(&q, a, doubts, e);
-    return told;
+    if (informed) solve(&q, a, doubts, e);
+    return informed;
 }
 
 static void step(const ts_shade_view *views, const float *const *images, int count, const ts_shade_row *row,
@@ -176,14 +176,14 @@ static void step(const ts_shade_view *views, const float *const *images, int cou
         v_load_pixels(mean + first, row->channels, n, MAP_CHANNELS, m);
         for (int c = 0; c < MAP_CHANNELS; c++) m[c] -= at[c];
         load_deviation(deviation + (int64_t)i * MAP_GROUPS, n, &a);
-        const bool told = learn(views, images, count, row, i, n, &s, prior, &a, m, after != NULL, &e);
-        if (told) widen(&a, e.z, x);
+        const bool informed = learn(views, images, count, row, i, n, &s, prior, &a, m, after != NULL, &e);
+        if (informed) widen(&a, e.z, x);
         for (int c = 0; c < MAP_CHANNELS; c++) x[c] = v_min(v_max(at[c] + (m[c] + x[c]), v_set(-1)), v_set(1)) - now[c];
         v_store_pixels(to + first, row->channels, n, MAP_CHANNELS, x);
         if (!after) continue;
         for (int g = 0; g < MAP_GROUPS; g++) {
             left[g] = a.deviation[g];
-            if (told) left[g] *= v_sqrt(v_min(v_max(e.share[g], v_set(0)), v_set(1)));
+            if (informed) left[g] *= v_sqrt(v_min(v_max(e.share[g], v_set(0)), v_set(1)));
         }
         v_store_pixels(after + (int64_t)i * MAP_GROUPS, MAP_GROUPS, n, MAP_GROUPS, left);
     }

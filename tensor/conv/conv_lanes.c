@@ -1,6 +1,9 @@
 /* Convolution of few inputs to few output channels, which would leave most lanes empty: lanes are pixels of a row
  * instead. A strip of columns goes down the image; its rows of input, transposed to [channel][column], stay in the
- * second cache, and a tile of output channels x pixels stays in registers over all taps and inputs. */
+ * second cache, and a tile of output channels x pixels stays in registers over all taps and inputs.
+ *
+ * In the shipped models these are g's two last layers, to 9 channels: 1.5 % of an estimate's time (LGD_TRACE=1). The
+ * direct way would fill 9 of 16 lanes there, and add in another order, so that results would have other bytes. */
 #include "tensor/conv/plan.h"
 #include "tensor/scratch.h"
 #include "tensor/team.h"

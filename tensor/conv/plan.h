@@ -21,8 +21,8 @@
  *      pixel < TS_TILE_PIXELS            |
  *                    +---------+---------+
  */
-#ifndef TS_CONV_INTERNAL_H
-#define TS_CONV_INTERNAL_H
+#ifndef TS_CONV_PLAN_H
+#define TS_CONV_PLAN_H
 #include "tensor/conv/conv.h"
 #include "tensor/kernels/conv.h"
 

@@ -1,7 +1,7 @@
 /* The matrix unit's tile registers, all eight of 16 rows of 64 bytes. Only files in this folder include it, for
  * instruction sets with __AMX_BF16__. */
-#ifndef TS_TILES_H
-#define TS_TILES_H
+#ifndef TS_AMX_H
+#define TS_AMX_H
 #include <immintrin.h>
 #include <stdint.h>
 

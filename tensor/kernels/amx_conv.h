@@ -1,8 +1,8 @@
 /* Products of bf16 matrices by the CPU's matrix unit (Intel AMX: eight tiles of 16 rows of 64 bytes, and TDPBF16PS;
  * Intel 64 and IA-32 Architectures Software Developer's Manual vol. 1, chapter 18). product is NULL for an instruction
  * set without one. Denormals count as zeros, sums are f32. */
-#ifndef TS_KERNELS_MATRIX_H
-#define TS_KERNELS_MATRIX_H
+#ifndef TS_AMX_CONV_H
+#define TS_AMX_CONV_H
 #include "tensor/kernels/family.h"
 #include <stdbool.h>
 #include <stddef.h>

@@ -1,6 +1,6 @@
 /* The two passes of a separable resampling: rows combined, then pixels of a row combined. */
-#ifndef TS_RESAMPLE_KERNELS_H
-#define TS_RESAMPLE_KERNELS_H
+#ifndef TS_KERNELS_RESAMPLE_H
+#define TS_KERNELS_RESAMPLE_H
 #include "tensor/kernels/family.h"
 #include <stdbool.h>
 #include <stdint.h>

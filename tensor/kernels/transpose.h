@@ -1,6 +1,6 @@
 /* Transposition of VL rows of VL values in registers. Only files in this folder include it. */
-#ifndef TS_TURN_H
-#define TS_TURN_H
+#ifndef TS_TRANSPOSE_H
+#define TS_TRANSPOSE_H
 #include "tensor/kernels/vec.h"
 
 /* Lane l of the two vectors that a stage of a transposition makes of a and b: squares of side h trade places. */

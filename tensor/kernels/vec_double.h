@@ -1,7 +1,7 @@
 /* What shading needs beyond vec.h: vectors of VL doubles as two halves, and pixels with interleaved channels to and
  * from lanes. */
-#ifndef TS_LANES_H
-#define TS_LANES_H
+#ifndef TS_VEC_DOUBLE_H
+#define TS_VEC_DOUBLE_H
 #include "tensor/kernels/vec.h"
 #include <stdbool.h>
 

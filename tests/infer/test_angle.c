@@ -37,8 +37,8 @@ TEST(angle_homography_and_pose)
         CHECK(!io_pinhole_pose(4, angled_square, (const double(*)[2])pixel, &other, &rms, &st), "%s", st.message);
         for (int k = 0; k < 9; k++) {
             double product = 0;
-            for (int n = 0; n < 3; n++) product += other.turn[k / 3][n] * other.turn[k % 3][n];
-            CHECK(fabs(product - (k / 3 == k % 3)) < 1e-9, "rows %d and %d of the turn: %g", k / 3, k % 3, product);
+            for (int n = 0; n < 3; n++) product += other.rotation[k / 3][n] * other.rotation[k % 3][n];
+            CHECK(fabs(product - (k / 3 == k % 3)) < 1e-9, "rows %d and %d of the rotation: %g", k / 3, k % 3, product);
         }
         for (int k = 0; k < 3; k++)
             CHECK(fabs(c.at[k] - true_camera.at[k]) < 1e-6, "camera %d: %g, not %g", k, c.at[k], true_camera.at[k]);

@@ -13,14 +13,16 @@ static inline io_pinhole angled_camera(int width, int height, double focal, doub
 {
     const double a = tilt / 57.29577951308232, ahead[3] = {-sin(a) * cos(turn), -sin(a) * sin(turn), -cos(a)};
     io_pinhole c = {width, height, focal, 0, {{0}}, {0}};
-    for (int k = 0; k < 3; k++) c.at[k] = -distance * ahead[k], c.turn[2][k] = ahead[k];
+    for (int k = 0; k < 3; k++) c.at[k] = -distance * ahead[k], c.rotation[2][k] = ahead[k];
     const double level[3] = {cos(roll), sin(roll), 0};
     double along = 0, length = 0;
     for (int k = 0; k < 3; k++) along += level[k] * ahead[k];
-    for (int k = 0; k < 3; k++) c.turn[0][k] = level[k] - along * ahead[k], length += c.turn[0][k] * c.turn[0][k];
-    for (int k = 0; k < 3; k++) c.turn[0][k] /= sqrt(length);
     for (int k = 0; k < 3; k++)
-        c.turn[1][k] = ahead[(k + 1) % 3] * c.turn[0][(k + 2) % 3] - ahead[(k + 2) % 3] * c.turn[0][(k + 1) % 3];
+        c.rotation[0][k] = level[k] - along * ahead[k], length += c.rotation[0][k] * c.rotation[0][k];
+    for (int k = 0; k < 3; k++) c.rotation[0][k] /= sqrt(length);
+    for (int k = 0; k < 3; k++)
+        c.rotation[1][k] = ahead[(k + 1) % 3] * c.rotation[0][(k + 2) % 3] -
+            ahead[(k + 2) % 3] * c.rotation[0][(k + 1) % 3];
     return c;
 }
 
@@ -36,7 +38,7 @@ static inline void angled_point(const io_pinhole *c, double x, double y, double 
 {
     const double q[3] = {(x - c->width / 2) / c->focal, (y - c->height / 2) / c->focal, 1};
     double d[3];
-    for (int k = 0; k < 3; k++) d[k] = q[0] * c->turn[0][k] + q[1] * c->turn[1][k] + q[2] * c->turn[2][k];
+    for (int k = 0; k < 3; k++) d[k] = q[0] * c->rotation[0][k] + q[1] * c->rotation[1][k] + q[2] * c->rotation[2][k];
     for (int k = 0; k < 2; k++) p[k] = c->at[k] - d[k] * c->at[2] / d[2];
 }
 

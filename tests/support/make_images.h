@@ -1,6 +1,6 @@
 /* Image files made byte by byte, for what no ordinary writer writes. */
-#ifndef TESTS_AWKWARD_H
-#define TESTS_AWKWARD_H
+#ifndef TESTS_MAKE_IMAGES_H
+#define TESTS_MAKE_IMAGES_H
 #include <stddef.h>
 #include <stdint.h>
 
