@@ -31,7 +31,7 @@ void io_family_bark(io_canvas *c)
     cv_tint(c, deep, colour, inner);
     cv_shade(c, cells.id, tone);
     cv_shade(c, flake, cv_range(c, 0, 0.25f));
-    if (cv_chance(c, 0.3f)) { /* moss and lichen lie where they like */
+    if (cv_chance(c, 0.3f)) { /* moss and lichen, wherever the furrows are */
         static const uint32_t green[] = {0x4a5230, 0x6d7f5a, 0x9aa58a, 0xb5b58a, 0x3c4a2a};
         const io_substance moss = fin_dielectric(c, green, PAL_COUNT(green), 0.8f, 1);
         c->used = 0;

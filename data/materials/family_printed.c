@@ -1,4 +1,4 @@
-/* Colours in bold shapes that the relief knows nothing of: printed and laminated paper, card, wrapping, wallpaper. */
+/* Colours in bold shapes that are independent of the relief: printed and laminated paper, card, wrapping, wallpaper. */
 #include "data/materials/family.h"
 #include "data/materials/finish.h"
 

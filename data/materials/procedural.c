@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { CLASSIC = 17 }; /* the first so many ask wear_calm for their last touch; the others end by fin_any */
+enum { CLASSIC = 17 }; /* the first so many families are finished by wear_calm, the others by fin_any */
 
 /* Every family: its key, how often it is drawn beside the others, and what it paints. */
 static const struct {

@@ -35,7 +35,7 @@ void io_features(const float *maps, int size, double out[IO_FEATURES])
            *above = calloc((size_t)size, PLANES * sizeof *above);
     double count = (double)size * size;
     memset(out, 0, IO_FEATURES * sizeof *out);
-    if (!above) return; /* a row: memory is out for good, and the caller's next allocation says so */
+    if (!above) return; /* no memory for one row: the caller's next allocation fails too and reports it */
     for (int y = 0; y < size; y++) {
         double left[PLANES] = {0};
         for (int x = 0; x < size; x++) {
@@ -96,7 +96,7 @@ ts_code io_features_procedural(const io_procedural *p, uint64_t first, int count
 
 static int not_hidden(const struct dirent *e) { return e->d_name[0] != '.'; }
 
-/* Shows visit everything in one folder; an absent folder has nothing. */
+/* Calls visit for everything in one folder; an absent folder is empty. */
 static ts_code visit_folder(const char *folder, bool strips, int size, io_visit *visit, void *context, ts_status *st)
 {
     struct dirent **list = NULL;

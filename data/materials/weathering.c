@@ -193,7 +193,7 @@ void wear_any(io_canvas *c, float harsh)
     }
 }
 
-/* Neither feet nor polish reach the flanks of a relief. */
+/* Traffic and polishing wear what faces up, not the flanks of a relief. */
 static void roughen_flanks(io_canvas *c, float amount)
 {
     int mark = c->used, size = c->size;

@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A layer that reads every photograph begins as a model of one photograph has it, for the first of them, and blind to
- * the others. False where the file has no such tensor. */
+/* A layer that reads every photograph begins as a model of one photograph has it, for the first of them, and with
+ * weights of zero for the others. False where the file has no such tensor. */
 static bool with_more_photographs(const nn_model *model, int index, nn_file *f)
 {
     const nn_layers *l = model->layers;
@@ -39,8 +39,8 @@ static bool with_more_photographs(const nn_model *model, int index, nn_file *f)
 }
 
 /* A first layer that reads squares of pixels begins as a model that reads their mean has it; one that reads further
- * channels begins blind to them, and one that writes further ones begins with zeros there. stated: the list of
- * parameters that the file states. False where the file has no such tensor. */
+ * channels begins with weights of zero for them, and one that writes further ones begins with zeros there. stated: the
+ * list of parameters that the file states. False where the file has no such tensor. */
 static bool with_more_channels(const nn_model *model, const nn_model *stated, int index, nn_file *f)
 {
     const nn_layers *l = model->layers;

@@ -151,7 +151,7 @@ static void copy_as_is(const nn_tensor *e, const unsigned char *p, int64_t step,
         memcpy(out, p, (size_t)(n * size));
         return;
     }
-    int part = e->dtype == NN_C64 ? 4 : size; /* what a byte order turns round */
+    int part = e->dtype == NN_C64 ? 4 : size; /* bytes that are swapped together */
     for (int64_t i = 0; i < n; i++, p += step)
         for (int j = 0; j < size; j++) *out++ = p[e->swapped ? j / part * part + part - 1 - j % part : j];
 }
