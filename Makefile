@@ -124,12 +124,14 @@ BIN := $(PROGRAMS:%=$(BUILD)/bin/lgd-%)
 STRESS_C := $(filter-out %main.c,$(wildcard tests/stress/*.c))
 FUZZ_C := $(filter-out %main.c,$(wildcard tests/fuzz/*.c))
 FAULTS := $(BUILD)/bin/lgd-faults $(BUILD)/lib/lgd-faults.so
-TEST_C := $(wildcard tests/*.c) $(filter-out tests/stress/%.c tests/fuzz/%.c tests/faults/%.c,$(wildcard tests/*/*.c)) $(STRESS_C) $(FUZZ_C)
+TEST_C := $(wildcard tests/*.c) \
+  $(filter-out tests/stress/%.c tests/fuzz/%.c tests/faults/%.c,$(wildcard tests/*/*.c)) $(STRESS_C) $(FUZZ_C)
 BENCH_C := $(wildcard bench/*.c)
 TEST_BIN := $(BUILD)/bin/lgd-test
 BENCH_BIN := $(BUILD)/bin/lgd-bench
 STRESS_BIN := $(BUILD)/bin/lgd-stress
-# tests/stress/training.c stands between the trainer and its data, tests/tensor/test_team.c between a team and its workers.
+# tests/stress/training.c stands between the trainer and its data, tests/tensor/test_team.c between a team and its
+# workers.
 WRAP := -Wl,--wrap=io_loader_next -Wl,--wrap=tr_photographs
 
 all: needs
@@ -184,7 +186,8 @@ $(INTERNAL): $(LIB_OBJ)
 	@rm -f $@
 	$(Q)$(AR) rcs $@ $^
 
-# The library: infer/api_model.o, infer/api_files.o and what they use, in one object whose only global symbols are those that lgd.h marks LGD_API.
+# The library: infer/api_model.o, infer/api_files.o and what they use, in one object whose only global symbols are those
+# that lgd.h marks LGD_API.
 $(OBJ)/liblgd.o: $(INTERNAL)
 	$(call step,LD,$@)
 	$(Q)$(CC) -r -nostdlib -o $@ $(OBJ)/infer/api_model.o $(OBJ)/infer/api_files.o $(INTERNAL)
@@ -221,7 +224,8 @@ $(MPIS:%=$(OBJ)/train/mpi/mpi.%.o): $(OBJ)/train/mpi/mpi.%.o: train/mpi/mpi.c $(
 $(MPI_LINKS): $(BUILD)/mpi/link_%.so: bench/mpi/link.c $(BUILD)/gen/flags
 	$(call step,LD,$@)
 	@mkdir -p $(@D)
-	$(Q)$(CC) -shared -fPIC -std=c11 -D_GNU_SOURCE -O2 $(WARN) $(MPI_CFLAGS) -o $@ $< $(shell pkg-config --libs $(PKG_$*)) -lm
+	$(Q)$(CC) -shared -fPIC -std=c11 -D_GNU_SOURCE -O2 $(WARN) $(MPI_CFLAGS) -o $@ $< \
+	  $(shell pkg-config --libs $(PKG_$*)) -lm
 
 # Every object is rebuilt when the flags change, and data/folders.o when PREFIX does, tags.o
 # when its library comes or goes.
@@ -349,9 +353,9 @@ faults: programs $(FAULTS)
 	@LSAN_OPTIONS=exitcode=23:print_suppressions=0:suppressions=tests/faults/leaks.txt \
 	  BUILD=$(BUILD)-leaks ONLY_ONCE=1 sh tests/faults/run.sh $(FAULT_OPTIONS)
 
-# clang's libFuzzer with the address and undefined sanitizers, FUZZ_SECONDS for each target. The readers are compiled for
-# it; what else they need comes from the library as it is. OpenImageIO's libraries take seconds to load, and its PNG
-# reader leaks a name where libpng jumps out of it.
+# clang's libFuzzer with the address and undefined sanitizers, FUZZ_SECONDS for each target. The readers are compiled
+# for it; what else they need comes from the library as it is. OpenImageIO's libraries take seconds to load, and its
+# PNG reader leaks a name where libpng jumps out of it.
 # New inputs go to $(BUILD)/fuzz/NAME, one that breaks something to $(BUILD)/fuzz/NAME.crash-….
 FUZZ ?= safetensors torch photo image config folder
 FUZZ_SECONDS ?= 600
