@@ -8,8 +8,8 @@ has() { "$1" -c 'import torch; print("bench-deps: PyTorch", torch.__version__)' 
 also() { "$1" -c 'import openvino; print("bench-deps: OpenVINO", openvino.__version__)' 2>/dev/null; }
 is() { "$venv/bin/python3" -c "import importlib.metadata as m; raise SystemExit(not m.version('$1').startswith('$2'))" 2>/dev/null; }
 if [ -d "$venv" ] || python3 -m venv "$venv"; then
-    is torch $torch || "$venv/binpip" install --quiet --no-input "torch==$torch" numpy
-    is openvino $openvino || "$venv/binpip" install --quiet --no-input "openvino==$openvino" ||
+    is torch $torch || "$venv/bin/pip" install --quiet --no-input "torch==$torch" numpy
+    is openvino $openvino || "$venv/bin/pip" install --quiet --no-input "openvino==$openvino" ||
         echo "bench-deps: no openvino $openvino from PyPI; lgd-bench goes on without" >&2
     command -v "${CXX:-g++}" >/dev/null || echo "bench-deps: torch.compile needs a C++ compiler, g++; lgd-bench goes on without" >&2
     if has "$venv/bin/python3"; then
