@@ -26,7 +26,8 @@ typedef struct laplace_attr {
     signed char group[MOST];
 } laplace_attr;
 
-static float held(float s) { return fminf(fmaxf(s, LEAST), LARGEST); }
+/* Comparisons, which become instructions, where fminf and fmaxf are calls. */
+static float held(float s) { return s < LEAST ? LEAST : s > LARGEST ? LARGEST : s; }
 
 typedef struct laplace_job {
     const ag_node *node;
@@ -35,10 +36,11 @@ typedef struct laplace_job {
     float up, *dx, *ds;
 } laplace_job;
 
-/* 1 / (u e^s) of count values of s, at most BLOCK pixels of MOST channels. */
-static void invert(const float *s, int64_t count, float unit, float *inverse)
+/* s in its range, and 1 / (u e^s), of count values of s, at most BLOCK pixels of MOST channels. */
+static void invert(const float *s, int64_t count, float unit, float *scale, float *inverse)
 {
-    for (int64_t i = 0; i < count; i++) inverse[i] = -held(s[i]);
+    for (int64_t i = 0; i < count; i++) scale[i] = held(s[i]);
+    for (int64_t i = 0; i < count; i++) inverse[i] = -scale[i];
     ts_vmath_arrays_k()->exp(count, inverse, inverse);
     for (int64_t i = 0; i < count; i++) inverse[i] /= unit;
 }
@@ -47,15 +49,15 @@ static void invert(const float *s, int64_t count, float unit, float *inverse)
 static double sum_block(const laplace_attr *a, int64_t pixels, int c, int g, const float *x, const float *s,
                         const float *t)
 {
-    float inverse[BLOCK * MOST];
+    float scale[BLOCK * MOST], inverse[BLOCK * MOST];
     double sum = 0;
-    invert(s, pixels * g, a->unit, inverse);
-    for (int64_t p = 0; p < pixels; p++, x += c, t += c, s += g) {
-        const float *of = inverse + p * g;
+    invert(s, pixels * g, a->unit, scale, inverse);
+    for (int64_t p = 0; p < pixels; p++, x += c, t += c) {
+        const float *of = inverse + p * g, *log_of = scale + p * g;
         float pixel = 0;
         for (int i = 0; i < c; i++) {
             const int j = a->group[i];
-            pixel += fabsf(x[i] - t[i]) * of[j] + held(s[j]);
+            pixel += fabsf(x[i] - t[i]) * of[j] + log_of[j];
         }
         sum += (double)pixel;
     }
@@ -94,18 +96,16 @@ static void forward(ag_tape *tape, ag_node *node)
 static void add_block(const laplace_attr *a, int64_t pixels, int c, int g, const float *x, const float *s,
                       const float *t, float up, float *dx, float *ds)
 {
-    float inverse[BLOCK * MOST];
-    invert(s, pixels * g, a->unit, inverse);
+    float scale[BLOCK * MOST], inverse[BLOCK * MOST], each[MOST];
+    invert(s, pixels * g, a->unit, scale, inverse);
     for (int64_t p = 0; p < pixels; p++, x += c, t += c, s += g) {
         const float *of = inverse + p * g;
-        float each[MOST] = {0};
-        for (int i = 0; i < c; i++) {
-            const int j = a->group[i];
-            const float e = x[i] - t[i];
-            if (dx) dx[p * c + i] += (float)((e > 0) - (e < 0)) * (up * of[j]);
-            each[j] += up * (1 - fabsf(e) * of[j]);
-        }
-        for (int j = 0; ds && j < g; j++) ds[p * g + j] += s[j] > LEAST && s[j] < LARGEST ? each[j] : 0;
+        for (int i = 0; dx && i < c; i++)
+            dx[p * c + i] += (float)((x[i] > t[i]) - (x[i] < t[i])) * (up * of[a->group[i]]);
+        if (!ds) continue;
+        for (int j = 0; j < g; j++) each[j] = 0;
+        for (int i = 0; i < c; i++) each[a->group[i]] += up * (1 - fabsf(x[i] - t[i]) * of[a->group[i]]);
+        for (int j = 0; j < g; j++) ds[p * g + j] += s[j] > LEAST && s[j] < LARGEST ? each[j] : 0;
     }
 }
 

@@ -3,14 +3,35 @@
 #include "nn/layers.h"
 #include "ops.h"
 #include "render/losses.h"
+#include "tensor/team.h"
+#include <stddef.h>
+
+typedef struct places {
+    int side;
+    float *to;
+} places;
+
+static float place(int i, int side) { return (2 * (float)i + 1) / (float)side - 1; }
+
+static void put_rows(const void *job, int64_t begin, int64_t end)
+{
+    const places *p = job;
+    const int side = p->side;
+    const size_t row = (size_t)side * NN_COORDINATES;
+    for (int64_t y = begin; y < end; y++) {
+        float *to = p->to + (size_t)y * row;
+        const float down = place((int)(y % side), side);
+        for (int x = 0; x < side; x++) {
+            to[NN_COORDINATES * x] = y == begin ? place(x, side) : to[NN_COORDINATES * x - (ptrdiff_t)row];
+            to[NN_COORDINATES * x + 1] = down;
+        }
+    }
+}
 
 ag_value *nn_coordinates(ag_tape *tape, int n, int side)
 {
     ag_value *v = ag_empty(tape, (ts_shape){n, side, side, NN_COORDINATES});
-    for (int64_t i = 0; v && i < (int64_t)n * side * side; i++) {
-        v->t.data[2 * i] = (2 * (float)(i % side) + 1) / (float)side - 1;
-        v->t.data[2 * i + 1] = (2 * (float)(i / side % side) + 1) / (float)side - 1;
-    }
+    if (v) ts_for(ag_compute(tape)->threads, (int64_t)n * side, 16, put_rows, &(places){side, v->t.data});
     return v;
 }
 

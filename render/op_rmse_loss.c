@@ -3,6 +3,7 @@
 #include "autograd/op.h"
 #include "render/losses.h"
 #include <math.h>
+#include <string.h>
 
 extern const ag_op op_rmse_loss;
 
@@ -93,11 +94,10 @@ static void backward_rows(const void *job, int64_t begin, int64_t end)
     const float *a = j->node->in[0]->t.data, *b = j->node->in[1]->t.data;
     for (int64_t y = begin; y < end; y++) {
         const float w = (float)(j->up / (double)j->rmse[y / s.h]);
-        for (int64_t i = y * s.w * s.c; i < (y + 1) * s.w * s.c; i++) {
-            const int c = (int)(i % s.c) - r->first;
-            const float g = c >= 0 && c < r->count ? w * (a[i] - b[i]) : 0;
-            j->to[i] = j->add ? j->to[i] + g : g;
-        }
+        const int64_t row = y * s.w * s.c;
+        if (!j->add) memset(j->to + row, 0, sizeof *j->to * (size_t)(s.w * s.c));
+        for (int64_t p = row + r->first; p < row + (int64_t)s.w * s.c; p += s.c)
+            for (int64_t i = p; i < p + r->count; i++) j->to[i] += w * (a[i] - b[i]);
     }
 }
 
