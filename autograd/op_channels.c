@@ -31,9 +31,13 @@ static void backward_pixels(const void *job, int64_t begin, int64_t end)
 {
     const ag_back *b = job;
     const int c = b->node->in[0]->t.shape.c, d = b->node->out->t.shape.c;
-    float *dx = b->dx + begin * c;
-    if (!b->accumulate) memset(dx, 0, sizeof *dx * (size_t)((end - begin) * c));
-    ts_elementwise_k()->copy(end - begin, d, b->node->out->grad + begin * d, d, dx + first_of(b->node), c, true);
+    enum { NEAR = 256 }; /* pixels whose zeros are in the first cache when their gradient comes */
+    for (int64_t p = begin; p < end; p += NEAR) {
+        const int64_t count = ag_part(end, p, NEAR);
+        float *dx = b->dx + p * c;
+        if (!b->accumulate) memset(dx, 0, sizeof *dx * (size_t)(count * c));
+        ts_elementwise_k()->copy(count, d, b->node->out->grad + p * d, d, dx + first_of(b->node), c, b->accumulate);
+    }
 }
 
 static void backward(ag_tape *tape, ag_node *node)

@@ -47,8 +47,8 @@ static float weight_of(const ag_node *node, int64_t i)
     return w->given ? w->of[i % MAP_CHANNELS] : 1;
 }
 
-/* The weights of PERIOD values from any on, the first of channel 0: of[first % MAP_CHANNELS + i] is that of value first +
- * i. Loops over them have neither divisions nor branches. */
+/* The weights of PERIOD values from any on, the first of channel 0: of[first % MAP_CHANNELS + i] is that of value first
+ * + i. Loops over them have neither divisions nor branches. */
 enum { PERIOD = 56 * MAP_CHANNELS, LANES = 8 };
 typedef struct weight_table {
     float of[PERIOD + MAP_CHANNELS];
@@ -80,8 +80,7 @@ static void sum_chunk(const void *job, int64_t k)
         const float *a = j->node->in[0]->t.data + at, *b = j->node->in[1]->t.data + at;
         const int64_t n = ag_part(last, at, PERIOD), whole = n / LANES * LANES;
         for (int64_t i = 0; i < whole; i += LANES)
-            for (int l = 0; l < LANES; l++)
-                lane[l] += (double)w[i + l] * fabs((double)a[i + l] - (double)b[i + l]);
+            for (int l = 0; l < LANES; l++) lane[l] += (double)w[i + l] * fabs((double)a[i + l] - (double)b[i + l]);
         for (int64_t i = whole; i < n; i++) lane[i - whole] += (double)w[i] * fabs((double)a[i] - (double)b[i]);
     }
     for (int l = 0; l < LANES; l++) part += lane[l];

@@ -13,13 +13,21 @@ extern const ag_op op_shading_frame;
 
 #define REGULAR 0.05
 
-static void frame(int64_t pixel, int side, double f[2])
+/* Of column j and row i. */
+static void frame(int i, int j, int side, double f[2])
 {
-    const double x = (2 * (double)(pixel % side) + 1) / side - 1,
-                 y = 1 - (2 * (double)(pixel / side % side) + 1) / side;
+    const double x = (2 * (double)j + 1) / side - 1, y = 1 - (2 * (double)i + 1) / side;
     const double inverse = 1 / (x * x + y * y + REGULAR);
     f[0] = x * inverse;
     f[1] = y * inverse;
+}
+
+/* The next pixel's row and column. */
+static void next(ts_shape s, int *i, int *j)
+{
+    if (++*j < s.w) return;
+    *j = 0;
+    if (++*i == s.h) *i = 0;
 }
 
 static void forward_pixels(const void *job, int64_t begin, int64_t end)
@@ -27,10 +35,11 @@ static void forward_pixels(const void *job, int64_t begin, int64_t end)
     const ag_node *node = job;
     const ts_shape s = node->out->t.shape;
     float *y = node->out->t.data;
-    for (int64_t p = begin; p < end; p++) {
+    int i = (int)(begin / s.w % s.h), j = (int)(begin % s.w);
+    for (int64_t p = begin; p < end; p++, next(s, &i, &j)) {
         const float *from = node->in[0]->t.data + p * (s.c + 2);
         double f[2];
-        frame(p, s.w, f);
+        frame(i, j, s.w, f);
         memcpy(y + p * s.c, from, (size_t)s.c * sizeof *y);
         y[p * s.c + MAP_NORMAL] += from[s.c] * (float)f[0] - from[s.c + 1] * (float)f[1];
         y[p * s.c + MAP_NORMAL + 1] += from[s.c] * (float)f[1] + from[s.c + 1] * (float)f[0];
@@ -47,12 +56,14 @@ static void backward_pixels(const void *job, int64_t begin, int64_t end)
 {
     const ag_back *b = job;
     const ts_shape s = b->node->out->t.shape;
-    for (int64_t p = begin; p < end; p++) {
+    int i = (int)(begin / s.w % s.h), j = (int)(begin % s.w);
+    for (int64_t p = begin; p < end; p++, next(s, &i, &j)) {
         const float *from = b->node->out->grad + p * s.c;
         float *to = b->dx + p * (s.c + 2);
         double f[2];
-        frame(p, s.w, f);
-        for (int i = 0; i < s.c; i++) to[i] += from[i];
+        frame(i, j, s.w, f);
+        if (!b->accumulate) memset(to, 0, (size_t)(s.c + 2) * sizeof *to);
+        for (int c = 0; c < s.c; c++) to[c] += from[c];
         to[s.c] += from[MAP_NORMAL] * (float)f[0] + from[MAP_NORMAL + 1] * (float)f[1];
         to[s.c + 1] += from[MAP_NORMAL + 1] * (float)f[0] - from[MAP_NORMAL] * (float)f[1];
     }
@@ -61,7 +72,8 @@ static void backward_pixels(const void *job, int64_t begin, int64_t end)
 static void backward(ag_tape *tape, ag_node *node)
 {
     const ts_shape s = node->out->t.shape;
-    const ag_back b = {.node = node, .dx = ag_grad_add(tape, node->in[0]), .accumulate = true};
+    ag_back b = {.node = node};
+    b.dx = ag_grad_target(tape, node->in[0], &b.accumulate);
     if (b.dx) ts_for(ag_threads(tape), ts_pixels(s), ag_pixel_chunk(s.c), backward_pixels, &b);
 }
 
@@ -71,7 +83,7 @@ static void reference(const ag_node *node, const double *const *in, double *out)
     for (int64_t p = 0; p < ts_pixels(s); p++) {
         const double *from = in[0] + p * (s.c + 2);
         double f[2];
-        frame(p, s.w, f);
+        frame((int)(p / s.w % s.h), (int)(p % s.w), s.w, f);
         for (int i = 0; i < s.c; i++) out[p * s.c + i] = from[i];
         out[p * s.c + MAP_NORMAL] += from[s.c] * f[0] - from[s.c + 1] * f[1];
         out[p * s.c + MAP_NORMAL + 1] += from[s.c] * f[1] + from[s.c + 1] * f[0];

@@ -122,11 +122,23 @@ static void broadcast(int64_t pixels, int c, const float *g, float *y, bool accu
         for (int i = 0; i < c; i += VL) put(y + i, v_load_part(g + i, c - i), c - i, accumulate);
 }
 
+static inline __attribute__((always_inline)) void copy_pixels(int64_t pixels, int c, const float *src,
+                                                              int64_t src_stride, float *dst, int64_t dst_stride,
+                                                              const bool accumulate)
+{
+    if (c < VL) /* one mask for all pixels */
+        for (int64_t p = 0; p < pixels; p++, src += src_stride, dst += dst_stride)
+            v_store_n(dst, accumulate ? v_load_n(dst, c) + v_load_n(src, c) : v_load_n(src, c), c);
+    else
+        for (int64_t p = 0; p < pixels; p++, src += src_stride, dst += dst_stride)
+            for (int i = 0; i < c; i += VL) put(dst + i, v_load_part(src + i, c - i), c - i, accumulate);
+}
+
 static void copy(int64_t pixels, int c, const float *src, int64_t src_stride, float *dst, int64_t dst_stride,
                  bool accumulate)
 {
-    for (int64_t p = 0; p < pixels; p++, src += src_stride, dst += dst_stride)
-        for (int i = 0; i < c; i += VL) put(dst + i, v_load_part(src + i, c - i), c - i, accumulate);
+    if (accumulate) copy_pixels(pixels, c, src, src_stride, dst, dst_stride, true);
+    else copy_pixels(pixels, c, src, src_stride, dst, dst_stride, false);
 }
 
 static void gru(int64_t pixels, int c, const float *ih, const float *hh, int64_t hh_stride, const float *old, float *y,
