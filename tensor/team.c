@@ -180,20 +180,31 @@ static void in_child(void)
     pthread_mutex_init(&each_alone, NULL);
 }
 
-/* So many workers, or as many as the system grants. Signals are for the program's own threads. */
+/* Signals from outside are for the program's own threads. Those that a thread brings upon itself, by a fault or by what
+ * it writes, act on a worker as on any thread: were they blocked there, a file that is too large would end the process
+ * or not, depending on which thread writes it. */
+static void block_signals(sigset_t *before)
+{
+    static const int own[] = {SIGABRT, SIGBUS, SIGFPE, SIGILL, SIGPIPE, SIGSEGV, SIGSYS, SIGTRAP, SIGXFSZ};
+    sigset_t others;
+    sigfillset(&others);
+    for (size_t i = 0; i < sizeof own / sizeof *own; i++) sigdelset(&others, own[i]);
+    pthread_sigmask(SIG_SETMASK, &others, before);
+}
+
+/* So many workers, or as many as the system grants. */
 static void grow(int wanted)
 {
     static bool watched, once;
     static atomic_bool told;
-    sigset_t all, before;
+    sigset_t before;
     pthread_attr_t attr;
     if (atomic_load(&refused_until) > nanoseconds() || pthread_attr_init(&attr)) return;
     pthread_attr_setdetachstate(&attr, PTHREAD_CREATE_DETACHED);
     pthread_mutex_lock(&growing);
     if (!once) watched = pthread_atfork(before_fork, after_fork, in_child) == 0;
     once = true;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before);
+    block_signals(&before);
     for (int i; watched && (i = atomic_load(&size)) < wanted; atomic_store(&size, i + 1)) {
         pthread_t thread;
         if (pthread_create(&thread, &attr, work, &workers[i]) == 0) continue;

@@ -4,6 +4,7 @@
 #include "tests/test.h"
 #include <errno.h>
 #include <pthread.h>
+#include <signal.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <sys/wait.h>
@@ -149,6 +150,23 @@ static bool all_there(int threads)
 TEST(team_has_each_thread_once)
 {
     for (int i = 0; i < 200; i++) CHECK(all_there(1 + i % 6), "not every one of %d threads, once", 1 + i % 6);
+}
+
+static void look_at_signals(const void *job, int k)
+{
+    atomic_int *const *blocked = job;
+    sigset_t set;
+    if (k == 0 || pthread_sigmask(SIG_BLOCK, NULL, &set)) return;
+    if (sigismember(&set, SIGTERM) == 1) atomic_fetch_add(&(*blocked)[0], 1);
+    if (sigismember(&set, SIGXFSZ) == 1 || sigismember(&set, SIGPIPE) == 1) atomic_fetch_add(&(*blocked)[1], 1);
+}
+
+TEST(team_workers_take_the_signals_of_what_they_do)
+{
+    atomic_int blocked[2] = {0}, *job = blocked;
+    CHECK(ts_each_thread(3, look_at_signals, &job) == 3, "three threads");
+    CHECK(blocked[0] == 2, "SIGTERM may go to a worker");
+    CHECK(blocked[1] == 0, "%d workers do not see SIGXFSZ or SIGPIPE", blocked[1]);
 }
 
 TEST(team_survives_a_fork)
