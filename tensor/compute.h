@@ -13,5 +13,5 @@ typedef struct ts_compute {
     int threads;            /* of loops; 0: the process's number (tensor/threads.h) */
 } ts_compute;
 
-const char *ts_precision_name(ts_precision p); /* f32, bf16 */
+static inline const char *ts_precision_name(ts_precision p) { return p == TS_BF16 ? "bf16" : "f32"; }
 #endif

@@ -29,10 +29,12 @@ ts_code ts_conv_check(const ts_conv *c, ts_status *st)
 
 static void run(const conv_plan *p, ts_conv_way way)
 {
-    static void (*const runs[])(const conv_plan *) = {
-        [TS_CONV_DIRECTLY] = conv_run_direct, [TS_CONV_BY_PIXELS] = conv_run_pointwise,
-        [TS_CONV_BY_BATCH] = conv_run_batch,  [TS_CONV_BY_COL2IM] = conv_run_col2im,
-        [TS_CONV_BY_LANES] = conv_run_lanes,  [TS_CONV_BY_AMX] = conv_run_amx};
+    static void (*const runs[])(const conv_plan *) = {[TS_CONV_DIRECTLY] = conv_run_direct,
+                                                      [TS_CONV_POINTWISE] = conv_run_pointwise,
+                                                      [TS_CONV_BY_BATCH] = conv_run_batch,
+                                                      [TS_CONV_BY_COL2IM] = conv_run_col2im,
+                                                      [TS_CONV_BY_PIXEL_LANES] = conv_run_pixel_lanes,
+                                                      [TS_CONV_BY_AMX] = conv_run_amx};
     runs[way](p);
 }
 
@@ -128,4 +130,37 @@ void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float 
     if (way == TS_CONV_BY_AMX) conv_amx_weight_gradient(c, x, dy, dweight);
     else if (way == TS_CONV_BY_BATCH) conv_batch_weight_gradient(c, true, x, dy, dweight);
     else conv_direct_weight_gradient(c, true, x, dy, dweight, NULL);
+}
+
+void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
+                              float *y)
+{
+    conv_winograd_forward(c, false, x, packed, bias, leak, y);
+}
+
+void ts_conv_forward_winograd_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
+                                   float *y)
+{
+    conv_winograd_forward(c, true, x, packed, bias, leak, y);
+}
+
+void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
+{
+    conv_winograd_data_gradient(c, false, dy, packed, dx, accumulate);
+}
+
+void ts_conv_data_gradient_winograd_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx,
+                                         bool accumulate)
+{
+    conv_winograd_data_gradient(c, true, dy, packed, dx, accumulate);
+}
+
+void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const float *dy, float *dweight)
+{
+    conv_winograd_weight_gradient(c, false, x, dy, dweight);
+}
+
+void ts_conv_weight_gradient_winograd_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight)
+{
+    conv_winograd_weight_gradient(c, true, x, dy, dweight);
 }

@@ -4,57 +4,8 @@
  * (validated by ts_conv_check). */
 #ifndef TS_CONV_H
 #define TS_CONV_H
-#include "tensor/compute.h"
+#include "tensor/conv/conv_choose.h"
 #include "tensor/tensor.h"
-
-typedef enum ts_pad { TS_PAD_ZERO, TS_PAD_REPLICATE } ts_pad;
-
-typedef struct ts_conv {
-    int n, h, w;   /* images, rows, columns of input and output */
-    int ic, oc;    /* input and output channels */
-    int k;         /* kernel side: odd, 1 .. 15 */
-    int dilation;  /* 1 or 2 */
-    ts_pad pad;    /* padding of dilation * (k - 1) / 2 on each side */
-    int constants; /* of the input's channels, the last: the data gradient is that of the others alone */
-    ts_compute compute;
-} ts_conv;
-
-/* Which order the packed weights are in: for the output and for the gradient of the input; both by Winograd's way; both
- * as pairs of bf16 values; both. */
-typedef enum ts_conv_use {
-    TS_CONV_FORWARD,
-    TS_CONV_DATA_GRADIENT,
-    TS_CONV_WINOGRAD,
-    TS_CONV_DATA_GRADIENT_WINOGRAD,
-    TS_CONV_FORWARD_BF16,
-    TS_CONV_DATA_GRADIENT_BF16,
-    TS_CONV_WINOGRAD_BF16,
-    TS_CONV_DATA_GRADIENT_WINOGRAD_BF16,
-    TS_CONV_USES
-} ts_conv_use;
-
-typedef enum ts_conv_direction { TS_CONV_OUTPUT, TS_CONV_INPUT, TS_CONV_WEIGHTS } ts_conv_direction;
-
-/* How: by rows of a padded window; without one where k = 1; position by position of several small maps; all taps'
- * products at once (col2im); pixels, not channels, in the lanes; Winograd's F(4 x 4, 3 x 3); the matrix unit. */
-typedef enum ts_conv_way {
-    TS_CONV_DIRECTLY,
-    TS_CONV_BY_PIXELS,
-    TS_CONV_BY_BATCH,
-    TS_CONV_BY_COL2IM,
-    TS_CONV_BY_LANES,
-    TS_CONV_BY_WINOGRAD,
-    TS_CONV_BY_AMX
-} ts_conv_way;
-/* Of the output, or of a gradient, by shape, c->compute and the ISA in use (conv_choose.c says why). */
-ts_conv_way ts_conv_choose(const ts_conv *c, ts_conv_direction direction);
-/* What its weights are packed for; not for TS_CONV_WEIGHTS. */
-ts_conv_use ts_conv_packing(const ts_conv *c, ts_conv_direction direction);
-/* Whether gradients of weights are made of rounded values: of those of c->compute, where that costs no time. */
-bool ts_conv_rounds_weights(const ts_conv *c);
-const char *ts_conv_way_name(ts_conv_way way);
-
-static inline int ts_conv_variables(const ts_conv *c) { return c->ic - c->constants; }
 
 ts_code ts_conv_check(const ts_conv *c, ts_status *st);
 

@@ -1,12 +1,10 @@
 /* Which way a convolution goes. Nobody else decides: the tape, packing and the entries in conv.c ask here. */
-#include "tensor/conv/plan.h"
+#include "tensor/conv/conv_choose.h"
 #include "tensor/conv/conv_winograd.h"
-
-const char *ts_precision_name(ts_precision p) { return p == TS_BF16 ? "bf16" : "f32"; }
 
 const char *ts_conv_way_name(ts_conv_way way)
 {
-    static const char *const names[] = {"direct", "pointwise", "batch", "col2im", "lanes", "Winograd", "AMX"};
+    static const char *const names[] = {"direct", "pointwise", "batch", "col2im", "pixel lanes", "Winograd", "AMX"};
     return names[way];
 }
 
@@ -25,7 +23,7 @@ static int64_t panel_cost(int oc, int pixels)
 }
 
 /* The same with pixels in the lanes, which leaves none empty but at the end of a row. */
-static bool lanes_pay(int oc, int k)
+static bool pixel_lanes_pay(int oc, int k)
 {
     return k > 1 && oc <= 2 * conv_lanes() && (int64_t)15 * oc * 64 < panel_cost(oc, 64);
 }
@@ -36,12 +34,14 @@ static bool col2im_pays(int ic, int oc, int k)
 {
     if (k == 1 || oc > 2 * conv_lanes()) return false;
     const int64_t products = (int64_t)k * k * ic, here = (int64_t)12 * conv_whole(k * k * oc) * (ic + 25);
-    return here < products * 13 * conv_whole(oc) && (!lanes_pay(oc, k) || here < products * (13 * oc + 70));
+    return here < products * 13 * conv_whole(oc) && (!pixel_lanes_pay(oc, k) || here < products * (13 * oc + 70));
 }
 
 ts_conv_way conv_choose_narrow(int ic, int oc, int k)
 {
-    return col2im_pays(ic, oc, k) ? TS_CONV_BY_COL2IM : lanes_pay(oc, k) ? TS_CONV_BY_LANES : TS_CONV_DIRECTLY;
+    return col2im_pays(ic, oc, k) ? TS_CONV_BY_COL2IM
+        : pixel_lanes_pay(oc, k)  ? TS_CONV_BY_PIXEL_LANES
+                                  : TS_CONV_DIRECTLY;
 }
 
 /* 36 products in place of 144 pay for the transformations. Tiles that are mostly outside cost what that saves, and
@@ -79,12 +79,12 @@ ts_conv_way ts_conv_choose(const ts_conv *c, ts_conv_direction direction)
     const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c);
     if (bf16 && conv_amx_present()) return TS_CONV_BY_AMX; /* 8 to 16 times the products of f32 */
     if (!c->compute.exact && winograd_pays(c, ic, oc)) return TS_CONV_BY_WINOGRAD; /* half the time, of bf16 too */
-    if (c->k == 1) return TS_CONV_BY_PIXELS; /* all images are one row: no window */
+    if (c->k == 1) return TS_CONV_POINTWISE; /* all images are one row: no window */
     if (small_maps(c)) return TS_CONV_BY_BATCH;
     if (bf16) return TS_CONV_DIRECTLY; /* pairs have no narrow way */
     const ts_conv_way narrow = conv_choose_narrow(ic, oc, c->k);
     const int fold = forward || c->pad == TS_PAD_ZERO ? 0 : c->dilation * (c->k / 2), width = c->w + 2 * fold;
-    if (narrow == TS_CONV_BY_LANES && (int64_t)14 * oc * conv_whole(width) >= panel_cost(oc, width))
+    if (narrow == TS_CONV_BY_PIXEL_LANES && (int64_t)14 * oc * conv_whole(width) >= panel_cost(oc, width))
         return TS_CONV_DIRECTLY; /* rows so narrow that lanes stay empty at their end */
     return narrow;
 }

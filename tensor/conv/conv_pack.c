@@ -1,4 +1,5 @@
 /* Packed weights: how many numbers, and in which order for each way. */
+#include "tensor/conv/conv.h"
 #include "tensor/conv/plan.h"
 #include "tensor/team.h"
 #include <stdlib.h>
@@ -17,7 +18,7 @@ size_t ts_conv_packed_count(const ts_conv *c, ts_conv_use use)
     const size_t panels = (size_t)conv_panels_count(ic, oc, c->k);
     const ts_conv_way narrow = conv_choose_narrow(ic, oc, c->k);
     if (narrow == TS_CONV_BY_COL2IM) return panels + (size_t)conv_col2im_count(ic, oc, c->k);
-    return panels + (narrow == TS_CONV_BY_LANES ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
+    return panels + (narrow == TS_CONV_BY_PIXEL_LANES ? (size_t)ic * (size_t)oc * (size_t)(c->k * c->k) : 0);
 }
 
 typedef struct panels_job {
@@ -56,7 +57,7 @@ static void pack_panels(const ts_conv *c, const conv_weights *w, bool forward, f
 }
 
 /* Whether the weights are read by conv_transpose alone. */
-static bool only_turned(const ts_conv *c, ts_conv_use use)
+static bool only_transposed(const ts_conv *c, ts_conv_use use)
 {
     return use == TS_CONV_WINOGRAD || use == TS_CONV_WINOGRAD_BF16 ||
         (use == TS_CONV_FORWARD_BF16 && !conv_amx_present()) ||
@@ -86,7 +87,8 @@ static void pack(const ts_conv *c, ts_conv_use use, const conv_weights *w, float
     const ts_conv_way narrow = conv_choose_narrow(ic, oc, c->k);
     float *behind = packed + conv_panels_count(ic, oc, c->k);
     if (narrow == TS_CONV_BY_COL2IM) conv_pack_col2im(ic, oc, c->k, !forward, w->full, i_step, o_step, behind);
-    if (narrow == TS_CONV_BY_LANES) conv_pack_lanes(ic, oc, c->k, !forward, w->full, i_step, o_step, behind);
+    if (narrow == TS_CONV_BY_PIXEL_LANES)
+        conv_pack_pixel_lanes(ic, oc, c->k, !forward, w->full, i_step, o_step, behind);
 }
 
 void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight, float *packed)
@@ -98,7 +100,7 @@ bool ts_conv_pack_half(const ts_conv *c, ts_conv_use use, const void *weight, fl
 {
     conv_weights w = {.half = weight};
     float *full = NULL;
-    if (!only_turned(c, use)) {
+    if (!only_transposed(c, use)) {
         const ptrdiff_t count = (ptrdiff_t)c->oc * c->ic * c->k * c->k;
         if (!(full = malloc(sizeof *full * (size_t)count))) return false;
         for (ptrdiff_t i = 0; i < count; i += CONV_TRANSPOSED)

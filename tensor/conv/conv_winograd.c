@@ -244,23 +244,11 @@ static void run(const winograd_grid *g, const float *x, const float *packed, con
     ts_tasks(g->threads, (g->tiles + step - 1) / step, run_tiles, &(run_job){g, x, packed, bias, leak, add, y, step});
 }
 
-static void forward(const ts_conv *c, bool bf16, const float *x, const float *packed, const float *bias, float leak,
-                    float *y)
+void conv_winograd_forward(const ts_conv *c, bool bf16, const float *x, const float *packed, const float *bias,
+                           float leak, float *y)
 {
     const winograd_grid g = winograd_grid_forward(c, bf16);
     run(&g, x, packed, bias, leak, false, y);
-}
-
-void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
-                              float *y)
-{
-    forward(c, false, x, packed, bias, leak, y);
-}
-
-void ts_conv_forward_winograd_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
-                                   float *y)
-{
-    forward(c, true, x, packed, bias, leak, y);
 }
 
 /* Row i of dx (+)= the rows of the larger domain that padding folds onto it. */
@@ -297,7 +285,8 @@ static void fold_rows(const void *job, int64_t begin, int64_t end)
                  j->dx + at * j->c->w * j->channels);
 }
 
-static void data_gradient(const ts_conv *c, bool bf16, const float *dy, const float *packed, float *dx, bool accumulate)
+void conv_winograd_data_gradient(const ts_conv *c, bool bf16, const float *dy, const float *packed, float *dx,
+                                 bool accumulate)
 {
     const int fold = c->pad == TS_PAD_REPLICATE ? c->dilation : 0, channels = ts_conv_variables(c);
     winograd_grid g = winograd_grid_gradient(c, fold, bf16);
@@ -310,15 +299,4 @@ static void data_gradient(const ts_conv *c, bool bf16, const float *dy, const fl
     run(&g, dy, packed, NULL, 1, false, larger);
     ts_for(c->compute.threads, (int64_t)c->n * c->h, 1, fold_rows,
            &(fold_job){c, fold, channels, image, larger, accumulate, dx});
-}
-
-void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)
-{
-    data_gradient(c, false, dy, packed, dx, accumulate);
-}
-
-void ts_conv_data_gradient_winograd_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx,
-                                         bool accumulate)
-{
-    data_gradient(c, true, dy, packed, dx, accumulate);
 }

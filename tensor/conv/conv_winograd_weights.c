@@ -156,21 +156,11 @@ static void reduce_inputs(const void *made, int64_t begin, int64_t end)
     }
 }
 
-static void weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight)
+void conv_winograd_weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight)
 {
     job j = make_job(c, bf16, x, dy);
     j.dweight = dweight;
     j.sums = ts_scratch(2, sizeof(float) * (size_t)(j.size * j.chunks));
     ts_tasks(c->compute.threads, (int64_t)j.chunks * j.parts, run_task, &j);
     ts_for(c->compute.threads, (int64_t)(j.padded / conv_lanes()) * c->ic, 1, reduce_inputs, &j);
-}
-
-void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const float *dy, float *dweight)
-{
-    weight_gradient(c, false, x, dy, dweight);
-}
-
-void ts_conv_weight_gradient_winograd_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight)
-{
-    weight_gradient(c, true, x, dy, dweight);
 }

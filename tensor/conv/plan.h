@@ -23,7 +23,7 @@
  */
 #ifndef TS_CONV_PLAN_H
 #define TS_CONV_PLAN_H
-#include "tensor/conv/conv.h"
+#include "tensor/conv/shape.h"
 #include "tensor/kernels/conv.h"
 
 /* y[n, i, j, o] (+)= act(bias[o] + sum x[n, i + first + d ky, j + first + d kx, c] w[ky, kx, c, o]).
@@ -120,7 +120,7 @@ int conv_transpose(const ts_conv *c, const conv_weights *w, bool forward, int pa
 void conv_run_direct(const conv_plan *p);
 void conv_run_pointwise(const conv_plan *p);
 void conv_run_batch(const conv_plan *p);
-void conv_run_lanes(const conv_plan *p);
+void conv_run_pixel_lanes(const conv_plan *p);
 void conv_run_col2im(const conv_plan *p);
 
 /* bf16 where the CPU has a matrix unit: weights are packed for it alone. */
@@ -140,18 +140,23 @@ size_t conv_bf16_count(const ts_conv *c, int ic, int oc);
 void conv_pack_bf16(const ts_conv *c, bool forward, const conv_weights *w, float *packed);
 
 ptrdiff_t conv_panels_count(int ic, int oc, int k);
-/* To few channels weights are packed behind the panels once more, for this way: TS_CONV_BY_COL2IM, TS_CONV_BY_LANES, or
- * TS_CONV_DIRECTLY where they are not. */
+/* To few channels weights are packed behind the panels once more, for this way: TS_CONV_BY_COL2IM,
+ * TS_CONV_BY_PIXEL_LANES, or TS_CONV_DIRECTLY where they are not. */
 ts_conv_way conv_choose_narrow(int ic, int oc, int k);
 ptrdiff_t conv_col2im_count(int ic, int oc, int k);
 /* weight[i * i_step + o * o_step + tap] */
 void conv_pack_col2im(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step,
                       float *packed);
-void conv_pack_lanes(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step,
-                     float *packed);
+void conv_pack_pixel_lanes(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step,
+                           ptrdiff_t o_step, float *packed);
 
 size_t conv_winograd_count(int ic, int oc, bool bf16);
 void conv_winograd_pack(const ts_conv *c, bool forward, bool bf16, const conv_weights *w, float *packed);
+void conv_winograd_forward(const ts_conv *c, bool bf16, const float *x, const float *packed, const float *bias,
+                           float leak, float *y);
+void conv_winograd_data_gradient(const ts_conv *c, bool bf16, const float *dy, const float *packed, float *dx,
+                                 bool accumulate);
+void conv_winograd_weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight);
 
 /* dweight += for at most CONV_BATCH_PIXELS pixels an image. */
 void conv_batch_weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight);

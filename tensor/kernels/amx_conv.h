@@ -31,8 +31,8 @@ typedef struct ts_amx_product {
 struct ts_amx_kernels {
     void (*begin)(void); /* on the thread that is to multiply */
     void (*end)(void);   /* gives the tiles back: until then the system saves them at every switch */
-    void (*product[2][2])(
-        const ts_amx_product *m); /* [rows > 16][columns > 16]: all 16 or 32 of both are read and written */
+    /* [rows > 16][columns > 16]: all 16 or 32 of both are read and written. */
+    void (*product[2][2])(const ts_amx_product *m);
     /* y[p y_row + o] = act(c[p c_row + o] + bias[o] (+ y[p y_row + o])), act as in tensor/conv/conv.h; bias may be NULL
      */
     void (*finish)(const float *c, ptrdiff_t c_row, int pixels, int channels, const float *bias, bool add, float leak,

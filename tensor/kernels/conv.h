@@ -37,8 +37,7 @@ typedef struct ts_tile {
     int channels;                 /* of the panel that exist; no others are written */
     const float *a[3];            /* pixels 0, 5, 10 */
     float *y[3];
-    const float
-        *fetch[2]; /* prefetched while the sum runs: two lines of each for 4 k; never read, but should be mapped */
+    const float *fetch[2]; /* prefetched while the sum runs, two lines of each for 4 k; never read, should be mapped */
     ptrdiff_t fetch_step[2]; /* bytes forward for 4 k */
 } ts_tile;
 
@@ -64,10 +63,9 @@ struct ts_conv_kernels {
     int rows;                                      /* largest m of a sum */
     ts_tile_function *tile[2][TS_TILE_PIXELS + 1]; /* [vectors - 1][pixels] */
     ts_tile_function *tile_bf16[2][TS_TILE_PIXELS + 1];
-    ts_sum_function *sum[2][TS_SUM_ROWS + 1]; /* [vectors - 1][m] */
-    ts_sum_function
-        *sum_near[2][TS_SUM_ROWS + 1]; /* the same of what lies in the first cache: nothing is fetched ahead */
-    ts_sum_function *sum_bf16[2][TS_SUM_ROWS + 1];                             /* sum_near of pairs of pixels */
+    ts_sum_function *sum[2][TS_SUM_ROWS + 1];      /* [vectors - 1][m] */
+    ts_sum_function *sum_near[2][TS_SUM_ROWS + 1]; /* of what lies in the first cache: nothing is fetched ahead */
+    ts_sum_function *sum_bf16[2][TS_SUM_ROWS + 1]; /* sum_near of pairs of pixels */
     void (*columns)(const float *x, int64_t pixels, int channels, float *sum); /* sum[o] += sum_p x[p][o] */
     void (*panel)(const float *x, ptrdiff_t stride, int64_t pixels, int channels,
                   float *to); /* [pixel][lane] of one or two vectors, zeros where there is no channel */

@@ -38,7 +38,7 @@ TEST(conv_choice_keeps_its_laws)
             CHECK(!winograd || (!c.compute.exact && c.k == 3), "Winograd's way, exact or of side %d", c.k);
             CHECK(way != TS_CONV_BY_AMX || bf16, "the matrix unit multiplies f32");
             if (direction == TS_CONV_WEIGHTS) continue;
-            CHECK(way == TS_CONV_BY_AMX || (c.k == 1) == (way == TS_CONV_BY_PIXELS), "%s of side %d",
+            CHECK(way == TS_CONV_BY_AMX || (c.k == 1) == (way == TS_CONV_POINTWISE), "%s of side %d",
                   ts_conv_way_name(way), c.k);
             const ts_conv_use use = ts_conv_packing(&c, direction);
             const bool winograd_bf16 = use == TS_CONV_WINOGRAD_BF16 || use == TS_CONV_DATA_GRADIENT_WINOGRAD_BF16;

@@ -14,8 +14,8 @@
 static int chunk_of(int k) { return 84 / k; }
 
 /* [part of the outputs][chunk of inputs][tap][input][output of the part] */
-void conv_pack_lanes(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step, ptrdiff_t o_step,
-                     float *packed)
+void conv_pack_pixel_lanes(int ic, int oc, int k, bool mirrored, const float *weight, ptrdiff_t i_step,
+                           ptrdiff_t o_step, float *packed)
 {
     const int rows = ts_conv_k()->rows, parts = (oc + rows - 1) / rows, taps = k * k, chunk = chunk_of(k);
     for (int part = 0; part < parts; part++) {
@@ -169,7 +169,7 @@ static void run_unit(const void *job, int64_t unit)
     run_band(j->p, (int)(unit / j->bands), begin, end);
 }
 
-void conv_run_lanes(const conv_plan *p)
+void conv_run_pixel_lanes(const conv_plan *p)
 {
     int bands = (4 * ts_threads_of(p->threads) + p->n - 1) / p->n; /* each makes the rows around it anew */
     if (bands > (p->h + 7) / 8) bands = (p->h + 7) / 8;
