@@ -23,7 +23,7 @@
 #ifndef RD_BRDF_H
 #define RD_BRDF_H
 #include "render/scene.h"
-#include "render/kernels/shade.h"
+#include "render/kernels/view.h"
 #include "tensor/maps.h"
 
 /* Every bound that keeps shading finite, for the reference and the kernels. */

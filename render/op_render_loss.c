@@ -5,6 +5,7 @@
 #include "render/brdf.h"
 #include "render/losses.h"
 #include "render/rows.h"
+#include "render/kernels/shade.h"
 #include <math.h>
 #include <string.h>
 

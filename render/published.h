@@ -8,7 +8,7 @@
 #ifndef RD_PUBLISHED_H
 #define RD_PUBLISHED_H
 #include "render/scene.h"
-#include "render/kernels/shade.h"
+#include "render/kernels/view.h"
 
 typedef struct rd_published_constants {
     double distance; /* of camera and light from the sample, in patch widths */

@@ -2,6 +2,7 @@
 #include "render/brdf.h"
 #include "render/published.h"
 #include "render/rows.h"
+#include "render/kernels/shade.h"
 #include "render/kernels/newton.h"
 #include "tensor/scratch.h"
 #include <math.h>

@@ -3,7 +3,7 @@
 #define RD_ROWS_H
 #include "render/scene.h"
 #include "tensor/team.h"
-#include "render/kernels/shade.h"
+#include "render/kernels/view.h"
 
 ts_shade_view rd_shade_view(const rd_view *view);
 /* Row y of a grid; maps [h, w, channels]. */

@@ -1,7 +1,8 @@
 /* Gauss-Newton steps for rows of pixels: toward maps whose renderings fit the photographs. */
 #ifndef TS_NEWTON_H
 #define TS_NEWTON_H
-#include "render/kernels/shade.h"
+#include "render/kernels/view.h"
+#include "tensor/kernels/family.h"
 #include "tensor/maps.h"
 
 struct ts_newton_kernels {

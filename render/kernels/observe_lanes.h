@@ -1,4 +1,4 @@
-/* What a photograph tells of VL pixels' maps: three observations a pixel, each a residual and its derivatives by the
+/* What a photograph says of VL pixels' maps: three observations a pixel, each a residual and its derivatives by the
  * five maps that its colour depends on, and how a factor takes them up. */
 #ifndef TS_OBSERVE_LANES_H
 #define TS_OBSERVE_LANES_H

@@ -2,7 +2,8 @@
  * equations. */
 #ifndef TS_POSTERIOR_H
 #define TS_POSTERIOR_H
-#include "render/kernels/shade.h"
+#include "render/kernels/view.h"
+#include "tensor/kernels/family.h"
 
 /* The variance of a photograph's value I is model^2 + noise i + (gain i)^2, i = max(I, 0). */
 typedef struct ts_prior {

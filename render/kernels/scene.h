@@ -2,7 +2,7 @@
 #ifndef TS_SCENE_H
 #define TS_SCENE_H
 #include "render/kernels/posterior.h"
-#include "render/kernels/shade.h"
+#include "render/kernels/view.h"
 
 /* The derivatives by the numbers of rd_scene_number, in their order, and by the level of the roughness after them. */
 enum {
@@ -16,7 +16,7 @@ typedef struct ts_scene {
     float offset;       /* patch widths for one number of a place */
     float ambient;      /* radiance for one number of the ambient light */
     float tone;         /* strength of the tone curve */
-    bool least;         /* a value that is burnt out tells that the rendering is no darker; else it tells nothing */
+    bool least;         /* a burnt-out value means that the rendering is no darker; else it is ignored */
 } ts_scene;
 
 /* Sums over pixels of the normal equations, the upper triangle of the matrix by rows. */

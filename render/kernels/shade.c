@@ -1,4 +1,5 @@
 /* Rows of pixels through render/kernels/shade_lanes.h. */
+#include "render/kernels/shade.h"
 #include "render/kernels/shade_lanes.h"
 
 V_INLINE void render_kind(const ts_shade_view *view, ts_shade_kind kind, bool surrounded, const ts_shade_row *row,

@@ -2,6 +2,7 @@
  * gradients against differences are in the check of all ops. */
 #include "render/brdf.h"
 #include "render/losses.h"
+#include "tensor/cpu.h"
 #include "tensor/threads.h"
 #include "tests/test.h"
 #include <math.h>

@@ -1,5 +1,6 @@
 /* The steps of Gauss and Newton's method, of every instruction set, against the same equations in double. */
 #include "tests/support/normal_equations.h"
+#include "tensor/cpu.h"
 #include "tests/support/shading.h"
 #include <math.h>
 #include <string.h>
@@ -105,7 +106,7 @@ TEST(newton_rests_at_the_truth)
     free(truth), free(step);
 }
 
-/* Nine photographs tell nine numbers: from maps near the truth the method finds back to it, in a handful of steps,
+/* Nine photographs determine nine numbers: from maps near the truth the method finds back to it, in a handful of steps,
  * quadratically but for the damping. */
 TEST(newton_finds_the_truth)
 {

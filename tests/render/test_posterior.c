@@ -130,7 +130,7 @@ TEST(posterior_has_no_edge_where_burning_out_begins)
     free(value);
     printf("steps across the edges differ by %.2g, and go %.2g from the prior's mean\n", worst, moved);
     CHECK(worst < 2e-4, "a step changes by %g at an edge", worst);
-    CHECK(moved > 0.01, "no photograph told anything");
+    CHECK(moved > 0.01, "no photograph had an effect");
 }
 
 TEST(posterior_moves_tied_colours_together)

@@ -1,5 +1,6 @@
 /* The most probable maps, of every instruction set: against the same in double, Newton's step, and for any input. */
 #include "render/kernels/newton.h"
+#include "tensor/cpu.h"
 #include "tensor/threads.h"
 #include "tests/support/posterior.h"
 #include <math.h>

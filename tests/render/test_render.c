@@ -1,6 +1,7 @@
 /* What rd_render, the flash loss, the views and the tone curves promise. */
 #include "data/material.h"
 #include "render/tone.h"
+#include "tensor/cpu.h"
 #include "tensor/threads.h"
 #include "tests/support/shading.h"
 #include <dirent.h>

@@ -2,6 +2,7 @@
 #include "render/scene_model.h"
 #include "render/kernels/newton.h"
 #include "render/rows.h"
+#include "tensor/cpu.h"
 #include "tensor/threads.h"
 #include "tests/support/normal_equations.h"
 #include "tests/support/shading.h"

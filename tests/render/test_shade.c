@@ -1,6 +1,8 @@
 /* The shading kernels of every instruction set against the double reference (render/brdf.h), and that nothing makes
  * them fail. */
 #include "render/rows.h"
+#include "render/kernels/shade.h"
+#include "tensor/cpu.h"
 #include "tensor/threads.h"
 #include "tests/support/shading.h"
 #include <math.h>

@@ -2,6 +2,7 @@
 #include "render/brdf.h"
 #include "render/render.h"
 #include "render/rows.h"
+#include "render/kernels/shade.h"
 #include "tests/stress/stress.h"
 #include "tensor/cpu.h"
 #include <math.h>
