@@ -4,7 +4,7 @@
 #include "render/losses.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"
-#include "train/trainer_internal.h"
+#include "train/state.h"
 #include <stdlib.h>
 
 static bool put(const float *from, size_t count) { return fwrite(from, sizeof *from, count, stdout) == count; }

@@ -17,12 +17,12 @@ enum { CL_CAMERA_OPTIONS = 17 };
 extern const cl_camera_option cl_camera_options[CL_CAMERA_OPTIONS];
 float *cl_camera_value(io_camera *camera, int option);
 
-/* A careful photographer's, and a phone's in anybody's hands: the ranges of configs/single-phone.ini. */
+/* A careful photographer's, and a phone's in anybody's hands: the camera of configs/single-phone.ini. What a model is
+ * given of a photograph (told_view, told_power) is no part of it. */
 extern const io_camera cl_camera_default, cl_camera_phone;
 
 /* text: "phone", or KEY=VALUE,... of the options' names, what is not named being 0. TS_INVALID, with a message that
- * names
- * --camera, for anything else. */
+ * names --camera, for anything else. */
 ts_code cl_camera_parse(const char *text, io_camera *camera, ts_status *st);
 
 /* What is true of a photograph: the radiance under view, with the ambient light, is what the camera saw before its

@@ -5,7 +5,7 @@
 #include "data/ini.h"
 #include "data/text.h"
 #include "tensor/cpu.h"
-#include "train/trainer_internal.h"
+#include "train/state.h"
 #include <errno.h>
 #include <inttypes.h>
 #include <math.h>

@@ -2,7 +2,7 @@
 #include "cli/plot.h"
 #include "data/file.h"
 #include "data/text.h"
-#include "train/trainer_internal.h"
+#include "train/state.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

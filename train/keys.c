@@ -128,12 +128,12 @@ const tr_key tr_keys[] = {
     {"data", "sharpen", TR_REAL, AT(data.sharpen), 0, 3, "0", NULL, false,
      "largest amount of a phone's sharpening, an unsharp mask"},
     {"data", "told_view", TR_REAL, AT(data.told_view), 0, 1, "1", NULL, false,
-     "share of the photographs whose field of view the model is told"},
+     "share of the photographs whose field of view the model is given"},
     {"data", "told_power", TR_REAL, AT(data.told_power), 0, 1, "1", NULL, false,
-     "share of the photographs whose light's power the model is told"},
+     "share of the photographs whose light's power the model is given"},
     {"data", "sheet", TR_REAL, AT(data.sheet), 0, 1, "0", NULL, false,
      "share of the materials whose photographs are those of a printed sheet (docs/capturing.md): exposure, meter, "
-     "white_balance, tilt, off_centre, fov_min, fov_max and flash, which a sheet tells, are then 0, and the next three "
+     "white_balance, tilt, off_centre, fov_min, fov_max and flash, which a sheet gives, are then 0, and the next three "
      "hold"},
     {"data", "pose", TR_REAL, AT(data.pose), 0, 0.1, "0", NULL, false,
      "largest distance of camera and flash from where a sheet's tags put them, in patch widths"},
@@ -141,7 +141,7 @@ const tr_key tr_keys[] = {
      "a sheet's windows are at most this far beside their places, and again as far bent by what is left of the lens's "
      "distortion; in pixels of 512"},
     {"data", "bracket", TR_REAL, AT(data.bracket), 0, 0.9, "0", NULL, false,
-     "a sheet's photographs are up to this share brighter or darker, which its paper tells: noise and what clips "
+     "a sheet's photographs are up to this share brighter or darker, which its paper shows: noise and what clips "
      "differ"},
     {"data", "jpeg", TR_INT, AT(data.jpeg), 0, 98, "75", NULL, false,
      "lowest quality of the photographs' JPEG, drawn up to 98, half of them with halved chroma; 0: no JPEG"},

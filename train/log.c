@@ -1,5 +1,5 @@
 /* log.csv and val.csv. Rows that a resumed run will write again are removed first. */
-#include "train/trainer_internal.h"
+#include "train/state.h"
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>

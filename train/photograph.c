@@ -3,10 +3,10 @@
 #include "data/under_sheet.h"
 #include "tensor/maps.h"
 #include "tensor/team.h"
-#include "train/trainer_internal.h"
+#include "train/state.h"
 #include <string.h>
 
-static io_camera camera_of(const tr_config *c)
+io_camera tr_camera_of(const tr_config *c)
 {
     return (io_camera){.noise = (float)c->data.noise,
                        .noise_spread = (float)c->data.noise_spread,
@@ -37,7 +37,7 @@ static io_under_sheet under_sheet_of(const tr_config *c)
         .pose = (float)c->data.pose, .shift = (float)c->data.shift, .bracket = (float)c->data.bracket};
 }
 
-/* The same camera, of which the sheet has told place and exposure. */
+/* The same camera with what a sheet gives, place and exposure, known exactly. */
 static io_camera measured(io_camera c)
 {
     c.exposure = c.meter = c.white_balance = c.tilt = c.off_centre = c.fov_min = c.fov_max = c.flash = 0;
@@ -96,7 +96,7 @@ static tr_shot shoot(const io_camera *camera, const io_under_sheet *sheet, uint6
 void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
                     const rd_view *views, int number, float *images, tr_shot *shots)
 {
-    const io_camera camera = camera_of(c);
+    const io_camera camera = tr_camera_of(c);
     const io_under_sheet sheet = under_sheet_of(c);
     const rd_view flash = rd_flash();
     const double share = views ? c->data.sheet : 0; /* the flash for all is no sheet's */

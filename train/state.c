@@ -1,5 +1,5 @@
 /* What the files of the trainer ask about a run. */
-#include "train/trainer_internal.h"
+#include "train/state.h"
 #include <stdarg.h>
 #include <stdio.h>
 #include <time.h>
@@ -23,7 +23,6 @@ void tr_note(const tr_trainer *t, const char *format, ...)
 int64_t tr_total(const tr_config *c) { return c->train.pretrain_steps + c->train.steps; }
 bool tr_pretraining(const tr_config *c, int64_t step) { return step < c->train.pretrain_steps; }
 const float *tr_weights(const tr_trainer *t) { return t->adam.ema ? t->adam.ema : t->model->value; }
-int64_t tr_step_now(const tr_trainer *t) { return t->step; }
 
 double tr_seconds(void)
 {

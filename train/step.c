@@ -4,7 +4,7 @@
 #include "render/render.h"
 #include "tensor/maps.h"
 #include "tensor/threads.h"
-#include "train/trainer_internal.h"
+#include "train/state.h"
 #include <math.h>
 #include <string.h>
 
@@ -234,8 +234,8 @@ static const float *draw(tr_trainer *t, int given, ts_status *st)
     return target;
 }
 
-/* What the ranks' losses are summed as, each with its rank's share of the batch as weight, and how many ranks were told
- * to stop. */
+/* What the ranks' losses are summed as, each with its rank's share of the batch as weight, and how many ranks were
+ * asked to stop. */
 typedef struct losses {
     double loss, render_start, map_start, render_end, map_end, spread, scene, stop;
 } losses;

@@ -4,7 +4,8 @@
 #include "tensor/cpu.h"
 #include "tensor/maps.h"
 #include "tensor/new_file.h"
-#include "train/trainer_internal.h"
+#include "train/state.h"
+#include "train/trainer.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
@@ -248,6 +249,8 @@ tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, 
     return t;
 }
 
+int64_t tr_step_now(const tr_trainer *t) { return t->step; }
+
 void tr_destroy(tr_trainer **trainer)
 {
     tr_trainer *t = *trainer;
@@ -301,9 +304,9 @@ static ts_code after_step(tr_trainer *t, const tr_row *row, ts_status *st)
 /* Whether the run is to end here; all ranks know it from the last step's sums. */
 static bool stops(tr_trainer *t, bool first)
 {
-    const bool told = t->listener.stop && t->listener.stop(t->listener.user);
-    if (!t->ranks.mpi) return told;
-    return first ? tr_first_failed(&t->ranks, told) >= 0 : t->stop;
+    const bool asked = t->listener.stop && t->listener.stop(t->listener.user);
+    if (!t->ranks.mpi) return asked;
+    return first ? tr_first_failed(&t->ranks, asked) >= 0 : t->stop;
 }
 
 static void note_waiting(const tr_trainer *t, int64_t steps)

@@ -2,7 +2,7 @@
 #include "render/error.h"
 #include "tensor/maps.h"
 #include "tensor/team.h"
-#include "train/trainer_internal.h"
+#include "train/state.h"
 #include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>

@@ -1,6 +1,8 @@
 /* What the programs share. */
+#include "cli/camera.h"
 #include "cli/cli.h"
 #include "tests/test.h"
+#include "train/state.h"
 #include <fcntl.h>
 #include <locale.h>
 #include <math.h>
@@ -40,7 +42,7 @@ TEST(cli_numbers_ignore_the_locale)
     CHECK(!strcmp(text, "0.25"), "printed as %s", text);
 }
 
-/* In a process of its own, which tells by its exit status what went wrong. */
+/* In a process of its own, whose exit status says what went wrong. */
 static int with_closed_streams(int closed)
 {
     for (int fd = 0; fd < 3; fd++)
@@ -90,4 +92,19 @@ TEST(cli_progress_is_silent_without_a_terminal)
     cl_progress_show(&p, 5, NULL);
     CHECK(p.last == 0, "nothing is shown without a terminal");
     cl_progress_end(&p);
+}
+
+/* lgd-eval --camera phone is what the model phone was trained on. */
+TEST(phone_of_the_evaluation_is_that_of_the_training)
+{
+    ts_status st;
+    tr_config c = tr_config_default();
+    CHECK(tr_config_read(&c, "configs/single-phone.ini", &st) == TS_OK, "%s", st.message);
+    io_camera trained = tr_camera_of(&c), phone = cl_camera_phone;
+    for (int i = 0; i < CL_CAMERA_OPTIONS; i++)
+        CHECK(*cl_camera_value(&phone, i) == *cl_camera_value(&trained, i), "%s is %g and was %g",
+              cl_camera_options[i].name, (double)*cl_camera_value(&phone, i), (double)*cl_camera_value(&trained, i));
+    CHECK(phone.jpeg == trained.jpeg && phone.quantise == trained.quantise, "JPEG %d, 8 bits %d; was %d, %d",
+          phone.jpeg, phone.quantise, trained.jpeg, trained.quantise);
+    CHECK(phone.told_view == 0 && phone.told_power == 0, "it says what a model is given");
 }

@@ -4,7 +4,7 @@
 #include "tensor/conv/conv.h"
 #include "tensor/maps.h"
 #include "tests/test.h"
-#include "train/trainer_internal.h"
+#include "train/state.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

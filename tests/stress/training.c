@@ -2,7 +2,8 @@
  * functions below between the trainer and its data (--wrap), so that the product needs no door for it. */
 #include "nn/weights/weights.h"
 #include "tests/stress/stress.h"
-#include "train/trainer_internal.h"
+#include "train/state.h"
+#include "train/trainer.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

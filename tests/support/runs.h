@@ -1,9 +1,10 @@
-/* What the tests of training runs share: a tiny run, folders for it, and what it tells its listener. */
+/* What the tests of training runs share: a tiny run, folders for it, and what it reports to its listener. */
 #ifndef TESTS_RUNS_H
 #define TESTS_RUNS_H
 #include "tensor/threads.h"
 #include "tests/test.h"
-#include "train/trainer_internal.h"
+#include "train/state.h"
+#include "train/trainer.h"
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>

@@ -4,7 +4,7 @@
 #include "tensor/maps.h"
 #include "tensor/threads.h"
 #include "tests/test.h"
-#include "train/trainer_internal.h"
+#include "train/state.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -220,7 +220,7 @@ TEST(photographs_of_a_sheet_are_a_share_and_change_no_others)
     CHECK(under > 0 && under < COUNT, "%d of %d are under the sheet", under, COUNT);
 }
 
-/* Without faults a sheet's photographs are the renderings under the views that are told, and each key adds its own. */
+/* Without faults a sheet's photographs are the renderings under the views that are given, and each key adds its own. */
 TEST(photographs_of_a_sheet_have_the_faults_of_their_keys)
 {
     make();

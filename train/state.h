@@ -1,10 +1,13 @@
-/* Shared by the trainer's files. */
-#ifndef TR_TRAINER_INTERNAL_H
-#define TR_TRAINER_INTERNAL_H
+/* The state of a run, and what the files of the trainer do with it. */
+#ifndef TR_STATE_H
+#define TR_STATE_H
+#include "data/camera.h"
 #include "data/loader.h"
 #include "nn/adam.h"
 #include "train/reduce.h"
-#include "train/trainer.h"
+#include "train/config.h"
+#include "train/listener.h"
+#include "train/ranks.h"
 
 enum { TR_PATH = 1200 }; /* a folder and one of our names */
 
@@ -14,7 +17,7 @@ typedef struct tr_shot {
     rd_view view;               /* the light's power has the exposure in it */
     float ambient;              /* as a share of the light at the centre of a flat matt sample */
     float tone;                 /* contrast of the tone curve, 0: none */
-    bool told_view, told_power; /* whether the model is told them */
+    bool told_view, told_power; /* whether the model is given them */
 } tr_shot;
 
 /* Of a material: of its renderings under R_0 ... R_T, then of the last maps. */
@@ -33,14 +36,14 @@ typedef struct tr_validator {
     ag_tape *tape;     /* without gradients */
 } tr_validator;
 
-struct tr_trainer {
+typedef struct tr_trainer {
     tr_config config;
     char folder[1024];
     tr_listener listener;
     tr_ranks ranks;
     tr_reducer reducer; /* of several ranks */
     int first, batch;   /* this rank's share of train.batch */
-    bool stop;          /* a rank was told to stop when the last step's losses were summed */
+    bool stop;          /* a rank was asked to stop when the last step's losses were summed */
     double waited;      /* seconds, of all steps here */
     double busy;        /* seconds of all steps here */
     int lock;           /* descriptor, -1: none */
@@ -63,7 +66,7 @@ struct tr_trainer {
     double mean_norm; /* of the gradient, a moving average */
     double best;      /* least validated error in this phase; infinity: none yet */
     int64_t best_step;
-};
+} tr_trainer;
 
 /* state.c */
 void tr_path(const tr_trainer *t, const char *name, char path[TR_PATH]);
@@ -78,7 +81,10 @@ const float *tr_weights(const tr_trainer *t); /* what is validated and saved */
  */
 nn_model *tr_model_create(const tr_config *c, ts_status *st);
 
-/* photograph.c: number photographs of each material [count][size][size][9], with the faults of [data]; images
+/* photograph.c: the camera of [data]. */
+io_camera tr_camera_of(const tr_config *c);
+
+/* Number photographs of each material [count][size][size][9], with the faults of [data]; images
  * [count][number][size][size][3], under views [count][number] as tr_capture_views draws them (NULL: the flash for
  * all); index: of the first material, for the camera's faults, of which every photograph has its own.
  * shots [count][number]: the truth of each; NULL: not wanted. */
