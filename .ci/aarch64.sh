@@ -1,7 +1,7 @@
 #!/bin/sh
-# The build for 64-bit ARM by a cross compiler, run by qemu-user: that the inner loops of the convolution multiply and add
-# in registers (FMLA, nothing spilled), and that an estimate, with products that are not fused, is that of x86's base path
-# bit for bit. Skipped by name where Debian's crossbuild tools, qemu-user or the libraries are absent:
+# The build for 64-bit ARM by a cross compiler, run by qemu-user: that the inner loops of the convolution multiply and
+# add in registers (FMLA, nothing spilled), and that an estimate, with products that are not fused, is that of x86's
+# base path bit for bit. Skipped by name where Debian's crossbuild tools, qemu-user or the libraries are absent:
 #   dpkg --add-architecture arm64; apt-get update
 #   apt-get install gcc-aarch64-linux-gnu qemu-user
 # The libraries need not be installed: they are downloaded and unpacked into build-aarch64/root.
@@ -18,18 +18,23 @@ dpkg --print-foreign-architectures | grep -qx arm64 || skip "dpkg does not know 
 mkdir -p build-aarch64/debs
 root=$(pwd)/build-aarch64/root
 # The numbers in the libraries' names differ between releases of Debian: what the -dev packages depend on.
-packages=$({ printf '%s:arm64\n' libopenexr-dev libimath-dev libpng-dev libjpeg62-turbo-dev liblcms2-dev libdeflate-dev zlib1g-dev
-    apt-cache depends libopenexr-dev:arm64 libimath-dev:arm64 libpng-dev:arm64 libjpeg62-turbo-dev:arm64 liblcms2-dev:arm64 libdeflate-dev:arm64 zlib1g-dev:arm64 |
-        sed -n 's/^  Depends: \(lib[A-Za-z0-9.+-]*\|zlib1g\)\(:arm64\)*$/\1:arm64/p' | grep -E '^(lib(openexr|imath|png|jpeg|lcms|deflate)|zlib)'; } | sort -u)
+packages=$({ printf '%s:arm64\n' libopenexr-dev libimath-dev libpng-dev libjpeg62-turbo-dev liblcms2-dev \
+    libdeflate-dev zlib1g-dev
+    apt-cache depends libopenexr-dev:arm64 libimath-dev:arm64 libpng-dev:arm64 libjpeg62-turbo-dev:arm64 \
+        liblcms2-dev:arm64 libdeflate-dev:arm64 zlib1g-dev:arm64 |
+        sed -n 's/^  Depends: \(lib[A-Za-z0-9.+-]*\|zlib1g\)\(:arm64\)*$/\1:arm64/p' |
+        grep -E '^(lib(openexr|imath|png|jpeg|lcms|deflate)|zlib)'; } | sort -u)
 if [ "$packages" != "$(cat "$root/.complete" 2>/dev/null)" ]; then
-    (cd build-aarch64/debs && apt-get download -qq $packages 2>/dev/null) || skip "the libraries for arm64 cannot be downloaded"
+    (cd build-aarch64/debs && apt-get download -qq $packages 2>/dev/null) ||
+        skip "the libraries for arm64 cannot be downloaded"
     for d in build-aarch64/debs/*.deb; do dpkg -x "$d" "$root" || exit 1; done
     echo "$packages" >"$root/.complete"
 fi
 lib=$root/usr/lib/$cross
 build() { # FOLDER CONTRACT
     PKG_CONFIG_LIBDIR=$lib/pkgconfig PKG_CONFIG_SYSROOT_DIR=$root make --no-print-directory BUILD="$1" CONTRACT="$2" \
-        CC=$cross-gcc CXX=$cross-g++ AR=$cross-ar OBJCOPY=$cross-objcopy CPPFLAGS="-I$root/usr/include -I$root/usr/include/$cross" \
+        CC=$cross-gcc CXX=$cross-g++ AR=$cross-ar OBJCOPY=$cross-objcopy \
+        CPPFLAGS="-I$root/usr/include -I$root/usr/include/$cross" \
         LDLIBS="-L$lib -L$root/lib/$cross -Wl,-rpath-link,$lib:$root/lib/$cross" "$1/bin/lgd-infer" "$1/liblgd.a"
 }
 build build-aarch64/fused fast || exit 1
@@ -51,7 +56,8 @@ $cross-objdump -d --no-show-raw-insn build-aarch64/fused/obj/tensor/kernels/conv
         fused = spilled = 0
         for (k = i; k <= n; k++) {
             if (code[k] == "fmla") fused++
-            if (code[k] ~ /^(ldr|str|ldp|stp|ldur|stur)$/ && operands[k] ~ /^[qsd][0-9]/ && operands[k] ~ /\[sp/) spilled++
+            if (code[k] ~ /^(ldr|str|ldp|stp|ldur|stur)$/ && operands[k] ~ /^[qsd][0-9]/ &&
+                operands[k] ~ /\[sp/) spilled++
         }
         if (fused > most[name]) { most[name] = fused; spills[name] = spilled }
     }
@@ -64,15 +70,25 @@ $cross-objdump -d --no-show-raw-insn build-aarch64/fused/obj/tensor/kernels/conv
         exit found != 3 || bad
     }' || { echo "FAIL aarch64: the inner loops of the convolution are not FMLA on registers" >&2; exit 1; }
 
-[ $# -gt 0 ] || { [ -d "$TESTDATA/photos" ] || skip "no photograph is given, and $TESTDATA is absent"; set -- "$TESTDATA"/photos/028.png "$TESTDATA"/photos/h_0231_IMG_0794.jpg; }
+[ $# -gt 0 ] || { [ -d "$TESTDATA/photos" ] ||
+    skip "no photograph is given, and $TESTDATA is absent"
+    set -- "$TESTDATA"/photos/028.png "$TESTDATA"/photos/h_0231_IMG_0794.jpg; }
 T=$(mktemp -d) || exit 1
 trap 'rm -rf "$T"' EXIT
 options="-q --size 64 --threads 1 --iterations 2 -m models/single.safetensors"
-arm() { folder=$1; shift; qemu-aarch64 -L /usr/$cross -E LD_LIBRARY_PATH="$lib:$root/lib/$cross" "$folder/bin/lgd-infer" $options "$@" >/dev/null; }
+arm()
+{
+    folder=$1
+    shift
+    qemu-aarch64 -L /usr/$cross -E LD_LIBRARY_PATH="$lib:$root/lib/$cross" "$folder/bin/lgd-infer" $options "$@" \
+        >/dev/null
+}
 LGD_ISA=base build/bin/lgd-infer $options "$@" -o "$T/x86" >/dev/null && arm build-aarch64/plain "$@" -o "$T/arm" &&
     arm build-aarch64/fused "$@" -o "$T/fused" || { echo "FAIL aarch64: an estimate" >&2; exit 1; }
 diff -r "$T/x86" "$T/arm" || { echo "FAIL aarch64: the maps are not those of x86's base path" >&2; exit 1; }
 for f in "$T"/x86/*/diffuse.png; do
-    cmp -s "$f" "$T/fused${f#"$T/x86"}" || echo "aarch64: with fused products ${f#"$T/x86/"} differs in $(cmp -l "$f" "$T/fused${f#"$T/x86"}" | wc -l) bytes"
+    cmp -s "$f" "$T/fused${f#"$T/x86"}" ||
+        echo "aarch64: with fused products ${f#"$T/x86/"} differs in $(cmp -l "$f" "$T/fused${f#"$T/x86"}" |
+        wc -l) bytes"
 done
 echo "ok aarch64: $# photographs as by x86's base path, bit for bit"

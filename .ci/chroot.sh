@@ -15,12 +15,15 @@ if ! command -v debootstrap >/dev/null; then echo "chroot: skipped: debootstrap 
 if [ "$(id -u)" -ne 0 ]; then echo "chroot: must be run as root" >&2; exit 1; fi
 mkdir -p "${LGD_CHROOTS:=../chroots}" || exit 1
 root=$(cd "$LGD_CHROOTS" && pwd)/$suite
-packages=ca-certificates,gcc,g++,make,pkg-config,libopenimageio-dev,libopenexr-dev,libpng-dev,libjpeg-dev,liblcms2-dev,libdeflate-dev,zlib1g-dev
+packages=ca-certificates,gcc,g++,make,pkg-config
+packages=$packages,libopenimageio-dev,libopenexr-dev,libpng-dev,libjpeg-dev,liblcms2-dev,libdeflate-dev,zlib1g-dev
 packages=$packages,file,git,procps,python3,valgrind,clang-format-14
-[ "$suite" = bookworm ] || packages=$(echo "$packages" | sed s/,clang-format-14//) # .ci/format.sh says that it is absent
+# .ci/format.sh says that it is absent
+[ "$suite" = bookworm ] || packages=$(echo "$packages" | sed s/,clang-format-14//)
 if [ ! -e "$root/.complete" ]; then
     rm -rf "$root"
-    debootstrap --variant=minbase --include="$packages" "$suite" "$root" "${LGD_MIRROR:-http://deb.debian.org/debian}" || exit 1
+    debootstrap --variant=minbase --include="$packages" "$suite" "$root" "${LGD_MIRROR:-http://deb.debian.org/debian}" \
+        || exit 1
     echo "$packages" >"$root/.complete"
 fi
 mounted=
@@ -39,7 +42,8 @@ bind /dev /dev
 if [ "$packages" != "$(cat "$root/.complete")" ]; then # made for another list
     cp /etc/resolv.conf "$root/etc/resolv.conf"
     chroot "$root" /usr/bin/env DEBIAN_FRONTEND=noninteractive PATH=/usr/sbin:/usr/bin:/sbin:/bin sh -c \
-        'apt-get update -qq && apt-get install -y -qq --no-install-recommends $(echo "$1" | tr , " ")' sh "$packages" || exit 1
+        'apt-get update -qq && apt-get install -y -qq --no-install-recommends $(echo "$1" | tr , " ")' sh "$packages" \
+        || exit 1
     echo "$packages" >"$root/.complete"
 fi
 if [ -d ../shared ]; then

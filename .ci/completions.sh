@@ -44,7 +44,7 @@ function words(v,   part, k, count, all) {
     for (k = 1; k <= count; k++) if (part[k] !~ /[A-Z]/) all = all (all ? " " : "") part[k]
     return all
 }
-function bash(   k, all, pattern, name) {
+function bash(   k, all, pattern, name, what, reply) {
     name = program
     gsub(/-/, "_", name)
     print "# Made from " program " --help."
@@ -56,10 +56,11 @@ function bash(   k, all, pattern, name) {
         all = all (all ? " " : "") names[k]
         pattern = names[k]
         gsub(/ /, "|", pattern)
-        if (kind(value[k]) == "words") print "    " pattern ") mapfile -t COMPREPLY < <(compgen -W " quote words(value[k]) quote " -- \"$cur\"); return ;;"
-        if (kind(value[k]) == "folders") print "    " pattern ") compopt -o filenames; mapfile -t COMPREPLY < <(compgen -d -- \"$cur\"); return ;;"
-        if (kind(value[k]) == "files") print "    " pattern ") compopt -o filenames; mapfile -t COMPREPLY < <(compgen -f -- \"$cur\"); return ;;"
-        if (kind(value[k]) == "other") print "    " pattern ") return ;;"
+        what = kind(value[k])
+        reply = what == "words" ? "-W " quote words(value[k]) quote : what == "folders" ? "-d" : "-f"
+        if (what != "other") reply = "mapfile -t COMPREPLY < <(compgen " reply " -- \"$cur\"); "
+        if (what == "folders" || what == "files") reply = "compopt -o filenames; " reply
+        if (what) print "    " pattern ") " (what == "other" ? "" : reply) "return ;;"
     }
     print "    esac\n    if [[ $cur == -* ]]; then"
     print "        mapfile -t COMPREPLY < <(compgen -W " quote all quote " -- \"$cur\")"
@@ -76,7 +77,8 @@ function zsh(   k, m, one, count, about, action, all) {
         gsub(quote, quote "\\" quote quote, about)
         one = value[k]
         gsub(/:/, "\\:", one); gsub(/\[/, "\\[", one); gsub(/\]/, "\\]", one)
-        action = kind(value[k]) == "words" ? ":" one ":(" words(value[k]) ")" : kind(value[k]) == "folders" ? ":" one ":_files -/" : \
+        action = kind(value[k]) == "words" ? ":" one ":(" words(value[k]) ")" : \
+            kind(value[k]) == "folders" ? ":" one ":_files -/" : \
             kind(value[k]) == "files" ? ":" one ":_files" : value[k] ? ":" one ": " : ""
         count = split(names[k], part, " ")
         for (m = 1; m <= count; m++) {

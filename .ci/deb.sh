@@ -10,7 +10,8 @@ fail() { echo "deb: $*" >&2; exit 1; }
 for tool in dpkg-deb dpkg-shlibdeps dpkg-architecture; do
     command -v $tool >/dev/null || fail "there is no $tool: apt-get install dpkg-dev"
 done
-name=${DEBFULLNAME:-$(git config user.name 2>/dev/null || :)} mail=${DEBEMAIL:-$(git config user.email 2>/dev/null || :)}
+name=${DEBFULLNAME:-$(git config user.name 2>/dev/null || :)} \
+    mail=${DEBEMAIL:-$(git config user.email 2>/dev/null || :)}
 [ -n "$name" ] && [ -n "$mail" ] || fail "who maintains them? Set DEBFULLNAME and DEBEMAIL"
 arch=$(dpkg-architecture -qDEB_HOST_ARCH) libdir=/usr/lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)
 day=$(LC_ALL=C date -R -u ${SOURCE_DATE_EPOCH:+-d @$SOURCE_DATE_EPOCH})
@@ -61,8 +62,10 @@ make_deb() {
     shift 6
     doc=$work/$package/usr/share/doc/$package
     mkdir -p "$doc" "$work/$package/DEBIAN"
-    printf 'lgd (%s) unstable; urgency=medium\n\n  * CHANGELOG.md of the sources has the changes.\n\n -- %s <%s>  %s\n' \
-        "$version" "$name" "$mail" "$day" | gzip -9n >"$doc/changelog.gz"
+    {
+        printf 'lgd (%s) unstable; urgency=medium\n\n' "$version"
+        printf '  * CHANGELOG.md of the sources has the changes.\n\n -- %s <%s>  %s\n' "$name" "$mail" "$day"
+    } | gzip -9n >"$doc/changelog.gz"
     {
         printf 'Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/\nUpstream-Name: lgd\n\n'
         printf 'Files: *\nCopyright: 2026 the lgd authors\nLicense: Apache-2.0\n'

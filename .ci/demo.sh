@@ -3,7 +3,8 @@
 set -e
 : "${BUILD:=build}"
 out=$BUILD/demo
-echo "The photograph is rendered (lgd-data --photographs: a procedural material under a flash, sensor noise, JPEG), not taken with a camera."
+echo "The photograph is rendered (lgd-data --photographs: a procedural material under a flash, sensor noise, JPEG)," \
+    "not taken with a camera."
 "$BUILD/bin/lgd-infer" demo/flash.jpg -o "$out"
 echo
 echo "Maps, the re-rendered photograph and a preview under four other lights:"

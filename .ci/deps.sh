@@ -1,6 +1,6 @@
 #!/bin/sh
-# Installs what the build needs with the system's package manager, as root or through sudo; where that is not possible it
-# prints the names of what is missing and ends with 1. On a terminal it asks first, unless YES or CI is set.
+# Installs what the build needs with the system's package manager, as root or through sudo; where that is not possible
+# it prints the names of what is missing and ends with 1. On a terminal it asks first, unless YES or CI is set.
 # Arguments: the pkg-config modules, help2man.
 missing=
 optional=
@@ -22,9 +22,11 @@ for module in "$@"; do
     libpng) missing="$missing libpng-dev" ;;
     libdeflate) missing="$missing libdeflate-dev" ;; # PNG files of maps
     zlib) missing="$missing zlib1g-dev" ;; # nn/weights/zip.c: compressed entries of PyTorch's files
-    ompi-c) optional="$optional libopenmpi-dev openmpi-bin" lost="$lost lgd-train under mpirun" ;; # train/mpi/mpi.c, and mpirun for its tests
+    # train/mpi/mpi.c, and mpirun for its tests
+    ompi-c) optional="$optional libopenmpi-dev openmpi-bin" lost="$lost lgd-train under mpirun" ;;
     libjpeg) missing="$missing libjpeg-dev" ;;
-    apriltag) optional="$optional libapriltag-dev" lost="$lost printed sheets (lgd-infer --sheet)" ;; # lgd-infer --sheet and lgd-capture; the rest works without
+    # lgd-infer --sheet and lgd-capture; the rest works without
+    apriltag) optional="$optional libapriltag-dev" lost="$lost printed sheets (lgd-infer --sheet)" ;;
     *) echo "deps: no package is known for $module" >&2; exit 1 ;;
     esac
 done
@@ -52,7 +54,9 @@ if [ -t 0 ] && [ -t 2 ] && [ -z "${YES:-}${CI:-}" ]; then
     read -r _ || exit 1
 fi
 export DEBIAN_FRONTEND=noninteractive
-if $run apt-get update -qq >&2 && $run apt-get install -y -qq --no-install-recommends $missing $optional >&2; then exit 0; fi
+if $run apt-get update -qq >&2 && $run apt-get install -y -qq --no-install-recommends $missing $optional >&2; then
+    exit 0
+fi
 [ -z "$missing" ] && without
 echo "deps: could not install$missing (no network?); install them and run make again" >&2
 exit 1

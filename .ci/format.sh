@@ -5,11 +5,12 @@
 # `pip install clang-format==14.0.6`); without it that half is skipped by name.
 cd "$(dirname "$0")/.." || exit 1
 sources=$(git ls-files '*.c' '*.h' '*.cpp')
+scripts=$(git ls-files '*.sh' '*.py' '*.js' '*.css' .ci/run Makefile)
 for format in clang-format-14 clang-format none; do
     case $("$format" --version 2>/dev/null) in *" version 14."*) break ;; esac
 done
 [ "${1:-}" = fix ] && [ "$format" != none ] && "$format" -i $sources
-long=$(awk 'length > 120 { print FILENAME ":" FNR ": " length " columns, the most are 120" }' $sources Makefile)
+long=$(awk 'length > 120 { print FILENAME ":" FNR ": " length " columns, the most are 120" }' $sources $scripts)
 [ -z "$long" ] || { echo "$long" >&2; exit 1; }
 # Bytes 200 to 277 continue a character of UTF-8: columns are characters.
 long=$(git ls-files '*.md' | LC_ALL=C xargs awk '{ text = $0; gsub(/[\200-\277]/, "", text) }

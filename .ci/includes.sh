@@ -17,14 +17,19 @@ allowed() {
     data) echo "data data/image data/materials data/rectify tensor tensor/conv" ;;
     cli) echo "cli render data autograd tensor" ;;
     cli/data) echo "cli cli/data render data data/image data/materials data/rectify autograd tensor" ;;
-    cli/infer|cli/convert) echo "cli cli/infer infer nn nn/weights render data data/image data/rectify autograd tensor tensor/conv" ;;
+    cli/infer|cli/convert)
+        echo "cli cli/infer infer nn nn/weights render data data/image data/rectify autograd tensor tensor/conv" ;;
     cli/capture) echo "cli cli/capture render data data/image data/rectify autograd tensor" ;;
     train/mpi) echo "train/mpi tensor" ;;
     train) echo "train train/mpi cli nn nn/weights render data data/image data/materials autograd tensor tensor/conv" ;;
     infer) echo "infer nn nn/weights render data data/image data/rectify autograd tensor tensor/conv" ;;
     eval/metrics) echo "eval/metrics eval nn nn/weights render data data/image autograd tensor tensor/conv" ;;
-    eval/methods) echo "eval/methods eval/metrics eval cli infer nn nn/weights render data data/materials autograd tensor tensor/conv" ;;
-    eval) echo "eval eval/methods eval/metrics cli infer nn nn/weights render data data/image data/materials data/rectify autograd tensor tensor/conv" ;;
+    eval/methods)
+        echo "eval/methods eval/metrics eval cli infer nn nn/weights render data data/materials" \
+            "autograd tensor tensor/conv" ;;
+    eval)
+        echo "eval eval/methods eval/metrics cli infer nn nn/weights render data data/image data/materials" \
+            "data/rectify autograd tensor tensor/conv" ;;
     *) return 1 ;;
     esac
 }

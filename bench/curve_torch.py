@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """lgd-train and PyTorch from the same weights on the same batches: curve_torch.py CONFIG.ini OUT.svg [BUILD]
 
-Draws the training losses, lgd-train's in f32 and bf16, as means of 50 steps, and prints how far they are apart. BUILD: where the programs are, build.
-The configuration has whole patches of model.g_size, descent = none and no moving average.
-"""
+Draws the training losses, lgd-train's in f32 and bf16, as means of 50 steps, and prints how far they are apart. BUILD:
+where the programs are, build. The configuration has whole patches of model.g_size, descent = none and no moving
+average."""
 import csv
 import json
 import math
@@ -20,7 +20,8 @@ MEAN = 50
 
 
 def configuration(build, config):
-    text = subprocess.run([f"{build}/bin/lgd-train", config, "--print-config"], check=True, capture_output=True, text=True).stdout
+    text = subprocess.run([f"{build}/bin/lgd-train", config, "--print-config"], check=True, capture_output=True,
+        text=True).stdout
     section, keys = "", {}
     for line in text.splitlines():
         line = line.split("#")[0].strip()
@@ -90,12 +91,14 @@ def rate(keys, step):
 
 
 def theirs(keys, build, config, weights):
-    names = ["g_width", "g_width_max", "g_levels", "g_kernel_first", "g_kernel", "g_size", "h_width", "h_gru", "channels", "", "iterations", "coarse_steps", "coarse_size", "coarse_width",
+    names = ["g_width", "g_width_max", "g_levels", "g_kernel_first", "g_kernel", "g_size", "h_width", "h_gru",
+        "channels", "", "iterations", "coarse_steps", "coarse_size", "coarse_width",
              "coarse_gru"]
     yes = keys["model.recurrent"] == "yes"
     net, _ = peer.network([str(int(yes)) if not n else keys["model." + n] for n in names])
     load(net, weights)
-    steps, batch, patch, clip = (int(float(keys[k])) for k in ("train.steps", "train.batch", "data.patch", "train.clip"))
+    steps, batch, patch, clip = (int(float(keys[k]))
+        for k in ("train.steps", "train.batch", "data.patch", "train.clip"))
     adam = torch.optim.Adam(net.parameters(), 1e-3)
     stream = subprocess.Popen([f"{build}/bin/lgd-bench", "--batches", config], stdout=subprocess.PIPE).stdout
     place, losses = peer.positions(patch, patch, patch), []
@@ -117,7 +120,8 @@ def theirs(keys, build, config, weights):
 
 def ours(build, config, folder, precision):
     settings = ["--set", "output.folder=" + folder, "--set", "train.precision=" + precision]
-    subprocess.run([f"{build}/bin/lgd-train", config, *settings], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    subprocess.run([f"{build}/bin/lgd-train", config, *settings], check=True, stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL)
     with open(folder + "/log.csv") as f:
         return [float(row["loss"]) for row in csv.DictReader(f)]
 
@@ -130,19 +134,26 @@ def draw(path, curves):
     across = lambda i: left + (i + 0.5) * MEAN / steps * (width - left - 20)
     down = lambda v: 20 + (high - v) / (high - low) * (height - 20 - bottom)
     with open(path, "w") as f:
-        f.write(f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" font-family="sans-serif" font-size="12">\n<rect width="100%" height="100%" fill="#fff"/>\n')
+        f.write(f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
+                f'font-family="sans-serif" font-size="12">\n<rect width="100%" height="100%" fill="#fff"/>\n')
         for k in range(6):
             v = low + (high - low) * k / 5
-            f.write(f'<line x1="{left}" x2="{width - 20}" y1="{down(v):.1f}" y2="{down(v):.1f}" stroke="#ddd"/><text x="{left - 6}" y="{down(v) + 4:.1f}" text-anchor="end">{v:.2f}</text>\n')
+            f.write(f'<line x1="{left}" x2="{width - 20}" y1="{down(v):.1f}" y2="{down(v):.1f}" stroke="#ddd"/>'
+                    f'<text x="{left - 6}" y="{down(v) + 4:.1f}" text-anchor="end">{v:.2f}</text>\n')
         for k in range(0, steps + 1, steps // 4):
-            f.write(f'<text x="{left + k / steps * (width - left - 20):.1f}" y="{height - 20}" text-anchor="middle">{k}</text>\n')
-        f.write(f'<text x="{width / 2}" y="{height - 4}" text-anchor="middle">steps; the training loss, means of {MEAN}</text>\n')
+            f.write(f'<text x="{left + k / steps * (width - left - 20):.1f}" y="{height - 20}" '
+                    f'text-anchor="middle">{k}</text>\n')
+        f.write(f'<text x="{width / 2}" y="{height - 4}" '
+                f'text-anchor="middle">steps; the training loss, means of {MEAN}</text>\n')
         at = 22
-        for (name, _), mean, colour, dash in zip(curves.items(), means, ("#0072b2", "#d55e00", "#009e73"), ("", "6 4", "2 3")):
+        for (name, _), mean, colour, dash in zip(curves.items(), means, ("#0072b2", "#d55e00", "#009e73"),
+            ("", "6 4", "2 3")):
             points = " ".join(f"{across(i):.1f},{down(v):.1f}" for i, v in enumerate(mean))
-            f.write(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/>\n')
+            f.write(f'<polyline points="{points}" fill="none" stroke="{colour}" stroke-width="2" '
+                    f'stroke-dasharray="{dash}"/>\n')
             at += 18
-            f.write(f'<line x1="{width - 200}" x2="{width - 170}" y1="{at - 4}" y2="{at - 4}" stroke="{colour}" stroke-width="2" stroke-dasharray="{dash}"/><text x="{width - 164}" y="{at}">{name}</text>\n')
+            f.write(f'<line x1="{width - 200}" x2="{width - 170}" y1="{at - 4}" y2="{at - 4}" stroke="{colour}" '
+                    f'stroke-width="2" stroke-dasharray="{dash}"/><text x="{width - 164}" y="{at}">{name}</text>\n')
         f.write("</svg>\n")
     return means
 
@@ -155,15 +166,18 @@ def main():
     torch.set_num_threads(int(os.environ.get("OMP_NUM_THREADS", os.cpu_count())))
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([f"{build}/bin/lgd-train", config, "--initial", folder + "/start.safetensors"], check=True)
-        curves = {"lgd-train": ours(build, config, folder + "/run", "f32"), f"PyTorch {torch.__version__}": theirs(keys, build, config, folder + "/start.safetensors"),
+        curves = {"lgd-train": ours(build, config, folder + "/run", "f32"),
+            f"PyTorch {torch.__version__}": theirs(keys, build, config, folder + "/start.safetensors"),
                   "lgd-train, bf16": ours(build, config, folder + "/bf16", "bf16")}
     means = draw(out, curves)
     ours_f32, *others = zip(curves, curves.values(), means)
     for name, curve, mean in others:
         apart = [abs(a - b) / b for a, b in zip(ours_f32[2], mean)]
         first = [abs(a - b) / b for a, b in zip(ours_f32[1][:20], curve)]
-        print(f"{name}: first step {curve[0]:.6f}, lgd-train {ours_f32[1][0]:.6f}; apart over the first 20 steps {100 * max(first):.3f} %, "
-              f"means of {MEAN} steps {100 * max(apart):.2f} % at most, the last {mean[-1]:.4f} and {ours_f32[2][-1]:.4f}")
+        print(f"{name}: first step {curve[0]:.6f}, lgd-train {ours_f32[1][0]:.6f}; "
+              f"apart over the first 20 steps {100 * max(first):.3f} %, "
+              f"means of {MEAN} steps {100 * max(apart):.2f} % at most, "
+              f"the last {mean[-1]:.4f} and {ours_f32[2][-1]:.4f}")
 
 
 if __name__ == "__main__":

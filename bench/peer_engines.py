@@ -1,7 +1,8 @@
-"""What computes the peer's networks (bench/peer_torch.py): PyTorch as it stands, what torch.compile makes of it, and OpenVINO.
+"""What computes the peer's networks (bench/peer_torch.py): PyTorch as it stands, what torch.compile makes of it, and
+OpenVINO.
 
-network() takes the whole network for inference, module() a part of one, function() a training loss; each gives back what does the same work.
-"""
+network() takes the whole network for inference, module() a part of one, function() a training loss; each gives back
+what does the same work. """
 import importlib.util
 import os
 import shutil
@@ -42,8 +43,8 @@ class Eager:
 
 
 class Compiled(Eager):
-    """torch.compile, the weights frozen where nothing is trained, channels last; the renderer's gradient by its own differentiation of functions,
-    which it compiles too."""
+    """torch.compile, the weights frozen where nothing is trained, channels last; the renderer's gradient by its own
+    differentiation of functions, which it compiles too."""
     layouts = LAYOUTS[:1]
 
     def __init__(self, threads, rounded):
@@ -80,7 +81,8 @@ class Flat(nn.Module):
 
 
 class OpenVINO(Eager):
-    """OpenVINO's networks; the renderer's gradient, which it cannot differentiate, and what lies between the networks are torch's, the gradient compiled."""
+    """OpenVINO's networks; the renderer's gradient, which it cannot differentiate, and what lies between the networks
+    are torch's, the gradient compiled."""
     layouts = LAYOUTS[1:]  # it chooses its own inside
 
     def __init__(self, threads, rounded):
@@ -110,7 +112,8 @@ class OpenVINO(Eager):
     def refiner(self, h, a, gru, side):
         if h is None:
             return None
-        x, state = torch.zeros(1, 2 * a["channels"], side, side), [torch.zeros(1, gru, side, side)] * (2 if a["recurrent"] else 0)
+        x, state = (torch.zeros(1, 2 * a["channels"], side, side),
+            [torch.zeros(1, gru, side, side)] * (2 if a["recurrent"] else 0))
         run = self.module(Flat(h), [x, *state])
 
         def step(x, state):
@@ -124,11 +127,13 @@ class OpenVINO(Eager):
     def module(self, module, examples):
         import openvino
         model = openvino.convert_model(module, example_input=examples, input=[list(e.shape) for e in examples])
-        hint = {"PERFORMANCE_HINT": "LATENCY", "INFERENCE_NUM_THREADS": self.threads, "INFERENCE_PRECISION_HINT": "bf16" if self.rounded else "f32"}
+        hint = {"PERFORMANCE_HINT": "LATENCY", "INFERENCE_NUM_THREADS": self.threads,
+            "INFERENCE_PRECISION_HINT": "bf16" if self.rounded else "f32"}
         request = openvino.Core().compile_model(model, "CPU", hint).create_infer_request()
 
         def run(*inputs):
-            out = request.infer([x.detach().contiguous().numpy() for x in inputs], share_inputs=True, share_outputs=False)
+            out = request.infer([x.detach().contiguous().numpy() for x in inputs], share_inputs=True,
+                share_outputs=False)
             return tuple(torch.from_numpy(out[i]) for i in range(len(out)))
         return run
 

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""The peers of lgd-bench: our networks and single convolutions in PyTorch, in torch.compile and in OpenVINO (peer_engines.py), on the CPU.
+"""The peers of lgd-bench: our networks and single convolutions in PyTorch, in torch.compile and in OpenVINO
+(peer_engines.py), on the CPU.
 
 Reads jobs from standard input, one a line, and answers each with its median time in seconds (or "-" and a reason):
     threads N
@@ -7,8 +8,10 @@ Reads jobs from standard input, one a line, and answers each with its median tim
     ENGINE version                               eager, compile or openvino: its name, and nothing to do with time
     ENGINE conv N H W IC OC K DILATION PAD       forward, PAD: zero or replicate
     ENGINE gradient N H W IC OC K DILATION PAD   gradients of input and weights together; eager alone
-    ENGINE infer G_WIDTH G_MAX G_LEVELS G_FIRST G_KERNEL G_SIZE H_WIDTH H_GRU CHANNELS RECURRENT T COARSE_T COARSE_SIZE COARSE_WIDTH COARSE_GRU SIDE
-    ENGINE train (the same up to COARSE_GRU) BATCH PATCH WINDOW FIXED   T 0: g alone; FIXED 1: all but g; H_WIDTH 0: the coarse steps alone
+    ENGINE infer G_WIDTH G_MAX G_LEVELS G_FIRST G_KERNEL G_SIZE H_WIDTH H_GRU CHANNELS RECURRENT T COARSE_T COARSE_SIZE
+    COARSE_WIDTH COARSE_GRU SIDE
+    ENGINE train (the same up to COARSE_GRU) BATCH PATCH WINDOW FIXED   T 0: g alone; FIXED 1: all but g; H_WIDTH 0: the
+    coarse steps alone
     ENGINE bf16 conv ..., infer ..., train ...   the same with the networks in bfloat16
 Weights are random: time does not depend on them. Renderer's gradients are included.
 """
@@ -103,7 +106,8 @@ class UNet(nn.Module):
         super().__init__()
         wide = [min(width << i, width_max) for i in range(levels + 1)]
         self.conv, self.glob = nn.Conv2d(3, wide[0], 3, padding=1), nn.Linear(3, wide[0])
-        self.down = nn.ModuleList(Block(wide[i], wide[i + 1], wide[i + 1], wide[i], kernel if i else first, i < levels - 1) for i in range(levels))
+        self.down = nn.ModuleList(Block(wide[i], wide[i + 1], wide[i + 1], wide[i], kernel if i else first,
+            i < levels - 1) for i in range(levels))
         up, deep = [], wide[levels]
         for i in range(1, levels + 1):
             skip, out = wide[levels - i], wide[levels - i - 1] if i < levels else wide[0]
@@ -120,7 +124,8 @@ class UNet(nn.Module):
             skips.append(x)
             x, g = block(F.max_pool2d(x, 2), g)
         for block in self.up:
-            x, g = block(torch.cat([skips.pop(), F.interpolate(x, scale_factor=2, mode="bilinear", align_corners=True)], 1), g)
+            x, g = block(torch.cat([skips.pop(), F.interpolate(x, scale_factor=2, mode="bilinear", align_corners=True)],
+                1), g)
         return torch.tanh(self.out2(self.out1(x)) + self.add(g)[:, :, None, None])
 
 
@@ -145,8 +150,10 @@ class Refiner(nn.Module):
         self.out, self.recurrent = nn.Conv2d(gru, channels, 3, bias=False), recurrent
 
     def forward(self, x, state):
-        a = self.cell1(F.leaky_relu(self.conv1(padded(x, 5, 1, "replicate")), 0.01), state[0] if self.recurrent else None)
-        b = self.cell2(F.leaky_relu(self.conv2(padded(a, 3, 2, "replicate")), 0.01), state[1] if self.recurrent else None)
+        a = self.cell1(F.leaky_relu(self.conv1(padded(x, 5, 1, "replicate")), 0.01),
+            state[0] if self.recurrent else None)
+        b = self.cell2(F.leaky_relu(self.conv2(padded(a, 3, 2, "replicate")), 0.01),
+            state[1] if self.recurrent else None)
         return torch.tanh(self.out(padded(b, 3, 1, "replicate"))), (a, b)
 
 
@@ -227,11 +234,14 @@ class LGD(nn.Module):
         first = seen(maps)
         if self.coarse is not None:
             small = min(self.a["c_size"], side)
-            maps, x = (v if v.shape[2] == small else F.interpolate(v, size=(small, small), mode="bilinear") for v in (maps, whole))
-            maps = refined(self.coarse, self.descent, self.a["c_gru"], self.a["c_steps"], maps, x, positions(small, small, small))
+            maps, x = (v if v.shape[2] == small else F.interpolate(v, size=(small, small), mode="bilinear")
+                for v in (maps, whole))
+            maps = refined(self.coarse, self.descent, self.a["c_gru"], self.a["c_steps"], maps, x,
+                positions(small, small, small))
         maps = seen(maps)
         place = positions(side, side, side)[:, :, y0:y0 + h, x0:x0 + w]
-        return first, refined(self.h, self.descent, self.a["h_gru"], self.a["steps"] - self.a["c_steps"], maps, image, place)
+        return first, refined(self.h, self.descent, self.a["h_gru"], self.a["steps"] - self.a["c_steps"], maps, image,
+            place)
 
 
 def refined(h, descent, gru, steps, maps, image, place):
@@ -246,7 +256,8 @@ def refined(h, descent, gru, steps, maps, image, place):
     return maps
 
 
-NAMES = ["g_width", "g_max", "g_levels", "g_first", "g_kernel", "g_size", "h_width", "h_gru", "channels", "recurrent", "steps", "c_steps", "c_size", "c_width", "c_gru"]
+NAMES = ["g_width", "g_max", "g_levels", "g_first", "g_kernel", "g_size", "h_width", "h_gru", "channels", "recurrent",
+    "steps", "c_steps", "c_size", "c_width", "c_gru"]
 
 
 def network(words):
@@ -266,7 +277,8 @@ def infer(engine, words):
 
 
 def training_loss(maps, target, place, light, camera):
-    """L1 of the maps and of the logarithms of nine renderings; light and camera [9, N, 3, 1, 1], the first three directions."""
+    """L1 of the maps and of the logarithms of nine renderings; light and camera [9, N, 3, 1, 1], the first three
+    directions."""
     total = (maps - target).abs().mean()
     for i in range(9):
         a, b = rendered(maps, place, light[i], camera[i], i >= 3), rendered(target, place, light[i], camera[i], i >= 3)

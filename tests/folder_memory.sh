@@ -9,7 +9,8 @@ make_tiny 64 || { tail -n 1 "$T/log" >&2; exit 1; }
 for count in "$@"; do
     rm -rf "$T/o"
     make_photos "$count"
-    "$BUILD/bin/lgd-infer" -q -m "$T/tiny.safetensors" --threads 2 --size 64 --maps diffuse,specular,roughness,normal "$T/in" -o "$T/o" >/dev/null &
+    "$BUILD/bin/lgd-infer" -q -m "$T/tiny.safetensors" --threads 2 --size 64 \
+        --maps diffuse,specular,roughness,normal "$T/in" -o "$T/o" >/dev/null &
     while kill -0 $! 2>/dev/null; do
         now=$(sed -n 's/^VmHWM:[^0-9]*//p' "/proc/$!/status" 2>/dev/null)
         if [ "$now" ]; then peak=$now; fi

@@ -1,5 +1,6 @@
-# What tests/kill_folder.sh and tests/folder_memory.sh share. Folders are about files, not about networks: $T/tiny.safetensors
-# are weights that take a millisecond, as training begins with them, and the photographs are one small picture.
+# What tests/kill_folder.sh and tests/folder_memory.sh share. Folders are about files, not about networks:
+# $T/tiny.safetensors are weights that take a millisecond, as training begins with them, and the photographs are one
+# small picture.
 T=$(mktemp -d) || exit 1
 . tests/support/small_model.sh
 : "${BUILD:=build}"
@@ -9,7 +10,8 @@ make_tiny() {
     first_weights >"$T/tiny.ini"
     "$BUILD/bin/lgd-train" "$T/tiny.ini" --set output.folder="$T/run" --threads 1 >"$T/log" 2>&1 &&
         mv "$T/run/last.safetensors" "$T/tiny.safetensors" &&
-        "$BUILD/bin/lgd-infer" -q -m "$T/tiny.safetensors" --size "$1" -i 0 --maps diffuse demo/flash.jpg -o "$T/small" >>"$T/log" 2>&1
+        "$BUILD/bin/lgd-infer" -q -m "$T/tiny.safetensors" --size "$1" -i 0 --maps diffuse demo/flash.jpg \
+        -o "$T/small" >>"$T/log" 2>&1
 }
 
 # $1 photographs in $T/in: one file's bytes so many times, and cut again.

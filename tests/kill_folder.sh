@@ -17,13 +17,17 @@ mkdir "$T/o"
 begin() {
     running=
     for part in $(seq "$parts"); do
-        "$BUILD/bin/lgd-infer" -m "$T/tiny.safetensors" --skip-existing --shard "$part/$parts" --size 16 --iterations 0 \
+        "$BUILD/bin/lgd-infer" -m "$T/tiny.safetensors" --skip-existing --shard "$part/$parts" --size 16 \
+            --iterations 0 \
             --maps diffuse --threads 1 "$T/in" -o "$T/o" >>"$T/names" 2>"$T/err.$part" &
         running="$running $!"
     done
 }
 # The folders that are complete, with what meta.txt is: its inode and time. In hidden ones it is not yet any.
-complete() { find "$T/o" -mindepth 2 -maxdepth 2 -name meta.txt ! -path '*/.lgd-*' -printf '%h %i %T@\n' 2>/dev/null | sort; }
+complete()
+{
+    find "$T/o" -mindepth 2 -maxdepth 2 -name meta.txt ! -path '*/.lgd-*' -printf '%h %i %T@\n' 2>/dev/null | sort
+}
 noted() { if [ -f "$T/o/results.jsonl" ]; then wc -l <"$T/o/results.jsonl"; else echo 0; fi; }
 random() { od -An -N4 -tu4 /dev/urandom | tr -d ' '; }
 
@@ -67,4 +71,5 @@ complete >"$T/now"
 sed 's/^{"folder": "\([^"]*\)", .*, "warnings": .*}$/\1/' "$T/o/results.jsonl" | sort >"$T/listed"
 ls "$T/in" | sed 's/\.png$//' | sort | cmp -s - "$T/listed" || no "results.jsonl has other names"
 owed=$(grep -c '"seconds": null' "$T/o/results.jsonl")
-echo "$count photographs, $killed kills of $parts process(es), $at_last complete at the last: each done once, each once in results.jsonl ($owed lines made from meta.txt)"
+echo "$count photographs, $killed kills of $parts process(es), $at_last complete at the last:" \
+    "each done once, each once in results.jsonl ($owed lines made from meta.txt)"

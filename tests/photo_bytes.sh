@@ -8,5 +8,6 @@ infer=${1:-build/bin/lgd-infer} model=${2:-single} tests=$(cd "$(dirname "$0")" 
 out=$(mktemp -d) || exit 1
 trap 'rm -rf "$out"' EXIT
 LGD_ISA=avx2 "$infer" -q -m "$model" "$TESTDATA"/photos/*.* -o "$out" >/dev/null || exit 1
-cd "$out" && find . -mindepth 2 -type f | LC_ALL=C sort | xargs -d '\n' python3 -B "$tests/browser/png.py" >sums || exit 1
+cd "$out" && find . -mindepth 2 -type f | LC_ALL=C sort | xargs -d '\n' python3 -B "$tests/browser/png.py" >sums ||
+    exit 1
 echo "$(wc -l <sums) files, sha256 $(sha256sum <sums | cut -c1-64)"

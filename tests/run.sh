@@ -11,7 +11,9 @@ trap 'rm -f "$results"' EXIT
 code=$?
 cat "$results.part" | tee -a "$results"
 # A runner that died says nothing of the tests it did not reach.
-if [ $code -ne 0 ] && ! grep -q '^FAIL ' "$results.part"; then echo "FAIL lgd-test: exit status $code" | tee -a "$results"; fi
+if [ $code -ne 0 ] && ! grep -q '^FAIL ' "$results.part"; then
+    echo "FAIL lgd-test: exit status $code" | tee -a "$results"
+fi
 rm -f "$results.part"
 for script in tests/cli/*.sh; do
     case $script in */lib.sh | */lib_*.sh) continue ;; esac

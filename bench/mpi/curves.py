@@ -46,7 +46,8 @@ def main(out, runs):
             print(f"{name}: {max(off[:20]):.1e} in the first 20 steps, {max(off):.1e} in all")
     for k in range(5):
         text(x((steps - 1) * k / 4), floor + LOW + 16, str(round((steps - 1) * k / 4) + 1), "middle")
-    text((X0 + X1) / 2, floor + LOW + 29, "steps; above the loss, below its relative difference from the first run's", "middle")
+    text((X0 + X1) / 2, floor + LOW + 29, "steps; above the loss, below its relative difference from the first run's",
+        "middle")
     open(out, "w", encoding="ascii").write("\n".join(svg) + "\n</svg>\n")
 
 

@@ -21,9 +21,9 @@ enum {
 };
 enum { CL_WARNINGS = 6 };
 extern const char *const cl_warning_names[CL_WARNINGS];
-#define CL_FAR                                                                                                    \
-    0.05 /* reconstruction RMSE from which the difference is seen. Of 32 photographs by others (docs/real.md) the \
-            default model leaves one beyond it, whose highlights are missing */
+/* Reconstruction RMSE from which the difference is seen. Of 32 photographs by others (docs/real.md) the default model
+ * leaves one beyond it, whose highlights are missing. */
+#define CL_FAR 0.05
 
 typedef struct cl_item {
     const cl_job *job;

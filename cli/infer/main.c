@@ -75,7 +75,7 @@ static void say_angle(const cl_item *item)
     cl_note("%s: camera at %.2f %.2f %.2f sides of the square, %.0f degrees from straight above (%s%.1f degrees across "
             "the photograph: %s%s)",
             item->job->photo, r->camera.at[0], r->camera.at[1], r->camera.at[2], io_pinhole_tilt(&r->camera),
-            r->assumed ? "warning: assumed " : "", r->fov, r->fov_from, r->assumed ? "; --fov DEG tells it" : "");
+            r->assumed ? "warning: assumed " : "", r->fov, r->fov_from, r->assumed ? "; --fov DEG sets it" : "");
 }
 
 static void say_profile(const char *photo, const char *profile)
@@ -83,8 +83,8 @@ static void say_profile(const char *photo, const char *profile)
     if (*profile) cl_note("%s: warning: its colour profile (%s) cannot be used: sRGB is assumed", photo, profile);
 }
 
-/* What the sheet told, unless quiet, and of which photographs it told nothing. False: there are such. Where it told
- * nothing at all the item's own message is the first's. */
+/* What the sheet gave, unless quiet, and the photographs in which it was not found. False: there are such. Where
+ * none has it, the first one's message is the item's. */
 static bool say_sheet(const cl_item *item, bool quiet)
 {
     const io_sheet_set *set = &item->sheet;
@@ -116,8 +116,8 @@ static void say_fov(const cl_item *item)
     else if (*how == 'e')
         cl_note("%s: field of view %.1f degrees, estimated: %s", item->job->photo, fov, item->fov_from);
     else
-        cl_note("%s: warning: a field of view of %.1f degrees is assumed: %s; --fov DEG tells it", item->job->photo,
-                fov, item->fov_from);
+        cl_note("%s: warning: a field of view of %.1f degrees is assumed: %s; --fov DEG sets it", item->job->photo, fov,
+                item->fov_from);
 }
 
 static void name_removed(const cl_item *item)
@@ -216,7 +216,7 @@ static void finished(const cl_item *item, void *user)
 static int all(run *r, cl_pipeline *pipeline, const char *recipe)
 {
     const double start = cl_seconds();
-    r->poor = open_memstream(&r->text, &r->size); /* without it no names are told */
+    r->poor = open_memstream(&r->text, &r->size); /* without it no names are printed */
     r->bar = cl_progress_start("step", (int64_t)r->jobs * (r->steps + 1));
     cl_pipeline_run(pipeline, r->model, recipe, &(cl_listener){show, finished, cl_interrupted, r});
     cl_progress_end(&r->bar);

@@ -1,12 +1,12 @@
 #!/bin/sh
-# sbatch configs/cluster/slurm.sh CONFIG.ini [OPTIONS]: lgd-train on four nodes with two ranks each, eight threads a rank.
-# The run's folder has to be on a file system that the job's first node sees; the others write nothing.
+# sbatch configs/cluster/slurm.sh CONFIG.ini [OPTIONS]: lgd-train on four nodes with two ranks each, eight threads a
+# rank. The run's folder has to be on a file system that the job's first node sees; the others write nothing.
 #SBATCH --job-name=lgd
 #SBATCH --nodes=4
 #SBATCH --ntasks-per-node=2
 #SBATCH --cpus-per-task=8
 #SBATCH --time=24:00:00
-# Ten minutes before the end every rank is told to save a checkpoint and stop; the job goes back into the queue.
+# Ten minutes before the end every rank is asked to save a checkpoint and stop; the job goes back into the queue.
 #SBATCH --signal=TERM@600
 #SBATCH --requeue
 #SBATCH --open-mode=append

@@ -20,7 +20,8 @@
     }
 
     for (const b of buttons)
-        b.addEventListener('click', () => sortBy(b.dataset.key, page.sorted !== b.dataset.key || page.order !== 'down'));
+        b.addEventListener('click', () =>
+            sortBy(b.dataset.key, page.sorted !== b.dataset.key || page.order !== 'down'));
     if (which) which.addEventListener('change', () => sortBy(page.sorted || 'render', page.order !== 'up'));
 
     addEventListener('load', () => {

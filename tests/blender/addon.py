@@ -1,4 +1,5 @@
-"""The add-on in Blender: addon.py ZIP PHOTO installs the extension and makes materials. Ends with 1 when one is wrong."""
+"""The add-on in Blender: addon.py ZIP PHOTO installs the extension and makes materials. Ends with 1 when one is
+wrong."""
 import os
 import sys
 

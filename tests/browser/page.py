@@ -60,7 +60,8 @@ def set_field(b, name, value):
 
 
 def box(b, which):
-    return b.run("(r => [r.left, r.top, r.width, r.height])(document.querySelector('%s').getBoundingClientRect())" % which)
+    return b.run("(r => [r.left, r.top, r.width, r.height])(document.querySelector('%s').getBoundingClientRect())" %
+        which)
 
 
 def is_used(b, path):
@@ -89,7 +90,8 @@ def is_used(b, path):
         changes(key)
     b.key(" ", " ")
     check(b.run("document.querySelector('[name=follow]').checked"), "space does not let go of the light")
-    for name, value in (("height", 1.5), ("stops", 1), ("ambient", 0.3), ("roughness", 0.4), ("relief", 2), ("show", "normal"),
+    for name, value in (("height", 1.5), ("stops", 1), ("ambient", 0.3), ("roughness", 0.4), ("relief", 2),
+        ("show", "normal"),
                         ("show", "roughness"), ("other", "photo"), ("split", 0.25)):
         set_field(b, name, value)
         changes(name)
@@ -204,9 +206,11 @@ def report(b, *paths):
             const i = s.querySelector('img'), box = i.getBoundingClientRect();
             const column = s.querySelectorAll('.columns span'), row = s.querySelectorAll('.rows span');
             const panel = box.width / column.length, place = e => e.getBoundingClientRect();
-            return { square: Math.abs(box.height / row.length - panel) < 1, names: [...column, ...row].map(e => e.textContent),
-                fine: [...column].every((e, k) => Math.abs(place(e).left + place(e).width / 2 - box.left - (k + 0.5) * panel) < 2) &&
-                    [...row].every((e, k) => Math.abs(place(e).top + place(e).height / 2 - box.top - (k + 0.5) * panel) < 3) };
+            const off = (at, k) => Math.abs(at - (k + 0.5) * panel);
+            return { square: Math.abs(box.height / row.length - panel) < 1,
+                names: [...column, ...row].map(e => e.textContent),
+                fine: [...column].every((e, k) => off(place(e).left + place(e).width / 2 - box.left, k) < 2) &&
+                    [...row].every((e, k) => off(place(e).top + place(e).height / 2 - box.top, k) < 3) };
         })""")
         check(sheets, "%s has no pictures", path)
         for s in sheets:

@@ -1,5 +1,6 @@
 #!/bin/sh
-# What make promises: who includes whom, how it installs packages, and what every program shares. The library: library.sh
+# What make promises: who includes whom, how it installs packages, and what every program shares. The library:
+# library.sh
 . tests/cli/lib.sh
 PROGRAMS="train infer eval data"
 
@@ -7,7 +8,8 @@ includes_follow_the_layout() { expect 0 sh .ci/includes.sh; }
 check includes_follow_the_layout includes_follow_the_layout
 
 includes_check_catches_a_breach() {
-    mkdir -p "$T/c/tensor" "$T/c/autograd" "$T/c/render" "$T/c/nn" "$T/c/data" "$T/c/cli" "$T/c/train" "$T/c/infer" "$T/c/eval"
+    mkdir -p "$T/c/tensor" "$T/c/autograd" "$T/c/render" "$T/c/nn" "$T/c/data" "$T/c/cli" "$T/c/train" "$T/c/infer" \
+        "$T/c/eval"
     echo '#include "nn/model.h"' >"$T/c/tensor/bad.c"
     cd "$T/c" && expect 1 sh "$ROOT/.ci/includes.sh" && says "$T/err" "tensor/bad.c includes nn/"
 }
@@ -123,13 +125,15 @@ make_says_what_it_does() {
     expect 0 make --no-print-directory -j1 BUILD="$T/b" "$T/b/obj/tensor/status.o" "$T/b/obj/data/folders.o"
     says "$T/out" "  CC    tensor/status.c"
     lines "$T/out" 2
-    expect 0 make --no-print-directory -j1 BUILD="$T/b" V=1 PREFIX=/elsewhere "$T/b/obj/tensor/status.o" "$T/b/obj/data/folders.o"
+    expect 0 make --no-print-directory -j1 BUILD="$T/b" V=1 PREFIX=/elsewhere "$T/b/obj/tensor/status.o" \
+        "$T/b/obj/data/folders.o"
     says "$T/out" "data/folders.c"
     says "$T/out" "-std=c11"
     grep -q "tensor/status.c" "$T/out" && fail "another PREFIX compiles everything again"
     :
 }
-# All that this build has, as another PREFIX would have it: one object is compiled. What make notes of its variables is put back.
+# All that this build has, as another PREFIX would have it: one object is compiled. What make notes of its variables is
+# put back.
 install_compiles_one_file() {
     cp -p "$BUILD/gen/prefix" "$BUILD/gen/flags" "$T" || skip "$BUILD was not built by make"
     make -n --no-print-directory -j1 BUILD="$BUILD" V=1 PREFIX=/elsewhere programs >"$T/out" 2>"$T/err"

@@ -47,14 +47,18 @@ list() {
     side=$(cat "$one/image_size.txt")
     power=$(cut -d, -f1 "$one/light_power.txt")
     for k in 0 1 2; do
-        printf '[photo_%d]\nfile = %s/0%d.png\nlight = %s\ncamera = %s\n' $k "$(basename "$one")" $k "$(sed -n "$((k + 1))p" "$one/light_pos.txt")" "$(sed -n "$((k + 1))p" "$one/camera_pos.txt")"
+        printf '[photo_%d]\nfile = %s/0%d.png\nlight = %s\ncamera = %s\n' $k "$(basename "$one")" $k \
+            "$(sed -n "$((k + 1))p" "$one/light_pos.txt")" "$(sed -n "$((k + 1))p" "$one/camera_pos.txt")"
     done >"$T/photos"
     { printf '[capture]\nside = %s ; centimetres\npower = %s\n' "$side" "$power"; cat "$T/photos"; } >"$T/c/three.ini"
     expect 0 infer --capture "$T/c/three.ini" -o "$T/o"
     [ -s "$T/o/three/diffuse.png" ] || fail "no maps of three.ini"
-    { printf '[capture]\nside = %s\npower = %s\n' "$side" "$power"; sed -n 5,8p "$T/photos"; sed -n 1,4p "$T/photos"; } >"$T/c/two.ini"
+    { printf '[capture]\nside = %s\npower = %s\n' "$side" "$power"; sed -n 5,8p "$T/photos"; sed -n 1,4p "$T/photos"
+    } >"$T/c/two.ini"
     expect 0 infer --capture "$T/c/two.ini" -o "$T/o"
-    if cmp -s "$T/o/two/maps.exr" "$T/o/three/maps.exr"; then fail "the order and number of photographs change nothing"; fi
+    if cmp -s "$T/o/two/maps.exr" "$T/o/three/maps.exr"; then
+        fail "the order and number of photographs change nothing"
+    fi
     expect 0 infer "$one/00.png" -o "$T/o"
     if cmp -s "$T/o/00/maps.exr" "$T/o/three/maps.exr"; then fail "one photograph gives what three give"; fi
 }

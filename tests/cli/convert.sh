@@ -4,7 +4,8 @@
 C=tests/corpus/torch
 
 usage() {
-    for a in "" "--list" "a.pth" "a.pth b.pth c.pth" "--list a b" "a.pth b.bin" "--dtype f8 a.pth b.pth" "--list --dtype f16 a.pth" "--what a b"; do
+    for a in "" "--list" "a.pth" "a.pth b.pth c.pth" "--list a b" "a.pth b.bin" "--dtype f8 a.pth b.pth" \
+        "--list --dtype f16 a.pth" "--what a b"; do
         # shellcheck disable=SC2086
         expect 2 "$BIN/lgd-convert" $a
         says "$T/err" "lgd-convert:"
@@ -51,7 +52,8 @@ there_and_back() {
     [ "$(ls -A "$T" | wc -l)" -eq 10 ] || fail "left over: $(ls -A "$T")"
 }
 
-# The files' bytes are what the script makes, and what is written is what Python's own zipfile and pickletools take for a sound archive.
+# The files' bytes are what the script makes, and what is written is what Python's own zipfile and pickletools take for
+# a sound archive.
 with_python() {
     command -v python3 >/dev/null 2>&1 || skip "python3 is absent"
     mkdir "$T/again"

@@ -10,7 +10,9 @@ data_folders() {
     expect 0 "$DATA" -o "$T/o/deep" --count 3 --size 32
     [ "$(entries "$T/o/deep" '0000[012]_*')" -eq 3 ] || fail "not three folders: $(ls "$T/o/deep")"
     for d in "$T"/o/deep/*; do
-        for f in diffuse.png specular.png roughness.png normal.png maps.exr; do [ -s "$d/$f" ] || fail "$d/$f is missing"; done
+        for f in diffuse.png specular.png roughness.png normal.png maps.exr; do
+            [ -s "$d/$f" ] || fail "$d/$f is missing"
+        done
     done
     [ -s "$T/out" ] && fail "writes to stdout"
     return 0
@@ -26,13 +28,15 @@ data_same_bytes_for_any_threads_and_range() {
     expect 0 cmp "$T/a/$strip" "$T/c/$strip"
     expect 0 "$DATA" -o "$T/d" --first 4 --count 1 --size 24 --format strips --seed 10
     cmp -s "$T/d/$(ls "$T/d")" "$T/c/$strip" && fail "two seeds give the same strip"
-    [ "$(entries "$T/a" '*.png')" -eq 6 ] && [ "$(entries "$T/a" '*.jpg')" -eq 6 ] || fail "not six strips and photographs: $(ls "$T/a")"
+    [ "$(entries "$T/a" '*.png')" -eq 6 ] && [ "$(entries "$T/a" '*.jpg')" -eq 6 ] ||
+        fail "not six strips and photographs: $(ls "$T/a")"
 }
 check data_same_bytes_for_any_threads_and_range data_same_bytes_for_any_threads_and_range
 
 data_camera() {
     expect 0 "$DATA" -o "$T/a" --count 2 --size 96 --photographs
-    for fault in "--fov-min 20 --fov-max 40" "--flash 0.2" "--flash-size 0.02" "--glare 0.2" "--ambient 0.5" "--tone 1" "--sharpen 3" "--noise-spread 2" "--exposure 2"; do
+    for fault in "--fov-min 20 --fov-max 40" "--flash 0.2" "--flash-size 0.02" "--glare 0.2" "--ambient 0.5" \
+        "--tone 1" "--sharpen 3" "--noise-spread 2" "--exposure 2"; do
         # shellcheck disable=SC2086
         expect 0 "$DATA" -o "$T/b" --count 2 --size 96 --photographs $fault
         diff -r "$T/a" "$T/b" >/dev/null && fail "$fault changes nothing"
@@ -62,7 +66,10 @@ check data_contact_sheet data_contact_sheet
 data_wrong_usage() {
     expect 2 "$DATA"
     says "$T/err" "-o DIR"
-    for bad in "--count 0" "--tilt 31" "--fov-min 20" "--fov-min 40 --fov-max 30" "--flash 0.6" "--tone 2" "--ambient x" "--vignette 1" "--off-centre -1" "--exposure nan" "--count x" "--size 4" "--size 1e3" "--format exe" "--noise 2" "--noise nan" "--seed -1" "--quality 0" "--threads 0" "stray" "--statistics" "--testdata ."; do
+    for bad in "--count 0" "--tilt 31" "--fov-min 20" "--fov-min 40 --fov-max 30" "--flash 0.6" "--tone 2" \
+        "--ambient x" "--vignette 1" "--off-centre -1" "--exposure nan" "--count x" "--size 4" "--size 1e3" \
+        "--format exe" "--noise 2" "--noise nan" "--seed -1" "--quality 0" "--threads 0" "stray" "--statistics" \
+        "--testdata ."; do
         # shellcheck disable=SC2086
         expect 2 "$DATA" -o "$T/o" $bad
         [ -e "$T/o" ] && fail "$bad made the folder"
@@ -88,7 +95,9 @@ check data_cannot_write data_cannot_write
 data_interrupted() {
     "$DATA" -o "$T/o" --count 100000 --size 64 --photographs >"$T/out" 2>"$T/err" &
     pid=$!
-    while [ "$(find "$T/o" -name '*.jpg' 2>/dev/null | wc -l)" -lt 2 ]; do kill -0 $pid 2>/dev/null || fail "it ended: $(cat "$T/err")"; done
+    while [ "$(find "$T/o" -name '*.jpg' 2>/dev/null | wc -l)" -lt 2 ]; do
+        kill -0 $pid 2>/dev/null || fail "it ended: $(cat "$T/err")"
+    done
     kill -TERM $pid
     wait $pid
     [ $? -eq 130 ] || fail "does not exit with 130"
@@ -99,7 +108,8 @@ check data_interrupted data_interrupted
 
 # $T/out: both sides are the same materials, those of --testdata through files: only 8 and 16 bits lie between.
 same_materials() {
-    awk '/^(relief|F0|roughness) / && NF == 11 { n++; for (k = 2; k <= 6; k++) if (($k - $(k + 5))^2 > 1e-4) exit 1 } END { exit n != 3 }' \
+    awk '/^(relief|F0|roughness) / && NF == 11 { n++; for (k = 2; k <= 6; k++) if (($k - $(k + 5))^2 > 1e-4) exit 1 }
+        END { exit n != 3 }' \
         "$T/out" || fail "quantiles: $(tail -n 16 "$T/out")"
     awk '/^distance of/ { if ($NF > 0.1) exit 1 }' "$T/out" || fail "$(grep '^distance of' "$T/out")"
 }
@@ -134,7 +144,8 @@ data_histograms() {
     expect 0 "$DATA" --histograms --testdata "$T/own" --count 8 --size 32 -o "$T/h"
     # The same materials through files: nearly all is in common; every column adds up to one for each map.
     awk '/in common/ { n++; if ($2 + 0 < 93) exit 1 } END { exit n != 5 }' "$T/out" || fail "$(cat "$T/out")"
-    awk -F, 'NR > 1 { a[$1] += $4; b[$1] += $5; n++ } END { for (k in a) if ((a[k] - 1)^2 + (b[k] - 1)^2 > 1e-6) exit 1; exit n != 160 }' \
+    awk -F, 'NR > 1 { a[$1] += $4; b[$1] += $5; n++ }
+        END { for (k in a) if ((a[k] - 1)^2 + (b[k] - 1)^2 > 1e-6) exit 1; exit n != 160 }' \
         "$T/h/histograms.csv" || fail "$(head -40 "$T/h/histograms.csv")"
     grep -q '</svg>' "$T/h/histograms.svg" || fail "the picture is cut short"
 }
@@ -143,6 +154,7 @@ check data_histograms data_histograms
 data_resembles_artists_maps() {
     [ -d "$TESTDATA/maps" ] || skip "no $TESTDATA"
     expect 0 "$DATA" --statistics --testdata "$TESTDATA" --count 200 --size 64
-    awk '/^distance of/ { d = $NF } /^distance between/ { sub(/.*halvings: /, ""); h = $1 } END { exit !(d > 0 && h > 0 && d <= 2 * h) }' "$T/out" || fail "$(tail -n 2 "$T/out" | tr '\n' ' ')"
+    awk '/^distance of/ { d = $NF } /^distance between/ { sub(/.*halvings: /, ""); h = $1 }
+        END { exit !(d > 0 && h > 0 && d <= 2 * h) }' "$T/out" || fail "$(tail -n 2 "$T/out" | tr '\n' ' ')"
 }
 check data_resembles_artists_maps data_resembles_artists_maps

@@ -36,7 +36,8 @@ packages() {
     export DEBFULLNAME='A Packager' DEBEMAIL=packager@debian.org
     expect 0 make --no-print-directory deb BUILD="$T/b" DEBS="$T/debs"
     want="lgd-models_*_all.deb lgd_*_$arch.deb liblgd-dev_*_$arch.deb liblgd0_*_$arch.deb python3-lgd_*_all.deb"
-    [ "$(ls -A "$T/debs" | sed 's/_[0-9.]*_/_*_/' | LC_ALL=C sort | tr '\n' ' ')" = "$want " ] || fail "there are: $(ls -A "$T/debs" | tr '\n' ' ')"
+    [ "$(ls -A "$T/debs" | sed 's/_[0-9.]*_/_*_/' | LC_ALL=C sort | tr '\n' ' ')" = "$want " ] ||
+        fail "there are: $(ls -A "$T/debs" | tr '\n' ' ')"
     for deb in "$T"/debs/*.deb; do
         expect 0 dpkg-deb --info "$deb"
         says "$T/out" "Maintainer: A Packager <packager@debian.org>"
@@ -45,11 +46,13 @@ packages() {
         expect 0 dpkg-deb -x "$deb" "$T/root"
     done
     for library in libpng16 libc6 liblcms2 libdeflate0; do
-        dpkg-deb --field "$T"/debs/liblgd0_*.deb Depends | grep -q "$library" || fail "liblgd0 does not depend on $library"
+        dpkg-deb --field "$T"/debs/liblgd0_*.deb Depends | grep -q "$library" ||
+            fail "liblgd0 does not depend on $library"
     done
     (unpacked_works) || exit $?
     command -v lintian >/dev/null || skip "they work; lintian is not installed"
-    lintian --fail-on error,warning "$T"/debs/*.deb >"$T/lintian" 2>&1 || fail "$(grep -m 1 '^[EW]:' "$T/lintian" || tail -n 1 "$T/lintian")"
+    lintian --fail-on error,warning "$T"/debs/*.deb >"$T/lintian" 2>&1 ||
+        fail "$(grep -m 1 '^[EW]:' "$T/lintian" || tail -n 1 "$T/lintian")"
 }
 check deb_packages packages
 
@@ -57,7 +60,8 @@ says_who_is_missing() {
     [ -z "$SANITIZED" ] || skip "the sanitizers' build is not packed"
     command -v dpkg-shlibdeps >/dev/null || skip "there is no dpkg-shlibdeps (dpkg-dev)"
     unset DEBFULLNAME DEBEMAIL
-    GIT_CONFIG_GLOBAL=/dev/null GIT_CONFIG_SYSTEM=/dev/null GIT_DIR="$T" expect 1 env BUILD="$BUILD" sh .ci/deb.sh 1 "$T/debs"
+    GIT_CONFIG_GLOBAL=/dev/null GIT_CONFIG_SYSTEM=/dev/null GIT_DIR="$T" expect 1 env BUILD="$BUILD" sh .ci/deb.sh 1 \
+        "$T/debs"
     says "$T/err" "Set DEBFULLNAME and DEBEMAIL"
     [ ! -e "$T/debs" ] || fail "something is left"
 }

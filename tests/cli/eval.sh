@@ -9,11 +9,13 @@ evaluate() { "$BIN/lgd-eval" --size 32 --iterations 2 --threads 1 "$@"; }
 
 help_names_the_options() {
     expect 0 "$BIN/lgd-eval" --help
-    for o in method repeat pin tune figure pareto descent finetune fast set iterations model threads seed noise images size output procedural strips maps told untold peer-maps photos peers shard; do says "$T/out" "$o"; done
+    for o in method repeat pin tune figure pareto descent finetune fast set iterations model threads seed noise images \
+        size output procedural strips maps told untold peer-maps photos peers shard; do says "$T/out" "$o"; done
 }
 
 wrong_usage() {
-    for o in --size=0 --iterations=-1 --threads=x --noise=2 --noise=0,5 --seed=-1 --repeat=0 --nonsense --set=procedural:1 --set=pictures:x; do
+    for o in --size=0 --iterations=-1 --threads=x --noise=2 --noise=0,5 --seed=-1 --repeat=0 --nonsense \
+        --set=procedural:1 --set=pictures:x; do
         expect 2 "$BIN/lgd-eval" --set procedural:1,1 "$o" -o "$T/o"
         says "$T/err" "${o%%=*}"
     done
@@ -35,7 +37,8 @@ procedural() {
     for t in 0 1 2; do grep -q "^R_$t  *0\.[0-9]* +- 0\." "$T/out" || fail "no line for R_$t"; done
     lines "$T/o/results.csv" 10
     lines "$T/o/summary.csv" 4
-    [ "$(ls -A "$T/o" | tr '\n' ' ')" = "report.html results.csv results.json summary.csv times.csv " ] || fail "other files: $(ls -A "$T/o")"
+    [ "$(ls -A "$T/o" | tr '\n' ' ')" = "report.html results.csv results.json summary.csv times.csv " ] ||
+        fail "other files: $(ls -A "$T/o")"
     # the summary is the mean of the results
     for t in 0 2; do
         mean=$(awk -F, -v t=$t 'NR > 1 && $5 == t { s += $10; n++ } END { printf "%.4f", s / n }' "$T/o/results.csv")
@@ -72,7 +75,8 @@ real_sets() {
     says "$T/out" "$((maps + strips)) materials"
     # set,material,method,step, five errors, angle, then ssim and flip of the first and the last step
     awk -F, 'NR > 1 { for (i = 5; i <= 9; i++) if (!($i >= 0 && $i < 2)) exit 1
-        if (!($10 > 0 && $10 < 90) || $4 != 1 && !($11 < 1 && $11 > -1 && $12 > 0 && $12 < 1)) exit 1 }' "$T/o/results.csv" || fail "an error is out of range"
+        if (!($10 > 0 && $10 < 90) || $4 != 1 && !($11 < 1 && $11 > -1 && $12 > 0 && $12 < 1)) exit 1 }' \
+            "$T/o/results.csv" || fail "an error is out of range"
 }
 
 images() {
@@ -126,14 +130,15 @@ interrupted() {
     [ "$(ls -A "$T/o")" = images ] || fail "half a result: $(ls -A "$T/o")"
 }
 
-# What the project promises of its weights: on 64 materials that nobody trained on, at the size that people use, refinement takes at least
-# 15% off the renderings' error.
+# What the project promises of its weights: on 64 materials that nobody trained on, at the size that people use,
+# refinement takes at least 15% off the renderings' error.
 refinement_helps() {
     model
     case ${MAKEFLAGS:-} in *fsanitize*) skip "64 materials at 256 x 256 take too long with sanitizers" ;; esac
     expect 0 "$BIN/lgd-eval" --fast --set procedural:1000003,64 -o "$T/o"
     awk -F, 'NR == 2 { first = $14 } { last = $14 } END { exit !(last < 0.85 * first) }' "$T/o/summary.csv" ||
-        fail "$(awk -F, 'NR == 2 { first = $14 } { last = $14 } END { print "render RMSE", first, "->", last }' "$T/o/summary.csv")"
+        fail "$(awk -F, 'NR == 2 { first = $14 } { last = $14 } END { print "render RMSE", first, "->", last }' \
+        "$T/o/summary.csv")"
 }
 
 check eval_help_names_the_options help_names_the_options
@@ -151,7 +156,8 @@ captures() {
     expect 0 evaluate --told --set "multiview:$T/c" --images -o "$T/o"
     says "$T/out" exposure
     lines "$T/o/results.csv" 7
-    awk -F, 'NR > 1 && !($5 == "" && $9 > 0 && $9 < 0.5 && $13 > 0.3 && $13 < 3) { exit 1 }' "$T/o/results.csv" || fail "$(cat "$T/o/results.csv")"
+    awk -F, 'NR > 1 && !($5 == "" && $9 > 0 && $9 < 0.5 && $13 > 0.3 && $13 < 3) { exit 1 }' "$T/o/results.csv" ||
+        fail "$(cat "$T/o/results.csv")"
     [ "$(ls "$T/o/images" | wc -l)" = 2 ] || fail "images: $(ls "$T/o/images")"
     one=$(ls -d "$T"/c/* | head -n 1)
     expect 0 evaluate --set "multiview:$one" -o "$T/p"
@@ -179,7 +185,8 @@ field_of_view() {
     awk -F, '{ print $1 "," $2 "," 2 * $3 }' "$one/camera_pos.txt" >"$T/far" && mv "$T/far" "$one/camera_pos.txt"
     untold=lgd:power=auto,label=untold told=lgd:power=auto,view=told,label=told
     expect 0 evaluate --set "multiview:$one" --method $untold --method $told -o "$T/m"
-    awk -F, '$3 == "untold" && $4 == 2 { a = $9 } $3 == "told" && $4 == 2 { b = $9 } END { exit !(a > 0 && b > 0 && a != b) }' "$T/m/results.csv" ||
+    awk -F, '$3 == "untold" && $4 == 2 { a = $9 }
+        $3 == "told" && $4 == 2 { b = $9 } END { exit !(a > 0 && b > 0 && a != b) }' "$T/m/results.csv" ||
         fail "told the steps make the same: $(cat "$T/m/results.csv")"
     for fov in 54.2249 30; do
         expect 0 evaluate --fov $fov --set procedural:1,1 --method lgd:label=set --method lgd:view=told,label=told \
@@ -225,7 +232,8 @@ told() {
     says "$T/err" set.ini:1
 }
 
-# LPIPS with weights that are not trained, but have the names and shapes: a program to make them is the test of the library.
+# LPIPS with weights that are not trained, but have the names and shapes: a program to make them is the test of the
+# library.
 lpips() {
     model
     expect 2 "$BIN/lgd-eval" --set procedural:1,1 -o "$T/o" --lpips-weights a.pth
@@ -233,9 +241,11 @@ lpips() {
     expect 1 evaluate --set procedural:1,1 -o "$T/o" --lpips-weights "$T/none.pth" "$T/none.safetensors"
     says "$T/err" "none.pth"
     LPIPS_OUT=$T "$BIN/lgd-test" eval_lpips_is >/dev/null || fail "the weights cannot be made"
-    expect 0 "$BIN/lgd-eval" -i 1 --fast --size 48 --set procedural:1,3 -o "$T/p" --lpips-weights "$T/alexnet.pth" "$T/alex.safetensors"
+    expect 0 "$BIN/lgd-eval" -i 1 --fast --size 48 --set procedural:1,3 -o "$T/p" \
+        --lpips-weights "$T/alexnet.pth" "$T/alex.safetensors"
     says "$T/out" "lpips"
-    awk -F, 'NR == 1 && $14 != "lpips" || NR > 1 && !($15 > 0 && $14 < 5) { exit 1 }' "$T/p/results.csv" || fail "$(cat "$T/p/results.csv")"
+    awk -F, 'NR == 1 && $14 != "lpips" || NR > 1 && !($15 > 0 && $14 < 5) { exit 1 }' "$T/p/results.csv" ||
+        fail "$(cat "$T/p/results.csv")"
     says "$T/p/summary.csv" "lpips_mean,lpips_deviation"
     says "$T/p/results.json" '"lpips": 0.'
     says "$T/p/report.html" 'data-key="lpips"'
@@ -245,7 +255,8 @@ lpips() {
 
 methods() {
     model
-    for m in nothing lgd:steps=3 lgd:iterations=x descent:start=here descent:rate descent:rate= descent:rate=1,rate=2 unet latent lgd-nograd mean:label=; do
+    for m in nothing lgd:steps=3 lgd:iterations=x descent:start=here descent:rate descent:rate= descent:rate=1,rate=2 \
+        unet latent lgd-nograd mean:label=; do
         expect 2 "$BIN/lgd-eval" --set procedural:1,1 --method "$m" -o "$T/o"
         says "$T/err" "--method $m"
     done
@@ -256,7 +267,8 @@ methods() {
         says "$T/err" "${m#*=}"
         lines "$T/err" 1
     done
-    expect 0 evaluate --set procedural:3,2 --method lgd --method mean --method descent:steps=3 --method "unet:label=g alone,model=$MODEL" --images -o "$T/o"
+    expect 0 evaluate --set procedural:3,2 --method lgd --method mean --method descent:steps=3 \
+        --method "unet:label=g alone,model=$MODEL" --images -o "$T/o"
     lines "$T/out" 6
     grep -q '^descent:steps=3  *0\.' "$T/out" || fail "no line for descent: $(cat "$T/out")"
     lines "$T/o/summary.csv" 10 # three of lgd, one of mean, four of descent (0, 1, 2, 3), one of unet
@@ -282,7 +294,8 @@ searches_and_figures() {
         expect 2 "$BIN/lgd-eval" --set procedural:1,1 $o -o "$T/o"
         lines "$T/err" 2
     done
-    expect 0 "$BIN/lgd-eval" --size 16 --threads 1 --set procedural:1000001,2 --tune --method mean --method descent:rate=0.01,start=r0 -o "$T/t"
+    expect 0 "$BIN/lgd-eval" --size 16 --threads 1 --set procedural:1000001,2 --tune --method mean \
+        --method descent:rate=0.01,start=r0 -o "$T/t"
     lines "$T/out" 3
     says "$T/out" "mean            2 tried"
     says "$T/out" "descent        10 tried"
@@ -290,9 +303,11 @@ searches_and_figures() {
     [ "$(ls -A "$T/t")" = tune.csv ] || fail "$(ls -A "$T/t")"
     # the best is the least of its method's
     best=$(awk '/^descent/ { print $(NF - 3) }' "$T/out")
-    least=$(grep descent "$T/t/tune.csv" | awk -F, '{ v = $(NF - 2); if (!n++ || v < m) m = v } END { printf "%.4f", m }')
+    least=$(grep descent "$T/t/tune.csv" |
+        awk -F, '{ v = $(NF - 2); if (!n++ || v < m) m = v } END { printf "%.4f", m }')
     [ "$best" = "$least" ] || fail "the best is $best, the least $least"
-    expect 0 "$BIN/lgd-eval" --fast --size 16 --threads 1 --set procedural:1,2 --figure iterations --figure methods --method lgd --method mean -o "$T/f"
+    expect 0 "$BIN/lgd-eval" --fast --size 16 --threads 1 --set procedural:1,2 --figure iterations --figure methods \
+        --method lgd --method mean -o "$T/f"
     lines "$T/f/iterations.csv" 27 # T = 0 .. 24 and mean
     lines "$T/f/methods.csv" 27
     for f in iterations methods; do
@@ -302,7 +317,8 @@ searches_and_figures() {
 }
 
 # Column NAME of a CSV file whose names of sets have no commas.
-column() { awk -F, -v name="$2" 'NR == 1 { for (k = 1; k <= NF; k++) if ($k == name) c = k } NR > 1 { print $c }' "$1"; }
+column() { awk -F, -v name="$2" 'NR == 1 { for (k = 1; k <= NF; k++) if ($k == name) c = k } NR > 1 { print $c }' \
+    "$1"; }
 
 # Photographs without known maps, and what others made of them.
 photographs() {
@@ -313,7 +329,8 @@ photographs() {
     expect 0 evaluate --set "photos:$T/photos" --images -o "$T/o"
     says "$T/out" "2 materials"
     for c in residue_diffuse residue_specular residue_roughness residue_hue relief; do
-        [ "$(column "$T/o/results.csv" $c | awk '$1 >= 0 && $1 < 1' | wc -l)" = 6 ] || fail "$c: $(column "$T/o/results.csv" $c)"
+        [ "$(column "$T/o/results.csv" $c | awk '$1 >= 0 && $1 < 1' | wc -l)" = 6 ] ||
+            fail "$c: $(column "$T/o/results.csv" $c)"
     done
     [ "$(column "$T/o/results.csv" render | tr -d '\n')" = "" ] || fail "an error without a truth"
     [ "$(ls "$T/o/images" | tr '\n' ' ')" = "1-a.png 1-b.png contact.png " ] || fail "images: $(ls "$T/o/images")"
@@ -359,9 +376,12 @@ light() {
     expect 0 evaluate --set procedural:3,2 --exposure 2 --method lgd:power=known -o "$T/known"
     expect 0 evaluate --set procedural:3,2 --exposure 2 --method lgd:power=auto -o "$T/auto"
     for a in one two known auto; do
-        sed 's/"[^"]*"/set/' "$T/$a/results.csv" | awk -F, 'NR == 1 { while ($++k != "exposure" && k < NF); } NR > 1 && !($k > 0.1 && $k < 10) { exit 1 }' || fail "$a: no factor is fitted"
+        sed 's/"[^"]*"/set/' "$T/$a/results.csv" |
+            awk -F, 'NR == 1 { while ($++k != "exposure" && k < NF); } NR > 1 && !($k > 0.1 && $k < 10) { exit 1 }' ||
+            fail "$a: no factor is fitted"
         for b in one two known auto; do
-            [ "$a" = "$b" ] || ! cmp -s "$T/$a/results.csv" "$T/$b/results.csv" || fail "$a and $b give the same numbers"
+            [ "$a" = "$b" ] || ! cmp -s "$T/$a/results.csv" "$T/$b/results.csv" ||
+                fail "$a and $b give the same numbers"
         done
     done
     expect 0 evaluate --set procedural:3,2 --light 0.5,0 -o "$T/side"

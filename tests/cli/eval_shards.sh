@@ -7,7 +7,9 @@ model() { [ -f "$MODEL" ] || fail "$MODEL is absent: the weights that the projec
 evaluate() { "$BIN/lgd-eval" --size 32 --iterations 1 --threads 1 --set procedural:1,5 --set procedural:9,2 "$@"; }
 
 same() {
-    for f in results.csv summary.csv; do cmp -s "$1/$f" "$2/$f" || fail "$f of the parts differs from one process's"; done
+    for f in results.csv summary.csv; do
+        cmp -s "$1/$f" "$2/$f" || fail "$f of the parts differs from one process's"
+    done
     [ "$(ls "$2")" = "$(ls "$1")" ] || fail "the parts leave: $(ls "$2" | tr '\n' ' ')"
     [ -z "$(find "$2" -name '.*')" ] || fail "left over: $(ls -A "$2")"
 }
@@ -22,11 +24,13 @@ parts() {
     wait
     [ ! -e "$T/bad" ] || fail "part $(cat "$T/bad"): $(cat "$T"/err.?)"
     same "$T/one" "$T/o"
-    cat "$T"/out.? | cut -c1-60 | cmp -s - "$T/table" || fail "another table, or more than one: $(cat "$T"/out.? | head -n 3)"
+    cat "$T"/out.? | cut -c1-60 | cmp -s - "$T/table" ||
+        fail "another table, or more than one: $(cat "$T"/out.? | head -n 3)"
     # more parts than materials, one after the other; the report has every picture
     for i in 1 2 3 4 5 6 7 8 9; do expect 0 evaluate --method lgd --method mean --shard $i/9 -o "$T/p"; done
     same "$T/one" "$T/p"
-    [ "$(grep -o 'data:image/png' "$T/p/report.html" | wc -l)" -eq "$(grep -o 'data:image/png' "$T/one/report.html" | wc -l)" ] || fail "the report has other pictures"
+    [ "$(grep -o 'data:image/png' "$T/p/report.html" | wc -l)" -eq \
+        "$(grep -o 'data:image/png' "$T/one/report.html" | wc -l)" ] || fail "the report has other pictures"
     for bad in 0/2 3/2 x; do expect 2 evaluate --shard $bad -o "$T/o"; done
     expect 2 evaluate --pareto --shard 1/2 -o "$T/o"
 }
@@ -57,7 +61,10 @@ failures() {
     second=$(ls "$T/maps" | sed -n 2p)
     for f in "$T/maps/$second"/*.png; do echo bad >"$f"; done
     expect 1 "$BIN/lgd-eval" --size 32 -i 1 --fast --set "maps:$T/maps" -o "$T/one"
-    for i in 1 2 3; do "$BIN/lgd-eval" --size 32 -i 1 --fast --set "maps:$T/maps" --shard $i/3 -o "$T/o" >"$T/out" 2>"$T/err.$i"; echo $? >>"$T/codes"; done
+    for i in 1 2 3; do
+        "$BIN/lgd-eval" --size 32 -i 1 --fast --set "maps:$T/maps" --shard $i/3 -o "$T/o" >"$T/out" 2>"$T/err.$i"
+        echo $? >>"$T/codes"
+    done
     [ "$(tr '\n' ' ' <"$T/codes")" = "0 1 1 " ] || fail "exit status: $(tr '\n' ' ' <"$T/codes")"
     says "$T/err.3" "1 of 3 materials failed"
     same "$T/one" "$T/o"
@@ -80,7 +87,8 @@ launchers() {
         rm -rf "$T/o"
         for rank in 0 1; do
             # shellcheck disable=SC2046,SC2059
-            env $(printf "$names" $rank | tr ':' ' ') "$BIN/lgd-eval" --size 32 --iterations 1 --threads 1 --set procedural:1,5 --set procedural:9,2 --fast -o "$T/o" >>"$T/out.$rank" 2>&1 &
+            env $(printf "$names" $rank | tr ':' ' ') "$BIN/lgd-eval" --size 32 --iterations 1 --threads 1 \
+                --set procedural:1,5 --set procedural:9,2 --fast -o "$T/o" >>"$T/out.$rank" 2>&1 &
         done
         wait
         same "$T/one" "$T/o"
@@ -103,7 +111,8 @@ under_mpirun() {
     for n in 1 2 4; do
         rm -rf "$T/o"
         # shellcheck disable=SC2086
-        expect 0 timeout 120 $launch -np $n "$BIN/lgd-eval" --size 32 --iterations 1 --threads 1 --set procedural:1,5 --set procedural:9,2 --fast -o "$T/o"
+        expect 0 timeout 120 $launch -np $n "$BIN/lgd-eval" --size 32 --iterations 1 --threads 1 --set procedural:1,5 \
+            --set procedural:9,2 --fast -o "$T/o"
         same "$T/one" "$T/o"
     done
 }

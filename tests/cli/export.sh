@@ -24,7 +24,8 @@ only_what_is_asked_for() {
     done
 }
 
-# Base colour and metalness, read back as a metallic map folder, are the maps that the specular workflow gives, but for the error that is printed.
+# Base colour and metalness, read back as a metallic map folder, are the maps that the specular workflow gives, but for
+# the error that is printed.
 metallic() {
     expect 0 infer --workflow metallic --maps diffuse,specular,roughness,normal
     holds "basecolor.png meta.txt metallic.png normal.png roughness.png"
@@ -56,7 +57,8 @@ assert len(b) == d["buffers"][0]["byteLength"]
 def corners(accessor, n):
     a = d["accessors"][accessor]
     v = d["bufferViews"][a["bufferView"]]
-    return [struct.unpack_from("<%df" % n, b, v["byteOffset"] + a["byteOffset"] + i * v["byteStride"]) for i in range(a["count"])]
+    first = v["byteOffset"] + a["byteOffset"]
+    return [struct.unpack_from("<%df" % n, b, first + i * v["byteStride"]) for i in range(a["count"])]
 for p, t in zip(corners(0, 3), corners(3, 2)):
     assert t == (p[0] + 0.5, 0.5 - p[1]), (p, t) # the picture's top is the sample's top
 EOF
@@ -83,7 +85,8 @@ assert d["materials"] == other["materials"] and len(d["images"]) == len(other["i
 for image, named in zip(d["images"], other["images"]):
     v = d["bufferViews"][image["bufferView"]]
     assert v["byteOffset"] % 4 == 0 and image["mimeType"] == "image/png"
-    assert binary[v["byteOffset"] : v["byteOffset"] + v["byteLength"]] == open(os.path.join(sys.argv[1], named["uri"]), "rb").read(), named
+    inside = binary[v["byteOffset"] : v["byteOffset"] + v["byteLength"]]
+    assert inside == open(os.path.join(sys.argv[1], named["uri"]), "rb").read(), named
 EOF
         rm -r "$T/o"
     done
@@ -110,7 +113,8 @@ materialx() {
     expect 0 infer --maps materialx
     holds "diffuse.png material.mtlx meta.txt normal.png roughness.png specular.png"
     python3 -c 'import MaterialX' 2>/dev/null || skip "the MaterialX library for Python is not installed"
-    python3 - "$T/o/flash/material.mtlx" <<'EOF' || fail "the MaterialX library does not take it: $(tail -n 1 "$T/.log")"
+    python3 - "$T/o/flash/material.mtlx" <<'EOF' || fail \
+        "the MaterialX library does not take it: $(tail -n 1 "$T/.log")"
 import sys, MaterialX as mx
 import MaterialX.PyMaterialXGenShader, MaterialX.PyMaterialXGenGlsl as glsl
 doc, library = mx.createDocument(), mx.createDocument()
@@ -135,8 +139,12 @@ exr() {
     command -v exrheader >/dev/null || skip "exrheader is not installed (openexr)"
     expect 0 infer --maps exr
     expect 0 exrheader "$T/o/flash/maps.exr"
-    for c in diffuse.R diffuse.G diffuse.B specular.R specular.G specular.B normal.X normal.Y normal.Z roughness.Y; do says "$T/out" "$c, 32-bit floating-point"; done
-    for c in R G B; do grep -q "^ *$c, 32-bit floating-point" "$T/out" || fail "no channel $c, which other programs show"; done
+    for c in diffuse.R diffuse.G diffuse.B specular.R specular.G specular.B normal.X normal.Y normal.Z roughness.Y; do
+        says "$T/out" "$c, 32-bit floating-point"
+    done
+    for c in R G B; do
+        grep -q "^ *$c, 32-bit floating-point" "$T/out" || fail "no channel $c, which other programs show"
+    done
     says "$T/out" "compression (type compression): none"
     expect 0 infer --maps exr --exr half
     expect 0 exrheader "$T/o/flash/maps.exr"
@@ -159,7 +167,8 @@ check export_materialx materialx
 seamless() {
     expect 0 infer --maps diffuse,height,render --seamless
     says "$T/o/flash/meta.txt" "seamless: the maps repeat"
-    grep -Eq '^height.png: linear, 16 bit: height, value v is -0\.[0-9]+ \+ 0\.[0-9]+ v sides of the square' "$T/o/flash/meta.txt" ||
+    grep -Eq '^height.png: linear, 16 bit: height, value v is -0\.[0-9]+ \+ 0\.[0-9]+ v sides of the square' \
+        "$T/o/flash/meta.txt" ||
         fail "no scale of the height: $(cat "$T/o/flash/meta.txt")"
     mv "$T/o" "$T/s"
     expect 0 infer --maps diffuse,render

@@ -7,7 +7,8 @@ faults() {
     case $(cat "$BUILD/gen/flags") in *-fsanitize=*) skip "the sanitizers have a malloc of their own" ;; esac
     chosen=$1
     shift
-    ONLY_ONCE=1 SCENARIOS=$chosen BUILD=$BUILD sh tests/faults/run.sh "$@" >"$T/out" 2>&1 || fail "$(head -n 1 "$T/out")"
+    ONLY_ONCE=1 SCENARIOS=$chosen BUILD=$BUILD sh tests/faults/run.sh "$@" >"$T/out" 2>&1 ||
+        fail "$(head -n 1 "$T/out")"
     says "$T/out" " 0 scenarios with defects"
 }
 of_infer() { faults infer --every 40; }
@@ -15,7 +16,11 @@ of_sheet() { faults sheet --call ftell; }
 of_convert() { faults "convert torch" --every 20; }
 of_data() { faults "data strips" --every 40; }
 # The first memory is refused; texts in memory and config.ini are cut.
-of_train() { faults train --call malloc --every 2000 && faults train --call fprintf --every 200 && faults train --call fputs --every 200; }
+of_train()
+{
+    faults train --call malloc --every 2000 && faults train --call fprintf --every 200 &&
+        faults train --call fputs --every 200
+}
 # A checkpoint or a log that cannot be opened now is not one that is not there.
 of_resume() { faults resume --call access && faults resume --call fopen; }
 of_threads() { faults many --call pthread_create && faults many --call open_memstream; }

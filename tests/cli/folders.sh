@@ -18,7 +18,8 @@ photos() {
 listed() {
     lines "$1/results.jsonl" "$2"
     sed 's/^{"folder": "\([^"]*\)", "file": .*}$/\1/' "$1/results.jsonl" | sort >"$T/listed"
-    ( cd "$1" && ls -d */ ) | tr -d / | sort | cmp -s - "$T/listed" || fail "results.jsonl has other names: $(head -n 3 "$T/listed" | tr '\n' ' ')"
+    ( cd "$1" && ls -d */ ) | tr -d / | sort | cmp -s - "$T/listed" ||
+        fail "results.jsonl has other names: $(head -n 3 "$T/listed" | tr '\n' ' ')"
     if command -v python3 >/dev/null; then
         python3 -c 'import json, sys
 for line in open(sys.argv[1]): json.loads(line)' "$1/results.jsonl" || fail "results.jsonl has lines that are no JSON"
@@ -41,7 +42,9 @@ parts() {
     expect 0 few --shard 2/3 "$T/in" -o "$T/p"
     grep -v more "$T/out" | sed "s|$T/p|$T/o|" | cmp -s - "$T/names.2" || fail "another photograph changes the parts"
     expect 0 few "$T/in" -o "$T/one"
-    for f in "$T"/o/*/diffuse.png "$T"/o/*/meta.txt; do cmp -s "$f" "$T/one/${f#"$T/o/"}" || fail "$f differs from one call's"; done
+    for f in "$T"/o/*/diffuse.png "$T"/o/*/meta.txt; do
+        cmp -s "$f" "$T/one/${f#"$T/o/"}" || fail "$f differs from one call's"
+    done
     # a part may be empty
     expect 0 few --shard 1/1000000 "$T/in/p1.ppm" "$T/in/p2.ppm" -o "$T/empty"
     lines "$T/out" 0
@@ -78,9 +81,12 @@ existing() {
     for f in p0 p1; do diff -r "$T/o/$f" "$T/first/$f" >/dev/null || fail "$f differs"; done
     if cmp -s "$T/o/p2/diffuse.png" "$T/first/p2/diffuse.png"; then fail "the older photograph's maps stay"; fi
     # every option that changes a file, and other weights
-    for option in "--size 17" "--iterations 1" "--orientations 1" "--fov 40" "--light-power 2" "--normal dx" "--maps diffuse,normal" \
-        "--exact" "--precision bf16" "--workflow metallic" "--seamless --size 32" "--mask $T/0.ppm" "--exr half --maps exr"; do
-        case $option in --mask*) rm "$T/in"/*; ln -s "$T/0.ppm" "$T/in/p0.ppm"; few "$T/in" -o "$T/o" >"$T/out" 2>&1 || fail "$(cat "$T/out")" ;; esac
+    for option in "--size 17" "--iterations 1" "--orientations 1" "--fov 40" "--light-power 2" "--normal dx" \
+        "--maps diffuse,normal" \
+        "--exact" "--precision bf16" "--workflow metallic" "--seamless --size 32" "--mask $T/0.ppm" \
+        "--exr half --maps exr"; do
+        case $option in --mask*) rm "$T/in"/*; ln -s "$T/0.ppm" "$T/in/p0.ppm"; few "$T/in" -o "$T/o" >"$T/out" 2>&1 ||
+            fail "$(cat "$T/out")" ;; esac
         # shellcheck disable=SC2086
         done_again $option
         lines "$T/out" "$(ls "$T/in" | wc -l)"
@@ -102,8 +108,10 @@ lists() {
     echo bad >"$T/in/bad.png"
     expect 1 few "$T/in" -o "$T/o"
     lines "$T/o/results.jsonl" 4
-    grep -q '^{"folder": "bad", "file": "[^"]*/in/bad.png", "seconds": [0-9.e-]*, "error": ".*bad.png.*"}$' "$T/o/results.jsonl" || fail "the failed one: $(grep bad "$T/o/results.jsonl")"
-    for word in '"seconds": 0.' '"rmse_first": 0.' '"rmse": 0.' '"fov": 54.2' '"fov_is": "assumed"' '"power": ' '"warnings": ["field of view assumed"'; do
+    grep -q '^{"folder": "bad", "file": "[^"]*/in/bad.png", "seconds": [0-9.e-]*, "error": ".*bad.png.*"}$' \
+        "$T/o/results.jsonl" || fail "the failed one: $(grep bad "$T/o/results.jsonl")"
+    for word in '"seconds": 0.' '"rmse_first": 0.' '"rmse": 0.' '"fov": 54.2' '"fov_is": "assumed"' '"power": ' \
+        '"warnings": ["field of view assumed"'; do
         grep '"folder": "p1"' "$T/o/results.jsonl" >"$T/line"
         says "$T/line" "$word"
     done
@@ -116,9 +124,11 @@ lists() {
     expect 0 few --skip-existing "$T/in" -o "$T/o"
     lines "$T/out" 1
     listed "$T/o" 4
-    grep -q '"folder": "p1".*"seconds": null, "hash"' "$T/o/results.jsonl" || fail "what a killed process owes: $(grep p1 "$T/o/results.jsonl")"
+    grep -q '"folder": "p1".*"seconds": null, "hash"' "$T/o/results.jsonl" ||
+        fail "what a killed process owes: $(grep p1 "$T/o/results.jsonl")"
     sed 's/"seconds": [0-9.e-]*/"seconds": null/' "$T/p2" >"$T/want"
-    grep '"p2"' "$T/o/results.jsonl" | cmp -s - "$T/want" || fail "the older line stays: $(grep p2 "$T/o/results.jsonl")"
+    grep '"p2"' "$T/o/results.jsonl" | cmp -s - "$T/want" ||
+        fail "the older line stays: $(grep p2 "$T/o/results.jsonl")"
     # done again: one line still; lines of other photographs stay
     expect 0 few "$T/in/p0.ppm" "$T/in/p1.ppm" -o "$T/o"
     listed "$T/o" 4
@@ -147,8 +157,12 @@ lists_at_once() {
 # Of photographs that the default model's maps look like, the summary says nothing; of noise it does.
 looks_like_it() {
     for f in m_pink 057; do [ -f "$TESTDATA/photos/$f.png" ] || skip "no $TESTDATA/photos"; done
-    { printf 'P3 64 64 255\n'; awk 'BEGIN { for (v = 1; i++ < 3 * 64 * 64;) print int((v = v * 16807 % 2147483647) / 8388608) }'; } >"$T/noise.ppm"
-    LGD_MODEL='' expect 0 "$BIN/lgd-infer" -m phone --maps diffuse "$TESTDATA/photos/m_pink.png" "$TESTDATA/photos/057.png" "$T/noise.ppm" -o "$T/o"
+    {
+        printf 'P3 64 64 255\n'
+        awk 'BEGIN { for (v = 1; i++ < 3 * 64 * 64;) print int((v = v * 16807 % 2147483647) / 8388608) }'
+    } >"$T/noise.ppm"
+    LGD_MODEL='' expect 0 "$BIN/lgd-infer" -m phone --maps diffuse "$TESTDATA/photos/m_pink.png" \
+        "$TESTDATA/photos/057.png" "$T/noise.ppm" -o "$T/o"
     says "$T/err" "lgd-infer:   $T/noise.ppm: its maps do not look like it"
     [ "$(grep -c 'do not look like it' "$T/err")" = 1 ] || fail "$(grep 'do not look like it' "$T/err")"
 }

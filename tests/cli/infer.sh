@@ -24,7 +24,8 @@ whole_run() {
     expect 0 "$BIN/lgd-infer" --size 32 "$T/wall.ppm" -o "$T/a/b"
     complete "$T/a/b/wall"
     [ "$(cat "$T/out")" = "$T/a/b/wall" ] || fail "standard output is: $(cat "$T/out")"
-    grep -Eq 'wall.ppm: difference from the photograph 0\.[0-9]+ at first -> 0\.[0-9]+ after [0-9]+ steps' "$T/err" || fail "no difference: $(cat "$T/err")"
+    grep -Eq 'wall.ppm: difference from the photograph 0\.[0-9]+ at first -> 0\.[0-9]+ after [0-9]+ steps' "$T/err" ||
+        fail "no difference: $(cat "$T/err")"
     expect 0 "$BIN/lgd-infer" --size 32 --iterations 0 -q "$T/wall.ppm" -o "$T/c"
     [ ! -s "$T/err" ] && [ ! -s "$T/out" ] || fail "--quiet says: $(cat "$T/err" "$T/out")"
     expect 0 "$BIN/lgd-infer" --size 32 --iterations 0 "$T/wall.ppm" -o "$T/c"
@@ -43,7 +44,8 @@ folders_and_lists() {
     echo text >"$T/in/notes.txt"
     expect 0 infer --maps render "$T/in" -o "$T/o"
     [ "$(cat "$T/out")" = "$(printf '%s\n' "$T/o/a" "$T/o/b")" ] || fail "not a and b: $(cat "$T/out")"
-    grep -Eq '^lgd-infer: 2 of 2 photographs done in [0-9.]+ s; look at:$' "$T/err" || fail "no summary: $(cat "$T/err")"
+    grep -Eq '^lgd-infer: 2 of 2 photographs done in [0-9.]+ s; look at:$' "$T/err" ||
+        fail "no summary: $(cat "$T/err")"
     says "$T/err" "lgd-infer:   $T/in/a.ppm: black"
     { printf '\357\273\277%s\r\n\r\n' "$T/in/b.ppm"; echo "$T/in/deeper"; } >"$T/list.txt"
     expect 0 infer --maps render "@$T/list.txt" -o "$T/l"
@@ -64,13 +66,17 @@ folders_and_lists() {
 # What the trained steps leave far from the photograph is said, with what may help, and that helps.
 far_from_the_photograph() {
     model
-    { printf 'P3 64 64 255\n'; awk 'BEGIN { for (v = 1; i++ < 3 * 64 * 64;) print int((v = v * 16807 % 2147483647) / 8388608) }'; } >"$T/noise.ppm"
+    {
+        printf 'P3 64 64 255\n'
+        awk 'BEGIN { for (v = 1; i++ < 3 * 64 * 64;) print int((v = v * 16807 % 2147483647) / 8388608) }'
+    } >"$T/noise.ppm"
     expect 0 "$BIN/lgd-infer" -s 64 --maps diffuse "$T/noise.ppm" -o "$T/o"
     says "$T/err" "; --iterations auto may come nearer"
     left=$(sed -n 's/.*-> \([0-9.]*\) .*/\1/p' "$T/err")
     expect 0 "$BIN/lgd-infer" -s 64 --maps diffuse -i auto "$T/noise.ppm" -o "$T/o"
     if grep -q "may come nearer" "$T/err"; then fail "it is said of --iterations auto itself"; fi
-    awk -v a="$left" -v b="$(sed -n 's/.*-> \([0-9.]*\) .*/\1/p' "$T/err")" 'BEGIN { exit !(b < a && a > 0.05) }' || fail "$left before, after: $(cat "$T/err")"
+    awk -v a="$left" -v b="$(sed -n 's/.*-> \([0-9.]*\) .*/\1/p' "$T/err")" 'BEGIN { exit !(b < a && a > 0.05) }' ||
+        fail "$left before, after: $(cat "$T/err")"
 }
 
 threads_agree() {
@@ -90,7 +96,8 @@ trace() {
     expect 0 infer -q "$T/p.ppm" -o "$T/0"
     [ ! -s "$T/err" ] || fail "untraced says: $(cat "$T/err")"
     expect 0 env LGD_TRACE=1 "$BIN/lgd-infer" --size 32 --iterations 1 --threads 1 -q "$T/p.ppm" -o "$T/1"
-    grep -Eq '^trace: conv +forward +1x[0-9x]+ -> 1x[0-9x]+, with [0-9x]+, [A-Za-z0-9]+, [0-9.]+ ms$' "$T/err" || fail "no convolution: $(head -3 "$T/err")"
+    grep -Eq '^trace: conv +forward +1x[0-9x]+ -> 1x[0-9x]+, with [0-9x]+, [A-Za-z0-9]+, [0-9.]+ ms$' "$T/err" ||
+        fail "no convolution: $(head -3 "$T/err")"
     if grep -v '^trace: ' "$T/err"; then fail "other lines"; fi
     for f in $FILES; do cmp -s "$T/0/p/$f" "$T/1/p/$f" || fail "$f differs when traced"; done
 }
@@ -100,8 +107,10 @@ field_of_view() {
     model
     photo "$T/p.ppm" 32 32
     expect 0 infer --maps render "$T/p.ppm" -o "$T/0"
-    says "$T/err" "p.ppm: warning: a field of view of 54.2 degrees is assumed: it has no focal length in its EXIF; --fov DEG tells it"
-    says "$T/0/p/meta.txt" "field of view: 54.22 degrees across the square (assumed: it has no focal length in its EXIF)"
+    says "$T/err" "p.ppm: warning: a field of view of 54.2 degrees is assumed: it has no focal length in its EXIF; "
+    says "$T/err" "; --fov DEG sets it"
+    says "$T/0/p/meta.txt" \
+        "field of view: 54.22 degrees across the square (assumed: it has no focal length in its EXIF)"
     expect 0 infer --fov 28 --maps render,preview "$T/p.ppm" -o "$T/28"
     says "$T/err" "p.ppm: field of view 28.0 degrees (--fov)"
     says "$T/28/p/meta.txt" "field of view: 28.00 degrees across the square (--fov)"
@@ -124,14 +133,17 @@ only_what_is_asked_for() {
     for list in diffuse specular roughness normal exr render preview; do
         expect 0 infer --maps $list "$T/p.ppm" -o "$T/$list"
         for f in "$T/$list/p"/*.[pe]*; do cmp -s "$f" "$T/all/p/${f##*/}" || fail "--maps $list: ${f##*/} differs"; done
-        case $list in render|preview) want="meta.txt $list.png " ;; exr) want="maps.exr meta.txt " ;; *) want=$(printf '%s\n' "$list.png" meta.txt | sort | tr '\n' ' ') ;; esac
-        [ "$(ls -A "$T/$list/p" | tr '\n' ' ')" = "$want" ] || fail "--maps $list writes $(ls -A "$T/$list/p" | tr '\n' ' ')"
+        case $list in render|preview) want="meta.txt $list.png " ;; exr) want="maps.exr meta.txt " ;; *) \
+            want=$(printf '%s\n' "$list.png" meta.txt | sort | tr '\n' ' ') ;; esac
+        [ "$(ls -A "$T/$list/p" | tr '\n' ' ')" = "$want" ] ||
+            fail "--maps $list writes $(ls -A "$T/$list/p" | tr '\n' ' ')"
     done
     expect 0 infer --maps render,normal "$T/p.ppm" -o "$T/all"
     complete "$T/all/p"
 }
 
-# Photographs in the same order, with the same words and the same bytes, whether several are computed at once or they come one at a time.
+# Photographs in the same order, with the same words and the same bytes, whether several are computed at once or they
+# come one at a time.
 overlap_changes_nothing() {
     model
     list=
@@ -148,8 +160,11 @@ overlap_changes_nothing() {
     for n in 1 2 3 5 20; do
         # shellcheck disable=SC2086
         expect 1 infer --threads $n $list -o "$T/o"
-        sed "s|$T/one/|$T/o/|" "$T/one_names" | cmp -s - "$T/out" || fail "$n threads: other folders, or in another order"
-        grep -Ev "1 of 7 photographs failed|6 of 7 photographs done|^lgd-infer:   " "$T/err" | cmp -s - "$T/one_words" || fail "$n threads: other words: $(grep -v photographs "$T/err" | diff - "$T/one_words" | head -n 3)"
+        sed "s|$T/one/|$T/o/|" "$T/one_names" | cmp -s - "$T/out" ||
+            fail "$n threads: other folders, or in another order"
+        grep -Ev "1 of 7 photographs failed|6 of 7 photographs done|^lgd-infer:   " "$T/err" |
+            cmp -s - "$T/one_words" ||
+            fail "$n threads: other words: $(grep -v photographs "$T/err" | diff - "$T/one_words" | head -n 3)"
         diff -r -x results.jsonl "$T/o" "$T/one" >/dev/null || fail "$n threads: other files"
         rm -r "$T/o"
     done
@@ -182,7 +197,8 @@ poor_photographs() {
     complete "$T/o/white"
     says "$T/err" "overexposed"
     # a little-endian float image, two thirds of it 4.0
-    { printf 'PF\n12 1\n-1.0\n'; for v in 1 2 3 4 5 6 7 8 9 10 11 12; do printf '\000\000\200\100\000\000\200\100\000\000\000\077'; done; } >"$T/bright.pfm"
+    { printf 'PF\n12 1\n-1.0\n'; for v in 1 2 3 4 5 6 7 8 9 10 11 12
+    do printf '\000\000\200\100\000\000\200\100\000\000\000\077'; done; } >"$T/bright.pfm"
     expect 0 infer --size 1 "$T/bright.pfm" -o "$T/o"
     says "$T/err" "66.7% of the values are above 1"
 }
@@ -208,8 +224,10 @@ sizes() {
 half_white() {
     { printf 'II*\000\010\000\000\000\012\000'
       # width, height, bits, compression, photometric, offset, orientation, samples, rows, bytes
-      for entry in '\000\001 \003 \020\000' '\001\001 \003 \020\000' '\002\001 \003 \010\000' '\003\001 \003 \001\000' '\006\001 \003 \001\000' \
-          '\021\001 \004 \206\000' "\\022\\001 \\003 \\00$2\\000" '\025\001 \003 \001\000' '\026\001 \003 \020\000' '\027\001 \004 \000\001'; do
+      for entry in '\000\001 \003 \020\000' '\001\001 \003 \020\000' '\002\001 \003 \010\000' '\003\001 \003 \001\000' \
+          '\006\001 \003 \001\000' \
+          '\021\001 \004 \206\000' "\\022\\001 \\003 \\00$2\\000" '\025\001 \003 \001\000' '\026\001 \003 \020\000' \
+          '\027\001 \004 \000\001'; do
           set -- "$1" "$2" $entry
           printf "$3$4\\000\\001\\000\\000\\000$5\\000\\000"
       done
@@ -228,7 +246,8 @@ mask_is_turned() {
     done
     cmp -s "$T/upper/p/maps.exr" "$T/lower/p/maps.exr" && fail "the orientation of a mask is ignored"
     # the same as stored the other way round
-    { head -c 134 "$T/upper.tif"; tail -c 128 "$T/upper.tif"; head -c 262 "$T/upper.tif" | tail -c 128; } >"$T/stored.tif"
+    { head -c 134 "$T/upper.tif"; tail -c 128 "$T/upper.tif"; head -c 262 "$T/upper.tif" | tail -c 128; } \
+        >"$T/stored.tif"
     expect 0 infer --size 256 --maps exr --model "$T/h.safetensors" --mask "$T/stored.tif" "$T/p.ppm" -o "$T/stored"
     cmp -s "$T/stored/p/maps.exr" "$T/lower/p/maps.exr" || fail "a mask that is turned by half is not its other half"
 }
@@ -248,7 +267,8 @@ mask_and_tolerance() {
     [ ! -s "$T/err" ] || fail "a mask that wants something is warned of: $(cat "$T/err")"
     expect 0 infer --iterations 3 --mask "$T/white.ppm" "$T/p.ppm" -o "$T/all"
     cmp -s "$T/all/p/normal.png" "$T/plain/p/normal.png" || fail "a mask that wants everything changes the maps"
-    cmp -s "$T/none/p/normal.png" "$T/first/p/normal.png" || fail "a mask that wants nothing does not give what the coarse steps leave"
+    cmp -s "$T/none/p/normal.png" "$T/first/p/normal.png" ||
+        fail "a mask that wants nothing does not give what the coarse steps leave"
     expect 1 infer --mask "$T/long.ppm" "$T/p.ppm" -o "$T/o"
     says "$T/err" "long.ppm is 40 x 20"
     expect 1 infer --mask "$T/absent.png" "$T/p.ppm" -o "$T/o"
@@ -263,7 +283,8 @@ mask_and_tolerance() {
     one="$BIN/lgd-infer --size 32 --threads 1 --model $T/h.safetensors $T/p.ppm"
     expect 0 $one --iterations 1 -o "$T/step"
     expect 0 $one --tolerance 1 -o "$T/one"
-    cmp -s "$T/one/p/normal.png" "$T/step/p/normal.png" || fail "with a tolerance above every change it is not the first step that counts"
+    cmp -s "$T/one/p/normal.png" "$T/step/p/normal.png" ||
+        fail "with a tolerance above every change it is not the first step that counts"
     expect 0 infer --size 520 "$T/p.ppm" -o "$T/large" # in tiles
     complete "$T/large/p"
     says "$T/err" "after 1 step"
@@ -292,8 +313,10 @@ usual_tolerance() {
 comma_locale() {
     model
     if ! locale -a 2>/dev/null | grep -qi '^de_DE.utf-\?8$'; then
-        localedef -i de_DE -f UTF-8 "$T/de_DE.UTF-8" 2>/dev/null || skip "there is no comma-decimal locale and none can be made"
-        export LOCPATH="$T" ASAN_OPTIONS="${ASAN_OPTIONS-}:detect_leaks=0" # the C library never frees what it makes of LOCPATH
+        localedef -i de_DE -f UTF-8 "$T/de_DE.UTF-8" 2>/dev/null ||
+            skip "there is no comma-decimal locale and none can be made"
+        # the C library never frees what it makes of LOCPATH
+        export LOCPATH="$T" ASAN_OPTIONS="${ASAN_OPTIONS-}:detect_leaks=0"
     fi
     photo "$T/p.ppm" 24 24
     expect 0 infer "$T/p.ppm" -o "$T/c"
@@ -309,7 +332,9 @@ directx_normals() {
     expect 0 infer "$T/p.ppm" -o "$T/gl"
     expect 0 infer --normal dx "$T/p.ppm" -o "$T/dx"
     if cmp -s "$T/gl/p/normal.png" "$T/dx/p/normal.png"; then fail "the normals are the same"; fi
-    for f in diffuse.png specular.png roughness.png render.png preview.png; do cmp -s "$T/gl/p/$f" "$T/dx/p/$f" || fail "$f differs"; done
+    for f in diffuse.png specular.png roughness.png render.png preview.png; do
+        cmp -s "$T/gl/p/$f" "$T/dx/p/$f" || fail "$f differs"
+    done
 }
 
 precision() {
@@ -320,9 +345,11 @@ precision() {
     for p in f32 bf16; do expect 0 infer --precision $p --maps normal,exr "$T/p.ppm" -o "$T/$p"; done
     expect 0 infer --maps normal,exr "$T/p.ppm" -o "$T/usual"
     cmp -s "$T/usual/p/maps.exr" "$T/f32/p/maps.exr" || fail "f32 is not the default"
-    cmp -s "$T/bf16/p/maps.exr" "$T/f32/p/maps.exr" && fail "bf16 gives the maps of f32" # how near they are: tests/nn/test_precision.c
+    # how near they are: tests/nn/test_precision.c
+    cmp -s "$T/bf16/p/maps.exr" "$T/f32/p/maps.exr" && fail "bf16 gives the maps of f32"
     for isa in base avx2 avx512 avx512bf16 amx; do
-        if LGD_ISA=$isa infer --help >/dev/null 2>&1; then expect 0 env LGD_ISA=$isa "$BIN/lgd-infer" --size 32 --threads 1 --precision bf16 "$T/p.ppm" -o "$T/$isa"
+        if LGD_ISA=$isa infer --help >/dev/null 2>&1
+        then expect 0 env LGD_ISA=$isa "$BIN/lgd-infer" --size 32 --threads 1 --precision bf16 "$T/p.ppm" -o "$T/$isa"
         else expect 2 env LGD_ISA=$isa "$BIN/lgd-infer" --precision bf16 "$T/p.ppm" -o "$T/$isa"; fi
     done
 }
@@ -346,7 +373,9 @@ all_photographs() {
     lines "$T/o/results.jsonl" "$n"
     while read -r folder; do complete "$folder"; done <"$T/out"
     [ "$(grep -c 'difference from the photograph' "$T/err")" -eq "$n" ] || fail "not every photograph has its figures"
-    awk '/difference from the photograph/ { for (i = 1; i <= NF; i++) if ($i == "photograph") { a += $(i + 1); b += $(i + 5) } } END { exit !(b < a && a > 0) }' "$T/err" ||
+    awk '/difference from the photograph/ { for (i = 1; i <= NF; i++)
+            if ($i == "photograph") { a += $(i + 1); b += $(i + 5) } }
+        END { exit !(b < a && a > 0) }' "$T/err" ||
         fail "refinement does not bring the renderings nearer to the photographs"
 }
 

@@ -41,7 +41,8 @@ odd_stems() {
     cd "$T/in" || exit 1
     expect 0 infer -o ../o -- ...ppm "a b.c.ppm" -o.ppm .ppm
     for f in ...ppm "a b.c" -o .ppm; do complete "$T/o/$f"; done
-    [ "$(ls -A "$T" | grep -cE '^(in|o|out|err)$')" = 4 ] && [ "$(ls -A "$T/in" | wc -l)" = 4 ] || fail "something was written beside the output folder"
+    [ "$(ls -A "$T" | grep -cE '^(in|o|out|err)$')" = 4 ] && [ "$(ls -A "$T/in" | wc -l)" = 4 ] ||
+        fail "something was written beside the output folder"
     expect 1 infer .. -o ../o
     says "$T/err" ".."
 }
@@ -141,7 +142,8 @@ interrupted() {
         done=$(wc -l <"$T/out.$s")
         [ "$done" -ge 1 ] && [ "$done" -lt 200 ] || fail "$s: $done photographs are done"
         lines "$T/$s/results.jsonl" "$done"
-        [ "$(ls -A "$T/$s" | wc -l)" -eq $((done + 1)) ] || fail "$s: $done are reported and there are: $(ls -A "$T/$s" | tr '\n' ' ')"
+        [ "$(ls -A "$T/$s" | wc -l)" -eq $((done + 1)) ] ||
+            fail "$s: $done are reported and there are: $(ls -A "$T/$s" | tr '\n' ' ')"
         while read -r folder; do complete "$folder"; done <"$T/out.$s"
     done
 }

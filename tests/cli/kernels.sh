@@ -22,7 +22,9 @@ inner_loop() {
                 if (text[i] ~ /vdpbf16ps/) products++
                 if (text[i] ~ /\(%r[sb]p/) stack++
             }
-            if (products && (!length_found || n - i < length_found)) { length_found = n - i; found = products " " stack }
+            if (products && (!length_found || n - i < length_found)) {
+                length_found = n - i; found = products " " stack
+            }
         }
         END { print found }'
 }
@@ -40,6 +42,8 @@ bf16_inner_loop_spills_nothing() {
     [ $# -eq 2 ] || fail "no loop with vdpbf16ps in bf16_14_2 of $object"
     [ "$1" -eq 112 ] || fail "$1 vdpbf16ps in the inner loop, not 112"
     [ "$2" -eq 0 ] || fail "$2 references to the stack in the inner loop"
-    if objdump -d --no-show-raw-insn "$BUILD/obj/tensor/kernels/conv.avx512.o" | grep -q vdpbf16ps; then fail "vdpbf16ps in the kernels for avx512"; fi
+    if objdump -d --no-show-raw-insn "$BUILD/obj/tensor/kernels/conv.avx512.o" | grep -q vdpbf16ps; then
+        fail "vdpbf16ps in the kernels for avx512"
+    fi
 }
 check bf16_inner_loop_spills_nothing bf16_inner_loop_spills_nothing

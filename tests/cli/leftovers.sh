@@ -1,7 +1,8 @@
 # What killed processes leave, and several processes that write the same folder.
 . tests/cli/lib_infer.sh
 
-# Kills the command in the middle of writing a file, by a signal that nobody can clean up after: the limit on the size of files.
+# Kills the command in the middle of writing a file, by a signal that nobody can clean up after: the limit on the size
+# of files.
 killed() {
     blocks=$1
     shift
@@ -108,11 +109,13 @@ older_maps_go() {
     expect 0 infer --maps normal,height "$T/a/p.ppm" -o "$T/o" # the same photograph's stay
     for f in $FILES height.png; do [ -s "$T/o/p/$f" ] || fail "$f of the same estimate is gone"; done
     expect 0 infer --maps normal "$T/b/p.ppm" -o "$T/o"
-    [ "$(ls -A "$T/o/p" | tr '\n' ' ')" = "meta.txt normal.png notes.txt " ] || fail "there are: $(ls -A "$T/o/p" | tr '\n' ' ')"
+    [ "$(ls -A "$T/o/p" | tr '\n' ' ')" = "meta.txt normal.png notes.txt " ] ||
+        fail "there are: $(ls -A "$T/o/p" | tr '\n' ' ')"
     says "$T/err" "removed from the folder"
     says "$T/err" "height.png"
     expect 0 infer --maps render "$T/a/p.ppm" -o "$T/o"
-    [ "$(ls -A "$T/o/p" | tr '\n' ' ')" = "meta.txt notes.txt render.png " ] || fail "there are: $(ls -A "$T/o/p" | tr '\n' ' ')"
+    [ "$(ls -A "$T/o/p" | tr '\n' ' ')" = "meta.txt notes.txt render.png " ] ||
+        fail "there are: $(ls -A "$T/o/p" | tr '\n' ' ')"
     expect 0 infer "$T/b/p.ppm" -o "$T/o"
     rm "$T/o/p/notes.txt"
     complete "$T/o/p"

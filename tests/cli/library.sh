@@ -1,5 +1,6 @@
 #!/bin/sh
-# liblgd: which symbols it has, that it installs and goes away, and that the README's program runs with both forms of it.
+# liblgd: which symbols it has, that it installs and goes away, and that the README's program runs with both forms of
+# it.
 . tests/cli/lib.sh
 case "$BUILD ${MAKEFLAGS:-}" in *asan* | *fsanitize*) SANITIZED=1 ;; *) SANITIZED= ;; esac
 
@@ -39,8 +40,10 @@ is_as_of_the_program() {
     for f in diffuse.png specular.png render.png preview.png; do
         same "$T/program/flash/$f" "$T/shared/$f" "$f is another than lgd-infer's"
     done
-    grep -v '^estimate: \|^field of view: \|^photograph: \|^weights: \|^options: \|^result: ' "$T/program/flash/meta.txt" >"$T/meta"
-    grep -v '^estimate: \|^field of view: \|^photograph: \|^weights: \|^options: \|^result: ' "$T/shared/meta.txt" >"$T/meta_shared"
+    grep -v '^estimate: \|^field of view: \|^photograph: \|^weights: \|^options: \|^result: ' \
+        "$T/program/flash/meta.txt" >"$T/meta"
+    grep -v '^estimate: \|^field of view: \|^photograph: \|^weights: \|^options: \|^result: ' "$T/shared/meta.txt" \
+        >"$T/meta_shared"
     cmp -s "$T/meta" "$T/meta_shared" || fail "meta.txt is another: $(diff "$T/meta" "$T/meta_shared" | head -n 2)"
 }
 
@@ -79,7 +82,8 @@ install_link_uninstall() {
     has_help2man
     expect 0 make --no-print-directory install BUILD="$BUILD" DESTDIR="$T/root" PREFIX=/usr/local
     root=$T/root/usr/local
-    for f in bin/lgd-infer bin/lgd-train bin/lgd-eval bin/lgd-data bin/lgd-convert bin/lgd-capture lib/liblgd.a lib/liblgd.so \
+    for f in bin/lgd-infer bin/lgd-train bin/lgd-eval bin/lgd-data bin/lgd-convert bin/lgd-capture lib/liblgd.a \
+        lib/liblgd.so \
         lib/liblgd.so.0 lib/lgd/liblgd_image.so include/lgd.h share/lgd/phone.safetensors lib/pkgconfig/lgd.pc \
         share/man/man1/lgd-infer.1 share/bash-completion/completions/lgd-train share/zsh/site-functions/_lgd-eval; do
         [ -s "$root/$f" ] || fail "$f is not installed"
@@ -117,7 +121,8 @@ install_link_uninstall() {
     same "$T/first" "$T/out" "the two libraries differ"
     diff -r "$T/shared" "$T/static" >"$T/diff" || fail "the two libraries differ: $(head -n 1 "$T/diff")"
     is_as_of_the_program
-    printf '#include <lgd.h>\nint main() { lgd_options o = lgd_options_default(); return o.size != sizeof o; }\n' >"$T/user.cpp"
+    printf '#include <lgd.h>\nint main() { lgd_options o = lgd_options_default(); return o.size != sizeof o; }\n' \
+        >"$T/user.cpp"
     # shellcheck disable=SC2086
     expect 0 ${CXX:-g++} -Wall -Werror -o "$T/cpp" "$T/user.cpp" $static
     expect 0 "$T/cpp"

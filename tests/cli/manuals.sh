@@ -1,6 +1,7 @@
 # Manual pages and completions: every option of --help is in them, and they do what they should.
 . tests/cli/lib.sh
-PROGRAMS=$(cd "$BIN" && for p in lgd-*; do case $p in lgd-test | lgd-bench | lgd-stress | lgd-faults) ;; *) echo "$p" ;; esac; done)
+PROGRAMS=$(cd "$BIN" && for p in lgd-*; do case $p in lgd-test | lgd-bench | lgd-stress | lgd-faults) ;; *) echo "$p" \
+    ;; esac; done)
 SHARE=$BUILD/share
 
 made() {
@@ -13,7 +14,8 @@ made() {
 options() {
     expect 0 "$BIN/$1" --help
     sed -n 's/^  *\(-.*\)/\1/p' "$T/out" | sed 's/  .*//' | tr ' ,' '\n\n' | grep '^-' | sort -u >"$T/options"
-    grep -qx -- --help "$T/options" && [ "$(wc -l <"$T/options")" -gt 4 ] || fail "$1 has the options $(tr '\n' ' ' <"$T/options")"
+    grep -qx -- --help "$T/options" && [ "$(wc -l <"$T/options")" -gt 4 ] ||
+        fail "$1 has the options $(tr '\n' ' ' <"$T/options")"
 }
 
 same() { cmp -s "$1" "$T/options" || fail "$2: $(diff "$1" "$T/options" | grep '^[<>]' | head -n 3 | tr '\n' ' ')"; }
@@ -40,7 +42,8 @@ bash_completes() {
     bash -c 'compopt() { :; }
         . "$1"; COMP_WORDS=("${@:2}"); COMP_CWORD=$(($# - 2))
         complete -p "$2" >/dev/null || exit 1
-        "_${2//-/_}" && printf "%s\n" "${COMPREPLY[@]}"' - "$SHARE/bash-completion/completions/$1" "$@" 2>"$T/err" | sort -u
+        "_${2//-/_}" && printf "%s\n" "${COMPREPLY[@]}"' - "$SHARE/bash-completion/completions/$1" "$@" 2>"$T/err" |
+            sort -u
     [ -s "$T/err" ] && fail "$1: $(head -n 1 "$T/err")"
     :
 }
@@ -56,8 +59,10 @@ of_bash() {
     mkdir -p "$T/files/a folder"
     : >"$T/files/a photo.jpg"
     cd "$T/files" || exit 1
-    [ "$(bash_completes lgd-infer --precision b)" = bf16 ] || fail "--precision: $(bash_completes lgd-infer --precision b)"
-    [ "$(bash_completes lgd-infer --precision = b)" = bf16 ] || fail "--precision=: $(bash_completes lgd-infer --precision = b)"
+    [ "$(bash_completes lgd-infer --precision b)" = bf16 ] ||
+        fail "--precision: $(bash_completes lgd-infer --precision b)"
+    [ "$(bash_completes lgd-infer --precision = b)" = bf16 ] ||
+        fail "--precision=: $(bash_completes lgd-infer --precision = b)"
     [ "$(bash_completes lgd-infer -o '')" = "a folder" ] || fail "-o: $(bash_completes lgd-infer -o '')"
     [ "$(bash_completes lgd-infer 'a p')" = "a photo.jpg" ] || fail "photographs: $(bash_completes lgd-infer 'a p')"
     [ -z "$(bash_completes lgd-infer --size '')" ] || fail "--size is a number"
@@ -71,7 +76,8 @@ of_zsh() {
         options "$p"
         # what _arguments gets: names are before the brackets
         zsh -f -c '_arguments() { print -rl -- "$@" }
-            load() { . "$1" }; load "$1"' - "$SHARE/zsh/site-functions/_$p" >"$T/specs" 2>"$T/err" || fail "$p: $(head -n 1 "$T/err")"
+            load() { . "$1" }; load "$1"' - "$SHARE/zsh/site-functions/_$p" >"$T/specs" 2>"$T/err" ||
+                fail "$p: $(head -n 1 "$T/err")"
         [ -s "$T/err" ] && fail "$p: $(head -n 1 "$T/err")"
         sed -n 's/^\(([^)]*)\)\{0,1\}\*\{0,1\}\(--*[A-Za-z][-A-Za-z0-9]*\)\[.*/\2/p' "$T/specs" | sort -u >"$T/found"
         same "$T/found" "$p in zsh"

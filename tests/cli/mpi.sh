@@ -92,7 +92,8 @@ begin() {
     folder=$2
     shift 2
     # shellcheck disable=SC2086
-    env --default-signal=HUP $LAUNCH -np "$n" "$TRAIN" "$T/small.ini" --set output.folder="$T/$folder" --threads 1 --set train.checkpoint_every=1 "$@" >"$T/out" 2>"$T/err" &
+    env --default-signal=HUP $LAUNCH -np "$n" "$TRAIN" "$T/small.ini" --set output.folder="$T/$folder" --threads 1 \
+        --set train.checkpoint_every=1 "$@" >"$T/out" 2>"$T/err" &
     job=$!
     for _ in $(seq 1 1200); do
         [ -s "$T/$folder/last.safetensors" ] && return
@@ -149,7 +150,8 @@ signals_save() {
     goes_on_as_whole other-HUP
 }
 
-# kill -9 of a rank ends the job, with a line that says which; the checkpoint is whole and going on makes the same bytes.
+# kill -9 of a rank ends the job, with a line that says which; the checkpoint is whole and going on makes the same
+# bytes.
 killed_rank() {
     launcher "$1"
     config
@@ -179,7 +181,8 @@ skip_together() {
     LGD_LINK_POISON=5 LD_PRELOAD=$LINK expect 0 train 2 run
     says "$T/err" "step 5 is skipped: its loss is not finite"
     [ "$(grep -c "is skipped" "$T/err")" = 1 ] || fail "more than one step is skipped, or more than one rank says it"
-    sed -n 6p "$T/run/log.csv" | grep -q ",nan,.*,1$" || fail "no skipped step in log.csv: $(sed -n 6p "$T/run/log.csv")"
+    sed -n 6p "$T/run/log.csv" | grep -q ",nan,.*,1$" ||
+        fail "no skipped step in log.csv: $(sed -n 6p "$T/run/log.csv")"
     lines "$T/run/log.csv" 25
 }
 
@@ -211,13 +214,15 @@ errors_are_said_once() {
     config
     fails "train.batch is 3: 4 ranks cannot share it" train 4 run --set train.batch=3
     [ ! -e "$T/run/config.ini" ] || fail "a run was begun"
-    fails "model.rmse = batch takes an error over the whole batch" train 2 run --set model.rmse=batch --set model.descent=none --set model.images=1
+    fails "model.rmse = batch takes an error over the whole batch" train 2 run --set model.rmse=batch \
+        --set model.descent=none --set model.images=1
     fails "there is no key train.bach" train 2 run --set train.bach=3
     fails "there is no run to resume" train 2 none --resume
     fails "none.safetensors" train 2 run --init "$T/none.safetensors"
     expect 0 train 2 run --set train.steps=0 --set train.pretrain_steps=1
     fails "there is a run already" train 2 run
-    fails "train.rate is 0.25" train 2 run --resume --set train.steps=0 --set train.pretrain_steps=1 --set train.rate=0.25
+    fails "train.rate is 0.25" train 2 run --resume --set train.steps=0 --set train.pretrain_steps=1 \
+        --set train.rate=0.25
     expect 0 train 2 help --help
     [ "$(grep -c "^Usage: lgd-train" "$T/out")" = 1 ] || fail "help is printed by more than one rank"
     if "$BIN/lgd-train" --version >/dev/null && LGD_ISA=avx2 "$BIN/lgd-train" --version >/dev/null 2>&1; then
@@ -260,7 +265,10 @@ SH
     chmod +x "$T/agent"
     sed 's/^node1/localhost/; s/^node2/127.0.0.2/; s/slots=[0-9]*/slots=1/' configs/cluster/hosts >"$T/hosts"
     case $1 in
-    openmpi) LAUNCH="$LAUNCH --hostfile $T/hosts --mca plm_rsh_agent $T/agent --mca btl self,tcp --mca btl_tcp_if_include lo --mca oob_tcp_if_include lo" ;;
+    openmpi)
+        LAUNCH="$LAUNCH --hostfile $T/hosts --mca plm_rsh_agent $T/agent --mca btl self,tcp"
+        LAUNCH="$LAUNCH --mca btl_tcp_if_include lo --mca oob_tcp_if_include lo"
+        ;;
     mpich)
         sed -i 's/ slots=/:/' "$T/hosts"
         LAUNCH="$LAUNCH -f $T/hosts -launcher ssh -launcher-exec $T/agent"
@@ -283,8 +291,10 @@ programs_know_no_mpi() {
     mkdir -p "$T/bin"
     cp "$TRAIN" "$T/bin"
     config
-    expect 0 "$T/bin/lgd-train" "$T/small.ini" --set output.folder="$T/run" --threads 1 --set train.steps=1 --set train.pretrain_steps=1
-    OMPI_COMM_WORLD_SIZE=2 OMPI_COMM_WORLD_RANK=0 expect 1 "$T/bin/lgd-train" "$T/small.ini" --set output.folder="$T/two"
+    expect 0 "$T/bin/lgd-train" "$T/small.ini" --set output.folder="$T/run" --threads 1 --set train.steps=1 \
+        --set train.pretrain_steps=1
+    OMPI_COMM_WORLD_SIZE=2 OMPI_COMM_WORLD_RANK=0 expect 1 "$T/bin/lgd-train" "$T/small.ini" \
+        --set output.folder="$T/two"
     says "$T/err" "one of 2 processes, for which lgd has to be built where Open MPI"
     PMI_SIZE=2 PMI_RANK=1 expect 1 "$T/bin/lgd-train" "$T/small.ini" --set output.folder="$T/two"
     says "$T/err" "rank 1: started as one of 2 processes, for which lgd has to be built where MPICH"
@@ -293,7 +303,8 @@ programs_know_no_mpi() {
 
 check mpi_programs_know_no_mpi programs_know_no_mpi
 for library in openmpi mpich; do
-    for name in ranks_agree signals_save killed_rank skip_together rounded_gradients errors_are_said_once lost_folder two_nodes; do
+    for name in ranks_agree signals_save killed_rank skip_together rounded_gradients errors_are_said_once lost_folder \
+        two_nodes; do
         with() { $name $library; }
         check mpi_${library}_$name with
     done

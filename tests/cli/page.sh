@@ -8,16 +8,20 @@ views() {
     command -v python3 >/dev/null || skip "python3 is not installed"
     model
     cp "$PHOTO" "$T/a <b> & \"c\" {{photo}} 100%#1.jpg"
-    expect 0 "$BIN/lgd-infer" --size 64 -i 1 --threads 1 --maps page,preview "$T/a <b> & \"c\" {{photo}} 100%#1.jpg" -o "$T/o"
-    says "$T/o/a <b> & \"c\" {{photo}} 100%#1/view.html" '<title>a &lt;b&gt; &amp; &quot;c&quot; {{photo}} 100%#1 - material</title>'
+    expect 0 "$BIN/lgd-infer" --size 64 -i 1 --threads 1 --maps page,preview "$T/a <b> & \"c\" {{photo}} 100%#1.jpg" \
+        -o "$T/o"
+    says "$T/o/a <b> & \"c\" {{photo}} 100%#1/view.html" \
+        '<title>a &lt;b&gt; &amp; &quot;c&quot; {{photo}} 100%#1 - material</title>'
     # an odd size, a long lens, normals that files have upside down; maps that repeat, brighter light
     expect 0 "$BIN/lgd-infer" --size 37 -i 1 --threads 1 --fov 28 --normal dx --maps page,preview "$PHOTO" -o "$T/odd"
-    expect 0 "$BIN/lgd-infer" --size 48 -i 1 --threads 1 --seamless --light-power 3 --maps page,preview "$PHOTO" -o "$T/seamless"
+    expect 0 "$BIN/lgd-infer" --size 48 -i 1 --threads 1 --seamless --light-power 3 --maps page,preview "$PHOTO" \
+        -o "$T/seamless"
     for f in "$T"/o/*/view.html "$T/odd/flash/view.html"; do
         if grep -qE 'https?://' "$f"; then fail "$f loads something"; fi
     done
     mv "$T"/o/* "$T/o/view"
-    TMPDIR=$T timeout 300 python3 tests/browser/page.py view "$T/o/view" "$T/odd/flash" "$T/seamless/flash" >"$T/out" 2>"$T/err" ||
+    TMPDIR=$T timeout 300 python3 tests/browser/page.py view "$T/o/view" "$T/odd/flash" "$T/seamless/flash" >"$T/out" \
+        2>"$T/err" ||
         fail "$(tail -n 1 "$T/err")"
 }
 
@@ -38,7 +42,8 @@ lists() {
     says "$T/o/index.html" "2 materials"
     says "$T/o/index.html" "1 photograph failed"
     says "$T/o/index.html" "broken.png"
-    TMPDIR=$T timeout 200 python3 tests/browser/page.py index "$T/o/index.html" "a <b> 100%#1?" bump >"$T/out" 2>"$T/err" ||
+    TMPDIR=$T timeout 200 python3 tests/browser/page.py index "$T/o/index.html" "a <b> 100%#1?" bump >"$T/out" \
+        2>"$T/err" ||
         fail "$(tail -n 1 "$T/err")"
 }
 

@@ -2,7 +2,8 @@
 # Weights of the published kind as a user has them: under the published names, with metadata and, as .pth, without.
 . tests/cli/lib_infer.sh
 
-# A small network of that kind, with random weights. The published size of g is what a file without metadata is taken to have.
+# A small network of that kind, with random weights. The published size of g is what a file without metadata is taken to
+# have.
 small() {
     cat >"$T/small.ini" <<INI
 [model]
@@ -35,7 +36,9 @@ runs_with_and_without_metadata() {
     says "$T/err" "after 2 steps"
     expect 0 "$BIN/lgd-infer" --threads 1 --iterations 2 --model "$T/a.pth" "$T/p.ppm" -o "$T/two"
     complete "$T/one/p"
-    for f in diffuse.png specular.png roughness.png normal.png maps.exr render.png; do cmp -s "$T/one/p/$f" "$T/two/p/$f" || fail "$f: the .pth gives another"; done
+    for f in diffuse.png specular.png roughness.png normal.png maps.exr render.png; do
+        cmp -s "$T/one/p/$f" "$T/two/p/$f" || fail "$f: the .pth gives another"
+    done
     expect 1 "$BIN/lgd-infer" --tolerance 0.1 --model "$T/a.pth" "$T/p.ppm" -o "$T/three"
     says "$T/err" "no mask and no tolerance"
 }

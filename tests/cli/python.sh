@@ -1,4 +1,5 @@
-# The Python package: in the tree, installed by pip in a venv with the library of the system and with its own, as a wheel.
+# The Python package: in the tree, installed by pip in a venv with the library of the system and with its own, as a
+# wheel.
 . tests/cli/lib_infer.sh
 : "${PYTHON:=python3}"
 PHOTO=$ROOT/demo/flash.jpg
@@ -53,7 +54,8 @@ maps.save(sys.argv[2])' "$PHOTO" "$T/p"
 }
 check python_writes_what_lgd_infer_writes is_as_lgd_infer
 
-# What multiprocessing does on Linux before Python 3.14: the child computes as the parent does, which has workers waiting.
+# What multiprocessing does on Linux before Python 3.14: the child computes as the parent does, which has workers
+# waiting.
 forks() {
     numpy
     export PYTHONPATH="$ROOT/python" PYTHONDONTWRITEBYTECODE=1 LGD_LIBRARY="$BUILD/liblgd.so"

@@ -5,13 +5,15 @@ export LGD_MODEL="$MODEL"
 
 # The page as it is once it has loaded and its script has run, in $T/dom.
 browse() {
-    timeout 120 "$BROWSER" --headless --no-sandbox --disable-gpu --user-data-dir="$T/profile" --virtual-time-budget=10000 --dump-dom "file://$1" >"$T/dom" 2>"$T/browser.log" ||
+    timeout 120 "$BROWSER" --headless --no-sandbox --disable-gpu --user-data-dir="$T/profile" \
+        --virtual-time-budget=10000 --dump-dom "file://$1" >"$T/dom" 2>"$T/browser.log" ||
         fail "$BROWSER: $(tail -n 1 "$T/browser.log")"
 }
 keys() { grep -o "data-$1=\"[^\"]*\"" "$T/dom" | cut -d'"' -f2; }
 
 opens_and_sorts() {
-    BROWSER=$(command -v chromium || command -v chromium-browser || command -v google-chrome) || skip "no chromium is installed"
+    BROWSER=$(command -v chromium || command -v chromium-browser || command -v google-chrome) ||
+        skip "no chromium is installed"
     [ -f "$MODEL" ] || fail "$MODEL is absent: the weights that the project ships"
     expect 0 "$BIN/lgd-data" --format captures --count 1 --size 32 -o "$T/c"
     expect 0 "$BIN/lgd-eval" --size 32 -i 1 --threads 1 --told --set procedural:3,4 --set "multiview:$T/c" -o "$T/o"
@@ -52,9 +54,11 @@ names_columns_and_fits_a_phone() {
     mkdir "$T/photos"
     cp demo/flash.jpg "$T/photos"
     expect 0 "$BIN/lgd-data" --format captures --count 1 --size 32 -o "$T/c"
-    expect 0 "$BIN/lgd-eval" --fast --size 32 -i 1 --threads 1 --told --set procedural:3,1 --set "multiview:$T/c" -o "$T/known"
+    expect 0 "$BIN/lgd-eval" --fast --size 32 -i 1 --threads 1 --told --set procedural:3,1 --set "multiview:$T/c" \
+        -o "$T/known"
     expect 0 "$BIN/lgd-eval" --fast --size 32 -i 1 --threads 1 --set "photos:$T/photos" -o "$T/photo"
-    TMPDIR=$T timeout 200 python3 tests/browser/page.py report "$T/known/report.html" "$T/photo/report.html" >"$T/out" 2>"$T/err" ||
+    TMPDIR=$T timeout 200 python3 tests/browser/page.py report "$T/known/report.html" "$T/photo/report.html" >"$T/out" \
+        2>"$T/err" ||
         fail "$(tail -n 1 "$T/err")"
 }
 

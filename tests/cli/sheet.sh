@@ -11,7 +11,8 @@ tags() {
 
 photographs() {
     tags
-    expect 0 "$BIN/lgd-data" --format sheet-captures --seed 5 --count 1 --size 64 --photo-width 1000 --threads 1 -o "$T/s"
+    expect 0 "$BIN/lgd-data" --format sheet-captures --seed 5 --count 1 --size 64 --photo-width 1000 --threads 1 \
+        -o "$T/s"
     one=$(ls -d "$T"/s/*)
 }
 
@@ -19,10 +20,12 @@ drawing() {
     tags
     [ "$(grep -c '<rect' "$T/sheet.svg")" -gt 300 ] || fail "few rectangles"
     # No word goes over the window's line or the paper's edge, with any font (0.6 of the size for a letter is much).
-    awk -F'[\">=<]+' '/^<text/ { n++; if ($3 + 0.6 * $9 * length($10) > ($5 < 210 ? 165 : 210)) exit 1 } END { if (n != 4) exit 1 }' \
+    awk -F'[\">=<]+' '/^<text/ { n++; if ($3 + 0.6 * $9 * length($10) > ($5 < 210 ? 165 : 210)) exit 1 }
+        END { if (n != 4) exit 1 }' \
         "$T/sheet.svg" || fail "words that go too far: $(grep '<text' "$T/sheet.svg")"
     # A line narrower than a pixel of a screen, 25.4/96 mm, may be left out there.
-    awk -F'"' '/^<rect x/ { n++; if ($6 < 25.4 / 96 || $8 < 25.4 / 96) exit 1 } END { if (n < 300) exit 1 }' "$T/sheet.svg" || fail "thin lines"
+    awk -F'"' '/^<rect x/ { n++; if ($6 < 25.4 / 96 || $8 < 25.4 / 96) exit 1 } END { if (n < 300) exit 1 }' \
+        "$T/sheet.svg" || fail "thin lines"
     for paper in a4 letter; do
         expect 0 capture sheet --paper $paper -o "$T/$paper.pdf"
         [ "$(head -c 8 "$T/$paper.pdf")" = "%PDF-1.4" ] || fail "$paper.pdf is no PDF"
@@ -95,7 +98,8 @@ measures() {
     expect 0 "$BIN/lgd-eval" --fast --size 32 --threads 1 --method lgd:iterations=1 --set "sheets:$T/s" \
         --set "sheets-exact:$T/s" -o "$T/e"
     lines "$T/e/results.csv" 5
-    awk -F, -v last=1 '$4 == 1 { n++; v[n] = $9 } END { exit !(n == 2 && v[1] > 0 && v[1] < 0.3 && v[1] != v[2] && (v[1] - v[2]) ^ 2 < 0.03 ^ 2) }' \
+    awk -F, -v last=1 '$4 == 1 { n++; v[n] = $9 }
+        END { exit !(n == 2 && v[1] > 0 && v[1] < 0.3 && v[1] != v[2] && (v[1] - v[2]) ^ 2 < 0.03 ^ 2) }' \
         "$T/e/results.csv" || fail "$(cat "$T/e/results.csv")"
     cp "$one/photo_1.jpg" "$T/first.jpg"
     photo "$one/photo_1.jpg" 200 150

@@ -1,7 +1,8 @@
 # Closed standard streams: no file that a program opens becomes the stream that its messages go to.
 . tests/cli/lib_infer.sh
 
-# Runs the command with the streams of $1 closed. Fails unless it ends with 1 where the results on standard output were lost, else with 0.
+# Runs the command with the streams of $1 closed. Fails unless it ends with 1 where the results on standard output were
+# lost, else with 0.
 closed() {
     way=$1
     shift
@@ -21,7 +22,9 @@ WAYS="0 1 2 01 02 12 012"
 same() {
     diff -rq -x results.jsonl "$1" "$2" >"$T/differs" || fail "without the streams $way: $(head -n 1 "$T/differs")"
     if [ -f "$1/results.jsonl" ]; then
-        ! grep -qv '^{"folder": ".*]}$' "$2/results.jsonl" || fail "without the streams $way: results.jsonl holds $(grep -v '^{"folder": ".*]}$' "$2/results.jsonl" | head -n 1)"
+        ! grep -qv '^{"folder": ".*]}$' "$2/results.jsonl" ||
+            fail "without the streams $way: results.jsonl holds $(grep -v '^{"folder": ".*]}$' "$2/results.jsonl" |
+            head -n 1)"
         lines "$2/results.jsonl" "$(wc -l <"$1/results.jsonl")"
     fi
 }

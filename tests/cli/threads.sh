@@ -4,9 +4,11 @@
 shim() { [ -e "$BUILD/lib/lgd-faults.so" ] || skip "lgd-faults.so is not built"
          case $(cat "$BUILD/gen/flags") in *-fsanitize=*) skip "the sanitizers are to be loaded first" ;; esac; }
 
-# started COMMAND...: prints how many threads lgd-infer starts for one photograph: one that decodes, and those that compute beside it.
+# started COMMAND...: prints how many threads lgd-infer starts for one photograph: one that decodes, and those that
+# compute beside it.
 started() {
-    LD_PRELOAD=$BUILD/lib/lgd-faults.so LGD_FAULT_COUNT=$T/counts expect 0 "$@" -q --size 32 --iterations 1 "$T/p.ppm" -o "$T/o"
+    LD_PRELOAD=$BUILD/lib/lgd-faults.so LGD_FAULT_COUNT=$T/counts expect 0 "$@" -q --size 32 --iterations 1 "$T/p.ppm" \
+        -o "$T/o"
     sed -n 's/^pthread_create //p' "$T/counts"
 }
 
@@ -45,7 +47,9 @@ refused() {
             infer --threads 3 "$T/p.ppm" -o "$T/$fault"
         [ "$(grep -c "lgd-infer: the system refuses threads (see ulimit -u): [12] of 3 compute" "$T/err")" -eq 1 ] ||
             fail "pthread_create $fault: $(cat "$T/err")"
-        for f in $FILES; do cmp -s "$T/1/p/$f" "$T/$fault/p/$f" || fail "$f differs where thread $fault is refused"; done
+        for f in $FILES; do
+            cmp -s "$T/1/p/$f" "$T/$fault/p/$f" || fail "$f differs where thread $fault is refused"
+        done
     done
 }
 check threads_that_are_refused refused

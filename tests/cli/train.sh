@@ -29,9 +29,12 @@ run_makes_its_files() {
     says "$T/out" "validation at step 10: render RMSE"
     says "$T/err" "step 10/10"
     lines "$T/run/log.csv" 11
-    for name in "first estimate, training" "last step, training" "first estimate, validation" "last step, validation" "</svg>"; do says "$T/run/curve.svg" "$name"; done
+    for name in "first estimate, training" "last step, training" "first estimate, validation" "last step, validation" \
+        "</svg>"; do says "$T/run/curve.svg" "$name"; done
     lines "$T/run/val.csv" 3
-    for f in best.safetensors last.safetensors checkpoint.safetensors config.ini; do [ -s "$T/run/$f" ] || fail "no $f"; done
+    for f in best.safetensors last.safetensors checkpoint.safetensors config.ini; do
+        [ -s "$T/run/$f" ] || fail "no $f"
+    done
     [ -z "$(find "$T/run" -name '.*')" ] || fail "temporary files are left"
     "$TRAIN" "$T/run/config.ini" --print-config | cmp -s - "$T/run/config.ini" || fail "config.ini does not read back"
     expect 0 train --resume
@@ -40,10 +43,12 @@ run_makes_its_files() {
     says "$T/err" "there is a run already"
 }
 
-# A small network of the published kind: its weights before training are a file, and it trains, its tenth channel included.
+# A small network of the published kind: its weights before training are a file, and it trains, its tenth channel
+# included.
 published_kind() {
     config
-    set -- --set model.channels=10 --set model.compat=published --set model.descent=none --set model.rmse=batch --set model.recurrent=no \
+    set -- --set model.channels=10 --set model.compat=published --set model.descent=none --set model.rmse=batch \
+        --set model.recurrent=no \
         --set train.pretrain_steps=0 --set train.steps=2
     expect 0 train "$@" --initial "$T/a.safetensors"
     [ ! -e "$T/run" ] || fail "a run was begun"
@@ -148,7 +153,8 @@ interrupt_saves_and_resume_is_exact() {
         rm -rf "$T/run"
         # A job in the background has SIGINT ignored; the program's handler is set all the same. One that began under
         # nohup has SIGHUP ignored, which the program keeps.
-        env --default-signal=HUP "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 "$@" --set train.checkpoint_every=1 >"$T/out" 2>"$T/err" &
+        env --default-signal=HUP "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 "$@" \
+            --set train.checkpoint_every=1 >"$T/out" 2>"$T/err" &
         job=$!
         await "$T/run/last.safetensors"
         kill -$signal $job
@@ -157,7 +163,8 @@ interrupt_saves_and_resume_is_exact() {
         [ $? -eq 130 ] || fail "SIG$signal: exit status is not 130: $(tail -n 1 "$T/err")"
         says "$T/err" "interrupted at step"
         expect 0 train "$@" --resume
-        cmp -s "$T/whole/checkpoint.safetensors" "$T/run/checkpoint.safetensors" || fail "SIG$signal: the checkpoint differs"
+        cmp -s "$T/whole/checkpoint.safetensors" "$T/run/checkpoint.safetensors" ||
+            fail "SIG$signal: the checkpoint differs"
         cmp -s "$T/whole/best.safetensors" "$T/run/best.safetensors" || fail "SIG$signal: the best weights differ"
         lines "$T/run/log.csv" 205
     done
@@ -174,17 +181,20 @@ hangup_is_ignored_under_nohup() {
     wait $job || fail "it was stopped: $(tail -n 1 "$T/err")"
 }
 
-# A run that was killed before its first checkpoint after step 1 goes on, and in a folder without a checkpoint one begins.
+# A run that was killed before its first checkpoint after step 1 goes on, and in a folder without a checkpoint one
+# begins.
 killed_before_a_checkpoint() {
     config
-    "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 --set train.steps=100000 --set train.checkpoint_every=100000 >"$T/out" 2>"$T/err" &
+    "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 --set train.steps=100000 \
+        --set train.checkpoint_every=100000 >"$T/out" 2>"$T/err" &
     job=$!
     await "$T/run/best.safetensors"
     kill -KILL $job
     wait $job 2>/dev/null
     [ ! -e "$T/run/last.safetensors" ] || fail "it was killed too late: the test is none"
     : >"$T/err"
-    "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 --set train.steps=100000 --set train.checkpoint_every=100000 --set train.log_every=1 --resume \
+    "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 --set train.steps=100000 \
+        --set train.checkpoint_every=100000 --set train.log_every=1 --resume \
         >"$T/out" 2>"$T/err" &
     job=$!
     await "$T/err"
@@ -198,7 +208,8 @@ killed_before_a_checkpoint() {
     expect 0 train --resume
     says "$T/err" "no checkpoint to resume from"
     lines "$T/run/log.csv" 11
-    cmp -s "$T/best" "$T/run/best-1.safetensors" && cmp -s "$T/log" "$T/run/log-1.csv" || fail "weights without a checkpoint are not kept"
+    cmp -s "$T/best" "$T/run/best-1.safetensors" && cmp -s "$T/log" "$T/run/log-1.csv" ||
+        fail "weights without a checkpoint are not kept"
     rm "$T/run/checkpoint.safetensors"
     expect 0 train
     says "$T/err" "best-2.safetensors"
@@ -243,25 +254,31 @@ init_from_weights() {
     says "$T/err" "$T/nothing.safetensors"
     expect 1 train --init "$T/small.ini"
     says "$T/err" "$T/small.ini"
-    # The second file gives what the first does not have: here g is the other's and h this one's, or the other way round.
+    # The second file gives what the first does not have: here g is the other's and h this one's, or the other way
+    # round.
     expect 0 train --set train.seed=5 --set model.h_width=0 --set train.steps=0 --initial "$T/g.safetensors"
     expect 0 train --init "$T/g.safetensors" --init "$T/first/last.safetensors" --initial "$T/both.safetensors"
     expect 0 train --init "$T/first/last.safetensors" --initial "$T/first.safetensors"
     expect 0 train --init "$T/g.safetensors" --initial "$T/drawn.safetensors"
-    for other in first drawn; do cmp -s "$T/both.safetensors" "$T/$other.safetensors" && fail "two files give what one gives ($other)"; done
-    expect 1 train --init "$T/first/last.safetensors" --init "$T/first/last.safetensors" --initial "$T/twice.safetensors"
+    for other in first drawn; do
+        cmp -s "$T/both.safetensors" "$T/$other.safetensors" && fail "two files give what one gives ($other)"
+    done
+    expect 1 train --init "$T/first/last.safetensors" --init "$T/first/last.safetensors" \
+        --initial "$T/twice.safetensors"
     says "$T/err" "$T/first/last.safetensors"
     expect 2 train --init "$T/a" --init "$T/b" --init "$T/c"
 }
 
 divergence_stops_with_a_reason() {
     config
-    expect 1 train --set train.rate=1e6 --set train.pretrain_rate=1e6 --set train.clip=0 --set train.warmup=0 --set train.steps=400 \
+    expect 1 train --set train.rate=1e6 --set train.pretrain_rate=1e6 --set train.clip=0 --set train.warmup=0 \
+        --set train.steps=400 \
         --set train.max_skipped=2
     says "$T/err" "is skipped"
     says "$T/err" "3 steps in a row"
     # What is on disk can be read: it is finite.
-    [ ! -e "$T/run/last.safetensors" ] || expect 0 "$TRAIN" "$T/small.ini" --set output.folder="$T/next" --set train.steps=0 \
+    [ ! -e "$T/run/last.safetensors" ] ||
+        expect 0 "$TRAIN" "$T/small.ini" --set output.folder="$T/next" --set train.steps=0 \
         --set train.pretrain_steps=1 --init "$T/run/last.safetensors"
 }
 

@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
-"""Writes tests/data/scikit_values.h: what scikit-image's transform.resize makes of small pictures, for tests/data/test_resize_scikit.c.
+"""Writes tests/data/scikit_values.h: what scikit-image's transform.resize makes of small pictures, for
+tests/data/test_resize_scikit.c.
 
-    python3 tests/data/make_scikit.py > tests/data/scikit_values.h        needs scikit-image (pip install scikit-image); 0.20 and 0.26 give the same
+    python3 tests/data/make_scikit.py > tests/data/scikit_values.h        needs scikit-image (pip install scikit-image);
+    0.20 and 0.26 give the same
 
-The pictures are a formula's, byte i of the picture being bits 24 to 31 of i * 2654435761 mod 2^32, so that the test can make them too."""
+The pictures are a formula's, byte i of the picture being bits 24 to 31 of i * 2654435761 mod 2^32, so that the test can
+make them too."""
 import numpy
 import skimage
 from skimage.transform import resize
@@ -22,9 +25,11 @@ def values(numbers):
 
 
 print(f"/* Made by tests/data/make_scikit.py with scikit-image {skimage.__version__}: do not edit. */")
-print("static const struct {\n    int from, to;\n} scikit_cases[] = {" + ", ".join(f"{{{a}, {b}}}" for a, b in CASES) + "};")
+print("static const struct {\n    int from, to;\n} scikit_cases[] = {" + 
+    ", ".join(f"{{{a}, {b}}}" for a, b in CASES) + "};")
 flat = numpy.concatenate([resize(picture(a), (b, b)).ravel() for a, b in CASES])
 print(f"/* [case][to][to][3] */\nstatic const float scikit_values[] = {{\n    {values(flat)}}};")
 print(f"/* Every {STEP}th value of {LARGE} x {LARGE} to {LARGE_TO} x {LARGE_TO}. */")
 print(f"enum {{ SCIKIT_LARGE = {LARGE}, SCIKIT_LARGE_TO = {LARGE_TO}, SCIKIT_STEP = {STEP} }};")
-print(f"static const float scikit_large[] = {{\n    {values(resize(picture(LARGE), (LARGE_TO, LARGE_TO)).ravel()[::STEP])}}};")
+print(f"static const float scikit_large[] = {{\n"
+    f"    {values(resize(picture(LARGE), (LARGE_TO, LARGE_TO)).ravel()[::STEP])}}};")

@@ -44,10 +44,13 @@ count = 2
 size = 16
 INI
 watched "the loader" 0 "$BUILD/bin/lgd-train" "$T/small.ini" --set output.folder="$T/run" --threads 2
-watched "photographs" 0 "$BUILD/bin/lgd-data" -o "$T/photos" --count 12 --size 32 --format strips --photographs --threads 1
+watched "photographs" 0 "$BUILD/bin/lgd-data" -o "$T/photos" --count 12 --size 32 --format strips --photographs \
+    --threads 1
 rm -f "$T"/photos/*.png
-watched "12 photographs" 0 "$BUILD/bin/lgd-infer" --size 32 --threads 4 -m "$T/run/last.safetensors" -o "$T/maps" "$T"/photos/*.jpg
+watched "12 photographs" 0 "$BUILD/bin/lgd-infer" --size 32 --threads 4 -m "$T/run/last.safetensors" \
+    -o "$T/maps" "$T"/photos/*.jpg
 echo damaged >"$T/photos/damaged.jpg"
-watched "12 photographs, one damaged, with pages" 1 "$BUILD/bin/lgd-infer" --size 32 --threads 4 --maps page,gltf -m "$T/run/last.safetensors" \
+watched "12 photographs, one damaged, with pages" 1 "$BUILD/bin/lgd-infer" --size 32 --threads 4 --maps page,gltf \
+    -m "$T/run/last.safetensors" \
     -o "$T/pages" "$T"/photos/*.jpg
 exit $bad
