@@ -1,5 +1,5 @@
 /* Parts whose inner values are computed again for the gradient. On the tape a part is one node that computes, whose
- * output is a token, followed by one for each result, which tells the first that a gradient has come. */
+ * output is a token, followed by one for each result, which lets the first see that a gradient has come. */
 #include "autograd/op.h"
 #include "autograd/tape_internal.h"
 #include <string.h>

@@ -59,7 +59,7 @@ static inline int64_t ag_chunk_at(const ag_chunks *a, int64_t t)
     return (t / a->parts * a->pixels + t % a->parts * a->chunk) * a->c;
 }
 
-/* Whether a program watches (autograd/trace.h); and what it is told of the convolution that runs. */
+/* Whether a program watches (autograd/trace.h); and what it gets to know of the convolution that runs. */
 bool ag_traced(void);
 void ag_trace_way(ag_tape *tape, const char *way);
 

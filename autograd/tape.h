@@ -104,8 +104,8 @@ float *ag_grad_add(ag_tape *tape, ag_value *v);
 ts_code ag_backward(ag_tape *tape, ag_value *loss);
 
 /* Called by ag_backward after each operation that it has gone through: grad[0 .. count - 1], as ag_parameter was given
- * them, are complete, nothing that is left of the tape adds to them. Every gradient of ag_parameter is told of once in
- * an ag_backward; count may be 0. For what is put on the tape from then on; NULL: nobody is told. */
+ * them, are complete, nothing that is left of the tape adds to them. Every gradient of ag_parameter is reported once in
+ * an ag_backward; count may be 0. For what is put on the tape from then on; NULL: none is reported. */
 typedef void (*ag_walked)(float *const *grad, int count, void *user);
 void ag_watch(ag_tape *tape, ag_walked walked, void *user);
 

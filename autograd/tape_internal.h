@@ -26,7 +26,7 @@ struct ag_tape {
         float **grad;  /* of the parameters on the tape, in the order in which they first came */
         size_t *place; /* of each: every node that uses it has this number or a later one */
         int count, capacity;
-        int left;  /* in ag_backward: of which nobody has been told */
+        int left;  /* in ag_backward: that are not reported yet */
         bool part; /* the body of a part runs for its results, in backward again for the gradient */
         bool walking;
     } watch;

@@ -11,7 +11,7 @@ enum { CL_OK = 0, CL_FAILED = 1, CL_USAGE = 2, CL_INTERRUPTED = 130 };
 
 /* The first call of every main: opens /dev/null as those of the descriptors 0 to 2 that are closed, so that no file
  * that is opened later becomes the standard stream that messages go to. It is opened the wrong way round: what reads or
- * writes such a stream is told that it is closed. Ends the program where there is no /dev/null. */
+ * writes such a stream gets an error. Ends the program where there is no /dev/null. */
 void cl_open_streams(void);
 
 /* Locale "C" for numbers, SIGPIPE as an error of write, LGD_ISA checked. Returns CL_OK or prints one line and returns

@@ -104,7 +104,7 @@ typedef struct labels {
 enum { LABEL_HEIGHT = 11, LABEL_ADVANCE = 6 }; /* of 10 pixel letters */
 
 /* Beside the point, above or below, right or left of it, where no other label is; nowhere if there is no such place:
- * the point still tells when one points at it. */
+ * the point still shows it under the pointer. */
 static void put_label(FILE *f, labels *all, double x, double y, const char *text)
 {
     const double width = LABEL_ADVANCE * (double)strlen(text);

@@ -25,7 +25,7 @@ typedef struct io_camera {
     float ambient;               /* largest other light, as a share of the flash's at the centre of a matt sample */
     float tone;                  /* largest strength of the tone curve; half of the photographs roll off highlights */
     float sharpen;               /* largest amount of the unsharp mask */
-    float told_view, told_power; /* share of the photographs whose field of view or power a model is told */
+    float told_view, told_power; /* share of the photographs whose field of view or power a model is given */
 } io_camera;
 
 /* Where camera and light stand, in patch widths, and the light's power. */
@@ -57,7 +57,7 @@ io_disk io_camera_flash(const io_camera *c, uint64_t seed, uint64_t index, float
 /* The tone curve and the shoulder that io_camera_apply puts in. */
 io_tone io_camera_tone(const io_camera *c, uint64_t seed, uint64_t index);
 
-/* Whether a model is told this photograph's field of view, and its power. */
+/* Whether a model is given this photograph's field of view, and its power. */
 void io_camera_told(const io_camera *c, uint64_t seed, uint64_t index, bool *view, bool *power);
 
 /* The factor of the light that the exposure stands for, which io_camera_apply multiplies in: for a loss that is to know

@@ -1,5 +1,5 @@
-/* What is left wrong with photographs of a printed sheet when its tags and its paper have told their windows, cameras
- * and exposures (data/rectify/sheet_set.h). Each is drawn from (seed, index) alone; one that is 0 changes no byte. */
+/* What is left wrong with photographs of a printed sheet once their windows, cameras and exposures are known
+ * (data/rectify/sheet_set.h). Each is drawn from (seed, index) alone; one that is 0 changes no byte. */
 #ifndef IO_UNDER_SHEET_H
 #define IO_UNDER_SHEET_H
 #include "data/camera.h"

@@ -1,4 +1,4 @@
-/* What a launcher of MPI programs tells its processes. */
+/* Rank and number of processes, from the environment that a launcher of MPI programs sets. */
 #ifndef EV_LAUNCHER_H
 #define EV_LAUNCHER_H
 #include <stdbool.h>

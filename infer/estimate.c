@@ -246,7 +246,7 @@ static ts_code fit_power(const lgd_estimator *e, given_photos *p, const lgd_opti
     return code;
 }
 
-/* What of the views is true. A flash is beside the lens, nobody tells where. */
+/* What of the views is true. A flash is beside the lens, at a place that is not known. */
 static int known(const lgd_options *o)
 {
     return (o->power ? 0 : NN_KNOWN_POWER) |

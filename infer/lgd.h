@@ -37,8 +37,8 @@ LGD_API lgd_model *lgd_load(const char *weights, lgd_error *error);
 LGD_API void lgd_free(lgd_model **model);
 
 LGD_API int lgd_trained_iterations(const lgd_model *model); /* the number of steps T that the model was trained for */
-LGD_API int lgd_most_photos(
-    const lgd_model *model); /* photographs that it reads at once: 1, or those of a multi-image model */
+/* Photographs that it reads at once: 1, or those of a multi-image model. */
+LGD_API int lgd_most_photos(const lgd_model *model);
 LGD_API int lgd_published(const lgd_model *model); /* nonzero: the published network's weights (docs/published.md) */
 
 /* The file of the weights that a program reads with --model name: a file, or the name of a model that ships with lgd;

@@ -13,12 +13,13 @@ typedef struct lgd_tiles {
     const unsigned char *mask;  /* [side][side] or NULL: tiles without a nonzero pixel keep what the coarse steps left
                                    (R_0), and of the others only the area that holds such is sure to be refined */
     int side, tile, steps;      /* tile: pixels of a tile's side */
-    int orientations;           /* as in nn_input, */
-    const float
-        *deviation;  /* NN_DESCENT_POSTERIOR: of r0's errors, [side][side][NN_SPREADS] of nn_arch_side; else NULL */
-    const float *r0; /* and this too */
-    double
-        tolerance; /* a tile ends at R_t when the RMS of R_t - R_{t-1} over it and what it reads is below; 0: never */
+    int orientations;           /* as in nn_input */
+    const float *r0;            /* as in nn_input */
+    /* NN_DESCENT_POSTERIOR: the standard deviations of R_0's errors, [side][side][NN_SPREADS] of nn_arch_side; else
+     * NULL. */
+    const float *deviation;
+    /* A tile ends at R_t when the RMS of R_t - R_{t-1} over it and what it reads is below; 0: never. */
+    double tolerance;
     /* Called before each of several tiles with the part that is done; nonzero: TS_INTERRUPTED. May be NULL. */
     int (*before)(double done, void *user);
     /* Called after R_0 and every step; false: stop there. May be NULL. rmse: R_t's, NAN where it is not measured. maps:

@@ -27,9 +27,9 @@ typedef struct nn_cell {
 
 /* The network of a step. */
 typedef struct nn_refiner {
-    int width, gru; /* width 0: no network, only path */
+    int width, gru; /* width 0: no network, only descent */
     nn_cell cell[2];
-    nn_layer output, path; /* path: of arch.descent, weight -1 where there is none */
+    nn_layer output, descent; /* descent: of arch.descent, weight -1 where there is none */
 } nn_refiner;
 
 typedef struct nn_layers {
@@ -45,14 +45,15 @@ typedef struct nn_layers {
     double *start; /* per parameter: standard deviation of the first values, 0 for zeros, or one of these: */
 } nn_layers;
 #define NN_ORTHOGONAL (-1.0)
-#define NN_NEWTON_DAMPING \
-    0.1f /* 0.03 to 0.3 are within some percent of each other, from one photograph and from five */
-#define NN_NEWTON_DAMPING_SPECULAR \
-    1.0f /* one photograph cannot separate F0 from albedo; with less, the detail of both goes into F0 */
-#define NN_NEWTON_START (-3.0) /* half the identity: the equations are linear only near the maps */
-#define NN_DESCENT_START                                                                                               \
-    (-2.0) /* -0.003 times the identity, shared by the photographs: six such steps lower the loss of a trained g's R_0 \
-            * without overshooting anywhere */
+/* 0.03 to 0.3 are within some percent of each other, from one photograph and from five. */
+#define NN_NEWTON_DAMPING 0.1f
+/* One photograph cannot separate F0 from albedo; with less, the detail of both goes into F0. */
+#define NN_NEWTON_DAMPING_SPECULAR 1.0f
+/* Half the identity: the equations are linear only near the maps. */
+#define NN_NEWTON_START (-3.0)
+/* -0.003 times the identity, shared by the photographs: six such steps lower the loss of a trained g's R_0 without
+ * overshooting anywhere. */
+#define NN_DESCENT_START (-2.0)
 
 /* Channels of g's level 0 .. g_levels. */
 int nn_level_width(const nn_arch *a, int level);
@@ -102,9 +103,9 @@ bool nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *phot
 ag_value *nn_change(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient,
                     ag_value *gru[2], ag_value *const to[2]);
 
-/* R_{t+1} from R_t and its encoded gradients. path: what arch.descent adds beside h, or NULL. length: of the step, 1
+/* R_{t+1} from R_t and its encoded gradients. descent: what arch.descent adds beside h, or NULL. length: of the step, 1
  * for the whole. into: NULL, or the value to write it into, which may be R_t's. */
-ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path,
+ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *descent,
                   ag_value *gradient, ag_value *gru[2], ag_value *const to[2], float length, ag_value *into);
 
 /* A model without parameters, a 3 x 3 convolution with bias that is added to it (gain: standard deviation of its output

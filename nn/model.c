@@ -164,7 +164,7 @@ static void plan_refiner(nn_model *m, const char *name, int width, int gru, nn_r
     nn_layers *l = m->layers;
     const double gain = leaky_gain(NN_LEAK_H);
     char full[64];
-    *h = (nn_refiner){.width = width, .gru = gru, .path = {-1, -1}};
+    *h = (nn_refiner){.width = width, .gru = gru, .descent = {-1, -1}};
     for (int i = 0; i < 2 && width > 0; i++) {
         nn_cell *c = &h->cell[i];
         const bool last = a->compat == NN_COMPAT_PUBLISHED; /* in the published order the convolution comes last */
@@ -188,8 +188,8 @@ static void plan_refiner(nn_model *m, const char *name, int width, int gru, nn_r
     if (a->descent == NN_DESCENT_NONE || a->descent == NN_DESCENT_POSTERIOR || !a->gradient) return;
     const bool newton = a->descent == NN_DESCENT_NEWTON;
     snprintf(full, sizeof full, "%s.%s", name, newton ? "newton" : "descent");
-    h->path = conv(m, full, a->channels, newton ? a->channels : a->images * a->channels, 1, false, 1);
-    l->start[h->path.weight] = newton ? NN_NEWTON_START : NN_DESCENT_START;
+    h->descent = conv(m, full, a->channels, newton ? a->channels : a->images * a->channels, 1, false, 1);
+    l->start[h->descent.weight] = newton ? NN_NEWTON_START : NN_DESCENT_START;
 }
 
 nn_model *nn_model_empty(ts_status *st)

@@ -46,7 +46,7 @@ typedef struct nn_arch {
     int g_kernel_first; /* of the first down block: odd */
     int g_kernel;       /* of all others */
     int g_unshuffle;    /* r: g reads photographs of r g_size pixels a side, squares of r x r pixels as channels of one,
-                         * and    writes R_0 at that size with what nn/detail.c adds; 1: R_0 has g_size pixels a side */
+                         * and writes R_0 at that size with what nn/detail.c adds; 1: R_0 has g_size pixels a side */
     int g_detail;       /* channels of what adds the detail, where g_unshuffle is above 1 */
     int g_trunk;        /* its residual blocks */
     bool conditions;    /* g reads what is known of each photograph's camera, light and exposure (nn_known) */

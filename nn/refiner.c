@@ -33,19 +33,19 @@ static ag_value *scaled(ag_tape *tape, ag_value *d, float length)
     return ag_scale(tape, d, length);
 }
 
-ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *path,
+ag_value *nn_step(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *descent,
                   ag_value *gradient, ag_value *gru[2], ag_value *const to[2], float length, ag_value *into)
 {
     ag_value *next = maps;
     if (h->width > 0) {
         ag_value *change = scaled(tape, nn_change(tape, model, h, maps, gradient, gru, to), length);
-        if (!path) ag_into(tape, into);
+        if (!descent) ag_into(tape, into);
         next = ag_add(tape, maps, change);
     }
-    if (!path) return next;
-    ag_value *past = scaled(tape, nn_conv(tape, model, h->path, path, 1, TS_PAD_ZERO, 1), length);
+    if (!descent) return next;
+    ag_value *moved = scaled(tape, nn_conv(tape, model, h->descent, descent, 1, TS_PAD_ZERO, 1), length);
     ag_into(tape, into);
-    return ag_add(tape, next, past);
+    return ag_add(tape, next, moved);
 }
 
 int nn_refiner_reach(const nn_model *model)

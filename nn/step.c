@@ -196,9 +196,9 @@ bool nn_descends(const nn_model *model, nn_descent how) { return model->arch.gra
 ag_value *nn_apply(ag_tape *tape, const nn_model *model, const nn_refiner *h, ag_value *maps, ag_value *gradient,
                    ag_value *newton, nn_state *state)
 {
-    ag_value *path = nn_descends(model, NN_DESCENT_GRADIENT) ? gradient : newton;
+    ag_value *descent = nn_descends(model, NN_DESCENT_GRADIENT) ? gradient : newton;
     state->step++;
-    return nn_step(tape, model, h, maps, path, gradient, state->gru, state->to, length(&model->arch, state->step),
+    return nn_step(tape, model, h, maps, descent, gradient, state->gru, state->to, length(&model->arch, state->step),
                    state->into);
 }
 

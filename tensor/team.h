@@ -6,7 +6,7 @@
  * Who works on which range is not known, so results must not depend on it. Loops inside of a loop's ranges are run by
  * the thread that meets them. Any number of threads may call at once. After a fork the child begins with no workers. A
  * worker that the system refuses is done without, since its ranges are for anybody: the loop is slower, not wrong; it
- * is asked for again a second later, and a program can be told. */
+ * is asked for again a second later, and a program can be notified. */
 #ifndef TS_TEAM_H
 #define TS_TEAM_H
 #include <stdbool.h>
@@ -29,7 +29,7 @@ void ts_share_tasks(int threads, int64_t count, int64_t piece, void (*run)(const
 bool ts_next(ts_queue *queue, int64_t *begin, int64_t *end);
 
 /* handler is called the first time that the system refuses a worker, by the thread that wanted it: it goes on with so
- * many threads in place of those that were wanted. NULL, as it begins: nobody is told. Set before the first loop. */
+ * many threads in place of those that were wanted. NULL, as it begins: no call. Set before the first loop. */
 void ts_team_refused(void (*handler)(int threads, int wanted));
 
 /* Calls run(job, k) with k = 0 .. n-1 on n threads, each once and all at the same time; the caller's k is 0. n is

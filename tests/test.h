@@ -28,6 +28,6 @@ const char *test_data(void);
 const char *test_fixtures(void);
 /* A fresh empty folder for this test, removed afterwards. */
 const char *test_folder(void);
-/* build/ as told by the environment (programs are in test_build()/bin). */
+/* build/, or as the environment has it (programs are in test_build()/bin). */
 const char *test_build(void);
 #endif

@@ -83,7 +83,7 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
     return TS_OK;
 }
 
-/* Names are UTF-8, but a terminal must not be told anything by them. */
+/* Names are UTF-8; what would control a terminal is not printed. */
 static void print_text(const char *s)
 {
     for (; *s; s++) putchar((unsigned char)*s < ' ' || *s == 127 ? '?' : *s);

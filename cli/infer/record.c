@@ -44,7 +44,7 @@ char *cl_recipe(const cl_command *c, const char *weights, ts_status *st)
     return io_text_end(&t, "the record", st) == TS_OK ? t.bytes : NULL;
 }
 
-/* What tells one way of making the files from another. */
+/* What makes one way of making the files differ from another. */
 static void put_key(FILE *f, const cl_item *item, const char *recipe)
 {
     fprintf(f, "photograph: %016" PRIx64 "\n%s", item->hash, recipe);
@@ -68,7 +68,7 @@ char *cl_record(const cl_command *c, const cl_item *item, const char *recipe)
     io_text t;
     if (io_text_begin(&t, "", NULL) != TS_OK) return NULL;
     FILE *f = t.f;
-    if (!*c->capture && !c->sheet) put_key(f, item, recipe); /* several files: no hash tells which */
+    if (!*c->capture && !c->sheet) put_key(f, item, recipe); /* several files: no one hash stands for them */
     fprintf(f, RESULT "\"hash\": \"%016" PRIx64 "\", \"steps\": %d, \"rmse_first\": ", item->hash, item->steps);
     io_put_json_number(f, item->first);
     fputs(", \"rmse\": ", f);

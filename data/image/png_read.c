@@ -91,7 +91,7 @@ static bool work(reading *r)
 {
     if (setjmp(png_jmpbuf(r->png))) return false;
     png_init_io(r->png, r->file);
-    png_set_user_limits(r->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX); /* ours are told below, in our words */
+    png_set_user_limits(r->png, PNG_UINT_31_MAX, PNG_UINT_31_MAX); /* ours are checked below */
     png_read_info(r->png, r->info);
     oi_image *image = r->image;
     r->bits = png_get_bit_depth(r->png, r->info);

@@ -13,7 +13,7 @@
 enum {
     IO_FAULT_MISSING = 1, /* not all tags are seen */
     IO_FAULT_BLURRED = 2,
-    IO_FAULT_BURNT = 4, /* the window; of burnt-out paper st tells */
+    IO_FAULT_BURNT = 4, /* the window; st says when it is the paper */
     IO_FAULT_BENT = 8,
     IO_FAULT_STEEP = 16
 };

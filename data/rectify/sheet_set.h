@@ -20,7 +20,7 @@ typedef struct io_sheet_photo {
 typedef struct io_sheet_set {
     io_sheet_photo *photo; /* owned, in the order of the names */
     int photos, good;      /* good: those with st TS_OK */
-    bool sure;             /* a focal length is known from EXIF or told */
+    bool sure;             /* a focal length is known from EXIF or given */
     double aside[2];       /* of the flash beside the lens, right and down, in the window's sides */
 } io_sheet_set;
 

@@ -103,11 +103,11 @@ static const ev_setting joint[] = {
         .help =                                                                                                     \
             "of the light: given = the default, auto = as lgd-infer --light-power auto, known = that of --exposure" \
     }
-#define VIEW                                                                                                          \
-    {                                                                                                                 \
-        .key = "view", .type = EV_WORD, .words = "set told unknown", .initial = "set",                                \
-        .help = "of the camera: set = its place as the set tells it (with power=auto taken for a guess), told = its " \
-                "field of view alone, as lgd-infer --fov, unknown = nothing"                                          \
+#define VIEW                                                                                                        \
+    {                                                                                                               \
+        .key = "view", .type = EV_WORD, .words = "set told unknown", .initial = "set",                              \
+        .help = "of the camera: set = its place as the set has it (with power=auto taken for a guess), told = its " \
+                "field of view alone, as lgd-infer --fov, unknown = nothing"                                        \
     }
 #define PRECISION                                                                   \
     {                                                                               \

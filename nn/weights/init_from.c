@@ -15,8 +15,8 @@ static bool with_more_photographs(const nn_model *model, int index, nn_file *f)
     const bool refiner = (l->h.width > 0 && index == l->h.cell[0].conv.weight) ||
         (l->coarse.width > 0 && index == l->coarse.cell[0].conv.weight);
     const bool descends = model->arch.descent == NN_DESCENT_GRADIENT &&
-        ((nn_arch_refines_full(&model->arch) && index == l->h.path.weight) ||
-         (model->arch.coarse_steps > 0 && index == l->coarse.path.weight));
+        ((nn_arch_refines_full(&model->arch) && index == l->h.descent.weight) ||
+         (model->arch.coarse_steps > 0 && index == l->coarse.descent.weight));
     const int first = refiner ? model->arch.channels : 0,
               each = (in - first) / images; /* h reads the maps, then the gradients */
     if (images == 1 || !(refiner || index == l->input_conv.weight || index == l->input_global.weight || descends))

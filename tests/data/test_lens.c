@@ -1,4 +1,4 @@
-/* The field of view that a photograph's file tells. */
+/* The field of view from a photograph's file. */
 #include "data/image/common_read.h"
 #include "data/image/image.h"
 #include "tests/support/make_images.h"

@@ -1,4 +1,4 @@
-/* Captures as lgd-eval compares them, and what a set of map folders is told. */
+/* Captures as lgd-eval compares them, and the conventions of a set of map folders. */
 #include "data/file.h"
 #include "data/materials/procedural.h"
 #include "eval/multiview.h"
@@ -222,7 +222,7 @@ TEST(eval_set_ini)
               "%zu: %s", i, st.message);
 }
 
-/* The same files under both of everything: what is told decides, and untold ambiguity is refused. */
+/* The same files under both of everything: what is given decides, and what stays ambiguous is refused. */
 TEST(eval_maps_as_told)
 {
     ts_status st = {0};

@@ -243,6 +243,6 @@ TEST(eval_the_nearest_picture_comes_first)
     }
     const ev_case untold = ev_case_of_capture(&c, c.image, 1, false, false);
     const rd_view flash = rd_flash();
-    CHECK(memcmp(&untold.view, &flash, sizeof flash) == 0, "the method is told a camera");
+    CHECK(memcmp(&untold.view, &flash, sizeof flash) == 0, "the method is given a camera");
     io_capture_free(&c);
 }

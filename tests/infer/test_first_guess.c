@@ -142,7 +142,7 @@ TEST(first_guess_keeps_what_is_known)
     nn_model_free(&m);
 }
 
-/* The field of view and the power are told or guessed each by itself. */
+/* The field of view and the power are given or guessed each by itself. */
 TEST(first_guess_is_told_view_and_power_apart)
 {
     nn_model *m = network();

@@ -285,7 +285,7 @@ TEST(infer_options_of_another_size)
     lgd_free(&m);
 }
 
-/* A field of view is a height of camera and light, at which the sample is as bright; what was taken is told. */
+/* A field of view is a height of camera and light, at which the sample is as bright; what was taken is reported. */
 TEST(infer_field_of_view)
 {
     static float image[SIDE * SIDE * 3], told[VALUES], placed[VALUES], usual[VALUES];

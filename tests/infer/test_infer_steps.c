@@ -1,4 +1,4 @@
-/* How many steps lgd_estimate makes, and what it tells of them. */
+/* How many steps lgd_estimate makes, and what it reports of them. */
 #include "tests/support/inference.h"
 
 /* The automatic number of steps ends at the first that does not pay, and gives the maps of the one before. */

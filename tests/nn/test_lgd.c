@@ -85,7 +85,7 @@ typedef struct seen {
 static bool watch(int step, const ag_value *maps, void *user)
 {
     seen *s = user;
-    CHECK(step == s->count, "step %d is told as number %d", step, s->count);
+    CHECK(step == s->count, "step %d is reported as number %d", step, s->count);
     s->first[s->count++] = maps->t.data[5];
     return step < s->stop;
 }
@@ -102,7 +102,7 @@ TEST(nn_after_sees_every_step_and_can_stop)
         seen s = {0, 3, {0}};
         CHECK(!nn_lgd(t, m, &in, 6, true, maps, &(nn_watch){watch, &s, false}), "%s", ag_status(t)->message);
         CHECK(s.count == 4, "%d calls, not 4", s.count);
-        for (int i = 0; i < 4; i++) CHECK(s.first[i] == maps[i]->t.data[5], "step %d was told other maps", i);
+        for (int i = 0; i < 4; i++) CHECK(s.first[i] == maps[i]->t.data[5], "step %d was reported with other maps", i);
         for (int i = 4; i <= 6; i++) CHECK(maps[i] == maps[3], "R_%d after the stop is not R_3", i);
         ag_reset(t);
         s = (seen){0, 0, {0}};

@@ -73,7 +73,7 @@ static void pixel(ts_rng *rng, int count, worst *w)
     w->pixels[region]++;
     w->step[region] = fmax(w->step[region], error);
     /* What is missing of the fall of the quadratic that the step minimises; its minimum is known where nothing is
-     * clamped. Falls that are rounding are not told. */
+     * clamped. Falls that are rounding are not counted. */
     if (inside && best > 1e-6) w->loss[region] = fmax(w->loss[region], 1 - reached / best);
 }
 

@@ -85,7 +85,7 @@ static void provoke(ag_tape *tape, const nn_model *model, int tries, float *imag
             for (int x = x0; x < x1; x++)
                 for (int c = 0; c < 3; c++) image[(y * size + x) * 3 + c] = (float)(colour >> c & 1);
         w->steps = 12;
-        if (!run(tape, model, image, w)) break; /* found: the run that follows tells */
+        if (!run(tape, model, image, w)) break; /* found: the run that follows reports it */
         if (w->largest > most) most = w->largest;
         else memcpy(image, best, bytes);
     }

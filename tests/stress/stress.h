@@ -19,6 +19,6 @@ bool stress_sums(const stress *s);
 bool stress_threads(const stress *s);
 bool stress_sheets(const stress *s);
 
-/* Prints a row; returns whether measured <= bound (NaN is not). bound INFINITY: told, and only has to be finite. */
+/* Prints a row; returns whether measured <= bound (NaN is not). bound INFINITY: printed, and only has to be finite. */
 bool stress_row(const char *what, double measured, double bound);
 #endif
