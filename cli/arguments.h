@@ -2,6 +2,7 @@
 #ifndef CL_ARGUMENTS_H
 #define CL_ARGUMENTS_H
 #include "tensor/status.h"
+#include <getopt.h>
 #include <stdio.h>
 
 typedef struct cl_argument {
@@ -17,6 +18,9 @@ enum { CL_ARGUMENT_END = -1, CL_ARGUMENT_BAD = -2 };
  * argv[argc-1] (GNU order: options may stand behind operands, "--" ends them). CL_ARGUMENT_BAD with st for what the
  * table does not have. */
 int cl_argument_next(int argc, char **argv, const cl_argument *table, const char **value, int *operands, ts_status *st);
+
+/* getopt_long, but that a fault is CL_ARGUMENT_BAD with st. shorts begins with ":". */
+int cl_option_next(int argc, char **argv, const char *shorts, const struct option *longs, ts_status *st);
 
 /* The word behind that value, for an option that has two; NULL when there is none. */
 const char *cl_argument_second(int argc, char **argv);

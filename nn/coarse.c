@@ -151,7 +151,7 @@ static bool step_and_forget(ag_tape *tape, const nn_model *model, nn_coarse *c)
 }
 
 /* The photographs that the steps read, resampled when they are large. */
-static bool reduce(ag_tape *tape, const nn_model *model, nn_coarse *c)
+static bool limit_size(ag_tape *tape, const nn_model *model, nn_coarse *c)
 {
     const int64_t most = (int64_t)model->arch.coarse_size * NN_COARSE_READS;
     if (c->side <= most) return true;
@@ -167,7 +167,7 @@ bool nn_coarse_step(ag_tape *tape, const nn_model *model, nn_coarse *c)
     if (!c->maps) return false;
     const ts_shape s = c->maps->t.shape;
     if (!c->up.weight) {
-        if (!reduce(tape, model, c)) return false;
+        if (!limit_size(tape, model, c)) return false;
         const int side = c->in.grid.side;
         c->up = ts_taps_smooth(ag_arena(tape), s.h, side);
         c->down = ts_taps_triangle(ag_arena(tape), side, s.h);

@@ -53,7 +53,7 @@ bool nn_resized(ag_tape *tape, const ts_tensor *photographs, int size, ts_tensor
 }
 
 /* The whole photographs, linear, resampled to g_size: small. False after an error. */
-static bool reduce(ag_tape *tape, const nn_model *model, const nn_input *in, nn_input *small)
+static bool resample_for_g(ag_tape *tape, const nn_model *model, const nn_input *in, nn_input *small)
 {
     if (!nn_input_check(tape, model, in)) return false;
     const ts_tensor *whole = in->whole.data ? &in->whole : &in->image;
@@ -81,8 +81,8 @@ bool nn_orients(const nn_model *model, const nn_input *in)
         central(view.light);
 }
 
-/* g of reduced photographs. */
-static bool propose(ag_tape *tape, const nn_model *model, const nn_input *small, nn_guess *guess)
+/* g of photographs of its size. */
+static bool run_g(ag_tape *tape, const nn_model *model, const nn_input *small, nn_guess *guess)
 {
     const ts_shape s = small->image.shape;
     const int images = model->arch.images, count = nn_given(small);
@@ -107,7 +107,7 @@ static bool propose(ag_tape *tape, const nn_model *model, const nn_input *small,
 bool nn_guess_from(ag_tape *tape, const nn_model *model, const nn_input *in, nn_guess *guess)
 {
     nn_input small;
-    return reduce(tape, model, in, &small) && propose(tape, model, &small, guess);
+    return resample_for_g(tape, model, in, &small) && run_g(tape, model, &small, guess);
 }
 
 bool nn_coarse_begin(ag_tape *tape, const nn_model *model, const nn_input *in, nn_coarse *c)

@@ -5,9 +5,8 @@
 #include "render/scene.h"
 
 /* M11 of docs/math.md: the mean over images, pixels, rgb and views of |log(a + 0.01) - log(b + 0.01)|, a and b the
- * renderings of maps and target
- * ([N, S, S, 9], whole patches). views: N * views_per_image, image-major, copied. Value and gradient are made in one
- * pass. */
+ * renderings of maps and target ([N, S, S, 9], whole patches). views: N * views_per_image, image-major, copied. Value
+ * and gradient are made in one pass. */
 ag_value *ag_render_loss(ag_tape *tape, ag_value *maps, ag_value *target, const rd_view *views, int views_per_image);
 
 /* The mean over the photographs of the RMSE (all pixels, rgb) between photograph and rendering under view, clamped to

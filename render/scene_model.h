@@ -57,8 +57,7 @@ typedef struct rd_scene_how {
  * variance model^2 + noise min(value, 1) of the rendering's value: with the photograph's, what is darker by chance
  * would weigh more. With the prior's mean m and its deviations in the diagonal matrix Q a step goes to t = m + Q z, (I
  * + Q A Q) z = Q (b + A (t_before - m)), at most RD_SCENE_STRIDE in any number. The ambient light is not let below 0,
- * nor the tone curve's strength out of
- * +-RD_SCENE_TONE_MOST.
+ * nor the tone curve's strength out of +-RD_SCENE_TONE_MOST.
  * In the first half of the steps, values of the photograph that are burnt out tell nothing; from then on they tell that
  * the rendering is no darker. Where much is burnt out and the maps are uncertain, exposure and tone curve lean to what
  * by chance is not. The maps are the mean of what the material may be: of maps that were fitted to this photograph the

@@ -1,8 +1,8 @@
 /* lgd-train: trains g and h as a configuration says. */
+#include "cli/arguments.h"
 #include "cli/cli.h"
 #include "tensor/threads.h"
 #include "train/trainer.h"
-#include <getopt.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -191,7 +191,7 @@ int main(int argc, char **argv)
     if (code == CL_OK && !set) code = cl_failed("out of memory");
     if (code != CL_OK) goto end;
     cl_trace();
-    while ((option = getopt_long(argc, argv, "", options, NULL)) != -1) {
+    while ((option = cl_option_next(argc, argv, ":", options, &st)) != CL_ARGUMENT_END) {
         int64_t threads;
         switch (option) {
         case SET: set[sets++] = optarg; break;
@@ -225,7 +225,7 @@ int main(int argc, char **argv)
             cl_print_version();
             code = cl_finish(CL_OK);
             goto end;
-        default: code = cl_usage("the option cannot be understood"); goto end;
+        default: code = cl_usage("%s", st.message); goto end;
         }
     }
     const int files = argc - optind;

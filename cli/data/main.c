@@ -1,6 +1,7 @@
 /* lgd-data: procedural materials as map folders, strips, photographs or a contact sheet, and how they compare with
  * others' materials. */
 #include "cli/camera.h"
+#include "cli/arguments.h"
 #include "cli/cli.h"
 #include "cli/data/histograms.h"
 #include "cli/data/pictures.h"
@@ -11,7 +12,6 @@
 #include "tensor/team.h"
 #include "tensor/threads.h"
 #include <errno.h>
-#include <getopt.h>
 #include <math.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -154,8 +154,8 @@ static int parse_options(int argc, char **argv, options *o)
     for (int i = 0; i < CL_CAMERA_OPTIONS; i++)
         long_options[i] = (struct option){cl_camera_options[i].name, required_argument, NULL, OPT_CAMERA + i};
     memcpy(long_options + CL_CAMERA_OPTIONS, plain_options, sizeof plain_options);
-    opterr = 0;
-    while (code == CL_OK && (c = getopt_long(argc, argv, ":o:", long_options, NULL)) != -1) switch (c) {
+    ts_status st;
+    while (code == CL_OK && (c = cl_option_next(argc, argv, ":o:", long_options, &st)) != CL_ARGUMENT_END) switch (c) {
         case 'o': o->output = optarg; break;
         case OPT_SEED: code = parse_number("seed", optarg, 0, INT64_MAX, &seed); break;
         case OPT_FIRST: code = parse_number("first", optarg, 0, INT64_C(1) << 60, &o->first); break;
@@ -183,12 +183,11 @@ static int parse_options(int argc, char **argv, options *o)
         case OPT_THREADS: code = parse_number("threads", optarg, 1, 1024, &o->threads); break;
         case OPT_HELP: print_help(); exit(cl_finish(CL_OK));
         case OPT_VERSION: cl_print_version(); exit(cl_finish(CL_OK));
-        case ':': code = cl_usage("%s needs a value", argv[optind - 1]); break;
-        default:
-            if (c >= OPT_CAMERA) {
-                const cl_camera_option *k = &cl_camera_options[c - OPT_CAMERA];
-                code = parse_share(k->name, optarg, k->most, cl_camera_value(&o->camera, c - OPT_CAMERA));
-            } else code = cl_usage("no option is called '%s'", argv[optind - 1]);
+        case CL_ARGUMENT_BAD: code = cl_usage("%s", st.message); break;
+        default: { /* of the camera's */
+            const cl_camera_option *k = &cl_camera_options[c - OPT_CAMERA];
+            code = parse_share(k->name, optarg, k->most, cl_camera_value(&o->camera, c - OPT_CAMERA));
+        }
         }
     if (code) return code;
     if (optind < argc) return cl_usage("'%s' is not an option", argv[optind]);

@@ -1,5 +1,5 @@
-/* The largest centred square of a photograph: of one of 12 million pixels as floats, which took three times as long as
- * all else, only as many rows are made at a time as the filter reads. */
+/* The largest centred square of a photograph, resampled. As floats there are only as many rows at a time as the filter
+ * reads: all of 12 million pixels take three times as long as the rest of the work. */
 #include "data/image/image.h"
 #include "data/image/photo_rows.h"
 #include "tensor/resample.h"

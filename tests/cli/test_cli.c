@@ -1,4 +1,5 @@
 /* What the programs share. */
+#include "cli/arguments.h"
 #include "cli/camera.h"
 #include "cli/cli.h"
 #include "tests/test.h"
@@ -107,4 +108,32 @@ TEST(phone_of_the_evaluation_is_that_of_the_training)
     CHECK(phone.jpeg == trained.jpeg && phone.quantise == trained.quantise, "JPEG %d, 8 bits %d; was %d, %d",
           phone.jpeg, phone.quantise, trained.jpeg, trained.quantise);
     CHECK(phone.told_view == 0 && phone.told_power == 0, "it says what a model is given");
+}
+
+/* One word of each kind that is wrong, with what is said of it. */
+TEST(options_each_fault_has_its_message)
+{
+    static const cl_argument table[] = {
+        {'s', "size", "N", ""},   {256, "seamless", NULL, ""}, {257, "seed", "N", ""},     {258, "maps", "LIST", ""},
+        {259, "exact", NULL, ""}, {'q', "quiet", NULL, ""},    {260, "exactly", NULL, ""}, {0, NULL, NULL, NULL}};
+    static const char *const cases[][2] = {{"--nonsense", "there is no option --nonsense"},
+                                           {"--nonsense=3", "there is no option --nonsense"},
+                                           {"--se", "--se may be --seamless or --seed: write it out"},
+                                           {"--exact=1", "option --exact takes no value"},
+                                           {"--qui=1", "option --quiet takes no value"},
+                                           {"--maps", "option --maps needs a value"},
+                                           {"-s", "option -s needs a value"},
+                                           {"-x", "there is no option -x"},
+                                           {"-qx", "there is no option -x"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        char word[32], program[] = "lgd", *argv[] = {program, word, NULL};
+        const char *value;
+        int operands, key;
+        ts_status st;
+        snprintf(word, sizeof word, "%s", cases[i][0]);
+        optind = 0; /* getopt begins anew */
+        while ((key = cl_argument_next(2, argv, table, &value, &operands, &st)) == 'q') continue;
+        CHECK(key == CL_ARGUMENT_BAD && !strcmp(st.message, cases[i][1]), "%s: %d, '%s'", word, key, st.message);
+    }
+    optind = 0;
 }

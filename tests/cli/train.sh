@@ -84,6 +84,7 @@ options_and_usage() {
     expect 2 "$TRAIN"
     expect 2 "$TRAIN" a.ini b.ini
     expect 2 "$TRAIN" --nonsense
+    says "$T/err" "lgd-train: there is no option --nonsense"
     expect 2 train --threads 0
     expect 2 train --threads two
     expect 2 train --resume --init x.safetensors
