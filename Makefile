@@ -52,7 +52,8 @@ else
 Q := @
 step = @printf '  %-5s %s\n' '$(1)' '$(2)'
 endif
-ifeq (,$(filter -j% --jobserver%,$(MAKEFLAGS)))
+# Below another make the jobs are its own.
+ifeq (0,$(MAKELEVEL)$(filter -j% --jobserver%,$(MAKEFLAGS)))
 MAKEFLAGS += -j$(shell nproc 2>/dev/null || echo 2)
 endif
 
@@ -136,8 +137,10 @@ WRAP := -Wl,--wrap=io_loader_next -Wl,--wrap=tr_photographs
 
 all: needs
 	@$(MAKE) --no-print-directory programs
+	@echo "The programs are in $(BUILD)/bin: $(BUILD)/bin/lgd-infer PHOTO.jpg -o DIR"
 
 programs: $(BIN) library $(MPI_LIBS) $(MPI_LINKS)
+	@:
 
 library: $(LIB) $(SHARED) $(IMAGE_LIB)
 

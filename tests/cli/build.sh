@@ -121,6 +121,8 @@ check deps_ask_on_a_terminal deps_ask_on_a_terminal
 make_says_what_it_does() {
     expect 0 make --no-print-directory help
     for target in demo test install YES=1 V=1; do says "$T/out" "$target"; done
+    expect 0 env -u MAKEFLAGS -u MAKELEVEL make -n --no-print-directory # two makes, one below the other
+    if grep -q "warning" "$T/err"; then fail "make warns: $(cat "$T/err")"; fi
     # Two objects of this tree in a folder of their own: a line each, the commands with V=1.
     expect 0 make --no-print-directory -j1 BUILD="$T/b" "$T/b/obj/tensor/status.o" "$T/b/obj/data/folders.o"
     says "$T/out" "  CC    tensor/status.c"
