@@ -1,3 +1,4 @@
+/* The batches of a training configuration as bytes, for bench/curve_torch.py. */
 #ifndef BENCH_BATCHES_H
 #define BENCH_BATCHES_H
 #include "tensor/status.h"

@@ -1,3 +1,4 @@
+/* LGD_TRACE=1: a line for each operation of the tapes, on standard error. */
 #include "autograd/trace.h"
 #include "cli/cli.h"
 #include <stdio.h>

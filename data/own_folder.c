@@ -1,3 +1,4 @@
+/* The folder of this program, or of the shared library that this is part of. */
 #include "data/folders.h"
 #include <dlfcn.h>
 #include <limits.h>

@@ -1,3 +1,4 @@
+/* JPEG files of linear images (data/image/jpeg_write.c encodes them). */
 #include "data/file.h"
 #include "data/image/image.h"
 #include "data/image/oiio.h"

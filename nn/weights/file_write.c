@@ -1,3 +1,4 @@
+/* A model's or any other tensors to a file of either form; it has its name when it is complete. */
 #include "nn/weights/file_internal.h"
 #include <stdlib.h>
 #include <string.h>

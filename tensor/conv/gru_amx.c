@@ -1,3 +1,4 @@
+/* The products of the gated unit on the matrix unit, in bf16. */
 #include "tensor/conv/gru_internal.h"
 #include "tensor/kernels/amx_conv.h"
 #include "tensor/kernels/pairs.h"

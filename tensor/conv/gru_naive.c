@@ -1,3 +1,4 @@
+/* The naive twin of the gated unit: one value at a time, in double. */
 #include "tensor/conv/gru.h"
 #include <math.h>
 
