@@ -1,4 +1,4 @@
-/* JPEG files of linear images (data/image/jpeg_write.c encodes them). */
+/* JPEG files of linear images. */
 #include "data/file.h"
 #include "data/image/image.h"
 #include "data/image/oiio.h"
