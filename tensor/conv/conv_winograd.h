@@ -1,4 +1,4 @@
-/* Internal to tensor/conv_winograd*.c: which pixels the tiles of F(4 x 4, 3 x 3) read and make. */
+/* Internal to tensor/conv/conv_winograd*.c: which pixels the tiles of F(4 x 4, 3 x 3) read and make. */
 #ifndef TS_CONV_WINOGRAD_H
 #define TS_CONV_WINOGRAD_H
 #include "tensor/conv/plan.h"
