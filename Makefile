@@ -213,7 +213,8 @@ $(IMAGE_LIB): $(OBJ)/data/image/oiio.o $(OBJ)/tensor/status.o
 	$(Q)$(CXX) -shared -Wl,-Bsymbolic -o $@ $^ $(shell pkg-config --libs $(PKG_IMAGE)) $(SANITIZE) $(LDLIBS)
 
 # MPI, behind the table in train/mpi/mpi.h. Loaded when mpirun has started the program, never linked.
-$(MPI_LIBS): $(BUILD)/lib/lgd/liblgd_%.so: $(OBJ)/train/mpi/mpi.%.o $(OBJ)/train/mpi/rounded.o $(OBJ)/tensor/status.o
+$(MPI_LIBS): $(BUILD)/lib/lgd/liblgd_%.so: $(OBJ)/train/mpi/mpi.%.o $(OBJ)/train/mpi/rounded.o \
+  $(OBJ)/train/mpi/parts.o $(OBJ)/train/mpi/place.o $(OBJ)/tensor/status.o
 	$(call step,LD,$@)
 	@mkdir -p $(@D)
 	$(Q)$(CC) -shared -Wl,-Bsymbolic-functions -o $@ $^ $(shell pkg-config --libs $(PKG_$*)) $(SANITIZE) $(LDLIBS)

@@ -1,4 +1,5 @@
 #include "train/reduce.h"
+#include "train/mpi/parts.h"
 #include <stdlib.h>
 
 ts_code tr_reducer_create(tr_reducer *r, const tr_mpi *mpi, nn_model *model, size_t bytes, tr_reduce how, ts_status *st)
@@ -84,4 +85,17 @@ ts_code tr_reduce_finish(tr_reducer *r, ts_status *st)
     }
     r->mpi->complete();
     return TS_OK;
+}
+
+bool tr_reduce_own(const tr_reducer *r, int i, size_t *first, size_t *last)
+{
+    if (!r->parts) return i == 0;
+    if (i >= r->count) return false;
+    const tr_bucket *b = &r->bucket[i];
+    const size_t count = b->last - b->first, from = b->first + tr_part(count, r->parts, r->part),
+                 to = b->first + tr_part(count, r->parts, r->part + 1);
+    if (*first < from) *first = from;
+    if (*last > to) *last = to;
+    if (*last < *first) *last = *first;
+    return true;
 }

@@ -19,6 +19,7 @@ typedef struct tr_reducer {
     tr_bucket *bucket; /* [model->params] */
     int *bucket_of;    /* [model->params], -1: fixed */
     int count, sent;
+    int parts, part;  /* of every bucket this rank sums one part alone (tr_mpi.share); 0: it has all sums */
     ts_status status; /* the first error; all of them are this process's alone */
 } tr_reducer;
 
@@ -33,4 +34,6 @@ void tr_reduce_begin(tr_reducer *r);
 void tr_reduce_walked(float *const *grad, int count, void *user);
 /* After backward, or without one: sends what has not been sent, and waits until the model's gradients are the sums. */
 ts_code tr_reduce_finish(tr_reducer *r, ts_status *st);
+/* Ranges of [*first, *last) that this rank has the sums of, i from 0 on; false: there are no more. One may be empty. */
+bool tr_reduce_own(const tr_reducer *r, int i, size_t *first, size_t *last);
 #endif

@@ -203,15 +203,29 @@ static void rate_factors(const tr_config *c, bool pretraining, double factor[NN_
     factor[NN_COARSE] = pretraining ? 0 : c->train.coarse_rate;
 }
 
+/* Number i of the ranges of a part that are trained and of which this rank has the gradients' sums; false: there are no
+ * more. */
+static bool own_range(const tr_trainer *t, int part, int i, size_t *first, size_t *last)
+{
+    nn_model_range(t->model, (nn_part)part, first, last);
+    return !t->model->fixed[part] && tr_reduce_own(&t->reducer, i, first, last);
+}
+
 /* Of what is trained. */
-static double gradient_norm(const nn_model *model)
+static double gradient_norm(tr_trainer *t, tr_row *row)
 {
     double squares = 0;
     for (int part = NN_G; part <= NN_COARSE; part++) {
         size_t first, last;
-        nn_model_range(model, (nn_part)part, &first, &last);
-        const double norm = model->fixed[part] || first == last ? 0 : nn_gradient_norm(model, first, last);
-        squares += norm * norm;
+        for (int i = 0; own_range(t, part, i, &first, &last); i++) {
+            const double norm = first < last ? nn_gradient_norm(t->model, first, last) : 0;
+            squares += norm * norm;
+        }
+    }
+    if (t->reducer.parts) {
+        const double start = tr_seconds();
+        squares = t->ranks.mpi->sum_here(squares);
+        row->waited += tr_seconds() - start;
     }
     return sqrt(squares);
 }
@@ -285,21 +299,30 @@ static ts_code differentiate(tr_trainer *t, const float *target, int given, tr_r
         return st->code;
     }
     if (t->ranks.mpi && end_losses(t, row, &sums, st) != TS_OK) return st->code;
-    if (isfinite(row->loss)) row->norm = gradient_norm(t->model);
+    if (isfinite(row->loss)) row->norm = gradient_norm(t, row);
     return TS_OK;
 }
 
-static void update(tr_trainer *t, const tr_row *row, const double factor[NN_COARSE + 1])
+/* Ranks that share memory go on when all of them have written what is theirs. */
+static void meet(tr_trainer *t, tr_row *row)
+{
+    const double start = tr_seconds();
+    if (!t->reducer.parts) return;
+    t->ranks.mpi->meet();
+    row->waited += tr_seconds() - start;
+}
+
+static void update(tr_trainer *t, tr_row *row, const double factor[NN_COARSE + 1])
 {
     const double clip = t->config.train.clip;
     const float scale = clip > 0 && row->norm > clip ? (float)(clip / row->norm) : 1.0f;
     nn_adam_next(&t->adam);
     for (int part = NN_G; part <= NN_COARSE; part++) {
         size_t first, last;
-        nn_model_range(t->model, (nn_part)part, &first, &last);
-        if (!t->model->fixed[part] && last > first)
-            nn_adam_step(&t->adam, t->model, first, last, (float)(row->rate * factor[part]), scale);
+        for (int i = 0; own_range(t, part, i, &first, &last); i++)
+            if (first < last) nn_adam_step(&t->adam, t->model, first, last, (float)(row->rate * factor[part]), scale);
     }
+    meet(t, row);
     t->mean_norm = t->adam.step == 1 ? row->norm : NORM_DECAY * t->mean_norm + (1 - NORM_DECAY) * row->norm;
 }
 
@@ -332,6 +355,7 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
     row->rate = rate_now(c, t->step);
     row->skip = why_skip(t, row);
     if (row->skip) {
+        meet(t, row); /* the others may still read this rank's gradients */
         memset(t->model->grad, 0, t->model->count * sizeof(float));
         t->skipped++;
         t->in_a_row++;

@@ -168,6 +168,41 @@ static void share_state(tr_trainer *t)
     t->best = real[0], t->mean_norm = real[1];
 }
 
+/* Ranks on one host have one block of weights, one of each moment and of the average from now on, of which each steps
+ * its part. */
+static void share_blocks(tr_trainer *t)
+{
+    float **const block[] = {&t->model->value, &t->adam.m, &t->adam.v, &t->adam.ema};
+    const size_t count = t->model->count;
+    const tr_world *w = &t->ranks.world;
+    const int blocks = t->adam.ema ? 4 : 3;
+    float *common, *gradient;
+    if (!t->ranks.mpi || t->config.train.reduce != TR_REDUCE_F32) return;
+    const char *why_not = t->ranks.mpi->share((size_t)blocks * count, count, &common, &gradient);
+    if (why_not) {
+        if (w->local > 1) tr_note(t, "%s: ranks on one host send each other their gradients", why_not);
+        return;
+    }
+    for (int i = 0; i < blocks; i++, common += count) {
+        if (w->local_rank == 0) memcpy(common, *block[i], count * sizeof *common);
+        free(*block[i]);
+        *block[i] = common;
+    }
+    free(t->model->grad);
+    t->model->grad = gradient;
+    t->reducer.parts = w->local;
+    t->reducer.part = w->local_rank;
+    t->ranks.mpi->meet();
+}
+
+/* What is shared belongs to MPI. */
+static void leave_blocks(tr_trainer *t)
+{
+    if (!t->reducer.parts) return;
+    t->model->value = t->model->grad = NULL;
+    t->adam.m = t->adam.v = t->adam.ema = NULL;
+}
+
 static ts_code begin(tr_trainer *t, bool resume, ts_status *st)
 {
     const tr_config *c = &t->config;
@@ -220,6 +255,7 @@ static ts_code build(tr_trainer *t, bool resume, ts_status *st)
     t->batch = tr_share(&t->ranks, t->config.train.batch, &t->first);
     if (tr_agree(&t->ranks, prepare(t, &resume, st), st) != TS_OK) return st->code;
     share_state(t);
+    share_blocks(t);
     return tr_agree(&t->ranks, begin(t, resume, st), st);
 }
 
@@ -258,6 +294,7 @@ void tr_destroy(tr_trainer **trainer)
     io_loader_destroy(&t->loader);
     tr_log_close(t);
     tr_validator_free(&t->validator);
+    leave_blocks(t);
     tr_reducer_free(&t->reducer);
     ag_tape_destroy(&t->tape);
     nn_adam_free(&t->adam);

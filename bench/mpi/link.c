@@ -4,9 +4,10 @@
  * has.
  *   LGD_LINK="LATENCY SPEED"   microseconds, bytes a microsecond
  *   LGD_LINK_LOG=FILE          at the end rank 0 writes for each bucket of a step: bytes, and the mean microseconds
- * from the beginning of backward to its sending, by the clock and of the thread's processor time (which other programs
- * do not lengthen); then "step" and a step's processor time LGD_LINK_POISON=STEP       the last rank's loss in that
- * step (from 1 on) is not a number */
+ *                              from the beginning of backward to its sending, by the clock and of the thread's
+ * processor time (which other programs do not lengthen); then "step" and a step's processor time LGD_LINK_HOSTS=N the
+ * ranks are as if on N hosts; with the two above each is on one of its own LGD_LINK_POISON=STEP       the last rank's
+ * loss in that step (from 1 on) is not a number */
 #include <math.h>
 #include <mpi.h>
 #include <stdio.h>
@@ -52,6 +53,18 @@ int MPI_Init_thread(int *argc, char ***argv, int required, int *provided)
     const int code = PMPI_Init_thread(argc, argv, required, provided);
     read_settings();
     return code;
+}
+
+/* Which ranks share memory. With a link or its log none do: no link delays that. */
+int MPI_Comm_split_type(MPI_Comm comm, int type, int key, MPI_Info info, MPI_Comm *made)
+{
+    const char *hosts = getenv("LGD_LINK_HOSTS");
+    int rank, ranks;
+    PMPI_Comm_rank(comm, &rank);
+    PMPI_Comm_size(comm, &ranks);
+    if (type != MPI_COMM_TYPE_SHARED || !(hosts || speed > 0 || getenv("LGD_LINK_LOG")))
+        return PMPI_Comm_split_type(comm, type, key, info, made);
+    return PMPI_Comm_split(comm, hosts ? rank * atoi(hosts) / ranks : rank, key, made);
 }
 
 /* share: of the time that the whole sum of so many bytes takes. */

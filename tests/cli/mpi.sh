@@ -248,6 +248,38 @@ lost_folder() {
     says "$T/err" "$T/lost/"
 }
 
+# Ranks on one host sum gradients in shared memory, or send them where it has no room for them: the same run.
+no_room() {
+    launcher "$1"
+    config
+    sed -i 's/^g_width = .*/g_width = 64/; s/^g_width_max = .*/g_width_max = 128/; s/_steps = 12/_steps = 3/' "$T/small.ini"
+    echo 'mount -t tmpfs -o size=16m none /dev/shm && exec "$@"' >"$T/small_shm"
+    unshare -m sh "$T/small_shm" true 2>/dev/null || skip "file systems cannot be mounted here"
+    expect 0 train 2 shared
+    grep -q "/dev/shm" "$T/err" && fail "/dev/shm is too small: $(grep /dev/shm "$T/err")"
+    LAUNCH="unshare -m sh $T/small_shm $LAUNCH"
+    expect 0 train 2 sent
+    says "$T/err" "/dev/shm has too little room: ranks on one host send each other their gradients"
+    near "$T/shared/log.csv" "$T/sent/log.csv" 3 1e-4
+}
+
+# Ranks of one host share memory, and hosts sum what theirs have; where hosts have different numbers of ranks nobody does.
+hosts_with_ranks() {
+    launcher "$1"
+    config
+    [ -e "$LINK" ] || skip "no $LINK"
+    expect 0 alone one
+    for n in 4 3; do
+        LGD_LINK_HOSTS=2 LD_PRELOAD=$LINK expect 0 train $n $n
+        near "$T/one/log.csv" "$T/$n/log.csv" 3 1e-4
+        near "$T/one/val.csv" "$T/$n/val.csv" 8 1e-3
+    done
+    says "$T/err" "hosts have different numbers of ranks: ranks on one host send each other their gradients"
+    LGD_LINK_HOSTS=2 LD_PRELOAD=$LINK expect 0 train 4 again
+    grep -q "send each other" "$T/err" && fail "two hosts do not have two ranks each"
+    same_weights 4 again
+}
+
 # Two nodes on one machine, without ssh: the second name of this machine is another node to mpirun, which starts what it
 # needs there with a program of ours in place of ssh. The hostfile is the one of configs/cluster.
 two_nodes() {
@@ -304,7 +336,7 @@ programs_know_no_mpi() {
 check mpi_programs_know_no_mpi programs_know_no_mpi
 for library in openmpi mpich; do
     for name in ranks_agree signals_save killed_rank skip_together rounded_gradients errors_are_said_once lost_folder \
-        two_nodes; do
+        no_room hosts_with_ranks two_nodes; do
         with() { $name $library; }
         check mpi_${library}_$name with
     done

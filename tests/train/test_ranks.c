@@ -1,6 +1,7 @@
 /* What several ranks rest on, without MPI: shares, buckets that are sent when they are complete, sums in bf16. */
 #include "render/losses.h"
 #include "tests/support/networks.h"
+#include "train/mpi/parts.h"
 #include "train/mpi/rounded.h"
 #include "train/ranks.h"
 #include "train/reduce.h"
@@ -111,6 +112,48 @@ TEST(buckets_are_sent_once_when_they_are_complete)
         check_buckets(&a, 4, recompute, -1, 0);
         check_buckets(&a, 4, recompute, NN_COARSE, 4000);
     }
+}
+
+/* Ranks that share memory: each value is summed once, in the ranks' order, by one that knows that it is its own. */
+static void check_parts(int ranks, size_t count)
+{
+    enum { MOST_RANKS = 5 };
+    float *value[MOST_RANKS], *sum = calloc(count, sizeof *sum);
+    unsigned char *owners = calloc(count, 1);
+    for (int r = 0; r < ranks; r++) {
+        value[r] = numbers((int)count, (uint64_t)(20 + r), -1, 1);
+        for (size_t i = 0; i < count; i++) sum[i] += value[r][i];
+    }
+    for (int r = 0; r < ranks; r++) {
+        tr_bucket bucket[] = {{.first = count / 3, .last = count}, {.first = 0, .last = count / 3}};
+        const tr_reducer own = {.bucket = bucket, .count = 2, .parts = ranks, .part = r};
+        for (int k = 0; k < 2; k++) {
+            const size_t all = bucket[k].last - bucket[k].first, from = tr_part(all, ranks, r);
+            tr_add_parts(value, ranks, bucket[k].first + from, tr_part(all, ranks, r + 1) - from, value[r]);
+        }
+        size_t first, last;
+        for (int i = 0; first = 1, last = count - 1, tr_reduce_own(&own, i, &first, &last); i++)
+            for (size_t v = first; v < last; v++) owners[v] += value[r][v] == sum[v];
+    }
+    for (size_t i = 0; i < count; i++) {
+        int zeros = 0;
+        for (int r = 0; r < ranks; r++) zeros += value[r][i] == 0;
+        CHECK(owners[i] == (i > 0 && i < count - 1), "value %zu of %zu has %d owners", i, count, owners[i]);
+        CHECK(zeros == ranks - 1, "value %zu of %zu is zero in %d of %d ranks", i, count, zeros, ranks);
+    }
+    for (int r = 0; r < ranks; r++) free(value[r]);
+    free(sum), free(owners);
+}
+
+TEST(ranks_that_share_memory_sum_each_value_once)
+{
+    static const size_t counts[] = {3, 16, 100, 4096, 12345};
+    for (int ranks = 2; ranks <= 5; ranks++)
+        for (int i = 0; i < 5; i++) check_parts(ranks, counts[i]);
+    size_t first = 5, last = 9;
+    CHECK(tr_reduce_own(&(tr_reducer){0}, 0, &first, &last) && first == 5 && last == 9 &&
+              !tr_reduce_own(&(tr_reducer){0}, 1, &first, &last),
+          "who shares nothing has %zu to %zu", first, last);
 }
 
 typedef struct heard {

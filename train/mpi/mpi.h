@@ -21,6 +21,7 @@ typedef struct tr_world {
     int rank, count;
     int cpus;        /* this rank's share of the CPUs that it may run on with others */
     int local;       /* ranks on its host, this one too */
+    int local_rank;  /* its number among them */
     char where[480]; /* for a message: ranks, host and PIDs of each host, as many as fit */
 } tr_world;
 
@@ -37,10 +38,19 @@ typedef struct tr_mpi {
     /* The same without waiting: values is read now, and holds the sums after complete. */
     ts_code (*begin_sum)(double *values, int count, ts_status *st);
     ts_code (*begin_gradient)(float *values, size_t count, tr_reduce how, ts_status *st);
+    /* Memory that the ranks of a host share, where each host has as many of them and more than one. All ranks call it,
+     * once. common: so many floats, one block for all of a host's ranks. gradient: so many zeros, this rank's own. From
+     * then on begin_gradient of what lies there makes the sums of this rank's part alone (tr_part of what is begun);
+     * the others' parts are zeros when sum_here returns. NULL, or why it cannot be had: no rank has it then. */
+    const char *(*share)(size_t common_count, size_t gradient_count, float **common, float **gradient);
+    /* The sum over the ranks of this host that share memory, in their order, when all have called it; what they have
+     * written before is seen by all. meet: the same without a sum. */
+    double (*sum_here)(double value);
+    void (*meet)(void);
     void (*poke)(void);     /* lets what was begun go on: MPI does so only while it is called */
     void (*complete)(void); /* waits for all that was begun */
 } tr_mpi;
 
-#define TR_MPI_BUILD LGD_VERSION " 2"
+#define TR_MPI_BUILD LGD_VERSION " 3"
 #define TR_MPI_TABLE "tr_mpi_table"
 #endif
