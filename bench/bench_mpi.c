@@ -14,7 +14,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { ROUNDS = 5, WARM = 3, STEPS = 12, PATH = PATH_MAX + 100, MOST_WORDS = 32 };
+enum { ROUNDS = 5, WARM = 3, STEPS = 40, PATH = PATH_MAX + 100, MOST_WORDS = 32 };
 extern char **environ;
 
 /* Runs the words with both streams into the file at messages. */
