@@ -5,7 +5,7 @@
  * R_0's. Each has its own warm-up, cosine and Adam moments, since the two losses differ.
  *
  * Several ranks (train/ranks.h) make one run: train.batch is the batch of all, of which each makes its share, the same
- * materials for any number of ranks; gradients are summed, and every rank makes the same update. Rank 0 alone has the
+ * materials for any number of ranks; gradients are summed, and all ranks have one update. Rank 0 alone has the
  * folder. The same number of ranks makes the same bytes; another one the same numbers to rounding.
  *
  * The folder's files: config.ini (as it runs), log.csv (a row a step), val.csv (a row a validation), best.safetensors

@@ -252,7 +252,8 @@ lost_folder() {
 no_room() {
     launcher "$1"
     config
-    sed -i 's/^g_width = .*/g_width = 64/; s/^g_width_max = .*/g_width_max = 128/; s/_steps = 12/_steps = 3/' "$T/small.ini"
+    sed -i 's/^g_width = .*/g_width = 64/; s/^g_width_max = .*/g_width_max = 128/; s/_steps = 12/_steps = 3/' \
+        "$T/small.ini"
     echo 'mount -t tmpfs -o size=16m none /dev/shm && exec "$@"' >"$T/small_shm"
     unshare -m sh "$T/small_shm" true 2>/dev/null || skip "file systems cannot be mounted here"
     expect 0 train 2 shared
@@ -263,7 +264,7 @@ no_room() {
     near "$T/shared/log.csv" "$T/sent/log.csv" 3 1e-4
 }
 
-# Ranks of one host share memory, and hosts sum what theirs have; where hosts have different numbers of ranks nobody does.
+# Ranks of one host share memory, and hosts sum what theirs have; where hosts have different numbers of ranks none do.
 hosts_with_ranks() {
     launcher "$1"
     config

@@ -3,8 +3,8 @@
 #define TR_PARTS_H
 #include <stddef.h>
 
-/* Where part number `part` of count values begins, 0 .. parts; part parts begins at the end. Parts are whole cache lines
- * but for the last. */
+/* Where part number `part` of count values begins, 0 .. parts; number `parts` begins at the end. Parts are whole cache
+ * lines but for the last. */
 static inline size_t tr_part(size_t count, int parts, int part)
 {
     const size_t line = 16, each = (count + line * (size_t)parts - 1) / (line * (size_t)parts) * line;
