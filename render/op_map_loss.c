@@ -101,18 +101,21 @@ static void forward(ag_tape *tape, ag_node *node)
     node->out->t.data[0] = (float)(sum / (double)count);
 }
 
+/* w with the sign of a - b. A branch would be mispredicted at every other value. */
+static inline float slope(float w, float a, float b) { return w * (float)((a > b) - (a < b)); }
+
 static void backward_range(const void *job, int64_t begin, int64_t end)
 {
     const loss_job *j = job;
     const float *w = j->table->of + begin % MAP_CHANNELS;
     for (int64_t at = begin; at < end; at += PERIOD) {
         const float *a = j->node->in[0]->t.data + at, *b = j->node->in[1]->t.data + at;
-        float *to = j->to + at;
+        float *restrict to = j->to + at;
         const int64_t n = ag_part(end, at, PERIOD);
         if (j->add)
-            for (int64_t i = 0; i < n; i++) to[i] += a[i] > b[i] ? w[i] : a[i] < b[i] ? -w[i] : 0;
+            for (int64_t i = 0; i < n; i++) to[i] += slope(w[i], a[i], b[i]);
         else
-            for (int64_t i = 0; i < n; i++) to[i] = a[i] > b[i] ? w[i] : a[i] < b[i] ? -w[i] : 0;
+            for (int64_t i = 0; i < n; i++) to[i] = slope(w[i], a[i], b[i]);
     }
 }
 
