@@ -59,7 +59,7 @@ static void fill(rows *s, const conv_plan *p, int image, int first, int last)
         float *to = s->memory + r % s->count * s->row;
         const float *x = p->x + ((ptrdiff_t)image * p->h + r) * p->w * p->ic;
         if (end > from)
-            ts_conv_k()->transpose(x + (ptrdiff_t)from * p->ic, end - from, p->ic, to + from - left, s->plane);
+            ts_conv_k()->transpose(x + (ptrdiff_t)from * p->ic, p->ic, end - from, p->ic, to + from - left, s->plane);
         if (left >= 0 && end == left + s->plane) continue;
         const float *before = x, *behind = x + (ptrdiff_t)(p->w - 1) * p->ic;
         for (int c = 0; c < p->ic; c++) {

@@ -1,5 +1,5 @@
-/* The weights of a panel's outputs are read as they stand, some inputs of each, and transposed in the first cache:
- * from number to number they would be a page apart. */
+/* The weights of a panel's outputs are read as they stand, some inputs of each, and transposed: from number to number
+ * they would be a page apart. Halves, and panels that are not full, are copied first. */
 #include "tensor/conv/plan.h"
 #include "tensor/kernels/elementwise.h"
 #include <string.h>
@@ -29,15 +29,18 @@ int conv_transpose(const ts_conv *c, const conv_weights *w, bool forward, int pa
         }
         return width;
     }
+    const ptrdiff_t stride = forward ? (ptrdiff_t)c->ic * taps : taps; /* from output to output */
     for (int i = 0; i < (forward ? 1 : inputs); i++) {
-        if (forward)
-            for (int o = 0; o < count; o++)
-                conv_take(w, ((ptrdiff_t)(o0 + o) * c->ic + input) * taps, columns, rows + o * columns);
-        else
-            for (int o = 0; o < count; o++)
-                conv_take(w, ((ptrdiff_t)(input + i) * c->ic + o0 + o) * taps, columns, rows + o * columns);
+        const ptrdiff_t at = forward ? o0 * stride + (ptrdiff_t)input * taps
+                                     : ((ptrdiff_t)(input + i) * c->ic + o0) * taps;
+        float *turned = to + (ptrdiff_t)i * taps * width;
+        if (w->full && count == width) {
+            ts_conv_k()->transpose(w->full + at, stride, width, columns, turned, width);
+            continue;
+        }
+        for (int o = 0; o < count; o++) conv_take(w, at + o * stride, columns, rows + o * columns);
         memset(rows + count * columns, 0, sizeof *rows * (size_t)((width - count) * columns));
-        ts_conv_k()->transpose(rows, width, columns, to + (ptrdiff_t)i * taps * width, width);
+        ts_conv_k()->transpose(rows, columns, width, columns, turned, width);
     }
     return width;
 }

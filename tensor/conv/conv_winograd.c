@@ -84,10 +84,9 @@ static void pack_part(const pack_job *j, int panel, int part)
     for (int i = 0; i < count; i++) {
         const ts_winograd_form form = !j->bf16 ? TS_WINOGRAD_F32 : i % 2 ? TS_WINOGRAD_ODD : TS_WINOGRAD_EVEN;
         const ptrdiff_t row = j->bf16 ? (begin + i) / 2 : begin + i;
-        float *tap = transposed + i * 9 * width, mirrored[9 * 2 * 16];
-        for (int t = 0; t < 9 && !j->forward; t++)
-            memcpy(mirrored + t * width, tap + (8 - t) * width, sizeof *tap * (size_t)width);
-        ts_winograd_k()->weights[form](j->forward ? tap : mirrored, width / conv_lanes(), to + row * width, j->plane);
+        const float *tap = transposed + i * 9 * width;
+        ts_winograd_k()->weights[form](j->forward ? tap : tap + 8 * width, j->forward ? width : -width,
+                                       width / conv_lanes(), to + row * width, j->plane);
     }
 }
 

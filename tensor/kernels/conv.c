@@ -230,18 +230,18 @@ static void panel(const float *x, ptrdiff_t stride, int64_t pixels, int channels
         }
 }
 
-static void transpose(const float *x, int pixels, int channels, float *to, ptrdiff_t plane)
+static void transpose(const float *x, ptrdiff_t stride, int pixels, int channels, float *to, ptrdiff_t plane)
 {
     const int whole = pixels / VL * VL;
     for (int p = 0; p < whole; p += VL)
         for (int c = 0; c < channels; c += VL) {
             vf r[VL];
-            UNROLL for (int i = 0; i < VL; i++) r[i] = v_load_part(x + (ptrdiff_t)(p + i) * channels + c, channels - c);
+            UNROLL for (int i = 0; i < VL; i++) r[i] = v_load_part(x + (p + i) * stride + c, channels - c);
             v_turn(r);
             UNROLL for (int i = 0; i < VL; i++) if (i < channels - c) v_store(to + (c + i) * plane + p, r[i]);
         }
     for (int p = whole; p < pixels; p++)
-        for (int c = 0; c < channels; c++) to[c * plane + p] = x[(ptrdiff_t)p * channels + c];
+        for (int c = 0; c < channels; c++) to[c * plane + p] = x[p * stride + c];
 }
 
 static void collect(const float *x, ptrdiff_t plane, int pixels, int channels, bool add, float leak, float *y,

@@ -69,8 +69,8 @@ struct ts_conv_kernels {
     void (*columns)(const float *x, int64_t pixels, int channels, float *sum); /* sum[o] += sum_p x[p][o] */
     void (*panel)(const float *x, ptrdiff_t stride, int64_t pixels, int channels,
                   float *to); /* [pixel][lane] of one or two vectors, zeros where there is no channel */
-    void (*transpose)(const float *x, int pixels, int channels, float *to,
-                      ptrdiff_t plane); /* to[c plane + p] = x[p][c] */
+    /* to[c plane + p] = x[p stride + c] */
+    void (*transpose)(const float *x, ptrdiff_t stride, int pixels, int channels, float *to, ptrdiff_t plane);
     /* y[p stride + c] = act(x[c plane + p] (+ y[p stride + c])) */
     void (*collect)(const float *x, ptrdiff_t plane, int pixels, int channels, bool add, float leak, float *y,
                     ptrdiff_t stride);

@@ -128,7 +128,8 @@ INLINE void from_three(points at, const vf w[3], vf to[6])
     to[5] = w[2];
 }
 
-INLINE void weights(const ts_winograd_form form, const float *tap, int vectors, float *u, ptrdiff_t plane)
+INLINE void weights(const ts_winograd_form form, const float *tap, ptrdiff_t step, int vectors, float *u,
+                    ptrdiff_t plane)
 {
     const points at = points_of(form);
     for (int o = 0; o < vectors * VL; o += VL) {
@@ -136,7 +137,7 @@ INLINE void weights(const ts_winograd_form form, const float *tap, int vectors, 
         UNROLL for (int j = 0; j < 3; j++)
         {
             vf w[3];
-            UNROLL for (int i = 0; i < 3; i++) w[i] = v_load(tap + (3 * i + j) * vectors * VL + o);
+            UNROLL for (int i = 0; i < 3; i++) w[i] = v_load(tap + (3 * i + j) * step + o);
             from_three(at, w, half[j]);
         }
         UNROLL for (int i = 0; i < 6; i++)
@@ -231,9 +232,9 @@ INLINE void weights_gradient(const ts_winograd_form form, const float *u, ptrdif
         input(form, pixel, next, channels, v, plane);                                                           \
     }
 #define WEIGHTS(name, form)                                                                                            \
-    static void weights_##name(const float *tap, int vectors, float *u, ptrdiff_t plane)                               \
+    static void weights_##name(const float *tap, ptrdiff_t step, int vectors, float *u, ptrdiff_t plane)               \
     {                                                                                                                  \
-        weights(form, tap, vectors, u, plane);                                                                         \
+        weights(form, tap, step, vectors, u, plane);                                                                   \
     }                                                                                                                  \
     static void output_gradient_##name(const float *const dy[16], const float *const next[16], int channels, float *m, \
                                        ptrdiff_t plane)                                                                \

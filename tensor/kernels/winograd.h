@@ -29,8 +29,8 @@ struct ts_winograd_kernels {
      * 1 as in tensor/conv/conv.h. next: the next tile's y, to be fetched. [whether products are of bf16] */
     void (*output[2])(const float *m, ptrdiff_t plane, int channels, const float *bias, float leak, bool add,
                       float *const y[16], float *const next[16]);
-    /* u[36 planes][o] = (G g G')[o] of tap[3 i + j][o], o over whole vectors. */
-    void (*weights[TS_WINOGRAD_FORMS])(const float *tap, int vectors, float *u, ptrdiff_t plane);
+    /* u[36 planes][o] = (G g G')[o] of tap[(3 i + j) step + o], o over whole vectors. */
+    void (*weights[TS_WINOGRAD_FORMS])(const float *tap, ptrdiff_t step, int vectors, float *u, ptrdiff_t plane);
     /* What output and weights do, transposed. m[36 planes][c] = (A dy A')[c], its last vector whole, with zeros behind
      * the channels; */
     void (*output_gradient[TS_WINOGRAD_FORMS])(const float *const dy[16], const float *const next[16], int channels,
