@@ -12,14 +12,16 @@ enum {
     GROUP_TILES = 64,        /* transformed together: long runs for the sums, */
     GROUP_BYTES = 896 << 10, /* as many as stay in the second cache */
     GROUP_TILES_LEAST = 28,
-    UNITS = 4 /* of work, at least, where the shape allows: parts of the outputs transform x anew */
+    UNITS = 4,       /* of work, at least, where the shape allows: parts of the outputs transform x anew, */
+    PART_INPUTS = 16 /* and parts of the inputs, of at least so many, dy */
 };
 
 typedef struct job {
     winograd_grid g;
     const float *x, *dy;
     int padded;                     /* output channels in whole vectors */
-    int group, chunks, parts;       /* tiles transformed together; chunks of tiles; parts of the panels of outputs */
+    int group, chunks;              /* tiles transformed together; chunks of tiles */
+    int parts, input_parts;         /* of the panels of outputs; of the inputs */
     ptrdiff_t in, out, plane, size; /* planes of V and of M; of the sums; and all those of a chunk */
     float *sums;                    /* [chunk][36][input][padded] */
     float *dweight;
@@ -41,6 +43,9 @@ static job make_job(const ts_conv *c, bool bf16, const float *x, const float *dy
     j.chunks = chunks > CHUNKS ? CHUNKS : chunks < 1 ? 1 : (int)chunks;
     j.parts = (UNITS + j.chunks - 1) / j.chunks;
     if (j.parts > conv_panels(c->oc)) j.parts = conv_panels(c->oc);
+    j.input_parts = (UNITS + j.chunks * j.parts - 1) / (j.chunks * j.parts);
+    if (j.input_parts > c->ic / PART_INPUTS) j.input_parts = c->ic / PART_INPUTS;
+    if (j.input_parts < 1) j.input_parts = 1;
     j.in = winograd_plane(rows_of(&j, j.group), c->ic);
     j.out = winograd_plane(rows_of(&j, j.group), j.padded);
     j.plane = (ptrdiff_t)c->ic * j.padded;
@@ -48,15 +53,16 @@ static job make_job(const ts_conv *c, bool bf16, const float *x, const float *dy
     return j;
 }
 
-/* Panels [panel, end) of the outputs, which begin with channel o0 and are count channels. */
+/* Panels [panel, end) of the outputs, which begin with channel o0 and are count channels, and inputs [i0, i1). */
 typedef struct part {
-    int panel, end, o0, count;
+    int panel, end, o0, count, i0, i1;
 } part;
 
 static part make_part(const job *j, int i)
 {
     part a;
-    conv_part(conv_panels(j->g.oc), j->parts, i, &a.panel, &a.end);
+    conv_part(conv_panels(j->g.oc), j->parts, i % j->parts, &a.panel, &a.end);
+    conv_part(j->g.ic, j->input_parts, i / j->parts, &a.i0, &a.i1);
     a.o0 = a.panel * 2 * conv_lanes();
     a.count = a.end * 2 * conv_lanes() < j->g.oc ? (a.end - a.panel) * 2 * conv_lanes() : j->g.oc - a.o0;
     return a;
@@ -70,7 +76,7 @@ static void put_sources(const job *j, part of, winograd_place tile, const float 
     for (int i = 0; i < WINOGRAD_SIDE * WINOGRAD_SIDE; i++) pixel[i] = at[i] < 0 ? nothing : j->dy + at[i] + of.o0;
 }
 
-/* V, and M of a part of the outputs, of some tiles. */
+/* V of a part of the inputs, and M of a part of the outputs, of some tiles. */
 static void transform(const job *j, part of, int64_t first, int count, const float *nothing, float *v, float *m)
 {
     const struct ts_winograd_kernels *k = ts_winograd_k();
@@ -79,14 +85,14 @@ static void transform(const job *j, part of, int64_t first, int count, const flo
     winograd_place place[2 * GROUP_TILES + 1];
     winograd_locate(g, first, count, place);
     place[count] = place[count - 1];
-    winograd_sources(g, j->x, nothing, place[0], x[0]);
+    winograd_sources(g, j->x + of.i0, nothing, place[0], x[0]);
     put_sources(j, of, place[0], nothing, dy[0]);
     for (int i = 0; i < count; i++) {
-        winograd_sources(g, j->x, nothing, place[i + 1], x[(i + 1) & 1]);
+        winograd_sources(g, j->x + of.i0, nothing, place[i + 1], x[(i + 1) & 1]);
         put_sources(j, of, place[i + 1], nothing, dy[(i + 1) & 1]);
         const ts_winograd_form form = !g->bf16 ? TS_WINOGRAD_F32 : i % 2 ? TS_WINOGRAD_ODD : TS_WINOGRAD_EVEN;
         const ptrdiff_t row = g->bf16 ? i / 2 : i;
-        k->input[form](x[i & 1], x[(i + 1) & 1], g->ic, v + row * g->ic, j->in);
+        k->input[form](x[i & 1], x[(i + 1) & 1], of.i1 - of.i0, v + of.i0 + row * g->ic, j->in);
         k->output_gradient[form](dy[i & 1], dy[(i + 1) & 1], of.count, m + of.o0 + row * j->padded, j->out);
     }
 }
@@ -95,21 +101,22 @@ static void transform(const job *j, part of, int64_t first, int count, const flo
 static void add_products(const job *j, part of, int count, bool first, const float *v, const float *m, float *sums)
 {
     const struct ts_conv_kernels *k = ts_conv_k();
-    const int ic = j->g.ic, parts = (ic + k->rows - 1) / k->rows;
+    const int inputs = of.i1 - of.i0, parts = (inputs + k->rows - 1) / k->rows;
     const ptrdiff_t start = 0;
     for (int q = 0; q < WINOGRAD_AREA; q++)
         for (int panel = of.panel; panel < of.end; panel++) {
             const int o0 = panel * 2 * k->lanes, vectors = conv_vectors(j->g.oc, panel);
             for (int b = 0; b < parts; b++) {
                 int begin, end;
-                conv_part(ic, parts, b, &begin, &end);
+                conv_part(inputs, parts, b, &begin, &end);
+                begin += of.i0, end += of.i0;
                 const ts_sum t = {.a = v + q * j->in + begin,
                                   .b = m + q * j->out + o0,
                                   .a_row = &start,
                                   .b_row = &start,
                                   .rows = 1,
                                   .count = rows_of(j, count),
-                                  .a_stride = ic,
+                                  .a_stride = j->g.ic,
                                   .b_stride = j->padded,
                                   .begin = first,
                                   .c = sums + q * j->plane + (ptrdiff_t)begin * j->padded + o0,
@@ -137,7 +144,8 @@ static void run_chunk(const job *j, int chunk, part of)
 static void run_task(const void *made, int64_t i)
 {
     const job *j = made;
-    run_chunk(j, (int)(i / j->parts), make_part(j, (int)(i % j->parts)));
+    const int parts = j->parts * j->input_parts;
+    run_chunk(j, (int)(i / parts), make_part(j, (int)(i % parts)));
 }
 
 static void reduce_inputs(const void *made, int64_t begin, int64_t end)
@@ -161,6 +169,6 @@ void conv_winograd_weight_gradient(const ts_conv *c, bool bf16, const float *x, 
     job j = make_job(c, bf16, x, dy);
     j.dweight = dweight;
     j.sums = ts_scratch(2, sizeof(float) * (size_t)(j.size * j.chunks));
-    ts_tasks(c->compute.threads, (int64_t)j.chunks * j.parts, run_task, &j);
+    ts_tasks(c->compute.threads, (int64_t)j.chunks * j.parts * j.input_parts, run_task, &j);
     ts_for(c->compute.threads, (int64_t)(j.padded / conv_lanes()) * c->ic, 1, reduce_inputs, &j);
 }
