@@ -69,16 +69,16 @@ typedef struct lgd_photo lgd_photo;
 
 /* New fields are added at the end. Begin with lgd_options_default(). */
 typedef struct lgd_options {
-    size_t size;    /* sizeof(lgd_options) where the caller was compiled: fields beyond it have their defaults */
-    int iterations; /* refinement steps; 0: R_0 alone, -1: as trained, LGD_AUTO */
-    int exact;     /* 0: 3 x 3 convolutions use Winograd's algorithm where it is faster; else all are computed directly.
-                    * Weights of the published network always are. The shipped model's maps of real photographs
-                    * differ by less than 1e-5 (RMS of a map), single values by less than 1e-3, as they do between
-                    * instruction sets (docs/performance.md) */
-    int precision; /* LGD_F32; LGD_BF16: inputs and weights of convolutions are rounded to bf16, for CPUs with AMX or
-                    * AVX512-BF16 (much slower on others). Sums, renderer and maps stay f32. Maps differ by
-                    * less than 0.005 (RMS), fewer than one value in 10,000 by more than 0.05, single ones by up to
-                    * 0.8 (docs/performance.md) */
+    size_t size;      /* sizeof(lgd_options) where the caller was compiled: fields beyond it have their defaults */
+    int iterations;   /* refinement steps; 0: R_0 alone, -1: as trained, LGD_AUTO */
+    int exact;        /* 0: convolutions use Winograd's algorithm where it is faster; else all are computed directly.
+                       * Weights of the published network always are. The shipped model's maps of real photographs
+                       * differ by less than 1e-5 (RMS of a map), single values by less than 1e-3, as they do between
+                       * instruction sets (docs/performance.md) */
+    int precision;    /* LGD_F32; LGD_BF16: inputs and weights of convolutions are rounded to bf16, for CPUs with AMX or
+                       * AVX512-BF16 (much slower on others). Sums, renderer and maps stay f32. Maps differ by
+                       * less than 0.005 (RMS), fewer than one value in 10,000 by more than 0.05, single ones by up to
+                       * 0.8 (docs/performance.md) */
     int orientations; /* R_0 is the mean over so many orientations of the photograph: 1 or 0: as it is, 2: and turned by
                        * a quarter, 4: all quarter turns, 8: and their mirror images. Only for a single photograph with
                        * light and camera above its centre, and not with published weights */

@@ -20,9 +20,9 @@ bool ts_conv_pack_half(const ts_conv *c, ts_conv_use use, const void *weight, fl
  * overlapping. */
 void ts_conv_forward(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y);
 
-/* The same y, and the gradients below, by Winograd's F(4 x 4, 3 x 3) with weights packed for the use of that name; c->k
- * must be 3. Its products are a quarter of the direct way's, its rounding errors about ten times as large (1e-5 of the
- * largest value, not 1e-6). */
+/* The same y, and the gradients below, by Winograd's F(4 x 4, 3 x 3) or F(2 x 2, 5 x 5) with weights packed for the use
+ * of that name; c->k must be 3, or 5 (of weights 3). Its products are a quarter of the direct way's (of side 5 .36),
+ * its rounding errors about ten times as large (1e-5 of the largest value, not 1e-6). */
 void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
                               float *y);
 void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
@@ -38,10 +38,10 @@ void ts_conv_forward_bf16(const ts_conv *c, const float *x, const float *packed,
                           float *y);
 void ts_conv_data_gradient_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
 
-/* Both by Winograd's way with what it multiplies rounded to bf16, transforms and sums in f32, and the gradient of the
- * weights too. Transforms magnify the rounding of numbers that do not resemble their neighbours': the RMS of errors is
- * 1.1% of the results' RMS, in place of the direct way's 0.24%, where inputs are random, and the same 0.24% where they
- * are as smooth as images (tensor/kernels/winograd.h). */
+/* Both by Winograd's way for c->k = 3 with what it multiplies rounded to bf16, transforms and sums in f32, and the
+ * gradient of the weights too. Transforms magnify the rounding of numbers that do not resemble their neighbours': the
+ * RMS of errors is 1.1% of the results' RMS, in place of the direct way's 0.24%, where inputs are random, and the same
+ * 0.24% where they are as smooth as images (tensor/kernels/winograd.h). */
 void ts_conv_forward_winograd_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
                                    float *y);
 void ts_conv_data_gradient_winograd_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx,

@@ -44,13 +44,14 @@ ts_conv_way conv_choose_narrow(int ic, int oc, int k)
                                   : TS_CONV_DIRECTLY;
 }
 
-/* 36 products in place of 144 pay for the transformations. Tiles that are mostly outside cost what that saves, and
- * fewer than so many save less than the transformation of the weights costs: with 32 it is done in .6 of the direct
- * way's time, packing included, with 16 in as much. */
+/* 36 products in place of 144, or of side 5 in place of 100, pay for the transformations. Tiles that are mostly outside
+ * cost what that saves, and fewer than so many save less than the transformation of the weights costs: with 32 it is
+ * done in .6 of the direct way's time, packing included, with 16 in as much. 5 x 5 18 -> 128 takes .55 of it. */
 static bool tiles_pay(const ts_conv *c, int least)
 {
-    const int64_t tiles = winograd_grid_forward(c, false).tiles;
-    return c->k == 3 && tiles >= least && 2 * tiles * WINOGRAD_SIDE * WINOGRAD_SIDE <= 3 * (int64_t)c->n * c->h * c->w;
+    if (c->k != 3 && (c->k != 5 || c->compute.precision == TS_BF16)) return false;
+    const winograd_grid g = winograd_grid_forward(c, false);
+    return g.tiles >= least && 2 * g.tiles * g.side * g.side <= 3 * (int64_t)c->n * c->h * c->w;
 }
 
 /* With fewer channels most lanes of the transforms are empty: from 9 to 9 the direct way takes .8 of the time, from 16
@@ -59,7 +60,10 @@ static bool winograd_pays(const ts_conv *c, int ic, int oc) { return ic >= 16 &&
 
 /* Of weights, from 16 x 16 pixels in batches of 8 on in .35 to .4 of the direct way's time, of bf16 too, at 8 x 8 in
  * .5 to .65, of bf16 in .7 to 1.05. */
-static bool winograd_pays_for_weights(const ts_conv *c) { return c->ic >= 16 && c->oc >= 16 && tiles_pay(c, 32); }
+static bool winograd_pays_for_weights(const ts_conv *c)
+{
+    return c->k == 3 && c->ic >= 16 && c->oc >= 16 && tiles_pay(c, 32);
+}
 
 static ts_conv_way choose_weights(const ts_conv *c, bool bf16)
 {

@@ -1,4 +1,5 @@
-/* Winograd's convolution F(4 x 4, 3 x 3): 36 products in place of 144 for 4 x 4 pixels (Lavin and Gray 2016). Some
+/* Winograd's convolutions F(4 x 4, 3 x 3), 36 products in place of 144 for 4 x 4 pixels (Lavin and Gray 2016), and
+ * F(2 x 2, 5 x 5), 36 in place of 100 for 2 x 2. Some
  * tiles at a time are transformed, multiplied as 36 small matrix products, and transformed back. The gradient of the
  * input is a convolution too (conv_gradient.c). */
 #include "tensor/conv/conv_winograd.h"
@@ -14,15 +15,15 @@ enum {
 };
 
 /* Tiles along a side of the interleaved images, the largest of which has ceil(size / dilation) pixels. */
-static int tiles_along(int size, int dilation)
+static int tiles_along(int size, int dilation, int side)
 {
-    return ((size + dilation - 1) / dilation + WINOGRAD_SIDE - 1) / WINOGRAD_SIDE;
+    return ((size + dilation - 1) / dilation + side - 1) / side;
 }
 
 static winograd_grid with_tiles(winograd_grid g)
 {
-    g.rows = tiles_along(g.out_h, g.dilation);
-    g.columns = tiles_along(g.out_w, g.dilation);
+    g.rows = tiles_along(g.out_h, g.dilation, g.side);
+    g.columns = tiles_along(g.out_w, g.dilation, g.side);
     g.tiles = (int64_t)g.n * g.dilation * g.dilation * g.rows * g.columns;
     return g;
 }
@@ -39,7 +40,8 @@ winograd_grid winograd_grid_forward(const ts_conv *c, bool bf16)
                                       .out_w = c->w,
                                       .oc = c->oc,
                                       .dilation = c->dilation,
-                                      .first = -c->dilation,
+                                      .side = WINOGRAD_REACH + 1 - c->k,
+                                      .first = -c->dilation * (c->k / 2),
                                       .replicate = c->pad == TS_PAD_REPLICATE});
 }
 
@@ -55,7 +57,8 @@ winograd_grid winograd_grid_gradient(const ts_conv *c, int fold, bool bf16)
                                       .out_w = c->w + 2 * fold,
                                       .oc = ts_conv_variables(c),
                                       .dilation = c->dilation,
-                                      .first = -c->dilation - fold});
+                                      .side = WINOGRAD_REACH + 1 - c->k,
+                                      .first = -c->dilation * (c->k / 2) - fold});
 }
 
 /* Inputs as products count them. */
@@ -79,14 +82,14 @@ static void pack_part(const pack_job *j, int panel, int part)
 {
     float transposed[2 * 16 * CONV_TRANSPOSED]; /* no vector has more than 16 lanes */
     const int begin = part * j->step, count = j->ic - begin < j->step ? j->ic - begin : j->step;
+    const int taps = j->c->k * j->c->k, last = j->forward ? 0 : taps - 1; /* a gradient's taps are mirrored */
     const int width = conv_transpose(j->c, j->w, j->forward, panel, begin, count, transposed);
     float *to = j->packed + (ptrdiff_t)panel * 2 * conv_lanes() * depth_of(j->ic, j->bf16);
     for (int i = 0; i < count; i++) {
         const ts_winograd_form form = !j->bf16 ? TS_WINOGRAD_F32 : i % 2 ? TS_WINOGRAD_ODD : TS_WINOGRAD_EVEN;
         const ptrdiff_t row = j->bf16 ? (begin + i) / 2 : begin + i;
-        const float *tap = transposed + i * 9 * width;
-        ts_winograd_k()->weights[form](j->forward ? tap : tap + 8 * width, j->forward ? width : -width,
-                                       width / conv_lanes(), to + row * width, j->plane);
+        ts_winograd_k()->weights[j->c->k == 5][form](transposed + (i * taps + last) * width, last ? -width : width,
+                                                     width / conv_lanes(), to + row * width, j->plane);
     }
 }
 
@@ -100,7 +103,7 @@ static void pack_parts(const void *job, int64_t begin, int64_t end)
 void conv_winograd_pack(const ts_conv *c, bool forward, bool bf16, const conv_weights *w, float *packed)
 {
     const int ic = forward ? c->ic : c->oc, oc = forward ? c->oc : ts_conv_variables(c);
-    const int step = conv_transposed_inputs(9), parts = (ic + step - 1) / step;
+    const int step = conv_transposed_inputs(c->k * c->k) & ~1, parts = (ic + step - 1) / step;
     ts_for(c->compute.threads, (int64_t)conv_panels(oc) * parts, 1, pack_parts,
            &(pack_job){c, w, forward, bf16, ic, step, parts, conv_panels_count(depth_of(ic, bf16), oc, 1), packed});
 }
@@ -113,7 +116,7 @@ void winograd_locate(const winograd_grid *g, int64_t first, int count, winograd_
     int image = (int)(phase / (d * d)), row = (int)(phase / d % d),
         column = (int)(phase % d);    /* of the interleaved image */
     for (int i = 0; i < count; i++) { /* without divisions, which would take a tenth of a small tile's time */
-        place[i] = (winograd_place){image, y * WINOGRAD_SIDE * d + row, x * WINOGRAD_SIDE * d + column};
+        place[i] = (winograd_place){image, y * g->side * d + row, x * g->side * d + column};
         if (++x < g->columns) continue;
         x = 0;
         if (++y < g->rows) continue;
@@ -141,13 +144,13 @@ void winograd_sources(const winograd_grid *g, const float *x, const float *nothi
             pixel[WINOGRAD_REACH * a + b] = row[a] < 0 || column[b] < 0 ? nothing : x + row[a] + column[b];
 }
 
-void winograd_targets(const winograd_grid *g, winograd_place at, ptrdiff_t pixel[WINOGRAD_SIDE * WINOGRAD_SIDE])
+void winograd_targets(const winograd_grid *g, winograd_place at, ptrdiff_t pixel[WINOGRAD_OUTPUTS])
 {
-    for (int a = 0; a < WINOGRAD_SIDE; a++) {
+    for (int a = 0; a < g->side; a++) {
         const int i = at.i + a * g->dilation;
-        for (int b = 0; b < WINOGRAD_SIDE; b++) {
+        for (int b = 0; b < g->side; b++) {
             const int j = at.j + b * g->dilation;
-            pixel[WINOGRAD_SIDE * a + b] = i < g->out_h && j < g->out_w
+            pixel[g->side * a + b] = i < g->out_h && j < g->out_w
                 ? (((ptrdiff_t)at.image * g->out_h + i) * g->out_w + j) * g->oc
                 : -1;
         }
@@ -183,12 +186,11 @@ static void multiply(const winograd_grid *g, const float *u, const float *v, int
         }
 }
 
-static void put_targets(const winograd_grid *g, winograd_place tile, float *y,
-                        float *pixel[WINOGRAD_SIDE * WINOGRAD_SIDE])
+static void put_targets(const winograd_grid *g, winograd_place tile, float *y, float *pixel[WINOGRAD_OUTPUTS])
 {
-    ptrdiff_t at[WINOGRAD_SIDE * WINOGRAD_SIDE];
+    ptrdiff_t at[WINOGRAD_OUTPUTS];
     winograd_targets(g, tile, at);
-    for (int i = 0; i < WINOGRAD_SIDE * WINOGRAD_SIDE; i++) pixel[i] = at[i] < 0 ? NULL : y + at[i];
+    for (int i = 0; i < g->side * g->side; i++) pixel[i] = at[i] < 0 ? NULL : y + at[i];
 }
 
 typedef struct run_job {
@@ -224,12 +226,12 @@ static void run_tiles(const void *job, int64_t group)
         kernels->input[form](from[i & 1], from[(i + 1) & 1], g->ic, v + (ptrdiff_t)i * depth, in);
     }
     multiply(g, j->packed, v, count, m);
-    float *to[2][WINOGRAD_SIDE * WINOGRAD_SIDE];
+    float *to[2][WINOGRAD_OUTPUTS];
     put_targets(g, place[0], j->y, to[0]);
     for (int i = 0; i < count; i++) {
         put_targets(g, place[i + 1], j->y, to[(i + 1) & 1]);
-        kernels->output[g->bf16](m + (ptrdiff_t)i * g->oc, out, g->oc, j->bias, j->leak, j->add, to[i & 1],
-                                 to[(i + 1) & 1]);
+        kernels->output[g->side == 2][g->bf16](m + (ptrdiff_t)i * g->oc, out, g->oc, j->bias, j->leak, j->add,
+                                               to[i & 1], to[(i + 1) & 1]);
     }
 }
 
@@ -287,7 +289,7 @@ static void fold_rows(const void *job, int64_t begin, int64_t end)
 void conv_winograd_data_gradient(const ts_conv *c, bool bf16, const float *dy, const float *packed, float *dx,
                                  bool accumulate)
 {
-    const int fold = c->pad == TS_PAD_REPLICATE ? c->dilation : 0, channels = ts_conv_variables(c);
+    const int fold = c->pad == TS_PAD_REPLICATE ? c->dilation * (c->k / 2) : 0, channels = ts_conv_variables(c);
     winograd_grid g = winograd_grid_gradient(c, fold, bf16);
     if (!fold) {
         run(&g, dy, packed, NULL, 1, accumulate, dx);

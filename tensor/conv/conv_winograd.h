@@ -1,11 +1,13 @@
-/* Internal to tensor/conv/conv_winograd*.c: which pixels the tiles of F(4 x 4, 3 x 3) read and make. */
+/* Internal to tensor/conv/conv_winograd*.c: which pixels the tiles of F(4 x 4, 3 x 3) and F(2 x 2, 5 x 5) read and
+ * make. */
 #ifndef TS_CONV_WINOGRAD_H
 #define TS_CONV_WINOGRAD_H
 #include "tensor/conv/plan.h"
 
 enum {
-    WINOGRAD_SIDE = 4,  /* of a tile's outputs */
-    WINOGRAD_REACH = 6, /* of its inputs */
+    WINOGRAD_REACH = 6, /* the side of a tile's inputs, */
+    WINOGRAD_SIDE = 4,  /* and of its outputs at most */
+    WINOGRAD_OUTPUTS = WINOGRAD_SIDE * WINOGRAD_SIDE,
     WINOGRAD_AREA = WINOGRAD_REACH * WINOGRAD_REACH,
     WINOGRAD_CHUNK_TILES = 128 /* of a weight gradient's sum: clearing and adding it is little beside making it */
 };
@@ -16,6 +18,7 @@ typedef struct winograd_grid {
     int out_h, out_w, oc;
     int dilation, first;
     bool replicate;
+    int side;          /* of a tile's outputs: WINOGRAD_REACH + 1 - the kernel's */
     int rows, columns; /* tiles of one interleaved image */
     int64_t tiles;     /* of all */
     bool bf16;         /* products of bf16, of pairs of channels in place of channels */
@@ -36,8 +39,8 @@ void winograd_locate(const winograd_grid *g, int64_t first, int count,
 void winograd_sources(const winograd_grid *g, const float *x, const float *nothing, winograd_place at,
                       const float *pixel[WINOGRAD_AREA]);
 
-/* Offsets of a tile's 4 x 4 outputs; -1: no such pixel. */
-void winograd_targets(const winograd_grid *g, winograd_place at, ptrdiff_t pixel[WINOGRAD_SIDE * WINOGRAD_SIDE]);
+/* Offsets of a tile's side x side outputs; -1: no such pixel. */
+void winograd_targets(const winograd_grid *g, winograd_place at, ptrdiff_t pixel[WINOGRAD_OUTPUTS]);
 
 /* Floats of one of 36 planes: whole lines and an odd number of them, or the planes would meet in a few sets of the
  * first cache. */

@@ -69,11 +69,11 @@ static part make_part(const job *j, int i)
 }
 
 static void put_sources(const job *j, part of, winograd_place tile, const float *nothing,
-                        const float *pixel[WINOGRAD_SIDE * WINOGRAD_SIDE])
+                        const float *pixel[WINOGRAD_OUTPUTS])
 {
-    ptrdiff_t at[WINOGRAD_SIDE * WINOGRAD_SIDE];
+    ptrdiff_t at[WINOGRAD_OUTPUTS];
     winograd_targets(&j->g, tile, at);
-    for (int i = 0; i < WINOGRAD_SIDE * WINOGRAD_SIDE; i++) pixel[i] = at[i] < 0 ? nothing : j->dy + at[i] + of.o0;
+    for (int i = 0; i < WINOGRAD_OUTPUTS; i++) pixel[i] = at[i] < 0 ? nothing : j->dy + at[i] + of.o0;
 }
 
 /* V of a part of the inputs, and M of a part of the outputs, of some tiles. */
@@ -81,7 +81,7 @@ static void transform(const job *j, part of, int64_t first, int count, const flo
 {
     const struct ts_winograd_kernels *k = ts_winograd_k();
     const winograd_grid *g = &j->g;
-    const float *x[2][WINOGRAD_AREA], *dy[2][WINOGRAD_SIDE * WINOGRAD_SIDE];
+    const float *x[2][WINOGRAD_AREA], *dy[2][WINOGRAD_OUTPUTS];
     winograd_place place[2 * GROUP_TILES + 1];
     winograd_locate(g, first, count, place);
     place[count] = place[count - 1];

@@ -32,7 +32,8 @@ typedef enum ts_conv_use {
 typedef enum ts_conv_direction { TS_CONV_OUTPUT, TS_CONV_INPUT, TS_CONV_WEIGHTS } ts_conv_direction;
 
 /* How: by rows of a padded window; without one where k = 1; position by position of several small maps; all taps'
- * products at once (col2im); pixels, not channels, in the lanes; Winograd's F(4 x 4, 3 x 3); the matrix unit. */
+ * products at once (col2im); pixels, not channels, in the lanes; Winograd's F(4 x 4, 3 x 3) and F(2 x 2, 5 x 5); the
+ * matrix unit. */
 typedef enum ts_conv_way {
     TS_CONV_DIRECTLY,
     TS_CONV_POINTWISE,

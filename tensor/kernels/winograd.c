@@ -31,7 +31,14 @@ INLINE void six(points at, const vf d[6], vf to[6])
     to[5] = SET(p2 * q2) * d[1] - SET(p2 + q2) * d[3] + d[5];
 }
 
-/* to = A' m */
+/* to = A' m of kernels of side 5, which make a tile of side 2 */
+INLINE void two(points at, const vf m[6], vf to[4])
+{
+    to[0] = m[0] + (m[1] + m[2]) + (m[3] + m[4]);
+    to[1] = SET(at.p) * (m[1] - m[2]) + SET(at.q) * (m[3] - m[4]) + m[5];
+}
+
+/* The same of side 3, which make one of side 4 */
 INLINE void four(points at, const vf m[6], vf to[4])
 {
     POINTS;
@@ -84,10 +91,12 @@ INLINE void input(const ts_winograd_form form, const float *const pixel[36], con
     }
 }
 
-INLINE void output(const ts_winograd_form form, const float *m, ptrdiff_t plane, int channels, const float *bias,
-                   float leak, bool add, float *const y[16], float *const next[16])
+/* side: of the tile of outputs. */
+INLINE void output(const ts_winograd_form form, const int side, const float *m, ptrdiff_t plane, int channels,
+                   const float *bias, float leak, bool add, float *const *y, float *const *next)
 {
     const points at = points_of(form);
+    void (*const make)(points, const vf *, vf *) = side == 4 ? four : two;
     for (int c = 0; c < channels; c += VL) {
         vf half[6][4];
         const vf init = bias ? v_load_part(bias + c, channels - c) : (vf){0};
@@ -95,26 +104,42 @@ INLINE void output(const ts_winograd_form form, const float *m, ptrdiff_t plane,
         {
             vf d[6];
             UNROLL for (int i = 0; i < 6; i++) d[i] = v_load_part(m + (6 * i + j) * plane + c, channels - c);
-            four(at, d, half[j]);
+            make(at, d, half[j]);
         }
-        UNROLL for (int i = 0; i < 4; i++)
+        UNROLL for (int i = 0; i < side; i++)
         {
             vf d[6], to[4];
             UNROLL for (int j = 0; j < 6; j++) d[j] = half[j][i];
-            four(at, d, to);
-            UNROLL for (int j = 0; j < 4; j++)
+            make(at, d, to);
+            UNROLL for (int j = 0; j < side; j++)
             {
-                if (next[4 * i + j]) __builtin_prefetch(next[4 * i + j] + c, 1);
-                if (!y[4 * i + j]) continue;
-                const vf u = add ? to[j] + init + v_load_part(y[4 * i + j] + c, channels - c) : to[j] + init;
-                v_store_part(y[4 * i + j] + c, v_max(v_set(leak) * u, u), channels - c);
+                const int k = side * i + j;
+                if (next[k]) __builtin_prefetch(next[k] + c, 1);
+                if (!y[k]) continue;
+                const vf u = add ? to[j] + init + v_load_part(y[k] + c, channels - c) : to[j] + init;
+                v_store_part(y[k] + c, v_max(v_set(leak) * u, u), channels - c);
             }
         }
     }
 }
 
-/* to = G w */
-INLINE void from_three(points at, const vf w[3], vf to[6])
+/* to = G w of a kernel of side 5 */
+INLINE void from_five(points at, const vf *w, vf to[6])
+{
+    POINTS;
+    const double at_p = 1 / (2 * p2 * (q2 - p2)), at_q = 1 / (2 * q2 * (q2 - p2));
+    const vf a = SET(at_p) * (w[0] + SET(p2) * w[2] + SET(p2 * p2) * w[4]), b = SET(p * at_p) * (w[1] + SET(p2) * w[3]),
+             c = SET(at_q) * (w[0] + SET(q2) * w[2] + SET(q2 * q2) * w[4]), d = SET(q * at_q) * (w[1] + SET(q2) * w[3]);
+    to[0] = SET(1 / (p2 * q2)) * w[0];
+    to[1] = -(a + b);
+    to[2] = b - a;
+    to[3] = c + d;
+    to[4] = c - d;
+    to[5] = w[4];
+}
+
+/* Of side 3 */
+INLINE void from_three(points at, const vf *w, vf to[6])
 {
     POINTS;
     const double at_p = 1 / (2 * p2 * (q2 - p2)), at_q = 1 / (2 * q2 * (q2 - p2)), squares = 1 / (2 * (q2 - p2));
@@ -128,23 +153,24 @@ INLINE void from_three(points at, const vf w[3], vf to[6])
     to[5] = w[2];
 }
 
-INLINE void weights(const ts_winograd_form form, const float *tap, ptrdiff_t step, int vectors, float *u,
-                    ptrdiff_t plane)
+INLINE void weights(const ts_winograd_form form, const int side, const float *tap, ptrdiff_t step, int vectors,
+                    float *u, ptrdiff_t plane)
 {
     const points at = points_of(form);
+    void (*const make)(points, const vf *, vf *) = side == 3 ? from_three : from_five;
     for (int o = 0; o < vectors * VL; o += VL) {
-        vf half[3][6]; /* [column][row of G g] */
-        UNROLL for (int j = 0; j < 3; j++)
+        vf half[5][6]; /* [column][row of G g] */
+        UNROLL for (int j = 0; j < side; j++)
         {
-            vf w[3];
-            UNROLL for (int i = 0; i < 3; i++) w[i] = v_load(tap + (3 * i + j) * step + o);
-            from_three(at, w, half[j]);
+            vf w[5];
+            UNROLL for (int i = 0; i < side; i++) w[i] = v_load(tap + (side * i + j) * step + o);
+            make(at, w, half[j]);
         }
         UNROLL for (int i = 0; i < 6; i++)
         {
-            vf w[3], to[6];
-            UNROLL for (int j = 0; j < 3; j++) w[j] = half[j][i];
-            from_three(at, w, to);
+            vf w[5], to[6];
+            UNROLL for (int j = 0; j < side; j++) w[j] = half[j][i];
+            make(at, w, to);
             UNROLL for (int j = 0; j < 6; j++) put(form, u + (6 * i + j) * plane + o, to[j], VL);
         }
     }
@@ -231,39 +257,48 @@ INLINE void weights_gradient(const ts_winograd_form form, const float *u, ptrdif
     {                                                                                                           \
         input(form, pixel, next, channels, v, plane);                                                           \
     }
-#define WEIGHTS(name, form)                                                                                            \
-    static void weights_##name(const float *tap, ptrdiff_t step, int vectors, float *u, ptrdiff_t plane)               \
-    {                                                                                                                  \
-        weights(form, tap, step, vectors, u, plane);                                                                   \
-    }                                                                                                                  \
+#define WEIGHTS(name, form, side)                                                                                 \
+    static void weights_##side##_##name(const float *tap, ptrdiff_t step, int vectors, float *u, ptrdiff_t plane) \
+    {                                                                                                             \
+        weights(form, side, tap, step, vectors, u, plane);                                                        \
+    }
+#define OUTPUT_GRADIENT(name, form)                                                                                    \
     static void output_gradient_##name(const float *const dy[16], const float *const next[16], int channels, float *m, \
                                        ptrdiff_t plane)                                                                \
     {                                                                                                                  \
         output_gradient(form, dy, next, channels, m, plane);                                                           \
     }
-#define PRODUCTS(name, form)                                                                                          \
-    static void output_##name(const float *m, ptrdiff_t plane, int channels, const float *bias, float leak, bool add, \
-                              float *const y[16], float *const next[16])                                              \
-    {                                                                                                                 \
-        output(form, m, plane, channels, bias, leak, add, y, next);                                                   \
-    }                                                                                                                 \
-    static void weights_gradient_##name(const float *u, ptrdiff_t plane, int sums, ptrdiff_t sum, float *tap)         \
-    {                                                                                                                 \
-        weights_gradient(form, u, plane, sums, sum, tap);                                                             \
+#define OUTPUT(name, form, k)                                                                                     \
+    static void output_##k##_##name(const float *m, ptrdiff_t plane, int channels, const float *bias, float leak, \
+                                    bool add, float *const *y, float *const *next)                                \
+    {                                                                                                             \
+        output(form, 7 - k, m, plane, channels, bias, leak, add, y, next);                                        \
+    }
+#define WEIGHTS_GRADIENT(name, form)                                                                          \
+    static void weights_gradient_##name(const float *u, ptrdiff_t plane, int sums, ptrdiff_t sum, float *tap) \
+    {                                                                                                         \
+        weights_gradient(form, u, plane, sums, sum, tap);                                                     \
     }
 INPUT(f32, TS_WINOGRAD_F32)
 INPUT(channels, TS_WINOGRAD_CHANNELS)
 INPUT(even, TS_WINOGRAD_EVEN)
 INPUT(odd, TS_WINOGRAD_ODD)
-WEIGHTS(f32, TS_WINOGRAD_F32)
-WEIGHTS(even, TS_WINOGRAD_EVEN)
-WEIGHTS(odd, TS_WINOGRAD_ODD)
-PRODUCTS(f32, TS_WINOGRAD_F32)
-PRODUCTS(bf16, TS_WINOGRAD_CHANNELS)
+WEIGHTS(f32, TS_WINOGRAD_F32, 3)
+WEIGHTS(f32, TS_WINOGRAD_F32, 5)
+WEIGHTS(even, TS_WINOGRAD_EVEN, 3)
+WEIGHTS(odd, TS_WINOGRAD_ODD, 3)
+OUTPUT(f32, TS_WINOGRAD_F32, 3)
+OUTPUT(f32, TS_WINOGRAD_F32, 5)
+OUTPUT(bf16, TS_WINOGRAD_CHANNELS, 3)
+OUTPUT_GRADIENT(f32, TS_WINOGRAD_F32)
+OUTPUT_GRADIENT(even, TS_WINOGRAD_EVEN)
+OUTPUT_GRADIENT(odd, TS_WINOGRAD_ODD)
+WEIGHTS_GRADIENT(f32, TS_WINOGRAD_F32)
+WEIGHTS_GRADIENT(bf16, TS_WINOGRAD_CHANNELS)
 
 const struct ts_winograd_kernels TS_TABLE(winograd) = {
     .input = {input_f32, input_channels, input_even, input_odd},
-    .output = {output_f32, output_bf16},
-    .weights = {weights_f32, NULL, weights_even, weights_odd},
+    .output = {{output_3_f32, output_3_bf16}, {output_5_f32, NULL}},
+    .weights = {{weights_3_f32, NULL, weights_3_even, weights_3_odd}, {weights_5_f32}},
     .output_gradient = {output_gradient_f32, NULL, output_gradient_even, output_gradient_odd},
     .weights_gradient = {weights_gradient_f32, weights_gradient_bf16}};

@@ -1,5 +1,7 @@
-/* The transforms of Winograd's convolution F(4 x 4, 3 x 3) on vectors of channels (Lavin and Gray, Fast Algorithms for
- * Convolutional Neural Networks, 2016, section 4.3). The products between them are those of tensor/kernels/conv.h. */
+/* The transforms of Winograd's convolutions F(4 x 4, 3 x 3) and F(2 x 2, 5 x 5) on vectors of channels (Lavin and Gray,
+ * Fast Algorithms for Convolutional Neural Networks, 2016, section 4.3). Both read 6 x 6 pixels, transformed alike: a
+ * kernel of side k makes 7 - k x 7 - k of them. Of side 5 there are products of floats alone: between those of bf16 the
+ * errors of random numbers are 2% of the sums' RMS. The products between them are those of tensor/kernels/conv.h. */
 #ifndef TS_KERNELS_WINOGRAD_H
 #define TS_KERNELS_WINOGRAD_H
 #include "tensor/kernels/family.h"
@@ -25,18 +27,20 @@ struct ts_winograd_kernels {
      * tile, to be fetched. An odd number of channels ends with a pair of one and a zero. */
     void (*input[TS_WINOGRAD_FORMS])(const float *const pixel[36], const float *const next[36], int channels, float *v,
                                      ptrdiff_t plane);
-    /* y[4 i + j][c] = act(bias[c] + (A' m A)[c] (+ y[4 i + j][c])) where y is not NULL; bias may be NULL; 0 <= leak <=
-     * 1 as in tensor/conv/conv.h. next: the next tile's y, to be fetched. [whether products are of bf16] */
-    void (*output[2])(const float *m, ptrdiff_t plane, int channels, const float *bias, float leak, bool add,
-                      float *const y[16], float *const next[16]);
-    /* u[36 planes][o] = (G g G')[o] of tap[(3 i + j) step + o], o over whole vectors. */
-    void (*weights[TS_WINOGRAD_FORMS])(const float *tap, ptrdiff_t step, int vectors, float *u, ptrdiff_t plane);
-    /* What output and weights do, transposed. m[36 planes][c] = (A dy A')[c], its last vector whole, with zeros behind
-     * the channels; */
+    /* y[(7 - k) i + j][c] = act(bias[c] + (A' m A)[c] (+ y[..][c])) where that y is not NULL; bias may be NULL; 0 <=
+     * leak
+     * <= 1 as in tensor/conv/conv.h. next: the next tile's y, to be fetched. [k = 3, 5][whether products are of bf16]
+     */
+    void (*output[2][2])(const float *m, ptrdiff_t plane, int channels, const float *bias, float leak, bool add,
+                         float *const *y, float *const *next);
+    /* u[36 planes][o] = (G g G')[o] of tap[(k i + j) step + o], o over whole vectors. [k = 3, 5] */
+    void (*weights[2][TS_WINOGRAD_FORMS])(const float *tap, ptrdiff_t step, int vectors, float *u, ptrdiff_t plane);
+    /* What output and weights do where k = 3, transposed. m[36 planes][c] = (A dy A')[c], its last vector whole, with
+     * zeros behind the channels; */
     void (*output_gradient[TS_WINOGRAD_FORMS])(const float *const dy[16], const float *const next[16], int channels,
                                                float *m, ptrdiff_t plane);
-    /* tap[3 i + j][o] = (G' u G)[o] of one vector of o, u being the sum of so many, sum floats apart, in order. [as
-     * output] */
+    /* tap[3 i + j][o] = (G' u G)[o] of one vector of o, u being the sum of so many, sum floats apart, in order.
+     * [whether products are of bf16] */
     void (*weights_gradient[2])(const float *u, ptrdiff_t plane, int sums, ptrdiff_t sum, float *tap);
 };
 TS_FAMILY(winograd)

@@ -21,7 +21,8 @@ static void check_shape(int ic, int oc, int k, int constants)
     for (int use = TS_CONV_FORWARD; use < TS_CONV_USES; use++) {
         const bool direct = use == TS_CONV_FORWARD || use == TS_CONV_DATA_GRADIENT || use == TS_CONV_FORWARD_BF16 ||
             use == TS_CONV_DATA_GRADIENT_BF16;
-        if (!direct && k != 3) continue;
+        const bool winograd = use == TS_CONV_WINOGRAD || use == TS_CONV_DATA_GRADIENT_WINOGRAD;
+        if (!direct && k != 3 && (!winograd || k != 5)) continue;
         const size_t packed = ts_conv_packed_count(&c, (ts_conv_use)use);
         float *a = aligned_alloc(64, (packed + 15) / 16 * 64), *b = aligned_alloc(64, (packed + 15) / 16 * 64);
         memset(a, 1, packed * sizeof *a);
