@@ -54,9 +54,14 @@ static bool tiles_pay(const ts_conv *c, int least)
     return g.tiles >= least && 2 * g.tiles * g.side * g.side <= 3 * (int64_t)c->n * c->h * c->w;
 }
 
-/* With fewer channels most lanes of the transforms are empty: from 9 to 9 the direct way takes .8 of the time, from 16
- * to 16 1.4 to 2 times as much, in bf16 1.2 to 1.3. */
-static bool winograd_pays(const ts_conv *c, int ic, int oc) { return ic >= 16 && oc >= 16 && tiles_pay(c, 32); }
+/* With few channels most lanes of the transforms are empty: from 9 to 9 the direct way takes .8 of the time, from 16 to
+ * 9 as much; from 9 to 16 1.3 times as much, from 64 to 9 1.8 times, from 16 to 16 1.4 to 2 times, in bf16 1.2 to 1.3.
+ */
+static bool winograd_pays(const ts_conv *c, int ic, int oc)
+{
+    const bool few = c->k == 3 && ((ic >= 9 && oc >= 16) || (ic >= 32 && oc >= 9));
+    return ((ic >= 16 && oc >= 16) || few) && tiles_pay(c, 32);
+}
 
 /* Of weights, from 16 x 16 pixels in batches of 8 on in .35 to .4 of the direct way's time, of bf16 too, at 8 x 8 in
  * .5 to .65, of bf16 in .7 to 1.05. */
@@ -98,12 +103,17 @@ bool ts_conv_rounds_weights(const ts_conv *c)
     return ts_isa_now() >= TS_AVX512BF16 && c->k > 1; /* of side 1 to copy pairs costs more than products save */
 }
 
+/* Whether values are rounded for products: of side 1, to round few channels takes longer than it saves. */
+static bool rounds(const ts_conv *c)
+{
+    return c->compute.precision == TS_BF16 && (conv_amx_present() || c->k > 1 || (c->ic >= 16 && c->oc >= 16));
+}
+
 ts_conv_use ts_conv_packing(const ts_conv *c, ts_conv_direction direction)
 {
     static const ts_conv_use uses[2][2][2] = {
         {{TS_CONV_DATA_GRADIENT, TS_CONV_DATA_GRADIENT_BF16},
          {TS_CONV_DATA_GRADIENT_WINOGRAD, TS_CONV_DATA_GRADIENT_WINOGRAD_BF16}},
         {{TS_CONV_FORWARD, TS_CONV_FORWARD_BF16}, {TS_CONV_WINOGRAD, TS_CONV_WINOGRAD_BF16}}};
-    return uses[direction == TS_CONV_OUTPUT][ts_conv_choose(c, direction) == TS_CONV_BY_WINOGRAD]
-               [c->compute.precision == TS_BF16];
+    return uses[direction == TS_CONV_OUTPUT][ts_conv_choose(c, direction) == TS_CONV_BY_WINOGRAD][rounds(c)];
 }
