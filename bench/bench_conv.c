@@ -24,6 +24,7 @@ static float *values(size_t count, float scale)
 
 static work make(ts_conv c)
 {
+    const bool winograd = c.k == 3 || c.k == 5;
     const size_t pixels = (size_t)c.n * (size_t)c.h * (size_t)c.w,
                  weights = (size_t)c.ic * (size_t)c.oc * (size_t)(c.k * c.k);
     work w = {c,
@@ -33,8 +34,8 @@ static work make(ts_conv c)
               values((size_t)c.oc, 1),
               values(ts_conv_packed_count(&c, TS_CONV_FORWARD), 1),
               values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT), 1),
-              c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_WINOGRAD), 1) : NULL,
-              c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT_WINOGRAD), 1) : NULL,
+              winograd ? values(ts_conv_packed_count(&c, TS_CONV_WINOGRAD), 1) : NULL,
+              winograd ? values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT_WINOGRAD), 1) : NULL,
               values(ts_conv_packed_count(&c, TS_CONV_FORWARD_BF16), 1),
               values(ts_conv_packed_count(&c, TS_CONV_DATA_GRADIENT_BF16), 1),
               c.k == 3 ? values(ts_conv_packed_count(&c, TS_CONV_WINOGRAD_BF16), 1) : NULL,
@@ -43,9 +44,11 @@ static work make(ts_conv c)
     ts_conv_pack(&c, TS_CONV_DATA_GRADIENT_BF16, w.weight, w.packed_gradient_bf16);
     ts_conv_pack(&c, TS_CONV_FORWARD, w.weight, w.packed);
     ts_conv_pack(&c, TS_CONV_DATA_GRADIENT, w.weight, w.packed_gradient);
-    if (c.k == 3) {
+    if (winograd) {
         ts_conv_pack(&c, TS_CONV_WINOGRAD, w.weight, w.packed_winograd);
         ts_conv_pack(&c, TS_CONV_DATA_GRADIENT_WINOGRAD, w.weight, w.packed_gradient_winograd);
+    }
+    if (c.k == 3) {
         ts_conv_pack(&c, TS_CONV_WINOGRAD_BF16, w.weight, w.packed_winograd_bf16);
         ts_conv_pack(&c, TS_CONV_DATA_GRADIENT_WINOGRAD_BF16, w.weight, w.packed_gradient_winograd_bf16);
     }
@@ -230,14 +233,15 @@ BENCH(conv_unet)
 
 BENCH(conv_winograd)
 {
-    static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}},
-                                    {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0, {0}},
-                                    {1, 256, 256, 32, 64, 3, 2, TS_PAD_REPLICATE, 0, {0}},
-                                    {1, 28, 28, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}}};
+    static const ts_conv shape[] = {
+        {1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}},      {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0, {0}},
+        {1, 256, 256, 32, 64, 3, 2, TS_PAD_REPLICATE, 0, {0}}, {1, 28, 28, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}},
+        {1, 64, 64, 64, 9, 3, 1, TS_PAD_REPLICATE, 0, {0}},    {1, 64, 64, 9, 64, 3, 1, TS_PAD_REPLICATE, 0, {0}},
+        {1, 64, 64, 18, 128, 5, 1, TS_PAD_REPLICATE, 0, {0}}};
     static const ts_conv trained[] = {{8, 64, 64, 48, 24, 3, 1, TS_PAD_ZERO, 0, {0}},
                                       {8, 32, 32, 96, 48, 3, 1, TS_PAD_ZERO, 0, {0}},
                                       {8, 64, 64, 64, 128, 3, 2, TS_PAD_REPLICATE, 0, {0}}};
-    bench_heading("Winograd's F(4 x 4, 3 x 3), counting the direct way's multiplications, each below the direct way");
+    bench_heading("Winograd's algorithm, counting the direct way's multiplications, each below the direct way");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
         row("forward", shape[i], forward);
         row("Winograd forward", shape[i], winograd);
@@ -273,7 +277,7 @@ static void weight_rows(ts_conv shape)
 {
     row("weight gradient", shape, weight_gradient);
     row("bf16 weight gradient", shape, weight_gradient_bf16);
-    if (shape.k != 3 || shape.h < 16) return;
+    if (shape.k != 3 || shape.h < 8) return;
     row("Winograd weight gradient", shape, weight_gradient_winograd);
     row("bf16 Winograd weight gradient", shape, weight_gradient_winograd_bf16);
 }
