@@ -1,24 +1,20 @@
 #include "tensor/team.h"
 #include "tensor/threads.h"
+#include "tensor/wait.h"
 #include <limits.h>
-#include <linux/futex.h>
 #include <pthread.h>
 #include <sched.h>
 #include <signal.h>
 #include <stdatomic.h>
-#include <sys/syscall.h>
-#include <time.h>
 #include <unistd.h>
 
 enum {
     SLOTS = 64,     /* loops at once; more than that are their callers' alone */
     WORKERS = 1023, /* the programs take up to 1024 threads */
     SHARES = 64,    /* of a loop's values, each its threads' own as long as it lasts */
-    PIECES = 8,     /* of a share, so that it can be helped with */
-    LOOKS = 32      /* at what is waited for, between two at the clock */
+    PIECES = 8      /* of a share, so that it can be helped with */
 };
-#define SPIN 50e-6 /* seconds: longer than from loop to loop in a network, shorter than a time slice */
-#define AGAIN 1.0  /* seconds until a worker that was refused is asked for again */
+#define AGAIN 1.0 /* seconds until a worker that was refused is asked for again */
 
 typedef struct share {
     _Alignas(64) atomic_llong next;
@@ -62,43 +58,6 @@ static atomic_llong refused_until;  /* nanoseconds */
 static pthread_mutex_t growing = PTHREAD_MUTEX_INITIALIZER, each_alone = PTHREAD_MUTEX_INITIALIZER;
 static _Thread_local bool inside; /* of a loop */
 static void (*on_refusal)(int threads, int wanted);
-
-static void futex_wait(atomic_uint *word, unsigned value)
-{
-    syscall(SYS_futex, word, FUTEX_WAIT_PRIVATE, value, NULL, NULL, 0);
-}
-
-static void futex_wake(atomic_uint *word) { syscall(SYS_futex, word, FUTEX_WAKE_PRIVATE, 1, NULL, NULL, 0); }
-
-static long long nanoseconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (long long)t.tv_sec * 1000000000 + t.tv_nsec;
-}
-
-static inline void pause_briefly(void)
-{
-#if defined(__x86_64__) || defined(__i386__)
-    __builtin_ia32_pause();
-#elif defined(__aarch64__)
-    __asm__ volatile("isb" ::: "memory"); /* yield does nothing on most cores */
-#endif
-}
-
-/* Until (*word & mask) == value where equal, or != value where not. False when it has taken too long. */
-static bool spin(const atomic_uint *word, unsigned mask, unsigned value, bool equal)
-{
-    for (long long end = 0;;) {
-        for (int i = 0; i < LOOKS; i++) {
-            if (((atomic_load_explicit(word, memory_order_acquire) & mask) == value) == equal) return true;
-            pause_briefly();
-        }
-        const long long now = nanoseconds();
-        if (!end) end = now + (long long)(SPIN * 1e9);
-        if (now > end) return false;
-    }
-}
 
 bool ts_next(ts_queue *q, int64_t *begin, int64_t *end)
 {
