@@ -123,6 +123,18 @@ INLINE void output(const ts_winograd_form form, const int side, const float *m, 
     }
 }
 
+/* At 0, p, -p, q, -q and infinity, from the even and odd part at p and at q. */
+INLINE void at_points(points at, vf first, vf a, vf b, vf c, vf d, vf last, vf to[6])
+{
+    POINTS;
+    to[0] = SET(1 / (p2 * q2)) * first;
+    to[1] = -(a + b);
+    to[2] = b - a;
+    to[3] = c + d;
+    to[4] = c - d;
+    to[5] = last;
+}
+
 /* to = G w of a kernel of side 5 */
 INLINE void from_five(points at, const vf *w, vf to[6])
 {
@@ -130,12 +142,7 @@ INLINE void from_five(points at, const vf *w, vf to[6])
     const double at_p = 1 / (2 * p2 * (q2 - p2)), at_q = 1 / (2 * q2 * (q2 - p2));
     const vf a = SET(at_p) * (w[0] + SET(p2) * w[2] + SET(p2 * p2) * w[4]), b = SET(p * at_p) * (w[1] + SET(p2) * w[3]),
              c = SET(at_q) * (w[0] + SET(q2) * w[2] + SET(q2 * q2) * w[4]), d = SET(q * at_q) * (w[1] + SET(q2) * w[3]);
-    to[0] = SET(1 / (p2 * q2)) * w[0];
-    to[1] = -(a + b);
-    to[2] = b - a;
-    to[3] = c + d;
-    to[4] = c - d;
-    to[5] = w[4];
+    at_points(at, w[0], a, b, c, d, w[4], to);
 }
 
 /* Of side 3 */
@@ -145,12 +152,7 @@ INLINE void from_three(points at, const vf *w, vf to[6])
     const double at_p = 1 / (2 * p2 * (q2 - p2)), at_q = 1 / (2 * q2 * (q2 - p2)), squares = 1 / (2 * (q2 - p2));
     const vf a = SET(at_p) * (w[0] + SET(p2) * w[2]), b = SET(p * at_p) * w[1],
              c = SET(at_q) * w[0] + SET(squares) * w[2], d = SET(q * at_q) * w[1];
-    to[0] = SET(1 / (p2 * q2)) * w[0];
-    to[1] = -(a + b);
-    to[2] = b - a;
-    to[3] = c + d;
-    to[4] = c - d;
-    to[5] = w[2];
+    at_points(at, w[0], a, b, c, d, w[2], to);
 }
 
 INLINE void weights(const ts_winograd_form form, const int side, const float *tap, ptrdiff_t step, int vectors,
