@@ -288,11 +288,13 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     /* Once: memory that one stage has touched is there for the next, and touching it first costs as much as computing.
      */
     ag_reset(e->tape);
-    const double more = most_bytes(a, side, tile_side(e, side, &o), o.orientations) -
-        (double)ts_arena_peak(ag_arena(e->tape)); /* than earlier calls left */
+    ts_arena *arena = ag_arena(e->tape);
+    const double most = most_bytes(a, side, tile_side(e, side, &o), o.orientations),
+                 more = most - (double)ts_arena_peak(arena); /* than earlier calls left */
     if (more > 0 && ts_budget_check(more, st) != TS_OK)
         return ts_context(st, "%d x %d pixels, of which the network reads %d x %d", side, side, nn_arch_side(a),
                           nn_arch_side(a));
+    if (more > 0) ts_arena_reserve(arena, (size_t)most);
     lgd_first_guess guess = {0};
     ts_code code = TS_OK;
     if (a->descent == NN_DESCENT_POSTERIOR && !e->g_alone) code = first_guess(e, &p, &o, &guess, st);

@@ -3,10 +3,14 @@
 #include "infer/hidden_diffuse.h"
 #include "render/scene_model.h"
 #include "tensor/maps.h"
+#include "tensor/memory.h"
 #include "tensor/resize.h"
+#include "tensor/team.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+enum { PIXELS = 1 << 11 }; /* at a time, at least */
 
 /* Of F0's error, what is not a level of the whole material: the part that a pixel may change by itself. */
 #define F0_DETAIL 0.35f
@@ -16,6 +20,19 @@
 #define ROUGHNESS_LEVEL 0.15
 #define ROUGHNESS_LEVEL_IN_KNOWN_VIEW 0.4
 #define LAPLACE 1.41421356f /* a Laplace density's standard deviation over its mean absolute error */
+
+typedef struct deviation_job {
+    const float *spread;
+    float *to;
+} deviation_job;
+
+static void deviations(const void *job, int64_t begin, int64_t end)
+{
+    const deviation_job *j = job;
+    for (int64_t i = begin * NN_SPREADS; i < end * NN_SPREADS; i++)
+        j->to[i] = (i % NN_SPREADS == GROUP_SPECULAR ? F0_DETAIL : 1) * LAPLACE * NN_SPREAD_UNIT *
+            expf(fminf(fmaxf(j->spread[i], -6), 4));
+}
 
 /* The numbers that are known have no error: the prior keeps them. */
 static void scene_prior(const float *said, const rd_view *view, int known, rd_scene_prior *prior)
@@ -56,17 +73,17 @@ static void level_prior(const lgd_first_guess *g, size_t pixels, int channels, i
 
 /* Scene and level, found from R_0; R_0's diffuse where that scene's highlight hides it; both again. */
 static ts_code fit(rd_grid grid, const float *image, int channels, int known, const rd_scene_prior *prior,
-                   lgd_first_guess *g, ts_status *st)
+                   ts_arena *arena, lgd_first_guess *g, ts_status *st)
 {
     const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior(known)};
     const int64_t pixels = (int64_t)grid.h * grid.w;
     const size_t values = (size_t)pixels * (size_t)channels;
-    float unknown[RD_SCENE_UNKNOWNS], *rough = malloc(values * sizeof *rough);
+    float unknown[RD_SCENE_UNKNOWNS], *rough = ts_arena_alloc(arena, values * sizeof *rough);
     if (!rough) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", grid.w, grid.h);
     memcpy(unknown, prior->mean, sizeof unknown);
     rd_scene_fit(grid, g->r0, channels, g->deviation, image, prior, &how, unknown, NULL);
     rd_scene_roughen(pixels, g->r0, channels, unknown[RD_SCENE_ROUGHNESS], rough);
-    const ts_code code = lgd_fill_hidden_diffuse(grid, image, unknown, channels, rough, st);
+    const ts_code code = lgd_fill_hidden_diffuse(grid, image, unknown, channels, arena, rough, st);
     if (!code) {
         for (size_t i = 0; i < values; i += (size_t)channels)
             memcpy(g->r0 + i + MAP_DIFFUSE, rough + i + MAP_DIFFUSE, 3 * sizeof *rough);
@@ -74,7 +91,6 @@ static ts_code fit(rd_grid grid, const float *image, int channels, int known, co
         memcpy(g->number, unknown, sizeof g->number);
         rd_scene_roughen(pixels, g->r0, channels, unknown[RD_SCENE_ROUGHNESS], g->r0);
     }
-    free(rough);
     return code;
 }
 
@@ -104,14 +120,13 @@ static ts_code make(ag_tape *tape, const nn_model *model, const float *image, in
         *st = *ag_status(tape);
         return st->code;
     }
-    memcpy(g->r0, guess.maps->t.data, pixels * (size_t)model->arch.channels * sizeof *g->r0);
-    for (size_t i = 0; i < pixels * NN_SPREADS; i++)
-        g->deviation[i] = (i % NN_SPREADS == GROUP_SPECULAR ? F0_DETAIL : 1) * LAPLACE * NN_SPREAD_UNIT *
-            expf(fminf(fmaxf(guess.spread->t.data[i], -6), 4));
+    ts_memory_copy(g->r0, guess.maps->t.data, pixels * (size_t)model->arch.channels * sizeof *g->r0, threads);
+    ts_for(threads, (int64_t)pixels, PIXELS, deviations, &(deviation_job){guess.spread->t.data, g->deviation});
     rd_scene_prior prior;
     scene_prior(guess.scene->t.data, view, known, &prior);
     level_prior(g, pixels, model->arch.channels, known, &prior);
-    return fit(rd_grid_on(rd_grid_full(size), threads), small->t.data, model->arch.channels, known, &prior, g, st);
+    return fit(rd_grid_on(rd_grid_full(size), threads), small->t.data, model->arch.channels, known, &prior,
+               ag_arena(tape), g, st);
 }
 
 ts_code lgd_first_guess_make(ag_tape *tape, const nn_model *model, const float *image, int side, const rd_view *view,

@@ -1,10 +1,14 @@
 #include "infer/hidden_diffuse.h"
 #include "tensor/maps.h"
+#include "tensor/memory.h"
+#include "tensor/team.h"
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
-enum { CELLS = 32 };        /* a side, at most */
+enum {
+    CELLS = 32, /* a side, at most */
+    ROWS = 4    /* of pixels at a time, at least */
+};
 #define STIFFNESS 0.1       /* of the field between neighbours, beside a weight of 1 */
 #define WEIGHT_LEAST 1e-4   /* keeps the field defined where nothing is seen */
 #define ALBEDO_LEAST 0.004f /* whose logarithm is taken: one step of 8 bits */
@@ -21,28 +25,46 @@ typedef struct cells {
     double weight[CELLS * CELLS], log_albedo[3][CELLS * CELLS], change[3][CELLS * CELLS];
 } cells;
 
-/* Sums over each cell, then means. */
-static void gather(const pictures *p, int size, int channels, const float *maps, const float *image, cells *c)
+typedef struct gather_job {
+    const pictures *p;
+    int size, channels;
+    const float *maps, *image;
+    cells *c;
+} gather_job;
+
+/* The first row of pixels of the cells' row. */
+static int first_row(int size, int side, int64_t row) { return (int)((row * size + side - 1) / side); }
+
+/* Sums over each cell of these rows, then means. */
+static void gather_rows(const void *job, int64_t begin, int64_t end)
 {
+    const gather_job *j = job;
+    const int size = j->size, side = j->c->side;
     int count[CELLS * CELLS] = {0};
-    double most = 0;
-    for (int i = 0; i < size * size; i++) {
-        const int at = i / size * c->side / size * c->side + i % size * c->side / size;
+    for (int i = first_row(size, side, begin) * size; i < first_row(size, side, end) * size; i++) {
+        const int at = i / size * side / size * side + i % size * side / size;
         float full = 0, diffuse = 0, seen = 0;
         for (int k = 0; k < 3; k++) {
-            full += p->full[3 * i + k], diffuse += p->diffuse[3 * i + k], seen += image[3 * i + k];
-            const float albedo = (maps[i * channels + MAP_DIFFUSE + k] + 1) / 2;
-            c->log_albedo[k][at] += (double)logf(fmaxf(albedo, ALBEDO_LEAST));
+            full += j->p->full[3 * i + k], diffuse += j->p->diffuse[3 * i + k], seen += j->image[3 * i + k];
+            const float albedo = (j->maps[i * j->channels + MAP_DIFFUSE + k] + 1) / 2;
+            j->c->log_albedo[k][at] += (double)logf(fmaxf(albedo, ALBEDO_LEAST));
         }
         const float part = fminf(diffuse / fmaxf(full, 1e-6f), 1);
-        c->weight[at] += (double)(seen > BURNT_OUT ? BURNT_OUT_TELLS * part : part);
+        j->c->weight[at] += (double)(seen > BURNT_OUT ? BURNT_OUT_TELLS * part : part);
         count[at]++;
     }
-    for (int i = 0; i < c->side * c->side; i++) {
-        c->weight[i] /= count[i];
-        for (int k = 0; k < 3; k++) c->log_albedo[k][i] /= count[i];
-        most = fmax(most, c->weight[i]);
+    for (int i = (int)begin * side; i < (int)end * side; i++) {
+        j->c->weight[i] /= count[i];
+        for (int k = 0; k < 3; k++) j->c->log_albedo[k][i] /= count[i];
     }
+}
+
+static void gather(const pictures *p, int size, int channels, const float *maps, const float *image, int threads,
+                   cells *c)
+{
+    double most = 0;
+    ts_for(threads, c->side, 1, gather_rows, &(gather_job){p, size, channels, maps, image, c});
+    for (int i = 0; i < c->side * c->side; i++) most = fmax(most, c->weight[i]);
     for (int i = 0; i < c->side * c->side; i++) c->weight[i] = pow(c->weight[i] / fmax(most, 1e-6), 3);
 }
 
@@ -112,16 +134,24 @@ static void between(int i, int size, int side, int *cell, float *part)
     *part = at - (float)*cell;
 }
 
-static void apply(const cells *c, int size, int channels, float *maps)
+typedef struct apply_job {
+    const cells *c;
+    int size, channels;
+    float *maps;
+} apply_job;
+
+static void apply_rows(const void *job, int64_t begin, int64_t end)
 {
-    const int next = c->side > 1;
-    for (int y = 0; y < size; y++) {
+    const apply_job *j = job;
+    const cells *c = j->c;
+    const int size = j->size, next = c->side > 1;
+    for (int y = (int)begin; y < (int)end; y++) {
         int row, column;
         float down, right;
         between(y, size, c->side, &row, &down);
         for (int x = 0; x < size; x++) {
             between(x, size, c->side, &column, &right);
-            float *map = maps + (size_t)(y * size + x) * (size_t)channels + MAP_DIFFUSE;
+            float *map = j->maps + (size_t)(y * size + x) * (size_t)j->channels + MAP_DIFFUSE;
             for (int k = 0; k < 3; k++) {
                 const double *a = c->change[k] + row * c->side + column, *b = a + next * c->side;
                 const float upper = (1 - right) * (float)a[0] + right * (float)a[next],
@@ -133,26 +163,27 @@ static void apply(const cells *c, int size, int channels, float *maps)
 }
 
 ts_code lgd_fill_hidden_diffuse(rd_grid grid, const float *image, const float number[RD_SCENE_NUMBERS], int channels,
-                                float *maps, ts_status *st)
+                                ts_arena *arena, float *maps, ts_status *st)
 {
     const int size = grid.w, side = size < CELLS ? size : CELLS;
     const size_t pixels = (size_t)size * (size_t)size, values = pixels * (size_t)channels;
-    pictures p = {malloc(values * sizeof(float)), malloc(pixels * 3 * sizeof(float)),
-                  malloc(pixels * 3 * sizeof(float))};
-    cells *c = calloc(1, sizeof *c);
-    double *band = malloc((size_t)(side * side * (side + 1)) * sizeof *band);
+    const ts_mark mark = ts_arena_mark(arena);
+    pictures p = {ts_arena_alloc(arena, values * sizeof(float)), ts_arena_alloc(arena, pixels * 3 * sizeof(float)),
+                  ts_arena_alloc(arena, pixels * 3 * sizeof(float))};
+    cells *c = ts_arena_zalloc(arena, 1, sizeof *c);
+    double *band = ts_arena_alloc(arena, (size_t)(side * side * (side + 1)) * sizeof *band);
     ts_code code = TS_OK;
     if (p.matt && p.full && p.diffuse && c && band) {
         c->side = side;
-        memcpy(p.matt, maps, values * sizeof(float));
+        ts_memory_copy(p.matt, maps, values * sizeof(float), grid.threads);
         for (size_t i = 0; i < values; i += (size_t)channels)
             for (size_t k = 0; k < 3; k++) p.matt[i + MAP_SPECULAR + k] = -1;
         rd_scene_photograph(grid, maps, channels, number, false, p.full);
         rd_scene_photograph(grid, p.matt, channels, number, false, p.diffuse);
-        gather(&p, size, channels, maps, image, c);
+        gather(&p, size, channels, maps, image, grid.threads, c);
         find_changes(c, band);
-        apply(c, size, channels, maps);
+        ts_for(grid.threads, size, ROWS, apply_rows, &(apply_job){c, size, channels, maps});
     } else code = ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", size, size);
-    free(p.matt), free(p.full), free(p.diffuse), free(c), free(band);
+    ts_arena_release(arena, mark);
     return code;
 }

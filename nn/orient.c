@@ -1,7 +1,10 @@
 /* g of a photograph in its orientations (docs/math.md, S1). */
 #include "nn/layers.h"
 #include "tensor/maps.h"
+#include "tensor/team.h"
 #include <string.h>
+
+enum { ROWS = 8 }; /* of pixels at a time, at least */
 
 /* As it is, a quarter turn, the other turns, and all of these mirrored. The first 1, 4 and 8 are groups, so that their
  * mean turns with the photograph; the first 2 are not (docs/training.md, Orientations). */
@@ -17,6 +20,15 @@ static void source(int k, int side, int y, int x, int *from_y, int *from_x)
     *from_x = k & 4 ? y : x;
 }
 
+/* The pixel (*at_y, *at_x) of orientation k of a picture that the picture has at (y, x). */
+static void place(int k, int side, int y, int x, int *at_y, int *at_x)
+{
+    *at_y = k & 4 ? x : y;
+    *at_x = k & 4 ? y : x;
+    if (k & 1) *at_x = side - 1 - *at_x;
+    if (k & 2) *at_y = side - 1 - *at_y;
+}
+
 /* The normal of orientation k in the picture's axes: as source for positions, but with y up. */
 static void normal_back(int k, const float *from, float to[2])
 {
@@ -25,27 +37,42 @@ static void normal_back(int k, const float *from, float to[2])
     to[1] = k & 4 ? -x : y;
 }
 
+typedef struct turn_job {
+    const float *from;
+    int count, side, channels, vector;
+    float *to;
+} turn_job;
+
+static void turn_back_rows(const void *job, int64_t begin, int64_t end)
+{
+    const turn_job *j = job;
+    const int side = j->side, channels = j->channels, v = j->vector;
+    const float part = 1 / (float)j->count; /* a power of two */
+    for (int64_t i = begin * side; i < end * side; i++) {
+        float *to = j->to + i * channels;
+        for (int k = 0; k < j->count; k++) {
+            int y, x;
+            place(orientations[k], side, (int)(i / side), (int)(i % side), &y, &x);
+            const float *from = j->from + (((int64_t)k * side + y) * side + x) * channels;
+            float turned[2];
+            if (v >= 0) normal_back(orientations[k], from + v, turned);
+            for (int c = 0; c < channels; c++) {
+                const float value = v >= 0 && c - v >= 0 && c - v < 2 ? turned[c - v] : from[c];
+                to[c] = k ? to[c] + value * part : value * part;
+            }
+        }
+    }
+}
+
 /* [1, S, S, channels]: the mean over orientations of from [count, S, S, channels], turned back; the vector in two
  * channels from vector on (-1: there is none) turns with it. */
 static ag_value *mean_back(ag_tape *tape, const ag_value *from, int vector)
 {
     const int count = from->t.shape.n, side = from->t.shape.h, channels = from->t.shape.c;
-    const size_t pixels = (size_t)side * (size_t)side;
     ag_value *mean = ag_empty(tape, (ts_shape){1, side, side, channels});
-    if (!mean) return NULL;
-    memset(mean->t.data, 0, (size_t)ts_count(mean->t.shape) * sizeof(float));
-    for (int k = 0; k < count; k++)
-        for (int i = 0; i < side * side; i++) {
-            int sy, sx;
-            source(orientations[k], side, i / side, i % side, &sy, &sx);
-            const float *x = from->t.data + ((size_t)k * pixels + (size_t)i) * (size_t)channels;
-            float *to = mean->t.data + (size_t)(sy * side + sx) * (size_t)channels, turned[2];
-            if (vector >= 0) normal_back(orientations[k], x + vector, turned);
-            for (int c = 0; c < channels; c++) {
-                const bool turns = vector >= 0 && (c == vector || c == vector + 1);
-                to[c] += (turns ? turned[c - vector] : x[c]) / (float)count;
-            }
-        }
+    if (mean)
+        ts_for(ag_compute(tape)->threads, side, ROWS, turn_back_rows,
+               &(turn_job){from->t.data, count, side, channels, vector, mean->t.data});
     return mean;
 }
 
@@ -67,22 +94,28 @@ static ag_value *mean_scene(ag_tape *tape, const ag_value *from)
     return mean;
 }
 
+static void turn_rows(const void *job, int64_t begin, int64_t end)
+{
+    const turn_job *j = job;
+    const int side = j->side, channels = j->channels;
+    for (int64_t i = begin * side; i < end * side; i++) {
+        const int at = (int)(i % ((int64_t)side * side));
+        int y, x;
+        source(orientations[i / side / side], side, at / side, at % side, &y, &x);
+        memcpy(j->to + i * channels, j->from + ((int64_t)y * side + x) * channels, (size_t)channels * sizeof(float));
+    }
+}
+
 bool nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *photo, ag_value *conditions, int count,
                       nn_guess *guess)
 {
     if (!photo) return false;
     const int side = photo->t.shape.h, read = photo->t.shape.c;
-    const size_t pixels = (size_t)side * (size_t)side;
     const ts_mark mark = ag_scope_begin(tape);
     ag_value *all = ag_empty(tape, (ts_shape){count, side, side, read});
     if (!all) return false;
-    for (int k = 0; k < count; k++)
-        for (int i = 0; i < side * side; i++) {
-            int sy, sx;
-            source(orientations[k], side, i / side, i % side, &sy, &sx);
-            memcpy(all->t.data + ((size_t)k * pixels + (size_t)i) * (size_t)read,
-                   photo->t.data + (size_t)(sy * side + sx) * (size_t)read, (size_t)read * sizeof(float));
-        }
+    ts_for(ag_compute(tape)->threads, (int64_t)count * side, ROWS, turn_rows,
+           &(turn_job){.from = photo->t.data, .side = side, .channels = read, .to = all->t.data});
     if (!nn_unet(tape, model, all, conditions, guess)) return false;
     ag_value *keep[3] = {mean_back(tape, guess->maps, MAP_NORMAL),
                          guess->spread ? mean_back(tape, guess->spread, -1) : NULL,

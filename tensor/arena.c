@@ -107,6 +107,13 @@ void ts_arena_release(ts_arena *a, ts_mark mark)
     a->total = mark.total;
 }
 
+void ts_arena_reserve(ts_arena *a, size_t bytes)
+{
+    if (a->total > 0 || bytes > SIZE_MAX / 4 || (a->chunks > 0 && a->chunk[0].size >= bytes)) return;
+    free_chunks(a);
+    add_chunk(a, bytes);
+}
+
 void ts_arena_reset(ts_arena *a)
 {
     if (a->chunks > 1) {

@@ -32,9 +32,11 @@ static void make(float roughness, float f0, float disk)
 static void fill(int threads, float *to)
 {
     ts_status st = {0};
+    ts_arena *arena = ts_arena_create(0, &st);
     memcpy(to, maps, sizeof maps);
-    CHECK(!lgd_fill_hidden_diffuse(rd_grid_on(rd_grid_full(SIDE), threads), image, scene, C, to, &st), "%s",
-          st.message);
+    CHECK(arena && !lgd_fill_hidden_diffuse(rd_grid_on(rd_grid_full(SIDE), threads), image, scene, C, arena, to, &st),
+          "%s", st.message);
+    ts_arena_destroy(&arena);
 }
 
 /* The disk ends where the highlight does: diffuse becomes that of the surroundings, and keeps its detail and hue. */

@@ -75,6 +75,23 @@ TEST(arena_aligns_grows_releases_and_merges)
     ts_arena_destroy(&a);
 }
 
+TEST(arena_reserves_one_piece)
+{
+    enum { BLOCKS = 40, BYTES = 1 << 20 };
+    ts_arena *a = ts_arena_create(0, NULL);
+    ts_arena_reserve(a, SIZE_MAX / 2); /* a hint that nothing can follow */
+    unsigned char *first = ts_arena_alloc(a, BYTES);
+    CHECK(first != NULL, "an arena without room for the hint");
+    ts_arena_reserve(a, 2 * BLOCKS * BYTES);
+    CHECK(ts_arena_alloc(a, BYTES) == first + BYTES, "an arena that is not empty changes");
+    ts_arena_reset(a);
+    ts_arena_reserve(a, BLOCKS * BYTES);
+    first = ts_arena_alloc(a, BYTES);
+    for (int i = 1; i < BLOCKS; i++)
+        CHECK(ts_arena_alloc(a, BYTES) == first + (ptrdiff_t)i * BYTES, "block %d lies elsewhere", i);
+    ts_arena_destroy(&a);
+}
+
 TEST(tensor_views_and_strided_copy)
 {
     float data[2 * 3 * 4 * 5], out[2 * 2 * 2 * 3];
