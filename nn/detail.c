@@ -49,6 +49,13 @@ static ag_value *squares(ag_tape *tape, const nn_model *model, ag_value *seen, a
     return ag_depth_to_space(tape, y, model->arch.g_unshuffle);
 }
 
+/* What is made next of v takes v's place where nobody asks for v again. */
+static ag_value *in_place(ag_tape *tape, ag_value *v)
+{
+    if (v && !ag_gradients(tape)) ag_into(tape, v);
+    return v;
+}
+
 bool nn_detail(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *seen, ag_value *features,
                ag_value *coarse, nn_guess *guess)
 {
@@ -64,7 +71,9 @@ bool nn_detail(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *
                                TS_PAD_REPLICATE, NN_LEAK_G);
     y = nn_conv(tape, model, l->detail[4], y, 1, TS_PAD_REPLICATE, 1);
     ag_value *added = ag_shading_frame(tape, ag_channels(tape, y, 0, framed));
-    ag_value *keep[2] = {ag_tanh(tape, ag_add(tape, ag_resize_smooth(tape, coarse, side, side), added)), NULL};
+    ag_value *sum = in_place(tape, ag_resize_smooth(tape, coarse, side, side));
+    sum = in_place(tape, ag_add(tape, sum, added));
+    ag_value *keep[2] = {ag_tanh(tape, sum), NULL};
     if (model->arch.spread) keep[1] = ag_channels(tape, y, framed, NN_SPREADS);
     ag_scope_end(tape, mark, keep, model->arch.spread ? 2 : 1);
     guess->maps = keep[0];
