@@ -18,6 +18,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 typedef struct run {
     const cl_command *command;
@@ -323,6 +324,7 @@ static int work(const cl_command *given)
     }
     int code = CL_FAILED;
     bool published = false;
+    const bool there = access(c->out, F_OK) == 0;
     cl_pipeline *pipeline = NULL;
     if (lgd_model_path(c->model, *c->capture || (c->sheet && c->photos > 1) ? "multi" : LGD_DEFAULT_MODEL, weights,
                        &st) != TS_OK)
@@ -346,6 +348,7 @@ static int work(const cl_command *given)
     }
     code = end_index(&r, code);
     cl_pipeline_end(&pipeline);
+    if (!there) rmdir(c->out); /* nothing came into it, or it stays */
     lgd_free(&r.model);
     cl_plan_free(&plan);
     cl_operands_free(&operands);

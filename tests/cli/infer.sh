@@ -33,6 +33,17 @@ whole_run() {
     if cmp -s "$T/a/b/wall/maps.exr" "$T/c/wall/maps.exr"; then fail "refinement changes nothing"; fi
 }
 
+# A folder that nothing came into is not left; one that was there stays.
+empty_folders() {
+    model
+    echo text >"$T/notes.txt"
+    expect 1 infer -q "$T/notes.txt" -o "$T/new/o"
+    [ ! -e "$T/new/o" ] || fail "an empty folder is left"
+    mkdir "$T/there"
+    expect 1 infer -q "$T/notes.txt" -o "$T/there"
+    [ -d "$T/there" ] || fail "a folder that was there is removed"
+}
+
 # A folder stands for the photographs in it, @FILE for those that it names; at the end it is said how it went.
 folders_and_lists() {
     model
@@ -408,6 +419,7 @@ check infer_field_of_view field_of_view
 check infer_writes_only_what_is_asked_for only_what_is_asked_for
 check infer_overlap_changes_nothing overlap_changes_nothing
 check infer_old_results_are_replaced old_results
+check infer_empty_folders_are_not_left empty_folders
 check infer_poor_photographs poor_photographs
 check infer_light_power light_power
 check infer_sizes sizes
