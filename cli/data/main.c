@@ -37,6 +37,7 @@ enum {
     OPT_FAMILIES,
     OPT_HUES,
     OPT_RELIEF,
+    OPT_BLEND,
     OPT_FORMAT,
     OPT_SHEET,
     OPT_PHOTOGRAPHS,
@@ -59,6 +60,7 @@ static const struct option plain_options[] = {{"output", required_argument, NULL
                                               {"families", required_argument, NULL, OPT_FAMILIES},
                                               {"hues", required_argument, NULL, OPT_HUES},
                                               {"relief", required_argument, NULL, OPT_RELIEF},
+                                              {"blend", required_argument, NULL, OPT_BLEND},
                                               {"format", required_argument, NULL, OPT_FORMAT},
                                               {"contact-sheet", no_argument, NULL, OPT_SHEET},
                                               {"photographs", no_argument, NULL, OPT_PHOTOGRAPHS},
@@ -102,7 +104,9 @@ static void print_help(void)
         printf("%s%s%s", i ? i % 8 ? ", " : "," : "", i % 8 ? "" : "\n                        ", io_family_name(i));
     printf("\n"
            "      --hues X          share of the materials with other hues, 0 .. 1 (default 0)\n"
-           "      --relief X        share of the materials with another relief, 0 .. 1 (default 0)\n");
+           "      --relief X        share of the materials with another relief, 0 .. 1 (default 0)\n"
+           "      --blend X         share of the materials that are a mean of themselves and another, 0 .. 1 (default "
+           "0)\n");
     printf("\nPhotographs, largest values of what each draws:\n");
     for (int i = 0; i < CL_CAMERA_OPTIONS; i++) {
         io_camera least = cl_camera_default;
@@ -163,6 +167,7 @@ static int parse_options(int argc, char **argv, options *o)
         case OPT_SIZE: code = parse_number("size", optarg, 8, 2048, &o->size); break;
         case OPT_FAMILIES: code = parse_families(optarg, &o->procedural.families); break;
         case OPT_HUES: code = parse_share("hues", optarg, 1, &o->procedural.hues); break;
+        case OPT_BLEND: code = parse_share("blend", optarg, 1, &o->procedural.blend); break;
         case OPT_RELIEF: code = parse_share("relief", optarg, 1, &o->procedural.relief); break;
         case OPT_FORMAT:
             if (!strcmp(optarg, "folders")) o->format = FORMAT_FOLDERS;

@@ -40,4 +40,5 @@ void io_family_creased(io_canvas *c);  /* crumpled foil, paper, film */
 void io_family_stamped(io_canvas *c);  /* metal and other sheet stamped with a pattern */
 void io_family_granite(io_canvas *c);  /* grains of several minerals, polished, honed or flamed */
 void io_family_printed(io_canvas *c);  /* paper, card, wrapping: bold shapes without relief */
+void io_family_faces(io_canvas *c);    /* tiles, blocks and panels whose faces lean, each another way */
 #endif

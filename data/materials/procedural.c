@@ -1,4 +1,5 @@
 #include "data/materials/procedural.h"
+#include "data/materials/blend.h"
 #include "data/materials/family.h"
 #include "data/materials/hues.h"
 #include "data/materials/relief.h"
@@ -31,7 +32,7 @@ static const struct {
     {"alloy", 1.8f, io_family_alloy},     {"bark", 1, io_family_bark},
     {"pebbles", 1.2f, io_family_pebbles}, {"creased", 1.2f, io_family_creased},
     {"stamped", 1, io_family_stamped},    {"granite", 1, io_family_granite},
-    {"printed", 1, io_family_printed},
+    {"printed", 1, io_family_printed},    {"faces", 1.2f, io_family_faces},
 };
 
 int io_family_count(void) { return (int)(sizeof families / sizeof *families); }
@@ -121,6 +122,19 @@ static void mix(io_canvas *c, const float *base)
     cv_drop(c, mark);
 }
 
+/* Material number index, painted on c, becomes a mean of itself and another; base has room for that. */
+static void blend(const io_procedural *p, uint64_t index, uint64_t allowed, io_canvas *c, float *base)
+{
+    ts_rng rng = ts_rng_make(p->seed, TS_STREAM_BLEND, index);
+    if (ts_rng_uniform(&rng) >= p->blend) return;
+    const float weight = 0.1f + 0.8f * ts_rng_uniform(&rng);
+    io_canvas other = *c;
+    painted_at(&other, base);
+    other.rng = rng;
+    families[draw_family(&other.rng, allowed, p->often)].paint(&other);
+    cv_blend(c, &other, weight);
+}
+
 /* Material number index, painted on c, gets another relief; base has room for a second material. */
 static void exchange_relief(const io_procedural *p, uint64_t index, uint64_t allowed, io_canvas *c, float *base)
 {
@@ -162,6 +176,8 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
     }
     c.used = 0;
     if (a < CLASSIC) wear_calm(&c);
+    c.used = 0;
+    blend(p, index, allowed, &c, mixed ? first : second);
     c.used = 0;
     exchange_relief(p, index, allowed, &c, mixed ? first : second);
     ts_rng hues = ts_rng_make(p->seed, TS_STREAM_HUES, index);

@@ -20,6 +20,7 @@ typedef struct io_procedural {
     uint64_t often;    /* families that are drawn three times as often as the rest; 0 = none */
     float hues;        /* share of the materials that get other hues (materials/hues.h); the rest stay as they are */
     float relief;      /* share of those whose relief is made anew (materials/relief.h) */
+    float blend;       /* share of those that are a mean of themselves and another (materials/blend.h) */
 } io_procedural;
 
 /* Material number index. m->size and m->maps are the caller's (io_material_create). Serial, thread safe. */

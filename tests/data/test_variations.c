@@ -1,4 +1,5 @@
-/* What training varies of the procedural materials: families, hues, relief. */
+/* What training varies of the procedural materials: families, hues, relief, blends. */
+#include "data/materials/blend.h"
 #include "data/materials/procedural.h"
 #include "tests/test.h"
 #include <math.h>
@@ -114,4 +115,87 @@ TEST(procedural_other_hues_change_diffuse_colours_alone)
     CHECK(changed > COUNT / 2 && halves > COUNT / 6 && halves < changed, "%d and %d of %d changed", changed, halves,
           COUNT);
     CHECK(bluer > before + COUNT / 8, "%d materials are more blue than red, %d before", bluer, before);
+}
+
+/* All eight planes of a canvas, at v[0] .. v[8 count - 1]. */
+static io_canvas painted(int count, float *v)
+{
+    return (io_canvas){.count = count,
+                       .height = v,
+                       .diffuse = {v + count, v + 2 * count, v + 3 * count},
+                       .specular = {v + 4 * count, v + 5 * count, v + 6 * count},
+                       .roughness = v + 7 * count};
+}
+
+TEST(blends_are_weighted_means_of_all_maps)
+{
+    enum { COUNT = 5, ALL = CANVAS_PAINTED * COUNT };
+    for (int w = 0; w <= 4; w++) {
+        const float weight = (float)w / 4;
+        float own[ALL], other[ALL], was[ALL];
+        ts_rng rng = ts_rng_make(1, TS_STREAM_TEST, (uint64_t)w);
+        for (int i = 0; i < ALL; i++) was[i] = own[i] = ts_rng_uniform(&rng), other[i] = ts_rng_uniform(&rng);
+        io_canvas c = painted(COUNT, own), o = painted(COUNT, other);
+        cv_blend(&c, &o, weight);
+        for (int i = 0; i < ALL; i++) {
+            const float want = (1 - weight) * was[i] + weight * other[i];
+            CHECK(fabsf(own[i] - want) < 1e-6f, "weight %g: value %d is %g, not %g", (double)weight, i, (double)own[i],
+                  (double)want);
+        }
+    }
+}
+
+TEST(procedural_blends_are_a_share)
+{
+    enum { COUNT = 48, SIZE = 32 };
+    const io_procedural plain = {.seed = 5}, blended = {.seed = 5, .blend = 1}, half = {.seed = 5, .blend = 0.5f};
+    int halves = 0;
+    for (int i = 0; i < COUNT; i++) {
+        io_material a = material(SIZE), b = material(SIZE);
+        io_procedural_make(&plain, (uint64_t)i, &a);
+        io_procedural_make(&blended, (uint64_t)i, &b);
+        halves += varies(&half, i, &a, &b);
+        bool changed[MAP_CHANNELS] = {false};
+        for (size_t k = 0; k < values(SIZE); k++) {
+            changed[k % MAP_CHANNELS] |= a.maps[k] != b.maps[k];
+            CHECK(b.maps[k] >= -1 && b.maps[k] <= 1, "material %d: a value of %g", i, (double)b.maps[k]);
+        }
+        CHECK(changed[MAP_DIFFUSE] && changed[MAP_ROUGHNESS], "material %d is not blended", i);
+        io_material_free(&a);
+        io_material_free(&b);
+    }
+    CHECK(halves > COUNT / 4 && halves < 3 * COUNT / 4, "%d of %d at a share of a half", halves, COUNT);
+}
+
+/* Root mean square of the normals' x and y, averaged over squares of side pixels. */
+static double lean(const io_material *m, int side)
+{
+    double sum = 0;
+    const int squares = m->size / side;
+    for (int q = 0; q < 2 * squares * squares; q++) {
+        const int k = q % 2, x0 = q / 2 % squares * side, y0 = q / 2 / squares * side;
+        double mean = 0;
+        for (int p = 0; p < side * side; p++)
+            mean += m->maps[((y0 + p / side) * m->size + x0 + p % side) * MAP_CHANNELS + MAP_NORMAL + k];
+        sum += mean / (side * side) * (mean / (side * side));
+    }
+    return sqrt(sum / (squares * squares));
+}
+
+TEST(faces_lean_as_a_whole)
+{
+    enum { COUNT = 40, SIZE = 128 };
+    static const char *const families[] = {"faces", "tile", "panels", "woven"};
+    double mean[4] = {0};
+    for (int f = 0; f < 4; f++) {
+        const io_procedural p = {.seed = 5, .families = io_family_mask(families[f])};
+        for (int i = 0; i < COUNT; i++) {
+            io_material m = material(SIZE);
+            io_procedural_make(&p, (uint64_t)i, &m);
+            mean[f] += lean(&m, SIZE / 8) / COUNT;
+            io_material_free(&m);
+        }
+    }
+    for (int f = 1; f < 4; f++)
+        CHECK(mean[0] > 1.5 * mean[f], "faces lean by %.3f, %s by %.3f", mean[0], families[f], mean[f]);
 }
