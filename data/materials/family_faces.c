@@ -50,7 +50,8 @@ static void fill(io_canvas *c, float *solid)
 /* Studs of metal where faces meet, or in their middle. */
 static void studs(io_canvas *c, nz_cells cells, float unit)
 {
-    const float size = cv_range(c, 0.05f, 0.14f), high = cv_range(c, 0.03f, 0.12f), stretch = cv_log_range(c, 0.6f, 1.6f);
+    const float size = cv_range(c, 0.05f, 0.14f), high = cv_range(c, 0.03f, 0.12f),
+                stretch = cv_log_range(c, 0.6f, 1.6f);
     const bool middle = cv_chance(c, 0.4f);
     const io_substance metal = fin_metal(c, cv_range(c, 0.12f, 0.45f));
     float *stud = cv_plane(c);
