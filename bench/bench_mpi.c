@@ -14,7 +14,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { ROUNDS = 5, WARM = 3, STEPS = 40, PATH = PATH_MAX + 100, MOST_WORDS = 32 };
+enum { ROUNDS = 5, WARM = 3, MOST_STEPS = 40, PATH = PATH_MAX + 100, MOST_WORDS = 32 };
 extern char **environ;
 
 /* Runs the words with both streams into the file at messages. */
@@ -48,11 +48,11 @@ static double median(double *v, int n)
 /* The median of log.csv's samples_per_s, the last column but one, after the first rows; NaN where there is none. */
 static double speed_in(const char *log)
 {
-    double speed[STEPS];
+    double speed[MOST_STEPS];
     char line[1024];
     int rows = -1, n = 0;
     FILE *f = fopen(log, "re");
-    for (; f && n < STEPS && fgets(line, sizeof line, f); rows++) {
+    for (; f && n < MOST_STEPS && fgets(line, sizeof line, f); rows++) {
         char *skipped = strrchr(line, ',');
         if (rows < WARM || !skipped) continue;
         *skipped = 0;
@@ -75,7 +75,7 @@ static void show_waiting(const char *messages)
     if (f) fclose(f);
 }
 
-static void compare(const char *config, const char *phase, const char *folder, const char *program)
+static void compare(const char *config, const char *phase, int steps, const char *folder, const char *program)
 {
     char out[PATH], log[PATH], messages[PATH], set_out[PATH + 32], set_steps[64];
     const char
@@ -88,7 +88,7 @@ static void compare(const char *config, const char *phase, const char *folder, c
     snprintf(log, sizeof log, "%s/run/log.csv", folder);
     snprintf(messages, sizeof messages, "%s/messages", folder);
     snprintf(set_out, sizeof set_out, "output.folder=%s", out);
-    snprintf(set_steps, sizeof set_steps, "train.%s=%d", phase, WARM + STEPS);
+    snprintf(set_steps, sizeof set_steps, "train.%s=%d", phase, WARM + steps);
     const bool pretrains = !strcmp(phase, "pretrain_steps");
     const char *const more[] = {"--set", set_out,
                                 "--set", set_steps,
@@ -132,7 +132,8 @@ BENCH(mpi)
         return;
     }
     snprintf(program, sizeof program, "%s/lgd-train", dirname(own));
-    compare("configs/single-g.ini", "pretrain_steps", folder, program);
-    compare("configs/tiny.ini", "pretrain_steps", folder, program);
+    compare("configs/single-phone.ini", "pretrain_steps", 12, folder, program); /* half a second each */
+    compare("configs/single-g.ini", "pretrain_steps", MOST_STEPS, folder, program);
+    compare("configs/tiny.ini", "pretrain_steps", MOST_STEPS, folder, program);
     run((const char *const[]){"rm", "-r", folder, NULL}, "/dev/null");
 }
