@@ -3,6 +3,7 @@
 #include "nn/layers.h"
 #include "ops.h"
 #include "render/losses.h"
+#include "tensor/memory.h"
 #include "tensor/team.h"
 #include <stddef.h>
 
@@ -35,7 +36,7 @@ ag_value *nn_coordinates(ag_tape *tape, int n, int side)
     return v;
 }
 
-/* [N, g_size, g_size, ...] to FINE channels at the photograph's size. */
+/* [N, g_size, g_size, ...]: the channels of the full size's pixels, square by square. */
 static ag_value *squares(ag_tape *tape, const nn_model *model, ag_value *seen, ag_value *features)
 {
     const nn_layers *l = model->layers;
@@ -45,8 +46,7 @@ static ag_value *squares(ag_tape *tape, const nn_model *model, ag_value *seen, a
         ag_value *change = nn_conv(tape, model, l->trunk[i][0], y, 2, TS_PAD_ZERO, NN_LEAK_G);
         y = ag_add(tape, y, nn_conv(tape, model, l->trunk[i][1], change, 1, TS_PAD_ZERO, 1));
     }
-    y = nn_conv(tape, model, l->detail[2], y, 1, TS_PAD_ZERO, NN_LEAK_G);
-    return ag_depth_to_space(tape, y, model->arch.g_unshuffle);
+    return nn_conv(tape, model, l->detail[2], y, 1, TS_PAD_ZERO, NN_LEAK_G);
 }
 
 /* What is made next of v takes v's place where nobody asks for v again. */
@@ -56,17 +56,15 @@ static ag_value *in_place(ag_tape *tape, ag_value *v)
     return v;
 }
 
-bool nn_detail(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *seen, ag_value *features,
-               ag_value *coarse, nn_guess *guess)
+static bool full_size(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y, ag_value *coarse,
+                      nn_guess *guess)
 {
     const nn_layers *l = model->layers;
     const int framed = model->arch.channels + NN_FRAME;
-    ts_mark mark = ag_scope_begin(tape);
-    ag_value *y = squares(tape, model, seen, features);
-    ag_scope_end(tape, mark, &y, 1);
+    const ts_mark mark = ag_scope_begin(tape);
+    y = ag_depth_to_space(tape, y, model->arch.g_unshuffle);
     if (!y || !coarse) return false;
     const int n = y->t.shape.n, side = y->t.shape.h;
-    mark = ag_scope_begin(tape);
     y = nn_conv_with_constants(tape, model, l->detail[3], y, ag_concat(tape, photo, nn_coordinates(tape, n, side)), 1,
                                TS_PAD_REPLICATE, NN_LEAK_G);
     y = nn_conv(tape, model, l->detail[4], y, 1, TS_PAD_REPLICATE, 1);
@@ -79,4 +77,48 @@ bool nn_detail(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *
     guess->maps = keep[0];
     guess->spread = keep[1];
     return keep[0] && (keep[1] || !model->arch.spread);
+}
+
+/* Image k of v. */
+static ag_value *image(ag_tape *tape, const ag_value *v, int k)
+{
+    ts_shape one = v->t.shape;
+    one.n = 1;
+    return ag_constant(tape, ts_view(v->t.data + (int64_t)k * ts_count(one), one));
+}
+
+static void put_image(const ag_tape *tape, const ag_value *one, int k, ag_value *all)
+{
+    const int64_t count = ts_count(one->t.shape);
+    ts_memory_copy(all->t.data + k * count, one->t.data, (size_t)count * sizeof(float), ag_compute(tape)->threads);
+}
+
+/* One image after the other: at the full size there is much of each. */
+static bool full_size_of_each(ag_tape *tape, const nn_model *model, const ag_value *photo, const ag_value *y,
+                              const ag_value *coarse, nn_guess *guess)
+{
+    const int n = photo->t.shape.n, side = photo->t.shape.h;
+    guess->maps = ag_empty(tape, (ts_shape){n, side, side, model->arch.channels});
+    if (model->arch.spread) guess->spread = ag_empty(tape, (ts_shape){n, side, side, NN_SPREADS});
+    for (int k = 0; k < n && !ag_status(tape)->code; k++) {
+        const ts_mark mark = ag_scope_begin(tape);
+        nn_guess one = {0};
+        if (full_size(tape, model, image(tape, photo, k), image(tape, y, k), image(tape, coarse, k), &one)) {
+            put_image(tape, one.maps, k, guess->maps);
+            if (one.spread) put_image(tape, one.spread, k, guess->spread);
+        }
+        ag_scope_end(tape, mark, NULL, 0);
+    }
+    return !ag_status(tape)->code;
+}
+
+bool nn_detail(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *seen, ag_value *features,
+               ag_value *coarse, nn_guess *guess)
+{
+    const ts_mark mark = ag_scope_begin(tape);
+    ag_value *y = squares(tape, model, seen, features);
+    ag_scope_end(tape, mark, &y, 1);
+    if (!y || !coarse) return false;
+    return ag_gradients(tape) ? full_size(tape, model, photo, y, coarse, guess)
+                              : full_size_of_each(tape, model, photo, y, coarse, guess);
 }

@@ -31,16 +31,22 @@ static double unet_floats(const nn_arch *a)
     return fmax(most, held);
 }
 
-/* Beside the U-Net's: nn_detail's squares, then the full size. */
-static double detail_floats(const nn_arch *a)
+enum { FINE = 12, FINER = 16 }; /* channels at the full size */
+
+/* Of one image's squares in nn_detail, all and what is left of them. */
+static double squares_floats(const nn_arch *a, double *left)
 {
-    enum { FINE = 12, FINER = 16 };
-    if (a->g_unshuffle == 1) return 0;
     const double pixels = (double)a->g_size * a->g_size, squares = (double)a->g_unshuffle * a->g_unshuffle;
-    const double first = pixels * (a->g_detail * (3 + 3.0 * a->g_trunk) + nn_level_width(a, 0) + 3 * FINE * squares);
-    const double writes = nn_detail_writes(a);
-    const double second = pixels * squares * (2 * FINE + 10 + FINER + 3 * writes + 6 * a->channels);
-    return fmax(first, second);
+    *left = a->g_unshuffle > 1 ? pixels * FINE * squares : 0;
+    if (a->g_unshuffle == 1) return 0;
+    return pixels * (a->g_detail * (3 + 3.0 * a->g_trunk) + nn_level_width(a, 0) + FINE * squares);
+}
+
+/* Of one image at the full size. */
+static double full_floats(const nn_arch *a)
+{
+    const double side = nn_arch_side(a), writes = nn_detail_writes(a);
+    return a->g_unshuffle > 1 ? side * side * (FINE + 10 + FINER + 2 * writes + 4 * a->channels) : 0;
 }
 
 double nn_guess_bytes(const nn_arch *a, int orientations)
@@ -49,6 +55,9 @@ double nn_guess_bytes(const nn_arch *a, int orientations)
     const bool turned = orientations > 1 && a->images == 1 && a->compat == NN_COMPAT_NONE;
     /* the photographs at g's size and encoded; of several orientations their maps' mean */
     const double once = side * side * (3 * photo + (turned ? 2 * maps : 0));
-    const double batch = unet_floats(a) + detail_floats(a) + side * side * photo;
-    return (once + (turned ? orientations : 1) * batch) * sizeof(float);
+    const int images = turned ? orientations : 1;
+    double left;
+    const double squares = images * squares_floats(a, &left),
+                 full = full_floats(a) + images * (left + (a->g_unshuffle > 1 ? side * side * maps : 0));
+    return (once + images * (unet_floats(a) + side * side * photo) + fmax(squares, full)) * sizeof(float);
 }
