@@ -61,7 +61,6 @@ static bool full_size(ag_tape *tape, const nn_model *model, ag_value *photo, ag_
 {
     const nn_layers *l = model->layers;
     const int framed = model->arch.channels + NN_FRAME;
-    const ts_mark mark = ag_scope_begin(tape);
     y = ag_depth_to_space(tape, y, model->arch.g_unshuffle);
     if (!y || !coarse) return false;
     const int n = y->t.shape.n, side = y->t.shape.h;
@@ -71,12 +70,9 @@ static bool full_size(ag_tape *tape, const nn_model *model, ag_value *photo, ag_
     ag_value *added = ag_shading_frame(tape, ag_channels(tape, y, 0, framed));
     ag_value *sum = in_place(tape, ag_resize_smooth(tape, coarse, side, side));
     sum = in_place(tape, ag_add(tape, sum, added));
-    ag_value *keep[2] = {ag_tanh(tape, sum), NULL};
-    if (model->arch.spread) keep[1] = ag_channels(tape, y, framed, NN_SPREADS);
-    ag_scope_end(tape, mark, keep, model->arch.spread ? 2 : 1);
-    guess->maps = keep[0];
-    guess->spread = keep[1];
-    return keep[0] && (keep[1] || !model->arch.spread);
+    guess->maps = ag_tanh(tape, sum);
+    if (model->arch.spread) guess->spread = ag_channels(tape, y, framed, NN_SPREADS);
+    return guess->maps && (guess->spread || !model->arch.spread);
 }
 
 /* Image k of v. */

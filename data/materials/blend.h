@@ -4,7 +4,7 @@
 #include "data/materials/canvas.h"
 
 /* c's painted values go to (1 - weight) c + weight other (weight 0 .. 1, pixel by pixel): convex combinations of pairs,
- * as in Deschaintre et al., "Single-Image SVBRDF Capture with a Rendering-Aware Deep Network", TOG 37(4), 2018, section
- * 5. other has c's size. */
+ * as in Deschaintre et al., "Single-Image SVBRDF Capture with a Rendering-Aware Deep Network", TOG 37(4), 2018. other
+ * has c's size. */
 void cv_blend(io_canvas *c, const io_canvas *other, float weight);
 #endif
