@@ -29,7 +29,9 @@ ts_code bench_batches(const char *path, ts_status *st)
                                   .families = c.data.families,
                                   .often = c.data.often,
                                   .hues = (float)c.data.hues,
-                                  .relief = (float)c.data.relief};
+                                  .relief = (float)c.data.relief,
+                                  .blend = (float)c.data.blend,
+                                  .uneven = (float)c.data.uneven};
     float *images = malloc(pixels * 3 * sizeof *images);
     rd_view *views = malloc((size_t)batch * RD_LOSS_VIEWS * sizeof *views),
             *captures = malloc((size_t)batch * sizeof *captures);

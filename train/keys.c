@@ -94,6 +94,8 @@ const tr_key tr_keys[] = {
      "share of the materials whose relief is another material's, weaker or stronger, or has broad waves below it"},
     {"data", "blend", TR_REAL, AT(data.blend), 0, 1, "0", NULL, false,
      "share of the materials that are a weighted mean of themselves and another, map by map, relief too"},
+    {"data", "uneven", TR_REAL, AT(data.uneven), 0, 1, "0", NULL, false,
+     "share of the materials that do not lie flat: a slope of the whole patch, broad waves"},
     {"data", "noise", TR_REAL, AT(data.noise), 0, 1, "0.3", NULL, false,
      "largest sensor noise: 0 none, 1 a phone at night"},
     {"data", "noise_spread", TR_REAL, AT(data.noise_spread), 0, 3, "1", NULL, false,

@@ -17,6 +17,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 typedef enum format { FORMAT_NONE, FORMAT_FOLDERS, FORMAT_STRIPS, FORMAT_CAPTURES, FORMAT_SHEETS } format;
 
@@ -38,6 +39,7 @@ enum {
     OPT_HUES,
     OPT_RELIEF,
     OPT_BLEND,
+    OPT_UNEVEN,
     OPT_FORMAT,
     OPT_SHEET,
     OPT_PHOTOGRAPHS,
@@ -61,6 +63,7 @@ static const struct option plain_options[] = {{"output", required_argument, NULL
                                               {"hues", required_argument, NULL, OPT_HUES},
                                               {"relief", required_argument, NULL, OPT_RELIEF},
                                               {"blend", required_argument, NULL, OPT_BLEND},
+                                              {"uneven", required_argument, NULL, OPT_UNEVEN},
                                               {"format", required_argument, NULL, OPT_FORMAT},
                                               {"contact-sheet", no_argument, NULL, OPT_SHEET},
                                               {"photographs", no_argument, NULL, OPT_PHOTOGRAPHS},
@@ -106,7 +109,8 @@ static void print_help(void)
            "      --hues X          share of the materials with other hues, 0 .. 1 (default 0)\n"
            "      --relief X        share of the materials with another relief, 0 .. 1 (default 0)\n"
            "      --blend X         share of the materials that are a mean of themselves and another, 0 .. 1 (default "
-           "0)\n");
+           "0)\n"
+           "      --uneven X        share of the materials that do not lie flat, 0 .. 1 (default 0)\n");
     printf("\nPhotographs, largest values of what each draws:\n");
     for (int i = 0; i < CL_CAMERA_OPTIONS; i++) {
         io_camera least = cl_camera_default;
@@ -168,6 +172,7 @@ static int parse_options(int argc, char **argv, options *o)
         case OPT_FAMILIES: code = parse_families(optarg, &o->procedural.families); break;
         case OPT_HUES: code = parse_share("hues", optarg, 1, &o->procedural.hues); break;
         case OPT_BLEND: code = parse_share("blend", optarg, 1, &o->procedural.blend); break;
+        case OPT_UNEVEN: code = parse_share("uneven", optarg, 1, &o->procedural.uneven); break;
         case OPT_RELIEF: code = parse_share("relief", optarg, 1, &o->procedural.relief); break;
         case OPT_FORMAT:
             if (!strcmp(optarg, "folders")) o->format = FORMAT_FOLDERS;
@@ -379,12 +384,14 @@ int main(int argc, char **argv)
     if (code) return code;
     ts_threads_set((int)o.threads);
     cl_catch_interrupt();
+    const bool there = o.output && access(o.output, F_OK) == 0;
     if (o.output) cl_make_folder(o.output, &st);
     if (!st.code && (o.format || o.photographs))
         run(&o, "materials", write_task, o.count ? o.count : 16, o.size ? (int)o.size : 256, NULL, &st);
     if (!st.code && o.sheet) make_sheet(&o, &st);
     if (!st.code && o.statistics) compare(&o, &st);
     if (!st.code && o.histograms) make_histograms(&o, &st);
+    if (o.output && !there) rmdir(o.output); /* nothing came into it, or it stays */
     if (st.code == TS_INTERRUPTED) return cl_finish(cl_stopped("%s", st.message));
     return cl_finish(st.code ? cl_failed("%s", st.message) : CL_OK);
 }

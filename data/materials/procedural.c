@@ -3,6 +3,7 @@
 #include "data/materials/family.h"
 #include "data/materials/hues.h"
 #include "data/materials/relief.h"
+#include "data/materials/uneven.h"
 #include "tensor/scratch.h"
 #include <math.h>
 #include <stdio.h>
@@ -148,6 +149,12 @@ static void exchange_relief(const io_procedural *p, uint64_t index, uint64_t all
     cv_other_relief(c, &relief, other.height, other.roughness);
 }
 
+static void make_uneven(const io_procedural *p, uint64_t index, io_canvas *c)
+{
+    c->rng = ts_rng_make(p->seed, TS_STREAM_UNEVEN, index);
+    if (cv_chance(c, p->uneven)) cv_uneven(c);
+}
+
 void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
 {
     io_canvas c = {.size = m->size, .count = m->size * m->size, .pixel = 1.0f / (float)m->size};
@@ -180,6 +187,8 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
     blend(p, index, allowed, &c, mixed ? first : second);
     c.used = 0;
     exchange_relief(p, index, allowed, &c, mixed ? first : second);
+    c.used = 0;
+    make_uneven(p, index, &c);
     ts_rng hues = ts_rng_make(p->seed, TS_STREAM_HUES, index);
     if (ts_rng_uniform(&hues) < p->hues) cv_other_hues(&c, &hues);
     cv_write(&c, m->maps);

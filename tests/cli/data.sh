@@ -140,6 +140,7 @@ data_histograms() {
     mkdir -p "$T/own" "$T/empty"
     expect 1 "$DATA" --histograms --testdata "$T/empty" -o "$T/h"
     says "$T/err" "$T/empty"
+    [ ! -e "$T/h" ] || fail "an empty folder is left"
     expect 0 "$DATA" -o "$T/own/maps" --count 8 --size 32
     expect 0 "$DATA" --histograms --testdata "$T/own" --count 8 --size 32 -o "$T/h"
     # The same materials through files: nearly all is in common; every column adds up to one for each map.

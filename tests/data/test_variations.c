@@ -1,4 +1,4 @@
-/* What training varies of the procedural materials: families, hues, relief, blends. */
+/* What training varies of the procedural materials: families, hues, relief, blends, slopes. */
 #include "data/materials/blend.h"
 #include "data/materials/procedural.h"
 #include "tests/test.h"
@@ -198,4 +198,45 @@ TEST(faces_lean_as_a_whole)
     }
     for (int f = 1; f < 4; f++)
         CHECK(mean[0] > 1.5 * mean[f], "faces lean by %.3f, %s by %.3f", mean[0], families[f], mean[f]);
+}
+
+/* Mean slope of the whole patch. */
+static double patch_slope(const io_material *m)
+{
+    double sum[2] = {0};
+    for (int i = 0; i < m->size * m->size; i++) {
+        const float *n = m->maps + i * MAP_CHANNELS + MAP_NORMAL;
+        const double z = sqrt(1 - (double)n[0] * n[0] - (double)n[1] * n[1]);
+        for (int k = 0; k < 2; k++) sum[k] -= n[k] / z / (m->size * m->size);
+    }
+    return hypot(sum[0], sum[1]);
+}
+
+TEST(uneven_materials_lean_and_keep_their_colours)
+{
+    enum { COUNT = 64, SIZE = 64 };
+    const io_procedural plain = {.seed = 5}, uneven = {.seed = 5, .uneven = 1}, half = {.seed = 5, .uneven = 0.5f};
+    int halves = 0, steep = 0;
+    double before = 0, after = 0;
+    for (int i = 0; i < COUNT; i++) {
+        io_material a = material(SIZE), b = material(SIZE);
+        io_procedural_make(&plain, (uint64_t)i, &a);
+        io_procedural_make(&uneven, (uint64_t)i, &b);
+        halves += varies(&half, i, &a, &b);
+        const double slope = patch_slope(&b);
+        before += patch_slope(&a) / COUNT;
+        after += slope / COUNT;
+        steep += slope > 0.1;
+        CHECK(slope < 0.6, "material %d leans by %.3f", i, slope);
+        for (int k = 0; k < SIZE * SIZE; k++) {
+            const float *from = a.maps + k * MAP_CHANNELS, *to = b.maps + k * MAP_CHANNELS;
+            for (int v = 0; v < MAP_CHANNELS; v++)
+                CHECK(from[v] == to[v] || v == MAP_NORMAL || v == MAP_NORMAL + 1, "material %d: map value %d", i, v);
+        }
+        io_material_free(&a);
+        io_material_free(&b);
+    }
+    CHECK(halves > COUNT / 4 && halves < 3 * COUNT / 4, "%d of %d at a share of a half", halves, COUNT);
+    CHECK(after > 0.04 && after < 0.12 && after > 3 * before, "they lean by %.3f, flat ones by %.3f", after, before);
+    CHECK(steep > COUNT / 12, "%d of %d lean by more than .1", steep, COUNT);
 }
