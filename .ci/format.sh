@@ -5,7 +5,7 @@
 # `pip install clang-format==14.0.6`); without it that half is skipped by name.
 cd "$(dirname "$0")/.." || exit 1
 sources=$(git ls-files '*.c' '*.h' '*.cpp')
-scripts=$(git ls-files '*.sh' '*.py' '*.js' '*.css' .ci/run Makefile)
+scripts=$(git ls-files '*.sh' '*.py' '*.js' '*.css' '*.html' .ci/run Makefile)
 for format in clang-format-14 clang-format none; do
     case $("$format" --version 2>/dev/null) in *" version 14."*) break ;; esac
 done

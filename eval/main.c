@@ -213,7 +213,12 @@ static int start(const ev_command *c)
         code = cl_failed("%s", st.message);
     if (code == CL_OK && (c->tune ? parse_tuning(w, &st) : c->pareto ? TS_OK : parse_methods(w, &st)) != TS_OK)
         code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
+    const bool there = access(c->out, F_OK) == 0;
     if (code == CL_OK) code = evaluate(w, &st);
+    if (!there) { /* nothing came into them, or they stay */
+        rmdir(w->images);
+        rmdir(c->out);
+    }
     for (int s = 0; s < c->sets; s++) ev_set_close(&w->set[s]);
     ev_run_free(&w->run);
     ev_lpips_free(&w->lpips);

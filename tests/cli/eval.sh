@@ -238,7 +238,8 @@ lpips() {
     model
     expect 2 "$BIN/lgd-eval" --set procedural:1,1 -o "$T/o" --lpips-weights a.pth
     says "$T/err" "lpips-weights"
-    expect 1 evaluate --set procedural:1,1 -o "$T/o" --lpips-weights "$T/none.pth" "$T/none.safetensors"
+    expect 1 evaluate --set procedural:1,1 --images -o "$T/o" --lpips-weights "$T/none.pth" "$T/none.safetensors"
+    [ ! -e "$T/o" ] || fail "an empty folder is left"
     says "$T/err" "none.pth"
     LPIPS_OUT=$T "$BIN/lgd-test" eval_lpips_is >/dev/null || fail "the weights cannot be made"
     expect 0 "$BIN/lgd-eval" -i 1 --fast --size 48 --set procedural:1,3 -o "$T/p" \
