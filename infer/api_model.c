@@ -47,7 +47,7 @@ void lgd_model_single(lgd_model *model) { model->net->g_once = true; }
 
 int lgd_published(const lgd_model *model) { return model->net->arch.compat == NN_COMPAT_PUBLISHED; }
 
-int lgd_most_photos(const lgd_model *model) { return model->net->arch.images; }
+int lgd_most_photos(const lgd_model *model) { return nn_most_photographs(&model->net->arch); }
 
 lgd_photo lgd_flash_photo(const float *image)
 {
@@ -149,9 +149,9 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
                                const lgd_options *o, const float *maps, ts_status *st)
 {
     if (!model || !photo || !maps) return ts_fail(st, TS_INVALID, "lgd_estimate: model, image and maps must be given");
-    if (photos < 1 || photos > model->net->arch.images)
+    if (photos < 1 || photos > nn_most_photographs(&model->net->arch))
         return ts_fail(st, TS_INVALID, "lgd_estimate: %d photographs: these weights read 1 .. %d", photos,
-                       model->net->arch.images);
+                       nn_most_photographs(&model->net->arch));
     for (int k = 0; k < photos; k++)
         if (check_photo(&photo[k], k + 1, st) != TS_OK) return st->code;
     if (side < 1 || side > LGD_SIDE_MAX)

@@ -1,5 +1,6 @@
 #include "infer/estimate.h"
 #include "data/material.h"
+#include "infer/exposure.h"
 #include "infer/first_guess.h"
 #include "infer/power.h"
 #include "infer/tiles.h"
@@ -124,10 +125,10 @@ static int before_tile(double done, void *user)
 
 /* What a step holds at once at so many pixels a side: maps, their gradient and change, the carried states, and for each
  * of its two cells the convolution, both gates' inputs and the new state. */
-static double step_bytes(const nn_arch *a, int side, int width, int gru)
+static double step_bytes(const nn_arch *a, int photos, int side, int width, int gru)
 {
     const double cells = width > 0 ? 2.0 * (width + 8.0 * gru) : 0;
-    return (3.0 * a->images + (3.0 + 2.0 * a->images) * a->channels + cells) * sizeof(float) * side * side;
+    return (3.0 * photos + (3.0 + 2.0 * a->images) * a->channels + cells) * sizeof(float) * side * side;
 }
 
 /* Mask and tolerance ask for tiles of which each ends by itself. */
@@ -142,17 +143,17 @@ static int tile_side(const lgd_estimator *e, int side, const lgd_options *o)
 }
 
 /* What an estimate holds at once, at most: g, or a step; beside them the whole photograph's maps. */
-static double most_bytes(const nn_arch *a, int side, int tile, int orientations)
+static double most_bytes(const nn_arch *a, int photos, int side, int tile, int orientations)
 {
     const int part = tile < side ? tile : side, coarse = a->coarse_size < side ? a->coarse_size : side;
-    double most = fmax(nn_guess_bytes(a, orientations), step_bytes(a, part, a->h_width, a->h_gru));
-    if (a->coarse_steps > 0) most = fmax(most, step_bytes(a, coarse, a->coarse_width, a->coarse_gru));
+    double most = fmax(nn_guess_bytes(a, orientations), step_bytes(a, photos, part, a->h_width, a->h_gru));
+    if (a->coarse_steps > 0) most = fmax(most, step_bytes(a, photos, coarse, a->coarse_width, a->coarse_gru));
     return most + 2.0 * a->channels * sizeof(float) * side * side;
 }
 
 double lgd_estimator_bytes(const lgd_estimator *e, int side, const lgd_options *o)
 {
-    return most_bytes(&e->net->arch, side, tile_side(e, side, o), o->orientations);
+    return most_bytes(&e->net->arch, e->net->arch.images, side, tile_side(e, side, o), o->orientations);
 }
 
 /* choose: the number of steps that paid, of the given most, is found on the way and left in *steps. */
@@ -258,19 +259,35 @@ static int known(const lgd_options *o)
 /* Power over distance squared at the centre of the sample, of a light above it. */
 static double irradiance(const rd_view *view) { return (double)view->power / pow((double)view->light[2], 2); }
 
-/* What a model that guesses the scene says first. */
+/* Where the power is not known, of photographs besides the first neither is their exposure; their lights are first as
+ * much stronger or weaker than supposed as that one's. */
+static ts_code expose_others(const lgd_estimator *e, given_photos *p, double factor, ts_status *st)
+{
+    const rd_grid grid = rd_grid_on(rd_grid_full(nn_arch_side(&e->net->arch)), ag_compute(e->tape)->threads);
+    for (int k = 1; k < p->count; k++) {
+        double own;
+        p->views[k].power *= (float)factor;
+        if (lgd_exposure_beside(grid, p->r0, e->net->arch.channels, &p->views[k], p->image[k], p->side, &own, st))
+            return st->code;
+        p->views[k].power *= (float)own;
+    }
+    return TS_OK;
+}
+
+/* What a model that guesses the scene says first, of the photograph that is taken most from above. */
 static ts_code first_guess(const lgd_estimator *e, given_photos *p, const lgd_options *o, lgd_first_guess *guess,
                            ts_status *st)
 {
     const double before = irradiance(&p->views[0]);
     const ts_code code = lgd_first_guess_make(e->tape, e->net, p->image[0], p->side, &p->views[0], known(o),
-                                              o->orientations, guess, st);
+                                              p->count > 1, o->orientations, guess, st);
     if (code) return code;
     p->views[0] = rd_scene_view(guess->number);
     p->r0 = guess->r0;
     p->deviation = guess->deviation;
-    if (o->power) *o->power = irradiance(&p->views[0]) / before;
-    return TS_OK;
+    if (!o->power) return TS_OK;
+    *o->power = irradiance(&p->views[0]) / before;
+    return expose_others(e, p, *o->power, st);
 }
 
 static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int photos, int side, const lgd_options *given,
@@ -278,8 +295,9 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
 {
     const nn_arch *a = &e->net->arch;
     lgd_options o = *given;
+    if (photos > 1) o.fov = LGD_FOV_OF_PHOTO; /* together they are of use only where their places are true */
     given_photos p = in_order(photo, photos, side, o.fov);
-    for (int k = 0; k < photos; k++) p.known[k] = (unsigned char)known(given);
+    for (int k = 0; k < photos; k++) p.known[k] = (unsigned char)known(&o);
     float *r0 = NULL;
     o.tolerance = tolerance(a, given);
     int steps = o.iterations == -1 ? a->iterations : o.iterations;
@@ -289,7 +307,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
      */
     ag_reset(e->tape);
     ts_arena *arena = ag_arena(e->tape);
-    const double most = most_bytes(a, side, tile_side(e, side, &o), o.orientations),
+    const double most = most_bytes(a, photos, side, tile_side(e, side, &o), o.orientations),
                  more = most - (double)ts_arena_peak(arena); /* than earlier calls left */
     if (more > 0 && ts_budget_check(more, st) != TS_OK)
         return ts_context(st, "%d x %d pixels, of which the network reads %d x %d", side, side, nn_arch_side(a),

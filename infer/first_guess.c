@@ -12,8 +12,10 @@
 
 enum { PIXELS = 1 << 11 }; /* at a time, at least */
 
-/* Of F0's error, what is not a level of the whole material: the part that a pixel may change by itself. */
-#define F0_DETAIL 0.35f
+/* Of F0's error, the part that a pixel may change by itself. What is not a level of the whole material is .35 of it; of
+ * that, highlights leave the more in F0 the more is believed, and renderings do not tell .35 from .2. Several
+ * photographs tell the level too. */
+#define F0_DETAIL 0.2f
 /* Of the roughness' error, relative to the roughness, what the fit may explain by a level of the whole material. It is
  * less than is true, about 1: where the maps lack relief the fit leans to rougher materials, and where the field of
  * view is not known a narrower one looks like them. */
@@ -23,14 +25,14 @@ enum { PIXELS = 1 << 11 }; /* at a time, at least */
 
 typedef struct deviation_job {
     const float *spread;
-    float *to;
+    float *to, f0;
 } deviation_job;
 
 static void deviations(const void *job, int64_t begin, int64_t end)
 {
     const deviation_job *j = job;
     for (int64_t i = begin * NN_SPREADS; i < end * NN_SPREADS; i++)
-        j->to[i] = (i % NN_SPREADS == GROUP_SPECULAR ? F0_DETAIL : 1) * LAPLACE * NN_SPREAD_UNIT *
+        j->to[i] = (i % NN_SPREADS == GROUP_SPECULAR ? j->f0 : 1) * LAPLACE * NN_SPREAD_UNIT *
             expf(fminf(fmaxf(j->spread[i], -6), 4));
 }
 
@@ -95,7 +97,7 @@ static ts_code fit(rd_grid grid, const float *image, int channels, int known, co
 }
 
 static ts_code make(ag_tape *tape, const nn_model *model, const float *image, int side, const rd_view *view, int known,
-                    int orientations, lgd_first_guess *g, ts_status *st)
+                    bool several, int orientations, lgd_first_guess *g, ts_status *st)
 {
     const int size = nn_arch_side(&model->arch), threads = ag_compute(tape)->threads;
     const size_t pixels = (size_t)size * (size_t)size, whole = (size_t)side * (size_t)side * 3;
@@ -121,7 +123,8 @@ static ts_code make(ag_tape *tape, const nn_model *model, const float *image, in
         return st->code;
     }
     ts_memory_copy(g->r0, guess.maps->t.data, pixels * (size_t)model->arch.channels * sizeof *g->r0, threads);
-    ts_for(threads, (int64_t)pixels, PIXELS, deviations, &(deviation_job){guess.spread->t.data, g->deviation});
+    ts_for(threads, (int64_t)pixels, PIXELS, deviations,
+           &(deviation_job){guess.spread->t.data, g->deviation, several ? 1 : F0_DETAIL});
     rd_scene_prior prior;
     scene_prior(guess.scene->t.data, view, known, &prior);
     level_prior(g, pixels, model->arch.channels, known, &prior);
@@ -130,11 +133,11 @@ static ts_code make(ag_tape *tape, const nn_model *model, const float *image, in
 }
 
 ts_code lgd_first_guess_make(ag_tape *tape, const nn_model *model, const float *image, int side, const rd_view *view,
-                             int known, int orientations, lgd_first_guess *guess, ts_status *st)
+                             int known, bool several, int orientations, lgd_first_guess *guess, ts_status *st)
 {
     *guess = (lgd_first_guess){0};
     const ts_mark mark = ag_scope_begin(tape);
-    const ts_code code = make(tape, model, image, side, view, known, orientations, guess, st);
+    const ts_code code = make(tape, model, image, side, view, known, several, orientations, guess, st);
     ag_scope_end(tape, mark, NULL, 0);
     if (code) lgd_first_guess_free(guess);
     return code;

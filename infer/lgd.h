@@ -37,7 +37,8 @@ LGD_API lgd_model *lgd_load(const char *weights, lgd_error *error);
 LGD_API void lgd_free(lgd_model **model);
 
 LGD_API int lgd_trained_iterations(const lgd_model *model); /* the number of steps T that the model was trained for */
-/* Photographs that it reads at once: 1, or those of a multi-image model. */
+/* Photographs of one sample that it takes at once: 1, those of a multi-image model, or 9 of one whose steps go to the
+ * most probable maps. */
 LGD_API int lgd_most_photos(const lgd_model *model);
 LGD_API int lgd_published(const lgd_model *model); /* nonzero: the published network's weights (docs/published.md) */
 
@@ -104,12 +105,13 @@ typedef struct lgd_options {
     /* NULL: the lights' powers are those of the photographs. Else the factor that fits them all is estimated from the
      * photographs, used, and written here. A stronger light and a brighter albedo look alike, so only what the model's
      * materials cannot explain, such as an albedo above 1, counts. 1 for published weights, whose light is fixed. Of a
-     * model that guesses how far away the camera is, the factor on what reaches the sample. */
+     * model that guesses how far away the camera is, the factor on what reaches the sample; there the others of
+     * several photographs have exposures of their own. */
     double *power;
     /* The photograph's field of view, LGD_FOV_LEAST .. LGD_FOV_MOST degrees, of one photograph alone: camera and light
      * are moved to that height, and the power grows so that the sample is as bright. LGD_FOV_UNKNOWN (the default):
      * they are where the photograph says, and models that guess the scene estimate the places of both.
-     * LGD_FOV_OF_PHOTO: they are where it says, and those models know it. */
+     * LGD_FOV_OF_PHOTO: they are where it says, and those models know it; so it is of several photographs. */
     double fov;
     /* NULL, or room for as many photographs as are given: each with light, camera and power as they were taken. May be
      * the given ones. */

@@ -9,7 +9,7 @@ typedef struct lgd_tiles {
     const float *const *image;  /* [given] of [side][side][3], linear; clamped to [0, 1] on the way */
     const rd_view *views;       /* [given] */
     const unsigned char *known; /* [given] of nn_known, what of views is true; NULL: all of it */
-    int given;                  /* photographs, 1 .. arch.images */
+    int given;                  /* photographs, 1 .. nn_most_photographs */
     const unsigned char *mask;  /* [side][side] or NULL: tiles without a nonzero pixel keep what the coarse steps left
                                    (R_0), and of the others only the area that holds such is sure to be refined */
     int side, tile, steps;      /* tile: pixels of a tile's side */

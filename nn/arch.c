@@ -78,6 +78,8 @@ nn_arch nn_arch_default(void)
 
 int nn_arch_side(const nn_arch *a) { return a->g_unshuffle * a->g_size; }
 
+int nn_most_photographs(const nn_arch *a) { return a->descent == NN_DESCENT_POSTERIOR ? NN_MAX_IMAGES : a->images; }
+
 bool nn_arch_refines(const nn_arch *a) { return a->coarse_steps > 0 || nn_arch_refines_full(a); }
 
 bool nn_arch_refines_full(const nn_arch *a)

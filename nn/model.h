@@ -76,6 +76,8 @@ typedef struct nn_arch {
 nn_arch nn_arch_default(void);
 int nn_arch_side(const nn_arch *a); /* pixels a side of R_0 */
 ts_code nn_arch_check(const nn_arch *a, ts_status *st);
+/* Of one material at once: g reads `images` of them, the steps to the most probable maps fit any that are given. */
+int nn_most_photographs(const nn_arch *a);
 bool nn_arch_refines(const nn_arch *a);      /* there is something to do steps with */
 bool nn_arch_refines_full(const nn_arch *a); /* at the photograph's size */
 bool nn_arch_reads(const nn_arch *a); /* those steps read the gradient, which the RMSE of what they begin with scales */
@@ -151,7 +153,7 @@ typedef struct nn_input {
                         whole */
     const rd_view *views;       /* [N * given], or NULL */
     const unsigned char *known; /* [N * given] of nn_known: what of views is true; NULL: all of it */
-    int given;                  /* 1 .. arch.images; 0 stands for 1 */
+    int given;                  /* 1 .. nn_most_photographs; 0 stands for 1 */
     int orientations; /* 2, 4, 8: R_0 is the mean of g's maps over so many orientations of the photograph (as it is and
                        * a quarter turn, all quarter turns, and their mirror images), if nn_orients; on a tape without
                        * gradients. 0, 1: as it is */

@@ -14,8 +14,9 @@ bool nn_input_check(ag_tape *tape, const nn_model *model, const nn_input *in)
         ag_fail(tape, TS_INVALID, "the model is an auto-encoder of maps: it cannot read a photograph");
     else if (!in->image.data || s.c != 3)
         ag_fail(tape, TS_INVALID, "the photograph has %d channels: 3 are needed", s.c);
-    else if (nn_given(in) > model->arch.images)
-        ag_fail(tape, TS_INVALID, "%d photographs are given: the model reads %d", nn_given(in), model->arch.images);
+    else if (nn_given(in) > nn_most_photographs(&model->arch))
+        ag_fail(tape, TS_INVALID, "%d photographs are given: the model reads %d", nn_given(in),
+                nn_most_photographs(&model->arch));
     else if (s.n % nn_given(in) != 0)
         ag_fail(tape, TS_INVALID, "%d photographs are not a multiple of %d", s.n, nn_given(in));
     else if (!ts_contiguous(&in->image)) ag_fail(tape, TS_INVALID, "the photograph is not contiguous");

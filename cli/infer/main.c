@@ -326,8 +326,9 @@ static int work(const cl_command *given)
     bool published = false;
     const bool there = access(c->out, F_OK) == 0;
     cl_pipeline *pipeline = NULL;
-    if (lgd_model_path(c->model, *c->capture || (c->sheet && c->photos > 1) ? "multi" : LGD_DEFAULT_MODEL, weights,
-                       &st) != TS_OK)
+    /* multi believes the lights */
+    const bool known = *c->capture ? c->power > 0 : c->sheet && c->photos > 1;
+    if (lgd_model_path(c->model, known ? "multi" : LGD_DEFAULT_MODEL, weights, &st) != TS_OK)
         cl_failed("%s", st.message);
     else if (lgd_weights_published(weights, &published, &st) != TS_OK ||
              (c->skip_existing && !(recipe = cl_recipe(c, weights, &st))))

@@ -48,7 +48,7 @@ const cl_argument cl_infer_arguments[] = {
      "slower on others; the maps differ by less than 0.005 (RMS), single values by up to 0.8"},
     {CAPTURE, "capture", "WHERE",
      "instead of PHOTO: several photographs of one sample under known lights, listed in an INI file or in a folder\n"
-     "in MaterialGAN's layout; the default model is then multi"},
+     "in MaterialGAN's layout; with a number for --light-power the default model is multi"},
     {FOV, "fov", "DEG",
      "field of view of the photographs, 1 .. 170 degrees across the side of the square that the maps cover\n"
      "(default: from the file's EXIF, else the model's guess, or 54.2 with a warning)"},
@@ -62,7 +62,8 @@ const cl_argument cl_infer_arguments[] = {
      "one photograph; --fov is across the photographs' shorter side"},
     {POWER, "light-power", "P",
      "power of the light, relative to the default light (of a capture: to the power it states): a number in\n"
-     "0.01 .. 100, or auto = estimated from the photograph and printed (default auto; of a capture 1)"},
+     "0.01 .. 100, or auto = estimated from the photograph and printed, of a capture from each (default auto; of a\n"
+     "sheet 1)"},
     {MASK, "mask", "FILE",
      "an image of the photographs' shape, upright as they are: refine only where it is not black; there the maps are\n"
      "the same as without it, elsewhere they may be those of an earlier step"},
@@ -72,7 +73,7 @@ const cl_argument cl_infer_arguments[] = {
      "photograph's size, not with --iterations or --exact; 0 for others, such as the shipped ones)"},
     {'m', "model", "FILE",
      "weights: a file, or the name of a shipped model: phone, single for pictures whose light and camera are the\n"
-     "default ones, multi for several (default: $LGD_MODEL, else phone)"},
+     "default ones, multi for several under known lights (default: $LGD_MODEL, else phone)"},
     {'t', "threads", "N", "number of threads, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {NORMAL, "normal", "gl|dx", "y of normal.png: up (gl, OpenGL, default) or down (dx, DirectX)"},
     {MAPS, "maps", "LIST",
@@ -258,7 +259,6 @@ ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st)
         return ts_fail(st, TS_INVALID, "--%s is one material: no --%s", c->sheet ? "sheet" : "capture",
                        c->shards ? "shard" : "skip-existing");
     if (*c->capture) {
-        if (!power_given) c->power = 1;
         c->only[0] = c->capture;
         c->photo = c->only;
         c->photos = 1;

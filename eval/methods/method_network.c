@@ -21,8 +21,9 @@ static ts_code open_lgd(ev_estimator *e, ts_status *st)
     if (ev_open_net(e, "model", st) != TS_OK) return st->code;
     const nn_arch *a = &e->net->arch;
     e->last_alone = ev_number(e, "tolerance") > 0;
-    if (photos(e) > a->images)
-        return ts_fail(st, TS_UNSUPPORTED, "%s: reads at most %d photographs", ev_text(e, "model"), a->images);
+    const int most = nn_most_photographs(a);
+    if (photos(e) > most)
+        return ts_fail(st, TS_UNSUPPORTED, "%s: reads at most %d photographs", ev_text(e, "model"), most);
     if (steps(e) > 0 && !nn_arch_refines(a))
         return ts_fail(st, TS_UNSUPPORTED, "%s: has no refiner: only iterations 0 are possible", ev_text(e, "model"));
     if (e->last_alone && !lgd_tiles_exact(a))
@@ -92,10 +93,10 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
 static const ev_setting unet[] = {MODEL_GIVEN("weights of a g that was trained alone"), {0}};
 static const ev_setting joint[] = {
     EV_MODEL("model", "weights of g and h (default: the program's)"), EV_ORIENTATIONS, {0}};
-#define PHOTOS                                                                \
-    {                                                                         \
-        .key = "photos", .type = EV_WHOLE, .lo = 1, .hi = NN_MAX_IMAGES,      \
-        .help = "number of photographs (default: as many as the model reads)" \
+#define PHOTOS                                                           \
+    {                                                                    \
+        .key = "photos", .type = EV_WHOLE, .lo = 1, .hi = NN_MAX_IMAGES, \
+        .help = "number of photographs (default: as many as g reads)"    \
     }
 #define POWER                                                                                                       \
     {                                                                                                               \

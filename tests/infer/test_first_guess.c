@@ -6,14 +6,6 @@
 
 enum { PLACE = 64, WIDE = 600 };
 
-static nn_model *network(void)
-{
-    nn_arch a = tiny();
-    a.g_unshuffle = 4, a.g_detail = 6, a.h_width = 0, a.descent = NN_DESCENT_POSTERIOR, a.iterations = 4;
-    a.conditions = a.spread = a.scene = true;
-    return create(&a, 81);
-}
-
 static float *estimate(const nn_model *m, const float *image, int side, int steps, double *power)
 {
     ts_status st = {0};
@@ -41,7 +33,7 @@ static double rmse(const float *maps, const float *image, int side)
  * and white alike. */
 TEST(first_guess_steps_explain_the_photograph)
 {
-    nn_model *m = network();
+    nn_model *m = guessing();
     const nn_input in = photographs(1, PLACE, 82, NULL);
     float *r0 = estimate(m, in.image.data, PLACE, 0, NULL), *r4 = estimate(m, in.image.data, PLACE, 4, NULL);
     const double before = rmse(r0, in.image.data, PLACE), after = rmse(r4, in.image.data, PLACE);
@@ -56,7 +48,7 @@ TEST(first_guess_steps_explain_the_photograph)
 /* The same scene, its power said to be known or not: a photograph of unknown exposure moves the maps less. */
 TEST(first_guess_trusts_a_careful_photograph_more)
 {
-    nn_model *m = network();
+    nn_model *m = guessing();
     const nn_input in = photographs(1, PLACE, 82, NULL);
     const rd_view view = rd_flash();
     const float *image = in.image.data;
@@ -94,7 +86,7 @@ TEST(first_guess_trusts_a_careful_photograph_more)
 /* A network that is sure of its maps keeps them. */
 TEST(first_guess_that_is_sure_stays)
 {
-    nn_model *m = network();
+    nn_model *m = guessing();
     const nn_param *bias = nn_model_find(m, "g.detail.conv5.bias");
     for (size_t i = 11; i < bias->count; i++) m->value[bias->offset + i] = -6;
     const nn_input in = photographs(1, PLACE, 83, NULL);
@@ -113,7 +105,7 @@ TEST(first_guess_that_is_sure_stays)
 /* What is known of the scene is kept as it is; what is not is finite and reported. */
 TEST(first_guess_keeps_what_is_known)
 {
-    nn_model *m = network();
+    nn_model *m = guessing();
     const nn_input in = photographs(1, PLACE, 84, NULL);
     ts_status st = {0};
     ag_tape *tape = tape_create(false);
@@ -123,7 +115,7 @@ TEST(first_guess_keeps_what_is_known)
     for (int known = 0; known <= NN_KNOWN_ALL; known++) {
         lgd_first_guess g;
         float want[RD_SCENE_NUMBERS];
-        CHECK(!lgd_first_guess_make(tape, m, in.image.data, PLACE, &view, known, 1, &g, &st), "%s", st.message);
+        CHECK(!lgd_first_guess_make(tape, m, in.image.data, PLACE, &view, known, false, 1, &g, &st), "%s", st.message);
         rd_scene_numbers(&view, 0, 0, want);
         for (int i = 0; i < RD_SCENE_NUMBERS; i++) CHECK(isfinite(g.number[i]), "number %d is not finite", i);
         if (known & NN_KNOWN_CAMERA)
@@ -145,7 +137,7 @@ TEST(first_guess_keeps_what_is_known)
 /* The field of view and the power are given or guessed each by itself. */
 TEST(first_guess_is_told_view_and_power_apart)
 {
-    nn_model *m = network();
+    nn_model *m = guessing();
     const nn_input in = photographs(1, PLACE, 86, NULL);
     static float maps[PLACE * PLACE * 9];
     ts_status st = {0};
@@ -176,7 +168,7 @@ TEST(first_guess_is_told_view_and_power_apart)
 /* In tiles as in one piece. */
 TEST(first_guess_in_tiles)
 {
-    nn_model *m = network();
+    nn_model *m = guessing();
     const nn_input in = photographs(1, WIDE, 85, NULL);
     float *tiles = estimate(m, in.image.data, WIDE, 2, NULL);
     ts_status st = {0};

@@ -28,6 +28,15 @@ static inline nn_model *create(const nn_arch *a, uint64_t seed)
     return m;
 }
 
+/* A network that guesses the scene and steps to the most probable maps; g reads 64 x 64 pixels. */
+static inline nn_model *guessing(void)
+{
+    nn_arch a = tiny();
+    a.g_unshuffle = 4, a.g_detail = 6, a.h_width = 0, a.descent = NN_DESCENT_POSTERIOR, a.iterations = 4;
+    a.conditions = a.spread = a.scene = true;
+    return create(&a, 81);
+}
+
 /* h begins as the identity; for tests of the loop its changes must count. */
 static inline void enliven(nn_model *m)
 {
