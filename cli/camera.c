@@ -2,7 +2,6 @@
 #include "cli/cli.h"
 #include "render/ambient.h"
 #include "tensor/maps.h"
-#include "tensor/scratch.h"
 #include <math.h>
 #include <string.h>
 
@@ -100,24 +99,6 @@ static float add_ambient(const io_camera *camera, uint64_t seed, uint64_t index,
     return light.share;
 }
 
-/* Radiance under a flash that is a disk, the mean of points on Vogel's spiral ("A better way to construct the sunflower
- * head", 1979). */
-static void render_disk(const io_disk *disk, const rd_view *view, int size, const float *maps, float *image)
-{
-    enum { POINTS = 32 };
-    const size_t values = (size_t)size * (size_t)size * 3;
-    float *one = ts_scratch(TS_SCRATCH_SLOTS - 1, values * sizeof *one);
-    memset(image, 0, values * sizeof *image);
-    for (int i = 0; i < POINTS; i++) {
-        const float r = disk->radius * sqrtf(((float)i + 0.5f) / POINTS), turn = disk->turn + 2.3999632f * (float)i;
-        rd_view point = *view;
-        point.light[0] += r * cosf(turn);
-        point.light[1] += r * sinf(turn);
-        rd_render(rd_grid_full(size), maps, MAP_CHANNELS, &point, false, one);
-        for (size_t k = 0; k < values; k++) image[k] += one[k] * (1.0f / POINTS);
-    }
-}
-
 cl_shot cl_expose(const io_camera *camera, uint64_t seed, uint64_t index, const rd_view *planned, int size,
                   const float *maps, float *image)
 {
@@ -130,7 +111,8 @@ cl_shot cl_expose(const io_camera *camera, uint64_t seed, uint64_t index, const 
     memcpy(shot.view.light, rig.light, sizeof rig.light);
     shot.view.power = rig.power;
     const io_disk flash = io_camera_flash(camera, seed, index, shot.view.light[2]);
-    if (flash.radius > 0) render_disk(&flash, &shot.view, size, maps, image);
+    if (flash.radius > 0)
+        rd_render_disk(rd_grid_full(size), maps, MAP_CHANNELS, &shot.view, flash.radius, flash.turn, image);
     else rd_render(rd_grid_full(size), maps, MAP_CHANNELS, &shot.view, false, image);
     if (camera->ambient > 0) shot.ambient = add_ambient(camera, seed, index, size, maps, &shot.view, image);
     const float metered = io_camera_meter(camera, seed, index, size, image);

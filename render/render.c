@@ -52,6 +52,7 @@ typedef struct rows_job {
     const float *const *image;
     float value; /* the limit, or the scale */
     const float *damping;
+    const ts_shade_disk *disk;
     double *sums;
     float *to;
 } rows_job;
@@ -75,6 +76,40 @@ void rd_render(rd_grid grid, const float *maps, int channels, const rd_view *vie
                        .view = &v,
                        .value = clamp ? 1.0f : INFINITY,
                        .to = image});
+}
+
+static void spiral(int count, float radius, float turn, double (*point)[2])
+{
+    const double golden = 2.399963229728653;
+    for (int i = 0; i < count; i++) {
+        const double r = (double)radius * sqrt((i + 0.5) / count), angle = (double)turn + golden * i;
+        point[i][0] = r * cos(angle);
+        point[i][1] = r * sin(angle);
+    }
+}
+
+static void render_disk_rows(const void *job, int64_t begin, int64_t end)
+{
+    const rows_job *j = job;
+    for (int64_t y = begin; y < end; y++) {
+        const ts_shade_row row = rd_shade_row(j->grid, (int)y, j->maps, j->channels);
+        ts_shade_k()->render_disk(j->view, &row, j->disk, j->to + y * j->grid.w * 3);
+    }
+}
+
+/* Half vectors turn half as far as the light: the disk widens a highlight as the mean over radius / (2 distance) does.
+ */
+void rd_render_disk(rd_grid grid, const float *maps, int channels, const rd_view *view, float radius, float turn,
+                    float *image)
+{
+    const double half = 0.5 * (double)radius / (double)fmaxf(view->light[2], 1e-3f);
+    ts_shade_view v = rd_shade_view(view);
+    ts_shade_disk disk = {.as_one = (float)(8 * half), .as_few = (float)(3 * half)};
+    v.kind = TS_SHADE_POSITIONS;
+    spiral(TS_DISK_FEW, radius, turn, disk.few);
+    spiral(TS_DISK_MANY, radius, turn, disk.many);
+    ts_for(grid.threads, grid.h, 1, render_disk_rows,
+           &(rows_job){.grid = grid, .maps = maps, .channels = channels, .view = &v, .disk = &disk, .to = image});
 }
 
 static void flash_rows(const void *job, int64_t begin, int64_t end)

@@ -10,6 +10,12 @@
  * is. */
 void rd_render(rd_grid grid, const float *maps, int channels, const rd_view *view, bool clamp, float *image);
 
+/* The same, not clamped, of an RD_POINT view whose light is a disk parallel to the sample, its centre at view->light:
+ * the mean of points on Vogel's spiral ("A better way to construct the sunflower head", 1979), which turn (radians)
+ * turns. Their number follows from the roughness: of a smooth surface 32. view->ambient is not read. */
+void rd_render_disk(rd_grid grid, const float *maps, int channels, const rd_view *view, float radius, float turn,
+                    float *image);
+
 /* The reconstruction loss of one flash photograph: *rmse = sqrt(mean over h w 3 of (render - image)^2), render clamped
  * to [0, 1]. */
 void rd_flash_rmse(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image,

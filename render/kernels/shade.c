@@ -74,6 +74,37 @@ static void render(const ts_shade_view *view, const ts_shade_row *row, float lim
     KINDS(render_kind, false, row, limit, image)
 }
 
+/* What is needed is decided for all pixels in the lanes: a highlight is seldom one pixel wide. */
+static void render_disk(const ts_shade_view *view, const ts_shade_row *row, const ts_shade_disk *disk, float *image)
+{
+    static const double centre[1][2];
+    for (int i = 0; i < row->count; i += VL) {
+        const int n = lanes_left(row, i);
+        surface s;
+        vf sum[3] = {0};
+        decode(view->guards, row->maps + (int64_t)i * row->channels, row->channels, n, &s);
+        const vf a = TS_ALPHA(s.roughness);
+        const bool sharp = v_any(a < v_set(disk->as_few)), seen = v_any(a < v_set(disk->as_one));
+        const double(*point)[2] = sharp ? disk->many : seen ? disk->few : centre;
+        const int points = sharp ? TS_DISK_MANY : seen ? TS_DISK_FEW : 1;
+        for (int k = 0; k < points; k++) {
+            ts_shade_view at = *view;
+            lighting e;
+            angles g;
+            radiance r;
+            at.light[0] += point[k][0];
+            at.light[1] += point[k][1];
+            light(&at, TS_SHADE_POSITIONS, row, i, &e);
+            measure(&s, &e, TS_SHADE_POSITIONS, &g);
+            if (!v_any(g.seen)) continue;
+            shade(&at, TS_SHADE_POSITIONS, false, &s, &e, &g, &r);
+            for (int c = 0; c < 3; c++) sum[c] += r.value[c];
+        }
+        for (int c = 0; c < 3; c++) sum[c] *= 1.0f / (float)points;
+        v_store_pixels(image + (int64_t)i * 3, 3, n, 3, sum);
+    }
+}
+
 static double flash(const ts_shade_view *view, const ts_shade_row *row, const float *image, float scale,
                     float *gradient)
 {
@@ -150,4 +181,4 @@ static void log_encode(int count, const float *in, float a, float b, float *out)
 }
 
 const struct ts_shade_kernels TS_TABLE(shade) = {
-    .render = render, .flash = flash, .log_loss = log_loss, .log_encode = log_encode};
+    .render = render, .render_disk = render_disk, .flash = flash, .log_loss = log_loss, .log_encode = log_encode};

@@ -9,6 +9,8 @@
 struct ts_shade_kernels {
     /* image[count, 3] = min(radiance, limit). */
     void (*render)(const ts_shade_view *view, const ts_shade_row *row, float limit, float *image);
+    /* image[count, 3] = radiance under the disk. view: TS_SHADE_POSITIONS without ambient light. */
+    void (*render_disk)(const ts_shade_view *view, const ts_shade_row *row, const ts_shade_disk *disk, float *image);
     /* With e = min(radiance, 1) - image: returns the sum of e^2; gradient[count, channels] (may be NULL) = scale * sum
      * over rgb of e d min(radiance, 1) / d maps. */
     double (*flash)(const ts_shade_view *view, const ts_shade_row *row, const float *image, float scale,

@@ -32,6 +32,14 @@ typedef struct ts_shade_view {
     float fresnel; /* 2^(...), where v.h is the same for every pixel: not for TS_SHADE_POSITIONS */
 } ts_shade_view;
 
+/* A light that is a disk, as points about its centre, TS_DISK_FEW of them and TS_DISK_MANY. Where alpha is above
+ * as_one a rendering does not tell it from its centre, above as_few it takes few points. */
+enum { TS_DISK_FEW = 8, TS_DISK_MANY = 32 };
+typedef struct ts_shade_disk {
+    double few[TS_DISK_FEW][2], many[TS_DISK_MANY][2];
+    float as_one, as_few;
+} ts_shade_disk;
+
 /* count pixels, pixel i with its centre at ((column + i + 1/2) step - 1/2, y); maps [count, channels], channels >= 9. A
  * pixel's result does not depend on the row that it is computed in. */
 typedef struct ts_shade_row {
