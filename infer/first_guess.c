@@ -16,6 +16,9 @@ enum { PIXELS = 1 << 11 }; /* at a time, at least */
  * that, highlights leave the more in F0 the more is believed, and renderings do not tell .35 from .2. Several
  * photographs tell the level too. */
 #define F0_DETAIL 0.2f
+/* The same of the roughness once its level is found: highlights that a photograph cannot explain otherwise leave disks
+ * and dots in it. */
+#define ROUGHNESS_DETAIL 0.5f
 /* Of the roughness' error, relative to the roughness, what the fit may explain by a level of the whole material. It is
  * less than is true, about 1: where the maps lack relief the fit leans to rougher materials, and where the field of
  * view is not known a narrower one looks like them. */
@@ -128,8 +131,11 @@ static ts_code make(ag_tape *tape, const nn_model *model, const float *image, in
     rd_scene_prior prior;
     scene_prior(guess.scene->t.data, view, known, &prior);
     level_prior(g, pixels, model->arch.channels, known, &prior);
-    return fit(rd_grid_on(rd_grid_full(size), threads), small->t.data, model->arch.channels, known, &prior,
-               ag_arena(tape), g, st);
+    const ts_code code = fit(rd_grid_on(rd_grid_full(size), threads), small->t.data, model->arch.channels, known,
+                             &prior, ag_arena(tape), g, st);
+    for (size_t i = GROUP_ROUGHNESS; i < pixels * NN_SPREADS && !several; i += NN_SPREADS)
+        g->deviation[i] *= ROUGHNESS_DETAIL;
+    return code;
 }
 
 ts_code lgd_first_guess_make(ag_tape *tape, const nn_model *model, const float *image, int side, const rd_view *view,
