@@ -282,7 +282,13 @@ static ts_code first_guess(const lgd_estimator *e, given_photos *p, const lgd_op
     const ts_code code = lgd_first_guess_make(e->tape, e->net, p->image[0], p->side, &p->views[0], known(o),
                                               p->count > 1, o->orientations, guess, st);
     if (code) return code;
+    const rd_view given = p->views[0];
     p->views[0] = rd_scene_view(guess->number);
+    if (known(o) & NN_KNOWN_LIGHT) { /* whose height a scene does not have */
+        const float higher = given.light[2] / p->views[0].light[2];
+        memcpy(p->views[0].light, given.light, sizeof given.light);
+        p->views[0].power *= higher * higher;
+    }
     p->r0 = guess->r0;
     p->deviation = guess->deviation;
     if (!o->power) return TS_OK;

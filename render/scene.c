@@ -57,9 +57,10 @@ static float stops(const rd_view *view)
 
 void rd_scene_numbers(const rd_view *view, float ambient, float tone, float number[RD_SCENE_NUMBERS])
 {
+    const float up = view->light[2] > 0 ? view->camera[2] / view->light[2] : 1;
     number[RD_SCENE_DISTANCE] = logf(view->camera[2] / RD_FLASH_DISTANCE);
     for (int i = 0; i < 2; i++) {
-        number[RD_SCENE_LIGHT_X + i] = (view->light[i] - view->camera[i]) / RD_SCENE_OFFSET;
+        number[RD_SCENE_LIGHT_X + i] = (up * view->light[i] - view->camera[i]) / RD_SCENE_OFFSET;
         number[RD_SCENE_CAMERA_X + i] = view->camera[i] / RD_SCENE_OFFSET;
     }
     number[RD_SCENE_EXPOSURE] = stops(view);

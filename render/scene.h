@@ -52,7 +52,8 @@ rd_view rd_view_tilted(rd_view view, double degrees);
  * RD_FLASH_DISTANCE; the light's place beside the camera, x and y, in RD_SCENE_OFFSET patch widths; the camera's place
  * beside the centre, x and y, in the same; the light's power over the square of its height in stops above the default
  * flash's; the ambient light in RD_SCENE_AMBIENTS of the flash's at the centre of the sample; the strength of the tone
- * curve. The light is as high as the camera. */
+ * curve. The light is as high as the camera; one at another height is put there along its ray to the centre of the
+ * sample, which looks the same from there. */
 typedef enum rd_scene_number {
     RD_SCENE_DISTANCE,
     RD_SCENE_LIGHT_X,

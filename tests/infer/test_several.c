@@ -120,6 +120,32 @@ TEST(several_photographs_in_any_order)
     nn_model_free(&m);
 }
 
+/* A light that is known stays where it is, higher than the camera too, and as bright as the factor on it says. */
+TEST(several_photographs_keep_known_lights)
+{
+    nn_model *m = guessing();
+    sample s = take();
+    lgd_photo photo[TAKEN], taken[TAKEN];
+    float *maps = malloc(VALUES * sizeof *maps);
+    for (int k = 0; k < TAKEN; k++) {
+        photo[k] = (lgd_photo){.image = s.image[k], .power = s.view[k].power};
+        memcpy(photo[k].camera, s.view[k].camera, sizeof photo[k].camera);
+        for (int i = 0; i < 3; i++) photo[k].light[i] = s.view[k].light[i] * (i == 2 ? 1.5f : 1) + 0.1f;
+    }
+    double factor = 0;
+    estimate(m, photo, &factor, taken, maps);
+    for (int k = 0; k < TAKEN; k++)
+        for (int i = 0; i < 3; i++)
+            CHECK(fabsf(taken[k].light[i] - photo[k].light[i]) < 1e-5f &&
+                      fabsf(taken[k].camera[i] - photo[k].camera[i]) < 1e-5f,
+                  "photograph %d: light and camera have moved", k);
+    CHECK(fabs((double)taken[0].power / (factor * (double)photo[0].power) - 1) < 1e-5, "a power of %g, the factor %g",
+          (double)taken[0].power, factor);
+    free(maps);
+    leave(&s);
+    nn_model_free(&m);
+}
+
 /* Of a photograph with another exposure, half of that is believed; what is black or burnt out tells nothing. */
 TEST(several_photographs_exposures)
 {
