@@ -12,6 +12,7 @@ const cl_camera_option cl_camera_options[CL_CAMERA_OPTIONS] = {
     {"blur", 4, AT(blur), "largest sigma in pixels at 256"},
     {"exposure", 3, AT(exposure), "up to this many stops brighter or darker"},
     {"meter", 1, AT(meter), "most that the mean of the picture may be, by less exposure; 0: any"},
+    {"automatic", 1, AT(automatic), "share of the photographs whose exposure the camera chose"},
     {"vignette", 0.9, AT(vignette), "largest share of light lost in the corners"},
     {"white-balance", 0.9, AT(white_balance), "red and blue up to this share stronger or weaker"},
     {"tilt", 30, AT(tilt), "largest angle of the camera in degrees"},
@@ -33,6 +34,7 @@ const io_camera cl_camera_default = {.noise = 0.5f, .blur = 0.6f, .quantise = tr
                                    .quantise = true,
                                    .exposure = 1.5f,
                                    .meter = 0.5f,
+                                   .automatic = 0.7f,
                                    .vignette = 0.35f,
                                    .white_balance = 0.08f,
                                    .jpeg = 75,
@@ -116,7 +118,7 @@ cl_shot cl_expose(const io_camera *camera, uint64_t seed, uint64_t index, const 
     else rd_render(rd_grid_full(size), maps, MAP_CHANNELS, &shot.view, false, image);
     if (camera->ambient > 0) shot.ambient = add_ambient(camera, seed, index, size, maps, &shot.view, image);
     const float metered = io_camera_meter(camera, seed, index, size, image);
-    for (size_t i = 0; metered < 1 && i < (size_t)size * (size_t)size * 3; i++) image[i] *= metered;
+    for (size_t i = 0; metered != 1 && i < (size_t)size * (size_t)size * 3; i++) image[i] *= metered;
     shot.view.power *= metered * io_camera_exposure(camera, seed, index);
     return shot;
 }

@@ -41,6 +41,7 @@ typedef struct phone {
     float ambient, side, side_turn, side_height, warmth;
     float contrast, pivot, bend, knee, sharpen, radius;
     float flash_size, points_turn, glare;
+    float automatic, aim, burnt;
 } phone;
 
 static phone draw_phone(uint64_t seed, uint64_t index)
@@ -66,6 +67,9 @@ static phone draw_phone(uint64_t seed, uint64_t index)
     p.flash_size = ts_rng_uniform(&r);
     p.points_turn = ts_rng_range(&r, 0, 6.2831853f);
     p.glare = ts_rng_uniform(&r);
+    p.automatic = ts_rng_uniform(&r);
+    p.aim = ts_rng_range(&r, -1.2f, 1.2f);
+    p.burnt = ts_rng_uniform(&r);
     return p;
 }
 
@@ -135,16 +139,48 @@ float io_camera_exposure(const io_camera *c, uint64_t seed, uint64_t index)
     return c->exposure > 0 ? exp2f(c->exposure * draw(seed, index).exposure) : 1;
 }
 
+/* The mean of the clamped values under an exposure. */
+static float mean_under(float exposure, size_t count, const float *image)
+{
+    double sum = 0;
+    for (size_t i = 0; i < count; i++) sum += (double)nz_min(image[i] * exposure, 1);
+    return (float)(sum / (double)count);
+}
+
+/* The value that a share of an image's values is above, to a tenth of a stop. */
+static float exceeded_by(float share, size_t count, const float *image)
+{
+    enum { STOP = 10, STOPS = 32, BINS = STOP * STOPS };
+    size_t above[BINS] = {0}, sum = 0;
+    for (size_t i = 0; i < count; i++) {
+        const float stops = log2f(nz_max(image[i], 1e-6f)) + STOPS / 2;
+        above[stops > 0 ? (int)nz_min(stops * STOP, BINS - 1) : 0]++;
+    }
+    int bin = BINS - 1;
+    while (bin > 0 && (float)(sum += above[bin]) <= share * (float)count) bin--;
+    return exp2f((float)(bin + 1) / STOP - STOPS / 2);
+}
+
+/* A phone's automatic exposure: a mean near a middle grey's, but with few values burnt out. */
+static float automatic_exposure(const phone *p, size_t count, const float *image)
+{
+    const float aim = 0.15f * exp2f(p->aim), most = 1 / exceeded_by(0.03f * p->burnt * p->burnt, count, image);
+    float exposure = 1;
+    for (int round = 0; round < 6; round++)
+        exposure = nz_min(nz_max(exposure * aim / nz_max(mean_under(exposure, count, image), 1e-4f), 0.1f), 10);
+    return nz_min(exposure, nz_max(most, 0.1f));
+}
+
 float io_camera_meter(const io_camera *c, uint64_t seed, uint64_t index, int size, const float *image)
 {
     const size_t count = (size_t)size * (size_t)size * 3;
     const float exposure = io_camera_exposure(c, seed, index);
+    const phone p = draw_phone(seed, index);
     float factor = 1;
+    if (p.automatic < c->automatic) return automatic_exposure(&p, count, image) / exposure;
     /* A clamped pixel does not darken with the factor: each round comes nearer from above. */
     for (int round = 0; c->meter > 0 && round < 4; round++) {
-        double sum = 0;
-        for (size_t i = 0; i < count; i++) sum += (double)nz_min(image[i] * exposure * factor, 1);
-        const float mean = (float)(sum / (double)count);
+        const float mean = mean_under(exposure * factor, count, image);
         if (mean <= c->meter) break;
         factor *= c->meter / mean;
     }

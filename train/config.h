@@ -18,7 +18,8 @@ typedef struct tr_config {
         uint64_t families, often; /* bits as in io_procedural; 0: all */
         double hues, relief, blend, uneven;
         double noise, noise_spread, blur, exposure, vignette, white_balance, tilt, off_centre; /* as in io_camera */
-        double fov_min, fov_max, meter, flash, flash_size, glare, ambient, tone, sharpen, told_view, told_power;
+        double fov_min, fov_max, meter, automatic, flash, flash_size, glare, ambient, tone, sharpen;
+        double told_view, told_power;
         double sheet, pose, shift, bracket; /* as in io_under_sheet */
         bool quantise;
         int jpeg, patch, prefetch, threads;

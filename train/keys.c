@@ -106,6 +106,8 @@ const tr_key tr_keys[] = {
      "photographs are up to this many stops brighter or darker than under the default light"},
     {"data", "meter", TR_REAL, AT(data.meter), 0, 1, "0", NULL, false,
      "most that the mean of the clamped linear photograph may be: less exposure brings it there; 0: any"},
+    {"data", "automatic", TR_REAL, AT(data.automatic), 0, 1, "0", NULL, false,
+     "share of the photographs whose exposure the camera chose, as phones do: a mean near .15, few values burnt out"},
     {"data", "vignette", TR_REAL, AT(data.vignette), 0, 0.9, "0.1", NULL, false,
      "largest share of the light that is lost in the corners"},
     {"data", "white_balance", TR_REAL, AT(data.white_balance), 0, 0.9, "0.03", NULL, false,

@@ -14,6 +14,7 @@ io_camera tr_camera_of(const tr_config *c)
                        .quantise = c->data.quantise,
                        .exposure = (float)c->data.exposure,
                        .meter = (float)c->data.meter,
+                       .automatic = (float)c->data.automatic,
                        .vignette = (float)c->data.vignette,
                        .white_balance = (float)c->data.white_balance,
                        .jpeg = c->data.jpeg,
@@ -40,7 +41,7 @@ static io_under_sheet under_sheet_of(const tr_config *c)
 /* The same camera with what a sheet gives, place and exposure, known exactly. */
 static io_camera measured(io_camera c)
 {
-    c.exposure = c.meter = c.white_balance = c.tilt = c.off_centre = c.fov_min = c.fov_max = c.flash = 0;
+    c.exposure = c.meter = c.automatic = c.white_balance = c.tilt = c.off_centre = c.fov_min = c.fov_max = c.flash = 0;
     return c;
 }
 

@@ -160,6 +160,32 @@ TEST(camera_meter_spares_white_pictures)
     CHECK(less > 10 && less < 40, "%d of 60 are metered", less);
 }
 
+/* Whatever the material's brightness and the drawn exposure, in the share of the photographs that is asked for. */
+TEST(camera_chooses_its_exposure)
+{
+    static float clean[N];
+    const io_camera camera = {.exposure = 1.5f, .meter = 0.5f, .automatic = 0.6f};
+    int chosen = 0, spared = 0;
+    for (uint64_t index = 0; index < 100; index++) {
+        const io_camera never = {.exposure = 1.5f, .meter = 0.5f};
+        fill(clean, index % 2 ? 0.05f : 0.8f);
+        for (int i = 0; i < N / 50; i++) clean[i * 50] = 5; /* glints */
+        const float factor = io_camera_meter(&camera, 1, index, SIZE, clean);
+        if (factor == io_camera_meter(&never, 1, index, SIZE, clean)) continue;
+        const float exposure = factor * io_camera_exposure(&camera, 1, index);
+        double mean = 0, burnt = 0;
+        for (int i = 0; i < N; i++) {
+            mean += fmin((double)(clean[i] * exposure), 1) / N;
+            burnt += clean[i] * exposure > 1.0f ? 1.0 / N : 0;
+        }
+        chosen++;
+        spared += burnt < 0.019; /* not the glints */
+        CHECK(burnt < 0.031 && mean < 0.35, "%g are burnt out, the mean is %g", burnt, mean);
+        CHECK(mean > 0.06 || burnt < 0.019, "the mean is %g, and %g are burnt out", mean, burnt);
+    }
+    CHECK(chosen > 45 && chosen < 75 && spared > 5, "%d of 100 are chosen, of %d glints are spared", chosen, spared);
+}
+
 TEST(camera_stands_at_its_distance_within_tilt_and_offset)
 {
     const io_camera tilted = {.tilt = 5}, off = {.off_centre = 0.1f}, both = {.tilt = 5, .off_centre = 0.1f};
