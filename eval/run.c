@@ -160,12 +160,15 @@ static ts_code one(ev_run *r, bench *b, int set, int m, int64_t number, const ev
     const ev_subject *s = &r->subject[m];
     unsigned char *png = NULL;
     size_t png_size = 0;
+    ev_case shown = *c;
+    e->found = c->view;
     ts_code code = ev_estimate(e, c, r->step + s->first, s->points, r->repeat, b->row, b->seconds, b->first, b->last,
                                st);
-    if (!code && r->images) code = sheet(r, b, c, set, m, st);
-    if (!code && r->images) code = ev_contact_add(&b->contact, c, b->last, st);
+    if (!c->capture && !c->truth) shown.view = e->found; /* a photograph of which nothing else is known */
+    if (!code && r->images) code = sheet(r, b, &shown, set, m, st);
+    if (!code && r->images) code = ev_contact_add(&b->contact, &shown, b->last, st);
     if (!code && r->pictures && b->pictures < EV_PICTURES) {
-        code = ev_sheet_png(c, b->last, &png, &png_size, st);
+        code = ev_sheet_png(&shown, b->last, &png, &png_size, st);
         b->pictures++;
     }
     if (!code && b->at[number] < 0) {

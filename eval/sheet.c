@@ -40,7 +40,7 @@ static void maps_row(io_image *sheet, const ev_case *c, int row, const float *ma
         lgd_panel_render(sheet, 1 + LGD_MAP_PANELS + i, row, &m, &c->views[i], picture);
 }
 
-/* As bright as the photograph, whose light nobody knows. */
+/* Under the light that the method found, c->view, and as bright as the photograph. */
 static void photo_row(io_image *sheet, const ev_case *c, int row, const float *maps, float *picture)
 {
     const size_t values = (size_t)c->size * (size_t)c->size * 3;

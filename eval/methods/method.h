@@ -60,6 +60,7 @@ struct ev_estimator {
     float *x, *gradient; /* what is optimised, and its gradient: blocks */
     size_t count;        /* their numbers */
     size_t bytes;        /* of the blocks above */
+    rd_view found; /* where the last run found the photograph's light and camera; c->view where it looks for none */
 };
 
 /* spec: NAME[:key=value,...]; every method also takes label=TEXT, by default spec. model and iterations (-1: none) are

@@ -89,10 +89,17 @@ ts_code ev_run(ev_estimator *e, const ev_case *c, const ev_run_how *how, ev_seen
     options.exact = e->exact;
     options.orientations = ev_orientations(e);
     options.threads = ts_threads();
+    lgd_photo taken[NN_MAX_IMAGES] = {0};
+    options.taken = taken;
     float *maps = malloc((size_t)c->size * (size_t)c->size * MAP_CHANNELS * sizeof *maps);
     const ts_code code = maps ? lgd_estimator_run(&estimator, how->photo, how->photos, c->size, &options, maps, st)
                               : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", c->size, c->size);
     free(maps);
+    if (!code && !how->g_alone) {
+        e->found = (rd_view){.kind = RD_POINT, .power = taken[0].power};
+        memcpy(e->found.light, taken[0].light, sizeof e->found.light);
+        memcpy(e->found.camera, taken[0].camera, sizeof e->found.camera);
+    }
     return code;
 }
 

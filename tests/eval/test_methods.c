@@ -6,12 +6,9 @@
 #include "render/error.h"
 #include "render/render.h"
 #include "tensor/peak.h"
-#include "tensor/pin.h"
-#include "tensor/team.h"
 #include "tensor/threads.h"
 #include "tests/test.h"
 #include <math.h>
-#include <sched.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -202,6 +199,34 @@ TEST(methods_begin_with_what_they_say)
         CHECK(m.maps[0][i] == m.maps[0][i % MAP_CHANNELS], "mean is not constant");
 }
 
+/* Weights of a model that guesses the scene. */
+static const char *guesses_scene(void)
+{
+    nn_arch arch = small();
+    arch.g_unshuffle = 4, arch.g_detail = 6, arch.h_width = 0, arch.descent = NN_DESCENT_POSTERIOR;
+    arch.conditions = arch.spread = arch.scene = true;
+    return weights_of(&arch, "scene");
+}
+
+/* Where the light is known it stays; where it is not, the method says where it found it. */
+TEST(methods_say_where_light_and_camera_are)
+{
+    const scene *s = make(5);
+    for (int known = 0; known < 2; known++) {
+        ev_estimator e;
+        seen_maps k;
+        char spec[400];
+        snprintf(spec, sizeof spec, "lgd:model=%s%s", guesses_scene(), known ? "" : ",power=auto,view=unknown");
+        open(&e, spec), run(&e, s, &k);
+        float off = 0;
+        for (int i = 0; i < 3; i++)
+            off += fabsf(e.found.light[i] - s->c.view.light[i]) + fabsf(e.found.camera[i] - s->c.view.camera[i]);
+        CHECK(known ? off < 1e-5f : off > 1e-3f, "light and camera are off by %g", off);
+        CHECK(known == (fabsf(e.found.power / s->c.view.power - 1) < 1e-5f), "a power of %g", e.found.power);
+        ev_close(&e);
+    }
+}
+
 /* R_0 of a method is g's own answer (finetune's step 0) where the estimator would fit scene and roughness first. */
 TEST(methods_begin_with_what_g_says_of_a_model_that_guesses_the_scene)
 {
@@ -209,10 +234,7 @@ TEST(methods_begin_with_what_g_says_of_a_model_that_guesses_the_scene)
     seen_maps a, b, c, d;
     const scene *s = make(5);
     char spec[400];
-    nn_arch arch = small();
-    arch.g_unshuffle = 4, arch.g_detail = 6, arch.h_width = 0, arch.descent = NN_DESCENT_POSTERIOR;
-    arch.conditions = arch.spread = arch.scene = true;
-    const char *path = weights_of(&arch, "scene");
+    const char *path = guesses_scene();
     snprintf(spec, sizeof spec, "unet:model=%s", path), open(&g, spec), run(&g, s, &a);
     snprintf(spec, sizeof spec, "descent:steps=0,model=%s", path), open(&descent, spec), run(&descent, s, &b);
     snprintf(spec, sizeof spec, "finetune:steps=0,model=%s", path), open(&tuned, spec), run(&tuned, s, &c);
@@ -264,28 +286,6 @@ TEST(methods_mean_is_as_bright_as_the_photograph)
         CHECK(fabs(mine / photo - 1) < 1e-3, "red is %g times the photograph's", mine / photo);
         ev_close(&mean);
     }
-}
-
-static void look(const void *job, int k)
-{
-    cpu_set_t *const *of = job;
-    sched_getaffinity(0, sizeof **of, &(*of)[k]);
-}
-
-TEST(methods_threads_are_pinned_to_a_cpu_each)
-{
-    cpu_set_t all, now;
-    CHECK(sched_getaffinity(0, sizeof all, &all) == 0, "sched_getaffinity");
-    ts_threads_set(CPU_COUNT(&all) + 1);
-    CHECK(!ts_threads_pin() && sched_getaffinity(0, sizeof now, &now) == 0 && CPU_EQUAL(&all, &now),
-          "more threads than CPUs are pinned");
-    const int threads = CPU_COUNT(&all) > 1 ? 2 : 1;
-    ts_threads_set(threads);
-    CHECK(ts_threads_pin(), "%d threads are not pinned", threads);
-    cpu_set_t of[2];
-    CHECK(ts_each_thread(threads, look, &(cpu_set_t *){of}) == threads, "not %d threads", threads);
-    for (int i = 0; i < threads; i++) CHECK(CPU_COUNT(&of[i]) == 1, "thread %d has %d CPUs", i, CPU_COUNT(&of[i]));
-    CHECK(threads == 1 || !CPU_EQUAL(&of[0], &of[1]), "two threads share a CPU");
 }
 
 TEST(methods_points_and_settings)
