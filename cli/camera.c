@@ -34,7 +34,6 @@ const io_camera cl_camera_default = {.noise = 0.5f, .blur = 0.6f, .quantise = tr
                                    .quantise = true,
                                    .exposure = 1.5f,
                                    .meter = 0.5f,
-                                   .automatic = 0.7f,
                                    .vignette = 0.35f,
                                    .white_balance = 0.08f,
                                    .jpeg = 75,
