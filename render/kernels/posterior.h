@@ -14,8 +14,9 @@ typedef struct ts_prior {
  * above 0; variances of a photograph's value as TS_PRIOR_FINEST where they are smaller. */
 #define TS_PRIOR_WIDEST 1e3f
 #define TS_PRIOR_FINEST 1e-10f
-/* What a burnt-out value tells fades from a radiance of 1 to 1 + TS_PRIOR_FADE. */
-#define TS_PRIOR_FADE 0.02f
+/* What a burnt-out value tells fades from a radiance of 1 to 1 + TS_PRIOR_FADE. A narrow fade makes a burnt-out pixel
+ * jump between what it is told and the mean, from step to step, and rounding decides where it ends. */
+#define TS_PRIOR_FADE 0.1f
 
 struct ts_posterior_kernels {
     /* step[count, channels]; mean[count, channels]; deviation[count, MAP_GROUPS]; after[count, MAP_GROUPS] may be NULL.
