@@ -1,6 +1,7 @@
 #include "infer/first_guess.h"
 #include "infer/clip.h"
 #include "infer/hidden_diffuse.h"
+#include "infer/lean.h"
 #include "render/scene_model.h"
 #include "tensor/maps.h"
 #include "tensor/memory.h"
@@ -95,6 +96,7 @@ static ts_code fit(rd_grid grid, const float *image, int channels, int known, co
         rd_scene_fit(grid, g->r0, channels, g->deviation, image, prior, &how, unknown, NULL);
         memcpy(g->number, unknown, sizeof g->number);
         rd_scene_roughen(pixels, g->r0, channels, unknown[RD_SCENE_ROUGHNESS], g->r0);
+        if (!(known & NN_KNOWN_LIGHT)) lgd_share_lean(pixels, channels, g->number, g->r0);
     }
     return code;
 }
