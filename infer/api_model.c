@@ -43,6 +43,8 @@ void lgd_options_init(lgd_options *options, size_t size)
 
 int lgd_trained_iterations(const lgd_model *model) { return model->net->arch.iterations; }
 
+int lgd_usual_iterations(const lgd_model *model, int photos) { return nn_arch_steps(&model->net->arch, photos); }
+
 void lgd_model_single(lgd_model *model) { model->net->g_once = true; }
 
 int lgd_published(const lgd_model *model) { return model->net->arch.compat == NN_COMPAT_PUBLISHED; }

@@ -306,7 +306,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     for (int k = 0; k < photos; k++) p.known[k] = (unsigned char)known(&o);
     float *r0 = NULL;
     o.tolerance = tolerance(a, given);
-    int steps = o.iterations == -1 ? a->iterations : o.iterations;
+    int steps = o.iterations == -1 ? nn_arch_steps(a, photos) : o.iterations;
     if (o.iterations == LGD_AUTO) steps = nn_arch_refines(a) ? LGD_AUTO_MOST : 0;
     const bool choose = o.iterations == LGD_AUTO && tile_side(e, side, &o) == side && !apart(&o);
     /* Once: memory that one stage has touched is there for the next, and touching it first costs as much as computing.

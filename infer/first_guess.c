@@ -25,18 +25,21 @@ enum { PIXELS = 1 << 11 }; /* at a time, at least */
  * view is not known a narrower one looks like them. */
 #define ROUGHNESS_LEVEL 0.15
 #define ROUGHNESS_LEVEL_IN_KNOWN_VIEW 0.4
+/* By which the deviations are multiplied where several photographs follow. Much of R_0's error is one of the whole
+ * material, and of that the mean absolute error of a pixel says too little. */
+#define SEVERAL 1.5f
 #define LAPLACE 1.41421356f /* a Laplace density's standard deviation over its mean absolute error */
 
 typedef struct deviation_job {
     const float *spread;
-    float *to, f0;
+    float *to, f0, all; /* by which F0's and all are multiplied */
 } deviation_job;
 
 static void deviations(const void *job, int64_t begin, int64_t end)
 {
     const deviation_job *j = job;
     for (int64_t i = begin * NN_SPREADS; i < end * NN_SPREADS; i++)
-        j->to[i] = (i % NN_SPREADS == GROUP_SPECULAR ? j->f0 : 1) * LAPLACE * NN_SPREAD_UNIT *
+        j->to[i] = (i % NN_SPREADS == GROUP_SPECULAR ? j->f0 : 1) * j->all * LAPLACE * NN_SPREAD_UNIT *
             expf(fminf(fmaxf(j->spread[i], -6), 4));
 }
 
@@ -81,7 +84,7 @@ static void level_prior(const lgd_first_guess *g, size_t pixels, int channels, i
 static ts_code fit(rd_grid grid, const float *image, int channels, int known, const rd_scene_prior *prior,
                    ts_arena *arena, lgd_first_guess *g, ts_status *st)
 {
-    const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior(known)};
+    const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior(known, 1)};
     const int64_t pixels = (int64_t)grid.h * grid.w;
     const size_t values = (size_t)pixels * (size_t)channels;
     float unknown[RD_SCENE_UNKNOWNS], *rough = ts_arena_alloc(arena, values * sizeof *rough);
@@ -129,7 +132,7 @@ static ts_code make(ag_tape *tape, const nn_model *model, const float *image, in
     }
     ts_memory_copy(g->r0, guess.maps->t.data, pixels * (size_t)model->arch.channels * sizeof *g->r0, threads);
     ts_for(threads, (int64_t)pixels, PIXELS, deviations,
-           &(deviation_job){guess.spread->t.data, g->deviation, several ? 1 : F0_DETAIL});
+           &(deviation_job){guess.spread->t.data, g->deviation, several ? 1 : F0_DETAIL, several ? SEVERAL : 1});
     rd_scene_prior prior;
     scene_prior(guess.scene->t.data, view, known, &prior);
     level_prior(g, pixels, model->arch.channels, known, &prior);

@@ -37,6 +37,9 @@ LGD_API lgd_model *lgd_load(const char *weights, lgd_error *error);
 LGD_API void lgd_free(lgd_model **model);
 
 LGD_API int lgd_trained_iterations(const lgd_model *model); /* the number of steps T that the model was trained for */
+/* What iterations = -1 stands for with so many photographs of one sample: T, and 2 T where the steps go to the most
+ * probable maps by several photographs. */
+LGD_API int lgd_usual_iterations(const lgd_model *model, int photos);
 /* Photographs of one sample that it takes at once: 1, those of a multi-image model, or 9 of one whose steps go to the
  * most probable maps. */
 LGD_API int lgd_most_photos(const lgd_model *model);
@@ -71,7 +74,7 @@ typedef struct lgd_photo lgd_photo;
 /* New fields are added at the end. Begin with lgd_options_default(). */
 typedef struct lgd_options {
     size_t size;      /* sizeof(lgd_options) where the caller was compiled: fields beyond it have their defaults */
-    int iterations;   /* refinement steps; 0: R_0 alone, -1: as trained, LGD_AUTO */
+    int iterations;   /* refinement steps; 0: R_0 alone, -1: lgd_usual_iterations, LGD_AUTO */
     int exact;        /* 0: convolutions use Winograd's algorithm where it is faster; else all are computed directly.
                        * Weights of the published network always are. The shipped model's maps of real photographs
                        * differ by less than 1e-5 (RMS of a map), single values by less than 1e-3, as they do between

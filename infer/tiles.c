@@ -130,7 +130,12 @@ static bool prior(const work *w, rd_grid window, const float *maps, nn_state *st
                   across = ts_taps_part(&w->taps[0], window.x0, window.w);
     float *mean = ts_arena_alloc(ag_arena(w->tape), pixels * (size_t)w->channels * sizeof *mean),
           *deviation = ts_arena_alloc(ag_arena(w->tape), pixels * NN_SPREADS * sizeof *deviation);
-    if (!mean || !deviation) return ag_fail(w->tape, TS_NOMEM, "out of memory"), false;
+    if (w->t->given > 1) {
+        state->best = ts_arena_alloc(ag_arena(w->tape), pixels * MAP_CHANNELS * sizeof *state->best);
+        state->misfit = ts_arena_alloc(ag_arena(w->tape), pixels * sizeof *state->misfit);
+    }
+    if (!mean || !deviation || (w->t->given > 1 && !(state->best && state->misfit)))
+        return ag_fail(w->tape, TS_NOMEM, "out of memory"), false;
     memcpy(mean, maps, pixels * (size_t)w->channels * sizeof *mean);
     ts_resample(1, NN_SPREADS, &down, &across, w->t->deviation, deviation, false, w->threads);
     state->mean = mean;

@@ -89,6 +89,11 @@ bool nn_arch_refines_full(const nn_arch *a)
 
 bool nn_arch_reads(const nn_arch *a) { return a->gradient && (a->h_width > 0 || a->descent == NN_DESCENT_GRADIENT); }
 
+int nn_arch_steps(const nn_arch *a, int photographs)
+{
+    return a->iterations * (photographs > 1 && a->descent == NN_DESCENT_POSTERIOR ? 2 : 1);
+}
+
 bool nn_arch_carries(const nn_arch *a) { return a->recurrent && a->h_width > 0; }
 
 ts_code nn_arch_check(const nn_arch *a, ts_status *st)

@@ -81,6 +81,9 @@ int nn_most_photographs(const nn_arch *a);
 bool nn_arch_refines(const nn_arch *a);      /* there is something to do steps with */
 bool nn_arch_refines_full(const nn_arch *a); /* at the photograph's size */
 bool nn_arch_reads(const nn_arch *a); /* those steps read the gradient, which the RMSE of what they begin with scales */
+/* Steps that are usual with so many photographs of one material: iterations, and where they go to the most probable
+ * maps by several, which takes more of them, twice that. */
+int nn_arch_steps(const nn_arch *a, int photographs);
 bool nn_arch_carries(const nn_arch *a); /* they have states */
 
 typedef struct nn_param {
@@ -208,6 +211,7 @@ typedef struct nn_state {
     ag_value *into; /* NULL, or where nn_refine writes R_{t+1} (a tape without gradients); may be R_t */
     const float *mean, *deviation; /* NN_DESCENT_POSTERIOR: R_0 and its errors' standard deviations in the grid's
                                     * window, [h, w, channels] and [h, w, NN_SPREADS] */
+    float *best, *misfit;          /* of several photographs: what rd_search keeps, [h, w, MAP_CHANNELS] and [h, w] */
     double *rmse0; /* of each whole photograph by R_0, in the tape's arena; NULL: nn_refine measures it on its maps */
     int step;      /* steps done; those beyond arch.iterations are shortened (docs/math.md, S7), but if compat is
                       published */
@@ -221,8 +225,8 @@ typedef struct nn_state {
  *     NN_DESCENT_POSTERIOR the step to the most probable maps; D is the identity
  *     NN_DESCENT_NONE      0, as published */
 /* Of NN_DESCENT_POSTERIOR: how colours hang together, and how far a rendering of the right maps is from a photograph of
- * which known (nn_known) is true. */
-ts_prior nn_step_prior(int known);
+ * which known (nn_known) is true, one of so many of the material. */
+ts_prior nn_step_prior(int known, int photographs);
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
 /* RMSE(R_t) = nn_rmse_of what nn_add_squares leaves: squares[i] += the squared differences between photograph i of in

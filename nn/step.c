@@ -141,27 +141,27 @@ static void newton_step(const ag_tape *tape, const nn_model *model, const nn_inp
 }
 
 /* The noise is the Newton step's. What is more: a photograph whose light's power is known was taken with care, and
- * renderer and lens leave out little; of another neither tone curve nor vignetting nor other light is known, and what
- * they change goes with the value. */
-ts_prior nn_step_prior(int known)
+ * renderer and lens leave out little; what they do, one photograph cannot tell from its maps, and several can. Of
+ * another neither tone curve nor vignetting nor other light is known, and what they change goes with the value. */
+ts_prior nn_step_prior(int known, int photographs)
 {
     const bool careful = known & NN_KNOWN_POWER;
-    return (ts_prior){
-        .hue = {0.1f, 0.1f}, .model = careful ? 0.03f : 0.1f, .noise = 0.002f, .gain = careful ? 0 : 0.5f};
+    return (ts_prior){.hue = {0.1f, 0.1f},
+                      .model = !careful     ? 0.1f
+                          : photographs > 1 ? 0.01f
+                                            : 0.03f,
+                      .noise = 0.002f,
+                      .gain = careful ? 0 : 0.5f};
 }
-
-/* Of the step to the most probable maps by several photographs. Highlights that lie apart bend what the step takes for
- * straight; whole steps overshoot, and errors grow from the second on. */
-#define STEP_BY_SEVERAL 0.5f
 
 /* The step to the most probable maps, given all photographs of one material: to is [1, H, W, channels]. */
 static bool posterior_step(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps,
                            const nn_state *state, float *to)
 {
     const ts_shape s = maps->shape;
-    if (!state->mean || !state->deviation || s.n != 1)
-        return ag_fail(tape, TS_INVALID, "the step to the most probable maps needs the prior of one material"), false;
     const int count = nn_given(in);
+    if (!state->mean || !state->deviation || (count > 1 && !(state->best && state->misfit)) || s.n != 1)
+        return ag_fail(tape, TS_INVALID, "the step to the most probable maps needs the prior of one material"), false;
     const int64_t values = (int64_t)s.h * s.w * 3;
     rd_view view[NN_MAX_IMAGES];
     const float *image[NN_MAX_IMAGES];
@@ -169,12 +169,11 @@ static bool posterior_step(ag_tape *tape, const nn_model *model, const nn_input 
         view[k] = nn_view_of(model, in, k);
         image[k] = in->image.data + k * values;
     }
-    const rd_prior prior = {state->mean, state->deviation, nn_step_prior(in->known ? in->known[0] : NN_KNOWN_ALL)};
-    rd_posterior_step(rd_grid_on(in->grid, ag_compute(tape)->threads), maps->data, s.c, view, image, count, &prior, to,
-                      NULL);
-    if (count > 1)
-        ts_for(ag_compute(tape)->threads, ts_count(s), STEP, scale_values,
-               &(values_job){.to = to, .scale = STEP_BY_SEVERAL});
+    const rd_prior prior = {state->mean, state->deviation,
+                            nn_step_prior(in->known ? in->known[0] : NN_KNOWN_ALL, count)};
+    const rd_search search = {state->best, state->misfit, state->step > 0};
+    rd_posterior_step(rd_grid_on(in->grid, ag_compute(tape)->threads), maps->data, s.c, view, image, count, &prior,
+                      count > 1 ? &search : NULL, to, NULL);
     return true;
 }
 

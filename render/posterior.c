@@ -11,6 +11,7 @@ typedef struct step_job {
     int channels, count;
     const ts_shade_view *view;
     const rd_prior *prior;
+    const rd_search *search;
     float *step, *after;
 } step_job;
 
@@ -21,19 +22,23 @@ static void step_rows(const void *job, int64_t begin, int64_t end)
         const int64_t at = y * j->grid.w;
         const ts_shade_row row = rd_shade_row(j->grid, (int)y, j->maps, j->channels);
         const float *part[RD_CAPTURE_VIEWS];
+        ts_search search;
+        if (j->search)
+            search = (ts_search){j->search->best + at * MAP_CHANNELS, j->search->misfit + at, j->search->begun};
         for (int k = 0; k < j->count; k++) part[k] = j->image[k] + at * 3;
         ts_posterior_k()->step(j->view, part, j->count, &row, &j->prior->scale, j->prior->mean + at * j->channels,
-                               j->prior->deviation + at * MAP_GROUPS, j->step + at * j->channels,
-                               j->after ? j->after + at * MAP_GROUPS : NULL);
+                               j->prior->deviation + at * MAP_GROUPS, j->search ? &search : NULL,
+                               j->step + at * j->channels, j->after ? j->after + at * MAP_GROUPS : NULL);
     }
 }
 
 void rd_posterior_step(rd_grid grid, const float *maps, int channels, const rd_view *views, const float *const *image,
-                       int count, const rd_prior *prior, float *step, float *after)
+                       int count, const rd_prior *prior, const rd_search *search, float *step, float *after)
 {
     ts_shade_view v[RD_CAPTURE_VIEWS];
     for (int k = 0; k < count; k++) v[k] = rd_shade_view(&views[k]);
-    ts_for(grid.threads, grid.h, 1, step_rows, &(step_job){grid, maps, image, channels, count, v, prior, step, after});
+    ts_for(grid.threads, grid.h, 1, step_rows,
+           &(step_job){grid, maps, image, channels, count, v, prior, search, step, after});
 }
 
 void rd_prior_covariance(const double deviation[MAP_GROUPS], const ts_prior *prior,

@@ -23,12 +23,22 @@ typedef struct rd_prior {
     ts_prior scale;         /* q of both colours, model and noise */
 } rd_prior;
 
+/* Along the steps of several photographs, whose highlights bend what a step takes for straight. With the misfit
+ *     E(R) = |r|^2 / S + (R - M)' Sigma^-1 (R - M)
+ * maps whose E is not above that of any before become the best of their pixel, and its step is TS_SEARCH_ON delta; from
+ * others the step goes back until TS_SEARCH_BACK of the way from the best is left. */
+typedef struct rd_search {
+    float *best, *misfit; /* [h, w, MAP_CHANNELS] and [h, w], of the caller; each step reads and writes them */
+    bool begun;           /* a step has written them */
+} rd_search;
+
 /* step: [h, w, channels], channels beyond the ninth are not written; where maps + step would leave [-1, 1] it ends
  * there. after (may be NULL): [h, w, MAP_GROUPS], what is left of the prior's standard deviations, of several values
  * the root of their mean variance. Views are RD_POINT, 1 <= count <= RD_CAPTURE_VIEWS; image[k] [h, w, 3] belongs to
- * views[k]. Finite for finite maps. Threaded; the same bytes for any number of threads. */
+ * views[k]. search: NULL, and of one photograph always: whole steps. Finite for finite maps. Threaded; the same bytes
+ * for any number of threads. */
 void rd_posterior_step(rd_grid grid, const float *maps, int channels, const rd_view *views, const float *const *image,
-                       int count, const rd_prior *prior, float *step, float *after);
+                       int count, const rd_prior *prior, const rd_search *search, float *step, float *after);
 
 /* The prior's covariance. */
 void rd_prior_covariance(const double deviation[MAP_GROUPS], const ts_prior *prior,

@@ -342,7 +342,7 @@ static int work(const cl_command *given)
         cl_failed("%s", st.message);
     else {
         if (plan.jobs == 1) lgd_model_single(r.model);
-        r.steps = cl_command_steps(c, r.model);
+        r.steps = cl_command_steps(c, r.model, *c->capture ? 2 : c->sheet ? c->photos : 1);
         code = all(&r, pipeline, recipe);
         if (code == CL_OK && missing) code = CL_FAILED;
         code = end_manifest(&r, code);

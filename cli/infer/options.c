@@ -36,7 +36,7 @@ const cl_argument cl_infer_arguments[] = {
     {'s', "size", "N", "side of the maps in pixels, 1 .. 8192 (default 256)"},
     {'i', "iterations", "N|auto",
      "refinement steps, 0 .. 1000; 0 = the first estimate only; auto = as long as the reconstruction improves,\n"
-     "24 at most (default: as trained)"},
+     "24 at most (default: as trained; of several photographs phone makes twice as many)"},
     {ORIENTATIONS, "orientations", "N",
      "the first estimate is the mean over N orientations of the photograph: 1 (as it is), 2 (and a quarter turn; the\n"
      "default), 4 (all quarter turns) or 8 (and their mirror images)"},
@@ -269,8 +269,8 @@ ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st)
     return TS_OK;
 }
 
-int cl_command_steps(const cl_command *c, const lgd_model *model)
+int cl_command_steps(const cl_command *c, const lgd_model *model, int photos)
 {
     if (c->iterations == LGD_AUTO) return LGD_AUTO_MOST;
-    return c->iterations < 0 ? lgd_trained_iterations(model) : c->iterations;
+    return c->iterations < 0 ? lgd_usual_iterations(model, photos) : c->iterations;
 }

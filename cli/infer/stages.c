@@ -142,7 +142,7 @@ static void look_at(const cl_command *c, cl_item *item)
 void cl_item_estimate(const cl_command *c, lgd_model *model, cl_item *item, cl_item_progress progress, void *user)
 {
     const bool fixed = c->power > 0;
-    task t = {item, cl_command_steps(c, model), progress, user};
+    task t = {.item = item, .progress = progress, .user = user};
     const lgd_options options = {.size = sizeof options,
                                  .iterations = c->iterations,
                                  .threads = item->threads,
@@ -159,6 +159,7 @@ void cl_item_estimate(const cl_command *c, lgd_model *model, cl_item *item, cl_i
                                  .taken = item->photo};
     item->photo[0] = c->corners ? item->angle.photo : lgd_flash_photo(item->image);
     item->photos = item->capture.images ? lgd_capture_photos(&item->capture, lgd_most_photos(model), item->photo) : 1;
+    t.steps = cl_command_steps(c, model, item->photos);
     item->power = fixed ? c->power : 1;
     for (int k = 0; k < item->photos; k++) item->photo[k].power *= (float)item->power;
     if (io_material_create(&item->m, c->size, &item->st) != TS_OK ||

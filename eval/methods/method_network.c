@@ -2,16 +2,16 @@
 #include "eval/methods/method_internal.h"
 #include "infer/tiles.h"
 
-static int steps(const ev_estimator *e)
-{
-    const double given = ev_number(e, "iterations");
-    return given < 0 ? e->net->arch.iterations : (int)given;
-}
-
 static int photos(const ev_estimator *e)
 {
     const double given = ev_given(e, "photos") ? ev_number(e, "photos") : e->net->arch.images;
     return (int)given;
+}
+
+static int steps(const ev_estimator *e)
+{
+    const double given = ev_number(e, "iterations");
+    return given < 0 ? nn_arch_steps(&e->net->arch, photos(e)) : (int)given;
 }
 
 static ts_code open_g(ev_estimator *e, ts_status *st) { return ev_open_net(e, "model", st); }

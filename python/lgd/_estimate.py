@@ -113,7 +113,8 @@ def _run(
     for shape in shapes:
         if shape != (side, side, 3):
             raise ValueError(f"a photograph of shape {shape}: all must be (side, side, 3)")
-    steps = model.iterations if iterations is None else c.AUTO_MOST if iterations == "auto" else int(iterations)
+    usual = lib.lgd_usual_iterations(model._model, len(given))
+    steps = usual if iterations is None else c.AUTO_MOST if iterations == "auto" else int(iterations)
     calls, error, options = _Calls(progress, steps), c.Failure(), c.Options()
     structs, taken = (c.PhotoStruct * len(given))(), (c.PhotoStruct * len(given))()
     power = ctypes.c_double(1 if light_power == "auto" else float(light_power))

@@ -82,6 +82,7 @@ _FUNCTIONS = {
     "lgd_load": (c_void_p, [c_char_p, _ERROR]),
     "lgd_free": (None, [POINTER(c_void_p)]),
     "lgd_trained_iterations": (c_int, [c_void_p]),
+    "lgd_usual_iterations": (c_int, [c_void_p, c_int]),
     "lgd_most_photos": (c_int, [c_void_p]),
     "lgd_published": (c_int, [c_void_p]),
     "lgd_options_init": (None, [POINTER(Options), c_size_t]),

@@ -8,19 +8,21 @@ typedef struct equations {
     vf d[MAP_CHANNELS], z[MAP_CHANNELS], l[MAP_CHANNELS][MAP_CHANNELS - 1];
 } equations;
 
-/* Of a pixel's white unknowns: the mean, and of each group of A z the mean variance as a share of the prior's. */
+/* Of a pixel's white unknowns: the mean, and of each group of A z the mean variance as a share of the prior's. misfit:
+ * of the maps as they are, sum r^2 / S of several photographs. */
 typedef struct estimate {
-    vf z[MAP_CHANNELS], share[MAP_GROUPS];
+    vf z[MAP_CHANNELS], share[MAP_GROUPS], misfit;
 } estimate;
 
 static const int shared_group[SHARED] = {GROUP_ROUGHNESS, GROUP_NORMAL, GROUP_NORMAL};
 
-/* A colour's row of J A, and its residual at the prior's mean, which is m from the maps. */
+/* A colour's row of J A, and its residual at the prior's mean, which is m from the maps; plain: at the maps. */
 V_INLINE vf observe(int c, const surface *s, const sight *t, const spread *a, const vf m[MAP_CHANNELS],
-                    vf h[MAP_CHANNELS])
+                    vf h[MAP_CHANNELS], vf *plain)
 {
     vf by[ROW], slope, error = residual(c, s, t, TS_PRIOR_FADE, by, &slope);
     error *= confidence(t->r.value[c], t->target[c], TS_PRIOR_FADE);
+    *plain = error;
     error -= by[0] * m[MAP_DIFFUSE + c] + by[1] * m[MAP_SPECULAR + c];
     for (int i = 0; i < SHARED; i++) error -= by[2 + i] * m[shared_map[i]];
     whiten(c, a, by, h);
@@ -32,10 +34,10 @@ V_INLINE void settle(const surface *s, const sight *t, const ts_prior *prior, co
                      bool doubts, estimate *e)
 {
     gram g;
-    vf error[3], variance[3], sum[2][3] = {{{0}}};
+    vf error[3], variance[3], plain, sum[2][3] = {{{0}}};
 #pragma GCC unroll 3
     for (int c = 0; c < 3; c++) {
-        error[c] = observe(c, s, t, a, m, g.u[c]);
+        error[c] = observe(c, s, t, a, m, g.u[c], &plain);
         variance[c] = variance_of(t->target[c], prior);
     }
     orthogonalise(variance, &g);
@@ -65,11 +67,13 @@ V_INLINE void settle(const surface *s, const sight *t, const ts_prior *prior, co
 
 /* Adds a photograph; first_view: q is unset. */
 V_INLINE void take(const surface *s, const sight *t, bool first_view, const ts_prior *prior, const spread *a,
-                   const vf m[MAP_CHANNELS], equations *q)
+                   const vf m[MAP_CHANNELS], equations *q, vf *misfit)
 {
 #pragma GCC unroll 3
     for (int c = 0; c < 3; c++) {
-        vf h[MAP_CHANNELS], error = observe(c, s, t, a, m, h), weight = 1.0f / variance_of(t->target[c], prior);
+        vf h[MAP_CHANNELS], plain, error = observe(c, s, t, a, m, h, &plain),
+                                   weight = 1.0f / variance_of(t->target[c], prior);
+        *misfit += plain * plain * weight;
 #pragma GCC unroll 9
         for (int i = own_at(c); i < MAP_CHANNELS; i++) {
             if (first_view && (c == 0 || i < own_at(c) + 2))
@@ -143,6 +147,7 @@ V_INLINE bool learn(const ts_shade_view *views, const float *const *images, int 
     equations q;
     sight t;
     bool informed = false;
+    e->misfit = v_set(0);
     if (count == 1) {
         if (!look_at(views, row, first, n, images[0], s, &t)) return false;
         settle(s, &t, prior, a, m, doubts, e);
@@ -150,16 +155,60 @@ V_INLINE bool learn(const ts_shade_view *views, const float *const *images, int 
     }
     for (int v = 0; v < count; v++) {
         if (!look_at(views + v, row, first, n, images[v], s, &t)) continue;
-        if (informed) take(s, &t, false, prior, a, m, &q);
-        else take(s, &t, true, prior, a, m, &q);
+        if (informed) take(s, &t, false, prior, a, m, &q, &e->misfit);
+        else take(s, &t, true, prior, a, m, &q, &e->misfit);
         informed = true;
     }
     if (informed) solve(&q, a, doubts, e);
     return informed;
 }
 
+/* m' Sigma^-1 m: |z|^2 of m = A z. */
+V_INLINE vf improbability(const spread *a, const vf m[MAP_CHANNELS])
+{
+    const vf least = v_set(TS_PRIOR_NARROWEST);
+    vf sum = {0};
+    for (int k = 0; k < 2; k++) {
+        const int map = k ? MAP_SPECULAR : MAP_DIFFUSE;
+        const vf deviation = v_max(a->deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE], least);
+        vf z[3];
+        for (int i = 0; i < 3; i++) {
+            z[i] = m[map + i] / deviation;
+            for (int j = 0; j < i; j++) z[i] -= z[j] * a->hue[k][i][j];
+            z[i] /= fmaxf(a->hue[k][i][i], TS_PRIOR_NARROWEST);
+            sum += z[i] * z[i];
+        }
+    }
+    for (int i = 0; i < SHARED; i++) {
+        const vf z = m[shared_map[i]] / v_max(a->deviation[shared_group[i]], least);
+        sum += z * z;
+    }
+    return sum;
+}
+
+/* From where the maps are now, of the given misfit, x or back. */
+V_INLINE void choose(const ts_search *search, int i, int n, vf misfit, const vf now[MAP_CHANNELS], vf x[MAP_CHANNELS])
+{
+    vf best[MAP_CHANNELS], least = misfit;
+    float *from = search->best + (int64_t)i * MAP_CHANNELS;
+    if (search->begun) {
+        v_load_pixels(from, MAP_CHANNELS, n, MAP_CHANNELS, best);
+        v_load_pixels(search->misfit + i, 1, n, 1, &least);
+    }
+    const vi better = search->begun ? misfit <= least : v_seti(-1);
+    for (int c = 0; c < MAP_CHANNELS; c++) {
+        const vf back = search->begun ? (best[c] - now[c]) * (1 - TS_SEARCH_BACK) : x[c];
+        x[c] = v_select(better, x[c] * TS_SEARCH_ON, back);
+        best[c] = search->begun ? v_select(better, now[c], best[c]) : now[c];
+    }
+    least = v_select(better, misfit, least);
+    v_store_pixels(from, MAP_CHANNELS, n, MAP_CHANNELS, best);
+    v_store_pixels(search->misfit + i, 1, n, 1, &least);
+}
+
 static void step(const ts_shade_view *views, const float *const *images, int count, const ts_shade_row *row,
-                 const ts_prior *prior, const float *mean, const float *deviation, float *to, float *after)
+                 const ts_prior *prior, const float *mean, const float *deviation, const ts_search *search, float *to,
+                 float *after)
 {
     spread a;
     set_hue(prior, &a);
@@ -179,6 +228,7 @@ static void step(const ts_shade_view *views, const float *const *images, int cou
         const bool informed = learn(views, images, count, row, i, n, &s, prior, &a, m, after != NULL, &e);
         if (informed) widen(&a, e.z, x);
         for (int c = 0; c < MAP_CHANNELS; c++) x[c] = v_min(v_max(at[c] + (m[c] + x[c]), v_set(-1)), v_set(1)) - now[c];
+        if (search) choose(search, i, n, (informed ? e.misfit : v_set(0)) + improbability(&a, m), now, x);
         v_store_pixels(to + first, row->channels, n, MAP_CHANNELS, x);
         if (!after) continue;
         for (int g = 0; g < MAP_GROUPS; g++) {

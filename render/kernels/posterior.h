@@ -14,15 +14,30 @@ typedef struct ts_prior {
  * above 0; variances of a photograph's value as TS_PRIOR_FINEST where they are smaller. */
 #define TS_PRIOR_WIDEST 1e3f
 #define TS_PRIOR_FINEST 1e-10f
+/* Misfits are those of deviations of TS_PRIOR_NARROWEST at least. */
+#define TS_PRIOR_NARROWEST 1e-6f
 /* What a burnt-out value tells fades from a radiance of 1 to 1 + TS_PRIOR_FADE. A narrow fade makes a burnt-out pixel
  * jump between what it is told and the mean, from step to step, and rounding decides where it ends. */
 #define TS_PRIOR_FADE 0.1f
 
+/* Of each pixel of a row, along the steps: the maps of the least misfit yet, [count, MAP_CHANNELS], and that misfit,
+ * [count]. begun: they are of earlier steps. */
+typedef struct ts_search {
+    float *best, *misfit;
+    bool begun;
+} ts_search;
+/* From maps that fit better than all before a step has this part of its length; others go back until this part of the
+ * way from the best ones is left. */
+#define TS_SEARCH_ON 0.7f
+#define TS_SEARCH_BACK 0.25f
+
 struct ts_posterior_kernels {
-    /* step[count, channels]; mean[count, channels]; deviation[count, MAP_GROUPS]; after[count, MAP_GROUPS] may be NULL.
-     * images[v][count, 3] belongs to views[v]. Channels of step beyond the maps' are not written. */
+    /* step[count, channels]; mean[count, channels]; deviation[count, MAP_GROUPS]; after[count, MAP_GROUPS] and search
+     * may be NULL, search of one photograph is. images[v][count, 3] belongs to views[v]. Channels of step beyond the
+     * maps' are not written. */
     void (*step)(const ts_shade_view *views, const float *const *images, int count, const ts_shade_row *row,
-                 const ts_prior *prior, const float *mean, const float *deviation, float *step, float *after);
+                 const ts_prior *prior, const float *mean, const float *deviation, const ts_search *search, float *step,
+                 float *after);
 };
 TS_FAMILY(posterior)
 #endif

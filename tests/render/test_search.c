@@ -1,0 +1,120 @@
+/* The search along the steps of several photographs. */
+#include "tests/support/posterior.h"
+#include <math.h>
+
+enum { VIEWS = 5, STEPS = 24 };
+
+/* E of render/posterior.h, in double. */
+static double misfit(const job *j, int pixel, const float *maps)
+{
+    const double point[2] = {(pixel % SIDE + 0.5) / SIDE - 0.5, 0.5 - (pixel / SIDE + 0.5) / SIDE};
+    double m[C], off[C], sum = 0;
+    for (int i = 0; i < C; i++) m[i] = (double)maps[i], off[i] = m[i] - (double)j->mean[pixel * C + i];
+    for (int k = 0; k < j->count; k++) {
+        rd_observation o[3];
+        rd_observe(m, point, &j->views[k], j->image[k] + pixel * 3, &j->scale, o);
+        for (int c = 0; c < 3; c++) sum += o[c].residual * o[c].residual / o[c].variance;
+    }
+    const float *deviation = j->deviation + pixel * G;
+    for (int k = 0; k < 2; k++) { /* ((1 - q) 1 1' + q I)^-1 = (I - (1 - q) / (3 - 2 q) 1 1') / q */
+        const double q = (double)j->scale.hue[k], s = (double)deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE],
+                     *v = off + (k ? MAP_SPECULAR : MAP_DIFFUSE), all = v[0] + v[1] + v[2];
+        sum += (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - (1 - q) / (3 - 2 * q) * all * all) / (q * s * s);
+    }
+    for (int i = 0; i < C; i++)
+        if (group_of[i] == GROUP_NORMAL || group_of[i] == GROUP_ROUGHNESS)
+            sum += pow(off[i] / (double)deviation[group_of[i]], 2);
+    return sum;
+}
+
+/* Careful photographs: of them whole steps overshoot. */
+static job careful(uint64_t seed)
+{
+    job j = begin(seed, VIEWS);
+    j.scale = (ts_prior){{0.2f, 0.1f}, 0.01f, 0.002f, 0};
+    return j;
+}
+
+static void step(job *j, const rd_search *search)
+{
+    const rd_prior prior = {j->mean, j->deviation, j->scale};
+    rd_posterior_step(rd_grid_full(SIDE), j->maps, C, j->views, (const float *const *)j->image, j->count, &prior,
+                      search, j->step, NULL);
+}
+
+/* The sum of all pixels' misfits after as many whole steps. */
+static double without_search(uint64_t seed)
+{
+    job j = careful(seed);
+    double sum = 0;
+    for (int t = 0; t < STEPS; t++) {
+        step(&j, NULL);
+        for (int i = 0; i < PIXELS * C; i++) j.maps[i] += j.step[i];
+    }
+    for (int p = 0; p < PIXELS; p++) sum += misfit(&j, p, j.maps + p * C);
+    end(&j);
+    return sum;
+}
+
+/* What is kept of a pixel is maps that were tried and their misfit, which never rises; from worse ones the step goes
+ * back towards them, from better ones on by a part of the whole step. */
+TEST(search_keeps_the_best_maps_of_each_pixel)
+{
+    job j = careful(91);
+    float *best = floats(PIXELS * C), *least = floats(PIXELS), *before = floats(PIXELS), *kept = floats(PIXELS * C);
+    rd_search search = {best, least, false};
+    int back = 0, on = 0;
+    double first = 0, last = 0;
+    for (int i = 0; i < PIXELS * C; i++) kept[i] = j.maps[i];
+    for (int t = 0; t < STEPS; t++) {
+        float *whole = floats(PIXELS * C);
+        step(&j, NULL);
+        memcpy(whole, j.step, PIXELS * C * sizeof *whole);
+        step(&j, &search);
+        for (int p = 0; p < PIXELS; p++) {
+            const double now = misfit(&j, p, j.maps + p * C), e = misfit(&j, p, best + p * C);
+            const bool better = !memcmp(best + p * C, j.maps + p * C, C * sizeof *best);
+            CHECK(fabs((double)least[p] - e) < 1e-3 * (e + 1), "pixel %d: misfit %g, not %g", p, (double)least[p], e);
+            CHECK(!search.begun || least[p] <= before[p], "pixel %d: misfit %g after %g", p, (double)least[p],
+                  (double)before[p]);
+            CHECK(better || !memcmp(best + p * C, kept + p * C, C * sizeof *best), "pixel %d: best was never tried", p);
+            CHECK(better || now > e * (1 - 1e-3), "pixel %d: %g was better than %g", p, now, e);
+            for (int i = 0; i < C; i++) {
+                const int at = p * C + i;
+                const float want = better ? TS_SEARCH_ON * whole[at] : (1 - TS_SEARCH_BACK) * (best[at] - j.maps[at]);
+                CHECK(fabsf(j.step[at] - want) < 1e-5f, "pixel %d, value %d: a step of %g, not %g", p, i,
+                      (double)j.step[at], (double)want);
+                j.maps[at] += j.step[at];
+                kept[at] = best[at];
+            }
+            better ? on++ : back++;
+            before[p] = least[p];
+            if (t == 0) first += e;
+            last += t == STEPS - 1 ? e : 0;
+        }
+        free(whole);
+        search.begun = true;
+    }
+    CHECK(on > 10 * PIXELS && back > PIXELS / 4, "%d steps on and %d back say nothing", on, back);
+    CHECK(last < 0.2 * first && last < 0.9 * without_search(91),
+          "the misfit fell from %g to %g, without a search to %g", first, last, without_search(91));
+    free(best), free(least), free(before), free(kept);
+    end(&j);
+}
+
+/* Maps that are not numbers are never kept, nor gone to. */
+TEST(search_leaves_what_is_not_a_number)
+{
+    job j = begin(92, VIEWS);
+    float *best = floats(PIXELS * C), *least = floats(PIXELS);
+    rd_search search = {best, least, false};
+    step(&j, &search);
+    search.begun = true;
+    const float kept = best[0];
+    j.maps[MAP_ROUGHNESS] = NAN;
+    least[1] = -1;
+    step(&j, &search);
+    CHECK(best[0] == kept && least[1] == -1, "%g was kept for %g", (double)best[0], (double)kept);
+    free(best), free(least);
+    end(&j);
+}
