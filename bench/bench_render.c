@@ -55,10 +55,12 @@ static void posterior(void *user)
     job *j = user;
     rd_view views[RD_CAPTURE_VIEWS];
     const float *image[RD_CAPTURE_VIEWS];
+    static float best[SIDE * SIDE * MAP_CHANNELS], misfit[SIDE * SIDE];
+    const rd_search search = {best, misfit, true};
     const rd_prior prior = {j->target, j->deviation, {.hue = {0.1f, 0.1f}, .model = 0.1f, .noise = 0.5f}};
     for (int k = 0; k < j->photographs; k++) views[k] = rd_capture_view(k), image[k] = j->image;
-    rd_posterior_step(rd_grid_full(j->side), j->maps, MAP_CHANNELS, views, image, j->photographs, &prior, NULL,
-                      j->gradient, j->after);
+    rd_posterior_step(rd_grid_full(j->side), j->maps, MAP_CHANNELS, views, image, j->photographs, &prior,
+                      j->photographs > 1 ? &search : NULL, j->gradient, j->after);
 }
 
 /* Four steps, of every sixteenth row. */
