@@ -1,6 +1,7 @@
 #include "eval/multiview.h"
 #include "eval/metrics/flip.h"
 #include "eval/metrics/ssim.h"
+#include "infer/capture.h"
 #include "render/render.h"
 #include "render/tone.h"
 #include <math.h>
@@ -30,20 +31,11 @@ void ev_capture_nearest_first(io_capture *c)
     }
 }
 
-/* What picture 0's colours are multiplied by. */
-static void input_gain(const io_capture *c, float gain[3])
-{
-    const float *l = c->light[0];
-    const float distance2 = l[0] * l[0] + l[1] * l[1] + l[2] * l[2];
-    for (int k = 0; k < 3; k++)
-        gain[k] = RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE) * distance2 / c->power[k];
-}
-
 rd_view ev_capture_view(const io_capture *c, int picture)
 {
     rd_view view = {.kind = RD_POINT};
     float gain[3];
-    input_gain(c, gain);
+    lgd_capture_gain(c, false, gain);
     view.power = c->power[1] * gain[1]; /* the same for every colour */
     for (int k = 0; k < 3; k++) {
         view.camera[k] = c->camera[picture][k];
@@ -52,10 +44,10 @@ rd_view ev_capture_view(const io_capture *c, int picture)
     return view;
 }
 
-void ev_capture_input(const io_capture *c, int inputs, float *image)
+void ev_capture_input(const io_capture *c, int inputs, bool as_taken, float *image)
 {
     float gain[3];
-    input_gain(c, gain);
+    lgd_capture_gain(c, as_taken, gain);
     for (size_t i = 0; i < (size_t)inputs * (size_t)c->size * (size_t)c->size * 3; i++)
         image[i] = fminf(c->image[i] * gain[i % 3], 1);
 }
@@ -65,7 +57,7 @@ static void render(const io_capture *c, int picture, const float *maps, int chan
 {
     const rd_view view = ev_capture_view(c, picture);
     float gain[3];
-    input_gain(c, gain);
+    lgd_capture_gain(c, false, gain);
     rd_render(rd_grid_full(c->size), maps, channels, &view, false, image);
     for (size_t i = 0; i < (size_t)c->size * (size_t)c->size * 3; i++) image[i] /= gain[i % 3];
 }

@@ -10,13 +10,13 @@
 /* Makes the picture whose camera is nearest to the sample's axis the first; the others keep their order. */
 void ev_capture_nearest_first(io_capture *c);
 
-/* Light and camera of a picture. Its power is that of the input picture as ev_capture_input gives it. */
+/* Light and camera of a picture. Its power is that of the input picture as ev_capture_input gives it where it is not
+ * as_taken. */
 rd_view ev_capture_view(const io_capture *c, int picture);
 
-/* The first `inputs` pictures in the brightness that the estimators expect: each colour is scaled, equally in all, so
- * that picture 0's light at the sample's centre equals the flash of render/scene.h, then clamped to [0, 1]. image:
- * [inputs, size, size, 3]. */
-void ev_capture_input(const io_capture *c, int inputs, float *image);
+/* The first `inputs` pictures as lgd-infer --capture reads them: multiplied by lgd_capture_gain, then clamped to [0,
+ * 1]. image: [inputs, size, size, 3]. */
+void ev_capture_input(const io_capture *c, int inputs, bool as_taken, float *image);
 
 /* Re-renderings of maps [size, size, channels] under each picture's own light and camera, in the capture's own
  * brightness. EV_RENDER (and EV_SSIM and EV_FLIP if perceptual, EV_LPIPS if lpips is not NULL) are means over pictures

@@ -88,9 +88,14 @@ static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, t
             return ts_fail(st, TS_FORMAT, "%s: has %d pictures: %d are the input, and one more at least is compared",
                            b->name, b->capture.images, r->inputs);
         ev_capture_nearest_first(&b->capture);
-        if (r->light_known) ev_capture_input(&b->capture, r->inputs, b->image);
+        float *const taken = b->image + (size_t)r->inputs * (size_t)r->size * (size_t)r->size * 3;
+        if (r->light_known) {
+            ev_capture_input(&b->capture, r->inputs, false, b->image);
+            ev_capture_input(&b->capture, r->inputs, true, taken);
+        }
         *c = ev_case_of_capture(&b->capture, r->light_known ? b->image : b->capture.image, r->inputs, r->light_known,
                                 r->perceptual);
+        if (r->light_known) c->taken = taken;
         c->lpips = r->lpips;
         return TS_OK;
     }
@@ -249,7 +254,7 @@ static ts_code plan(ev_run *r, ts_status *st)
 static bool make(ev_run *r, bench *b, int64_t total)
 {
     const size_t pixels = (size_t)r->size * (size_t)r->size;
-    b->image = malloc((size_t)r->inputs * pixels * 3 * sizeof *b->image);
+    b->image = malloc(2 * (size_t)r->inputs * pixels * 3 * sizeof *b->image); /* and as they were taken */
     b->first = malloc(pixels * MAP_CHANNELS * sizeof *b->first);
     b->last = malloc(pixels * MAP_CHANNELS * sizeof *b->last);
     b->row = malloc((size_t)r->report.columns * sizeof *b->row);

@@ -64,7 +64,7 @@ ts_code ev_load_under_sheet(const char *folder, const io_map_convention *own, bo
     if (code) return code;
     if (exact) {
         snprintf(path, sizeof path, "%s/exact", folder);
-        code = lgd_read_capture(path, size, IO_MAX_PIXELS_DEFAULT, c, st);
+        code = lgd_read_capture(path, size, IO_MAX_PIXELS_DEFAULT, false, c, st);
     } else code = find_photographs(folder, most, size, c, st);
     if (!code && c->images < most)
         code = ts_fail(st, TS_FORMAT, "%s: has %d photographs of the %d that are read", folder, c->images, most);

@@ -11,17 +11,22 @@ static bool is_folder(const char *path)
     return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
 }
 
-ts_code lgd_read_capture(const char *path, int size, int64_t max_pixels, io_capture *c, ts_status *st)
+void lgd_capture_gain(const io_capture *c, bool as_taken, float gain[3])
+{
+    const float *l = c->light[0], distance2 = l[0] * l[0] + l[1] * l[1] + l[2] * l[2];
+    const float white = cbrtf(c->power[0] * c->power[1] * c->power[2]),
+                all = as_taken ? 1 : RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE) * distance2 / white;
+    for (int i = 0; i < 3; i++) gain[i] = all * (white / c->power[i]);
+}
+
+ts_code lgd_read_capture(const char *path, int size, int64_t max_pixels, bool as_taken, io_capture *c, ts_status *st)
 {
     const ts_code code = is_folder(path) ? io_read_capture(path, size, c, st)
                                          : io_read_capture_ini(path, size, RD_FLASH_POWER, max_pixels, c, st);
     if (code) return code;
-    const float *l = c->light[0], distance2 = l[0] * l[0] + l[1] * l[1] + l[2] * l[2];
     float gain[3];
-    for (int i = 0; i < 3; i++) {
-        gain[i] = RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE) * distance2 / c->power[i];
-        c->power[i] *= gain[i];
-    }
+    lgd_capture_gain(c, as_taken, gain);
+    for (int i = 0; i < 3; i++) c->power[i] *= gain[i];
     const size_t values = (size_t)c->images * (size_t)size * (size_t)size * 3;
     for (size_t i = 0; i < values; i++) c->image[i] = fminf(c->image[i] * gain[i % 3], 1);
     return TS_OK;

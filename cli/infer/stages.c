@@ -75,7 +75,7 @@ static void read_input(const cl_command *c, bool published, cl_item *item)
     if (c->sheet) read_sheet(c, item);
     else if (c->corners) read_angle(c, published, item);
     else if (!*c->capture) read_photo(c, published, item);
-    else if (!lgd_read_capture(c->capture, c->size, c->max_pixels, &item->capture, &item->st)) {
+    else if (!lgd_read_capture(c->capture, c->size, c->max_pixels, !(c->power > 0), &item->capture, &item->st)) {
         item->photo_side = c->size;
         item->image = item->capture.image;
         item->fov = LGD_FOV_OF_PHOTO;

@@ -51,7 +51,7 @@ static void photographs(const ev_estimator *e, const ev_case *c, ev_run_how *how
     const int power = (int)ev_number(e, "power"), view = (int)ev_number(e, "view");
     const size_t pixels = (size_t)c->size * (size_t)c->size;
     for (int k = 0; k < how->photos; k++) {
-        const float *image = c->image + (size_t)k * pixels * 3;
+        const float *image = (power == POWER_AUTO && c->taken ? c->taken : c->image) + (size_t)k * pixels * 3;
         if (view == VIEW_SET) ev_photo_of(&c->input[k], image, &how->photo[k]);
         else how->photo[k] = lgd_flash_photo(image);
         if (power == POWER_KNOWN) how->photo[k].power *= (float)c->exposure;

@@ -14,6 +14,7 @@ typedef struct ev_case {
     int size;
     rd_view view;                 /* of the first input picture, as the methods know it */
     const float *image;           /* the input pictures, [inputs][size][size][3], linear, in [0, 1] */
+    const float *taken;           /* NULL, or these as bright as they were taken: for methods that find the power */
     int inputs;                   /* 1 .. NN_MAX_IMAGES; all but the first are for methods that read several */
     rd_view input[NN_MAX_IMAGES]; /* their views, the first being view */
     double fov;                   /* the first input's true field of view in degrees (render/scene.h); 0: unknown */

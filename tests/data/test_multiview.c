@@ -4,6 +4,7 @@
 #include "eval/multiview.h"
 #include "eval/set_ini.h"
 #include "eval/sets.h"
+#include "infer/capture.h"
 #include "render/render.h"
 #include "tests/test.h"
 #include <math.h>
@@ -65,7 +66,7 @@ TEST(eval_capture_input_is_a_flash_photograph)
     io_capture c;
     static float input[SIZE * SIZE * 3], expected[SIZE * SIZE * 3];
     make(&m, &c, 1);
-    ev_capture_input(&c, 1, input);
+    ev_capture_input(&c, 1, false, input);
     const rd_view view = ev_capture_view(&c, 0);
     rd_render(rd_grid_full(SIZE), m.maps, MAP_CHANNELS, &view, true, expected);
     int compared = 0;
@@ -79,6 +80,32 @@ TEST(eval_capture_input_is_a_flash_photograph)
     const float strength = view.power / (l[0] * l[0] + l[1] * l[1] + l[2] * l[2]);
     CHECK(fabsf(strength * RD_FLASH_DISTANCE * RD_FLASH_DISTANCE / RD_FLASH_POWER - 1) < 1e-5f,
           "at the centre the light's strength is %g", (double)strength);
+    io_material_free(&m);
+    io_capture_free(&c);
+}
+
+/* As taken, a picture loses its light's colour and keeps its brightness: what the file has below 1 is not burnt out. */
+TEST(eval_capture_input_as_taken_is_as_bright)
+{
+    io_material m = {0};
+    io_capture c;
+    static float input[SIZE * SIZE * 3];
+    float gain[3], flash[3];
+    make(&m, &c, 1);
+    for (int k = 0; k < 3; k++) c.power[k] /= 40; /* to the flash's brightness all of it would burn out */
+    lgd_capture_gain(&c, true, gain);
+    lgd_capture_gain(&c, false, flash);
+    CHECK(fabsf(gain[0] * gain[1] * gain[2] - 1) < 1e-5f && flash[1] > 10, "gains of %g, %g", (double)gain[1],
+          (double)flash[1]);
+    for (int k = 0; k < 3; k++)
+        CHECK(fabsf(flash[k] / gain[k] * gain[0] / flash[0] - 1) < 1e-5f &&
+                  fabsf(gain[k] * c.power[k] / c.power[0] / gain[0] - 1) < 1e-5f,
+              "colour %d has a gain of %g", k, (double)gain[k]);
+    ev_capture_input(&c, 1, true, input);
+    for (int i = 0; i < SIZE * SIZE * 3; i++) {
+        const float want = fminf(c.image[i] * gain[i % 3], 1);
+        CHECK(input[i] == want, "value %d: %g, not %g", i, (double)input[i], (double)want);
+    }
     io_material_free(&m);
     io_capture_free(&c);
 }
