@@ -15,6 +15,11 @@ typedef struct step_job {
     float *step, *after;
 } step_job;
 
+float rd_search_length(int steps)
+{
+    return fminf(RD_SEARCH_FIRST * powf(RD_SEARCH_GROWTH, (float)steps), RD_SEARCH_LONGEST);
+}
+
 static void step_rows(const void *job, int64_t begin, int64_t end)
 {
     const step_job *j = job;
@@ -24,7 +29,8 @@ static void step_rows(const void *job, int64_t begin, int64_t end)
         const float *part[RD_CAPTURE_VIEWS];
         ts_search search;
         if (j->search)
-            search = (ts_search){j->search->best + at * MAP_CHANNELS, j->search->misfit + at, j->search->begun};
+            search = (ts_search){j->search->best + at * MAP_CHANNELS, j->search->misfit + at,
+                                 rd_search_length(j->search->steps), j->search->steps > 0};
         for (int k = 0; k < j->count; k++) part[k] = j->image[k] + at * 3;
         ts_posterior_k()->step(j->view, part, j->count, &row, &j->prior->scale, j->prior->mean + at * j->channels,
                                j->prior->deviation + at * MAP_GROUPS, j->search ? &search : NULL,

@@ -25,12 +25,19 @@ typedef struct rd_prior {
 
 /* Along the steps of several photographs, whose highlights bend what a step takes for straight. With the misfit
  *     E(R) = |r|^2 / S + (R - M)' Sigma^-1 (R - M)
- * maps whose E is not above that of any before become the best of their pixel, and its step is TS_SEARCH_ON delta; from
+ * maps whose E is not above that of any before become the best of their pixel, and its step is a part of delta; from
  * others the step goes back until TS_SEARCH_BACK of the way from the best is left. */
 typedef struct rd_search {
     float *best, *misfit; /* [h, w, MAP_CHANNELS] and [h, w], of the caller; each step reads and writes them */
-    bool begun;           /* a step has written them */
+    int steps;            /* that have written them */
 } rd_search;
+
+/* The part of delta that the step after so many has, from RD_SEARCH_FIRST to RD_SEARCH_LONGEST: the first linear model
+ * is made farthest from the end, and a long step along it leads to maps that no later step leaves. */
+#define RD_SEARCH_FIRST 0.3f
+#define RD_SEARCH_GROWTH 1.13f
+#define RD_SEARCH_LONGEST 0.7f
+float rd_search_length(int steps);
 
 /* step: [h, w, channels], channels beyond the ninth are not written; where maps + step would leave [-1, 1] it ends
  * there. after (may be NULL): [h, w, MAP_GROUPS], what is left of the prior's standard deviations, of several values

@@ -198,7 +198,7 @@ V_INLINE void choose(const ts_search *search, int i, int n, vf misfit, const vf 
     const vi better = search->begun ? misfit <= least : v_seti(-1);
     for (int c = 0; c < MAP_CHANNELS; c++) {
         const vf back = search->begun ? (best[c] - now[c]) * (1 - TS_SEARCH_BACK) : x[c];
-        x[c] = v_select(better, x[c] * TS_SEARCH_ON, back);
+        x[c] = v_select(better, x[c] * search->on, back);
         best[c] = search->begun ? v_select(better, now[c], best[c]) : now[c];
     }
     least = v_select(better, misfit, least);

@@ -21,14 +21,12 @@ typedef struct ts_prior {
 #define TS_PRIOR_FADE 0.1f
 
 /* Of each pixel of a row, along the steps: the maps of the least misfit yet, [count, MAP_CHANNELS], and that misfit,
- * [count]. begun: they are of earlier steps. */
+ * [count]. begun: they are of earlier steps. on: the part of a whole step that maps go on by. */
 typedef struct ts_search {
-    float *best, *misfit;
+    float *best, *misfit, on;
     bool begun;
 } ts_search;
-/* From maps that fit better than all before a step has this part of its length; others go back until this part of the
- * way from the best ones is left. */
-#define TS_SEARCH_ON 0.7f
+/* Maps that fit worse than the best of their pixel go back until this part of the way from those is left. */
 #define TS_SEARCH_BACK 0.25f
 
 struct ts_posterior_kernels {
