@@ -81,7 +81,8 @@ TEST(search_keeps_the_best_maps_of_each_pixel)
             CHECK(better || now > e * (1 - 1e-3), "pixel %d: %g was better than %g", p, now, e);
             for (int i = 0; i < C; i++) {
                 const int at = p * C + i;
-                const float want = better ? rd_search_length(t) * whole[at] : (1 - TS_SEARCH_BACK) * (best[at] - j.maps[at]);
+                const float want = better ? rd_search_length(t) * whole[at]
+                                          : (1 - TS_SEARCH_BACK) * (best[at] - j.maps[at]);
                 CHECK(fabsf(j.step[at] - want) < 1e-5f, "pixel %d, value %d: a step of %g, not %g", p, i,
                       (double)j.step[at], (double)want);
                 j.maps[at] += j.step[at];
