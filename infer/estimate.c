@@ -2,6 +2,7 @@
 #include "data/material.h"
 #include "infer/exposure.h"
 #include "infer/first_guess.h"
+#include "infer/metal.h"
 #include "infer/power.h"
 #include "infer/tiles.h"
 #include "nn/need.h"
@@ -291,9 +292,15 @@ static ts_code first_guess(const lgd_estimator *e, given_photos *p, const lgd_op
     }
     p->r0 = guess->r0;
     p->deviation = guess->deviation;
-    if (!o->power) return TS_OK;
-    *o->power = irradiance(&p->views[0]) / before;
-    return expose_others(e, p, *o->power, st);
+    if (o->power) {
+        *o->power = irradiance(&p->views[0]) / before;
+        if (expose_others(e, p, *o->power, st)) return st->code;
+    }
+    if (p->count == 1) return TS_OK;
+    const nn_arch *a = &e->net->arch;
+    const lgd_metal_photos photos = {p->image, p->views, p->count, p->side, known(o)};
+    return lgd_tell_metal(rd_grid_on(rd_grid_full(nn_arch_side(a)), ag_compute(e->tape)->threads), &photos,
+                          guess->deviation, nn_arch_steps(a, p->count), a->channels, guess->r0, st);
 }
 
 static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int photos, int side, const lgd_options *given,

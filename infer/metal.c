@@ -1,0 +1,110 @@
+#include "infer/metal.h"
+#include "render/posterior.h"
+#include "tensor/maps.h"
+#include "tensor/team.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define DIFFUSE_OF_METAL 0.05f
+#define F0_OF_PLASTIC 0.04f
+
+typedef enum kind { AS_READ, METAL, DIELECTRIC } kind;
+
+static float encoded(float v) { return 2 * fminf(fmaxf(v, 0), 1) - 1; }
+
+static void become(kind k, int64_t pixels, int channels, float *maps)
+{
+    for (int64_t i = 0; i < pixels && k != AS_READ; i++, maps += channels)
+        for (int c = 0; c < 3; c++) {
+            const float diffuse = (maps[MAP_DIFFUSE + c] + 1) / 2, f0 = (maps[MAP_SPECULAR + c] + 1) / 2;
+            maps[MAP_DIFFUSE + c] = encoded(k == METAL ? DIFFUSE_OF_METAL : diffuse + f0 / LGD_METAL_F0);
+            maps[MAP_SPECULAR + c] = encoded(k == METAL ? f0 + LGD_METAL_F0 * diffuse : F0_OF_PLASTIC);
+        }
+}
+
+/* The pixels of maps and photographs that are looked at. */
+typedef struct sample {
+    rd_grid grid;
+    float *r0, *deviation, *image[NN_MAX_IMAGES];
+    float *maps, *step, *best, *misfit, *memory;
+} sample;
+
+static void take(rd_grid from, const lgd_metal_photos *p, const float *r0, int channels, const float *deviation,
+                 sample *s)
+{
+    const int side = s->grid.side;
+    for (int i = 0; i < side * side; i++) {
+        const double x = (i % side + 0.5) / side, y = (i / side + 0.5) / side;
+        const size_t map = (size_t)(y * from.side) * (size_t)from.side + (size_t)(x * from.side),
+                     photo = (size_t)(y * p->side) * (size_t)p->side + (size_t)(x * p->side);
+        memcpy(s->r0 + (size_t)(i * channels), r0 + map * (size_t)channels, (size_t)channels * sizeof *r0);
+        memcpy(s->deviation + (size_t)(i * NN_SPREADS), deviation + map * NN_SPREADS, NN_SPREADS * sizeof *deviation);
+        for (int k = 0; k < p->given; k++)
+            for (int c = 0; c < 3; c++) s->image[k][i * 3 + c] = fminf(fmaxf(p->image[k][photo * 3 + (size_t)c], 0), 1);
+    }
+}
+
+/* What r0 is not. */
+static kind other_than(const sample *s, int channels)
+{
+    double more = 0;
+    for (int i = 0; i < s->grid.side * s->grid.side; i++)
+        for (int c = 0; c < 3; c++)
+            more += (double)s->r0[i * channels + MAP_SPECULAR + c] - (double)s->r0[i * channels + MAP_DIFFUSE + c];
+    return more > 0 ? DIELECTRIC : METAL;
+}
+
+/* The mean of log(1 + E) after the steps from maps of the kind. */
+static double misfit(const lgd_metal_photos *p, kind k, int steps, int channels, sample *s)
+{
+    const int pixels = s->grid.side * s->grid.side, values = pixels * channels;
+    float *mean = s->memory;
+    memcpy(mean, s->r0, (size_t)values * sizeof *mean);
+    become(k, pixels, channels, mean);
+    memcpy(s->maps, mean, (size_t)values * sizeof *mean);
+    const rd_prior prior = {mean, s->deviation, nn_step_prior(p->known, p->given)};
+    for (int t = 0; t <= steps; t++) { /* the last one looks at what the one before made */
+        const rd_search search = {s->best, s->misfit, t};
+        rd_posterior_step(s->grid, s->maps, channels, p->views, (const float *const *)s->image, p->given, &prior,
+                          &search, s->step, NULL);
+        for (int i = 0; i < values; i++)
+            if (i % channels < MAP_CHANNELS) s->maps[i] += s->step[i];
+    }
+    double sum = 0;
+    for (int i = 0; i < pixels; i++) sum += log1p((double)s->misfit[i]);
+    return sum / pixels;
+}
+
+static bool sample_create(rd_grid grid, int given, int channels, sample *s)
+{
+    const size_t pixels = (size_t)grid.side * (size_t)grid.side, maps = pixels * (size_t)channels;
+    *s = (sample){.grid = grid};
+    float *at = s->memory = malloc((4 * maps + pixels * (NN_SPREADS + MAP_CHANNELS + 1 + 3 * (size_t)given)) *
+                                   sizeof *at);
+    if (!at) return false;
+    s->r0 = at += maps; /* the prior's mean is before it */
+    s->maps = at += maps;
+    s->step = at += maps;
+    s->best = at += maps;
+    s->deviation = at += pixels * MAP_CHANNELS;
+    s->misfit = at += pixels * NN_SPREADS;
+    at += pixels;
+    for (int k = 0; k < given; k++) s->image[k] = at + (size_t)k * pixels * 3;
+    return true;
+}
+
+ts_code lgd_tell_metal(rd_grid grid, const lgd_metal_photos *photos, const float *deviation, int steps, int channels,
+                       float *r0, ts_status *st)
+{
+    const int side = grid.side < LGD_METAL_SIDE ? grid.side : LGD_METAL_SIDE;
+    sample s;
+    if (!sample_create(rd_grid_on(rd_grid_full(side), grid.threads), photos->given, channels, &s))
+        return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
+    take(grid, photos, r0, channels, deviation, &s);
+    const kind other = other_than(&s, channels);
+    if (misfit(photos, other, steps, channels, &s) < LGD_METAL_SURE * misfit(photos, AS_READ, steps, channels, &s))
+        become(other, (int64_t)grid.side * grid.side, channels, r0);
+    free(s.memory);
+    return TS_OK;
+}
