@@ -187,7 +187,7 @@ $(BENCH_BIN): $(BENCH_C:%.c=$(OBJ)/%.o) $(INTERNAL)
 $(INTERNAL): $(LIB_OBJ)
 	$(call step,AR,$@)
 	@rm -f $@
-	$(Q)$(AR) rcs $@ $^
+	$(Q)$(AR) rcs $@ $(LIB_OBJ)
 
 # The library: infer/api_model.o, infer/api_files.o and what they use, in one object whose only global symbols are those
 # that lgd.h marks LGD_API.
@@ -231,11 +231,13 @@ $(MPI_LINKS): $(BUILD)/mpi/link_%.so: bench/mpi/link.c $(BUILD)/gen/flags
 	$(Q)$(CC) -shared -fPIC -std=c11 -D_GNU_SOURCE -O2 $(WARN) $(MPI_CFLAGS) -o $@ $< \
 	  $(shell pkg-config --libs $(PKG_$*)) -lm
 
-# Every object is rebuilt when the flags change, and data/folders.o when PREFIX does, tags.o
-# when its library comes or goes.
+# Every object is rebuilt when the flags change, and data/folders.o when PREFIX does, tags.o when its library comes or
+# goes; what is made of many files, when one of them comes or goes.
 FLAGS_NOW := $(CC) $(CXX) $(WHOLE_JUMPS) $(OPT) $(SANITIZE) $(CFLAGS) $(CPPFLAGS) $(VERSION)
 changed = $(shell mkdir -p $(BUILD)/gen; echo '$(2)' | cmp -s - $(BUILD)/gen/$(1) || echo '$(2)' > $(BUILD)/gen/$(1))
 $(call changed,flags,$(FLAGS_NOW))
+$(call changed,sources,$(LIB_C) $(KERNELS) $(OPS) $(PAGES))
+$(INTERNAL) $(addprefix $(BUILD)/gen/,ops.h op_list.c pages.h pages.c): $(BUILD)/gen/sources
 $(call changed,prefix,$(PREFIX) $(LIBDIR))
 $(OBJ)/data/folders.o: $(BUILD)/gen/prefix
 $(call changed,tags,$(HAVE_TAGS))
