@@ -1,12 +1,13 @@
 #include "infer/estimate.h"
 #include "data/material.h"
-#include "infer/exposure.h"
-#include "infer/first_guess.h"
-#include "infer/metal.h"
+#include "infer/guess.h"
 #include "infer/power.h"
 #include "infer/tiles.h"
+#include "nn/clip.h"
 #include "nn/need.h"
+#include "nn/revise.h"
 #include "tensor/budget.h"
+#include "tensor/resample.h"
 #include "tensor/resize.h"
 #include "tensor/team.h"
 #include "tensor/threads.h"
@@ -25,20 +26,10 @@ enum {
 };
 #define AUTO_LEAST 1e-3 /* of the RMSE: a step that lowers it by less is not worth its time */
 
-/* What is estimated from; r0: R_0 where it is known, as in nn_input. */
-typedef struct given_photos {
-    const float *image[NN_MAX_IMAGES];
-    rd_view views[NN_MAX_IMAGES];
-    unsigned char known[NN_MAX_IMAGES]; /* what of the views is true, nn_known */
-    int order[NN_MAX_IMAGES];           /* the caller's number of each */
-    int count, side;
-    const float *r0, *deviation; /* deviation: of a model that says it */
-} given_photos;
-
 /* The photographs in the order in which models read them. */
-static given_photos in_order(const lgd_photo *photo, int photos, int side, double fov)
+static lgd_given in_order(const lgd_photo *photo, int photos, int side, double fov)
 {
-    given_photos p = {.count = photos, .side = side};
+    lgd_given p = {.count = photos, .side = side};
     rd_view view[NN_MAX_IMAGES] = {0};
     for (int k = 0; k < photos; k++) {
         view[k] = (rd_view){.kind = RD_POINT, .power = photo[k].power};
@@ -98,24 +89,34 @@ static bool convert(const float *from, int channels, int64_t pixels, bool encode
 typedef struct watch {
     const lgd_estimator *e;
     const lgd_options *options;
-    float *best; /* NULL, or R_t of the last step that paid */
+    int first, last; /* R_first is what the tiles begin with, R_last is wanted */
+    bool ends_alone; /* as in lgd_tiles */
+    float *best;     /* NULL, or R_t of the last step that paid */
     double best_rmse;
     int best_step, channels;
     size_t values;
 } watch;
 
-static bool after_step(int step, double rmse, const float *maps, void *user)
+/* R_t. */
+static bool show(const watch *w, int t, double rmse, const float *maps)
+{
+    const lgd_options *o = w->options;
+    if (w->e->seen && maps && !w->e->seen(t, maps, w->channels, w->e->user)) return false;
+    return !o->progress || o->progress(t, rmse, o->user) == 0;
+}
+
+static bool after_step(int tile_step, double rmse, const float *maps, void *user)
 {
     watch *w = user;
-    const lgd_options *o = w->options;
+    const int step = w->first + tile_step;
     if (w->best) {
-        if (step > 0 && !(rmse < w->best_rmse * (1 - AUTO_LEAST))) return false;
+        if (tile_step > 0 && !(rmse < w->best_rmse * (1 - AUTO_LEAST))) return false;
         memcpy(w->best, maps, w->values * sizeof *w->best);
         w->best_rmse = rmse;
         w->best_step = step;
     }
-    if (w->e->seen && maps && !w->e->seen(step, maps, w->channels, w->e->user)) return false;
-    return !o->progress || o->progress(step, rmse, o->user) == 0;
+    const bool between = w->ends_alone && step > 0 && step < w->last;
+    return show(w, step, between ? NAN : rmse, maps);
 }
 
 static int before_tile(double done, void *user)
@@ -149,6 +150,7 @@ static double most_bytes(const nn_arch *a, int photos, int side, int tile, int o
     const int part = tile < side ? tile : side, coarse = a->coarse_size < side ? a->coarse_size : side;
     double most = fmax(nn_guess_bytes(a, orientations), step_bytes(a, photos, part, a->h_width, a->h_gru));
     if (a->coarse_steps > 0) most = fmax(most, step_bytes(a, photos, coarse, a->coarse_width, a->coarse_gru));
+    if (a->revisions > 0 && photos == 1) most = fmax(most, nn_revision_bytes(a));
     return most + 2.0 * a->channels * sizeof(float) * side * side;
 }
 
@@ -157,17 +159,30 @@ double lgd_estimator_bytes(const lgd_estimator *e, int side, const lgd_options *
     return most_bytes(&e->net->arch, e->net->arch.images, side, tile_side(e, side, o), o->orientations);
 }
 
-/* choose: the number of steps that paid, of the given most, is found on the way and left in *steps. */
-static ts_code refine(const lgd_estimator *e, const given_photos *p, const lgd_options *o, bool choose, int *steps,
-                      float *maps, ts_status *st)
+/* The RMSE and maps of R_0 and R_steps alone are wanted. */
+static bool ends_alone(const lgd_estimator *e, const lgd_options *o, bool choose)
+{
+    return !choose && !e->seen && !o->every_rmse && o->iterations != LGD_AUTO;
+}
+
+/* choose: the number of steps that paid, of the given most, is found on the way and left in *steps. first of them are
+ * done; watched: somebody sees the others. */
+static ts_code refine(const lgd_estimator *e, const lgd_given *p, const lgd_options *o, bool choose, int first,
+                      bool watched, int *steps, float *maps, ts_status *st)
 {
     const int side = p->side, channels = e->net->arch.channels;
     const int64_t pixels = (int64_t)side * side;
-    watch w = {
-        .e = e, .options = o, .best_step = *steps, .channels = channels, .values = (size_t)pixels * (size_t)channels};
+    watch w = {.e = e,
+               .options = o,
+               .first = first,
+               .last = *steps,
+               .ends_alone = ends_alone(e, o, choose),
+               .best_step = *steps,
+               .channels = channels,
+               .values = (size_t)pixels * (size_t)channels};
     float *raw = channels == MAP_CHANNELS ? maps
                                           : malloc(w.values * sizeof *raw); /* only published networks have more */
-    double *rmse = o->progress || choose ? calloc((size_t)*steps + 1, sizeof *rmse) : NULL;
+    double *rmse = o->progress || choose ? calloc((size_t)(*steps - first) + 1, sizeof *rmse) : NULL;
     if (choose) w.best = malloc(w.values * sizeof *w.best);
     lgd_tiles t = {.image = p->image,
                    .views = p->views,
@@ -178,14 +193,14 @@ static ts_code refine(const lgd_estimator *e, const given_photos *p, const lgd_o
                    .mask = o->mask,
                    .side = side,
                    .tile = tile_side(e, side, o),
-                   .steps = *steps,
+                   .steps = *steps - first,
                    .orientations = o->orientations,
                    .tolerance = o->tolerance,
                    .before = before_tile,
-                   .after = o->progress || e->seen || choose ? after_step : NULL,
+                   .after = (watched && (o->progress || e->seen)) || choose ? after_step : NULL,
                    .user = &w,
                    .rmse = rmse,
-                   .ends_alone = !choose && !e->seen && !o->every_rmse && o->iterations != LGD_AUTO};
+                   .ends_alone = w.ends_alone};
     const bool memory = raw && (rmse || !(o->progress || choose)) && (w.best || !choose);
     ts_code code = memory ? lgd_tiles_run(e->tape, e->net, &t, raw, st)
                           : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
@@ -199,13 +214,13 @@ static ts_code refine(const lgd_estimator *e, const given_photos *p, const lgd_o
 }
 
 /* The number of steps that the photographs take at AUTO_SIDE pixels. */
-static ts_code count_steps(const lgd_estimator *e, const given_photos *p, int orientations, int *steps, ts_status *st)
+static ts_code count_steps(const lgd_estimator *e, const lgd_given *p, int orientations, int *steps, ts_status *st)
 {
     const int side = p->side, given = p->count, small = side < AUTO_SIDE ? side : AUTO_SIDE;
     const size_t pixels = (size_t)small * (size_t)small;
     const lgd_options o = {.size = sizeof o, .iterations = LGD_AUTO, .orientations = orientations};
     const lgd_estimator quiet = {.net = e->net, .tape = e->tape};
-    given_photos reduced = *p;
+    lgd_given reduced = *p;
     float *photo = malloc((size_t)given * pixels * 3 * sizeof *photo),
           *maps = malloc(pixels * MAP_CHANNELS * sizeof *maps);
     ts_arena *arena = ts_arena_create(0, st);
@@ -219,7 +234,7 @@ static ts_code count_steps(const lgd_estimator *e, const given_photos *p, int or
         else code = ts_resize(&to, &from, arena, ag_compute(e->tape)->threads, st);
         reduced.image[k] = to.data;
     }
-    if (!code) code = refine(&quiet, &reduced, &o, true, steps, maps, st);
+    if (!code) code = refine(&quiet, &reduced, &o, true, 0, true, steps, maps, st);
     ts_arena_destroy(&arena);
     free(photo);
     free(maps);
@@ -234,7 +249,7 @@ static double tolerance(const nn_arch *a, const lgd_options *o)
 }
 
 /* The photographs' lights as strong as they seem, and R_0, which that takes. */
-static ts_code fit_power(const lgd_estimator *e, given_photos *p, const lgd_options *o, float **r0, ts_status *st)
+static ts_code fit_power(const lgd_estimator *e, lgd_given *p, const lgd_options *o, float **r0, ts_status *st)
 {
     const nn_arch *a = &e->net->arch;
     *o->power = 1;
@@ -248,59 +263,45 @@ static ts_code fit_power(const lgd_estimator *e, given_photos *p, const lgd_opti
     return code;
 }
 
-/* What of the views is true. A flash is beside the lens, at a place that is not known. */
-static int known(const lgd_options *o)
-{
-    return (o->power ? 0 : NN_KNOWN_POWER) |
-        (o->fov > 0                       ? NN_KNOWN_CAMERA
-             : o->fov == LGD_FOV_OF_PHOTO ? NN_KNOWN_CAMERA | NN_KNOWN_LIGHT
-                                          : 0);
-}
+typedef struct revision_watch {
+    const lgd_estimator *e;
+    const lgd_given *given;
+    const lgd_options *options;
+    bool stopped;
+} revision_watch;
 
-/* Power over distance squared at the centre of the sample, of a light above it. */
-static double irradiance(const rd_view *view) { return (double)view->power / pow((double)view->light[2], 2); }
-
-/* Where the power is not known, of photographs besides the first neither is their exposure; their lights are first as
- * much stronger or weaker than supposed as that one's. */
-static ts_code expose_others(const lgd_estimator *e, given_photos *p, double factor, ts_status *st)
+/* R_t before its revision, at the photograph's size. */
+static bool see_revision(const nn_first_guess *g, void *user)
 {
-    const rd_grid grid = rd_grid_on(rd_grid_full(nn_arch_side(&e->net->arch)), ag_compute(e->tape)->threads);
-    for (int k = 1; k < p->count; k++) {
-        double own;
-        p->views[k].power *= (float)factor;
-        if (lgd_exposure_beside(grid, p->r0, e->net->arch.channels, &p->views[k], p->image[k], p->side, &own, st))
-            return st->code;
-        p->views[k].power *= (float)own;
+    revision_watch *u = user;
+    const lgd_options *o = u->options;
+    const nn_model *net = u->e->net;
+    ag_tape *tape = u->e->tape;
+    const int side = u->given->side, size = nn_arch_side(&net->arch), channels = net->arch.channels;
+    const watch w = {.e = u->e, .options = o, .channels = channels};
+    const bool wanted = u->e->seen || (o->progress && (g->revised == 0 || !ends_alone(u->e, o, false)));
+    const ts_mark mark = ag_scope_begin(tape);
+    const float *maps = NULL;
+    double rmse = NAN;
+    if (wanted) {
+        const int threads = ag_compute(tape)->threads;
+        const ts_taps taps = ts_taps_smooth(ag_arena(tape), size, side);
+        ag_value *v = ag_empty(tape, (ts_shape){1, side, side, channels}),
+                 *image = ag_empty(tape, (ts_shape){1, side, side, 3});
+        if (!taps.weight) ag_fail(tape, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
+        if (!taps.weight || !v || !image) return false;
+        ts_resample(1, channels, &taps, &taps, g->r0, v->t.data, false, threads);
+        nn_clip(ts_count(image->t.shape), u->given->image[0], image->t.data);
+        const nn_input in = {
+            .image = image->t, .grid = rd_grid_on(rd_grid_full(side), threads), .views = &g->view, .given = 1};
+        double squares = 0;
+        nn_add_squares(net, &in, v->t.data, channels, &squares);
+        rmse = nn_rmse_of(&squares, 1, (double)side * side);
+        maps = v->t.data;
     }
-    return TS_OK;
-}
-
-/* What a model that guesses the scene says first, of the photograph that is taken most from above. */
-static ts_code first_guess(const lgd_estimator *e, given_photos *p, const lgd_options *o, lgd_first_guess *guess,
-                           ts_status *st)
-{
-    const double before = irradiance(&p->views[0]);
-    const ts_code code = lgd_first_guess_make(e->tape, e->net, p->image[0], p->side, &p->views[0], known(o),
-                                              p->count > 1, o->orientations, guess, st);
-    if (code) return code;
-    const rd_view given = p->views[0];
-    p->views[0] = rd_scene_view(guess->number);
-    if (known(o) & NN_KNOWN_LIGHT) { /* whose height a scene does not have */
-        const float higher = given.light[2] / p->views[0].light[2];
-        memcpy(p->views[0].light, given.light, sizeof given.light);
-        p->views[0].power *= higher * higher;
-    }
-    p->r0 = guess->r0;
-    p->deviation = guess->deviation;
-    if (o->power) {
-        *o->power = irradiance(&p->views[0]) / before;
-        if (expose_others(e, p, *o->power, st)) return st->code;
-    }
-    if (p->count == 1) return TS_OK;
-    const nn_arch *a = &e->net->arch;
-    const lgd_metal_photos photos = {p->image, p->views, p->count, p->side, known(o)};
-    return lgd_tell_metal(rd_grid_on(rd_grid_full(nn_arch_side(a)), ag_compute(e->tape)->threads), &photos,
-                          guess->deviation, nn_arch_steps(a, p->count), a->channels, guess->r0, st);
+    u->stopped = !show(&w, g->revised, rmse, maps);
+    ag_scope_end(tape, mark, NULL, 0);
+    return !u->stopped;
 }
 
 static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int photos, int side, const lgd_options *given,
@@ -309,8 +310,8 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     const nn_arch *a = &e->net->arch;
     lgd_options o = *given;
     if (photos > 1) o.fov = LGD_FOV_OF_PHOTO; /* together they are of use only where their places are true */
-    given_photos p = in_order(photo, photos, side, o.fov);
-    for (int k = 0; k < photos; k++) p.known[k] = (unsigned char)known(&o);
+    lgd_given p = in_order(photo, photos, side, o.fov);
+    for (int k = 0; k < photos; k++) p.known[k] = (unsigned char)lgd_guess_known(&o);
     float *r0 = NULL;
     o.tolerance = tolerance(a, given);
     int steps = o.iterations == -1 ? nn_arch_steps(a, photos) : o.iterations;
@@ -326,21 +327,29 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
         return ts_context(st, "%d x %d pixels, of which the network reads %d x %d", side, side, nn_arch_side(a),
                           nn_arch_side(a));
     if (more > 0) ts_arena_reserve(arena, (size_t)most);
-    lgd_first_guess guess = {0};
+    nn_first_guess guess = {0};
     ts_code code = TS_OK;
-    if (a->descent == NN_DESCENT_POSTERIOR && !e->g_alone) code = first_guess(e, &p, &o, &guess, st);
+    revision_watch user = {e, &p, &o, false};
+    const bool guesses = a->descent == NN_DESCENT_POSTERIOR && !e->g_alone;
+    if (guesses)
+        code = lgd_guess_first(e, &p, &o, nn_arch_revisions(a, photos, steps),
+                               o.progress || e->seen ? see_revision : NULL, &user, &guess, st);
     else if (o.power) code = fit_power(e, &p, &o, &r0, st);
-    if (!code && o.iterations == LGD_AUTO && !choose) code = count_steps(e, &p, o.orientations, &steps, st);
+    if (!code && user.stopped) steps = guess.revised;
+    else if (!code && o.iterations == LGD_AUTO && !choose) {
+        code = count_steps(e, &p, o.orientations, &steps, st);
+        steps += guess.revised;
+    }
     for (int k = 0; k < photos && !code && o.taken; k++) {
         lgd_photo *to = &o.taken[p.order[k]];
         *to = (lgd_photo){.image = p.image[k], .power = p.views[k].power};
         memcpy(to->light, p.views[k].light, sizeof to->light);
         memcpy(to->camera, p.views[k].camera, sizeof to->camera);
     }
-    if (!code) code = refine(e, &p, &o, choose, &steps, maps, st);
+    if (!code) code = refine(e, &p, &o, choose && !user.stopped, guess.revised, !user.stopped, &steps, maps, st);
     if (side > ONE_TILE) ag_drop(e->tape); /* what is done with such maps needs memory of its own */
     free(r0);
-    lgd_first_guess_free(&guess);
+    nn_first_guess_free(&guess);
     return code;
 }
 

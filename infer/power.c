@@ -1,5 +1,5 @@
 #include "infer/power.h"
-#include "infer/clip.h"
+#include "nn/clip.h"
 #include "render/render.h"
 #include "tensor/resize.h"
 #include "tensor/team.h"
@@ -71,10 +71,10 @@ static ts_code fit(ag_tape *tape, const nn_model *model, const float *const *ima
              *rendered = ag_empty(tape, (ts_shape){given, size, size, 3});
     const ts_mark mark = ag_scope_begin(tape);
     ts_tensor full = ts_view((float *)(uintptr_t)image[0], (ts_shape){given, side, side, 3});
-    if (given > 1 || !lgd_clipped((int64_t)whole, image[0], grid.threads)) full = ts_new(ag_arena(tape), full.shape);
+    if (given > 1 || !nn_clipped((int64_t)whole, image[0], grid.threads)) full = ts_new(ag_arena(tape), full.shape);
     if (!small || !rendered || !full.data) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
     for (int k = 0; k < given && full.data != image[0]; k++)
-        lgd_clip((int64_t)whole, image[k], full.data + (size_t)k * whole);
+        nn_clip((int64_t)whole, image[k], full.data + (size_t)k * whole);
     if (side == size) memcpy(small->t.data, full.data, (size_t)given * values * sizeof(float));
     else if (ts_resize(&small->t, &full, ag_arena(tape), grid.threads, st)) return st->code;
     ag_scope_end(tape, mark, NULL, 0);

@@ -1,5 +1,5 @@
 #include "infer/tiles.h"
-#include "infer/clip.h"
+#include "nn/clip.h"
 #include "nn/window.h"
 #include "tensor/resample.h"
 #include "tensor/team.h"
@@ -45,9 +45,9 @@ static void clip_rows(const void *job, int64_t begin, int64_t end)
     const rows_job *j = job;
     const size_t side = (size_t)j->w->t->side, row = 3 * (size_t)j->g.w;
     for (int64_t i = begin; i < end; i++)
-        lgd_clip((int64_t)row,
-                 j->w->t->image[i / j->g.h] + ((size_t)(j->g.y0 + i % j->g.h) * side + (size_t)j->g.x0) * 3,
-                 j->to + (size_t)i * row);
+        nn_clip((int64_t)row,
+                j->w->t->image[i / j->g.h] + ((size_t)(j->g.y0 + i % j->g.h) * side + (size_t)j->g.x0) * 3,
+                j->to + (size_t)i * row);
 }
 
 /* The given photographs in a window, one after the other. */
@@ -280,7 +280,7 @@ static ts_code prepare(work *w)
         return ag_fail(w->tape, TS_NOMEM, "out of memory"), TS_NOMEM;
     ts_mark mark = ag_scope_begin(w->tape);
     w->photo = ts_view((float *)(uintptr_t)t->image[0], (ts_shape){t->given, side, side, 3});
-    if (t->given > 1 || !lgd_clipped(ts_count(w->photo.shape), t->image[0], w->threads)) {
+    if (t->given > 1 || !nn_clipped(ts_count(w->photo.shape), t->image[0], w->threads)) {
         const ag_value *clipped = ag_empty(w->tape, w->photo.shape);
         if (!clipped) return ag_status(w->tape)->code;
         photographs(w, whole(w), clipped->t.data);

@@ -50,6 +50,8 @@ const nn_arch_field nn_arch_fields[NN_ARCH_FIELDS] = {
     {.key = "coarse_size", .kind = FIELD_INT, .at = AT(coarse_size), .lo = 1, .hi = 8192, .start = 128, .late = true},
     {.key = "coarse_width", .kind = FIELD_INT, .at = AT(coarse_width), .lo = 1, .hi = 4096, .start = 128, .late = true},
     {.key = "coarse_gru", .kind = FIELD_INT, .at = AT(coarse_gru), .lo = 1, .hi = 1024, .start = 64, .late = true},
+    {.key = "revisions", .kind = FIELD_INT, .at = AT(revisions), .hi = 16, .late = true},
+    {.key = "revise_width", .kind = FIELD_INT, .at = AT(revise_width), .lo = 4, .hi = 1024, .start = 64, .late = true},
 };
 
 int nn_arch_get(const nn_arch *a, const nn_arch_field *f)
@@ -91,7 +93,14 @@ bool nn_arch_reads(const nn_arch *a) { return a->gradient && (a->h_width > 0 || 
 
 int nn_arch_steps(const nn_arch *a, int photographs)
 {
-    return a->iterations * (photographs > 1 && a->descent == NN_DESCENT_POSTERIOR ? 2 : 1);
+    return a->iterations * (photographs > 1 && a->descent == NN_DESCENT_POSTERIOR ? 2 : 1) +
+        (photographs > 1 ? 0 : a->revisions);
+}
+
+int nn_arch_revisions(const nn_arch *a, int photographs, int steps)
+{
+    if (photographs > 1) return 0;
+    return steps < a->revisions ? steps : a->revisions;
 }
 
 bool nn_arch_carries(const nn_arch *a) { return a->recurrent && a->h_width > 0; }
@@ -122,6 +131,10 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
     if (a->spread && a->g_unshuffle == 1) return ts_fail(st, TS_INVALID, "spread is set: that needs unshuffle above 1");
     if (a->descent == NN_DESCENT_POSTERIOR && (!a->spread || !a->scene || a->coarse_steps > 0 || a->h_width > 0))
         return ts_fail(st, TS_INVALID, "descent is posterior: that needs spread, scene, h_width 0 and coarse_steps 0");
+    if (a->revisions > 0 && (a->descent != NN_DESCENT_POSTERIOR || !a->conditions || a->g_size % 4 != 0))
+        return ts_fail(st, TS_INVALID,
+                       "revisions is %d: that needs descent = posterior, conditions and a g_size that 4 divides",
+                       a->revisions);
     if (a->scene && a->images > 1) return ts_fail(st, TS_INVALID, "scene is set: that needs images 1");
     if (a->images > 1 && a->rmse == NN_RMSE_BATCH)
         return ts_fail(st, TS_INVALID, "images is %d: with rmse = batch it must be 1", a->images);

@@ -32,6 +32,17 @@ typedef struct nn_refiner {
     nn_layer output, descent; /* descent: of arch.descent, weight -1 where there is none */
 } nn_refiner;
 
+/* h of nn/revise.c: a small U-Net over squares of pixels, whose last features a recurrent cell carries from revision to
+ * revision. Of a pair the first layer is 1 x 1 where it reads channels of several kinds, all others are 3 x 3. */
+enum { NN_REVISE_LEVELS = 2 };
+typedef struct nn_reviser {
+    nn_layer read[2], down[NN_REVISE_LEVELS][2], up[NN_REVISE_LEVELS][2];
+    nn_layer global;        /* mean of the deepest features -> what is added to them */
+    nn_layer input, hidden; /* of the cell */
+    nn_layer squares;       /* 1 x 1, to channels of the full size's pixels */
+    nn_layer full[2];
+} nn_reviser;
+
 typedef struct nn_layers {
     nn_layer input_conv, input_global;
     nn_unet_block down[NN_MAX_LEVELS], up[NN_MAX_LEVELS];
@@ -39,6 +50,7 @@ typedef struct nn_layers {
     nn_layer detail[5], trunk[NN_MAX_LEVELS][2]; /* nn/detail.c */
     nn_layer scene[2];                           /* of the deepest global vector */
     nn_refiner h, coarse;
+    nn_reviser revise;
     nn_layer encoder[NN_MAX_LEVELS + 1], code, decoder[NN_MAX_LEVELS + 1][2],
         decoded;   /* of an auto-encoder; the deepest decoder level has one convolution */
     int first[4];  /* index of each nn_part's first parameter, and their number */
@@ -74,6 +86,10 @@ ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_val
  * the camera's place is not known; the same of the light; the light's power over the square of its height, in stops
  * above the default flash's, and 1, or two zeros. */
 enum { NN_CONDITIONS = 8, NN_COORDINATES = 2, NN_FRAME = 2 };
+
+/* Channels that a revision reads of each pixel, and those of them that it reads again at the full size (nn/revise.c).
+ */
+enum { NN_REVISION_READS = 40, NN_REVISION_READS_AGAIN = 18 };
 
 /* Channels that g's first layers read, and that the last of nn_detail writes: the maps', two of the shading's frame
  * (render/op_shading_frame.c), and the spreads. */

@@ -3,6 +3,7 @@
 #include "nn/weights/file.h"
 #include "nn/weights/published.h"
 #include "ops.h"
+#include "tensor/maps.h"
 #include "tensor/memory.h"
 #include <math.h>
 #include <stdio.h>
@@ -10,7 +11,7 @@
 #include <string.h>
 
 /* Parameters of the largest model: 8 levels, two blocks of 11 each, and the layers before and after them. */
-enum { MAX_PARAMS = 4 + 2 * 11 * NN_MAX_LEVELS + 6 + 2 * 14 + 10 + 4 * NN_MAX_LEVELS + 4 };
+enum { MAX_PARAMS = 4 + 2 * 11 * NN_MAX_LEVELS + 6 + 2 * 14 + 10 + 4 * NN_MAX_LEVELS + 4 + 30 };
 
 static nn_layers *layers_of(const nn_model *m) { return m->layers; }
 
@@ -192,6 +193,45 @@ static void plan_refiner(nn_model *m, const char *name, int width, int gru, nn_r
     l->start[h->descent.weight] = newton ? NN_NEWTON_START : NN_DESCENT_START;
 }
 
+/* Two convolutions; side: of the first one's kernel. */
+static void pair(nn_model *m, const char *name, int in, int out, int side, nn_layer layer[2])
+{
+    char full[64];
+    for (int i = 0; i < 2; i++) {
+        snprintf(full, sizeof full, "h.%s.conv%d", name, i + 1);
+        layer[i] = conv(m, full, out, i ? out : in, i ? 3 : side, true, leaky_gain(NN_LEAK_G));
+    }
+}
+
+static void plan_revise(nn_model *m)
+{
+    enum { FINE = 12, FINER = 16 };
+    const nn_arch *a = &m->arch;
+    nn_reviser *h = &((nn_layers *)m->layers)->revise;
+    const int w = a->revise_width, squares = a->g_unshuffle * a->g_unshuffle,
+              level[NN_REVISE_LEVELS + 1] = {w, w * 3 / 2, w * 7 / 4};
+    const double gain = leaky_gain(NN_LEAK_G);
+    pair(m, "read", NN_REVISION_READS * squares + NN_CONDITIONS, w, 1, h->read);
+    for (int i = 0; i < NN_REVISE_LEVELS; i++) {
+        char name[16];
+        snprintf(name, sizeof name, "down%d", i + 1);
+        pair(m, name, level[i], level[i + 1], 3, h->down[i]);
+    }
+    h->global = linear(m, "h.global", level[NN_REVISE_LEVELS], level[NN_REVISE_LEVELS], 1);
+    for (int i = NN_REVISE_LEVELS; i-- > 0;) {
+        char name[16];
+        snprintf(name, sizeof name, "up%d", i + 1);
+        pair(m, name, level[i] + level[i + 1], level[i], 1, h->up[i]);
+    }
+    h->input = conv(m, "h.gru.ih", 3 * w, w, 1, true, 1);
+    h->hidden = conv(m, "h.gru.hh", 3 * w, w, 1, true, 1);
+    ((nn_layers *)m->layers)->start[h->hidden.weight] = NN_ORTHOGONAL;
+    h->squares = conv(m, "h.squares", FINE * squares, w, 1, true, gain);
+    h->full[0] = conv(m, "h.full.conv1", FINER, FINE + NN_REVISION_READS_AGAIN + NN_COORDINATES, 3, true, gain);
+    h->full[1] = conv(m, "h.full.conv2", MAP_CHANNELS + NN_FRAME + NN_SPREADS, FINER, 3, true,
+                      0); /* nothing at first */
+}
+
 nn_model *nn_model_empty(ts_status *st)
 {
     nn_model *m = calloc(1, sizeof *m);
@@ -216,6 +256,7 @@ nn_model *nn_model_plan(const nn_arch *arch, ts_status *st)
     plan_g(m);
     l->first[NN_H] = m->params;
     if (nn_arch_refines_full(arch)) plan_refiner(m, "h", arch->h_width, arch->h_gru, &l->h);
+    if (arch->revisions > 0) plan_revise(m);
     l->first[NN_COARSE] = m->params;
     if (arch->coarse_steps > 0) plan_refiner(m, "coarse", arch->coarse_width, arch->coarse_gru, &l->coarse);
     l->first[NN_COARSE + 1] = m->params;

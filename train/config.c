@@ -254,6 +254,11 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
         !nn_arch_refines_full(&c->arch))
         return ts_fail(st, TS_INVALID,
                        "train.g_rate is 0 and there is no refiner (model.h_width): nothing would be trained");
+    if (c->train.steps && c->arch.revisions > 0 && (c->train.g_rate != 0 || c->train.window))
+        return ts_fail(st, TS_INVALID,
+                       "model.revisions is %d: h learns over a fixed g and on whole patches, so train.g_rate and "
+                       "train.window must be 0",
+                       c->arch.revisions);
     const double narrow = c->data.fov_min, wide = c->data.fov_max;
     if ((narrow != 0 || wide != 0) && (narrow < 5 || wide < narrow))
         return ts_fail(st, TS_INVALID,

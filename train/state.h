@@ -4,6 +4,7 @@
 #include "data/camera.h"
 #include "data/loader.h"
 #include "nn/adam.h"
+#include "nn/revise.h"
 #include "train/reduce.h"
 #include "train/config.h"
 #include "train/listener.h"
@@ -50,6 +51,7 @@ typedef struct tr_trainer {
     nn_model *model;
     nn_adam adam;
     ag_tape *tape;
+    ag_tape *quiet; /* of a fixed g, without gradients, whose packed weights are kept; NULL without arch.revisions */
     io_loader *loader;
     float *images;     /* [batch][given][patch][patch][3], given <= arch.images; batch: the share's, here and below */
     rd_view *captures; /* [batch][given] */
@@ -98,6 +100,17 @@ void tr_capture_views(double sheet, uint64_t seed, uint64_t index, int count, in
 
 /* step.c. One step; t->step counts it. Returns an error only where the run cannot go on (a skipped step is none). */
 ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st);
+
+/* Adds weight * (rendering loss + map_weight * map loss) of maps to sum (NULL: none yet); the losses of these maps
+ * alone go to *render and *map. NULL after an error, which the tape has. */
+ag_value *tr_add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value *target, double weight, double *render,
+                      double *map);
+
+/* revision.c. The first guesses of photographs of nn_arch_side, one of each material, on a tape without gradients:
+ * what revisions begin with. False after an error, which the tape has. */
+bool tr_first_guesses(ag_tape *tape, const nn_model *model, const nn_input *in, nn_revision *r);
+/* The mean loss of all revisions: of their maps, and of how far they say that these may be off. NULL after an error. */
+ag_value *tr_revision_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr_row *row);
 
 /* validate.c */
 ts_code tr_validator_create(tr_trainer *t, ts_status *st);

@@ -8,9 +8,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Adds weight * (rendering loss + map_weight * map loss) of maps to sum (NULL: none yet). */
-static ag_value *add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value *target, double weight, double *render,
-                          double *map)
+ag_value *tr_add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value *target, double weight, double *render,
+                      double *map)
 {
     ag_tape *tape = t->tape;
     const double map_weight = t->config.train.map_weight;
@@ -53,7 +52,7 @@ static ag_value *guess_loss(tr_trainer *t, const nn_input *in, ag_value *target,
         maps = ag_resize_smooth(tape, maps, size, size);
         if (spread) spread = ag_resize_smooth(tape, spread, size, size);
     }
-    ag_value *loss = add_loss(t, NULL, maps, target, 1, &row->render_start, &row->map_start);
+    ag_value *loss = tr_add_loss(t, NULL, maps, target, 1, &row->render_start, &row->map_start);
     if (spread && maps && c->train.spread_weight > 0)
         loss = add_weighted(tape, loss,
                             ag_laplace(tape, ag_constant(tape, maps->t), spread, target, nn_spread_of, NN_SPREAD_UNIT),
@@ -137,10 +136,11 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
     if (row->pretraining) {
         return guess_loss(t, &in, ag_constant(t->tape, goals), row);
     }
+    if (c->arch.revisions > 0) return tr_revision_loss(t, &in, ag_constant(t->tape, goals), row);
     if (c->coder.code > 0) {
         ag_value *goal = ag_constant(t->tape, goals);
-        return add_loss(t, NULL, nn_decode(t->tape, t->model, nn_encode(t->tape, t->model, goal)), goal, 1,
-                        &row->render_end, &row->map_end);
+        return tr_add_loss(t, NULL, nn_decode(t->tape, t->model, nn_encode(t->tape, t->model, goal)), goal, 1,
+                           &row->render_end, &row->map_end);
     }
     const rd_grid window = draw_window(c, t->step);
     if (window.w < size) {
@@ -153,9 +153,9 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
     ag_value *goal = ag_constant(t->tape, goals);
     row->iterations = draw_iterations(c, t->step);
     if (nn_lgd(t->tape, t->model, &in, row->iterations, true, maps, NULL) != TS_OK) return NULL;
-    ag_value *loss = add_loss(t, NULL, maps[row->iterations], goal, 1, &row->render_end, &row->map_end);
+    ag_value *loss = tr_add_loss(t, NULL, maps[row->iterations], goal, 1, &row->render_end, &row->map_end);
     if (row->iterations > 0 && c->train.start_weight > 0)
-        loss = add_loss(t, loss, maps[0], goal, c->train.start_weight, &row->render_start, &row->map_start);
+        loss = tr_add_loss(t, loss, maps[0], goal, c->train.start_weight, &row->render_start, &row->map_start);
     return loss;
 }
 

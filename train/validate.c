@@ -91,6 +91,17 @@ void tr_validator_free(tr_validator *v)
 /* Of a photograph that comes from anywhere. */
 static const unsigned char nothing[TOGETHER * NN_MAX_IMAGES];
 
+/* The first guess and its revisions. */
+static void revise(ag_tape *tape, const nn_model *model, const nn_input *in, int revisions, ag_value **maps)
+{
+    nn_revision r;
+    if (!tr_first_guesses(tape, model, in, &r)) return;
+    for (int k = 0; k <= revisions; k++) {
+        maps[k] = r.maps;
+        if (k < revisions && !nn_revise(tape, model, &r)) return;
+    }
+}
+
 /* Measures n materials from number first of the share on, of R_0 ... R_iterations. */
 static ts_code measure(tr_trainer *t, int first, int n, int iterations, ts_status *st)
 {
@@ -112,7 +123,8 @@ static ts_code measure(tr_trainer *t, int first, int n, int iterations, ts_statu
         maps[0] = nn_decode(v->tape, v->model,
                             nn_encode(v->tape, v->model,
                                       ag_constant(v->tape, ts_view(truth, (ts_shape){n, size, size, MAP_CHANNELS}))));
-    } else nn_lgd(v->tape, v->model, &in, iterations, true, maps, NULL);
+    } else if (iterations > 0 && v->model->arch.revisions > 0) revise(v->tape, v->model, &in, iterations, maps);
+    else nn_lgd(v->tape, v->model, &in, iterations, true, maps, NULL);
     if (ag_status(v->tape)->code != TS_OK) {
         *st = *ag_status(v->tape);
         return st->code;
@@ -143,7 +155,10 @@ ts_code tr_validate(tr_trainer *t, tr_validation *out, ts_status *st)
     const int together = c->arch.rmse == NN_RMSE_BATCH ? 1 : TOGETHER;
     const double start = tr_seconds();
     /* A step of the first phase has been made last: there is no refiner to speak of. */
-    *out = (tr_validation){.step = t->step, .iterations = tr_pretraining(c, t->step - 1) ? 0 : c->arch.iterations};
+    *out = (tr_validation){.step = t->step,
+                           .iterations = tr_pretraining(c, t->step - 1) ? 0
+                               : c->arch.revisions > 0                  ? c->arch.revisions
+                                                                        : c->arch.iterations};
     memcpy(v->model->value, tr_weights(t), t->model->count * sizeof(float));
     memset(v->errors, 0, (size_t)count * TR_ERRORS * sizeof *v->errors);
     ts_code code = TS_OK;

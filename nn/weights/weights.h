@@ -42,7 +42,7 @@ ts_code nn_coder_from_file(const nn_file *file, nn_coder *c, ts_status *st);
  * bytes of text are enough) and back. A field that not every file has is written only when it is not the default.
  * Returns the number of entries, -1 when capacity or text_size is too small. Keys that do not begin with "arch." are
  * free for other use. */
-enum { NN_ARCH_META = 30, NN_ARCH_TEXT = 1024 };
+enum { NN_ARCH_META = 32, NN_ARCH_TEXT = 1024 };
 int nn_arch_to_meta(const nn_arch *arch, nn_meta *meta, int capacity, char *text, size_t text_size);
 ts_code nn_arch_from_file(const nn_file *file, nn_arch *arch, ts_status *st);
 #endif

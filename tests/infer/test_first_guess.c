@@ -1,6 +1,6 @@
 /* Estimates of a model that guesses the scene and steps to the most probable maps. */
 #include "infer/estimate.h"
-#include "infer/first_guess.h"
+#include "nn/first_guess.h"
 #include "infer/tiles.h"
 #include "tests/support/networks.h"
 
@@ -113,9 +113,10 @@ TEST(first_guess_keeps_what_is_known)
     view.camera[2] = view.light[2] = 1.5f;
     view.light[0] = 0.1f;
     for (int known = 0; known <= NN_KNOWN_ALL; known++) {
-        lgd_first_guess g;
+        nn_first_guess g;
         float want[RD_SCENE_NUMBERS];
-        CHECK(!lgd_first_guess_make(tape, m, in.image.data, PLACE, &view, known, false, 1, &g, &st), "%s", st.message);
+        const nn_first_ask ask = {.image = in.image.data, .side = PLACE, .taken = {view, known, false}};
+        CHECK(!nn_first_guess_make(tape, m, &ask, &g, &st), "%s", st.message);
         rd_scene_numbers(&view, 0, 0, want);
         for (int i = 0; i < RD_SCENE_NUMBERS; i++) CHECK(isfinite(g.number[i]), "number %d is not finite", i);
         if (known & NN_KNOWN_CAMERA)
@@ -124,7 +125,7 @@ TEST(first_guess_keeps_what_is_known)
             CHECK(g.number[RD_SCENE_LIGHT_X] == want[RD_SCENE_LIGHT_X], "known %d: the light moved", known);
         if (known & NN_KNOWN_POWER)
             CHECK(g.number[RD_SCENE_EXPOSURE] == want[RD_SCENE_EXPOSURE], "known %d: the power changed", known);
-        lgd_first_guess_free(&g);
+        nn_first_guess_free(&g);
     }
     ag_tape_destroy(&tape);
     double power = 0;
@@ -186,6 +187,70 @@ TEST(first_guess_in_tiles)
     free(mask);
     free(whole);
     free(tiles);
+    free(in.image.data);
+    nn_model_free(&m);
+}
+
+typedef struct seen_steps {
+    int count, stop_at;
+    int at[16];
+    float *maps[16];
+} seen_steps;
+
+static bool on_seen(int step, const float *maps, int channels, void *user)
+{
+    seen_steps *s = user;
+    const size_t size = (size_t)PLACE * PLACE * (size_t)channels * sizeof(float);
+    s->at[s->count] = step;
+    memcpy(s->maps[s->count++] = malloc(size), maps, size);
+    return step != s->stop_at;
+}
+
+static seen_steps watch_steps(const nn_model *m, const float *image, int iterations, int stop_at, float *result)
+{
+    seen_steps s = {.stop_at = stop_at};
+    ts_status st = {0};
+    double power;
+    ag_tape *tape = tape_create(false);
+    ag_freeze(tape, true);
+    const lgd_photo photo = lgd_flash_photo(image);
+    const lgd_options o = {.size = sizeof o, .iterations = iterations, .power = &power, .fov = LGD_FOV_UNKNOWN};
+    const lgd_estimator e = {.net = m, .tape = tape, .encoded = true, .seen = on_seen, .user = &s};
+    CHECK(!lgd_estimator_run(&e, &photo, 1, PLACE, &o, result, &st), "%s", st.message);
+    ag_tape_destroy(&tape);
+    return s;
+}
+
+static void free_steps(seen_steps *s)
+{
+    for (int i = 0; i < s->count; i++) free(s->maps[i]);
+}
+
+/* R_0 is g's, then come h's revisions, then the steps; fewer steps end earlier, and whoever stops gets what was seen
+ * last. */
+TEST(first_guess_is_revised_in_the_first_steps)
+{
+    nn_model *m = revising();
+    const nn_input in = photographs(1, PLACE, 86, NULL);
+    enum { VALUES = PLACE * PLACE * 9 };
+    static float all[VALUES], some[VALUES];
+    seen_steps whole = watch_steps(m, in.image.data, -1, -1, all);
+    CHECK(whole.count == 7, "%d steps are seen", whole.count);
+    for (int i = 0; i < whole.count; i++) CHECK(whole.at[i] == i, "step %d is seen as %d", i, whole.at[i]);
+    for (int i = 1; i <= 2; i++)
+        CHECK(memcmp(whole.maps[i], whole.maps[i - 1], sizeof all), "revision %d changes nothing", i);
+    for (int n = 0; n <= 3; n++)
+        for (int stop = 0; stop < 2; stop++) {
+            seen_steps part = watch_steps(m, in.image.data, stop ? -1 : n, stop ? n : -1, some);
+            CHECK(part.count == n + 1, "%d of %d steps are seen", part.count, n);
+            CHECK(!memcmp(part.maps[n], whole.maps[n], sizeof all), "R_%d depends on what follows", n);
+            for (int i = 0; i < VALUES; i++)
+                CHECK(i % 9 == MAP_NORMAL || i % 9 == MAP_NORMAL + 1 ||
+                          fabsf(some[i] - fminf(fmaxf(whole.maps[n][i], -1), 1)) < 1e-6f,
+                      "R_%d: value %d is %g, not %g", n, i, (double)some[i], (double)whole.maps[n][i]);
+            free_steps(&part);
+        }
+    free_steps(&whole);
     free(in.image.data);
     nn_model_free(&m);
 }

@@ -374,3 +374,46 @@ TEST(trainer_starts_from_given_weights)
     t = tr_create(&other, folder("third"), false, NULL, NULL, &st);
     CHECK(!t && strstr(st.message, "/nonexistent/x.safetensors"), "%s", st.message);
 }
+
+/* h learns to revise what a fixed g says: whatever the threads, resumed exactly, and g stays. */
+TEST(trainer_teaches_revisions)
+{
+    static const char *const keys[] = {"model.unshuffle=4",      "model.g_detail=6",       "model.conditions=yes",
+                                       "model.spread=yes",       "model.scene=yes",        "model.descent=posterior",
+                                       "model.h_width=0",        "model.revisions=2",      "model.revise_width=8",
+                                       "data.patch=64",          "validate.size=64",       "train.window=0",
+                                       "train.g_rate=0",         "train.pretrain_steps=2", "train.steps=4",
+                                       "train.iterations_min=0", "train.iterations_max=0"};
+    ts_status st = {0};
+    tr_config c = small();
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+        CHECK(tr_config_set_assignment(&c, keys[i], &st) == TS_OK, "%s", st.message);
+    run_whole(&c, folder("one"));
+    ts_threads_set(3);
+    run_whole(&c, folder("three"));
+    expect_same_run(folder("one"), folder("three"));
+    watch w = {.stop_at = 4}, rest = {0};
+    CHECK(run(&c, folder("part"), false, &w, &st) == TS_INTERRUPTED, "%s", st.message);
+    CHECK(run(&c, folder("part"), true, &rest, &st) == TS_OK && rest.steps == 2, "%s", st.message);
+    expect_same_run(folder("one"), folder("part"));
+
+    char path[700];
+    c.train.pretrain_steps = 0;
+    snprintf(path, sizeof path, "%s/last.safetensors", folder("one"));
+    snprintf(c.train.init, sizeof c.train.init, "%s", path);
+    run_whole(&c, folder("on"));
+    nn_model *a = nn_model_load(path, NULL);
+    snprintf(path, sizeof path, "%s/last.safetensors", folder("on"));
+    nn_model *b = nn_model_load(path, NULL);
+    CHECK(a && b, "the weights");
+    size_t first, last;
+    nn_model_range(a, NN_G, &first, &last);
+    CHECK(!memcmp(a->value + first, b->value + first, (last - first) * sizeof(float)), "g moved");
+    nn_model_range(a, NN_H, &first, &last);
+    CHECK(memcmp(a->value + first, b->value + first, (last - first) * sizeof(float)), "h did not move");
+    nn_model_free(&a);
+    nn_model_free(&b);
+
+    c.train.g_rate = 0.5;
+    CHECK(run(&c, folder("both"), false, &w, &st) == TS_INVALID && strstr(st.message, "g_rate"), "%s", st.message);
+}

@@ -1,8 +1,8 @@
 /* The diffuse albedo that a highlight hides. Of a pixel whose light is nearly all mirrored, a photograph says next to
  * nothing about diffuse, and a first estimate that takes the highlight for too broad leaves a dark disk there. What is
  * smooth in diffuse is then that of the surroundings; detail stays. */
-#ifndef LGD_HIDDEN_DIFFUSE_H
-#define LGD_HIDDEN_DIFFUSE_H
+#ifndef NN_HIDDEN_DIFFUSE_H
+#define NN_HIDDEN_DIFFUSE_H
 #include "render/scene_model.h"
 #include "tensor/arena.h"
 
@@ -13,6 +13,6 @@
  * for each colour, and albedo is multiplied by exp((1 - w) (b - x)), linear between the cells' centres. Where the
  * mirrored part is the same everywhere nothing changes. arena: for what it holds meanwhile. The same
  * bytes for any number of threads. TS_NOMEM with st. */
-ts_code lgd_fill_hidden_diffuse(rd_grid grid, const float *image, const float number[RD_SCENE_NUMBERS], int channels,
-                                ts_arena *arena, float *maps, ts_status *st);
+ts_code nn_fill_hidden_diffuse(rd_grid grid, const float *image, const float number[RD_SCENE_NUMBERS], int channels,
+                               ts_arena *arena, float *maps, ts_status *st);
 #endif

@@ -1,5 +1,5 @@
 /* Diffuse under a highlight. */
-#include "infer/hidden_diffuse.h"
+#include "nn/hidden_diffuse.h"
 #include "tensor/maps.h"
 #include "tests/test.h"
 #include <math.h>
@@ -34,7 +34,7 @@ static void fill(int threads, float *to)
     ts_status st = {0};
     ts_arena *arena = ts_arena_create(0, &st);
     memcpy(to, maps, sizeof maps);
-    CHECK(arena && !lgd_fill_hidden_diffuse(rd_grid_on(rd_grid_full(SIDE), threads), image, scene, C, arena, to, &st),
+    CHECK(arena && !nn_fill_hidden_diffuse(rd_grid_on(rd_grid_full(SIDE), threads), image, scene, C, arena, to, &st),
           "%s", st.message);
     ts_arena_destroy(&arena);
 }

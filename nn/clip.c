@@ -1,9 +1,9 @@
-#include "infer/clip.h"
+#include "nn/clip.h"
 #include "tensor/team.h"
 #include <float.h>
 #include <stdatomic.h>
 
-void lgd_clip(int64_t count, const float *from, float *to)
+void nn_clip(int64_t count, const float *from, float *to)
 {
     for (int64_t i = 0; i < count; i++) {
         const float v = from[i];
@@ -24,7 +24,7 @@ static void inspect(const void *job, int64_t begin, int64_t end)
     if (!fine) atomic_store(i->fine, false);
 }
 
-bool lgd_clipped(int64_t count, const float *from, int threads)
+bool nn_clipped(int64_t count, const float *from, int threads)
 {
     enum { STEP = 1 << 12 };
     atomic_bool fine = true;

@@ -1,7 +1,8 @@
-#include "infer/first_guess.h"
-#include "infer/clip.h"
-#include "infer/hidden_diffuse.h"
-#include "infer/lean.h"
+#include "nn/first_guess.h"
+#include "nn/clip.h"
+#include "nn/hidden_diffuse.h"
+#include "nn/lean.h"
+#include "nn/revise.h"
 #include "render/scene_model.h"
 #include "tensor/maps.h"
 #include "tensor/memory.h"
@@ -32,15 +33,26 @@ enum { PIXELS = 1 << 11 }; /* at a time, at least */
 
 typedef struct deviation_job {
     const float *spread;
-    float *to, f0, all; /* by which F0's and all are multiplied */
+    float *to, factor[NN_SPREADS];
 } deviation_job;
 
 static void deviations(const void *job, int64_t begin, int64_t end)
 {
     const deviation_job *j = job;
     for (int64_t i = begin * NN_SPREADS; i < end * NN_SPREADS; i++)
-        j->to[i] = (i % NN_SPREADS == GROUP_SPECULAR ? j->f0 : 1) * j->all * LAPLACE * NN_SPREAD_UNIT *
-            expf(fminf(fmaxf(j->spread[i], -6), 4));
+        j->to[i] = j->factor[i % NN_SPREADS] * LAPLACE * NN_SPREAD_UNIT * expf(fminf(fmaxf(j->spread[i], -6), 4));
+}
+
+static void deviations_of(int64_t pixels, const float *spread, float f0, float roughness, float all, int threads,
+                          float *to)
+{
+    ts_for(threads, pixels, PIXELS, deviations, &(deviation_job){spread, to, {all, all, all * roughness, all * f0}});
+}
+
+void nn_first_guess_deviation(int64_t pixels, const float *spread, bool several, int threads, float *deviation)
+{
+    deviations_of(pixels, spread, several ? 1 : F0_DETAIL, several ? 1 : ROUGHNESS_DETAIL, several ? SEVERAL : 1,
+                  threads, deviation);
 }
 
 /* The numbers that are known have no error: the prior keeps them. */
@@ -68,7 +80,7 @@ static void scene_prior(const float *said, const rd_view *view, int known, rd_sc
     prior->mean[RD_SCENE_TONE] = prior->deviation[RD_SCENE_TONE] = 0; /* the steps have no tone curve */
 }
 
-static void level_prior(const lgd_first_guess *g, size_t pixels, int channels, int known, rd_scene_prior *prior)
+static void level_prior(const nn_first_guess *g, size_t pixels, int channels, int known, rd_scene_prior *prior)
 {
     const double part = known & NN_KNOWN_CAMERA ? ROUGHNESS_LEVEL_IN_KNOWN_VIEW : ROUGHNESS_LEVEL;
     double rough = 0, off = 0;
@@ -82,7 +94,7 @@ static void level_prior(const lgd_first_guess *g, size_t pixels, int channels, i
 
 /* Scene and level, found from R_0; R_0's diffuse where that scene's highlight hides it; both again. */
 static ts_code fit(rd_grid grid, const float *image, int channels, int known, const rd_scene_prior *prior,
-                   ts_arena *arena, lgd_first_guess *g, ts_status *st)
+                   ts_arena *arena, nn_first_guess *g, ts_status *st)
 {
     const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior(known, 1)};
     const int64_t pixels = (int64_t)grid.h * grid.w;
@@ -92,71 +104,128 @@ static ts_code fit(rd_grid grid, const float *image, int channels, int known, co
     memcpy(unknown, prior->mean, sizeof unknown);
     rd_scene_fit(grid, g->r0, channels, g->deviation, image, prior, &how, unknown, NULL);
     rd_scene_roughen(pixels, g->r0, channels, unknown[RD_SCENE_ROUGHNESS], rough);
-    const ts_code code = lgd_fill_hidden_diffuse(grid, image, unknown, channels, arena, rough, st);
+    const ts_code code = nn_fill_hidden_diffuse(grid, image, unknown, channels, arena, rough, st);
     if (!code) {
         for (size_t i = 0; i < values; i += (size_t)channels)
             memcpy(g->r0 + i + MAP_DIFFUSE, rough + i + MAP_DIFFUSE, 3 * sizeof *rough);
         rd_scene_fit(grid, g->r0, channels, g->deviation, image, prior, &how, unknown, NULL);
         memcpy(g->number, unknown, sizeof g->number);
         rd_scene_roughen(pixels, g->r0, channels, unknown[RD_SCENE_ROUGHNESS], g->r0);
-        if (!(known & NN_KNOWN_LIGHT)) lgd_share_lean(pixels, channels, g->number, g->r0);
+        if (!(known & NN_KNOWN_LIGHT)) nn_share_lean(pixels, channels, g->number, g->r0);
     }
     return code;
 }
 
-static ts_code make(ag_tape *tape, const nn_model *model, const float *image, int side, const rd_view *view, int known,
-                    bool several, int orientations, lgd_first_guess *g, ts_status *st)
+/* Where the light is known its height, which a scene does not have, is as given. */
+static rd_view view_of(const float number[RD_SCENE_NUMBERS], const nn_taken *taken)
 {
-    const int size = nn_arch_side(&model->arch), threads = ag_compute(tape)->threads;
+    rd_view view = rd_scene_view(number);
+    if (taken->known & NN_KNOWN_LIGHT) {
+        const float higher = taken->view.light[2] / view.light[2];
+        memcpy(view.light, taken->view.light, sizeof view.light);
+        view.power *= higher * higher;
+    }
+    return view;
+}
+
+ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, const float *scene, const nn_taken *taken,
+                              ts_arena *arena, nn_first_guess *g, ts_status *st)
+{
+    const int64_t pixels = (int64_t)grid.h * grid.w;
+    rd_scene_prior prior;
+    deviations_of(pixels, g->spread, taken->several ? 1 : F0_DETAIL, 1, taken->several ? SEVERAL : 1, grid.threads,
+                  g->deviation);
+    scene_prior(scene, &taken->view, taken->known, &prior);
+    level_prior(g, (size_t)pixels, channels, taken->known, &prior);
+    const ts_mark mark = ts_arena_mark(arena);
+    const ts_code code = fit(grid, image, channels, taken->known, &prior, arena, g, st);
+    ts_arena_release(arena, mark);
+    nn_first_guess_deviation(pixels, g->spread, taken->several, grid.threads, g->deviation);
+    g->view = view_of(g->number, taken);
+    return code;
+}
+
+/* h's revisions of r0 and spread. */
+static ts_code revise(ag_tape *tape, const nn_model *model, const ts_tensor *image, const nn_first_ask *ask,
+                      nn_first_guess *g, ts_status *st)
+{
+    const int size = image->shape.h, channels = model->arch.channels;
+    const size_t pixels = (size_t)size * (size_t)size;
+    const unsigned char known = (unsigned char)ask->taken.known;
+    nn_revision r = {.image = *image, .views = &g->view, .known = &known};
+    r.maps = ag_constant(tape, ts_view(g->r0, (ts_shape){1, size, size, channels}));
+    r.spread = ag_constant(tape, ts_view(g->spread, (ts_shape){1, size, size, NN_SPREADS}));
+    while (g->revised < ask->revisions && (!ask->seen || ask->seen(g, ask->user))) {
+        const ts_mark mark = ag_scope_begin(tape);
+        if (!nn_revise(tape, model, &r)) {
+            *st = *ag_status(tape);
+            return st->code;
+        }
+        memcpy(g->r0, r.maps->t.data, pixels * (size_t)channels * sizeof *g->r0);
+        memcpy(g->spread, r.spread->t.data, pixels * NN_SPREADS * sizeof *g->spread);
+        ag_value *keep[3] = {r.maps, r.spread, r.state};
+        ag_scope_end(tape, mark, keep, 3);
+        r.maps = keep[0], r.spread = keep[1], r.state = keep[2];
+        g->revised++;
+    }
+    if (g->revised > 0)
+        nn_first_guess_deviation((int64_t)pixels, g->spread, ask->taken.several, ag_compute(tape)->threads,
+                                 g->deviation);
+    return TS_OK;
+}
+
+static ts_code make(ag_tape *tape, const nn_model *model, const nn_first_ask *ask, nn_first_guess *g, ts_status *st)
+{
+    const int size = nn_arch_side(&model->arch), side = ask->side, threads = ag_compute(tape)->threads;
     const size_t pixels = (size_t)size * (size_t)size, whole = (size_t)side * (size_t)side * 3;
     ag_value *small = ag_empty(tape, (ts_shape){1, size, size, 3});
     g->r0 = malloc(pixels * (size_t)model->arch.channels * sizeof *g->r0);
+    g->spread = malloc(pixels * NN_SPREADS * sizeof *g->spread);
     g->deviation = malloc(pixels * NN_SPREADS * sizeof *g->deviation);
     ts_tensor full = ts_new(ag_arena(tape), (ts_shape){1, side, side, 3});
-    if (!small || !g->r0 || !g->deviation || !full.data)
+    if (!small || !g->r0 || !g->spread || !g->deviation || !full.data)
         return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
-    lgd_clip((int64_t)whole, image, full.data);
+    nn_clip((int64_t)whole, ask->image, full.data);
     if (side == size) memcpy(small->t.data, full.data, whole * sizeof(float));
     else if (ts_resize(&small->t, &full, ag_arena(tape), threads, st)) return st->code;
-    const unsigned char is_known = (unsigned char)known;
+    const unsigned char is_known = (unsigned char)ask->taken.known;
     const nn_input in = {.image = small->t,
                          .grid = rd_grid_full(size),
-                         .views = view,
+                         .views = &ask->taken.view,
                          .known = &is_known,
                          .given = 1,
-                         .orientations = orientations};
+                         .orientations = ask->orientations};
+    const ts_mark mark = ag_scope_begin(tape);
+    float scene[2 * RD_SCENE_NUMBERS];
     nn_guess guess;
     if (!nn_guess_from(tape, model, &in, &guess)) {
         *st = *ag_status(tape);
         return st->code;
     }
     ts_memory_copy(g->r0, guess.maps->t.data, pixels * (size_t)model->arch.channels * sizeof *g->r0, threads);
-    ts_for(threads, (int64_t)pixels, PIXELS, deviations,
-           &(deviation_job){guess.spread->t.data, g->deviation, several ? 1 : F0_DETAIL, several ? SEVERAL : 1});
-    rd_scene_prior prior;
-    scene_prior(guess.scene->t.data, view, known, &prior);
-    level_prior(g, pixels, model->arch.channels, known, &prior);
-    const ts_code code = fit(rd_grid_on(rd_grid_full(size), threads), small->t.data, model->arch.channels, known,
-                             &prior, ag_arena(tape), g, st);
-    for (size_t i = GROUP_ROUGHNESS; i < pixels * NN_SPREADS && !several; i += NN_SPREADS)
-        g->deviation[i] *= ROUGHNESS_DETAIL;
-    return code;
-}
-
-ts_code lgd_first_guess_make(ag_tape *tape, const nn_model *model, const float *image, int side, const rd_view *view,
-                             int known, bool several, int orientations, lgd_first_guess *guess, ts_status *st)
-{
-    *guess = (lgd_first_guess){0};
-    const ts_mark mark = ag_scope_begin(tape);
-    const ts_code code = make(tape, model, image, side, view, known, several, orientations, guess, st);
+    ts_memory_copy(g->spread, guess.spread->t.data, pixels * NN_SPREADS * sizeof *g->spread, threads);
+    memcpy(scene, guess.scene->t.data, sizeof scene);
     ag_scope_end(tape, mark, NULL, 0);
-    if (code) lgd_first_guess_free(guess);
+    const ts_code code = nn_first_guess_settle(rd_grid_on(rd_grid_full(size), threads), model->arch.channels,
+                                               small->t.data, scene, &ask->taken, ag_arena(tape), g, st);
+    return code ? code : revise(tape, model, &small->t, ask, g, st);
+}
+
+ts_code nn_first_guess_make(ag_tape *tape, const nn_model *model, const nn_first_ask *ask, nn_first_guess *guess,
+                            ts_status *st)
+{
+    *guess = (nn_first_guess){0};
+    const ts_mark mark = ag_scope_begin(tape);
+    const ts_code code = make(tape, model, ask, guess, st);
+    ag_scope_end(tape, mark, NULL, 0);
+    if (code) nn_first_guess_free(guess);
     return code;
 }
 
-void lgd_first_guess_free(lgd_first_guess *guess)
+void nn_first_guess_free(nn_first_guess *guess)
 {
     free(guess->r0);
+    free(guess->spread);
     free(guess->deviation);
-    *guess = (lgd_first_guess){0};
+    *guess = (nn_first_guess){0};
 }

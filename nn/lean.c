@@ -1,11 +1,11 @@
-#include "infer/lean.h"
+#include "nn/lean.h"
 #include "tensor/maps.h"
 #include <math.h>
 
-void lgd_share_lean(int64_t pixels, int channels, float number[RD_SCENE_NUMBERS], float *maps)
+void nn_share_lean(int64_t pixels, int channels, float number[RD_SCENE_NUMBERS], float *maps)
 {
     const double twice = 2 * (double)RD_FLASH_DISTANCE * exp((double)number[RD_SCENE_DISTANCE]),
-                 flash = LGD_LEAN_FLASH / twice, share = LGD_LEAN * LGD_LEAN / (LGD_LEAN * LGD_LEAN + flash * flash);
+                 flash = NN_LEAN_FLASH / twice, share = NN_LEAN * NN_LEAN / (NN_LEAN * NN_LEAN + flash * flash);
     for (int k = 0; k < 2; k++) {
         float *beside = &number[RD_SCENE_LIGHT_X + k];
         const float lean = (float)(-share * (double)RD_SCENE_OFFSET * (double)*beside / twice);

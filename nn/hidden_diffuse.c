@@ -1,4 +1,4 @@
-#include "infer/hidden_diffuse.h"
+#include "nn/hidden_diffuse.h"
 #include "tensor/maps.h"
 #include "tensor/memory.h"
 #include "tensor/team.h"
@@ -162,8 +162,8 @@ static void apply_rows(const void *job, int64_t begin, int64_t end)
     }
 }
 
-ts_code lgd_fill_hidden_diffuse(rd_grid grid, const float *image, const float number[RD_SCENE_NUMBERS], int channels,
-                                ts_arena *arena, float *maps, ts_status *st)
+ts_code nn_fill_hidden_diffuse(rd_grid grid, const float *image, const float number[RD_SCENE_NUMBERS], int channels,
+                               ts_arena *arena, float *maps, ts_status *st)
 {
     const int size = grid.w, side = size < CELLS ? size : CELLS;
     const size_t pixels = (size_t)size * (size_t)size, values = pixels * (size_t)channels;

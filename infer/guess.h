@@ -1,0 +1,26 @@
+/* What a model that guesses the scene says of photographs before their steps. */
+#ifndef LGD_GUESS_H
+#define LGD_GUESS_H
+#include "infer/estimate.h"
+#include "nn/first_guess.h"
+
+/* What is estimated from, in the order in which models read it. */
+typedef struct lgd_given {
+    const float *image[NN_MAX_IMAGES]; /* [side][side][3] each, of the caller */
+    rd_view views[NN_MAX_IMAGES];
+    unsigned char known[NN_MAX_IMAGES]; /* what of the views is true, nn_known */
+    int order[NN_MAX_IMAGES];           /* the caller's number of each */
+    int count, side;
+    const float *r0, *deviation; /* r0: where it is known, as in nn_input; deviation: of a model that says it */
+} lgd_given;
+
+/* The first guess from the photograph that is taken most from above, after so many revisions; seen as in nn_first_ask.
+ * given gets its view, its r0 and deviation, which guess owns, and where o->power is wanted the exposures of all. The
+ * caller frees guess, after a failure too. */
+ts_code lgd_guess_first(const lgd_estimator *e, lgd_given *given, const lgd_options *o, int revisions,
+                        bool (*seen)(const nn_first_guess *guess, void *user), void *user, nn_first_guess *guess,
+                        ts_status *st);
+
+/* What of the views is true, of nn_known. A flash is beside the lens, at a place that is not known. */
+int lgd_guess_known(const lgd_options *o);
+#endif

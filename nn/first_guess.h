@@ -1,0 +1,50 @@
+/* What a model says of a photograph before any step at the photograph's size: R_0, how far it may be off, the scene,
+ * and what h makes of them. */
+#ifndef NN_FIRST_GUESS_H
+#define NN_FIRST_GUESS_H
+#include "nn/model.h"
+
+typedef struct nn_first_guess {
+    float *r0, *spread; /* [side][side][channels] and [side][side][NN_SPREADS], side = nn_arch_side: the maps and the
+                         * logarithms of their expected errors, as nn_guess has them */
+    float *deviation;   /* [side][side][NN_SPREADS]: the standard deviations that the steps believe */
+    float number[RD_SCENE_NUMBERS];
+    rd_view view; /* light and camera of number, those that are known as they were given */
+    int revised;  /* r0 is R_revised */
+} nn_first_guess;
+
+/* How a photograph was taken. */
+typedef struct nn_taken {
+    rd_view view; /* where camera and light are supposed to be */
+    int known;    /* what of it is true, nn_known */
+    bool several; /* more photographs of the sample follow: the deviations of F0 and roughness are with their level,
+                   * which they tell */
+} nn_taken;
+
+/* From what g says (r0 and spread of guess, scene [2 RD_SCENE_NUMBERS]) of image [side][side][3], linear in [0, 1]: the
+ * numbers of the scene that are not known are the network's, then those of rd_scene_fit, whose prior they are; with
+ * them it finds the level of r0's roughness. r0's diffuse is filled where the highlight hides it (nn/hidden_diffuse.h);
+ * of a light that is not known a part of its place is taken for a slope of the sample (nn/lean.h). r0, spread and
+ * deviation are the caller's. arena: for what it holds meanwhile. TS_NOMEM with st. */
+ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, const float *scene, const nn_taken *taken,
+                              ts_arena *arena, nn_first_guess *guess, ts_status *st);
+
+typedef struct nn_first_ask {
+    const float *image; /* [side][side][3], linear, clamped here */
+    int side;
+    nn_taken taken;
+    int orientations;                                      /* as in nn_input */
+    int revisions;                                         /* of R_0 by h, at most arch.revisions (nn/revise.h) */
+    bool (*seen)(const nn_first_guess *guess, void *user); /* or NULL: called with what is revised next, false: it is
+                                                            * not */
+    void *user;
+} nn_first_ask;
+
+/* For a model with arch.spread and arch.scene, on a tape without gradients. The caller frees after success. */
+ts_code nn_first_guess_make(ag_tape *tape, const nn_model *model, const nn_first_ask *ask, nn_first_guess *guess,
+                            ts_status *st);
+void nn_first_guess_free(nn_first_guess *guess);
+
+/* The standard deviations that the steps believe, [pixels][NN_SPREADS], of spread. Serial but for large pixels. */
+void nn_first_guess_deviation(int64_t pixels, const float *spread, bool several, int threads, float *deviation);
+#endif

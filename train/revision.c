@@ -1,0 +1,77 @@
+/* The second phase of a model with arch.revisions: h learns to revise what a fixed g says first. */
+#include "ops.h"
+#include "nn/first_guess.h"
+#include "nn/revise.h"
+#include "render/losses.h"
+#include "tensor/maps.h"
+#include "train/state.h"
+#include <string.h>
+
+/* The first guess of photograph n, in place of what g said of it. */
+static bool settle(ag_tape *tape, const nn_model *model, const nn_input *in, const nn_guess *said, int n, rd_view *view)
+{
+    const int side = in->image.shape.h, channels = model->arch.channels;
+    const int64_t pixels = (int64_t)side * side;
+    const nn_taken taken = {.view = in->views[n], .known = in->known ? in->known[n] : NN_KNOWN_ALL};
+    ts_arena *arena = ag_arena(tape);
+    ts_status st = {0};
+    const ts_mark mark = ts_arena_mark(arena);
+    nn_first_guess guess = {.r0 = said->maps->t.data + n * pixels * channels,
+                            .spread = said->spread->t.data + n * pixels * NN_SPREADS,
+                            .deviation = ts_arena_alloc(arena, (size_t)pixels * NN_SPREADS * sizeof(float))};
+    if (!guess.deviation) return ag_fail(tape, TS_NOMEM, "no memory for the maps' deviations"), false;
+    if (nn_first_guess_settle(rd_grid_on(rd_grid_full(side), ag_compute(tape)->threads), channels,
+                              in->image.data + n * pixels * 3, said->scene->t.data + (size_t)n * 2 * RD_SCENE_NUMBERS,
+                              &taken, arena, &guess, &st))
+        return ag_fail(tape, st.code, "%s", st.message), false;
+    *view = guess.view;
+    ts_arena_release(arena, mark);
+    return true;
+}
+
+bool tr_first_guesses(ag_tape *tape, const nn_model *model, const nn_input *in, nn_revision *r)
+{
+    const int count = in->image.shape.n, side = nn_arch_side(&model->arch);
+    rd_view *views = ts_arena_alloc(ag_arena(tape), (size_t)count * sizeof *views);
+    nn_guess said;
+    if (!views) return ag_fail(tape, TS_NOMEM, "no memory for the scenes that are found"), false;
+    if (in->image.shape.h != side)
+        return ag_fail(tape, TS_INVALID,
+                       "photographs of %d pixels a side: revisions are learned at %d (data.patch, "
+                       "validate.size)",
+                       in->image.shape.h, side),
+               false;
+    if (!nn_guess_from(tape, model, in, &said)) return false;
+    for (int n = 0; n < count; n++)
+        if (!settle(tape, model, in, &said, n, &views[n])) return false;
+    *r = (nn_revision){.image = in->image,
+                       .views = views,
+                       .known = in->known,
+                       .maps = ag_constant(tape, said.maps->t),
+                       .spread = ag_constant(tape, said.spread->t)};
+    return r->maps && r->spread;
+}
+
+ag_value *tr_revision_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr_row *row)
+{
+    const tr_config *c = &t->config;
+    const int revisions = c->arch.revisions;
+    ag_tape *tape = t->tape;
+    nn_revision r;
+    ag_value *loss = NULL;
+    ag_reset(t->quiet);
+    ag_compute_set(t->quiet, (ts_compute){.exact = c->train.exact, .precision = c->train.precision});
+    if (!tr_first_guesses(t->quiet, t->model, in, &r))
+        return ag_fail(tape, ag_status(t->quiet)->code, "%s", ag_status(t->quiet)->message);
+    r.maps = ag_constant(tape, r.maps->t), r.spread = ag_constant(tape, r.spread->t);
+    row->iterations = revisions;
+    for (int k = 0; k < revisions; k++) {
+        if (!nn_revise(tape, t->model, &r)) return NULL;
+        loss = tr_add_loss(t, loss, r.maps, target, 1, &row->render_end, &row->map_end);
+        ag_value *unlikely = ag_laplace(tape, ag_constant(tape, r.maps->t), r.spread, target, nn_spread_of,
+                                        NN_SPREAD_UNIT);
+        if (unlikely) row->spread = (double)unlikely->t.data[0];
+        loss = ag_add(tape, loss, ag_scale(tape, unlikely, (float)c->train.spread_weight));
+    }
+    return revisions > 1 ? ag_scale(tape, loss, 1 / (float)revisions) : loss;
+}
