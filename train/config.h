@@ -29,7 +29,7 @@ typedef struct tr_config {
         int64_t pretrain_steps, steps, warmup;
         double pretrain_rate, pretrain_floor, rate, g_rate, coarse_rate, rate_floor;
         double clip, spike, ema, start_weight, map_weight, normal_weight, normal_rmse, specular_weight, spread_weight,
-            scene_weight;
+            disturb, scene_weight;
         int iterations_min, iterations_max; /* 0: arch.iterations */
         int given_min;                      /* 0: arch.images */
         bool checkpoint_steps;

@@ -4,6 +4,8 @@
 #include "nn/revise.h"
 #include "render/losses.h"
 #include "tensor/maps.h"
+#include "tensor/team.h"
+#include "train/disturb.h"
 #include "train/state.h"
 #include <string.h>
 
@@ -29,7 +31,24 @@ static bool settle(ag_tape *tape, const nn_model *model, const nn_input *in, con
     return true;
 }
 
-bool tr_first_guesses(ag_tape *tape, const nn_model *model, const nn_input *in, nn_revision *r)
+typedef struct disturbing {
+    const tr_trainer *t;
+    float *maps;
+    int side;
+} disturbing;
+
+static void disturb_one(const void *job, int64_t i)
+{
+    const disturbing *j = job;
+    const tr_trainer *t = j->t;
+    const tr_config *c = &t->config;
+    const uint64_t index = (uint64_t)t->step * (uint64_t)c->train.batch + (uint64_t)(t->first + i);
+    tr_disturb(c->train.disturb, (uint64_t)c->train.seed, index, &t->shots[i].view, j->side,
+               j->maps + i * j->side * j->side * MAP_CHANNELS);
+}
+
+bool tr_first_guesses(ag_tape *tape, const nn_model *model, const nn_input *in, const tr_trainer *disturbed,
+                      nn_revision *r)
 {
     const int count = in->image.shape.n, side = nn_arch_side(&model->arch);
     rd_view *views = ts_arena_alloc(ag_arena(tape), (size_t)count * sizeof *views);
@@ -42,6 +61,8 @@ bool tr_first_guesses(ag_tape *tape, const nn_model *model, const nn_input *in, 
                        in->image.shape.h, side),
                false;
     if (!nn_guess_from(tape, model, in, &said)) return false;
+    if (disturbed && disturbed->config.train.disturb > 0)
+        ts_tasks(0, count, disturb_one, &(disturbing){disturbed, said.maps->t.data, side});
     for (int n = 0; n < count; n++)
         if (!settle(tape, model, in, &said, n, &views[n])) return false;
     *r = (nn_revision){.image = in->image,
@@ -61,7 +82,7 @@ ag_value *tr_revision_loss(tr_trainer *t, const nn_input *in, ag_value *target, 
     ag_value *loss = NULL;
     ag_reset(t->quiet);
     ag_compute_set(t->quiet, (ts_compute){.exact = c->train.exact, .precision = c->train.precision});
-    if (!tr_first_guesses(t->quiet, t->model, in, &r))
+    if (!tr_first_guesses(t->quiet, t->model, in, t, &r))
         return ag_fail(tape, ag_status(t->quiet)->code, "%s", ag_status(t->quiet)->message);
     r.maps = ag_constant(tape, r.maps->t), r.spread = ag_constant(tape, r.spread->t);
     row->iterations = revisions;

@@ -107,8 +107,10 @@ ag_value *tr_add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value *ta
                       double *map);
 
 /* revision.c. The first guesses of photographs of nn_arch_side, one of each material, on a tape without gradients:
- * what revisions begin with. False after an error, which the tape has. */
-bool tr_first_guesses(ag_tape *tape, const nn_model *model, const nn_input *in, nn_revision *r);
+ * what revisions begin with. disturbed: NULL, or whose train.disturb makes this step's maps worse. False after an
+ * error, which the tape has. */
+bool tr_first_guesses(ag_tape *tape, const nn_model *model, const nn_input *in, const struct tr_trainer *disturbed,
+                      nn_revision *r);
 /* The mean loss of all revisions: of their maps, and of how far they say that these may be off. NULL after an error. */
 ag_value *tr_revision_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr_row *row);
 

@@ -95,7 +95,7 @@ static const unsigned char nothing[TOGETHER * NN_MAX_IMAGES];
 static void revise(ag_tape *tape, const nn_model *model, const nn_input *in, int revisions, ag_value **maps)
 {
     nn_revision r;
-    if (!tr_first_guesses(tape, model, in, &r)) return;
+    if (!tr_first_guesses(tape, model, in, NULL, &r)) return;
     for (int k = 0; k <= revisions; k++) {
         maps[k] = r.maps;
         if (k < revisions && !nn_revise(tape, model, &r)) return;

@@ -383,7 +383,7 @@ TEST(trainer_teaches_revisions)
                                        "model.h_width=0",        "model.revisions=2",      "model.revise_width=8",
                                        "data.patch=64",          "validate.size=64",       "train.window=0",
                                        "train.g_rate=0",         "train.pretrain_steps=2", "train.steps=4",
-                                       "train.iterations_min=0", "train.iterations_max=0"};
+                                       "train.iterations_min=0", "train.iterations_max=0", "train.disturb=0.7"};
     ts_status st = {0};
     tr_config c = small();
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
