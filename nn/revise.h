@@ -16,8 +16,8 @@ typedef struct nn_revision {
 /* One revision. With d the step to the most probable maps from R (render/posterior.h, R being the prior's mean), G the
  * gradient of the reconstruction error, E the encoding of g and L the rendering under views, h reads of each pixel
  *     E(I), E(I) - E(L(R)), E(I) - E(L(R + d)), R, asinh(10 d), asinh(10 G), spread
- * and the directions to camera and light, all of them constants for back-propagation, and adds its change to R and to
- * spread. False after an error, which the tape has. */
+ * and the directions to camera and light, all of them constants for back-propagation, and changes R as ag_change_maps
+ * does, and spread by a sum. False after an error, which the tape has. */
 bool nn_revise(ag_tape *tape, const nn_model *model, nn_revision *r);
 
 /* Bytes that a revision of one material takes on a tape without gradients, at most. */

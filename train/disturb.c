@@ -4,38 +4,14 @@
 #include <math.h>
 #include <stdbool.h>
 
-/* Standard deviations of the logarithms by which a whole map may be off, and of those around the highlight. */
+/* Standard deviations of the logarithms by which a whole map may be off. */
 #define DIFFUSE_OFF 0.2f
 #define RELIEF_OFF 0.4f
 #define ROUGHNESS_OFF 0.35f
-#define F0_OFF 0.6f
-#define SPOT_OFF 0.4f
-#define SPOT_SHARE 0.4f  /* of the groups of maps that have a spot */
-#define KIND_SHARE 0.08f /* of the materials that are taken for a metal, or for none */
+#define F0_OFF 0.45f
+#define KIND_SHARE 0.06f /* of the materials that are taken for a metal, or for none */
 #define METAL_F0 1.4f    /* as in infer/metal.h */
 #define STEEPEST 0.95f
-
-/* A spot's place, width and strength; strength 0: none. */
-typedef struct spot {
-    float x, y, radius, ring, strength;
-} spot;
-
-static spot draw_spot(ts_rng *rng, const float centre[2])
-{
-    spot s = {.x = centre[0] + 0.03f * ts_rng_normal(rng), .y = centre[1] + 0.03f * ts_rng_normal(rng)};
-    s.radius = 0.04f * expf(ts_rng_range(rng, 0, 2.3f));
-    s.ring = ts_rng_uniform(rng) < 0.3f ? s.radius * ts_rng_range(rng, 1, 2) : 0;
-    s.strength = SPOT_OFF * ts_rng_normal(rng);
-    if (!(ts_rng_uniform(rng) < SPOT_SHARE)) s.strength = 0;
-    return s;
-}
-
-static float factor(const spot *s, float level, float x, float y)
-{
-    if (s->strength == 0) return expf(level);
-    const float away = sqrtf((x - s->x) * (x - s->x) + (y - s->y) * (y - s->y)) - s->ring;
-    return expf(level + s->strength * expf(-away * away / (2 * s->radius * s->radius)));
-}
 
 static float encoded(float v) { return 2 * fminf(fmaxf(v, 0), 1) - 1; }
 static float value(float x) { return (fminf(fmaxf(x, -1), 1) + 1) / 2; }
@@ -59,26 +35,17 @@ static bool is_metal(int64_t pixels, const float *maps)
     return more > 0;
 }
 
-void tr_disturb(double share, uint64_t seed, uint64_t index, const rd_view *view, int side, float *maps)
+void tr_disturb(double share, uint64_t seed, uint64_t index, int side, float *maps)
 {
     ts_rng rng = ts_rng_make(seed, TS_STREAM_DISTURB, index);
     if (!((double)ts_rng_uniform(&rng) < share)) return;
-    const float *c = view->camera, *l = view->light,
-                centre[2] = {(c[0] * l[2] + l[0] * c[2]) / (c[2] + l[2]), (c[1] * l[2] + l[1] * c[2]) / (c[2] + l[2])};
     static const float off[MAP_GROUPS] = {DIFFUSE_OFF, RELIEF_OFF, ROUGHNESS_OFF, F0_OFF};
-    float level[MAP_GROUPS];
-    spot spots[MAP_GROUPS];
-    for (int g = 0; g < MAP_GROUPS; g++) {
-        level[g] = off[g] * ts_rng_normal(&rng);
-        spots[g] = draw_spot(&rng, centre);
-    }
+    float by[MAP_GROUPS];
+    for (int g = 0; g < MAP_GROUPS; g++) by[g] = expf(off[g] * ts_rng_normal(&rng));
     const int64_t pixels = (int64_t)side * side;
     const bool other = ts_rng_uniform(&rng) < KIND_SHARE, metal = other && is_metal(pixels, maps);
     for (int64_t i = 0; i < pixels; i++) {
-        float *m = maps + i * MAP_CHANNELS, by[MAP_GROUPS];
-        const float x = ((float)(i % side) + 0.5f) / (float)side - 0.5f,
-                    y = 0.5f - ((float)(i / side) + 0.5f) / (float)side;
-        for (int g = 0; g < MAP_GROUPS; g++) by[g] = factor(&spots[g], level[g], x, y);
+        float *m = maps + i * MAP_CHANNELS;
         if (other) change_kind(metal, m);
         for (int k = 0; k < 3; k++) {
             m[MAP_DIFFUSE + k] = encoded(value(m[MAP_DIFFUSE + k]) * by[GROUP_DIFFUSE]);

@@ -43,7 +43,7 @@ static void disturb_one(const void *job, int64_t i)
     const tr_trainer *t = j->t;
     const tr_config *c = &t->config;
     const uint64_t index = (uint64_t)t->step * (uint64_t)c->train.batch + (uint64_t)(t->first + i);
-    tr_disturb(c->train.disturb, (uint64_t)c->train.seed, index, &t->shots[i].view, j->side,
+    tr_disturb(c->train.disturb, (uint64_t)c->train.seed, index, j->side,
                j->maps + i * j->side * j->side * MAP_CHANNELS);
 }
 

@@ -17,67 +17,40 @@ static void make_flat(float diffuse, float f0)
     }
 }
 
-static void disturb(double share, uint64_t index, const rd_view *view, float *to)
+static void disturb(double share, uint64_t index, float *to)
 {
     memcpy(to, flat, sizeof flat);
-    tr_disturb(share, 7, index, view, SIDE, to);
+    tr_disturb(share, 7, index, SIDE, to);
 }
 
 /* A share of the materials, each another way and always the same; values stay those that maps can have. */
 TEST(disturb_is_a_function_of_the_material)
 {
-    const rd_view view = rd_flash();
     make_flat(0.4f, 0.05f);
     int changed = 0;
     for (uint64_t i = 0; i < DRAWS; i++) {
-        disturb(0, i, &view, maps);
+        disturb(0, i, maps);
         CHECK(!memcmp(maps, flat, sizeof flat), "material %d changes where none is to", (int)i);
-        disturb(0.5, i, &view, maps);
-        disturb(0.5, i, &view, again);
+        disturb(0.5, i, maps);
+        disturb(0.5, i, again);
         CHECK(!memcmp(maps, again, sizeof flat), "material %d is not the same again", (int)i);
         changed += memcmp(maps, flat, sizeof flat) != 0;
         for (int k = 0; k < VALUES; k++) CHECK(maps[k] >= -1 && maps[k] <= 1, "a value of %g", (double)maps[k]);
     }
     CHECK(changed > DRAWS * 0.4 && changed < DRAWS * 0.6, "%d of %d change", changed, DRAWS);
-    disturb(1, 1, &view, maps);
-    disturb(1, 2, &view, again);
+    disturb(1, 1, maps);
+    disturb(1, 2, again);
     CHECK(memcmp(maps, again, sizeof flat), "two materials are off in the same way");
-}
-
-/* How far the roughness of a pixel is from that of a corner, mean over many materials. */
-static double unevenness(const rd_view *view, int at)
-{
-    double sum = 0;
-    for (uint64_t i = 0; i < DRAWS; i++) {
-        disturb(1, i, view, maps);
-        const int corner = MAP_ROUGHNESS; /* the first pixel's, far from every highlight */
-        sum += fabs((double)(maps[at * MAP_CHANNELS + MAP_ROUGHNESS] - maps[corner]));
-    }
-    return sum / DRAWS;
-}
-
-/* Spots are where the highlight of a flat sample is, that of a light beside the camera half way to it. */
-TEST(disturb_has_its_spots_under_the_highlight)
-{
-    rd_view view = rd_flash();
-    make_flat(0.4f, 0.05f);
-    const int middle = SIDE / 2 * SIDE + SIDE / 2, beside = SIDE / 2 * SIDE + SIDE * 3 / 4;
-    CHECK(unevenness(&view, middle) > 1.5 * unevenness(&view, beside), "the middle has %g, a place beside it %g",
-          unevenness(&view, middle), unevenness(&view, beside));
-    view.light[0] = 0.5f; /* a quarter of the width to the right */
-    CHECK(unevenness(&view, beside) > 1.5 * unevenness(&view, middle), "of a displaced light %g, the middle %g",
-          unevenness(&view, beside), unevenness(&view, middle));
 }
 
 /* Some dielectrics become metals and some metals dielectrics, and nothing else does. */
 TEST(disturb_takes_some_for_metals)
 {
-    const rd_view view = rd_flash();
     for (int metal = 0; metal < 2; metal++) {
         int other = 0;
         make_flat(metal ? 0.02f : 0.4f, metal ? 0.6f : 0.04f);
         for (uint64_t i = 0; i < DRAWS; i++) {
-            disturb(1, i, &view, maps);
+            disturb(1, i, maps);
             double diffuse = 0, f0 = 0;
             for (int k = 0; k < PIXELS; k++) {
                 diffuse += (double)maps[k * MAP_CHANNELS + MAP_DIFFUSE];
