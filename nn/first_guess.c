@@ -29,6 +29,8 @@ enum { PIXELS = 1 << 11 }; /* at a time, at least */
 /* By which the deviations are multiplied where several photographs follow. Much of R_0's error is one of the whole
  * material, and of that the mean absolute error of a pixel says too little. */
 #define SEVERAL 1.5f
+/* By which they are multiplied after a revision: h has read what a step would read, and it is not believed twice. */
+#define REVISED 0.5f
 #define LAPLACE 1.41421356f /* a Laplace density's standard deviation over its mean absolute error */
 
 typedef struct deviation_job {
@@ -169,8 +171,8 @@ static ts_code revise(ag_tape *tape, const nn_model *model, const ts_tensor *ima
         g->revised++;
     }
     if (g->revised > 0)
-        nn_first_guess_deviation((int64_t)pixels, g->spread, ask->taken.several, ag_compute(tape)->threads,
-                                 g->deviation);
+        deviations_of((int64_t)pixels, g->spread, F0_DETAIL, ROUGHNESS_DETAIL, REVISED, ag_compute(tape)->threads,
+                      g->deviation);
     return TS_OK;
 }
 

@@ -1,8 +1,10 @@
-/* y = maps x changed by c and, F0, by a level l, with v(x) = max((x + 1) / 2, LEAST) and enc(v) = 2 v - 1:
- *     diffuse    enc(min(v e^a, 1)),  a = DIFFUSE (c_0 + c_1 + c_2) / 3: the three colours by one factor, their hue
- * stays normal     x + c roughness  x + c F0         enc(min(v e^b, 1)),  b = F0 (l_0 + l_1 + l_2) / 3: the whole image
- * by one factor and d enc / da = 2 v e^a, d enc / dx = e^a, both 0 where the value ends at 1, the latter also below
- * LEAST. x: [N,H,W,9], c: [N,H,W,9], of which the last three are not read, l: [N,1,1,3], y: [N,H,W,9] */
+/* y = maps x changed by c and by levels l of the whole image, with v(x) = max((x + 1) / 2, LEAST), enc(v) = 2 v - 1:
+ *     diffuse    enc(min(v e^a, 1)),  a = DIFFUSE (c_0 + c_1 + c_2) / 3: the hue stays
+ *     normal     x + c
+ *     roughness  enc(min(v e^b, 1)),  b = ROUGHNESS l_0
+ *     F0         enc(min(v e^b, 1)),  b = F0 (l_1 + l_2 + l_3) / 3
+ * and d enc / da = 2 v e^a, d enc / dx = e^a, both 0 where the value ends at 1, the latter also below LEAST.
+ * x: [N,H,W,9], c: [N,H,W,9], of which roughness and F0 are not read, l: [N,1,1,4], y: [N,H,W,9] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "render/losses.h"
@@ -13,10 +15,13 @@
 extern const ag_op op_change_maps;
 
 #define DIFFUSE 2.0f /* what adds as much to an albedo of 1/4 as to a normal */
+#define ROUGHNESS 1.25f
 #define F0 4.0f
 #define LEAST 0.004f /* one step of 8 bits */
 
 static float mean_of(const float *v) { return (v[0] + v[1] + v[2]) / 3; }
+enum { LEVELS = MAP_CHANNELS - MAP_ROUGHNESS };
+
 static float value(float x) { return fmaxf((x + 1) / 2, LEAST); }
 
 /* enc of a value times a factor, and whether it is not cut. */
@@ -33,15 +38,16 @@ static void forward_rows(const void *job, int64_t begin, int64_t end)
     const ts_shape s = node->out->t.shape;
     for (int64_t p = begin * s.w; p < end * s.w; p++) {
         const float *x = node->in[0]->t.data + p * MAP_CHANNELS, *c = node->in[1]->t.data + p * MAP_CHANNELS,
-                    *l = node->in[2]->t.data + p / ((int64_t)s.h * s.w) * 3;
-        const float a = expf(DIFFUSE * mean_of(c)), b = expf(F0 * mean_of(l));
+                    *l = node->in[2]->t.data + p / ((int64_t)s.h * s.w) * LEVELS;
+        const float a = expf(DIFFUSE * mean_of(c)), b = expf(F0 * mean_of(l + 1));
         float *y = node->out->t.data + p * MAP_CHANNELS;
         bool inside;
         for (int k = 0; k < 3; k++) {
             y[MAP_DIFFUSE + k] = scaled(x[MAP_DIFFUSE + k], a, &inside);
             y[MAP_SPECULAR + k] = scaled(x[MAP_SPECULAR + k], b, &inside);
         }
-        for (int k = MAP_NORMAL; k < MAP_SPECULAR; k++) y[k] = x[k] + c[k];
+        y[MAP_ROUGHNESS] = scaled(x[MAP_ROUGHNESS], expf(ROUGHNESS * l[0]), &inside);
+        for (int k = MAP_NORMAL; k < MAP_ROUGHNESS; k++) y[k] = x[k] + c[k];
     }
 }
 
@@ -55,11 +61,11 @@ typedef struct gradients {
     const ag_node *node;
     float *dx, *dc;
     bool add_x, add_c;
-    double *db; /* of each row: the gradient by its image's b */
+    double (*db)[2]; /* of each row: the gradients by the logarithms of its image's two factors */
 } gradients;
 
-/* One of three colours: adds to the gradient by the factor's logarithm, and to that by x. */
-static void colour(float x, float factor, float dy, double *dlog, float *dx)
+/* One value: adds to the gradient by the factor's logarithm, and to that by x. */
+static void by_factor(float x, float factor, float dy, double *dlog, float *dx)
 {
     bool inside;
     const float v = scaled(x, factor, &inside);
@@ -74,28 +80,29 @@ static void backward_rows(const void *job, int64_t begin, int64_t end)
     const ag_node *node = g->node;
     const ts_shape s = node->out->t.shape;
     for (int64_t row = begin; row < end; row++) {
-        double db = 0;
+        double db[2] = {0};
         for (int64_t p = row * s.w; p < (row + 1) * s.w; p++) {
             const float *x = node->in[0]->t.data + p * MAP_CHANNELS, *c = node->in[1]->t.data + p * MAP_CHANNELS,
-                        *l = node->in[2]->t.data + p / ((int64_t)s.h * s.w) * 3,
+                        *l = node->in[2]->t.data + p / ((int64_t)s.h * s.w) * LEVELS,
                         *dy = node->out->grad + p * MAP_CHANNELS;
-            const float a = expf(DIFFUSE * mean_of(c)), b = expf(F0 * mean_of(l));
+            const float a = expf(DIFFUSE * mean_of(c)), b = expf(F0 * mean_of(l + 1)), r = expf(ROUGHNESS * l[0]);
             float *dx = g->dx ? g->dx + p * MAP_CHANNELS : NULL, *dc = g->dc ? g->dc + p * MAP_CHANNELS : NULL;
             double da = 0;
             if (dx && !g->add_x) memset(dx, 0, MAP_CHANNELS * sizeof *dx);
             if (dc && !g->add_c) memset(dc, 0, MAP_CHANNELS * sizeof *dc);
             for (int k = 0; k < 3; k++) {
                 const int d = MAP_DIFFUSE + k, f = MAP_SPECULAR + k;
-                colour(x[d], a, dy[d], &da, dx ? &dx[d] : NULL);
-                colour(x[f], b, dy[f], &db, dx ? &dx[f] : NULL);
+                by_factor(x[d], a, dy[d], &da, dx ? &dx[d] : NULL);
+                by_factor(x[f], b, dy[f], &db[1], dx ? &dx[f] : NULL);
             }
+            by_factor(x[MAP_ROUGHNESS], r, dy[MAP_ROUGHNESS], &db[0], dx ? &dx[MAP_ROUGHNESS] : NULL);
             for (int k = 0; k < 3 && dc; k++) dc[MAP_DIFFUSE + k] += (float)da * (DIFFUSE / 3);
-            for (int k = MAP_NORMAL; k < MAP_SPECULAR; k++) {
+            for (int k = MAP_NORMAL; k < MAP_ROUGHNESS; k++) {
                 if (dx) dx[k] += dy[k];
                 if (dc) dc[k] += dy[k];
             }
         }
-        g->db[row] = db;
+        memcpy(g->db[row], db, sizeof db);
     }
 }
 
@@ -114,14 +121,15 @@ static void backward(ag_tape *tape, ag_node *node)
     }
     ts_for(ag_threads(tape), (int64_t)s.n * s.h, 4, backward_rows, &g);
     for (int n = 0; n < s.n && dl; n++) {
-        double sum = 0;
-        for (int y = 0; y < s.h; y++) sum += g.db[(size_t)n * (size_t)s.h + (size_t)y];
-        for (int k = 0; k < 3; k++) dl[3 * n + k] += (float)sum * (F0 / 3);
+        double sum[2] = {0};
+        for (int y = 0; y < 2 * s.h; y++) sum[y % 2] += g.db[(size_t)n * (size_t)s.h + (size_t)(y / 2)][y % 2];
+        for (int k = 0; k < LEVELS; k++)
+            dl[LEVELS * n + k] += k == 0 ? (float)sum[0] * ROUGHNESS : (float)sum[1] * (F0 / 3);
     }
     ts_arena_release(ag_arena(tape), mark);
 }
 
-static double reference_colour(double x, double log_factor)
+static double reference_value(double x, double log_factor)
 {
     const double v = fmax((x + 1) / 2, (double)LEAST) * exp(log_factor);
     return v < 1 ? 2 * v - 1 : 1;
@@ -132,12 +140,13 @@ static void reference(const ag_node *node, const double *const *in, double *out)
     const ts_shape s = node->out->t.shape;
     for (int64_t p = 0; p < ts_pixels(s); p++) {
         const double *x = in[0] + p * MAP_CHANNELS, *c = in[1] + p * MAP_CHANNELS,
-                     *l = in[2] + p / ((int64_t)s.h * s.w) * 3;
-        const double a = (double)DIFFUSE * (c[0] + c[1] + c[2]) / 3, b = (double)F0 * (l[0] + l[1] + l[2]) / 3;
+                     *l = in[2] + p / ((int64_t)s.h * s.w) * LEVELS;
+        const double a = (double)DIFFUSE * (c[0] + c[1] + c[2]) / 3, b = (double)F0 * (l[1] + l[2] + l[3]) / 3;
         for (int k = 0; k < MAP_CHANNELS; k++)
-            out[p * MAP_CHANNELS + k] = k < MAP_NORMAL ? reference_colour(x[k], a)
-                : k < MAP_SPECULAR                     ? x[k] + c[k]
-                                                       : reference_colour(x[k], b);
+            out[p * MAP_CHANNELS + k] = k < MAP_NORMAL ? reference_value(x[k], a)
+                : k < MAP_ROUGHNESS                    ? x[k] + c[k]
+                : k == MAP_ROUGHNESS                   ? reference_value(x[k], (double)ROUGHNESS * l[0])
+                                                       : reference_value(x[k], b);
     }
 }
 
@@ -153,7 +162,7 @@ static void cases(ag_gradcheck *check)
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
         ag_case c = {.label = i ? "images" : "one pixel",
                      .inputs = 3,
-                     .shape = {shapes[i], shapes[i], {shapes[i].n, 1, 1, 3}},
+                     .shape = {shapes[i], shapes[i], {shapes[i].n, 1, 1, LEVELS}},
                      .lo = -0.6f,
                      .hi = 0.2f, /* nothing ends at 1 */
                      .build = build};
@@ -170,9 +179,8 @@ ag_value *ag_change_maps(ag_tape *tape, ag_value *maps, ag_value *change, ag_val
     char text[AG_SHAPE_TEXT];
     if (!ag_ready(tape, "change_maps", 3, in)) return NULL;
     const ts_shape s = maps->t.shape;
-    if (s.c != MAP_CHANNELS || !ts_same(s, change->t.shape) || !ts_same(level->t.shape, (ts_shape){s.n, 1, 1, 3}))
-        return ag_fail(tape, TS_INVALID,
-                       "change_maps: %s is not [N,H,W,9] with a change of that shape and three levels",
+    if (s.c != MAP_CHANNELS || !ts_same(s, change->t.shape) || !ts_same(level->t.shape, (ts_shape){s.n, 1, 1, LEVELS}))
+        return ag_fail(tape, TS_INVALID, "change_maps: %s is not [N,H,W,9] with a change of that shape and four levels",
                        ag_shape_text(text, s));
     return ag_apply(tape, &op_change_maps, 3, in, s, NULL, 0);
 }
