@@ -8,12 +8,13 @@
 
 void *ts_memory(size_t bytes)
 {
-    const size_t line = 64, huge = (size_t)2 << 20, align = bytes >= 2 * huge ? huge : line;
+    const size_t line = 64, huge = (size_t)2 << 20, align = bytes >= huge / 2 ? huge : line;
     if (bytes > SIZE_MAX - align) return NULL;
     void *p = aligned_alloc(align, (bytes + align - 1) / align * align);
 #ifdef MADV_HUGEPAGE
-    if (p && align == huge)
-        (void)madvise(p, bytes / huge * huge, MADV_HUGEPAGE); /* a hint: without it the block is only slower */
+    /* A huge page is cleared in the time of a quarter of its small ones: half of one is worth it. A hint: without it
+     * the block is only slower. */
+    if (p && align == huge) (void)madvise(p, (bytes + huge / 2) / huge * huge, MADV_HUGEPAGE);
 #endif
     return p;
 }
