@@ -76,8 +76,13 @@ static ag_value *pixels(ag_tape *tape, const nn_model *model, ag_value *photo, a
     const ts_shape s = photo->t.shape;
     ag_value *to = room(tape, (ts_shape){s.n, s.h, s.w, nn_detail_writes(&model->arch)});
     const ts_mark mark = ag_scope_begin(tape);
+    const int r = model->arch.g_unshuffle, fine = model->param[l->detail[2].weight].dim[0] / (r * r);
+    ag_value *shuffled = room(tape, (ts_shape){s.n, s.h, s.w, fine});
+    const ts_mark inner = ag_scope_begin(tape);
     y = nn_conv(tape, model, l->detail[2], y, 1, TS_PAD_ZERO, NN_LEAK_G);
-    y = ag_depth_to_space(tape, y, model->arch.g_unshuffle);
+    ag_into(tape, shuffled);
+    y = ag_depth_to_space(tape, y, r);
+    ag_scope_end(tape, inner, NULL, 0);
     y = nn_conv_with_constants(tape, model, l->detail[3], y, ag_concat(tape, photo, nn_coordinates(tape, s.n, s.h)), 1,
                                TS_PAD_REPLICATE, NN_LEAK_G);
     ag_into(tape, to);
