@@ -1,12 +1,13 @@
 #include "autograd/tape.h"
 #include "autograd/op.h"
 #include "autograd/tape_internal.h"
-#include "tensor/memory.h"
 #include "tensor/scratch.h"
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+enum { LISTS = 4096 }; /* bytes of tape->moving at first: lists of what scopes keep */
 
 /* packs: the tape's to release, also after failure; NULL after an error. */
 static ag_tape *create(bool gradients, ag_packs *packs, ts_status *st)
@@ -21,7 +22,7 @@ static ag_tape *create(bool gradients, ag_packs *packs, ts_status *st)
     tape->compute.exact = true;
     tape->packs = packs;
     tape->arena = ts_arena_create(0, st);
-    tape->moving = tape->arena ? ts_arena_create(0, st) : NULL;
+    tape->moving = tape->arena ? ts_arena_create(LISTS, st) : NULL;
     if (!tape->moving) ag_tape_destroy(&tape);
     return tape;
 }
@@ -89,7 +90,7 @@ ag_value *ag_fail(ag_tape *tape, ts_code code, const char *format, ...)
     return NULL;
 }
 
-static ag_value *no_memory(ag_tape *tape, const char *what)
+ag_value *ag_no_memory(ag_tape *tape, const char *what)
 {
     return ag_fail(tape, TS_NOMEM, "no memory for %s (the tape already holds %zu MiB); use smaller images or batches",
                    what, ts_arena_used(tape->arena) >> 20);
@@ -117,7 +118,7 @@ ag_value *ag_new_value(ag_tape *tape, ts_tensor t, float *grad)
     if (tape->status.code != TS_OK) return NULL;
     size_t born = ts_arena_used(tape->arena);
     ag_held *held = ts_arena_alloc(tape->arena, sizeof *held);
-    if (!held) return no_memory(tape, "a value");
+    if (!held) return ag_no_memory(tape, "a value");
     *held = (ag_held){{t, grad, grad != NULL, grad != NULL}, born};
     return &held->v;
 }
@@ -154,7 +155,7 @@ static void note_place(ag_tape *tape, float *grad)
         size_t *p = realloc(tape->watch.place, (size_t)more * sizeof *p);
         if (p) tape->watch.place = p;
         if (!g || !p) {
-            no_memory(tape, "the list of parameters");
+            ag_no_memory(tape, "the list of parameters");
             return;
         }
         tape->watch.capacity = more;
@@ -175,7 +176,7 @@ ag_value *ag_empty(ag_tape *tape, ts_shape shape)
     ag_value *v = ag_new_value(tape, (ts_tensor){0}, NULL); /* the header first: one order for values and their data */
     if (!v) return NULL;
     v->t = ts_new(tape->arena, shape);
-    if (!v->t.data) return no_memory(tape, "a value's data");
+    if (!v->t.data) return ag_no_memory(tape, "a value's data");
     return v;
 }
 
@@ -190,7 +191,7 @@ bool ag_record(ag_tape *tape, ag_node *node)
     if (tape->nodes == tape->node_capacity) {
         const size_t more = tape->node_capacity ? 2 * tape->node_capacity : 256;
         ag_node **grown = realloc(tape->node, more * sizeof *grown);
-        if (!grown) return no_memory(tape, "the list of operations");
+        if (!grown) return ag_no_memory(tape, "the list of operations");
         tape->node = grown;
         tape->node_capacity = more;
     }
@@ -223,7 +224,7 @@ ag_value *ag_apply(ag_tape *tape, const ag_op *op, int inputs, ag_value *const *
     ag_value *v = result(tape, op, out);
     ag_node *node = ts_arena_zalloc(tape->arena, 1, sizeof *node);
     void *copy = attr_size ? ts_arena_alloc(tape->arena, attr_size) : NULL;
-    if (!v || !node || (attr_size && !copy)) return no_memory(tape, op->name);
+    if (!v || !node || (attr_size && !copy)) return ag_no_memory(tape, op->name);
     if (attr_size) memcpy(copy, attr, attr_size);
     *node = (ag_node){.op = op, .inputs = inputs, .out = v, .attr = copy};
     for (int i = 0; i < inputs; i++) {
@@ -242,7 +243,7 @@ float *ag_grad_target(ag_tape *tape, ag_value *v, bool *accumulate)
     if (!v->grad) {
         v->grad = ts_arena_alloc(tape->arena, (size_t)ts_count(v->t.shape) * sizeof(float));
         if (!v->grad) {
-            no_memory(tape, "a gradient");
+            ag_no_memory(tape, "a gradient");
             return NULL;
         }
     }
@@ -303,52 +304,13 @@ const float *ag_packed(ag_tape *tape, const ts_conv *c, ts_conv_use use, const f
 {
     const float *packed = tape->passing ? ag_packs_pass(tape->packs, c, use, weight, tape->arena)
                                         : ag_packs_find(tape->packs, c, use, weight);
-    if (!packed) no_memory(tape, "packed weights");
+    if (!packed) ag_no_memory(tape, "packed weights");
     return packed;
 }
 
 void ag_pass(ag_tape *tape, bool passing) { tape->passing = passing && !tape->gradients; }
 
 void ag_halves_from(ag_tape *tape, ag_halves halves, void *user) { ag_packs_halves(tape->packs, halves, user); }
-
-ts_mark ag_scope_begin(ag_tape *tape) { return ts_arena_mark(tape->arena); }
-
-void ag_scope_end(ag_tape *tape, ts_mark mark, ag_value **keep, int count)
-{
-    if (tape->gradients) return;
-    ts_mark moving = ts_arena_mark(tape->moving);
-    /* Out of the way first, back in afterwards: what is kept may be larger than the space before it. */
-    struct {
-        ts_shape shape;
-        float *data;
-    } *kept = ts_arena_zalloc(tape->moving, (size_t)(count > 0 ? count : 1), sizeof *kept);
-    for (int i = 0; kept && i < count; i++) {
-        if (!keep[i] || ((const ag_held *)keep[i])->born < mark.total) continue;
-        size_t bytes = (size_t)ts_count(keep[i]->t.shape) * sizeof(float);
-        kept[i].shape = keep[i]->t.shape;
-        kept[i].data = ts_arena_alloc(tape->moving, bytes);
-        if (!kept[i].data) {
-            kept = NULL;
-            break;
-        }
-        ts_memory_copy(kept[i].data, keep[i]->t.data, bytes, tape->compute.threads);
-    }
-    if (!kept) { /* nothing is lost: the memory stays taken */
-        no_memory(tape, "the values that a scope keeps");
-        ts_arena_release(tape->moving, moving);
-        return;
-    }
-    ts_arena_release(tape->arena, mark);
-    for (int i = 0; i < count; i++) {
-        if (!kept[i].data) continue;
-        keep[i] = ag_empty(tape, kept[i].shape);
-        if (keep[i])
-            ts_memory_copy(keep[i]->t.data, kept[i].data, (size_t)ts_count(kept[i].shape) * sizeof(float),
-                           tape->compute.threads);
-    }
-    ts_arena_release(tape->moving, moving);
-    if (ts_arena_used(tape->moving) == 0) ts_arena_reset(tape->moving); /* several chunks become one */
-}
 
 const ag_node *ag_node_of(const ag_tape *tape, const ag_value *v)
 {

@@ -1,4 +1,4 @@
-/* What the tape is made of: for autograd/tape.c and autograd/checkpoint.c alone. */
+/* What the tape is made of: for autograd/tape.c, scope.c and checkpoint.c alone. */
 #ifndef AG_TAPE_INTERNAL_H
 #define AG_TAPE_INTERNAL_H
 #include "autograd/packs.h"
@@ -11,7 +11,7 @@ typedef struct ag_held {
 } ag_held;
 
 struct ag_tape {
-    ts_arena *arena, *moving; /* moving: what a scope keeps, while the arena is released */
+    ts_arena *arena, *moving; /* moving: what a scope keeps and cannot be moved at once, while the arena is released */
     ag_packs *packs;
     bool gradients, frozen, passing;
     ts_compute compute;
@@ -32,6 +32,8 @@ struct ag_tape {
     } watch;
 };
 
+/* Fails the tape for want of memory for what; NULL. */
+ag_value *ag_no_memory(ag_tape *tape, const char *what);
 /* A leaf; grad (NULL: none is wanted) is where its gradient goes. */
 ag_value *ag_new_value(ag_tape *tape, ts_tensor t, float *grad);
 /* Forward or backward of a node, with a record for the sink of autograd/trace.h. */

@@ -3,6 +3,7 @@
 #include "infer/api.h"
 #include "infer/estimate.h"
 #include "infer/tiles.h"
+#include "nn/weights/file.h"
 #include "nn/weights/weights.h"
 #include "render/render.h"
 #include "tensor/maps.h"
@@ -44,6 +45,8 @@ void lgd_options_init(lgd_options *options, size_t size)
 int lgd_trained_iterations(const lgd_model *model) { return model->net->arch.iterations; }
 
 int lgd_usual_iterations(const lgd_model *model, int photos) { return nn_arch_steps(&model->net->arch, photos); }
+
+uint64_t lgd_model_hash(const lgd_model *model) { return nn_file_hash(model->net->file); }
 
 void lgd_model_single(lgd_model *model) { model->net->g_once = true; }
 

@@ -5,6 +5,7 @@
 #include "infer/lgd.h"
 #include "tensor/status.h"
 #include <stdbool.h>
+#include <stdint.h>
 
 /* Checks the arguments. encoded: maps are in the encoding of tensor/maps.h (infer/estimate.h), else as infer/lgd.h has
  * them. */
@@ -13,6 +14,9 @@ ts_code lgd_model_estimate(lgd_model *model, const lgd_photo *photo, int photos,
 
 /* Bytes that such an estimate holds at once, at most, beside its photographs and maps. */
 double lgd_model_bytes(const lgd_model *model, int side, const lgd_options *options);
+
+/* Of the bytes of its weights' file (tensor/hash.h). */
+uint64_t lgd_model_hash(const lgd_model *model);
 
 /* Called before any estimate: there will be a single one. Its packed weights of g are not kept. */
 void lgd_model_single(lgd_model *model);

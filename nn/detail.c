@@ -3,7 +3,6 @@
 #include "nn/layers.h"
 #include "ops.h"
 #include "render/losses.h"
-#include "tensor/memory.h"
 #include "tensor/team.h"
 #include <stddef.h>
 
@@ -36,18 +35,9 @@ ag_value *nn_coordinates(ag_tape *tape, int n, int side)
     return v;
 }
 
-/* [N, g_size, g_size, ...]: the channels of the full size's pixels, square by square. */
-static ag_value *squares(ag_tape *tape, const nn_model *model, ag_value *seen, ag_value *features)
-{
-    const nn_layers *l = model->layers;
-    ag_value *y = nn_conv(tape, model, l->detail[0], seen, 1, TS_PAD_ZERO, NN_LEAK_G);
-    y = nn_conv(tape, model, l->detail[1], ag_concat(tape, y, features), 1, TS_PAD_ZERO, NN_LEAK_G);
-    for (int i = 0; i < model->arch.g_trunk; i++) {
-        ag_value *change = nn_conv(tape, model, l->trunk[i][0], y, 2, TS_PAD_ZERO, NN_LEAK_G);
-        y = ag_add(tape, y, nn_conv(tape, model, l->trunk[i][1], change, 1, TS_PAD_ZERO, 1));
-    }
-    return nn_conv(tape, model, l->detail[2], y, 1, TS_PAD_ZERO, NN_LEAK_G);
-}
+/* Where a result goes that outlives the scope in which it is made: NULL on a tape with gradients, which has no scopes.
+ */
+static ag_value *room(ag_tape *tape, ts_shape s) { return ag_gradients(tape) ? NULL : ag_empty(tape, s); }
 
 /* What is made next of v takes v's place where nobody asks for v again. */
 static ag_value *in_place(ag_tape *tape, ag_value *v)
@@ -56,21 +46,64 @@ static ag_value *in_place(ag_tape *tape, ag_value *v)
     return v;
 }
 
+/* [N, g_size, g_size, g_detail]: what squares of the full size's pixels are made of. */
+static ag_value *squares(ag_tape *tape, const nn_model *model, ag_value *seen, ag_value *features)
+{
+    const nn_layers *l = model->layers;
+    if (!seen || !features) return NULL;
+    const ts_shape s = seen->t.shape;
+    ag_value *to = room(tape, (ts_shape){s.n, s.h, s.w, model->arch.g_detail});
+    ts_mark mark = ag_scope_begin(tape);
+    ag_value *y = nn_conv(tape, model, l->detail[0], seen, 1, TS_PAD_ZERO, NN_LEAK_G);
+    y = ag_concat(tape, y, features);
+    ag_into(tape, to);
+    y = nn_conv(tape, model, l->detail[1], y, 1, TS_PAD_ZERO, NN_LEAK_G);
+    ag_scope_end(tape, mark, NULL, 0);
+    for (int i = 0; i < model->arch.g_trunk; i++) {
+        mark = ag_scope_begin(tape);
+        ag_value *change = nn_conv(tape, model, l->trunk[i][0], y, 2, TS_PAD_ZERO, NN_LEAK_G);
+        change = nn_conv(tape, model, l->trunk[i][1], change, 1, TS_PAD_ZERO, 1);
+        y = ag_add(tape, in_place(tape, y), change);
+        ag_scope_end(tape, mark, NULL, 0);
+    }
+    return y;
+}
+
+/* The channels of the full size's pixels, square by square, then as pixels: [N, S, S, nn_detail_writes]. */
+static ag_value *pixels(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y)
+{
+    const nn_layers *l = model->layers;
+    const ts_shape s = photo->t.shape;
+    ag_value *to = room(tape, (ts_shape){s.n, s.h, s.w, nn_detail_writes(&model->arch)});
+    const ts_mark mark = ag_scope_begin(tape);
+    const int r = model->arch.g_unshuffle, fine = model->param[l->detail[2].weight].dim[0] / (r * r);
+    ag_value *shuffled = room(tape, (ts_shape){s.n, s.h, s.w, fine});
+    const ts_mark inner = ag_scope_begin(tape);
+    y = nn_conv(tape, model, l->detail[2], y, 1, TS_PAD_ZERO, NN_LEAK_G);
+    ag_into(tape, shuffled);
+    y = ag_depth_to_space(tape, y, r);
+    ag_scope_end(tape, inner, NULL, 0);
+    y = nn_conv_with_constants(tape, model, l->detail[3], y, ag_concat(tape, photo, nn_coordinates(tape, s.n, s.h)), 1,
+                               TS_PAD_REPLICATE, NN_LEAK_G);
+    ag_into(tape, to);
+    y = nn_conv(tape, model, l->detail[4], y, 1, TS_PAD_REPLICATE, 1);
+    ag_scope_end(tape, mark, NULL, 0);
+    return y;
+}
+
+/* guess: NULL, or where maps and spread go. */
 static bool full_size(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y, ag_value *coarse,
                       nn_guess *guess)
 {
-    const nn_layers *l = model->layers;
     const int framed = model->arch.channels + NN_FRAME;
-    y = ag_depth_to_space(tape, y, model->arch.g_unshuffle);
-    if (!y || !coarse) return false;
-    const int n = y->t.shape.n, side = y->t.shape.h;
-    y = nn_conv_with_constants(tape, model, l->detail[3], y, ag_concat(tape, photo, nn_coordinates(tape, n, side)), 1,
-                               TS_PAD_REPLICATE, NN_LEAK_G);
-    y = nn_conv(tape, model, l->detail[4], y, 1, TS_PAD_REPLICATE, 1);
+    if (!photo || !y || !coarse) return false;
+    y = pixels(tape, model, photo, y);
     ag_value *added = ag_shading_frame(tape, ag_channels(tape, y, 0, framed));
-    ag_value *sum = in_place(tape, ag_resize_smooth(tape, coarse, side, side));
+    ag_into(tape, guess->maps);
+    ag_value *sum = in_place(tape, ag_resize_smooth(tape, coarse, photo->t.shape.h, photo->t.shape.w));
     sum = in_place(tape, ag_add(tape, sum, added));
     guess->maps = ag_tanh(tape, sum);
+    ag_into(tape, guess->spread);
     if (model->arch.spread) guess->spread = ag_channels(tape, y, framed, NN_SPREADS);
     return guess->maps && (guess->spread || !model->arch.spread);
 }
@@ -78,15 +111,10 @@ static bool full_size(ag_tape *tape, const nn_model *model, ag_value *photo, ag_
 /* Image k of v. */
 static ag_value *image(ag_tape *tape, const ag_value *v, int k)
 {
+    if (!v) return NULL;
     ts_shape one = v->t.shape;
     one.n = 1;
     return ag_constant(tape, ts_view(v->t.data + (int64_t)k * ts_count(one), one));
-}
-
-static void put_image(const ag_tape *tape, const ag_value *one, int k, ag_value *all)
-{
-    const int64_t count = ts_count(one->t.shape);
-    ts_memory_copy(all->t.data + k * count, one->t.data, (size_t)count * sizeof(float), ag_compute(tape)->threads);
 }
 
 /* One image after the other: at the full size there is much of each. */
@@ -98,11 +126,9 @@ static bool full_size_of_each(ag_tape *tape, const nn_model *model, const ag_val
     if (model->arch.spread) guess->spread = ag_empty(tape, (ts_shape){n, side, side, NN_SPREADS});
     for (int k = 0; k < n && !ag_status(tape)->code; k++) {
         const ts_mark mark = ag_scope_begin(tape);
-        nn_guess one = {0};
-        if (full_size(tape, model, image(tape, photo, k), image(tape, y, k), image(tape, coarse, k), &one)) {
-            put_image(tape, one.maps, k, guess->maps);
-            if (one.spread) put_image(tape, one.spread, k, guess->spread);
-        }
+        nn_guess one = {.maps = image(tape, guess->maps, k)};
+        if (model->arch.spread) one.spread = image(tape, guess->spread, k);
+        full_size(tape, model, image(tape, photo, k), image(tape, y, k), image(tape, coarse, k), &one);
         ag_scope_end(tape, mark, NULL, 0);
     }
     return !ag_status(tape)->code;
@@ -111,9 +137,7 @@ static bool full_size_of_each(ag_tape *tape, const nn_model *model, const ag_val
 bool nn_detail(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *seen, ag_value *features,
                ag_value *coarse, nn_guess *guess)
 {
-    const ts_mark mark = ag_scope_begin(tape);
     ag_value *y = squares(tape, model, seen, features);
-    ag_scope_end(tape, mark, &y, 1);
     if (!y || !coarse) return false;
     return ag_gradients(tape) ? full_size(tape, model, photo, y, coarse, guess)
                               : full_size_of_each(tape, model, photo, y, coarse, guess);

@@ -43,25 +43,43 @@ typedef struct turn_job {
     float *to;
 } turn_job;
 
+/* A row of orientation k turned back, times part, into to or added to it. from: its first pixel, next: from pixel to
+ * pixel. */
+static inline __attribute__((always_inline)) void turn_back_row(const turn_job *j, int k, const float *from,
+                                                                ptrdiff_t next, const int channels, const bool add,
+                                                                float *to)
+{
+    const float part = 1 / (float)j->count; /* a power of two */
+    const int v = j->vector;
+    for (int x = 0; x < j->side; x++, from += next, to += channels) {
+        float turned[2], old[2] = {0};
+        if (v >= 0) {
+            normal_back(k, from + v, turned);
+            if (add) memcpy(old, to + v, sizeof old);
+        }
+        for (int c = 0; c < channels; c++) to[c] = add ? to[c] + from[c] * part : from[c] * part;
+        for (int c = 0; c < 2 && v >= 0; c++) to[v + c] = add ? old[c] + turned[c] * part : turned[c] * part;
+    }
+}
+
 static void turn_back_rows(const void *job, int64_t begin, int64_t end)
 {
     const turn_job *j = job;
-    const int side = j->side, channels = j->channels, v = j->vector;
-    const float part = 1 / (float)j->count; /* a power of two */
-    for (int64_t i = begin * side; i < end * side; i++) {
-        float *to = j->to + i * channels;
-        for (int k = 0; k < j->count; k++) {
+    const int side = j->side, channels = j->channels;
+    for (int64_t i = begin; i < end; i++)
+        for (int n = 0; n < j->count; n++) {
+            const int k = orientations[n];
             int y, x;
-            place(orientations[k], side, (int)(i / side), (int)(i % side), &y, &x);
-            const float *from = j->from + (((int64_t)k * side + y) * side + x) * channels;
-            float turned[2];
-            if (v >= 0) normal_back(orientations[k], from + v, turned);
-            for (int c = 0; c < channels; c++) {
-                const float value = v >= 0 && c - v >= 0 && c - v < 2 ? turned[c - v] : from[c];
-                to[c] = k ? to[c] + value * part : value * part;
-            }
+            place(k, side, (int)i, 0, &y, &x);
+            const float *from = j->from + (((int64_t)n * side + y) * side + x) * channels;
+            const ptrdiff_t next = (ptrdiff_t)(k & 4 ? (k & 2 ? -side : side) : k & 1 ? -1 : 1) * channels;
+            float *to = j->to + i * side * channels;
+            /* Loops of a known length: those of the maps and of their errors. */
+            if (channels == MAP_CHANNELS && n) turn_back_row(j, k, from, next, MAP_CHANNELS, true, to);
+            else if (channels == MAP_CHANNELS) turn_back_row(j, k, from, next, MAP_CHANNELS, false, to);
+            else if (channels == NN_SPREADS && n) turn_back_row(j, k, from, next, NN_SPREADS, true, to);
+            else turn_back_row(j, k, from, next, channels, n > 0, to);
         }
-    }
 }
 
 /* [1, S, S, channels]: the mean over orientations of from [count, S, S, channels], turned back; the vector in two

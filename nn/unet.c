@@ -35,12 +35,15 @@ static ag_value *repeated(ag_tape *tape, ag_value *x, int n)
 static ag_value *seen_by(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions)
 {
     const int r = model->arch.g_unshuffle, n = photo ? photo->t.shape.n : 0;
+    const ts_mark mark = ag_scope_begin(tape);
     ag_value *x = photo;
     if (r > 1) {
         x = ag_space_to_depth(tape, x, r);
         x = x ? ag_concat(tape, x, nn_coordinates(tape, n, x->t.shape.h)) : NULL;
     }
-    return conditions ? ag_concat(tape, x, repeated(tape, conditions, n)) : x;
+    if (conditions) x = ag_concat(tape, x, repeated(tape, conditions, n));
+    ag_scope_end(tape, mark, &x, 1);
+    return x;
 }
 
 static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, nn_guess *guess)

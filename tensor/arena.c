@@ -1,5 +1,7 @@
 #include "tensor/arena.h"
 #include "tensor/memory.h"
+#include "tensor/threads.h"
+#include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,6 +17,8 @@ struct ts_arena {
     } chunk[MAX_CHUNKS];
     int chunks;
     size_t at, used; /* the chunk in use and the bytes taken from it */
+    size_t fetched;  /* bytes of the first chunk whose pages are there, if it was reserved */
+    bool reserved;
     size_t total, peak;
 };
 
@@ -41,6 +45,7 @@ static void free_chunks(ts_arena *a)
     for (int i = 0; i < a->chunks; i++) free(a->chunk[i].base);
     a->chunks = 0;
     a->at = a->used = 0;
+    a->reserved = false;
 }
 
 void ts_arena_destroy(ts_arena **arena)
@@ -70,6 +75,18 @@ static int add_chunk(ts_arena *a, size_t bytes)
     return 1;
 }
 
+/* The pages of a reserved chunk come some at a time, one by each thread: what an operation needs of new pages its first
+ * number would bring by one thread, and two threads in one page clear it twice. */
+static void fetch(ts_arena *a)
+{
+    const size_t each = CHUNK_STEP, threads = (size_t)ts_threads(), step = each * (threads < 8 ? threads : 8),
+                 size = a->chunk[0].size;
+    size_t to = (a->used + step - 1) / step * step;
+    if (to > size) to = size;
+    ts_memory_fetch(a->chunk[0].base + a->fetched, to - a->fetched);
+    a->fetched = to;
+}
+
 void *ts_arena_alloc(ts_arena *a, size_t bytes)
 {
     if (bytes > SIZE_MAX / 4) return NULL;
@@ -85,6 +102,7 @@ void *ts_arena_alloc(ts_arena *a, size_t bytes)
     }
     void *p = a->chunk[a->at].base + a->used;
     a->used += bytes;
+    if (a->reserved && a->at == 0 && a->used > a->fetched) fetch(a);
     a->total += bytes;
     if (a->total > a->peak) a->peak = a->total;
     return p;
@@ -111,7 +129,8 @@ void ts_arena_reserve(ts_arena *a, size_t bytes)
 {
     if (a->total > 0 || bytes > SIZE_MAX / 4 || (a->chunks > 0 && a->chunk[0].size >= bytes)) return;
     free_chunks(a);
-    add_chunk(a, bytes);
+    a->reserved = add_chunk(a, bytes);
+    a->fetched = 0;
 }
 
 void ts_arena_reset(ts_arena *a)

@@ -2,6 +2,7 @@
 #include "tensor/kernels/elementwise.h"
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 static void put(float *p, double x, bool accumulate) { *p = (float)(accumulate ? *p + x : x); }
 static double sigmoid(double x) { return 1 / (1 + exp(-x)); }
@@ -117,14 +118,16 @@ static void gru_backward(int64_t pixels, int c, const float *saved, const float 
     }
 }
 
-static void from_half(int64_t n, const uint16_t *x, float *y)
+static void from_half(int64_t n, const void *x, float *y)
 {
     for (int64_t i = 0; i < n; i++) {
-        const int exponent = x[i] >> 10 & 31, fraction = x[i] & 0x3ff;
+        uint16_t h;
+        memcpy(&h, (const char *)x + sizeof h * (size_t)i, sizeof h);
+        const int exponent = h >> 10 & 31, fraction = h & 0x3ff;
         const double size = exponent == 31 ? fraction ? NAN : INFINITY
             : exponent                     ? ldexp(1024 + fraction, exponent - 25)
                                            : ldexp(fraction, -24);
-        y[i] = (float)copysign(size, x[i] & 0x8000 ? -1 : 1);
+        y[i] = (float)copysign(size, h & 0x8000 ? -1 : 1);
     }
 }
 

@@ -6,14 +6,17 @@
 #include <string.h>
 #include <sys/mman.h>
 
+enum { HUGE = 2 << 20 }; /* bytes of a huge page */
+
 void *ts_memory(size_t bytes)
 {
-    const size_t line = 64, huge = (size_t)2 << 20, align = bytes >= 2 * huge ? huge : line;
+    const size_t line = 64, huge = HUGE, align = bytes >= huge / 2 ? huge : line;
     if (bytes > SIZE_MAX - align) return NULL;
     void *p = aligned_alloc(align, (bytes + align - 1) / align * align);
 #ifdef MADV_HUGEPAGE
-    if (p && align == huge)
-        (void)madvise(p, bytes / huge * huge, MADV_HUGEPAGE); /* a hint: without it the block is only slower */
+    /* A huge page is cleared in the time of a quarter of its small ones: half of one is worth it. A hint: without it
+     * the block is only slower. */
+    if (p && align == huge) (void)madvise(p, (bytes + huge / 2) / huge * huge, MADV_HUGEPAGE);
 #endif
     return p;
 }
@@ -29,6 +32,18 @@ void *ts_memory_sparse(size_t bytes)
 #endif
     return p;
 }
+
+static void fetch_pages(const void *job, int64_t begin, int64_t end)
+{
+#ifdef MADV_POPULATE_WRITE
+    char *p = (char *)(uintptr_t)job;
+    (void)madvise(p + begin, (size_t)(end - begin), MADV_POPULATE_WRITE); /* a hint: pages come when they are written */
+#else
+    (void)job, (void)begin, (void)end;
+#endif
+}
+
+void ts_memory_fetch(void *p, size_t bytes) { ts_for(0, (int64_t)bytes, HUGE, fetch_pages, p); }
 
 enum { PART = 128 << 10 };
 

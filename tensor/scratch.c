@@ -57,11 +57,21 @@ static void grow(scratch *s, int slot, size_t bytes)
     s->size[slot] = bytes;
 }
 
+/* Powers of two while they are small: one layer after the other asks for a little more, and new memory has new pages.
+ */
+static size_t roomy(size_t bytes)
+{
+    const size_t page = 4096, small = (size_t)4 << 20;
+    size_t room = page;
+    while (room < bytes && room < small) room *= 2;
+    return room >= bytes ? room : (bytes + page - 1) / page * page;
+}
+
 void *ts_scratch(int slot, size_t bytes)
 {
     scratch *s = own_scratch();
     if (s->size[slot] < bytes) {
-        bytes = (bytes + 4095) / 4096 * 4096;
+        bytes = roomy(bytes);
         size_t before = atomic_load(&most[slot]);
         while (before < bytes && !atomic_compare_exchange_weak(&most[slot], &before, bytes)) continue;
         grow(s, slot, bytes);

@@ -12,6 +12,7 @@
 #include "infer/photograph.h"
 #include "render/scene.h"
 #include "tensor/budget.h"
+#include "tensor/hash.h"
 #include "tensor/threads.h"
 #include <math.h>
 #include <pthread.h>
@@ -323,6 +324,7 @@ static int work(const cl_command *given)
         return st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
     }
     int code = CL_FAILED;
+    uint64_t hash;
     bool published = false;
     const bool there = access(c->out, F_OK) == 0;
     cl_pipeline *pipeline = NULL;
@@ -331,12 +333,13 @@ static int work(const cl_command *given)
     if (lgd_model_path(c->model, known ? "multi" : LGD_DEFAULT_MODEL, weights, &st) != TS_OK)
         cl_failed("%s", st.message);
     else if (lgd_weights_published(weights, &published, &st) != TS_OK ||
-             (c->skip_existing && !(recipe = cl_recipe(c, weights, &st))))
+             (c->skip_existing &&
+              (ts_hash_file(weights, &hash, &st) != TS_OK || !(recipe = cl_recipe(c, weights, hash, &st)))))
         cl_failed("%s", st.message);
     else if (!(pipeline = cl_pipeline_start(&plan, c, recipe, published, &st)))
-        cl_failed("%s", st.message); /* decodes while the weights are read, once to be hashed */
-    else if (!recipe && !(recipe = cl_recipe(c, weights, &st))) cl_failed("%s", st.message);
+        cl_failed("%s", st.message); /* decodes while the weights are read */
     else if (!(r.model = lgd_load(weights, &error))) cl_failed("%s", error.message);
+    else if (!recipe && !(recipe = cl_recipe(c, weights, lgd_model_hash(r.model), &st))) cl_failed("%s", st.message);
     else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK ||
              (several && !(r.manifest = cl_manifest_open(&plan, c->out, &st))))
         cl_failed("%s", st.message);

@@ -5,9 +5,9 @@
 #include "cli/infer/item.h"
 #include "cli/infer/options.h"
 
-/* The lines of meta.txt that are the same for all photographs of a call: the weights and their hash, and every option
- * that changes a byte of what is written. NULL and st on failure; the caller frees it. */
-char *cl_recipe(const cl_command *c, const char *weights, ts_status *st);
+/* The lines of meta.txt that are the same for all photographs of a call: the weights' name and the hash of their bytes,
+ * and every option that changes a byte of what is written. NULL and st on failure; the caller frees it. */
+char *cl_recipe(const cl_command *c, const char *weights, uint64_t hash, ts_status *st);
 
 /* Whether the photograph's folder is complete, made from these very bytes by this recipe. Then *result gets what
  * cl_record_result finds in its meta.txt. */

@@ -8,6 +8,7 @@
 #include <string.h>
 
 enum { BAND = 4, LARGE = 1024 }; /* rows of the result at a time; pixels a side from which on threads pay */
+enum { FEW = 1 << 19 };          /* bytes of the filter and the rows that most photographs need at once */
 
 typedef struct cut {
     const io_photo_rows *photo;
@@ -85,7 +86,7 @@ ts_code io_read_photo_square(const char *path, int64_t max_pixels, int size, int
     ts_code code = io_photo_open(path, max_pixels, true, &photo, st);
     if (code) return code;
     const int side = photo.width < photo.height ? photo.width : photo.height;
-    ts_arena *arena = ts_arena_create(0, st);
+    ts_arena *arena = ts_arena_create(FEW, st);
     const ts_taps taps = arena ? ts_taps_triangle(arena, side, size) : (ts_taps){0};
     const cut c = {&photo, &taps, side, (photo.width - side) / 2, (photo.height - side) / 2};
     if (!taps.weight) code = ts_fail(st, TS_NOMEM, "no memory for the filter of %d to %d pixels", side, size);

@@ -1,5 +1,6 @@
 /* Opens a file of tensors, finds a tensor in it, and checks that names are unique. */
 #include "nn/weights/file_internal.h"
+#include "tensor/hash.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -64,6 +65,8 @@ void nn_file_fetch(const nn_file *file)
     (void)file;
 #endif
 }
+
+uint64_t nn_file_hash(const nn_file *file) { return ts_hash(file->map, file->size, 0); }
 
 enum { NAMES = 64 << 10 }; /* bytes of most files' names and metadata */
 

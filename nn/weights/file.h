@@ -70,6 +70,8 @@ const char *nn_file_meta_key(const nn_file *file, int i);       /* in the file's
 const nn_tensor *nn_file_find_real(const nn_file *file, const char *name, int rank, const int64_t *dim, ts_status *st);
 /* Reads the file's pages before they are asked for one by one. */
 void nn_file_fetch(const nn_file *file);
+/* Of the file's bytes: what ts_hash_file says of it. */
+uint64_t nn_file_hash(const nn_file *file);
 
 /* Copies tensor name into out (as many floats as dim says, row-major); TS_FORMAT when it is missing, has another shape
  * or is not of real numbers. F64 is rounded. */

@@ -109,9 +109,11 @@ static void load(const nn_tensor *e, const unsigned char *p, int64_t step, int n
     uint16_t half[CHUNK];
     switch (e->dtype) {
     case NN_F16:
-        if (step == 2 && !e->swapped) memcpy(half, p, sizeof *half * (size_t)n); /* as the models that ship are */
-        else
-            for (int i = 0; i < n; i++, p += step) half[i] = take16(p, e->swapped);
+        if (step == 2 && !e->swapped) { /* as the models that ship are */
+            ts_elementwise_k()->from_half(n, p, out);
+            break;
+        }
+        for (int i = 0; i < n; i++, p += step) half[i] = take16(p, e->swapped);
         ts_elementwise_k()->from_half(n, half, out);
         break;
     case NN_BF16:

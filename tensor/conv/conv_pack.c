@@ -1,6 +1,7 @@
 /* Packed weights: how many numbers, and in which order for each way. */
 #include "tensor/conv/conv.h"
 #include "tensor/conv/plan.h"
+#include "tensor/kernels/elementwise.h"
 #include "tensor/team.h"
 #include <stdlib.h>
 #include <string.h>
@@ -36,9 +37,8 @@ static void pack_part(const panels_job *j, int panel, int part)
     const int width = conv_transpose(j->c, j->w, j->forward, panel, begin, count, transposed);
     float *to = j->packed + (ptrdiff_t)panel * 2 * conv_lanes() * j->ic * j->taps;
     for (int t = 0; t < j->taps; t++)
-        for (int i = 0; i < count; i++)
-            memcpy(to + ((ptrdiff_t)t * j->ic + begin + i) * width,
-                   transposed + (i * j->taps + (j->forward ? t : j->taps - 1 - t)) * width, sizeof *to * (size_t)width);
+        ts_elementwise_k()->copy(count, width, transposed + (j->forward ? t : j->taps - 1 - t) * width,
+                                 (int64_t)j->taps * width, to + ((ptrdiff_t)t * j->ic + begin) * width, width, false);
 }
 
 static void pack_parts(const void *job, int64_t begin, int64_t end)

@@ -6,13 +6,8 @@
 
 void conv_take(const conv_weights *w, ptrdiff_t at, int count, float *to)
 {
-    uint16_t part[CONV_TRANSPOSED]; /* a file's halves are not aligned */
-    if (w->full) {
-        memcpy(to, w->full + at, sizeof *to * (size_t)count);
-        return;
-    }
-    memcpy(part, w->half + 2 * at, sizeof *part * (size_t)count);
-    ts_elementwise_k()->from_half(count, part, to);
+    if (w->full) memcpy(to, w->full + at, sizeof *to * (size_t)count);
+    else ts_elementwise_k()->from_half(count, w->half + 2 * at, to);
 }
 
 int conv_transpose(const ts_conv *c, const conv_weights *w, bool forward, int panel, int input, int inputs, float *to)

@@ -206,17 +206,32 @@ static inline uint32_t bits_of(float f)
     return bits;
 }
 
+#if VL == 16
+static void from_half(int64_t n, const void *x, float *y)
+{
+    const char *from = x;
+    int64_t i = 0;
+    for (; n - i >= VL; i += VL)
+        v_store(y + i, (vf)_mm512_cvtph_ps(_mm256_loadu_si256((const __m256i *)(const void *)(from + 2 * i))));
+    if (i == n) return;
+    const __mmask16 rest = (__mmask16)((1 << (n - i)) - 1);
+    _mm512_mask_storeu_ps(y + i, rest, _mm512_cvtph_ps(_mm256_maskz_loadu_epi16(rest, from + 2 * i)));
+}
+#else
 /* Without branches, so that the loop becomes one of vectors. */
-static void from_half(int64_t n, const uint16_t *restrict x, float *restrict y)
+static void from_half(int64_t n, const void *x, float *restrict y)
 {
     for (int64_t i = 0; i < n; i++) {
-        const uint32_t h = x[i], sign = (h & 0x8000) << 16, exponent = h >> 10 & 31, fraction = h & 0x3ff;
+        uint16_t bits16;
+        memcpy(&bits16, (const char *)x + 2 * i, sizeof bits16);
+        const uint32_t h = bits16, sign = (h & 0x8000) << 16, exponent = h >> 10 & 31, fraction = h & 0x3ff;
         const uint32_t usual = (exponent == 31 ? 255u : exponent + 112) << 23 | fraction << 13,
                        subnormal = bits_of((float)(int32_t)fraction * 0x1p-24f);
         const uint32_t bits = sign | (exponent ? usual : subnormal);
         memcpy(&y[i], &bits, sizeof bits);
     }
 }
+#endif
 
 const struct ts_elementwise_kernels TS_TABLE(elementwise) = {
     .leaky = leaky,

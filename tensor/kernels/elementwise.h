@@ -21,8 +21,8 @@ struct ts_elementwise_kernels {
     void (*selu)(int64_t n, const float *x, float *y);
     void (*selu_backward)(int64_t n, const float *y, const float *dy, float *dx, bool accumulate);
     void (*asinh)(int64_t n, float s, const float *x, float *y); /* y = asinh(s x) */
-    void (*from_half)(int64_t n, const uint16_t *x,
-                      float *y); /* y = x, whose bits are IEEE 754 binary16, exactly; NaNs stay such */
+    void (*from_half)(int64_t n, const void *x,
+                      float *y); /* y = x, IEEE 754 binary16 at any address, exactly; NaNs stay such */
     void (*add)(int64_t n, const float *a, const float *b, float *y);
     void (*scale)(int64_t n, float s, const float *x, float *y, bool accumulate); /* y (+)= s x */
 

@@ -1,5 +1,6 @@
 /* Weights files: what is written comes back, and no file that is something else does any harm. */
 #include "nn/weights/weights.h"
+#include "tensor/hash.h"
 #include "tensor/maps.h"
 #include "tensor/rng.h"
 #include "tests/test.h"
@@ -67,6 +68,8 @@ TEST(weights_round_trip_is_exact)
     CHECK((header + 8) % 64 == 0 && x[8] == '{', "the values begin at byte %llu", (unsigned long long)header + 8);
     nn_file *f = nn_safetensors_open(path, &st);
     CHECK(f && nn_file_count(f) == m->params, "%s", st.message);
+    uint64_t hash;
+    CHECK(!ts_hash_file(path, &hash, &st) && nn_file_hash(f) == hash, "another hash than the file's");
     CHECK(!strcmp(nn_file_meta(f, "run"), extra[0].value), "metadata '%s'", nn_file_meta(f, "run"));
     CHECK(!*nn_file_meta(f, "empty") && !nn_file_meta(f, "none"), "empty and missing metadata");
     for (int i = 0; i < m->params; i++)

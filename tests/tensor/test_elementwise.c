@@ -98,18 +98,18 @@ TEST(elementwise_twins)
     }
 }
 
-/* Every value there is, in one run and in short ones. */
+/* Every value there is, in one run and in short ones, at odd addresses. */
 TEST(elementwise_from_half_is_exact)
 {
     enum { ALL = 1 << 16, SHORT = 37 };
-    static uint16_t half[ALL];
+    static unsigned char bytes[1 + 2 * ALL], *half = bytes + 1;
     static float expected[ALL], got[ALL];
-    for (int i = 0; i < ALL; i++) half[i] = (uint16_t)i;
+    for (int i = 0; i < ALL; i++) memcpy(half + 2 * i, &(uint16_t){(uint16_t)i}, 2);
     ts_elementwise_naive.from_half(ALL, half, expected);
     EVERY_ISA for (int run = SHORT; run <= ALL; run += ALL - SHORT)
     {
         for (int i = 0; i < ALL; i += run)
-            ts_elementwise_k()->from_half(ALL - i < run ? ALL - i : run, half + i, got + i);
+            ts_elementwise_k()->from_half(ALL - i < run ? ALL - i : run, half + 2 * i, got + i);
         for (int i = 0; i < ALL; i++)
             CHECK(isnan(expected[i]) ? isnan(got[i]) && !signbit(got[i]) == !(i & 0x8000)
                                      : !memcmp(&got[i], &expected[i], sizeof got[i]),

@@ -14,11 +14,13 @@
 
 TEST(blocks_are_aligned_whole_and_refused)
 {
-    static const size_t sizes[] = {1, 63, 64, 1000, (4u << 20) - 1, 4u << 20, (4u << 20) + 1, (9u << 20) + 17};
+    static const size_t sizes[] = {
+        1, 63, 64, 1000, 1u << 20, (3u << 20) + 5, (4u << 20) - 1, 4u << 20, (4u << 20) + 1, (9u << 20) + 17};
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         unsigned char *p = ts_memory(sizes[i]);
         CHECK(p && (uintptr_t)p % 64 == 0, "%zu bytes", sizes[i]);
         memset(p, 0x5a, sizes[i]); /* the sanitizer sees a block that is too short */
+        ts_memory_fetch(p, sizes[i]);
         CHECK(p[0] == 0x5a && p[sizes[i] - 1] == 0x5a, "%zu bytes do not hold what was written", sizes[i]);
         free(p);
     }
