@@ -1,15 +1,17 @@
-/* PNG specification, third edition: chunks (5), the filter Average (9.2) and the zlib stream (10). */
+/* PNG specification, third edition: chunks (5), the filter Average (9.2) and the zlib stream (10). libdeflate wants all
+ * rows at once; of a picture that is too large for that they go through zlib's stream. */
 #include "data/image/png_pack.h"
-#include "data/image/runs.h"
 #include <libdeflate.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <zlib.h>
 
 enum {
-    PART = 1 << 20, /* bytes of the compressed stream from which on a chunk ends */
-    CHUNK = 12,     /* length, type, checksum */
-    AVERAGE = 3     /* of left and above: what is left is 3 to 10% smaller than by Paeth's */
+    AT_ONCE = 64 << 20, /* bytes of rows that are held together */
+    PART = 1 << 20,     /* of the compressed stream, a chunk where it comes in parts */
+    CHUNK = 12,         /* length, type, checksum */
+    AVERAGE = 3         /* of left and above: what matches are found in is 3 to 10% smaller than by Paeth's */
 };
 
 struct io_png_pack {
@@ -17,12 +19,12 @@ struct io_png_pack {
     size_t stride;        /* bytes of a row */
     int step;             /* of a pixel */
     unsigned char *above; /* the last row, behind a pixel of zeros */
-    unsigned char *rows;  /* filtered, each behind its filter's number, that are to be compressed together */
-    size_t filled, room;  /* bytes of rows */
+    unsigned char *rows;  /* filtered, each behind its filter's number: all of them, or the one that is put */
+    size_t filled, total; /* bytes of rows */
     unsigned char *file;
     size_t size, capacity;
-    size_t part; /* of the stream, behind size and a chunk's head */
-    io_runs stream;
+    bool at_once;
+    z_stream stream;
 };
 
 static ts_code no_memory(const io_png_pack *p, ts_status *st)
@@ -88,11 +90,12 @@ io_png_pack *io_png_pack_begin(const char *name, int width, int height, int chan
     const size_t step = (size_t)(channels * bits / 8), stride = (size_t)width * step;
     io_png_pack *p = calloc(1, sizeof *p);
     if (!p) return ts_fail(st, TS_NOMEM, "%s: out of memory", name), NULL;
-    *p = (io_png_pack){.name = name, .stride = stride, .step = (int)step};
-    p->room = stride + 1 > IO_RUNS_BLOCK ? stride + 1 : IO_RUNS_BLOCK / (stride + 1) * (stride + 1);
+    *p = (io_png_pack){.name = name, .stride = stride, .step = (int)step, .total = (stride + 1) * (size_t)height};
+    p->at_once = p->total <= AT_ONCE;
     p->above = calloc(step + stride, 1);
-    p->rows = malloc(p->room);
-    if (!p->above || !p->rows || !reserve(p, 4096)) {
+    p->rows = malloc(p->at_once ? p->total : stride + 1);
+    if (!p->above || !p->rows || !reserve(p, 4096) ||
+        (!p->at_once && deflateInit2(&p->stream, 1, Z_DEFLATED, 15, 9, Z_RLE) != Z_OK)) {
         no_memory(p, st);
         io_png_pack_free(&p);
         return NULL;
@@ -101,17 +104,29 @@ io_png_pack *io_png_pack_begin(const char *name, int width, int height, int chan
     return p;
 }
 
-/* The rows that are there go into the stream. */
-static ts_code compress(io_png_pack *p, bool last, ts_status *st)
+/* What has come out of the stream, at the file's end, as a chunk. */
+static void end_part(io_png_pack *p)
 {
-    if (!reserve(p, p->part + io_runs_most(p->filled) + 2 * CHUNK)) return no_memory(p, st);
-    p->part += io_runs_put(&p->stream, p->rows, p->filled, last, p->file + p->size + 8 + p->part);
-    p->filled = 0;
-    if (last || p->part >= PART) {
-        end_chunk(p, "IDAT", p->part);
-        p->part = 0;
+    const size_t size = (size_t)(p->stream.next_out - (p->file + p->size + 8));
+    if (size) end_chunk(p, "IDAT", size);
+    p->stream.next_out = NULL;
+}
+
+static ts_code stream(io_png_pack *p, unsigned char *from, size_t size, int flush, ts_status *st)
+{
+    p->stream.next_in = from;
+    p->stream.avail_in = (uInt)size;
+    for (;;) {
+        if (!p->stream.next_out) {
+            if (!reserve(p, PART + CHUNK)) return no_memory(p, st);
+            p->stream.next_out = p->file + p->size + 8;
+            p->stream.avail_out = PART;
+        }
+        const int state = deflate(&p->stream, flush);
+        if (state == Z_STREAM_END) end_part(p);
+        if (state == Z_STREAM_END || (flush == Z_NO_FLUSH && p->stream.avail_in == 0)) return TS_OK;
+        if (p->stream.avail_out == 0) end_part(p);
     }
-    return TS_OK;
 }
 
 ts_code io_png_pack_row(io_png_pack *p, const unsigned char *row, ts_status *st)
@@ -123,13 +138,31 @@ ts_code io_png_pack_row(io_png_pack *p, const unsigned char *row, ts_status *st)
     for (size_t i = 0; i < step; i++) to[i] = (unsigned char)(x[i] - above[i] / 2);
     for (size_t i = step; i < p->stride; i++) to[i] = (unsigned char)(x[i] - (x[i - step] + above[i]) / 2);
     memcpy(above, x, p->stride);
+    if (!p->at_once) return stream(p, p->rows, p->stride + 1, Z_NO_FLUSH, st);
     p->filled += p->stride + 1;
-    return p->filled == p->room ? compress(p, false, st) : TS_OK;
+    return TS_OK;
+}
+
+static ts_code compress_at_once(io_png_pack *p, ts_status *st)
+{
+    /* Higher levels find no more in filtered rows, and take longer. */
+    struct libdeflate_compressor *c = libdeflate_alloc_compressor(1);
+    const size_t most = c ? libdeflate_zlib_compress_bound(c, p->total) : 0;
+    if (!c || !reserve(p, most + 2 * CHUNK)) {
+        libdeflate_free_compressor(c);
+        return no_memory(p, st);
+    }
+    const size_t size = libdeflate_zlib_compress(c, p->rows, p->total, p->file + p->size + 8, most);
+    libdeflate_free_compressor(c);
+    end_chunk(p, "IDAT", size);
+    return TS_OK;
 }
 
 ts_code io_png_pack_end(io_png_pack *p, unsigned char **bytes, size_t *size, ts_status *st)
 {
-    if (compress(p, true, st)) return st->code;
+    ts_code code = p->at_once ? compress_at_once(p, st) : stream(p, p->rows, 0, Z_FINISH, st);
+    if (!code && !reserve(p, CHUNK)) code = no_memory(p, st);
+    if (code) return code;
     end_chunk(p, "IEND", 0);
     *bytes = p->file;
     *size = p->size;
@@ -142,6 +175,7 @@ void io_png_pack_free(io_png_pack **pack)
     io_png_pack *p = *pack;
     *pack = NULL;
     if (!p) return;
+    if (!p->at_once) deflateEnd(&p->stream);
     free(p->above);
     free(p->rows);
     free(p->file);
