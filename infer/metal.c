@@ -1,27 +1,11 @@
 #include "infer/metal.h"
+#include "nn/kind.h"
 #include "render/posterior.h"
 #include "tensor/maps.h"
 #include "tensor/team.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-#define DIFFUSE_OF_METAL 0.05f
-#define F0_OF_PLASTIC 0.04f
-
-typedef enum kind { AS_READ, METAL, DIELECTRIC } kind;
-
-static float encoded(float v) { return 2 * fminf(fmaxf(v, 0), 1) - 1; }
-
-static void become(kind k, int64_t pixels, int channels, float *maps)
-{
-    for (int64_t i = 0; i < pixels && k != AS_READ; i++, maps += channels)
-        for (int c = 0; c < 3; c++) {
-            const float diffuse = (maps[MAP_DIFFUSE + c] + 1) / 2, f0 = (maps[MAP_SPECULAR + c] + 1) / 2;
-            maps[MAP_DIFFUSE + c] = encoded(k == METAL ? DIFFUSE_OF_METAL : diffuse + f0 / LGD_METAL_F0);
-            maps[MAP_SPECULAR + c] = encoded(k == METAL ? f0 + LGD_METAL_F0 * diffuse : F0_OF_PLASTIC);
-        }
-}
 
 /* The pixels of maps and photographs that are looked at. */
 typedef struct sample {
@@ -45,23 +29,13 @@ static void take(rd_grid from, const lgd_metal_photos *p, const float *r0, int c
     }
 }
 
-/* What r0 is not. */
-static kind other_than(const sample *s, int channels)
-{
-    double more = 0;
-    for (int i = 0; i < s->grid.side * s->grid.side; i++)
-        for (int c = 0; c < 3; c++)
-            more += (double)s->r0[i * channels + MAP_SPECULAR + c] - (double)s->r0[i * channels + MAP_DIFFUSE + c];
-    return more > 0 ? DIELECTRIC : METAL;
-}
-
-/* The mean of log(1 + E) after the steps from maps of the kind. */
-static double misfit(const lgd_metal_photos *p, kind k, int steps, int channels, sample *s)
+/* The mean of log(1 + E) after the steps from maps as they are read, or of the other kind. */
+static double misfit(const lgd_metal_photos *p, bool other, bool metal, int steps, int channels, sample *s)
 {
     const int pixels = s->grid.side * s->grid.side, values = pixels * channels;
     float *mean = s->memory;
     memcpy(mean, s->r0, (size_t)values * sizeof *mean);
-    become(k, pixels, channels, mean);
+    if (other) nn_change_kind(metal, pixels, channels, mean);
     memcpy(s->maps, mean, (size_t)values * sizeof *mean);
     const rd_prior prior = {mean, s->deviation, nn_step_prior(p->known, p->given)};
     for (int t = 0; t <= steps; t++) { /* the last one looks at what the one before made */
@@ -102,9 +76,10 @@ ts_code lgd_tell_metal(rd_grid grid, const lgd_metal_photos *photos, const float
     if (!sample_create(rd_grid_on(rd_grid_full(side), grid.threads), photos->given, channels, &s))
         return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
     take(grid, photos, r0, channels, deviation, &s);
-    const kind other = other_than(&s, channels);
-    if (misfit(photos, other, steps, channels, &s) < LGD_METAL_SURE * misfit(photos, AS_READ, steps, channels, &s))
-        become(other, (int64_t)grid.side * grid.side, channels, r0);
+    const bool metal = nn_is_metal((int64_t)side * side, channels, s.r0);
+    if (misfit(photos, true, metal, steps, channels, &s) <
+        LGD_METAL_SURE * misfit(photos, false, metal, steps, channels, &s))
+        nn_change_kind(metal, (int64_t)grid.side * grid.side, channels, r0);
     free(s.memory);
     return TS_OK;
 }

@@ -12,13 +12,11 @@ typedef struct lgd_metal_photos {
 } lgd_metal_photos;
 
 /* LGD_METAL_SIDE x LGD_METAL_SIDE pixels of r0, [grid.side][grid.side][channels], take steps to the most probable maps
- * (rd_search), with deviation, [grid.side][grid.side][NN_SPREADS], as r0 reads and as were it of the other kind: a
- * dielectric, whose mean F0 is below its diffuse, with LGD_METAL_F0 of the diffuse in F0 and nearly black diffuse; a
- * metal with F0 in diffuse and the F0 of plastic. Where the mean over pixels of log(1 + E) is then less than
+ * (rd_search), with deviation, [grid.side][grid.side][NN_SPREADS], as r0 reads and as were it of the other kind
+ * (nn/kind.h). Where the mean over pixels of log(1 + E) is then less than
  * LGD_METAL_SURE of what it is as r0 reads, r0 becomes of that kind. Each pixel is compared with the photographs'
  * pixels at its centre. Fails where memory is out; r0 is then as it was. */
 #define LGD_METAL_SIDE 64
-#define LGD_METAL_F0 1.4f
 #define LGD_METAL_SURE 0.9
 ts_code lgd_tell_metal(rd_grid grid, const lgd_metal_photos *photos, const float *deviation, int steps, int channels,
                        float *r0, ts_status *st);

@@ -11,8 +11,6 @@ typedef struct places {
     float *to;
 } places;
 
-static float place(int i, int side) { return (2 * (float)i + 1) / (float)side - 1; }
-
 static void put_rows(const void *job, int64_t begin, int64_t end)
 {
     const places *p = job;
@@ -20,9 +18,9 @@ static void put_rows(const void *job, int64_t begin, int64_t end)
     const size_t row = (size_t)side * NN_COORDINATES;
     for (int64_t y = begin; y < end; y++) {
         float *to = p->to + (size_t)y * row;
-        const float down = place((int)(y % side), side);
+        const float down = nn_place((int)(y % side), side);
         for (int x = 0; x < side; x++) {
-            to[NN_COORDINATES * x] = y == begin ? place(x, side) : to[NN_COORDINATES * x - (ptrdiff_t)row];
+            to[NN_COORDINATES * x] = y == begin ? nn_place(x, side) : to[NN_COORDINATES * x - (ptrdiff_t)row];
             to[NN_COORDINATES * x + 1] = down;
         }
     }

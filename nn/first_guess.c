@@ -142,33 +142,29 @@ ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, co
     const ts_mark mark = ts_arena_mark(arena);
     const ts_code code = fit(grid, image, channels, taken->known, &prior, arena, g, st);
     ts_arena_release(arena, mark);
-    nn_first_guess_deviation(pixels, g->spread, taken->several, grid.threads, g->deviation);
+    for (int64_t i = GROUP_ROUGHNESS; i < pixels * NN_SPREADS && !taken->several; i += NN_SPREADS)
+        g->deviation[i] *= ROUGHNESS_DETAIL; /* its level is found */
     g->view = view_of(g->number, taken);
     return code;
 }
 
-/* h's revisions of r0 and spread. */
-static ts_code revise(ag_tape *tape, const nn_model *model, const ts_tensor *image, const nn_first_ask *ask,
-                      nn_first_guess *g, ts_status *st)
+/* h's revisions of r0 and spread, which are the tape's. */
+static ts_code revise(ag_tape *tape, const nn_model *model, const ts_tensor *image, ag_value *spread,
+                      const nn_first_ask *ask, nn_first_guess *g, ts_status *st)
 {
     const int size = image->shape.h, channels = model->arch.channels;
     const size_t pixels = (size_t)size * (size_t)size;
     const unsigned char known = (unsigned char)ask->taken.known;
-    nn_revision r = {.image = *image, .views = &g->view, .known = &known};
+    nn_revision r = {.image = *image, .views = &g->view, .known = &known, .spread = spread};
     r.maps = ag_constant(tape, ts_view(g->r0, (ts_shape){1, size, size, channels}));
-    r.spread = ag_constant(tape, ts_view(g->spread, (ts_shape){1, size, size, NN_SPREADS}));
-    while (g->revised < ask->revisions && (!ask->seen || ask->seen(g, ask->user))) {
-        const ts_mark mark = ag_scope_begin(tape);
-        if (!nn_revise(tape, model, &r)) {
-            *st = *ag_status(tape);
-            return st->code;
-        }
+    while (g->revised < ask->revisions && (!ask->seen || ask->seen(g, ask->user)) && nn_revise(tape, model, &r)) {
         memcpy(g->r0, r.maps->t.data, pixels * (size_t)channels * sizeof *g->r0);
-        memcpy(g->spread, r.spread->t.data, pixels * NN_SPREADS * sizeof *g->spread);
-        ag_value *keep[3] = {r.maps, r.spread, r.state};
-        ag_scope_end(tape, mark, keep, 3);
-        r.maps = keep[0], r.spread = keep[1], r.state = keep[2];
+        g->spread = r.spread->t.data;
         g->revised++;
+    }
+    if (ag_status(tape)->code) {
+        *st = *ag_status(tape);
+        return st->code;
     }
     if (g->revised > 0)
         deviations_of((int64_t)pixels, g->spread, F0_DETAIL, ROUGHNESS_DETAIL, REVISED, ag_compute(tape)->threads,
@@ -182,10 +178,9 @@ static ts_code make(ag_tape *tape, const nn_model *model, const nn_first_ask *as
     const size_t pixels = (size_t)size * (size_t)size, whole = (size_t)side * (size_t)side * 3;
     ag_value *small = ag_empty(tape, (ts_shape){1, size, size, 3});
     g->r0 = malloc(pixels * (size_t)model->arch.channels * sizeof *g->r0);
-    g->spread = malloc(pixels * NN_SPREADS * sizeof *g->spread);
     g->deviation = malloc(pixels * NN_SPREADS * sizeof *g->deviation);
     ts_tensor full = ts_new(ag_arena(tape), (ts_shape){1, side, side, 3});
-    if (!small || !g->r0 || !g->spread || !g->deviation || !full.data)
+    if (!small || !g->r0 || !g->deviation || !full.data)
         return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
     nn_clip((int64_t)whole, ask->image, full.data);
     if (side == size) memcpy(small->t.data, full.data, whole * sizeof(float));
@@ -205,12 +200,16 @@ static ts_code make(ag_tape *tape, const nn_model *model, const nn_first_ask *as
         return st->code;
     }
     ts_memory_copy(g->r0, guess.maps->t.data, pixels * (size_t)model->arch.channels * sizeof *g->r0, threads);
-    ts_memory_copy(g->spread, guess.spread->t.data, pixels * NN_SPREADS * sizeof *g->spread, threads);
     memcpy(scene, guess.scene->t.data, sizeof scene);
-    ag_scope_end(tape, mark, NULL, 0);
+    if (ask->revisions > 0) ag_scope_end(tape, mark, &guess.spread, 1); /* h takes g's memory */
+    if (ag_status(tape)->code) {
+        *st = *ag_status(tape);
+        return st->code;
+    }
+    g->spread = guess.spread->t.data;
     const ts_code code = nn_first_guess_settle(rd_grid_on(rd_grid_full(size), threads), model->arch.channels,
                                                small->t.data, scene, &ask->taken, ag_arena(tape), g, st);
-    return code ? code : revise(tape, model, &small->t, ask, g, st);
+    return code ? code : revise(tape, model, &small->t, guess.spread, ask, g, st);
 }
 
 ts_code nn_first_guess_make(ag_tape *tape, const nn_model *model, const nn_first_ask *ask, nn_first_guess *guess,
@@ -220,6 +219,7 @@ ts_code nn_first_guess_make(ag_tape *tape, const nn_model *model, const nn_first
     const ts_mark mark = ag_scope_begin(tape);
     const ts_code code = make(tape, model, ask, guess, st);
     ag_scope_end(tape, mark, NULL, 0);
+    guess->spread = NULL; /* it was the tape's */
     if (code) nn_first_guess_free(guess);
     return code;
 }
@@ -227,7 +227,6 @@ ts_code nn_first_guess_make(ag_tape *tape, const nn_model *model, const nn_first
 void nn_first_guess_free(nn_first_guess *guess)
 {
     free(guess->r0);
-    free(guess->spread);
     free(guess->deviation);
     *guess = (nn_first_guess){0};
 }

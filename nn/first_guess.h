@@ -5,9 +5,10 @@
 #include "nn/model.h"
 
 typedef struct nn_first_guess {
-    float *r0, *spread; /* [side][side][channels] and [side][side][NN_SPREADS], side = nn_arch_side: the maps and the
-                         * logarithms of their expected errors, as nn_guess has them */
-    float *deviation;   /* [side][side][NN_SPREADS]: the standard deviations that the steps believe */
+    float *r0;     /* [side][side][channels], side = nn_arch_side */
+    float *spread; /* [side][side][NN_SPREADS]: the logarithms of the maps' expected errors, as nn_guess has them; NULL
+                    * when the guess is made */
+    float *deviation; /* [side][side][NN_SPREADS]: the standard deviations that the steps believe */
     float number[RD_SCENE_NUMBERS];
     rd_view view; /* light and camera of number, those that are known as they were given */
     int revised;  /* r0 is R_revised */
@@ -25,7 +26,7 @@ typedef struct nn_taken {
  * numbers of the scene that are not known are the network's, then those of rd_scene_fit, whose prior they are; with
  * them it finds the level of r0's roughness. r0's diffuse is filled where the highlight hides it (nn/hidden_diffuse.h);
  * of a light that is not known a part of its place is taken for a slope of the sample (nn/lean.h). r0, spread and
- * deviation are the caller's. arena: for what it holds meanwhile. TS_NOMEM with st. */
+ * deviation are the caller's memory. arena: for what it holds meanwhile. TS_NOMEM with st. */
 ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, const float *scene, const nn_taken *taken,
                               ts_arena *arena, nn_first_guess *guess, ts_status *st);
 
@@ -45,6 +46,6 @@ ts_code nn_first_guess_make(ag_tape *tape, const nn_model *model, const nn_first
                             ts_status *st);
 void nn_first_guess_free(nn_first_guess *guess);
 
-/* The standard deviations that the steps believe, [pixels][NN_SPREADS], of spread. Serial but for large pixels. */
+/* The standard deviations that the steps believe, [pixels][NN_SPREADS], of spread. */
 void nn_first_guess_deviation(int64_t pixels, const float *spread, bool several, int threads, float *deviation);
 #endif

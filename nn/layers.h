@@ -96,6 +96,9 @@ enum { NN_REVISION_READS = 40, NN_REVISION_READS_AGAIN = 18 };
 int nn_g_reads(const nn_arch *a);
 int nn_detail_writes(const nn_arch *a);
 
+/* Of pixel i of side, in -1 .. 1. */
+static inline float nn_place(int i, int side) { return (2 * (float)i + 1) / (float)side - 1; }
+
 /* Every pixel's place, across and down, in -1 .. 1: [n, side, side, NN_COORDINATES]. */
 ag_value *nn_coordinates(ag_tape *tape, int n, int side);
 

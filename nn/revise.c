@@ -40,8 +40,6 @@ typedef struct one {
     int side, r;
 } one;
 
-static float place(int i, int side) { return (2 * (float)i + 1) / (float)side - 1; }
-
 static void put_pixel(const one *o, int64_t i, float *to)
 {
     for (int c = 0; c < 3; c++) {
@@ -71,8 +69,8 @@ static void put_rows(const void *job, int64_t begin, int64_t end)
             float *again = o->again + i * AGAIN;
             put_pixel(o, i, to);
             memcpy(again, to, MAPS * sizeof *to);
-            again[MAPS] = place(x, o->side);
-            again[MAPS + 1] = place(y, o->side);
+            again[MAPS] = nn_place(x, o->side);
+            again[MAPS + 1] = nn_place(y, o->side);
         }
         memcpy(to, o->conditions + k * NN_CONDITIONS, NN_CONDITIONS * sizeof *to);
     }
@@ -210,7 +208,8 @@ bool nn_revise(ag_tape *tape, const nn_model *model, nn_revision *r)
 double nn_revision_bytes(const nn_arch *a)
 {
     const double squares = (double)a->g_unshuffle * a->g_unshuffle, w = a->revise_width,
-                 held = NN_REVISION_READS + AGAIN + NN_CONDITIONS / squares;
+                 held = NN_REVISION_READS + AGAIN + NN_CONDITIONS / squares +
+        (a->revisions - 1) * (MAP_CHANNELS + NN_SPREADS + w / squares); /* and what those before left */
     const double filling = MAP_CHANNELS + 2 * NN_CONDITIONS / squares + 9 + 2 * MAP_CHANNELS + NN_SPREADS,
                  seeing = 20 * w / squares,
                  writing = w / squares + 2 * 12 + 16 + 3 * (MAP_CHANNELS + NN_FRAME + NN_SPREADS) +

@@ -156,15 +156,30 @@ static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
     return ag_change_maps(tape, in[0], in[1], in[2]);
 }
 
+/* Of four pixels the first ends at 1 in every value that a factor changes, the second has no diffuse. */
+static void at_the_ends(float *const *in, const void *user)
+{
+    (void)user;
+    for (int k = 0; k < 3; k++) {
+        in[0][MAP_DIFFUSE + k] = in[1][MAP_DIFFUSE + k] = 0.9f;
+        in[0][MAP_CHANNELS + MAP_DIFFUSE + k] = -1;
+        for (int p = 0; p < 4; p++) in[0][p * MAP_CHANNELS + MAP_SPECULAR + k] = p ? -0.5f : 0.9f;
+    }
+    in[0][MAP_ROUGHNESS] = 0.95f;
+    for (int k = 0; k < LEVELS; k++) in[2][k] = 0.2f;
+}
+
 static void cases(ag_gradcheck *check)
 {
-    static const ts_shape shapes[] = {{1, 1, 1, 9}, {2, 5, 3, 9}, {1, 9, 8, 9}};
+    static const ts_shape shapes[] = {{1, 1, 1, 9}, {2, 5, 3, 9}, {1, 9, 8, 9}, {1, 2, 2, 9}};
+    static const char *const labels[] = {"one pixel", "two images", "an image", "ends"};
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
-        ag_case c = {.label = i ? "images" : "one pixel",
+        ag_case c = {.label = labels[i],
                      .inputs = 3,
                      .shape = {shapes[i], shapes[i], {shapes[i].n, 1, 1, LEVELS}},
                      .lo = -0.6f,
-                     .hi = 0.2f, /* nothing ends at 1 */
+                     .hi = 0.2f, /* nothing ends at 1 by chance */
+                     .prepare = i == 3 ? at_the_ends : NULL,
                      .build = build};
         ag_gradcheck_run(check, &c);
     }

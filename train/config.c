@@ -259,6 +259,19 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
                        "model.revisions is %d: h learns over a fixed g and on whole patches, so train.g_rate and "
                        "train.window must be 0",
                        c->arch.revisions);
+    if (c->train.disturb > 0 && !(c->train.steps && c->arch.revisions > 0))
+        return ts_fail(
+            st, TS_INVALID,
+            "train.disturb is %g: it makes worse what h learns to revise, so model.revisions and train.steps "
+            "must be above 0",
+            c->train.disturb);
+    const int side = nn_arch_side(&c->arch);
+    if (c->train.steps && c->arch.revisions > 0 &&
+        (c->data.patch != side || (c->validate.every && c->validate.size != side)))
+        return ts_fail(
+            st, TS_INVALID,
+            "data.patch is %d and validate.size %d: revisions are of %d pixels a side, unshuffle times g_size",
+            c->data.patch, c->validate.size, side);
     const double narrow = c->data.fov_min, wide = c->data.fov_max;
     if ((narrow != 0 || wide != 0) && (narrow < 5 || wide < narrow))
         return ts_fail(st, TS_INVALID,

@@ -210,9 +210,8 @@ const tr_key tr_keys[] = {
     {"train", "iterations_max", TR_INT, AT(train.iterations_max), 0, 64, "0", NULL, false,
      "largest number of refinement steps; 0: model.iterations"},
     {"train", "disturb", TR_REAL, AT(train.disturb), 0, 1, "0", NULL, false,
-     "share of the materials whose R_0 is made worse before h learns to revise it (model.revisions): levels, spots "
-     "under "
-     "the highlight, metals"},
+     "share of the materials whose R_0 is made worse before h learns to revise it (model.revisions): the "
+     "levels of its maps, and what is a metal"},
     {"train", "given_min", TR_INT, AT(train.given_min), 0, NN_MAX_IMAGES, "0", NULL, false,
      "smallest number of photographs in a training step, drawn uniformly up to model.images; 0: always model.images"},
     {"train", "checkpoint_steps", TR_BOOL, AT(train.checkpoint_steps), 0, 1, "no", NULL, true,

@@ -54,12 +54,6 @@ bool tr_first_guesses(ag_tape *tape, const nn_model *model, const nn_input *in, 
     rd_view *views = ts_arena_alloc(ag_arena(tape), (size_t)count * sizeof *views);
     nn_guess said;
     if (!views) return ag_fail(tape, TS_NOMEM, "no memory for the scenes that are found"), false;
-    if (in->image.shape.h != side)
-        return ag_fail(tape, TS_INVALID,
-                       "photographs of %d pixels a side: revisions are learned at %d (data.patch, "
-                       "validate.size)",
-                       in->image.shape.h, side),
-               false;
     if (!nn_guess_from(tape, model, in, &said)) return false;
     if (disturbed && disturbed->config.train.disturb > 0)
         ts_tasks(0, count, disturb_one, &(disturbing){disturbed, said.maps->t.data, side});

@@ -75,6 +75,11 @@ TEST(trainer_teaches_revisions)
     CHECK(run(&c, on, false, 0, &st) == TS_OK, "%s", st.message);
     CHECK(same(one, on, NN_G), "g moved");
     CHECK(!same(one, on, NN_H), "h did not move");
-    c.train.g_rate = 0.5;
+    c.train.g_rate = 0;
+    c.data.patch = 128;
+    CHECK(run(&c, folder("both"), false, 0, &st) == TS_INVALID && strstr(st.message, "data.patch"), "%s", st.message);
+    c.data.patch = 64, c.arch.revisions = 0;
+    CHECK(run(&c, folder("both"), false, 0, &st) == TS_INVALID && strstr(st.message, "disturb"), "%s", st.message);
+    c.arch.revisions = 2, c.train.g_rate = 0.5;
     CHECK(run(&c, folder("both"), false, 0, &st) == TS_INVALID && strstr(st.message, "g_rate"), "%s", st.message);
 }
