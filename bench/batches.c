@@ -31,7 +31,8 @@ ts_code bench_batches(const char *path, ts_status *st)
                                   .hues = (float)c.data.hues,
                                   .relief = (float)c.data.relief,
                                   .blend = (float)c.data.blend,
-                                  .uneven = (float)c.data.uneven};
+                                  .uneven = (float)c.data.uneven,
+                                  .homogeneous = (float)c.data.homogeneous};
     float *images = malloc(pixels * 3 * sizeof *images);
     rd_view *views = malloc((size_t)batch * RD_LOSS_VIEWS * sizeof *views),
             *captures = malloc((size_t)batch * sizeof *captures);

@@ -1,5 +1,6 @@
 #include "cli/camera.h"
 #include "cli/cli.h"
+#include "cli/reflect.h"
 #include "render/ambient.h"
 #include "tensor/maps.h"
 #include <math.h>
@@ -22,6 +23,8 @@ const cl_camera_option cl_camera_options[CL_CAMERA_OPTIONS] = {
     {"flash", 0.5, AT(flash), "how far the flash may be beside the lens in patch widths"},
     {"flash-size", 0.1, AT(flash_size), "largest radius of the flash as a share of its distance"},
     {"glare", 0.5, AT(glare), "largest share of the light that the lens scatters"},
+    {"lobes", 0.5, AT(lobes), "largest share of the mirrored light in a second, broader lobe"},
+    {"soften", 1, AT(soften), "largest share of the relief that diffuse shading does not show"},
     {"ambient", 1, AT(ambient), "largest share of other light"},
     {"tone", 1, AT(tone), "largest strength of a tone curve"},
     {"sharpen", 3, AT(sharpen), "largest amount of sharpening"},
@@ -112,9 +115,8 @@ cl_shot cl_expose(const io_camera *camera, uint64_t seed, uint64_t index, const 
     memcpy(shot.view.light, rig.light, sizeof rig.light);
     shot.view.power = rig.power;
     const io_disk flash = io_camera_flash(camera, seed, index, shot.view.light[2]);
-    if (flash.radius > 0)
-        rd_render_disk(rd_grid_full(size), maps, MAP_CHANNELS, &shot.view, flash.radius, flash.turn, image);
-    else rd_render(rd_grid_full(size), maps, MAP_CHANNELS, &shot.view, false, image);
+    const io_reflection reflection = io_camera_reflection(camera, seed, index);
+    cl_reflect(&reflection, &shot.view, &flash, size, maps, image);
     if (camera->ambient > 0) shot.ambient = add_ambient(camera, seed, index, size, maps, &shot.view, image);
     const float metered = io_camera_meter(camera, seed, index, size, image);
     for (size_t i = 0; metered != 1 && i < (size_t)size * (size_t)size * 3; i++) image[i] *= metered;

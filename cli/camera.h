@@ -13,7 +13,7 @@ typedef struct cl_camera_option {
     const char *help;
 } cl_camera_option;
 
-enum { CL_CAMERA_OPTIONS = 18 };
+enum { CL_CAMERA_OPTIONS = 20 };
 extern const cl_camera_option cl_camera_options[CL_CAMERA_OPTIONS];
 float *cl_camera_value(io_camera *camera, int option);
 

@@ -42,6 +42,7 @@ typedef struct phone {
     float contrast, pivot, bend, knee, sharpen, radius;
     float flash_size, points_turn, glare;
     float automatic, aim, burnt;
+    float lobes, broad, soften;
 } phone;
 
 static phone draw_phone(uint64_t seed, uint64_t index)
@@ -70,6 +71,9 @@ static phone draw_phone(uint64_t seed, uint64_t index)
     p.automatic = ts_rng_uniform(&r);
     p.aim = ts_rng_range(&r, -1.2f, 1.2f);
     p.burnt = ts_rng_uniform(&r);
+    p.lobes = ts_rng_uniform(&r);
+    p.broad = ts_rng_range(&r, 1.3f, 2.5f);
+    p.soften = ts_rng_uniform(&r);
     return p;
 }
 
@@ -123,6 +127,16 @@ io_disk io_camera_flash(const io_camera *c, uint64_t seed, uint64_t index, float
 {
     const phone p = draw_phone(seed, index);
     return (io_disk){.radius = c->flash_size * sqrtf(p.flash_size) * distance, .turn = p.points_turn};
+}
+
+io_reflection io_camera_reflection(const io_camera *c, uint64_t seed, uint64_t index)
+{
+    const phone p = draw_phone(seed, index);
+    const float share = c->lobes * p.lobes;
+    return (io_reflection){.share = share,
+                           .broad = share > 0 ? p.broad : 1,
+                           .narrow = share > 0 ? powf(p.broad, -share / (1 - share)) : 1,
+                           .soft = 1 - c->soften * p.soften};
 }
 
 io_tone io_camera_tone(const io_camera *c, uint64_t seed, uint64_t index)

@@ -23,6 +23,8 @@ typedef struct io_camera {
     float flash;                 /* largest offset of the light from the camera parallel to the sample, patch widths */
     float flash_size;            /* largest radius of the flash's disk, as a share of its distance */
     float glare;                 /* largest share of the light that the lens scatters */
+    float lobes;                 /* largest share of the mirrored light that a broader lobe takes */
+    float soften;                /* largest share of the relief that diffuse shading does not show */
     float ambient;               /* largest other light, as a share of the flash's at the centre of a matt sample */
     float tone;                  /* largest strength of the tone curve; half of the photographs roll off highlights */
     float sharpen;               /* largest amount of the unsharp mask */
@@ -54,6 +56,15 @@ typedef struct io_disk {
     float radius, turn; /* patch widths at this distance; radians: of whatever pattern its points have */
 } io_disk;
 io_disk io_camera_flash(const io_camera *c, uint64_t seed, uint64_t index, float distance);
+
+/* How the sample reflects otherwise than the renderer's BRDF, as real ones do. The mirrored light has two lobes, share
+ * of it that of roughness r broad, the rest that of r narrow: broad^share narrow^(1 - share) = 1, so that the mean of
+ * their logarithms is r's. The diffuse light comes out of the material beside where it went in: it is shaded by
+ * normals of which n_x and n_y are soft times as long. 0, 1, 1, 1 with both keys at 0. */
+typedef struct io_reflection {
+    float share, broad, narrow, soft;
+} io_reflection;
+io_reflection io_camera_reflection(const io_camera *c, uint64_t seed, uint64_t index);
 
 /* The tone curve and the shoulder that io_camera_apply puts in. */
 io_tone io_camera_tone(const io_camera *c, uint64_t seed, uint64_t index);

@@ -25,6 +25,8 @@ io_camera tr_camera_of(const tr_config *c)
                        .flash = (float)c->data.flash,
                        .flash_size = (float)c->data.flash_size,
                        .glare = (float)c->data.glare,
+                       .lobes = (float)c->data.lobes,
+                       .soften = (float)c->data.soften,
                        .ambient = (float)c->data.ambient,
                        .tone = (float)c->data.tone,
                        .sharpen = (float)c->data.sharpen,

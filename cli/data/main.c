@@ -40,6 +40,7 @@ enum {
     OPT_RELIEF,
     OPT_BLEND,
     OPT_UNEVEN,
+    OPT_HOMOGENEOUS,
     OPT_FORMAT,
     OPT_SHEET,
     OPT_PHOTOGRAPHS,
@@ -64,6 +65,7 @@ static const struct option plain_options[] = {{"output", required_argument, NULL
                                               {"relief", required_argument, NULL, OPT_RELIEF},
                                               {"blend", required_argument, NULL, OPT_BLEND},
                                               {"uneven", required_argument, NULL, OPT_UNEVEN},
+                                              {"homogeneous", required_argument, NULL, OPT_HOMOGENEOUS},
                                               {"format", required_argument, NULL, OPT_FORMAT},
                                               {"contact-sheet", no_argument, NULL, OPT_SHEET},
                                               {"photographs", no_argument, NULL, OPT_PHOTOGRAPHS},
@@ -108,9 +110,9 @@ static void print_help(void)
     printf("\n"
            "      --hues X          share of the materials with other hues, 0 .. 1 (default 0)\n"
            "      --relief X        share of the materials with another relief, 0 .. 1 (default 0)\n"
-           "      --blend X         share of the materials that are a mean of themselves and another, 0 .. 1 (default "
-           "0)\n"
-           "      --uneven X        share of the materials that do not lie flat, 0 .. 1 (default 0)\n");
+           "      --blend X         share of the materials that are a mean of two, 0 .. 1 (default 0)\n"
+           "      --uneven X        share of the materials that do not lie flat, 0 .. 1 (default 0)\n"
+           "      --homogeneous X   share of the materials that are the same all over the patch, 0 .. 1 (default 0)\n");
     printf("\nPhotographs, largest values of what each draws:\n");
     for (int i = 0; i < CL_CAMERA_OPTIONS; i++) {
         io_camera least = cl_camera_default;
@@ -173,6 +175,7 @@ static int parse_options(int argc, char **argv, options *o)
         case OPT_HUES: code = parse_share("hues", optarg, 1, &o->procedural.hues); break;
         case OPT_BLEND: code = parse_share("blend", optarg, 1, &o->procedural.blend); break;
         case OPT_UNEVEN: code = parse_share("uneven", optarg, 1, &o->procedural.uneven); break;
+        case OPT_HOMOGENEOUS: code = parse_share("homogeneous", optarg, 1, &o->procedural.homogeneous); break;
         case OPT_RELIEF: code = parse_share("relief", optarg, 1, &o->procedural.relief); break;
         case OPT_FORMAT:
             if (!strcmp(optarg, "folders")) o->format = FORMAT_FOLDERS;

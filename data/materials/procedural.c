@@ -1,6 +1,7 @@
 #include "data/materials/procedural.h"
 #include "data/materials/blend.h"
 #include "data/materials/family.h"
+#include "data/materials/homogeneous.h"
 #include "data/materials/hues.h"
 #include "data/materials/relief.h"
 #include "data/materials/uneven.h"
@@ -155,6 +156,12 @@ static void make_uneven(const io_procedural *p, uint64_t index, io_canvas *c)
     if (cv_chance(c, p->uneven)) cv_uneven(c);
 }
 
+static void make_homogeneous(const io_procedural *p, uint64_t index, io_canvas *c)
+{
+    c->rng = ts_rng_make(p->seed, TS_STREAM_HOMOGENEOUS, index);
+    if (cv_chance(c, p->homogeneous)) cv_homogeneous(c);
+}
+
 void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
 {
     io_canvas c = {.size = m->size, .count = m->size * m->size, .pixel = 1.0f / (float)m->size};
@@ -189,6 +196,8 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
     exchange_relief(p, index, allowed, &c, mixed ? first : second);
     c.used = 0;
     make_uneven(p, index, &c);
+    c.used = 0;
+    make_homogeneous(p, index, &c);
     ts_rng hues = ts_rng_make(p->seed, TS_STREAM_HUES, index);
     if (ts_rng_uniform(&hues) < p->hues) cv_other_hues(&c, &hues);
     cv_write(&c, m->maps);

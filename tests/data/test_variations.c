@@ -240,3 +240,53 @@ TEST(uneven_materials_lean_and_keep_their_colours)
     CHECK(after > 0.04 && after < 0.12 && after > 3 * before, "they lean by %.3f, flat ones by %.3f", after, before);
     CHECK(steep > COUNT / 12, "%d of %d lean by more than .1", steep, COUNT);
 }
+
+/* RMS of the sine waves of one period a patch in the logarithm of the green diffuse value, and of the whole. */
+static double slow_waves(const io_material *m, double *all)
+{
+    double sum[4] = {0}, mean = 0, squares = 0;
+    const int count = m->size * m->size;
+    for (int i = 0; i < count; i++) {
+        const double turn = 6.28318530718 / m->size, x = turn * (i % m->size + 0.5), y = turn * (i / m->size + 0.5);
+        const double v = log(fmax((m->maps[i * MAP_CHANNELS + MAP_DIFFUSE + 1] + 1) / 2, 1e-3));
+        sum[0] += v * sin(x), sum[1] += v * cos(x), sum[2] += v * sin(y), sum[3] += v * cos(y);
+        mean += v / count, squares += v * v / count;
+    }
+    *all = sqrt(fmax(squares - mean * mean, 0));
+    return sqrt(2 * (sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2] + sum[3] * sum[3])) / count;
+}
+
+TEST(homogeneous_materials_vary_in_their_details_alone)
+{
+    enum { COUNT = 96, SIZE = 64 };
+    const io_procedural plain = {.seed = 5}, same = {.seed = 5, .homogeneous = 1},
+                        half = {.seed = 5, .homogeneous = 0.5f};
+    int halves = 0, changed = 0;
+    double slow[2] = {0}, deviation[2] = {0};
+    for (int i = 0; i < COUNT; i++) {
+        io_material a = material(SIZE), b = material(SIZE);
+        io_procedural_make(&plain, (uint64_t)i, &a);
+        io_procedural_make(&same, (uint64_t)i, &b);
+        bool diffuse = false;
+        for (int k = 0; k < SIZE * SIZE * MAP_CHANNELS; k++) {
+            const int map = k % MAP_CHANNELS;
+            const bool other = a.maps[k] != b.maps[k];
+            diffuse = diffuse || (other && map < MAP_NORMAL);
+            CHECK(!other || map < MAP_NORMAL || map == MAP_ROUGHNESS, "material %d: map value %d", i, map);
+        }
+        if (memcmp(a.maps, b.maps, values(SIZE) * sizeof(float))) halves += varies(&half, i, &a, &b);
+        if (diffuse) {
+            double all;
+            changed++;
+            slow[0] += slow_waves(&a, &all), deviation[0] += all;
+            slow[1] += slow_waves(&b, &all), deviation[1] += all;
+            CHECK(all > 0, "material %d is one colour", i);
+        }
+        io_material_free(&a);
+        io_material_free(&b);
+    }
+    CHECK(changed > COUNT / 3 && changed < COUNT, "%d of %d have other colours", changed, COUNT);
+    CHECK(halves > changed / 4, "%d of %d at a share of a half", halves, changed);
+    CHECK(slow[1] < 0.4 * slow[0], "slow waves of %g in place of %g", slow[1], slow[0]);
+    CHECK(deviation[1] > 0.6 * deviation[0], "a deviation of %g in place of %g", deviation[1], deviation[0]);
+}
