@@ -332,7 +332,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     revision_watch user = {e, &p, &o, false};
     const bool guesses = a->descent == NN_DESCENT_POSTERIOR && !e->g_alone;
     if (guesses)
-        code = lgd_guess_first(e, &p, &o, nn_arch_revisions(a, photos, steps),
+        code = lgd_guess_first(e->tape, e->net, &p, &o, nn_arch_revisions(a, photos, steps),
                                o.progress || e->seen ? see_revision : NULL, &user, &guess, st);
     else if (o.power) code = fit_power(e, &p, &o, &r0, st);
     if (!code && user.stopped) steps = guess.revised;

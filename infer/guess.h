@@ -1,7 +1,7 @@
 /* What a model that guesses the scene says of photographs before their steps. */
 #ifndef LGD_GUESS_H
 #define LGD_GUESS_H
-#include "infer/estimate.h"
+#include "infer/lgd.h"
 #include "nn/first_guess.h"
 
 /* What is estimated from, in the order in which models read it. */
@@ -17,7 +17,7 @@ typedef struct lgd_given {
 /* The first guess from the photograph that is taken most from above, after so many revisions; seen as in nn_first_ask.
  * given gets its view, its r0 and deviation, which guess owns, and where o->power is wanted the exposures of all. The
  * caller frees guess, after a failure too. */
-ts_code lgd_guess_first(const lgd_estimator *e, lgd_given *given, const lgd_options *o, int revisions,
+ts_code lgd_guess_first(ag_tape *tape, const nn_model *net, lgd_given *given, const lgd_options *o, int revisions,
                         bool (*seen)(const nn_first_guess *guess, void *user), void *user, nn_first_guess *guess,
                         ts_status *st);
 

@@ -1,5 +1,6 @@
 #include "nn/first_guess.h"
 #include "nn/clip.h"
+#include "nn/deviation.h"
 #include "nn/hidden_diffuse.h"
 #include "nn/lean.h"
 #include "nn/revise.h"
@@ -12,50 +13,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { PIXELS = 1 << 11 }; /* at a time, at least */
-
-/* Of F0's error, the part that a pixel may change by itself. What is not a level of the whole material is .35 of it; of
- * that, highlights leave the more in F0 the more is believed, and renderings do not tell .35 from .2. Several
- * photographs tell the level too. */
-#define F0_DETAIL 0.2f
-/* The same of the roughness once its level is found: highlights that a photograph cannot explain otherwise leave disks
- * and dots in it. */
-#define ROUGHNESS_DETAIL 0.5f
 /* Of the roughness' error, relative to the roughness, what the fit may explain by a level of the whole material. It is
  * less than is true, about 1: where the maps lack relief the fit leans to rougher materials, and where the field of
  * view is not known a narrower one looks like them. */
 #define ROUGHNESS_LEVEL 0.15
 #define ROUGHNESS_LEVEL_IN_KNOWN_VIEW 0.4
-/* By which the deviations are multiplied where several photographs follow. Much of R_0's error is one of the whole
- * material, and of that the mean absolute error of a pixel says too little. */
-#define SEVERAL 1.5f
-/* By which they are multiplied after a revision: h has read what a step would read, and it is not believed twice. */
-#define REVISED 0.5f
 #define LAPLACE 1.41421356f /* a Laplace density's standard deviation over its mean absolute error */
-
-typedef struct deviation_job {
-    const float *spread;
-    float *to, factor[NN_SPREADS];
-} deviation_job;
-
-static void deviations(const void *job, int64_t begin, int64_t end)
-{
-    const deviation_job *j = job;
-    for (int64_t i = begin * NN_SPREADS; i < end * NN_SPREADS; i++)
-        j->to[i] = j->factor[i % NN_SPREADS] * LAPLACE * NN_SPREAD_UNIT * expf(fminf(fmaxf(j->spread[i], -6), 4));
-}
-
-static void deviations_of(int64_t pixels, const float *spread, float f0, float roughness, float all, int threads,
-                          float *to)
-{
-    ts_for(threads, pixels, PIXELS, deviations, &(deviation_job){spread, to, {all, all, all * roughness, all * f0}});
-}
-
-void nn_first_guess_deviation(int64_t pixels, const float *spread, bool several, int threads, float *deviation)
-{
-    deviations_of(pixels, spread, several ? 1 : F0_DETAIL, several ? 1 : ROUGHNESS_DETAIL, several ? SEVERAL : 1,
-                  threads, deviation);
-}
 
 /* The numbers that are known have no error: the prior keeps them. */
 static void scene_prior(const float *said, const rd_view *view, int known, rd_scene_prior *prior)
@@ -135,15 +98,13 @@ ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, co
 {
     const int64_t pixels = (int64_t)grid.h * grid.w;
     rd_scene_prior prior;
-    deviations_of(pixels, g->spread, taken->several ? 1 : F0_DETAIL, 1, taken->several ? SEVERAL : 1, grid.threads,
-                  g->deviation);
+    nn_deviations(pixels, g->spread, (nn_belief){.several = taken->several}, grid.threads, g->deviation);
     scene_prior(scene, &taken->view, taken->known, &prior);
     level_prior(g, (size_t)pixels, channels, taken->known, &prior);
     const ts_mark mark = ts_arena_mark(arena);
     const ts_code code = fit(grid, image, channels, taken->known, &prior, arena, g, st);
     ts_arena_release(arena, mark);
-    for (int64_t i = GROUP_ROUGHNESS; i < pixels * NN_SPREADS && !taken->several; i += NN_SPREADS)
-        g->deviation[i] *= ROUGHNESS_DETAIL; /* its level is found */
+    if (!taken->several) nn_deviations_of_found_level(pixels, g->deviation);
     g->view = view_of(g->number, taken);
     return code;
 }
@@ -167,8 +128,8 @@ static ts_code revise(ag_tape *tape, const nn_model *model, const ts_tensor *ima
         return st->code;
     }
     if (g->revised > 0)
-        deviations_of((int64_t)pixels, g->spread, F0_DETAIL, ROUGHNESS_DETAIL, REVISED, ag_compute(tape)->threads,
-                      g->deviation);
+        nn_deviations((int64_t)pixels, g->spread, (nn_belief){.level_found = true, .revised = true},
+                      ag_compute(tape)->threads, g->deviation);
     return TS_OK;
 }
 

@@ -45,7 +45,4 @@ typedef struct nn_first_ask {
 ts_code nn_first_guess_make(ag_tape *tape, const nn_model *model, const nn_first_ask *ask, nn_first_guess *guess,
                             ts_status *st);
 void nn_first_guess_free(nn_first_guess *guess);
-
-/* The standard deviations that the steps believe, [pixels][NN_SPREADS], of spread. */
-void nn_first_guess_deviation(int64_t pixels, const float *spread, bool several, int threads, float *deviation);
 #endif

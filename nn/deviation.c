@@ -1,0 +1,44 @@
+#include "nn/deviation.h"
+#include "tensor/maps.h"
+#include "tensor/team.h"
+#include <math.h>
+
+enum { PIXELS = 1 << 11 }; /* at a time, at least */
+
+/* Of F0's error, the part that a pixel may change by itself. What is not a level of the whole material is .35 of it; of
+ * that, highlights leave the more in F0 the more is believed, and renderings do not tell .35 from .2. Several
+ * photographs tell the level too. */
+#define F0_DETAIL 0.2f
+/* The same of the roughness once its level is found: highlights that a photograph cannot explain otherwise leave disks
+ * and dots in it. */
+#define ROUGHNESS_DETAIL 0.5f
+/* By which the deviations are multiplied where several photographs follow. Much of R_0's error is one of the whole
+ * material, and of that the mean absolute error of a pixel says too little. */
+#define SEVERAL 1.5f
+/* By which they are multiplied after a revision: what h has read is not believed twice. */
+#define REVISED 0.5f
+#define LAPLACE 1.41421356f /* a Laplace density's standard deviation over its mean absolute error */
+
+typedef struct job {
+    const float *spread;
+    float *to, factor[NN_SPREADS];
+} job;
+
+static void deviations(const void *of, int64_t begin, int64_t end)
+{
+    const job *j = of;
+    for (int64_t i = begin * NN_SPREADS; i < end * NN_SPREADS; i++)
+        j->to[i] = j->factor[i % NN_SPREADS] * LAPLACE * NN_SPREAD_UNIT * expf(fminf(fmaxf(j->spread[i], -6), 4));
+}
+
+void nn_deviations(int64_t pixels, const float *spread, nn_belief b, int threads, float *deviation)
+{
+    const float all = (b.several ? SEVERAL : 1) * (b.revised ? REVISED : 1), f0 = b.several ? 1 : F0_DETAIL,
+                roughness = b.level_found && !b.several ? ROUGHNESS_DETAIL : 1;
+    ts_for(threads, pixels, PIXELS, deviations, &(job){spread, deviation, {all, all, all * roughness, all * f0}});
+}
+
+void nn_deviations_of_found_level(int64_t pixels, float *deviation)
+{
+    for (int64_t i = GROUP_ROUGHNESS; i < pixels * NN_SPREADS; i += NN_SPREADS) deviation[i] *= ROUGHNESS_DETAIL;
+}

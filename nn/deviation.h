@@ -1,0 +1,18 @@
+/* How far from what a model says the steps may go. */
+#ifndef NN_DEVIATION_H
+#define NN_DEVIATION_H
+#include "nn/model.h"
+
+typedef struct nn_belief {
+    bool several;     /* more photographs of the sample follow: deviations of F0 and roughness are with their level */
+    bool level_found; /* of the roughness, of one photograph */
+    bool revised;     /* by h, which has read what a step would read */
+} nn_belief;
+
+/* deviation [pixels][NN_SPREADS]: the standard deviations that the steps believe, of spread, the logarithms of the
+ * maps' expected errors as nn_guess has them. */
+void nn_deviations(int64_t pixels, const float *spread, nn_belief belief, int threads, float *deviation);
+
+/* From deviations of belief {0} to those with level_found. */
+void nn_deviations_of_found_level(int64_t pixels, float *deviation);
+#endif
