@@ -5,11 +5,10 @@ FILES is a quoted pattern of diffuse maps (sRGB), or of images of square panels 
 in linear light; a PANEL of q is the upper right quarter, v^(1/2.2). Prints quarter, median and three quarters of the
 RMS of the logarithm of the mean colour, from .4 to 1.6 and from 1.6 to 4 cycles a patch, mirrored at its borders, at
 128 x 128 pixels (docs/materials.md). Needs numpy and Pillow."""
-import glob
-import sys
-
 import numpy as np
 from PIL import Image
+
+from sets import sets
 
 SIDE = 128
 DARKEST = 0.004
@@ -40,14 +39,7 @@ def row(path, panel):
 
 
 def main():
-    if len(sys.argv) < 2 or any("=" not in a for a in sys.argv[1:]):
-        sys.exit(__doc__)
-    for argument in sys.argv[1:]:
-        name, files = argument.split("=", 1)
-        files, _, panel = files.partition(":")
-        paths = sorted(glob.glob(files))
-        if not paths:
-            sys.exit(f"evenness.py: {files}: no such file")
+    for name, paths, panel in sets("evenness.py", __doc__):
         rows = np.percentile([row(p, panel) for p in paths], [25, 50, 75], axis=0)
         print(f"{name} {len(paths)}", *("%.3f %.3f %.3f;" % tuple(band) for band in rows.T))
 

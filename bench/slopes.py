@@ -5,11 +5,10 @@ FILES is a quoted pattern of normal maps (y up or down), or of images of square 
 is one; a PANEL of q is the upper left quarter. Prints the medians of a patch's mean slope and of the RMS slope below 2,
 and from 2 to 8, 8 to 32 and 32 to 64 cycles a patch, at 128 x 128 pixels (docs/materials.md). Needs numpy and
 Pillow."""
-import glob
-import sys
-
 import numpy as np
 from PIL import Image
+
+from sets import sets
 
 SIDE = 128
 BANDS = (0.5, 2), (2, 8), (8, 32), (32, 64)
@@ -39,14 +38,7 @@ def row(path, panel):
 
 
 def main():
-    if len(sys.argv) < 2 or any("=" not in a for a in sys.argv[1:]):
-        sys.exit(__doc__)
-    for argument in sys.argv[1:]:
-        name, files = argument.split("=", 1)
-        files, _, panel = files.partition(":")
-        paths = sorted(glob.glob(files))
-        if not paths:
-            sys.exit(f"slopes.py: {files}: no such file")
+    for name, paths, panel in sets("slopes.py", __doc__):
         print(f"{name} {len(paths)}", *(f"{v:.3f}" for v in np.median([row(p, panel) for p in paths], axis=0)))
 
 

@@ -1,5 +1,6 @@
 #include "cli/reflect.h"
 #include "render/render.h"
+#include "render/scene_model.h"
 #include "tensor/maps.h"
 #include "tensor/scratch.h"
 #include <math.h>
@@ -16,11 +17,9 @@ static void render(const rd_view *view, const io_disk *flash, int size, const fl
 /* What is mirrored, by roughness times rough. */
 static void mirrored(const float *maps, size_t pixels, float rough, float *to)
 {
-    memcpy(to, maps, pixels * MAP_CHANNELS * sizeof *to);
-    for (size_t i = 0; i < pixels; i++, to += MAP_CHANNELS) {
-        for (int k = 0; k < 3; k++) to[MAP_DIFFUSE + k] = -1;
-        to[MAP_ROUGHNESS] = fminf((to[MAP_ROUGHNESS] + 1) * rough - 1, 1);
-    }
+    rd_scene_roughen((int64_t)pixels, maps, MAP_CHANNELS, logf(rough), to);
+    for (size_t i = 0; i < pixels * MAP_CHANNELS; i += MAP_CHANNELS)
+        for (int k = 0; k < 3; k++) to[i + MAP_DIFFUSE + (size_t)k] = -1;
 }
 
 /* What is diffuse: (1 - F0) times the map. A rough surface without F0 mirrors a ten thousandth. */
@@ -57,9 +56,11 @@ void cl_reflect(const io_reflection *how, const rd_view *view, const io_disk *fl
           *more = part + pixels * MAP_CHANNELS;
     mirrored(maps, pixels, how->narrow, part);
     render(view, flash, size, part, image);
-    mirrored(maps, pixels, how->broad, part);
-    render(view, &point, size, part, more);
-    mix(pixels * 3, 1 - how->share, how->share, more, image);
+    if (how->share > 0) {
+        mirrored(maps, pixels, how->broad, part);
+        render(view, &point, size, part, more);
+        mix(pixels * 3, 1 - how->share, how->share, more, image);
+    }
     diffuse(maps, pixels, how->soft, part);
     render(view, &point, size, part, more);
     mix(pixels * 3, 1, 1, more, image);

@@ -17,7 +17,6 @@ enum { PIXELS = 1 << 11 }; /* at a time, at least */
 #define SEVERAL 1.5f
 /* By which they are multiplied after a revision: what h has read is not believed twice. */
 #define REVISED 0.5f
-#define LAPLACE 1.41421356f /* a Laplace density's standard deviation over its mean absolute error */
 
 typedef struct job {
     const float *spread;
@@ -28,7 +27,7 @@ static void deviations(const void *of, int64_t begin, int64_t end)
 {
     const job *j = of;
     for (int64_t i = begin * NN_SPREADS; i < end * NN_SPREADS; i++)
-        j->to[i] = j->factor[i % NN_SPREADS] * LAPLACE * NN_SPREAD_UNIT * expf(fminf(fmaxf(j->spread[i], -6), 4));
+        j->to[i] = j->factor[i % NN_SPREADS] * NN_LAPLACE * NN_SPREAD_UNIT * expf(fminf(fmaxf(j->spread[i], -6), 4));
 }
 
 void nn_deviations(int64_t pixels, const float *spread, nn_belief b, int threads, float *deviation)

@@ -3,6 +3,8 @@
 #define NN_DEVIATION_H
 #include "nn/model.h"
 
+#define NN_LAPLACE 1.41421356f /* a Laplace density's standard deviation over its mean absolute error */
+
 typedef struct nn_belief {
     bool several;     /* more photographs of the sample follow: deviations of F0 and roughness are with their level */
     bool level_found; /* of the roughness, of one photograph */

@@ -18,7 +18,6 @@
  * view is not known a narrower one looks like them. */
 #define ROUGHNESS_LEVEL 0.15
 #define ROUGHNESS_LEVEL_IN_KNOWN_VIEW 0.4
-#define LAPLACE 1.41421356f /* a Laplace density's standard deviation over its mean absolute error */
 
 /* The numbers that are known have no error: the prior keeps them. */
 static void scene_prior(const float *said, const rd_view *view, int known, rd_scene_prior *prior)
@@ -27,7 +26,7 @@ static void scene_prior(const float *said, const rd_view *view, int known, rd_sc
     rd_scene_numbers(view, 0, 0, given);
     for (int i = 0; i < RD_SCENE_NUMBERS; i++) {
         prior->mean[i] = said[i];
-        prior->deviation[i] = LAPLACE * expf(fminf(fmaxf(said[RD_SCENE_NUMBERS + i], -6), 4));
+        prior->deviation[i] = NN_LAPLACE * expf(fminf(fmaxf(said[RD_SCENE_NUMBERS + i], -6), 4));
     }
     const bool camera = known & NN_KNOWN_CAMERA, light = known & NN_KNOWN_LIGHT, power = known & NN_KNOWN_POWER;
     const bool fixed[RD_SCENE_NUMBERS] = {[RD_SCENE_DISTANCE] = camera,

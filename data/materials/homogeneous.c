@@ -49,25 +49,29 @@ static void slow_part(const io_canvas *c, const basis *b, const float *logarithm
     }
 }
 
+static float *logarithm_of(io_canvas *c, const float *plane)
+{
+    float *to = cv_plane(c);
+    for (int i = 0; i < c->count; i++) to[i] = logf(nz_max(plane[i], DARKEST));
+    return to;
+}
+
 /* Parts of different materials side by side stay: evened out they would be shaded toward each other. */
-static bool one_material(const io_canvas *c, const float *plane)
+static bool one_material(const io_canvas *c, const float *logarithm)
 {
     double sum = 0, squares = 0;
     for (int i = 0; i < c->count; i++) {
-        const double logarithm = (double)logf(nz_max(plane[i], DARKEST));
-        sum += logarithm, squares += logarithm * logarithm;
+        const double v = (double)logarithm[i];
+        sum += v, squares += v * v;
     }
     const double mean = sum / c->count;
     return squares / c->count - mean * mean <= MOST * MOST;
 }
 
-static void even_out(const io_canvas *c, const basis *b, float amount, float least, float most, float *logarithm,
+static void even_out(const io_canvas *c, const basis *b, float amount, float least, float most, const float *logarithm,
                      float *slow, float *plane)
 {
-    for (int i = 0; i < c->count; i++) {
-        least = nz_min(least, plane[i]), most = nz_max(most, plane[i]);
-        logarithm[i] = logf(nz_max(plane[i], DARKEST));
-    }
+    for (int i = 0; i < c->count; i++) least = nz_min(least, plane[i]), most = nz_max(most, plane[i]);
     slow_part(c, b, logarithm, slow);
     for (int i = 0; i < c->count; i++) plane[i] = nz_clamp(plane[i] * expf(-amount * slow[i]), least, most);
 }
@@ -78,9 +82,11 @@ void cv_homogeneous(io_canvas *c)
     if (c->size < MODES) return; /* its waves would not fit a plane */
     const int mark = c->used;
     const basis b = make_basis(c);
-    float *logarithm = cv_plane(c), *slow = cv_plane(c), **d = c->diffuse;
-    if (one_material(c, d[0]) && one_material(c, d[1]) && one_material(c, d[2]))
-        for (int k = 0; k < 3; k++) even_out(c, &b, amount, 0.004f, 0.9f, logarithm, slow, d[k]);
-    if (one_material(c, c->roughness)) even_out(c, &b, amount, 0.02f, 1, logarithm, slow, c->roughness);
+    float *slow = cv_plane(c), *colour[3];
+    const float *rough = logarithm_of(c, c->roughness);
+    for (int k = 0; k < 3; k++) colour[k] = logarithm_of(c, c->diffuse[k]);
+    if (one_material(c, colour[0]) && one_material(c, colour[1]) && one_material(c, colour[2]))
+        for (int k = 0; k < 3; k++) even_out(c, &b, amount, 0.004f, 0.9f, colour[k], slow, c->diffuse[k]);
+    if (one_material(c, rough)) even_out(c, &b, amount, 0.02f, 1, rough, slow, c->roughness);
     cv_drop(c, mark);
 }
