@@ -9,7 +9,8 @@ enum {
     CELLS = 32, /* a side, at most */
     ROWS = 4    /* of pixels at a time, at least */
 };
-#define STIFFNESS 0.1       /* of the field between neighbours, beside a weight of 1 */
+#define STIFFNESS 1         /* of the field between neighbours, beside a weight of 1 */
+#define SHARPNESS 6         /* power of what is seen that weighs a cell */
 #define WEIGHT_LEAST 1e-4   /* keeps the field defined where nothing is seen */
 #define ALBEDO_LEAST 0.004f /* whose logarithm is taken: one step of 8 bits */
 #define BURNT_OUT 2.94f     /* sum of a pixel's three values, of which noise leaves .98 */
@@ -22,7 +23,7 @@ typedef struct pictures {
 
 typedef struct cells {
     int side;
-    double weight[CELLS * CELLS], log_albedo[3][CELLS * CELLS], change[3][CELLS * CELLS];
+    double seen[CELLS * CELLS], weight[CELLS * CELLS], log_albedo[3][CELLS * CELLS], change[3][CELLS * CELLS];
 } cells;
 
 typedef struct gather_job {
@@ -50,11 +51,11 @@ static void gather_rows(const void *job, int64_t begin, int64_t end)
             j->c->log_albedo[k][at] += (double)logf(fmaxf(albedo, ALBEDO_LEAST));
         }
         const float part = fminf(diffuse / fmaxf(full, 1e-6f), 1);
-        j->c->weight[at] += (double)(seen > BURNT_OUT ? BURNT_OUT_TELLS * part : part);
+        j->c->seen[at] += (double)(seen > BURNT_OUT ? BURNT_OUT_TELLS * part : part);
         count[at]++;
     }
     for (int i = (int)begin * side; i < (int)end * side; i++) {
-        j->c->weight[i] /= count[i];
+        j->c->seen[i] /= count[i];
         for (int k = 0; k < 3; k++) j->c->log_albedo[k][i] /= count[i];
     }
 }
@@ -64,8 +65,11 @@ static void gather(const pictures *p, int size, int channels, const float *maps,
 {
     double most = 0;
     ts_for(threads, c->side, 1, gather_rows, &(gather_job){p, size, channels, maps, image, c});
-    for (int i = 0; i < c->side * c->side; i++) most = fmax(most, c->weight[i]);
-    for (int i = 0; i < c->side * c->side; i++) c->weight[i] = pow(c->weight[i] / fmax(most, 1e-6), 3);
+    for (int i = 0; i < c->side * c->side; i++) most = fmax(most, c->seen[i]);
+    for (int i = 0; i < c->side * c->side; i++) {
+        c->seen[i] /= fmax(most, 1e-6);
+        c->weight[i] = pow(c->seen[i], SHARPNESS);
+    }
 }
 
 /* The lower band of the symmetric matrix: row i has entries i - side .. i, of which those of the neighbours before it
@@ -113,6 +117,25 @@ static void solve(int count, int side, const double *band, double *x)
     }
 }
 
+/* Of the logarithms, each as far as it is seen. */
+static double variance(const cells *c, const double *x)
+{
+    double weight = 0, sum = 0, squares = 0;
+    for (int i = 0; i < c->side * c->side; i++) {
+        const double w = c->weight[i] + WEIGHT_LEAST;
+        weight += w, sum += w * x[i], squares += w * x[i] * x[i];
+    }
+    const double mean = sum / weight;
+    return fmax(squares / weight - mean * mean, 0);
+}
+
+/* The part of a difference from the field that the highlight made: cells of a print or of tiles differ anyway. */
+static double part_hidden(double seen, double differ)
+{
+    const double hidden = (1 - seen) * (1 - seen);
+    return hidden > 0 ? hidden / (hidden + differ) : 0;
+}
+
 static void find_changes(cells *c, double *band)
 {
     const int count = c->side * c->side;
@@ -122,7 +145,8 @@ static void find_changes(cells *c, double *band)
         double *b = c->change[k];
         for (int i = 0; i < count; i++) b[i] = (c->weight[i] + WEIGHT_LEAST) * c->log_albedo[k][i];
         solve(count, c->side, band, b);
-        for (int i = 0; i < count; i++) b[i] = (1 - c->weight[i]) * (b[i] - c->log_albedo[k][i]);
+        const double differ = variance(c, c->log_albedo[k]);
+        for (int i = 0; i < count; i++) b[i] = part_hidden(c->seen[i], differ) * (b[i] - c->log_albedo[k][i]);
     }
 }
 

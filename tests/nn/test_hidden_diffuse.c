@@ -72,6 +72,18 @@ TEST(hidden_diffuse_leaves_what_is_seen)
         CHECK(fabsf((filled[i] + 1) / (maps[i] + 1) - 1) < 0.02f, "without a disk %g became %g", maps[i], filled[i]);
 }
 
+/* Stripes and ground under a highlight stay apart: were their differences not expected, both would come out alike. */
+TEST(hidden_diffuse_leaves_a_pattern)
+{
+    make(0.25f, 0.1f, 0);
+    for (int i = 0; i < PIXELS; i++)
+        for (int k = 0; k < 3; k++) maps[i * C + MAP_DIFFUSE + k] = i % SIDE / 16 % 2 ? 2 * 0.8f - 1 : 2 * 0.2f - 1;
+    fill(1, filled);
+    float most = 0;
+    for (int i = 0; i < PIXELS * C; i++) most = fmaxf(most, fabsf(logf((filled[i] + 1) / (maps[i] + 1))));
+    CHECK(most < 0.8f, "a value is changed by e^%g", most);
+}
+
 TEST(hidden_diffuse_is_the_same_for_any_number_of_threads)
 {
     static float again[PIXELS * C];
