@@ -41,7 +41,7 @@ static double misfit(const lgd_metal_photos *p, bool other, bool metal, int step
     for (int t = 0; t <= steps; t++) { /* the last one looks at what the one before made */
         const rd_search search = {s->best, s->misfit, t};
         rd_posterior_step(s->grid, s->maps, channels, p->views, (const float *const *)s->image, p->given, &prior,
-                          &search, s->step, NULL);
+                          rd_step_length(p->given, t), &search, s->step, NULL);
         for (int i = 0; i < values; i++)
             if (i % channels < MAP_CHANNELS) s->maps[i] += s->step[i];
     }

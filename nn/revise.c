@@ -108,7 +108,7 @@ static bool read_one(ag_tape *tape, const nn_revision *r, const ts_tensor *gradi
           *tried = step + MAP_CHANNELS * pixels, *deviation = tried + MAP_CHANNELS * pixels;
     nn_deviations((int64_t)pixels, spread, (nn_belief){.level_found = true}, threads, deviation);
     const rd_prior prior = {maps, deviation, nn_step_prior(r->known[n], 1)};
-    rd_posterior_step(grid, maps, MAP_CHANNELS, &r->views[n], &image, 1, &prior, NULL, step, NULL);
+    rd_posterior_step(grid, maps, MAP_CHANNELS, &r->views[n], &image, 1, &prior, 1, NULL, step, NULL);
     ts_for(threads, (int64_t)pixels * MAP_CHANNELS, TOGETHER, try_values, &(try_job){maps, step, tried});
     rd_render(grid, maps, MAP_CHANNELS, &r->views[n], true, before);
     rd_render(grid, tried, MAP_CHANNELS, &r->views[n], true, after);

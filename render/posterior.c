@@ -12,11 +12,12 @@ typedef struct step_job {
     const ts_shade_view *view;
     const rd_prior *prior;
     const rd_search *search;
-    float *step, *after;
+    float length, *step, *after;
 } step_job;
 
-float rd_search_length(int steps)
+float rd_step_length(int photographs, int steps)
 {
+    if (photographs == 1) return steps == 0 ? 1 : RD_STEP_LATER;
     return fminf(RD_SEARCH_FIRST * powf(RD_SEARCH_GROWTH, (float)steps), RD_SEARCH_LONGEST);
 }
 
@@ -29,22 +30,22 @@ static void step_rows(const void *job, int64_t begin, int64_t end)
         const float *part[RD_CAPTURE_VIEWS];
         ts_search search;
         if (j->search)
-            search = (ts_search){j->search->best + at * MAP_CHANNELS, j->search->misfit + at,
-                                 rd_search_length(j->search->steps), j->search->steps > 0};
+            search = (ts_search){j->search->best + at * MAP_CHANNELS, j->search->misfit + at, j->search->steps > 0};
         for (int k = 0; k < j->count; k++) part[k] = j->image[k] + at * 3;
         ts_posterior_k()->step(j->view, part, j->count, &row, &j->prior->scale, j->prior->mean + at * j->channels,
-                               j->prior->deviation + at * MAP_GROUPS, j->search ? &search : NULL,
+                               j->prior->deviation + at * MAP_GROUPS, j->length, j->search ? &search : NULL,
                                j->step + at * j->channels, j->after ? j->after + at * MAP_GROUPS : NULL);
     }
 }
 
 void rd_posterior_step(rd_grid grid, const float *maps, int channels, const rd_view *views, const float *const *image,
-                       int count, const rd_prior *prior, const rd_search *search, float *step, float *after)
+                       int count, const rd_prior *prior, float length, const rd_search *search, float *step,
+                       float *after)
 {
     ts_shade_view v[RD_CAPTURE_VIEWS];
     for (int k = 0; k < count; k++) v[k] = rd_shade_view(&views[k]);
     ts_for(grid.threads, grid.h, 1, step_rows,
-           &(step_job){grid, maps, image, channels, count, v, prior, search, step, after});
+           &(step_job){grid, maps, image, channels, count, v, prior, search, length, step, after});
 }
 
 void rd_prior_covariance(const double deviation[MAP_GROUPS], const ts_prior *prior,

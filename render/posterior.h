@@ -25,27 +25,31 @@ typedef struct rd_prior {
 
 /* Along the steps of several photographs, whose highlights bend what a step takes for straight. With the misfit
  *     E(R) = |r|^2 / S + (R - M)' Sigma^-1 (R - M)
- * maps whose E is not above that of any before become the best of their pixel, and its step is a part of delta; from
- * others the step goes back until TS_SEARCH_BACK of the way from the best is left. */
+ * maps whose E is not above that of any before become the best of their pixel, and its step goes on; from others it
+ * goes back until TS_SEARCH_BACK of the way from the best is left. */
 typedef struct rd_search {
     float *best, *misfit; /* [h, w, MAP_CHANNELS] and [h, w], of the caller; each step reads and writes them */
     int steps;            /* that have written them */
 } rd_search;
 
-/* The part of delta that the step after so many has, from RD_SEARCH_FIRST to RD_SEARCH_LONGEST: the first linear model
- * is made farthest from the end, and a long step along it leads to maps that no later step leaves. */
+/* The part of delta that the step after so many has. Of one photograph the first is whole, and the others are
+ * RD_STEP_LATER: on glossy pixels whole steps swing from one side to the other, and rounding decides where they end. Of
+ * several from RD_SEARCH_FIRST to RD_SEARCH_LONGEST: the first linear model is made farthest from the end, and a long
+ * step along it leads to maps that no later step leaves. */
+#define RD_STEP_LATER 0.5f
 #define RD_SEARCH_FIRST 0.3f
 #define RD_SEARCH_GROWTH 1.13f
 #define RD_SEARCH_LONGEST 0.7f
-float rd_search_length(int steps);
+float rd_step_length(int photographs, int steps);
 
-/* step: [h, w, channels], channels beyond the ninth are not written; where maps + step would leave [-1, 1] it ends
- * there. after (may be NULL): [h, w, MAP_GROUPS], what is left of the prior's standard deviations, of several values
- * the root of their mean variance. Views are RD_POINT, 1 <= count <= RD_CAPTURE_VIEWS; image[k] [h, w, 3] belongs to
- * views[k]. search: NULL, and of one photograph always: whole steps. Finite for finite maps. Threaded; the same bytes
- * for any number of threads. */
+/* step: length times delta, 0 < length <= 1, [h, w, channels], channels beyond the ninth are not written; where maps +
+ * delta would leave [-1, 1] delta ends there. after (may be NULL): [h, w, MAP_GROUPS], what is left of the prior's
+ * standard deviations, of several values the root of their mean variance. Views are RD_POINT,
+ * 1 <= count <= RD_CAPTURE_VIEWS; image[k] [h, w, 3] belongs to views[k]. search: NULL, and of one photograph always.
+ * Finite for finite maps. Threaded; the same bytes for any number of threads. */
 void rd_posterior_step(rd_grid grid, const float *maps, int channels, const rd_view *views, const float *const *image,
-                       int count, const rd_prior *prior, const rd_search *search, float *step, float *after);
+                       int count, const rd_prior *prior, float length, const rd_search *search, float *step,
+                       float *after);
 
 /* The prior's covariance. */
 void rd_prior_covariance(const double deviation[MAP_GROUPS], const ts_prior *prior,

@@ -198,7 +198,7 @@ V_INLINE void choose(const ts_search *search, int i, int n, vf misfit, const vf 
     const vi better = search->begun ? misfit <= least : v_seti(-1);
     for (int c = 0; c < MAP_CHANNELS; c++) {
         const vf back = search->begun ? (best[c] - now[c]) * (1 - TS_SEARCH_BACK) : x[c];
-        x[c] = v_select(better, x[c] * search->on, back);
+        x[c] = v_select(better, x[c], back);
         best[c] = search->begun ? v_select(better, now[c], best[c]) : now[c];
     }
     least = v_select(better, misfit, least);
@@ -207,8 +207,8 @@ V_INLINE void choose(const ts_search *search, int i, int n, vf misfit, const vf 
 }
 
 static void step(const ts_shade_view *views, const float *const *images, int count, const ts_shade_row *row,
-                 const ts_prior *prior, const float *mean, const float *deviation, const ts_search *search, float *to,
-                 float *after)
+                 const ts_prior *prior, const float *mean, const float *deviation, float length,
+                 const ts_search *search, float *to, float *after)
 {
     spread a;
     set_hue(prior, &a);
@@ -227,7 +227,8 @@ static void step(const ts_shade_view *views, const float *const *images, int cou
         load_deviation(deviation + (int64_t)i * MAP_GROUPS, n, &a);
         const bool informed = learn(views, images, count, row, i, n, &s, prior, &a, m, after != NULL, &e);
         if (informed) widen(&a, e.z, x);
-        for (int c = 0; c < MAP_CHANNELS; c++) x[c] = v_min(v_max(at[c] + (m[c] + x[c]), v_set(-1)), v_set(1)) - now[c];
+        for (int c = 0; c < MAP_CHANNELS; c++)
+            x[c] = (v_min(v_max(at[c] + (m[c] + x[c]), v_set(-1)), v_set(1)) - now[c]) * length;
         if (search) choose(search, i, n, (informed ? e.misfit : v_set(0)) + improbability(&a, m), now, x);
         v_store_pixels(to + first, row->channels, n, MAP_CHANNELS, x);
         if (!after) continue;

@@ -21,9 +21,9 @@ typedef struct ts_prior {
 #define TS_PRIOR_FADE 0.1f
 
 /* Of each pixel of a row, along the steps: the maps of the least misfit yet, [count, MAP_CHANNELS], and that misfit,
- * [count]. begun: they are of earlier steps. on: the part of a whole step that maps go on by. */
+ * [count]. begun: they are of earlier steps. */
 typedef struct ts_search {
-    float *best, *misfit, on;
+    float *best, *misfit;
     bool begun;
 } ts_search;
 /* Maps that fit worse than the best of their pixel go back until this part of the way from those is left. */
@@ -31,11 +31,11 @@ typedef struct ts_search {
 
 struct ts_posterior_kernels {
     /* step[count, channels]; mean[count, channels]; deviation[count, MAP_GROUPS]; after[count, MAP_GROUPS] and search
-     * may be NULL, search of one photograph is. images[v][count, 3] belongs to views[v]. Channels of step beyond the
-     * maps' are not written. */
+     * may be NULL, search of one photograph is. images[v][count, 3] belongs to views[v]. length: the part of a whole
+     * step that maps go on by. Channels of step beyond the maps' are not written. */
     void (*step)(const ts_shade_view *views, const float *const *images, int count, const ts_shade_row *row,
-                 const ts_prior *prior, const float *mean, const float *deviation, const ts_search *search, float *step,
-                 float *after);
+                 const ts_prior *prior, const float *mean, const float *deviation, float length,
+                 const ts_search *search, float *step, float *after);
 };
 TS_FAMILY(posterior)
 #endif

@@ -1,4 +1,4 @@
-/* The search along the steps of several photographs. */
+/* How far steps go: those of one photograph, and the search of several. */
 #include "tests/support/posterior.h"
 #include <math.h>
 
@@ -35,11 +35,11 @@ static job careful(uint64_t seed)
     return j;
 }
 
-static void step(job *j, const rd_search *search)
+static void step(job *j, float length, const rd_search *search)
 {
     const rd_prior prior = {j->mean, j->deviation, j->scale};
     rd_posterior_step(rd_grid_full(SIDE), j->maps, C, j->views, (const float *const *)j->image, j->count, &prior,
-                      search, j->step, NULL);
+                      length, search, j->step, NULL);
 }
 
 /* The sum of all pixels' misfits after as many whole steps. */
@@ -48,7 +48,7 @@ static double without_search(uint64_t seed)
     job j = careful(seed);
     double sum = 0;
     for (int t = 0; t < STEPS; t++) {
-        step(&j, NULL);
+        step(&j, 1, NULL);
         for (int i = 0; i < PIXELS * C; i++) j.maps[i] += j.step[i];
     }
     for (int p = 0; p < PIXELS; p++) sum += misfit(&j, p, j.maps + p * C);
@@ -68,9 +68,9 @@ TEST(search_keeps_the_best_maps_of_each_pixel)
     for (int i = 0; i < PIXELS * C; i++) kept[i] = j.maps[i];
     for (int t = 0; t < STEPS; t++) {
         float *whole = floats(PIXELS * C);
-        step(&j, NULL);
+        step(&j, 1, NULL);
         memcpy(whole, j.step, PIXELS * C * sizeof *whole);
-        step(&j, &search);
+        step(&j, rd_step_length(VIEWS, t), &search);
         for (int p = 0; p < PIXELS; p++) {
             const double now = misfit(&j, p, j.maps + p * C), e = misfit(&j, p, best + p * C);
             const bool better = !memcmp(best + p * C, j.maps + p * C, C * sizeof *best);
@@ -81,7 +81,7 @@ TEST(search_keeps_the_best_maps_of_each_pixel)
             CHECK(better || now > e * (1 - 1e-3), "pixel %d: %g was better than %g", p, now, e);
             for (int i = 0; i < C; i++) {
                 const int at = p * C + i;
-                const float want = better ? rd_search_length(t) * whole[at]
+                const float want = better ? rd_step_length(VIEWS, t) * whole[at]
                                           : (1 - TS_SEARCH_BACK) * (best[at] - j.maps[at]);
                 CHECK(fabsf(j.step[at] - want) < 1e-5f, "pixel %d, value %d: a step of %g, not %g", p, i,
                       (double)j.step[at], (double)want);
@@ -109,13 +109,55 @@ TEST(search_leaves_what_is_not_a_number)
     job j = begin(92, VIEWS);
     float *best = floats(PIXELS * C), *least = floats(PIXELS);
     rd_search search = {best, least, 0};
-    step(&j, &search);
+    step(&j, 1, &search);
     search.steps++;
     const float kept = best[0];
     j.maps[MAP_ROUGHNESS] = NAN;
     least[1] = -1;
-    step(&j, &search);
+    step(&j, 1, &search);
     CHECK(best[0] == kept && least[1] == -1, "%g was kept for %g", (double)best[0], (double)kept);
     free(best), free(least);
     end(&j);
+}
+
+/* Of one careful photograph of glossy maps under a near flash: the mean misfit after some steps, and how far maps end
+ * from others that began 1e-6 away. */
+static double settled(bool whole, int steps, double *apart)
+{
+    double sum = 0;
+    float *ends[2];
+    for (int k = 0; k < 2; k++) {
+        job j = begin(94, 1);
+        j.scale = (ts_prior){{0.1f, 0.1f}, 0.03f, 0.002f, 0};
+        for (int i = 0; i < PIXELS * C; i++) {
+            if (i % C == MAP_ROUGHNESS) j.maps[i] = j.mean[i] = -0.75f;
+            if (i % C == MAP_NORMAL || i % C == MAP_NORMAL + 1) j.maps[i] *= 0.2f, j.mean[i] = j.maps[i];
+            j.maps[i] += k ? 1e-6f : 0;
+        }
+        for (int t = 0; t < steps; t++) {
+            step(&j, whole ? 1 : rd_step_length(1, t), NULL);
+            for (int i = 0; i < PIXELS * C; i++) j.maps[i] += j.step[i];
+        }
+        for (int p = 0; p < PIXELS && !k; p++) sum += misfit(&j, p, j.maps + p * C) / PIXELS;
+        ends[k] = floats(PIXELS * C);
+        memcpy(ends[k], j.maps, PIXELS * C * sizeof *ends[k]);
+        end(&j);
+    }
+    *apart = 0;
+    for (int i = 0; i < PIXELS * C; i++) *apart = fmax(*apart, fabs((double)ends[0][i] - (double)ends[1][i]));
+    free(ends[0]), free(ends[1]);
+    return sum;
+}
+
+/* Whole steps on glossy pixels swing; shortened ones come to rest at maps that fit better, and where they end does not
+ * hang on the last digits of where they begin. */
+TEST(steps_of_one_photograph_come_to_rest)
+{
+    double apart, far;
+    for (int steps = 4; steps <= 8; steps += 2) {
+        const double whole = settled(true, steps, &far), shortened = settled(false, steps, &apart);
+        printf("  %d steps: misfit %.4g, apart %.2g; whole ones: %.4g, %.2g\n", steps, shortened, apart, whole, far);
+        CHECK(shortened < 0.5 * whole, "%d steps: misfit %g, with whole ones %g", steps, shortened, whole);
+        CHECK(apart < 0.02, "%d steps end %g apart", steps, apart);
+    }
 }

@@ -55,7 +55,7 @@ static void compute(const scene *s, int y, const float *maps, const float *dark,
     ts_shade_k()->flash(&view, &row, photo, 3, r->flash);
     ts_shade_k()->log_loss(&view, 1, &row, &other, 3, r->loss);
     ts_newton_k()->step(&view, &photo, 1, &row, damping, r->step);
-    ts_posterior_k()->step(&view, &photo, 1, &row, &prior, dark, deviation, NULL, r->probable, r->after);
+    ts_posterior_k()->step(&view, &photo, 1, &row, &prior, dark, deviation, 1, NULL, r->probable, r->after);
 }
 
 static void compare(const char *isa, const scene *s, int y)

@@ -53,7 +53,7 @@ static inline void end(job *j)
 static inline void run(job *j)
 {
     const rd_prior prior = {j->mean, j->deviation, j->scale};
-    rd_posterior_step(rd_grid_full(SIDE), j->maps, C, j->views, (const float *const *)j->image, j->count, &prior, NULL,
-                      j->step, j->after);
+    rd_posterior_step(rd_grid_full(SIDE), j->maps, C, j->views, (const float *const *)j->image, j->count, &prior, 1,
+                      NULL, j->step, j->after);
 }
 #endif
