@@ -59,8 +59,8 @@ static void posterior(void *user)
     const rd_search search = {best, misfit, 1};
     const rd_prior prior = {j->target, j->deviation, {.hue = {0.1f, 0.1f}, .model = 0.1f, .noise = 0.5f}};
     for (int k = 0; k < j->photographs; k++) views[k] = rd_capture_view(k), image[k] = j->image;
-    rd_posterior_step(rd_grid_full(j->side), j->maps, MAP_CHANNELS, views, image, j->photographs, &prior,
-                      1, j->photographs > 1 ? &search : NULL, j->gradient, j->after);
+    rd_posterior_step(rd_grid_full(j->side), j->maps, MAP_CHANNELS, views, image, j->photographs, &prior, 1,
+                      j->photographs > 1 ? &search : NULL, j->gradient, j->after);
 }
 
 /* Four steps, of every sixteenth row. */
