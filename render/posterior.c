@@ -48,17 +48,31 @@ void rd_posterior_step(rd_grid grid, const float *maps, int channels, const rd_v
            &(step_job){grid, maps, image, channels, count, v, prior, search, length, step, after});
 }
 
-void rd_prior_covariance(const double deviation[MAP_GROUPS], const ts_prior *prior,
+/* W of the three values from at on. */
+static void tint(const double mean[MAP_CHANNELS], int at, double w[3])
+{
+    double squares = 0;
+    for (int c = 0; c < 3; c++) {
+        w[c] = fmin(fmax((mean[at + c] + 1) / 2, 0), 1) + (double)TS_PRIOR_BLACK;
+        squares += w[c] * w[c] / 3;
+    }
+    for (int c = 0; c < 3; c++) w[c] /= sqrt(squares);
+}
+
+void rd_prior_covariance(const double deviation[MAP_GROUPS], const double mean[MAP_CHANNELS], const ts_prior *prior,
                          double covariance[MAP_CHANNELS][MAP_CHANNELS])
 {
     for (int i = 0; i < MAP_CHANNELS; i++)
         for (int j = 0; j < MAP_CHANNELS; j++) covariance[i][j] = 0;
-    for (int a = 0; a < 3; a++)
-        for (int b = 0; b < 3; b++) {
-            const double d = deviation[GROUP_DIFFUSE], s = deviation[GROUP_SPECULAR];
-            covariance[MAP_DIFFUSE + a][MAP_DIFFUSE + b] = d * d * (a == b ? 1 : 1 - (double)prior->hue[0]);
-            covariance[MAP_SPECULAR + a][MAP_SPECULAR + b] = s * s * (a == b ? 1 : 1 - (double)prior->hue[1]);
-        }
+    for (int k = 0; k < 2; k++) {
+        const int at = k ? MAP_SPECULAR : MAP_DIFFUSE;
+        const double s = deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE];
+        double w[3];
+        tint(mean, at, w);
+        for (int a = 0; a < 3; a++)
+            for (int b = 0; b < 3; b++)
+                covariance[at + a][at + b] = s * s * w[a] * w[b] * (a == b ? 1 : 1 - (double)prior->hue[k]);
+    }
     for (int i = 0; i < 2; i++)
         covariance[MAP_NORMAL + i][MAP_NORMAL + i] = deviation[GROUP_NORMAL] * deviation[GROUP_NORMAL];
     covariance[MAP_ROUGHNESS][MAP_ROUGHNESS] = deviation[GROUP_ROUGHNESS] * deviation[GROUP_ROUGHNESS];

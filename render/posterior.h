@@ -7,10 +7,11 @@
  * R is cut to [-1, 1] first (why: render/kernels/observe_lanes.h). What is left of the prior's uncertainty afterwards
  * is Sigma - Sigma J' (J Sigma J' + S)^-1 J Sigma. Sigma has a standard deviation s for each of the four maps. The
  * values of different maps are independent, and so are the normal's x and y; the three values of the diffuse map and
- * the three of F0 have the covariance s^2 ((1 - q) 1 1' + q I), so that with a small q they only move together and keep
- * their hue. S is diagonal: a value I of a photograph has the variance model^2 + noise max(I, 0). seen is the radiance
- * up to 1 and 1 + log(radiance) above; where it is above 1 and the photograph is TS_NEWTON_BURNT at least, r and J
- * fade, and from 1 + TS_PRIOR_FADE on nothing is learned. */
+ * the three of F0 have the covariance s^2 W ((1 - q) 1 1' + q I) W. W is diagonal and holds the colour of the mean: its
+ * three values of [0, 1], each TS_PRIOR_BLACK more, over their root mean square. With a small q the three are
+ * multiplied by the same and keep their hue. S is diagonal: a value I of a photograph has the variance
+ * model^2 + noise max(I, 0) + (gain I)^2. seen is the radiance up to 1 and 1 + log(radiance) above; where it is above 1
+ * and the photograph is TS_NEWTON_BURNT at least, r and J fade, and from 1 + TS_PRIOR_FADE on nothing is learned. */
 #ifndef RD_POSTERIOR_H
 #define RD_POSTERIOR_H
 #include "render/scene.h"
@@ -52,7 +53,7 @@ void rd_posterior_step(rd_grid grid, const float *maps, int channels, const rd_v
                        float *after);
 
 /* The prior's covariance. */
-void rd_prior_covariance(const double deviation[MAP_GROUPS], const ts_prior *prior,
+void rd_prior_covariance(const double deviation[MAP_GROUPS], const double mean[MAP_CHANNELS], const ts_prior *prior,
                          double covariance[MAP_CHANNELS][MAP_CHANNELS]);
 
 /* What a photograph's value says of a pixel's maps: the residual, its variance, and d seen / d maps. */

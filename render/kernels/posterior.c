@@ -58,7 +58,7 @@ V_INLINE void settle(const surface *s, const sight *t, const ts_prior *prior, co
             for (int i = 0; i < 3; i++) {
                 vf along = {0};
                 for (int j = 0; j <= (i < c ? i : c); j++) along += a->hue[k][i][j] * g.u[c][own_at(j) + k];
-                sum[k][i] += along * along * g.inverse[c];
+                sum[k][i] += along * along * g.inverse[c] * a->tint[k][i] * a->tint[k][i];
             }
     }
     e->share[GROUP_DIFFUSE] = 1.0f - (sum[0][0] + sum[0][1] + sum[0][2]) * (1.0f / 3);
@@ -109,7 +109,8 @@ V_INLINE void solve(const equations *q, const spread *a, bool doubts, estimate *
         for (int c = 0; c < 3; c++) {
             vf u[MAP_CHANNELS] = {0};
             for (int j = 0; j <= c; j++) u[own_at(j) + k] = v_set(a->hue[k][c][j]);
-            e->share[k ? GROUP_SPECULAR : GROUP_DIFFUSE] += variance(q, own_at(c), u) * (1.0f / 3);
+            e->share[k ? GROUP_SPECULAR : GROUP_DIFFUSE] += variance(q, own_at(c), u) * a->tint[k][c] * a->tint[k][c] *
+                (1.0f / 3);
         }
     for (int i = 0; i < SHARED; i++) {
         vf u[MAP_CHANNELS] = {0};
@@ -125,8 +126,8 @@ V_INLINE void widen(const spread *a, const vf z[MAP_CHANNELS], vf x[MAP_CHANNELS
         vf sum[2] = {{0}, {0}};
         for (int j = 0; j <= c; j++)
             for (int k = 0; k < 2; k++) sum[k] += a->hue[k][c][j] * z[own_at(j) + k];
-        x[MAP_DIFFUSE + c] = sum[0] * a->deviation[GROUP_DIFFUSE];
-        x[MAP_SPECULAR + c] = sum[1] * a->deviation[GROUP_SPECULAR];
+        x[MAP_DIFFUSE + c] = sum[0] * a->deviation[GROUP_DIFFUSE] * a->tint[0][c];
+        x[MAP_SPECULAR + c] = sum[1] * a->deviation[GROUP_SPECULAR] * a->tint[1][c];
     }
     for (int i = 0; i < SHARED; i++) x[shared_map[i]] = z[OWN + i] * a->deviation[shared_group[i]];
 }
@@ -173,7 +174,7 @@ V_INLINE vf improbability(const spread *a, const vf m[MAP_CHANNELS])
         const vf deviation = v_max(a->deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE], least);
         vf z[3];
         for (int i = 0; i < 3; i++) {
-            z[i] = m[map + i] / deviation;
+            z[i] = m[map + i] / (deviation * a->tint[k][i]);
             for (int j = 0; j < i; j++) z[i] -= z[j] * a->hue[k][i][j];
             z[i] /= fmaxf(a->hue[k][i][i], TS_PRIOR_NARROWEST);
             sum += z[i] * z[i];
@@ -223,6 +224,7 @@ static void step(const ts_shade_view *views, const float *const *images, int cou
         within(now, at);
         decode_values(views->guards, at, &s);
         v_load_pixels(mean + first, row->channels, n, MAP_CHANNELS, m);
+        set_tint(m, &a);
         for (int c = 0; c < MAP_CHANNELS; c++) m[c] -= at[c];
         load_deviation(deviation + (int64_t)i * MAP_GROUPS, n, &a);
         const bool informed = learn(views, images, count, row, i, n, &s, prior, &a, m, after != NULL, &e);

@@ -14,6 +14,8 @@ typedef struct ts_prior {
  * above 0; variances of a photograph's value as TS_PRIOR_FINEST where they are smaller. */
 #define TS_PRIOR_WIDEST 1e3f
 #define TS_PRIOR_FINEST 1e-10f
+/* What a colour's value of 0 counts as, so that it may move too. */
+#define TS_PRIOR_BLACK 0.01f
 /* Misfits are those of deviations of TS_PRIOR_NARROWEST at least. */
 #define TS_PRIOR_NARROWEST 1e-6f
 /* What a burnt-out value tells fades from a radiance of 1 to 1 + TS_PRIOR_FADE. A narrow fade makes a burnt-out pixel

@@ -10,9 +10,9 @@
 enum { OWN = 6 };
 #define own_at(c) (2 * (2 - (c)))
 
-/* A: the prior's deviations, and the lower triangular factor of (1 - q) 1 1' + q I. */
+/* A: the prior's deviations, W of both colours, and the lower triangular factor of (1 - q) 1 1' + q I. */
 typedef struct spread {
-    vf deviation[MAP_GROUPS];
+    vf deviation[MAP_GROUPS], tint[2][3];
     float hue[2][3][3];
 } spread;
 
@@ -34,10 +34,25 @@ V_INLINE void load_deviation(const float *deviation, int n, spread *a)
         a->deviation[g] = v_min(v_max(a->deviation[g], v_set(0)), v_set(TS_PRIOR_WIDEST));
 }
 
+V_INLINE void set_tint(const vf mean[MAP_CHANNELS], spread *a)
+{
+    for (int k = 0; k < 2; k++) {
+        vf squares = {0};
+        for (int c = 0; c < 3; c++) {
+            const vf value = (mean[(k ? MAP_SPECULAR : MAP_DIFFUSE) + c] + 1.0f) * 0.5f;
+            a->tint[k][c] = v_min(v_max(value, v_set(0)), v_set(1)) + TS_PRIOR_BLACK;
+            squares += a->tint[k][c] * a->tint[k][c];
+        }
+        const vf inverse = 1.0f / v_sqrt(squares * (1.0f / 3));
+        for (int c = 0; c < 3; c++) a->tint[k][c] *= inverse;
+    }
+}
+
 /* A colour's row of J A from its row of J: h[own_at(c) ..], of MAP_CHANNELS values. */
 V_INLINE void whiten(int c, const spread *a, const vf by[ROW], vf h[MAP_CHANNELS])
 {
-    const vf own[2] = {by[0] * a->deviation[GROUP_DIFFUSE], by[1] * a->deviation[GROUP_SPECULAR]};
+    const vf own[2] = {by[0] * a->deviation[GROUP_DIFFUSE] * a->tint[0][c],
+                       by[1] * a->deviation[GROUP_SPECULAR] * a->tint[1][c]};
     for (int j = 0; j <= c; j++)
         for (int k = 0; k < 2; k++) h[own_at(j) + k] = own[k] * a->hue[k][c][j];
     h[OWN] = by[2] * a->deviation[GROUP_ROUGHNESS];

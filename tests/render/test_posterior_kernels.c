@@ -14,7 +14,7 @@ static void expect(const job *j, int p, double mean[C], double covariance[C][C])
     to_double(j->maps + p * C, maps), to_double(j->mean + p * C, mean);
     for (int g = 0; g < G; g++) deviation[g] = (double)j->deviation[p * G + g];
     for (int k = 0; k < j->count; k++) memcpy(image[k], j->image[k] + p * 3, sizeof image[k]);
-    rd_prior_covariance(deviation, &j->scale, covariance);
+    rd_prior_covariance(deviation, mean, &j->scale, covariance);
     rd_posterior_pixel(maps, point, j->views, (const float(*)[3])image, j->count, &j->scale, mean, covariance);
 }
 
@@ -101,6 +101,9 @@ TEST(posterior_is_newtons_step_for_equal_priors)
             j.scale = (ts_prior){{1, 1}, sqrtf(TS_NEWTON_NOISE), 1, 0};
             for (int i = 0; i < C; i++) damping[i] = of[group_of[i]];
             for (int i = 0; i < PIXELS * G; i++) j.deviation[i] = 1 / sqrtf(of[i % G]);
+            for (int i = 0; i < PIXELS * C; i++) /* of grey maps W is 1 */
+                if (group_of[i % C] == GROUP_DIFFUSE || group_of[i % C] == GROUP_SPECULAR)
+                    j.maps[i] = j.maps[i / C * C + (i % C < 3 ? 0 : MAP_SPECULAR)];
             memcpy(j.mean, j.maps, PIXELS * C * sizeof(float));
             for (int i = 0; i < PIXELS * 3 * count; i++) { /* of what is burnt out Newton's step fades nothing */
                 float *value = &j.image[i / (PIXELS * 3)][i % (PIXELS * 3)];

@@ -105,7 +105,7 @@ static void add_pixel(const float *maps, const double point[2], const float *ima
     to_double(maps, m);
     for (int i = 0; i < K; i++) numbers[i] = (double)number[i];
     for (int g = 0; g < G; g++) d[g] = (double)deviation[g];
-    rd_prior_covariance(d, prior, sigma);
+    rd_prior_covariance(d, m, prior, sigma);
     seen_of(m, point, numbers, seen), rd_scene_value(m, point, numbers, value);
     for (int i = 0; i < C; i++) differences(m, point, numbers, m, i, by_maps[i]);
     for (int i = 0; i < K; i++) differences(m, point, numbers, numbers, i, by[i]);

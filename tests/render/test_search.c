@@ -17,8 +17,11 @@ static double misfit(const job *j, int pixel, const float *maps)
     }
     const float *deviation = j->deviation + pixel * G;
     for (int k = 0; k < 2; k++) { /* ((1 - q) 1 1' + q I)^-1 = (I - (1 - q) / (3 - 2 q) 1 1') / q */
-        const double q = (double)j->scale.hue[k], s = (double)deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE],
-                     *v = off + (k ? MAP_SPECULAR : MAP_DIFFUSE), all = v[0] + v[1] + v[2];
+        const int first = k ? MAP_SPECULAR : MAP_DIFFUSE;
+        double w[3], v[3], all = 0;
+        tint_of(j->mean + pixel * C, first, w);
+        for (int c = 0; c < 3; c++) all += v[c] = off[first + c] / w[c];
+        const double q = (double)j->scale.hue[k], s = (double)deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE];
         sum += (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - (1 - q) / (3 - 2 * q) * all * all) / (q * s * s);
     }
     for (int i = 0; i < C; i++)
@@ -120,7 +123,7 @@ TEST(search_leaves_what_is_not_a_number)
     end(&j);
 }
 
-/* Of one careful photograph of glossy maps under a near flash: the mean misfit after some steps, and how far maps end
+/* Of one photograph of glossy maps under a near flash: the mean misfit after some steps, and how far maps end
  * from others that began 1e-6 away. */
 static double settled(bool whole, int steps, double *apart)
 {
@@ -128,12 +131,14 @@ static double settled(bool whole, int steps, double *apart)
     float *ends[2];
     for (int k = 0; k < 2; k++) {
         job j = begin(94, 1);
-        j.scale = (ts_prior){{0.1f, 0.1f}, 0.03f, 0.002f, 0};
-        for (int i = 0; i < PIXELS * C; i++) {
-            if (i % C == MAP_ROUGHNESS) j.maps[i] = j.mean[i] = -0.75f;
-            if (i % C == MAP_NORMAL || i % C == MAP_NORMAL + 1) j.maps[i] *= 0.2f, j.mean[i] = j.maps[i];
-            j.maps[i] += k ? 1e-6f : 0;
+        j.scale = (ts_prior){{0.1f, 0.1f}, 0.1f, 0.002f, 0.5f};
+        for (int i = 0; i < PIXELS * C; i++) { /* the truth is a deviation away from glossy maps, which are the mean */
+            const bool normal = i % C == MAP_NORMAL || i % C == MAP_NORMAL + 1;
+            j.mean[i] = i % C == MAP_ROUGHNESS ? -0.75f : normal ? 0.2f * j.maps[i] : j.maps[i];
+            j.truth[i] = j.mean[i] + 0.2f * (j.truth[i] > 0 ? 1 : -1) * j.deviation[i / C * G + group_of[i % C]];
+            j.maps[i] = j.mean[i] + (k ? 1e-6f : 0);
         }
+        rd_render(rd_grid_full(SIDE), j.truth, C, j.views, true, j.image[0]);
         for (int t = 0; t < steps; t++) {
             step(&j, whole ? 1 : rd_step_length(1, t), NULL);
             for (int i = 0; i < PIXELS * C; i++) j.maps[i] += j.step[i];
@@ -157,7 +162,7 @@ TEST(steps_of_one_photograph_come_to_rest)
     for (int steps = 4; steps <= 8; steps += 2) {
         const double whole = settled(true, steps, &far), shortened = settled(false, steps, &apart);
         printf("  %d steps: misfit %.4g, apart %.2g; whole ones: %.4g, %.2g\n", steps, shortened, apart, whole, far);
-        CHECK(shortened < 0.5 * whole, "%d steps: misfit %g, with whole ones %g", steps, shortened, whole);
-        CHECK(apart < 0.02, "%d steps end %g apart", steps, apart);
+        CHECK(shortened < 0.9 * whole, "%d steps: misfit %g, with whole ones %g", steps, shortened, whole);
+        CHECK(apart < 5e-4, "%d steps end %g apart", steps, apart);
     }
 }

@@ -4,6 +4,7 @@
 #include "render/posterior.h"
 #include "tests/support/normal_equations.h"
 #include "tests/support/shading.h"
+#include <math.h>
 #include <string.h>
 
 enum { SIDE = 19, PIXELS = SIDE * SIDE, MOST = RD_CAPTURE_VIEWS, G = MAP_GROUPS };
@@ -42,6 +43,17 @@ static inline job begin(uint64_t seed, int count)
         rd_render(rd_grid_full(SIDE), j.truth, C, &j.views[k], true, j.image[k]);
     }
     return j;
+}
+
+/* W of a pixel's three values from first on. */
+static inline void tint_of(const float *mean, int first, double w[3])
+{
+    double squares = 0;
+    for (int c = 0; c < 3; c++) {
+        w[c] = fmin(fmax(((double)mean[first + c] + 1) / 2, 0), 1) + (double)TS_PRIOR_BLACK;
+        squares += w[c] * w[c];
+    }
+    for (int c = 0; c < 3; c++) w[c] /= sqrt(squares / 3);
 }
 
 static inline void end(job *j)
