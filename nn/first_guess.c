@@ -1,7 +1,7 @@
 #include "nn/first_guess.h"
 #include "nn/clip.h"
 #include "nn/deviation.h"
-#include "nn/hidden_diffuse.h"
+#include "nn/hidden.h"
 #include "nn/lean.h"
 #include "nn/revise.h"
 #include "render/scene_model.h"
@@ -68,10 +68,12 @@ static ts_code fit(rd_grid grid, const float *image, int channels, int known, co
     memcpy(unknown, prior->mean, sizeof unknown);
     rd_scene_fit(grid, g->r0, channels, g->deviation, image, prior, &how, unknown, NULL);
     rd_scene_roughen(pixels, g->r0, channels, unknown[RD_SCENE_ROUGHNESS], rough);
-    const ts_code code = nn_fill_hidden_diffuse(grid, image, unknown, channels, arena, rough, st);
+    const ts_code code = nn_fill_hidden(grid, image, unknown, channels, arena, rough, st);
     if (!code) {
-        for (size_t i = 0; i < values; i += (size_t)channels)
+        for (size_t i = 0; i < values; i += (size_t)channels) {
             memcpy(g->r0 + i + MAP_DIFFUSE, rough + i + MAP_DIFFUSE, 3 * sizeof *rough);
+            memcpy(g->r0 + i + MAP_SPECULAR, rough + i + MAP_SPECULAR, 3 * sizeof *rough);
+        }
         rd_scene_fit(grid, g->r0, channels, g->deviation, image, prior, &how, unknown, NULL);
         memcpy(g->number, unknown, sizeof g->number);
         rd_scene_roughen(pixels, g->r0, channels, unknown[RD_SCENE_ROUGHNESS], g->r0);

@@ -37,10 +37,17 @@ TEST(several_photographs_are_fitted_at_once)
     sample s = take();
     float *r0 = numbers(VALUES, 8, -0.35f, 0.35f), *maps = malloc(VALUES * sizeof *maps),
           *deviation = malloc(PIXELS * NN_SPREADS * sizeof *deviation);
-    for (int i = 0; i < PIXELS; i++) { /* the colours are off alike, as the prior says */
-        float *r = r0 + i * MAP_CHANNELS;
-        for (int c = 1; c < 3; c++) r[MAP_DIFFUSE + c] = r[MAP_DIFFUSE], r[MAP_SPECULAR + c] = r[MAP_SPECULAR];
-    }
+    for (int i = 0; i < PIXELS; i++) /* the colours are off by a factor, as the prior says */
+        for (int first = 0; first <= MAP_SPECULAR; first += MAP_SPECULAR) {
+            float *r = r0 + i * MAP_CHANNELS + first, squares = 0, most = 0;
+            const float *truth = s.truth + i * MAP_CHANNELS + first;
+            for (int c = 0; c < 3; c++) {
+                squares += (truth[c] + 1) * (truth[c] + 1);
+                most = fmaxf(most, truth[c] + 1);
+            }
+            const float factor = fminf(r[0] / sqrtf(squares / 3), 2 / most - 1);
+            for (int c = 0; c < 3; c++) r[c] = factor * (truth[c] + 1);
+        }
     for (int i = 0; i < VALUES; i++) r0[i] += s.truth[i];
     for (int i = 0; i < PIXELS * NN_SPREADS; i++) deviation[i] = 0.2f;
     double off[TAKEN + 1] = {0}, seen[TAKEN + 1] = {0};
@@ -55,7 +62,7 @@ TEST(several_photographs_are_fitted_at_once)
                        .deviation = deviation,
                        .side = EDGE,
                        .tile = EDGE,
-                       .steps = 8};
+                       .steps = 12};
         CHECK(!lgd_tiles_run(tape, m, &t, maps, &st), "%s", st.message);
         ag_tape_destroy(&tape);
         for (int i = 0; i < VALUES; i++) off[count] += pow((double)maps[i] - (double)s.truth[i], 2);

@@ -1,4 +1,4 @@
-#include "nn/hidden_diffuse.h"
+#include "nn/hidden.h"
 #include "tensor/maps.h"
 #include "tensor/memory.h"
 #include "tensor/team.h"
@@ -9,32 +9,48 @@ enum {
     CELLS = 32, /* a side, at most */
     ROWS = 4    /* of pixels at a time, at least */
 };
-#define STIFFNESS 1         /* of the field between neighbours, beside a weight of 1 */
-#define SHARPNESS 6         /* power of what is seen that weighs a cell */
-#define WEIGHT_LEAST 1e-4   /* keeps the field defined where nothing is seen */
-#define ALBEDO_LEAST 0.004f /* whose logarithm is taken: one step of 8 bits */
-#define BURNT_OUT 2.94f     /* sum of a pixel's three values, of which noise leaves .98 */
+#define STIFFNESS 1        /* of the field between neighbours, beside a weight of 1 */
+#define WEIGHT_LEAST 1e-4  /* keeps the field defined where nothing is seen */
+#define VALUE_LEAST 0.004f /* whose logarithm is taken: one step of 8 bits */
+#define BURNT_OUT 2.94f    /* sum of a pixel's three values, of which noise leaves .98 */
 #define BURNT_OUT_TELLS 0.1f
+
+/* A map of three colours, seen in the part of the light that is mirrored or in the rest. sharpness: the power of what
+ * is seen that weighs a cell. reach: how far a logarithm may be off that is not seen; what differs by more is another
+ * material. */
+typedef struct hidden_map {
+    int at;
+    bool mirrored;
+    double sharpness, reach;
+} hidden_map;
+static const hidden_map hidden[] = {{MAP_DIFFUSE, false, 6, INFINITY}, {MAP_SPECULAR, true, 4, 1}};
 
 /* The whole square is full; matt holds its maps without F0. */
 typedef struct pictures {
     float *matt, *full, *diffuse; /* [size, size, channels]; [size, size, 3] each */
 } pictures;
 
+/* seen: the part of the light that shows the map. usual: the same were the map's value the picture's mean, so that dark
+ * things are not taken for hidden ones. Both relative to the largest. */
 typedef struct cells {
     int side;
-    double seen[CELLS * CELLS], weight[CELLS * CELLS], log_albedo[3][CELLS * CELLS], change[3][CELLS * CELLS];
+    double seen[CELLS * CELLS], usual[CELLS * CELLS], weight[CELLS * CELLS], log_value[3][CELLS * CELLS],
+        change[3][CELLS * CELLS];
 } cells;
 
 typedef struct gather_job {
+    const hidden_map *map;
     const pictures *p;
     int size, channels;
     const float *maps, *image;
+    float mean; /* of the sum of the map's three values */
     cells *c;
 } gather_job;
 
 /* The first row of pixels of the cells' row. */
 static int first_row(int size, int side, int64_t row) { return (int)((row * size + side - 1) / side); }
+
+static double part_of(float shown, float other) { return (double)(shown / fmaxf(shown + other, 1e-6f)); }
 
 /* Sums over each cell of these rows, then means. */
 static void gather_rows(const void *job, int64_t begin, int64_t end)
@@ -44,31 +60,40 @@ static void gather_rows(const void *job, int64_t begin, int64_t end)
     int count[CELLS * CELLS] = {0};
     for (int i = first_row(size, side, begin) * size; i < first_row(size, side, end) * size; i++) {
         const int at = i / size * side / size * side + i % size * side / size;
-        float full = 0, diffuse = 0, seen = 0;
+        float full = 0, rest = 0, seen = 0, own = 0;
         for (int k = 0; k < 3; k++) {
-            full += j->p->full[3 * i + k], diffuse += j->p->diffuse[3 * i + k], seen += j->image[3 * i + k];
-            const float albedo = (j->maps[i * j->channels + MAP_DIFFUSE + k] + 1) / 2;
-            j->c->log_albedo[k][at] += (double)logf(fmaxf(albedo, ALBEDO_LEAST));
+            full += j->p->full[3 * i + k], rest += j->p->diffuse[3 * i + k], seen += j->image[3 * i + k];
+            const float value = (j->maps[i * j->channels + j->map->at + k] + 1) / 2;
+            own += value;
+            j->c->log_value[k][at] += (double)logf(fmaxf(value, VALUE_LEAST));
         }
-        const float part = fminf(diffuse / fmaxf(full, 1e-6f), 1);
-        j->c->seen[at] += (double)(seen > BURNT_OUT ? BURNT_OUT_TELLS * part : part);
+        const float mirrored = fmaxf(full - rest, 0), shown = j->map->mirrored ? mirrored : rest,
+                    other = j->map->mirrored ? rest : mirrored;
+        const double tells = seen > BURNT_OUT ? (double)BURNT_OUT_TELLS : 1;
+        j->c->seen[at] += tells * part_of(shown, other);
+        j->c->usual[at] += tells * part_of(shown * j->mean / fmaxf(own, 3 * VALUE_LEAST), other);
         count[at]++;
     }
     for (int i = (int)begin * side; i < (int)end * side; i++) {
-        j->c->seen[i] /= count[i];
-        for (int k = 0; k < 3; k++) j->c->log_albedo[k][i] /= count[i];
+        j->c->seen[i] /= count[i], j->c->usual[i] /= count[i];
+        for (int k = 0; k < 3; k++) j->c->log_value[k][i] /= count[i];
     }
 }
 
-static void gather(const pictures *p, int size, int channels, const float *maps, const float *image, int threads,
-                   cells *c)
+static void gather(const hidden_map *map, const pictures *p, int size, int channels, const float *maps,
+                   const float *image, int threads, cells *c)
 {
-    double most = 0;
-    ts_for(threads, c->side, 1, gather_rows, &(gather_job){p, size, channels, maps, image, c});
-    for (int i = 0; i < c->side * c->side; i++) most = fmax(most, c->seen[i]);
-    for (int i = 0; i < c->side * c->side; i++) {
-        c->seen[i] /= fmax(most, 1e-6);
-        c->weight[i] = pow(c->seen[i], SHARPNESS);
+    const int count = c->side * c->side;
+    double mean = 0, most = 0, most_usual = 0;
+    memset(c->seen, 0, sizeof c->seen), memset(c->usual, 0, sizeof c->usual);
+    memset(c->log_value, 0, sizeof c->log_value);
+    for (int i = 0; i < 3 * size * size; i++) mean += (double)maps[i / 3 * channels + map->at + i % 3] + 1;
+    mean /= 2.0 * size * size;
+    ts_for(threads, c->side, 1, gather_rows, &(gather_job){map, p, size, channels, maps, image, (float)mean, c});
+    for (int i = 0; i < count; i++) most = fmax(most, c->seen[i]), most_usual = fmax(most_usual, c->usual[i]);
+    for (int i = 0; i < count; i++) {
+        c->seen[i] /= fmax(most, 1e-6), c->usual[i] /= fmax(most_usual, 1e-6);
+        c->weight[i] = pow(c->seen[i], map->sharpness);
     }
 }
 
@@ -129,24 +154,27 @@ static double variance(const cells *c, const double *x)
     return fmax(squares / weight - mean * mean, 0);
 }
 
-/* The part of a difference from the field that the highlight made: cells of a print or of tiles differ anyway. */
-static double part_hidden(double seen, double differ)
+/* The part of a difference from the field that is not the material's: cells of a print or of tiles differ anyway. */
+static double part_hidden(double usual, double differ)
 {
-    const double hidden = (1 - seen) * (1 - seen);
-    return hidden > 0 ? hidden / (hidden + differ) : 0;
+    const double away = (1 - usual) * (1 - usual);
+    return away > 0 ? away / (away + differ) : 0;
 }
 
-static void find_changes(cells *c, double *band)
+static void find_changes(const hidden_map *map, cells *c, double *band)
 {
     const int count = c->side * c->side;
     make_band(c, band);
     factor(count, c->side, band);
     for (int k = 0; k < 3; k++) {
         double *b = c->change[k];
-        for (int i = 0; i < count; i++) b[i] = (c->weight[i] + WEIGHT_LEAST) * c->log_albedo[k][i];
+        for (int i = 0; i < count; i++) b[i] = (c->weight[i] + WEIGHT_LEAST) * c->log_value[k][i];
         solve(count, c->side, band, b);
-        const double differ = variance(c, c->log_albedo[k]);
-        for (int i = 0; i < count; i++) b[i] = part_hidden(c->seen[i], differ) * (b[i] - c->log_albedo[k][i]);
+        const double differ = variance(c, c->log_value[k]);
+        for (int i = 0; i < count; i++) {
+            const double from = b[i] - c->log_value[k][i], far = from / map->reach;
+            b[i] = part_hidden(c->usual[i], differ) * from / (1 + far * far);
+        }
     }
 }
 
@@ -160,7 +188,7 @@ static void between(int i, int size, int side, int *cell, float *part)
 
 typedef struct apply_job {
     const cells *c;
-    int size, channels;
+    int at, size, channels;
     float *maps;
 } apply_job;
 
@@ -175,7 +203,7 @@ static void apply_rows(const void *job, int64_t begin, int64_t end)
         between(y, size, c->side, &row, &down);
         for (int x = 0; x < size; x++) {
             between(x, size, c->side, &column, &right);
-            float *map = j->maps + (size_t)(y * size + x) * (size_t)j->channels + MAP_DIFFUSE;
+            float *map = j->maps + (size_t)(y * size + x) * (size_t)j->channels + (size_t)j->at;
             for (int k = 0; k < 3; k++) {
                 const double *a = c->change[k] + row * c->side + column, *b = a + next * c->side;
                 const float upper = (1 - right) * (float)a[0] + right * (float)a[next],
@@ -186,8 +214,8 @@ static void apply_rows(const void *job, int64_t begin, int64_t end)
     }
 }
 
-ts_code nn_fill_hidden_diffuse(rd_grid grid, const float *image, const float number[RD_SCENE_NUMBERS], int channels,
-                               ts_arena *arena, float *maps, ts_status *st)
+ts_code nn_fill_hidden(rd_grid grid, const float *image, const float number[RD_SCENE_NUMBERS], int channels,
+                       ts_arena *arena, float *maps, ts_status *st)
 {
     const int size = grid.w, side = size < CELLS ? size : CELLS;
     const size_t pixels = (size_t)size * (size_t)size, values = pixels * (size_t)channels;
@@ -204,9 +232,11 @@ ts_code nn_fill_hidden_diffuse(rd_grid grid, const float *image, const float num
             for (size_t k = 0; k < 3; k++) p.matt[i + MAP_SPECULAR + k] = -1;
         rd_scene_photograph(grid, maps, channels, number, false, p.full);
         rd_scene_photograph(grid, p.matt, channels, number, false, p.diffuse);
-        gather(&p, size, channels, maps, image, grid.threads, c);
-        find_changes(c, band);
-        ts_for(grid.threads, size, ROWS, apply_rows, &(apply_job){c, size, channels, maps});
+        for (int i = 0; i < 2; i++) {
+            gather(&hidden[i], &p, size, channels, maps, image, grid.threads, c);
+            find_changes(&hidden[i], c, band);
+            ts_for(grid.threads, size, ROWS, apply_rows, &(apply_job){c, hidden[i].at, size, channels, maps});
+        }
     } else code = ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", size, size);
     ts_arena_release(arena, mark);
     return code;

@@ -1,5 +1,5 @@
-/* Diffuse under a highlight. */
-#include "nn/hidden_diffuse.h"
+/* Diffuse under a highlight, and F0 beside it. */
+#include "nn/hidden.h"
 #include "tensor/maps.h"
 #include "tests/test.h"
 #include <math.h>
@@ -34,8 +34,8 @@ static void fill(int threads, float *to)
     ts_status st = {0};
     ts_arena *arena = ts_arena_create(0, &st);
     memcpy(to, maps, sizeof maps);
-    CHECK(arena && !nn_fill_hidden_diffuse(rd_grid_on(rd_grid_full(SIDE), threads), image, scene, C, arena, to, &st),
-          "%s", st.message);
+    CHECK(arena && !nn_fill_hidden(rd_grid_on(rd_grid_full(SIDE), threads), image, scene, C, arena, to, &st), "%s",
+          st.message);
     ts_arena_destroy(&arena);
 }
 
@@ -56,7 +56,9 @@ TEST(hidden_diffuse_is_that_of_the_surroundings)
     CHECK(count > 5 && sum / count > 0.33 && sum / count < 0.43, "albedo .133 became %g, not .4", sum / count);
     CHECK(fabs(contrast / count - 1.2) < 0.03, "contrast %g, not 1.2", contrast / count);
     for (int i = 0; i < PIXELS; i++)
-        for (int k = MAP_NORMAL; k < C; k++) CHECK(filled[i * C + k] == maps[i * C + k], "channel %d changed", k);
+        for (int k = MAP_NORMAL; k < C; k++)
+            CHECK(fabsf(filled[i * C + k] - maps[i * C + k]) < (k < MAP_SPECULAR ? 0 : 1e-5f) + 1e-9f,
+                  "channel %d changed", k);
 }
 
 /* What is seen stays: a disk on a matt material is the material's own. */
@@ -84,7 +86,55 @@ TEST(hidden_diffuse_leaves_a_pattern)
     CHECK(most < 0.8f, "a value is changed by e^%g", most);
 }
 
-TEST(hidden_diffuse_is_the_same_for_any_number_of_threads)
+/* Black things are not hidden, though most of their light is mirrored. */
+TEST(hidden_diffuse_leaves_what_is_dark)
+{
+    make(0.5f, 0.04f, 0);
+    for (int i = 0; i < PIXELS; i++)
+        for (int k = 0; k < 3; k++) maps[i * C + MAP_DIFFUSE + k] = i / SIDE < SIDE / 4 ? 2 * 0.01f - 1 : 2 * 0.7f - 1;
+    fill(1, filled);
+    float most = 0;
+    for (int i = 0; i < PIXELS / 8; i++) most = fmaxf(most, (filled[i * C] + 1) / 2);
+    CHECK(most < 0.015f, "an albedo of .01 beside .7 becomes %g", most);
+}
+
+/* F0 beside a highlight, a guess, goes most of the way to that of the highlight, and keeps its detail; that of the
+ * highlight stays. */
+TEST(hidden_f0_is_that_of_the_highlight)
+{
+    make(0.3f, 0.05f, 0);
+    for (int i = 0; i < PIXELS; i++)
+        for (int k = 0; k < 3; k++)
+            maps[i * C + MAP_SPECULAR + k] = 2 * 0.05f * (distance(i) > 0.25f ? 0.5f : 1) * (i % 2 ? 1.1f : 1) - 1;
+    fill(1, filled);
+    double inside = 0, outside = 0, contrast = 0;
+    int in = 0, out = 0;
+    for (int i = 0; i < PIXELS; i += 2) {
+        const double even = ((double)filled[i * C + MAP_SPECULAR] + 1) / 2,
+                     odd = ((double)filled[(i + 1) * C + MAP_SPECULAR] + 1) / 2;
+        if (distance(i) < 0.05f) inside += even, in++;
+        if (distance(i) > 0.35f) outside += even, contrast += odd / even, out++;
+    }
+    CHECK(fabs(inside / in - 0.05) < 0.003, "F0 of .05 in the highlight became %g", inside / in);
+    CHECK(outside / out > 0.037 && outside / out < 0.053, "F0 of .025 beside it became %g, not .05", outside / out);
+    CHECK(fabs(contrast / out - 1.1) < 0.01, "contrast %g, not 1.1", contrast / out);
+}
+
+/* Where F0 differs in what is seen of it too, as of metal beside paint, what is not seen is left alone. */
+TEST(hidden_f0_leaves_a_pattern)
+{
+    make(0.3f, 0.05f, 0);
+    for (int i = 0; i < PIXELS; i++)
+        for (int k = 0; k < 3; k++) maps[i * C + MAP_SPECULAR + k] = i % SIDE / 8 % 2 ? 2 * 0.6f - 1 : 2 * 0.04f - 1;
+    fill(1, filled);
+    float most = 0;
+    for (int i = 0; i < PIXELS; i++)
+        for (int k = MAP_SPECULAR; k < C; k++)
+            most = fmaxf(most, fabsf(logf((filled[i * C + k] + 1) / (maps[i * C + k] + 1))));
+    CHECK(most < 0.8f, "F0 is changed by e^%g, where the two differ by e^2.7", most);
+}
+
+TEST(hidden_maps_are_the_same_for_any_number_of_threads)
 {
     static float again[PIXELS * C];
     make(0.25f, 0.3f, 0.08f);
