@@ -48,8 +48,8 @@ void rd_posterior_step(rd_grid grid, const float *maps, int channels, const rd_v
            &(step_job){grid, maps, image, channels, count, v, prior, search, length, step, after});
 }
 
-/* W of the three values from at on. */
-static void tint(const double mean[MAP_CHANNELS], int at, double w[3])
+/* W of the three values from at on; the result is their root mean square. */
+static double tint(const double mean[MAP_CHANNELS], int at, double w[3])
 {
     double squares = 0;
     for (int c = 0; c < 3; c++) {
@@ -57,6 +57,7 @@ static void tint(const double mean[MAP_CHANNELS], int at, double w[3])
         squares += w[c] * w[c] / 3;
     }
     for (int c = 0; c < 3; c++) w[c] /= sqrt(squares);
+    return sqrt(squares);
 }
 
 void rd_prior_covariance(const double deviation[MAP_GROUPS], const double mean[MAP_CHANNELS], const ts_prior *prior,
@@ -66,9 +67,9 @@ void rd_prior_covariance(const double deviation[MAP_GROUPS], const double mean[M
         for (int j = 0; j < MAP_CHANNELS; j++) covariance[i][j] = 0;
     for (int k = 0; k < 2; k++) {
         const int at = k ? MAP_SPECULAR : MAP_DIFFUSE;
-        const double s = deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE];
         double w[3];
-        tint(mean, at, w);
+        const double level = tint(mean, at, w),
+                     s = fmin(deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE], 2 * (double)TS_PRIOR_SHARE * level);
         for (int a = 0; a < 3; a++)
             for (int b = 0; b < 3; b++)
                 covariance[at + a][at + b] = s * s * w[a] * w[b] * (a == b ? 1 : 1 - (double)prior->hue[k]);

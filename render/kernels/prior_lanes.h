@@ -34,6 +34,7 @@ V_INLINE void load_deviation(const float *deviation, int n, spread *a)
         a->deviation[g] = v_min(v_max(a->deviation[g], v_set(0)), v_set(TS_PRIOR_WIDEST));
 }
 
+/* W, and the colours' deviations, which have been loaded, cut to a share of their level. */
 V_INLINE void set_tint(const vf mean[MAP_CHANNELS], spread *a)
 {
     for (int k = 0; k < 2; k++) {
@@ -43,7 +44,9 @@ V_INLINE void set_tint(const vf mean[MAP_CHANNELS], spread *a)
             a->tint[k][c] = v_min(v_max(value, v_set(0)), v_set(1)) + TS_PRIOR_BLACK;
             squares += a->tint[k][c] * a->tint[k][c];
         }
-        const vf inverse = 1.0f / v_sqrt(squares * (1.0f / 3));
+        const vf level = v_sqrt(squares * (1.0f / 3)), inverse = 1.0f / level;
+        vf *deviation = &a->deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE];
+        *deviation = v_min(*deviation, level * (2 * TS_PRIOR_SHARE));
         for (int c = 0; c < 3; c++) a->tint[k][c] *= inverse;
     }
 }

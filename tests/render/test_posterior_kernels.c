@@ -97,7 +97,7 @@ TEST(posterior_is_newtons_step_for_equal_priors)
         for (int count = 1; count <= MOST; count += 4) {
             job j = begin(33, count);
             float damping[C], *newton = floats(PIXELS * C);
-            static const float of[G] = {0.5f, 4, 1, 2};
+            static const float of[G] = {150, 120, 100, 110}; /* deviations below those of the darkest colours */
             j.scale = (ts_prior){{1, 1}, sqrtf(TS_NEWTON_NOISE), 1, 0};
             for (int i = 0; i < C; i++) damping[i] = of[group_of[i]];
             for (int i = 0; i < PIXELS * G; i++) j.deviation[i] = 1 / sqrtf(of[i % G]);

@@ -19,9 +19,10 @@ static double misfit(const job *j, int pixel, const float *maps)
     for (int k = 0; k < 2; k++) { /* ((1 - q) 1 1' + q I)^-1 = (I - (1 - q) / (3 - 2 q) 1 1') / q */
         const int first = k ? MAP_SPECULAR : MAP_DIFFUSE;
         double w[3], v[3], all = 0;
-        tint_of(j->mean + pixel * C, first, w);
+        const double widest = tint_of(j->mean + pixel * C, first, w);
         for (int c = 0; c < 3; c++) all += v[c] = off[first + c] / w[c];
-        const double q = (double)j->scale.hue[k], s = (double)deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE];
+        const double q = (double)j->scale.hue[k],
+                     s = fmin((double)deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE], widest);
         sum += (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - (1 - q) / (3 - 2 * q) * all * all) / (q * s * s);
     }
     for (int i = 0; i < C; i++)

@@ -45,8 +45,8 @@ static inline job begin(uint64_t seed, int count)
     return j;
 }
 
-/* W of a pixel's three values from first on. */
-static inline void tint_of(const float *mean, int first, double w[3])
+/* W of a pixel's three values from first on; the result is how large their encoded deviation may be. */
+static inline double tint_of(const float *mean, int first, double w[3])
 {
     double squares = 0;
     for (int c = 0; c < 3; c++) {
@@ -54,6 +54,7 @@ static inline void tint_of(const float *mean, int first, double w[3])
         squares += w[c] * w[c];
     }
     for (int c = 0; c < 3; c++) w[c] /= sqrt(squares / 3);
+    return 2 * (double)TS_PRIOR_SHARE * sqrt(squares / 3);
 }
 
 static inline void end(job *j)
