@@ -142,7 +142,8 @@ static void newton_step(const ag_tape *tape, const nn_model *model, const nn_inp
 
 /* The noise is the Newton step's. What is more: a photograph whose light's power is known was taken with care, and
  * renderer and lens leave out little; what they do, one photograph cannot tell from its maps, and several can. Of
- * another neither tone curve nor vignetting nor other light is known, and what they change goes with the value. */
+ * another neither tone curve nor vignetting nor other light is known, and what they change goes with the value. One
+ * photograph, whose light may be another's, is not to make a dark colour black. */
 ts_prior nn_step_prior(int known, int photographs)
 {
     const bool careful = known & NN_KNOWN_POWER;
@@ -151,7 +152,8 @@ ts_prior nn_step_prior(int known, int photographs)
                           : photographs > 1 ? 0.01f
                                             : 0.03f,
                       .noise = 0.002f,
-                      .gain = careful ? 0 : 0.5f};
+                      .gain = careful ? 0 : 0.5f,
+                      .share = photographs > 1 ? 0 : 0.5f};
 }
 
 /* The step to the most probable maps, given all photographs of one material: to is [1, H, W, channels]. */

@@ -68,8 +68,9 @@ void rd_prior_covariance(const double deviation[MAP_GROUPS], const double mean[M
     for (int k = 0; k < 2; k++) {
         const int at = k ? MAP_SPECULAR : MAP_DIFFUSE;
         double w[3];
-        const double level = tint(mean, at, w),
-                     s = fmin(deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE], 2 * (double)TS_PRIOR_SHARE * level);
+        const double widest = 2 * (double)prior->share * tint(mean, at, w);
+        double s = deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE];
+        if (prior->share > 0) s = fmin(s, widest);
         for (int a = 0; a < 3; a++)
             for (int b = 0; b < 3; b++)
                 covariance[at + a][at + b] = s * s * w[a] * w[b] * (a == b ? 1 : 1 - (double)prior->hue[k]);

@@ -225,7 +225,7 @@ static void step(const ts_shade_view *views, const float *const *images, int cou
         decode_values(views->guards, at, &s);
         v_load_pixels(mean + first, row->channels, n, MAP_CHANNELS, m);
         load_deviation(deviation + (int64_t)i * MAP_GROUPS, n, &a);
-        set_tint(m, &a);
+        set_tint(m, prior->share, &a);
         for (int c = 0; c < MAP_CHANNELS; c++) m[c] -= at[c];
         const bool informed = learn(views, images, count, row, i, n, &s, prior, &a, m, after != NULL, &e);
         if (informed) widen(&a, e.z, x);

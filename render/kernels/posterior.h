@@ -9,6 +9,7 @@
 typedef struct ts_prior {
     float hue[2]; /* of the diffuse values and of F0's, in [0, 1] */
     float model, noise, gain;
+    float share; /* a colour's deviation, of values in [0, 1], is at most this part of its root mean square; 0: any */
 } ts_prior;
 /* Standard deviations of the prior are taken as TS_PRIOR_WIDEST where they are larger, and as 0 where they are not
  * above 0; variances of a photograph's value as TS_PRIOR_FINEST where they are smaller. */
@@ -16,9 +17,6 @@ typedef struct ts_prior {
 #define TS_PRIOR_FINEST 1e-10f
 /* What a colour's value of 0 counts as, so that it may move too. */
 #define TS_PRIOR_BLACK 0.01f
-/* A colour's deviation, of values in [0, 1], is at most this share of its root mean square: of a dark colour a wider
- * one would take it for black. */
-#define TS_PRIOR_SHARE 0.5f
 /* Misfits are those of deviations of TS_PRIOR_NARROWEST at least. */
 #define TS_PRIOR_NARROWEST 1e-6f
 /* What a burnt-out value tells fades from a radiance of 1 to 1 + TS_PRIOR_FADE. A narrow fade makes a burnt-out pixel

@@ -35,7 +35,7 @@ V_INLINE void load_deviation(const float *deviation, int n, spread *a)
 }
 
 /* W, and the colours' deviations, which have been loaded, cut to a share of their level. */
-V_INLINE void set_tint(const vf mean[MAP_CHANNELS], spread *a)
+V_INLINE void set_tint(const vf mean[MAP_CHANNELS], float share, spread *a)
 {
     for (int k = 0; k < 2; k++) {
         vf squares = {0};
@@ -46,7 +46,7 @@ V_INLINE void set_tint(const vf mean[MAP_CHANNELS], spread *a)
         }
         const vf level = v_sqrt(squares * (1.0f / 3)), inverse = 1.0f / level;
         vf *deviation = &a->deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE];
-        *deviation = v_min(*deviation, level * (2 * TS_PRIOR_SHARE));
+        if (share > 0) *deviation = v_min(*deviation, level * (2 * share));
         for (int c = 0; c < 3; c++) a->tint[k][c] *= inverse;
     }
 }

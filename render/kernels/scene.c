@@ -153,7 +153,7 @@ static void normal(const ts_scene *scene, const ts_shade_row *row, const float *
         if (!look(&scene->view, TS_SHADE_POSITIONS, row, i, n, true, 0, image, &s, &t)) continue;
         load_deviation(deviation + (int64_t)i * MAP_GROUPS, n, &a);
         v_load_pixels(row->maps + (int64_t)i * row->channels, row->channels, n, MAP_CHANNELS, mean);
-        set_tint(mean, &a);
+        set_tint(mean, prior->share, &a);
         move(scene, &t.e, &t.g, &m);
 #pragma GCC unroll 3
         for (int c = 0; c < 3; c++) {

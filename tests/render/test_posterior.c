@@ -26,7 +26,7 @@ TEST(posterior_is_where_the_objective_is_flat)
                 if (g != GROUP_DIFFUSE && g != GROUP_SPECULAR) continue;
                 const double q = (double)j.scale.hue[g == GROUP_SPECULAR];
                 double sum = 0, w[3]; /* (a I + b 1 1')^-1 = (I - b / (a + 3 b) 1 1') / a */
-                s = fmin(s, tint_of(j.mean + p * C, first, w));
+                s = fmin(s, (double)j.scale.share * tint_of(j.mean + p * C, first, w));
                 digit[i] = (double)FLT_EPSILON / (s * s);
                 for (int k = first; k < first + 3; k++)
                     sum += (maps[k] + delta[k] - (double)j.mean[p * C + k]) / w[k - first];
@@ -77,7 +77,7 @@ TEST(posterior_without_a_prior_fits_the_photograph)
     ts_rng rng = ts_rng_make(35, TS_STREAM_TEST, 1);
     j.views[0].power = 0.5f; /* nothing is clamped */
     rd_render(rd_grid_full(SIDE), j.truth, C, j.views, true, j.image[0]);
-    j.scale = (ts_prior){{1, 1}, 1e-4f, 0, 0};
+    j.scale = (ts_prior){{1, 1}, 1e-4f, 0, 0, 0};
     for (int i = 0; i < PIXELS * G; i++) j.deviation[i] = 0.5f; /* of changes of .02 */
     for (int i = 0; i < PIXELS * C; i++) j.maps[i] = j.truth[i] + ts_rng_range(&rng, -0.02f, 0.02f);
     double rmse[3];

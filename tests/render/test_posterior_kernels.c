@@ -98,7 +98,7 @@ TEST(posterior_is_newtons_step_for_equal_priors)
             job j = begin(33, count);
             float damping[C], *newton = floats(PIXELS * C);
             static const float of[G] = {150, 120, 100, 110}; /* deviations below those of the darkest colours */
-            j.scale = (ts_prior){{1, 1}, sqrtf(TS_NEWTON_NOISE), 1, 0};
+            j.scale = (ts_prior){{1, 1}, sqrtf(TS_NEWTON_NOISE), 1, 0, 0};
             for (int i = 0; i < C; i++) damping[i] = of[group_of[i]];
             for (int i = 0; i < PIXELS * G; i++) j.deviation[i] = 1 / sqrtf(of[i % G]);
             for (int i = 0; i < PIXELS * C; i++) /* of grey maps W is 1 */
@@ -154,6 +154,7 @@ TEST(posterior_is_finite_everywhere)
             part.scale = (ts_prior){{ts_rng_uniform(&rng), (float)ts_rng_int(&rng, 2)},
                                     ts_rng_int(&rng, 2) ? 0 : 0.1f,
                                     ts_rng_int(&rng, 2) ? 0 : 1,
+                                    ts_rng_int(&rng, 2) ? 0 : 0.5f,
                                     ts_rng_int(&rng, 2) ? 0 : 0.5f};
             for (int i = 0; i < PIXELS * C; i++) {
                 j.maps[i] = ts_rng_int(&rng, 3) ? extreme[ts_rng_int(&rng, EXTREMES)] : ts_rng_range(&rng, -1, 1);

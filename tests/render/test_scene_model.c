@@ -141,7 +141,8 @@ TEST(scene_normal_equations_equal_their_double_twin)
         double worst = 0;
         for (int round = 0; round < 6; round++) {
             ts_rng rng = ts_rng_make(51, TS_STREAM_TEST, (uint64_t)round);
-            const ts_prior prior = {{0.1f, round % 2 ? 1 : 0}, 0.05f, 0.02f, round % 3 ? 0.3f : 0};
+            const ts_prior prior = {
+                {0.1f, round % 2 ? 1 : 0}, 0.05f, 0.02f, round % 3 ? 0.3f : 0, round % 2 ? 0.5f : 0};
             float number[K], truth[K];
             double matrix[K][K] = {{0}}, right[K] = {0}, size[K];
             random_maps(&rng, maps), random_numbers(&rng, number), random_numbers(&rng, truth);
@@ -356,7 +357,7 @@ TEST(scene_fit_is_finite)
             for (int i = 0; i < PIXELS * 3; i++)
                 j.image[i] = round % 4 < 2 ? (float)(round % 2) : ts_rng_range(&rng, 0, 1);
             j.how = (rd_scene_how){
-                6, 1 + round % 3, 10, {{0.1f, 0}, round % 5 ? 0.1f : 0, round % 3 ? 0.1f : 0, round % 4 ? 0 : 0.2f}};
+                6, 1 + round % 3, 10, {{0.1f, 0}, round % 5 ? 0.1f : 0, round % 3 ? 0.1f : 0, round % 4 ? 0 : 0.2f, 0}};
             fit(&j, number, after);
             for (int i = 0; i < K; i++)
                 CHECK(fabsf(number[i]) <= 6 && after[i] >= 0 && after[i] <= j.prior.deviation[i] * 1.00001f,

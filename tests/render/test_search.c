@@ -22,7 +22,9 @@ static double misfit(const job *j, int pixel, const float *maps)
         const double widest = tint_of(j->mean + pixel * C, first, w);
         for (int c = 0; c < 3; c++) all += v[c] = off[first + c] / w[c];
         const double q = (double)j->scale.hue[k],
-                     s = fmin((double)deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE], widest);
+                     s = j->scale.share > 0
+            ? fmin((double)deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE], (double)j->scale.share * widest)
+            : (double)deviation[k ? GROUP_SPECULAR : GROUP_DIFFUSE];
         sum += (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - (1 - q) / (3 - 2 * q) * all * all) / (q * s * s);
     }
     for (int i = 0; i < C; i++)
@@ -35,7 +37,7 @@ static double misfit(const job *j, int pixel, const float *maps)
 static job careful(uint64_t seed)
 {
     job j = begin(seed, VIEWS);
-    j.scale = (ts_prior){{0.2f, 0.1f}, 0.01f, 0.002f, 0};
+    j.scale = (ts_prior){{0.2f, 0.1f}, 0.01f, 0.002f, 0, 0};
     return j;
 }
 
@@ -132,7 +134,7 @@ static double settled(bool whole, int steps, double *apart)
     float *ends[2];
     for (int k = 0; k < 2; k++) {
         job j = begin(94, 1);
-        j.scale = (ts_prior){{0.1f, 0.1f}, 0.1f, 0.002f, 0.5f};
+        j.scale = (ts_prior){{0.1f, 0.1f}, 0.1f, 0.002f, 0.5f, 0.5f};
         for (int i = 0; i < PIXELS * C; i++) { /* the truth is a deviation away from glossy maps, which are the mean */
             const bool normal = i % C == MAP_NORMAL || i % C == MAP_NORMAL + 1;
             j.mean[i] = i % C == MAP_ROUGHNESS ? -0.75f : normal ? 0.2f * j.maps[i] : j.maps[i];

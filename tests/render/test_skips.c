@@ -44,7 +44,7 @@ typedef struct results {
 static void compute(const scene *s, int y, const float *maps, const float *dark, const float *photo, results *r)
 {
     const float damping[C] = {0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 0.1f, 1, 1, 1};
-    const ts_prior prior = {{0.2f, 0.1f}, 0.1f, 0.5f, 0.3f};
+    const ts_prior prior = {{0.2f, 0.1f}, 0.1f, 0.5f, 0.3f, 0.5f};
     float deviation[SIDE * MAP_GROUPS];
     for (int i = 0; i < SIDE * MAP_GROUPS; i++) deviation[i] = 0.1f + 0.01f * (float)(i % 7);
     const rd_grid grid = rd_grid_full(SIDE);

@@ -27,7 +27,7 @@ static inline job begin(uint64_t seed, int count)
              .step = floats(PIXELS * C),
              .after = floats(PIXELS * G),
              .count = count,
-             .scale = {{0.2f, 0.1f}, 0.1f, 0.5f, 0.3f}};
+             .scale = {{0.2f, 0.1f}, 0.1f, 0.5f, 0.3f, 0.5f}};
     ts_rng rng = ts_rng_make(seed, TS_STREAM_TEST, (uint64_t)count);
     rd_capture_draw(&rng, count, j.views);
     for (int p = 0; p < PIXELS * C; p++) {
@@ -45,7 +45,7 @@ static inline job begin(uint64_t seed, int count)
     return j;
 }
 
-/* W of a pixel's three values from first on; the result is how large their encoded deviation may be. */
+/* W of a pixel's three values from first on; the result is their encoded root mean square. */
 static inline double tint_of(const float *mean, int first, double w[3])
 {
     double squares = 0;
@@ -54,7 +54,7 @@ static inline double tint_of(const float *mean, int first, double w[3])
         squares += w[c] * w[c];
     }
     for (int c = 0; c < 3; c++) w[c] /= sqrt(squares / 3);
-    return 2 * (double)TS_PRIOR_SHARE * sqrt(squares / 3);
+    return 2 * sqrt(squares / 3);
 }
 
 static inline void end(job *j)
