@@ -56,7 +56,7 @@ static void posterior(void *user)
     rd_view views[RD_CAPTURE_VIEWS];
     const float *image[RD_CAPTURE_VIEWS];
     static float best[SIDE * SIDE * MAP_CHANNELS], misfit[SIDE * SIDE];
-    const rd_search search = {best, misfit, 1};
+    const rd_search search = {best, misfit, true};
     const rd_prior prior = {j->target, j->deviation, {.hue = {0.1f, 0.1f}, .model = 0.1f, .noise = 0.5f}};
     for (int k = 0; k < j->photographs; k++) views[k] = rd_capture_view(k), image[k] = j->image;
     rd_posterior_step(rd_grid_full(j->side), j->maps, MAP_CHANNELS, views, image, j->photographs, &prior, 1,

@@ -39,7 +39,7 @@ static double misfit(const lgd_metal_photos *p, bool other, bool metal, int step
     memcpy(s->maps, mean, (size_t)values * sizeof *mean);
     const rd_prior prior = {mean, s->deviation, nn_step_prior(p->known, p->given)};
     for (int t = 0; t <= steps; t++) { /* the last one looks at what the one before made */
-        const rd_search search = {s->best, s->misfit, t};
+        const rd_search search = {s->best, s->misfit, t > 0};
         rd_posterior_step(s->grid, s->maps, channels, p->views, (const float *const *)s->image, p->given, &prior,
                           rd_step_length(p->given, t), &search, s->step, NULL);
         for (int i = 0; i < values; i++)

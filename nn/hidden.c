@@ -87,7 +87,8 @@ static void gather(const hidden_map *map, const pictures *p, int size, int chann
     double mean = 0, most = 0, most_usual = 0;
     memset(c->seen, 0, sizeof c->seen), memset(c->usual, 0, sizeof c->usual);
     memset(c->log_value, 0, sizeof c->log_value);
-    for (int i = 0; i < 3 * size * size; i++) mean += (double)maps[i / 3 * channels + map->at + i % 3] + 1;
+    for (int i = 0; i < size * size; i++)
+        for (int k = 0; k < 3; k++) mean += (double)maps[i * channels + map->at + k] + 1;
     mean /= 2.0 * size * size;
     ts_for(threads, c->side, 1, gather_rows, &(gather_job){map, p, size, channels, maps, image, (float)mean, c});
     for (int i = 0; i < count; i++) most = fmax(most, c->seen[i]), most_usual = fmax(most_usual, c->usual[i]);

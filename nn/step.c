@@ -173,7 +173,7 @@ static bool posterior_step(ag_tape *tape, const nn_model *model, const nn_input 
     }
     const rd_prior prior = {state->mean, state->deviation,
                             nn_step_prior(in->known ? in->known[0] : NN_KNOWN_ALL, count)};
-    const rd_search search = {state->best, state->misfit, state->step};
+    const rd_search search = {state->best, state->misfit, state->step > 0};
     rd_posterior_step(rd_grid_on(in->grid, ag_compute(tape)->threads), maps->data, s.c, view, image, count, &prior,
                       rd_step_length(count, state->step), count > 1 ? &search : NULL, to, NULL);
     return true;

@@ -30,7 +30,7 @@ static void step_rows(const void *job, int64_t begin, int64_t end)
         const float *part[RD_CAPTURE_VIEWS];
         ts_search search;
         if (j->search)
-            search = (ts_search){j->search->best + at * MAP_CHANNELS, j->search->misfit + at, j->search->steps > 0};
+            search = (ts_search){j->search->best + at * MAP_CHANNELS, j->search->misfit + at, j->search->begun};
         for (int k = 0; k < j->count; k++) part[k] = j->image[k] + at * 3;
         ts_posterior_k()->step(j->view, part, j->count, &row, &j->prior->scale, j->prior->mean + at * j->channels,
                                j->prior->deviation + at * MAP_GROUPS, j->length, j->search ? &search : NULL,

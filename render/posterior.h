@@ -8,8 +8,8 @@
  * is Sigma - Sigma J' (J Sigma J' + S)^-1 J Sigma. Sigma has a standard deviation s for each of the four maps. The
  * values of different maps are independent, and so are the normal's x and y; the three values of the diffuse map and
  * the three of F0 have the covariance s^2 W ((1 - q) 1 1' + q I) W. W is diagonal and holds the colour of the mean: its
- * three values of [0, 1], each TS_PRIOR_BLACK more, over their root mean square, of which their s is ts_prior's
- * share at most. With a small q the three are multiplied by the same and keep their hue. S is diagonal: a value I of a
+ * three values of [0, 1], each TS_PRIOR_BLACK more, over their root mean square, of which their s is ts_prior's share
+ * at most. With a small q the three are multiplied by the same and keep their hue. S is diagonal: a value I of a
  * photograph has the variance model^2 + noise max(I, 0) + (gain I)^2. seen is the radiance up to 1 and
  * 1 + log(radiance) above; where it is above 1 and the photograph is TS_NEWTON_BURNT at least, r and J fade, and from
  * 1 + TS_PRIOR_FADE on nothing is learned. */
@@ -22,7 +22,7 @@
 typedef struct rd_prior {
     const float *mean;      /* [h, w, channels], as the maps */
     const float *deviation; /* [h, w, MAP_GROUPS], of encoded values, >= 0 */
-    ts_prior scale;         /* q of both colours, model and noise */
+    ts_prior scale;
 } rd_prior;
 
 /* Along the steps of several photographs, whose highlights bend what a step takes for straight. With the misfit
@@ -31,7 +31,7 @@ typedef struct rd_prior {
  * goes back until TS_SEARCH_BACK of the way from the best is left. */
 typedef struct rd_search {
     float *best, *misfit; /* [h, w, MAP_CHANNELS] and [h, w], of the caller; each step reads and writes them */
-    int steps;            /* that have written them */
+    bool begun;           /* earlier steps have written them */
 } rd_search;
 
 /* The part of delta that the step after so many has. Of one photograph the first is whole, and the others are

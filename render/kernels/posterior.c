@@ -219,13 +219,17 @@ static void step(const ts_shade_view *views, const float *const *images, int cou
         const float *maps = row->maps + first;
         surface s;
         estimate e;
-        vf x[MAP_CHANNELS] = {0}, now[MAP_CHANNELS], at[MAP_CHANNELS], m[MAP_CHANNELS], left[MAP_GROUPS];
+        vf x[MAP_CHANNELS] = {0}, now[MAP_CHANNELS], at[MAP_CHANNELS], m[MAP_CHANNELS], left[MAP_GROUPS], colour[6];
         v_load_pixels(maps, row->channels, n, MAP_CHANNELS, now);
         within(now, at);
         decode_values(views->guards, at, &s);
         v_load_pixels(mean + first, row->channels, n, MAP_CHANNELS, m);
         load_deviation(deviation + (int64_t)i * MAP_GROUPS, n, &a);
-        set_tint(m, prior->share, &a);
+        for (int c = 0; c < 6; c++) {
+            const vf value = m[(c < 3 ? MAP_DIFFUSE : MAP_SPECULAR - 3) + c];
+            colour[c] = (v_min(v_max(value, v_set(-1)), v_set(1)) + 1.0f) * 0.5f;
+        }
+        set_colours(colour, colour + 3, prior->share, &a);
         for (int c = 0; c < MAP_CHANNELS; c++) m[c] -= at[c];
         const bool informed = learn(views, images, count, row, i, n, &s, prior, &a, m, after != NULL, &e);
         if (informed) widen(&a, e.z, x);

@@ -34,14 +34,13 @@ V_INLINE void load_deviation(const float *deviation, int n, spread *a)
         a->deviation[g] = v_min(v_max(a->deviation[g], v_set(0)), v_set(TS_PRIOR_WIDEST));
 }
 
-/* W, and the colours' deviations, which have been loaded, cut to a share of their level. */
-V_INLINE void set_tint(const vf mean[MAP_CHANNELS], float share, spread *a)
+/* W of the mean's colours, values in [0, 1], and their deviations, which have been loaded, cut to a share of them. */
+V_INLINE void set_colours(const vf diffuse[3], const vf specular[3], float share, spread *a)
 {
     for (int k = 0; k < 2; k++) {
         vf squares = {0};
         for (int c = 0; c < 3; c++) {
-            const vf value = (mean[(k ? MAP_SPECULAR : MAP_DIFFUSE) + c] + 1.0f) * 0.5f;
-            a->tint[k][c] = v_min(v_max(value, v_set(0)), v_set(1)) + TS_PRIOR_BLACK;
+            a->tint[k][c] = (k ? specular : diffuse)[c] + TS_PRIOR_BLACK;
             squares += a->tint[k][c] * a->tint[k][c];
         }
         const vf level = v_sqrt(squares * (1.0f / 3)), inverse = 1.0f / level;

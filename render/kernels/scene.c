@@ -148,12 +148,11 @@ static void normal(const ts_scene *scene, const ts_shade_row *row, const float *
         sight t;
         motion m;
         gram g;
-        vf by[3][TS_SCENE_UNKNOWNS], error[3], variance[3], mean[MAP_CHANNELS];
+        vf by[3][TS_SCENE_UNKNOWNS], error[3], variance[3];
         decode(scene->view.guards, row->maps + (int64_t)i * row->channels, row->channels, n, &s);
         if (!look(&scene->view, TS_SHADE_POSITIONS, row, i, n, true, 0, image, &s, &t)) continue;
         load_deviation(deviation + (int64_t)i * MAP_GROUPS, n, &a);
-        v_load_pixels(row->maps + (int64_t)i * row->channels, row->channels, n, MAP_CHANNELS, mean);
-        set_tint(mean, prior->share, &a);
+        set_colours(s.diffuse, s.specular, prior->share, &a);
         move(scene, &t.e, &t.g, &m);
 #pragma GCC unroll 3
         for (int c = 0; c < 3; c++) {

@@ -62,7 +62,7 @@ TEST(several_photographs_are_fitted_at_once)
                        .deviation = deviation,
                        .side = EDGE,
                        .tile = EDGE,
-                       .steps = 12};
+                       .steps = 12 /* the search is near its end */};
         CHECK(!lgd_tiles_run(tape, m, &t, maps, &st), "%s", st.message);
         ag_tape_destroy(&tape);
         for (int i = 0; i < VALUES; i++) off[count] += pow((double)maps[i] - (double)s.truth[i], 2);

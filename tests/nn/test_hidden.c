@@ -74,15 +74,24 @@ TEST(hidden_diffuse_leaves_what_is_seen)
         CHECK(fabsf((filled[i] + 1) / (maps[i] + 1) - 1) < 0.02f, "without a disk %g became %g", maps[i], filled[i]);
 }
 
+/* The largest change of a logarithm where a map's three values are a and b in stripes. */
+static float change_of_stripes(int at, int width, float a, float b)
+{
+    float most = 0;
+    for (int i = 0; i < PIXELS; i++)
+        for (int k = at; k < at + 3; k++) maps[i * C + k] = 2 * (i % SIDE / width % 2 ? a : b) - 1;
+    fill(1, filled);
+    for (int i = 0; i < PIXELS; i++)
+        for (int k = at; k < at + 3; k++)
+            most = fmaxf(most, fabsf(logf((filled[i * C + k] + 1) / (maps[i * C + k] + 1))));
+    return most;
+}
+
 /* Stripes and ground under a highlight stay apart: were their differences not expected, both would come out alike. */
 TEST(hidden_diffuse_leaves_a_pattern)
 {
     make(0.25f, 0.1f, 0);
-    for (int i = 0; i < PIXELS; i++)
-        for (int k = 0; k < 3; k++) maps[i * C + MAP_DIFFUSE + k] = i % SIDE / 16 % 2 ? 2 * 0.8f - 1 : 2 * 0.2f - 1;
-    fill(1, filled);
-    float most = 0;
-    for (int i = 0; i < PIXELS * C; i++) most = fmaxf(most, fabsf(logf((filled[i] + 1) / (maps[i] + 1))));
+    const float most = change_of_stripes(MAP_DIFFUSE, 16, 0.8f, 0.2f);
     CHECK(most < 0.8f, "a value is changed by e^%g", most);
 }
 
@@ -124,13 +133,7 @@ TEST(hidden_f0_is_that_of_the_highlight)
 TEST(hidden_f0_leaves_a_pattern)
 {
     make(0.3f, 0.05f, 0);
-    for (int i = 0; i < PIXELS; i++)
-        for (int k = 0; k < 3; k++) maps[i * C + MAP_SPECULAR + k] = i % SIDE / 8 % 2 ? 2 * 0.6f - 1 : 2 * 0.04f - 1;
-    fill(1, filled);
-    float most = 0;
-    for (int i = 0; i < PIXELS; i++)
-        for (int k = MAP_SPECULAR; k < C; k++)
-            most = fmaxf(most, fabsf(logf((filled[i * C + k] + 1) / (maps[i * C + k] + 1))));
+    const float most = change_of_stripes(MAP_SPECULAR, 8, 0.6f, 0.04f);
     CHECK(most < 0.8f, "F0 is changed by e^%g, where the two differ by e^2.7", most);
 }
 

@@ -68,7 +68,7 @@ TEST(search_keeps_the_best_maps_of_each_pixel)
 {
     job j = careful(91);
     float *best = floats(PIXELS * C), *least = floats(PIXELS), *before = floats(PIXELS), *kept = floats(PIXELS * C);
-    rd_search search = {best, least, 0};
+    rd_search search = {best, least, false};
     int back = 0, on = 0;
     double first = 0, last = 0;
     for (int i = 0; i < PIXELS * C; i++) kept[i] = j.maps[i];
@@ -81,7 +81,7 @@ TEST(search_keeps_the_best_maps_of_each_pixel)
             const double now = misfit(&j, p, j.maps + p * C), e = misfit(&j, p, best + p * C);
             const bool better = !memcmp(best + p * C, j.maps + p * C, C * sizeof *best);
             CHECK(fabs((double)least[p] - e) < 1e-3 * (e + 1), "pixel %d: misfit %g, not %g", p, (double)least[p], e);
-            CHECK(!search.steps || least[p] <= before[p], "pixel %d: misfit %g after %g", p, (double)least[p],
+            CHECK(!search.begun || least[p] <= before[p], "pixel %d: misfit %g after %g", p, (double)least[p],
                   (double)before[p]);
             CHECK(better || !memcmp(best + p * C, kept + p * C, C * sizeof *best), "pixel %d: best was never tried", p);
             CHECK(better || now > e * (1 - 1e-3), "pixel %d: %g was better than %g", p, now, e);
@@ -100,7 +100,7 @@ TEST(search_keeps_the_best_maps_of_each_pixel)
             last += t == STEPS - 1 ? e : 0;
         }
         free(whole);
-        search.steps++;
+        search.begun = true;
     }
     CHECK(on > 10 * PIXELS && back > PIXELS / 4, "%d steps on and %d back say nothing", on, back);
     CHECK(last < 0.2 * first && last < 0.9 * without_search(91),
@@ -114,9 +114,9 @@ TEST(search_leaves_what_is_not_a_number)
 {
     job j = begin(92, VIEWS);
     float *best = floats(PIXELS * C), *least = floats(PIXELS);
-    rd_search search = {best, least, 0};
+    rd_search search = {best, least, false};
     step(&j, 1, &search);
-    search.steps++;
+    search.begun = true;
     const float kept = best[0];
     j.maps[MAP_ROUGHNESS] = NAN;
     least[1] = -1;
