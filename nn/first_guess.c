@@ -2,6 +2,7 @@
 #include "nn/clip.h"
 #include "nn/deviation.h"
 #include "nn/hidden.h"
+#include "nn/lattice.h"
 #include "nn/lean.h"
 #include "nn/revise.h"
 #include "render/scene_model.h"
@@ -169,6 +170,9 @@ static ts_code make(ag_tape *tape, const nn_model *model, const nn_first_ask *as
         return st->code;
     }
     g->spread = guess.spread->t.data;
+    const int period = model->arch.g_unshuffle;
+    if (period > 1 && nn_take_lattice(period, size, model->arch.channels, threads, ag_arena(tape), g->r0, st))
+        return st->code;
     const ts_code code = nn_first_guess_settle(rd_grid_on(rd_grid_full(size), threads), model->arch.channels,
                                                small->t.data, scene, &ask->taken, ag_arena(tape), g, st);
     return code ? code : revise(tape, model, &small->t, guess.spread, ask, g, st);
