@@ -50,7 +50,8 @@ static void level_prior(const nn_first_guess *g, size_t pixels, int channels, in
     const double part = known & NN_KNOWN_CAMERA ? ROUGHNESS_LEVEL_IN_KNOWN_VIEW : ROUGHNESS_LEVEL;
     double rough = 0, off = 0;
     for (size_t i = 0; i < pixels; i++) {
-        rough += fmax((double)g->r0[i * (size_t)channels + MAP_ROUGHNESS], -1) + 1;
+        const float own = g->r0[i * (size_t)channels + MAP_ROUGHNESS];
+        rough += own > -1 ? (double)own + 1 : 0;
         off += (double)g->deviation[i * NN_SPREADS + GROUP_ROUGHNESS];
     }
     prior->mean[RD_SCENE_ROUGHNESS] = 0;

@@ -1,6 +1,8 @@
 #include "nn/hidden.h"
 #include "tensor/maps.h"
+#include "tensor/kernels/vmath_arrays.h"
 #include "tensor/memory.h"
+#include "tensor/scratch.h"
 #include "tensor/team.h"
 #include <math.h>
 #include <string.h>
@@ -47,36 +49,61 @@ typedef struct gather_job {
     cells *c;
 } gather_job;
 
-/* The first row of pixels of the cells' row. */
-static int first_row(int size, int side, int64_t row) { return (int)((row * size + side - 1) / side); }
+/* The first pixel of a cell in a row or column of them. */
+static int first_pixel(int size, int side, int64_t cell) { return (int)((cell * size + side - 1) / side); }
 
-static double part_of(float shown, float other) { return (double)(shown / fmaxf(shown + other, 1e-6f)); }
+static float larger(float a, float b) { return a > b ? a : b; }
+
+static float part_of(float shown, float other) { return shown / larger(shown + other, 1e-6f); }
+
+/* What each pixel of row y shows: logarithm [size][3], seen and usual [size]. */
+static void look(const gather_job *j, int y, float *logarithm, float *seen, float *usual)
+{
+    const int size = j->size;
+    for (int x = 0; x < size; x++) {
+        const size_t i = (size_t)y * (size_t)size + (size_t)x;
+        const float *map = j->maps + i * (size_t)j->channels + (size_t)j->map->at;
+        float full = 0, rest = 0, bright = 0, own = 0;
+        for (size_t k = 0; k < 3; k++) {
+            full += j->p->full[3 * i + k], rest += j->p->diffuse[3 * i + k], bright += j->image[3 * i + k];
+            const float value = (map[k] + 1) / 2;
+            own += value;
+            logarithm[3 * (size_t)x + k] = larger(value, VALUE_LEAST);
+        }
+        const float mirrored = larger(full - rest, 0), shown = j->map->mirrored ? mirrored : rest,
+                    other = j->map->mirrored ? rest : mirrored, tells = bright > BURNT_OUT ? BURNT_OUT_TELLS : 1;
+        seen[x] = tells * part_of(shown, other);
+        usual[x] = tells * part_of(shown * j->mean / larger(own, 3 * VALUE_LEAST), other);
+    }
+    ts_vmath_arrays_k()->log(3 * size, logarithm, logarithm);
+}
 
 /* Sums over each cell of these rows, then means. */
 static void gather_rows(const void *job, int64_t begin, int64_t end)
 {
     const gather_job *j = job;
     const int size = j->size, side = j->c->side;
-    int count[CELLS * CELLS] = {0};
-    for (int i = first_row(size, side, begin) * size; i < first_row(size, side, end) * size; i++) {
-        const int at = i / size * side / size * side + i % size * side / size;
-        float full = 0, rest = 0, seen = 0, own = 0;
-        for (int k = 0; k < 3; k++) {
-            full += j->p->full[3 * i + k], rest += j->p->diffuse[3 * i + k], seen += j->image[3 * i + k];
-            const float value = (j->maps[i * j->channels + j->map->at + k] + 1) / 2;
-            own += value;
-            j->c->log_value[k][at] += (double)logf(fmaxf(value, VALUE_LEAST));
+    float *logarithm = ts_scratch(0, 5 * (size_t)size * sizeof *logarithm), *seen = logarithm + 3 * size,
+          *usual = seen + size;
+    for (int row = (int)begin; row < (int)end; row++) {
+        const int first = first_pixel(size, side, row), last = first_pixel(size, side, row + 1);
+        for (int y = first; y < last; y++) {
+            look(j, y, logarithm, seen, usual);
+            for (int column = 0; column < side; column++) {
+                const int at = row * side + column;
+                for (int x = first_pixel(size, side, column); x < first_pixel(size, side, column + 1); x++) {
+                    j->c->seen[at] += (double)seen[x], j->c->usual[at] += (double)usual[x];
+                    for (int k = 0; k < 3; k++) j->c->log_value[k][at] += (double)logarithm[3 * x + k];
+                }
+            }
         }
-        const float mirrored = fmaxf(full - rest, 0), shown = j->map->mirrored ? mirrored : rest,
-                    other = j->map->mirrored ? rest : mirrored;
-        const double tells = seen > BURNT_OUT ? (double)BURNT_OUT_TELLS : 1;
-        j->c->seen[at] += tells * part_of(shown, other);
-        j->c->usual[at] += tells * part_of(shown * j->mean / fmaxf(own, 3 * VALUE_LEAST), other);
-        count[at]++;
-    }
-    for (int i = (int)begin * side; i < (int)end * side; i++) {
-        j->c->seen[i] /= count[i], j->c->usual[i] /= count[i];
-        for (int k = 0; k < 3; k++) j->c->log_value[k][i] /= count[i];
+        for (int column = 0; column < side; column++) {
+            const int at = row * side + column,
+                      across = first_pixel(size, side, column + 1) - first_pixel(size, side, column);
+            const double count = (double)(last - first) * across;
+            j->c->seen[at] /= count, j->c->usual[at] /= count;
+            for (int k = 0; k < 3; k++) j->c->log_value[k][at] /= count;
+        }
     }
 }
 
@@ -84,12 +111,12 @@ static void gather(const hidden_map *map, const pictures *p, int size, int chann
                    const float *image, int threads, cells *c)
 {
     const int count = c->side * c->side;
-    double mean = 0, most = 0, most_usual = 0;
+    double sum[3] = {0}, most = 0, most_usual = 0;
     memset(c->seen, 0, sizeof c->seen), memset(c->usual, 0, sizeof c->usual);
     memset(c->log_value, 0, sizeof c->log_value);
     for (int i = 0; i < size * size; i++)
-        for (int k = 0; k < 3; k++) mean += (double)maps[i * channels + map->at + k] + 1;
-    mean /= 2.0 * size * size;
+        for (int k = 0; k < 3; k++) sum[k] += (double)maps[i * channels + map->at + k] + 1;
+    const double mean = (sum[0] + sum[1] + sum[2]) / (2.0 * size * size);
     ts_for(threads, c->side, 1, gather_rows, &(gather_job){map, p, size, channels, maps, image, (float)mean, c});
     for (int i = 0; i < count; i++) most = fmax(most, c->seen[i]), most_usual = fmax(most_usual, c->usual[i]);
     for (int i = 0; i < count; i++) {
@@ -117,29 +144,34 @@ static void make_band(const cells *c, double *band)
 static void factor(int count, int side, double *band)
 {
     const int width = side + 1;
-    for (int i = 0; i < count; i++) {
-        double *row = band + (size_t)i * (size_t)width;
-        for (int j = i < side ? 0 : i - side; j <= i; j++) {
-            const double *other = band + (size_t)j * (size_t)width;
-            double sum = row[j - i + side];
-            for (int k = i < side ? 0 : i - side; k < j; k++) sum -= row[k - i + side] * other[k - j + side];
-            row[j - i + side] = j == i ? sqrt(sum) : sum / other[side];
+    for (int j = 0; j < count; j++) {
+        double column[CELLS + 1]; /* of rows j .. j + side, whose entry it is the one before the next's by width - 1 */
+        double *const diagonal = band + (size_t)j * (size_t)width + side;
+        const int below = count - 1 - j < side ? count - 1 - j : side;
+        *diagonal = sqrt(*diagonal);
+        for (int i = 1; i <= below; i++) column[i] = diagonal[i * (width - 1)] /= *diagonal;
+        for (int i = 1; i <= below; i++) {
+            double *row = diagonal + i * (width - 1);
+            for (int k = 1; k <= i; k++) row[k] -= column[i] * column[k];
         }
     }
 }
 
-static void solve(int count, int side, const double *band, double *x)
+/* Three right-hand sides at once. */
+static void solve(int count, int side, const double *band, double x[3][CELLS * CELLS])
 {
     const int width = side + 1;
     for (int i = 0; i < count; i++) {
         const double *row = band + (size_t)i * (size_t)width;
-        for (int k = i < side ? 0 : i - side; k < i; k++) x[i] -= row[k - i + side] * x[k];
-        x[i] /= row[side];
+        for (int k = i < side ? 0 : i - side; k < i; k++)
+            for (int c = 0; c < 3; c++) x[c][i] -= row[k - i + side] * x[c][k];
+        for (int c = 0; c < 3; c++) x[c][i] /= row[side];
     }
     for (int i = count - 1; i >= 0; i--) {
         const double *row = band + (size_t)i * (size_t)width;
-        x[i] /= row[side];
-        for (int k = i < side ? 0 : i - side; k < i; k++) x[k] -= row[k - i + side] * x[i];
+        for (int c = 0; c < 3; c++) x[c][i] /= row[side];
+        for (int k = i < side ? 0 : i - side; k < i; k++)
+            for (int c = 0; c < 3; c++) x[c][k] -= row[k - i + side] * x[c][i];
     }
 }
 
@@ -167,10 +199,11 @@ static void find_changes(const hidden_map *map, cells *c, double *band)
     const int count = c->side * c->side;
     make_band(c, band);
     factor(count, c->side, band);
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < count; i++) c->change[k][i] = (c->weight[i] + WEIGHT_LEAST) * c->log_value[k][i];
+    solve(count, c->side, band, c->change);
     for (int k = 0; k < 3; k++) {
         double *b = c->change[k];
-        for (int i = 0; i < count; i++) b[i] = (c->weight[i] + WEIGHT_LEAST) * c->log_value[k][i];
-        solve(count, c->side, band, b);
         const double differ = variance(c, c->log_value[k]);
         for (int i = 0; i < count; i++) {
             const double from = b[i] - c->log_value[k][i], far = from / map->reach;
@@ -182,7 +215,10 @@ static void find_changes(const hidden_map *map, cells *c, double *band)
 /* Pixel i lies between the centres of cells *cell and the one after it, *part of the way. */
 static void between(int i, int size, int side, int *cell, float *part)
 {
-    const float at = fminf(fmaxf(((float)i + 0.5f) * (float)side / (float)size - 0.5f, 0), (float)(side - 1));
+    const float centre = ((float)i + 0.5f) * (float)side / (float)size - 0.5f, last = (float)(side - 1),
+                at = centre < 0 ? 0
+        : centre < last         ? centre
+                                : last;
     *cell = (int)at < side - 1 ? (int)at : side > 1 ? side - 2 : 0;
     *part = at - (float)*cell;
 }
@@ -197,21 +233,29 @@ static void apply_rows(const void *job, int64_t begin, int64_t end)
 {
     const apply_job *j = job;
     const cells *c = j->c;
-    const int size = j->size, next = c->side > 1;
+    const int size = j->size, side = c->side, next = side > 1;
+    float *factor = ts_scratch(0, (3 * (size_t)size + 3 * CELLS) * sizeof *factor), *row = factor + 3 * size;
     for (int y = (int)begin; y < (int)end; y++) {
-        int row, column;
+        int above, left;
         float down, right;
-        between(y, size, c->side, &row, &down);
-        for (int x = 0; x < size; x++) {
-            between(x, size, c->side, &column, &right);
-            float *map = j->maps + (size_t)(y * size + x) * (size_t)j->channels + (size_t)j->at;
+        between(y, size, side, &above, &down);
+        for (int i = 0; i < side; i++)
             for (int k = 0; k < 3; k++) {
-                const double *a = c->change[k] + row * c->side + column, *b = a + next * c->side;
-                const float upper = (1 - right) * (float)a[0] + right * (float)a[next],
-                            lower = (1 - right) * (float)b[0] + right * (float)b[next];
-                map[k] = fminf((map[k] + 1) * expf((1 - down) * upper + down * lower) - 1, 1);
+                const double *a = c->change[k] + above * side + i;
+                row[3 * i + k] = (1 - down) * (float)a[0] + down * (float)a[next * side];
             }
+        for (int x = 0; x < size; x++) {
+            between(x, size, side, &left, &right);
+            const float *a = row + 3 * left;
+            for (int k = 0; k < 3; k++) factor[3 * x + k] = (1 - right) * a[k] + right * a[3 * next + k];
         }
+        ts_vmath_arrays_k()->exp(3 * size, factor, factor);
+        float *map = j->maps + (size_t)y * (size_t)size * (size_t)j->channels + (size_t)j->at;
+        for (int x = 0; x < size; x++, map += j->channels)
+            for (int k = 0; k < 3; k++) {
+                const float value = (map[k] + 1) * factor[3 * x + k] - 1;
+                map[k] = value < 1 ? value : 1;
+            }
     }
 }
 

@@ -126,7 +126,10 @@ void rd_scene_roughen(int64_t pixels, const float *maps, int channels, float lev
 {
     const float factor = expf(level);
     if (to != maps) memcpy(to, maps, (size_t)(pixels * channels) * sizeof *to);
-    for (int64_t i = MAP_ROUGHNESS; i < pixels * channels; i += channels) to[i] = fminf((to[i] + 1) * factor - 1, 1);
+    for (int64_t i = MAP_ROUGHNESS; i < pixels * channels; i += channels) {
+        const float x = (to[i] + 1) * factor - 1;
+        to[i] = x < 1 ? x : 1;
+    }
 }
 
 typedef struct sums_job {
