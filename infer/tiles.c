@@ -1,7 +1,9 @@
 #include "infer/tiles.h"
+#include "infer/detail.h"
 #include "nn/clip.h"
 #include "nn/window.h"
 #include "tensor/resample.h"
+#include "tensor/resize.h"
 #include "tensor/team.h"
 #include <math.h>
 #include <stdint.h>
@@ -21,6 +23,7 @@ typedef struct work {
     ag_value **coarse; /* [coarse_steps + 1]: R_0 at g's size, then those of the coarse steps at theirs */
     int coarse_steps;  /* of t->steps */
     ts_taps taps[2];   /* from R_0 and from the others to side, along rows and columns alike */
+    float *levels;     /* of lgd_detail_compare, at g's size; NULL: the steps see all detail */
     double *rmse0;     /* [given] */
     double *squares;   /* [steps + 1]: sums over the pixels of squared differences, by t; NULL: not measured */
     bool stopped;      /* by t->after, while one tile was refined */
@@ -122,8 +125,8 @@ static bool after_step(int step, const ag_value *maps, void *user)
     return look(u->w, &u->loop->in, u->loop->core, step, maps ? maps->t.data : NULL);
 }
 
-/* R_0 of a window, which its steps will overwrite, and its errors' deviations there. */
-static bool prior(const work *w, rd_grid window, const float *maps, nn_state *state)
+/* R_0 of a window with the photograph's detail, which its steps will overwrite, and its errors' deviations there. */
+static bool prior(const work *w, rd_grid window, const float *image, float *maps, nn_state *state)
 {
     const size_t pixels = (size_t)nn_window_pixels(window);
     const ts_taps down = ts_taps_part(&w->taps[0], window.y0, window.h),
@@ -136,8 +139,13 @@ static bool prior(const work *w, rd_grid window, const float *maps, nn_state *st
     }
     if (!mean || !deviation || (w->t->given > 1 && !(state->best && state->misfit)))
         return ag_fail(w->tape, TS_NOMEM, "out of memory"), false;
-    memcpy(mean, maps, pixels * (size_t)w->channels * sizeof *mean);
     ts_resample(1, NN_SPREADS, &down, &across, w->t->deviation, deviation, false, w->threads);
+    ts_status st = {0};
+    if (w->levels &&
+        lgd_detail_add(window, &down, &across, w->levels, image, &w->t->views[0], deviation, w->channels,
+                       ag_arena(w->tape), maps, &st))
+        return ag_fail(w->tape, st.code, "%s", st.message), false;
+    memcpy(mean, maps, pixels * (size_t)w->channels * sizeof *mean);
     state->mean = mean;
     state->deviation = deviation;
     return true;
@@ -163,7 +171,7 @@ static void refine(work *w, rd_grid core, rd_grid window, ts_tensor image, float
         if (looks) look(w, &loop.in, core, i, maps);
     }
     const ts_mark mark = ts_arena_mark(ag_arena(w->tape));
-    if (t->deviation && !w->stopped && !prior(w, window, maps, &loop.state)) return;
+    if (t->deviation && !w->stopped && !prior(w, window, image.data, maps, &loop.state)) return;
     ag_value *now = ag_constant(w->tape, ts_view(maps, (ts_shape){1, window.h, window.w, w->channels}));
     if (now && !w->stopped) nn_steps(w->tape, w->model, &loop, &now);
     t->refined += (int64_t)nn_window_pixels(core) * loop.made;
@@ -264,6 +272,28 @@ static ts_code measure_start(work *w)
     return ag_status(w->tape)->code;
 }
 
+/* One photograph of more pixels than g reads, whose exposure is not known. */
+static bool lacks_detail(const work *w)
+{
+    const lgd_tiles *t = w->t;
+    return t->deviation && t->r0 && t->given == 1 && t->steps > 0 && t->known && !(t->known[0] & NN_KNOWN_POWER) &&
+        t->side > nn_arch_side(&w->model->arch);
+}
+
+static void compare_levels(work *w)
+{
+    const int size = nn_arch_side(&w->model->arch);
+    ts_arena *arena = ag_arena(w->tape);
+    const ts_mark mark = ts_arena_mark(arena);
+    ts_status st = {0};
+    ts_tensor small = ts_new(arena, (ts_shape){1, size, size, 3});
+    if (!small.data || ts_resize(&small, &w->photo, arena, w->threads, &st) ||
+        lgd_detail_compare(rd_grid_on(rd_grid_full(size), w->threads), w->t->r0, w->channels, &w->t->views[0],
+                           small.data, arena, w->levels, &st))
+        ag_fail(w->tape, TS_NOMEM, "out of memory for %d x %d pixels", size, size);
+    ts_arena_release(arena, mark);
+}
+
 /* g and the coarse steps work on the whole photograph. */
 static ts_code prepare(work *w)
 {
@@ -278,6 +308,9 @@ static ts_code prepare(work *w)
     w->squares = t->rmse ? ts_arena_zalloc(arena, (size_t)t->steps + 1, sizeof *w->squares) : NULL;
     if (!w->coarse || !w->taps[0].weight || (w->coarse_steps > 0 && !w->taps[1].weight) || (t->rmse && !w->squares))
         return ag_fail(w->tape, TS_NOMEM, "out of memory"), TS_NOMEM;
+    const size_t pixels = (size_t)nn_arch_side(a) * (size_t)nn_arch_side(a);
+    if (lacks_detail(w) && !(w->levels = ts_arena_alloc(arena, pixels * LGD_DETAIL_LEVELS * sizeof *w->levels)))
+        return ag_fail(w->tape, TS_NOMEM, "out of memory"), TS_NOMEM;
     ts_mark mark = ag_scope_begin(w->tape);
     w->photo = ts_view((float *)(uintptr_t)t->image[0], (ts_shape){t->given, side, side, 3});
     if (t->given > 1 || !nn_clipped(ts_count(w->photo.shape), t->image[0], w->threads)) {
@@ -286,6 +319,7 @@ static ts_code prepare(work *w)
         photographs(w, whole(w), clipped->t.data);
         w->photo = clipped->t;
     }
+    if (w->levels) compare_levels(w);
     if (w->one) mark = ag_scope_begin(w->tape); /* which needs them again */
     const nn_input in = input(w, whole(w), w->photo);
     if (nn_coarse_steps(w->tape, w->model, &in, w->coarse_steps, w->coarse, w->one ? after_coarse : NULL, w) != TS_OK)

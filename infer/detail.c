@@ -1,0 +1,125 @@
+#include "infer/detail.h"
+#include "nn/model.h"
+#include "render/kernels/newton.h"
+#include "render/render.h"
+#include "tensor/maps.h"
+#include "tensor/team.h"
+#include <string.h>
+
+enum {
+    STEP = 1 << 12, /* pixels at a time, at least */
+    AROUND = 2      /* pixels that enlarging reads */
+};
+#define DARK 0.004f      /* one step of 8 bits */
+#define MOST 4.0f        /* times brighter or darker */
+#define BRIGHT 0.75f     /* values from here on are trusted less */
+#define FINE_RELIEF 0.5f /* of the normals' deviations: most relief is broader than g's pixels */
+
+typedef struct level_job {
+    rd_grid grid;
+    const float *image, *from; /* from: the rendering, or what is enlarged */
+    float *to;
+} level_job;
+
+/* 1 for what is far from burnt out, 0 from TS_NEWTON_BURNT on. */
+static float trust(const float v[3])
+{
+    const float largest = v[0] > v[1] ? v[0] > v[2] ? v[0] : v[2]
+        : v[1] > v[2] ? v[1]
+                                      : v[2],
+                left = (TS_NEWTON_BURNT - largest) / (TS_NEWTON_BURNT - BRIGHT);
+    return left < 0 ? 0 : left < 1 ? left : 1;
+}
+
+static void compare_rows(const void *job, int64_t begin, int64_t end)
+{
+    const level_job *j = job;
+    const int w = j->grid.w, h = j->grid.h;
+    for (int y = (int)begin; y < (int)end; y++)
+        for (int x = 0; x < w; x++) {
+            const size_t i = (size_t)y * (size_t)w + (size_t)x;
+            float *to = j->to + LGD_DETAIL_LEVELS * i;
+            for (size_t c = 0; c < 3; c++) {
+                const float level = (j->from[3 * i + c] + DARK) / (j->image[3 * i + c] + DARK);
+                to[c] = level > MOST ? MOST : level < 1 / MOST ? 1 / MOST : level;
+            }
+            to[3] = 1;
+            for (int ny = y > AROUND ? y - AROUND : 0; ny <= y + AROUND && ny < h; ny++)
+                for (int nx = x > AROUND ? x - AROUND : 0; nx <= x + AROUND && nx < w; nx++) {
+                    const float there = trust(j->image + 3 * ((size_t)ny * (size_t)w + (size_t)nx));
+                    if (there < to[3]) to[3] = there;
+                }
+        }
+}
+
+ts_code lgd_detail_compare(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image,
+                           ts_arena *arena, float *levels, ts_status *st)
+{
+    const ts_mark mark = ts_arena_mark(arena);
+    float *rendering = ts_arena_alloc(arena, (size_t)grid.h * (size_t)grid.w * 3 * sizeof *rendering);
+    if (!rendering) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", grid.w, grid.h);
+    rd_render(grid, maps, channels, view, true, rendering);
+    ts_for(grid.threads, grid.h, 1, compare_rows, &(level_job){grid, image, rendering, levels});
+    ts_arena_release(arena, mark);
+    return TS_OK;
+}
+
+/* The photograph, as bright as the rendering. */
+static void level_pixels(const void *job, int64_t begin, int64_t end)
+{
+    const level_job *j = job;
+    for (int64_t i = begin; i < end; i++)
+        for (int c = 0; c < 3; c++) j->to[3 * i + c] = j->image[3 * i + c] * j->from[LGD_DETAIL_LEVELS * i + c];
+}
+
+typedef struct errors_job {
+    const float *from;
+    float *to;
+} errors_job;
+
+static void fine_errors(const void *job, int64_t begin, int64_t end)
+{
+    const errors_job *j = job;
+    memcpy(j->to + begin * MAP_GROUPS, j->from + begin * MAP_GROUPS,
+           (size_t)(end - begin) * MAP_GROUPS * sizeof *j->to);
+    for (int64_t i = begin; i < end; i++) j->to[i * MAP_GROUPS + GROUP_NORMAL] *= FINE_RELIEF;
+}
+
+typedef struct add_job {
+    const float *levels, *step;
+    int channels;
+    float *maps;
+} add_job;
+
+static void add_pixels(const void *job, int64_t begin, int64_t end)
+{
+    const add_job *j = job;
+    for (int64_t i = begin; i < end; i++) {
+        const float part = j->levels[LGD_DETAIL_LEVELS * i + 3];
+        for (int64_t c = i * j->channels; c < i * j->channels + MAP_CHANNELS; c++) j->maps[c] += part * j->step[c];
+    }
+}
+
+ts_code lgd_detail_add(rd_grid grid, const ts_taps *rows, const ts_taps *columns, const float *levels,
+                       const float *image, const rd_view *view, const float *deviation, int channels, ts_arena *arena,
+                       float *maps, ts_status *st)
+{
+    const int64_t pixels = (int64_t)grid.h * grid.w;
+    const ts_mark mark = ts_arena_mark(arena);
+    float *enlarged = ts_arena_alloc(arena, (size_t)pixels * LGD_DETAIL_LEVELS * sizeof *enlarged),
+          *levelled = ts_arena_alloc(arena, (size_t)pixels * 3 * sizeof *levelled),
+          *errors = ts_arena_alloc(arena, (size_t)pixels * MAP_GROUPS * sizeof *errors),
+          *step = ts_arena_alloc(arena, (size_t)(pixels * channels) * sizeof *step);
+    ts_code code = TS_OK;
+    if (enlarged && levelled && errors && step) {
+        const rd_prior prior = {maps, errors, nn_step_prior(NN_KNOWN_ALL, 1)};
+        const float *seen = levelled;
+        ts_resample(1, LGD_DETAIL_LEVELS, rows, columns, levels, enlarged, false, grid.threads);
+        ts_for(grid.threads, pixels, STEP, level_pixels, &(level_job){grid, image, enlarged, levelled});
+        ts_for(grid.threads, pixels, STEP, fine_errors, &(errors_job){deviation, errors});
+        rd_posterior_step(grid, maps, channels, view, &seen, 1, &prior, 1, NULL, step, NULL);
+        ts_for(grid.threads, pixels, STEP, add_pixels, &(add_job){enlarged, step, channels, maps});
+    } else code = ts_fail(st, TS_NOMEM, "out of memory for the detail of %d x %d pixels", grid.w, grid.h);
+    ts_arena_release(arena, mark);
+    return code;
+}
