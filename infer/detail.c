@@ -1,6 +1,5 @@
 #include "infer/detail.h"
 #include "nn/model.h"
-#include "render/kernels/newton.h"
 #include "render/render.h"
 #include "tensor/maps.h"
 #include "tensor/team.h"

@@ -1,7 +1,6 @@
 #include "render/posterior.h"
 #include "render/brdf.h"
 #include "render/rows.h"
-#include "render/kernels/newton.h"
 #include <math.h>
 #include <stddef.h>
 

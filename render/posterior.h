@@ -16,6 +16,7 @@
 #ifndef RD_POSTERIOR_H
 #define RD_POSTERIOR_H
 #include "render/scene.h"
+#include "render/kernels/newton.h"
 #include "render/kernels/posterior.h"
 #include "tensor/maps.h"
 
