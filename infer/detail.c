@@ -94,7 +94,10 @@ static void add_pixels(const void *job, int64_t begin, int64_t end)
 {
     const add_job *j = job;
     for (int64_t i = begin; i < end; i++) {
-        const float part = j->levels[LGD_DETAIL_LEVELS * i + 3];
+        const float trusted = j->levels[LGD_DETAIL_LEVELS * i + 3], /* enlarging goes a little beyond 0 and 1 */
+            part = trusted < 0 ? 0
+            : trusted < 1      ? trusted
+                               : 1;
         for (int64_t c = i * j->channels; c < i * j->channels + MAP_CHANNELS; c++) j->maps[c] += part * j->step[c];
     }
 }

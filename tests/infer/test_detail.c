@@ -83,18 +83,20 @@ TEST(detail_is_found_at_any_exposure)
 TEST(detail_stays_away_from_burnt_out_pixels)
 {
     add(1, 2);
-    double most = 0, rim = 0;
+    double most = 0, rim = 0, beyond = 0;
     for (int y = 0; y < SIDE; y++)
         for (int x = 0; x < SIDE; x++) {
             const int far = (int)fmax(abs(y - SIDE / 2), abs(x - SIDE / 2));
             for (int k = 0; k < C; k++) {
                 const int i = (y * SIDE + x) * C + k;
                 const double change = fabs((double)(maps[i] - before[i]));
+                beyond = fmax(beyond, fabs((double)maps[i]) - 1);
                 if (far < BURNT / 2) most = fmax(most, change);
                 else if (far < BURNT / 2 + 8 && k < MAP_NORMAL)
                     rim = fmax(rim, change - fabs((double)(truth[i] - before[i])));
             }
         }
+    CHECK(beyond < 1e-6, "a map's value is %g beyond its range", beyond);
     CHECK(most < 1e-3, "burnt-out pixels changed by %g", most);
     CHECK(rim < 0.02, "beside them diffuse changed by %g more than the material does", rim);
 }
