@@ -2,6 +2,7 @@
 #include "nn/model.h"
 #include "render/render.h"
 #include "tensor/maps.h"
+#include "tensor/resize.h"
 #include "tensor/team.h"
 #include <string.h>
 
@@ -17,6 +18,7 @@ enum {
 typedef struct level_job {
     rd_grid grid;
     const float *image, *from; /* from: the rendering, or what is enlarged */
+    float *own;                /* how far each pixel by itself is to be trusted */
     float *to;
 } level_job;
 
@@ -30,37 +32,55 @@ static float trust(const float v[3])
     return left < 0 ? 0 : left < 1 ? left : 1;
 }
 
-static void compare_rows(const void *job, int64_t begin, int64_t end)
+static void compare_pixels(const void *job, int64_t begin, int64_t end)
+{
+    const level_job *j = job;
+    for (int64_t i = begin; i < end; i++) {
+        for (int64_t c = 0; c < 3; c++) {
+            const float level = (j->from[3 * i + c] + DARK) / (j->image[3 * i + c] + DARK);
+            j->to[LGD_DETAIL_LEVELS * i + c] = level > MOST ? MOST : level < 1 / MOST ? 1 / MOST : level;
+        }
+        j->own[i] = trust(j->image + 3 * i);
+    }
+}
+
+/* A pixel is trusted as far as those that enlarging reads with it. */
+static void least_rows(const void *job, int64_t begin, int64_t end)
 {
     const level_job *j = job;
     const int w = j->grid.w, h = j->grid.h;
     for (int y = (int)begin; y < (int)end; y++)
         for (int x = 0; x < w; x++) {
-            const size_t i = (size_t)y * (size_t)w + (size_t)x;
-            float *to = j->to + LGD_DETAIL_LEVELS * i;
-            for (size_t c = 0; c < 3; c++) {
-                const float level = (j->from[3 * i + c] + DARK) / (j->image[3 * i + c] + DARK);
-                to[c] = level > MOST ? MOST : level < 1 / MOST ? 1 / MOST : level;
-            }
-            to[3] = 1;
+            float least = 1;
             for (int ny = y > AROUND ? y - AROUND : 0; ny <= y + AROUND && ny < h; ny++)
                 for (int nx = x > AROUND ? x - AROUND : 0; nx <= x + AROUND && nx < w; nx++) {
-                    const float there = trust(j->image + 3 * ((size_t)ny * (size_t)w + (size_t)nx));
-                    if (there < to[3]) to[3] = there;
+                    const float there = j->own[(size_t)ny * (size_t)w + (size_t)nx];
+                    if (there < least) least = there;
                 }
+            j->to[LGD_DETAIL_LEVELS * ((size_t)y * (size_t)w + (size_t)x) + 3] = least;
         }
 }
 
-ts_code lgd_detail_compare(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image,
+ts_code lgd_detail_compare(rd_grid grid, const float *maps, int channels, const rd_view *view, const ts_tensor *image,
                            ts_arena *arena, float *levels, ts_status *st)
 {
+    const int64_t pixels = (int64_t)grid.h * grid.w;
     const ts_mark mark = ts_arena_mark(arena);
-    float *rendering = ts_arena_alloc(arena, (size_t)grid.h * (size_t)grid.w * 3 * sizeof *rendering);
-    if (!rendering) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", grid.w, grid.h);
-    rd_render(grid, maps, channels, view, true, rendering);
-    ts_for(grid.threads, grid.h, 1, compare_rows, &(level_job){grid, image, rendering, levels});
+    ts_tensor small = ts_new(arena, (ts_shape){1, grid.h, grid.w, 3});
+    float *rendering = ts_arena_alloc(arena, (size_t)pixels * 3 * sizeof *rendering),
+          *own = ts_arena_alloc(arena, (size_t)pixels * sizeof *own);
+    ts_code code = TS_OK;
+    if (!small.data || !rendering || !own)
+        code = ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", grid.w, grid.h);
+    else code = ts_resize(&small, image, arena, grid.threads, st);
+    if (!code) {
+        const level_job job = {grid, small.data, rendering, own, levels};
+        rd_render(grid, maps, channels, view, true, rendering);
+        ts_for(grid.threads, pixels, STEP, compare_pixels, &job);
+        ts_for(grid.threads, grid.h, 1, least_rows, &job);
+    }
     ts_arena_release(arena, mark);
-    return TS_OK;
+    return code;
 }
 
 /* The photograph, as bright as the rendering. */
@@ -117,7 +137,8 @@ ts_code lgd_detail_add(rd_grid grid, const ts_taps *rows, const ts_taps *columns
         const rd_prior prior = {maps, errors, nn_step_prior(NN_KNOWN_ALL, 1)};
         const float *seen = levelled;
         ts_resample(1, LGD_DETAIL_LEVELS, rows, columns, levels, enlarged, false, grid.threads);
-        ts_for(grid.threads, pixels, STEP, level_pixels, &(level_job){grid, image, enlarged, levelled});
+        ts_for(grid.threads, pixels, STEP, level_pixels,
+               &(level_job){.image = image, .from = enlarged, .to = levelled});
         ts_for(grid.threads, pixels, STEP, fine_errors, &(errors_job){deviation, errors});
         rd_posterior_step(grid, maps, channels, view, &seen, 1, &prior, 1, NULL, step, NULL);
         ts_for(grid.threads, pixels, STEP, add_pixels, &(add_job){enlarged, step, channels, maps});

@@ -9,11 +9,11 @@
 #include "tensor/resample.h"
 
 /* levels [h, w, LGD_DETAIL_LEVELS], of the rendering L of maps [h, w, channels] under view, cut to [0, 1] as a
- * photograph is, and of the photograph image [h, w, 3] of as many pixels: (L + .004) / (I + .004) of each colour,
- * within [1/4, 4], and how far detail is to be trusted: 1 where the largest value of the 5 x 5 pixels around is .75 at
- * most, 0 from TS_NEWTON_BURNT on. arena: for what it holds meanwhile. TS_NOMEM with st. */
+ * photograph is, and of the photograph image [1, any, any, 3], reduced to as many pixels: (L + .004) / (I + .004) of
+ * each colour, within [1/4, 4], and how far detail is to be trusted: 1 where the largest value of the 5 x 5 pixels
+ * around is .75 at most, 0 from TS_NEWTON_BURNT on. arena: for what it holds meanwhile. TS_NOMEM with st. */
 enum { LGD_DETAIL_LEVELS = 4 };
-ts_code lgd_detail_compare(rd_grid grid, const float *maps, int channels, const rd_view *view, const float *image,
+ts_code lgd_detail_compare(rd_grid grid, const float *maps, int channels, const rd_view *view, const ts_tensor *image,
                            ts_arena *arena, float *levels, ts_status *st);
 
 /* Of a window of the full size: the photograph image [h, w, 3] is multiplied by levels, enlarged by the taps, so that

@@ -3,7 +3,6 @@
 #include "nn/clip.h"
 #include "nn/window.h"
 #include "tensor/resample.h"
-#include "tensor/resize.h"
 #include "tensor/team.h"
 #include <math.h>
 #include <stdint.h>
@@ -282,16 +281,10 @@ static bool lacks_detail(const work *w)
 
 static void compare_levels(work *w)
 {
-    const int size = nn_arch_side(&w->model->arch);
-    ts_arena *arena = ag_arena(w->tape);
-    const ts_mark mark = ts_arena_mark(arena);
+    const rd_grid grid = rd_grid_on(rd_grid_full(nn_arch_side(&w->model->arch)), w->threads);
     ts_status st = {0};
-    ts_tensor small = ts_new(arena, (ts_shape){1, size, size, 3});
-    if (!small.data || ts_resize(&small, &w->photo, arena, w->threads, &st) ||
-        lgd_detail_compare(rd_grid_on(rd_grid_full(size), w->threads), w->t->r0, w->channels, &w->t->views[0],
-                           small.data, arena, w->levels, &st))
-        ag_fail(w->tape, TS_NOMEM, "out of memory for %d x %d pixels", size, size);
-    ts_arena_release(arena, mark);
+    if (lgd_detail_compare(grid, w->t->r0, w->channels, &w->t->views[0], &w->photo, ag_arena(w->tape), w->levels, &st))
+        ag_fail(w->tape, st.code, "%s", st.message);
 }
 
 /* g and the coarse steps work on the whole photograph. */
