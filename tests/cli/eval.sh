@@ -1,11 +1,5 @@
 # lgd-eval as people use it.
-. tests/cli/lib.sh
-MODEL=${LGD_TEST_MODEL:-$ROOT/models/single.safetensors}
-export LGD_MODEL="$MODEL"
-
-model() { [ -f "$MODEL" ] || fail "$MODEL is absent: the weights that the project ships"; }
-# One thread: at these sizes more only wait for each other when the machine is busy.
-evaluate() { "$BIN/lgd-eval" --size 32 --iterations 2 --threads 1 "$@"; }
+. tests/cli/lib_eval.sh
 
 help_names_the_options() {
     expect 0 "$BIN/lgd-eval" --help
@@ -149,70 +143,6 @@ check eval_real_sets real_sets
 check eval_images images
 check eval_bad_material_is_reported bad_material
 check eval_unwritable_output unwritable
-captures() {
-    model
-    expect 0 "$BIN/lgd-data" --format captures --count 2 --size 32 -o "$T/c"
-    [ "$(ls "$T"/c/*/ | grep -c 'png$')" = 18 ] || fail "pictures: $(ls "$T"/c/*)"
-    expect 0 evaluate --told --set "multiview:$T/c" --images -o "$T/o"
-    says "$T/out" exposure
-    lines "$T/o/results.csv" 7
-    awk -F, 'NR > 1 && !($5 == "" && $9 > 0 && $9 < 0.5 && $13 > 0.3 && $13 < 3) { exit 1 }' "$T/o/results.csv" ||
-        fail "$(cat "$T/o/results.csv")"
-    [ "$(ls "$T/o/images" | wc -l)" = 2 ] || fail "images: $(ls "$T/o/images")"
-    one=$(ls -d "$T"/c/* | head -n 1)
-    expect 0 evaluate --set "multiview:$one" -o "$T/p"
-    expect 0 evaluate --set "multiview:$one" --method lgd:power=auto,orientations=2,label=lgd -o "$T/same"
-    cmp -s "$T/p/results.csv" "$T/same/results.csv" || fail "the default is not as lgd-infer estimates"
-    expect 0 evaluate --told --set "multiview:$one" -o "$T/told"
-    if cmp -s "$T/p/results.csv" "$T/told/results.csv"; then fail "--told changes nothing"; fi
-    expect 2 evaluate --set "multiview:$one" --set procedural:1,1 -o "$T/mixed"
-    says "$T/err" "--told"
-    rm "$one/light_pos.txt"
-    expect 1 evaluate --set "multiview:$T/c" -o "$T/q"
-    says "$T/err" light_pos.txt
-    lines "$T/q/results.csv" 4
-}
-
-# A field of view is told by the set, by --fov, or not at all, and changes what the steps make.
-field_of_view() {
-    for degrees in 0 180; do
-        expect 2 "$BIN/lgd-eval" --set procedural:1,1 --fov $degrees -o "$T/o"
-        says "$T/err" "--fov: '$degrees' is not an angle in 1 .. 170 degrees"
-    done
-    model
-    expect 0 "$BIN/lgd-data" --format captures --count 1 --size 32 -o "$T/c"
-    one=$(ls -d "$T"/c/*)
-    awk -F, '{ print $1 "," $2 "," 2 * $3 }' "$one/camera_pos.txt" >"$T/far" && mv "$T/far" "$one/camera_pos.txt"
-    untold=lgd:power=auto,label=untold told=lgd:power=auto,view=told,label=told
-    expect 0 evaluate --set "multiview:$one" --method $untold --method $told -o "$T/m"
-    awk -F, '$3 == "untold" && $4 == 2 { a = $9 }
-        $3 == "told" && $4 == 2 { b = $9 } END { exit !(a > 0 && b > 0 && a != b) }' "$T/m/results.csv" ||
-        fail "told the steps make the same: $(cat "$T/m/results.csv")"
-    for fov in 54.2249 30; do
-        expect 0 evaluate --fov $fov --set procedural:1,1 --method lgd:label=set --method lgd:view=told,label=told \
-            --method lgd:view=unknown,label=unknown -o "$T/$fov"
-        awk -F, -v fov=$fov '$5 == 2 { v[$4] = $10 } function near(a, b) { return a > 0 && (a - b) ^ 2 < 1e-8 }
-            END { exit !(near(v["set"], v["told"]) && near(v["unknown"], v["told"]) == (fov > 54)) }' \
-            "$T/$fov/results.csv" || fail "at $fov degrees: $(cat "$T/$fov/results.csv")"
-    done
-}
-
-# A tilted camera: a method that knows it makes something else of the photograph than one that does not.
-tilt() {
-    for degrees in -1 90 x; do
-        expect 2 "$BIN/lgd-eval" --set procedural:1,1 --tilt=$degrees -o "$T/o"
-        says "$T/err" "--tilt: '$degrees' is not an angle in 0 .. 60 degrees"
-    done
-    model
-    for tilt in 0 20; do
-        expect 0 evaluate --tilt $tilt --set procedural:1,1 --method lgd:label=set --method lgd:view=told,label=told \
-            --method lgd:view=unknown,label=unknown -o "$T/$tilt"
-        awk -F, -v tilt=$tilt '$5 == 2 { v[$4] = $10 } function near(a, b) { return a > 0 && (a - b) ^ 2 < 1e-8 }
-            END { exit !(near(v["told"], v["unknown"]) && near(v["set"], v["told"]) == (tilt == 0)) }' \
-            "$T/$tilt/results.csv" || fail "at $tilt degrees: $(cat "$T/$tilt/results.csv")"
-    done
-    if cmp -s "$T/0/results.csv" "$T/20/results.csv"; then fail "--tilt changes nothing"; fi
-}
 
 told() {
     for o in --normal=up --workflow=mixed --colour=p3; do
@@ -317,78 +247,6 @@ searches_and_figures() {
     done
 }
 
-# Column NAME of a CSV file whose names of sets have no commas.
-column() { awk -F, -v name="$2" 'NR == 1 { for (k = 1; k <= NF; k++) if ($k == name) c = k } NR > 1 { print $c }' \
-    "$1"; }
-
-# Photographs without known maps, and what others made of them.
-photographs() {
-    model
-    mkdir "$T/photos" "$T/peers"
-    cp demo/flash.jpg "$T/photos/a.jpg"
-    cp demo/flash.jpg "$T/photos/b.jpg"
-    expect 0 evaluate --set "photos:$T/photos" --images -o "$T/o"
-    says "$T/out" "2 materials"
-    for c in residue_diffuse residue_specular residue_roughness residue_hue relief; do
-        [ "$(column "$T/o/results.csv" $c | awk '$1 >= 0 && $1 < 1' | wc -l)" = 6 ] ||
-            fail "$c: $(column "$T/o/results.csv" $c)"
-    done
-    [ "$(column "$T/o/results.csv" render | tr -d '\n')" = "" ] || fail "an error without a truth"
-    [ "$(ls "$T/o/images" | tr '\n' ' ')" = "1-a.png 1-b.png contact.png " ] || fail "images: $(ls "$T/o/images")"
-    [ "$(grep -c 'data:image/png' "$T/o/report.html")" = 2 ] || fail "no pictures in the report"
-    expect 0 evaluate --set "photos:$T/photos" --peer-maps "$T/peers" --method lgd --method peer -o "$T/p"
-    says "$T/out" "2 materials"
-    expect 1 evaluate --set "peers:$T/photos" -o "$T/q"
-    says "$T/err" "a.jpg"
-}
-
-# Nobody tells the light: one factor is fitted, and the estimate finds the power.
-untold() {
-    model
-    expect 0 evaluate --set procedural:3,2 --untold -o "$T/o"
-    says "$T/out" exposure
-    says "$T/out" over_flat
-    says "$T/out" band_8_32
-    expect 0 evaluate --set procedural:3,2 --untold --method lgd:power=auto,orientations=2,label=lgd -o "$T/p"
-    cmp -s "$T/o/results.csv" "$T/p/results.csv" || fail "the default is not as lgd-infer estimates"
-}
-
-check eval_captures captures
-check eval_field_of_view field_of_view
-check eval_tilt tilt
-check eval_photographs photographs
-check eval_untold untold
-check eval_lpips lpips
-check eval_maps_options told
-check eval_methods methods
-check eval_searches_and_figures searches_and_figures
-check eval_interrupted interrupted
-check eval_refinement_helps refinement_helps
-
-# Photographs under a stronger light: what is told of it is not known to the method, and the comparison fits one factor.
-light() {
-    model
-    for o in --exposure=0 --exposure=x --light=1 --light=a,b --light=9,0; do
-        expect 2 "$BIN/lgd-eval" --set procedural:1,1 "$o" -o "$T/o"
-        says "$T/err" "${o%%=*}"
-    done
-    expect 0 evaluate --set procedural:3,2 --exposure 1 -o "$T/one"
-    expect 0 evaluate --set procedural:3,2 --exposure 2 -o "$T/two"
-    expect 0 evaluate --set procedural:3,2 --exposure 2 --method lgd:power=known -o "$T/known"
-    expect 0 evaluate --set procedural:3,2 --exposure 2 --method lgd:power=auto -o "$T/auto"
-    for a in one two known auto; do
-        sed 's/"[^"]*"/set/' "$T/$a/results.csv" |
-            awk -F, 'NR == 1 { while ($++k != "exposure" && k < NF); } NR > 1 && !($k > 0.1 && $k < 10) { exit 1 }' ||
-            fail "$a: no factor is fitted"
-        for b in one two known auto; do
-            [ "$a" = "$b" ] || ! cmp -s "$T/$a/results.csv" "$T/$b/results.csv" ||
-                fail "$a and $b give the same numbers"
-        done
-    done
-    expect 0 evaluate --set procedural:3,2 --light 0.5,0 -o "$T/side"
-    expect 0 evaluate --set procedural:3,2 -o "$T/middle"
-    if cmp -s "$T/side/results.csv" "$T/middle/results.csv"; then fail "--light changes nothing"; fi
-}
 # A file name is bytes; a report is UTF-8.
 names_of_any_bytes() {
     model
@@ -403,5 +261,10 @@ names_of_any_bytes() {
     says "$T/o/results.json" "$(printf 'caf\\\\xE9 \303\251')"
 }
 
-check eval_light light
+check eval_lpips lpips
+check eval_maps_options told
+check eval_methods methods
+check eval_searches_and_figures searches_and_figures
+check eval_interrupted interrupted
+check eval_refinement_helps refinement_helps
 check eval_names_of_any_bytes names_of_any_bytes

@@ -1,8 +1,5 @@
 # lgd-eval in parts: --shard, and processes that mpirun starts.
-. tests/cli/lib.sh
-MODEL=${LGD_TEST_MODEL:-$ROOT/models/single.safetensors}
-export LGD_MODEL="$MODEL"
-model() { [ -f "$MODEL" ] || fail "$MODEL is absent: the weights that the project ships"; }
+. tests/cli/lib_eval.sh
 
 evaluate() { "$BIN/lgd-eval" --size 32 --iterations 1 --threads 1 --set procedural:1,5 --set procedural:9,2 "$@"; }
 
