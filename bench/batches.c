@@ -32,6 +32,7 @@ ts_code bench_batches(const char *path, ts_status *st)
                                   .relief = (float)c.data.relief,
                                   .blend = (float)c.data.blend,
                                   .uneven = (float)c.data.uneven,
+                                  .closer = (float)c.data.closer,
                                   .homogeneous = (float)c.data.homogeneous};
     float *images = malloc(pixels * 3 * sizeof *images);
     rd_view *views = malloc((size_t)batch * RD_LOSS_VIEWS * sizeof *views),

@@ -100,6 +100,8 @@ const tr_key tr_keys[] = {
      "share of the materials that are a weighted mean of themselves and another, map by map, relief too"},
     {"data", "uneven", TR_REAL, AT(data.uneven), 0, 1, "0", NULL, false,
      "share of the materials that do not lie flat: a slope of the whole patch, broad waves"},
+    {"data", "closer", TR_REAL, AT(data.closer), 0, 1, "0", NULL, false,
+     "share of the materials that are seen from up to four times as near: what they are made of is larger"},
     {"data", "homogeneous", TR_REAL, AT(data.homogeneous), 0, 1, "0", NULL, false,
      "share of the materials that are the same all over the patch: what varies slowly in colour and roughness is less"},
     {"data", "noise", TR_REAL, AT(data.noise), 0, 1, "0.3", NULL, false,

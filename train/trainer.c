@@ -215,6 +215,7 @@ static ts_code begin(tr_trainer *t, bool resume, ts_status *st)
                                   .relief = (float)c->data.relief,
                                   .blend = (float)c->data.blend,
                                   .uneven = (float)c->data.uneven,
+                                  .closer = (float)c->data.closer,
                                   .homogeneous = (float)c->data.homogeneous};
     const io_share share = {c->train.batch, t->first, t->batch};
     t->loader = io_loader_create(&source, c->data.patch, share, (uint64_t)t->step, c->data.prefetch, c->data.threads,

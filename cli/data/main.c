@@ -1,9 +1,8 @@
 /* lgd-data: procedural materials as map folders, strips, photographs or a contact sheet, and how they compare with
  * others' materials. */
-#include "cli/camera.h"
-#include "cli/arguments.h"
 #include "cli/cli.h"
 #include "cli/data/histograms.h"
+#include "cli/data/options.h"
 #include "cli/data/pictures.h"
 #include "cli/data/sheet_captures.h"
 #include "data/materials/compare.h"
@@ -11,214 +10,11 @@
 #include "render/render.h"
 #include "tensor/team.h"
 #include "tensor/threads.h"
-#include <errno.h>
-#include <math.h>
 #include <pthread.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
 
-typedef enum format { FORMAT_NONE, FORMAT_FOLDERS, FORMAT_STRIPS, FORMAT_CAPTURES, FORMAT_SHEETS } format;
-
-typedef struct options {
-    const char *output, *testdata;
-    io_procedural procedural;
-    int64_t first, count, size, threads, quality, width; /* count and size 0: not given */
-    io_camera camera;
-    format format;
-    bool sheet, photographs, statistics, histograms;
-} options;
-
-enum {
-    OPT_SEED = 256,
-    OPT_FIRST,
-    OPT_COUNT,
-    OPT_SIZE,
-    OPT_FAMILIES,
-    OPT_HUES,
-    OPT_RELIEF,
-    OPT_BLEND,
-    OPT_UNEVEN,
-    OPT_HOMOGENEOUS,
-    OPT_FORMAT,
-    OPT_SHEET,
-    OPT_PHOTOGRAPHS,
-    OPT_QUALITY,
-    OPT_WIDTH,
-    OPT_STATISTICS,
-    OPT_HISTOGRAMS,
-    OPT_TESTDATA,
-    OPT_THREADS,
-    OPT_HELP,
-    OPT_VERSION,
-    OPT_CAMERA /* and more: cl_camera_options */
-};
-
-static const struct option plain_options[] = {{"output", required_argument, NULL, 'o'},
-                                              {"seed", required_argument, NULL, OPT_SEED},
-                                              {"first", required_argument, NULL, OPT_FIRST},
-                                              {"count", required_argument, NULL, OPT_COUNT},
-                                              {"size", required_argument, NULL, OPT_SIZE},
-                                              {"families", required_argument, NULL, OPT_FAMILIES},
-                                              {"hues", required_argument, NULL, OPT_HUES},
-                                              {"relief", required_argument, NULL, OPT_RELIEF},
-                                              {"blend", required_argument, NULL, OPT_BLEND},
-                                              {"uneven", required_argument, NULL, OPT_UNEVEN},
-                                              {"homogeneous", required_argument, NULL, OPT_HOMOGENEOUS},
-                                              {"format", required_argument, NULL, OPT_FORMAT},
-                                              {"contact-sheet", no_argument, NULL, OPT_SHEET},
-                                              {"photographs", no_argument, NULL, OPT_PHOTOGRAPHS},
-                                              {"quality", required_argument, NULL, OPT_QUALITY},
-                                              {"photo-width", required_argument, NULL, OPT_WIDTH},
-                                              {"statistics", no_argument, NULL, OPT_STATISTICS},
-                                              {"histograms", no_argument, NULL, OPT_HISTOGRAMS},
-                                              {"testdata", required_argument, NULL, OPT_TESTDATA},
-                                              {"threads", required_argument, NULL, OPT_THREADS},
-                                              {"help", no_argument, NULL, OPT_HELP},
-                                              {"version", no_argument, NULL, OPT_VERSION},
-                                              {NULL, 0, NULL, 0}};
-
-static void print_help(void)
-{
-    printf(
-        "Usage: lgd-data [options] -o DIR\n"
-        "  or:  lgd-data --statistics --testdata DIR [options]\n"
-        "Writes procedural materials number FIRST .. FIRST+COUNT-1 of the sequence of SEED.\n\n"
-        "What to write (the default is --format folders):\n"
-        "  -o, --output DIR      output folder; created when absent\n"
-        "      --format FORMAT   folders: DIR/NAME/ with diffuse.png, specular.png, roughness.png, normal.png, "
-        "maps.exr;\n"
-        "                        strips: DIR/NAME.png, five panels: photograph, normal, diffuse, roughness, specular;\n"
-        "                        captures: DIR/NAME/ with nine photographs 00.png .. 08.png and their lights and "
-        "cameras\n"
-        "                        sheet-captures: DIR/NAME/ with maps/, five photographs of the material in the window "
-        "of\n"
-        "                        lgd-capture's sheet, photo_1.jpg .. photo_5.jpg, and exact/: the same without faults\n"
-        "      --photographs     DIR/NAME.jpg: renderings under the flash, with sensor noise, blur and JPEG\n"
-        "      --contact-sheet   DIR/contact-sheet.png: a row for each family, with its name\n"
-        "      --statistics      print a table that compares the maps with those of --testdata\n"
-        "      --histograms      DIR/histograms.svg and .csv: histograms of the maps and of those of --testdata\n\n"
-        "Which materials:\n"
-        "      --seed N          default 1\n"
-        "      --first N         default 0\n"
-        "      --count N         default 16; contact sheet 3 for each family; statistics and histograms 512\n"
-        "      --size N          8 .. 2048 pixels, default 256; contact sheet, statistics and histograms 128\n"
-        "      --families LIST   all (the default), classic (the first seventeen), or some of: ");
-    for (int i = 0; i < io_family_count(); i++)
-        printf("%s%s%s", i ? i % 8 ? ", " : "," : "", i % 8 ? "" : "\n                        ", io_family_name(i));
-    printf("\n"
-           "      --hues X          share of the materials with other hues, 0 .. 1 (default 0)\n"
-           "      --relief X        share of the materials with another relief, 0 .. 1 (default 0)\n"
-           "      --blend X         share of the materials that are a mean of two, 0 .. 1 (default 0)\n"
-           "      --uneven X        share of the materials that do not lie flat, 0 .. 1 (default 0)\n"
-           "      --homogeneous X   share of the materials that are the same all over the patch, 0 .. 1 (default 0)\n");
-    printf("\nPhotographs, largest values of what each draws:\n");
-    for (int i = 0; i < CL_CAMERA_OPTIONS; i++) {
-        io_camera least = cl_camera_default;
-        const cl_camera_option *k = &cl_camera_options[i];
-        printf("      --%s X%*s%s, 0 .. %g (default %g)\n", k->name, 15 - (int)strlen(k->name), "", k->help, k->most,
-               (double)*cl_camera_value(&least, i));
-    }
-    printf("\nOther:\n"
-           "      --quality N       of photographs' JPEG, 1 .. 100 (default 90)\n"
-           "      --photo-width N   of sheet-captures, 400 .. 8000 pixels (default 4000)\n"
-           "      --testdata DIR    folder with maps/ (map folders) and strips/ to compare with\n"
-           "      --threads N       number of threads (default: as many as the process may use)\n"
-           "      --help, --version\n");
-}
-
-static int parse_families(char *list, uint64_t *families)
-{
-    *families = 0;
-    char *rest = NULL;
-    for (char *name = strtok_r(list, ",", &rest); name; name = strtok_r(NULL, ",", &rest)) {
-        const uint64_t bits = io_family_mask(name);
-        if (!bits) return cl_usage("--families: no family is called '%s' (--help lists them)", name);
-        *families |= bits;
-    }
-    return *families ? CL_OK : cl_usage("--families: the list is empty");
-}
-
-static int parse_number(const char *option, const char *text, int64_t lo, int64_t hi, int64_t *value)
-{
-    return cl_parse_int(text, lo, hi, value)
-        ? CL_OK
-        : cl_usage("--%s: '%s' is not a whole number from %lld to %lld", option, text, (long long)lo, (long long)hi);
-}
-
-static int parse_share(const char *option, const char *text, double hi, float *value)
-{
-    double v;
-    if (!cl_parse_real(text, 0, hi, &v)) return cl_usage("--%s: '%s' is not a number from 0 to %g", option, text, hi);
-    *value = (float)v;
-    return CL_OK;
-}
-
-static int parse_options(int argc, char **argv, options *o)
-{
-    int code = CL_OK, c;
-    int64_t seed = 1;
-    enum { PLAIN = sizeof plain_options / sizeof *plain_options };
-    struct option long_options[PLAIN + CL_CAMERA_OPTIONS];
-    for (int i = 0; i < CL_CAMERA_OPTIONS; i++)
-        long_options[i] = (struct option){cl_camera_options[i].name, required_argument, NULL, OPT_CAMERA + i};
-    memcpy(long_options + CL_CAMERA_OPTIONS, plain_options, sizeof plain_options);
-    ts_status st;
-    while (code == CL_OK && (c = cl_option_next(argc, argv, ":o:", long_options, &st)) != CL_ARGUMENT_END) switch (c) {
-        case 'o': o->output = optarg; break;
-        case OPT_SEED: code = parse_number("seed", optarg, 0, INT64_MAX, &seed); break;
-        case OPT_FIRST: code = parse_number("first", optarg, 0, INT64_C(1) << 60, &o->first); break;
-        case OPT_COUNT: code = parse_number("count", optarg, 1, 10000000, &o->count); break;
-        case OPT_SIZE: code = parse_number("size", optarg, 8, 2048, &o->size); break;
-        case OPT_FAMILIES: code = parse_families(optarg, &o->procedural.families); break;
-        case OPT_HUES: code = parse_share("hues", optarg, 1, &o->procedural.hues); break;
-        case OPT_BLEND: code = parse_share("blend", optarg, 1, &o->procedural.blend); break;
-        case OPT_UNEVEN: code = parse_share("uneven", optarg, 1, &o->procedural.uneven); break;
-        case OPT_HOMOGENEOUS: code = parse_share("homogeneous", optarg, 1, &o->procedural.homogeneous); break;
-        case OPT_RELIEF: code = parse_share("relief", optarg, 1, &o->procedural.relief); break;
-        case OPT_FORMAT:
-            if (!strcmp(optarg, "folders")) o->format = FORMAT_FOLDERS;
-            else if (!strcmp(optarg, "strips")) o->format = FORMAT_STRIPS;
-            else if (!strcmp(optarg, "captures")) o->format = FORMAT_CAPTURES;
-            else if (!strcmp(optarg, "sheet-captures")) o->format = FORMAT_SHEETS;
-            else
-                code = cl_usage("--format: '%s' is none of 'folders', 'strips', 'captures' and 'sheet-captures'",
-                                optarg);
-            break;
-        case OPT_SHEET: o->sheet = true; break;
-        case OPT_PHOTOGRAPHS: o->photographs = true; break;
-        case OPT_QUALITY: code = parse_number("quality", optarg, 1, 100, &o->quality); break;
-        case OPT_WIDTH: code = parse_number("photo-width", optarg, 400, 8000, &o->width); break;
-        case OPT_STATISTICS: o->statistics = true; break;
-        case OPT_HISTOGRAMS: o->histograms = true; break;
-        case OPT_TESTDATA: o->testdata = optarg; break;
-        case OPT_THREADS: code = parse_number("threads", optarg, 1, 1024, &o->threads); break;
-        case OPT_HELP: print_help(); exit(cl_finish(CL_OK));
-        case OPT_VERSION: cl_print_version(); exit(cl_finish(CL_OK));
-        case CL_ARGUMENT_BAD: code = cl_usage("%s", st.message); break;
-        default: { /* of the camera's */
-            const cl_camera_option *k = &cl_camera_options[c - OPT_CAMERA];
-            code = parse_share(k->name, optarg, k->most, cl_camera_value(&o->camera, c - OPT_CAMERA));
-        }
-        }
-    if (code) return code;
-    if (optind < argc) return cl_usage("'%s' is not an option", argv[optind]);
-    bool writes = o->format || o->sheet || o->photographs || o->histograms;
-    if (!o->statistics && !writes) o->format = FORMAT_FOLDERS;
-    if (!o->output && (writes || !o->statistics)) return cl_usage("where to? Give -o DIR");
-    const bool compares = o->statistics || o->histograms;
-    if (compares && !o->testdata)
-        return cl_usage("%s needs --testdata DIR", o->statistics ? "--statistics" : "--histograms");
-    if (o->testdata && !compares) return cl_usage("--testdata is for --statistics and --histograms");
-    const float narrow = o->camera.fov_min, wide = o->camera.fov_max;
-    if ((narrow != 0 || wide != 0) && (narrow < 5 || wide < narrow))
-        return cl_usage("--fov-min and --fov-max go together: 5 <= fov-min <= fov-max");
-    o->procedural.seed = (uint64_t)seed;
-    return CL_OK;
-}
-
-static ts_code make_path(char path[4096], const options *o, const char *name, const char *suffix, ts_status *st)
+static ts_code make_path(char path[4096], const cl_data_options *o, const char *name, const char *suffix, ts_status *st)
 {
     if (snprintf(path, 4096, "%s/%s%s", o->output, name, suffix) >= 4096)
         return ts_fail(st, TS_INVALID, "%s: the path is too long", o->output);
@@ -226,28 +22,28 @@ static ts_code make_path(char path[4096], const options *o, const char *name, co
 }
 
 /* One material and its photograph, to the files that were asked for. */
-static ts_code write_material(const options *o, uint64_t index, io_material *m, io_image *photo, ts_status *st)
+static ts_code write_material(const cl_data_options *o, uint64_t index, io_material *m, io_image *photo, ts_status *st)
 {
     char path[4096];
     rd_view flash = rd_flash();
     io_procedural_make(&o->procedural, index, m);
     ts_code code = TS_OK;
-    if (o->format == FORMAT_FOLDERS) {
+    if (o->format == CL_FORMAT_FOLDERS) {
         code = make_path(path, o, m->name, "", st);
         if (!code) code = cl_make_folder(path, st);
         if (!code) code = io_write_maps(path, m, IO_MAPS_ALL, false, st);
     }
-    if (!code && o->format == FORMAT_STRIPS) {
+    if (!code && o->format == CL_FORMAT_STRIPS) {
         rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &flash, true, photo->data);
         code = make_path(path, o, m->name, ".png", st);
         if (!code) code = io_write_strip(path, m, photo, st);
     }
-    if (!code && o->format == FORMAT_CAPTURES) {
+    if (!code && o->format == CL_FORMAT_CAPTURES) {
         code = make_path(path, o, m->name, "", st);
         if (!code) code = cl_make_folder(path, st);
         if (!code) code = cl_write_capture(path, m, st);
     }
-    if (!code && o->format == FORMAT_SHEETS) {
+    if (!code && o->format == CL_FORMAT_SHEETS) {
         code = make_path(path, o, m->name, "/maps", st);
         if (!code) code = cl_make_folder(path, st);
         if (!code) code = io_write_maps(path, m, IO_MAPS_ALL, false, st);
@@ -263,23 +59,24 @@ static ts_code write_material(const options *o, uint64_t index, io_material *m, 
     return code;
 }
 
-typedef ts_code task(const options *o, int64_t number, io_material *m, io_image *photo, io_sheet *sheet, ts_status *st);
+typedef ts_code task(const cl_data_options *o, int64_t number, io_material *m, io_image *photo, io_sheet *sheet,
+                     ts_status *st);
 
-static ts_code write_task(const options *o, int64_t number, io_material *m, io_image *photo, io_sheet *sheet,
+static ts_code write_task(const cl_data_options *o, int64_t number, io_material *m, io_image *photo, io_sheet *sheet,
                           ts_status *st)
 {
     (void)sheet;
     return write_material(o, (uint64_t)(o->first + number), m, photo, st);
 }
 
-static int row_family(const options *o, int row)
+static int row_family(const cl_data_options *o, int row)
 {
     for (int i = 0; i < io_family_count(); i++)
         if ((!o->procedural.families || o->procedural.families >> i & 1) && row-- == 0) return i;
     return 0;
 }
 
-static ts_code sheet_task(const options *o, int64_t number, io_material *m, io_image *photo, io_sheet *sheet,
+static ts_code sheet_task(const cl_data_options *o, int64_t number, io_material *m, io_image *photo, io_sheet *sheet,
                           ts_status *st)
 {
     (void)st;
@@ -294,7 +91,7 @@ static ts_code sheet_task(const options *o, int64_t number, io_material *m, io_i
 }
 
 typedef struct running {
-    const options *o;
+    const cl_data_options *o;
     task *f;
     int size;
     io_sheet *sheet;
@@ -333,7 +130,8 @@ static void run_tasks(const void *job, ts_queue *queue)
 }
 
 /* Runs count tasks on all threads; the first failure (in the order of their numbers) is reported. */
-static ts_code run(const options *o, const char *what, task *f, int64_t count, int size, io_sheet *sheet, ts_status *st)
+static ts_code run(const cl_data_options *o, const char *what, task *f, int64_t count, int size, io_sheet *sheet,
+                   ts_status *st)
 {
     int64_t done = 0, failed = count;
     pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
@@ -345,7 +143,7 @@ static ts_code run(const options *o, const char *what, task *f, int64_t count, i
     return st->code;
 }
 
-static ts_code make_sheet(const options *o, ts_status *st)
+static ts_code make_sheet(const cl_data_options *o, ts_status *st)
 {
     int rows = 0;
     for (int i = 0; i < io_family_count(); i++) rows += !o->procedural.families || o->procedural.families >> i & 1;
@@ -365,13 +163,13 @@ static ts_code make_sheet(const options *o, ts_status *st)
     return code;
 }
 
-static ts_code compare(const options *o, ts_status *st)
+static ts_code compare(const cl_data_options *o, ts_status *st)
 {
     const int count = o->count ? (int)o->count : 512, size = o->size ? (int)o->size : 128;
     return io_compare(&o->procedural, (uint64_t)o->first, count, o->testdata, size, stdout, st);
 }
 
-static ts_code make_histograms(const options *o, ts_status *st)
+static ts_code make_histograms(const cl_data_options *o, ts_status *st)
 {
     const int count = o->count ? (int)o->count : 512, size = o->size ? (int)o->size : 128;
     return cl_write_histograms(o->output, &o->procedural, (uint64_t)o->first, count, o->testdata, size, st);
@@ -380,10 +178,10 @@ static ts_code make_histograms(const options *o, ts_status *st)
 int main(int argc, char **argv)
 {
     cl_open_streams();
-    options o = {.quality = 90, .width = 4000, .camera = cl_camera_default};
+    cl_data_options o = {.quality = 90, .width = 4000, .camera = cl_camera_default};
     ts_status st = {0};
     int code = cl_init("lgd-data");
-    if (!code) code = parse_options(argc, argv, &o);
+    if (!code) code = cl_data_options_read(argc, argv, &o);
     if (code) return code;
     ts_threads_set((int)o.threads);
     cl_catch_interrupt();

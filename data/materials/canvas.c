@@ -9,6 +9,26 @@ float *cv_plane(io_canvas *c)
     return c->planes + (size_t)c->used++ * (size_t)c->count;
 }
 
+void cv_view(io_canvas *c, float closer, float x, float y)
+{
+    const float beside = 0.5f - 0.5f / closer, x0 = nz_clamp(x, -beside, beside), y0 = nz_clamp(y, -beside, beside);
+    c->width = closer * (float)c->size;
+    c->pixel = 1 / c->width;
+    for (int i = 0; i < c->count; i++) {
+        c->x[i] = x0 + ((float)(i % c->size) + 0.5f) * c->pixel - 0.5f / closer;
+        c->y[i] = y0 + 0.5f / closer - ((float)(i / c->size) + 0.5f) * c->pixel;
+    }
+}
+
+static int pixel_at(const io_canvas *c, float from_edge)
+{
+    return (int)nz_clamp(from_edge * c->width, 0, (float)c->size - 1);
+}
+
+int cv_column(const io_canvas *c, float x) { return pixel_at(c, x - c->x[0] + 0.5f * c->pixel); }
+
+int cv_row(const io_canvas *c, float y) { return pixel_at(c, c->y[0] + 0.5f * c->pixel - y); }
+
 void cv_drop(io_canvas *c, int mark) { c->used = mark; }
 
 uint32_t cv_seed(io_canvas *c) { return ts_rng_u32(&c->rng); }
@@ -153,7 +173,7 @@ void cv_raise(io_canvas *c, const float *plane, float amount)
 float *cv_cavity(io_canvas *c, float radius)
 {
     float *out = cv_plane(c), *work = cv_plane(c);
-    int pixels = (int)(radius * (float)c->size + 0.5f);
+    int pixels = (int)(radius * c->width + 0.5f);
     nz_blur(c->size, pixels < 1 ? 1 : pixels, c->height, out, work);
     cv_drop(c, c->used - 1);
     float scale = 6 / radius; /* a groove as deep as a sixth of its width counts as fully deep */
@@ -171,11 +191,11 @@ static void slopes(const io_canvas *c, int y, int x0, int n, float *p, float *q)
     const int size = c->size, up = y > 0 ? y - 1 : y, down = y + 1 < size ? y + 1 : y;
     const float *row = c->height + (size_t)y * (size_t)size, *above = c->height + (size_t)up * (size_t)size;
     const float *below = c->height + (size_t)down * (size_t)size;
-    const float per_y = down > up ? (float)size / (float)(down - up) : 0, per_x = (float)size / 2;
+    const float per_y = down > up ? c->width / (float)(down - up) : 0, per_x = c->width / 2;
     const int first = x0 > 0 ? 0 : 1, last = x0 + n < size ? n : n - 1;
     for (int i = first; i < last; i++) p[i] = (row[x0 + i + 1] - row[x0 + i - 1]) * per_x;
-    if (first && size > 1) p[0] = (row[1] - row[0]) * (float)size;
-    if (last < n && size > 1) p[n - 1] = (row[size - 1] - row[size - 2]) * (float)size;
+    if (first && size > 1) p[0] = (row[1] - row[0]) * c->width;
+    if (last < n && size > 1) p[n - 1] = (row[size - 1] - row[size - 2]) * c->width;
     if (size == 1) p[0] = 0;
     for (int i = 0; i < n; i++) q[i] = (above[x0 + i] - below[x0 + i]) * per_y;
     for (int i = 0; i < n; i++) {

@@ -19,7 +19,8 @@ typedef struct io_substance {
 
 typedef struct io_canvas {
     int size, count; /* count = size * size */
-    float pixel;     /* 1 / size, in patch widths */
+    float width;     /* a patch width in pixels: size, or more where only a part of the patch is seen */
+    float pixel;     /* 1 / width, in patch widths */
     ts_rng rng;
     float *x, *y;  /* pixel centres in patch widths, x right and y up, in [-1/2, 1/2] */
     float *height; /* patch widths */
@@ -30,6 +31,13 @@ typedef struct io_canvas {
 
 /* Floats of memory for a canvas with its scratch, and with only the eight painted planes. */
 enum { CANVAS_PAINTED = 8, CANVAS_ALL = 2 + CANVAS_PAINTED + CANVAS_PLANES };
+
+/* The whole patch is seen, or of its sides 1 / closer around (x, y), as far as that lies in the patch; sets width and
+ * pixel and fills x and y. */
+void cv_view(io_canvas *c, float closer, float x, float y);
+/* The column or row that (x, y) lies in, the nearest one of what lies beside. */
+int cv_column(const io_canvas *c, float x);
+int cv_row(const io_canvas *c, float y);
 
 float *cv_plane(io_canvas *c);        /* the next scratch plane, contents undefined; cv_drop gives the last ones back */
 void cv_drop(io_canvas *c, int mark); /* mark = an earlier c->used */

@@ -100,23 +100,20 @@ static sign draw_sign(io_canvas *c)
 static void stamp(io_canvas *c, const sign *s, float cx, float cy, float turn, float margin, float *ink_mask,
                   float *label_mask)
 {
-    const float cosine = cosf(turn), sine = sinf(turn), w = s->half_w + margin, h = s->half_h + margin,
-                size = (float)c->size;
+    const float cosine = cosf(turn), sine = sinf(turn), w = s->half_w + margin, h = s->half_h + margin;
     const float reach_x = nz_abs(cosine) * w + nz_abs(sine) * h + 2 * c->pixel,
                 reach_y = nz_abs(sine) * w + nz_abs(cosine) * h + 2 * c->pixel;
-    const int x0 = (int)(nz_clamp(cx - reach_x + 0.5f, 0, 1) * size),
-              x1 = (int)(nz_clamp(cx + reach_x + 0.5f, 0, 1) * size);
-    const int y0 = (int)(nz_clamp(0.5f - cy - reach_y, 0, 1) * size),
-              y1 = (int)(nz_clamp(0.5f - cy + reach_y, 0, 1) * size);
-    for (int j = y0; j < y1; j++)
-        for (int i = x0; i < x1; i++) {
+    const int x0 = cv_column(c, cx - reach_x), x1 = cv_column(c, cx + reach_x), y0 = cv_row(c, cy + reach_y),
+              y1 = cv_row(c, cy - reach_y);
+    for (int j = y0; j <= y1; j++)
+        for (int i = x0; i <= x1; i++) {
             const int at = j * c->size + i;
             const float px = c->x[at] - cx, py = c->y[at] - cy, x = cosine * px + sine * py,
                         y = cosine * py - sine * px;
             const float border = nz_max(nz_abs(x) - w, nz_abs(y) - h);
             const float inked = nz_max(ink(s, x, y), nz_max(nz_abs(x) - s->half_w, nz_abs(y) - s->half_h) - c->pixel);
-            ink_mask[at] = nz_max(ink_mask[at], nz_clamp(0.5f - inked * size, 0, 1));
-            label_mask[at] = nz_max(label_mask[at], nz_clamp(0.5f - border * size, 0, 1));
+            ink_mask[at] = nz_max(ink_mask[at], nz_clamp(0.5f - inked * c->width, 0, 1));
+            label_mask[at] = nz_max(label_mask[at], nz_clamp(0.5f - border * c->width, 0, 1));
         }
 }
 

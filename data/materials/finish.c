@@ -16,7 +16,7 @@ void fin_slope(io_canvas *c, float slope)
             mean += h[0];
             count += 1;
         }
-    const float per = (float)size / (float)reach, rms = sqrtf(sum / count) * per;
+    const float per = c->width / (float)reach, rms = sqrtf(sum / count) * per;
     if (rms < 1e-6f) return;
     const float scale = slope / rms;
     mean /= count;
@@ -160,7 +160,7 @@ void fin_coat(io_canvas *c)
         smooth_noise(c, cycles, 4, patch);
         for (int i = 0; i < c->count; i++) mask[i] = nz_smooth(edge - 0.15f, edge + 0.15f, patch[i] + pull * mask[i]);
     }
-    int pixels = (int)(thick * (float)c->size + 0.5f);
+    int pixels = (int)(thick * c->width + 0.5f);
     nz_blur(c->size, pixels < 1 ? 1 : pixels, c->height, level, patch);
     for (int i = 0; i < c->count; i++) {
         const float t = mask[i], plain = nz_smooth(0.25f, 0.1f, c->specular[1][i]), dark = 1 - t * plain * (1 - deepen);

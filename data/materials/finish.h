@@ -4,7 +4,7 @@
 #define IO_FINISH_H
 #include "data/materials/canvas.h"
 
-/* Scales the height, less its mean, so that slopes over a 64th of the patch have this root mean square in both
+/* Scales the height, less its mean, so that slopes over a 64th of what is seen have this root mean square in both
  * directions together. */
 void fin_slope(io_canvas *c, float slope);
 /* The same with a slope between lo and hi, uniform in the logarithm. */

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#define MOST_CLOSER 4.0f
 enum { CLASSIC = 17 }; /* the first so many families are finished by wear_calm, the others by fin_any */
 
 /* Every family: its key, how often it is drawn beside the others, and what it paints. */
@@ -162,19 +163,26 @@ static void make_homogeneous(const io_procedural *p, uint64_t index, io_canvas *
     if (cv_chance(c, p->homogeneous)) cv_homogeneous(c);
 }
 
+/* How much of the patch is seen. */
+static void look(const io_procedural *p, uint64_t index, io_canvas *c)
+{
+    c->rng = ts_rng_make(p->seed, TS_STREAM_CLOSER, index);
+    const bool closer = cv_chance(c, p->closer);
+    const float times = closer ? cv_log_range(c, 1, MOST_CLOSER) : 1, x = cv_range(c, -0.5f, 0.5f),
+                y = cv_range(c, -0.5f, 0.5f);
+    cv_view(c, times, x, y);
+}
+
 void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
 {
-    io_canvas c = {.size = m->size, .count = m->size * m->size, .pixel = 1.0f / (float)m->size};
+    io_canvas c = {.size = m->size, .count = m->size * m->size};
     size_t n = (size_t)c.count;
     float *memory = ts_scratch(TS_SCRATCH_SLOTS - 1, (CANVAS_ALL + CANVAS_PAINTED) * n * sizeof *memory);
     c.x = memory;
     c.y = memory + n;
     float *first = memory + 2 * n, *second = first + CANVAS_PAINTED * n;
     c.planes = second + CANVAS_PAINTED * n;
-    for (int i = 0; i < c.count; i++) {
-        c.x[i] = ((float)(i % c.size) + 0.5f) * c.pixel - 0.5f;
-        c.y[i] = 0.5f - ((float)(i / c.size) + 0.5f) * c.pixel;
-    }
+    look(p, index, &c);
     c.rng = ts_rng_make(p->seed, TS_STREAM_MATERIAL, index);
     uint64_t all = io_family_mask("all"), allowed = p->families & all ? p->families & all : all;
     int a = draw_family(&c.rng, allowed, p->often), b = draw_family(&c.rng, allowed, p->often);

@@ -22,6 +22,7 @@ typedef struct io_procedural {
     float relief;      /* share of those whose relief is made anew (materials/relief.h) */
     float blend;       /* share of those that are a mean of themselves and another (materials/blend.h) */
     float uneven;      /* share of those that lean and undulate (materials/uneven.h) */
+    float closer;      /* share of those of which only a part is seen, from a quarter of the patch's side on */
     float homogeneous; /* share of those that are the same all over the patch (materials/homogeneous.h) */
 } io_procedural;
 

@@ -5,6 +5,10 @@ cv_relief cv_draw_relief(io_canvas *c)
     cv_relief r = {.gain = 1};
     r.exchanged = cv_chance(c, 0.6f);
     r.gloss = r.exchanged && cv_chance(c, 0.3f);
+    if (r.exchanged && cv_chance(c, 0.7f)) {
+        r.shape = cv_log_range(c, 0.01f, 0.03f);
+        r.steeper = cv_log_range(c, 0.7f, 3);
+    }
     if (cv_chance(c, r.exchanged ? 0.4f : 0.8f)) {
         r.waves = cv_log_range(c, 0.03f, 0.3f);
         r.cycles = cv_log_range(c, 1, 7);
@@ -13,9 +17,22 @@ cv_relief cv_draw_relief(io_canvas *c)
     return r;
 }
 
+/* Its own where it is broad, the other's where it is fine. */
+static void mean_of_both(io_canvas *c, const cv_relief *r, const float *height)
+{
+    const int mark = c->used, pixels = (int)(r->shape * (float)c->size + 0.5f), radius = pixels < 1 ? 1 : pixels;
+    float *own = cv_plane(c), *other = cv_plane(c), *work = cv_plane(c);
+    nz_blur(c->size, radius, c->height, own, work);
+    nz_blur(c->size, radius, height, other, work);
+    for (int i = 0; i < c->count; i++) c->height[i] = r->steeper * own[i] + height[i] - other[i];
+    cv_drop(c, mark);
+}
+
 void cv_other_relief(io_canvas *c, const cv_relief *r, const float *height, const float *roughness)
 {
-    for (int i = 0; r->exchanged && i < c->count; i++) c->height[i] = height[i];
+    if (r->shape > 0) mean_of_both(c, r, height);
+    else
+        for (int i = 0; r->exchanged && i < c->count; i++) c->height[i] = height[i];
     for (int i = 0; r->gloss && i < c->count; i++) c->roughness[i] = roughness[i];
     for (int i = 0; i < c->count; i++) c->height[i] *= r->gain;
     if (r->waves == 0) return;

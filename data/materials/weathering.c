@@ -41,13 +41,9 @@ static void line(const io_canvas *c, float ax, float ay, float bx, float by, flo
 {
     float width = nz_max(half, 0.7f * c->pixel),
           weight = strength * half / width; /* thinner than a pixel: fainter instead */
-    float size = (float)c->size, lx = bx - ax, ly = by - ay, inverse = 1 / (lx * lx + ly * ly + 1e-8f);
-    int x0 = (int)(nz_clamp(nz_min(ax, bx) + 0.5f - width, 0, 1) * size),
-        x1 = (int)(nz_clamp(nz_max(ax, bx) + 0.5f + width, 0, 1) * size);
-    int y0 = (int)(nz_clamp(0.5f - nz_max(ay, by) - width, 0, 1) * size),
-        y1 = (int)(nz_clamp(0.5f - nz_min(ay, by) + width, 0, 1) * size);
-    x1 = x1 < c->size ? x1 : c->size - 1;
-    y1 = y1 < c->size ? y1 : c->size - 1;
+    float lx = bx - ax, ly = by - ay, inverse = 1 / (lx * lx + ly * ly + 1e-8f);
+    int x0 = cv_column(c, nz_min(ax, bx) - width), x1 = cv_column(c, nz_max(ax, bx) + width);
+    int y0 = cv_row(c, nz_max(ay, by) + width), y1 = cv_row(c, nz_min(ay, by) - width);
     for (int y = y0; y <= y1; y++)
         for (int x = x0; x <= x1; x++) {
             int i = y * c->size + x;
@@ -202,7 +198,7 @@ static void roughen_flanks(io_canvas *c, float amount)
         const float *row = c->height + (size_t)y * (size_t)size, *below = y + 1 < size ? row + size : row;
         float *out = steep + (size_t)y * (size_t)size;
         for (int x = 0; x + 1 < size; x++)
-            out[x] = (nz_abs(row[x + 1] - row[x]) + nz_abs(below[x] - row[x])) * (float)size;
+            out[x] = (nz_abs(row[x + 1] - row[x]) + nz_abs(below[x] - row[x])) * c->width;
         out[size - 1] = size > 1 ? out[size - 2] : 0;
         for (int x = 0; x < size; x++) out[x] = nz_min(1, 1.5f * out[x]);
     }

@@ -83,7 +83,8 @@ TEST(procedural_other_relief_leaves_colours)
     }
     CHECK(halves > COUNT / 4 && halves < 3 * COUNT / 4, "%d of %d at a share of a half", halves, COUNT);
     CHECK(gloss > COUNT / 16 && gloss < COUNT / 2, "the roughness of %d of %d is another's", gloss, COUNT);
-    CHECK(slopes[1] > 0.5 * slopes[0] && slopes[1] < 2 * slopes[0], "relief %g in place of %g", sqrt(slopes[1]),
+    /* what is broad stays in some, up to three times as steep */
+    CHECK(slopes[1] > 0.5 * slopes[0] && slopes[1] < 3 * slopes[0], "relief %g in place of %g", sqrt(slopes[1]),
           sqrt(slopes[0]));
 }
 
@@ -289,4 +290,47 @@ TEST(homogeneous_materials_vary_in_their_details_alone)
     CHECK(halves > changed / 4, "%d of %d at a share of a half", halves, changed);
     CHECK(slow[1] < 0.4 * slow[0], "slow waves of %g in place of %g", slow[1], slow[0]);
     CHECK(deviation[1] > 0.6 * deviation[0], "a deviation of %g in place of %g", deviation[1], deviation[0]);
+}
+
+/* Periods a patch of the strongest waves of the normals' x along rows and columns. */
+static double strongest(const io_material *m)
+{
+    double most = 0, at = 0;
+    for (int k = 1; k <= m->size / 4; k++) {
+        double power = 0;
+        for (int line = 0; line < 2 * m->size; line++) {
+            double re = 0, im = 0;
+            for (int i = 0; i < m->size; i++) {
+                const int pixel = line < m->size ? line * m->size + i : i * m->size + line - m->size;
+                const double v = m->maps[pixel * MAP_CHANNELS + MAP_NORMAL], turn = 6.28318530718 * k * i / m->size;
+                re += v * cos(turn), im += v * sin(turn);
+            }
+            power += re * re + im * im;
+        }
+        if (power > most) most = power, at = k;
+    }
+    return at;
+}
+
+TEST(closer_materials_are_of_larger_parts)
+{
+    enum { COUNT = 64, SIZE = 64 };
+    const uint64_t built = io_family_mask("masonry") | io_family_mask("cobbles") | io_family_mask("scales");
+    const io_procedural plain = {.seed = 5, .families = built}, near = {.seed = 5, .families = built, .closer = 1},
+                        half = {.seed = 5, .families = built, .closer = 0.5f};
+    int halves = 0;
+    double periods[2] = {0};
+    for (int i = 0; i < COUNT; i++) {
+        io_material a = material(SIZE), b = material(SIZE);
+        io_procedural_make(&plain, (uint64_t)i, &a);
+        io_procedural_make(&near, (uint64_t)i, &b);
+        halves += varies(&half, i, &a, &b);
+        periods[0] += log(strongest(&a)) / COUNT;
+        periods[1] += log(strongest(&b)) / COUNT;
+        io_material_free(&a);
+        io_material_free(&b);
+    }
+    const double times = exp(periods[0] - periods[1]);
+    CHECK(halves > COUNT / 4 && halves < 3 * COUNT / 4, "%d of %d at a share of a half", halves, COUNT);
+    CHECK(times > 1.4 && times < 2.6, "parts are %.2f times as large; the mean of the logarithm is that of 2", times);
 }

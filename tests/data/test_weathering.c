@@ -2,6 +2,7 @@
 #include "data/materials/finish.h"
 #include "data/materials/palette.h"
 #include "data/materials/weathering.h"
+#include "tests/data/grey_canvas.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
@@ -9,32 +10,11 @@
 
 enum { SIZE = 128, COUNT = SIZE * SIZE };
 
-/* A grey sheet of roughness 0.5. */
 static io_canvas sheet(uint64_t index)
 {
     static float *memory;
     if (!memory) memory = malloc((size_t)CANVAS_ALL * COUNT * sizeof *memory);
-    io_canvas c = {.size = SIZE,
-                   .count = COUNT,
-                   .pixel = 1.0f / SIZE,
-                   .rng = ts_rng_make(1, TS_STREAM_TEST, index),
-                   .x = memory,
-                   .y = memory + COUNT};
-    float *plane = memory + 2 * COUNT;
-    c.height = plane;
-    for (int k = 0; k < 3; k++) {
-        c.diffuse[k] = plane + (1 + k) * COUNT;
-        c.specular[k] = plane + (4 + k) * COUNT;
-    }
-    c.roughness = plane + 7 * COUNT;
-    c.planes = plane + CANVAS_PAINTED * COUNT;
-    for (int i = 0; i < COUNT; i++) {
-        c.x[i] = ((float)(i % SIZE) + 0.5f) / SIZE - 0.5f;
-        c.y[i] = 0.5f - ((float)(i / SIZE) + 0.5f) / SIZE;
-    }
-    const io_substance grey = {{0.3f, 0.3f, 0.3f}, {0.04f, 0.04f, 0.04f}, 0.5f};
-    cv_fill(&c, &grey);
-    return c;
+    return grey_canvas(memory, SIZE, index);
 }
 
 TEST(decals_cover_a_part_with_crisp_borders)
