@@ -25,15 +25,7 @@ ts_code bench_batches(const char *path, ts_status *st)
                        "%s: a peer takes one photograph of whole patches (model.images 1, train.window 0)", path);
     const int batch = c.train.batch, patch = c.data.patch;
     const size_t pixels = (size_t)batch * (size_t)patch * (size_t)patch;
-    const io_procedural source = {.seed = (uint64_t)c.data.seed,
-                                  .families = c.data.families,
-                                  .often = c.data.often,
-                                  .hues = (float)c.data.hues,
-                                  .relief = (float)c.data.relief,
-                                  .blend = (float)c.data.blend,
-                                  .uneven = (float)c.data.uneven,
-                                  .closer = (float)c.data.closer,
-                                  .homogeneous = (float)c.data.homogeneous};
+    const io_procedural source = tr_materials_of(&c);
     float *images = malloc(pixels * 3 * sizeof *images);
     rd_view *views = malloc((size_t)batch * RD_LOSS_VIEWS * sizeof *views),
             *captures = malloc((size_t)batch * sizeof *captures);

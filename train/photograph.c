@@ -6,6 +6,19 @@
 #include "train/state.h"
 #include <string.h>
 
+io_procedural tr_materials_of(const tr_config *c)
+{
+    return (io_procedural){.seed = (uint64_t)c->data.seed,
+                           .families = c->data.families,
+                           .often = c->data.often,
+                           .hues = (float)c->data.hues,
+                           .relief = (float)c->data.relief,
+                           .blend = (float)c->data.blend,
+                           .uneven = (float)c->data.uneven,
+                           .closer = (float)c->data.closer,
+                           .homogeneous = (float)c->data.homogeneous};
+}
+
 io_camera tr_camera_of(const tr_config *c)
 {
     return (io_camera){.noise = (float)c->data.noise,

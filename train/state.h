@@ -83,7 +83,8 @@ const float *tr_weights(const tr_trainer *t); /* what is validated and saved */
  */
 nn_model *tr_model_create(const tr_config *c, ts_status *st);
 
-/* photograph.c: the camera of [data]. */
+/* photograph.c: the materials and the camera of [data]. */
+io_procedural tr_materials_of(const tr_config *c);
 io_camera tr_camera_of(const tr_config *c);
 
 /* Number photographs of each material [count][size][size][9], with the faults of [data]; images

@@ -208,15 +208,7 @@ static void leave_blocks(tr_trainer *t)
 static ts_code begin(tr_trainer *t, bool resume, ts_status *st)
 {
     const tr_config *c = &t->config;
-    const io_procedural source = {.seed = (uint64_t)c->data.seed,
-                                  .families = c->data.families,
-                                  .often = c->data.often,
-                                  .hues = (float)c->data.hues,
-                                  .relief = (float)c->data.relief,
-                                  .blend = (float)c->data.blend,
-                                  .uneven = (float)c->data.uneven,
-                                  .closer = (float)c->data.closer,
-                                  .homogeneous = (float)c->data.homogeneous};
+    const io_procedural source = tr_materials_of(c);
     const io_share share = {c->train.batch, t->first, t->batch};
     t->loader = io_loader_create(&source, c->data.patch, share, (uint64_t)t->step, c->data.prefetch, c->data.threads,
                                  st);

@@ -121,8 +121,8 @@ void io_family_alloy(io_canvas *c)
         pal_paint(c, colour);
         const float gloss = cv_range(c, 0.08f, 0.9f), share = cv_range(c, 0.1f, 0.85f),
                     cycles = cv_log_range(c, 0.7f, 8), gain = cv_range(c, 0.45f, 0.75f),
-                    sharp = over == 3 ? 0.05f : cv_log_range(c, 0.03f, 1),
-                    thick = cv_range(c, 0.5f, 4) * c->pixel * c->width / 2000, coarse = cv_log_range(c, 10, 40);
+                    sharp = over == 3 ? 0.05f : cv_log_range(c, 0.03f, 1), thick = cv_range(c, 0.5f, 4) / 2000,
+                    coarse = cv_log_range(c, 10, 40);
         const io_substance layer = over == 2 ? fin_dielectric(c, oxide, PAL_COUNT(oxide), 0.6f, 1)
             : over == 3                      ? pal_dielectric(c, colour, gloss)
                                              : fin_metal(c, gloss);

@@ -14,10 +14,11 @@ static basis make_basis(io_canvas *c)
 {
     basis b;
     float *plane = cv_plane(c);
+    const float pixel = 1.0f / (float)c->size; /* of what is seen, which may be a part of the patch */
     for (int k = 0; k < MODES; k++) {
         b.wave[k] = plane + k * c->size;
         const float scale = sqrtf((k ? 2.0f : 1.0f) / (float)c->size);
-        for (int i = 0; i < c->size; i++) b.wave[k][i] = scale * cosf(PI * (float)k * ((float)i + 0.5f) * c->pixel);
+        for (int i = 0; i < c->size; i++) b.wave[k][i] = scale * cosf(PI * (float)k * ((float)i + 0.5f) * pixel);
     }
     return b;
 }

@@ -257,11 +257,11 @@ static double slow_waves(const io_material *m, double *all)
     return sqrt(2 * (sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2] + sum[3] * sum[3])) / count;
 }
 
-TEST(homogeneous_materials_vary_in_their_details_alone)
+static void homogeneous(float closer)
 {
     enum { COUNT = 96, SIZE = 64 };
-    const io_procedural plain = {.seed = 5}, same = {.seed = 5, .homogeneous = 1},
-                        half = {.seed = 5, .homogeneous = 0.5f};
+    const io_procedural plain = {.seed = 5, .closer = closer}, same = {.seed = 5, .closer = closer, .homogeneous = 1},
+                        half = {.seed = 5, .closer = closer, .homogeneous = 0.5f};
     int halves = 0, changed = 0;
     double slow[2] = {0}, deviation[2] = {0};
     for (int i = 0; i < COUNT; i++) {
@@ -290,6 +290,13 @@ TEST(homogeneous_materials_vary_in_their_details_alone)
     CHECK(halves > changed / 4, "%d of %d at a share of a half", halves, changed);
     CHECK(slow[1] < 0.4 * slow[0], "slow waves of %g in place of %g", slow[1], slow[0]);
     CHECK(deviation[1] > 0.6 * deviation[0], "a deviation of %g in place of %g", deviation[1], deviation[0]);
+}
+
+/* Of what is seen, whether that is the whole patch or a part. */
+TEST(homogeneous_materials_vary_in_their_details_alone)
+{
+    homogeneous(0);
+    homogeneous(1);
 }
 
 /* Periods a patch of the strongest waves of the normals' x along rows and columns. */

@@ -1,0 +1,93 @@
+#!/usr/bin/env python3
+"""A published suite under our own light: relight.py SUITE OUT
+
+SUITE is a folder of lgd-eval's peers: (docs/real.md). Places of light and camera and the light's power are fitted to
+each photograph, given the true maps (docs/math.md, M1 to M5). OUT/default, OUT/power, OUT/place and OUT/both get the
+suite with other photographs: rendered from the true maps under the default camera, with the fitted power, from the
+fitted places, and both; lgd-eval --set peers:OUT/... says what of an error is the camera's (docs/training-phone.md).
+Needs numpy, Pillow and scipy."""
+import sys
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+from scipy.optimize import least_squares
+
+SIDE = 256
+DISTANCE = 250 / 256
+POWER = 329288 / SIDE**2 / DISTANCE**2  # over the distance's square
+STARTS = [(d, x, y) for d in (1, 2) for x, y in ((0, 0), (0.2, 0.2), (-0.2, 0.2), (0.2, -0.2), (-0.2, -0.2))]
+rows, columns = np.mgrid[0:SIDE, 0:SIDE]
+PLACE = np.stack([(columns + 0.5) / SIDE - 0.5, 0.5 - (rows + 0.5) / SIDE, 0 * rows], -1)
+
+
+def unit(v):
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def dot(a, b):
+    return (a * b).sum(-1, keepdims=True)
+
+
+def panels(path):
+    image = np.asarray(Image.open(path).convert("RGB"), np.float64) / 255
+    photo, normal, diffuse, roughness, specular = (image[:, i * SIDE : (i + 1) * SIDE] for i in range(5))
+    return photo, (unit(normal * 2 - 1), diffuse, np.maximum(roughness[..., :1], 0.02), specular)
+
+
+def render(maps, camera, light, power):
+    """Encoded as sRGB; power is over the distance's square, of a light as far as the camera."""
+    normal, diffuse, roughness, specular = maps
+    to_light = light - PLACE
+    l, v = unit(to_light), unit(camera - PLACE)
+    h = unit(l + v)
+    alpha = roughness**2
+    k = alpha / 2
+    nl, nv = np.maximum(dot(normal, l), 0), np.maximum(dot(normal, v), 1e-3)
+    d = alpha**2 / (np.pi * (dot(normal, h) ** 2 * (alpha**2 - 1) + 1) ** 2)
+    g = 1 / ((nl * (1 - k) + k) * (nv * (1 - k) + k))
+    f = specular + (1 - specular) * 2 ** ((-5.55473 * dot(v, h) - 6.98316) * dot(v, h))
+    brdf = (1 - specular) * diffuse / np.pi + d * g * f / 4
+    x = np.clip(brdf * nl * power * light[2] ** 2 / dot(to_light, to_light), 0, 1)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
+
+
+def places(t):
+    distance = np.exp(t[0])
+    return np.array([t[1], t[2], distance]), np.array([t[3], t[4], distance])
+
+
+def fit(photo, maps):
+    def residual(t):
+        return (render(maps, *places(t), np.exp(t[5])) - photo)[::4, ::4].ravel()
+
+    starts = ([np.log(d), 0, 0, x, y, np.log(8)] for d, x, y in STARTS)
+    fits = (least_squares(residual, start, loss="soft_l1", f_scale=0.05) for start in starts)
+    return min(fits, key=lambda fitted: fitted.cost).x
+
+
+def main():
+    if len(sys.argv) != 3:
+        sys.exit(__doc__.splitlines()[0])
+    straight = np.array([0, 0, DISTANCE])
+    for path in sorted(Path(sys.argv[1]).glob("*.png")):
+        photo, maps = panels(path)
+        t = fit(photo, maps)
+        error = np.sqrt(np.mean((render(maps, *places(t), np.exp(t[5])) - photo) ** 2))
+        found = f"power {np.exp(t[5]) / POWER:.2f}, distance {np.exp(t[0]):.2f}, RMSE {error:.3f}"
+        print(f"{path.name}: {found}", flush=True)
+        for name, (camera, light), power in (
+            ("default", (straight, straight), POWER),
+            ("power", (straight, straight), np.exp(t[5])),
+            ("place", places(t), POWER),
+            ("both", places(t), np.exp(t[5])),
+        ):
+            image = Image.open(path).convert("RGB")
+            rendered = render(maps, camera, light, power)
+            image.paste(Image.fromarray((rendered * 255 + 0.5).astype(np.uint8)), (0, 0))
+            folder = Path(sys.argv[2]) / name
+            folder.mkdir(parents=True, exist_ok=True)
+            image.save(folder / path.name)
+
+
+main()
