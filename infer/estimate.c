@@ -334,7 +334,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     if (guesses)
         code = lgd_guess_first(e->tape, e->net, &p, &o, nn_arch_revisions(a, photos, steps),
                                o.progress || e->seen ? see_revision : NULL, &user, &guess, st);
-    else if (o.power) code = fit_power(e, &p, &o, &r0, st);
+    else if (o.power && !e->g_alone) code = fit_power(e, &p, &o, &r0, st);
     if (!code && user.stopped) steps = guess.revised;
     else if (!code && o.iterations == LGD_AUTO && !choose) {
         code = count_steps(e, &p, o.orientations, &steps, st);

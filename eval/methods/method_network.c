@@ -74,6 +74,16 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
     return ev_run(e, c, &how, seen, user, st);
 }
 
+/* What g says of the first photograph, told as much of camera and light as run_lgd is. */
+static ts_code run_g(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
+{
+    double factor;
+    ev_run_how how = {
+        .photos = 1, .options.power = (int)ev_number(e, "power") == POWER_AUTO ? &factor : NULL, .g_alone = true};
+    photographs(e, c, &how);
+    return ev_run(e, c, &how, seen, user, st);
+}
+
 #define MODEL_GIVEN(text)                                \
     {                                                    \
         .key = "model", .type = EV_WEIGHTS, .help = text \
@@ -90,9 +100,6 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
         .help = "early stop of a tile, as lgd-infer --tolerance"               \
     }
 
-static const ev_setting unet[] = {MODEL_GIVEN("weights of a g that was trained alone"), {0}};
-static const ev_setting joint[] = {
-    EV_MODEL("model", "weights of g and h (default: the program's)"), EV_ORIENTATIONS, {0}};
 #define PHOTOS                                                           \
     {                                                                    \
         .key = "photos", .type = EV_WHOLE, .lo = 1, .hi = NN_MAX_IMAGES, \
@@ -118,17 +125,20 @@ static const ev_setting joint[] = {
 #define REFINER \
     ITERATIONS, TOLERANCE, EV_ORIENTATIONS, PHOTOS, POWER, VIEW, PRECISION, { 0 }
 
+static const ev_setting unet[] = {MODEL_GIVEN("weights of a g that was trained alone"), POWER, VIEW, {0}};
+static const ev_setting joint[] = {
+    EV_MODEL("model", "weights of g and h (default: the program's)"), EV_ORIENTATIONS, POWER, VIEW, {0}};
 static const ev_setting lgd[] = {EV_MODEL("model", "weights of g and h (default: the program's)"), REFINER};
 static const ev_setting nograd[] = {MODEL_GIVEN("weights trained with model.gradient = no"), REFINER};
 static const ev_setting frozen[] = {MODEL_GIVEN("weights trained with train.g_rate = 0"), REFINER};
 
 const ev_method ev_method_unet = {
-    .name = "unet", .help = "g alone, feed-forward", .settings = unet, .open = open_g, .run = ev_run_g};
+    .name = "unet", .help = "g alone, feed-forward", .settings = unet, .open = open_g, .run = run_g};
 const ev_method ev_method_unet_joint = {.name = "unet-joint",
                                         .help = "R_0 of g and h that were trained together",
                                         .settings = joint,
                                         .open = open_g,
-                                        .run = ev_run_g};
+                                        .run = run_g};
 const ev_method ev_method_lgd = {.name = "lgd",
                                  .help = "g, then refinement steps that read the gradient",
                                  .settings = lgd,

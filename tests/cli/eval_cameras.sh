@@ -53,6 +53,16 @@ field_of_view() {
     done
 }
 
+# g reads what it is told of camera and light, and its own maps are those of that reading.
+what_g_is_told() {
+    expect 0 "$BIN/lgd-eval" --fast --model models/phone.safetensors --fov 30 --set procedural:1,1 \
+        --method unet-joint:label=all --method unet-joint:view=told,label=fov \
+        --method unet-joint:power=auto,view=told,label=power --method unet-joint:power=auto,view=unknown,label=none \
+        -o "$T/o"
+    [ "$(awk -F, 'NR > 1 { print $10 }' "$T/o/results.csv" | sort -u | wc -l)" = 4 ] ||
+        fail "g makes the same of what it is told and not: $(cat "$T/o/results.csv")"
+}
+
 # A tilted camera: a method that knows it makes something else of the photograph than one that does not.
 tilt() {
     for degrees in -1 90 x; do
@@ -129,6 +139,7 @@ light() {
 
 check eval_captures captures
 check eval_field_of_view field_of_view
+check eval_tells_g_what_is_known what_g_is_told
 check eval_tilt tilt
 check eval_photographs photographs
 check eval_untold untold
