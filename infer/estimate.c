@@ -226,7 +226,6 @@ static ts_code count_steps(const lgd_estimator *e, const lgd_given *p, int orien
     ts_arena *arena = ts_arena_create(0, st);
     ts_code code = photo && maps && arena ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory");
     reduced.side = small;
-    reduced.r0 = NULL;
     for (int k = 0; k < given && !code; k++) {
         ts_tensor to = ts_view(photo + (size_t)k * pixels * 3, (ts_shape){1, small, small, 3});
         const ts_tensor from = ts_view((float *)(uintptr_t)p->image[k], (ts_shape){1, side, side, 3});
