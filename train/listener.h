@@ -7,7 +7,7 @@
 /* One step as log.csv has it. NaN in a part: that loss has no weight or does not exist in this phase. */
 typedef struct tr_row {
     int64_t step, total; /* steps made so far, this one included, and to make */
-    bool pretraining;
+    bool pretraining, g_fixed;
     const char *skip;                                          /* why the step made no update; NULL: it made one */
     int iterations;                                            /* refinement steps that were drawn */
     double loss, render_start, map_start, render_end, map_end; /* of R_0 and R_T */

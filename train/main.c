@@ -34,6 +34,11 @@ typedef struct shown {
     int steps, samples, ranks;
 } shown;
 
+static const char *trained(const tr_row *row)
+{
+    return row->pretraining ? "g alone" : row->g_fixed ? "h alone" : "g and h";
+}
+
 static void show_step(const tr_row *row, void *user)
 {
     shown *s = user;
@@ -47,16 +52,16 @@ static void show_step(const tr_row *row, void *user)
     const bool line = row->step % s->log_every == 0 || row->step == row->total;
     const double mean = s->steps ? s->loss / s->steps : NAN, speed = s->seconds > 0 ? s->samples / s->seconds : 0;
     if (s->progress.terminal) {
-        snprintf(extra, sizeof extra, "%s  step %lld  loss %.4f  %.1f samples/s",
-                 row->pretraining ? "g alone" : "g and h", (long long)row->step, mean, speed);
+        snprintf(extra, sizeof extra, "%s  step %lld  loss %.4f  %.1f samples/s", trained(row), (long long)row->step,
+                 mean, speed);
         cl_progress_show(&s->progress, done, extra);
     } else if (line) {
         /* From the last lines' speed: a step of the second phase takes several times as long as one of the first. */
         const long left = s->steps ? lround(s->seconds / s->steps * (double)(row->total - row->step)) : 0;
         if (s->ranks > 1) snprintf(extra, sizeof extra, "  waiting %.1f%%", 100 * s->waited / s->seconds);
         cl_note("step %lld/%lld  %s  loss %.4f  rate %.2e  %.1f samples/s%s  ETA %ld:%02ld:%02ld", (long long)row->step,
-                (long long)row->total, row->pretraining ? "g alone" : "g and h", mean, row->rate, speed,
-                s->ranks > 1 ? extra : "", left / 3600, left / 60 % 60, left % 60);
+                (long long)row->total, trained(row), mean, row->rate, speed, s->ranks > 1 ? extra : "", left / 3600,
+                left / 60 % 60, left % 60);
     }
     if (line) s->loss = s->seconds = s->waited = 0, s->steps = s->samples = 0;
 }

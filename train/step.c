@@ -349,6 +349,7 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st)
     double factor[NN_COARSE + 1]; /* of the rate, for each part */
     rate_factors(c, row->pretraining, factor);
     for (int part = NN_G; part <= NN_COARSE; part++) t->model->fixed[part] = factor[part] == 0;
+    row->g_fixed = t->model->fixed[NN_G];
     ag_reset(t->tape);
     ag_compute_set(t->tape, (ts_compute){.exact = c->train.exact, .precision = c->train.precision});
     if (differentiate(t, target, given, row, st) != TS_OK) return st->code;

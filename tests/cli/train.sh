@@ -27,7 +27,7 @@ run_makes_its_files() {
     config
     expect 0 train
     says "$T/out" "validation at step 10: render RMSE"
-    says "$T/err" "step 10/10"
+    says "$T/err" "step 10/10  g and h"
     lines "$T/run/log.csv" 11
     for name in "first estimate, training" "last step, training" "first estimate, validation" "last step, validation" \
         "</svg>"; do says "$T/run/curve.svg" "$name"; done
@@ -41,6 +41,9 @@ run_makes_its_files() {
     says "$T/err" "complete at step 10 of 10"
     expect 1 train
     says "$T/err" "there is a run already"
+    rm -r "$T/run"
+    expect 0 train --set train.g_rate=0
+    says "$T/err" "step 10/10  h alone"
 }
 
 # A small network of the published kind: its weights before training are a file, and it trains, its tenth channel
