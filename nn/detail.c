@@ -3,6 +3,7 @@
 #include "nn/layers.h"
 #include "ops.h"
 #include "render/losses.h"
+#include "tensor/memory.h"
 #include "tensor/team.h"
 #include <stddef.h>
 
@@ -44,13 +45,15 @@ static ag_value *in_place(ag_tape *tape, ag_value *v)
     return v;
 }
 
-/* [N, g_size, g_size, g_detail]: what squares of the full size's pixels are made of. */
-static ag_value *squares(ag_tape *tape, const nn_model *model, ag_value *seen, ag_value *features)
+ag_value *nn_squares_room(ag_tape *tape, const nn_model *model, int images)
+{
+    const nn_arch *a = &model->arch;
+    return a->g_unshuffle > 1 ? room(tape, (ts_shape){images, a->g_size, a->g_size, a->g_detail}) : NULL;
+}
+
+ag_value *nn_squares(ag_tape *tape, const nn_model *model, ag_value *seen, ag_value *features, ag_value *to)
 {
     const nn_layers *l = model->layers;
-    if (!seen || !features) return NULL;
-    const ts_shape s = seen->t.shape;
-    ag_value *to = room(tape, (ts_shape){s.n, s.h, s.w, model->arch.g_detail});
     ts_mark mark = ag_scope_begin(tape);
     ag_value *y = nn_conv(tape, model, l->detail[0], seen, 1, TS_PAD_ZERO, NN_LEAK_G);
     y = ag_concat(tape, y, features);
@@ -68,25 +71,48 @@ static ag_value *squares(ag_tape *tape, const nn_model *model, ag_value *seen, a
 }
 
 /* The channels of the full size's pixels, square by square, then as pixels: [N, S, S, nn_detail_writes]. */
-static ag_value *pixels(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y)
+static ag_value *pixels(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *coordinates, ag_value *y)
 {
     const nn_layers *l = model->layers;
-    const ts_shape s = photo->t.shape;
-    ag_value *to = room(tape, (ts_shape){s.n, s.h, s.w, nn_detail_writes(&model->arch)});
-    const ts_mark mark = ag_scope_begin(tape);
-    const int r = model->arch.g_unshuffle, fine = model->param[l->detail[2].weight].dim[0] / (r * r);
-    ag_value *shuffled = room(tape, (ts_shape){s.n, s.h, s.w, fine});
-    const ts_mark inner = ag_scope_begin(tape);
     y = nn_conv(tape, model, l->detail[2], y, 1, TS_PAD_ZERO, NN_LEAK_G);
-    ag_into(tape, shuffled);
-    y = ag_depth_to_space(tape, y, r);
-    ag_scope_end(tape, inner, NULL, 0);
-    y = nn_conv_with_constants(tape, model, l->detail[3], y, ag_concat(tape, photo, nn_coordinates(tape, s.n, s.h)), 1,
-                               TS_PAD_REPLICATE, NN_LEAK_G);
-    ag_into(tape, to);
-    y = nn_conv(tape, model, l->detail[4], y, 1, TS_PAD_REPLICATE, 1);
-    ag_scope_end(tape, mark, NULL, 0);
-    return y;
+    y = ag_depth_to_space(tape, y, model->arch.g_unshuffle);
+    y = nn_conv_with_constants(tape, model, l->detail[3], y, ag_concat(tape, photo, coordinates), 1, TS_PAD_REPLICATE,
+                               NN_LEAK_G);
+    return nn_conv(tape, model, l->detail[4], y, 1, TS_PAD_REPLICATE, 1);
+}
+
+/* Rows begin to end - 1 of an image. */
+static ag_value *rows(ag_tape *tape, const ag_value *v, int begin, int end)
+{
+    if (!v) return NULL;
+    ts_shape part = v->t.shape;
+    part.h = end - begin;
+    return ag_constant(tape, ts_view(v->t.data + (ptrdiff_t)begin * part.w * part.c, part));
+}
+
+/* The same of one image, some rows of squares at a time: memory that is used again is in the caches and need not be
+ * cleared by the system. A row of squares more on either side is as far as the two convolutions reach, so that no value
+ * depends on the bands; where the image goes on, what that row's own edge gives is left out. */
+static ag_value *pixels_in_bands(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y)
+{
+    if (!photo || !y) return NULL;
+    const ts_shape s = photo->t.shape;
+    const int r = model->arch.g_unshuffle, squares = y->t.shape.h;
+    ag_value *to = ag_empty(tape, (ts_shape){1, s.h, s.w, nn_detail_writes(&model->arch)}),
+             *coordinates = nn_coordinates(tape, 1, s.h);
+    for (int begin = 0; begin < squares && !ag_status(tape)->code; begin += NN_BAND) {
+        const int end = begin + NN_BAND < squares ? begin + NN_BAND : squares, above = begin > 0, below = end < squares,
+                  top = (begin - above) * r, bottom = (end + below) * r;
+        const ts_mark mark = ag_scope_begin(tape);
+        const ag_value *band = pixels(tape, model, rows(tape, photo, top, bottom), rows(tape, coordinates, top, bottom),
+                                      rows(tape, y, begin - above, end + below));
+        const ptrdiff_t row = (ptrdiff_t)s.w * nn_detail_writes(&model->arch);
+        if (band)
+            ts_memory_copy(to->t.data + begin * r * row, band->t.data + above * r * row,
+                           (size_t)((end - begin) * r * row) * sizeof(float), ag_compute(tape)->threads);
+        ag_scope_end(tape, mark, NULL, 0);
+    }
+    return to;
 }
 
 /* guess: NULL, or where maps and spread go. */
@@ -95,11 +121,12 @@ static bool full_size(ag_tape *tape, const nn_model *model, ag_value *photo, ag_
 {
     const int framed = model->arch.channels + NN_FRAME;
     if (!photo || !y || !coarse) return false;
-    y = pixels(tape, model, photo, y);
+    y = ag_gradients(tape) ? pixels(tape, model, photo, nn_coordinates(tape, photo->t.shape.n, photo->t.shape.h), y)
+                           : pixels_in_bands(tape, model, photo, y);
     ag_value *added = ag_shading_frame(tape, ag_channels(tape, y, 0, framed));
     ag_into(tape, guess->maps);
-    ag_value *sum = in_place(tape, ag_resize_smooth(tape, coarse, photo->t.shape.h, photo->t.shape.w));
-    sum = in_place(tape, ag_add(tape, sum, added));
+    ag_value *sum = ag_resize_smooth(tape, coarse, photo->t.shape.h, photo->t.shape.w);
+    sum = in_place(tape, ag_add(tape, in_place(tape, sum), added));
     guess->maps = ag_tanh(tape, sum);
     ag_into(tape, guess->spread);
     if (model->arch.spread) guess->spread = ag_channels(tape, y, framed, NN_SPREADS);
@@ -132,11 +159,9 @@ static bool full_size_of_each(ag_tape *tape, const nn_model *model, const ag_val
     return !ag_status(tape)->code;
 }
 
-bool nn_detail(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *seen, ag_value *features,
-               ag_value *coarse, nn_guess *guess)
+bool nn_full_size(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y, ag_value *coarse, nn_guess *guess)
 {
-    ag_value *y = squares(tape, model, seen, features);
-    if (!y || !coarse) return false;
+    if (!photo || !y || !coarse) return false;
     return ag_gradients(tape) ? full_size(tape, model, photo, y, coarse, guess)
                               : full_size_of_each(tape, model, photo, y, coarse, guess);
 }

@@ -106,10 +106,21 @@ ag_value *nn_coordinates(ag_tape *tape, int n, int side);
  * g_size, NN_CONDITIONS images], or NULL where the architecture has none. */
 bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, nn_guess *guess);
 
-/* What R_0 has at the photograph's size beyond the U-Net's coarse maps [N, g_size, g_size, channels], before the tanh:
- * features [N, g_size, g_size, g_width] of the U-Net, seen: what it read. */
-bool nn_detail(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *seen, ag_value *features,
-               ag_value *coarse, nn_guess *guess);
+/* What R_0 has at the photograph's size beyond the U-Net's coarse maps is made of squares of its pixels: [N, g_size,
+ * g_size, g_detail] from features [N, g_size, g_size, g_width] of the U-Net and seen, what it read. to: NULL, or where
+ * it goes, made by nn_squares_room before what may be forgotten then; that is NULL where there is no detail, or on a
+ * tape with gradients. */
+ag_value *nn_squares_room(ag_tape *tape, const nn_model *model, int images);
+ag_value *nn_squares(ag_tape *tape, const nn_model *model, ag_value *seen, ag_value *features, ag_value *to);
+
+/* Rows of squares that are at the full size at once, on a tape without gradients. */
+enum { NN_BAND = 16 };
+
+/* Maps and spread at photo's size, from nn_squares' y and the coarse maps [N, g_size, g_size, channels] before the
+ * tanh.
+ */
+bool nn_full_size(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y, ag_value *coarse,
+                  nn_guess *guess);
 
 /* The mean of g's guesses of photo [1, ...] in 2, 4 or 8 of its orientations, each turned back: of a photograph that
  * the light and the camera above its centre show alike in all of them. On a tape without gradients. */

@@ -31,33 +31,33 @@ static double unet_floats(const nn_arch *a)
     return fmax(most, held);
 }
 
-enum { FINE = 12, FINER = 16 }; /* channels at the full size */
+enum { FINE = 12, FINER = 16, CONSTANTS = 3 + NN_COORDINATES }; /* channels at the full size */
 
-/* Of one image's squares in nn_detail, all and what is left of them. */
-static double squares_floats(const nn_arch *a, double *left)
+/* Of one image in nn_squares, beside the result. */
+static double squares_floats(const nn_arch *a)
 {
-    const double pixels = (double)a->g_size * a->g_size, squares = (double)a->g_unshuffle * a->g_unshuffle;
-    *left = a->g_unshuffle > 1 ? pixels * FINE * squares : 0;
-    if (a->g_unshuffle == 1) return 0;
-    return pixels * (a->g_detail * (3 + 3.0 * a->g_trunk) + nn_level_width(a, 0) + FINE * squares);
+    const double pixels = (double)a->g_size * a->g_size;
+    return pixels * (2 * a->g_detail + nn_level_width(a, 0));
 }
 
-/* Of one image at the full size. */
+/* Of one image at the full size: bands, then what is made of their result. */
 static double full_floats(const nn_arch *a)
 {
-    const double side = nn_arch_side(a), writes = nn_detail_writes(a);
-    return a->g_unshuffle > 1 ? side * side * (FINE + 10 + FINER + 2 * writes + 4 * a->channels) : 0;
+    const double side = nn_arch_side(a), writes = nn_detail_writes(a), rows = fmin(NN_BAND + 2, a->g_size) / a->g_size,
+                 band = rows * (3 * FINE + 2 * CONSTANTS + FINER + writes), framed = 2 * a->channels + NN_FRAME;
+    return side * side * (writes + NN_COORDINATES + fmax(band, framed));
 }
 
 double nn_guess_bytes(const nn_arch *a, int orientations)
 {
-    const double side = nn_arch_side(a), photo = 3.0 * a->images, maps = a->channels + (a->spread ? NN_SPREADS : 0);
-    const bool turned = orientations > 1 && a->images == 1 && a->compat == NN_COMPAT_NONE;
-    /* the photographs at g's size and encoded; of several orientations their maps' mean */
-    const double once = side * side * (3 * photo + (turned ? 2 * maps : 0));
+    const double side = nn_arch_side(a), pixels = (double)a->g_size * a->g_size, photo = 3.0 * a->images,
+                 maps = a->channels + (a->spread ? NN_SPREADS : 0);
+    const bool turned = orientations > 1 && a->images == 1 && a->compat == NN_COMPAT_NONE, detail = a->g_unshuffle > 1;
     const int images = turned ? orientations : 1;
-    double left;
-    const double squares = images * squares_floats(a, &left),
-                 full = full_floats(a) + images * (left + (a->g_unshuffle > 1 ? side * side * maps : 0));
-    return (once + images * (unet_floats(a) + side * side * photo) + fmax(squares, full)) * sizeof(float);
+    /* the photographs at g's size and encoded; of several orientations their maps' mean */
+    const double once = side * side * (3 * photo + (turned ? 2 * maps : 0)),
+                 left = detail ? pixels * (a->g_detail + a->channels) : 0; /* of the U-Net */
+    const double unet = images * (unet_floats(a) + (detail ? squares_floats(a) : 0)),
+                 full = detail ? full_floats(a) + images * side * side * maps : 0;
+    return (once + images * (side * side * photo + left) + fmax(unet, full)) * sizeof(float);
 }

@@ -51,6 +51,9 @@ static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value 
     const nn_layers *l = model->layers;
     const int levels = model->arch.g_levels;
     *guess = (nn_guess){0};
+    if (!photo) return false;
+    ag_value *squares = nn_squares_room(tape, model, photo->t.shape.n);
+    const ts_mark begun = ag_scope_begin(tape);
     ag_value *seen = seen_by(tape, model, photo, conditions);
     ag_value *skip[NN_MAX_LEVELS],
         *global = ag_selu(tape, nn_linear(tape, model, l->input_global, ag_channel_mean(tape, seen)));
@@ -78,9 +81,13 @@ static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value 
     x = nn_conv(tape, model, l->output_conv1, x, 1, TS_PAD_ZERO, 1);
     x = nn_conv(tape, model, l->output_conv2, x, 1, TS_PAD_ZERO, 1);
     x = ag_add_leaky(tape, x, nn_linear(tape, model, l->output_add, global), 1);
-    if (model->arch.g_unshuffle > 1) return nn_detail(tape, model, photo, seen, features, x, guess);
-    guess->maps = ag_tanh(tape, x);
-    return guess->maps != NULL;
+    const bool detailed = model->arch.g_unshuffle > 1;
+    if (detailed) squares = nn_squares(tape, model, seen, features, squares);
+    else x = ag_tanh(tape, x);
+    ag_value *keep[3] = {x, squares, guess->scene};
+    ag_scope_end(tape, begun, keep, 3);
+    *guess = (nn_guess){.maps = detailed ? NULL : keep[0], .scene = keep[2]};
+    return detailed ? nn_full_size(tape, model, photo, keep[1], keep[0], guess) : guess->maps != NULL;
 }
 
 bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, nn_guess *guess)

@@ -73,6 +73,39 @@ TEST(guess_reads_what_is_known)
     free(in.image.data);
 }
 
+/* Some rows at a time, as without gradients, the full size is what it is as a whole. */
+TEST(guess_does_not_depend_on_its_bands)
+{
+    for (int unshuffle = 2; unshuffle <= 4; unshuffle += 2)
+        for (int exact = 0; exact < 2; exact++) {
+            nn_arch a = detailed();
+            a.g_unshuffle = unshuffle, a.g_size = 2 * NN_BAND + 8; /* two bands and a half */
+            nn_model *m = create(&a, 75);
+            enliven_guess(m);
+            const unsigned char known[2] = {NN_KNOWN_ALL, 0};
+            const rd_view views[2] = {rd_flash(), rd_flash()};
+            nn_input in = photographs(2, nn_arch_side(&a), 76, NULL);
+            in.views = views;
+            in.known = known;
+            ag_tape *whole = tape_create(true), *bands = tape_create(false);
+            nn_guess g[2];
+            ag_compute_set(whole, (ts_compute){.exact = exact});
+            ag_compute_set(bands, (ts_compute){.exact = exact});
+            CHECK(nn_guess_from(whole, m, &in, &g[0]) && nn_guess_from(bands, m, &in, &g[1]), "no guess");
+            const size_t pixels = (size_t)ts_pixels(g[0].maps->t.shape);
+            const double maps = difference(g[0].maps->t.data, g[1].maps->t.data, 9 * pixels),
+                         spread = difference(g[0].spread->t.data, g[1].spread->t.data, NN_SPREADS * pixels);
+            /* Winograd's tiles of 4 x 4 pixels begin elsewhere in bands of squares of 2, and round otherwise. */
+            const double bound = exact || unshuffle == 4 ? 0 : 1e-5;
+            CHECK(maps <= bound && spread <= bound, "squares of %d, exact %d: maps %g, spread %g", unshuffle, exact,
+                  maps, spread);
+            ag_tape_destroy(&whole);
+            ag_tape_destroy(&bands);
+            nn_model_free(&m);
+            free(in.image.data);
+        }
+}
+
 /* Turned by a quarter, the mean over four orientations turns with the photograph, and so does the light's guess. */
 TEST(guess_turns_with_the_photograph)
 {
