@@ -194,6 +194,30 @@ static double part_hidden(double usual, double differ)
     return away > 0 ? away / (away + differ) : 0;
 }
 
+static double mean_of_three(double x[3][CELLS * CELLS], int i) { return (x[0][i] + x[1][i] + x[2][i]) / 3; }
+
+/* The variances of the colours' level, their mean logarithm, and of the hue, what each colour is beside it. */
+static void differ(cells *c, double *level, double *hue)
+{
+    const int count = c->side * c->side;
+    double x[CELLS * CELLS];
+    for (int i = 0; i < count; i++) x[i] = mean_of_three(c->log_value, i);
+    *level = variance(c, x);
+    *hue = 0;
+    for (int k = 0; k < 3; k++) {
+        for (int i = 0; i < count; i++) x[i] = c->log_value[k][i] - mean_of_three(c->log_value, i);
+        *hue += variance(c, x) / 3;
+    }
+}
+
+/* How far a logarithm that is from away from the field is believed to be. */
+static double believed(const hidden_map *map, double from)
+{
+    const double far = from / map->reach;
+    return from / (1 + far * far);
+}
+
+/* A material that is light and dark may be of one hue all over: each has a part of its own. */
 static void find_changes(const hidden_map *map, cells *c, double *band)
 {
     const int count = c->side * c->side;
@@ -202,13 +226,13 @@ static void find_changes(const hidden_map *map, cells *c, double *band)
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < count; i++) c->change[k][i] = (c->weight[i] + WEIGHT_LEAST) * c->log_value[k][i];
     solve(count, c->side, band, c->change);
-    for (int k = 0; k < 3; k++) {
-        double *b = c->change[k];
-        const double differ = variance(c, c->log_value[k]);
-        for (int i = 0; i < count; i++) {
-            const double from = b[i] - c->log_value[k][i], far = from / map->reach;
-            b[i] = part_hidden(c->usual[i], differ) * from / (1 + far * far);
-        }
+    double level, hue;
+    differ(c, &level, &hue);
+    for (int i = 0; i < count; i++) {
+        for (int k = 0; k < 3; k++) c->change[k][i] -= c->log_value[k][i];
+        const double from = mean_of_three(c->change, i), tint = part_hidden(c->usual[i], hue),
+                     grey = part_hidden(c->usual[i], level) * believed(map, from);
+        for (int k = 0; k < 3; k++) c->change[k][i] = grey + tint * believed(map, c->change[k][i] - from);
     }
 }
 

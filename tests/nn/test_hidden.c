@@ -95,6 +95,25 @@ TEST(hidden_diffuse_leaves_a_pattern)
     CHECK(most < 0.8f, "a value is changed by e^%g", most);
 }
 
+/* Stripes of one hue: a redder disk under the highlight takes theirs, and stays as light and dark as it was. */
+TEST(hidden_hue_is_that_of_the_surroundings)
+{
+    const float hue[3] = {1, 0.75f, 0.5f};
+    make(0.25f, 0.3f, 0);
+    for (int i = 0; i < PIXELS; i++)
+        for (int k = 0; k < 3; k++)
+            maps[i * C + MAP_DIFFUSE + k] =
+                2 * hue[k] * (i % SIDE / 16 % 2 ? 0.6f : 0.2f) * (k == 0 && distance(i) < 0.08f ? 1.3f : 1) - 1;
+    fill(1, filled);
+    for (int i = 0; i < PIXELS; i++) {
+        if (distance(i) > 0.03f) continue;
+        const float red = (filled[i * C] + 1) / 2, green = (filled[i * C + 1] + 1) / 2,
+                    before = (maps[i * C + 1] + 1) / 2;
+        CHECK(fabsf(green / red - 0.75f) < 0.04f, "a hue of %g, .58 before, .75 around", green / red);
+        CHECK(fabsf(logf(green / before)) < 0.8f, "a level of %g, %g before", green, before);
+    }
+}
+
 /* Black things are not hidden, though most of their light is mirrored. */
 TEST(hidden_diffuse_leaves_what_is_dark)
 {
