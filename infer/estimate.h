@@ -10,8 +10,8 @@ typedef struct lgd_estimator {
     ag_tape *tape; /* without gradients, frozen; it is reset */
     bool encoded;  /* the result is in the encoding of tensor/maps.h, each value clamped to what a map can say; else as
                       infer/lgd.h has it */
-    bool g_alone;  /* R_0 is what g says: of a model that guesses the scene, nothing is fitted to the photograph before
-                      the steps. For options.iterations 0 alone. */
+    bool g_alone;  /* R_0 is what g says: nothing is fitted to the photograph before the steps, and options.power
+                      says that the light's power is not known but is not set. For options.iterations 0 alone. */
     /* Called after R_0 and every step, or NULL. maps: R_t as the network has it, [side][side][channels], valid during
      * the call; false: stop there. The photograph is then one tile, whatever its size; but where a mask or a tolerance
      * asks for several, only R_T is seen. */

@@ -135,7 +135,7 @@ static const ev_setting frozen[] = {MODEL_GIVEN("weights trained with train.g_ra
 const ev_method ev_method_unet = {
     .name = "unet", .help = "g alone, feed-forward", .settings = unet, .open = open_g, .run = run_g};
 const ev_method ev_method_unet_joint = {.name = "unet-joint",
-                                        .help = "R_0 of g and h that were trained together",
+                                        .help = "what g says that was trained with h or steps",
                                         .settings = joint,
                                         .open = open_g,
                                         .run = run_g};

@@ -95,7 +95,7 @@ TEST(hidden_diffuse_leaves_a_pattern)
     CHECK(most < 0.8f, "a value is changed by e^%g", most);
 }
 
-/* Stripes of one hue: a redder disk under the highlight takes theirs, and stays as light and dark as it was. */
+/* Stripes of one hue: a redder disk under the highlight takes theirs; light and dark ones stay apart. */
 TEST(hidden_hue_is_that_of_the_surroundings)
 {
     const float hue[3] = {1, 0.75f, 0.5f};
