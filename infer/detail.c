@@ -10,10 +10,9 @@ enum {
     STEP = 1 << 12, /* pixels at a time, at least */
     AROUND = 2      /* pixels that enlarging reads */
 };
-#define DARK 0.004f      /* one step of 8 bits */
-#define MOST 4.0f        /* times brighter or darker */
-#define BRIGHT 0.75f     /* values from here on are trusted less */
-#define FINE_RELIEF 0.5f /* of the normals' deviations: most relief is broader than g's pixels */
+#define DARK 0.004f  /* one step of 8 bits */
+#define MOST 4.0f    /* times brighter or darker */
+#define BRIGHT 0.75f /* values from here on are trusted less */
 
 typedef struct level_job {
     rd_grid grid;
@@ -91,19 +90,6 @@ static void level_pixels(const void *job, int64_t begin, int64_t end)
         for (int c = 0; c < 3; c++) j->to[3 * i + c] = j->image[3 * i + c] * j->from[LGD_DETAIL_LEVELS * i + c];
 }
 
-typedef struct errors_job {
-    const float *from;
-    float *to;
-} errors_job;
-
-static void fine_errors(const void *job, int64_t begin, int64_t end)
-{
-    const errors_job *j = job;
-    memcpy(j->to + begin * MAP_GROUPS, j->from + begin * MAP_GROUPS,
-           (size_t)(end - begin) * MAP_GROUPS * sizeof *j->to);
-    for (int64_t i = begin; i < end; i++) j->to[i * MAP_GROUPS + GROUP_NORMAL] *= FINE_RELIEF;
-}
-
 typedef struct add_job {
     const float *levels, *step;
     int channels;
@@ -130,16 +116,14 @@ ts_code lgd_detail_add(rd_grid grid, const ts_taps *rows, const ts_taps *columns
     const ts_mark mark = ts_arena_mark(arena);
     float *enlarged = ts_arena_alloc(arena, (size_t)pixels * LGD_DETAIL_LEVELS * sizeof *enlarged),
           *levelled = ts_arena_alloc(arena, (size_t)pixels * 3 * sizeof *levelled),
-          *errors = ts_arena_alloc(arena, (size_t)pixels * MAP_GROUPS * sizeof *errors),
           *step = ts_arena_alloc(arena, (size_t)(pixels * channels) * sizeof *step);
     ts_code code = TS_OK;
-    if (enlarged && levelled && errors && step) {
-        const rd_prior prior = {maps, errors, nn_step_prior(NN_KNOWN_ALL, 1)};
+    if (enlarged && levelled && step) {
+        const rd_prior prior = {maps, deviation, nn_step_prior(NN_KNOWN_ALL, 1)};
         const float *seen = levelled;
         ts_resample(1, LGD_DETAIL_LEVELS, rows, columns, levels, enlarged, false, grid.threads);
         ts_for(grid.threads, pixels, STEP, level_pixels,
                &(level_job){.image = image, .from = enlarged, .to = levelled});
-        ts_for(grid.threads, pixels, STEP, fine_errors, &(errors_job){deviation, errors});
         rd_posterior_step(grid, maps, channels, view, &seen, 1, &prior, 1, NULL, step, NULL);
         ts_for(grid.threads, pixels, STEP, add_pixels, &(add_job){enlarged, step, channels, maps});
     } else code = ts_fail(st, TS_NOMEM, "out of memory for the detail of %d x %d pixels", grid.w, grid.h);

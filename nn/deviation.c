@@ -9,9 +9,12 @@ enum { PIXELS = 1 << 11 }; /* at a time, at least */
  * that, highlights leave the more in F0 the more is believed, and renderings do not tell .35 from .2. Several
  * photographs tell the level too. */
 #define F0_DETAIL 0.2f
-/* The same of the roughness once its level is found: highlights that a photograph cannot explain otherwise leave disks
- * and dots in it. */
+/* The same of the roughness once its level is found with the scene: highlights that a photograph cannot explain
+ * otherwise leave disks and dots in it. */
 #define ROUGHNESS_DETAIL 0.5f
+/* The same of the normals: with the whole, one photograph's steps take them farther from the truth than R_0's are,
+ * since what they read as slopes is often colour or gloss. */
+#define NORMAL_DETAIL 0.5f
 /* By which the deviations are multiplied where several photographs follow. Much of R_0's error is one of the whole
  * material, and of that the mean absolute error of a pixel says too little. */
 #define SEVERAL 1.5f
@@ -32,12 +35,21 @@ static void deviations(const void *of, int64_t begin, int64_t end)
 
 void nn_deviations(int64_t pixels, const float *spread, nn_belief b, int threads, float *deviation)
 {
-    const float all = (b.several ? SEVERAL : 1) * (b.revised ? REVISED : 1), f0 = b.several ? 1 : F0_DETAIL,
-                roughness = b.level_found && !b.several ? ROUGHNESS_DETAIL : 1;
-    ts_for(threads, pixels, PIXELS, deviations, &(job){spread, deviation, {all, all, all * roughness, all * f0}});
+    const bool found = b.scene_found && !b.several;
+    const float all = (b.several ? SEVERAL : 1) * (b.revised ? REVISED : 1),
+                factor[NN_SPREADS] = {[GROUP_NORMAL] = found ? NORMAL_DETAIL : 1,
+                                      [GROUP_DIFFUSE] = 1,
+                                      [GROUP_ROUGHNESS] = found ? ROUGHNESS_DETAIL : 1,
+                                      [GROUP_SPECULAR] = b.several ? 1 : F0_DETAIL};
+    job j = {.spread = spread, .to = deviation};
+    for (int k = 0; k < NN_SPREADS; k++) j.factor[k] = all * factor[k];
+    ts_for(threads, pixels, PIXELS, deviations, &j);
 }
 
-void nn_deviations_of_found_level(int64_t pixels, float *deviation)
+void nn_deviations_of_found_scene(int64_t pixels, float *deviation)
 {
-    for (int64_t i = GROUP_ROUGHNESS; i < pixels * NN_SPREADS; i += NN_SPREADS) deviation[i] *= ROUGHNESS_DETAIL;
+    for (int64_t i = 0; i < pixels * NN_SPREADS; i += NN_SPREADS) {
+        deviation[i + GROUP_NORMAL] *= NORMAL_DETAIL;
+        deviation[i + GROUP_ROUGHNESS] *= ROUGHNESS_DETAIL;
+    }
 }

@@ -7,7 +7,7 @@
 
 typedef struct nn_belief {
     bool several;     /* more photographs of the sample follow: deviations of F0 and roughness are with their level */
-    bool level_found; /* of the roughness, of one photograph */
+    bool scene_found; /* of one photograph, and the level of the roughness with it */
     bool revised;     /* by h, which has read what a step would read */
 } nn_belief;
 
@@ -15,6 +15,6 @@ typedef struct nn_belief {
  * maps' expected errors as nn_guess has them. */
 void nn_deviations(int64_t pixels, const float *spread, nn_belief belief, int threads, float *deviation);
 
-/* From deviations of belief {0} to those with level_found. */
-void nn_deviations_of_found_level(int64_t pixels, float *deviation);
+/* From deviations of belief {0} to those with scene_found. */
+void nn_deviations_of_found_scene(int64_t pixels, float *deviation);
 #endif

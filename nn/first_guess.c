@@ -107,7 +107,7 @@ ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, co
     const ts_mark mark = ts_arena_mark(arena);
     const ts_code code = fit(grid, image, channels, taken->known, &prior, arena, g, st);
     ts_arena_release(arena, mark);
-    if (!taken->several) nn_deviations_of_found_level(pixels, g->deviation);
+    if (!taken->several) nn_deviations_of_found_scene(pixels, g->deviation);
     g->view = view_of(g->number, taken);
     return code;
 }
@@ -131,7 +131,7 @@ static ts_code revise(ag_tape *tape, const nn_model *model, const ts_tensor *ima
         return st->code;
     }
     if (g->revised > 0)
-        nn_deviations((int64_t)pixels, g->spread, (nn_belief){.level_found = true, .revised = true},
+        nn_deviations((int64_t)pixels, g->spread, (nn_belief){.scene_found = true, .revised = true},
                       ag_compute(tape)->threads, g->deviation);
     return TS_OK;
 }

@@ -106,7 +106,7 @@ static bool read_one(ag_tape *tape, const nn_revision *r, const ts_tensor *gradi
     if (!memory) return ag_fail(tape, TS_NOMEM, "no memory for a revision of %d x %d pixels", side, side), false;
     float *photo = memory, *before = photo + 3 * pixels, *after = before + 3 * pixels, *step = after + 3 * pixels,
           *tried = step + MAP_CHANNELS * pixels, *deviation = tried + MAP_CHANNELS * pixels;
-    nn_deviations((int64_t)pixels, spread, (nn_belief){.level_found = true}, threads, deviation);
+    nn_deviations((int64_t)pixels, spread, (nn_belief){.scene_found = true}, threads, deviation);
     const rd_prior prior = {maps, deviation, nn_step_prior(r->known[n], 1)};
     rd_posterior_step(grid, maps, MAP_CHANNELS, &r->views[n], &image, 1, &prior, 1, NULL, step, NULL);
     ts_for(threads, (int64_t)pixels * MAP_CHANNELS, TOGETHER, try_values, &(try_job){maps, step, tried});

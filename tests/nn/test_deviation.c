@@ -1,0 +1,47 @@
+/* How far the steps may go from what a model says. */
+#include "nn/deviation.h"
+#include "tensor/maps.h"
+#include "tests/test.h"
+#include <math.h>
+
+enum { PIXELS = 5000 };
+static float spread[PIXELS * NN_SPREADS], said[PIXELS * NN_SPREADS], other[PIXELS * NN_SPREADS];
+
+static void say(void)
+{
+    for (int i = 0; i < PIXELS * NN_SPREADS; i++) spread[i] = -2.0f + 0.001f * (float)(i % 3001);
+}
+
+/* A Laplace density's mean absolute error times the square root of 2 is its standard deviation; of F0 a part. */
+TEST(deviation_is_that_of_a_laplace_density)
+{
+    say();
+    nn_deviations(PIXELS, spread, (nn_belief){0}, 2, said);
+    for (int i = 0; i < PIXELS * NN_SPREADS; i++) {
+        const double all = sqrt(2) * (double)NN_SPREAD_UNIT * exp((double)spread[i]),
+                     part = (double)said[i] / (i % NN_SPREADS == GROUP_SPECULAR ? 0.2 : 1);
+        CHECK(fabs(part - all) < 1e-5 * all, "value %d: %g in place of %g", i, part, all);
+    }
+}
+
+/* Once the scene is found relief and roughness may move less, and nothing else changes; of several photographs nothing
+ * does. */
+TEST(deviation_of_relief_is_less_once_the_scene_is_found)
+{
+    say();
+    nn_deviations(PIXELS, spread, (nn_belief){0}, 1, said);
+    nn_deviations(PIXELS, spread, (nn_belief){.scene_found = true}, 2, other);
+    for (int i = 0; i < PIXELS * NN_SPREADS; i++) {
+        const int k = i % NN_SPREADS;
+        const bool less = k == GROUP_NORMAL || k == GROUP_ROUGHNESS;
+        CHECK(less ? other[i] < 0.9f * said[i] : other[i] == said[i], "group %d: %g of %g", k, (double)other[i],
+              (double)said[i]);
+    }
+    nn_deviations_of_found_scene(PIXELS, said);
+    for (int i = 0; i < PIXELS * NN_SPREADS; i++)
+        CHECK(fabsf(said[i] - other[i]) <= 1e-6f * other[i], "value %d: %g and %g", i, (double)said[i],
+              (double)other[i]);
+    nn_deviations(PIXELS, spread, (nn_belief){.several = true}, 1, said);
+    nn_deviations(PIXELS, spread, (nn_belief){.several = true, .scene_found = true}, 1, other);
+    for (int i = 0; i < PIXELS * NN_SPREADS; i++) CHECK(said[i] == other[i], "of several photographs value %d", i);
+}
