@@ -37,6 +37,7 @@ const nn_arch_field nn_arch_fields[NN_ARCH_FIELDS] = {
     {.key = "unshuffle", .kind = FIELD_INT, .at = AT(g_unshuffle), .lo = 1, .hi = 8, .start = 1, .late = true},
     {.key = "g_detail", .kind = FIELD_INT, .at = AT(g_detail), .lo = 1, .hi = 1024, .start = 64, .late = true},
     {.key = "g_trunk", .kind = FIELD_INT, .at = AT(g_trunk), .lo = 0, .hi = NN_MAX_LEVELS, .late = true},
+    {.key = "g_half", .kind = FIELD_INT, .at = AT(g_half), .lo = 0, .hi = 1024, .late = true},
     {.key = "conditions", .kind = FIELD_BOOL, .at = AT(conditions), .hi = 1, .late = true},
     {.key = "spread", .kind = FIELD_BOOL, .at = AT(spread), .hi = 1, .late = true},
     {.key = "scene", .kind = FIELD_BOOL, .at = AT(scene), .hi = 1, .late = true},
@@ -128,6 +129,8 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
                        "unshuffle, conditions, spread or scene is set: that needs channels 9 and compat = none");
     if (a->g_unshuffle > 1 && a->images > 1)
         return ts_fail(st, TS_INVALID, "unshuffle is %d: that needs images 1", a->g_unshuffle);
+    if (a->g_half > 0 && a->g_unshuffle % 2 != 0)
+        return ts_fail(st, TS_INVALID, "g_half is %d: that needs an even unshuffle, not %d", a->g_half, a->g_unshuffle);
     if (a->spread && a->g_unshuffle == 1) return ts_fail(st, TS_INVALID, "spread is set: that needs unshuffle above 1");
     if (a->descent == NN_DESCENT_POSTERIOR && (!a->spread || !a->scene || a->coarse_steps > 0 || a->h_width > 0))
         return ts_fail(st, TS_INVALID, "descent is posterior: that needs spread, scene, h_width 0 and coarse_steps 0");

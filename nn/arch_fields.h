@@ -15,7 +15,7 @@ typedef struct nn_arch_field {
     bool late;                /* files older than the field do not have it */
 } nn_arch_field;
 
-enum { NN_ARCH_FIELDS = 30 };
+enum { NN_ARCH_FIELDS = 31 };
 extern const nn_arch_field nn_arch_fields[NN_ARCH_FIELDS];
 
 int nn_arch_get(const nn_arch *a, const nn_arch_field *f);

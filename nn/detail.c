@@ -70,12 +70,28 @@ ag_value *nn_squares(ag_tape *tape, const nn_model *model, ag_value *seen, ag_va
     return y;
 }
 
+/* What y and squares of 2 x 2 pixels of the photograph give each pixel of the full size, made at half of its side. */
+static ag_value *from_half(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y)
+{
+    const nn_layers *l = model->layers;
+    y = nn_conv(tape, model, l->half[0], y, 1, TS_PAD_ZERO, NN_LEAK_G);
+    if (model->arch.g_unshuffle > 2) y = ag_depth_to_space(tape, y, model->arch.g_unshuffle / 2);
+    y = nn_conv_with_constants(tape, model, l->half[1], y, ag_space_to_depth(tape, photo, 2), 1, TS_PAD_REPLICATE,
+                               NN_LEAK_G);
+    ag_value *change = nn_conv(tape, model, l->half[2], y, 1, TS_PAD_REPLICATE, NN_LEAK_G);
+    change = nn_conv(tape, model, l->half[3], change, 1, TS_PAD_REPLICATE, 1);
+    y = ag_add(tape, in_place(tape, y), change);
+    return ag_depth_to_space(tape, nn_conv(tape, model, l->half[4], y, 1, TS_PAD_ZERO, 1), 2);
+}
+
 /* The channels of the full size's pixels, square by square, then as pixels: [N, S, S, nn_detail_writes]. */
 static ag_value *pixels(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *coordinates, ag_value *y)
 {
     const nn_layers *l = model->layers;
+    ag_value *half = model->arch.g_half > 0 ? from_half(tape, model, photo, y) : NULL;
     y = nn_conv(tape, model, l->detail[2], y, 1, TS_PAD_ZERO, NN_LEAK_G);
     y = ag_depth_to_space(tape, y, model->arch.g_unshuffle);
+    if (half) y = ag_add(tape, in_place(tape, y), half);
     y = nn_conv_with_constants(tape, model, l->detail[3], y, ag_concat(tape, photo, coordinates), 1, TS_PAD_REPLICATE,
                                NN_LEAK_G);
     return nn_conv(tape, model, l->detail[4], y, 1, TS_PAD_REPLICATE, 1);
@@ -91,18 +107,19 @@ static ag_value *rows(ag_tape *tape, const ag_value *v, int begin, int end)
 }
 
 /* The same of one image, some rows of squares at a time: memory that is used again is in the caches and need not be
- * cleared by the system. A row of squares more on either side is as far as the two convolutions reach, so that no value
- * depends on the bands; where the image goes on, what that row's own edge gives is left out. */
+ * cleared by the system. Rows of squares more on either side are as many as the convolutions reach, so that no value
+ * depends on the bands; where the image goes on, what their own edge gives is left out. */
 static ag_value *pixels_in_bands(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y)
 {
     if (!photo || !y) return NULL;
     const ts_shape s = photo->t.shape;
-    const int r = model->arch.g_unshuffle, squares = y->t.shape.h;
+    const int r = model->arch.g_unshuffle, squares = y->t.shape.h, more = nn_band_margin(&model->arch);
     ag_value *to = ag_empty(tape, (ts_shape){1, s.h, s.w, nn_detail_writes(&model->arch)}),
              *coordinates = nn_coordinates(tape, 1, s.h);
     for (int begin = 0; begin < squares && !ag_status(tape)->code; begin += NN_BAND) {
-        const int end = begin + NN_BAND < squares ? begin + NN_BAND : squares, above = begin > 0, below = end < squares,
-                  top = (begin - above) * r, bottom = (end + below) * r;
+        const int end = begin + NN_BAND < squares ? begin + NN_BAND : squares, above = begin < more ? begin : more,
+                  below = squares - end < more ? squares - end : more, top = (begin - above) * r,
+                  bottom = (end + below) * r;
         const ts_mark mark = ag_scope_begin(tape);
         const ag_value *band = pixels(tape, model, rows(tape, photo, top, bottom), rows(tape, coordinates, top, bottom),
                                       rows(tape, y, begin - above, end + below));

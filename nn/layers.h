@@ -47,8 +47,8 @@ typedef struct nn_layers {
     nn_layer input_conv, input_global;
     nn_unet_block down[NN_MAX_LEVELS], up[NN_MAX_LEVELS];
     nn_layer output_conv1, output_conv2, output_add;
-    nn_layer detail[5], trunk[NN_MAX_LEVELS][2]; /* nn/detail.c */
-    nn_layer scene[2];                           /* of the deepest global vector */
+    nn_layer detail[5], trunk[NN_MAX_LEVELS][2], half[5]; /* nn/detail.c */
+    nn_layer scene[2];                                    /* of the deepest global vector */
     nn_refiner h, coarse;
     nn_reviser revise;
     nn_layer encoder[NN_MAX_LEVELS + 1], code, decoder[NN_MAX_LEVELS + 1][2],
@@ -113,8 +113,14 @@ bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *co
 ag_value *nn_squares_room(ag_tape *tape, const nn_model *model, int images);
 ag_value *nn_squares(ag_tape *tape, const nn_model *model, ag_value *seen, ag_value *features, ag_value *to);
 
-/* Rows of squares that are at the full size at once, on a tape without gradients. */
+/* Rows of squares that are at the full size at once, on a tape without gradients, and as many more above and below as
+ * two convolutions there reach, and three at half of the side. */
 enum { NN_BAND = 16 };
+static inline int nn_band_margin(const nn_arch *a)
+{
+    const int reach = 2 + (a->g_half > 0 ? 6 : 0);
+    return (reach + a->g_unshuffle - 1) / a->g_unshuffle;
+}
 
 /* Maps and spread at photo's size, from nn_squares' y and the coarse maps [N, g_size, g_size, channels] before the
  * tanh.

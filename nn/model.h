@@ -49,6 +49,7 @@ typedef struct nn_arch {
                          * and writes R_0 at that size with what nn/detail.c adds; 1: R_0 has g_size pixels a side */
     int g_detail;       /* channels of what adds the detail, where g_unshuffle is above 1 */
     int g_trunk;        /* its residual blocks */
+    int g_half;         /* channels of what it adds at half of the photograph's side; 0: nothing */
     bool conditions;    /* g reads what is known of each photograph's camera, light and exposure (nn_known) */
     bool spread;        /* g says how far each map may be off (nn_guess) */
     bool scene;         /* g guesses what is not known of camera and light (nn_guess) */

@@ -35,6 +35,8 @@ const tr_key tr_keys[] = {
     {"model", "g_detail", TR_INT, AT(arch.g_detail), 1, 1024, NULL, NULL, false,
      "channels of what gives R_0 its detail, where unshuffle is above 1"},
     {"model", "g_trunk", TR_INT, AT(arch.g_trunk), 0, 8, NULL, NULL, false, "its residual blocks"},
+    {"model", "g_half", TR_INT, AT(arch.g_half), 0, 1024, NULL, NULL, false,
+     "channels of what it adds at half of the photograph's side, where unshuffle is even; 0: nothing"},
     {"model", "conditions", TR_BOOL, AT(arch.conditions), 0, 1, NULL, NULL, false,
      "g reads what is known of the camera's and the light's places and of the exposure"},
     {"model", "spread", TR_BOOL, AT(arch.spread), 0, 1, NULL, NULL, false,

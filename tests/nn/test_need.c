@@ -38,6 +38,8 @@ TEST(need_of_g_is_counted)
             nn_arch a = tiny();
             a.g_unshuffle = 4, a.g_size = 32, a.g_levels = 3, a.g_detail = detail, a.g_trunk = trunk;
             fits("detail", &a, 1);
+            a.g_half = trunk * detail / 8;
+            fits("detail and half of the side", &a, 1);
             a.spread = a.scene = a.conditions = true;
             fits("detail, spread, scene and conditions", &a, 2);
         }
