@@ -19,8 +19,8 @@ ts_code lgd_detail_compare(rd_grid grid, const float *maps, int channels, const 
 /* Of a window of the full size: the photograph image [h, w, 3] is multiplied by levels, enlarged by the taps, so that
  * it is as bright as the rendering everywhere, and maps [h, w, channels] take that part of the step to their most
  * probable ones (render/posterior.h) that is trusted, as if the light's power were known. deviation: [h, w,
- * MAP_GROUPS], of maps. arena: for what it holds meanwhile. The same bytes for any number
- * of threads. TS_NOMEM with st. */
+ * MAP_GROUPS], of maps. arena: for what it holds meanwhile. The same bytes for any number of threads. TS_NOMEM with
+ * st. */
 ts_code lgd_detail_add(rd_grid grid, const ts_taps *rows, const ts_taps *columns, const float *levels,
                        const float *image, const rd_view *view, const float *deviation, int channels, ts_arena *arena,
                        float *maps, ts_status *st);

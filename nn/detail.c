@@ -1,5 +1,6 @@
 /* What g adds at the photograph's size: convolutions of squares of pixels that no normalisation follows, so that they
- * keep how strong relief and gloss are, and two at the full size. */
+ * keep how strong relief and gloss are, then some at half of its side where arch.g_half asks for them, and two at the
+ * full size. */
 #include "nn/layers.h"
 #include "ops.h"
 #include "render/losses.h"
@@ -108,7 +109,8 @@ static ag_value *rows(ag_tape *tape, const ag_value *v, int begin, int end)
 
 /* The same of one image, some rows of squares at a time: memory that is used again is in the caches and need not be
  * cleared by the system. Rows of squares more on either side are as many as the convolutions reach, so that no value
- * depends on the bands; where the image goes on, what their own edge gives is left out. */
+ * depends on the bands but by rounding, which Winograd's tiles share; where the image goes on, what their own edge
+ * gives is left out. */
 static ag_value *pixels_in_bands(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y)
 {
     if (!photo || !y) return NULL;

@@ -113,6 +113,9 @@ bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *co
 ag_value *nn_squares_room(ag_tape *tape, const nn_model *model, int images);
 ag_value *nn_squares(ag_tape *tape, const nn_model *model, ag_value *seen, ag_value *features, ag_value *to);
 
+/* Channels of a pixel at half of the photograph's side: the four pixels that it stands for. */
+enum { NN_HALF_READS = 4 * 3 };
+
 /* Rows of squares that are at the full size at once, on a tape without gradients, and as many more above and below as
  * two convolutions there reach, and three at half of the side. */
 enum { NN_BAND = 16 };

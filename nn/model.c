@@ -130,7 +130,7 @@ static void plan_detail(nn_model *m)
     if (a->g_half > 0) {
         const int r = a->g_unshuffle / 2, w = a->g_half;
         l->half[0] = conv(m, "g.half.conv1", w * r * r, a->g_detail, 1, true, gain);
-        l->half[1] = conv(m, "g.half.conv2", w, w + 12, 3, true, gain);
+        l->half[1] = conv(m, "g.half.conv2", w, w + NN_HALF_READS, 3, true, gain);
         l->half[2] = conv(m, "g.half.conv3", w, w, 3, true, gain);
         l->half[3] = conv(m, "g.half.conv4", w, w, 3, false, 1);
         l->half[4] = conv(m, "g.half.conv5", 4 * FINE, w, 1, false, 0); /* nothing at first */

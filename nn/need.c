@@ -45,7 +45,7 @@ static double full_floats(const nn_arch *a)
 {
     const double side = nn_arch_side(a), writes = nn_detail_writes(a),
                  rows = fmin(NN_BAND + 2 * nn_band_margin(a), a->g_size) / a->g_size,
-                 half = a->g_half > 0 ? (5 * a->g_half + 2 * 12) / 4.0 + 3 * FINE : 0,
+                 half = a->g_half > 0 ? (5 * a->g_half + 2 * NN_HALF_READS) / 4.0 + 3 * FINE : 0,
                  band = rows * (3 * FINE + 2 * CONSTANTS + FINER + writes + half), framed = 2 * a->channels + NN_FRAME;
     return side * side * (writes + NN_COORDINATES + fmax(band, framed));
 }
