@@ -8,8 +8,22 @@ static const uint32_t bodies[] = {0x3b4048, 0x2b2420, 0x4a3328, 0x6b4a33, 0x8c6a
 
 typedef struct faces {
     float joint, bevel, depth, lean, dome, bowl;
-    bool round; /* pillows in place of bevels */
+    bool round;         /* pillows in place of bevels */
+    float lap[2];       /* rise of a face along x and y, which ends in a step down to the next one, with its sign */
+    float width, riser; /* of a face in x; of the step */
 } faces;
+
+/* Shingles, slates, boards: each lies over the next one, so that there is a step at one side of a joint only. */
+static float lapped(const faces *w, float x, float y)
+{
+    const float along[2] = {x / w->width, y}, size[2] = {w->width, 1};
+    float height = 0;
+    for (int k = 0; k < 2; k++) {
+        const float up = (w->lap[k] < 0 ? -along[k] : along[k]) + 0.5f;
+        height += nz_abs(w->lap[k]) * (up - nz_smooth(1 - w->riser / size[k], 1, up));
+    }
+    return height;
+}
 
 /* Lengths are in rows; solid receives 1 on faces and 0 in joints. */
 static void build(io_canvas *c, nz_frame f, nz_cells cells, const faces *w, float unit, float *solid)
@@ -21,8 +35,20 @@ static void build(io_canvas *c, nz_frame f, nz_cells cells, const faces *w, floa
                     slope = lean * (nz_sine(turn) * x + nz_sine(turn + 0.25f) * y),
                     dome = (nz_again(id, 3) < w->bowl ? w->dome : -w->dome) * (x * x + y * y);
         solid[i] = nz_smooth(w->joint - 0.6f * f.step, w->joint + 0.6f * f.step + 0.01f, e);
-        c->height[i] = unit * side * (w->depth + slope + dome);
+        c->height[i] = unit * (side * (w->depth + slope + dome) + lapped(w, x, y));
     }
+}
+
+/* Steep risers, along one direction of the faces or both. */
+static void lap(io_canvas *c, faces *w, float step)
+{
+    const int which = ts_rng_int(&c->rng, 3); /* 0: x, 1: y, 2: both */
+    w->riser = cv_range(c, 0.03f, 0.16f) + step;
+    for (int k = 0; k < 2; k++) {
+        const float steep = cv_log_range(c, 0.6f, 2.5f), rise = cv_chance(c, 0.5f) ? steep : -steep;
+        if (which == 2 || which == k) w->lap[k] = rise * w->riser;
+    }
+    if (cv_chance(c, 0.7f)) w->depth = 0; /* else a groove too */
 }
 
 /* A tone, a tint and a gloss for each face, at times none of them. */
@@ -83,13 +109,14 @@ void io_family_faces(io_canvas *c)
     const nz_frame straight = cv_frame(c, rows, pattern == 4 ? 0.8660254f : 1, turns),
                    f = cv_bend(c, straight, often, 2, bend);
     nz_cells cells = cv_cells(c);
+    faces w = {.width = 1, .riser = 1};
     if (pattern < 4) {
         nz_brick_shape shape = {.width = 1, .shift = pattern == 3 ? 0.5f : 0};
         if (pattern > 1) shape.width = cv_range(c, 1, 3);
         shape.round = cv_range(c, 0.01f, 0.2f);
+        w.width = shape.width;
         nz_brick(f, shape, cv_seed(c), cells);
     } else nz_cell(f, 1, pattern == 4 ? 0 : 0.9f, 0.5f, cv_seed(c), cells);
-    faces w;
     w.joint = cv_chance(c, 0.3f) ? 0 : cv_range(c, 0.005f, 0.05f);
     w.round = cv_chance(c, 0.4f);
     w.bevel = (w.round ? cv_range(c, 0.1f, 0.45f) : cv_range(c, 0.015f, 0.12f)) + 0.7f * f.step;
@@ -97,6 +124,7 @@ void io_family_faces(io_canvas *c)
     w.lean = cv_log_range(c, 0.04f, 0.4f);
     w.dome = cv_chance(c, 0.4f) ? cv_range(c, 0, 0.3f) : 0;
     w.bowl = cv_chance(c, 0.3f) ? cv_range(c, 0, 1) : 0;
+    if (pattern < 4 && cv_chance(c, 0.45f)) lap(c, &w, f.step);
     float *solid = cv_plane(c);
     build(c, f, cells, &w, 1 / rows, solid);
     colour(c, cells, second);
