@@ -41,4 +41,6 @@ void io_family_stamped(io_canvas *c);  /* metal and other sheet stamped with a p
 void io_family_granite(io_canvas *c);  /* grains of several minerals, polished, honed or flamed */
 void io_family_printed(io_canvas *c);  /* paper, card, wrapping: bold shapes without relief */
 void io_family_faces(io_canvas *c);    /* tiles, blocks and panels whose faces lean, each another way */
+void io_family_pierced(io_canvas *c);  /* sheets with holes and slots, mostly dark behind them */
+void io_family_lattice(io_canvas *c);  /* cane, wicker, mesh, netting: strands over a gap */
 #endif

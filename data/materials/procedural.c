@@ -36,6 +36,7 @@ static const struct {
     {"pebbles", 1.2f, io_family_pebbles}, {"creased", 1.2f, io_family_creased},
     {"stamped", 1, io_family_stamped},    {"granite", 1, io_family_granite},
     {"printed", 1, io_family_printed},    {"faces", 1.2f, io_family_faces},
+    {"pierced", 0.7f, io_family_pierced}, {"lattice", 0.8f, io_family_lattice},
 };
 
 int io_family_count(void) { return (int)(sizeof families / sizeof *families); }
