@@ -37,7 +37,7 @@ ts_code lgd_guess_first(ag_tape *tape, const nn_model *net, lgd_given *p, const 
     const double before = irradiance(&p->views[0]);
     const nn_first_ask ask = {.image = p->image[0],
                               .side = p->side,
-                              .taken = {p->views[0], lgd_guess_known(o), p->count > 1},
+                              .taken = {p->views[0], lgd_guess_known(o), p->count},
                               .orientations = o->orientations,
                               .revisions = revisions,
                               .seen = seen,

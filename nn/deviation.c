@@ -15,9 +15,11 @@ enum { PIXELS = 1 << 11 }; /* at a time, at least */
 /* The same of the normals: with the whole, one photograph's steps take them farther from the truth than R_0's are,
  * since what they read as slopes is often colour or gloss. */
 #define NORMAL_DETAIL 0.5f
-/* By which the deviations are multiplied where several photographs follow. Much of R_0's error is one of the whole
- * material, and of that the mean absolute error of a pixel says too little. */
+/* By which the deviations are multiplied at most where several photographs follow, and how much more it is for each
+ * beyond the second. Much of R_0's error is one of the whole material, and of that the mean absolute error of a pixel
+ * says too little; two photographs do not tell it. */
 #define SEVERAL 1.5f
+#define EACH_MORE 0.166666667f
 /* By which they are multiplied after a revision: what h has read is not believed twice. */
 #define REVISED 0.5f
 
@@ -33,14 +35,20 @@ static void deviations(const void *of, int64_t begin, int64_t end)
         j->to[i] = j->factor[i % NN_SPREADS] * NN_LAPLACE * NN_SPREAD_UNIT * expf(fminf(fmaxf(j->spread[i], -6), 4));
 }
 
+static float for_all_maps(nn_belief b)
+{
+    const float several = b.photographs > 1 ? fminf(1 + EACH_MORE * (float)(b.photographs - 2), SEVERAL) : 1;
+    return several * (b.revised ? REVISED : 1);
+}
+
 void nn_deviations(int64_t pixels, const float *spread, nn_belief b, int threads, float *deviation)
 {
-    const bool found = b.scene_found && !b.several;
-    const float all = (b.several ? SEVERAL : 1) * (b.revised ? REVISED : 1),
+    const bool several = b.photographs > 1, found = b.scene_found && !several;
+    const float all = for_all_maps(b),
                 factor[NN_SPREADS] = {[GROUP_NORMAL] = found ? NORMAL_DETAIL : 1,
                                       [GROUP_DIFFUSE] = 1,
                                       [GROUP_ROUGHNESS] = found ? ROUGHNESS_DETAIL : 1,
-                                      [GROUP_SPECULAR] = b.several ? 1 : F0_DETAIL};
+                                      [GROUP_SPECULAR] = several ? 1 : F0_DETAIL};
     job j = {.spread = spread, .to = deviation};
     for (int k = 0; k < NN_SPREADS; k++) j.factor[k] = all * factor[k];
     ts_for(threads, pixels, PIXELS, deviations, &j);

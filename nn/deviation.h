@@ -6,7 +6,7 @@
 #define NN_LAPLACE 1.41421356f /* a Laplace density's standard deviation over its mean absolute error */
 
 typedef struct nn_belief {
-    bool several;     /* more photographs of the sample follow: deviations of F0 and roughness are with their level */
+    int photographs;  /* of the sample, 0 as 1; of more than one deviations of F0 and roughness are with their level */
     bool scene_found; /* of one photograph, and the level of the roughness with it */
     bool revised;     /* by h, which has read what a step would read */
 } nn_belief;

@@ -101,13 +101,13 @@ ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, co
 {
     const int64_t pixels = (int64_t)grid.h * grid.w;
     rd_scene_prior prior;
-    nn_deviations(pixels, g->spread, (nn_belief){.several = taken->several}, grid.threads, g->deviation);
+    nn_deviations(pixels, g->spread, (nn_belief){.photographs = taken->photographs}, grid.threads, g->deviation);
     scene_prior(scene, &taken->view, taken->known, &prior);
     level_prior(g, (size_t)pixels, channels, taken->known, &prior);
     const ts_mark mark = ts_arena_mark(arena);
     const ts_code code = fit(grid, image, channels, taken->known, &prior, arena, g, st);
     ts_arena_release(arena, mark);
-    if (!taken->several) nn_deviations_of_found_scene(pixels, g->deviation);
+    if (taken->photographs <= 1) nn_deviations_of_found_scene(pixels, g->deviation);
     g->view = view_of(g->number, taken);
     return code;
 }

@@ -16,10 +16,10 @@ typedef struct nn_first_guess {
 
 /* How a photograph was taken. */
 typedef struct nn_taken {
-    rd_view view; /* where camera and light are supposed to be */
-    int known;    /* what of it is true, nn_known */
-    bool several; /* more photographs of the sample follow: the deviations of F0 and roughness are with their level,
-                   * which they tell */
+    rd_view view;    /* where camera and light are supposed to be */
+    int known;       /* what of it is true, nn_known */
+    int photographs; /* of the sample, with this one: of more the deviations of F0 and roughness are with their level,
+                      * which they tell */
 } nn_taken;
 
 /* From what g says (r0 and spread of guess, scene [2 RD_SCENE_NUMBERS]) of image [side][side][3], linear in [0, 1]: the

@@ -115,7 +115,7 @@ TEST(first_guess_keeps_what_is_known)
     for (int known = 0; known <= NN_KNOWN_ALL; known++) {
         nn_first_guess g;
         float want[RD_SCENE_NUMBERS];
-        const nn_first_ask ask = {.image = in.image.data, .side = PLACE, .taken = {view, known, false}};
+        const nn_first_ask ask = {.image = in.image.data, .side = PLACE, .taken = {view, known, 1}};
         CHECK(!nn_first_guess_make(tape, m, &ask, &g, &st), "%s", st.message);
         rd_scene_numbers(&view, 0, 0, want);
         for (int i = 0; i < RD_SCENE_NUMBERS; i++) CHECK(isfinite(g.number[i]), "number %d is not finite", i);

@@ -41,7 +41,22 @@ TEST(deviation_of_relief_is_less_once_the_scene_is_found)
     for (int i = 0; i < PIXELS * NN_SPREADS; i++)
         CHECK(fabsf(said[i] - other[i]) <= 1e-6f * other[i], "value %d: %g and %g", i, (double)said[i],
               (double)other[i]);
-    nn_deviations(PIXELS, spread, (nn_belief){.several = true}, 1, said);
-    nn_deviations(PIXELS, spread, (nn_belief){.several = true, .scene_found = true}, 1, other);
+    nn_deviations(PIXELS, spread, (nn_belief){.photographs = 2}, 1, said);
+    nn_deviations(PIXELS, spread, (nn_belief){.photographs = 2, .scene_found = true}, 1, other);
     for (int i = 0; i < PIXELS * NN_SPREADS; i++) CHECK(said[i] == other[i], "of several photographs value %d", i);
+}
+
+/* What g says is believed less the more photographs follow, up to five of them. */
+TEST(deviation_grows_with_the_photographs)
+{
+    static const int counts[] = {2, 3, 4, 5, 9};
+    static const float times[] = {1, 1.16667f, 1.33333f, 1.5f, 1.5f};
+    say();
+    nn_deviations(PIXELS, spread, (nn_belief){.photographs = 2}, 1, said);
+    for (int k = 0; k < 5; k++) {
+        nn_deviations(PIXELS, spread, (nn_belief){.photographs = counts[k]}, 2, other);
+        for (int i = 0; i < PIXELS * NN_SPREADS; i++)
+            CHECK(fabsf(other[i] - times[k] * said[i]) <= 1e-4f * said[i], "%d photographs: %g of %g", counts[k],
+                  (double)other[i], (double)said[i]);
+    }
 }
