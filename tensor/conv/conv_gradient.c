@@ -11,6 +11,7 @@ enum {
     PASS_POINTWISE = 128, /* and, where they have no neighbours to share, in the first with the panel */
     CHUNK_PIXELS = 1024,  /* so many that clearing and adding the sums of a chunk is little beside making them */
     CHUNKS = 16,
+    LINE = 64, /* bytes */
     UNITS = 16 /* of work, at least, where the shape allows */
 };
 
@@ -143,6 +144,8 @@ static void sum_line(const job *g, ts_sum *t, pass *s, int panel, float *c)
         t->c = c + (ptrdiff_t)begin * g->padded + panel * 2 * kernels->lanes;
         t->fetch = s->fetched < s->next_bytes[0] ? s->next[0] + s->fetched
                                                  : s->next[1] + (s->fetched - s->next_bytes[0]);
+        if (g->bf16) /* their kernels fetch nothing */
+            for (ptrdiff_t b = 0; b < s->fetch_each; b += LINE) __builtin_prefetch(t->fetch + b, 0, 2);
         s->fetched += s->fetch_each;
         (g->bf16 ? kernels->sum_bf16 : kernels->sum)[vectors - 1][end - begin](t);
     }
