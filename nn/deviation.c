@@ -1,4 +1,5 @@
 #include "nn/deviation.h"
+#include "tensor/kernels/vmath_arrays.h"
 #include "tensor/maps.h"
 #include "tensor/team.h"
 #include <math.h>
@@ -31,8 +32,10 @@ typedef struct job {
 static void deviations(const void *of, int64_t begin, int64_t end)
 {
     const job *j = of;
-    for (int64_t i = begin * NN_SPREADS; i < end * NN_SPREADS; i++)
-        j->to[i] = j->factor[i % NN_SPREADS] * NN_LAPLACE * NN_SPREAD_UNIT * expf(fminf(fmaxf(j->spread[i], -6), 4));
+    const int64_t first = begin * NN_SPREADS, last = end * NN_SPREADS;
+    for (int64_t i = first; i < last; i++) j->to[i] = fminf(fmaxf(j->spread[i], -6), 4);
+    ts_vmath_arrays_k()->exp(last - first, j->to + first, j->to + first);
+    for (int64_t i = first; i < last; i++) j->to[i] *= j->factor[i % NN_SPREADS] * NN_LAPLACE * NN_SPREAD_UNIT;
 }
 
 static float for_all_maps(nn_belief b)
