@@ -1,4 +1,4 @@
-/* A training run whose rate is thirty times too high and whose inputs are spoilt now and then. The linker puts the two
+/* A training run whose rate is ten times too high and whose inputs are spoilt now and then. The linker puts the two
  * functions below between the trainer and its data (--wrap), so that the product needs no door for it. */
 #include "nn/weights/weights.h"
 #include "tests/stress/stress.h"
@@ -99,8 +99,8 @@ static bool train(const stress *s, ts_precision precision)
     c.train.pretrain_steps = s->full ? 5000 : 100;
     c.train.steps = s->full ? 15000 : 300;
     c.train.precision = precision;
-    c.train.rate *= 30;
-    c.train.pretrain_rate *= 30;
+    c.train.rate *= 10;
+    c.train.pretrain_rate *= 10;
     c.train.checkpoint_every = s->full ? 500 : 50;
     c.validate.every = s->full ? 5000 : 200;
     poison.batch = c.train.batch;
