@@ -38,8 +38,8 @@ const cl_argument cl_infer_arguments[] = {
      "refinement steps, 0 .. 1000; 0 = the first estimate only; auto = as long as the reconstruction improves,\n"
      "24 at most (default: as trained; of several photographs phone makes twice as many)"},
     {ORIENTATIONS, "orientations", "N",
-     "the first estimate is the mean over N orientations of the photograph: 1 (as it is; the default), 2 (and a\n"
-     "quarter turn), 4 (all quarter turns) or 8 (and their mirror images)"},
+     "the first estimate is the mean over N orientations of the photograph: 1 (as it is), 2 (and a quarter turn; the\n"
+     "default), 4 (all quarter turns) or 8 (and their mirror images)"},
     {EXACT, "exact", NULL,
      "compute convolutions directly; the default is Winograd's algorithm where it is faster: the maps differ by less\n"
      "than 1e-5 (RMS), single values by less than 1e-3"},

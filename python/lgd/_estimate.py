@@ -152,7 +152,7 @@ def estimate(
     iterations: Union[int, str, None] = None,
     light_power: Union[float, str] = "auto",
     tolerance: Optional[float] = None,
-    orientations: int = 1,
+    orientations: int = 2,
     exact: bool = False,
     precision: str = "f32",
     threads: int = 0,
