@@ -19,6 +19,8 @@ captures() {
     expect 0 evaluate --set "multiview:$one" -o "$T/p"
     expect 0 evaluate --set "multiview:$one" --method lgd:power=auto,orientations=2,label=lgd -o "$T/same"
     cmp -s "$T/p/results.csv" "$T/same/results.csv" || fail "the default is not as lgd-infer estimates"
+    step_back "$one"
+    expect 0 evaluate --set "multiview:$one" -o "$T/p"
     expect 0 evaluate --told --set "multiview:$one" -o "$T/told"
     if cmp -s "$T/p/results.csv" "$T/told/results.csv"; then fail "--told changes nothing"; fi
     expect 2 evaluate --set "multiview:$one" --set procedural:1,1 -o "$T/mixed"
@@ -27,6 +29,11 @@ captures() {
     expect 1 evaluate --set "multiview:$T/c" -o "$T/q"
     says "$T/err" light_pos.txt
     lines "$T/q/results.csv" 4
+}
+
+# The camera of capture $1, twice as far away.
+step_back() {
+    awk -F, '{ print $1 "," $2 "," 2 * $3 }' "$1/camera_pos.txt" >"$T/far" && mv "$T/far" "$1/camera_pos.txt"
 }
 
 # A field of view is told by the set, by --fov, or not at all, and changes what the steps make.
@@ -38,7 +45,7 @@ field_of_view() {
     model
     expect 0 "$BIN/lgd-data" --format captures --count 1 --size 32 -o "$T/c"
     one=$(ls -d "$T"/c/*)
-    awk -F, '{ print $1 "," $2 "," 2 * $3 }' "$one/camera_pos.txt" >"$T/far" && mv "$T/far" "$one/camera_pos.txt"
+    step_back "$one"
     untold=lgd:power=auto,label=untold told=lgd:power=auto,view=told,label=told
     expect 0 evaluate --set "multiview:$one" --method $untold --method $told -o "$T/m"
     awk -F, '$3 == "untold" && $4 == 2 { a = $9 }
