@@ -4,7 +4,6 @@
 #include "nn/layers.h"
 #include "ops.h"
 #include "render/losses.h"
-#include "tensor/memory.h"
 #include "tensor/team.h"
 #include <stddef.h>
 
@@ -72,9 +71,10 @@ ag_value *nn_squares(ag_tape *tape, const nn_model *model, ag_value *seen, ag_va
 }
 
 /* What y and squares of 2 x 2 pixels of the photograph give each pixel of the full size, made at half of its side. */
-static ag_value *from_half(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y)
+static ag_value *from_half(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y, ag_value *to)
 {
     const nn_layers *l = model->layers;
+    const ts_mark mark = ag_scope_begin(tape);
     y = nn_conv(tape, model, l->half[0], y, 1, TS_PAD_ZERO, NN_LEAK_G);
     if (model->arch.g_unshuffle > 2) y = ag_depth_to_space(tape, y, model->arch.g_unshuffle / 2);
     y = nn_conv_with_constants(tape, model, l->half[1], y, ag_space_to_depth(tape, photo, 2), 1, TS_PAD_REPLICATE,
@@ -82,20 +82,43 @@ static ag_value *from_half(ag_tape *tape, const nn_model *model, ag_value *photo
     ag_value *change = nn_conv(tape, model, l->half[2], y, 1, TS_PAD_REPLICATE, NN_LEAK_G);
     change = nn_conv(tape, model, l->half[3], change, 1, TS_PAD_REPLICATE, 1);
     y = ag_add(tape, in_place(tape, y), change);
-    return ag_depth_to_space(tape, nn_conv(tape, model, l->half[4], y, 1, TS_PAD_ZERO, 1), 2);
+    y = nn_conv(tape, model, l->half[4], y, 1, TS_PAD_ZERO, 1);
+    ag_into(tape, to);
+    y = ag_depth_to_space(tape, y, 2);
+    ag_scope_end(tape, mark, NULL, 0);
+    return y;
 }
 
-/* The channels of the full size's pixels, square by square, then as pixels: [N, S, S, nn_detail_writes]. */
+/* The channels of the full size's pixels, square by square, then as pixels: [N, H, S, nn_detail_writes]. */
 static ag_value *pixels(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *coordinates, ag_value *y)
 {
+    if (!photo || !y) return NULL;
     const nn_layers *l = model->layers;
-    ag_value *half = model->arch.g_half > 0 ? from_half(tape, model, photo, y) : NULL;
+    const ts_shape s = photo->t.shape, fine = {s.n, s.h, s.w, NN_FINE};
+    ag_value *to = room(tape, fine), *half = NULL;
+    if (model->arch.g_half > 0) half = from_half(tape, model, photo, y, room(tape, fine));
+    const ts_mark mark = ag_scope_begin(tape);
     y = nn_conv(tape, model, l->detail[2], y, 1, TS_PAD_ZERO, NN_LEAK_G);
+    ag_into(tape, to);
     y = ag_depth_to_space(tape, y, model->arch.g_unshuffle);
+    ag_scope_end(tape, mark, NULL, 0);
     if (half) y = ag_add(tape, in_place(tape, y), half);
     y = nn_conv_with_constants(tape, model, l->detail[3], y, ag_concat(tape, photo, coordinates), 1, TS_PAD_REPLICATE,
                                NN_LEAK_G);
     return nn_conv(tape, model, l->detail[4], y, 1, TS_PAD_REPLICATE, 1);
+}
+
+/* Of pixels' y, rows top .. of the image: what is added to the coarse maps, and the spread. to: where they go, or
+ * empty. */
+static void take_apart(ag_tape *tape, const nn_model *model, ag_value *y, int top, nn_guess *to)
+{
+    const int framed = model->arch.channels + NN_FRAME;
+    ag_value *parts = ag_channels(tape, y, 0, framed);
+    ag_into(tape, to->maps);
+    to->maps = ag_shading_frame(tape, parts, top);
+    if (!model->arch.spread) return;
+    ag_into(tape, to->spread);
+    to->spread = ag_channels(tape, y, framed, NN_SPREADS);
 }
 
 /* Rows begin to end - 1 of an image. */
@@ -111,13 +134,10 @@ static ag_value *rows(ag_tape *tape, const ag_value *v, int begin, int end)
  * cleared by the system. Rows of squares more on either side are as many as the convolutions reach, so that no value
  * depends on the bands but by rounding, which Winograd's tiles share; where the image goes on, what their own edge
  * gives is left out. */
-static ag_value *pixels_in_bands(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y)
+static void in_bands(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y, const nn_guess *to)
 {
-    if (!photo || !y) return NULL;
-    const ts_shape s = photo->t.shape;
     const int r = model->arch.g_unshuffle, squares = y->t.shape.h, more = nn_band_margin(&model->arch);
-    ag_value *to = ag_empty(tape, (ts_shape){1, s.h, s.w, nn_detail_writes(&model->arch)}),
-             *coordinates = nn_coordinates(tape, 1, s.h);
+    ag_value *coordinates = nn_coordinates(tape, 1, photo->t.shape.h);
     for (int begin = 0; begin < squares && !ag_status(tape)->code; begin += NN_BAND) {
         const int end = begin + NN_BAND < squares ? begin + NN_BAND : squares, above = begin < more ? begin : more,
                   below = squares - end < more ? squares - end : more, top = (begin - above) * r,
@@ -125,30 +145,26 @@ static ag_value *pixels_in_bands(ag_tape *tape, const nn_model *model, ag_value 
         const ts_mark mark = ag_scope_begin(tape);
         const ag_value *band = pixels(tape, model, rows(tape, photo, top, bottom), rows(tape, coordinates, top, bottom),
                                       rows(tape, y, begin - above, end + below));
-        const ptrdiff_t row = (ptrdiff_t)s.w * nn_detail_writes(&model->arch);
-        if (band)
-            ts_memory_copy(to->t.data + begin * r * row, band->t.data + above * r * row,
-                           (size_t)((end - begin) * r * row) * sizeof(float), ag_compute(tape)->threads);
+        nn_guess part = {.maps = rows(tape, to->maps, begin * r, end * r),
+                         .spread = rows(tape, to->spread, begin * r, end * r)};
+        take_apart(tape, model, rows(tape, band, above * r, (above + end - begin) * r), begin * r, &part);
         ag_scope_end(tape, mark, NULL, 0);
     }
-    return to;
 }
 
-/* guess: NULL, or where maps and spread go. */
+/* guess: empty, or on a tape without gradients where maps and spread go. */
 static bool full_size(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y, ag_value *coarse,
                       nn_guess *guess)
 {
-    const int framed = model->arch.channels + NN_FRAME;
     if (!photo || !y || !coarse) return false;
-    y = ag_gradients(tape) ? pixels(tape, model, photo, nn_coordinates(tape, photo->t.shape.n, photo->t.shape.h), y)
-                           : pixels_in_bands(tape, model, photo, y);
-    ag_value *added = ag_shading_frame(tape, ag_channels(tape, y, 0, framed));
-    ag_into(tape, guess->maps);
-    ag_value *sum = ag_resize_smooth(tape, coarse, photo->t.shape.h, photo->t.shape.w);
-    sum = in_place(tape, ag_add(tape, in_place(tape, sum), added));
+    const ts_shape s = photo->t.shape;
+    if (ag_gradients(tape))
+        take_apart(tape, model, pixels(tape, model, photo, nn_coordinates(tape, s.n, s.h), y), 0, guess);
+    else in_bands(tape, model, photo, y, guess);
+    ag_value *sum = ag_resize_smooth(tape, coarse, s.h, s.w);
+    sum = in_place(tape, ag_add(tape, in_place(tape, sum), guess->maps));
+    in_place(tape, guess->maps);
     guess->maps = ag_tanh(tape, sum);
-    ag_into(tape, guess->spread);
-    if (model->arch.spread) guess->spread = ag_channels(tape, y, framed, NN_SPREADS);
     return guess->maps && (guess->spread || !model->arch.spread);
 }
 

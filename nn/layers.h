@@ -91,6 +91,9 @@ enum { NN_CONDITIONS = 8, NN_COORDINATES = 2, NN_FRAME = 2 };
  */
 enum { NN_REVISION_READS = 40, NN_REVISION_READS_AGAIN = 18 };
 
+/* Channels of the photograph's pixels in squares and between the last two convolutions of nn_detail, and of h. */
+enum { NN_FINE = 12, NN_FINER = 16 };
+
 /* Channels that g's first layers read, and that the last of nn_detail writes: the maps', two of the shading's frame
  * (render/op_shading_frame.c), and the spreads. */
 int nn_g_reads(const nn_arch *a);

@@ -110,16 +110,15 @@ int nn_g_reads(const nn_arch *a)
         (a->conditions ? NN_CONDITIONS * a->images : 0);
 }
 
-/* The U-Net's features and what it read, to squares of FINE channels, and these to what is added at the full size. */
+/* The U-Net's features and what it read, to squares of NN_FINE channels, and these to what is added at the full size. */
 static void plan_detail(nn_model *m)
 {
-    enum { FINE = 12, FINER = 16 };
     const nn_arch *a = &m->arch;
     nn_layers *l = m->layers;
     const double gain = leaky_gain(NN_LEAK_G);
     l->detail[0] = conv(m, "g.detail.conv1", a->g_detail, nn_g_reads(a), 3, true, gain);
     l->detail[1] = conv(m, "g.detail.conv2", a->g_detail, a->g_detail + nn_level_width(a, 0), 3, true, gain);
-    l->detail[2] = conv(m, "g.detail.conv3", FINE * a->g_unshuffle * a->g_unshuffle, a->g_detail, 1, true, gain);
+    l->detail[2] = conv(m, "g.detail.conv3", NN_FINE * a->g_unshuffle * a->g_unshuffle, a->g_detail, 1, true, gain);
     for (int i = 0; i < a->g_trunk; i++) {
         char name[64];
         snprintf(name, sizeof name, "g.trunk%d.conv1", i + 1);
@@ -133,10 +132,10 @@ static void plan_detail(nn_model *m)
         l->half[1] = conv(m, "g.half.conv2", w, w + NN_HALF_READS, 3, true, gain);
         l->half[2] = conv(m, "g.half.conv3", w, w, 3, true, gain);
         l->half[3] = conv(m, "g.half.conv4", w, w, 3, false, 1);
-        l->half[4] = conv(m, "g.half.conv5", 4 * FINE, w, 1, false, 0); /* nothing at first */
+        l->half[4] = conv(m, "g.half.conv5", 4 * NN_FINE, w, 1, false, 0); /* nothing at first */
     }
-    l->detail[3] = conv(m, "g.detail.conv4", FINER, FINE + 3 + NN_COORDINATES, 3, true, gain);
-    l->detail[4] = conv(m, "g.detail.conv5", nn_detail_writes(a), FINER, 3, true, 0);
+    l->detail[3] = conv(m, "g.detail.conv4", NN_FINER, NN_FINE + 3 + NN_COORDINATES, 3, true, gain);
+    l->detail[4] = conv(m, "g.detail.conv5", nn_detail_writes(a), NN_FINER, 3, true, 0);
 }
 
 static void plan_g(nn_model *m)
@@ -213,7 +212,6 @@ static void pair(nn_model *m, const char *name, int in, int out, int side, nn_la
 
 static void plan_revise(nn_model *m)
 {
-    enum { FINE = 12, FINER = 16 };
     const nn_arch *a = &m->arch;
     nn_reviser *h = &((nn_layers *)m->layers)->revise;
     const int w = a->revise_width, squares = a->g_unshuffle * a->g_unshuffle,
@@ -234,9 +232,9 @@ static void plan_revise(nn_model *m)
     h->input = conv(m, "h.gru.ih", 3 * w, w, 1, true, 1);
     h->hidden = conv(m, "h.gru.hh", 3 * w, w, 1, true, 1);
     ((nn_layers *)m->layers)->start[h->hidden.weight] = NN_ORTHOGONAL;
-    h->squares = conv(m, "h.squares", FINE * squares, w, 1, true, gain);
-    h->full[0] = conv(m, "h.full.conv1", FINER, FINE + NN_REVISION_READS_AGAIN + NN_COORDINATES, 3, true, gain);
-    h->full[1] = conv(m, "h.full.conv2", MAP_CHANNELS + NN_FRAME + NN_SPREADS, FINER, 3, true,
+    h->squares = conv(m, "h.squares", NN_FINE * squares, w, 1, true, gain);
+    h->full[0] = conv(m, "h.full.conv1", NN_FINER, NN_FINE + NN_REVISION_READS_AGAIN + NN_COORDINATES, 3, true, gain);
+    h->full[1] = conv(m, "h.full.conv2", MAP_CHANNELS + NN_FRAME + NN_SPREADS, NN_FINER, 3, true,
                       0); /* nothing at first */
 }
 

@@ -31,8 +31,6 @@ static double unet_floats(const nn_arch *a)
     return fmax(most, held);
 }
 
-enum { FINE = 12, FINER = 16, CONSTANTS = 3 + NN_COORDINATES }; /* channels at the full size */
-
 /* Of one image in nn_squares, beside the result. */
 static double squares_floats(const nn_arch *a)
 {
@@ -40,14 +38,15 @@ static double squares_floats(const nn_arch *a)
     return pixels * (2 * a->g_detail + nn_level_width(a, 0));
 }
 
-/* Of one image at the full size: bands, then what is made of their result. */
+/* Of one image at the full size: bands, then the coarse maps' resampling. */
 static double full_floats(const nn_arch *a)
 {
-    const double side = nn_arch_side(a), writes = nn_detail_writes(a),
+    const double side = nn_arch_side(a), writes = nn_detail_writes(a), constants = 3 + NN_COORDINATES,
                  rows = fmin(NN_BAND + 2 * nn_band_margin(a), a->g_size) / a->g_size,
-                 half = a->g_half > 0 ? (5 * a->g_half + 2 * NN_HALF_READS) / 4.0 + 3 * FINE : 0,
-                 band = rows * (3 * FINE + 2 * CONSTANTS + FINER + writes + half), framed = 2 * a->channels + NN_FRAME;
-    return side * side * (writes + NN_COORDINATES + fmax(band, framed));
+                 squares = NN_FINE, half = a->g_half > 0 ? (5 * a->g_half + 2 * NN_HALF_READS) / 4.0 + NN_FINE : 0,
+                 last = 2 * constants + NN_FINER + writes + a->channels + NN_FRAME,
+                 band = rows * (NN_FINE + (a->g_half > 0 ? NN_FINE : 0) + fmax(fmax(squares, half), last));
+    return side * side * (NN_COORDINATES + fmax(band, a->channels));
 }
 
 double nn_guess_bytes(const nn_arch *a, int orientations)
