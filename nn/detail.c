@@ -74,11 +74,16 @@ ag_value *nn_squares(ag_tape *tape, const nn_model *model, ag_value *seen, ag_va
 static ag_value *from_half(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *y, ag_value *to)
 {
     const nn_layers *l = model->layers;
+    const ts_shape s = photo->t.shape;
     const ts_mark mark = ag_scope_begin(tape);
+    ag_value *seen = room(tape, (ts_shape){s.n, s.h / 2, s.w / 2, model->arch.g_half});
+    const ts_mark inner = ag_scope_begin(tape);
     y = nn_conv(tape, model, l->half[0], y, 1, TS_PAD_ZERO, NN_LEAK_G);
     if (model->arch.g_unshuffle > 2) y = ag_depth_to_space(tape, y, model->arch.g_unshuffle / 2);
-    y = nn_conv_with_constants(tape, model, l->half[1], y, ag_space_to_depth(tape, photo, 2), 1, TS_PAD_REPLICATE,
-                               NN_LEAK_G);
+    ag_value *four = ag_space_to_depth(tape, photo, 2);
+    ag_into(tape, seen);
+    y = nn_conv_with_constants(tape, model, l->half[1], y, four, 1, TS_PAD_REPLICATE, NN_LEAK_G);
+    ag_scope_end(tape, inner, NULL, 0);
     ag_value *change = nn_conv(tape, model, l->half[2], y, 1, TS_PAD_REPLICATE, NN_LEAK_G);
     change = nn_conv(tape, model, l->half[3], change, 1, TS_PAD_REPLICATE, 1);
     y = ag_add(tape, in_place(tape, y), change);
@@ -96,13 +101,13 @@ static ag_value *pixels(ag_tape *tape, const nn_model *model, ag_value *photo, a
     const nn_layers *l = model->layers;
     const ts_shape s = photo->t.shape, fine = {s.n, s.h, s.w, NN_FINE};
     ag_value *to = room(tape, fine), *half = NULL;
-    if (model->arch.g_half > 0) half = from_half(tape, model, photo, y, room(tape, fine));
     const ts_mark mark = ag_scope_begin(tape);
+    if (model->arch.g_half > 0) half = from_half(tape, model, photo, y, room(tape, fine));
     y = nn_conv(tape, model, l->detail[2], y, 1, TS_PAD_ZERO, NN_LEAK_G);
     ag_into(tape, to);
     y = ag_depth_to_space(tape, y, model->arch.g_unshuffle);
-    ag_scope_end(tape, mark, NULL, 0);
     if (half) y = ag_add(tape, in_place(tape, y), half);
+    ag_scope_end(tape, mark, NULL, 0);
     y = nn_conv_with_constants(tape, model, l->detail[3], y, ag_concat(tape, photo, coordinates), 1, TS_PAD_REPLICATE,
                                NN_LEAK_G);
     return nn_conv(tape, model, l->detail[4], y, 1, TS_PAD_REPLICATE, 1);

@@ -141,14 +141,15 @@ static ts_code make(ag_tape *tape, const nn_model *model, const nn_first_ask *as
     const int size = nn_arch_side(&model->arch), side = ask->side, threads = ag_compute(tape)->threads;
     const size_t pixels = (size_t)size * (size_t)size, whole = (size_t)side * (size_t)side * 3;
     ag_value *small = ag_empty(tape, (ts_shape){1, size, size, 3});
+    const ts_mark input = ag_scope_begin(tape);
     g->r0 = malloc(pixels * (size_t)model->arch.channels * sizeof *g->r0);
     g->deviation = malloc(pixels * NN_SPREADS * sizeof *g->deviation);
-    ts_tensor full = ts_new(ag_arena(tape), (ts_shape){1, side, side, 3});
-    if (!small || !g->r0 || !g->deviation || !full.data)
+    ag_value *full = side == size ? small : ag_empty(tape, (ts_shape){1, side, side, 3});
+    if (!small || !g->r0 || !g->deviation || !full)
         return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
-    nn_clip((int64_t)whole, ask->image, full.data);
-    if (side == size) memcpy(small->t.data, full.data, whole * sizeof(float));
-    else if (ts_resize(&small->t, &full, ag_arena(tape), threads, st)) return st->code;
+    nn_clip((int64_t)whole, ask->image, full->t.data);
+    if (side != size && ts_resize(&small->t, &full->t, ag_arena(tape), threads, st)) return st->code;
+    ag_scope_end(tape, input, NULL, 0);
     const unsigned char is_known = (unsigned char)ask->taken.known;
     const nn_input in = {.image = small->t,
                          .grid = rd_grid_full(size),

@@ -43,9 +43,10 @@ static double full_floats(const nn_arch *a)
 {
     const double side = nn_arch_side(a), writes = nn_detail_writes(a), constants = 3 + NN_COORDINATES,
                  rows = fmin(NN_BAND + 2 * nn_band_margin(a), a->g_size) / a->g_size,
-                 squares = NN_FINE, half = a->g_half > 0 ? (5 * a->g_half + 2 * NN_HALF_READS) / 4.0 + NN_FINE : 0,
+                 reading = (3 * a->g_half + 2 * NN_HALF_READS) / 4.0, changing = 3 * a->g_half / 4.0 + NN_FINE,
+                 half = a->g_half > 0 ? NN_FINE + fmax(reading, changing) : 0,
                  last = 2 * constants + NN_FINER + writes + a->channels + NN_FRAME,
-                 band = rows * (NN_FINE + (a->g_half > 0 ? NN_FINE : 0) + fmax(fmax(squares, half), last));
+                 band = rows * (NN_FINE + fmax(fmax(NN_FINE, half), last));
     return side * side * (NN_COORDINATES + fmax(band, a->channels));
 }
 
