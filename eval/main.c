@@ -60,7 +60,7 @@ static ts_code parse_default(const work *w, const char **spec, ts_status *st)
             return ts_fail(st, TS_INVALID,
                            "--set %s: its light is %s, unlike that of %s: give --method, --told or --untold",
                            w->set[s].spec, known ? "not given" : "given", w->set[0].spec);
-    *spec = known ? "lgd" : "lgd:power=auto,orientations=2,label=lgd";
+    *spec = known ? "lgd" : "lgd:power=auto,orientations=auto,label=lgd";
     return TS_OK;
 }
 

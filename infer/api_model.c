@@ -177,7 +177,9 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
                        o->precision, LGD_F32, LGD_BF16);
     if (o->orientations != 0 && o->orientations != 1 && o->orientations != 2 && o->orientations != 4 &&
         o->orientations != 8)
-        return ts_fail(st, TS_INVALID, "lgd_estimate: orientations is %d and must be 1, 2, 4 or 8", o->orientations);
+        return ts_fail(st, TS_INVALID,
+                       "lgd_estimate: orientations is %d and must be 1, 2, 4 or 8, or 0 as suits the model",
+                       o->orientations);
     if (check_fov(o->fov, photos, st) != TS_OK) return st->code;
     if ((o->tolerance > 0 || o->mask) && !lgd_tiles_exact(&model->net->arch))
         return ts_fail(st, TS_UNSUPPORTED,

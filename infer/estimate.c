@@ -154,9 +154,17 @@ static double most_bytes(const nn_arch *a, int photos, int side, int tile, int o
     return most + 2.0 * a->channels * sizeof(float) * side * side;
 }
 
+/* A model that knows the camera gains from a second orientation (docs/accuracy.md). */
+static int orientations_of(const nn_arch *a, const lgd_options *o)
+{
+    if (o->orientations != LGD_ORIENTATIONS_DEFAULT) return o->orientations;
+    return a->scene ? 1 : 2;
+}
+
 double lgd_estimator_bytes(const lgd_estimator *e, int side, const lgd_options *o)
 {
-    return most_bytes(&e->net->arch, e->net->arch.images, side, tile_side(e, side, o), o->orientations);
+    const nn_arch *a = &e->net->arch;
+    return most_bytes(a, a->images, side, tile_side(e, side, o), orientations_of(a, o));
 }
 
 /* The RMSE and maps of R_0 and R_steps alone are wanted. */
@@ -308,6 +316,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
 {
     const nn_arch *a = &e->net->arch;
     lgd_options o = *given;
+    o.orientations = orientations_of(a, given);
     if (photos > 1) o.fov = LGD_FOV_OF_PHOTO; /* together they are of use only where their places are true */
     lgd_given p = in_order(photo, photos, side, o.fov);
     for (int k = 0; k < photos; k++) p.known[k] = (unsigned char)lgd_guess_known(&o);

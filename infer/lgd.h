@@ -57,7 +57,8 @@ enum { LGD_AUTO = -2, LGD_AUTO_MOST = 24 };
 /* The tolerance of least time whose renderings are at most 1% worse than those of all steps (docs/performance.md). */
 #define LGD_TOLERANCE 0.003
 #define LGD_TOLERANCE_DEFAULT (-1.0)
-#define LGD_ORIENTATIONS_DEFAULT 2 /* renderings as near as of 8, in a quarter of g's time (docs/performance.md) */
+/* As suits the model: 1 where it guesses camera and light, else 2 (docs/accuracy.md). */
+#define LGD_ORIENTATIONS_DEFAULT 0
 
 enum { LGD_F32, LGD_BF16 };
 
@@ -83,9 +84,10 @@ typedef struct lgd_options {
                        * AVX512-BF16 (much slower on others). Sums, renderer and maps stay f32. Maps differ by
                        * less than 0.005 (RMS), fewer than one value in 10,000 by more than 0.05, single ones by up to
                        * 0.8 (docs/performance.md) */
-    int orientations; /* R_0 is the mean over so many orientations of the photograph: 1 or 0: as it is, 2: and turned by
-                       * a quarter, 4: all quarter turns, 8: and their mirror images. Only for a single photograph with
-                       * light and camera above its centre, and not with published weights */
+    int orientations; /* R_0 is the mean over so many orientations of the photograph: 1: as it is, 2: and turned by a
+                       * quarter, 4: all quarter turns, 8: and their mirror images; 0: LGD_ORIENTATIONS_DEFAULT. Only
+                       * for a single photograph with light and camera above its centre, and not with published weights
+                       */
     int threads;      /* that the call computes on; 0: as many as the process may use */
     /* Called after R_0 (step 0) and after every step; return nonzero to stop there. May be NULL. rmse: the
      * reconstruction RMSE after R_0 and after the last step. Between them it is NAN, unless iterations is LGD_AUTO or

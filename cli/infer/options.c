@@ -38,8 +38,9 @@ const cl_argument cl_infer_arguments[] = {
      "refinement steps, 0 .. 1000; 0 = the first estimate only; auto = as long as the reconstruction improves,\n"
      "24 at most (default: as trained; of several photographs phone makes twice as many)"},
     {ORIENTATIONS, "orientations", "N",
-     "the first estimate is the mean over N orientations of the photograph: 1 (as it is), 2 (and a quarter turn; the\n"
-     "default), 4 (all quarter turns) or 8 (and their mirror images)"},
+     "the first estimate is the mean over N orientations of the photograph: 1 (as it is), 2 (and a quarter turn), 4\n"
+     "(all quarter turns), 8 (and their mirror images) or auto (the default: 1 where the model guesses camera and\n"
+     "light, else 2)"},
     {EXACT, "exact", NULL,
      "compute convolutions directly; the default is Winograd's algorithm where it is faster: the maps differ by less\n"
      "than 1e-5 (RMS), single values by less than 1e-3"},
@@ -172,9 +173,9 @@ ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st)
             c->threads = (int)n;
             break;
         case ORIENTATIONS:
-            c->orientations = strlen(value) == 1 ? value[0] - '0' : 0;
-            if (c->orientations < 1 || !strchr("1248", value[0]))
-                code = ts_fail(st, TS_INVALID, "--orientations: '%s' is not 1, 2, 4 or 8", value);
+            if (!strcmp(value, "auto")) c->orientations = LGD_ORIENTATIONS_DEFAULT;
+            else if (strlen(value) == 1 && strchr("1248", *value)) c->orientations = *value - '0';
+            else code = ts_fail(st, TS_INVALID, "--orientations: '%s' is not 1, 2, 4, 8 or auto", value);
             break;
         case EXACT: c->exact = true; break;
         case SKIP_EXISTING: c->skip_existing = true; break;

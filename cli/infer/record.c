@@ -28,8 +28,10 @@ char *cl_recipe(const cl_command *c, const char *weights, uint64_t hash, ts_stat
     FILE *f = t.f;
     fputs("weights: ", f);
     io_put_json(f, slash ? slash + 1 : weights);
-    fprintf(f, " %016" PRIx64 "\noptions: lgd-infer " LGD_VERSION " size %d, iterations %d, orientations %d", hash,
-            c->size, c->iterations, c->orientations);
+    fprintf(f, " %016" PRIx64 "\noptions: lgd-infer " LGD_VERSION " size %d, iterations %d, orientations ", hash,
+            c->size, c->iterations);
+    if (c->orientations == LGD_ORIENTATIONS_DEFAULT) fputs("auto", f);
+    else fprintf(f, "%d", c->orientations);
     fprintf(f, ", tolerance %.9g, fov %.9g, light-power %.9g", c->tolerance, c->fov, c->power);
     fprintf(f, ", %s, %s, normal %s, %s, exr %s%s", c->bf16 ? "bf16" : "f32", c->exact ? "exact" : "Winograd",
             c->directx ? "dx" : "gl", c->metallic ? "metallic" : "specular", c->half ? "half" : "float",

@@ -45,7 +45,8 @@ double ev_number(const ev_estimator *e, const char *key)
 
 int ev_orientations(const ev_estimator *e)
 {
-    return ev_find(e->method->settings, "orientations") >= 0 ? 1 << (int)ev_number(e, "orientations") : 1;
+    static const int values[] = {1, 2, 4, 8, LGD_ORIENTATIONS_DEFAULT};
+    return ev_find(e->method->settings, "orientations") >= 0 ? values[(int)ev_number(e, "orientations")] : 1;
 }
 
 int ev_steps(const ev_estimator *e) { return (int)ev_number(e, "steps"); }

@@ -37,11 +37,11 @@ bool ev_given(const ev_estimator *e, const char *key);
         .key = name, .type = EV_WEIGHTS, .initial = "", .help = text \
     }
 #define EV_MODEL_R0(name) EV_MODEL(name, "weights for R_0 (default: the program's)")
-/* Of the methods that have this key: nn_input.orientations; of the others 1. */
-#define EV_ORIENTATIONS                                                                                       \
-    {                                                                                                         \
-        .key = "orientations", .type = EV_WORD, .words = "1 2 4 8", .initial = "1",                           \
-        .help = "of the photograph that R_0 is the mean of, as lgd-infer --orientations (whose default is 2)" \
+/* Of the methods that have this key: lgd_options.orientations; of the others 1. */
+#define EV_ORIENTATIONS                                                                                          \
+    {                                                                                                            \
+        .key = "orientations", .type = EV_WORD, .words = "1 2 4 8 auto", .initial = "1",                         \
+        .help = "of the photograph that R_0 is the mean of, as lgd-infer --orientations (whose default is auto)" \
     }
 int ev_steps(const ev_estimator *e);  /* of "steps" */
 int ev_photos(const ev_estimator *e); /* of "photos" */

@@ -95,7 +95,7 @@ def _run(
     iterations: Union[int, str, None],
     light_power: Union[float, str],
     tolerance: Optional[float],
-    orientations: int,
+    orientations: Union[int, str],
     exact: bool,
     precision: str,
     threads: int,
@@ -107,6 +107,8 @@ def _run(
         raise ValueError(f"iterations {iterations!r} is neither a number nor 'auto'")
     if isinstance(light_power, str) and light_power != "auto":
         raise ValueError(f"light_power {light_power!r} is neither a number nor 'auto'")
+    if isinstance(orientations, str) and orientations != "auto":
+        raise ValueError(f"orientations {orientations!r} is neither a number nor 'auto'")
     given = [Photo(p.image, p.light, p.camera, p.power) for p in photos]
     shapes = [np.shape(p.image) for p in given]
     side = shapes[0][0] if shapes and shapes[0] else 0
@@ -124,7 +126,8 @@ def _run(
     lib.lgd_options_init(options, ctypes.sizeof(options))
     options.iterations = -1 if iterations is None else c.AUTO if iterations == "auto" else steps
     options.exact, options.precision = exact, c.PRECISIONS[precision]
-    options.orientations, options.threads, options.fov = orientations, threads, fov
+    options.orientations = 0 if orientations == "auto" else int(orientations)
+    options.threads, options.fov = threads, fov
     options.progress, options.tile, options.taken = calls.step, calls.tile, taken
     if tolerance is not None:
         options.tolerance = tolerance
@@ -152,7 +155,7 @@ def estimate(
     iterations: Union[int, str, None] = None,
     light_power: Union[float, str] = "auto",
     tolerance: Optional[float] = None,
-    orientations: int = 2,
+    orientations: Union[int, str] = "auto",
     exact: bool = False,
     precision: str = "f32",
     threads: int = 0,

@@ -17,7 +17,7 @@ captures() {
     [ "$(ls "$T/o/images" | wc -l)" = 2 ] || fail "images: $(ls "$T/o/images")"
     one=$(ls -d "$T"/c/* | head -n 1)
     expect 0 evaluate --set "multiview:$one" -o "$T/p"
-    expect 0 evaluate --set "multiview:$one" --method lgd:power=auto,orientations=2,label=lgd -o "$T/same"
+    expect 0 evaluate --set "multiview:$one" --method lgd:power=auto,orientations=auto,label=lgd -o "$T/same"
     cmp -s "$T/p/results.csv" "$T/same/results.csv" || fail "the default is not as lgd-infer estimates"
     step_back "$one"
     expect 0 evaluate --set "multiview:$one" -o "$T/p"
@@ -115,7 +115,7 @@ untold() {
     says "$T/out" exposure
     says "$T/out" over_flat
     says "$T/out" band_8_32
-    expect 0 evaluate --set procedural:3,2 --untold --method lgd:power=auto,orientations=2,label=lgd -o "$T/p"
+    expect 0 evaluate --set procedural:3,2 --untold --method lgd:power=auto,orientations=auto,label=lgd -o "$T/p"
     cmp -s "$T/o/results.csv" "$T/p/results.csv" || fail "the default is not as lgd-infer estimates"
 }
 

@@ -108,3 +108,27 @@ TEST(infer_stopping_at_a_step_is_asking_for_that_many)
     }
     lgd_free(&m);
 }
+
+/* By default one orientation where the model guesses camera and light, else two. */
+TEST(infer_takes_orientations_that_suit_the_model)
+{
+    static float image[SIDE * SIDE * 3], maps[3][VALUES];
+    make_image(image, SIDE);
+    for (int guesses = 0; guesses < 2; guesses++) {
+        nn_arch a = tiny();
+        if (guesses) {
+            a.g_unshuffle = 4, a.g_detail = 6, a.h_width = 0, a.descent = NN_DESCENT_POSTERIOR;
+            a.conditions = a.spread = a.scene = true;
+        }
+        lgd_model *m = load(a);
+        for (int n = 0; n < 3; n++) {
+            lgd_error e;
+            const lgd_options o = {.size = sizeof o, .iterations = 0, .orientations = n};
+            CHECK(!lgd_estimate(m, image, SIDE, &o, maps[n], &e), "%s", e.message);
+        }
+        const bool one = !memcmp(maps[0], maps[1], sizeof maps[0]), two = !memcmp(maps[0], maps[2], sizeof maps[0]);
+        CHECK(one == (guesses == 1) && two == (guesses == 0), "guesses %d: one orientation %d, two %d", guesses, one,
+              two);
+        lgd_free(&m);
+    }
+}

@@ -53,7 +53,7 @@ class Structs(unittest.TestCase):
         options, size = _library.Options(), ctypes.sizeof(_library.Options)
         library = _library.load()
         library.lgd_options_init(options, size)
-        self.assertEqual((options.size, options.iterations, options.orientations), (size, -1, 2))
+        self.assertEqual((options.size, options.iterations, options.orientations), (size, -1, 0))
 
     def test_constants_are_those_of_the_header(self):
         header = (ROOT / "infer" / "lgd.h").read_text()
