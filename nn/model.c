@@ -110,7 +110,8 @@ int nn_g_reads(const nn_arch *a)
         (a->conditions ? NN_CONDITIONS * a->images : 0);
 }
 
-/* The U-Net's features and what it read, to squares of NN_FINE channels, and these to what is added at the full size. */
+/* The U-Net's features and what it read, to squares of NN_FINE channels, and these to what is added at the full
+ * size. */
 static void plan_detail(nn_model *m)
 {
     const nn_arch *a = &m->arch;
