@@ -151,6 +151,7 @@ static double most_bytes(const nn_arch *a, int photos, int side, int tile, int o
     double most = fmax(nn_guess_bytes(a, orientations), step_bytes(a, photos, part, a->h_width, a->h_gru));
     if (a->coarse_steps > 0) most = fmax(most, step_bytes(a, photos, coarse, a->coarse_width, a->coarse_gru));
     if (a->revisions > 0 && photos == 1) most = fmax(most, nn_revision_bytes(a));
+    if (a->scene) most += nn_first_guess_bytes(a);
     return most + 2.0 * a->channels * sizeof(float) * side * side;
 }
 
@@ -357,7 +358,6 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     if (!code) code = refine(e, &p, &o, choose && !user.stopped, guess.revised, !user.stopped, &steps, maps, st);
     if (side > ONE_TILE) ag_drop(e->tape); /* what is done with such maps needs memory of its own */
     free(r0);
-    nn_first_guess_free(&guess);
     return code;
 }
 

@@ -15,8 +15,8 @@ typedef struct lgd_given {
 } lgd_given;
 
 /* The first guess from the photograph that is taken most from above, after so many revisions; seen as in nn_first_ask.
- * given gets its view, its r0 and deviation, which guess owns, and where o->power is wanted the exposures of all. The
- * caller frees guess, after a failure too. */
+ * given gets its view, its r0 and deviation, which are the tape's memory, and where o->power is wanted the exposures of
+ * all. */
 ts_code lgd_guess_first(ag_tape *tape, const nn_model *net, lgd_given *given, const lgd_options *o, int revisions,
                         bool (*seen)(const nn_first_guess *guess, void *user), void *user, nn_first_guess *guess,
                         ts_status *st);

@@ -11,7 +11,6 @@
 #include "tensor/resize.h"
 #include "tensor/team.h"
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 /* Of the roughness' error, relative to the roughness, what the fit may explain by a level of the whole material. It is
@@ -136,20 +135,19 @@ static ts_code revise(ag_tape *tape, const nn_model *model, const ts_tensor *ima
     return TS_OK;
 }
 
-static ts_code make(ag_tape *tape, const nn_model *model, const nn_first_ask *ask, nn_first_guess *g, ts_status *st)
+ts_code nn_first_guess_make(ag_tape *tape, const nn_model *model, const nn_first_ask *ask, nn_first_guess *g,
+                            ts_status *st)
 {
     const int size = nn_arch_side(&model->arch), side = ask->side, threads = ag_compute(tape)->threads;
-    const size_t pixels = (size_t)size * (size_t)size, whole = (size_t)side * (size_t)side * 3;
+    const int64_t whole = (int64_t)side * side * 3;
+    *g = (nn_first_guess){0};
     ag_value *small = ag_empty(tape, (ts_shape){1, size, size, 3});
-    const ts_mark input = ag_scope_begin(tape);
-    g->r0 = malloc(pixels * (size_t)model->arch.channels * sizeof *g->r0);
-    g->deviation = malloc(pixels * NN_SPREADS * sizeof *g->deviation);
+    const ts_mark mark = ag_scope_begin(tape);
     ag_value *full = side == size ? small : ag_empty(tape, (ts_shape){1, side, side, 3});
-    if (!small || !g->r0 || !g->deviation || !full)
-        return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
-    nn_clip((int64_t)whole, ask->image, full->t.data);
+    if (!small || !full) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
+    nn_clip(whole, ask->image, full->t.data);
     if (side != size && ts_resize(&small->t, &full->t, ag_arena(tape), threads, st)) return st->code;
-    ag_scope_end(tape, input, NULL, 0);
+    ag_scope_end(tape, mark, NULL, 0);
     const unsigned char is_known = (unsigned char)ask->taken.known;
     const nn_input in = {.image = small->t,
                          .grid = rd_grid_full(size),
@@ -157,44 +155,27 @@ static ts_code make(ag_tape *tape, const nn_model *model, const nn_first_ask *as
                          .known = &is_known,
                          .given = 1,
                          .orientations = ask->orientations};
-    const ts_mark mark = ag_scope_begin(tape);
-    float scene[2 * RD_SCENE_NUMBERS];
-    nn_guess guess;
-    if (!nn_guess_from(tape, model, &in, &guess)) {
+    nn_guess guess = {0};
+    const bool made = nn_guess_from(tape, model, &in, &guess);
+    ag_value *deviation = ag_empty(tape, (ts_shape){1, size, size, NN_SPREADS});
+    if (!made || !deviation) {
         *st = *ag_status(tape);
         return st->code;
     }
-    ts_memory_copy(g->r0, guess.maps->t.data, pixels * (size_t)model->arch.channels * sizeof *g->r0, threads);
-    memcpy(scene, guess.scene->t.data, sizeof scene);
-    if (ask->revisions > 0) ag_scope_end(tape, mark, &guess.spread, 1); /* h takes g's memory */
-    if (ag_status(tape)->code) {
-        *st = *ag_status(tape);
-        return st->code;
-    }
+    g->r0 = guess.maps->t.data;
     g->spread = guess.spread->t.data;
+    g->deviation = deviation->t.data;
     const int period = model->arch.g_unshuffle;
     if (period > 1 && nn_take_lattice(period, size, model->arch.channels, threads, ag_arena(tape), g->r0, st))
         return st->code;
-    const ts_code code = nn_first_guess_settle(rd_grid_on(rd_grid_full(size), threads), model->arch.channels,
-                                               small->t.data, scene, &ask->taken, ag_arena(tape), g, st);
+    const ts_code code =
+        nn_first_guess_settle(rd_grid_on(rd_grid_full(size), threads), model->arch.channels, small->t.data,
+                              guess.scene->t.data, &ask->taken, ag_arena(tape), g, st);
     return code ? code : revise(tape, model, &small->t, guess.spread, ask, g, st);
 }
 
-ts_code nn_first_guess_make(ag_tape *tape, const nn_model *model, const nn_first_ask *ask, nn_first_guess *guess,
-                            ts_status *st)
+double nn_first_guess_bytes(const nn_arch *a)
 {
-    *guess = (nn_first_guess){0};
-    const ts_mark mark = ag_scope_begin(tape);
-    const ts_code code = make(tape, model, ask, guess, st);
-    ag_scope_end(tape, mark, NULL, 0);
-    guess->spread = NULL; /* it was the tape's */
-    if (code) nn_first_guess_free(guess);
-    return code;
-}
-
-void nn_first_guess_free(nn_first_guess *guess)
-{
-    free(guess->r0);
-    free(guess->deviation);
-    *guess = (nn_first_guess){0};
+    const double side = nn_arch_side(a);
+    return side * side * (3 + a->channels + 2 * NN_SPREADS) * sizeof(float);
 }

@@ -6,8 +6,7 @@
 
 typedef struct nn_first_guess {
     float *r0;     /* [side][side][channels], side = nn_arch_side */
-    float *spread; /* [side][side][NN_SPREADS]: the logarithms of the maps' expected errors, as nn_guess has them; NULL
-                    * when the guess is made */
+    float *spread; /* [side][side][NN_SPREADS]: the logarithms of the maps' expected errors, as nn_guess has them */
     float *deviation; /* [side][side][NN_SPREADS]: the standard deviations that the steps believe */
     float number[RD_SCENE_NUMBERS];
     rd_view view; /* light and camera of number, those that are known as they were given */
@@ -41,8 +40,10 @@ typedef struct nn_first_ask {
     void *user;
 } nn_first_ask;
 
-/* For a model with arch.spread and arch.scene, on a tape without gradients. The caller frees after success. */
+/* For a model with arch.spread and arch.scene, on a tape without gradients, whose memory the guess is: until ag_reset,
+ * or a scope of the caller's ends. */
 ts_code nn_first_guess_make(ag_tape *tape, const nn_model *model, const nn_first_ask *ask, nn_first_guess *guess,
                             ts_status *st);
-void nn_first_guess_free(nn_first_guess *guess);
+/* Bytes that it leaves on the tape. */
+double nn_first_guess_bytes(const nn_arch *a);
 #endif

@@ -56,16 +56,6 @@ static ts_code map_file(nn_file *f, ts_status *st)
     return f->map ? TS_OK : TS_IO;
 }
 
-void nn_file_fetch(const nn_file *file)
-{
-#ifdef MADV_POPULATE_READ
-    (void)madvise((void *)(uintptr_t)file->map, file->size,
-                  MADV_POPULATE_READ); /* a hint: pages come when they are read */
-#else
-    (void)file;
-#endif
-}
-
 uint64_t nn_file_hash(const nn_file *file) { return ts_hash(file->map, file->size, 0); }
 
 enum { NAMES = 64 << 10 }; /* bytes of most files' names and metadata */

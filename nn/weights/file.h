@@ -68,8 +68,6 @@ const char *nn_file_meta_key(const nn_file *file, int i);       /* in the file's
 
 /* Tensor name, which must have that shape; NULL and st otherwise, and where it is not of real numbers. */
 const nn_tensor *nn_file_find_real(const nn_file *file, const char *name, int rank, const int64_t *dim, ts_status *st);
-/* Reads the file's pages before they are asked for one by one. */
-void nn_file_fetch(const nn_file *file);
 /* Of the file's bytes: what ts_hash_file says of it. */
 uint64_t nn_file_hash(const nn_file *file);
 

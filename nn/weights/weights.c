@@ -127,10 +127,7 @@ nn_model *nn_model_open(const char *path, ts_status *st)
     nn_arch arch;
     nn_model *m = NULL;
     nn_file *f = nn_file_open(path, st);
-    if (f && !nn_arch_from_file(f, &arch, st)) {
-        nn_file_fetch(f);
-        m = fill(nn_model_plan(&arch, st), f, true, st);
-    }
+    if (f && !nn_arch_from_file(f, &arch, st)) m = fill(nn_model_plan(&arch, st), f, true, st);
     if (m) m->file = f;
     else nn_file_close(&f);
     return m;

@@ -125,7 +125,6 @@ TEST(first_guess_keeps_what_is_known)
             CHECK(g.number[RD_SCENE_LIGHT_X] == want[RD_SCENE_LIGHT_X], "known %d: the light moved", known);
         if (known & NN_KNOWN_POWER)
             CHECK(g.number[RD_SCENE_EXPOSURE] == want[RD_SCENE_EXPOSURE], "known %d: the power changed", known);
-        nn_first_guess_free(&g);
     }
     ag_tape_destroy(&tape);
     double power = 0;
