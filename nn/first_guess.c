@@ -168,9 +168,8 @@ ts_code nn_first_guess_make(ag_tape *tape, const nn_model *model, const nn_first
     const int period = model->arch.g_unshuffle;
     if (period > 1 && nn_take_lattice(period, size, model->arch.channels, threads, ag_arena(tape), g->r0, st))
         return st->code;
-    const ts_code code =
-        nn_first_guess_settle(rd_grid_on(rd_grid_full(size), threads), model->arch.channels, small->t.data,
-                              guess.scene->t.data, &ask->taken, ag_arena(tape), g, st);
+    const ts_code code = nn_first_guess_settle(rd_grid_on(rd_grid_full(size), threads), model->arch.channels,
+                                               small->t.data, guess.scene->t.data, &ask->taken, ag_arena(tape), g, st);
     return code ? code : revise(tape, model, &small->t, guess.spread, ask, g, st);
 }
 

@@ -5,8 +5,8 @@
 #include "nn/model.h"
 
 typedef struct nn_first_guess {
-    float *r0;     /* [side][side][channels], side = nn_arch_side */
-    float *spread; /* [side][side][NN_SPREADS]: the logarithms of the maps' expected errors, as nn_guess has them */
+    float *r0;        /* [side][side][channels], side = nn_arch_side */
+    float *spread;    /* [side][side][NN_SPREADS]: the logarithms of the maps' expected errors, as nn_guess has them */
     float *deviation; /* [side][side][NN_SPREADS]: the standard deviations that the steps believe */
     float number[RD_SCENE_NUMBERS];
     rd_view view; /* light and camera of number, those that are known as they were given */

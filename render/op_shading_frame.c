@@ -107,13 +107,8 @@ static void cases(ag_gradcheck *check)
     static int tops[] = {0, 0, 0, 4};
     static const char *const labels[] = {"the centre alone", "images", "more channels", "some rows"};
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
-        ag_case c = {.label = labels[i],
-                     .inputs = 1,
-                     .shape = {shapes[i]},
-                     .lo = -1,
-                     .hi = 1,
-                     .build = build,
-                     .user = &tops[i]};
+        ag_case c = {
+            .label = labels[i], .inputs = 1, .shape = {shapes[i]}, .lo = -1, .hi = 1, .build = build, .user = &tops[i]};
         ag_gradcheck_run(check, &c);
     }
 }

@@ -90,3 +90,45 @@ TEST(lattice_of_noise_is_next_to_nothing)
     }
     CHECK(sqrt(changed / squares) < 0.25, "%g of the noise was taken", sqrt(changed / squares));
 }
+
+static double tap(int period, int k)
+{
+    const bool half = period % 2 == 0 && (k == -(period / 2) || k == period / 2);
+    return (half ? 0.5 : 1) / period;
+}
+
+/* What S27 says of one number, with every sum written out. */
+static double said(int period, int y, int x, int c)
+{
+    double weight = 0, weighted = 0, squares = 0;
+    for (int v = -3; v <= 3; v++)
+        for (int u = -3; u <= 3; u++) {
+            const int b = y + v * period, a = x + u * period, reach = period / 2;
+            if (b < 0 || a < 0 || b >= SIDE || a >= SIDE) continue;
+            squares++;
+            if (b < reach || b >= SIDE - reach || a < reach || a >= SIDE - reach) continue;
+            double mean = 0;
+            for (int k = -reach; k <= reach; k++)
+                for (int l = -reach; l <= reach; l++)
+                    mean += tap(period, k) * tap(period, l) * (double)before[((b + k) * SIDE + a + l) * C + c];
+            const double differ = (double)before[(b * SIDE + a) * C + c] - mean, w = 1 / (1 + pow(differ / 0.02, 2));
+            weight += w * w;
+            weighted += w * w * differ;
+        }
+    return (double)before[(y * SIDE + x) * C + c] - weighted / (weight + 0.1 * squares);
+}
+
+TEST(lattice_is_what_its_equation_says)
+{
+    ts_rng rng = ts_rng_make(7, 0, 0);
+    for (int i = 0; i < VALUES; i++) before[i] = 0.03f * (ts_rng_uniform(&rng) - 0.5f);
+    for (int period = 2; period <= 5; period++) {
+        double most = 0;
+        take(period, 2);
+        for (int i = 0; i < VALUES; i++) {
+            const double want = said(period, i / C / SIDE, i / C % SIDE, i % C);
+            most = fmax(most, fabs(want - (double)after[i]));
+        }
+        CHECK(most < 1e-6, "period %d: %g from the equation", period, most);
+    }
+}
