@@ -116,7 +116,7 @@ static double computing(void)
     lgd_error e = {0};
     call c = {.maps = malloc(SIDE * SIDE * 9 * sizeof(float))};
     double t = 0;
-    if (!c.maps || lgd_model_path(NULL, "single", path, &st) || !(c.model = lgd_load(path, &e)) ||
+    if (!c.maps || lgd_model_path(NULL, LGD_DEFAULT_MODEL, path, &st) || !(c.model = lgd_load(path, &e)) ||
         io_read_photo_square(photograph, 1 << 24, SIDE, 0, &c.image, NULL, &st))
         printf("  the computing was not measured: %s\n", st.code ? st.message : e.message);
     else {

@@ -10,6 +10,7 @@
 /* The least float whose sRGB-encoded value rounds to each of the 256 levels, and the level of the middle of each of
  * GUESSES steps: eight bits without a power for every value, and the same bytes as with it. */
 enum { GUESSES = 4096 };
+#define NEAR 1e-5f /* relative: farther from its equation no threshold is looked for at first */
 static float threshold[257];
 static unsigned char guess[GUESSES + 1];
 
@@ -17,10 +18,12 @@ static unsigned level_of(float v, float top) { return (unsigned)(io_linear_to_sr
 
 static void make_levels(void)
 {
-    threshold[0] = -1;
+    threshold[0] = 0;
     threshold[256] = INFINITY;
     for (unsigned k = 1; k < 256; k++) {
-        float below = k == 1 ? 0 : threshold[k - 1], at = 1;
+        const float near = io_srgb_to_linear(((float)k - 0.5f) / 255);
+        float below = near * (1 - NEAR), at = near * (1 + NEAR);
+        if (level_of(below, 255) >= k || level_of(at, 255) < k) below = threshold[k - 1], at = 1;
         for (;;) {
             const float middle = below + (at - below) * 0.5f;
             if (middle <= below || middle >= at) break;
@@ -42,16 +45,25 @@ static unsigned srgb_level(float v)
     return k;
 }
 
+static float within(float v) { return v > 0 ? v < 1 ? v : 1 : 0; }
+
 /* Values in [0, 1] (NaN to 0) to integers, rounded to nearest, big-endian. The alpha of four channels is never encoded.
  */
 static void quantise(const float *values, size_t pixels, int channels, int bits, bool srgb, unsigned char *out)
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     if (srgb && bits == 8) pthread_once(&once, make_levels);
+    if (!srgb && bits == 16) {
+        for (size_t i = 0; i < pixels * (size_t)channels; i++) {
+            const unsigned level = (unsigned)(within(values[i]) * 65535 + 0.5f);
+            out[2 * i] = (unsigned char)(level >> 8);
+            out[2 * i + 1] = (unsigned char)(level & 255);
+        }
+        return;
+    }
     for (size_t i = 0; i < pixels; i++)
         for (int c = 0; c < channels; c++) {
-            float v = *values++;
-            v = v > 0 ? v < 1 ? v : 1 : 0;
+            const float v = within(*values++);
             const bool curve = srgb && c < 3;
             if (bits == 8) *out++ = (unsigned char)(curve ? srgb_level(v) : (unsigned)(v * 255 + 0.5f));
             else {
