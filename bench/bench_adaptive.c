@@ -112,7 +112,7 @@ BENCH(adaptive)
                    {"--iterations auto", {.iterations = LGD_AUTO}},
                    {"--mask, an eighth wanted", {.iterations = -1, .mask = mask}}};
     const int settings = sizeof k / sizeof *k;
-    for (int i = 0; i < settings; i++) k[i].options.size = sizeof k[i].options;
+    for (int i = 0; i < settings; i++) k[i].options.size = sizeof k[i].options, k[i].options.orientations = 1;
     const int procedural = load("procedural:1000003,8", 1, s, MOST);
     snprintf(path, sizeof path, "maps:%s/maps", data ? data : "../shared/testdata");
     const int maps = load(path, EVERY, s + procedural, MOST);

@@ -70,7 +70,7 @@ static void measure(nn_arch arch, bool always_exact, const char *heading)
 {
     enum { ROUNDED = 5 };
     char label[128], job[256] = "bf16 ";
-    subject s = {.options = {.size = sizeof(lgd_options), .exact = 1}};
+    subject s = {.options = {.size = sizeof(lgd_options), .exact = 1, .orientations = 1}}; /* as the peers */
     s.model = nn_model_create(&arch, &s.st);
     s.tape = ag_tape_create(false, &s.st);
     s.own = ag_tape_create(false, &s.st);
