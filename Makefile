@@ -58,7 +58,7 @@ MAKEFLAGS += -j$(shell nproc 2>/dev/null || echo 2)
 endif
 
 # What the programs read and write themselves, and what only the shared object needs that reads all other image formats.
-PKG := OpenEXR libpng libjpeg zlib libdeflate lcms2
+PKG := OpenEXR libpng libjpeg zlib libisal lcms2
 PKG_IMAGE := OpenImageIO
 # Optional: the tags of a printed sheet (data/rectify/tags.c).
 PKG_TAGS := apriltag

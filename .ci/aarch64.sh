@@ -19,11 +19,11 @@ mkdir -p build-aarch64/debs
 root=$(pwd)/build-aarch64/root
 # The numbers in the libraries' names differ between releases of Debian: what the -dev packages depend on.
 packages=$({ printf '%s:arm64\n' libopenexr-dev libimath-dev libpng-dev libjpeg62-turbo-dev liblcms2-dev \
-    libdeflate-dev zlib1g-dev
+    libisal-dev zlib1g-dev
     apt-cache depends libopenexr-dev:arm64 libimath-dev:arm64 libpng-dev:arm64 libjpeg62-turbo-dev:arm64 \
-        liblcms2-dev:arm64 libdeflate-dev:arm64 zlib1g-dev:arm64 |
+        liblcms2-dev:arm64 libisal-dev:arm64 zlib1g-dev:arm64 |
         sed -n 's/^  Depends: \(lib[A-Za-z0-9.+-]*\|zlib1g\)\(:arm64\)*$/\1:arm64/p' |
-        grep -E '^(lib(openexr|imath|png|jpeg|lcms|deflate)|zlib)'; } | sort -u)
+        grep -E '^(lib(openexr|imath|png|jpeg|lcms|isal)|zlib)'; } | sort -u)
 if [ "$packages" != "$(cat "$root/.complete" 2>/dev/null)" ]; then
     (cd build-aarch64/debs && apt-get download -qq $packages 2>/dev/null) ||
         skip "the libraries for arm64 cannot be downloaded"

@@ -16,7 +16,7 @@ if [ "$(id -u)" -ne 0 ]; then echo "chroot: must be run as root" >&2; exit 1; fi
 mkdir -p "${LGD_CHROOTS:=../chroots}" || exit 1
 root=$(cd "$LGD_CHROOTS" && pwd)/$suite
 packages=ca-certificates,gcc,g++,make,pkg-config
-packages=$packages,libopenimageio-dev,libopenexr-dev,libpng-dev,libjpeg-dev,liblcms2-dev,libdeflate-dev,zlib1g-dev
+packages=$packages,libopenimageio-dev,libopenexr-dev,libpng-dev,libjpeg-dev,liblcms2-dev,libisal-dev,zlib1g-dev
 packages=$packages,file,git,procps,python3,valgrind,clang-format-14
 # .ci/format.sh says that it is absent
 [ "$suite" = bookworm ] || packages=$(echo "$packages" | sed s/,clang-format-14//)

@@ -103,7 +103,7 @@ make_deb liblgd0 libs "$arch" "$depends" 'material of a surface from one flash p
  This is the library, with its reader of image formats other than PNG and JPEG." \
     'Multi-Arch: same' "Suggests: lgd-models (= $version)"
 make_deb liblgd-dev libdevel "$arch" \
-    "liblgd0 (= $version), libpng-dev, libjpeg-dev, libdeflate-dev, liblcms2-dev, libopenexr-dev, zlib1g-dev" \
+    "liblgd0 (= $version), libpng-dev, libjpeg-dev, libisal-dev, liblcms2-dev, libopenexr-dev, zlib1g-dev" \
     'material of a surface from one flash photograph - development' "$what
  .
  This is what programs that use the library are compiled with." 'Multi-Arch: same'

@@ -20,7 +20,7 @@ for module in "$@"; do
     OpenEXR) missing="$missing libopenexr-dev" ;;
     lcms2) missing="$missing liblcms2-dev" ;; # colour profiles with look-up tables
     libpng) missing="$missing libpng-dev" ;;
-    libdeflate) missing="$missing libdeflate-dev" ;; # PNG files of maps
+    libisal) missing="$missing libisal-dev" ;; # PNG files of maps
     zlib) missing="$missing zlib1g-dev" ;; # nn/weights/zip.c: compressed entries of PyTorch's files
     # train/mpi/mpi.c, and mpirun for its tests
     ompi-c) optional="$optional libopenmpi-dev openmpi-bin" lost="$lost lgd-train under mpirun" ;;

@@ -17,20 +17,22 @@ static ts_code make_rows(int y, int count, float *out, void *user, ts_status *st
 {
     const map *q = user;
     const size_t first = (size_t)y * (size_t)q->m->size, pixels = (size_t)count * (size_t)q->m->size;
-    const int from = q->which == IO_MAPS_DIFFUSE ? MAP_DIFFUSE
-        : q->which == IO_MAPS_SPECULAR           ? MAP_SPECULAR
-                                                 : MAP_ROUGHNESS,
-              channels = q->which == IO_MAPS_ROUGHNESS ? 1 : 3;
+    const float *maps = q->m->maps + first * MAP_CHANNELS,
+                *colour = maps + (q->which == IO_MAPS_DIFFUSE ? MAP_DIFFUSE : MAP_SPECULAR);
+    const float up = q->directx ? -0.5f : 0.5f;
     (void)st;
-    for (size_t i = 0; i < pixels; i++, out += channels) {
-        const float *maps = q->m->maps + (first + i) * MAP_CHANNELS;
-        if (q->which == IO_MAPS_NORMAL) {
-            const io_texel t = io_texel_get(maps);
-            for (int c = 0; c < 3; c++) out[c] = (c == 1 && q->directx ? -t.normal[c] : t.normal[c]) * 0.5f + 0.5f;
-        } else {
-            for (int c = 0; c < channels; c++) out[c] = io_unit(maps[from + c]);
+    if (q->which == IO_MAPS_NORMAL)
+        for (size_t i = 0; i < pixels; i++) {
+            const io_texel t = io_texel_get(maps + i * MAP_CHANNELS);
+            out[3 * i] = t.normal[0] * 0.5f + 0.5f;
+            out[3 * i + 1] = t.normal[1] * up + 0.5f;
+            out[3 * i + 2] = t.normal[2] * 0.5f + 0.5f;
         }
-    }
+    else if (q->which == IO_MAPS_ROUGHNESS)
+        for (size_t i = 0; i < pixels; i++) out[i] = io_unit(maps[i * MAP_CHANNELS + MAP_ROUGHNESS]);
+    else
+        for (size_t i = 0; i < pixels; i++)
+            for (int c = 0; c < 3; c++) out[3 * i + c] = io_unit(colour[i * MAP_CHANNELS + c]);
     return TS_OK;
 }
 

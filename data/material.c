@@ -11,8 +11,7 @@ ts_code io_material_create(io_material *m, int size, ts_status *st)
     if (size < 1 || size > MAX_SIZE)
         return ts_fail(st, TS_INVALID, "maps of %d x %d pixels: the size must be 1 .. %d", size, size, MAX_SIZE);
     const size_t bytes = (size_t)size * (size_t)size * MAP_CHANNELS * sizeof *m->maps;
-    if ((m->maps = ts_memory(bytes))) ts_memory_clear(m->maps, bytes, 1);
-    else return ts_fail(st, TS_NOMEM, "no memory for maps of %d x %d pixels", size, size);
+    if (!(m->maps = ts_memory(bytes))) return ts_fail(st, TS_NOMEM, "no memory for maps of %d x %d pixels", size, size);
     m->size = size;
     return TS_OK;
 }

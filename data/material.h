@@ -12,6 +12,7 @@ typedef struct io_material {
     char name[128];
 } io_material;
 
+/* size: 1 .. 32768. The values of the maps are not set: whoever makes a material writes all of them. */
 ts_code io_material_create(io_material *m, int size, ts_status *st);
 void io_material_free(io_material *m);
 

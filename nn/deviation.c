@@ -29,13 +29,19 @@ typedef struct job {
     float *to, factor[NN_SPREADS];
 } job;
 
+/* NaN to the least. Comparisons, which become instructions, where fminf and fmaxf are calls. */
+static float held(float s) { return s > -6 ? s < 4 ? s : 4 : -6; }
+
 static void deviations(const void *of, int64_t begin, int64_t end)
 {
     const job *j = of;
     const int64_t first = begin * NN_SPREADS, last = end * NN_SPREADS;
-    for (int64_t i = first; i < last; i++) j->to[i] = fminf(fmaxf(j->spread[i], -6), 4);
+    for (int64_t i = first; i < last; i++) j->to[i] = held(j->spread[i]);
     ts_vmath_arrays_k()->exp(last - first, j->to + first, j->to + first);
-    for (int64_t i = first; i < last; i++) j->to[i] *= j->factor[i % NN_SPREADS] * NN_LAPLACE * NN_SPREAD_UNIT;
+    float factor[NN_SPREADS];
+    for (int k = 0; k < NN_SPREADS; k++) factor[k] = j->factor[k] * NN_LAPLACE * NN_SPREAD_UNIT;
+    for (int64_t i = begin; i < end; i++)
+        for (int k = 0; k < NN_SPREADS; k++) j->to[i * NN_SPREADS + k] *= factor[k];
 }
 
 static float for_all_maps(nn_belief b)

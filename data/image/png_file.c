@@ -1,7 +1,7 @@
 /* Chunks of a PNG file (PNG specification, third edition, 5.3 and 11.3.2). */
 #include "data/image/png_file.h"
 #include <errno.h>
-#include <libdeflate.h>
+#include <isa-l/crc.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -33,12 +33,12 @@ ts_code io_check_png(const char *path, ts_status *st)
             fault = "cut short";
             break;
         }
-        uint32_t left = be32(head), crc = libdeflate_crc32(0, head + 4, 4);
+        uint32_t left = be32(head), crc = crc32_gzip_refl(0, head + 4, 4);
         if (left > 0x7fffffff) fault = "a chunk has no valid length";
         while (left && !fault) {
             size_t n = left < sizeof block ? left : sizeof block;
             if (fread(block, 1, n, f) != n) fault = "cut short";
-            else crc = libdeflate_crc32(crc, block, n);
+            else crc = crc32_gzip_refl(crc, block, n);
             left -= (uint32_t)n;
         }
         if (!fault && fread(block, 1, 4, f) != 4) fault = "cut short";

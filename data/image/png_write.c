@@ -38,11 +38,11 @@ static void make_levels(void)
     }
 }
 
+/* Thresholds are farther apart than steps, so that a step has one at most. */
 static unsigned srgb_level(float v)
 {
-    unsigned k = guess[(int)(v * GUESSES)];
-    while (v >= threshold[k + 1]) k++;
-    return k;
+    const unsigned k = guess[(int)(v * GUESSES)];
+    return k + (v >= threshold[k + 1]);
 }
 
 static float within(float v) { return v > 0 ? v < 1 ? v : 1 : 0; }
@@ -53,8 +53,13 @@ static void quantise(const float *values, size_t pixels, int channels, int bits,
 {
     static pthread_once_t once = PTHREAD_ONCE_INIT;
     if (srgb && bits == 8) pthread_once(&once, make_levels);
+    const size_t count = pixels * (size_t)channels;
+    if (srgb && bits == 8 && channels != 4) {
+        for (size_t i = 0; i < count; i++) out[i] = (unsigned char)srgb_level(within(values[i]));
+        return;
+    }
     if (!srgb && bits == 16) {
-        for (size_t i = 0; i < pixels * (size_t)channels; i++) {
+        for (size_t i = 0; i < count; i++) {
             const unsigned level = (unsigned)(within(values[i]) * 65535 + 0.5f);
             out[2 * i] = (unsigned char)(level >> 8);
             out[2 * i + 1] = (unsigned char)(level & 255);

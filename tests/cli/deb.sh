@@ -45,7 +45,7 @@ packages() {
         [ -s "$T/others" ] && fail "not root's: $(head -n 1 "$T/others")"
         expect 0 dpkg-deb -x "$deb" "$T/root"
     done
-    for library in libpng16 libc6 liblcms2 libdeflate0; do
+    for library in libpng16 libc6 liblcms2 libisal2; do
         dpkg-deb --field "$T"/debs/liblgd0_*.deb Depends | grep -q "$library" ||
             fail "liblgd0 does not depend on $library"
     done

@@ -48,7 +48,7 @@ static int ranges;
 static int find_code(struct dl_phdr_info *info, size_t size, void *libraries)
 {
     (void)size;
-    static const char *const names[] = {"/libpng", "/libjpeg", "/libz.", "/libdeflate", "/libOpenEXRCore"};
+    static const char *const names[] = {"/libpng", "/libjpeg", "/libz.", "/libOpenEXRCore"};
     bool found = !libraries;
     for (size_t i = 0; libraries && i < sizeof names / sizeof *names; i++)
         found |= strstr(info->dlpi_name, names[i]) != NULL;
