@@ -1,4 +1,5 @@
 #include "tensor/team.h"
+#include "tensor/begin.h"
 #include "tensor/threads.h"
 #include "tensor/wait.h"
 #include <limits.h>
@@ -166,7 +167,7 @@ static void grow(int wanted)
     block_signals(&before);
     for (int i; watched && (i = atomic_load(&size)) < wanted; atomic_store(&size, i + 1)) {
         pthread_t thread;
-        if (pthread_create(&thread, &attr, work, &workers[i]) == 0) continue;
+        if (ts_begin_thread(&thread, &attr, work, &workers[i]) == 0) continue;
         atomic_store(&refused_until, nanoseconds() + (long long)(AGAIN * 1e9));
         break;
     }

@@ -1,5 +1,6 @@
 #include "cli/infer/pipeline.h"
 #include "cli/cli.h"
+#include "tensor/begin.h"
 #include "tensor/budget.h"
 #include "tensor/threads.h"
 #include <pthread.h>
@@ -175,7 +176,7 @@ cl_pipeline *cl_pipeline_start(const cl_plan *plan, const cl_command *command, c
         p->writing = plan->jobs > p->lanes ? WRITING : 0;
         p->items = p->lanes + AHEAD + p->writing;
     }
-    p->decoding = pthread_create(&p->decoder, NULL, decode_all, p) == 0;
+    p->decoding = ts_begin_thread(&p->decoder, NULL, decode_all, p) == 0;
     if (!p->decoding) {
         ts_fail(st, TS_NOMEM, "no more threads can be started here");
         cl_pipeline_end(&p);
@@ -193,7 +194,7 @@ void cl_pipeline_run(cl_pipeline *p, lgd_model *model, const char *recipe, const
     p->listener = listener;
     const double each = cl_item_bytes(p->command, model);
     while (p->lanes > 1 && ts_budget_check(p->lanes * each, NULL) != TS_OK) p->lanes--;
-    while (others < p->lanes + p->writing - 1 && pthread_create(&other[others], NULL, lane, p) == 0)
+    while (others < p->lanes + p->writing - 1 && ts_begin_thread(&other[others], NULL, lane, p) == 0)
         others++; /* fewer do the same work */
     while ((item = next(p, true))) {
         if (item->stage == FINISHED) {
