@@ -5,6 +5,8 @@
 #include "autograd/op.h"
 #include "ops.h"
 #include "tensor/conv/gemm.h"
+#include "tensor/kernels/elementwise.h"
+#include "tensor/team.h"
 #include <string.h>
 
 #ifdef AG_API
@@ -12,15 +14,39 @@
 ag_value *ag_linear(ag_tape *tape, ag_value *x, ag_value *weight, ag_value *bias);
 #endif
 
+typedef struct rows_job {
+    int64_t n, in, out;
+    const float *x, *weight;
+    const char *half; /* or NULL */
+    float *y;
+} rows_job;
+
+static void add_rows(const void *job, int64_t begin, int64_t end)
+{
+    const rows_job *r = job;
+    const struct ts_elementwise_kernels *k = ts_elementwise_k();
+    const int64_t rows = r->n > 1 ? 1 : end - begin; /* at once: a row of weights stays near for all of x */
+    for (int64_t i = begin; i < end; i += rows)
+        for (int64_t j = 0; j < r->n; j++) {
+            const float *x = r->x + j * r->in;
+            float *y = r->y + j * r->out + i;
+            if (r->half) k->add_dots_half(rows, r->in, r->half + 2 * i * r->in, x, y);
+            else k->add_dots(rows, r->in, r->weight + i * r->in, x, y);
+        }
+}
+
+enum { WORTH = 1 << 14 }; /* products that another thread is worth */
+
 static void forward(ag_tape *tape, ag_node *node)
 {
-    (void)tape;
     const int n = node->out->t.shape.n, o = node->out->t.shape.c, i = node->in[0]->t.shape.c;
     float *y = node->out->t.data;
     for (int j = 0; node->in[2] && j < n; j++)
         memcpy(y + (size_t)j * (size_t)o, node->in[2]->t.data, (size_t)o * sizeof(float));
-    ts_gemm(false, true, n, o, i, 1.0f, node->in[0]->t.data, node->in[1]->t.data, node->in[2] ? 1.0f : 0.0f, y,
-            ag_threads(tape));
+    if (!node->in[2]) memset(y, 0, (size_t)n * (size_t)o * sizeof *y);
+    const float *weight = node->in[1]->t.data;
+    ts_for(ag_threads(tape), o, WORTH / ((int64_t)n * i) + 1, add_rows,
+           &(rows_job){n, i, o, node->in[0]->t.data, weight, ag_half(tape, weight), y});
 }
 
 static void backward(ag_tape *tape, ag_node *node)

@@ -72,6 +72,14 @@ void ag_packs_halves(ag_packs *p, ag_halves halves, void *user)
     pthread_mutex_unlock(&p->lock);
 }
 
+const void *ag_packs_half(ag_packs *p, const float *weight)
+{
+    pthread_mutex_lock(&p->lock);
+    const void *half = p->halves ? p->halves(weight, p->user) : NULL;
+    pthread_mutex_unlock(&p->lock);
+    return half;
+}
+
 static bool is(const pack *p, const ts_conv *c, ts_conv_use use, const float *weight)
 {
     const ts_conv *has = &p->conv;

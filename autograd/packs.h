@@ -17,6 +17,8 @@ void ag_packs_forget(ag_packs *p);
 
 /* From now on a weight of which halves returns other than NULL is packed from that (ts_conv_pack_half) and not read. */
 void ag_packs_halves(ag_packs *p, ag_halves halves, void *user);
+/* Where a weight is as halves, or NULL. */
+const void *ag_packs_half(ag_packs *p, const float *weight);
 
 /* Those of weight for that use, packed at the first request; they stay where they are until forgotten. The key is
  * weight's address, use and c but for n, h and w. Threads may ask at once. NULL when memory is out. */

@@ -312,6 +312,8 @@ void ag_pass(ag_tape *tape, bool passing) { tape->passing = passing && !tape->gr
 
 void ag_halves_from(ag_tape *tape, ag_halves halves, void *user) { ag_packs_halves(tape->packs, halves, user); }
 
+const void *ag_half(ag_tape *tape, const float *weight) { return ag_packs_half(tape->packs, weight); }
+
 const ag_node *ag_node_of(const ag_tape *tape, const ag_value *v)
 {
     for (size_t i = tape->nodes; i-- > 0;)

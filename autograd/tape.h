@@ -129,10 +129,12 @@ void ag_freeze(ag_tape *tape, bool frozen);
  * operation has its intermediate values, which the next one has again: that memory is neither cleared by the system for
  * each layer nor far from the caches. */
 void ag_pass(ag_tape *tape, bool passing);
-/* Weights of convolutions that are in memory as IEEE 754 halves: halves returns where, or NULL for others. The floats
- * of such a weight are never read; its address is its name. For tapes that share packed weights too. */
+/* Weights of convolutions and linear layers that are in memory as IEEE 754 halves: halves returns where, or NULL for
+ * others. The floats of such a weight are never read; its address is its name. For tapes that share packed weights too.
+ */
 typedef const void *(*ag_halves)(const float *weight, void *user);
 void ag_halves_from(ag_tape *tape, ag_halves halves, void *user);
+const void *ag_half(ag_tape *tape, const float *weight); /* what halves returns of it */
 
 /* A scope for a tape without gradients: ag_scope_end gives back what was allocated since begin, except that the values
  * in keep[0 .. count-1] survive (they are moved; the pointers in keep are updated). On a tape with gradients both do

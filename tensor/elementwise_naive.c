@@ -131,6 +131,28 @@ static void from_half(int64_t n, const void *x, float *y)
     }
 }
 
+static void add_dots(int64_t rows, int64_t n, const float *w, const float *x, float *y)
+{
+    for (int64_t r = 0; r < rows; r++) {
+        double sum = y[r];
+        for (int64_t i = 0; i < n; i++) sum += (double)w[r * n + i] * x[i];
+        y[r] = (float)sum;
+    }
+}
+
+static void add_dots_half(int64_t rows, int64_t n, const void *w, const float *x, float *y)
+{
+    for (int64_t r = 0; r < rows; r++) {
+        double sum = y[r];
+        for (int64_t i = 0; i < n; i++) {
+            float v;
+            from_half(1, (const char *)w + 2 * (r * n + i), &v);
+            sum += (double)v * x[i];
+        }
+        y[r] = (float)sum;
+    }
+}
+
 const struct ts_elementwise_kernels ts_elementwise_naive = {
     .leaky = leaky,
     .leaky_backward = leaky_backward,
@@ -140,6 +162,8 @@ const struct ts_elementwise_kernels ts_elementwise_naive = {
     .selu_backward = selu_backward,
     .asinh = asinh_scaled,
     .from_half = from_half,
+    .add_dots = add_dots,
+    .add_dots_half = add_dots_half,
     .add = add,
     .scale = scale,
     .add_leaky = add_leaky,

@@ -91,17 +91,18 @@ static bool all_finite(const float *v, int n)
     return !bad;
 }
 
-/* The same of halves. */
+/* The same of halves, whose exponents are compared as they are, 16 bits each. */
 static bool all_finite_half(const unsigned char *p, int64_t n)
 {
-    const uint16_t most = 0x7c00;
-    int bad = 0;
+    const int16_t exponent = 0x7c00;
+    int16_t largest = 0;
     for (int64_t i = 0; i < n; i++) {
-        uint16_t v;
+        int16_t v;
         memcpy(&v, p + 2 * i, 2);
-        bad |= (v & most) == most;
+        v &= exponent;
+        largest = v > largest ? v : largest;
     }
-    return !bad;
+    return largest < exponent;
 }
 
 static void load(const nn_tensor *e, const unsigned char *p, int64_t step, int n, float *out)

@@ -42,10 +42,10 @@ static bool of_network(const char *name)
         !strncmp(name, "a.", 2) || nn_published_tensor(name);
 }
 
-/* A convolution's weights that can be packed from the file stay there. False: they are to be read; or st. */
+/* Weights that can be taken from the file as they are stay there. False: they are to be read; or st. */
 static bool leave_halves(const nn_file *f, nn_param *p, const int64_t dim[4], ts_status *st)
 {
-    const nn_tensor *e = p->rank == 4 ? nn_file_find_real(f, p->name, p->rank, dim, st) : NULL;
+    const nn_tensor *e = p->rank > 1 ? nn_file_find_real(f, p->name, p->rank, dim, st) : NULL;
     const void *half = e ? nn_tensor_halves(e) : NULL;
     if (!half) return false;
     if (!nn_halves_finite(e))

@@ -19,8 +19,8 @@ ts_code nn_safetensors_write(const char *path, const nn_block *blocks, int count
 /* A model with its parameters from a file whose metadata has the architecture. Tensors with other names than "g.…",
  * "h.…" and "a.…" (a checkpoint's) are ignored. */
 nn_model *nn_model_load(const char *path, ts_status *st);
-/* The same to compute with on a tape without gradients: weights of convolutions that the file has as plain F16 are not
- * in model->value but stay in the file, which the model holds open, and are packed from there: their tape gets
+/* The same to compute with on a tape without gradients: weights that the file has as plain F16 are not in
+ * model->value but stay in the file, which the model holds open, and are taken from there: their tape gets
  * ag_halves_from(tape, nn_model_halves, model). */
 nn_model *nn_model_open(const char *path, ts_status *st);
 /* values: the block to write, model->value or an EMA. Extra metadata may be given. TS_NUMERIC when a value is not

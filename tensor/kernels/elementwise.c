@@ -233,6 +233,44 @@ static void from_half(int64_t n, const void *x, float *restrict y)
 }
 #endif
 
+enum { PART = 16 * VL, SUMS = 4 }; /* of a row, as floats in the first cache; and what a row is added up in */
+
+/* sum += the products of count numbers, PART at most. */
+static inline void add_products(int64_t count, const float *w, const float *x, vf sum[SUMS])
+{
+    int64_t i = 0;
+    for (; i + SUMS * VL <= count; i += SUMS * VL)
+        for (int s = 0; s < SUMS; s++) sum[s] = v_fma(v_load(w + i + s * VL), v_load(x + i + s * VL), sum[s]);
+    for (; i < count; i += VL) sum[0] = v_fma(v_load_part(w + i, count - i), v_load_part(x + i, count - i), sum[0]);
+}
+
+static inline int64_t part_of(int64_t left) { return left < PART ? left : PART; }
+
+static inline float total(const vf sum[SUMS]) { return v_sum(sum[0] + sum[1] + (sum[2] + sum[3])); }
+
+static void add_dots(int64_t rows, int64_t n, const float *w, const float *x, float *y)
+{
+    for (int64_t r = 0; r < rows; r++, w += n) {
+        vf sum[SUMS] = {0};
+        for (int64_t i = 0; i < n; i += PART) add_products(part_of(n - i), w + i, x + i, sum);
+        y[r] += total(sum);
+    }
+}
+
+static void add_dots_half(int64_t rows, int64_t n, const void *w, const float *x, float *y)
+{
+    const char *from = w;
+    float part[PART];
+    for (int64_t r = 0; r < rows; r++, from += 2 * n) {
+        vf sum[SUMS] = {0};
+        for (int64_t i = 0; i < n; i += PART) {
+            from_half(part_of(n - i), from + 2 * i, part);
+            add_products(part_of(n - i), part, x + i, sum);
+        }
+        y[r] += total(sum);
+    }
+}
+
 const struct ts_elementwise_kernels TS_TABLE(elementwise) = {
     .leaky = leaky,
     .leaky_backward = leaky_backward,
@@ -242,6 +280,8 @@ const struct ts_elementwise_kernels TS_TABLE(elementwise) = {
     .selu_backward = selu_backward,
     .asinh = asinh_scaled,
     .from_half = from_half,
+    .add_dots = add_dots,
+    .add_dots_half = add_dots_half,
     .add = add,
     .scale = scale,
     .add_leaky = add_leaky,

@@ -23,6 +23,9 @@ struct ts_elementwise_kernels {
     void (*asinh)(int64_t n, float s, const float *x, float *y); /* y = asinh(s x) */
     void (*from_half)(int64_t n, const void *x,
                       float *y); /* y = x, IEEE 754 binary16 at any address, exactly; NaNs stay such */
+    /* y[r] += sum of w[r][i] x[i]; w: [rows][n], or the same as from_half takes them: the same bytes */
+    void (*add_dots)(int64_t rows, int64_t n, const float *w, const float *x, float *y);
+    void (*add_dots_half)(int64_t rows, int64_t n, const void *w, const float *x, float *y);
     void (*add)(int64_t n, const float *a, const float *b, float *y);
     void (*scale)(int64_t n, float s, const float *x, float *y, bool accumulate); /* y (+)= s x */
 

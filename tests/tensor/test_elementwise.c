@@ -117,6 +117,34 @@ TEST(elementwise_from_half_is_exact)
     }
 }
 
+/* Rows that begin at odd addresses, of lengths around those that vectors and parts end at. */
+TEST(elementwise_dots)
+{
+    enum { ROWS = 3, MOST = 600 };
+    static unsigned char bytes[1 + 2 * ROWS * MOST], *half = bytes + 1;
+    static float x[MOST], full[ROWS * MOST];
+    EVERY_ISA for (int n = 1; n <= MOST; n += n < 70 ? 1 : 53)
+    {
+        float got[ROWS], same[ROWS], expected[ROWS], size[ROWS] = {0};
+        for (int i = 0; i < n; i++) x[i] = (float)ts_rng_range(&r, -1, 1);
+        for (int i = 0; i < ROWS * n; i++) {
+            const uint16_t v = (uint16_t)(ts_rng_int(&r, 0x4000) | (ts_rng_int(&r, 2) ? 0x8000 : 0)); /* below 2 */
+            memcpy(half + 2 * i, &v, 2);
+            size[i / n] += 2 * fabsf(x[i % n]);
+        }
+        for (int k = 0; k < ROWS; k++) got[k] = same[k] = expected[k] = (float)k;
+        ts_elementwise_naive.from_half(ROWS * n, half, full);
+        ts_elementwise_k()->add_dots_half(ROWS, n, half, x, got);
+        ts_elementwise_k()->add_dots(ROWS, n, full, x, same);
+        ts_elementwise_naive.add_dots_half(ROWS, n, half, x, expected);
+        CHECK(!memcmp(got, same, sizeof got), "%d numbers on %s: other bytes than of floats", n,
+              ts_isa_name(ts_isa_now()));
+        for (int k = 0; k < ROWS; k++)
+            CHECK(fabsf(got[k] - expected[k]) <= 3e-7f * (1 + (float)k + size[k]), "%d numbers on %s: %g, not %g", n,
+                  ts_isa_name(ts_isa_now()), (double)got[k], (double)expected[k]);
+    }
+}
+
 TEST(elementwise_pixel_twins)
 {
     const struct ts_elementwise_kernels *n = &ts_elementwise_naive;
