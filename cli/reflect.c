@@ -17,7 +17,7 @@ static void render(const rd_view *view, const io_disk *flash, int size, const fl
 /* What is mirrored, by roughness times rough. */
 static void mirrored(const float *maps, size_t pixels, float rough, float *to)
 {
-    rd_scene_roughen((int64_t)pixels, maps, MAP_CHANNELS, logf(rough), to);
+    rd_scene_roughen((int64_t)pixels, maps, MAP_CHANNELS, logf(rough), 0, to);
     for (size_t i = 0; i < pixels * MAP_CHANNELS; i += MAP_CHANNELS)
         for (int k = 0; k < 3; k++) to[i + MAP_DIFFUSE + (size_t)k] = -1;
 }

@@ -63,10 +63,16 @@ void nn_deviations(int64_t pixels, const float *spread, nn_belief b, int threads
     ts_for(threads, pixels, PIXELS, deviations, &j);
 }
 
-void nn_deviations_of_found_scene(int64_t pixels, float *deviation)
+static void narrow(const void *of, int64_t begin, int64_t end)
 {
-    for (int64_t i = 0; i < pixels * NN_SPREADS; i += NN_SPREADS) {
-        deviation[i + GROUP_NORMAL] *= NORMAL_DETAIL;
-        deviation[i + GROUP_ROUGHNESS] *= ROUGHNESS_DETAIL;
+    float *const *deviation = of;
+    for (int64_t i = begin * NN_SPREADS; i < end * NN_SPREADS; i += NN_SPREADS) {
+        (*deviation)[i + GROUP_NORMAL] *= NORMAL_DETAIL;
+        (*deviation)[i + GROUP_ROUGHNESS] *= ROUGHNESS_DETAIL;
     }
+}
+
+void nn_deviations_of_found_scene(int64_t pixels, int threads, float *deviation)
+{
+    ts_for(threads, pixels, PIXELS, narrow, &(float *){deviation});
 }

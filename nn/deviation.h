@@ -16,5 +16,5 @@ typedef struct nn_belief {
 void nn_deviations(int64_t pixels, const float *spread, nn_belief belief, int threads, float *deviation);
 
 /* From deviations of belief {0} to those with scene_found. */
-void nn_deviations_of_found_scene(int64_t pixels, float *deviation);
+void nn_deviations_of_found_scene(int64_t pixels, int threads, float *deviation);
 #endif

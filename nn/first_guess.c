@@ -9,6 +9,7 @@
 #include "tensor/maps.h"
 #include "tensor/memory.h"
 #include "tensor/resize.h"
+#include "tensor/scratch.h"
 #include "tensor/team.h"
 #include <math.h>
 #include <string.h>
@@ -18,6 +19,8 @@
  * view is not known a narrower one looks like them. */
 #define ROUGHNESS_LEVEL 0.15
 #define ROUGHNESS_LEVEL_IN_KNOWN_VIEW 0.4
+
+enum { ROWS = 16 }; /* that another thread is worth */
 
 /* The numbers that are known have no error: the prior keeps them. */
 static void scene_prior(const float *said, const rd_view *view, int known, rd_scene_prior *prior)
@@ -44,17 +47,52 @@ static void scene_prior(const float *said, const rd_view *view, int known, rd_sc
     prior->mean[RD_SCENE_TONE] = prior->deviation[RD_SCENE_TONE] = 0; /* the steps have no tone curve */
 }
 
-static void level_prior(const nn_first_guess *g, size_t pixels, int channels, int known, rd_scene_prior *prior)
+/* Of some of R_0's rows: the roughness (twice its value), and how far it may be off. */
+typedef struct level_job {
+    const nn_first_guess *g;
+    int64_t w;
+    int channels;
+    double (*sums)[2]; /* of each row */
+} level_job;
+
+static void level_of_rows(const void *job, int64_t begin, int64_t end)
+{
+    const level_job *j = job;
+    for (int64_t y = begin; y < end; y++) {
+        double rough = 0, off = 0;
+        for (int64_t i = y * j->w; i < (y + 1) * j->w; i++) {
+            const float own = j->g->r0[i * j->channels + MAP_ROUGHNESS];
+            rough += own > -1 ? (double)own + 1 : 0;
+            off += (double)j->g->deviation[i * NN_SPREADS + GROUP_ROUGHNESS];
+        }
+        j->sums[y][0] = rough, j->sums[y][1] = off;
+    }
+}
+
+static void level_prior(rd_grid grid, const nn_first_guess *g, int channels, int known, rd_scene_prior *prior)
 {
     const double part = known & NN_KNOWN_CAMERA ? ROUGHNESS_LEVEL_IN_KNOWN_VIEW : ROUGHNESS_LEVEL;
-    double rough = 0, off = 0;
-    for (size_t i = 0; i < pixels; i++) {
-        const float own = g->r0[i * (size_t)channels + MAP_ROUGHNESS];
-        rough += own > -1 ? (double)own + 1 : 0;
-        off += (double)g->deviation[i * NN_SPREADS + GROUP_ROUGHNESS];
-    }
+    double rough = 0, off = 0, (*sums)[2] = ts_scratch(0, (size_t)grid.h * sizeof *sums);
+    ts_for(grid.threads, grid.h, ROWS, level_of_rows, &(level_job){g, grid.w, channels, sums});
+    for (int y = 0; y < grid.h; y++) rough += sums[y][0], off += sums[y][1];
     prior->mean[RD_SCENE_ROUGHNESS] = 0;
     prior->deviation[RD_SCENE_ROUGHNESS] = (float)(part * fmin(off / fmax(rough, 1e-6), 1));
+}
+
+typedef struct colours_job {
+    const float *from;
+    int channels;
+    float *to;
+} colours_job;
+
+static void copy_colours(const void *job, int64_t begin, int64_t end)
+{
+    const colours_job *j = job;
+    for (int64_t i = begin * j->channels; i < end * j->channels; i += j->channels)
+        for (int k = 0; k < 3; k++) {
+            j->to[i + MAP_DIFFUSE + k] = j->from[i + MAP_DIFFUSE + k];
+            j->to[i + MAP_SPECULAR + k] = j->from[i + MAP_SPECULAR + k];
+        }
 }
 
 /* Scene and level, found from R_0; R_0's diffuse where that scene's highlight hides it; both again. */
@@ -62,25 +100,21 @@ static ts_code fit(rd_grid grid, const float *image, int channels, int known, co
                    ts_arena *arena, nn_first_guess *g, ts_status *st)
 {
     const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior(known, 1)};
+    const int threads = grid.threads;
     const int64_t pixels = (int64_t)grid.h * grid.w;
-    const size_t values = (size_t)pixels * (size_t)channels;
-    float unknown[RD_SCENE_UNKNOWNS], *rough = ts_arena_alloc(arena, values * sizeof *rough);
+    float unknown[RD_SCENE_UNKNOWNS], *rough = ts_arena_alloc(arena, (size_t)pixels * (size_t)channels * sizeof *rough);
     if (!rough) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", grid.w, grid.h);
     memcpy(unknown, prior->mean, sizeof unknown);
     rd_scene_fit(grid, g->r0, channels, g->deviation, image, prior, &how, unknown, NULL);
-    rd_scene_roughen(pixels, g->r0, channels, unknown[RD_SCENE_ROUGHNESS], rough);
+    rd_scene_roughen(pixels, g->r0, channels, unknown[RD_SCENE_ROUGHNESS], threads, rough);
     const ts_code code = nn_fill_hidden(grid, image, unknown, channels, arena, rough, st);
-    if (!code) {
-        for (size_t i = 0; i < values; i += (size_t)channels) {
-            memcpy(g->r0 + i + MAP_DIFFUSE, rough + i + MAP_DIFFUSE, 3 * sizeof *rough);
-            memcpy(g->r0 + i + MAP_SPECULAR, rough + i + MAP_SPECULAR, 3 * sizeof *rough);
-        }
-        rd_scene_fit(grid, g->r0, channels, g->deviation, image, prior, &how, unknown, NULL);
-        memcpy(g->number, unknown, sizeof g->number);
-        rd_scene_roughen(pixels, g->r0, channels, unknown[RD_SCENE_ROUGHNESS], g->r0);
-        if (!(known & NN_KNOWN_LIGHT)) nn_share_lean(pixels, channels, g->number, g->r0);
-    }
-    return code;
+    if (code) return code;
+    ts_for(threads, pixels, (int64_t)ROWS * grid.w, copy_colours, &(colours_job){rough, channels, g->r0});
+    rd_scene_fit(grid, g->r0, channels, g->deviation, image, prior, &how, unknown, NULL);
+    memcpy(g->number, unknown, sizeof g->number);
+    rd_scene_roughen(pixels, g->r0, channels, unknown[RD_SCENE_ROUGHNESS], threads, g->r0);
+    if (!(known & NN_KNOWN_LIGHT)) nn_share_lean(pixels, channels, threads, g->number, g->r0);
+    return TS_OK;
 }
 
 /* Where the light is known its height, which a scene does not have, is as given. */
@@ -102,11 +136,11 @@ ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, co
     rd_scene_prior prior;
     nn_deviations(pixels, g->spread, (nn_belief){.photographs = taken->photographs}, grid.threads, g->deviation);
     scene_prior(scene, &taken->view, taken->known, &prior);
-    level_prior(g, (size_t)pixels, channels, taken->known, &prior);
+    level_prior(grid, g, channels, taken->known, &prior);
     const ts_mark mark = ts_arena_mark(arena);
     const ts_code code = fit(grid, image, channels, taken->known, &prior, arena, g, st);
     ts_arena_release(arena, mark);
-    if (taken->photographs <= 1) nn_deviations_of_found_scene(pixels, g->deviation);
+    if (taken->photographs <= 1) nn_deviations_of_found_scene(pixels, grid.threads, g->deviation);
     g->view = view_of(g->number, taken);
     return code;
 }

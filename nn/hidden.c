@@ -1,7 +1,6 @@
 #include "nn/hidden.h"
 #include "tensor/maps.h"
 #include "tensor/kernels/vmath_arrays.h"
-#include "tensor/memory.h"
 #include "tensor/scratch.h"
 #include "tensor/team.h"
 #include <math.h>
@@ -25,7 +24,8 @@ typedef struct hidden_map {
     bool mirrored;
     double sharpness, reach;
 } hidden_map;
-static const hidden_map hidden[] = {{MAP_DIFFUSE, false, 6, INFINITY}, {MAP_SPECULAR, true, 4, 1}};
+enum { HIDDEN = 2 };
+static const hidden_map hidden[HIDDEN] = {{MAP_DIFFUSE, false, 6, INFINITY}, {MAP_SPECULAR, true, 4, 1}};
 
 /* The whole square is full; matt holds its maps without F0. */
 typedef struct pictures {
@@ -35,19 +35,20 @@ typedef struct pictures {
 /* seen: the part of the light that shows the map. usual: the same were the map's value the picture's mean, so that dark
  * things are not taken for hidden ones. Both relative to the largest. */
 typedef struct cells {
-    int side;
+    double mean; /* of the sum of the map's three values */
     double seen[CELLS * CELLS], usual[CELLS * CELLS], weight[CELLS * CELLS], log_value[3][CELLS * CELLS],
         change[3][CELLS * CELLS];
 } cells;
 
-typedef struct gather_job {
-    const hidden_map *map;
-    const pictures *p;
-    int size, channels;
-    const float *maps, *image;
-    float mean; /* of the sum of the map's three values */
-    cells *c;
-} gather_job;
+/* The maps' cells; [HIDDEN] where it says so. */
+typedef struct field {
+    int size, channels, side, threads;
+    pictures p;
+    const float *image;
+    float *maps;
+    double *sums, *band; /* [HIDDEN][size], [HIDDEN][side * side * (side + 1)] */
+    cells *c;            /* [HIDDEN] */
+} field;
 
 /* The first pixel of a cell in a row or column of them. */
 static int first_pixel(int size, int side, int64_t cell) { return (int)((cell * size + side - 1) / side); }
@@ -57,67 +58,89 @@ static float larger(float a, float b) { return a > b ? a : b; }
 static float part_of(float shown, float other) { return shown / larger(shown + other, 1e-6f); }
 
 /* What each pixel of row y shows: logarithm [size][3], seen and usual [size]. */
-static void look(const gather_job *j, int y, float *logarithm, float *seen, float *usual)
+static void look(const field *j, const hidden_map *m, float mean, int y, float *logarithm, float *seen, float *usual)
 {
     const int size = j->size;
     for (int x = 0; x < size; x++) {
         const size_t i = (size_t)y * (size_t)size + (size_t)x;
-        const float *map = j->maps + i * (size_t)j->channels + (size_t)j->map->at;
+        const float *map = j->maps + i * (size_t)j->channels + (size_t)m->at;
         float full = 0, rest = 0, bright = 0, own = 0;
         for (size_t k = 0; k < 3; k++) {
-            full += j->p->full[3 * i + k], rest += j->p->diffuse[3 * i + k], bright += j->image[3 * i + k];
+            full += j->p.full[3 * i + k], rest += j->p.diffuse[3 * i + k], bright += j->image[3 * i + k];
             const float value = (map[k] + 1) / 2;
             own += value;
             logarithm[3 * (size_t)x + k] = larger(value, VALUE_LEAST);
         }
-        const float mirrored = larger(full - rest, 0), shown = j->map->mirrored ? mirrored : rest,
-                    other = j->map->mirrored ? rest : mirrored, tells = bright > BURNT_OUT ? BURNT_OUT_TELLS : 1;
+        const float mirrored = larger(full - rest, 0), shown = m->mirrored ? mirrored : rest,
+                    other = m->mirrored ? rest : mirrored, tells = bright > BURNT_OUT ? BURNT_OUT_TELLS : 1;
         seen[x] = tells * part_of(shown, other);
-        usual[x] = tells * part_of(shown * j->mean / larger(own, 3 * VALUE_LEAST), other);
+        usual[x] = tells * part_of(shown * mean / larger(own, 3 * VALUE_LEAST), other);
     }
     ts_vmath_arrays_k()->log(3 * size, logarithm, logarithm);
 }
 
-/* Sums over each cell of these rows, then means. */
+/* Of both maps, the three values of each pixel of a row. */
+static void sum_rows(const void *job, int64_t begin, int64_t end)
+{
+    const field *j = job;
+    for (int64_t y = begin; y < end; y++)
+        for (int i = 0; i < HIDDEN; i++) {
+            const float *map = j->maps + y * j->size * j->channels + hidden[i].at;
+            double sum = 0;
+            for (int x = 0; x < j->size; x++, map += j->channels)
+                sum += ((double)map[0] + 1) + ((double)map[1] + 1) + ((double)map[2] + 1);
+            j->sums[i * j->size + y] = sum;
+        }
+}
+
+/* What a row of cells of one map shows: sums over each cell, then means. Row r is of map r / side. */
 static void gather_rows(const void *job, int64_t begin, int64_t end)
 {
-    const gather_job *j = job;
-    const int size = j->size, side = j->c->side;
+    const field *j = job;
+    const int size = j->size, side = j->side;
     float *logarithm = ts_scratch(0, 5 * (size_t)size * sizeof *logarithm), *seen = logarithm + 3 * size,
           *usual = seen + size;
-    for (int row = (int)begin; row < (int)end; row++) {
-        const int first = first_pixel(size, side, row), last = first_pixel(size, side, row + 1);
+    for (int64_t r = begin; r < end; r++) {
+        const int which = (int)(r / side), row = (int)(r % side), first = first_pixel(size, side, row),
+                  last = first_pixel(size, side, row + 1);
+        cells *c = &j->c[which];
         for (int y = first; y < last; y++) {
-            look(j, y, logarithm, seen, usual);
+            look(j, &hidden[which], (float)c->mean, y, logarithm, seen, usual);
             for (int column = 0; column < side; column++) {
-                const int at = row * side + column;
+                double sum[5] = {0};
                 for (int x = first_pixel(size, side, column); x < first_pixel(size, side, column + 1); x++) {
-                    j->c->seen[at] += (double)seen[x], j->c->usual[at] += (double)usual[x];
-                    for (int k = 0; k < 3; k++) j->c->log_value[k][at] += (double)logarithm[3 * x + k];
+                    sum[0] += (double)seen[x], sum[1] += (double)usual[x];
+                    for (int k = 0; k < 3; k++) sum[2 + k] += (double)logarithm[3 * x + k];
                 }
+                const int at = row * side + column;
+                c->seen[at] += sum[0], c->usual[at] += sum[1];
+                for (int k = 0; k < 3; k++) c->log_value[k][at] += sum[2 + k];
             }
         }
         for (int column = 0; column < side; column++) {
             const int at = row * side + column,
                       across = first_pixel(size, side, column + 1) - first_pixel(size, side, column);
             const double count = (double)(last - first) * across;
-            j->c->seen[at] /= count, j->c->usual[at] /= count;
-            for (int k = 0; k < 3; k++) j->c->log_value[k][at] /= count;
+            c->seen[at] /= count, c->usual[at] /= count;
+            for (int k = 0; k < 3; k++) c->log_value[k][at] /= count;
         }
     }
 }
 
-static void gather(const hidden_map *map, const pictures *p, int size, int channels, const float *maps,
-                   const float *image, int threads, cells *c)
+static void gather(const field *j)
 {
-    const int count = c->side * c->side;
-    double sum[3] = {0}, most = 0, most_usual = 0;
-    memset(c->seen, 0, sizeof c->seen), memset(c->usual, 0, sizeof c->usual);
-    memset(c->log_value, 0, sizeof c->log_value);
-    for (int i = 0; i < size * size; i++)
-        for (int k = 0; k < 3; k++) sum[k] += (double)maps[i * channels + map->at + k] + 1;
-    const double mean = (sum[0] + sum[1] + sum[2]) / (2.0 * size * size);
-    ts_for(threads, c->side, 1, gather_rows, &(gather_job){map, p, size, channels, maps, image, (float)mean, c});
+    ts_for(j->threads, j->size, ROWS, sum_rows, j);
+    for (int i = 0; i < HIDDEN; i++) {
+        double sum = 0;
+        for (int y = 0; y < j->size; y++) sum += j->sums[i * j->size + y];
+        j->c[i].mean = sum / (2.0 * j->size * j->size);
+    }
+    ts_for(j->threads, (int64_t)HIDDEN * j->side, 1, gather_rows, j);
+}
+
+static void weigh(const hidden_map *map, int count, cells *c)
+{
+    double most = 0, most_usual = 0;
     for (int i = 0; i < count; i++) most = fmax(most, c->seen[i]), most_usual = fmax(most_usual, c->usual[i]);
     for (int i = 0; i < count; i++) {
         c->seen[i] /= fmax(most, 1e-6), c->usual[i] /= fmax(most_usual, 1e-6);
@@ -127,9 +150,9 @@ static void gather(const hidden_map *map, const pictures *p, int size, int chann
 
 /* The lower band of the symmetric matrix: row i has entries i - side .. i, of which those of the neighbours before it
  * and its own are not 0. */
-static void make_band(const cells *c, double *band)
+static void make_band(const cells *c, int side, double *band)
 {
-    const int side = c->side, width = side + 1;
+    const int width = side + 1;
     memset(band, 0, (size_t)(side * side * width) * sizeof *band);
     for (int i = 0; i < side * side; i++) {
         double *row = band + (size_t)i * (size_t)width;
@@ -176,10 +199,10 @@ static void solve(int count, int side, const double *band, double x[3][CELLS * C
 }
 
 /* Of the logarithms, each as far as it is seen. */
-static double variance(const cells *c, const double *x)
+static double variance(const cells *c, int count, const double *x)
 {
     double weight = 0, sum = 0, squares = 0;
-    for (int i = 0; i < c->side * c->side; i++) {
+    for (int i = 0; i < count; i++) {
         const double w = c->weight[i] + WEIGHT_LEAST;
         weight += w, sum += w * x[i], squares += w * x[i] * x[i];
     }
@@ -197,16 +220,15 @@ static double part_hidden(double usual, double differ)
 static double mean_of_three(double x[3][CELLS * CELLS], int i) { return (x[0][i] + x[1][i] + x[2][i]) / 3; }
 
 /* The variances of the colours' level, their mean logarithm, and of the hue, what each colour is beside it. */
-static void differ(cells *c, double *level, double *hue)
+static void differ(cells *c, int count, double *level, double *hue)
 {
-    const int count = c->side * c->side;
     double x[CELLS * CELLS];
     for (int i = 0; i < count; i++) x[i] = mean_of_three(c->log_value, i);
-    *level = variance(c, x);
+    *level = variance(c, count, x);
     *hue = 0;
     for (int k = 0; k < 3; k++) {
         for (int i = 0; i < count; i++) x[i] = c->log_value[k][i] - mean_of_three(c->log_value, i);
-        *hue += variance(c, x) / 3;
+        *hue += variance(c, count, x) / 3;
     }
 }
 
@@ -218,16 +240,21 @@ static double believed(const hidden_map *map, double from)
 }
 
 /* A material that is light and dark may be of one hue all over: each has a part of its own. */
-static void find_changes(const hidden_map *map, cells *c, double *band)
+static void find_changes(const void *job, int64_t which)
 {
-    const int count = c->side * c->side;
-    make_band(c, band);
-    factor(count, c->side, band);
+    const field *j = job;
+    const hidden_map *map = &hidden[which];
+    const int side = j->side, count = side * side;
+    cells *c = &j->c[which];
+    double *band = j->band + which * count * (side + 1);
+    weigh(map, count, c);
+    make_band(c, side, band);
+    factor(count, side, band);
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < count; i++) c->change[k][i] = (c->weight[i] + WEIGHT_LEAST) * c->log_value[k][i];
-    solve(count, c->side, band, c->change);
+    solve(count, side, band, c->change);
     double level, hue;
-    differ(c, &level, &hue);
+    differ(c, count, &level, &hue);
     for (int i = 0; i < count; i++) {
         for (int k = 0; k < 3; k++) c->change[k][i] -= c->log_value[k][i];
         const double from = mean_of_three(c->change, i), tint = part_hidden(c->usual[i], hue),
@@ -247,65 +274,78 @@ static void between(int i, int size, int side, int *cell, float *part)
     *part = at - (float)*cell;
 }
 
-typedef struct apply_job {
-    const cells *c;
-    int at, size, channels;
-    float *maps;
-} apply_job;
+/* factor: [size][3]; row: [side][3]. */
+static void apply_row(const field *j, int which, int y, float *factor, float *row)
+{
+    const cells *c = &j->c[which];
+    const int size = j->size, side = j->side, next = side > 1;
+    int above, left;
+    float down, right;
+    between(y, size, side, &above, &down);
+    for (int i = 0; i < side; i++)
+        for (int k = 0; k < 3; k++) {
+            const double *a = c->change[k] + above * side + i;
+            row[3 * i + k] = (1 - down) * (float)a[0] + down * (float)a[next * side];
+        }
+    for (int x = 0; x < size; x++) {
+        between(x, size, side, &left, &right);
+        const float *a = row + 3 * left;
+        for (int k = 0; k < 3; k++) factor[3 * x + k] = (1 - right) * a[k] + right * a[3 * next + k];
+    }
+    ts_vmath_arrays_k()->exp(3 * size, factor, factor);
+    float *map = j->maps + (size_t)y * (size_t)size * (size_t)j->channels + (size_t)hidden[which].at;
+    for (int x = 0; x < size; x++, map += j->channels)
+        for (int k = 0; k < 3; k++) {
+            const float value = (map[k] + 1) * factor[3 * x + k] - 1;
+            map[k] = value < 1 ? value : 1;
+        }
+}
 
 static void apply_rows(const void *job, int64_t begin, int64_t end)
 {
-    const apply_job *j = job;
-    const cells *c = j->c;
-    const int size = j->size, side = c->side, next = side > 1;
-    float *factor = ts_scratch(0, (3 * (size_t)size + 3 * CELLS) * sizeof *factor), *row = factor + 3 * size;
-    for (int y = (int)begin; y < (int)end; y++) {
-        int above, left;
-        float down, right;
-        between(y, size, side, &above, &down);
-        for (int i = 0; i < side; i++)
-            for (int k = 0; k < 3; k++) {
-                const double *a = c->change[k] + above * side + i;
-                row[3 * i + k] = (1 - down) * (float)a[0] + down * (float)a[next * side];
-            }
-        for (int x = 0; x < size; x++) {
-            between(x, size, side, &left, &right);
-            const float *a = row + 3 * left;
-            for (int k = 0; k < 3; k++) factor[3 * x + k] = (1 - right) * a[k] + right * a[3 * next + k];
-        }
-        ts_vmath_arrays_k()->exp(3 * size, factor, factor);
-        float *map = j->maps + (size_t)y * (size_t)size * (size_t)j->channels + (size_t)j->at;
-        for (int x = 0; x < size; x++, map += j->channels)
-            for (int k = 0; k < 3; k++) {
-                const float value = (map[k] + 1) * factor[3 * x + k] - 1;
-                map[k] = value < 1 ? value : 1;
-            }
-    }
+    const field *j = job;
+    float *factor = ts_scratch(0, (3 * (size_t)j->size + 3 * CELLS) * sizeof *factor), *row = factor + 3 * j->size;
+    for (int y = (int)begin; y < (int)end; y++)
+        for (int i = 0; i < HIDDEN; i++) apply_row(j, i, y, factor, row);
+}
+
+static void make_matt(const void *job, int64_t begin, int64_t end)
+{
+    const field *j = job;
+    const int64_t row = (int64_t)j->size * j->channels;
+    memcpy(j->p.matt + begin * row, j->maps + begin * row, (size_t)((end - begin) * row) * sizeof(float));
+    for (int64_t i = begin * row; i < end * row; i += j->channels)
+        for (int k = 0; k < 3; k++) j->p.matt[i + MAP_SPECULAR + k] = -1;
 }
 
 ts_code nn_fill_hidden(rd_grid grid, const float *image, const float number[RD_SCENE_NUMBERS], int channels,
                        ts_arena *arena, float *maps, ts_status *st)
 {
     const int size = grid.w, side = size < CELLS ? size : CELLS;
-    const size_t pixels = (size_t)size * (size_t)size, values = pixels * (size_t)channels;
+    const size_t pixels = (size_t)size * (size_t)size, values = pixels * (size_t)channels,
+                 bands = HIDDEN * (size_t)(side * side * (side + 1));
     const ts_mark mark = ts_arena_mark(arena);
-    pictures p = {ts_arena_alloc(arena, values * sizeof(float)), ts_arena_alloc(arena, pixels * 3 * sizeof(float)),
-                  ts_arena_alloc(arena, pixels * 3 * sizeof(float))};
-    cells *c = ts_arena_zalloc(arena, 1, sizeof *c);
-    double *band = ts_arena_alloc(arena, (size_t)(side * side * (side + 1)) * sizeof *band);
+    const field j = {
+        .size = size,
+        .channels = channels,
+        .side = side,
+        .threads = grid.threads,
+        .p = {ts_arena_alloc(arena, values * sizeof(float)), ts_arena_alloc(arena, pixels * 3 * sizeof(float)),
+              ts_arena_alloc(arena, pixels * 3 * sizeof(float))},
+        .image = image,
+        .maps = maps,
+        .sums = ts_arena_alloc(arena, HIDDEN * (size_t)size * sizeof(double)),
+        .band = ts_arena_alloc(arena, bands * sizeof(double)),
+        .c = ts_arena_zalloc(arena, HIDDEN, sizeof(cells)),
+    };
     ts_code code = TS_OK;
-    if (p.matt && p.full && p.diffuse && c && band) {
-        c->side = side;
-        ts_memory_copy(p.matt, maps, values * sizeof(float), grid.threads);
-        for (size_t i = 0; i < values; i += (size_t)channels)
-            for (size_t k = 0; k < 3; k++) p.matt[i + MAP_SPECULAR + k] = -1;
-        rd_scene_photograph(grid, maps, channels, number, false, p.full);
-        rd_scene_photograph(grid, p.matt, channels, number, false, p.diffuse);
-        for (int i = 0; i < 2; i++) {
-            gather(&hidden[i], &p, size, channels, maps, image, grid.threads, c);
-            find_changes(&hidden[i], c, band);
-            ts_for(grid.threads, size, ROWS, apply_rows, &(apply_job){c, hidden[i].at, size, channels, maps});
-        }
+    if (j.p.matt && j.p.full && j.p.diffuse && j.sums && j.band && j.c) {
+        ts_for(grid.threads, size, ROWS, make_matt, &j);
+        rd_scene_photograph(grid, maps, channels, number, false, j.p.full);
+        rd_scene_photograph(grid, j.p.matt, channels, number, false, j.p.diffuse);
+        gather(&j);
+        ts_tasks(grid.threads, HIDDEN, find_changes, &j);
+        ts_for(grid.threads, size, ROWS, apply_rows, &j);
     } else code = ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", size, size);
     ts_arena_release(arena, mark);
     return code;

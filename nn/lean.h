@@ -12,5 +12,5 @@
  */
 #define NN_LEAN 0.04
 #define NN_LEAN_FLASH 0.08
-void nn_share_lean(int64_t pixels, int channels, float number[RD_SCENE_NUMBERS], float *maps);
+void nn_share_lean(int64_t pixels, int channels, int threads, float number[RD_SCENE_NUMBERS], float *maps);
 #endif

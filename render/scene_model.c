@@ -122,14 +122,28 @@ static void upper(double a[K][K], double x[K])
     }
 }
 
-void rd_scene_roughen(int64_t pixels, const float *maps, int channels, float level, float *to)
+typedef struct roughen_job {
+    const float *maps;
+    int channels;
+    float factor, *to;
+} roughen_job;
+
+static void roughen(const void *job, int64_t begin, int64_t end)
 {
-    const float factor = expf(level);
-    if (to != maps) memcpy(to, maps, (size_t)(pixels * channels) * sizeof *to);
-    for (int64_t i = MAP_ROUGHNESS; i < pixels * channels; i += channels) {
-        const float x = (to[i] + 1) * factor - 1;
-        to[i] = x < 1 ? x : 1;
+    const roughen_job *j = job;
+    const int64_t first = begin * j->channels, last = end * j->channels;
+    if (j->to != j->maps) memcpy(j->to + first, j->maps + first, (size_t)(last - first) * sizeof *j->to);
+    for (int64_t i = first + MAP_ROUGHNESS; i < last; i += j->channels) {
+        const float x = (j->to[i] + 1) * j->factor - 1;
+        j->to[i] = x < 1 ? x : 1;
     }
+}
+
+enum { WORTH = 4096 }; /* pixels that another thread is worth */
+
+void rd_scene_roughen(int64_t pixels, const float *maps, int channels, float level, int threads, float *to)
+{
+    ts_for(threads, pixels, WORTH, roughen, &(roughen_job){maps, channels, expf(level), to});
 }
 
 typedef struct sums_job {
@@ -149,7 +163,7 @@ static void sums_of_rows(const void *job, int64_t begin, int64_t end)
         const int y = j->first + (int)i * j->how->every;
         const int64_t at = (int64_t)y * j->grid.w;
         float *maps = ts_scratch(1, (size_t)(j->grid.w * j->channels) * sizeof *maps);
-        rd_scene_roughen(j->grid.w, j->maps + at * j->channels, j->channels, j->level, maps);
+        rd_scene_roughen(j->grid.w, j->maps + at * j->channels, j->channels, j->level, 1, maps);
         ts_shade_row row = rd_shade_row(j->grid, y, j->maps, j->channels);
         row.maps = maps;
         j->part[i] = (ts_scene_sums){.misfit = 0};

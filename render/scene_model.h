@@ -34,8 +34,8 @@ ag_value *ag_scene_render(ag_tape *tape, ag_value *maps, ag_value *numbers, bool
  * it, is found together with the numbers of the scene. */
 enum { RD_SCENE_ROUGHNESS = RD_SCENE_NUMBERS, RD_SCENE_UNKNOWNS };
 
-/* to = maps [pixels, channels], the roughness at a level; it ends at 1. to may be maps. */
-void rd_scene_roughen(int64_t pixels, const float *maps, int channels, float level, float *to);
+/* to = maps [pixels, channels], the roughness at a level; it ends at 1. to may be maps. threads as in tensor/team.h. */
+void rd_scene_roughen(int64_t pixels, const float *maps, int channels, float level, int threads, float *to);
 
 /* What is known beforehand of a scene's numbers and the level: they are independent and have Gaussian errors. A
  * deviation of 0 keeps an unknown. */

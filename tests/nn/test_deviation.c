@@ -37,7 +37,7 @@ TEST(deviation_of_relief_is_less_once_the_scene_is_found)
         CHECK(less ? other[i] < 0.9f * said[i] : other[i] == said[i], "group %d: %g of %g", k, (double)other[i],
               (double)said[i]);
     }
-    nn_deviations_of_found_scene(PIXELS, said);
+    nn_deviations_of_found_scene(PIXELS, 1, said);
     for (int i = 0; i < PIXELS * NN_SPREADS; i++)
         CHECK(fabsf(said[i] - other[i]) <= 1e-6f * other[i], "value %d: %g and %g", i, (double)said[i],
               (double)other[i]);

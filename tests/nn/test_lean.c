@@ -43,7 +43,7 @@ TEST(lean_keeps_the_highlight_in_its_place)
         double before[2], after[2];
         make_flat();
         find(number, before);
-        nn_share_lean(PIXELS, C, number, maps);
+        nn_share_lean(PIXELS, C, 1, number, maps);
         find(number, after);
         for (int k = 0; k < 2; k++)
             CHECK(fabs(before[k]) > 0.02 && fabs(after[k] - before[k]) < 0.1 * fabs(before[k]),
@@ -63,10 +63,10 @@ TEST(lean_of_a_light_at_the_lens_is_none)
     float number[RD_SCENE_NUMBERS] = {0};
     make_flat();
     maps[MAP_NORMAL] = 0.25f;
-    nn_share_lean(PIXELS, C, number, maps);
+    nn_share_lean(PIXELS, C, 1, number, maps);
     CHECK(maps[MAP_NORMAL] == 0.25f && maps[C + MAP_NORMAL] == 0, "normals moved");
     number[RD_SCENE_LIGHT_X] = -9;
     maps[MAP_NORMAL] = 1;
-    nn_share_lean(PIXELS, C, number, maps);
+    nn_share_lean(PIXELS, C, 1, number, maps);
     CHECK(maps[MAP_NORMAL] == 1, "a normal of %g", (double)maps[MAP_NORMAL]);
 }

@@ -184,7 +184,7 @@ typedef struct job {
 static void photograph(job *j, const float *maps)
 {
     float *rough = floats(PIXELS * C);
-    rd_scene_roughen(PIXELS, maps, C, j->truth[RD_SCENE_ROUGHNESS], rough);
+    rd_scene_roughen(PIXELS, maps, C, j->truth[RD_SCENE_ROUGHNESS], 1, rough);
     rd_scene_photograph(rd_grid_full(SIDE), rough, C, j->truth, true, j->image);
     free(rough);
 }
@@ -300,14 +300,14 @@ TEST(scene_level_is_a_factor_on_the_roughness)
     ts_rng rng = ts_rng_make(55, TS_STREAM_TEST, 0);
     random_maps(&rng, maps);
     for (size_t k = 0; k < sizeof level / sizeof *level; k++) {
-        rd_scene_roughen(PIXELS, maps, C, level[k], to);
+        rd_scene_roughen(PIXELS, maps, C, level[k], 1, to);
         for (int i = 0; i < PIXELS * C; i++) {
             const double want = i % C != MAP_ROUGHNESS ? (double)maps[i]
                                                        : fmin(((double)maps[i] + 1) * exp((double)level[k]) - 1, 1);
             CHECK(fabs((double)to[i] - want) < 1e-6, "level %g: %g, not %g", (double)level[k], (double)to[i], want);
         }
     }
-    rd_scene_roughen(PIXELS, maps, C, level[3], maps);
+    rd_scene_roughen(PIXELS, maps, C, level[3], 1, maps);
     CHECK(!memcmp(maps, to, PIXELS * C * sizeof *to), "in place it is another");
     free(maps), free(to);
 }
