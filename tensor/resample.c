@@ -3,6 +3,7 @@
 #include "tensor/scratch.h"
 #include "tensor/team.h"
 #include <math.h>
+#include <string.h>
 
 static ts_taps make_taps(ts_arena *arena, int in, int out, size_t weights)
 {
@@ -106,7 +107,7 @@ typedef struct resampling {
     const ts_taps *rows, *columns;
     const float *x;
     float *y;
-    bool accumulate;
+    bool accumulate, copies; /* columns are copied as they are */
 } resampling;
 
 static void resample_lines(const void *job, int64_t begin, int64_t end)
@@ -123,13 +124,24 @@ static void resample_lines(const void *job, int64_t begin, int64_t end)
             k->rows(row, count, rows->weight + at, from, row, mixed);
             from = mixed;
         }
-        k->pixels(columns->out, r->c, columns->first, columns->offset, columns->weight, from,
-                  r->y + line * columns->out * r->c, r->accumulate);
+        float *to = r->y + line * columns->out * r->c;
+        if (r->copies) memcpy(to, from + columns->first[0] * r->c, (size_t)(columns->out * r->c) * sizeof *to);
+        else k->pixels(columns->out, r->c, columns->first, columns->offset, columns->weight, from, to, r->accumulate);
     }
+}
+
+/* Whether every position is that of one of its own, one after the other. */
+static bool copies(const ts_taps *t)
+{
+    for (int i = 0; i < t->out; i++)
+        if (t->offset[i + 1] - t->offset[i] != 1 || t->weight[t->offset[i]] != 1.0f || t->first[i] != t->first[0] + i)
+            return false;
+    return t->out > 0;
 }
 
 void ts_resample(int n, int c, const ts_taps *rows, const ts_taps *columns, const float *x, float *y, bool accumulate,
                  int threads)
 {
-    ts_for(threads, (int64_t)n * rows->out, 1, resample_lines, &(resampling){c, rows, columns, x, y, accumulate});
+    ts_for(threads, (int64_t)n * rows->out, 1, resample_lines,
+           &(resampling){c, rows, columns, x, y, accumulate, !accumulate && copies(columns)});
 }

@@ -21,15 +21,20 @@ const char *cl_item_fov_is(const cl_item *item)
     return !*how ? "known" : *how == 'e' ? "estimated" : "assumed";
 }
 
-void cl_item_free(cl_item *item)
+void cl_item_clear(cl_item *item)
 {
     free(item->square);
     item->square = NULL;
     io_capture_free(&item->capture);
     io_sheet_set_free(&item->sheet);
-    io_material_free(&item->m);
     free(item->mask);
     free(item->result);
     item->mask = NULL;
     item->result = NULL;
+}
+
+void cl_item_free(cl_item *item)
+{
+    cl_item_clear(item);
+    io_material_free(&item->m);
 }

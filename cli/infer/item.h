@@ -62,5 +62,7 @@ typedef struct cl_item {
 const char *cl_item_assumption(const cl_item *item);
 /* "known", "estimated" or "assumed". */
 const char *cl_item_fov_is(const cl_item *item);
+/* Before the next photograph: all but the maps, whose memory it writes again. */
+void cl_item_clear(cl_item *item);
 void cl_item_free(cl_item *item);
 #endif

@@ -63,7 +63,8 @@ static cl_item *begin_decoding(cl_pipeline *p)
     while (p->begun < p->plan->jobs && !p->stopped && !(item = first_at(p, IDLE)))
         pthread_cond_wait(&p->changed, &p->lock);
     if (item) {
-        *item = (cl_item){.job = &p->plan->job[p->begun],
+        *item = (cl_item){.m = item->m,
+                          .job = &p->plan->job[p->begun],
                           .index = p->begun,
                           .stage = DECODING,
                           .threads = p->plan->jobs > 1 ? 1 : 0}; /* of several the others have work */
@@ -199,7 +200,7 @@ void cl_pipeline_run(cl_pipeline *p, lgd_model *model, const char *recipe, const
     while ((item = next(p, true))) {
         if (item->stage == FINISHED) {
             listener->finished(item, listener->user);
-            cl_item_free(item);
+            cl_item_clear(item);
             move(p, item, IDLE);
         } else work_on(p, item);
     }

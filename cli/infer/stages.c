@@ -162,7 +162,7 @@ void cl_item_estimate(const cl_command *c, lgd_model *model, cl_item *item, cl_i
     t.steps = cl_command_steps(c, model, item->photos);
     item->power = fixed ? c->power : 1;
     for (int k = 0; k < item->photos; k++) item->photo[k].power *= (float)item->power;
-    if (io_material_create(&item->m, c->size, &item->st) != TS_OK ||
+    if ((!item->m.maps && io_material_create(&item->m, c->size, &item->st) != TS_OK) ||
         lgd_model_estimate(model, item->photo, item->photos, c->size, &options, true, item->m.maps, &item->st))
         ts_context(&item->st, "%s", item->job->photo);
     look_at(c, item);
