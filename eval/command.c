@@ -65,7 +65,7 @@ static const cl_argument arguments[] = {
      "encoding of map folders' colours: srgb or linear (default: from set.ini or meta.txt, else sRGB)"},
     {METHOD, "method", "NAME[:KEY=VALUE,...]",
      "a method to compare (may be repeated; default: lgd, every step); their keys are listed below"},
-    {'i', "iterations", "N", "refinement steps, 0 .. 1000 (default: as trained)"},
+    {'i', "iterations", "N", "refinement steps, 0 .. 1000 (default: as in lgd-infer)"},
     {'m', "model", "FILE", "weights (default: $LGD_MODEL, else those installed or built with the program)"},
     {SIZE, "size", "N", "side of the photographs and maps in pixels, 1 .. 4096 (default 256)"},
     {SEED, "seed", "N", "seed of the renderings' lights and cameras and of the noise (default 1)"},

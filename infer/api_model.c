@@ -164,7 +164,7 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
     if (o->iterations < LGD_AUTO || o->iterations > ITERATIONS_MAX)
         return ts_fail(
             st, TS_INVALID,
-            "lgd_estimate: iterations is %d and must lie in 0 .. %d, or be -1 for as trained or %d for automatic",
+            "lgd_estimate: iterations is %d and must lie in 0 .. %d, or be -1 for as usual or %d for automatic",
             o->iterations, ITERATIONS_MAX, LGD_AUTO);
     if (o->threads < 0 || o->threads > LGD_THREADS_MAX)
         return ts_fail(st, TS_INVALID, "lgd_estimate: threads is %d and must lie in 1 .. %d, or be 0 for all",

@@ -10,7 +10,7 @@
 typedef struct cl_command {
     const char *out, *model, *mask;
     char capture[4096]; /* what is read in place of a photograph, without slashes at its end; or empty */
-    int size, iterations /* -1: as trained; LGD_AUTO */, threads;
+    int size, iterations /* -1: lgd_usual_iterations; LGD_AUTO */, threads;
     int64_t max_pixels;
     double max_memory; /* bytes; 0: tensor/budget.h's default */
     double tolerance;

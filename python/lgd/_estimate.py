@@ -166,7 +166,7 @@ def estimate(
     model: by default phone, the shipped one for photographs. image: a file; or an array, (height, width, 3): uint8 and
     uint16 are sRGB, floats are linear. Its largest centred square is used. fov: degrees across that square; None: from
     the file's EXIF, else what the model assumes or estimates. mask: a file, or an array of the photograph's height and
-    width: only where it is not black the maps are refined. iterations: None: as trained, or "auto". The rest is as
+    width: only where it is not black the maps are refined. iterations: None: as usual, or "auto". The rest is as
     lgd-infer --help says."""
     model = model or _shipped()
     if size < 1:
