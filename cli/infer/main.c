@@ -286,6 +286,15 @@ static ts_code settle(run *r, cl_plan *plan, bool several, ts_status *st)
     return c->outputs & LGD_OUT_PAGE && several && !c->shards ? cl_index_start(&r->index, plan, c->out, st) : TS_OK;
 }
 
+/* Of two threads the decoder is one meanwhile: a worker would only take turns with it. */
+static lgd_model *load_beside_decoder(const cl_command *c, const char *weights, lgd_error *error)
+{
+    if (ts_threads() == 2) ts_threads_set(1);
+    lgd_model *model = lgd_load(weights, error);
+    ts_threads_set(c->threads);
+    return model;
+}
+
 static int work(const cl_command *given)
 {
     cl_command own = *given;
@@ -338,7 +347,7 @@ static int work(const cl_command *given)
         cl_failed("%s", st.message);
     else if (!(pipeline = cl_pipeline_start(&plan, c, recipe, published, &st)))
         cl_failed("%s", st.message); /* decodes while the weights are read */
-    else if (!(r.model = lgd_load(weights, &error))) cl_failed("%s", error.message);
+    else if (!(r.model = load_beside_decoder(c, weights, &error))) cl_failed("%s", error.message);
     else if (!recipe && !(recipe = cl_recipe(c, weights, lgd_model_hash(r.model), &st))) cl_failed("%s", st.message);
     else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK ||
              (several && !(r.manifest = cl_manifest_open(&plan, c->out, &st))))
