@@ -37,8 +37,8 @@ LGD_API lgd_model *lgd_load(const char *weights, lgd_error *error);
 LGD_API void lgd_free(lgd_model **model);
 
 LGD_API int lgd_trained_iterations(const lgd_model *model); /* the number of steps T that the model was trained for */
-/* What iterations = -1 stands for with so many photographs of one sample: T; where the steps go to the most probable
- * maps, T / 2 of one photograph, whose later steps change next to nothing, and 2 T of several. */
+/* What iterations = -1 stands for with so many photographs of one sample: T, and 2 T where the steps go to the most
+ * probable maps by several photographs. */
 LGD_API int lgd_usual_iterations(const lgd_model *model, int photos);
 /* Photographs of one sample that it takes at once: 1, those of a multi-image model, or 9 of one whose steps go to the
  * most probable maps. */

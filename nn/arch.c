@@ -94,9 +94,8 @@ bool nn_arch_reads(const nn_arch *a) { return a->gradient && (a->h_width > 0 || 
 
 int nn_arch_steps(const nn_arch *a, int photographs)
 {
-    const bool posterior = a->descent == NN_DESCENT_POSTERIOR, alone = posterior && a->h_width == 0;
-    if (photographs > 1) return a->iterations * (posterior ? 2 : 1);
-    return (alone ? (a->iterations + 1) / 2 : a->iterations) + a->revisions;
+    return a->iterations * (photographs > 1 && a->descent == NN_DESCENT_POSTERIOR ? 2 : 1) +
+        (photographs > 1 ? 0 : a->revisions);
 }
 
 int nn_arch_revisions(const nn_arch *a, int photographs, int steps)

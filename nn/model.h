@@ -84,9 +84,8 @@ int nn_most_photographs(const nn_arch *a);
 bool nn_arch_refines(const nn_arch *a);      /* there is something to do steps with */
 bool nn_arch_refines_full(const nn_arch *a); /* at the photograph's size */
 bool nn_arch_reads(const nn_arch *a); /* those steps read the gradient, which the RMSE of what they begin with scales */
-/* Steps that are usual with so many photographs of one material: the iterations, and of one photograph the revisions
- * too. Where they go to the most probable maps, several photographs take twice the iterations; one takes half of them
- * where no h is in the steps: those after that change no map by .0002 in the mean (docs/real.md). */
+/* Steps that are usual with so many photographs of one material: of one the revisions and iterations; where they go to
+ * the most probable maps by several, which takes more of them, twice the iterations. */
 int nn_arch_steps(const nn_arch *a, int photographs);
 /* Of so many steps those that are revisions: R_1 and so on. */
 int nn_arch_revisions(const nn_arch *a, int photographs, int steps);

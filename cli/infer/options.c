@@ -36,7 +36,7 @@ const cl_argument cl_infer_arguments[] = {
     {'s', "size", "N", "side of the maps in pixels, 1 .. 8192 (default 256)"},
     {'i', "iterations", "N|auto",
      "refinement steps, 0 .. 1000; 0 = the first estimate only; auto = as long as the reconstruction improves,\n"
-     "24 at most (default: as trained; phone: 2 of one photograph, 8 of several)"},
+     "24 at most (default: as trained; of several photographs phone makes twice as many)"},
     {ORIENTATIONS, "orientations", "N",
      "the first estimate is the mean over N orientations of the photograph: 1 (as it is), 2 (and a quarter turn), 4\n"
      "(all quarter turns), 8 (and their mirror images) or auto (the default: 1 where the model guesses camera and\n"

@@ -234,7 +234,7 @@ TEST(first_guess_is_revised_in_the_first_steps)
     enum { VALUES = PLACE * PLACE * 9 };
     static float all[VALUES], some[VALUES];
     seen_steps whole = watch_steps(m, in.image.data, -1, -1, all);
-    CHECK(whole.count == 5, "%d steps are seen", whole.count);
+    CHECK(whole.count == 7, "%d steps are seen", whole.count);
     for (int i = 0; i < whole.count; i++) CHECK(whole.at[i] == i, "step %d is seen as %d", i, whole.at[i]);
     for (int i = 1; i <= 2; i++)
         CHECK(memcmp(whole.maps[i], whole.maps[i - 1], sizeof all), "revision %d changes nothing", i);
