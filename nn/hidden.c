@@ -79,20 +79,6 @@ static void look(const field *j, const hidden_map *m, float mean, int y, float *
     ts_vmath_arrays_k()->log(3 * size, logarithm, logarithm);
 }
 
-/* Of both maps, the three values of each pixel of a row. */
-static void sum_rows(const void *job, int64_t begin, int64_t end)
-{
-    const field *j = job;
-    for (int64_t y = begin; y < end; y++)
-        for (int i = 0; i < HIDDEN; i++) {
-            const float *map = j->maps + y * j->size * j->channels + hidden[i].at;
-            double sum = 0;
-            for (int x = 0; x < j->size; x++, map += j->channels)
-                sum += ((double)map[0] + 1) + ((double)map[1] + 1) + ((double)map[2] + 1);
-            j->sums[i * j->size + y] = sum;
-        }
-}
-
 /* What a row of cells of one map shows: sums over each cell, then means. Row r is of map r / side. */
 static void gather_rows(const void *job, int64_t begin, int64_t end)
 {
@@ -129,7 +115,6 @@ static void gather_rows(const void *job, int64_t begin, int64_t end)
 
 static void gather(const field *j)
 {
-    ts_for(j->threads, j->size, ROWS, sum_rows, j);
     for (int i = 0; i < HIDDEN; i++) {
         double sum = 0;
         for (int y = 0; y < j->size; y++) sum += j->sums[i * j->size + y];
@@ -309,13 +294,23 @@ static void apply_rows(const void *job, int64_t begin, int64_t end)
         for (int i = 0; i < HIDDEN; i++) apply_row(j, i, y, factor, row);
 }
 
+/* The maps without F0, and of each row the sums of both maps' three values. */
 static void make_matt(const void *job, int64_t begin, int64_t end)
 {
     const field *j = job;
     const int64_t row = (int64_t)j->size * j->channels;
     memcpy(j->p.matt + begin * row, j->maps + begin * row, (size_t)((end - begin) * row) * sizeof(float));
-    for (int64_t i = begin * row; i < end * row; i += j->channels)
-        for (int k = 0; k < 3; k++) j->p.matt[i + MAP_SPECULAR + k] = -1;
+    for (int64_t y = begin; y < end; y++) {
+        double sum[HIDDEN] = {0};
+        for (int64_t at = y * row; at < (y + 1) * row; at += j->channels) {
+            for (int i = 0; i < HIDDEN; i++) {
+                const float *map = j->maps + at + hidden[i].at;
+                sum[i] += ((double)map[0] + 1) + ((double)map[1] + 1) + ((double)map[2] + 1);
+            }
+            for (int k = 0; k < 3; k++) j->p.matt[at + MAP_SPECULAR + k] = -1;
+        }
+        for (int i = 0; i < HIDDEN; i++) j->sums[i * j->size + y] = sum[i];
+    }
 }
 
 ts_code nn_fill_hidden(rd_grid grid, const float *image, const float number[RD_SCENE_NUMBERS], int channels,

@@ -11,7 +11,7 @@ enum {
     BATCH = 64 << 10, /* bytes of filtered rows that are compressed together */
     PART = 1 << 20,   /* of the compressed stream at most, a chunk */
     CHUNK = 12,       /* length, type, checksum */
-    SPACE = 1024,     /* for the chunks before the pixels, with a stream that does not compress */
+    SPACE = 1024,     /* for the chunks before the pixels; and what a stream is longer by that cannot be compressed */
     LEVEL = 1,        /* higher ones find no more in filtered rows */
     AVERAGE = 3       /* of left and above: what matches are found in is 3 to 10% smaller than by Paeth's */
 };
