@@ -65,8 +65,8 @@ static void gradient(void *user)
     ag_scope_end(s->own, mark, NULL, 0);
 }
 
-/* always_exact: lgd-infer computes such a network directly. The peers stand beside the way that it takes. */
-static void measure(nn_arch arch, bool always_exact, const char *heading)
+/* compat: what the estimator and g take the layers for. The peers stand beside the way that lgd-infer takes. */
+static void measure(nn_arch arch, nn_compat compat, const char *heading)
 {
     enum { ROUNDED = 5 };
     char label[128], job[256] = "bf16 ";
@@ -82,6 +82,7 @@ static void measure(nn_arch arch, bool always_exact, const char *heading)
         ag_tape_destroy(&s.own);
         return;
     }
+    s.model->arch.compat = compat; /* only now: the layers have our names, which bench_network_flop reads */
     nn_model_init(s.model, 1);
     ag_freeze(s.tape, true);
     ag_freeze(s.own, true);
@@ -117,11 +118,10 @@ static void measure(nn_arch arch, bool always_exact, const char *heading)
         snprintf(label, sizeof label, "g and %d steps, %s", steps, exact ? "direct" : "Winograd where it wins");
         t = bench_measure(whole, &s);
         bench_row(label, t, flop);
-        if (exact == always_exact) bench_row_peers(t, flop, job + ROUNDED);
+        if (!exact) bench_row_peers(t, flop, job + ROUNDED);
         if (exact) bench_row_threads(whole, &s);
         bench_row("  of which g and the steps", bench_measure(network, &s), flop);
     }
-    s.options.exact = always_exact;
     s.options.precision = LGD_BF16;
     t = bench_measure(whole, &s);
     snprintf(label, sizeof label, "g and %d steps, bf16%s", steps, bench_bf16(&t) ? "" : ", emulated");
@@ -133,7 +133,7 @@ static void measure(nn_arch arch, bool always_exact, const char *heading)
     nn_model_free(&s.model);
 }
 
-BENCH(infer) { measure(nn_arch_default(), false, "inference, 256 x 256, default architecture"); }
+BENCH(infer) { measure(nn_arch_default(), NN_COMPAT_NONE, "inference, 256 x 256, default architecture"); }
 
 /* The shipped model's, whose Newton steps the peers do not have. */
 BENCH(infer_shipped)
@@ -142,7 +142,7 @@ BENCH(infer_shipped)
     nn_arch a;
     nn_file *file = nn_file_open("models/single.safetensors", &st);
     if (!file || nn_arch_from_file(file, &a, &st)) printf("  %s\n", st.message);
-    else measure(a, false, "inference, 256 x 256, the architecture of models/single.safetensors");
+    else measure(a, NN_COMPAT_NONE, "inference, 256 x 256, the architecture of models/single.safetensors");
     nn_file_close(&file);
 }
 
@@ -155,5 +155,5 @@ BENCH(infer_paper)
     a.h_width = 256, a.h_gru = 64, a.iterations = 6, a.recurrent = false, a.descent = NN_DESCENT_NONE,
     a.mean_before_norm = false;
     a.rmse = NN_RMSE_BATCH, a.encoding = NN_GRADIENT_RAW;
-    measure(a, true, "inference, 256 x 256, the published networks");
+    measure(a, NN_COMPAT_PUBLISHED, "inference, 256 x 256, the published networks");
 }

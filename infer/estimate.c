@@ -365,8 +365,7 @@ ts_code lgd_estimator_run(const lgd_estimator *e, const lgd_photo *photo, int ph
                           float *maps, ts_status *st)
 {
     ag_compute_set(e->tape,
-                   (ts_compute){/* whoever runs the published network wants its numbers */
-                                .exact = o->exact || e->net->arch.compat == NN_COMPAT_PUBLISHED,
+                   (ts_compute){.exact = o->exact,
                                 .precision = o->precision == LGD_BF16 ? TS_BF16 : TS_F32,
                                 .threads = o->threads > 0 ? o->threads : ts_threads_allowed()});
     return estimate(e, photo, photos, side, o, maps, st);

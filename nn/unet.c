@@ -46,12 +46,24 @@ static ag_value *seen_by(ag_tape *tape, const nn_model *model, ag_value *photo, 
     return x;
 }
 
+/* How g is computed before its last block. The first normalisation of the published g magnifies rounding up to six
+ * times, the others carry it on (docs/published.md): no Winograd there, but where more is rounded anyway, in bf16, and
+ * for training, whose gradients are noisier. */
+static ts_compute careful(const ag_tape *tape, const nn_model *model)
+{
+    ts_compute c = *ag_compute(tape);
+    c.exact |= model->arch.compat == NN_COMPAT_PUBLISHED && c.precision == TS_F32 && !ag_gradients(tape);
+    return c;
+}
+
 static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, nn_guess *guess)
 {
     const nn_layers *l = model->layers;
     const int levels = model->arch.g_levels;
     *guess = (nn_guess){0};
     if (!photo) return false;
+    const ts_compute asked = *ag_compute(tape);
+    ag_compute_set(tape, careful(tape, model));
     ag_value *squares = nn_squares_room(tape, model, photo->t.shape.n);
     const ts_mark begun = ag_scope_begin(tape);
     ag_value *seen = seen_by(tape, model, photo, conditions);
@@ -70,6 +82,7 @@ static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value 
     if (model->arch.scene)
         guess->scene = nn_linear(tape, model, l->scene[1], ag_selu(tape, nn_linear(tape, model, l->scene[0], global)));
     for (int i = 0; i < levels; i++) {
+        if (i == levels - 1) ag_compute_set(tape, asked);
         ts_mark mark = ag_scope_begin(tape);
         ag_value *keep[2] = {ag_concat(tape, skip[levels - 1 - i], ag_upsample(tape, x)), global};
         block(tape, model, &l->up[i], true, &keep[0], &keep[1]);

@@ -124,7 +124,8 @@ static bool look(int step, const ag_value *maps, void *user)
     return true;
 }
 
-TEST(parity_with_the_published_network)
+/* exact: as lgd-infer --exact computes it, else as it does by itself. */
+static void whole(bool exact)
 {
 #ifdef __SANITIZE_ADDRESS__
     test_skip("265 billion multiplications take too long with sanitizers; parity_of_the_refiner runs");
@@ -134,6 +135,7 @@ TEST(parity_with_the_published_network)
     float *image = stored(f, "input.image", 3);
     ts_status st = {0};
     ag_tape *t = ag_tape_create(false, &st);
+    ag_compute_set(t, (ts_compute){.exact = exact});
     nn_input in = {
         .image = ts_view(image, (ts_shape){1, SIDE, SIDE, 3}), .grid = rd_grid_full(SIDE), .view = rd_flash()};
     seen s = {m, &in, f, malloc((size_t)SIDE * SIDE * CHANNELS * sizeof(float))};
@@ -143,8 +145,11 @@ TEST(parity_with_the_published_network)
     compare("lgd.output", out->t.data, stored(f, "lgd.output", CHANNELS), CHANNELS, 0, 3e-3);
 }
 
+TEST(parity_with_the_published_network) { whole(false); }
+TEST(parity_with_the_published_network_directly) { whole(true); }
+
 /* The renderer and h alone, from the stored R_0: nothing of g's rounding is in these. */
-TEST(parity_of_the_refiner)
+static void refiner(bool exact)
 {
     nn_file *f = fixture();
     nn_model *m = published();
@@ -154,6 +159,7 @@ TEST(parity_of_the_refiner)
     double rmse;
     ts_status st = {0};
     ag_tape *t = ag_tape_create(false, &st);
+    ag_compute_set(t, (ts_compute){.exact = exact});
     const ts_shape s = {1, SIDE, SIDE, CHANNELS};
     const rd_view view = rd_published_flash();
     const rd_grid grid = rd_grid_full(SIDE);
@@ -167,3 +173,6 @@ TEST(parity_of_the_refiner)
     CHECK(delta, "%s", ag_status(t)->message);
     compare("step0.delta", delta->t.data, stored(f, "step0.delta", CHANNELS), CHANNELS, 1e-6, 1e-7);
 }
+
+TEST(parity_of_the_refiner) { refiner(false); }
+TEST(parity_of_the_refiner_directly) { refiner(true); }
