@@ -77,9 +77,9 @@ typedef struct lgd_options {
     size_t size;      /* sizeof(lgd_options) where the caller was compiled: fields beyond it have their defaults */
     int iterations;   /* refinement steps; 0: R_0 alone, -1: lgd_usual_iterations, LGD_AUTO */
     int exact;        /* 0: convolutions use Winograd's algorithm where it is faster; else all are computed directly.
-                       * g of the published network always is but for its last block. The shipped model's maps of real
-                       * photographs differ by less than 1e-5 (RMS of a map), single values by less than 1e-3, as they
-                       * do between instruction sets (docs/performance.md) */
+                       * In f32 g of the published network always is, but for its last block. The shipped model's maps
+                       * of real photographs differ by less than 1e-5 (RMS of a map), single values by less than 1e-3,
+                       * as they do between instruction sets (docs/performance.md) */
     int precision;    /* LGD_F32; LGD_BF16: inputs and weights of convolutions are rounded to bf16, for CPUs with AMX or
                        * AVX512-BF16 (much slower on others). Sums, renderer and maps stay f32. Maps differ by
                        * less than 0.005 (RMS), fewer than one value in 10,000 by more than 0.05, single ones by up to
