@@ -20,6 +20,7 @@ class Absent(Exception):
 class Eager:
     """Operation by operation, in the better of both memory formats."""
     layouts = LAYOUTS
+    edge = "replicate"  # of convolutions that are trained, as F.pad calls it
 
     def __init__(self, threads, rounded):
         self.threads, self.rounded = threads, rounded
@@ -46,6 +47,7 @@ class Compiled(Eager):
     """torch.compile, the weights frozen where nothing is trained, channels last; the renderer's gradient by its own
     differentiation of functions, which it compiles too."""
     layouts = LAYOUTS[:1]
+    edge = "constant"  # zeros, in less time: it fails at the gradient of a repeated border
 
     def __init__(self, threads, rounded):
         super().__init__(threads, rounded)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """The peers of lgd-bench: our networks and single convolutions in PyTorch, in torch.compile and in OpenVINO
-(peer_engines.py), on the CPU.
+(peer_engines.py), on the CPU. The networks are in peer_networks.py.
 
 Reads jobs from standard input, one a line, and answers each with its median time in seconds (or "-" and a reason):
     threads N
@@ -12,7 +12,9 @@ Reads jobs from standard input, one a line, and answers each with its median tim
     COARSE_WIDTH COARSE_GRU SIDE
     ENGINE train (the same up to COARSE_GRU) BATCH PATCH WINDOW FIXED   T 0: g alone; FIXED 1: all but g; H_WIDTH 0: the
     coarse steps alone
-    ENGINE bf16 conv ..., infer ..., train ...   the same with the networks in bfloat16
+    ENGINE guess G_WIDTH G_MAX G_LEVELS G_FIRST G_KERNEL G_SIZE UNSHUFFLE DETAIL TRUNK HALF   g at full detail
+    ENGINE train_guess (the same) BATCH          a step of its training
+    ENGINE bf16 conv ..., infer ..., train ..., guess ...   the same with the networks in bfloat16
 Weights are random: time does not depend on them. Renderer's gradients are included.
 """
 import math
@@ -25,6 +27,7 @@ try:
     from torch import nn
 
     import peer_engines as engines
+    from peer_networks import Detailed, Refiner, UNet, padded
 except ImportError:
     print("- there is no PyTorch here", flush=True)
     sys.exit(0)
@@ -45,11 +48,6 @@ def median_time(f, least=0.7, most=10.0):
         if wall() - begin > most and len(times) >= 2:
             break
     return sorted(times)[len(times) // 2]
-
-
-def padded(x, k, dilation, pad):
-    reach = dilation * (k // 2)
-    return F.pad(x, (reach,) * 4, mode="replicate") if pad == "replicate" else x
 
 
 class Convolution(nn.Module):
@@ -83,78 +81,6 @@ def gradient(engine, n, h, w, ic, oc, k, dilation, pad):
         dy = torch.randn_like(y)
         best = min(best, median_time(lambda: torch.autograd.grad(y, (x, net.conv.weight), dy, retain_graph=True)))
     return best
-
-
-class Block(nn.Module):
-    def __init__(self, ins, middle, out, glob, k, norm):
-        super().__init__()
-        self.conv1 = nn.Conv2d(ins, middle, k, padding=k // 2)
-        self.conv2 = nn.Conv2d(middle, out, k, padding=k // 2, bias=False)
-        self.add, self.glob, self.norm = nn.Linear(glob, out), nn.Linear(out + glob, out), norm
-
-    def forward(self, x, g):
-        y = self.conv2(self.conv1(x))
-        mean = y.mean((2, 3))
-        if self.norm:
-            y = F.instance_norm(y, eps=1e-5)
-        x = F.leaky_relu(y + self.add(g)[:, :, None, None], 0.2)
-        return x, F.selu(self.glob(torch.cat([mean, g], 1)))
-
-
-class UNet(nn.Module):
-    def __init__(self, width, width_max, levels, first, kernel, channels):
-        super().__init__()
-        wide = [min(width << i, width_max) for i in range(levels + 1)]
-        self.conv, self.glob = nn.Conv2d(3, wide[0], 3, padding=1), nn.Linear(3, wide[0])
-        self.down = nn.ModuleList(Block(wide[i], wide[i + 1], wide[i + 1], wide[i], kernel if i else first,
-            i < levels - 1) for i in range(levels))
-        up, deep = [], wide[levels]
-        for i in range(1, levels + 1):
-            skip, out = wide[levels - i], wide[levels - i - 1] if i < levels else wide[0]
-            up.append(Block(skip + deep, (skip + deep) // 2, out, deep, kernel, True))
-            deep = out
-        self.up = nn.ModuleList(up)
-        self.out1, self.out2 = nn.Conv2d(wide[0], channels, 3, padding=1), nn.Conv2d(channels, channels, 3, padding=1)
-        self.add = nn.Linear(wide[0], channels)
-
-    def forward(self, x):
-        g = F.selu(self.glob(x.mean((2, 3))))
-        x, skips = F.leaky_relu(self.conv(x), 0.2), []
-        for block in self.down:
-            skips.append(x)
-            x, g = block(F.max_pool2d(x, 2), g)
-        for block in self.up:
-            x, g = block(torch.cat([skips.pop(), F.interpolate(x, scale_factor=2, mode="bilinear", align_corners=True)],
-                1), g)
-        return torch.tanh(self.out2(self.out1(x)) + self.add(g)[:, :, None, None])
-
-
-class Cell(nn.Module):
-    def __init__(self, ins, c):
-        super().__init__()
-        self.ih, self.hh, self.c = nn.Conv2d(ins, 3 * c, 1), nn.Conv2d(c, 3 * c, 1), c
-
-    def forward(self, x, old):
-        iz, ir, im = self.ih(x).chunk(3, 1)
-        hz, hr, hm = (self.hh(old) if old is not None else self.hh.bias[None, :, None, None]).chunk(3, 1)
-        z, r = torch.sigmoid(iz + hz), torch.sigmoid(ir + hr)
-        m = torch.tanh(im + r * hm)
-        return z * m if old is None else (1 - z) * old + z * m
-
-
-class Refiner(nn.Module):
-    def __init__(self, width, gru, channels, recurrent):
-        super().__init__()
-        self.conv1, self.cell1 = nn.Conv2d(2 * channels, width, 5), Cell(width, gru)
-        self.conv2, self.cell2 = nn.Conv2d(gru, width, 3, dilation=2), Cell(width, gru)
-        self.out, self.recurrent = nn.Conv2d(gru, channels, 3, bias=False), recurrent
-
-    def forward(self, x, state):
-        a = self.cell1(F.leaky_relu(self.conv1(padded(x, 5, 1, "replicate")), 0.01),
-            state[0] if self.recurrent else None)
-        b = self.cell2(F.leaky_relu(self.conv2(padded(a, 3, 2, "replicate")), 0.01),
-            state[1] if self.recurrent else None)
-        return torch.tanh(self.out(padded(b, 3, 1, "replicate"))), (a, b)
 
 
 def dot(a, b):
@@ -286,6 +212,27 @@ def training_loss(maps, target, place, light, camera):
     return total
 
 
+def directions(batch):
+    """Lights and cameras of nine views, above the surface."""
+    light, camera = torch.randn(9, batch, 3, 1, 1), torch.randn(9, batch, 3, 1, 1)
+    light[:, :, 2], camera[:, :, 2] = light[:, :, 2].abs() + 0.3, camera[:, :, 2].abs() + 0.3
+    return light, camera
+
+
+def stepper(engine, net, loss):
+    """A step of training."""
+    adam = torch.optim.Adam([p for p in net.parameters() if p.requires_grad], 1e-4, fused=True)
+    forward = engine.function(loss)
+
+    def step():
+        adam.zero_grad(set_to_none=True)
+        forward().backward()
+        torch.nn.utils.clip_grad_norm_(net.parameters(), 1.0)
+        adam.step()
+
+    return step
+
+
 def train(engine, words):
     best = math.inf
     for layout in engine.layouts:
@@ -294,12 +241,10 @@ def train(engine, words):
         net.g.requires_grad_(not fixed)
         if type(engine) is engines.Compiled:
             net.descent = gradient_of_function
-        adam = torch.optim.Adam([p for p in net.parameters() if p.requires_grad], 1e-4, fused=True)
         whole = torch.rand(batch, 3, patch, patch).contiguous(memory_format=layout)
         image, place = whole[:, :, :window, :window], positions(window, window, window)
         target = torch.rand(batch, net.a["channels"], window, window) - 0.5
-        light, camera = torch.randn(9, batch, 3, 1, 1), torch.randn(9, batch, 3, 1, 1)
-        light[:, :, 2], camera[:, :, 2] = light[:, :, 2].abs() + 0.3, camera[:, :, 2].abs() + 0.3
+        light, camera = directions(batch)
 
         def loss():
             with engine.autocast():
@@ -309,15 +254,54 @@ def train(engine, words):
                 total = total + training_loss(first, target, place, light, camera)
             return total
 
-        forward = engine.function(loss)
+        best = min(best, median_time(stepper(engine, net, loss)))
+    return best
 
-        def step():
-            adam.zero_grad(set_to_none=True)
-            forward().backward()
-            torch.nn.utils.clip_grad_norm_(net.parameters(), 1.0)
-            adam.step()
 
-        best = min(best, median_time(step))
+def detailed(words, edge="replicate"):
+    torch.manual_seed(1)
+    return Detailed(*map(int, words), edge)
+
+
+def guess(engine, words):
+    """R_0 at full detail, how far it may be off, and the scene, of one photograph of which nothing is known."""
+    best = math.inf
+    for layout in engine.layouts:
+        net, size = detailed(words), int(words[5])
+        side = size * int(words[6])
+        given = [torch.rand(1, 3, side, side).contiguous(memory_format=layout), torch.zeros(1, 8, size, size)]
+        with torch.no_grad(), engine.autocast():
+            run = engine.module(net.to(memory_format=layout).eval(), given)
+            best = min(best, median_time(lambda: run(*given)))
+    return best
+
+
+def laplace(x, scale, target, unit):
+    """-log of Laplace's density, but for a constant."""
+    scale = scale.clamp(-6, 4)
+    return ((x - target).abs() * torch.exp(-scale) / unit + scale).mean()
+
+
+def train_guess(engine, words):
+    best = math.inf
+    for layout in engine.layouts:
+        *shape, batch = words
+        net, size = detailed(shape, engine.edge).to(memory_format=layout), int(shape[5])
+        side = size * int(shape[6])
+        photo, known = torch.rand(batch := int(batch), 3, side, side), torch.zeros(batch, 8, size, size)
+        photo = photo.contiguous(memory_format=layout)
+        target, scene, place = torch.rand(batch, 9, side, side) - 0.5, torch.rand(batch, 8), positions(side, side, side)
+        light, camera = directions(batch)
+
+        def loss():
+            with engine.autocast():
+                maps, spread, numbers = (v.float() for v in net(photo, known))
+            each = torch.cat([spread[:, [c]] for c in (0, 0, 0, 1, 1, 2, 3, 3, 3)], 1)
+            normal = (maps[:, 3:5] - target[:, 3:5]).square().mean((1, 2, 3)).add(1e-6).sqrt().mean()
+            return training_loss(maps, target, place, light, camera) + 5 * normal + \
+                laplace(maps.detach(), each, target, 0.1) + laplace(numbers[:, :8], numbers[:, 8:], scene, 1)
+
+        best = min(best, median_time(stepper(engine, net, loss)))
     return best
 
 
@@ -338,7 +322,8 @@ def answer(words):
     if work in ("conv", "gradient"):
         return f"{(convolution if work == 'conv' else gradient)(engine, *map(int, rest[:7]), rest[7]):.6g}"
     torch.compiler.reset()
-    return f"{(infer if work == 'infer' else train)(engine, rest):.6g}"
+    work = {"infer": infer, "train": train, "guess": guess, "train_guess": train_guess}[work]
+    return f"{work(engine, rest):.6g}"
 
 
 def main():

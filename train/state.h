@@ -107,6 +107,10 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st);
 ag_value *tr_add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value *target, double weight, double *render,
                       double *map);
 
+/* The loss of all that g says of in's photographs: R_0, how far that may be off (which moves R_0 nowhere), and the
+ * scene. target [batch, patch, patch, 9]; its parts go to *row. NULL after an error, which the tape has. */
+ag_value *tr_guess_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr_row *row);
+
 /* revision.c. The first guesses of photographs of nn_arch_side, one of each material, on a tape without gradients:
  * what revisions begin with. disturbed: NULL, or whose train.disturb makes this step's maps worse. False after an
  * error, which the tape has. */

@@ -39,8 +39,7 @@ static ag_value *add_weighted(ag_tape *tape, ag_value *sum, ag_value *loss, doub
     return ag_add(tape, sum, ag_scale(tape, loss, (float)weight));
 }
 
-/* The loss of all that g says: R_0, how far that may be off (which moves R_0 nowhere), and the scene. */
-static ag_value *guess_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr_row *row)
+ag_value *tr_guess_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr_row *row)
 {
     const tr_config *c = &t->config;
     ag_tape *tape = t->tape;
@@ -134,7 +133,7 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
                    .given = given,
                    .recompute = c->train.checkpoint_steps};
     if (row->pretraining) {
-        return guess_loss(t, &in, ag_constant(t->tape, goals), row);
+        return tr_guess_loss(t, &in, ag_constant(t->tape, goals), row);
     }
     if (c->arch.revisions > 0) return tr_revision_loss(t, &in, ag_constant(t->tape, goals), row);
     if (c->coder.code > 0) {
