@@ -180,6 +180,7 @@ static int by_name(const void *a, const void *b)
 int main(int argc, char **argv)
 {
     cl_open_streams();
+    cl_trace();
     ts_status st = {0};
     if (argc == 2 && strcmp(argv[1], "--help") == 0) {
         printf("usage: lgd-bench [--list | --cpu | --batches CONFIG.ini] [NAME...]\nRuns the benchmarks whose name "
