@@ -21,18 +21,26 @@ static void forward(ag_tape *tape, ag_node *node)
     ts_for(ag_threads(tape), ts_count(node->out->t.shape), AG_CHUNK, forward_range, node);
 }
 
-static void backward_range(const void *job, int64_t begin, int64_t end)
+typedef struct passing {
+    const float *dy;
+    float *dx;
+    bool accumulate;
+} passing;
+
+static void pass_range(const void *job, int64_t begin, int64_t end)
 {
-    const ag_back *b = job;
-    ts_elementwise_k()->scale(end - begin, 1.0f, b->node->out->grad + begin, b->dx + begin, b->accumulate);
+    const passing *p = job;
+    ts_elementwise_k()->scale(end - begin, 1.0f, p->dy + begin, p->dx + begin, p->accumulate);
 }
 
+/* One input gets dy itself where it can. */
 static void backward(ag_tape *tape, ag_node *node)
 {
+    passing p = {.dy = node->out->grad};
+    const int moved = ag_grad_move(node->out, node->in[0]) ? 0 : ag_grad_move(node->out, node->in[1]) ? 1 : -1;
     for (int j = 0; j < 2; j++) {
-        ag_back b = {.node = node};
-        b.dx = ag_grad_target(tape, node->in[j], &b.accumulate);
-        if (b.dx) ts_for(ag_threads(tape), ts_count(node->out->t.shape), AG_CHUNK, backward_range, &b);
+        p.dx = j == moved ? NULL : ag_grad_target(tape, node->in[j], &p.accumulate);
+        if (p.dx) ts_for(ag_threads(tape), ts_count(node->out->t.shape), AG_CHUNK, pass_range, &p);
     }
 }
 

@@ -24,7 +24,7 @@ typedef struct conv_attr {
     float leak;
 } conv_attr;
 
-/* All channels of the input; what is joined is there until the arena is released to before. */
+/* All channels of the input, in the arena where constants join it. */
 static const float *input(ag_tape *tape, const ag_node *node)
 {
     const ag_value *x = node->in[X], *constants = node->in[CONSTANTS];
@@ -35,6 +35,13 @@ static const float *input(ag_tape *tape, const ag_node *node)
     if (both) ag_join(tape, x, constants, both);
     else ag_fail(tape, TS_NOMEM, "conv: no memory for %lld values", (long long)ts_count(s));
     return both;
+}
+
+/* Whether backward reads the input. */
+static bool reads_input(const ag_tape *tape, const ag_node *node)
+{
+    const ag_value *bias = node->in[BIAS];
+    return ag_gradients(tape) && (node->in[WEIGHT]->needs_grad || (bias && bias->needs_grad));
 }
 
 static void weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
@@ -65,11 +72,14 @@ static void forward(ag_tape *tape, ag_node *node)
     const conv_attr *a = node->attr;
     const ts_conv_use use = ts_conv_packing(&a->conv, TS_CONV_OUTPUT);
     if (ag_traced()) ag_trace_way(tape, ts_conv_way_name(ts_conv_choose(&a->conv, TS_CONV_OUTPUT)));
-    const ts_mark mark = ts_arena_mark(ag_arena(tape));
-    const float *packed = ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data);
-    if (!packed) return;
+    ts_mark mark = ts_arena_mark(ag_arena(tape));
     const float *x = input(tape, node), *bias = node->in[BIAS] ? node->in[BIAS]->t.data : NULL;
-    if (x) forwards[use](&a->conv, x, packed, bias, a->leak, node->out->t.data);
+    if (reads_input(tape, node)) {
+        node->saved = (void *)(uintptr_t)x;
+        mark = ts_arena_mark(ag_arena(tape));
+    }
+    const float *packed = ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data);
+    if (x && packed) forwards[use](&a->conv, x, packed, bias, a->leak, node->out->t.data);
     ts_arena_release(ag_arena(tape), mark);
 }
 
@@ -88,10 +98,7 @@ static void backward(ag_tape *tape, ag_node *node)
     if (a->leak != 1.0f) /* in place: nobody reads this gradient afterwards */
         ts_for(ag_threads(tape), ts_count(node->out->t.shape), AG_CHUNK, leaky_range, node);
     float *dweight = ag_grad_add(tape, node->in[WEIGHT]), *dbias = ag_grad_add(tape, node->in[BIAS]);
-    const ts_mark mark = ts_arena_mark(ag_arena(tape));
-    const float *x = dweight || dbias ? input(tape, node) : NULL;
-    if (x) weight_gradient(&a->conv, x, dy, dweight, dbias);
-    ts_arena_release(ag_arena(tape), mark);
+    if (dweight || dbias) weight_gradient(&a->conv, node->saved, dy, dweight, dbias);
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[X], &accumulate);
     const ts_conv_use use = ts_conv_packing(&a->conv, TS_CONV_INPUT);

@@ -5,9 +5,9 @@
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
+#include "tensor/kernels/elementwise.h"
 #include "tensor/kernels/vmath_arrays.h"
 #include <math.h>
-#include <string.h>
 
 #ifdef AG_API
 /* How unlikely target [N,H,W,C] is where x [N,H,W,C] is expected and off by u e^spread. spread: [N,H,W,G]; group: for
@@ -23,17 +23,22 @@ enum { MOST = 32, BLOCK = 64 /* pixels whose scales are computed at once */ };
 
 typedef struct laplace_attr {
     float unit;
-    signed char group[MOST];
+    signed char group[MOST], member[MOST], first[MOST + 1]; /* group g has the channels member[first[g]] .. */
 } laplace_attr;
 
 /* Comparisons, which become instructions, where fminf and fmaxf are calls. */
 static float held(float s) { return s < LEAST ? LEAST : s > LARGEST ? LARGEST : s; }
 
+/* What forward keeps: its derivatives by x and s times count, NULL where nobody asks. */
+typedef struct slopes {
+    float *dx, *ds;
+} slopes;
+
 typedef struct laplace_job {
     const ag_node *node;
+    slopes to;
     int64_t pixels, chunk;
     double *sums;
-    float up, *dx, *ds;
 } laplace_job;
 
 /* s in its range, and 1 / (u e^s), of count values of s, at most BLOCK pixels of MOST channels. */
@@ -45,26 +50,31 @@ static void invert(const float *s, int64_t count, float unit, float *scale, floa
     for (int64_t i = 0; i < count; i++) inverse[i] /= unit;
 }
 
-/* Of so many pixels. */
-static double sum_block(const laplace_attr *a, int64_t pixels, int c, int g, const float *x, const float *s,
-                        const float *t)
+/* The sum of so many pixels, and their slopes. */
+static double block(const laplace_attr *a, int64_t pixels, int c, int g, const float *x, const float *s, const float *t,
+                    float *dx, float *ds)
 {
     float scale[BLOCK * MOST], inverse[BLOCK * MOST];
     double sum = 0;
     invert(s, pixels * g, a->unit, scale, inverse);
-    for (int64_t p = 0; p < pixels; p++, x += c, t += c) {
-        const float *of = inverse + p * g, *log_of = scale + p * g;
+    for (int64_t p = 0; p < pixels; p++, x += c, t += c, s += g) {
+        const float *of = inverse + p * g;
         float pixel = 0;
-        for (int i = 0; i < c; i++) {
-            const int j = a->group[i];
-            pixel += fabsf(x[i] - t[i]) * of[j] + log_of[j];
+        for (int j = 0; j < g; j++) {
+            const int first = a->first[j], count = a->first[j + 1] - first;
+            float off = 0;
+            for (int k = first; k < first + count; k++) off += fabsf(x[a->member[k]] - t[a->member[k]]);
+            off *= of[j];
+            pixel += off + (float)count * scale[p * g + j];
+            if (ds) ds[p * g + j] = s[j] > LEAST && s[j] < LARGEST ? (float)count - off : 0;
         }
         sum += (double)pixel;
+        for (int i = 0; dx && i < c; i++) dx[p * c + i] = (float)((x[i] > t[i]) - (x[i] < t[i])) * of[a->group[i]];
     }
     return sum;
 }
 
-static void sum_chunk(const void *job, int64_t k)
+static void chunk(const void *job, int64_t k)
 {
     const laplace_job *j = job;
     const float *x = j->node->in[0]->t.data, *s = j->node->in[1]->t.data, *t = j->node->in[2]->t.data;
@@ -72,62 +82,61 @@ static void sum_chunk(const void *job, int64_t k)
     const int64_t end = k * j->chunk + ag_part(j->pixels, k * j->chunk, j->chunk);
     double part = 0;
     for (int64_t p = k * j->chunk; p < end; p += BLOCK)
-        part += sum_block(j->node->attr, ag_part(end, p, BLOCK), c, g, x + p * c, s + p * g, t + p * c);
+        part += block(j->node->attr, ag_part(end, p, BLOCK), c, g, x + p * c, s + p * g, t + p * c,
+                      j->to.dx ? j->to.dx + p * c : NULL, j->to.ds ? j->to.ds + p * g : NULL);
     j->sums[k] = part;
+}
+
+/* Room for the slopes that backward asks for. */
+static bool slopes_of(ag_tape *tape, const ag_node *node, slopes *to)
+{
+    float **of[2] = {&to->dx, &to->ds};
+    for (int i = 0; i < 2; i++)
+        if (ag_gradients(tape) && node->in[i]->needs_grad &&
+            !(*of[i] = ts_new(ag_arena(tape), node->in[i]->t.shape).data))
+            return false;
+    return true;
 }
 
 static void forward(ag_tape *tape, ag_node *node)
 {
     const int c = node->in[0]->t.shape.c;
-    const int64_t pixels = ts_pixels(node->in[0]->t.shape), chunk = ag_pixel_chunk(c),
-                  chunks = (pixels + chunk - 1) / chunk;
+    const int64_t pixels = ts_pixels(node->in[0]->t.shape), each = ag_pixel_chunk(c),
+                  chunks = (pixels + each - 1) / each;
     double *sums = ts_arena_alloc(ag_arena(tape), (size_t)chunks * sizeof *sums), sum = 0;
-    if (!sums) {
-        ag_fail(tape, TS_NOMEM, "laplace: no memory for %lld sums", (long long)chunks);
+    slopes *to = ts_arena_zalloc(ag_arena(tape), 1, sizeof *to);
+    if (!sums || !to || !slopes_of(tape, node, to)) {
+        ag_fail(tape, TS_NOMEM, "laplace: no memory for %lld pixels", (long long)pixels);
         return;
     }
-    ts_tasks(ag_threads(tape), chunks, sum_chunk,
-             &(laplace_job){.node = node, .pixels = pixels, .chunk = chunk, .sums = sums});
+    node->saved = to;
+    ts_tasks(ag_threads(tape), chunks, chunk,
+             &(laplace_job){.node = node, .to = *to, .pixels = pixels, .chunk = each, .sums = sums});
     for (int64_t k = 0; k < chunks; k++) sum += sums[k];
     node->out->t.data[0] = (float)(sum / ((double)pixels * c));
 }
 
-/* Of so many pixels; dx or ds may be NULL. */
-static void add_block(const laplace_attr *a, int64_t pixels, int c, int g, const float *x, const float *s,
-                      const float *t, float up, float *dx, float *ds)
-{
-    float scale[BLOCK * MOST], inverse[BLOCK * MOST], each[MOST];
-    invert(s, pixels * g, a->unit, scale, inverse);
-    for (int64_t p = 0; p < pixels; p++, x += c, t += c, s += g) {
-        const float *of = inverse + p * g;
-        for (int i = 0; dx && i < c; i++)
-            dx[p * c + i] += (float)((x[i] > t[i]) - (x[i] < t[i])) * (up * of[a->group[i]]);
-        if (!ds) continue;
-        for (int j = 0; j < g; j++) each[j] = 0;
-        for (int i = 0; i < c; i++) each[a->group[i]] += up * (1 - fabsf(x[i] - t[i]) * of[a->group[i]]);
-        for (int j = 0; j < g; j++) ds[p * g + j] += s[j] > LEAST && s[j] < LARGEST ? each[j] : 0;
-    }
-}
+typedef struct scaling {
+    const float *slope;
+    float up, *to;
+    bool accumulate;
+} scaling;
 
-static void backward_pixels(const void *job, int64_t begin, int64_t end)
+static void scale_range(const void *job, int64_t begin, int64_t end)
 {
-    const laplace_job *j = job;
-    const float *x = j->node->in[0]->t.data, *s = j->node->in[1]->t.data, *t = j->node->in[2]->t.data;
-    const int c = j->node->in[0]->t.shape.c, g = j->node->in[1]->t.shape.c;
-    for (int64_t p = begin; p < end; p += BLOCK)
-        add_block(j->node->attr, ag_part(end, p, BLOCK), c, g, x + p * c, s + p * g, t + p * c, j->up,
-                  j->dx ? j->dx + p * c : NULL, j->ds ? j->ds + p * g : NULL);
+    const scaling *s = job;
+    ts_elementwise_k()->scale(end - begin, s->up, s->slope + begin, s->to + begin, s->accumulate);
 }
 
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const int c = node->in[0]->t.shape.c;
-    const int64_t pixels = ts_pixels(node->in[0]->t.shape);
-    ts_for(ag_threads(tape), pixels, ag_pixel_chunk(c), backward_pixels,
-           &(laplace_job){.node = node,
-                          .up = node->out->grad[0] / (float)(pixels * c),
-                          .dx = ag_grad_add(tape, node->in[0]),
-                          .ds = ag_grad_add(tape, node->in[1])});
+    const slopes *of = node->saved;
+    const float *slope[2] = {of->dx, of->ds};
+    for (int i = 0; i < 2; i++) {
+        scaling s = {.slope = slope[i], .up = node->out->grad[0] / (float)ts_count(node->in[0]->t.shape)};
+        s.to = ag_grad_target(tape, node->in[i], &s.accumulate);
+        if (s.to) ts_for(ag_threads(tape), ts_count(node->in[i]->t.shape), AG_CHUNK, scale_range, &s);
+    }
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)
@@ -195,6 +204,12 @@ ag_value *ag_laplace(ag_tape *tape, ag_value *x, ag_value *spread, ag_value *tar
         a.group[i] = group[i];
         if (group[i] < 0 || group[i] >= of.c)
             return ag_fail(tape, TS_INVALID, "laplace: channel %d has spread %d of %d", i, group[i], of.c);
+    }
+    for (int g = 0, members = 0; g < of.c; g++) {
+        a.first[g] = (signed char)members;
+        for (int i = 0; i < s.c; i++)
+            if (group[i] == g) a.member[members++] = (signed char)i;
+        a.first[g + 1] = (signed char)members;
     }
     return ag_apply(tape, &op_laplace, 3, in, (ts_shape){1, 1, 1, 1}, &a, sizeof a);
 }

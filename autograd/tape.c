@@ -252,6 +252,15 @@ float *ag_grad_target(ag_tape *tape, ag_value *v, bool *accumulate)
     return v->grad;
 }
 
+bool ag_grad_move(ag_value *from, ag_value *v)
+{
+    if (!v || !v->needs_grad || v->grad) return false;
+    v->grad = from->grad;
+    v->grad_ready = true;
+    from->grad = NULL;
+    return true;
+}
+
 float *ag_grad_add(ag_tape *tape, ag_value *v)
 {
     bool accumulate;

@@ -96,7 +96,10 @@ ag_value *ag_apply(ag_tape *tape, const ag_op *op, int inputs, ag_value *const *
 /* For backward: where to put the gradient of v, or NULL when nobody needs it. *accumulate says whether to add to what
  * is there (true) or to overwrite every value (false); afterwards the gradient counts as written. */
 float *ag_grad_target(ag_tape *tape, ag_value *v, bool *accumulate);
-/* The same, always to be added to (zeros were put there when it was fresh). */
+/* Makes the gradient of `from`, which has been made and which nobody reads afterwards, that of v, of as many values,
+ * without a copy. False, with nothing done, when v has one already or needs none. */
+bool ag_grad_move(ag_value *from, ag_value *v);
+/* As ag_grad_target, always to be added to (zeros were put there when it was fresh). */
 float *ag_grad_add(ag_tape *tape, ag_value *v);
 
 /* d loss / d parameter is added to every parameter's grad. loss: one value. Returns the tape's code. May be called

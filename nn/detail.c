@@ -117,13 +117,12 @@ static ag_value *pixels(ag_tape *tape, const nn_model *model, ag_value *photo, a
  * empty. */
 static void take_apart(ag_tape *tape, const nn_model *model, ag_value *y, int top, nn_guess *to)
 {
-    const int framed = model->arch.channels + NN_FRAME;
-    ag_value *parts = ag_channels(tape, y, 0, framed);
+    const int channels = model->arch.channels;
     ag_into(tape, to->maps);
-    to->maps = ag_shading_frame(tape, parts, top);
+    to->maps = ag_shading_frame(tape, y, channels, top);
     if (!model->arch.spread) return;
     ag_into(tape, to->spread);
-    to->spread = ag_channels(tape, y, framed, NN_SPREADS);
+    to->spread = ag_channels(tape, y, channels + NN_FRAME, NN_SPREADS);
 }
 
 /* Rows begin to end - 1 of an image. */

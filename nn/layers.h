@@ -121,7 +121,7 @@ enum { NN_HALF_READS = 4 * 3 };
 
 /* Rows of squares that are at the full size at once, on a tape without gradients, and as many more above and below as
  * two convolutions there reach, and three at half of the side. */
-enum { NN_BAND = 16 };
+enum { NN_BAND = 32 };
 static inline int nn_band_margin(const nn_arch *a)
 {
     const int reach = 2 + (a->g_half > 0 ? 6 : 0);

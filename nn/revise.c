@@ -194,7 +194,7 @@ bool nn_revise(ag_tape *tape, const nn_model *model, nn_revision *r)
     y = ag_depth_to_space(tape, y, model->arch.g_unshuffle);
     y = nn_conv_with_constants(tape, model, h->full[0], y, read.again, 1, TS_PAD_REPLICATE, NN_LEAK_G);
     y = nn_conv(tape, model, h->full[1], y, 1, TS_PAD_REPLICATE, 1);
-    ag_value *change = ag_tanh(tape, ag_shading_frame(tape, ag_channels(tape, y, 0, MAP_CHANNELS + NN_FRAME), 0));
+    ag_value *change = ag_tanh(tape, ag_shading_frame(tape, y, MAP_CHANNELS, 0));
     ag_value *level = ag_channel_mean(tape, ag_channels(tape, change, MAP_ROUGHNESS, 4));
     ag_value *keep[3] = {ag_change_maps(tape, r->maps, change, level),
                          ag_add(tape, r->spread, ag_channels(tape, y, MAP_CHANNELS + NN_FRAME, NN_SPREADS)), state};

@@ -14,10 +14,10 @@ ag_value *ag_render_loss(ag_tape *tape, ag_value *maps, ag_value *target, const 
  * gradient at a perfect fit is 0 (render/render.h). */
 ag_value *ag_flash_loss(ag_tape *tape, ag_value *maps, ag_value *image, const rd_view *view);
 
-/* The maps [N, H, S, C] from x [N, H, S, C+2], whose last two channels are parts of the normal along and across the
- * direction from the centre (render/op_shading_frame.c has the equation). x has rows top .. top + H - 1 of squares of S
- * rows. */
-ag_value *ag_shading_frame(ag_tape *tape, ag_value *x, int top);
+/* The maps [N, H, S, channels] from the first channels + 2 of x [N, H, S, C], the last two of which are parts of the
+ * normal along and across the direction from the centre (render/op_shading_frame.c has the equation). x has rows top ..
+ * top + H - 1 of squares of S rows. */
+ag_value *ag_shading_frame(ag_tape *tape, ag_value *x, int channels, int top);
 
 /* Maps [N, H, W, 9] changed by change [N, H, W, 9] and levels [N, 1, 1, 4]: the three colours of diffuse by one factor,
  * so that a pixel keeps its hue, the normal by a sum, roughness and F0 of an image by one factor each, which the levels

@@ -65,7 +65,7 @@ static double squares(const ag_node *node, int64_t image, int threads, double *r
     return sum;
 }
 
-/* RMSE of each image, which backward divides by. */
+/* RMSE of each image, which backward divides by; NULL after an error. */
 static float *rmse_of(ag_tape *tape, const ag_node *node)
 {
     const ts_shape s = node->in[0]->t.shape;
@@ -80,7 +80,7 @@ static float *rmse_of(ag_tape *tape, const ag_node *node)
 static void forward(ag_tape *tape, ag_node *node)
 {
     const int n = node->in[0]->t.shape.n;
-    const float *rmse = rmse_of(tape, node);
+    const float *rmse = node->saved = rmse_of(tape, node);
     double sum = 0;
     for (int i = 0; i < n && rmse; i++) sum += (double)rmse[i];
     node->out->t.data[0] = (float)(sum / n);
@@ -107,8 +107,8 @@ static void backward(ag_tape *tape, ag_node *node)
     const range *r = node->attr;
     loss_job j = {.node = node, .up = (double)node->out->grad[0] / ((double)s.n * s.h * s.w * r->count)};
     j.to = ag_grad_target(tape, node->in[0], &j.add);
-    j.rmse = j.to ? rmse_of(tape, node) : NULL;
-    if (j.rmse) ts_for(ag_threads(tape), (int64_t)s.n * s.h, 1, backward_rows, &j);
+    j.rmse = node->saved;
+    if (j.to) ts_for(ag_threads(tape), (int64_t)s.n * s.h, 1, backward_rows, &j);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)
