@@ -41,11 +41,12 @@ winograd_grid winograd_grid_forward(const ts_conv *c, bool bf16)
                                       .oc = c->oc,
                                       .dilation = c->dilation,
                                       .side = WINOGRAD_REACH + 1 - c->k,
-                                      .first = -c->dilation * (c->k / 2),
+                                      .first_row = -c->dilation * (c->k / 2),
+                                      .first_column = -c->dilation * (c->k / 2),
                                       .replicate = c->pad == TS_PAD_REPLICATE});
 }
 
-winograd_grid winograd_grid_gradient(const ts_conv *c, int fold, bool bf16)
+winograd_grid winograd_grid_gradient(const ts_conv *c, winograd_part part, bool bf16)
 {
     return with_tiles((winograd_grid){.threads = c->compute.threads,
                                       .bf16 = bf16,
@@ -53,12 +54,13 @@ winograd_grid winograd_grid_gradient(const ts_conv *c, int fold, bool bf16)
                                       .h = c->h,
                                       .w = c->w,
                                       .ic = c->oc,
-                                      .out_h = c->h + 2 * fold,
-                                      .out_w = c->w + 2 * fold,
+                                      .out_h = part.h,
+                                      .out_w = part.w,
                                       .oc = ts_conv_variables(c),
                                       .dilation = c->dilation,
                                       .side = WINOGRAD_REACH + 1 - c->k,
-                                      .first = -c->dilation * (c->k / 2) - fold});
+                                      .first_row = part.row - c->dilation * (c->k / 2),
+                                      .first_column = part.column - c->dilation * (c->k / 2)});
 }
 
 /* Inputs as products count them. */
@@ -134,8 +136,8 @@ void winograd_sources(const winograd_grid *g, const float *x, const float *nothi
 {
     ptrdiff_t row[WINOGRAD_REACH], column[WINOGRAD_REACH]; /* offsets; -1: outside */
     for (int a = 0; a < WINOGRAD_REACH; a++) {
-        const int r = at.i + g->first + a * g->dilation, i = conv_clamp(r, g->h), s = at.j + g->first + a * g->dilation,
-                  j = conv_clamp(s, g->w);
+        const int r = at.i + g->first_row + a * g->dilation, i = conv_clamp(r, g->h),
+                  s = at.j + g->first_column + a * g->dilation, j = conv_clamp(s, g->w);
         row[a] = !g->replicate && i != r ? -1 : ((ptrdiff_t)at.image * g->h + i) * g->w * g->ic;
         column[a] = !g->replicate && j != s ? -1 : (ptrdiff_t)j * g->ic;
     }
@@ -252,52 +254,48 @@ void conv_winograd_forward(const ts_conv *c, bool bf16, const float *x, const fl
     run(&g, x, packed, bias, leak, false, y);
 }
 
-/* Row i of dx (+)= the rows of the larger domain that padding folds onto it. */
-static void fold_row(const ts_conv *c, int fold, int channels, const float *larger, int i, bool add, float *dx)
-{
-    const int width = c->w + 2 * fold, begin = i == 0 ? 0 : i + fold,
-              end = i == c->h - 1 ? c->h + 2 * fold : i + fold + 1;
-    const struct ts_elementwise_kernels *k = ts_elementwise_k();
-    for (int e = begin; e < end; e++, add = true) {
-        const float *row = larger + (ptrdiff_t)e * width * channels;
-        k->copy(c->w, channels, row + fold * channels, channels, dx, channels, add);
-        for (int j = 0; j < fold; j++) {
-            k->copy(1, channels, row + j * channels, channels, dx, channels, true);
-            k->copy(1, channels, row + (width - 1 - j) * channels, channels, dx + (ptrdiff_t)(c->w - 1) * channels,
-                    channels, true);
-        }
-    }
-}
-
-typedef struct fold_job {
+typedef struct add_job {
     const ts_conv *c;
-    int fold, channels;
-    ptrdiff_t image;
-    const float *larger;
-    bool add;
+    winograd_part part;
+    int channels;
+    const float *from;
     float *dx;
-} fold_job;
+} add_job;
 
-static void fold_rows(const void *job, int64_t begin, int64_t end)
+/* What padding puts around the images gives its gradient to their borders. */
+static void add_images(const void *job, int64_t begin, int64_t end)
 {
-    const fold_job *j = job;
-    for (int64_t at = begin; at < end; at++)
-        fold_row(j->c, j->fold, j->channels, j->larger + at / j->c->h * j->image, (int)(at % j->c->h), j->add,
-                 j->dx + at * j->c->w * j->channels);
+    const add_job *j = job;
+    const int w = j->c->w, channels = j->channels;
+    for (int64_t image = begin; image < end; image++)
+        for (int i = 0; i < j->part.h; i++) {
+            const float *from = j->from + (image * j->part.h + i) * j->part.w * channels;
+            float *row = j->dx + (image * j->c->h + conv_clamp(j->part.row + i, j->c->h)) * w * channels;
+            for (int at = j->part.column, last = at + j->part.w, count; at < last; at += count) {
+                count = at < 0 || at >= w ? 1 : (last < w ? last : w) - at;
+                ts_elementwise_k()->copy(count, channels, from, channels, row + (ptrdiff_t)conv_clamp(at, w) * channels,
+                                         channels, true);
+                from += (ptrdiff_t)count * channels;
+            }
+        }
 }
 
 void conv_winograd_data_gradient(const ts_conv *c, bool bf16, const float *dy, const float *packed, float *dx,
                                  bool accumulate)
 {
-    const int fold = c->pad == TS_PAD_REPLICATE ? c->dilation * (c->k / 2) : 0, channels = ts_conv_variables(c);
-    winograd_grid g = winograd_grid_gradient(c, fold, bf16);
-    if (!fold) {
-        run(&g, dy, packed, NULL, 1, accumulate, dx);
-        return;
+    winograd_grid g = winograd_grid_gradient(c, (winograd_part){0, 0, c->h, c->w}, bf16);
+    run(&g, dy, packed, NULL, 1, accumulate, dx);
+    if (c->pad != TS_PAD_REPLICATE) return;
+    const int more = c->dilation * (c->k / 2), channels = ts_conv_variables(c);
+    const winograd_part around[] = {{-more, -more, more, c->w + 2 * more},
+                                    {c->h, -more, more, c->w + 2 * more},
+                                    {0, -more, c->h, more},
+                                    {0, c->w, c->h, more}};
+    const int most = c->h > c->w + 2 * more ? c->h : c->w + 2 * more;
+    float *part = ts_scratch(3, sizeof(float) * (size_t)c->n * (size_t)(most * more) * (size_t)channels);
+    for (size_t i = 0; i < sizeof around / sizeof *around; i++) {
+        g = winograd_grid_gradient(c, around[i], bf16);
+        run(&g, dy, packed, NULL, 1, false, part);
+        ts_for(c->compute.threads, c->n, 1, add_images, &(add_job){c, around[i], channels, part, dx});
     }
-    const ptrdiff_t image = (ptrdiff_t)g.out_h * g.out_w * channels;
-    float *larger = ts_scratch(3, sizeof(float) * (size_t)(image * c->n));
-    run(&g, dy, packed, NULL, 1, false, larger);
-    ts_for(c->compute.threads, (int64_t)c->n * c->h, 1, fold_rows,
-           &(fold_job){c, fold, channels, image, larger, accumulate, dx});
 }

@@ -12,11 +12,12 @@ enum {
     WINOGRAD_CHUNK_TILES = 128 /* of a weight gradient's sum: clearing and adding it is little beside making it */
 };
 
-/* Outputs [0, out_h) x [0, out_w); tap 0 of output 0 reads coordinate first. Dilation 2 is four interleaved images. */
+/* Outputs [0, out_h) x [0, out_w); tap 0 of output 0 reads row first_row and column first_column. Dilation 2 is four
+ * interleaved images. */
 typedef struct winograd_grid {
     int n, h, w, ic; /* input */
     int out_h, out_w, oc;
-    int dilation, first;
+    int dilation, first_row, first_column;
     bool replicate;
     int side;          /* of a tile's outputs: WINOGRAD_REACH + 1 - the kernel's */
     int rows, columns; /* tiles of one interleaved image */
@@ -25,9 +26,14 @@ typedef struct winograd_grid {
     int threads;
 } winograd_grid;
 
-/* Of a convolution; of the gradient of its input on the domain that is larger by fold on each side. */
+/* A part of the input's domain, or of what padding puts around it. */
+typedef struct winograd_part {
+    int row, column, h, w;
+} winograd_part;
+
+/* Of a convolution; of the gradient of its input in a part of the domain. */
 winograd_grid winograd_grid_forward(const ts_conv *c, bool bf16);
-winograd_grid winograd_grid_gradient(const ts_conv *c, int fold, bool bf16);
+winograd_grid winograd_grid_gradient(const ts_conv *c, winograd_part part, bool bf16);
 
 typedef struct winograd_place {
     int image, i, j; /* first output pixel; the others are dilation apart */
