@@ -27,7 +27,7 @@ static void frame(int i, int j, int side, double f[2])
     f[1] = y * inverse;
 }
 
-/* The rows from row `begin` of all images on, one at a time, with their pixels' f. */
+/* What a loop over the rows of all images is given. */
 typedef struct rows {
     const ag_node *node;
     const float *from; /* y's gradient backward */
@@ -38,6 +38,7 @@ typedef struct rows {
 
 enum { NEAR = 64 }; /* pixels at once: what they were copied to is in the first cache when it is changed */
 
+/* f of some pixels of a row. */
 static void frames(const rows *r, int64_t row, int first, int count, float fx[NEAR], float fy[NEAR])
 {
     const ts_shape s = r->node->out->t.shape;
