@@ -3,6 +3,7 @@
  * ds = (1 - |x - t| / (u e^s)) / count, summed over the channels that share it, 0 outside of the range
  * x, t: [N,H,W,C], s: [N,H,W,G], y: [1,1,1,1] */
 #include "autograd/gradcheck.h"
+#include "autograd/log_scale.h"
 #include "autograd/op.h"
 #include "ops.h"
 #include "tensor/kernels/elementwise.h"
@@ -18,16 +19,11 @@ ag_value *ag_laplace(ag_tape *tape, ag_value *x, ag_value *spread, ag_value *tar
 #endif
 
 enum { MOST = 32, BLOCK = 64 /* pixels whose scales are computed at once */ };
-#define LEAST (-6.0f) /* narrower or wider than anything that is learned: keeps a first step's exponentials finite */
-#define LARGEST 4.0f
 
 typedef struct laplace_attr {
     float unit;
     signed char group[MOST], member[MOST], first[MOST + 1]; /* group g has the channels member[first[g]] .. */
 } laplace_attr;
-
-/* Comparisons, which become instructions, where fminf and fmaxf are calls. */
-static float held(float s) { return s < LEAST ? LEAST : s > LARGEST ? LARGEST : s; }
 
 /* What forward keeps: its derivatives by x and s times count, NULL where nobody asks. */
 typedef struct slopes {
@@ -44,7 +40,7 @@ typedef struct laplace_job {
 /* s in its range, and 1 / (u e^s), of count values of s, at most BLOCK pixels of MOST channels. */
 static void invert(const float *s, int64_t count, float unit, float *scale, float *inverse)
 {
-    for (int64_t i = 0; i < count; i++) scale[i] = held(s[i]);
+    for (int64_t i = 0; i < count; i++) scale[i] = ag_log_scale_held(s[i]);
     for (int64_t i = 0; i < count; i++) inverse[i] = -scale[i];
     ts_vmath_arrays_k()->exp(count, inverse, inverse);
     for (int64_t i = 0; i < count; i++) inverse[i] /= unit;
@@ -66,7 +62,7 @@ static double block(const laplace_attr *a, int64_t pixels, int c, int g, const f
             for (int k = first; k < first + count; k++) off += fabsf(x[a->member[k]] - t[a->member[k]]);
             off *= of[j];
             pixel += off + (float)count * scale[p * g + j];
-            if (ds) ds[p * g + j] = s[j] > LEAST && s[j] < LARGEST ? (float)count - off : 0;
+            if (ds) ds[p * g + j] = s[j] > AG_LOG_SCALE_LEAST && s[j] < AG_LOG_SCALE_MOST ? (float)count - off : 0;
         }
         sum += (double)pixel;
         for (int i = 0; dx && i < c; i++) dx[p * c + i] = (float)((x[i] > t[i]) - (x[i] < t[i])) * of[a->group[i]];
@@ -146,7 +142,8 @@ static void reference(const ag_node *node, const double *const *in, double *out)
     const int64_t count = ts_count(node->in[0]->t.shape);
     double sum = 0;
     for (int64_t i = 0; i < count; i++) {
-        const double s = fmin(fmax(in[1][i / c * g + a->group[i % c]], (double)LEAST), (double)LARGEST);
+        const double s = fmin(fmax(in[1][i / c * g + a->group[i % c]], (double)AG_LOG_SCALE_LEAST),
+                              (double)AG_LOG_SCALE_MOST);
         sum += fabs(in[0][i] - in[2][i]) / ((double)a->unit * exp(s)) + s;
     }
     out[0] = sum / (double)count;
@@ -156,7 +153,7 @@ static bool kink(const double *const *in, int input, int64_t i, double step, con
 {
     (void)user;
     if (input == 0) return fabs(in[0][i] - in[2][i]) <= step;
-    return fabs(in[1][i] - (double)LEAST) <= step || fabs(in[1][i] - (double)LARGEST) <= step;
+    return fabs(in[1][i] - (double)AG_LOG_SCALE_LEAST) <= step || fabs(in[1][i] - (double)AG_LOG_SCALE_MOST) <= step;
 }
 
 static const signed char few[] = {0, 0, 0, 1, 1, 2, 3, 3, 3};

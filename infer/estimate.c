@@ -150,7 +150,7 @@ static double most_bytes(const nn_arch *a, int photos, int side, int tile, int o
     const int part = tile < side ? tile : side, coarse = a->coarse_size < side ? a->coarse_size : side;
     double most = fmax(nn_guess_bytes(a, orientations), step_bytes(a, photos, part, a->h_width, a->h_gru));
     if (a->coarse_steps > 0) most = fmax(most, step_bytes(a, photos, coarse, a->coarse_width, a->coarse_gru));
-    if (a->revisions > 0 && photos == 1) most = fmax(most, nn_revision_bytes(a));
+    if (a->revisions > 0 && photos > 1) most = fmax(most, nn_revision_bytes(a, photos));
     if (a->scene) most += nn_first_guess_bytes(a);
     return most + 2.0 * a->channels * sizeof(float) * side * side;
 }
@@ -278,8 +278,8 @@ typedef struct revision_watch {
     bool stopped;
 } revision_watch;
 
-/* R_t before its revision, at the photograph's size. */
-static bool see_revision(const nn_first_guess *g, void *user)
+/* R_t before its revision, at the photographs' size, with its error in the first of them. */
+static bool see_revision(int step, const float *r, void *user)
 {
     revision_watch *u = user;
     const lgd_options *o = u->options;
@@ -287,7 +287,7 @@ static bool see_revision(const nn_first_guess *g, void *user)
     ag_tape *tape = u->e->tape;
     const int side = u->given->side, size = nn_arch_side(&net->arch), channels = net->arch.channels;
     const watch w = {.e = u->e, .options = o, .channels = channels};
-    const bool wanted = u->e->seen || (o->progress && (g->revised == 0 || !ends_alone(u->e, o, false)));
+    const bool wanted = u->e->seen || (o->progress && (step == 0 || !ends_alone(u->e, o, false)));
     const ts_mark mark = ag_scope_begin(tape);
     const float *maps = NULL;
     double rmse = NAN;
@@ -298,16 +298,16 @@ static bool see_revision(const nn_first_guess *g, void *user)
                  *image = ag_empty(tape, (ts_shape){1, side, side, 3});
         if (!taps.weight) ag_fail(tape, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
         if (!taps.weight || !v || !image) return false;
-        ts_resample(1, channels, &taps, &taps, g->r0, v->t.data, false, threads);
+        ts_resample(1, channels, &taps, &taps, r, v->t.data, false, threads);
         nn_clip(ts_count(image->t.shape), u->given->image[0], image->t.data);
         const nn_input in = {
-            .image = image->t, .grid = rd_grid_on(rd_grid_full(side), threads), .views = &g->view, .given = 1};
+            .image = image->t, .grid = rd_grid_on(rd_grid_full(side), threads), .views = u->given->views, .given = 1};
         double squares = 0;
         nn_add_squares(net, &in, v->t.data, channels, &squares);
         rmse = nn_rmse_of(&squares, 1, (double)side * side);
         maps = v->t.data;
     }
-    u->stopped = !show(&w, g->revised, rmse, maps);
+    u->stopped = !show(&w, step, rmse, maps);
     ag_scope_end(tape, mark, NULL, 0);
     return !u->stopped;
 }
@@ -340,14 +340,16 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     ts_code code = TS_OK;
     revision_watch user = {e, &p, &o, false};
     const bool guesses = a->descent == NN_DESCENT_POSTERIOR && !e->g_alone;
-    if (guesses)
-        code = lgd_guess_first(e->tape, e->net, &p, &o, nn_arch_revisions(a, photos, steps),
-                               o.progress || e->seen ? see_revision : NULL, &user, &guess, st);
+    int revised = 0;
+    if (guesses) code = lgd_guess_first(e->tape, e->net, &p, &o, &guess, st);
     else if (o.power && !e->g_alone) code = fit_power(e, &p, &o, &r0, st);
-    if (!code && user.stopped) steps = guess.revised;
+    if (!code && guesses)
+        code = lgd_guess_revise(e->tape, e->net, &p, nn_arch_revisions(a, photos, p.known[0], steps),
+                                o.progress || e->seen ? see_revision : NULL, &user, &guess, &revised, st);
+    if (!code && user.stopped) steps = revised;
     else if (!code && o.iterations == LGD_AUTO && !choose) {
         code = count_steps(e, &p, o.orientations, &steps, st);
-        steps += guess.revised;
+        steps += revised;
     }
     for (int k = 0; k < photos && !code && o.taken; k++) {
         lgd_photo *to = &o.taken[p.order[k]];
@@ -355,7 +357,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
         memcpy(to->light, p.views[k].light, sizeof to->light);
         memcpy(to->camera, p.views[k].camera, sizeof to->camera);
     }
-    if (!code) code = refine(e, &p, &o, choose && !user.stopped, guess.revised, !user.stopped, &steps, maps, st);
+    if (!code) code = refine(e, &p, &o, choose && !user.stopped, revised, !user.stopped, &steps, maps, st);
     if (side > ONE_TILE) ag_drop(e->tape); /* what is done with such maps needs memory of its own */
     free(r0);
     return code;

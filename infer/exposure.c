@@ -8,10 +8,24 @@ enum { LEAST = 64 };
 #define DARK 0.02f
 #define BRIGHT 0.9f
 
-static int ascending(const void *a, const void *b)
+/* The k-th smallest of count values, which are moved about (Hoare 1961, "Find"). */
+static float smallest(float *v, size_t count, size_t k)
 {
-    const float x = *(const float *)a, y = *(const float *)b;
-    return (x > y) - (x < y);
+    size_t first = 0, last = count - 1;
+    while (first < last) {
+        const float pivot = v[first + (last - first) / 2];
+        size_t i = first, j = last;
+        for (;; i++, j--) {
+            while (v[i] < pivot) i++;
+            while (v[j] > pivot) j--;
+            if (i >= j) break;
+            const float swapped = v[i];
+            v[i] = v[j], v[j] = swapped;
+        }
+        if (k <= j) last = j;
+        else first = j + 1;
+    }
+    return v[k];
 }
 
 static bool tells(float value) { return value > DARK && value < BRIGHT; }
@@ -29,14 +43,25 @@ ts_code lgd_exposure_beside(rd_grid grid, const float *maps, int channels, const
         const float *photo = image + (y * (size_t)side + x) * 3, *rendering = seen + (size_t)i * 3;
         for (int c = 0; c < 3; c++) {
             const float value = rendering[c];
-            if (tells(photo[c]) && tells(value)) seen[count++] = logf(photo[c] / value);
+            if (tells(photo[c]) && tells(value)) seen[count++] = photo[c] / value;
         }
     }
     *factor = 1;
-    if (count >= LEAST) {
-        qsort(seen, count, sizeof *seen, ascending);
-        *factor = exp(BELIEVED * (double)seen[count / 2]);
-    }
+    if (count >= LEAST) *factor = pow((double)smallest(seen, count, count / 2), BELIEVED);
     free(seen);
+    return TS_OK;
+}
+
+double lgd_irradiance(const rd_view *view) { return (double)view->power / pow((double)view->light[2], 2); }
+
+ts_code lgd_expose_others(rd_grid grid, const float *maps, int channels, int count, rd_view *views,
+                          const float *const *image, int side, double factor, ts_status *st)
+{
+    for (int k = 1; k < count; k++) {
+        double own;
+        views[k].power *= (float)factor;
+        if (lgd_exposure_beside(grid, maps, channels, &views[k], image[k], side, &own, st)) return st->code;
+        views[k].power *= (float)own;
+    }
     return TS_OK;
 }

@@ -1,7 +1,11 @@
 #include "infer/guess.h"
 #include "infer/exposure.h"
-#include "infer/metal.h"
-#include <math.h>
+#include "nn/metal.h"
+#include "nn/clip.h"
+#include "nn/deviation.h"
+#include "nn/revise.h"
+#include "tensor/maps.h"
+#include "tensor/resize.h"
 
 int lgd_guess_known(const lgd_options *o)
 {
@@ -11,48 +15,75 @@ int lgd_guess_known(const lgd_options *o)
                                           : 0);
 }
 
-/* Power over distance squared at the centre of the sample, of a light above it. */
-static double irradiance(const rd_view *view) { return (double)view->power / pow((double)view->light[2], 2); }
-
-/* Where the power is not known, of photographs besides the first neither is their exposure; their lights are first as
- * much stronger or weaker than supposed as that one's. */
-static ts_code expose_others(const ag_tape *tape, const nn_arch *a, lgd_given *p, double factor, ts_status *st)
+/* The photographs, clamped, at g's size: [count, size, size, 3]. NULL after an error. */
+static ag_value *photographs_for_h(ag_tape *tape, int size, const lgd_given *p)
 {
-    const rd_grid grid = rd_grid_on(rd_grid_full(nn_arch_side(a)), ag_compute(tape)->threads);
-    for (int k = 1; k < p->count; k++) {
-        double own;
-        p->views[k].power *= (float)factor;
-        if (lgd_exposure_beside(grid, p->r0, a->channels, &p->views[k], p->image[k], p->side, &own, st))
-            return st->code;
-        p->views[k].power *= (float)own;
+    ag_value *small = ag_empty(tape, (ts_shape){p->count, size, size, 3});
+    const ts_mark mark = ag_scope_begin(tape);
+    const int64_t whole = (int64_t)p->side * p->side * 3, values = (int64_t)size * size * 3;
+    ag_value *full = p->side == size ? NULL : ag_empty(tape, (ts_shape){1, p->side, p->side, 3});
+    ts_status st = {0};
+    for (int k = 0; k < p->count && !ag_status(tape)->code; k++) {
+        ts_tensor to = ts_view(small->t.data + k * values, (ts_shape){1, size, size, 3});
+        nn_clip(whole, p->image[k], full ? full->t.data : to.data);
+        if (full && ts_resize(&to, &full->t, ag_arena(tape), ag_compute(tape)->threads, &st))
+            ag_fail(tape, st.code, "%s", st.message);
     }
+    if (ag_status(tape)->code) return NULL;
+    ag_scope_end(tape, mark, NULL, 0);
+    return small;
+}
+
+ts_code lgd_guess_revise(ag_tape *tape, const nn_model *net, lgd_given *p, int revisions,
+                         bool (*seen)(int step, const float *maps, void *user), void *user, nn_first_guess *g,
+                         int *made, ts_status *st)
+{
+    const int size = nn_arch_side(&net->arch);
+    const ts_shape maps = {1, size, size, MAP_CHANNELS}, spread = {1, size, size, NN_SPREADS};
+    *made = 0;
+    ag_value *image = revisions > 0 ? photographs_for_h(tape, size, p) : NULL;
+    nn_revision r = {.given = p->count, .views = p->views, .known = p->known};
+    if (image) {
+        r.image = image->t;
+        r.maps = ag_constant(tape, ts_view(g->r0, maps));
+        r.spread = ag_constant(tape, ts_view(g->spread, spread));
+        while (*made < revisions && (!seen || seen(*made, g->r0, user)) && nn_revise(tape, net, &r)) {
+            g->r0 = r.maps->t.data, g->spread = r.spread->t.data;
+            ++*made;
+        }
+    }
+    if (ag_status(tape)->code) {
+        *st = *ag_status(tape);
+        return st->code;
+    }
+    if (*made > 0)
+        nn_deviations((int64_t)size * size, g->spread, (nn_belief){.photographs = p->count, .revised = true},
+                      ag_compute(tape)->threads, g->deviation);
+    p->r0 = g->r0;
     return TS_OK;
 }
 
-ts_code lgd_guess_first(ag_tape *tape, const nn_model *net, lgd_given *p, const lgd_options *o, int revisions,
-                        bool (*seen)(const nn_first_guess *guess, void *user), void *user, nn_first_guess *guess,
+ts_code lgd_guess_first(ag_tape *tape, const nn_model *net, lgd_given *p, const lgd_options *o, nn_first_guess *guess,
                         ts_status *st)
 {
     const nn_arch *a = &net->arch;
-    const double before = irradiance(&p->views[0]);
+    const rd_grid grid = rd_grid_on(rd_grid_full(nn_arch_side(a)), ag_compute(tape)->threads);
+    const double before = lgd_irradiance(&p->views[0]);
     const nn_first_ask ask = {.image = p->image[0],
                               .side = p->side,
                               .taken = {p->views[0], lgd_guess_known(o), p->count},
-                              .orientations = o->orientations,
-                              .revisions = revisions,
-                              .seen = seen,
-                              .user = user};
+                              .orientations = o->orientations};
     const ts_code code = nn_first_guess_make(tape, net, &ask, guess, st);
     if (code) return code;
     p->views[0] = guess->view;
     p->r0 = guess->r0;
     p->deviation = guess->deviation;
     if (o->power) {
-        *o->power = irradiance(&p->views[0]) / before;
-        if (expose_others(tape, a, p, *o->power, st)) return st->code;
+        *o->power = lgd_irradiance(&p->views[0]) / before;
+        if (lgd_expose_others(grid, p->r0, a->channels, p->count, p->views, p->image, p->side, *o->power, st))
+            return st->code;
     }
     if (p->count == 1) return TS_OK;
-    const lgd_metal_photos photos = {p->image, p->views, p->count, p->side, lgd_guess_known(o)};
-    return lgd_tell_metal(rd_grid_on(rd_grid_full(nn_arch_side(a)), ag_compute(tape)->threads), &photos,
-                          guess->deviation, nn_arch_steps(a, p->count), a->channels, guess->r0, st);
+    const nn_metal_photos photos = {p->image, p->views, p->count, p->side, lgd_guess_known(o)};
+    return nn_tell_metal(grid, &photos, guess->deviation, nn_arch_steps(a, p->count), a->channels, guess->r0, st);
 }

@@ -94,13 +94,12 @@ bool nn_arch_reads(const nn_arch *a) { return a->gradient && (a->h_width > 0 || 
 
 int nn_arch_steps(const nn_arch *a, int photographs)
 {
-    return a->iterations * (photographs > 1 && a->descent == NN_DESCENT_POSTERIOR ? 2 : 1) +
-        (photographs > 1 ? 0 : a->revisions);
+    return a->iterations * (photographs > 1 && a->descent == NN_DESCENT_POSTERIOR ? 2 : 1);
 }
 
-int nn_arch_revisions(const nn_arch *a, int photographs, int steps)
+int nn_arch_revisions(const nn_arch *a, int photographs, int known, int steps)
 {
-    if (photographs > 1) return 0;
+    if (photographs < 2 || known != NN_KNOWN_ALL) return 0;
     return steps < a->revisions ? steps : a->revisions;
 }
 
@@ -134,9 +133,8 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
     if (a->spread && a->g_unshuffle == 1) return ts_fail(st, TS_INVALID, "spread is set: that needs unshuffle above 1");
     if (a->descent == NN_DESCENT_POSTERIOR && (!a->spread || !a->scene || a->coarse_steps > 0 || a->h_width > 0))
         return ts_fail(st, TS_INVALID, "descent is posterior: that needs spread, scene, h_width 0 and coarse_steps 0");
-    if (a->revisions > 0 && (a->descent != NN_DESCENT_POSTERIOR || !a->conditions || a->g_size % 4 != 0))
-        return ts_fail(st, TS_INVALID,
-                       "revisions is %d: that needs descent = posterior, conditions and a g_size that 4 divides",
+    if (a->revisions > 0 && (a->descent != NN_DESCENT_POSTERIOR || a->g_size % 4 != 0))
+        return ts_fail(st, TS_INVALID, "revisions is %d: that needs descent = posterior and a g_size that 4 divides",
                        a->revisions);
     if (a->scene && a->images > 1) return ts_fail(st, TS_INVALID, "scene is set: that needs images 1");
     if (a->images > 1 && a->rmse == NN_RMSE_BATCH)

@@ -1,4 +1,5 @@
 #include "nn/deviation.h"
+#include "autograd/log_scale.h"
 #include "tensor/kernels/vmath_arrays.h"
 #include "tensor/maps.h"
 #include "tensor/team.h"
@@ -29,14 +30,11 @@ typedef struct job {
     float *to, factor[NN_SPREADS];
 } job;
 
-/* NaN to the least. Comparisons, which become instructions, where fminf and fmaxf are calls. */
-static float held(float s) { return s > -6 ? s < 4 ? s : 4 : -6; }
-
 static void deviations(const void *of, int64_t begin, int64_t end)
 {
     const job *j = of;
     const int64_t first = begin * NN_SPREADS, last = end * NN_SPREADS;
-    for (int64_t i = first; i < last; i++) j->to[i] = held(j->spread[i]);
+    for (int64_t i = first; i < last; i++) j->to[i] = ag_log_scale_held(j->spread[i]);
     ts_vmath_arrays_k()->exp(last - first, j->to + first, j->to + first);
     float factor[NN_SPREADS];
     for (int k = 0; k < NN_SPREADS; k++) factor[k] = j->factor[k] * NN_LAPLACE * NN_SPREAD_UNIT;

@@ -1,10 +1,10 @@
 #include "nn/first_guess.h"
+#include "autograd/log_scale.h"
 #include "nn/clip.h"
 #include "nn/deviation.h"
 #include "nn/hidden.h"
 #include "nn/lattice.h"
 #include "nn/lean.h"
-#include "nn/revise.h"
 #include "render/scene_model.h"
 #include "tensor/maps.h"
 #include "tensor/memory.h"
@@ -29,7 +29,7 @@ static void scene_prior(const float *said, const rd_view *view, int known, rd_sc
     rd_scene_numbers(view, 0, 0, given);
     for (int i = 0; i < RD_SCENE_NUMBERS; i++) {
         prior->mean[i] = said[i];
-        prior->deviation[i] = NN_LAPLACE * expf(fminf(fmaxf(said[RD_SCENE_NUMBERS + i], -6), 4));
+        prior->deviation[i] = NN_LAPLACE * expf(ag_log_scale_held(said[RD_SCENE_NUMBERS + i]));
     }
     const bool camera = known & NN_KNOWN_CAMERA, light = known & NN_KNOWN_LIGHT, power = known & NN_KNOWN_POWER;
     const bool fixed[RD_SCENE_NUMBERS] = {[RD_SCENE_DISTANCE] = camera,
@@ -145,30 +145,6 @@ ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, co
     return code;
 }
 
-/* h's revisions of r0 and spread, which are the tape's. */
-static ts_code revise(ag_tape *tape, const nn_model *model, const ts_tensor *image, ag_value *spread,
-                      const nn_first_ask *ask, nn_first_guess *g, ts_status *st)
-{
-    const int size = image->shape.h, channels = model->arch.channels;
-    const size_t pixels = (size_t)size * (size_t)size;
-    const unsigned char known = (unsigned char)ask->taken.known;
-    nn_revision r = {.image = *image, .views = &g->view, .known = &known, .spread = spread};
-    r.maps = ag_constant(tape, ts_view(g->r0, (ts_shape){1, size, size, channels}));
-    while (g->revised < ask->revisions && (!ask->seen || ask->seen(g, ask->user)) && nn_revise(tape, model, &r)) {
-        memcpy(g->r0, r.maps->t.data, pixels * (size_t)channels * sizeof *g->r0);
-        g->spread = r.spread->t.data;
-        g->revised++;
-    }
-    if (ag_status(tape)->code) {
-        *st = *ag_status(tape);
-        return st->code;
-    }
-    if (g->revised > 0)
-        nn_deviations((int64_t)pixels, g->spread, (nn_belief){.scene_found = true, .revised = true},
-                      ag_compute(tape)->threads, g->deviation);
-    return TS_OK;
-}
-
 ts_code nn_first_guess_make(ag_tape *tape, const nn_model *model, const nn_first_ask *ask, nn_first_guess *g,
                             ts_status *st)
 {
@@ -202,9 +178,8 @@ ts_code nn_first_guess_make(ag_tape *tape, const nn_model *model, const nn_first
     const int period = model->arch.g_unshuffle;
     if (period > 1 && nn_take_lattice(period, size, model->arch.channels, threads, ag_arena(tape), g->r0, st))
         return st->code;
-    const ts_code code = nn_first_guess_settle(rd_grid_on(rd_grid_full(size), threads), model->arch.channels,
-                                               small->t.data, guess.scene->t.data, &ask->taken, ag_arena(tape), g, st);
-    return code ? code : revise(tape, model, &small->t, guess.spread, ask, g, st);
+    return nn_first_guess_settle(rd_grid_on(rd_grid_full(size), threads), model->arch.channels, small->t.data,
+                                 guess.scene->t.data, &ask->taken, ag_arena(tape), g, st);
 }
 
 double nn_first_guess_bytes(const nn_arch *a)

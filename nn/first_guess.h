@@ -1,5 +1,4 @@
-/* What a model says of a photograph before any step at the photograph's size: R_0, how far it may be off, the scene,
- * and what h makes of them. */
+/* What a model says of a photograph before any step: R_0, how far it may be off, and the scene. */
 #ifndef NN_FIRST_GUESS_H
 #define NN_FIRST_GUESS_H
 #include "nn/model.h"
@@ -10,7 +9,6 @@ typedef struct nn_first_guess {
     float *deviation; /* [side][side][NN_SPREADS]: the standard deviations that the steps believe */
     float number[RD_SCENE_NUMBERS];
     rd_view view; /* light and camera of number, those that are known as they were given */
-    int revised;  /* r0 is R_revised */
 } nn_first_guess;
 
 /* How a photograph was taken. */
@@ -33,11 +31,7 @@ typedef struct nn_first_ask {
     const float *image; /* [side][side][3], linear, clamped here */
     int side;
     nn_taken taken;
-    int orientations;                                      /* as in nn_input */
-    int revisions;                                         /* of R_0 by h, at most arch.revisions (nn/revise.h) */
-    bool (*seen)(const nn_first_guess *guess, void *user); /* or NULL: called with what is revised next, false: it is
-                                                            * not */
-    void *user;
+    int orientations; /* as in nn_input */
 } nn_first_ask;
 
 /* For a model with arch.spread and arch.scene, on a tape without gradients, whose memory the guess is: until ag_reset,

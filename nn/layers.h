@@ -32,15 +32,14 @@ typedef struct nn_refiner {
     nn_layer output, descent; /* descent: of arch.descent, weight -1 where there is none */
 } nn_refiner;
 
-/* h of nn/revise.c: a small U-Net over squares of pixels, whose last features a recurrent cell carries from revision to
- * revision. Of a pair the first layer is 1 x 1 where it reads channels of several kinds, all others are 3 x 3. */
+/* h of nn/revise.c: a small U-Net over squares of pixels, and three convolutions at the full size. Of a pair the first
+ * layer is 1 x 1 where it reads channels of several kinds, all others are 3 x 3. */
 enum { NN_REVISE_LEVELS = 2 };
 typedef struct nn_reviser {
     nn_layer read[2], down[NN_REVISE_LEVELS][2], up[NN_REVISE_LEVELS][2];
-    nn_layer global;        /* mean of the deepest features -> what is added to them */
-    nn_layer input, hidden; /* of the cell */
-    nn_layer squares;       /* 1 x 1, to channels of the full size's pixels */
-    nn_layer full[2];
+    nn_layer global;  /* mean of the deepest features -> what is added to them */
+    nn_layer squares; /* 1 x 1, to channels of the full size's pixels */
+    nn_layer full[3];
 } nn_reviser;
 
 typedef struct nn_layers {
@@ -87,11 +86,10 @@ ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_val
  * above the default flash's, and 1, or two zeros. */
 enum { NN_CONDITIONS = 8, NN_COORDINATES = 2, NN_FRAME = 2 };
 
-/* Channels that a revision reads of each pixel, and those of them that it reads again at the full size (nn/revise.c).
- */
-enum { NN_REVISION_READS = 40, NN_REVISION_READS_AGAIN = 18 };
+/* Channels that a revision reads of each pixel, and those of its convolutions at the full size (nn/revise.c). */
+enum { NN_REVISION_READS = 34, NN_REVISION_FINE = 24 };
 
-/* Channels of the photograph's pixels in squares and between the last two convolutions of nn_detail, and of h. */
+/* Channels of the photograph's pixels in squares and between the last two convolutions of nn_detail. */
 enum { NN_FINE = 12, NN_FINER = 16 };
 
 /* Channels that g's first layers read, and that the last of nn_detail writes: the maps', two of the shading's frame

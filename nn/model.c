@@ -215,10 +215,10 @@ static void plan_revise(nn_model *m)
 {
     const nn_arch *a = &m->arch;
     nn_reviser *h = &((nn_layers *)m->layers)->revise;
-    const int w = a->revise_width, squares = a->g_unshuffle * a->g_unshuffle,
+    const int w = a->revise_width, squares = a->g_unshuffle * a->g_unshuffle, fine = NN_REVISION_FINE,
               level[NN_REVISE_LEVELS + 1] = {w, w * 3 / 2, w * 7 / 4};
     const double gain = leaky_gain(NN_LEAK_G);
-    pair(m, "read", NN_REVISION_READS * squares + NN_CONDITIONS, w, 1, h->read);
+    pair(m, "read", NN_REVISION_READS * squares, w, 1, h->read);
     for (int i = 0; i < NN_REVISE_LEVELS; i++) {
         char name[16];
         snprintf(name, sizeof name, "down%d", i + 1);
@@ -230,13 +230,10 @@ static void plan_revise(nn_model *m)
         snprintf(name, sizeof name, "up%d", i + 1);
         pair(m, name, level[i] + level[i + 1], level[i], 1, h->up[i]);
     }
-    h->input = conv(m, "h.gru.ih", 3 * w, w, 1, true, 1);
-    h->hidden = conv(m, "h.gru.hh", 3 * w, w, 1, true, 1);
-    ((nn_layers *)m->layers)->start[h->hidden.weight] = NN_ORTHOGONAL;
     h->squares = conv(m, "h.squares", NN_FINE * squares, w, 1, true, gain);
-    h->full[0] = conv(m, "h.full.conv1", NN_FINER, NN_FINE + NN_REVISION_READS_AGAIN + NN_COORDINATES, 3, true, gain);
-    h->full[1] = conv(m, "h.full.conv2", MAP_CHANNELS + NN_FRAME + NN_SPREADS, NN_FINER, 3, true,
-                      0); /* nothing at first */
+    h->full[0] = conv(m, "h.full.conv1", fine, NN_FINE + NN_REVISION_READS, 3, true, gain);
+    h->full[1] = conv(m, "h.full.conv2", fine, fine, 3, true, gain);
+    h->full[2] = conv(m, "h.full.conv3", MAP_CHANNELS + NN_SPREADS, fine, 3, true, 0); /* nothing at first */
 }
 
 nn_model *nn_model_empty(ts_status *st)

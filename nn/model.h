@@ -64,7 +64,8 @@ typedef struct nn_arch {
                         0 */
     int coarse_width;      /* of that network's convolutions */
     int coarse_gru;        /* of its states */
-    int revisions;         /* by h at g's full size, before the steps of NN_DESCENT_POSTERIOR (nn/revise.h); 0: none */
+    int revisions;         /* of several photographs' maps by h at g's full size, before the steps of
+                            * NN_DESCENT_POSTERIOR (nn/revise.h); 0: none */
     int revise_width;      /* of that h; of no meaning where revisions is 0 */
     int iterations;        /* T that it was trained for, beside the revisions */
     bool recurrent;        /* h carries its states from step to step */
@@ -84,11 +85,11 @@ int nn_most_photographs(const nn_arch *a);
 bool nn_arch_refines(const nn_arch *a);      /* there is something to do steps with */
 bool nn_arch_refines_full(const nn_arch *a); /* at the photograph's size */
 bool nn_arch_reads(const nn_arch *a); /* those steps read the gradient, which the RMSE of what they begin with scales */
-/* Steps that are usual with so many photographs of one material: of one the revisions and iterations; where they go to
- * the most probable maps by several, which takes more of them, twice the iterations. */
+/* Steps that are usual with so many photographs of one material: the iterations; of several, where they go to the most
+ * probable maps, which takes more of them, twice as many. */
 int nn_arch_steps(const nn_arch *a, int photographs);
-/* Of so many steps those that are revisions: R_1 and so on. */
-int nn_arch_revisions(const nn_arch *a, int photographs, int steps);
+/* Of so many steps those that are revisions, R_1 and so on: of several photographs of which all is known (nn_known). */
+int nn_arch_revisions(const nn_arch *a, int photographs, int known, int steps);
 bool nn_arch_carries(const nn_arch *a); /* they have states */
 
 typedef struct nn_param {

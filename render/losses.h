@@ -19,11 +19,6 @@ ag_value *ag_flash_loss(ag_tape *tape, ag_value *maps, ag_value *image, const rd
  * top + H - 1 of squares of S rows. */
 ag_value *ag_shading_frame(ag_tape *tape, ag_value *x, int channels, int top);
 
-/* Maps [N, H, W, 9] changed by change [N, H, W, 9] and levels [N, 1, 1, 4]: the three colours of diffuse by one factor,
- * so that a pixel keeps its hue, the normal by a sum, roughness and F0 of an image by one factor each, which the levels
- * say: a highlight leaves no spot in them (render/op_change_maps.c has the equation). */
-ag_value *ag_change_maps(ag_tape *tape, ag_value *maps, ag_value *change, ag_value *level);
-
 /* ag_map_loss with a weight for each of the nine channels. */
 ag_value *ag_map_loss_weighted(ag_tape *tape, ag_value *maps, ag_value *target, const float *weight);
 

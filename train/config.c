@@ -224,6 +224,8 @@ ts_code tr_config_read(tr_config *c, const char *path, ts_status *st)
     return code;
 }
 
+int tr_most_given(const tr_config *c) { return c->train.given_max ? c->train.given_max : c->arch.images; }
+
 ts_code tr_config_check(const tr_config *c, ts_status *st)
 {
     const int t = c->arch.iterations;
@@ -259,6 +261,12 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
                        "model.revisions is %d: h learns over a fixed g and on whole patches, so train.g_rate and "
                        "train.window must be 0",
                        c->arch.revisions);
+    const int least = c->train.given_min ? c->train.given_min : tr_most_given(c);
+    if (c->train.steps && c->arch.revisions > 0 && least < 2)
+        return ts_fail(st, TS_INVALID,
+                       "model.revisions is %d: h revises the maps of several photographs, so train.given_max must be 2 "
+                       "at least, and train.given_min 0 or as many",
+                       c->arch.revisions);
     if (c->train.disturb > 0 && !(c->train.steps && c->arch.revisions > 0))
         return ts_fail(
             st, TS_INVALID,
@@ -280,9 +288,15 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
     if (c->train.window && (c->train.window < 8 || c->train.window > c->data.patch))
         return ts_fail(st, TS_INVALID, "train.window is %d: use 8 to data.patch, which is %d, or 0", c->train.window,
                        c->data.patch);
-    if (c->train.given_min > c->arch.images)
-        return ts_fail(st, TS_INVALID, "train.given_min is %d, more than the %d of model.images", c->train.given_min,
-                       c->arch.images);
+    if (c->train.given_min > tr_most_given(c))
+        return ts_fail(st, TS_INVALID,
+                       "train.given_min is %d, more than the %d photographs of train.given_max or model.images",
+                       c->train.given_min, tr_most_given(c));
+    if (tr_most_given(c) > c->arch.images && (c->arch.revisions == 0 || c->train.pretrain_steps > 0))
+        return ts_fail(st, TS_INVALID,
+                       "train.given_max is %d, model.images %d: more are for h alone, so model.revisions must be above "
+                       "0 and train.pretrain_steps 0",
+                       c->train.given_max, c->arch.images);
     if (lo > hi)
         return ts_fail(st, TS_INVALID, "train.iterations_min is %d, more than the %d of train.iterations_max", lo, hi);
     if (c->validate.every && c->validate.seed == c->data.seed)

@@ -31,7 +31,8 @@ typedef struct tr_config {
         double clip, spike, ema, start_weight, map_weight, normal_weight, normal_rmse, specular_weight, spread_weight,
             disturb, scene_weight;
         int iterations_min, iterations_max; /* 0: arch.iterations */
-        int given_min;                      /* 0: arch.images */
+        int given_min;                      /* 0: tr_most_given */
+        int given_max;                      /* 0: arch.images */
         bool checkpoint_steps;
         ts_precision precision;
         bool exact;
@@ -77,6 +78,9 @@ ts_code tr_config_set(tr_config *c, const char *where, const char *section, cons
 ts_code tr_config_set_assignment(tr_config *c, const char *assignment, ts_status *st);
 /* Every entry of the file; other keys keep their values. */
 ts_code tr_config_read(tr_config *c, const char *path, ts_status *st);
+
+/* Photographs of a material in a training step, at most. */
+int tr_most_given(const tr_config *c);
 
 /* Conditions on several keys: the architecture as a whole, ranges against each other. */
 ts_code tr_config_check(const tr_config *c, ts_status *st);

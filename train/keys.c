@@ -56,7 +56,8 @@ const tr_key tr_keys[] = {
     {"model", "coarse_gru", TR_INT, AT(arch.coarse_gru), 1, 1024, NULL, NULL, false,
      "channels of the coarse network's recurrent states"},
     {"model", "revisions", TR_INT, AT(arch.revisions), 0, 16, NULL, NULL, false,
-     "times that a network h of its own revises R_0 at g's full size, before steps of descent = posterior"},
+     "times that a network h revises the maps of several photographs at g's full size, before steps of descent = "
+     "posterior"},
     {"model", "revise_width", TR_INT, AT(arch.revise_width), 4, 1024, NULL, NULL, false,
      "channels of that network's first level"},
     {"model", "iterations", TR_INT, AT(arch.iterations), 0, 64, NULL, NULL, false,
@@ -223,7 +224,10 @@ const tr_key tr_keys[] = {
      "share of the materials whose R_0 is made worse before h learns to revise it (model.revisions): the "
      "levels of its maps, and what is a metal"},
     {"train", "given_min", TR_INT, AT(train.given_min), 0, NN_MAX_IMAGES, "0", NULL, false,
-     "smallest number of photographs in a training step, drawn uniformly up to model.images; 0: always model.images"},
+     "smallest number of photographs in a training step, drawn uniformly up to train.given_max; 0: always that many"},
+    {"train", "given_max", TR_INT, AT(train.given_max), 0, NN_MAX_IMAGES, "0", NULL, false,
+     "largest number of photographs of a material: above model.images where h learns to revise the maps of several "
+     "(model.revisions); 0: model.images"},
     {"train", "checkpoint_steps", TR_BOOL, AT(train.checkpoint_steps), 0, 1, "no", NULL, true,
      "keep only the maps and h's states of each refinement step, and compute the rest again for the gradient: less "
      "memory, a third more time, the same numbers"},

@@ -145,3 +145,9 @@ void tr_capture_views(double sheet, uint64_t seed, uint64_t index, int count, in
         else rd_capture_draw(&rng, number, views + i * number);
     }
 }
+
+void tr_describe_several(const tr_shot *shots, int photographs, rd_view *views, unsigned char *known)
+{
+    for (int i = 0; i < photographs; i++) views[i] = shots[i].view;
+    memset(known, NN_KNOWN_ALL, (size_t)photographs);
+}

@@ -1,6 +1,8 @@
-/* The second phase of a model with arch.revisions: h learns to revise what a fixed g says first. */
+/* The second phase of a model with arch.revisions: h learns to revise what a fixed g and the steps make of several
+ * photographs. */
 #include "ops.h"
 #include "nn/first_guess.h"
+#include "nn/metal.h"
 #include "nn/revise.h"
 #include "render/losses.h"
 #include "tensor/maps.h"
@@ -9,26 +11,34 @@
 #include "train/state.h"
 #include <string.h>
 
-/* The first guess of photograph n, in place of what g said of it. */
-static bool settle(ag_tape *tape, const nn_model *model, const nn_input *in, const nn_guess *said, int n, rd_view *view)
+/* The first guess of material n, in place of what g said of its first photograph; views: of all, which are found. */
+static bool settle(ag_tape *tape, const nn_model *model, const nn_input *in, const nn_guess *said, int n,
+                   rd_view *views)
 {
-    const int side = in->image.shape.h, channels = model->arch.channels;
+    const int side = in->image.shape.h, channels = model->arch.channels, given = in->given,
+              known = in->known[n * given];
     const int64_t pixels = (int64_t)side * side;
-    const nn_taken taken = {.view = in->views[n], .known = in->known ? in->known[n] : NN_KNOWN_ALL};
+    const rd_grid grid = rd_grid_on(rd_grid_full(side), ag_compute(tape)->threads);
+    const nn_taken taken = {.view = views[0], .known = known, .photographs = given};
+    const float *image[NN_MAX_IMAGES];
     ts_arena *arena = ag_arena(tape);
     ts_status st = {0};
+    for (int k = 0; k < given; k++) image[k] = in->image.data + (n * given + k) * pixels * 3;
     const ts_mark mark = ts_arena_mark(arena);
     nn_first_guess guess = {.r0 = said->maps->t.data + n * pixels * channels,
                             .spread = said->spread->t.data + n * pixels * NN_SPREADS,
                             .deviation = ts_arena_alloc(arena, (size_t)pixels * NN_SPREADS * sizeof(float))};
     if (!guess.deviation) return ag_fail(tape, TS_NOMEM, "no memory for the maps' deviations"), false;
-    if (nn_first_guess_settle(rd_grid_on(rd_grid_full(side), ag_compute(tape)->threads), channels,
-                              in->image.data + n * pixels * 3, said->scene->t.data + (size_t)n * 2 * RD_SCENE_NUMBERS,
-                              &taken, arena, &guess, &st))
-        return ag_fail(tape, st.code, "%s", st.message), false;
-    *view = guess.view;
+    ts_code code = nn_first_guess_settle(
+        grid, channels, image[0], said->scene->t.data + (size_t)n * 2 * RD_SCENE_NUMBERS, &taken, arena, &guess, &st);
+    views[0] = guess.view;
+    const nn_metal_photos photos = {image, views, given, side, known};
+    if (!code)
+        code = nn_tell_metal(grid, &photos, guess.deviation, nn_arch_steps(&model->arch, given), channels, guess.r0,
+                             &st);
+    if (code) ag_fail(tape, st.code, "%s", st.message);
     ts_arena_release(arena, mark);
-    return true;
+    return !code;
 }
 
 typedef struct disturbing {
@@ -50,16 +60,30 @@ static void disturb_one(const void *job, int64_t i)
 bool tr_first_guesses(ag_tape *tape, const nn_model *model, const nn_input *in, const tr_trainer *disturbed,
                       nn_revision *r)
 {
-    const int count = in->image.shape.n, side = nn_arch_side(&model->arch);
-    rd_view *views = ts_arena_alloc(ag_arena(tape), (size_t)count * sizeof *views);
+    const int given = in->given, count = in->image.shape.n / given, side = nn_arch_side(&model->arch);
+    const size_t values = (size_t)side * (size_t)side * 3;
+    ts_arena *arena = ag_arena(tape);
+    rd_view *views = ts_arena_alloc(arena, (size_t)(count * given) * sizeof *views),
+            *own = ts_arena_alloc(arena, (size_t)count * sizeof *own);
+    unsigned char *known = ts_arena_alloc(arena, (size_t)count);
+    ag_value *first = ag_empty(tape, (ts_shape){count, side, side, 3});
     nn_guess said;
-    if (!views) return ag_fail(tape, TS_NOMEM, "no memory for the scenes that are found"), false;
-    if (!nn_guess_from(tape, model, in, &said)) return false;
+    if (!views || !own || !known) ag_fail(tape, TS_NOMEM, "no memory for the scenes that are found");
+    if (ag_status(tape)->code) return false;
+    memcpy(views, in->views, (size_t)(count * given) * sizeof *views);
+    for (int n = 0; n < count; n++) {
+        own[n] = in->views[n * given], known[n] = in->known[n * given];
+        memcpy(first->t.data + (size_t)n * values, in->image.data + (size_t)(n * given) * values,
+               values * sizeof(float));
+    }
+    const nn_input read = {.image = first->t, .grid = in->grid, .views = own, .known = known, .given = 1};
+    if (!nn_guess_from(tape, model, &read, &said)) return false;
     if (disturbed && disturbed->config.train.disturb > 0)
         ts_tasks(0, count, disturb_one, &(disturbing){disturbed, said.maps->t.data, side});
     for (int n = 0; n < count; n++)
-        if (!settle(tape, model, in, &said, n, &views[n])) return false;
-    *r = (nn_revision){.image = in->image,
+        if (!settle(tape, model, in, &said, n, views + n * given)) return false;
+    *r = (nn_revision){.given = given,
+                       .image = in->image,
                        .views = views,
                        .known = in->known,
                        .maps = ag_constant(tape, said.maps->t),

@@ -27,14 +27,15 @@ enum { TR_ERRORS = TR_MOST_ITERATIONS + 5 };
 /* The fixed materials of validation: this rank's share of them. */
 typedef struct tr_validator {
     int first, count;
-    float *maps;       /* [count][size][size][9], owned */
-    float *images;     /* [count][arch.images][size][size][3], owned */
-    rd_view *captures; /* [count][arch.images], owned */
-    tr_shot *shots;    /* [count][arch.images], owned */
-    rd_view *views;    /* [count][RD_EVAL_VIEWS], owned */
-    double *errors;    /* [validate.count][TR_ERRORS] of all, owned */
-    nn_model *model;   /* holds what is validated: the moving average, or a copy of the weights */
-    ag_tape *tape;     /* without gradients */
+    float *maps;          /* [count][size][size][9], owned */
+    float *images;        /* [count][given][size][size][3], owned */
+    rd_view *captures;    /* [count][given], owned */
+    tr_shot *shots;       /* [count][given], owned */
+    unsigned char *known; /* [count][given] of nn_known, where h is trained */
+    rd_view *views;       /* [count][RD_EVAL_VIEWS], owned */
+    double *errors;       /* [validate.count][TR_ERRORS] of all, owned */
+    nn_model *model;      /* holds what is validated: the moving average, or a copy of the weights */
+    ag_tape *tape;        /* without gradients */
 } tr_validator;
 
 typedef struct tr_trainer {
@@ -93,6 +94,8 @@ io_camera tr_camera_of(const tr_config *c);
  * shots [count][number]: the truth of each; NULL: not wanted. */
 void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
                     const rd_view *views, int number, float *images, tr_shot *shots);
+/* Of photographs that h revises light and camera are known: views and known [photographs], of nn_known, say so. */
+void tr_describe_several(const tr_shot *shots, int photographs, rd_view *views, unsigned char *known);
 /* Whether the photographs of material number index are those of a printed sheet, of which there is this share. */
 bool tr_under_sheet(double share, uint64_t seed, uint64_t index);
 /* The views of number photographs of each of count materials, [count][number], drawn for each material
@@ -111,7 +114,7 @@ ag_value *tr_add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value *ta
  * scene. target [batch, patch, patch, 9]; its parts go to *row. NULL after an error, which the tape has. */
 ag_value *tr_guess_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr_row *row);
 
-/* revision.c. The first guesses of photographs of nn_arch_side, one of each material, on a tape without gradients:
+/* revision.c. The first guesses of several photographs of each material, of nn_arch_side, on a tape without gradients:
  * what revisions begin with. disturbed: NULL, or whose train.disturb makes this step's maps worse. False after an
  * error, which the tape has. */
 bool tr_first_guesses(ag_tape *tape, const nn_model *model, const nn_input *in, const struct tr_trainer *disturbed,

@@ -80,7 +80,7 @@ static int draw_iterations(const tr_config *c, int64_t step)
 /* The photographs of each material in this step. */
 static int draw_given(const tr_config *c, int64_t step)
 {
-    const int hi = c->arch.images, lo = c->train.given_min ? c->train.given_min : hi;
+    const int hi = tr_most_given(c), lo = c->train.given_min ? c->train.given_min : hi;
     ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_CAPTURE, (uint64_t)step);
     return lo + ts_rng_int(&rng, hi - lo + 1);
 }
@@ -129,7 +129,7 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
     nn_input in = {.image = ts_view(t->images, (ts_shape){batch * given, size, size, 3}),
                    .grid = rd_grid_full(size),
                    .views = t->captures,
-                   .known = c->arch.conditions ? t->known : NULL,
+                   .known = c->arch.conditions || c->arch.revisions > 0 ? t->known : NULL,
                    .given = given,
                    .recompute = c->train.checkpoint_steps};
     if (row->pretraining) {
@@ -240,7 +240,8 @@ static const float *draw(tr_trainer *t, int given, ts_status *st)
     tr_capture_views(c->data.sheet, (uint64_t)c->data.seed, index, t->batch, given, t->captures);
     tr_photographs(c, (uint64_t)c->data.seed, index, t->batch, c->data.patch, target, t->captures, given, t->images,
                    t->shots);
-    if (c->arch.conditions || c->arch.scene) describe(t, given);
+    if (c->arch.revisions > 0 && given > 1) tr_describe_several(t->shots, t->batch * given, t->captures, t->known);
+    else if (c->arch.conditions || c->arch.scene) describe(t, given);
     ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_SCENE, (uint64_t)t->step);
     for (int i = -t->first; i < t->batch; i++) /* other ranks' are drawn over */
         rd_loss_views(&rng, t->views + (i < 0 ? 0 : i) * RD_LOSS_VIEWS);

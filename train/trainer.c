@@ -128,7 +128,7 @@ static ts_code prepare(tr_trainer *t, bool *resume, ts_status *st)
         if (lock_folder(t, st) != TS_OK || check_folder(t, resume, st) != TS_OK) return st->code;
         ts_sweep(t->folder);
     }
-    const size_t photographs = batch * (size_t)c->arch.images;
+    const size_t photographs = batch * (size_t)tr_most_given(c);
     t->images = malloc(photographs * pixels * 3 * sizeof(float));
     t->captures = malloc(photographs * sizeof *t->captures);
     t->scenes = malloc(photographs * RD_SCENE_NUMBERS * sizeof *t->scenes);

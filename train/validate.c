@@ -50,13 +50,14 @@ ts_code tr_validator_create(tr_trainer *t, ts_status *st)
     const size_t count = (size_t)(v->count > 0 ? v->count : 1),
                  pixels = (size_t)c->validate.size * (size_t)c->validate.size;
     v->maps = malloc(count * pixels * MAP_CHANNELS * sizeof(float));
-    const size_t given = (size_t)c->arch.images;
+    const size_t given = (size_t)tr_most_given(c);
     v->images = malloc(count * given * pixels * 3 * sizeof(float));
     v->captures = malloc(count * given * sizeof *v->captures);
     v->shots = malloc(count * given * sizeof *v->shots);
+    v->known = malloc(count * given);
     v->views = malloc(count * RD_EVAL_VIEWS * sizeof *v->views);
     v->errors = malloc((size_t)c->validate.count * TR_ERRORS * sizeof *v->errors);
-    if (!v->maps || !v->images || !v->captures || !v->shots || !v->views || !v->errors ||
+    if (!v->maps || !v->images || !v->captures || !v->shots || !v->known || !v->views || !v->errors ||
         !make_materials(c, v->first, v->count, v->maps))
         return ts_fail(st, TS_NOMEM, "no memory for the validation materials");
     v->model = tr_model_create(c, st);
@@ -65,9 +66,10 @@ ts_code tr_validator_create(tr_trainer *t, ts_status *st)
     const uint64_t first = (uint64_t)v->first;
     tr_config camera = *c;
     if (c->validate.camera == TR_CAMERA_DEFAULT) camera.data = tr_config_default().data;
-    tr_capture_views(camera.data.sheet, (uint64_t)c->validate.seed, first, v->count, c->arch.images, v->captures);
+    tr_capture_views(camera.data.sheet, (uint64_t)c->validate.seed, first, v->count, (int)given, v->captures);
     tr_photographs(&camera, (uint64_t)c->validate.seed, first, v->count, c->validate.size, v->maps, v->captures,
-                   c->arch.images, v->images, v->shots);
+                   (int)given, v->images, v->shots);
+    if (c->arch.revisions > 0 && given > 1) tr_describe_several(v->shots, v->count * (int)given, v->captures, v->known);
     for (int i = 0; i < v->count; i++) {
         ts_rng rng = ts_rng_make((uint64_t)c->validate.seed, TS_STREAM_EVAL, first + (uint64_t)i);
         rd_eval_views(&rng, RD_EVAL_VIEWS, v->views + (size_t)i * RD_EVAL_VIEWS);
@@ -81,6 +83,7 @@ void tr_validator_free(tr_validator *v)
     free(v->images);
     free(v->captures);
     free(v->shots);
+    free(v->known);
     free(v->views);
     free(v->errors);
     nn_model_free(&v->model);
@@ -109,14 +112,14 @@ static ts_code measure(tr_trainer *t, int first, int n, int iterations, ts_statu
     const int size = t->config.validate.size, channels = t->config.arch.channels;
     const size_t pixels = (size_t)size * (size_t)size;
     const rd_grid grid = rd_grid_full(size);
-    const size_t given = (size_t)t->config.arch.images, photograph = (size_t)first * given;
-    const nn_input in = {
-        .image = ts_view(v->images + photograph * pixels * 3, (ts_shape){n * (int)given, size, size, 3}),
-        .grid = grid,
-        .views = v->captures + photograph,
-        .known = t->config.arch.conditions ? nothing : NULL,
-        .given = (int)given};
+    const size_t given = (size_t)tr_most_given(&t->config), photograph = (size_t)first * given;
+    nn_input in = {.image = ts_view(v->images + photograph * pixels * 3, (ts_shape){n * (int)given, size, size, 3}),
+                   .grid = grid,
+                   .views = v->captures + photograph,
+                   .known = t->config.arch.conditions ? nothing : NULL,
+                   .given = (int)given};
     ag_value *maps[TR_MOST_ITERATIONS + 1];
+    if (v->model->arch.revisions > 0 && given > 1) in.known = v->known + photograph;
     ag_reset(v->tape);
     if (v->model->coder.code > 0) { /* how well the maps themselves come back */
         float *truth = v->maps + (size_t)first * pixels * MAP_CHANNELS;

@@ -138,7 +138,7 @@ TEST(first_guess_keeps_what_is_known)
 TEST(first_guess_is_told_view_and_power_apart)
 {
     nn_model *m = guessing();
-    const nn_input in = photographs(1, PLACE, 86, NULL);
+    const nn_input in = photographs(3, PLACE, 86, NULL);
     static float maps[PLACE * PLACE * 9];
     ts_status st = {0};
     ag_tape *tape = tape_create(false);
@@ -205,17 +205,21 @@ static bool on_seen(int step, const float *maps, int channels, void *user)
     return step != s->stop_at;
 }
 
-static seen_steps watch_steps(const nn_model *m, const float *image, int iterations, int stop_at, float *result)
+static seen_steps watch_steps(const nn_model *m, const float *images, int count, int iterations, int stop_at,
+                              float *result)
 {
     seen_steps s = {.stop_at = stop_at};
     ts_status st = {0};
-    double power;
     ag_tape *tape = tape_create(false);
     ag_freeze(tape, true);
-    const lgd_photo photo = lgd_flash_photo(image);
-    const lgd_options o = {.size = sizeof o, .iterations = iterations, .power = &power, .fov = LGD_FOV_UNKNOWN};
+    lgd_photo photo[3];
+    for (int k = 0; k < count; k++) {
+        photo[k] = lgd_flash_photo(images + k * PLACE * PLACE * 3);
+        photo[k].light[0] = 0.3f * (float)k;
+    }
+    const lgd_options o = {.size = sizeof o, .iterations = iterations, .fov = LGD_FOV_OF_PHOTO};
     const lgd_estimator e = {.net = m, .tape = tape, .encoded = true, .seen = on_seen, .user = &s};
-    CHECK(!lgd_estimator_run(&e, &photo, 1, PLACE, &o, result, &st), "%s", st.message);
+    CHECK(!lgd_estimator_run(&e, photo, count, PLACE, &o, result, &st), "%s", st.message);
     ag_tape_destroy(&tape);
     return s;
 }
@@ -225,22 +229,25 @@ static void free_steps(seen_steps *s)
     for (int i = 0; i < s->count; i++) free(s->maps[i]);
 }
 
-/* R_0 is g's, then come h's revisions, then the steps; fewer steps end earlier, and whoever stops gets what was seen
- * last. */
+/* Of several photographs R_0 is g's, then come h's revisions, then the steps; fewer steps end earlier, and whoever
+ * stops gets what was seen last. One photograph has no revisions. */
 TEST(first_guess_is_revised_in_the_first_steps)
 {
     nn_model *m = revising();
-    const nn_input in = photographs(1, PLACE, 86, NULL);
+    const nn_input in = photographs(3, PLACE, 86, NULL);
     enum { VALUES = PLACE * PLACE * 9 };
     static float all[VALUES], some[VALUES];
-    seen_steps whole = watch_steps(m, in.image.data, -1, -1, all);
-    CHECK(whole.count == 7, "%d steps are seen", whole.count);
+    seen_steps one = watch_steps(m, in.image.data, 1, -1, -1, all);
+    CHECK(one.count == 5, "of one photograph %d steps are seen", one.count);
+    free_steps(&one);
+    seen_steps whole = watch_steps(m, in.image.data, 3, -1, -1, all);
+    CHECK(whole.count == 9, "%d steps are seen", whole.count);
     for (int i = 0; i < whole.count; i++) CHECK(whole.at[i] == i, "step %d is seen as %d", i, whole.at[i]);
     for (int i = 1; i <= 2; i++)
         CHECK(memcmp(whole.maps[i], whole.maps[i - 1], sizeof all), "revision %d changes nothing", i);
     for (int n = 0; n <= 3; n++)
         for (int stop = 0; stop < 2; stop++) {
-            seen_steps part = watch_steps(m, in.image.data, stop ? -1 : n, stop ? n : -1, some);
+            seen_steps part = watch_steps(m, in.image.data, 3, stop ? -1 : n, stop ? n : -1, some);
             CHECK(part.count == n + 1, "%d of %d steps are seen", part.count, n);
             CHECK(!memcmp(part.maps[n], whole.maps[n], sizeof all), "R_%d depends on what follows", n);
             for (int i = 0; i < VALUES; i++)

@@ -1,27 +1,28 @@
-/* h that revises R_0 at g's full size. */
+/* h that revises the maps of several photographs at g's full size. */
+#include "nn/deviation.h"
 #include "nn/revise.h"
 #include "nn/need.h"
+#include "render/posterior.h"
 #include "tests/support/networks.h"
 
-enum { FINE = 4 * SIDE, VALUES = FINE * FINE * 9, MATERIALS = 3 };
-
-static const unsigned char known[MATERIALS] = {NN_KNOWN_ALL, 0, NN_KNOWN_CAMERA};
+enum { FINE = 4 * SIDE, PIXELS = FINE * FINE, VALUES = PIXELS * 9, MATERIALS = 3, GIVEN = 3 };
 
 /* Photographs of materials, and maps that are not theirs. */
 typedef struct scene {
     nn_input in;
     float *maps, *spread;
-    rd_view views[MATERIALS];
+    rd_view views[MATERIALS * GIVEN];
+    unsigned char known[MATERIALS * GIVEN];
 } scene;
 
 static scene scene_make(void)
 {
-    scene s = {.in = photographs(MATERIALS, FINE, 31, NULL),
+    scene s = {.in = photographs(MATERIALS * GIVEN, FINE, 31, NULL),
                .maps = numbers((size_t)MATERIALS * VALUES, 32, -0.9f, 0.9f),
-               .spread = numbers((size_t)MATERIALS * FINE * FINE * NN_SPREADS, 33, -1, 1)};
-    for (int i = 0; i < MATERIALS; i++) {
-        s.views[i] = rd_flash();
-        s.views[i].light[0] = 0.05f * (float)i;
+               .spread = numbers((size_t)MATERIALS * PIXELS * NN_SPREADS, 33, -1, 1)};
+    for (int i = 0; i < MATERIALS * GIVEN; i++) {
+        s.views[i] = rd_capture_view(i % GIVEN);
+        s.known[i] = NN_KNOWN_ALL;
     }
     return s;
 }
@@ -36,42 +37,71 @@ static void scene_free(scene *s)
 /* Of count materials from number first on. */
 static nn_revision begin(ag_tape *tape, const scene *s, int first, int count)
 {
-    const ts_shape shape = {count, FINE, FINE, 9}, image = {count, FINE, FINE, 3},
+    const ts_shape shape = {count, FINE, FINE, 9}, image = {count * GIVEN, FINE, FINE, 3},
                    spread = {count, FINE, FINE, NN_SPREADS};
     return (nn_revision){
-        .image = ts_view(s->in.image.data + (int64_t)first * FINE * FINE * 3, image),
-        .views = s->views + first,
-        .known = known + first,
+        .given = GIVEN,
+        .image = ts_view(s->in.image.data + (int64_t)first * GIVEN * PIXELS * 3, image),
+        .views = s->views + first * GIVEN,
+        .known = s->known + first * GIVEN,
         .maps = ag_constant(tape, ts_view(s->maps + (int64_t)first * VALUES, shape)),
-        .spread = ag_constant(tape, ts_view(s->spread + (int64_t)first * FINE * FINE * NN_SPREADS, spread))};
+        .spread = ag_constant(tape, ts_view(s->spread + (int64_t)first * PIXELS * NN_SPREADS, spread))};
 }
 
-/* An h that learned nothing changes nothing; another changes maps and spread, the second time from its state. */
-TEST(revise_begins_as_the_identity)
+/* maps become what all steps make of them. */
+static void descend(const nn_model *m, const scene *s, int material, float *maps)
+{
+    const rd_grid grid = rd_grid_full(FINE);
+    const int first = material * GIVEN;
+    float *mean = malloc(VALUES * sizeof *mean), *step = malloc(VALUES * sizeof *step),
+          *best = malloc(VALUES * sizeof *best), *misfit = malloc(PIXELS * sizeof *misfit),
+          *deviation = malloc(PIXELS * NN_SPREADS * sizeof *deviation);
+    const float *image[GIVEN];
+    for (int k = 0; k < GIVEN; k++) image[k] = s->in.image.data + (int64_t)(first + k) * PIXELS * 3;
+    memcpy(mean, maps, VALUES * sizeof *mean);
+    nn_deviations(PIXELS, s->spread + (int64_t)material * PIXELS * NN_SPREADS, (nn_belief){.photographs = GIVEN}, 1,
+                  deviation);
+    const rd_prior prior = {mean, deviation, nn_step_prior(s->known[first], GIVEN)};
+    for (int t = 0; t < nn_arch_steps(&m->arch, GIVEN); t++) {
+        const rd_search search = {best, misfit, t > 0};
+        rd_posterior_step(grid, maps, 9, s->views + first, image, GIVEN, &prior, rd_step_length(GIVEN, t), &search,
+                          step, NULL);
+        for (int i = 0; i < VALUES; i++) maps[i] += step[i];
+    }
+    free(mean), free(step), free(best), free(misfit), free(deviation);
+}
+
+/* An h that learned nothing leaves what the steps make; another changes maps and spread. */
+TEST(revise_begins_with_the_steps)
 {
     nn_model *m = revising();
     scene s = scene_make();
     ag_tape *tape = tape_create(false);
     nn_revision r = begin(tape, &s, 0, MATERIALS);
-    CHECK(nn_revise(tape, m, &r) && nn_revise(tape, m, &r), "%s", ag_status(tape)->message);
-    float *kept = malloc(sizeof *kept * (size_t)MATERIALS * VALUES);
-    memcpy(kept, r.maps->t.data, sizeof *kept * (size_t)MATERIALS * VALUES);
-    nn_revision again = begin(tape, &s, 0, MATERIALS);
-    CHECK(nn_revise(tape, m, &again), "%s", ag_status(tape)->message);
-    again.state = NULL; /* forgotten */
-    CHECK(nn_revise(tape, m, &again), "%s", ag_status(tape)->message);
-    CHECK(memcmp(kept, again.maps->t.data, sizeof *kept * (size_t)MATERIALS * VALUES), "the state is not read");
-    CHECK(memcmp(s.spread, again.spread->t.data, sizeof *kept * FINE * FINE * NN_SPREADS), "the spread stays");
+    CHECK(nn_revise(tape, m, &r) && r.made == 1, "%s", ag_status(tape)->message);
+    float *changed = malloc(sizeof *changed * (size_t)MATERIALS * VALUES);
+    memcpy(changed, r.maps->t.data, sizeof *changed * (size_t)MATERIALS * VALUES);
+    CHECK(memcmp(s.spread, r.spread->t.data, sizeof *changed * PIXELS * NN_SPREADS), "the spread stays");
     ag_reset(tape);
-    const nn_param *last = nn_model_find(m, "h.full.conv2.weight");
+    const nn_param *last = nn_model_find(m, "h.full.conv3.weight");
     memset(m->value + last->offset, 0, last->count * sizeof(float));
     r = begin(tape, &s, 0, MATERIALS);
     CHECK(nn_revise(tape, m, &r), "%s", ag_status(tape)->message);
-    for (int k = 0; k < MATERIALS * VALUES; k++)
-        CHECK(fabsf(s.maps[k] - r.maps->t.data[k]) < 1e-6f, "without a change %g became %g", (double)s.maps[k],
-              (double)r.maps->t.data[k]);
+    CHECK(!memcmp(s.spread, r.spread->t.data, sizeof *changed * PIXELS * NN_SPREADS), "without a change it moves");
+    for (int n = 0; n < MATERIALS; n++) {
+        float *maps = s.maps + n * VALUES;
+        descend(m, &s, n, maps);
+        double change = 0;
+        for (int k = 0; k < VALUES; k++) {
+            const float own = r.maps->t.data[n * VALUES + k];
+            CHECK(fabsf(maps[k] - own) < 1e-5f, "the steps make %g, and without a change it is %g", (double)maps[k],
+                  (double)own);
+            change = fmax(change, fabs((double)changed[n * VALUES + k] - (double)own));
+        }
+        CHECK(change > 1e-3, "h changes by %g at most", change);
+    }
     ag_tape_destroy(&tape);
-    free(kept);
+    free(changed);
     scene_free(&s);
     nn_model_free(&m);
 }
@@ -100,42 +130,53 @@ TEST(revise_materials_apart)
     nn_model_free(&m);
 }
 
-/* A part of a loss' slope along a random direction of h's parameters, against the difference quotient. What h reads is
- * a constant for back-propagation: of one revision the two agree. */
+/* A loss after one revision; gradients: h's get its slope. */
+static double loss_of(const nn_model *m, const scene *s, bool gradients)
+{
+    static float weight[13] = {1, -2, 3, 1, 2, -1, 1, 2, 3, 1, 1, -1, 2};
+    ag_tape *tape = tape_create(gradients);
+    ag_compute_set(tape, (ts_compute){.exact = true});
+    nn_revision r = begin(tape, s, 0, 1);
+    CHECK(nn_revise(tape, m, &r), "%s", ag_status(tape)->message);
+    ag_value *loss = ag_channel_mean(tape, ag_resize(tape, ag_concat(tape, r.maps, r.spread), 1, 1));
+    loss = ag_linear(tape, loss, ag_constant(tape, ts_view(weight, (ts_shape){1, 1, 1, 13})), NULL);
+    CHECK(loss, "%s", ag_status(tape)->message);
+    if (gradients) ag_backward(tape, loss);
+    const double value = (double)loss->t.data[0];
+    ag_tape_destroy(&tape);
+    return value;
+}
+
+/* A loss' slope along a random direction of each of h's layers, against the difference quotient. What h reads is a
+ * constant for back-propagation: of one revision the two agree. */
 TEST(revise_has_a_gradient)
 {
+    static const char *const layers[] = {"read.conv1", "read.conv2", "down1.conv1", "down2.conv2",
+                                         "global",     "up2.conv1",  "up1.conv2",   "squares",
+                                         "full.conv1", "full.conv2", "full.conv3"};
     nn_model *m = revising();
     scene s = scene_make();
-    double slope = 0, value[2];
-    size_t first, last;
-    nn_model_range(m, NN_H, &first, &last);
-    float *way = numbers(last - first, 34, -1, 1), *before = malloc((last - first) * sizeof *before);
-    memcpy(before, m->value + first, (last - first) * sizeof *before);
     const float step = 1e-3f;
-    for (int k = 0; k < 3; k++) {
-        ag_tape *tape = tape_create(k == 2);
-        ag_compute_set(tape, (ts_compute){.exact = true});
-        for (size_t i = first; i < last && k < 2; i++)
-            m->value[i] = before[i - first] + (k ? step : -step) * way[i - first];
-        if (k == 2) memcpy(m->value + first, before, (last - first) * sizeof *before);
-        nn_revision r = begin(tape, &s, 0, 1);
-        CHECK(nn_revise(tape, m, &r), "%s", ag_status(tape)->message);
-        ag_value *loss = ag_channel_mean(tape, ag_resize(tape, ag_concat(tape, r.maps, r.spread), 1, 1));
-        loss = ag_linear(
-            tape, loss,
-            ag_constant(tape, ts_view((float[13]){1, -2, 3, 1, 2, -1, 1, 2, 3, 1, 1, -1, 2}, (ts_shape){1, 1, 1, 13})),
-            NULL);
-        CHECK(loss, "%s", ag_status(tape)->message);
-        if (k < 2) value[k] = (double)loss->t.data[0];
-        else {
-            ag_backward(tape, loss);
-            for (size_t i = first; i < last; i++) slope += (double)m->grad[i] * (double)way[i - first];
+    loss_of(m, &s, true);
+    for (size_t l = 0; l < sizeof layers / sizeof *layers; l++) {
+        char name[64];
+        snprintf(name, sizeof name, "h.%s.weight", layers[l]);
+        const nn_param *p = nn_model_find(m, name);
+        float *at = m->value + p->offset, *way = numbers(p->count, 34 + l, -1, 1),
+              *before = malloc(p->count * sizeof *before);
+        double slope = 0, value[2];
+        memcpy(before, at, p->count * sizeof *before);
+        for (int k = 0; k < 2; k++) {
+            for (size_t i = 0; i < p->count; i++) at[i] = before[i] + (k ? step : -step) * way[i];
+            value[k] = loss_of(m, &s, false);
         }
-        ag_tape_destroy(&tape);
+        memcpy(at, before, p->count * sizeof *before);
+        for (size_t i = 0; i < p->count; i++) slope += (double)m->grad[p->offset + i] * (double)way[i];
+        const double quotient = (value[1] - value[0]) / (2 * (double)step);
+        CHECK(fabs(slope) > 1e-3 && fabs(slope - quotient) < 0.02 * fabs(slope) + 5e-4, "%s: slope %g, quotient %g",
+              name, slope, quotient);
+        free(way), free(before);
     }
-    const double quotient = (value[1] - value[0]) / (2 * (double)step);
-    CHECK(fabs(slope) > 1e-3 && fabs(slope - quotient) < 0.02 * fabs(slope), "slope %g, quotient %g", slope, quotient);
-    free(way), free(before);
     scene_free(&s);
     nn_model_free(&m);
 }
@@ -152,7 +193,7 @@ TEST(need_of_a_revision_is_counted)
         ag_tape *tape = tape_create(false);
         nn_revision r = begin(tape, &s, 0, 1);
         CHECK(nn_revise(tape, m, &r), "%s", ag_status(tape)->message);
-        const double taken = (double)ts_arena_peak(ag_arena(tape)), counted = nn_revision_bytes(&a);
+        const double taken = (double)ts_arena_peak(ag_arena(tape)), counted = nn_revision_bytes(&a, GIVEN);
         CHECK(taken <= counted && counted < 2 * taken, "width %d: %.0f bytes are counted and %.0f taken", width,
               counted, taken);
         ag_tape_destroy(&tape);
@@ -173,14 +214,22 @@ TEST(revise_refuses)
     r = begin(tape, &s, 0, 1);
     r.image.shape.h = r.image.shape.w = FINE / 2;
     CHECK(!nn_revise(tape, m, &r) && ag_status(tape)->code == TS_INVALID, "a photograph of half the size is revised");
+    ag_reset(tape);
+    r = begin(tape, &s, 0, 1);
+    r.given = 1;
+    CHECK(!nn_revise(tape, m, &r) && ag_status(tape)->code == TS_INVALID, "one photograph is revised");
     nn_arch a = m->arch;
     ts_status st = {0};
-    a.conditions = false;
+    a.descent = NN_DESCENT_NEWTON;
     CHECK(nn_arch_check(&a, &st) == TS_INVALID && strstr(st.message, "revisions"), "%s", st.message);
     a = m->arch, a.g_size = 18, a.g_levels = 1;
     CHECK(nn_arch_check(&a, &st) == TS_INVALID && strstr(st.message, "revisions"), "%s", st.message);
-    CHECK(nn_arch_steps(&m->arch, 1) == 6 && nn_arch_steps(&m->arch, 2) == 8, "%d and %d steps",
-          nn_arch_steps(&m->arch, 1), nn_arch_steps(&m->arch, 2));
+    for (int photographs = 1; photographs <= 2; photographs++)
+        for (int known = 0; known <= NN_KNOWN_ALL; known++) {
+            const int made = nn_arch_revisions(&m->arch, photographs, known, 8);
+            CHECK(made == (photographs == 2 && known == NN_KNOWN_ALL ? 2 : 0), "%d revisions of %d photographs", made,
+                  photographs);
+        }
     ag_tape_destroy(&tape);
     scene_free(&s);
     nn_model_free(&m);

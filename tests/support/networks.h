@@ -37,7 +37,7 @@ static inline nn_model *guessing(void)
     return create(&a, 81);
 }
 
-/* The same with an h that revises R_0 twice and is not the identity. */
+/* The same with an h that revises the maps of several photographs twice and changes them. */
 static inline nn_model *revising(void)
 {
     nn_arch a = tiny();
@@ -45,7 +45,7 @@ static inline nn_model *revising(void)
     a.conditions = a.spread = a.scene = true;
     a.revisions = 2, a.revise_width = 8;
     nn_model *m = create(&a, 81);
-    const nn_param *p = nn_model_find(m, "h.full.conv2.weight");
+    const nn_param *p = nn_model_find(m, "h.full.conv3.weight");
     ts_rng r = ts_rng_make(10, TS_STREAM_TEST, 0);
     for (size_t i = 0; i < p->count; i++) m->value[p->offset + i] = ts_rng_range(&r, -0.02f, 0.02f);
     return m;

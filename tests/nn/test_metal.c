@@ -1,5 +1,5 @@
 /* Several photographs tell a metal from a dielectric, whatever was read of the first. */
-#include "infer/metal.h"
+#include "nn/metal.h"
 #include "render/render.h"
 #include "tests/support/networks.h"
 #include <math.h>
@@ -40,8 +40,8 @@ static void tell(const float *truth, float *read)
         image[k] = malloc(PIXELS * 3 * sizeof *image[k]);
         rd_render(rd_grid_full(EDGE), truth, C, &view[k], false, image[k]);
     }
-    const lgd_metal_photos photos = {(const float *const *)image, view, TAKEN, EDGE, NN_KNOWN_ALL};
-    CHECK(!lgd_tell_metal(rd_grid_full(EDGE), &photos, deviation, STEPS, C, read, &st), "%s", st.message);
+    const nn_metal_photos photos = {(const float *const *)image, view, TAKEN, EDGE, NN_KNOWN_ALL};
+    CHECK(!nn_tell_metal(rd_grid_full(EDGE), &photos, deviation, STEPS, C, read, &st), "%s", st.message);
     for (int k = 0; k < TAKEN; k++) free(image[k]);
     free(deviation);
 }

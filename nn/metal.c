@@ -1,4 +1,4 @@
-#include "infer/metal.h"
+#include "nn/metal.h"
 #include "nn/kind.h"
 #include "render/posterior.h"
 #include "tensor/maps.h"
@@ -14,7 +14,7 @@ typedef struct sample {
     float *maps, *step, *best, *misfit, *memory;
 } sample;
 
-static void take(rd_grid from, const lgd_metal_photos *p, const float *r0, int channels, const float *deviation,
+static void take(rd_grid from, const nn_metal_photos *p, const float *r0, int channels, const float *deviation,
                  sample *s)
 {
     const int side = s->grid.side;
@@ -30,7 +30,7 @@ static void take(rd_grid from, const lgd_metal_photos *p, const float *r0, int c
 }
 
 /* The mean of log(1 + E) after the steps from maps as they are read, or of the other kind. */
-static double misfit(const lgd_metal_photos *p, bool other, bool metal, int steps, int channels, sample *s)
+static double misfit(const nn_metal_photos *p, bool other, bool metal, int steps, int channels, sample *s)
 {
     const int pixels = s->grid.side * s->grid.side, values = pixels * channels;
     float *mean = s->memory;
@@ -68,17 +68,17 @@ static bool sample_create(rd_grid grid, int given, int channels, sample *s)
     return true;
 }
 
-ts_code lgd_tell_metal(rd_grid grid, const lgd_metal_photos *photos, const float *deviation, int steps, int channels,
-                       float *r0, ts_status *st)
+ts_code nn_tell_metal(rd_grid grid, const nn_metal_photos *photos, const float *deviation, int steps, int channels,
+                      float *r0, ts_status *st)
 {
-    const int side = grid.side < LGD_METAL_SIDE ? grid.side : LGD_METAL_SIDE;
+    const int side = grid.side < NN_METAL_SIDE ? grid.side : NN_METAL_SIDE;
     sample s;
     if (!sample_create(rd_grid_on(rd_grid_full(side), grid.threads), photos->given, channels, &s))
         return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
     take(grid, photos, r0, channels, deviation, &s);
     const bool metal = nn_is_metal((int64_t)side * side, channels, s.r0);
     if (misfit(photos, true, metal, steps, channels, &s) <
-        LGD_METAL_SURE * misfit(photos, false, metal, steps, channels, &s))
+        NN_METAL_SURE * misfit(photos, false, metal, steps, channels, &s))
         nn_change_kind(metal, (int64_t)grid.side * grid.side, channels, r0);
     free(s.memory);
     return TS_OK;

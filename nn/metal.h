@@ -1,23 +1,23 @@
 /* Whether a sample is a metal. Of one photograph g decides it, and is wrong at times: bright diffuse and a rough
  * metal look alike. Steps from maps of the wrong kind end in maps of that kind, since on the way all are worse; several
  * photographs tell by how well the maps of either fit in the end. */
-#ifndef LGD_METAL_H
-#define LGD_METAL_H
+#ifndef NN_METAL_H
+#define NN_METAL_H
 #include "nn/model.h"
 
-typedef struct lgd_metal_photos {
+typedef struct nn_metal_photos {
     const float *const *image; /* [given] of [side][side][3], linear */
     const rd_view *views;      /* [given] */
     int given, side, known;    /* at least 2 photographs; known: of nn_known, true of all views */
-} lgd_metal_photos;
+} nn_metal_photos;
 
-/* LGD_METAL_SIDE x LGD_METAL_SIDE pixels of r0, [grid.side][grid.side][channels], take steps to the most probable maps
+/* NN_METAL_SIDE x NN_METAL_SIDE pixels of r0, [grid.side][grid.side][channels], take steps to the most probable maps
  * (rd_search), with deviation, [grid.side][grid.side][NN_SPREADS], as r0 reads and as were it of the other kind
  * (nn/kind.h). Where the mean over pixels of log(1 + E) is then less than
- * LGD_METAL_SURE of what it is as r0 reads, r0 becomes of that kind. Each pixel is compared with the photographs'
+ * NN_METAL_SURE of what it is as r0 reads, r0 becomes of that kind. Each pixel is compared with the photographs'
  * pixels at its centre. Fails where memory is out; r0 is then as it was. */
-#define LGD_METAL_SIDE 64
-#define LGD_METAL_SURE 0.9
-ts_code lgd_tell_metal(rd_grid grid, const lgd_metal_photos *photos, const float *deviation, int steps, int channels,
-                       float *r0, ts_status *st);
+#define NN_METAL_SIDE 64
+#define NN_METAL_SURE 0.9
+ts_code nn_tell_metal(rd_grid grid, const nn_metal_photos *photos, const float *deviation, int steps, int channels,
+                      float *r0, ts_status *st);
 #endif
