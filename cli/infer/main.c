@@ -337,10 +337,7 @@ static int work(const cl_command *given)
     bool published = false;
     const bool there = access(c->out, F_OK) == 0;
     cl_pipeline *pipeline = NULL;
-    /* multi believes the lights */
-    const bool known = *c->capture ? c->power > 0 : c->sheet && c->photos > 1;
-    if (lgd_model_path(c->model, known ? "multi" : LGD_DEFAULT_MODEL, weights, &st) != TS_OK)
-        cl_failed("%s", st.message);
+    if (lgd_model_path(c->model, LGD_DEFAULT_MODEL, weights, &st) != TS_OK) cl_failed("%s", st.message);
     else if (lgd_weights_published(weights, &published, &st) != TS_OK ||
              (c->skip_existing &&
               (ts_hash_file(weights, &hash, &st) != TS_OK || !(recipe = cl_recipe(c, weights, hash, &st)))))

@@ -49,7 +49,7 @@ const cl_argument cl_infer_arguments[] = {
      "slower on others; the maps differ by less than 0.005 (RMS), single values by up to 0.8"},
     {CAPTURE, "capture", "WHERE",
      "instead of PHOTO: several photographs of one sample under known lights, listed in an INI file or in a folder\n"
-     "in MaterialGAN's layout; with a number for --light-power the default model is multi"},
+     "in MaterialGAN's layout"},
     {FOV, "fov", "DEG",
      "field of view of the photographs, 1 .. 170 degrees across the side of the square that the maps cover\n"
      "(default: from the file's EXIF, else the model's guess, or 54.2 with a warning)"},
@@ -59,8 +59,8 @@ const cl_argument cl_infer_arguments[] = {
      "that square, and --fov is across the photograph's shorter side"},
     {SHEET, "sheet", NULL,
      "the photographs are of one sample in the window of lgd-capture's printed sheet: DIR/STEM/ of the first gets the\n"
-     "maps of all; cameras, flash and exposure are found from the sheet; the default model is then multi, but of\n"
-     "one photograph; --fov is across the photographs' shorter side"},
+     "maps of all; cameras, flash and exposure are found from the sheet; --fov is across the photographs' shorter\n"
+     "side"},
     {POWER, "light-power", "P",
      "power of the light, relative to the default light (of a capture: to the power it states): a number in\n"
      "0.01 .. 100, or auto = estimated from the photograph and printed, of a capture from each (default auto; of a\n"
@@ -73,8 +73,8 @@ const cl_argument cl_infer_arguments[] = {
      "photographs up to 512 pixels are one tile; 0 = never (default: 0.003 for models whose network works at the\n"
      "photograph's size, not with --iterations or --exact; 0 for others, such as the shipped ones)"},
     {'m', "model", "FILE",
-     "weights: a file, or the name of a shipped model: phone, single for pictures whose light and camera are the\n"
-     "default ones, multi for several under known lights (default: $LGD_MODEL, else phone)"},
+     "weights: a file, or the name of a shipped model: phone, or single for pictures whose light and camera are the\n"
+     "default ones (default: $LGD_MODEL, else phone)"},
     {'t', "threads", "N", "number of threads, 1 .. 1024; 0 = all that are allowed (default 0)"},
     {NORMAL, "normal", "gl|dx", "y of normal.png: up (gl, OpenGL, default) or down (dx, DirectX)"},
     {MAPS, "maps", "LIST",

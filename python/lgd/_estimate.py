@@ -44,7 +44,7 @@ class _Calls:
 
 
 class Model:
-    """Weights: a file, or the name of a model that ships with lgd ("phone", "single", "multi"). Any number of threads
+    """Weights: a file, or the name of a model that ships with lgd ("phone", "single"). Any number of threads
     may use one model at once."""
 
     def __init__(self, weights: Optional[Path] = None):

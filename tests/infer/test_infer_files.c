@@ -228,7 +228,7 @@ TEST(infer_model_path_order)
     CHECK(lgd_model_path("given", "single", path, &st) == TS_IO && strstr(st.message, "no given.safetensors"),
           "a name that no model has: %s", st.message);
     st = (ts_status){0};
-    CHECK(lgd_model_path("multi", "single", path, &st) == TS_OK && strstr(path, "/multi.safetensors"), "%s: %s", path,
+    CHECK(lgd_model_path("phone", "single", path, &st) == TS_OK && strstr(path, "/phone.safetensors"), "%s: %s", path,
           st.message);
     CHECK(lgd_model_path(NULL, "single", path, &st) == TS_OK && strcmp(path, "/from/variable") == 0, "%s", path);
 }
