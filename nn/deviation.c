@@ -9,7 +9,7 @@ enum { PIXELS = 1 << 11 }; /* at a time, at least */
 
 /* Of F0's error, the part that a pixel may change by itself. What is not a level of the whole material is .35 of it; of
  * that, highlights leave the more in F0 the more is believed, and renderings do not tell .35 from .2. Several
- * photographs tell the level too. */
+ * photographs tell the level too, until h has found it from them. */
 #define F0_DETAIL 0.2f
 /* The same of the roughness once its level is found with the scene: highlights that a photograph cannot explain
  * otherwise leave disks and dots in it. */
@@ -50,12 +50,12 @@ static float for_all_maps(nn_belief b)
 
 void nn_deviations(int64_t pixels, const float *spread, nn_belief b, int threads, float *deviation)
 {
-    const bool several = b.photographs > 1, found = b.scene_found && !several;
+    const bool several = b.photographs > 1, found = b.scene_found && !several, levels = several && b.revised;
     const float all = for_all_maps(b),
                 factor[NN_SPREADS] = {[GROUP_NORMAL] = found ? NORMAL_DETAIL : 1,
                                       [GROUP_DIFFUSE] = 1,
-                                      [GROUP_ROUGHNESS] = found ? ROUGHNESS_DETAIL : 1,
-                                      [GROUP_SPECULAR] = several ? 1 : F0_DETAIL};
+                                      [GROUP_ROUGHNESS] = found || levels ? ROUGHNESS_DETAIL : 1,
+                                      [GROUP_SPECULAR] = several && !levels ? 1 : F0_DETAIL};
     job j = {.spread = spread, .to = deviation};
     for (int k = 0; k < NN_SPREADS; k++) j.factor[k] = all * factor[k];
     ts_for(threads, pixels, PIXELS, deviations, &j);

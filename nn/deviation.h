@@ -8,7 +8,7 @@
 typedef struct nn_belief {
     int photographs;  /* of the sample, 0 as 1; of more than one deviations of F0 and roughness are with their level */
     bool scene_found; /* of one photograph, and the level of the roughness with it */
-    bool revised;     /* by h, which has read what a step would read */
+    bool revised;     /* by h, which has read what a step would read, and of several photographs has found levels */
 } nn_belief;
 
 /* deviation [pixels][NN_SPREADS]: the standard deviations that the steps believe, of spread, the logarithms of the
