@@ -56,9 +56,8 @@ ts_code lgd_guess_revise(ag_tape *tape, const nn_model *net, lgd_given *p, int r
         *st = *ag_status(tape);
         return st->code;
     }
-    if (*made > 0)
-        nn_deviations((int64_t)size * size, g->spread, (nn_belief){.photographs = p->count, .revised = true},
-                      ag_compute(tape)->threads, g->deviation);
+    const nn_belief belief = {.photographs = p->count, .revised = true, .finer = p->side > size};
+    if (*made > 0) nn_deviations((int64_t)size * size, g->spread, belief, ag_compute(tape)->threads, g->deviation);
     p->r0 = g->r0;
     return TS_OK;
 }

@@ -22,7 +22,8 @@ enum { PIXELS = 1 << 11 }; /* at a time, at least */
  * says too little; two photographs do not tell it. */
 #define SEVERAL 1.5f
 #define EACH_MORE 0.166666667f
-/* By which they are multiplied after a revision: what h has read is not believed twice. */
+/* By which they are multiplied after a revision: what h has read is not believed twice. What is finer than its pixels
+ * it has not read. */
 #define REVISED 0.5f
 
 typedef struct job {
@@ -45,7 +46,7 @@ static void deviations(const void *of, int64_t begin, int64_t end)
 static float for_all_maps(nn_belief b)
 {
     const float several = b.photographs > 1 ? fminf(1 + EACH_MORE * (float)(b.photographs - 2), SEVERAL) : 1;
-    return several * (b.revised ? REVISED : 1);
+    return several * (b.revised && !b.finer ? REVISED : 1);
 }
 
 void nn_deviations(int64_t pixels, const float *spread, nn_belief b, int threads, float *deviation)

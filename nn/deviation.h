@@ -8,6 +8,7 @@
 typedef struct nn_belief {
     int photographs;  /* of the sample, 0 as 1; of more than one deviations of F0 and roughness are with their level */
     bool scene_found; /* of one photograph, and the level of the roughness with it */
+    bool finer;       /* the photographs have more pixels than h wrote: what it lacks of them is still to be found */
     bool revised;     /* by h, which has read what a step would read, and of several photographs has found levels */
 } nn_belief;
 

@@ -62,17 +62,19 @@ TEST(deviation_grows_with_the_photographs)
 }
 
 /* After a revision of several photographs' maps all of them may move less, F0 and roughness, whose levels h has found,
- * the least. */
+ * the least; of photographs of more pixels twice that. */
 TEST(deviation_is_less_after_a_revision)
 {
     static const double parts[NN_SPREADS] = {
         [GROUP_DIFFUSE] = 0.5, [GROUP_NORMAL] = 0.5, [GROUP_ROUGHNESS] = 0.25, [GROUP_SPECULAR] = 0.1};
     say();
     nn_deviations(PIXELS, spread, (nn_belief){.photographs = 5}, 1, said);
-    nn_deviations(PIXELS, spread, (nn_belief){.photographs = 5, .revised = true}, 2, other);
-    for (int i = 0; i < PIXELS * NN_SPREADS; i++) {
-        const double part = parts[i % NN_SPREADS];
-        CHECK(fabs((double)other[i] / (double)said[i] / part - 1) < 1e-5, "group %d: %g of %g", i % NN_SPREADS,
-              (double)other[i], (double)said[i]);
+    for (int finer = 0; finer < 2; finer++) {
+        nn_deviations(PIXELS, spread, (nn_belief){.photographs = 5, .revised = true, .finer = finer}, 2, other);
+        for (int i = 0; i < PIXELS * NN_SPREADS; i++) {
+            const double part = parts[i % NN_SPREADS] * (finer ? 2 : 1);
+            CHECK(fabs((double)other[i] / (double)said[i] / part - 1) < 1e-5, "group %d: %g of %g", i % NN_SPREADS,
+                  (double)other[i], (double)said[i]);
+        }
     }
 }
