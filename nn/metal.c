@@ -36,15 +36,10 @@ static double misfit(const nn_metal_photos *p, bool other, bool metal, int steps
     float *mean = s->memory;
     memcpy(mean, s->r0, (size_t)values * sizeof *mean);
     if (other) nn_change_kind(metal, pixels, channels, mean);
-    memcpy(s->maps, mean, (size_t)values * sizeof *mean);
     const rd_prior prior = {mean, s->deviation, nn_step_prior(p->known, p->given)};
-    for (int t = 0; t <= steps; t++) { /* the last one looks at what the one before made */
-        const rd_search search = {s->best, s->misfit, t > 0};
-        rd_posterior_step(s->grid, s->maps, channels, p->views, (const float *const *)s->image, p->given, &prior,
-                          rd_step_length(p->given, t), &search, s->step, NULL);
-        for (int i = 0; i < values; i++)
-            if (i % channels < MAP_CHANNELS) s->maps[i] += s->step[i];
-    }
+    const int and_a_look = steps + 1; /* at what the last one made */
+    rd_posterior_steps(s->grid, channels, p->views, (const float *const *)s->image, p->given, &prior, and_a_look,
+                       (rd_search){.best = s->best, .misfit = s->misfit}, s->maps, s->step, NULL);
     double sum = 0;
     for (int i = 0; i < pixels; i++) sum += log1p((double)s->misfit[i]);
     return sum / pixels;

@@ -83,13 +83,6 @@ static void add_difference(const void *job, int64_t begin, int64_t end)
     for (int64_t i = begin; i < end; i++) j->to[i] += j->scale * (j->a[i] - j->b[i]);
 }
 
-/* to += a. */
-static void add_values(const void *job, int64_t begin, int64_t end)
-{
-    const sum_job *j = job;
-    for (int64_t i = begin; i < end; i++) j->to[i] += j->a[i];
-}
-
 enum { TOGETHER = 1 << 12 }; /* values at a time, at least */
 
 /* Memory for one material's steps, a float a pixel and channel. */
@@ -115,22 +108,6 @@ static bool room_make(ts_arena *arena, size_t pixels, room *r)
     return true;
 }
 
-/* m->maps from before: all steps. */
-static void steps(rd_grid grid, const nn_model *model, const nn_revision *r, const rd_view *views,
-                  const float *const *image, int known, const float *before, room *m)
-{
-    const int64_t values = (int64_t)grid.h * grid.w * MAP_CHANNELS;
-    const rd_prior prior = {before, m->deviation, nn_step_prior(known, r->given)};
-    const int count = nn_arch_steps(&model->arch, r->given);
-    memcpy(m->maps, before, (size_t)values * sizeof *m->maps);
-    for (int t = 0; t < count; t++) {
-        const rd_search search = {m->best, m->misfit, t > 0};
-        rd_posterior_step(grid, m->maps, MAP_CHANNELS, views, image, r->given, &prior, rd_step_length(r->given, t),
-                          &search, m->step, t == count - 1 ? m->after : NULL);
-        ts_for(grid.threads, values, TOGETHER, add_values, &(sum_job){.a = m->step, .to = m->maps});
-    }
-}
-
 /* Material n's part of what is read; maps: R + d goes there. */
 static bool read_one(ag_tape *tape, const nn_model *model, const nn_revision *r, int n, const reading *to, float *maps)
 {
@@ -148,7 +125,9 @@ static bool read_one(ag_tape *tape, const nn_model *model, const nn_revision *r,
     for (int k = 0; k < r->given; k++) image[k] = r->image.data + ((size_t)(n * r->given + k)) * pixels * 3;
     nn_deviations((int64_t)pixels, spread, (nn_belief){.photographs = r->given, .revised = r->made > 0}, threads,
                   m.deviation);
-    steps(grid, model, r, views, image, r->known[n * r->given], before, &m);
+    const rd_prior prior = {before, m.deviation, nn_step_prior(r->known[n * r->given], r->given)};
+    rd_posterior_steps(grid, MAP_CHANNELS, views, image, r->given, &prior, nn_arch_steps(&model->arch, r->given),
+                       (rd_search){.best = m.best, .misfit = m.misfit}, m.maps, m.step, m.after);
     memset(m.left, 0, pixels * 3 * sizeof *m.left);
     for (int k = r->given; k-- > 0;) { /* the first one's stays in m.photo */
         rd_log_encode((int64_t)pixels * 3, image[k], m.photo, threads);

@@ -3,6 +3,7 @@
 #include "render/rows.h"
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 typedef struct step_job {
     rd_grid grid;
@@ -45,6 +46,34 @@ void rd_posterior_step(rd_grid grid, const float *maps, int channels, const rd_v
     for (int k = 0; k < count; k++) v[k] = rd_shade_view(&views[k]);
     ts_for(grid.threads, grid.h, 1, step_rows,
            &(step_job){grid, maps, image, channels, count, v, prior, search, length, step, after});
+}
+
+typedef struct sum_job {
+    int channels;
+    const float *step;
+    float *maps;
+} sum_job;
+
+static void add_step(const void *job, int64_t begin, int64_t end)
+{
+    const sum_job *j = job;
+    for (int64_t i = begin * j->channels; i < end * j->channels; i += j->channels)
+        for (int k = 0; k < MAP_CHANNELS; k++) j->maps[i + k] += j->step[i + k];
+}
+
+enum { PIXELS = 1 << 9 }; /* at a time, at least */
+
+void rd_posterior_steps(rd_grid grid, int channels, const rd_view *views, const float *const *image, int count,
+                        const rd_prior *prior, int steps, rd_search search, float *maps, float *step, float *after)
+{
+    const int64_t pixels = (int64_t)grid.h * grid.w;
+    memcpy(maps, prior->mean, (size_t)(pixels * channels) * sizeof *maps);
+    for (int t = 0; t < steps; t++) {
+        search.begun = t > 0;
+        rd_posterior_step(grid, maps, channels, views, image, count, prior, rd_step_length(count, t),
+                          count > 1 ? &search : NULL, step, t == steps - 1 ? after : NULL);
+        ts_for(grid.threads, pixels, PIXELS, add_step, &(sum_job){channels, step, maps});
+    }
 }
 
 /* W of the three values from at on; the result is their root mean square. */

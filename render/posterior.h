@@ -54,6 +54,11 @@ void rd_posterior_step(rd_grid grid, const float *maps, int channels, const rd_v
                        int count, const rd_prior *prior, float length, const rd_search *search, float *step,
                        float *after);
 
+/* All steps, of the lengths above, from the prior's mean on: maps and step [h, w, channels], which become the last
+ * maps and the last step. search: begun is not read, the rest as above; after: of the last step. */
+void rd_posterior_steps(rd_grid grid, int channels, const rd_view *views, const float *const *image, int count,
+                        const rd_prior *prior, int steps, rd_search search, float *maps, float *step, float *after);
+
 /* The prior's covariance. */
 void rd_prior_covariance(const double deviation[MAP_GROUPS], const double mean[MAP_CHANNELS], const ts_prior *prior,
                          double covariance[MAP_CHANNELS][MAP_CHANNELS]);
