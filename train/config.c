@@ -1,4 +1,5 @@
 /* Reading, checking and printing a configuration by the table of keys. */
+#include "tensor/maps.h"
 #include "train/config.h"
 #include "data/ini.h"
 #include <errno.h>
@@ -273,7 +274,16 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
             "train.disturb is %g: it makes worse what h learns to revise, so model.revisions and train.steps "
             "must be above 0",
             c->train.disturb);
+    if (*c->train.teacher &&
+        (c->train.steps || !c->arch.conditions || !c->arch.spread || !c->arch.scene || c->arch.images != 1 ||
+         c->arch.channels != MAP_CHANNELS))
+        return ts_fail(st, TS_INVALID,
+                       "train.teacher is given: it teaches g alone, of one photograph, so train.steps must be 0, "
+                       "model.images 1, model.channels %d and model.conditions, spread and scene yes",
+                       MAP_CHANNELS);
     const int side = nn_arch_side(&c->arch);
+    if (*c->train.teacher && c->data.patch != side)
+        return ts_fail(st, TS_INVALID, "data.patch is %d: a teacher's maps have %d pixels a side", c->data.patch, side);
     if (c->train.steps && c->arch.revisions > 0 &&
         (c->data.patch != side || (c->validate.every && c->validate.size != side)))
         return ts_fail(

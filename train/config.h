@@ -38,7 +38,7 @@ typedef struct tr_config {
         bool exact;
         int64_t seed, checkpoint_every, log_every;
         int max_skipped;
-        char init[1024], init_rest[1024];
+        char init[1024], init_rest[1024], teacher[1024];
         tr_reduce reduce; /* of several ranks */
         double bucket;    /* MiB */
     } train;

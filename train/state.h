@@ -52,7 +52,8 @@ typedef struct tr_trainer {
     nn_model *model;
     nn_adam adam;
     ag_tape *tape;
-    ag_tape *quiet; /* of a fixed g, without gradients, whose packed weights are kept; NULL without arch.revisions */
+    nn_model *teacher; /* train.teacher, or NULL */
+    ag_tape *quiet;    /* of a fixed g, without gradients, whose packed weights are kept; NULL where none is read */
     io_loader *loader;
     float *images;     /* [batch][given][patch][patch][3], given <= arch.images; batch: the share's, here and below */
     rd_view *captures; /* [batch][given] */
@@ -121,6 +122,16 @@ bool tr_first_guesses(ag_tape *tape, const nn_model *model, const nn_input *in, 
                       nn_revision *r);
 /* The mean loss of all revisions: of their maps, and of how far they say that these may be off. NULL after an error. */
 ag_value *tr_revision_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr_row *row);
+
+/* teach.c. train.teacher, in t. TS_FORMAT, TS_INVALID with st where it is none that the model can learn from. */
+ts_code tr_teacher_load(tr_trainer *t, ts_status *st);
+/* What a teacher says of in's photographs, one of each material, with known not NULL: diffuse and normals as it reads
+ * them in an orientation (nn/orient.h) and is told a camera above the centre, at its own guess of the distance, where
+ * none is known; else its first answer. False after an error, which the tape has. */
+bool tr_taught(ag_tape *tape, const nn_model *teacher, const nn_input *in, int orientation, nn_guess *said);
+/* How far the model is from what the teacher says: of maps in the teacher's own deviations, of their logarithms and the
+ * scene as they are. NULL after an error. */
+ag_value *tr_taught_loss(tr_trainer *t, const nn_input *in, tr_row *row);
 
 /* validate.c */
 ts_code tr_validator_create(tr_trainer *t, ts_status *st);

@@ -132,9 +132,8 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
                    .known = c->arch.conditions || c->arch.revisions > 0 ? t->known : NULL,
                    .given = given,
                    .recompute = c->train.checkpoint_steps};
-    if (row->pretraining) {
-        return tr_guess_loss(t, &in, ag_constant(t->tape, goals), row);
-    }
+    if (row->pretraining)
+        return t->teacher ? tr_taught_loss(t, &in, row) : tr_guess_loss(t, &in, ag_constant(t->tape, goals), row);
     if (c->arch.revisions > 0) return tr_revision_loss(t, &in, ag_constant(t->tape, goals), row);
     if (c->coder.code > 0) {
         ag_value *goal = ag_constant(t->tape, goals);

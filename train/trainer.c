@@ -144,7 +144,8 @@ static ts_code prepare(tr_trainer *t, bool *resume, ts_status *st)
     if (nn_adam_create(&t->adam, t->model, (float)c->train.ema, st) != TS_OK) return st->code;
     if (tr_leads(t) && *resume && tr_resume(t, st) != TS_OK) return st->code;
     t->tape = ag_tape_create(true, st);
-    if (c->arch.revisions > 0 && !(t->quiet = ag_tape_create(false, st))) return st->code;
+    if (*c->train.teacher && tr_teacher_load(t, st) != TS_OK) return st->code;
+    if ((c->arch.revisions > 0 || t->teacher) && !(t->quiet = ag_tape_create(false, st))) return st->code;
     if (t->quiet) ag_freeze(t->quiet, true);
     if (!t->tape || (c->validate.every && tr_validator_create(t, st) != TS_OK)) return st->code;
     if (!t->ranks.mpi) return TS_OK;
@@ -298,6 +299,7 @@ void tr_destroy(tr_trainer **trainer)
     ag_tape_destroy(&t->quiet);
     nn_adam_free(&t->adam);
     nn_model_free(&t->model);
+    nn_model_free(&t->teacher);
     free(t->images);
     free(t->captures);
     free(t->scenes);

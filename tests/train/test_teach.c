@@ -1,0 +1,188 @@
+/* A g that learns from another what that says when it is told its own guess of the camera. */
+#include "nn/orient.h"
+#include "nn/weights/weights.h"
+#include "tensor/maps.h"
+#include "tests/support/networks.h"
+#include "tests/support/runs.h"
+
+enum { FINE = 4 * SIDE, COUNT = 3 };
+
+/* Its last layers, which begin as zero, have values. */
+static nn_model *teacher(void)
+{
+    static const char *const last[] = {"g.detail.conv5.weight", "g.scene.numbers.weight"};
+    nn_model *m = guessing();
+    for (size_t k = 0; k < sizeof last / sizeof *last; k++) {
+        const nn_param *p = nn_model_find(m, last[k]);
+        ts_rng r = ts_rng_make(5, TS_STREAM_TEST, k);
+        CHECK(p, "no %s", last[k]);
+        for (size_t i = 0; i < p->count; i++) m->value[p->offset + i] = ts_rng_range(&r, -0.1f, 0.1f);
+    }
+    return m;
+}
+
+/* Of photograph n the largest difference in the channels [first, last). */
+static double apart(const ag_value *a, const ag_value *b, int n, int first, int last)
+{
+    const ts_shape s = a->t.shape;
+    const int64_t pixels = (int64_t)s.h * s.w;
+    double most = 0;
+    for (int64_t i = n * pixels; i < (n + 1) * pixels; i++)
+        for (int k = first; k < last; k++)
+            most = fmax(most, fabs((double)a->t.data[i * s.c + k] - (double)b->t.data[i * s.c + k]));
+    return most;
+}
+
+/* Diffuse and normals are what a teacher says of a camera that is known, or else at the distance that it guesses; all
+ * else is its first answer. */
+TEST(teacher_is_told_its_own_guess)
+{
+    static const unsigned char known[COUNT] = {0, NN_KNOWN_CAMERA, NN_KNOWN_POWER};
+    unsigned char told[COUNT];
+    rd_view views[COUNT], guessed[COUNT];
+    nn_model *m = teacher();
+    nn_input in = photographs(COUNT, FINE, 33, NULL);
+    for (int n = 0; n < COUNT; n++) views[n] = rd_view_from(rd_flash(), 1.5);
+    in.views = views, in.known = known, in.given = 1;
+    ag_tape *one = tape_create(false), *two = tape_create(false), *three = tape_create(false);
+    nn_guess taught, first, second;
+    CHECK(tr_taught(one, m, &in, 0, &taught), "%s", ag_status(one)->message);
+    CHECK(nn_guess_from(two, m, &in, &first), "%s", ag_status(two)->message);
+    for (int n = 0; n < COUNT; n++) {
+        const double log_height = (double)first.scene->t.data[(size_t)n * 2 * RD_SCENE_NUMBERS + RD_SCENE_DISTANCE];
+        guessed[n] = views[n];
+        told[n] = known[n] | NN_KNOWN_CAMERA;
+        if (known[n] & NN_KNOWN_CAMERA) continue;
+        guessed[n].camera[0] = guessed[n].camera[1] = 0;
+        guessed[n].camera[2] = (float)((double)RD_FLASH_DISTANCE * exp(log_height));
+    }
+    in.views = guessed, in.known = told;
+    CHECK(nn_guess_from(three, m, &in, &second), "%s", ag_status(three)->message);
+    for (int n = 0; n < COUNT; n++) {
+        const bool knew = known[n] & NN_KNOWN_CAMERA;
+        CHECK(apart(taught.maps, second.maps, n, MAP_DIFFUSE, MAP_ROUGHNESS) < 1e-5, "diffuse or normals of %d", n);
+        CHECK(knew || apart(first.maps, second.maps, n, MAP_DIFFUSE, MAP_NORMAL) > 1e-4,
+              "%d: the camera changes nothing", n);
+        CHECK(apart(taught.maps, first.maps, n, MAP_ROUGHNESS, MAP_CHANNELS) == 0, "the other maps of %d", n);
+        CHECK(apart(taught.spread, first.spread, n, 0, NN_SPREADS) == 0, "spread of %d", n);
+        CHECK(apart(taught.scene, first.scene, n, 0, 2 * RD_SCENE_NUMBERS) == 0, "scene of %d", n);
+    }
+    ag_tape_destroy(&one), ag_tape_destroy(&two), ag_tape_destroy(&three);
+    nn_model_free(&m);
+    free(in.image.data);
+}
+
+/* The mean of what a teacher says in each orientation is what g says in all of them. */
+TEST(teacher_reads_every_orientation)
+{
+    static const unsigned char known = NN_KNOWN_CAMERA | NN_KNOWN_POWER;
+    static float mean[FINE * FINE * MAP_CHANNELS];
+    const rd_view view = rd_flash();
+    nn_model *m = teacher();
+    nn_input in = photographs(1, FINE, 34, NULL);
+    in.views = &view, in.known = &known, in.given = 1;
+    memset(mean, 0, sizeof mean);
+    for (int k = 0; k < NN_ORIENTATIONS; k++) {
+        ag_tape *tape = tape_create(false);
+        nn_guess taught;
+        CHECK(tr_taught(tape, m, &in, k, &taught), "%s", ag_status(tape)->message);
+        for (size_t i = 0; i < FINE * FINE * MAP_CHANNELS; i++) mean[i] += taught.maps->t.data[i] / NN_ORIENTATIONS;
+        ag_tape_destroy(&tape);
+    }
+    ag_tape *tape = tape_create(false);
+    nn_guess all;
+    in.orientations = NN_ORIENTATIONS;
+    CHECK(nn_guess_from(tape, m, &in, &all), "%s", ag_status(tape)->message);
+    const ag_value means = {.t = ts_view(mean, (ts_shape){1, FINE, FINE, MAP_CHANNELS})};
+    const double off = apart(&means, all.maps, 0, MAP_DIFFUSE, MAP_ROUGHNESS);
+    CHECK(off < 1e-5, "diffuse or normals are off by %g", off);
+    CHECK(apart(&means, all.maps, 0, MAP_ROUGHNESS, MAP_CHANNELS) > 1e-4, "the orientations are all alike");
+    ag_tape_destroy(&tape);
+    nn_model_free(&m);
+    free(in.image.data);
+}
+
+/* A place turns as the pixel that is there. */
+TEST(orientations_turn_places_with_pixels)
+{
+    enum { S = 8 };
+    for (int k = 0; k < NN_ORIENTATIONS; k++) {
+        float picture[S * S] = {0}, turned[S * S], place[2];
+        picture[2 * S + 5] = 1;
+        nn_turn(k, S, 1, picture, turned);
+        nn_turn_vector(k, (float[2]){5.5f / S - 0.5f, 0.5f - 2.5f / S}, place);
+        const int x = (int)((place[0] + 0.5f) * S), y = (int)((0.5f - place[1]) * S);
+        CHECK(turned[y * S + x] == 1, "orientation %d: not at %d, %d", k, x, y);
+    }
+}
+
+typedef struct losses {
+    double first, last, spread;
+} losses;
+
+static void on_step(const tr_row *row, void *user)
+{
+    losses *l = user;
+    if (row->step == 1) l->first = row->loss, l->spread = row->spread;
+    l->last = row->loss;
+}
+
+static ts_code run(const tr_config *c, const char *where, losses *l, ts_status *st)
+{
+    const tr_listener listener = {.step = on_step, .user = l};
+    *st = (ts_status){0};
+    tr_trainer *t = tr_create(c, where, false, NULL, &listener, st);
+    if (!t) return st->code;
+    const ts_code code = tr_run(t, st);
+    tr_destroy(&t);
+    return code;
+}
+
+static tr_config lesson(const char *path)
+{
+    static const char *const keys[] = {"model.g_width=4",    "model.g_width_max=8",     "model.g_levels=2",
+                                       "model.g_size=16",    "model.unshuffle=4",       "model.g_detail=6",
+                                       "model.g_trunk=1",    "model.conditions=yes",    "model.spread=yes",
+                                       "model.scene=yes",    "model.descent=posterior", "model.h_width=0",
+                                       "data.patch=64",      "validate.every=0",        "train.window=0",
+                                       "train.steps=0",      "train.iterations_min=0",  "train.iterations_max=0",
+                                       "data.told_view=0.5", "train.pretrain_steps=24", "train.pretrain_rate=0.003"};
+    ts_status st = {0};
+    tr_config c = small();
+    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+        CHECK(tr_config_set_assignment(&c, keys[i], &st) == TS_OK, "%s", st.message);
+    snprintf(c.train.teacher, sizeof c.train.teacher, "%s", path);
+    return c;
+}
+
+/* A student that begins elsewhere comes nearer; one that begins as its teacher, who was told every camera, has nothing
+ * to learn. */
+TEST(trainer_learns_from_a_teacher)
+{
+    ts_status st = {0};
+    losses l, same;
+    char path[700], other[700];
+    snprintf(path, sizeof path, "%s/last.safetensors", folder("school"));
+    snprintf(other, sizeof other, "%s/missing.safetensors", test_folder());
+    tr_config c = lesson(path);
+    *c.train.teacher = 0;
+    CHECK(run(&c, folder("school"), &l, &st) == TS_OK, "%s", st.message);
+    snprintf(c.train.teacher, sizeof c.train.teacher, "%s", path);
+    c.train.seed = 77;
+    CHECK(run(&c, folder("pupil"), &l, &st) == TS_OK, "%s", st.message);
+    CHECK(l.last < l.first - 0.1, "the pupil's loss goes from %g to %g", l.first, l.last);
+    c.data.told_view = 1, c.train.pretrain_steps = 1;
+    snprintf(c.train.init, sizeof c.train.init, "%s", path);
+    CHECK(run(&c, folder("master"), &same, &st) == TS_OK, "%s", st.message);
+    CHECK(same.spread == 0, "the teacher differs from itself by %g", same.spread);
+
+    snprintf(c.train.teacher, sizeof c.train.teacher, "%s", other);
+    CHECK(run(&c, folder("none"), &l, &st) != TS_OK && strstr(st.message, "missing"), "%s", st.message);
+    snprintf(c.train.teacher, sizeof c.train.teacher, "%s", path);
+    c.train.steps = 1;
+    CHECK(run(&c, folder("none"), &l, &st) == TS_INVALID && strstr(st.message, "train.steps"), "%s", st.message);
+    c.train.steps = 0, c.data.patch = 32;
+    CHECK(run(&c, folder("none"), &l, &st) == TS_INVALID && strstr(st.message, "data.patch"), "%s", st.message);
+    c.data.patch = 128, c.arch.g_size = 32;
+    CHECK(run(&c, folder("none"), &l, &st) == TS_INVALID && strstr(st.message, "128 x 128"), "%s", st.message);
+}
