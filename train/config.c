@@ -262,6 +262,11 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
                        "model.revisions is %d: h learns over a fixed g and on whole patches, so train.g_rate and "
                        "train.window must be 0",
                        c->arch.revisions);
+    if (c->train.steps && c->arch.revisions > 0 && (c->train.iterations_min || c->train.iterations_max))
+        return ts_fail(st, TS_INVALID,
+                       "model.revisions is %d: h is trained through all of its revisions, so train.iterations_min and "
+                       "train.iterations_max must be 0",
+                       c->arch.revisions);
     const int least = c->train.given_min ? c->train.given_min : tr_most_given(c);
     if (c->train.steps && c->arch.revisions > 0 && least < 2)
         return ts_fail(st, TS_INVALID,
