@@ -1,6 +1,5 @@
 /* g of a photograph in its orientations (docs/math.md, S1). */
 #include "nn/layers.h"
-#include "nn/orient.h"
 #include "tensor/maps.h"
 #include "tensor/team.h"
 #include <string.h>
@@ -36,33 +35,6 @@ static void normal_back(int k, const float *from, float to[2])
     const float x = k & 1 ? -from[0] : from[0], y = k & 2 ? -from[1] : from[1];
     to[0] = k & 4 ? -y : x;
     to[1] = k & 4 ? -x : y;
-}
-
-void nn_turn_vector(int k, const float from[2], float to[2])
-{
-    const float x = k & 4 ? -from[1] : from[0], y = k & 4 ? -from[0] : from[1];
-    to[0] = k & 1 ? -x : x;
-    to[1] = k & 2 ? -y : y;
-}
-
-void nn_turn(int k, int side, int channels, const float *from, float *to)
-{
-    for (int i = 0; i < side * side; i++) {
-        int y, x;
-        source(k, side, i / side, i % side, &y, &x);
-        memcpy(to + i * channels, from + ((int64_t)y * side + x) * channels, (size_t)channels * sizeof *to);
-    }
-}
-
-void nn_turn_maps_back(int k, int side, int channels, const float *from, float *to)
-{
-    for (int i = 0; i < side * side; i++, to += channels) {
-        int y, x;
-        place(k, side, i / side, i % side, &y, &x);
-        const float *turned = from + ((int64_t)y * side + x) * channels;
-        memcpy(to, turned, (size_t)channels * sizeof *to);
-        normal_back(k, turned + MAP_NORMAL, to + MAP_NORMAL);
-    }
 }
 
 typedef struct turn_job {

@@ -254,7 +254,7 @@ const tr_key tr_keys[] = {
      "weights file for the parameters that train.init lacks, for example the coarse steps of another run"},
     {"train", "teacher", TR_TEXT, AT(train.teacher), 0, sizeof((tr_config *)0)->train.teacher, "", NULL, false,
      "weights file of a g that says what is learned, in place of the materials' maps and the losses of their weights; "
-     "of the diffuse albedo and the normals its second answer counts (train/teach.c)"},
+     "where no camera is known it is told its own guess for the diffuse albedo (train/teach.c)"},
     {"train", "reduce", TR_CHOICE, AT(train.reduce), 0, TR_REDUCE_BF16, "f32", reduce_names, false,
      "how gradients are summed over the ranks of mpirun: as f32, or rounded to bf16 and summed as f32, which is half "
      "the bytes and off by at most a 256th of the sum of their magnitudes; one process sums nothing"},

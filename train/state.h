@@ -125,10 +125,10 @@ ag_value *tr_revision_loss(tr_trainer *t, const nn_input *in, ag_value *target, 
 
 /* teach.c. train.teacher, in t. TS_FORMAT, TS_INVALID with st where it is none that the model can learn from. */
 ts_code tr_teacher_load(tr_trainer *t, ts_status *st);
-/* What a teacher says of in's photographs, one of each material, with known not NULL: diffuse and normals as it reads
- * them in an orientation (nn/orient.h) and is told a camera above the centre, at its own guess of the distance, where
- * none is known; else its first answer. False after an error, which the tape has. */
-bool tr_taught(ag_tape *tape, const nn_model *teacher, const nn_input *in, int orientation, nn_guess *said);
+/* What a teacher says of in's photographs, one of each material, with known not NULL: its first answer, but for the
+ * diffuse albedo where the camera is not known: that is what it says of one above the centre, at the distance that it
+ * guesses. False after an error, which the tape has. */
+bool tr_taught(ag_tape *tape, const nn_model *teacher, const nn_input *in, nn_guess *said);
 /* How far the model is from what the teacher says: of maps in the teacher's own deviations, of their logarithms and the
  * scene as they are. NULL after an error. */
 ag_value *tr_taught_loss(tr_trainer *t, const nn_input *in, tr_row *row);

@@ -1,9 +1,7 @@
-/* The loss of a g that learns from another, train.teacher, which reads each photograph twice. The second time it reads
- * it in a drawn orientation, and where the camera is not known it is told its own guess of the distance: what it then
- * says of the diffuse albedo is better, and so is the mean of its normals over the orientations. A student learns to
- * say both at once, and all else as the first answer has it. */
+/* The loss of a g that learns from another, train.teacher. Where the camera is not known, a g says more of the diffuse
+ * albedo when it reads the photograph a second time and is told its own guess of the distance. A student learns to say
+ * that at once, and all else as the teacher's first answer has it. */
 #include "ops.h"
-#include "nn/orient.h"
 #include "nn/weights/weights.h"
 #include "render/scene.h"
 #include "tensor/maps.h"
@@ -40,47 +38,23 @@ static void tell_guesses(const nn_input *in, const ag_value *scene, rd_view *vie
     }
 }
 
-/* in with the photographs and views in an orientation. False after an error. */
-static bool turn(ag_tape *tape, int orientation, nn_input *in, rd_view *views)
+bool tr_taught(ag_tape *tape, const nn_model *teacher, const nn_input *in, nn_guess *said)
 {
-    const ts_shape s = in->image.shape;
-    const int64_t values = (int64_t)s.h * s.w * s.c;
-    ag_value *turned = ag_empty(tape, s);
-    if (!turned) return false;
-    for (int n = 0; n < s.n; n++) {
-        const rd_view view = views[n];
-        nn_turn(orientation, s.h, s.c, in->image.data + n * values, turned->t.data + n * values);
-        nn_turn_vector(orientation, view.camera, views[n].camera);
-        nn_turn_vector(orientation, view.light, views[n].light);
-    }
-    in->image = turned->t;
-    in->views = views;
-    return true;
-}
-
-bool tr_taught(ag_tape *tape, const nn_model *teacher, const nn_input *in, int orientation, nn_guess *said)
-{
-    const int count = in->image.shape.n, channels = teacher->arch.channels, side = nn_arch_side(&teacher->arch);
-    const int64_t pixels = (int64_t)side * side;
-    ts_arena *arena = ag_arena(tape);
-    rd_view *views = ts_arena_alloc(arena, (size_t)count * sizeof *views);
-    unsigned char *known = ts_arena_alloc(arena, (size_t)count);
-    float *maps = ts_arena_alloc(arena, (size_t)(pixels * channels) * sizeof *maps);
-    if (!views || !known || !maps) return ag_fail(tape, TS_NOMEM, "no memory for what a teacher says"), false;
+    const int count = in->image.shape.n, channels = teacher->arch.channels;
+    rd_view *views = ts_arena_alloc(ag_arena(tape), (size_t)count * sizeof *views);
+    unsigned char *known = ts_arena_alloc(ag_arena(tape), (size_t)count);
+    if (!views || !known) return ag_fail(tape, TS_NOMEM, "no memory for %d cameras", count), false;
     nn_guess again;
     if (!nn_guess_from(tape, teacher, in, said)) return false;
     tell_guesses(in, said->scene, views, known);
     nn_input told = *in;
-    told.known = known;
-    if (!turn(tape, orientation, &told, views) || !nn_guess_from(tape, teacher, &told, &again)) return false;
-    for (int n = 0; n < count; n++) {
-        float *to = said->maps->t.data + n * pixels * channels;
-        nn_turn_maps_back(orientation, side, channels, again.maps->t.data + n * pixels * channels, maps);
-        for (int64_t i = 0; i < pixels * channels; i += channels) {
-            memcpy(to + i + MAP_DIFFUSE, maps + i + MAP_DIFFUSE, 3 * sizeof *to);
-            memcpy(to + i + MAP_NORMAL, maps + i + MAP_NORMAL, 2 * sizeof *to);
-        }
-    }
+    told.views = views, told.known = known;
+    if (!nn_guess_from(tape, teacher, &told, &again)) return false;
+    const int64_t pixels = (int64_t)said->maps->t.shape.h * said->maps->t.shape.w;
+    for (int64_t i = 0; i < count * pixels; i++)
+        if (!(in->known[i / pixels] & NN_KNOWN_CAMERA))
+            memcpy(said->maps->t.data + i * channels + MAP_DIFFUSE, again.maps->t.data + i * channels + MAP_DIFFUSE,
+                   3 * sizeof(float));
     return true;
 }
 
@@ -101,8 +75,7 @@ ag_value *tr_taught_loss(tr_trainer *t, const nn_input *in, tr_row *row)
     nn_guess said, guess;
     ag_reset(t->quiet);
     ag_compute_set(t->quiet, (ts_compute){.exact = c->train.exact, .precision = c->train.precision});
-    ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_TRAIN, (uint64_t)t->step);
-    if (!tr_taught(t->quiet, t->teacher, in, ts_rng_int(&rng, NN_ORIENTATIONS), &said))
+    if (!tr_taught(t->quiet, t->teacher, in, &said))
         return ag_fail(tape, ag_status(t->quiet)->code, "%s", ag_status(t->quiet)->message);
     if (!nn_guess_from(tape, t->model, in, &guess)) return NULL;
     ag_value *maps = ag_laplace(tape, guess.maps, ag_constant(tape, said.spread->t), ag_constant(tape, said.maps->t),

@@ -1,5 +1,4 @@
 /* A g that learns from another what that says when it is told its own guess of the camera. */
-#include "nn/orient.h"
 #include "nn/weights/weights.h"
 #include "tensor/maps.h"
 #include "tests/support/networks.h"
@@ -33,8 +32,8 @@ static double apart(const ag_value *a, const ag_value *b, int n, int first, int 
     return most;
 }
 
-/* Diffuse and normals are what a teacher says of a camera that is known, or else at the distance that it guesses; all
- * else is its first answer. */
+/* Where the camera is known a teacher says what it says anyway. Where it is not, its diffuse is what it says of a
+ * camera at the distance that it guesses, and all else is its first answer. */
 TEST(teacher_is_told_its_own_guess)
 {
     static const unsigned char known[COUNT] = {0, NN_KNOWN_CAMERA, NN_KNOWN_POWER};
@@ -46,7 +45,7 @@ TEST(teacher_is_told_its_own_guess)
     in.views = views, in.known = known, in.given = 1;
     ag_tape *one = tape_create(false), *two = tape_create(false), *three = tape_create(false);
     nn_guess taught, first, second;
-    CHECK(tr_taught(one, m, &in, 0, &taught), "%s", ag_status(one)->message);
+    CHECK(tr_taught(one, m, &in, &taught), "%s", ag_status(one)->message);
     CHECK(nn_guess_from(two, m, &in, &first), "%s", ag_status(two)->message);
     for (int n = 0; n < COUNT; n++) {
         const double log_height = (double)first.scene->t.data[(size_t)n * 2 * RD_SCENE_NUMBERS + RD_SCENE_DISTANCE];
@@ -60,60 +59,16 @@ TEST(teacher_is_told_its_own_guess)
     CHECK(nn_guess_from(three, m, &in, &second), "%s", ag_status(three)->message);
     for (int n = 0; n < COUNT; n++) {
         const bool knew = known[n] & NN_KNOWN_CAMERA;
-        CHECK(apart(taught.maps, second.maps, n, MAP_DIFFUSE, MAP_ROUGHNESS) < 1e-5, "diffuse or normals of %d", n);
+        CHECK(apart(taught.maps, second.maps, n, MAP_DIFFUSE, MAP_NORMAL) < 1e-5, "diffuse of %d", n);
         CHECK(knew || apart(first.maps, second.maps, n, MAP_DIFFUSE, MAP_NORMAL) > 1e-4,
               "%d: the camera changes nothing", n);
-        CHECK(apart(taught.maps, first.maps, n, MAP_ROUGHNESS, MAP_CHANNELS) == 0, "the other maps of %d", n);
+        CHECK(apart(taught.maps, first.maps, n, MAP_NORMAL, MAP_CHANNELS) == 0, "the other maps of %d", n);
         CHECK(apart(taught.spread, first.spread, n, 0, NN_SPREADS) == 0, "spread of %d", n);
         CHECK(apart(taught.scene, first.scene, n, 0, 2 * RD_SCENE_NUMBERS) == 0, "scene of %d", n);
     }
     ag_tape_destroy(&one), ag_tape_destroy(&two), ag_tape_destroy(&three);
     nn_model_free(&m);
     free(in.image.data);
-}
-
-/* The mean of what a teacher says in each orientation is what g says in all of them. */
-TEST(teacher_reads_every_orientation)
-{
-    static const unsigned char known = NN_KNOWN_CAMERA | NN_KNOWN_POWER;
-    static float mean[FINE * FINE * MAP_CHANNELS];
-    const rd_view view = rd_flash();
-    nn_model *m = teacher();
-    nn_input in = photographs(1, FINE, 34, NULL);
-    in.views = &view, in.known = &known, in.given = 1;
-    memset(mean, 0, sizeof mean);
-    for (int k = 0; k < NN_ORIENTATIONS; k++) {
-        ag_tape *tape = tape_create(false);
-        nn_guess taught;
-        CHECK(tr_taught(tape, m, &in, k, &taught), "%s", ag_status(tape)->message);
-        for (size_t i = 0; i < FINE * FINE * MAP_CHANNELS; i++) mean[i] += taught.maps->t.data[i] / NN_ORIENTATIONS;
-        ag_tape_destroy(&tape);
-    }
-    ag_tape *tape = tape_create(false);
-    nn_guess all;
-    in.orientations = NN_ORIENTATIONS;
-    CHECK(nn_guess_from(tape, m, &in, &all), "%s", ag_status(tape)->message);
-    const ag_value means = {.t = ts_view(mean, (ts_shape){1, FINE, FINE, MAP_CHANNELS})};
-    const double off = apart(&means, all.maps, 0, MAP_DIFFUSE, MAP_ROUGHNESS);
-    CHECK(off < 1e-5, "diffuse or normals are off by %g", off);
-    CHECK(apart(&means, all.maps, 0, MAP_ROUGHNESS, MAP_CHANNELS) > 1e-4, "the orientations are all alike");
-    ag_tape_destroy(&tape);
-    nn_model_free(&m);
-    free(in.image.data);
-}
-
-/* A place turns as the pixel that is there. */
-TEST(orientations_turn_places_with_pixels)
-{
-    enum { S = 8 };
-    for (int k = 0; k < NN_ORIENTATIONS; k++) {
-        float picture[S * S] = {0}, turned[S * S], place[2];
-        picture[2 * S + 5] = 1;
-        nn_turn(k, S, 1, picture, turned);
-        nn_turn_vector(k, (float[2]){5.5f / S - 0.5f, 0.5f - 2.5f / S}, place);
-        const int x = (int)((place[0] + 0.5f) * S), y = (int)((0.5f - place[1]) * S);
-        CHECK(turned[y * S + x] == 1, "orientation %d: not at %d, %d", k, x, y);
-    }
 }
 
 typedef struct losses {
