@@ -15,9 +15,11 @@ ts_code tr_teacher_load(tr_trainer *t, ts_status *st)
     t->teacher = nn_model_load(path, st);
     if (!t->teacher) return ts_context(st, "train.teacher");
     const nn_arch *a = &t->teacher->arch;
-    if (!a->conditions || !a->spread || !a->scene || a->images != 1)
-        return ts_fail(st, TS_INVALID,
-                       "%s: train.teacher must have model.conditions, spread and scene, and read one photograph", path);
+    if (!a->conditions || !a->spread || !a->scene || a->images != 1 || a->channels != MAP_CHANNELS)
+        return ts_fail(
+            st, TS_INVALID,
+            "%s: train.teacher must have model.conditions, spread and scene, read one photograph and say %d channels",
+            path, MAP_CHANNELS);
     if (nn_arch_side(a) != nn_arch_side(&c->arch))
         return ts_fail(st, TS_INVALID, "%s: train.teacher says maps of %d x %d pixels, the model of %d x %d", path,
                        nn_arch_side(a), nn_arch_side(a), nn_arch_side(&c->arch), nn_arch_side(&c->arch));
