@@ -3,6 +3,11 @@
 #define NN_FIRST_GUESS_H
 #include "nn/model.h"
 
+/* Where the light's power is not known g reads the photograph this many times as bright, and says an exposure that is
+ * as much lower: it believes darker materials under a stronger light. Materials of training have albedos 2.2 times
+ * those of artists' (the mean of v^(1/2.2), lgd-data --statistics); this is about half of it, in the logarithm. */
+#define NN_READ_AT 0.7f
+
 typedef struct nn_first_guess {
     float *r0;        /* [side][side][channels], side = nn_arch_side */
     float *spread;    /* [side][side][NN_SPREADS]: the logarithms of the maps' expected errors, as nn_guess has them */

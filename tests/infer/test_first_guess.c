@@ -29,6 +29,62 @@ static double rmse(const float *maps, const float *image, int side)
     return error;
 }
 
+/* g's own guess of a photograph this many times as bright as given. */
+static void said_of(ag_tape *tape, const nn_model *m, nn_input in, float brightness, nn_guess *said)
+{
+    ag_value *v = ag_empty(tape, in.image.shape);
+    for (int64_t i = 0; i < ts_count(v->t.shape); i++) v->t.data[i] = brightness * in.image.data[i];
+    in.image = v->t;
+    CHECK(nn_guess_from(tape, m, &in, said), "%s", ag_status(tape)->message);
+}
+
+/* A photograph whose light's power is not known is read at NN_READ_AT, another as it is; and the fit of an exposure,
+ * which has nothing else to go by where g is sure of it, ends at what g says of the darker picture, made brighter. */
+TEST(first_guess_reads_unknown_powers_darker)
+{
+    nn_model *m = guessing();
+    static const char *const last[] = {"g.detail.conv5.weight", "g.scene.numbers.weight"}; /* they begin as nothing */
+    for (int k = 0; k < 2; k++) {
+        const nn_param *p = nn_model_find(m, last[k]);
+        ts_rng r = ts_rng_make(5, TS_STREAM_TEST, k);
+        CHECK(p, "no %s", last[k]);
+        for (size_t i = 0; i < p->count; i++) m->value[p->offset + i] = ts_rng_range(&r, -0.1f, 0.1f);
+    }
+    const nn_param *bias = nn_model_find(m, "g.scene.numbers.bias");
+    CHECK(bias && bias->count == 2 * RD_SCENE_NUMBERS, "the head of the scene has another name");
+    m->value[bias->offset + RD_SCENE_NUMBERS + RD_SCENE_EXPOSURE] = -20;
+    nn_input in = photographs(1, PLACE, 82, NULL);
+    const rd_view view = rd_flash();
+    for (int k = 0; k < 2; k++) {
+        const unsigned char known = k ? NN_KNOWN_ALL : NN_KNOWN_CAMERA | NN_KNOWN_LIGHT;
+        const nn_first_ask ask = {.image = in.image.data,
+                                  .side = PLACE,
+                                  .taken = {.view = view, .known = known, .photographs = 1},
+                                  .orientations = 1};
+        ts_status st = {0};
+        ag_tape *tape = tape_create(false);
+        nn_first_guess g;
+        nn_guess same, darker;
+        CHECK(!nn_first_guess_make(tape, m, &ask, &g, &st), "%s", st.message);
+        in.views = &view, in.known = &known, in.given = 1;
+        said_of(tape, m, in, 1, &same);
+        said_of(tape, m, in, NN_READ_AT, &darker);
+        double as_it_is = 0, as_darker = 0;
+        for (int i = 0; i < PLACE * PLACE * NN_SPREADS; i++) {
+            as_it_is = fmax(as_it_is, fabs((double)(g.spread[i] - same.spread->t.data[i])));
+            as_darker = fmax(as_darker, fabs((double)(g.spread[i] - darker.spread->t.data[i])));
+        }
+        CHECK((k ? as_it_is : as_darker) == 0, "it is read otherwise: off by %g, %g", as_it_is, as_darker);
+        CHECK((k ? as_darker : as_it_is) > 1e-4, "brightness changes nothing: %g, %g", as_it_is, as_darker);
+        const double exposure = (double)darker.scene->t.data[RD_SCENE_EXPOSURE] - log2((double)NN_READ_AT);
+        CHECK(k || fabs((double)g.number[RD_SCENE_EXPOSURE] - exposure) < 0.01, "an exposure of %g for %g",
+              (double)g.number[RD_SCENE_EXPOSURE], exposure);
+        ag_tape_destroy(&tape);
+    }
+    free(in.image.data);
+    nn_model_free(&m);
+}
+
 /* Under a scene that is known the steps bring renderings nearer to the photograph, and leave them where it is black
  * and white alike. */
 TEST(first_guess_steps_explain_the_photograph)
