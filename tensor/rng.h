@@ -33,7 +33,8 @@ enum {
     TS_STREAM_UNEVEN, /* materials that do not lie flat */
     TS_STREAM_DISTURB,
     TS_STREAM_HOMOGENEOUS,
-    TS_STREAM_CLOSER
+    TS_STREAM_CLOSER,
+    TS_STREAM_DARKER
 };
 
 uint32_t ts_rng_u32(ts_rng *r);

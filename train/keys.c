@@ -97,6 +97,8 @@ const tr_key tr_keys[] = {
      "families that are drawn three times as often as the others"},
     {"data", "hues", TR_REAL, AT(data.hues), 0, 1, "0", NULL, false,
      "share of the materials whose diffuse colours are exchanged between channels and more or less saturated"},
+    {"data", "darker", TR_REAL, AT(data.darker), 0, 1, "0", NULL, false,
+     "share of the materials whose diffuse colours are darkened, down to an eighth"},
     {"data", "relief", TR_REAL, AT(data.relief), 0, 1, "0", NULL, false,
      "share of the materials whose relief is another material's, weaker or stronger, or has broad waves below it"},
     {"data", "blend", TR_REAL, AT(data.blend), 0, 1, "0", NULL, false,

@@ -12,6 +12,7 @@ io_procedural tr_materials_of(const tr_config *c)
                            .families = c->data.families,
                            .often = c->data.often,
                            .hues = (float)c->data.hues,
+                           .darker = (float)c->data.darker,
                            .relief = (float)c->data.relief,
                            .blend = (float)c->data.blend,
                            .uneven = (float)c->data.uneven,

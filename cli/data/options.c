@@ -11,6 +11,7 @@ static const struct {
     const char *name, *help;
     size_t at; /* in io_procedural */
 } shares[] = {{"hues", "with other hues", offsetof(io_procedural, hues)},
+              {"darker", "with darker diffuse colours", offsetof(io_procedural, darker)},
               {"relief", "with another relief", offsetof(io_procedural, relief)},
               {"blend", "that are a mean of two", offsetof(io_procedural, blend)},
               {"uneven", "that do not lie flat", offsetof(io_procedural, uneven)},

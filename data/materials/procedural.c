@@ -2,6 +2,7 @@
 #include "data/materials/blend.h"
 #include "data/materials/family.h"
 #include "data/materials/homogeneous.h"
+#include "data/materials/darker.h"
 #include "data/materials/hues.h"
 #include "data/materials/relief.h"
 #include "data/materials/uneven.h"
@@ -209,6 +210,8 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
     make_homogeneous(p, index, &c);
     ts_rng hues = ts_rng_make(p->seed, TS_STREAM_HUES, index);
     if (ts_rng_uniform(&hues) < p->hues) cv_other_hues(&c, &hues);
+    ts_rng darker = ts_rng_make(p->seed, TS_STREAM_DARKER, index);
+    if (ts_rng_uniform(&darker) < p->darker) cv_darker(&c, &darker);
     cv_write(&c, m->maps);
     snprintf(m->name, sizeof m->name, mixed ? "%05llu_%s_%s" : "%05llu_%s", (unsigned long long)index, families[a].name,
              families[b].name);

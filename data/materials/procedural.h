@@ -19,6 +19,7 @@ typedef struct io_procedural {
     uint64_t families; /* bit i: family i may be drawn; 0 = all */
     uint64_t often;    /* families that are drawn three times as often as the rest; 0 = none */
     float hues;        /* share of the materials that get other hues (materials/hues.h); the rest stay as they are */
+    float darker;      /* share of those whose diffuse colours are darkened (materials/darker.h) */
     float relief;      /* share of those whose relief is made anew (materials/relief.h) */
     float blend;       /* share of those that are a mean of themselves and another (materials/blend.h) */
     float uneven;      /* share of those that lean and undulate (materials/uneven.h) */

@@ -1,4 +1,4 @@
-/* What training varies of the procedural materials: families, hues, relief, blends, slopes. */
+/* What training varies of the procedural materials: families, hues, brightness, relief, blends, slopes. */
 #include "data/materials/blend.h"
 #include "data/materials/procedural.h"
 #include "tests/test.h"
@@ -118,6 +118,44 @@ TEST(procedural_other_hues_change_diffuse_colours_alone)
     CHECK(bluer > before + COUNT / 8, "%d materials are more blue than red, %d before", bluer, before);
 }
 
+TEST(procedural_darker_multiplies_diffuse_colours_by_one_factor)
+{
+    enum { COUNT = 48, SIZE = 16 };
+    const io_procedural plain = {.seed = 5}, dark = {.seed = 5, .darker = 1}, half = {.seed = 5, .darker = 0.5f};
+    int changed = 0, halves = 0;
+    double stops = 0;
+    for (int i = 0; i < COUNT; i++) {
+        io_material a = material(SIZE), b = material(SIZE);
+        io_procedural_make(&plain, (uint64_t)i, &a);
+        io_procedural_make(&dark, (uint64_t)i, &b);
+        halves += varies(&half, i, &a, &b);
+        double least = 1, most = 0, wrong = 0;
+        for (int k = 0; k < SIZE * SIZE; k++) {
+            const float *from = a.maps + k * MAP_CHANNELS, *to = b.maps + k * MAP_CHANNELS;
+            CHECK(!memcmp(from + MAP_NORMAL, to + MAP_NORMAL, (MAP_CHANNELS - MAP_NORMAL) * sizeof(float)),
+                  "material %d: F0, roughness or normals changed with the diffuse colours", i);
+            for (int v = MAP_DIFFUSE; v < MAP_DIFFUSE + 3; v++) {
+                const double before = (from[v] + 1) / 2, after = (to[v] + 1) / 2;
+                wrong = fmax(wrong, after - before);
+                if (after < 0.005) continue; /* at the least albedo, or near enough for its rounding to show */
+                least = fmin(least, after / before), most = fmax(most, after / before);
+            }
+        }
+        CHECK(wrong < 1e-6, "material %d: a value is %g brighter", i, wrong);
+        if (most <= 0) {
+        } /* a bare metal has no diffuse colour */
+        else {
+            CHECK(least > 0.1249 && most - least < 2e-4, "material %d: factors of %g to %g", i, least, most);
+            stops -= log2(most), changed++;
+        }
+        io_material_free(&a);
+        io_material_free(&b);
+    }
+    CHECK(changed > COUNT / 2 && halves > COUNT / 6 && halves < 5 * COUNT / 6, "%d and %d of %d changed", changed,
+          halves, COUNT);
+    CHECK(fabs(stops / changed - 1.5) < 0.4, "darker by %g stops, 1.5 is the mean of 0 .. 3", stops / changed);
+}
+
 /* All eight planes of a canvas, at v[0] .. v[8 count - 1]. */
 static io_canvas painted(int count, float *v)
 {
@@ -166,77 +204,6 @@ TEST(procedural_blends_are_a_share)
         io_material_free(&b);
     }
     CHECK(halves > COUNT / 4 && halves < 3 * COUNT / 4, "%d of %d at a share of a half", halves, COUNT);
-}
-
-/* Root mean square of the normals' x and y, averaged over squares of side pixels. */
-static double lean(const io_material *m, int side)
-{
-    double sum = 0;
-    const int squares = m->size / side;
-    for (int q = 0; q < 2 * squares * squares; q++) {
-        const int k = q % 2, x0 = q / 2 % squares * side, y0 = q / 2 / squares * side;
-        double mean = 0;
-        for (int p = 0; p < side * side; p++)
-            mean += m->maps[((y0 + p / side) * m->size + x0 + p % side) * MAP_CHANNELS + MAP_NORMAL + k];
-        sum += mean / (side * side) * (mean / (side * side));
-    }
-    return sqrt(sum / (squares * squares));
-}
-
-TEST(faces_lean_as_a_whole)
-{
-    enum { COUNT = 40, SIZE = 128 };
-    static const char *const families[] = {"faces", "tile", "panels", "woven"};
-    double mean[4] = {0};
-    for (int f = 0; f < 4; f++) {
-        const io_procedural p = {.seed = 5, .families = io_family_mask(families[f])};
-        for (int i = 0; i < COUNT; i++) {
-            io_material m = material(SIZE);
-            io_procedural_make(&p, (uint64_t)i, &m);
-            mean[f] += lean(&m, SIZE / 8) / COUNT;
-            io_material_free(&m);
-        }
-    }
-    for (int f = 1; f < 4; f++)
-        CHECK(mean[0] > 1.5 * mean[f], "faces lean by %.3f, %s by %.3f", mean[0], families[f], mean[f]);
-}
-
-/* Correlation of the normals' x and y with the slope of the logarithm of green diffuse albedo and F0 together, -1 where
- * what is dark lies low. */
-static double darkness_lies_low(const io_material *m)
-{
-    double product = 0, normals = 0, slopes = 0;
-    for (int y = 1; y + 1 < m->size; y++)
-        for (int x = 1; x + 1 < m->size; x++) {
-            const float *at = m->maps + (y * m->size + x) * MAP_CHANNELS, *diffuse = at + MAP_DIFFUSE + 1,
-                        *specular = at + MAP_SPECULAR + 1;
-            const int side[2] = {MAP_CHANNELS, -m->size * MAP_CHANNELS}; /* x right, y up */
-            for (int k = 0; k < 2; k++) {
-                const double n = at[MAP_NORMAL + k],
-                             s = log((diffuse[side[k]] + specular[side[k]] + 2.02) /
-                                     (diffuse[-side[k]] + specular[-side[k]] + 2.02));
-                product += n * s, normals += n * n, slopes += s * s;
-            }
-        }
-    return product / sqrt(normals * slopes + 1e-12);
-}
-
-TEST(openings_are_dark_and_lie_low)
-{
-    enum { COUNT = 60, SIZE = 96 };
-    static const char *const families[] = {"pierced", "lattice", "printed"};
-    double mean[3] = {0};
-    for (int f = 0; f < 3; f++) {
-        const io_procedural p = {.seed = 6, .families = io_family_mask(families[f])};
-        for (int i = 0; i < COUNT; i++) {
-            io_material m = material(SIZE);
-            io_procedural_make(&p, (uint64_t)i, &m);
-            mean[f] += darkness_lies_low(&m) / COUNT;
-            io_material_free(&m);
-        }
-    }
-    for (int f = 0; f < 2; f++)
-        CHECK(mean[f] < -0.15 && mean[f] < mean[2] - 0.1, "%s: %.3f, printed ones %.3f", families[f], mean[f], mean[2]);
 }
 
 /* Mean slope of the whole patch. */
