@@ -5,20 +5,13 @@
 #include "data/occlusion.h"
 #include "data/seamless.h"
 #include "tensor/rng.h"
+#include "tests/data/new_material.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #define PI 3.14159265358979323846
-
-static io_material material(int size)
-{
-    io_material m;
-    ts_status st = {0};
-    CHECK(io_material_create(&m, size, &st) == TS_OK, "%s", st.message);
-    return m;
-}
 
 /* A smooth relief that does not repeat at the borders, x right and y up in patch widths. */
 static double relief(double x, double y)
@@ -28,7 +21,7 @@ static double relief(double x, double y)
 
 static double relief_error(int size, double *spread)
 {
-    io_material m = material(size);
+    io_material m = new_material(size);
     const double e = 1e-5;
     for (int i = 0; i < size; i++)
         for (int j = 0; j < size; j++) {
@@ -74,7 +67,7 @@ TEST(height_is_finite_for_any_maps)
     static const float extreme[] = {-1, 1, 0, 0.7071068f, 1e30f, -1e30f, INFINITY, NAN};
     ts_rng r = ts_rng_make(5, TS_STREAM_TEST, 0);
     for (int size = 1; size < 20; size++) {
-        io_material m = material(size);
+        io_material m = new_material(size);
         for (int k = 0; k < size * size * MAP_CHANNELS; k++) m.maps[k] = extreme[ts_rng_int(&r, 8)];
         float height[400];
         ts_status st = {0};
@@ -89,7 +82,7 @@ TEST(height_is_finite_for_any_maps)
 TEST(height_of_what_repeats)
 {
     enum { N = 60 };
-    io_material m = material(N);
+    io_material m = new_material(N);
     float height[N * N];
     ts_status st = {0};
     for (int i = 0; i < N; i++)
@@ -152,7 +145,7 @@ TEST(seamless_borders_are_as_the_inside)
     ts_status st = {0};
     for (size_t k = 0; k < sizeof sizes / sizeof *sizes; k++) {
         const int n = sizes[k];
-        io_material m = material(n), tile, again;
+        io_material m = new_material(n), tile, again;
         for (int i = 0; i < n; i++)
             for (int j = 0; j < n; j++) {
                 /* a slope from border to border, waves that do not close, and grain */
@@ -175,7 +168,7 @@ TEST(seamless_borders_are_as_the_inside)
         free(height);
         io_material_free(&m), io_material_free(&tile), io_material_free(&again);
     }
-    io_material small = material(IO_SEAMLESS_LEAST - 1), none;
+    io_material small = new_material(IO_SEAMLESS_LEAST - 1), none;
     CHECK(io_seamless(&small, &none, 0, &st) == TS_INVALID && strstr(st.message, "16 at least") && !none.maps, "'%s'",
           st.message);
     io_material_free(&small);
@@ -185,7 +178,7 @@ TEST(seamless_borders_are_as_the_inside)
 TEST(metallic_conversion_and_its_error)
 {
     enum { N = 12 };
-    io_material m = material(N);
+    io_material m = new_material(N);
     ts_rng r = ts_rng_make(6, TS_STREAM_TEST, 0);
     float base[N * N][3], metal[N * N], got_base[N * N * 3], got_metal[N * N];
     for (int i = 0; i < N * N; i++) {

@@ -1,14 +1,8 @@
 /* What makes single families what they are. */
 #include "data/materials/procedural.h"
+#include "tests/data/new_material.h"
 #include "tests/test.h"
 #include <math.h>
-
-static io_material material(int size)
-{
-    io_material m = {0};
-    CHECK(io_material_create(&m, size, NULL) == TS_OK, "no memory for a material of %d", size);
-    return m;
-}
 
 /* Root mean square of the normals' x and y, averaged over squares of side pixels. */
 static double lean(const io_material *m, int side)
@@ -33,7 +27,7 @@ TEST(faces_lean_as_a_whole)
     for (int f = 0; f < 4; f++) {
         const io_procedural p = {.seed = 5, .families = io_family_mask(families[f])};
         for (int i = 0; i < COUNT; i++) {
-            io_material m = material(SIZE);
+            io_material m = new_material(SIZE);
             io_procedural_make(&p, (uint64_t)i, &m);
             mean[f] += lean(&m, SIZE / 8) / COUNT;
             io_material_free(&m);
@@ -71,7 +65,7 @@ TEST(openings_are_dark_and_lie_low)
     for (int f = 0; f < 3; f++) {
         const io_procedural p = {.seed = 6, .families = io_family_mask(families[f])};
         for (int i = 0; i < COUNT; i++) {
-            io_material m = material(SIZE);
+            io_material m = new_material(SIZE);
             io_procedural_make(&p, (uint64_t)i, &m);
             mean[f] += darkness_lies_low(&m) / COUNT;
             io_material_free(&m);

@@ -3,17 +3,11 @@
 #include "data/materials/procedural.h"
 #include "data/materials/statistics.h"
 #include "tensor/team.h"
+#include "tests/data/new_material.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-static io_material material(int size)
-{
-    io_material m = {0};
-    CHECK(io_material_create(&m, size, NULL) == TS_OK, "no memory for a material of %d", size);
-    return m;
-}
 
 static size_t values(int size) { return (size_t)size * (size_t)size * MAP_CHANNELS; }
 
@@ -36,7 +30,7 @@ static void make_after_another(const void *job, int64_t task)
 {
     const making *j = job;
     const int i = j->count - 1 - (int)task;
-    io_material other = material(8 + 4 * i), m = {.size = j->size, .maps = j->to + (size_t)i * values(j->size)};
+    io_material other = new_material(8 + 4 * i), m = {.size = j->size, .maps = j->to + (size_t)i * values(j->size)};
     io_procedural_make(j->p, (uint64_t)(7 * i), &other);
     io_procedural_make(j->p, (uint64_t)i, &m);
     io_material_free(&other);
@@ -71,7 +65,7 @@ TEST(procedural_values_are_in_range)
     for (int f = 0; f < io_family_count(); f++)
         for (int k = 0; k < 30; k++) {
             int size = sizes[k % 6];
-            io_material m = material(size);
+            io_material m = new_material(size);
             io_procedural p = {.seed = 2, .families = UINT64_C(1) << f};
             io_procedural_make(&p, (uint64_t)k, &m);
             for (int i = 0; i < size * size; i++) {
@@ -94,7 +88,7 @@ TEST(procedural_values_are_in_range)
 /* Every branch of every family: none runs out of scratch planes (an assertion), none leaves a value out. */
 TEST(procedural_many_materials_of_every_family)
 {
-    io_material m = material(3);
+    io_material m = new_material(3);
     for (int f = 0; f < io_family_count(); f++)
         for (uint64_t i = 0; i < 1500; i++) {
             io_procedural p = {.seed = 7, .families = UINT64_C(1) << f};
@@ -107,7 +101,7 @@ TEST(procedural_many_materials_of_every_family)
 
 TEST(procedural_family_mask_is_respected)
 {
-    io_material m = material(8);
+    io_material m = new_material(8);
     int wood = io_family_find("wood"), rust = io_family_find("rust"), seen[2] = {0, 0};
     CHECK(wood >= 0 && rust >= 0, "wood and rust are families");
     for (int f = 0; f < io_family_count(); f++) {
@@ -144,7 +138,7 @@ TEST(procedural_classic_families_stay)
     static const double means[] = {-0.585629, -0.652200, -0.349389, -0.588958, -0.608256, -0.683954,
                                    -0.668373, -0.452797, -0.598985, -0.666903, -0.652926, -0.565165,
                                    -0.373751, -0.667716, -0.454003, -0.429447};
-    io_material m = material(32);
+    io_material m = new_material(32);
     const io_procedural p = {.seed = 1000003, .families = io_family_mask("classic")};
     for (int i = 0; i < 16; i++) {
         double sum = 0;
@@ -185,7 +179,7 @@ TEST(procedural_sizes_agree)
 {
     enum { SMALL = 96, LARGE = 192 };
     const int count = io_family_count();
-    io_material a = material(SMALL), b = material(LARGE), c = material(SMALL);
+    io_material a = new_material(SMALL), b = new_material(LARGE), c = new_material(SMALL);
     double same = 0, other = 0;
     for (uint64_t i = 0; i < (uint64_t)count; i++) {
         io_procedural p = {.seed = 4, .families = UINT64_C(1) << i};
@@ -256,7 +250,7 @@ TEST(procedural_statistics_resemble_artists_maps)
 TEST(statistics_measure_what_they_say)
 {
     enum { SIZE = 32 };
-    io_material m = material(SIZE);
+    io_material m = new_material(SIZE);
     for (int y = 0; y < SIZE; y++)
         for (int x = 0; x < SIZE; x++) { /* left half smooth metal, right half rough and grey, tilted by 0.6 */
             bool right = x >= SIZE / 2;

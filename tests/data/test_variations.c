@@ -1,23 +1,17 @@
 /* What training varies of the procedural materials: families, hues, brightness, relief, blends, slopes. */
 #include "data/materials/blend.h"
 #include "data/materials/procedural.h"
+#include "tests/data/new_material.h"
 #include "tests/test.h"
 #include <math.h>
 #include <string.h>
-
-static io_material material(int size)
-{
-    io_material m = {0};
-    CHECK(io_material_create(&m, size, NULL) == TS_OK, "no memory for a material of %d", size);
-    return m;
-}
 
 static size_t values(int size) { return (size_t)size * (size_t)size * MAP_CHANNELS; }
 
 static int drawn(const io_procedural *p, const char *family, int count)
 {
     int found = 0;
-    io_material m = material(8);
+    io_material m = new_material(8);
     for (int i = 0; i < count; i++) {
         io_procedural_make(p, (uint64_t)i, &m);
         found += !strncmp(m.name + 6, family, strlen(family));
@@ -42,7 +36,7 @@ TEST(procedural_families_are_drawn_more_often)
 /* Whether material i of a share of a half is varied; it must be that or plain. */
 static bool varies(const io_procedural *half, int i, const io_material *plain, const io_material *varied)
 {
-    io_material m = material(plain->size);
+    io_material m = new_material(plain->size);
     const size_t bytes = values(plain->size) * sizeof(float);
     io_procedural_make(half, (uint64_t)i, &m);
     const bool is_plain = !memcmp(m.maps, plain->maps, bytes);
@@ -58,7 +52,7 @@ TEST(procedural_other_relief_leaves_colours)
     int halves = 0, gloss = 0;
     double slopes[2] = {0, 0};
     for (int i = 0; i < COUNT; i++) {
-        io_material a = material(SIZE), b = material(SIZE);
+        io_material a = new_material(SIZE), b = new_material(SIZE);
         io_procedural_make(&plain, (uint64_t)i, &a);
         io_procedural_make(&other, (uint64_t)i, &b);
         halves += varies(&half, i, &a, &b);
@@ -94,7 +88,7 @@ TEST(procedural_other_hues_change_diffuse_colours_alone)
     const io_procedural plain = {.seed = 5}, hued = {.seed = 5, .hues = 1}, half = {.seed = 5, .hues = 0.5f};
     int changed = 0, halves = 0, bluer = 0, before = 0;
     for (int i = 0; i < COUNT; i++) {
-        io_material a = material(SIZE), b = material(SIZE);
+        io_material a = new_material(SIZE), b = new_material(SIZE);
         io_procedural_make(&plain, (uint64_t)i, &a);
         io_procedural_make(&hued, (uint64_t)i, &b);
         halves += varies(&half, i, &a, &b);
@@ -125,7 +119,7 @@ TEST(procedural_darker_multiplies_diffuse_colours_by_one_factor)
     int changed = 0, halves = 0;
     double stops = 0;
     for (int i = 0; i < COUNT; i++) {
-        io_material a = material(SIZE), b = material(SIZE);
+        io_material a = new_material(SIZE), b = new_material(SIZE);
         io_procedural_make(&plain, (uint64_t)i, &a);
         io_procedural_make(&dark, (uint64_t)i, &b);
         halves += varies(&half, i, &a, &b);
@@ -190,7 +184,7 @@ TEST(procedural_blends_are_a_share)
     const io_procedural plain = {.seed = 5}, blended = {.seed = 5, .blend = 1}, half = {.seed = 5, .blend = 0.5f};
     int halves = 0;
     for (int i = 0; i < COUNT; i++) {
-        io_material a = material(SIZE), b = material(SIZE);
+        io_material a = new_material(SIZE), b = new_material(SIZE);
         io_procedural_make(&plain, (uint64_t)i, &a);
         io_procedural_make(&blended, (uint64_t)i, &b);
         halves += varies(&half, i, &a, &b);
@@ -225,7 +219,7 @@ TEST(uneven_materials_lean_and_keep_their_colours)
     int halves = 0, steep = 0;
     double before = 0, after = 0;
     for (int i = 0; i < COUNT; i++) {
-        io_material a = material(SIZE), b = material(SIZE);
+        io_material a = new_material(SIZE), b = new_material(SIZE);
         io_procedural_make(&plain, (uint64_t)i, &a);
         io_procedural_make(&uneven, (uint64_t)i, &b);
         halves += varies(&half, i, &a, &b);
@@ -270,7 +264,7 @@ static void homogeneous(float closer)
     int halves = 0, changed = 0;
     double slow[2] = {0}, deviation[2] = {0};
     for (int i = 0; i < COUNT; i++) {
-        io_material a = material(SIZE), b = material(SIZE);
+        io_material a = new_material(SIZE), b = new_material(SIZE);
         io_procedural_make(&plain, (uint64_t)i, &a);
         io_procedural_make(&same, (uint64_t)i, &b);
         bool diffuse = false;
@@ -333,7 +327,7 @@ TEST(closer_materials_are_of_larger_parts)
     int halves = 0;
     double periods[2] = {0};
     for (int i = 0; i < COUNT; i++) {
-        io_material a = material(SIZE), b = material(SIZE);
+        io_material a = new_material(SIZE), b = new_material(SIZE);
         io_procedural_make(&plain, (uint64_t)i, &a);
         io_procedural_make(&near, (uint64_t)i, &b);
         halves += varies(&half, i, &a, &b);
