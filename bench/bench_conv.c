@@ -1,4 +1,5 @@
 /* Convolutions and their gradients: sizes of the published networks at 256 x 256, and of a small model in training. */
+#include "bench/arrays.h"
 #include "bench/bench.h"
 #include "tensor/conv/conv.h"
 #include "tensor/rng.h"
@@ -140,6 +141,16 @@ static void forward_naive(void *user)
     ts_conv_forward_naive(&w->c, w->x, w->weight, w->bias, 0.2f, w->y);
 }
 
+/* Input, weights and output of one of the three directions. */
+static bench_arrays arrays_of(const work *w, bool back, bool weights)
+{
+    const int64_t pixels = (int64_t)w->c.n * w->c.h * w->c.w, in = pixels * w->c.ic, out = pixels * w->c.oc,
+                  kernel = (int64_t)w->c.ic * w->c.oc * w->c.k * w->c.k;
+    if (weights) return (bench_arrays){{w->x, w->y}, w->weight, {in, out}, kernel, true};
+    if (back) return (bench_arrays){{w->y, w->packed_gradient}, w->x, {out, kernel}, in, false};
+    return (bench_arrays){{w->x, w->packed}, w->y, {in, kernel}, out, false};
+}
+
 static void row(const char *what, ts_conv c, void (*f)(void *user))
 {
     char label[96];
@@ -155,6 +166,8 @@ static void row(const char *what, ts_conv c, void (*f)(void *user))
     bench_time t = bench_measure(f, &w);
     if (bf16 && !bench_bf16(&t)) snprintf(label + strlen(label), sizeof label - strlen(label), ", emulated");
     bench_row(label, t, 2.0 * c.n * c.h * c.w * (back ? ts_conv_variables(&c) : c.ic) * c.oc * c.k * c.k);
+    bench_arrays arrays = arrays_of(&w, back, f == weight_gradient);
+    if (!bf16) bench_row_arrays(t, &arrays);
     discard(&w);
 }
 

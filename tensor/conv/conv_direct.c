@@ -121,15 +121,26 @@ static void make_segments(const runner *r, source *s, int e, int ky0, int ky1)
     }
 }
 
-/* Adds (or on first touch puts) a row of the extended domain into y's row. */
-static void fold_row(const conv_plan *p, const float *extended, float *y, int channels, bool first)
+/* Whether y has a pixel of its own for all of the larger domain's columns [begin, end). */
+static bool lies_inside(const conv_plan *p, int begin, int end) { return begin >= p->fold && end <= p->fold + p->w; }
+
+/* Adds (or on first touch puts) the tiles of a row that do not lie inside to y's row: first the columns that y has,
+ * then those beyond them, which belong to its border. */
+static void fold_row(const runner *r, float *y, int channels, bool first)
 {
-    if (first)
-        for (int j = 0; j < p->w; j++) memset(y + (ptrdiff_t)j * p->oc, 0, sizeof(float) * (size_t)channels);
-    for (int e = 0; e < p->w + 2 * p->fold; e++) {
-        float *to = y + (ptrdiff_t)conv_clamp(e - p->fold, p->w) * p->oc;
-        for (int o = 0; o < channels; o++) to[o] += extended[e * channels + o];
-    }
+    const conv_plan *p = r->p;
+    for (int beyond = 0; beyond < 2; beyond++)
+        for (int tile = 0; tile < r->tiles; tile++) {
+            int begin, end;
+            tile_range(r, tile, &begin, &end);
+            if (lies_inside(p, begin, end)) continue;
+            for (int e = begin; e < end; e++) {
+                const float *from = r->extended + (ptrdiff_t)e * channels;
+                float *to = y + (ptrdiff_t)conv_clamp(e - p->fold, p->w) * p->oc;
+                if (lies_inside(p, e, e + 1) == beyond) continue;
+                for (int o = 0; o < channels; o++) to[o] = first && !beyond ? from[o] : to[o] + from[o];
+            }
+        }
 }
 
 /* One output row of panels [panel0, panel1). first: nothing has been put into y's row yet. */
@@ -151,12 +162,9 @@ static void run_row(runner *r, int e, int ky0, int ky1, int panel0, int panel1, 
     for (int panel = panel0; panel < panel1; panel++) {
         ts_tile t = conv_panel_tile(p, panel);
         const int o0 = panel * lanes2, channels = t.channels < lanes2 ? t.channels : lanes2;
-        float *to = p->fold ? r->extended : y + o0;
-        if (ky0 > 0) t.add = true;
-        if (p->fold) t.add = false, t.y_stride = channels;
         if (ky1 < p->k) t.leak = 1;
         /* The output of the next tile is fetched in time: stores that miss would hold up what follows. */
-        if (!p->fold) t.fetch_step[1] = r->tile_size * t.y_stride * (ptrdiff_t)sizeof(float) / calls;
+        t.fetch_step[1] = r->tile_size * (ptrdiff_t)p->oc * (ptrdiff_t)sizeof(float) / calls;
         for (int i = 0; i < r->sources; i++) {
             const source *s = &r->source[i];
             t.segment = s->segment;
@@ -183,12 +191,17 @@ static void run_row(runner *r, int e, int ky0, int ky1, int panel0, int panel1, 
                 int begin, end;
                 tile_range(r, tile, &begin, &end);
                 t.fetch[0] = fresh ? fresh + end * s->pixel : coming ? coming + share * tile : p->packed;
-                t.fetch[1] = to + end * t.y_stride;
-                conv_run_tile(&t, conv_vectors(p->oc, panel), s->pixel0 + begin * s->pixel, to + begin * t.y_stride,
+                t.fetch[1] = y + o0 + (ptrdiff_t)(end - p->fold) * p->oc;
+                const bool inside = lies_inside(p, begin, end);
+                t.add = inside && !first;
+                t.y_stride = inside ? p->oc : channels;
+                conv_run_tile(&t, conv_vectors(p->oc, panel), s->pixel0 + begin * s->pixel,
+                              inside ? y + o0 + (ptrdiff_t)(begin - p->fold) * p->oc
+                                     : r->extended + (ptrdiff_t)begin * channels,
                               end - begin, p->bf16);
             }
         }
-        if (p->fold) fold_row(p, r->extended, y + o0, channels, first);
+        if (p->fold) fold_row(r, y + o0, channels, first);
     }
 }
 
