@@ -166,7 +166,7 @@ static void row(const char *what, ts_conv c, void (*f)(void *user))
     bench_time t = bench_measure(f, &w);
     if (bf16 && !bench_bf16(&t)) snprintf(label + strlen(label), sizeof label - strlen(label), ", emulated");
     bench_row(label, t, 2.0 * c.n * c.h * c.w * (back ? ts_conv_variables(&c) : c.ic) * c.oc * c.k * c.k);
-    bench_arrays arrays = arrays_of(&w, back, f == weight_gradient);
+    bench_arrays arrays = arrays_of(&w, back, f == weight_gradient || f == weight_gradient_winograd);
     if (!bf16) bench_row_arrays(t, &arrays);
     discard(&w);
 }

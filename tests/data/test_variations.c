@@ -136,9 +136,7 @@ TEST(procedural_darker_multiplies_diffuse_colours_by_one_factor)
             }
         }
         CHECK(wrong < 1e-6, "material %d: a value is %g brighter", i, wrong);
-        if (most <= 0) {
-        } /* a bare metal has no diffuse colour */
-        else {
+        if (most > 0) { /* a bare metal has no diffuse colour */
             CHECK(least > 0.1249 && most - least < 2e-4, "material %d: factors of %g to %g", i, least, most);
             stops -= log2(most), changed++;
         }
