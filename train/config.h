@@ -10,6 +10,9 @@
 /* The camera of the validation's photographs: [data]'s, or that of its keys' defaults. */
 typedef enum tr_camera { TR_CAMERA_DATA, TR_CAMERA_DEFAULT } tr_camera;
 
+/* What is new to a student of train.teacher (train/teach.c). */
+typedef enum tr_lesson { TR_LESSON_DIFFUSE, TR_LESSON_NORMALS } tr_lesson;
+
 typedef struct tr_config {
     nn_arch arch;   /* [model] */
     nn_coder coder; /* [coder] */
@@ -39,6 +42,7 @@ typedef struct tr_config {
         int64_t seed, checkpoint_every, log_every;
         int max_skipped;
         char init[1024], init_rest[1024], teacher[1024];
+        tr_lesson lesson;
         tr_reduce reduce; /* of several ranks */
         double bucket;    /* MiB */
     } train;

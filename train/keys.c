@@ -7,6 +7,7 @@ static const char *const compat_names[] = {"none", "published", NULL};          
 static const char *const descent_names[] = {"none", "gradient", "newton", "posterior", NULL}; /* as nn_descent */
 static const char *const precision_names[] = {"f32", "bf16", NULL};                           /* as ts_precision */
 static const char *const rmse_names[] = {"start", "batch", NULL};                             /* as nn_rmse */
+static const char *const lesson_names[] = {"diffuse", "normals", NULL};                       /* as tr_lesson */
 static const char *const reduce_names[] = {"f32", "bf16", NULL};                              /* as tr_reduce */
 static const char *const camera_names[] = {"data", "default", NULL};                          /* as tr_camera */
 
@@ -255,8 +256,12 @@ const tr_key tr_keys[] = {
     {"train", "init_rest", TR_TEXT, AT(train.init_rest), 0, sizeof((tr_config *)0)->train.init_rest, "", NULL, true,
      "weights file for the parameters that train.init lacks, for example the coarse steps of another run"},
     {"train", "teacher", TR_TEXT, AT(train.teacher), 0, sizeof((tr_config *)0)->train.teacher, "", NULL, false,
-     "weights file of a g that says what is learned, in place of the materials' maps and the losses of their weights; "
-     "where no camera is known it is told its own guess for the diffuse albedo (train/teach.c)"},
+     "weights file of a g that says what is learned, in place of the materials' maps and the losses of their weights "
+     "(train/teach.c)"},
+    {"train", "lesson", TR_CHOICE, AT(train.lesson), 0, TR_LESSON_NORMALS, "diffuse", lesson_names, false,
+     "what is new to a student of train.teacher: diffuse as the teacher has it when it is told its own guess of a "
+     "camera "
+     "that is not known, or normals, which are the materials' own, by train.normal_rmse too"},
     {"train", "reduce", TR_CHOICE, AT(train.reduce), 0, TR_REDUCE_BF16, "f32", reduce_names, false,
      "how gradients are summed over the ranks of mpirun: as f32, or rounded to bf16 and summed as f32, which is half "
      "the bytes and off by at most a 256th of the sum of their magnitudes; one process sums nothing"},

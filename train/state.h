@@ -129,9 +129,10 @@ ts_code tr_teacher_load(tr_trainer *t, ts_status *st);
  * diffuse albedo where the camera is not known: that is what it says of one above the centre, at the distance that it
  * guesses. False after an error, which the tape has. */
 bool tr_taught(ag_tape *tape, const nn_model *teacher, const nn_input *in, nn_guess *said);
-/* How far the model is from what the teacher says: of maps in the teacher's own deviations, of their logarithms and the
+/* How far the model is from what the teacher says, or with train.lesson = normals of the normals from target [batch,
+ * patch, patch, 9], by train.normal_rmse too: of maps in the teacher's own deviations, of their logarithms and the
  * scene as they are. NULL after an error. */
-ag_value *tr_taught_loss(tr_trainer *t, const nn_input *in, tr_row *row);
+ag_value *tr_taught_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr_row *row);
 
 /* validate.c */
 ts_code tr_validator_create(tr_trainer *t, ts_status *st);

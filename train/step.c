@@ -133,7 +133,7 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
                    .given = given,
                    .recompute = c->train.checkpoint_steps};
     if (row->pretraining)
-        return t->teacher ? tr_taught_loss(t, &in, row) : tr_guess_loss(t, &in, ag_constant(t->tape, goals), row);
+        return (t->teacher ? tr_taught_loss : tr_guess_loss)(t, &in, ag_constant(t->tape, goals), row);
     if (c->arch.revisions > 0) return tr_revision_loss(t, &in, ag_constant(t->tape, goals), row);
     if (c->coder.code > 0) {
         ag_value *goal = ag_constant(t->tape, goals);

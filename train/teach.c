@@ -1,8 +1,11 @@
-/* The loss of a g that learns from another, train.teacher. Where the camera is not known, a g says more of the diffuse
- * albedo when it reads the photograph a second time and is told its own guess of the distance. A student learns to say
- * that at once, and all else as the teacher's first answer has it. */
+/* The losses of a g that learns from another, train.teacher, by train.lesson. Where the camera is not known, a g says
+ * more of the diffuse albedo when it reads the photograph a second time and is told its own guess of the distance: a
+ * student of diffuse learns to say that at once, and all else as the teacher's first answer has it. A student of
+ * normals learns them from the materials, and keeps all else as the teacher has it: trained on the maps alone, levels
+ * of F0 and roughness wander while normals gain (docs/training-phone.md). */
 #include "ops.h"
 #include "nn/weights/weights.h"
+#include "render/losses.h"
 #include "render/scene.h"
 #include "tensor/maps.h"
 #include "train/state.h"
@@ -70,22 +73,41 @@ static ag_value *differ(ag_tape *tape, ag_value *x, const ag_value *said)
     return ag_laplace(tape, x, one, ag_constant(tape, said->t), own, 1);
 }
 
-ag_value *tr_taught_loss(tr_trainer *t, const nn_input *in, tr_row *row)
+/* The teacher's maps, but for the normals, which are those of target. */
+static ag_value *with_normals_of(ag_tape *tape, const ts_tensor *said, const ag_value *target)
 {
+    const ts_tensor maps = ts_new(ag_arena(tape), said->shape);
+    if (!maps.data) return ag_fail(tape, TS_NOMEM, "no memory for the maps of %d materials", said->shape.n);
+    const int64_t pixels = ts_count(said->shape) / MAP_CHANNELS;
+    memcpy(maps.data, said->data, (size_t)ts_count(said->shape) * sizeof(float));
+    for (int64_t i = 0; i < pixels; i++)
+        memcpy(maps.data + i * MAP_CHANNELS + MAP_NORMAL, target->t.data + i * MAP_CHANNELS + MAP_NORMAL,
+               2 * sizeof(float));
+    return ag_constant(tape, maps);
+}
+
+ag_value *tr_taught_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr_row *row)
+{
+    const bool normals = t->config.train.lesson == TR_LESSON_NORMALS;
     const tr_config *c = &t->config;
     ag_tape *tape = t->tape;
     nn_guess said, guess;
     ag_reset(t->quiet);
     ag_compute_set(t->quiet, (ts_compute){.exact = c->train.exact, .precision = c->train.precision});
-    if (!tr_taught(t->quiet, t->teacher, in, &said))
+    if (!(normals ? nn_guess_from(t->quiet, t->teacher, in, &said) : tr_taught(t->quiet, t->teacher, in, &said)))
         return ag_fail(tape, ag_status(t->quiet)->code, "%s", ag_status(t->quiet)->message);
     if (!nn_guess_from(tape, t->model, in, &guess)) return NULL;
-    ag_value *maps = ag_laplace(tape, guess.maps, ag_constant(tape, said.spread->t), ag_constant(tape, said.maps->t),
-                                nn_spread_of, NN_SPREAD_UNIT);
+    ag_value *goal = normals ? with_normals_of(tape, &said.maps->t, target) : ag_constant(tape, said.maps->t);
+    ag_value *maps = ag_laplace(tape, guess.maps, ag_constant(tape, said.spread->t), goal, nn_spread_of,
+                                NN_SPREAD_UNIT);
     ag_value *spread = differ(tape, guess.spread, said.spread), *scene = differ(tape, guess.scene, said.scene);
     ag_value *loss = ag_add(tape, maps,
                             ag_add(tape, ag_scale(tape, spread, (float)c->train.spread_weight),
                                    ag_scale(tape, scene, (float)c->train.scene_weight)));
+    if (normals && c->train.normal_rmse > 0)
+        loss = ag_add(
+            tape, loss,
+            ag_scale(tape, ag_rmse_loss(tape, guess.maps, target, MAP_NORMAL, 2), (float)c->train.normal_rmse));
     if (!loss) return NULL;
     row->map_start = (double)maps->t.data[0];
     row->spread = (double)spread->t.data[0], row->scene = (double)scene->t.data[0];

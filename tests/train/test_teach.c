@@ -141,3 +141,35 @@ TEST(trainer_learns_from_a_teacher)
     c.data.patch = 128, c.arch.g_size = 32;
     CHECK(run(&c, folder("none"), &l, &st) == TS_INVALID && strstr(st.message, "128 x 128"), "%s", st.message);
 }
+
+/* A student that begins as its teacher, who was told every camera, keeps all but the normals, which it learns from the
+ * materials. */
+TEST(trainer_learns_normals_beside_a_teacher)
+{
+    ts_status st = {0};
+    losses diffuse, normals, rmse;
+    char path[700];
+    snprintf(path, sizeof path, "%s/last.safetensors", folder("masters"));
+    tr_config c = lesson(path);
+    *c.train.teacher = 0, c.data.told_view = 1;
+    CHECK(run(&c, folder("masters"), &diffuse, &st) == TS_OK, "%s", st.message);
+    snprintf(c.train.teacher, sizeof c.train.teacher, "%s", path);
+    snprintf(c.train.init, sizeof c.train.init, "%s", path);
+    const int64_t steps = c.train.pretrain_steps;
+    c.train.pretrain_steps = 1; /* there is nothing to learn */
+    CHECK(run(&c, folder("of_diffuse"), &diffuse, &st) == TS_OK, "%s", st.message);
+    c.train.lesson = TR_LESSON_NORMALS, c.train.normal_rmse = 0;
+    CHECK(run(&c, folder("of_normals"), &normals, &st) == TS_OK, "%s", st.message);
+    CHECK(normals.first > diffuse.first + 0.01, "the materials' normals are the teacher's: %g, %g", normals.first,
+          diffuse.first);
+    CHECK(normals.spread == 0, "the teacher differs from itself by %g", normals.spread);
+    c.train.normal_rmse = 5;
+    CHECK(run(&c, folder("of_squares"), &rmse, &st) == TS_OK, "%s", st.message);
+    CHECK(rmse.first > normals.first + 0.1, "train.normal_rmse adds nothing: %g, %g", normals.first, rmse.first);
+    *c.train.init = 0, c.train.seed = 77, c.train.pretrain_steps = steps;
+    CHECK(run(&c, folder("of_both"), &rmse, &st) == TS_OK, "%s", st.message);
+    CHECK(rmse.last < rmse.first - 0.1, "the loss goes from %g to %g", rmse.first, rmse.last);
+
+    *c.train.teacher = 0;
+    CHECK(run(&c, folder("none"), &rmse, &st) == TS_INVALID && strstr(st.message, "train.lesson"), "%s", st.message);
+}
