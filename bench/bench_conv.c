@@ -4,6 +4,7 @@
 #include "tensor/conv/conv.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -141,33 +142,66 @@ static void forward_naive(void *user)
     ts_conv_forward_naive(&w->c, w->x, w->weight, w->bias, 0.2f, w->y);
 }
 
-/* Input, weights and output of one of the three directions. */
-static bench_arrays arrays_of(const work *w, bool back, bool weights)
+/* What a computation reads and writes, and which of its packed weights. */
+typedef struct way {
+    void (*f)(void *user);
+    enum { FORWARD, BACK, WEIGHTS } direction;
+    bool bf16;
+    size_t packed; /* its offset in work; WEIGHTS has none */
+    ts_conv_use use;
+} way;
+
+static const way ways[] = {
+    {forward, FORWARD, false, offsetof(work, packed), TS_CONV_FORWARD},
+    {winograd, FORWARD, false, offsetof(work, packed_winograd), TS_CONV_WINOGRAD},
+    {forward_bf16, FORWARD, true, offsetof(work, packed_bf16), TS_CONV_FORWARD_BF16},
+    {winograd_bf16, FORWARD, true, offsetof(work, packed_winograd_bf16), TS_CONV_WINOGRAD_BF16},
+    {data_gradient, BACK, false, offsetof(work, packed_gradient), TS_CONV_DATA_GRADIENT},
+    {data_gradient_winograd, BACK, false, offsetof(work, packed_gradient_winograd), TS_CONV_DATA_GRADIENT_WINOGRAD},
+    {data_gradient_bf16, BACK, true, offsetof(work, packed_gradient_bf16), TS_CONV_DATA_GRADIENT_BF16},
+    {data_gradient_winograd_bf16, BACK, true, offsetof(work, packed_gradient_winograd_bf16),
+     TS_CONV_DATA_GRADIENT_WINOGRAD_BF16},
+    {weight_gradient, WEIGHTS, false, 0, TS_CONV_FORWARD},
+    {weight_gradient_winograd, WEIGHTS, false, 0, TS_CONV_FORWARD},
+    {weight_gradient_bf16, WEIGHTS, true, 0, TS_CONV_FORWARD},
+    {weight_gradient_winograd_bf16, WEIGHTS, true, 0, TS_CONV_FORWARD},
+};
+
+static const way *way_of(void (*f)(void *user))
 {
-    const int64_t pixels = (int64_t)w->c.n * w->c.h * w->c.w, in = pixels * w->c.ic, out = pixels * w->c.oc,
-                  kernel = (int64_t)w->c.ic * w->c.oc * w->c.k * w->c.k;
-    if (weights) return (bench_arrays){{w->x, w->y}, w->weight, {in, out}, kernel, true};
-    if (back) return (bench_arrays){{w->y, w->packed_gradient}, w->x, {out, kernel}, in, false};
-    return (bench_arrays){{w->x, w->packed}, w->y, {in, kernel}, out, false};
+    for (size_t i = 0; i < sizeof ways / sizeof *ways; i++)
+        if (ways[i].f == f) return &ways[i];
+    return NULL;
+}
+
+static bench_arrays arrays_of(const work *w, const way *by)
+{
+    const int64_t pixels = (int64_t)w->c.n * w->c.h * w->c.w, in = pixels * w->c.ic, out = pixels * w->c.oc;
+    if (by->direction == WEIGHTS)
+        return (bench_arrays){{w->x, w->y}, w->weight, {in, out}, (int64_t)w->c.ic * w->c.oc * w->c.k * w->c.k, true};
+    const float *packed = *(float *const *)((const char *)w + by->packed);
+    const int64_t kernel = (int64_t)ts_conv_packed_count(&w->c, by->use);
+    if (by->direction == BACK) return (bench_arrays){{w->y, packed}, w->x, {out, kernel}, in, false};
+    return (bench_arrays){{w->x, packed}, w->y, {in, kernel}, out, false};
 }
 
 static void row(const char *what, ts_conv c, void (*f)(void *user))
 {
     char label[96];
+    const way *by = way_of(f);
     snprintf(label, sizeof label, "%s n%d %dx%d %d->%d %dx%d%s%s", what, c.n, c.h, c.w, c.ic, c.oc, c.k, c.k,
              c.dilation > 1 ? " d2" : "", c.pad == TS_PAD_REPLICATE ? " rep" : "");
-    const bool back = f == data_gradient || f == data_gradient_winograd || f == data_gradient_bf16 ||
-        f == data_gradient_winograd_bf16;
-    const bool bf16 = f == forward_bf16 || f == data_gradient_bf16 || f == weight_gradient_bf16 || f == winograd_bf16 ||
-        f == data_gradient_winograd_bf16 || f == weight_gradient_winograd_bf16;
+    const bool back = by && by->direction == BACK;
     if (back && c.constants)
         snprintf(label + strlen(label), sizeof label - strlen(label), " (of %d)", ts_conv_variables(&c));
     work w = make(c);
     bench_time t = bench_measure(f, &w);
-    if (bf16 && !bench_bf16(&t)) snprintf(label + strlen(label), sizeof label - strlen(label), ", emulated");
+    if (by && by->bf16 && !bench_bf16(&t)) snprintf(label + strlen(label), sizeof label - strlen(label), ", emulated");
     bench_row(label, t, 2.0 * c.n * c.h * c.w * (back ? ts_conv_variables(&c) : c.ic) * c.oc * c.k * c.k);
-    bench_arrays arrays = arrays_of(&w, back, f == weight_gradient || f == weight_gradient_winograd);
-    if (!bf16) bench_row_arrays(t, &arrays);
+    if (by) {
+        bench_arrays arrays = arrays_of(&w, by);
+        bench_row_arrays(t, &arrays);
+    }
     discard(&w);
 }
 
