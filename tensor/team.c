@@ -265,6 +265,21 @@ static void run_ranges(const void *job, ts_queue *queue)
     for (int64_t begin, end; ts_next(queue, &begin, &end);) r->run(r->job, begin, end);
 }
 
+/* A loop over [0, count) in pieces: in order, or each of n threads with its own share of whole steps. */
+static loop spread(int64_t count, int64_t step, int64_t piece, int shares)
+{
+    const int64_t steps = count / step + (count % step != 0);
+    loop l = {.piece = piece, .shares = shares};
+    for (int i = 0; i < shares; i++) {
+        const int64_t end = steps * (i + 1) / shares * step;
+        atomic_init(&l.share[i].next, steps * i / shares * step);
+        l.share[i].end = end < count ? end : count;
+    }
+    return l;
+}
+
+static int shares_of(int threads) { return threads < SHARES ? threads : SHARES; }
+
 void ts_for(int threads, int64_t count, int64_t step, void (*run)(const void *job, int64_t begin, int64_t end),
             const void *job)
 {
@@ -275,32 +290,23 @@ void ts_for(int threads, int64_t count, int64_t step, void (*run)(const void *jo
         run(job, 0, count);
         return;
     }
-    loop l;
+    const int shares = shares_of(n);
+    const int64_t each = (steps + shares - 1) / shares;
+    loop l = spread(count, step, (each + PIECES - 1) / PIECES * step, shares);
     l.run = run_ranges;
     l.job = &(ranges){run, job};
-    l.shares = n < SHARES ? n : SHARES;
-    const int64_t each = (steps + l.shares - 1) / l.shares;
-    l.piece = (each + PIECES - 1) / PIECES * step;
-    for (int i = 0; i < l.shares; i++) {
-        const int64_t end = steps * (i + 1) / l.shares * step;
-        atomic_init(&l.share[i].next, steps * i / l.shares * step);
-        l.share[i].end = end < count ? end : count;
-    }
     run_loop(n, &l);
 }
 
-void ts_share_tasks(int threads, int64_t count, int64_t piece, void (*run)(const void *job, ts_queue *queue),
-                    const void *job)
+void ts_share_tasks(int threads, ts_order order, int64_t count, int64_t piece,
+                    void (*run)(const void *job, ts_queue *queue), const void *job)
 {
     if (count < 1) return;
-    loop l;
+    const int n = limited(threads, (count + piece - 1) / piece);
+    loop l = spread(count, piece, piece, order == TS_IN_ORDER || inside ? 1 : shares_of(n));
     l.run = run;
     l.job = job;
-    l.shares = 1;
-    l.piece = piece;
-    l.share[0].end = count;
-    atomic_init(&l.share[0].next, 0);
-    run_loop(limited(threads, (count + piece - 1) / piece), &l);
+    run_loop(n, &l);
 }
 
 typedef struct tasks {
@@ -316,7 +322,12 @@ static void run_tasks(const void *job, ts_queue *queue)
 
 void ts_tasks(int threads, int64_t count, void (*run)(const void *job, int64_t i), const void *job)
 {
-    ts_share_tasks(threads, count, 1, run_tasks, &(tasks){run, job});
+    ts_share_tasks(threads, TS_IN_ORDER, count, 1, run_tasks, &(tasks){run, job});
+}
+
+void ts_spread_tasks(int threads, int64_t count, void (*run)(const void *job, int64_t i), const void *job)
+{
+    ts_share_tasks(threads, TS_SPREAD, count, 1, run_tasks, &(tasks){run, job});
 }
 
 typedef struct roll {

@@ -21,11 +21,17 @@ void ts_for(int threads, int64_t count, int64_t step, void (*run)(const void *jo
 /* Calls run(job, i) for i = 0 .. count-1 on up to so many threads; they are begun in this order. */
 void ts_tasks(int threads, int64_t count, void (*run)(const void *job, int64_t i), const void *job);
 
-/* The same for threads with something of their own to prepare: each that takes part calls run(job, queue) once, which
- * asks for its tasks, piece >= 1 neighbours at a time, with ts_next until that is false. */
+/* The same in no order: as of ts_for's ranges, neighbours are one thread's as far as time allows, and those of the next
+ * loop with as many values, or twice as many, are the same thread's. Tasks that are numbered as the rows of an image
+ * are then run where what they read was written: CPUs that do not share a cache fetch each other's values slowly. */
+void ts_spread_tasks(int threads, int64_t count, void (*run)(const void *job, int64_t i), const void *job);
+
+/* Both for threads with something of their own to prepare: each that takes part calls run(job, queue) once, which asks
+ * for its tasks, piece >= 1 neighbours at a time, with ts_next until that is false. */
 typedef struct ts_queue ts_queue;
-void ts_share_tasks(int threads, int64_t count, int64_t piece, void (*run)(const void *job, ts_queue *queue),
-                    const void *job);
+typedef enum ts_order { TS_IN_ORDER, TS_SPREAD } ts_order;
+void ts_share_tasks(int threads, ts_order order, int64_t count, int64_t piece,
+                    void (*run)(const void *job, ts_queue *queue), const void *job);
 bool ts_next(ts_queue *queue, int64_t *begin, int64_t *end);
 
 /* handler is called the first time that the system refuses a worker, by the thread that wanted it: it goes on with so

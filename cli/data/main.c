@@ -136,7 +136,8 @@ static ts_code run(const cl_data_options *o, const char *what, task *f, int64_t 
     int64_t done = 0, failed = count;
     pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
     cl_progress progress = cl_progress_start(what, count);
-    ts_share_tasks(0, count, 1, run_tasks, &(running){o, f, size, sheet, &lock, &done, &failed, &progress, st});
+    ts_share_tasks(0, TS_IN_ORDER, count, 1, run_tasks,
+                   &(running){o, f, size, sheet, &lock, &done, &failed, &progress, st});
     cl_progress_end(&progress);
     if (st->code == TS_OK && cl_interrupted())
         ts_fail(st, TS_INTERRUPTED, "interrupted after %lld of %lld materials", (long long)done, (long long)count);

@@ -248,7 +248,7 @@ void conv_run_amx(const conv_plan *p)
     if (bands > (p->h + least - 1) / least) bands = (p->h + least - 1) / least;
     int groups = p->n * bands < UNITS ? (UNITS + p->n * bands - 1) / (p->n * bands) : 1;
     if (groups > panels) groups = panels;
-    ts_tasks(p->threads, (int64_t)p->n * bands * groups, run_unit, &(run_job){&f, bands, groups, panels});
+    ts_spread_tasks(p->threads, (int64_t)p->n * bands * groups, run_unit, &(run_job){&f, bands, groups, panels});
 }
 
 void conv_amx_pixels(const conv_plan *p, int count)

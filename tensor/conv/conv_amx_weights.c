@@ -182,7 +182,7 @@ void conv_amx_weight_gradient(const ts_conv *c, const float *x, const float *dy,
     for (int s = 0; s < steps; s++) at[s] = s * (ptrdiff_t)(STEP_PIXELS * sizeof(uint16_t));
     g.at = at;
     g.sums = ts_scratch(2, sizeof(float) * (size_t)(g.size * g.chunks));
-    ts_tasks(c->compute.threads, (int64_t)g.chunks * g.groups, run_unit, &g);
+    ts_spread_tasks(c->compute.threads, (int64_t)g.chunks * g.groups, run_unit, &g);
     ts_for(c->compute.threads,
            (int64_t)((c->oc + TS_AMX_BLOCK - 1) / TS_AMX_BLOCK) * ((c->ic + REDUCE_INPUTS - 1) / REDUCE_INPUTS), 1,
            reduce_parts, &g);

@@ -66,5 +66,5 @@ static void run_lines(const void *plan, ts_queue *queue)
 /* Small images: a tile is one position in several images, and only taps that meet an input are multiplied. */
 void conv_run_batch(const conv_plan *p)
 {
-    ts_share_tasks(p->threads, (int64_t)conv_panels(p->oc) * p->h, 1, run_lines, p);
+    ts_share_tasks(p->threads, TS_SPREAD, (int64_t)conv_panels(p->oc) * p->h, 1, run_lines, p);
 }

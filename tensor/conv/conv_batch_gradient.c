@@ -153,6 +153,6 @@ void conv_batch_weight_gradient(const ts_conv *c, bool bf16, const float *x, con
 {
     const int panels = conv_panels(c->oc), parts = (c->ic + ts_conv_k()->rows - 1) / ts_conv_k()->rows;
     const int piece = (panels * parts + PIECES - 1) / PIECES; /* of neighbouring parts, which share lines of dweight */
-    ts_share_tasks(c->compute.threads, (int64_t)panels * parts, piece, run_units,
+    ts_share_tasks(c->compute.threads, TS_SPREAD, (int64_t)panels * parts, piece, run_units,
                    &(gradient_job){c, bf16, x, dy, dweight, parts});
 }

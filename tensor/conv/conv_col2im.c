@@ -199,6 +199,6 @@ void conv_run_col2im(const conv_plan *p)
         g.products.bias = bias;
     }
     const run_job r = {p, &g, shared, rows, part};
-    ts_tasks(p->threads, (int64_t)p->n * g.bands, run_unit, &r);
+    ts_spread_tasks(p->threads, (int64_t)p->n * g.bands, run_unit, &r);
     ts_for(p->threads, (int64_t)p->n * (g.bands - 1) * rows, 1, add_shared, &r);
 }

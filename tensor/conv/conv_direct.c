@@ -233,16 +233,20 @@ static void run_band(const conv_plan *p, weight_part part, const band *b)
 typedef struct run_job {
     const conv_plan *p;
     weight_part part;
-    int bands, groups, panels, ahead; /* ahead: of the group that fetches, the one that is fetched; 0: none is */
+    int bands, groups, panels;
+    bool weighty, fetches; /* a group fetches the weights of the next */
 } run_job;
+
+/* Neighbouring units share what there is more of: weights, or rows. */
 
 static void run_unit(const void *job, int64_t unit)
 {
     const run_job *j = job;
     const conv_plan *p = j->p;
-    const int i = (int)(unit % j->bands), n = (int)(unit / j->bands % p->n), g = (int)(unit / j->bands / p->n);
-    band b = {.image = n, .next = j->ahead && g + j->ahead < j->panels ? g + j->ahead : -1};
-    conv_part(p->h, j->bands, i, &b.begin, &b.end);
+    const int all = p->n * j->bands, g = (int)(j->weighty ? unit / all : unit % j->groups),
+              i = (int)(j->weighty ? unit % all : unit / j->groups);
+    band b = {.image = i / j->bands, .next = j->fetches && g + 1 < j->panels ? g + 1 : -1};
+    conv_part(p->h, j->bands, i % j->bands, &b.begin, &b.end);
     conv_part(j->panels, j->groups, g, &b.panel_begin, &b.panel_end);
     run_band(p, j->part, &b);
 }
@@ -263,6 +267,6 @@ void conv_run_direct(const conv_plan *p)
     if (groups > panels) groups = panels;
     if (weighty && p->h <= WHOLE_ROWS && groups * p->n >= 8) bands = 1;
     const bool fetch = weighty && part.ky == p->k && bands == 1 && groups == panels;
-    ts_tasks(p->threads, (int64_t)groups * p->n * bands, run_unit,
-             &(run_job){p, part, bands, groups, panels, fetch ? ts_threads_of(p->threads) : 0});
+    ts_spread_tasks(p->threads, (int64_t)groups * p->n * bands, run_unit,
+                    &(run_job){p, part, bands, groups, panels, weighty, fetch});
 }

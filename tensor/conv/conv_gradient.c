@@ -334,7 +334,7 @@ void conv_direct_weight_gradient(const ts_conv *c, bool bf16, const float *x, co
     g->bias_sums = dbias ? g->sums + g->size * g->chunks : NULL;
     const int groups = dweight ? g->groups : 1, o_parts = dweight ? (c->oc + REDUCE_OUTPUTS - 1) / REDUCE_OUTPUTS : 0;
     const int c_parts = (c->ic + REDUCE_INPUTS - 1) / REDUCE_INPUTS;
-    ts_tasks(c->compute.threads, (int64_t)g->chunks * groups, run_unit, g);
+    ts_spread_tasks(c->compute.threads, (int64_t)g->chunks * groups, run_unit, g);
     ts_for(c->compute.threads, (int64_t)o_parts * c_parts, 1, reduce_parts, g);
     for (int i = 0; dbias && i < g->chunks; i++)
         for (int o = 0; o < c->oc; o++) dbias[o] += g->bias_sums[(ptrdiff_t)i * c->oc + o];

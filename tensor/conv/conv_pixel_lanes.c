@@ -173,5 +173,5 @@ void conv_run_pixel_lanes(const conv_plan *p)
 {
     int bands = (4 * ts_threads_of(p->threads) + p->n - 1) / p->n; /* each makes the rows around it anew */
     if (bands > (p->h + 7) / 8) bands = (p->h + 7) / 8;
-    ts_tasks(p->threads, (int64_t)p->n * bands, run_unit, &(run_job){p, bands});
+    ts_spread_tasks(p->threads, (int64_t)p->n * bands, run_unit, &(run_job){p, bands});
 }

@@ -5,17 +5,17 @@
 
 typedef struct run_job {
     const conv_plan *p;
-    int chunk, chunks, groups; /* pixels; of them; of panels */
+    int chunk, groups; /* pixels; of panels */
 } run_job;
 
 static void run_unit(const void *job, int64_t unit)
 {
     const run_job *j = job;
     const conv_plan *p = j->p;
-    const ptrdiff_t pixels = (ptrdiff_t)p->n * p->h * p->w, first = unit % j->chunks * j->chunk,
+    const ptrdiff_t pixels = (ptrdiff_t)p->n * p->h * p->w, first = unit / j->groups * j->chunk,
                     count = pixels - first < j->chunk ? pixels - first : j->chunk;
     int panel0, panel1;
-    conv_part(conv_panels(p->oc), j->groups, (int)(unit / j->chunks), &panel0, &panel1);
+    conv_part(conv_panels(p->oc), j->groups, (int)(unit % j->groups), &panel0, &panel1);
     if (!p->bf16) {
         conv_run_pixels(p, first, count, panel0, panel1);
         return;
@@ -36,5 +36,5 @@ void conv_run_pointwise(const conv_plan *p)
     const int chunks = (int)((pixels + chunk - 1) / chunk);
     int groups = chunks < 8 ? (8 + chunks - 1) / chunks : 1;
     if (groups > panels) groups = panels;
-    ts_tasks(p->threads, (int64_t)groups * chunks, run_unit, &(run_job){p, chunk, chunks, groups});
+    ts_spread_tasks(p->threads, (int64_t)groups * chunks, run_unit, &(run_job){p, chunk, groups});
 }

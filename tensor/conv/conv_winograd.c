@@ -113,20 +113,20 @@ void conv_winograd_pack(const ts_conv *c, bool forward, bool bf16, const conv_we
 void winograd_locate(const winograd_grid *g, int64_t first, int count, winograd_place *place)
 {
     const int d = g->dilation;
-    int x = (int)(first % g->columns), y = (int)(first / g->columns % g->rows);
-    const int64_t phase = first / g->columns / g->rows;
-    int image = (int)(phase / (d * d)), row = (int)(phase / d % d),
-        column = (int)(phase % d);    /* of the interleaved image */
+    int x = (int)(first % g->columns);
+    const int64_t line = first / g->columns;
+    int column = (int)(line % d), row = (int)(line / d % d), /* of the interleaved image */
+        y = (int)(line / (d * d) % g->rows), image = (int)(line / (d * d) / g->rows);
     for (int i = 0; i < count; i++) { /* without divisions, which would take a tenth of a small tile's time */
         place[i] = (winograd_place){image, y * g->side * d + row, x * g->side * d + column};
         if (++x < g->columns) continue;
         x = 0;
-        if (++y < g->rows) continue;
-        y = 0;
         if (++column < d) continue;
         column = 0;
         if (++row < d) continue;
         row = 0;
+        if (++y < g->rows) continue;
+        y = 0;
         image++;
     }
 }
@@ -244,7 +244,8 @@ static void run(const winograd_grid *g, const float *x, const float *packed, con
     const int threads = ts_threads_of(g->threads);
     const int64_t groups = ((g->tiles + TILES - 1) / TILES + threads - 1) / threads * threads;
     const int step = (int)((g->tiles + groups - 1) / groups);
-    ts_tasks(g->threads, (g->tiles + step - 1) / step, run_tiles, &(run_job){g, x, packed, bias, leak, add, y, step});
+    ts_spread_tasks(g->threads, (g->tiles + step - 1) / step, run_tiles,
+                    &(run_job){g, x, packed, bias, leak, add, y, step});
 }
 
 void conv_winograd_forward(const ts_conv *c, bool bf16, const float *x, const float *packed, const float *bias,

@@ -169,6 +169,6 @@ void conv_winograd_weight_gradient(const ts_conv *c, bool bf16, const float *x, 
     job j = make_job(c, bf16, x, dy);
     j.dweight = dweight;
     j.sums = ts_scratch(2, sizeof(float) * (size_t)(j.size * j.chunks));
-    ts_tasks(c->compute.threads, (int64_t)j.chunks * j.parts * j.input_parts, run_task, &j);
+    ts_spread_tasks(c->compute.threads, (int64_t)j.chunks * j.parts * j.input_parts, run_task, &j);
     ts_for(c->compute.threads, (int64_t)(j.padded / conv_lanes()) * c->ic, 1, reduce_inputs, &j);
 }

@@ -127,7 +127,7 @@ void ts_gemm(bool ta, bool tb, int m, int n, int k, float alpha, const float *a,
     if (groups > panels) groups = panels;
     p.panels = panels;
     p.groups = groups;
-    ts_tasks(threads, (int64_t)units * groups, run_unit, &p);
+    ts_spread_tasks(threads, (int64_t)units * groups, run_unit, &p);
 }
 
 void ts_gemm_naive(bool ta, bool tb, int m, int n, int k, float alpha, const float *a, const float *b, float beta,

@@ -80,7 +80,7 @@ void ts_gru_forward(const ts_gru *g, const float *x, const float *old, const flo
                     const float *hh_packed, const float *hh_bias, float *y, float *saved)
 {
     enum { BANDS = 4 }; /* at a time */
-    ts_share_tasks(g->threads, (g->pixels + GRU_BAND - 1) / GRU_BAND, BANDS, forward_bands,
+    ts_share_tasks(g->threads, TS_SPREAD, (g->pixels + GRU_BAND - 1) / GRU_BAND, BANDS, forward_bands,
                    &(forward_job){g, gates_of(g, g->ic, ih_packed, ih_bias), gates_of(g, g->c, hh_packed, hh_bias), x,
                                   old, hh_bias, y, saved});
 }
@@ -235,7 +235,7 @@ void ts_gru_backward(const ts_gru *g, const float *x, const float *old, const fl
     const ptrdiff_t size = 4 * c + (input + hidden + 1) / 2;
     double *memory = ts_scratch(2, sizeof(double) * (size_t)(size * parts));
     const backward_job j = {g, x, old, ih_packed, hh_packed, saved, dy, to, parts, input, size, memory};
-    ts_tasks(g->threads, parts, backward_part, &j);
+    ts_spread_tasks(g->threads, parts, backward_part, &j);
     ts_for(g->threads, gates, 1, reduce_rows, &j);
     if (to->ih_bias || to->hh_bias) reduce_bias(memory, size, parts, c, to);
 }

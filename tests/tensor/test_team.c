@@ -48,8 +48,10 @@ static int wrong(int threads, int64_t count, int64_t step)
     if (!mark) return -1;
     ts_for(threads, count, step, mark_range, &(marks){count, step, mark, &bad});
     ts_tasks(threads, count, mark_one, &(marks){count, 1, mark, &bad});
-    ts_share_tasks(threads, count, step, mark_pieces, &(marks){count, step, mark, &bad});
-    for (int64_t i = 0; i <= count; i++) missed += mark[i] != (i < count ? 3 : 0);
+    ts_spread_tasks(threads, count, mark_one, &(marks){count, 1, mark, &bad});
+    ts_share_tasks(threads, TS_IN_ORDER, count, step, mark_pieces, &(marks){count, step, mark, &bad});
+    ts_share_tasks(threads, TS_SPREAD, count, step, mark_pieces, &(marks){count, step, mark, &bad});
+    for (int64_t i = 0; i <= count; i++) missed += mark[i] != (i < count ? 5 : 0);
     free(mark);
     return missed + bad;
 }
