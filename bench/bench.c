@@ -1,5 +1,6 @@
 /* lgd-bench [--cpu] [NAME...]: runs the benchmarks whose name contains one of the words (all without a word), in order
  * of name. */
+#include "bench/apart.h"
 #include "bench/batches.h"
 #include "bench/bench.h"
 #include "cli/cli.h"
@@ -17,6 +18,7 @@
 
 enum { MOST = 256, MOST_RUNS = 1000 };
 #define LOOP_EVERY 0.02 /* seconds */
+#define APART 200e-9    /* seconds: bench_apart of CPUs that share a cache is less */
 static struct entry {
     const char *name;
     bench_function f;
@@ -112,7 +114,7 @@ static double median(double *v, int count)
 bench_time bench_measure(void (*f)(void *user), void *user)
 {
     static double times[MOST_RUNS], loops[MOST_RUNS];
-    bench_time t = {.peak = peak()};
+    bench_time t = {.peak = peak(), .apart = bench_apart()};
     int looped = 0;
     f(user);
     const double begin = now();
@@ -127,6 +129,8 @@ bench_time bench_measure(void (*f)(void *user), void *user)
         times[t.runs++] = now() - start;
     } while (t.runs < MOST_RUNS && (t.runs < 3 || now() - begin < 0.33));
     if (looped < MOST_RUNS) loops[looped++] = inner_loop();
+    const double apart = bench_apart();
+    if (apart > t.apart) t.apart = apart;
     t.peak = 0.5 * (t.peak + peak());
     t.loop = median(loops, looped);
     t.seconds = median(times, t.runs);
@@ -162,6 +166,7 @@ void bench_row(const char *label, bench_time t, double flop)
         printf(" %9.1f GFLOP/s %6.1f %% of the peak (best %.1f)", 1e-9 * flop / t.seconds,
                100 * flop / t.seconds / t.peak, 100 * flop / t.best / t.peak);
     if (flop > 0 && t.loop > 0) printf(", %.1f %% of the inner loop", 100 * flop / t.seconds / t.loop);
+    if (t.apart > APART) printf(", on CPUs that share no cache (%.0f ns there and back)", 1e9 * t.apart);
     printf("\n");
     fflush(stdout);
 }

@@ -21,6 +21,7 @@ typedef struct bench_time {
     double peak;    /* FLOP/s of the FMA peak with the threads in use, the mean of before and after */
     double loop; /* FLOP/s of the convolutions' inner loop on data in the first cache, the median of before, between and
                     after; 0: does not apply */
+    double apart; /* bench_apart, the larger of before and after */
     int runs;
 } bench_time;
 bench_time bench_measure(void (*f)(void *user), void *user);
@@ -33,7 +34,7 @@ bool bench_bf16(bench_time *t);
 bool bench_cpu(void);
 
 /* A row: label, milliseconds, GFLOP/s and the fraction of the peak, at the median and at the best, and of the inner
- * loop (flop = 0: no such columns). */
+ * loop (flop = 0: no such columns); whether the threads were on CPUs that share no cache. */
 void bench_row(const char *label, bench_time t, double flop);
 /* A row: the time of a call alone, and how many times as long it takes beside as many busy processes as there are
  * threads, and twice as many, on the same CPUs; measured in turn. */
