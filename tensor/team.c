@@ -265,17 +265,17 @@ static void run_ranges(const void *job, ts_queue *queue)
     for (int64_t begin, end; ts_next(queue, &begin, &end);) r->run(r->job, begin, end);
 }
 
-/* A loop over [0, count) in pieces: in order, or each of n threads with its own share of whole steps. */
-static loop spread(int64_t count, int64_t step, int64_t piece, int shares)
+/* Cuts [0, count) into shares of whole steps, which threads take piece by piece. */
+static void spread(loop *l, int64_t count, int64_t step, int64_t piece, int shares)
 {
     const int64_t steps = count / step + (count % step != 0);
-    loop l = {.piece = piece, .shares = shares};
+    l->piece = piece;
+    l->shares = shares;
     for (int i = 0; i < shares; i++) {
         const int64_t end = steps * (i + 1) / shares * step;
-        atomic_init(&l.share[i].next, steps * i / shares * step);
-        l.share[i].end = end < count ? end : count;
+        atomic_init(&l->share[i].next, steps * i / shares * step);
+        l->share[i].end = end < count ? end : count;
     }
-    return l;
 }
 
 static int shares_of(int threads) { return threads < SHARES ? threads : SHARES; }
@@ -292,9 +292,10 @@ void ts_for(int threads, int64_t count, int64_t step, void (*run)(const void *jo
     }
     const int shares = shares_of(n);
     const int64_t each = (steps + shares - 1) / shares;
-    loop l = spread(count, step, (each + PIECES - 1) / PIECES * step, shares);
+    loop l;
     l.run = run_ranges;
     l.job = &(ranges){run, job};
+    spread(&l, count, step, (each + PIECES - 1) / PIECES * step, shares);
     run_loop(n, &l);
 }
 
@@ -303,9 +304,10 @@ void ts_share_tasks(int threads, ts_order order, int64_t count, int64_t piece,
 {
     if (count < 1) return;
     const int n = limited(threads, (count + piece - 1) / piece);
-    loop l = spread(count, piece, piece, order == TS_IN_ORDER || inside ? 1 : shares_of(n));
+    loop l;
     l.run = run;
     l.job = job;
+    spread(&l, count, piece, piece, order == TS_IN_ORDER || inside ? 1 : shares_of(n));
     run_loop(n, &l);
 }
 
