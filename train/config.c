@@ -287,7 +287,8 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
                        "model.images 1, model.channels %d and model.conditions, spread and scene yes",
                        MAP_CHANNELS);
     if (c->train.lesson != TR_LESSON_DIFFUSE && !*c->train.teacher)
-        return ts_fail(st, TS_INVALID, "train.lesson is given without train.teacher, whose lesson it is");
+        return ts_fail(st, TS_INVALID,
+                       "train.lesson is given without train.teacher, whose lesson it is: give both or none");
     const int side = nn_arch_side(&c->arch);
     if (*c->train.teacher && c->data.patch != side)
         return ts_fail(st, TS_INVALID, "data.patch is %d: a teacher's maps have %d pixels a side", c->data.patch, side);

@@ -260,8 +260,7 @@ const tr_key tr_keys[] = {
      "(train/teach.c)"},
     {"train", "lesson", TR_CHOICE, AT(train.lesson), 0, TR_LESSON_NORMALS, "diffuse", lesson_names, false,
      "what is new to a student of train.teacher: diffuse as the teacher has it when it is told its own guess of a "
-     "camera "
-     "that is not known, or normals, which are the materials' own, by train.normal_rmse too"},
+     "camera that is not known, or normals, which are the materials' own, by train.normal_rmse too"},
     {"train", "reduce", TR_CHOICE, AT(train.reduce), 0, TR_REDUCE_BF16, "f32", reduce_names, false,
      "how gradients are summed over the ranks of mpirun: as f32, or rounded to bf16 and summed as f32, which is half "
      "the bytes and off by at most a 256th of the sum of their magnitudes; one process sums nothing"},
