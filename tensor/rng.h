@@ -34,7 +34,8 @@ enum {
     TS_STREAM_DISTURB,
     TS_STREAM_HOMOGENEOUS,
     TS_STREAM_CLOSER,
-    TS_STREAM_DARKER
+    TS_STREAM_DARKER,
+    TS_STREAM_LESSON
 };
 
 uint32_t ts_rng_u32(ts_rng *r);

@@ -11,7 +11,7 @@
 typedef enum tr_camera { TR_CAMERA_DATA, TR_CAMERA_DEFAULT } tr_camera;
 
 /* What is new to a student of train.teacher (train/teach.c). */
-typedef enum tr_lesson { TR_LESSON_DIFFUSE, TR_LESSON_NORMALS } tr_lesson;
+typedef enum tr_lesson { TR_LESSON_DIFFUSE, TR_LESSON_NORMALS, TR_LESSON_KNOWN } tr_lesson;
 
 typedef struct tr_config {
     nn_arch arch;   /* [model] */

@@ -7,7 +7,7 @@ static const char *const compat_names[] = {"none", "published", NULL};          
 static const char *const descent_names[] = {"none", "gradient", "newton", "posterior", NULL}; /* as nn_descent */
 static const char *const precision_names[] = {"f32", "bf16", NULL};                           /* as ts_precision */
 static const char *const rmse_names[] = {"start", "batch", NULL};                             /* as nn_rmse */
-static const char *const lesson_names[] = {"diffuse", "normals", NULL};                       /* as tr_lesson */
+static const char *const lesson_names[] = {"diffuse", "normals", "known", NULL};              /* as tr_lesson */
 static const char *const reduce_names[] = {"f32", "bf16", NULL};                              /* as tr_reduce */
 static const char *const camera_names[] = {"data", "default", NULL};                          /* as tr_camera */
 
@@ -258,9 +258,11 @@ const tr_key tr_keys[] = {
     {"train", "teacher", TR_TEXT, AT(train.teacher), 0, sizeof((tr_config *)0)->train.teacher, "", NULL, false,
      "weights file of a g that says what is learned, in place of the materials' maps and the losses of their weights "
      "(train/teach.c)"},
-    {"train", "lesson", TR_CHOICE, AT(train.lesson), 0, TR_LESSON_NORMALS, "diffuse", lesson_names, false,
+    {"train", "lesson", TR_CHOICE, AT(train.lesson), 0, TR_LESSON_KNOWN, "diffuse", lesson_names, false,
      "what is new to a student of train.teacher: diffuse as the teacher has it when it is told its own guess of a "
-     "camera that is not known, or normals, which are the materials' own, by train.normal_rmse too"},
+     "camera that is not known; normals, which are the materials' own, by train.normal_rmse too; or known, all maps of "
+     "photographs whose light and camera are measured, which are every other step's, by the losses of a g without a "
+     "teacher"},
     {"train", "reduce", TR_CHOICE, AT(train.reduce), 0, TR_REDUCE_BF16, "f32", reduce_names, false,
      "how gradients are summed over the ranks of mpirun: as f32, or rounded to bf16 and summed as f32, which is half "
      "the bytes and off by at most a 256th of the sum of their magnitudes; one process sums nothing"},

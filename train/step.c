@@ -132,8 +132,10 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
                    .known = c->arch.conditions || c->arch.revisions > 0 ? t->known : NULL,
                    .given = given,
                    .recompute = c->train.checkpoint_steps};
-    if (row->pretraining)
-        return (t->teacher ? tr_taught_loss : tr_guess_loss)(t, &in, ag_constant(t->tape, goals), row);
+    if (row->pretraining) {
+        const bool taught = t->teacher && !tr_teaches_known(c, t->step);
+        return (taught ? tr_taught_loss : tr_guess_loss)(t, &in, ag_constant(t->tape, goals), row);
+    }
     if (c->arch.revisions > 0) return tr_revision_loss(t, &in, ag_constant(t->tape, goals), row);
     if (c->coder.code > 0) {
         ag_value *goal = ag_constant(t->tape, goals);
@@ -237,8 +239,9 @@ static const float *draw(tr_trainer *t, int given, ts_status *st)
     if (!target) return ts_context(st, "procedural materials"), NULL;
     const uint64_t index = (uint64_t)t->step * (uint64_t)c->train.batch + (uint64_t)t->first;
     tr_capture_views(c->data.sheet, (uint64_t)c->data.seed, index, t->batch, given, t->captures);
-    tr_photographs(c, (uint64_t)c->data.seed, index, t->batch, c->data.patch, target, t->captures, given, t->images,
-                   t->shots);
+    const tr_config measured = tr_measured(c, t->step);
+    tr_photographs(tr_teaches_known(c, t->step) ? &measured : c, (uint64_t)c->data.seed, index, t->batch, c->data.patch,
+                   target, t->captures, given, t->images, t->shots);
     if (c->arch.revisions > 0 && given > 1) tr_describe_several(t->shots, t->batch * given, t->captures, t->known);
     else if (c->arch.conditions || c->arch.scene) describe(t, given);
     ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_SCENE, (uint64_t)t->step);

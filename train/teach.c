@@ -2,7 +2,8 @@
  * more of the diffuse albedo when it reads the photograph a second time and is told its own guess of the distance: a
  * student of diffuse learns to say that at once, and all else as the teacher's first answer has it. A student of
  * normals learns them from the materials, and keeps all else as the teacher has it: trained on the maps alone, levels
- * of F0 and roughness wander while normals gain (docs/training-phone.md). */
+ * of F0 and roughness wander while normals gain (docs/training-phone.md). A student of what is known learns from the
+ * materials what pictures say whose light and camera are measured, and keeps what the teacher says of all others. */
 #include "ops.h"
 #include "nn/weights/weights.h"
 #include "render/losses.h"
@@ -27,6 +28,32 @@ ts_code tr_teacher_load(tr_trainer *t, ts_status *st)
         return ts_fail(st, TS_INVALID, "%s: train.teacher says maps of %d x %d pixels, the model of %d x %d", path,
                        nn_arch_side(a), nn_arch_side(a), nn_arch_side(&c->arch), nn_arch_side(&c->arch));
     return TS_OK;
+}
+
+static ts_rng rng_of(const tr_config *c, int64_t step)
+{
+    return ts_rng_make((uint64_t)c->train.seed, TS_STREAM_LESSON, (uint64_t)step);
+}
+
+bool tr_teaches_known(const tr_config *c, int64_t step)
+{
+    ts_rng rng = rng_of(c, step);
+    return c->train.lesson == TR_LESSON_KNOWN && ts_rng_uniform(&rng) < 0.5f;
+}
+
+/* Who knows the light's power has its pictures in proportion to the light: they have no tone curve, and nothing else
+ * shines. */
+tr_config tr_measured(const tr_config *c, int64_t step)
+{
+    ts_rng rng = rng_of(c, step);
+    ts_rng_uniform(&rng); /* tr_teaches_known's */
+    tr_config m = *c;
+    m.data.told_view = m.data.told_power = 1;
+    m.data.exposure = m.data.meter = m.data.automatic = m.data.white_balance = m.data.vignette = 0;
+    m.data.ambient = m.data.tone = m.data.sharpen = m.data.glare = 0;
+    if (ts_rng_uniform(&rng) < 0.5f)
+        m.data.fov_min = m.data.fov_max = m.data.flash = m.data.flash_size = m.data.tilt = m.data.off_centre = 0;
+    return m;
 }
 
 /* Of cameras that are not known, the one above the centre that the teacher takes for likeliest. */
@@ -88,13 +115,14 @@ static ag_value *with_normals_of(ag_tape *tape, const ts_tensor *said, const ag_
 
 ag_value *tr_taught_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr_row *row)
 {
-    const bool normals = t->config.train.lesson == TR_LESSON_NORMALS;
+    const bool normals = t->config.train.lesson == TR_LESSON_NORMALS,
+               diffuse = t->config.train.lesson == TR_LESSON_DIFFUSE;
     const tr_config *c = &t->config;
     ag_tape *tape = t->tape;
     nn_guess said, guess;
     ag_reset(t->quiet);
     ag_compute_set(t->quiet, (ts_compute){.exact = c->train.exact, .precision = c->train.precision});
-    if (!(normals ? nn_guess_from(t->quiet, t->teacher, in, &said) : tr_taught(t->quiet, t->teacher, in, &said)))
+    if (!(diffuse ? tr_taught : nn_guess_from)(t->quiet, t->teacher, in, &said))
         return ag_fail(tape, ag_status(t->quiet)->code, "%s", ag_status(t->quiet)->message);
     if (!nn_guess_from(tape, t->model, in, &guess)) return NULL;
     ag_value *goal = normals ? with_normals_of(tape, &said.maps->t, target) : ag_constant(tape, said.maps->t);

@@ -173,3 +173,56 @@ TEST(trainer_learns_normals_beside_a_teacher)
     *c.train.teacher = 0;
     CHECK(run(&c, folder("none"), &rmse, &st) == TS_INVALID && strstr(st.message, "train.lesson"), "%s", st.message);
 }
+
+static void count_known(const tr_row *row, void *user)
+{
+    const int64_t step = row->step - 1;
+    tr_config c = small();
+    c.train.lesson = TR_LESSON_KNOWN, c.train.seed = 77;
+    CHECK(isfinite(row->render_start) == tr_teaches_known(&c, step), "step %lld", (long long)step);
+    if (!isfinite(row->render_start)) CHECK(row->spread < 1, "the teacher's are %g away", row->spread);
+    *(int *)user += isfinite(row->render_start);
+}
+
+/* Half of the steps are of pictures whose light and camera are measured, which are told and have no other light and no
+ * tone curve; the others are the teacher's, from which a student that begins as it does not go far. */
+TEST(trainer_learns_known_cameras_beside_a_teacher)
+{
+    enum { STEPS = 400 };
+    ts_status st = {0};
+    losses l;
+    int known = 0, flash = 0, steps = 0;
+    char path[700];
+    snprintf(path, sizeof path, "%s/last.safetensors", folder("tellers"));
+    tr_config c = lesson(path);
+    c.data.tone = c.data.ambient = c.data.exposure = 1, c.data.flash = 0.2, c.data.fov_min = 20, c.data.fov_max = 70;
+    for (int step = 0; step < STEPS; step++) {
+        c.train.lesson = TR_LESSON_NORMALS;
+        CHECK(!tr_teaches_known(&c, step), "a lesson of normals teaches cameras");
+        c.train.lesson = TR_LESSON_KNOWN;
+        if (!tr_teaches_known(&c, step)) continue;
+        const tr_config m = tr_measured(&c, step);
+        const rd_view planned = rd_flash();
+        tr_shot shot;
+        float *maps = calloc((size_t)SIDE * SIDE, MAP_CHANNELS * sizeof(float)),
+              *image = calloc((size_t)SIDE * SIDE, 3 * sizeof(float));
+        CHECK(maps && image, "no memory");
+        tr_photographs(&m, 3, (uint64_t)step, 1, SIDE, maps, NULL, 1, image, &shot);
+        CHECK(shot.told_view && shot.told_power && shot.tone == 0 && shot.ambient == 0, "step %d", step);
+        known++, flash += memcmp(&shot.view, &planned, sizeof planned) == 0;
+        free(maps), free(image);
+    }
+    CHECK(known > STEPS * 2 / 5 && known < STEPS * 3 / 5, "%d of %d steps are known", known, STEPS);
+    CHECK(flash > known * 2 / 5 && flash < known * 3 / 5, "%d of %d under the flash", flash, known);
+
+    *c.train.teacher = 0, c.train.lesson = TR_LESSON_DIFFUSE;
+    CHECK(run(&c, folder("tellers"), &l, &st) == TS_OK, "%s", st.message);
+    snprintf(c.train.teacher, sizeof c.train.teacher, "%s", path);
+    snprintf(c.train.init, sizeof c.train.init, "%s", path);
+    c.train.lesson = TR_LESSON_KNOWN, c.train.seed = 77;
+    const tr_listener listener = {.step = count_known, .user = &steps};
+    tr_trainer *t = tr_create(&c, folder("hearers"), false, NULL, &listener, &st);
+    CHECK(t && tr_run(t, &st) == TS_OK, "%s", st.message);
+    CHECK(steps > 4 && steps < 20, "%d of 24 steps are known", steps);
+    tr_destroy(&t);
+}
