@@ -104,17 +104,20 @@ static ts_tensor cut(tr_trainer *t, const ts_tensor *whole, rd_grid g)
 }
 
 /* What g may read of each photograph, and what it is to guess. The place of a light is known where the camera's is, in
- * half of the photographs; a camera whose field of view alone is known stands above the centre. */
+ * half of the photographs; a camera whose field of view alone is known stands above the centre. What a student learns
+ * without its teacher, of camera and power, the teacher is not asked. */
 static void describe(tr_trainer *t, int given)
 {
+    const bool taught = t->config.train.lesson == TR_LESSON_KNOWN && !tr_teaches_known(&t->config, t->step);
     ts_rng rng = ts_rng_make((uint64_t)t->config.train.seed, TS_STREAM_KNOWN, (uint64_t)t->step);
     for (int i = 0; i < t->first * given; i++) ts_rng_uniform(&rng); /* other ranks' */
     for (int i = 0; i < t->batch * given; i++) {
         const tr_shot *s = &t->shots[i];
-        const bool light = ts_rng_uniform(&rng) < 0.5f && s->told_view;
+        const bool light = ts_rng_uniform(&rng) < 0.5f && s->told_view,
+                   power = s->told_power && !(taught && s->told_view);
         rd_scene_numbers(&s->view, s->ambient, s->tone, t->scenes + (size_t)i * RD_SCENE_NUMBERS);
         t->known[i] = (unsigned char)((s->told_view ? NN_KNOWN_CAMERA : 0) | (light ? NN_KNOWN_LIGHT : 0) |
-                                      (s->told_power ? NN_KNOWN_POWER : 0));
+                                      (power ? NN_KNOWN_POWER : 0));
         t->captures[i] = s->view;
         if (s->told_view && !light) t->captures[i].camera[0] = t->captures[i].camera[1] = 0;
     }
