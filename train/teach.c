@@ -2,8 +2,8 @@
  * more of the diffuse albedo when it reads the photograph a second time and is told its own guess of the distance: a
  * student of diffuse learns to say that at once, and all else as the teacher's first answer has it. A student of
  * normals learns them from the materials, and keeps all else as the teacher has it: trained on the maps alone, levels
- * of F0 and roughness wander while normals gain (docs/training-phone.md). A student of what is known learns from the
- * materials what pictures say whose light and camera are measured, and keeps what the teacher says of all others. */
+ * of F0 and roughness wander while normals gain (docs/training-over-phone.md). A student of what is known learns from
+ * the materials what pictures say whose light and camera are measured, and keeps what the teacher says of others. */
 #include "ops.h"
 #include "nn/weights/weights.h"
 #include "render/losses.h"
