@@ -116,6 +116,19 @@ void rd_loss_views(ts_rng *rng, rd_view views[RD_LOSS_VIEWS])
     }
 }
 
+void rd_flash_views(ts_rng *rng, int count, rd_view *views)
+{
+    for (int i = 0; i < count; i++) {
+        const float farther = expf(ts_rng_uniform(rng));
+        rd_view *v = &views[i];
+        *v = rd_flash();
+        v->camera[2] = v->light[2] = RD_FLASH_DISTANCE * farther;
+        v->power *= farther * farther;
+        for (int k = 0; k < 2; k++) v->camera[k] = ts_rng_range(rng, -0.5f, 0.5f);
+        for (int k = 0; k < 2; k++) v->light[k] = i % 2 ? ts_rng_range(rng, -0.5f, 0.5f) : v->camera[k];
+    }
+}
+
 void rd_eval_views(ts_rng *rng, int count, rd_view *views)
 {
     for (int i = 0; i < count; i++) {

@@ -78,6 +78,11 @@ rd_view rd_scene_view(const float number[RD_SCENE_NUMBERS]);
 enum { RD_LOSS_DIFFUSE = 3, RD_LOSS_SPECULAR = 6, RD_LOSS_VIEWS = 9 };
 void rd_loss_views(ts_rng *rng, rd_view views[RD_LOSS_VIEWS]);
 
+/* Of a phone over the sample: the camera uniform over [-1/2, 1/2]^2 at exp(U(0, 1)) times RD_FLASH_DISTANCE, 54 to 22
+ * degrees across the patch; the light at the same height, at the camera in views 0, 2 and so on, and uniform over the
+ * same square in the others. A matt sample is as bright as under the default flash. */
+void rd_flash_views(ts_rng *rng, int count, rd_view *views);
+
 /* Evaluation: camera and light each uniform over the square [-1/2, 1/2]^2 at z = RD_FLASH_DISTANCE,
  * power RD_FLASH_POWER. */
 void rd_eval_views(ts_rng *rng, int count, rd_view *views);

@@ -42,6 +42,7 @@ typedef struct tr_config {
         int64_t seed, checkpoint_every, log_every;
         int max_skipped;
         char init[1024], init_rest[1024], teacher[1024];
+        int flash_views;
         tr_lesson lesson;
         tr_reduce reduce; /* of several ranks */
         double bucket;    /* MiB */

@@ -248,8 +248,11 @@ static const float *draw(tr_trainer *t, int given, ts_status *st)
     if (c->arch.revisions > 0 && given > 1) tr_describe_several(t->shots, t->batch * given, t->captures, t->known);
     else if (c->arch.conditions || c->arch.scene) describe(t, given);
     ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_SCENE, (uint64_t)t->step);
-    for (int i = -t->first; i < t->batch; i++) /* other ranks' are drawn over */
-        rd_loss_views(&rng, t->views + (i < 0 ? 0 : i) * RD_LOSS_VIEWS);
+    for (int i = -t->first; i < t->batch; i++) { /* other ranks' are drawn over */
+        rd_view *views = t->views + (i < 0 ? 0 : i) * RD_LOSS_VIEWS;
+        rd_loss_views(&rng, views);
+        rd_flash_views(&rng, c->train.flash_views, views + RD_LOSS_VIEWS - c->train.flash_views);
+    }
     return target;
 }
 

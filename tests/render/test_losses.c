@@ -32,7 +32,12 @@ static problem make(uint64_t seed)
         p.target[i] = ts_rng_range(&rng, -size, size);
         if (i % C == MAP_ROUGHNESS) p.maps[i] = fmaxf(p.maps[i], -0.9f), p.target[i] = fmaxf(p.target[i], -0.9f);
     }
-    for (int i = 0; i < N; i++) rd_loss_views(&rng, p.views + i * RD_LOSS_VIEWS);
+    for (int i = 0; i < N; i++) {
+        enum { FLASH = 4 };
+        rd_view *views = p.views + i * RD_LOSS_VIEWS;
+        rd_loss_views(&rng, views);
+        if (i % 2) rd_flash_views(&rng, FLASH, views + RD_LOSS_VIEWS - FLASH); /* as train.flash_views has them */
+    }
     return p;
 }
 

@@ -284,6 +284,34 @@ TEST(render_views)
     }
 }
 
+/* A phone over the sample: a matt sample's middle is as bright as under the default flash where it stands straight
+ * above; every other light is at the camera. */
+TEST(render_flash_views)
+{
+    enum { ROUNDS = 2000, COUNT = 4 };
+    ts_rng rng = ts_rng_make(10, TS_STREAM_TEST, 0);
+    double heights = 0, apart = 0;
+    for (int i = 0; i < ROUNDS; i++) {
+        rd_view views[COUNT];
+        rd_flash_views(&rng, COUNT, views);
+        for (int k = 0; k < COUNT; k++) {
+            const rd_view *v = &views[k];
+            const double farther = (double)(v->camera[2] / RD_FLASH_DISTANCE);
+            CHECK(v->kind == RD_POINT && v->ambient == 0 && v->light[2] == v->camera[2], "view %d", k);
+            CHECK(farther >= 1 && farther <= 2.7183, "%g times the distance", farther);
+            CHECK(fabs((double)(v->power / RD_FLASH_POWER) - farther * farther) < 1e-5, "power %g", (double)v->power);
+            for (int j = 0; j < 2; j++) {
+                CHECK(fabsf(v->camera[j]) <= 0.5f && fabsf(v->light[j]) <= 0.5f, "beside the patch");
+                if (k % 2) apart += fabs((double)(v->light[j] - v->camera[j])) / (COUNT * ROUNDS);
+                else CHECK(v->light[j] == v->camera[j], "view %d: the light is not at the camera", k);
+            }
+            heights += log(farther) / (COUNT * ROUNDS);
+        }
+    }
+    CHECK(fabs(heights - 0.5) < 0.02, "mean logarithm of the height %g instead of 1/2", heights);
+    CHECK(fabs(apart - 1 / 3.0) < 0.02, "mean distance of two uniform places %g instead of 1/3", apart);
+}
+
 TEST(render_tone)
 {
     enum { N = 40001 };

@@ -189,6 +189,8 @@ static void count_known(const tr_row *row, void *user)
     CHECK(known == tr_teaches_known(c, row->step - 1), "step %lld", (long long)row->step);
     CHECK(known || row->spread < 1, "the teacher's are %g away", row->spread);
     h->known += known;
+    for (int i = 0; i < RD_LOSS_VIEWS; i++)
+        CHECK((h->t->views[i].kind == RD_POINT) == (i >= RD_LOSS_VIEWS - c->train.flash_views), "view %d", i);
     for (int i = 0; i < h->t->batch; i++) {
         const int sure = NN_KNOWN_CAMERA | NN_KNOWN_POWER, told = h->t->known[i];
         CHECK(((told & sure) == sure) == known, "step %lld, photograph %d: %d is told", (long long)row->step, i, told);
@@ -234,7 +236,7 @@ TEST(trainer_learns_known_cameras_beside_a_teacher)
     snprintf(c.train.init, sizeof c.train.init, "%s", path);
     c.train.lesson = TR_LESSON_KNOWN, c.train.seed = 77;
     const tr_listener listener = {.step = count_known, .user = &h};
-    c.data.told_power = 0.5;
+    c.data.told_power = 0.5, c.train.flash_views = 2;
     h.t = tr_create(&c, folder("hearers"), false, NULL, &listener, &st);
     CHECK(h.t && tr_run(h.t, &st) == TS_OK, "%s", st.message);
     CHECK(h.known > 4 && h.known < 20, "%d of 24 steps are known", h.known);
