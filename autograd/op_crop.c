@@ -1,7 +1,7 @@
 /* y[n,i,j,:] = x[n, y0+i, x0+j, :];   dx = dy inside the window, 0 elsewhere
  * x: [N,H,W,C], y: [N,h,w,C] */
-#include "autograd/gradcheck.h"
 #include "autograd/op.h"
+#include "autograd/gradcheck.h"
 #include "ops.h"
 #include "tensor/threads.h"
 #include <string.h>

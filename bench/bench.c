@@ -1,8 +1,8 @@
 /* lgd-bench [--cpu] [NAME...]: runs the benchmarks whose name contains one of the words (all without a word), in order
  * of name. */
+#include "bench/bench.h"
 #include "bench/apart.h"
 #include "bench/batches.h"
-#include "bench/bench.h"
 #include "cli/cli.h"
 #include "tensor/cpu.h"
 #include "tensor/kernels/conv.h"

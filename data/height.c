@@ -1,6 +1,6 @@
 #include "data/height.h"
-#include "tensor/memory.h"
 #include "tensor/conv/gemm.h"
+#include "tensor/memory.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -6,8 +6,8 @@
  *   normal: ... OpenGL ... | ... DirectX ...  (y up or y down)
  *   file.MAP: NAME                           when its name does not say so; MAP as in io_map_kind_name */
 #include "data/file.h"
-#include "data/map_folder.h"
 #include "data/image/oiio.h"
+#include "data/map_folder.h"
 #include <ctype.h>
 #include <dirent.h>
 #include <errno.h>

@@ -1,6 +1,6 @@
 /* Maps as picture files in a folder, and the meta.txt that says what they mean. */
-#include "data/material.h"
 #include "data/image/exr.h"
+#include "data/material.h"
 #include "data/text.h"
 #include <limits.h>
 #include <stdio.h>

@@ -1,6 +1,6 @@
 #include "eval/html.h"
-#include "data/html.h"
 #include "cli/plot.h"
+#include "data/html.h"
 #include "eval/text.h"
 #include "pages.h"
 #include "tensor/conv/conv.h"

@@ -1,7 +1,7 @@
 #include "nn/adam.h"
 #include "tensor/kernels/adam.h"
-#include "tensor/team.h"
 #include "tensor/memory.h"
+#include "tensor/team.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,6 +1,6 @@
 #include "nn/hidden.h"
-#include "tensor/maps.h"
 #include "tensor/kernels/vmath_arrays.h"
+#include "tensor/maps.h"
 #include "tensor/scratch.h"
 #include "tensor/team.h"
 #include <math.h>

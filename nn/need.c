@@ -1,6 +1,6 @@
 /* What g holds at once, counted as nn/unet.c and nn/detail.c allocate it. */
-#include "nn/layers.h"
 #include "nn/need.h"
+#include "nn/layers.h"
 #include "tensor/maps.h"
 #include <math.h>
 

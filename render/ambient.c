@@ -1,6 +1,6 @@
 #include "render/ambient.h"
-#include "render/rows.h"
 #include "render/kernels/shade.h"
+#include "render/rows.h"
 #include "tensor/maps.h"
 #include "tensor/scratch.h"
 #include <math.h>

@@ -22,8 +22,8 @@
  * Refraction through Rough Surfaces", 2007; G and F: Karis, "Real Shading in Unreal Engine 4", 2013. */
 #ifndef RD_BRDF_H
 #define RD_BRDF_H
-#include "render/scene.h"
 #include "render/kernels/view.h"
+#include "render/scene.h"
 #include "tensor/maps.h"
 
 /* Every bound that keeps shading finite, for the reference and the kernels. */

@@ -3,9 +3,9 @@
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "render/brdf.h"
+#include "render/kernels/shade.h"
 #include "render/losses.h"
 #include "render/rows.h"
-#include "render/kernels/shade.h"
 #include <math.h>
 #include <string.h>
 

@@ -15,9 +15,9 @@
  * 1 + TS_PRIOR_FADE on nothing is learned. */
 #ifndef RD_POSTERIOR_H
 #define RD_POSTERIOR_H
-#include "render/scene.h"
 #include "render/kernels/newton.h"
 #include "render/kernels/posterior.h"
+#include "render/scene.h"
 #include "tensor/maps.h"
 
 typedef struct rd_prior {

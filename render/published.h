@@ -7,8 +7,8 @@
  *     f = ... + D G F / (4 n.l n.v + e) */
 #ifndef RD_PUBLISHED_H
 #define RD_PUBLISHED_H
-#include "render/scene.h"
 #include "render/kernels/view.h"
+#include "render/scene.h"
 
 typedef struct rd_published_constants {
     double distance; /* of camera and light from the sample, in patch widths */

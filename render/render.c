@@ -1,9 +1,9 @@
 #include "render/render.h"
 #include "render/brdf.h"
+#include "render/kernels/newton.h"
+#include "render/kernels/shade.h"
 #include "render/published.h"
 #include "render/rows.h"
-#include "render/kernels/shade.h"
-#include "render/kernels/newton.h"
 #include "tensor/scratch.h"
 #include <math.h>
 

@@ -1,9 +1,9 @@
 /* Views and rows as the kernels take them, for render.c and the loss op. */
 #ifndef RD_ROWS_H
 #define RD_ROWS_H
+#include "render/kernels/view.h"
 #include "render/scene.h"
 #include "tensor/team.h"
-#include "render/kernels/view.h"
 
 ts_shade_view rd_shade_view(const rd_view *view);
 /* Row y of a grid; maps [h, w, channels]. */

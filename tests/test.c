@@ -1,7 +1,7 @@
 /* Runs every registered test in a process of its own, so that a crash is one failure and not the end, and prints
  * "ok NAME", "FAIL NAME: why" or "skip NAME: why" for each. An argument selects the tests whose name contains it. */
-#include "cli/cli.h"
 #include "tests/test.h"
+#include "cli/cli.h"
 #include "tensor/cpu.h"
 #include <errno.h>
 #include <stdarg.h>

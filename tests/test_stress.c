@@ -1,8 +1,8 @@
 /* The short form of the stress of the numerics (tests/stress; `make stress` is the long one). */
+#include "data/rectify/tag_sheet.h"
 #include "tensor/threads.h"
 #include "tests/stress/stress.h"
 #include "tests/test.h"
-#include "data/rectify/tag_sheet.h"
 
 static void run(bool (*part)(const stress *))
 {

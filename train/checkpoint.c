@@ -1,9 +1,9 @@
 /* The run's state on disk: checkpoint.safetensors holds the parameters, Adam's moments and the moving average as whole
  * blocks (padding included, so that they come back bit by bit), and in its metadata the counters and the configuration.
  */
-#include "nn/weights/weights.h"
 #include "data/ini.h"
 #include "data/text.h"
+#include "nn/weights/weights.h"
 #include "tensor/cpu.h"
 #include "train/state.h"
 #include <errno.h>

@@ -1,7 +1,7 @@
 /* Reading, checking and printing a configuration by the table of keys. */
-#include "tensor/maps.h"
 #include "train/config.h"
 #include "data/ini.h"
+#include "tensor/maps.h"
 #include <errno.h>
 #include <locale.h>
 #include <math.h>

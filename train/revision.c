@@ -1,9 +1,9 @@
 /* The second phase of a model with arch.revisions: h learns to revise what a fixed g and the steps make of several
  * photographs. */
-#include "ops.h"
 #include "nn/first_guess.h"
 #include "nn/metal.h"
 #include "nn/revise.h"
+#include "ops.h"
 #include "render/losses.h"
 #include "tensor/maps.h"
 #include "tensor/team.h"

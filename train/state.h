@@ -5,10 +5,10 @@
 #include "data/loader.h"
 #include "nn/adam.h"
 #include "nn/revise.h"
-#include "train/reduce.h"
 #include "train/config.h"
 #include "train/listener.h"
 #include "train/ranks.h"
+#include "train/reduce.h"
 
 enum { TR_PATH = 1200 }; /* a folder and one of our names */
 

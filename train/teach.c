@@ -4,8 +4,8 @@
  * normals learns them from the materials, and keeps all else as the teacher has it: trained on the maps alone, levels
  * of F0 and roughness wander while normals gain (docs/training-over-phone.md). A student of what is known learns from
  * the materials what pictures say whose light and camera are measured, and keeps what the teacher says of others. */
-#include "ops.h"
 #include "nn/weights/weights.h"
+#include "ops.h"
 #include "render/losses.h"
 #include "render/scene.h"
 #include "tensor/maps.h"

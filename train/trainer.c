@@ -1,11 +1,11 @@
 /* The run: what it owns, its folder, the loop over steps. */
+#include "train/trainer.h"
 #include "data/text.h"
 #include "nn/weights/weights.h"
 #include "tensor/cpu.h"
 #include "tensor/maps.h"
 #include "tensor/new_file.h"
 #include "train/state.h"
-#include "train/trainer.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>

@@ -1,6 +1,6 @@
 /* lgd-convert: weights between safetensors and PyTorch's files, and what is in them. */
-#include "cli/cli.h"
 #include "cli/arguments.h"
+#include "cli/cli.h"
 #include "nn/weights/weights.h"
 #include <inttypes.h>
 #include <stdlib.h>

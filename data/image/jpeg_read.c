@@ -6,7 +6,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <jpeglib.h>
+
+#include <jpeglib.h> /* after stdio.h, whose FILE it needs */
 
 typedef struct reading {
     struct jpeg_decompress_struct jpeg;

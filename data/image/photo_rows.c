@@ -1,6 +1,6 @@
 #include "data/image/photo_rows.h"
-#include "data/image/common_read.h"
 #include "data/file.h"
+#include "data/image/common_read.h"
 #include "data/image/header.h"
 #include "data/image/png_file.h"
 #include "tensor/budget.h"

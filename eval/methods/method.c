@@ -1,5 +1,5 @@
-#include "eval/methods/method_internal.h"
 #include "cli/cli.h"
+#include "eval/methods/method_internal.h"
 #include <stdlib.h>
 #include <string.h>
 

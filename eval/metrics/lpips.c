@@ -1,7 +1,7 @@
 #include "eval/metrics/lpips.h"
 #include "nn/weights/file.h"
-#include "tensor/memory.h"
 #include "tensor/conv/gemm.h"
+#include "tensor/memory.h"
 #include "tensor/team.h"
 #include <math.h>
 #include <stdio.h>

@@ -1,8 +1,8 @@
 /* The published network's checkpoints: the names of its tensors, and its architecture from their shapes. */
 #ifndef NN_PUBLISHED_H
 #define NN_PUBLISHED_H
-#include "nn/weights/file.h"
 #include "nn/model.h"
+#include "nn/weights/file.h"
 
 /* The published code's name of a layer: "g.down2.conv1" -> "preprocess_net.down2.conv.conv.0". False: it has no such
  * layer. */

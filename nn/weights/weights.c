@@ -1,7 +1,7 @@
 /* A model to a file and back. */
 #include "nn/weights/weights.h"
-#include "nn/weights/file_internal.h"
 #include "nn/layers.h"
+#include "nn/weights/file_internal.h"
 #include "nn/weights/published.h"
 #include "tensor/team.h"
 #include <float.h>

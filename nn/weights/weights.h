@@ -1,8 +1,8 @@
 /* Weights and checkpoints as files; the metadata of safetensors carries the architecture. */
 #ifndef NN_WEIGHTS_H
 #define NN_WEIGHTS_H
-#include "nn/weights/file.h"
 #include "nn/model.h"
+#include "nn/weights/file.h"
 
 /* A writer of any named f32 blocks: used for weights (name "g.…", "h.…") and by the trainer for checkpoints. */
 typedef struct nn_block {

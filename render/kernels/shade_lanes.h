@@ -2,8 +2,8 @@
  * equations, render/kernels/shade.h for what is double and why. */
 #ifndef TS_SHADE_LANES_H
 #define TS_SHADE_LANES_H
-#include "render/kernels/view.h"
 #include "render/kernels/pixels.h"
+#include "render/kernels/view.h"
 #include "tensor/kernels/vmath.h"
 #include "tensor/maps.h"
 

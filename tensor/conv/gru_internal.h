@@ -1,8 +1,8 @@
 /* Internal to tensor/conv/gru*.c: the products of a backward band by the matrix unit. */
 #ifndef TS_GRU_INTERNAL_H
 #define TS_GRU_INTERNAL_H
-#include "tensor/conv/plan.h"
 #include "tensor/conv/gru.h"
+#include "tensor/conv/plan.h"
 
 enum {
     GRU_BAND = 8 * TS_TILE_PIXELS

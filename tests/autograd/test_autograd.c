@@ -1,9 +1,9 @@
 /* The tape: errors, memory, scopes, the same bytes for any number of threads. */
-#include "tests/test.h"
 #include "ops.h"
 #include "render/losses.h"
 #include "tensor/cpu.h"
 #include "tensor/threads.h"
+#include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* Steps that are computed again for the gradient: the same numbers in less memory. */
-#include "tests/support/networks.h"
 #include "render/losses.h"
 #include "tensor/threads.h"
+#include "tests/support/networks.h"
 
 /* The gradient of a loss on R_0 and R_T; memory: the most that the tape held. */
 static float *gradient(nn_model *m, const nn_input *in, const float *target, int steps, bool recompute, size_t *memory,

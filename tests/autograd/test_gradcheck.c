@@ -1,7 +1,7 @@
 /* Every op's gradients against differences, on every instruction set. */
-#include "tests/test.h"
 #include "autograd/gradcheck.h"
 #include "tensor/cpu.h"
+#include "tests/test.h"
 
 static void report(const char *op, int cases, int64_t compared, int64_t excluded, const ts_status *st, void *user)
 {

@@ -2,8 +2,8 @@
  * can be written. */
 #include "data/file.h"
 #include "data/image/image.h"
-#include "tests/support/make_images.h"
 #include "tensor/budget.h"
+#include "tests/support/make_images.h"
 #include "tests/test.h"
 #include <dirent.h>
 #include <math.h>

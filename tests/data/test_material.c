@@ -1,6 +1,6 @@
 /* Maps in memory, maps.exr, strips, and what lgd writes. */
-#include "data/image/exr.h"
 #include "data/file.h"
+#include "data/image/exr.h"
 #include "data/material.h"
 #include "tests/support/make_images.h"
 #include "tests/test.h"

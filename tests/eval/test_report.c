@@ -1,8 +1,8 @@
 /* The report's files: what they say and that they are what they claim to be. */
-#include "eval/html.h"
 #include "cli/plot.h"
 #include "data/html.h"
 #include "data/json.h"
+#include "eval/html.h"
 #include "eval/text.h"
 #include "tests/test.h"
 #include <math.h>

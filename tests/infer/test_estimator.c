@@ -1,6 +1,6 @@
 /* The estimator that lgd.h, lgd-infer and lgd-eval share: what a watcher sees is what comes out. */
-#include "infer/estimate.h"
 #include "data/material.h"
+#include "infer/estimate.h"
 #include "tests/support/networks.h"
 
 enum { STEPS = 4, LARGE = 520 /* more than one tile */ };

@@ -1,7 +1,7 @@
 /* Estimates of a model that guesses the scene and steps to the most probable maps. */
 #include "infer/estimate.h"
-#include "nn/first_guess.h"
 #include "infer/tiles.h"
+#include "nn/first_guess.h"
 #include "tests/support/networks.h"
 
 enum { PLACE = 64, WIDE = 600 };

@@ -1,9 +1,9 @@
 /* The public C API. */
-#include "tensor/budget.h"
 #include "render/scene.h"
+#include "tensor/budget.h"
 #include "tests/support/inference.h"
-#include <sys/resource.h>
 #include <pthread.h>
+#include <sys/resource.h>
 
 /* Winograd's way, where the network is wide enough for it. */
 TEST(infer_exact_and_fast_maps_are_near)

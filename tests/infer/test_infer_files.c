@@ -1,10 +1,10 @@
 /* What lgd-infer settles before its work (options, names, weights), and how it writes files. */
+#include "cli/infer/options.h"
+#include "cli/infer/plan.h"
 #include "data/material.h"
 #include "infer/model_path.h"
-#include "cli/infer/options.h"
 #include "infer/output.h"
 #include "infer/preview.h"
-#include "cli/infer/plan.h"
 #include "tensor/rng.h"
 #include "tests/test.h"
 #include <getopt.h>

@@ -1,6 +1,6 @@
 /* view.html as text; tests/cli/page.sh opens it in a browser. */
-#include "infer/page.h"
 #include "data/file.h"
+#include "infer/page.h"
 #include "tests/test.h"
 #include <stdlib.h>
 #include <string.h>

@@ -1,7 +1,7 @@
 /* h that revises the maps of several photographs at g's full size. */
 #include "nn/deviation.h"
-#include "nn/revise.h"
 #include "nn/need.h"
+#include "nn/revise.h"
 #include "render/posterior.h"
 #include "tests/support/networks.h"
 

@@ -1,6 +1,6 @@
 /* The steps of Gauss and Newton's method, of every instruction set, against the same equations in double. */
-#include "tests/support/normal_equations.h"
 #include "tensor/cpu.h"
+#include "tests/support/normal_equations.h"
 #include "tests/support/shading.h"
 #include <math.h>
 #include <string.h>

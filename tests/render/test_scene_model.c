@@ -1,7 +1,7 @@
 /* A photograph as a function of its scene, of every instruction set, and what is found of the scene from it. */
-#include "render/scene_model.h"
 #include "render/kernels/newton.h"
 #include "render/rows.h"
+#include "render/scene_model.h"
 #include "tensor/cpu.h"
 #include "tensor/threads.h"
 #include "tests/support/normal_equations.h"

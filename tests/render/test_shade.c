@@ -1,7 +1,7 @@
 /* The shading kernels of every instruction set against the double reference (render/brdf.h), and that nothing makes
  * them fail. */
-#include "render/rows.h"
 #include "render/kernels/shade.h"
+#include "render/rows.h"
 #include "tensor/cpu.h"
 #include "tensor/threads.h"
 #include "tests/support/shading.h"

@@ -1,11 +1,11 @@
 /* What a vector of pixels does not need is not computed: a pixel that needs nothing gets the same bytes among its like,
  * where its vector is skipped, as beside pixels that need all. */
-#include "render/rows.h"
-#include "render/kernels/shade.h"
 #include "render/kernels/newton.h"
 #include "render/kernels/posterior.h"
-#include "tests/support/shading.h"
+#include "render/kernels/shade.h"
+#include "render/rows.h"
 #include "tensor/cpu.h"
+#include "tests/support/shading.h"
 #include <math.h>
 #include <string.h>
 

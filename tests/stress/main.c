@@ -1,8 +1,8 @@
 /* lgd-stress: every part in full. Ends with 1 where a bound breaks. */
 #include "cli/cli.h"
-#include "tests/stress/stress.h"
 #include "tensor/cpu.h"
 #include "tensor/threads.h"
+#include "tests/stress/stress.h"
 #include <stdlib.h>
 #include <string.h>
 

@@ -3,8 +3,8 @@
  * multiplies rounding where the equations are summed first. */
 #include "nn/layers.h"
 #include "tensor/cpu.h"
-#include "tests/support/normal_equations.h"
 #include "tests/stress/stress.h"
+#include "tests/support/normal_equations.h"
 #include <math.h>
 #include <string.h>
 

@@ -3,8 +3,8 @@
 #include "nn/weights/weights.h"
 #include "render/error.h"
 #include "render/render.h"
-#include "tests/stress/stress.h"
 #include "tensor/maps.h"
+#include "tests/stress/stress.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,10 +1,10 @@
 /* The kernels in float against the double reference over a grid of roughness, angles, albedos and tilts. */
 #include "render/brdf.h"
+#include "render/kernels/shade.h"
 #include "render/render.h"
 #include "render/rows.h"
-#include "render/kernels/shade.h"
-#include "tests/stress/stress.h"
 #include "tensor/cpu.h"
+#include "tests/stress/stress.h"
 #include <math.h>
 #include <string.h>
 

@@ -1,12 +1,12 @@
 /* The same bytes for any number of threads: maps, loss and gradients of the loop at a size that every loop divides. */
-#include "ops.h"
+#include "tensor/threads.h"
 #include "nn/adam.h"
 #include "nn/model.h"
+#include "ops.h"
 #include "render/losses.h"
 #include "render/render.h"
-#include "tests/stress/stress.h"
 #include "tensor/maps.h"
-#include "tensor/threads.h"
+#include "tests/stress/stress.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

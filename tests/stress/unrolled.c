@@ -1,12 +1,12 @@
 /* The gradient of the whole unrolled loop against central differences in double: the recorded operations are run again
  * with their double references, so that the differences have no rounding to speak of. */
 #include "autograd/op.h"
+#include "nn/model.h"
 #include "ops.h"
 #include "render/losses.h"
 #include "render/render.h"
-#include "nn/model.h"
-#include "tests/stress/stress.h"
 #include "tensor/maps.h"
+#include "tests/stress/stress.h"
 #include <math.h>
 #include <stdlib.h>
 

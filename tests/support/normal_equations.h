@@ -2,8 +2,8 @@
 #ifndef TESTS_NORMAL_EQUATIONS_H
 #define TESTS_NORMAL_EQUATIONS_H
 #include "render/brdf.h"
-#include "render/render.h"
 #include "render/kernels/newton.h"
+#include "render/render.h"
 #include "tensor/maps.h"
 #include "tensor/rng.h"
 #include <math.h>

@@ -1,6 +1,5 @@
 /* The kernels between the convolutions against their naive twins, on every instruction set; vmath against the C library
  * in double. */
-#include "tests/test.h"
 #include "tensor/cpu.h"
 #include "tensor/kernels/adam.h"
 #include "tensor/kernels/elementwise.h"
@@ -9,6 +8,7 @@
 #include "tensor/kernels/resample.h"
 #include "tensor/kernels/vmath_arrays.h"
 #include "tensor/rng.h"
+#include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,5 @@
-#include "tensor/cpu.h"
 #include "tensor/conv/gemm.h"
+#include "tensor/cpu.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"
 #include "tests/test.h"

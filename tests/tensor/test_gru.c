@@ -1,5 +1,5 @@
-#include "tensor/cpu.h"
 #include "tensor/conv/gru.h"
+#include "tensor/cpu.h"
 #include "tensor/kernels/elementwise.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"

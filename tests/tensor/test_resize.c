@@ -1,8 +1,8 @@
 /* Resampling: laws, and the same bytes for any number of threads. */
-#include "tests/test.h"
 #include "tensor/resize.h"
 #include "tensor/rng.h"
 #include "tensor/threads.h"
+#include "tests/test.h"
 #include <math.h>
 #include <string.h>
 

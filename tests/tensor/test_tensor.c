@@ -1,10 +1,10 @@
 /* The foundation: status, arena, tensor views, random numbers, instruction sets, threads. */
 #include "tensor/arena.h"
-#include "tensor/memory.h"
 #include "tensor/cpu.h"
+#include "tensor/memory.h"
 #include "tensor/rng.h"
-#include "tensor/tensor.h"
 #include "tensor/scratch.h"
+#include "tensor/tensor.h"
 #include "tensor/threads.h"
 #include "tests/test.h"
 #include <math.h>

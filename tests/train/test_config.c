@@ -1,7 +1,7 @@
 /* The INI reader and the table of configuration keys. */
+#include "data/ini.h"
 #include "tests/test.h"
 #include "train/config.h"
-#include "data/ini.h"
 #include "train/trainer.h"
 #include <locale.h>
 #include <math.h>

@@ -1,7 +1,7 @@
 /* R_0 made worse for h to learn from. */
-#include "train/disturb.h"
 #include "tensor/maps.h"
 #include "tests/test.h"
+#include "train/disturb.h"
 #include <math.h>
 #include <string.h>
 
