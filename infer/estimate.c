@@ -155,11 +155,13 @@ static double most_bytes(const nn_arch *a, int photos, int side, int tile, int o
     return most + 2.0 * a->channels * sizeof(float) * side * side;
 }
 
-/* A model that knows the camera gains from a second orientation (docs/accuracy.md). */
+/* Where camera and power are known a second orientation pays (docs/accuracy.md). Models that do not guess them take
+ * them for known. */
 static int orientations_of(const nn_arch *a, const lgd_options *o)
 {
+    enum { SURE = NN_KNOWN_CAMERA | NN_KNOWN_POWER };
     if (o->orientations != LGD_ORIENTATIONS_DEFAULT) return o->orientations;
-    return a->scene ? 1 : 2;
+    return a->scene && (lgd_guess_known(o) & SURE) != SURE ? 1 : 2;
 }
 
 double lgd_estimator_bytes(const lgd_estimator *e, int side, const lgd_options *o)
@@ -317,8 +319,8 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
 {
     const nn_arch *a = &e->net->arch;
     lgd_options o = *given;
-    o.orientations = orientations_of(a, given);
     if (photos > 1) o.fov = LGD_FOV_OF_PHOTO; /* together they are of use only where their places are true */
+    o.orientations = orientations_of(a, &o);
     lgd_given p = in_order(photo, photos, side, o.fov);
     for (int k = 0; k < photos; k++) p.known[k] = (unsigned char)lgd_guess_known(&o);
     float *r0 = NULL;

@@ -109,26 +109,42 @@ TEST(infer_stopping_at_a_step_is_asking_for_that_many)
     lgd_free(&m);
 }
 
-/* By default one orientation where the model guesses camera and light, else two. */
-TEST(infer_takes_orientations_that_suit_the_model)
+/* By default one orientation where camera or power is guessed, else two. */
+TEST(infer_takes_orientations_that_suit_what_is_known)
 {
+    static const struct {
+        bool guesses, power;
+        double fov;
+        int orientations;
+    } of[] = {{false, true, LGD_FOV_UNKNOWN, 2},
+              {false, false, LGD_FOV_UNKNOWN, 2},
+              {true, true, LGD_FOV_UNKNOWN, 1},
+              {true, true, 40, 2},
+              {true, false, 40, 1},
+              {true, true, LGD_FOV_OF_PHOTO, 2},
+              {true, false, LGD_FOV_OF_PHOTO, 1}};
     static float image[SIDE * SIDE * 3], maps[3][VALUES];
     make_image(image, SIDE);
-    for (int guesses = 0; guesses < 2; guesses++) {
+    for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
         nn_arch a = tiny();
-        if (guesses) {
+        if (of[i].guesses) {
             a.g_unshuffle = 4, a.g_detail = 6, a.h_width = 0, a.descent = NN_DESCENT_POSTERIOR;
             a.conditions = a.spread = a.scene = true;
         }
         lgd_model *m = load(a);
         for (int n = 0; n < 3; n++) {
             lgd_error e;
-            const lgd_options o = {.size = sizeof o, .iterations = 0, .orientations = n};
+            double power;
+            const lgd_options o = {.size = sizeof o,
+                                   .iterations = 0,
+                                   .orientations = n,
+                                   .fov = of[i].fov,
+                                   .power = of[i].power ? NULL : &power};
             CHECK(!lgd_estimate(m, image, SIDE, &o, maps[n], &e), "%s", e.message);
         }
-        const bool one = !memcmp(maps[0], maps[1], sizeof maps[0]), two = !memcmp(maps[0], maps[2], sizeof maps[0]);
-        CHECK(one == (guesses == 1) && two == (guesses == 0), "guesses %d: one orientation %d, two %d", guesses, one,
-              two);
+        CHECK(memcmp(maps[1], maps[2], sizeof maps[1]), "case %zu: two orientations say what one says", i);
+        CHECK(!memcmp(maps[0], maps[of[i].orientations], sizeof maps[0]), "case %zu: not %d orientations", i,
+              of[i].orientations);
         lgd_free(&m);
     }
 }
