@@ -57,7 +57,7 @@ enum { LGD_AUTO = -2, LGD_AUTO_MOST = 24 };
 /* The tolerance of least time whose renderings are at most 1% worse than those of all steps (docs/performance.md). */
 #define LGD_TOLERANCE 0.003
 #define LGD_TOLERANCE_DEFAULT (-1.0)
-/* As suits the model: 1 where it guesses camera and light, else 2 (docs/accuracy.md). */
+/* As suits what is known: 1 where the model guesses the camera or the light's power, else 2 (docs/accuracy.md). */
 #define LGD_ORIENTATIONS_DEFAULT 0
 
 enum { LGD_F32, LGD_BF16 };

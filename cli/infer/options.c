@@ -39,8 +39,8 @@ const cl_argument cl_infer_arguments[] = {
      "24 at most (default: as trained; of several photographs phone makes twice as many)"},
     {ORIENTATIONS, "orientations", "N",
      "the first estimate is the mean over N orientations of the photograph: 1 (as it is), 2 (and a quarter turn), 4\n"
-     "(all quarter turns), 8 (and their mirror images) or auto (the default: 1 where the model guesses camera and\n"
-     "light, else 2)"},
+     "(all quarter turns), 8 (and their mirror images) or auto (the default: 1 where the model guesses the camera\n"
+     "or the light's power, else 2)"},
     {EXACT, "exact", NULL,
      "compute convolutions directly; the default is Winograd's algorithm where it is faster: the maps differ by less\n"
      "than 1e-5 (RMS), single values by less than 1e-3"},
