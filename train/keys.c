@@ -265,7 +265,7 @@ const tr_key tr_keys[] = {
     {"train", "lesson", TR_CHOICE, AT(train.lesson), 0, TR_LESSON_KNOWN, "diffuse", lesson_names, false,
      "what is new to a student of train.teacher: diffuse as the teacher has it when it is told its own guess of a "
      "camera that is not known; normals, which are the materials' own, by train.normal_rmse too; or known, all maps of "
-     "photographs whose light and camera are measured, which are every other step's, by the losses of a g without a "
+     "photographs whose light and camera are measured, which are half of the steps', by the losses of a g without a "
      "teacher"},
     {"train", "reduce", TR_CHOICE, AT(train.reduce), 0, TR_REDUCE_BF16, "f32", reduce_names, false,
      "how gradients are summed over the ranks of mpirun: as f32, or rounded to bf16 and summed as f32, which is half "
