@@ -213,8 +213,7 @@ const tr_key tr_keys[] = {
      "weight of the normals in the maps' L1"},
     {"train", "flash_views", TR_INT, AT(train.flash_views), 0, RD_LOSS_SPECULAR, "0", NULL, false,
      "of the nine renderings of the loss so many of the six highlights are those of a phone's flash over the sample, "
-     "in "
-     "place of mirrored grazing ones"},
+     "in place of mirrored grazing ones"},
     {"train", "normal_rmse", TR_REAL, AT(train.normal_rmse), 0, 1e3, "0", NULL, false,
      "weight of the normals' RMSE of each material, which relief that is uncertain does not pull to flat"},
     {"train", "specular_weight", TR_REAL, AT(train.specular_weight), 0, 1e3, "1", NULL, false,
