@@ -70,11 +70,18 @@ static const ts_conv unet[] = {
     {8, 8, 8, 64, 128, 5, 1, TS_PAD_ZERO, 0, {0}},  {8, 16, 16, 128, 64, 5, 1, TS_PAD_ZERO, 0, {0}},
 };
 
+/* Rows of a shape, as many ways as the list has. */
+#define ROWS(shape, ...) rows((shape), (const int[]){__VA_ARGS__}, sizeof((const int[]){__VA_ARGS__}) / sizeof(int))
+static void rows(ts_conv shape, const int *way, size_t ways)
+{
+    for (size_t i = 0; i < ways; i++) row(shape, way[i]);
+}
+
 static void all(const ts_conv *shape, size_t count)
 {
-    for (size_t i = 0; i < count; i++) row(shape[i], BENCH_FORWARD);
-    for (size_t i = 0; i < count; i++) row(shape[i], BENCH_DATA);
-    for (size_t i = 0; i < count; i++) row(shape[i], BENCH_WEIGHTS);
+    static const int way[] = {BENCH_FORWARD, BENCH_DATA, BENCH_WEIGHTS};
+    for (size_t k = 0; k < sizeof way / sizeof *way; k++)
+        for (size_t i = 0; i < count; i++) row(shape[i], way[k]);
 }
 
 BENCH(conv_published)
@@ -107,19 +114,11 @@ BENCH(conv_winograd)
                                       {8, 32, 32, 96, 48, 3, 1, TS_PAD_ZERO, 0, {0}},
                                       {8, 64, 64, 64, 128, 3, 2, TS_PAD_REPLICATE, 0, {0}}};
     bench_heading("Winograd's algorithm, counting the direct way's multiplications, each below the direct way");
-    for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
-        row(shape[i], BENCH_FORWARD);
-        row(shape[i], BENCH_WINOGRAD);
-    }
+    for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) ROWS(shape[i], BENCH_FORWARD, BENCH_WINOGRAD);
     bench_heading("The same in training: g's larger layers and a coarse step's");
-    for (size_t i = 0; i < sizeof trained / sizeof *trained; i++) {
-        row(trained[i], BENCH_FORWARD);
-        row(trained[i], BENCH_WINOGRAD);
-        row(trained[i], BENCH_DATA);
-        row(trained[i], BENCH_DATA_WINOGRAD);
-        row(trained[i], BENCH_WEIGHTS);
-        row(trained[i], BENCH_WEIGHTS_WINOGRAD);
-    }
+    for (size_t i = 0; i < sizeof trained / sizeof *trained; i++)
+        ROWS(trained[i], BENCH_FORWARD, BENCH_WINOGRAD, BENCH_DATA, BENCH_DATA_WINOGRAD, BENCH_WEIGHTS,
+             BENCH_WEIGHTS_WINOGRAD);
 }
 
 /* Where it is not emulated, % of the peak is that of the matrix unit or of vdpbf16ps: LGD_ISA=avx512bf16 for the latter
@@ -127,24 +126,16 @@ BENCH(conv_winograd)
 BENCH(conv_bf16)
 {
     bench_heading("bf16, inputs rounded on the way, each below f32");
-    for (size_t i = 0; i < 5; i++) {
-        row(published[i], BENCH_FORWARD);
-        row(published[i], BENCH_FORWARD_BF16);
-        row(published[i], BENCH_DATA);
-        row(published[i], BENCH_DATA_BF16);
-        row(published[i], BENCH_WEIGHTS);
-        row(published[i], BENCH_WEIGHTS_BF16);
-    }
+    for (size_t i = 0; i < 5; i++)
+        ROWS(published[i], BENCH_FORWARD, BENCH_FORWARD_BF16, BENCH_DATA, BENCH_DATA_BF16, BENCH_WEIGHTS,
+             BENCH_WEIGHTS_BF16);
 }
 
 /* Winograd's way where a layer may take it. */
 static void weight_rows(ts_conv shape)
 {
-    row(shape, BENCH_WEIGHTS);
-    row(shape, BENCH_WEIGHTS_BF16);
-    if (shape.k != 3 || shape.h < 8) return;
-    row(shape, BENCH_WEIGHTS_WINOGRAD);
-    row(shape, BENCH_WEIGHTS_WINOGRAD_BF16);
+    ROWS(shape, BENCH_WEIGHTS, BENCH_WEIGHTS_BF16);
+    if (shape.k == 3 && shape.h >= 8) ROWS(shape, BENCH_WEIGHTS_WINOGRAD, BENCH_WEIGHTS_WINOGRAD_BF16);
 }
 
 /* Layers of configs/single-phone.ini. */
@@ -157,14 +148,8 @@ BENCH(conv_winograd_bf16)
         {8, 32, 32, 16, 32, 3, 1, TS_PAD_ZERO, 0, {0}},  {8, 256, 256, 17, 16, 3, 1, TS_PAD_ZERO, 5, {0}}};
     bench_heading("Winograd's way and the direct one, in f32 and bf16");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
-        row(shape[i], BENCH_FORWARD);
-        row(shape[i], BENCH_WINOGRAD);
-        row(shape[i], BENCH_FORWARD_BF16);
-        row(shape[i], BENCH_WINOGRAD_BF16);
-        row(shape[i], BENCH_DATA);
-        row(shape[i], BENCH_DATA_WINOGRAD);
-        row(shape[i], BENCH_DATA_BF16);
-        row(shape[i], BENCH_DATA_WINOGRAD_BF16);
+        ROWS(shape[i], BENCH_FORWARD, BENCH_WINOGRAD, BENCH_FORWARD_BF16, BENCH_WINOGRAD_BF16, BENCH_DATA,
+             BENCH_DATA_WINOGRAD, BENCH_DATA_BF16, BENCH_DATA_WINOGRAD_BF16);
         weight_rows(shape[i]);
     }
 }
@@ -179,9 +164,7 @@ BENCH(weights_bf16)
         {8, 8, 8, 256, 128, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 8, 8, 128, 128, 3, 1, TS_PAD_ZERO, 0, {0}},
         {8, 4, 4, 128, 128, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 64, 64, 64, 192, 1, 1, TS_PAD_ZERO, 0, {0}}};
     bench_heading("gradients of weights in f32 and bf16, directly and by Winograd's way");
-    for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
-        weight_rows(shape[i]);
-    }
+    for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) weight_rows(shape[i]);
 }
 
 BENCH(peer_conv)
@@ -228,6 +211,5 @@ BENCH(conv_naive)
 {
     const ts_conv c = {1, 64, 64, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}};
     bench_heading("A convolution and its naive twin");
-    row(c, BENCH_FORWARD);
-    row(c, BENCH_NAIVE);
+    ROWS(c, BENCH_FORWARD, BENCH_NAIVE);
 }

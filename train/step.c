@@ -242,9 +242,9 @@ static const float *draw(tr_trainer *t, int given, ts_status *st)
     if (!target) return ts_context(st, "procedural materials"), NULL;
     const uint64_t index = (uint64_t)t->step * (uint64_t)c->train.batch + (uint64_t)t->first;
     tr_capture_views(c->data.sheet, (uint64_t)c->data.seed, index, t->batch, given, t->captures);
-    const tr_config measured = tr_measured(c, t->step);
-    tr_photographs(tr_teaches_known(c, t->step) ? &measured : c, (uint64_t)c->data.seed, index, t->batch, c->data.patch,
-                   target, t->captures, given, t->images, t->shots);
+    tr_config measured;
+    tr_photographs(tr_taken_with(c, t->step, &measured), (uint64_t)c->data.seed, index, t->batch, c->data.patch, target,
+                   t->captures, given, t->images, t->shots);
     if (c->arch.revisions > 0 && given > 1) tr_describe_several(t->shots, t->batch * given, t->captures, t->known);
     else if (c->arch.conditions || c->arch.scene) describe(t, given);
     ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_SCENE, (uint64_t)t->step);

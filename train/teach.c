@@ -43,16 +43,18 @@ bool tr_teaches_known(const tr_config *c, int64_t step)
 
 /* Who knows the light's power has its pictures in proportion to the light: they have no tone curve, and nothing else
  * shines. */
-tr_config tr_measured(const tr_config *c, int64_t step)
+const tr_config *tr_taken_with(const tr_config *c, int64_t step, tr_config *measured)
 {
+    if (!tr_teaches_known(c, step)) return c;
     ts_rng rng = rng_of(c, step);
     ts_rng_uniform(&rng); /* tr_teaches_known's */
-    tr_config m = *c;
-    m.data.told_view = m.data.told_power = 1;
-    m.data.exposure = m.data.meter = m.data.automatic = m.data.white_balance = m.data.vignette = 0;
-    m.data.ambient = m.data.tone = m.data.sharpen = m.data.glare = 0;
+    tr_config *m = measured;
+    *m = *c;
+    m->data.told_view = m->data.told_power = 1;
+    m->data.exposure = m->data.meter = m->data.automatic = m->data.white_balance = m->data.vignette = 0;
+    m->data.ambient = m->data.tone = m->data.sharpen = m->data.glare = 0;
     if (ts_rng_uniform(&rng) < 0.5f)
-        m.data.fov_min = m.data.fov_max = m.data.flash = m.data.flash_size = m.data.tilt = m.data.off_centre = 0;
+        m->data.fov_min = m->data.fov_max = m->data.flash = m->data.flash_size = m->data.tilt = m->data.off_centre = 0;
     return m;
 }
 
