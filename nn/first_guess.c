@@ -5,6 +5,7 @@
 #include "nn/hidden.h"
 #include "nn/lattice.h"
 #include "nn/lean.h"
+#include "nn/relief.h"
 #include "render/scene_model.h"
 #include "tensor/maps.h"
 #include "tensor/memory.h"
@@ -134,6 +135,7 @@ ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, co
 {
     const int64_t pixels = (int64_t)grid.h * grid.w;
     rd_scene_prior prior;
+    nn_weigh_relief(pixels, channels, g->spread, taken->known, grid.threads, g->r0);
     nn_deviations(pixels, g->spread, (nn_belief){.photographs = taken->photographs}, grid.threads, g->deviation);
     scene_prior(scene, &taken->view, taken->known, &prior);
     level_prior(grid, g, channels, taken->known, &prior);
