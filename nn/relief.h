@@ -7,8 +7,8 @@
 
 /* Of the mean slope over the mean expected error of normals: up to NN_RELIEF_NONE a sample is flat, from NN_RELIEF_SURE
  * on its relief is as g says. */
-#define NN_RELIEF_NONE 0.15f
-#define NN_RELIEF_SURE 0.45f
+#define NN_RELIEF_NONE 0.1f
+#define NN_RELIEF_SURE 0.25f
 /* By which the slopes are multiplied beside that where the light's power is not known. */
 #define NN_RELIEF_STEEPER 1.15f
 

@@ -44,7 +44,7 @@ TEST(relief_below_its_errors_is_none)
     static const struct {
         float part; /* of the expected error */
         double factor;
-    } of[] = {{0.05f, 0}, {0.14f, 0}, {0.3f, 0.5}, {0.46f, 1}, {2, 1}};
+    } of[] = {{0.05f, 0}, {0.09f, 0}, {0.175f, 0.5}, {0.27f, 1}, {2, 1}};
     for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
         make(of[k].part * 0.08f);
         const double is = factor(NN_KNOWN_POWER, 1);
