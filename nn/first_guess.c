@@ -135,7 +135,8 @@ ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, co
 {
     const int64_t pixels = (int64_t)grid.h * grid.w;
     rd_scene_prior prior;
-    nn_weigh_relief(pixels, channels, g->spread, taken->known, grid.threads, g->r0);
+    const bool told = taken->photographs > 1 || (taken->known & NN_KNOWN_POWER);
+    nn_weigh_relief(pixels, channels, g->spread, told ? 1 : NN_RELIEF_STEEPER, grid.threads, g->r0);
     nn_deviations(pixels, g->spread, (nn_belief){.photographs = taken->photographs}, grid.threads, g->deviation);
     scene_prior(scene, &taken->view, taken->known, &prior);
     level_prior(grid, g, channels, taken->known, &prior);

@@ -39,7 +39,7 @@ static void multiply(const void *job, int64_t begin, int64_t end)
         }
 }
 
-void nn_weigh_relief(int64_t pixels, int channels, const float *spread, int known, int threads, float *maps)
+void nn_weigh_relief(int64_t pixels, int channels, const float *spread, float steeper, int threads, float *maps)
 {
     double slopes[PARTS], errors[PARTS], slope = 0, error = 0;
     relief_job j = {pixels, channels, spread, maps, 1, slopes, errors};
@@ -47,6 +47,6 @@ void nn_weigh_relief(int64_t pixels, int channels, const float *spread, int know
     for (int k = 0; k < PARTS; k++) slope += slopes[k], error += errors[k];
     const float shown = (float)(slope / fmax(error, 1e-30)),
                 sure = fminf(fmaxf((shown - NN_RELIEF_NONE) / (NN_RELIEF_SURE - NN_RELIEF_NONE), 0), 1);
-    j.factor = sure * (known & NN_KNOWN_POWER ? 1 : NN_RELIEF_STEEPER);
+    j.factor = sure * steeper;
     if (j.factor != 1) ts_for(threads, pixels, WORTH, multiply, &j);
 }

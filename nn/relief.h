@@ -9,10 +9,11 @@
  * on its relief is as g says. */
 #define NN_RELIEF_NONE 0.1f
 #define NN_RELIEF_SURE 0.25f
-/* By which the slopes are multiplied beside that where the light's power is not known. */
+/* By which the slopes of one photograph are multiplied beside that where the light's power is not known; several show
+ * for themselves how steep they are. */
 #define NN_RELIEF_STEEPER 1.15f
 
-/* The normals of maps [pixels, channels] are multiplied by one factor, each within [-1, 1]; spread [pixels, NN_SPREADS]
- * as in nn_guess; known of nn_known. The same bytes for any number of threads. */
-void nn_weigh_relief(int64_t pixels, int channels, const float *spread, int known, int threads, float *maps);
+/* The normals of maps [pixels, channels] are multiplied by one factor, steeper times what the relief's size makes of
+ * it, each within [-1, 1]; spread [pixels, NN_SPREADS] as in nn_guess. The same bytes for any number of threads. */
+void nn_weigh_relief(int64_t pixels, int channels, const float *spread, float steeper, int threads, float *maps);
 #endif
