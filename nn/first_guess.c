@@ -136,12 +136,13 @@ ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, co
     const int64_t pixels = (int64_t)grid.h * grid.w;
     rd_scene_prior prior;
     const bool told = taken->photographs > 1 || (taken->known & NN_KNOWN_POWER);
-    nn_weigh_relief(pixels, channels, g->spread, told ? 1 : NN_RELIEF_STEEPER, grid.threads, g->r0);
+    ts_code code = nn_weigh_relief(grid.side, channels, g->spread, !told, grid.threads, arena, g->r0, st);
+    if (code) return code;
     nn_deviations(pixels, g->spread, (nn_belief){.photographs = taken->photographs}, grid.threads, g->deviation);
     scene_prior(scene, &taken->view, taken->known, &prior);
     level_prior(grid, g, channels, taken->known, &prior);
     const ts_mark mark = ts_arena_mark(arena);
-    const ts_code code = fit(grid, image, channels, taken->known, &prior, arena, g, st);
+    code = fit(grid, image, channels, taken->known, &prior, arena, g, st);
     ts_arena_release(arena, mark);
     if (taken->photographs <= 1) nn_deviations_of_found_scene(pixels, grid.threads, g->deviation);
     g->view = view_of(g->number, taken);

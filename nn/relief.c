@@ -2,6 +2,7 @@
 #include "autograd/log_scale.h"
 #include "nn/model.h"
 #include "tensor/maps.h"
+#include "tensor/resample.h"
 #include "tensor/team.h"
 #include <math.h>
 
@@ -11,8 +12,9 @@ typedef struct relief_job {
     int64_t pixels;
     int channels;
     const float *spread;
-    float *maps, factor;
-    double *slope, *error; /* [PARTS]: sums */
+    float *maps, *slopes, *broad; /* [pixels][2] the last two: the normals' x and y, and what cells show of them */
+    float factor, more;           /* of the slopes, and by how much more of the broad ones */
+    double *slope, *error;        /* [PARTS]: sums */
 } relief_job;
 
 static void sum_parts(const void *job, int64_t begin, int64_t end)
@@ -29,24 +31,64 @@ static void sum_parts(const void *job, int64_t begin, int64_t end)
     }
 }
 
+/* How much of the relief that g says there is, 0 to 1. */
+static float sure_of(relief_job *j, int threads)
+{
+    double slopes[PARTS], errors[PARTS], slope = 0, error = 0;
+    j->slope = slopes, j->error = errors;
+    ts_for(threads, PARTS, WORTH * PARTS / (j->pixels + 1) + 1, sum_parts, j);
+    for (int k = 0; k < PARTS; k++) slope += slopes[k], error += errors[k];
+    const float shown = (float)(slope / fmax(error, 1e-30));
+    return fminf(fmaxf((shown - NN_RELIEF_NONE) / (NN_RELIEF_SURE - NN_RELIEF_NONE), 0), 1);
+}
+
+static void take_slopes(const void *job, int64_t begin, int64_t end)
+{
+    const relief_job *j = job;
+    for (int64_t i = begin; i < end; i++)
+        for (int k = 0; k < 2; k++) j->slopes[i * 2 + k] = j->maps[i * j->channels + MAP_NORMAL + k];
+}
+
+/* The slopes as cells show them: broad. */
+static ts_code broaden(int side, int threads, ts_arena *arena, relief_job *j, ts_status *st)
+{
+    enum { CELLS = NN_RELIEF_CELLS };
+    float *cells = ts_arena_alloc(arena, (size_t)(CELLS * CELLS * 2) * sizeof *cells);
+    j->slopes = ts_arena_alloc(arena, (size_t)j->pixels * 2 * sizeof *j->slopes);
+    j->broad = ts_arena_alloc(arena, (size_t)j->pixels * 2 * sizeof *j->broad);
+    const ts_taps down = ts_taps_triangle(arena, side, CELLS), up = ts_taps_smooth(arena, CELLS, side);
+    if (!cells || !j->slopes || !j->broad || !down.weight || !up.weight)
+        return ts_fail(st, TS_NOMEM, "out of memory for the relief of %d x %d pixels", side, side);
+    ts_for(threads, j->pixels, WORTH, take_slopes, j);
+    ts_resample(1, 2, &down, &down, j->slopes, cells, false, threads);
+    ts_resample(1, 2, &up, &up, cells, j->broad, false, threads);
+    return TS_OK;
+}
+
 static void multiply(const void *job, int64_t begin, int64_t end)
 {
     const relief_job *j = job;
     for (int64_t i = begin; i < end; i++)
         for (int k = 0; k < 2; k++) {
             float *n = &j->maps[i * j->channels + MAP_NORMAL + k];
-            *n = fminf(fmaxf(*n * j->factor, -1), 1);
+            *n = fminf(fmaxf(*n * j->factor + (j->broad ? j->broad[i * 2 + k] * j->more : 0), -1), 1);
         }
 }
 
-void nn_weigh_relief(int64_t pixels, int channels, const float *spread, float steeper, int threads, float *maps)
+ts_code nn_weigh_relief(int side, int channels, const float *spread, bool steeper, int threads, ts_arena *arena,
+                        float *maps, ts_status *st)
 {
-    double slopes[PARTS], errors[PARTS], slope = 0, error = 0;
-    relief_job j = {pixels, channels, spread, maps, 1, slopes, errors};
-    ts_for(threads, PARTS, WORTH * PARTS / (pixels + 1) + 1, sum_parts, &j);
-    for (int k = 0; k < PARTS; k++) slope += slopes[k], error += errors[k];
-    const float shown = (float)(slope / fmax(error, 1e-30)),
-                sure = fminf(fmaxf((shown - NN_RELIEF_NONE) / (NN_RELIEF_SURE - NN_RELIEF_NONE), 0), 1);
-    j.factor = sure * steeper;
-    if (j.factor != 1) ts_for(threads, pixels, WORTH, multiply, &j);
+    relief_job j = {.pixels = (int64_t)side * side, .channels = channels, .spread = spread, .maps = maps};
+    j.factor = sure_of(&j, threads);
+    if (j.factor == 1 && !steeper) return TS_OK;
+    const ts_mark mark = ts_arena_mark(arena);
+    ts_code code = TS_OK;
+    if (steeper && j.factor > 0) {
+        j.more = j.factor * (NN_RELIEF_BROAD - NN_RELIEF_FINE);
+        j.factor *= NN_RELIEF_FINE;
+        code = broaden(side, threads, arena, &j, st);
+    }
+    if (code == TS_OK) ts_for(threads, j.pixels, WORTH, multiply, &j);
+    ts_arena_release(arena, mark);
+    return code;
 }

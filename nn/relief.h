@@ -1,19 +1,24 @@
 /* How much relief a photograph shows. Of smooth samples g makes faint slopes out of shades, which are smaller than what
  * it expects its own errors to be; of others the absolute error, which it learned from, leads to the median of the
- * slopes that it thinks possible, and that is flatter than their mean. */
+ * slopes that it thinks possible, and that is flatter than their mean, the more so the less a photograph tells: of
+ * broad shapes less than of fine ones, whose edges it sees. */
 #ifndef NN_RELIEF_H
 #define NN_RELIEF_H
-#include <stdint.h>
+#include "tensor/tensor.h"
 
 /* Of the mean slope over the mean expected error of normals: up to NN_RELIEF_NONE a sample is flat, from NN_RELIEF_SURE
  * on its relief is as g says. */
 #define NN_RELIEF_NONE 0.1f
 #define NN_RELIEF_SURE 0.25f
-/* By which the slopes of one photograph are multiplied beside that where the light's power is not known; several show
- * for themselves how steep they are. */
-#define NN_RELIEF_STEEPER 1.15f
+/* By which the slopes of one photograph are multiplied beside that where the light's power is not known: what
+ * NN_RELIEF_CELLS cells a side can show, and the rest. Several photographs show for themselves how steep they are. */
+#define NN_RELIEF_BROAD 1.8f
+#define NN_RELIEF_FINE 1.15f
+#define NN_RELIEF_CELLS 24
 
-/* The normals of maps [pixels, channels] are multiplied by one factor, steeper times what the relief's size makes of
- * it, each within [-1, 1]; spread [pixels, NN_SPREADS] as in nn_guess. The same bytes for any number of threads. */
-void nn_weigh_relief(int64_t pixels, int channels, const float *spread, float steeper, int threads, float *maps);
+/* The normals of maps [side][side][channels] are multiplied by what their size makes of them, and if steeper by the two
+ * factors above; each ends in [-1, 1]. spread [side][side][NN_SPREADS] as in nn_guess. The same bytes for any number of
+ * threads. arena: for what it holds meanwhile. TS_NOMEM with st. */
+ts_code nn_weigh_relief(int side, int channels, const float *spread, bool steeper, int threads, ts_arena *arena,
+                        float *maps, ts_status *st);
 #endif

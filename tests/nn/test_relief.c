@@ -7,27 +7,42 @@
 #include <math.h>
 #include <string.h>
 
-enum { PIXELS = 20000 + 7, C = MAP_CHANNELS, STATED = GROUP_NORMAL };
+enum { SIDE = 141, PIXELS = SIDE * SIDE, C = MAP_CHANNELS, STATED = GROUP_NORMAL };
 static float maps[PIXELS * C], before[PIXELS * C], spread[PIXELS * NN_SPREADS];
 
-/* Slopes of this mean length in drawn directions, beside other channels that are drawn; expected errors of 0.08. */
-static void make(float slope)
+/* Channels that are drawn, and expected errors of normals of 0.08. */
+static ts_rng draw(void)
 {
     ts_rng rng = ts_rng_make(5, 0, 0);
     for (int i = 0; i < PIXELS * C; i++) maps[i] = ts_rng_range(&rng, -1, 1);
     for (int i = 0; i < PIXELS * NN_SPREADS; i++) spread[i] = ts_rng_range(&rng, -3, 1);
+    for (int i = 0; i < PIXELS; i++) spread[i * NN_SPREADS + STATED] = logf(0.08f / NN_SPREAD_UNIT);
+    return rng;
+}
+
+/* Slopes of this mean length in drawn directions. */
+static void make(float slope)
+{
+    ts_rng rng = draw();
     for (int i = 0; i < PIXELS; i++) {
         const float turn = ts_rng_range(&rng, 0, 6.2831853f), length = slope * ts_rng_range(&rng, 0.5f, 1.5f);
         maps[i * C + MAP_NORMAL] = length * cosf(turn), maps[i * C + MAP_NORMAL + 1] = length * sinf(turn);
-        spread[i * NN_SPREADS + STATED] = logf(0.08f / NN_SPREAD_UNIT);
     }
     memcpy(before, maps, sizeof maps);
 }
 
-/* The factor of all slopes; NAN where there is more than one, or where another channel moved. */
-static double factor(float steeper)
+static void weigh(bool steeper, int threads)
 {
-    nn_weigh_relief(PIXELS, C, spread, steeper, 1, maps);
+    ts_status st = {0};
+    ts_arena *arena = ts_arena_create(0, &st);
+    CHECK(arena && nn_weigh_relief(SIDE, C, spread, steeper, threads, arena, maps, &st) == TS_OK, "%s", st.message);
+    ts_arena_destroy(&arena);
+}
+
+/* The factor of all slopes; NAN where there is more than one, or where another channel moved. */
+static double factor(void)
+{
+    weigh(false, 1);
     double times = NAN;
     for (int i = 0; i < PIXELS * C; i++) {
         const bool slope = i % C == MAP_NORMAL || i % C == MAP_NORMAL + 1;
@@ -40,20 +55,44 @@ static double factor(float steeper)
     return times;
 }
 
+static const struct {
+    float part; /* of the expected error */
+    double factor;
+} relief_of[] = {{0.05f, 0}, {0.09f, 0}, {0.175f, 0.5}, {0.27f, 1}, {2, 1}};
+enum { RELIEFS = sizeof relief_of / sizeof *relief_of };
+
 TEST(relief_below_its_errors_is_none)
 {
-    static const struct {
-        float part; /* of the expected error */
-        double factor;
-    } of[] = {{0.05f, 0}, {0.09f, 0}, {0.175f, 0.5}, {0.27f, 1}, {2, 1}};
-    for (size_t k = 0; k < sizeof of / sizeof *of; k++) {
-        make(of[k].part * 0.08f);
-        const double is = factor(1);
-        CHECK(fabs(is - of[k].factor) < 0.02, "%g of the error: slopes times %g", (double)of[k].part, is);
-        make(of[k].part * 0.08f);
-        const double steep = factor(NN_RELIEF_STEEPER);
-        CHECK(fabs(steep - (double)NN_RELIEF_STEEPER * is) < 1e-4, "%g of the error, made steeper: slopes times %g",
-              (double)of[k].part, steep);
+    for (int k = 0; k < RELIEFS; k++) {
+        make(relief_of[k].part * 0.08f);
+        const double is = factor();
+        CHECK(fabs(is - relief_of[k].factor) < 0.02, "%g of the error: slopes times %g", (double)relief_of[k].part, is);
+    }
+}
+
+/* x has a slope of one size everywhere, y one that changes its sign from pixel to pixel. */
+TEST(relief_that_is_broad_gets_steeper_than_what_is_fine)
+{
+    for (int k = 0; k < RELIEFS; k++) {
+        const float size = relief_of[k].part * 0.08f / sqrtf(2);
+        draw();
+        for (int i = 0; i < PIXELS; i++) {
+            maps[i * C + MAP_NORMAL] = size;
+            maps[i * C + MAP_NORMAL + 1] = (i / SIDE + i % SIDE) % 2 ? size : -size;
+        }
+        memcpy(before, maps, sizeof maps);
+        weigh(true, 1);
+        for (int i = 0; i < PIXELS * C; i++) {
+            const int c = i % C - MAP_NORMAL;
+            const double times = c == 0 ? (double)NN_RELIEF_BROAD
+                : c == 1                ? (double)NN_RELIEF_FINE
+                                        : 1,
+                         is = (double)maps[i] / (double)before[i] / (c == 0 || c == 1 ? times : 1);
+            if (c != 0 && c != 1) CHECK(maps[i] == before[i], "another channel moved");
+            else if (fabs(is - relief_of[k].factor) > 0.03)
+                CHECK(false, "%g of the error, %s: slopes times %g", (double)relief_of[k].part, c ? "fine" : "broad",
+                      is * times);
+        }
     }
 }
 
@@ -61,7 +100,7 @@ TEST(relief_stays_within_what_maps_hold)
 {
     static float one[PIXELS * C];
     make(0.95f);
-    nn_weigh_relief(PIXELS, C, spread, NN_RELIEF_STEEPER, 1, maps);
+    weigh(true, 1);
     memcpy(one, maps, sizeof one);
     int held = 0;
     for (int i = 0; i < PIXELS; i++)
@@ -72,25 +111,25 @@ TEST(relief_stays_within_what_maps_hold)
         }
     CHECK(held > 0, "no slope reached what maps can hold");
     memcpy(maps, before, sizeof maps);
-    nn_weigh_relief(PIXELS, C, spread, NN_RELIEF_STEEPER, 3, maps);
+    weigh(true, 3);
     CHECK(memcmp(one, maps, sizeof one) == 0, "three threads make other normals than one");
 }
 
 /* The slope of the first pixel that a first guess begins with, of a network that said .2 everywhere. */
 static double settled(int known, int photographs)
 {
-    enum { SIDE = 64 };
-    static float r0[SIDE * SIDE * C], image[SIDE * SIDE * 3], deviation[SIDE * SIDE * NN_SPREADS];
+    enum { S = 64 };
+    static float r0[S * S * C], image[S * S * 3], deviation[S * S * NN_SPREADS];
     const float scene[2 * RD_SCENE_NUMBERS] = {0};
     const nn_taken taken = {rd_flash(), known, photographs};
     ts_status st = {0};
-    for (int i = 0; i < SIDE * SIDE * C; i++) r0[i] = i % C == MAP_NORMAL ? 0.2f : i % C == MAP_NORMAL + 1 ? 0 : -0.4f;
-    for (int i = 0; i < SIDE * SIDE * 3; i++) image[i] = 0.3f;
-    for (int i = 0; i < SIDE * SIDE * NN_SPREADS; i++) spread[i] = -1;
+    for (int i = 0; i < S * S * C; i++) r0[i] = i % C == MAP_NORMAL ? 0.2f : i % C == MAP_NORMAL + 1 ? 0 : -0.4f;
+    for (int i = 0; i < S * S * 3; i++) image[i] = 0.3f;
+    for (int i = 0; i < S * S * NN_SPREADS; i++) spread[i] = -1;
     nn_first_guess guess = {.r0 = r0, .spread = spread, .deviation = deviation};
     ts_arena *arena = ts_arena_create(0, &st);
-    CHECK(arena && nn_first_guess_settle(rd_grid_full(SIDE), C, image, scene, &taken, arena, &guess, &st) == TS_OK,
-          "%s", st.message);
+    CHECK(arena && nn_first_guess_settle(rd_grid_full(S), C, image, scene, &taken, arena, &guess, &st) == TS_OK, "%s",
+          st.message);
     ts_arena_destroy(&arena);
     return (double)r0[MAP_NORMAL];
 }
@@ -99,7 +138,7 @@ TEST(relief_is_steeper_where_one_photograph_alone_tells_it)
 {
     enum { PLACES = NN_KNOWN_CAMERA | NN_KNOWN_LIGHT };
     const double alone = settled(PLACES, 1), told = settled(NN_KNOWN_ALL, 1), several = settled(PLACES, 2);
-    CHECK(fabs(alone - 0.2 * (double)NN_RELIEF_STEEPER) < 1e-5, "power not known: a slope of %g", alone);
+    CHECK(fabs(alone - 0.2 * (double)NN_RELIEF_BROAD) < 1e-5, "power not known: a slope of %g", alone);
     CHECK(fabs(told - 0.2) < 1e-5, "power known: a slope of %g", told);
     CHECK(fabs(several - 0.2) < 1e-5, "two photographs: a slope of %g", several);
 }
