@@ -2,6 +2,7 @@
 #include "infer/exposure.h"
 #include "nn/clip.h"
 #include "nn/deviation.h"
+#include "nn/level.h"
 #include "nn/metal.h"
 #include "nn/revise.h"
 #include "tensor/maps.h"
@@ -82,7 +83,9 @@ ts_code lgd_guess_first(ag_tape *tape, const nn_model *net, lgd_given *p, const 
         if (lgd_expose_others(grid, p->r0, a->channels, p->count, p->views, p->image, p->side, *o->power, st))
             return st->code;
     }
+    const nn_photos photos = {p->image, p->views, p->count, p->side, lgd_guess_known(o)};
+    if (p->count == 1 && photos.known == NN_KNOWN_ALL)
+        return nn_find_levels(grid, p->image[0], p->side, &p->views[0], guess->deviation, a->channels, guess->r0, st);
     if (p->count == 1) return TS_OK;
-    const nn_metal_photos photos = {p->image, p->views, p->count, p->side, lgd_guess_known(o)};
     return nn_tell_metal(grid, &photos, guess->deviation, nn_arch_steps(a, p->count), a->channels, guess->r0, st);
 }

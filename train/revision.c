@@ -32,7 +32,7 @@ static bool settle(ag_tape *tape, const nn_model *model, const nn_input *in, con
     ts_code code = nn_first_guess_settle(
         grid, channels, image[0], said->scene->t.data + (size_t)n * 2 * RD_SCENE_NUMBERS, &taken, arena, &guess, &st);
     views[0] = guess.view;
-    const nn_metal_photos photos = {image, views, given, side, known};
+    const nn_photos photos = {image, views, given, side, known};
     if (!code)
         code = nn_tell_metal(grid, &photos, guess.deviation, nn_arch_steps(&model->arch, given), channels, guess.r0,
                              &st);

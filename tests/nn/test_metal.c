@@ -40,7 +40,7 @@ static void tell(const float *truth, float *read)
         image[k] = malloc(PIXELS * 3 * sizeof *image[k]);
         rd_render(rd_grid_full(EDGE), truth, C, &view[k], false, image[k]);
     }
-    const nn_metal_photos photos = {(const float *const *)image, view, TAKEN, EDGE, NN_KNOWN_ALL};
+    const nn_photos photos = {(const float *const *)image, view, TAKEN, EDGE, NN_KNOWN_ALL};
     CHECK(!nn_tell_metal(rd_grid_full(EDGE), &photos, deviation, STEPS, C, read, &st), "%s", st.message);
     for (int k = 0; k < TAKEN; k++) free(image[k]);
     free(deviation);

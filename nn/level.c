@@ -1,0 +1,73 @@
+#include "nn/level.h"
+#include "tensor/maps.h"
+#include <math.h>
+#include <string.h>
+
+enum { ROUNDS = 5 }; /* of the search; after one that finds nothing better it looks half as far */
+
+static const float first_stride[NN_LEVELS] = {0.4f, 0.3f, 0.4f, 0.1f};
+
+void nn_set_levels(int64_t pixels, int channels, const float level[NN_LEVELS], float *maps)
+{
+    const float f0 = expf(level[NN_LEVEL_F0]), rough = expf(level[NN_LEVEL_ROUGHNESS]),
+                diffuse = expf(level[NN_LEVEL_DIFFUSE]), beneath = level[NN_LEVEL_BENEATH];
+    for (int64_t i = 0; i < pixels; i++, maps += channels) {
+        for (int c = 0; c < 3; c++) {
+            float *of = &maps[MAP_DIFFUSE + c], *f = &maps[MAP_SPECULAR + c];
+            *of = fminf(fmaxf((*of + 1) * diffuse + beneath * (*f + 1) - 1, -1), 1);
+            *f = fminf(fmaxf((*f + 1) * f0 - 1, -1), 1);
+        }
+        maps[MAP_ROUGHNESS] = fminf(fmaxf((maps[MAP_ROUGHNESS] + 1) * rough - 1, -1), 1);
+    }
+}
+
+static double cost(nn_trial *t, const float level[NN_LEVELS])
+{
+    static const float deviation[NN_LEVELS] = NN_LEVEL_DEVIATIONS;
+    const int pixels = t->side * t->side;
+    const ts_prior prior = nn_step_prior(t->photos->known, 1);
+    memcpy(t->tried, t->r0, (size_t)(pixels * t->channels) * sizeof *t->tried);
+    nn_set_levels(pixels, t->channels, level, t->tried);
+    double sum = nn_trial_misfit(t, &prior, NN_LEVEL_STEPS);
+    for (int k = 0; k < NN_LEVELS; k++) {
+        const double far = (double)(level[k] / deviation[k]);
+        sum += NN_LEVEL_COST * far * far;
+    }
+    return sum;
+}
+
+/* From level along its k-th number, one way or else the other. Whether that is better, and level is there. */
+static bool go(nn_trial *t, int k, float stride, float level[NN_LEVELS], double *best)
+{
+    for (int way = -1; way <= 1; way += 2) {
+        const float before = level[k];
+        level[k] += (float)way * stride;
+        const double there = level[NN_LEVEL_BENEATH] < 0 ? INFINITY : cost(t, level);
+        if (there < *best) return *best = there, true;
+        level[k] = before;
+    }
+    return false;
+}
+
+ts_code nn_find_levels(rd_grid grid, const float *image, int side, const rd_view *view, const float *deviation,
+                       int channels, float *r0, ts_status *st)
+{
+    /* Steps that come with a misfit are those of several photographs: this one is there twice. */
+    const float *const twice[] = {image, image};
+    const rd_view views[] = {*view, *view};
+    const nn_photos photos = {twice, views, 2, side, NN_KNOWN_ALL};
+    nn_trial t;
+    if (nn_trial_begin(grid, NN_LEVEL_SIDE, &photos, deviation, channels, r0, &t, st)) return st->code;
+    float level[NN_LEVELS] = {0}, stride[NN_LEVELS];
+    memcpy(stride, first_stride, sizeof stride);
+    const double as_read = cost(&t, level);
+    double best = as_read;
+    for (int round = 0; round < ROUNDS; round++) {
+        bool better = false;
+        for (int k = 0; k < NN_LEVELS; k++) better |= go(&t, k, stride[k], level, &best);
+        for (int k = 0; k < NN_LEVELS && !better; k++) stride[k] *= 0.5f;
+    }
+    nn_trial_end(&t);
+    if (best < NN_LEVEL_SURE * as_read) nn_set_levels((int64_t)grid.side * grid.side, channels, level, r0);
+    return TS_OK;
+}

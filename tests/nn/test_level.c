@@ -1,0 +1,110 @@
+/* Levels that a photograph under a known light tells. */
+#include "nn/level.h"
+#include "render/render.h"
+#include "tests/support/networks.h"
+#include <math.h>
+#include <string.h>
+
+enum { C = MAP_CHANNELS, EDGE = 80, PIXELS = EDGE * EDGE, VALUES = PIXELS * C };
+
+/* A glossy material, brown, with some relief and grain. */
+static void paint(float diffuse, float f0, float *maps)
+{
+    static const float hue[3] = {1.2f, 1, 0.7f};
+    float *r = numbers(VALUES, 17, -1, 1);
+    for (int i = 0; i < VALUES; i++) {
+        const int c = i % C;
+        const float grain = 1 + 0.1f * r[i];
+        maps[i] = c < MAP_NORMAL ? 2 * diffuse * hue[c] * grain - 1
+            : c < MAP_ROUGHNESS  ? 0.02f * r[i]
+            : c == MAP_ROUGHNESS ? 2 * 0.35f * grain - 1
+                                 : 2 * f0 * hue[c - MAP_SPECULAR] * grain - 1;
+    }
+    free(r);
+}
+
+static float mean_of(const float *maps, int first, int count)
+{
+    double sum = 0;
+    for (int i = 0; i < PIXELS; i++)
+        for (int c = first; c < first + count; c++) sum += ((double)maps[i * C + c] + 1) / 2;
+    return (float)(sum / PIXELS / count);
+}
+
+/* R_0 = read after a photograph of truth. */
+static void find(const float *truth, int threads, float *read)
+{
+    float *image = malloc(PIXELS * 3 * sizeof *image), *deviation = malloc(PIXELS * NN_SPREADS * sizeof *deviation);
+    const rd_view view = rd_flash();
+    ts_status st = {0};
+    for (int i = 0; i < PIXELS * NN_SPREADS; i++) deviation[i] = 0.04f;
+    rd_render(rd_grid_full(EDGE), truth, C, &view, false, image);
+    CHECK(!nn_find_levels(rd_grid_on(rd_grid_full(EDGE), threads), image, EDGE, &view, deviation, C, read, &st), "%s",
+          st.message);
+    free(image), free(deviation);
+}
+
+TEST(levels_that_are_off_are_found)
+{
+    static const struct {
+        const char *what;
+        float level[NN_LEVELS];
+    } off[] = {{"F0", {0.5f, 0, 0, 0}},
+               {"roughness", {0, 0.4f, 0, 0}},
+               {"roughness, too smooth", {0, -0.4f, 0, 0}},
+               {"diffuse", {0, 0, 0.5f, 0}},
+               {"F0 and roughness", {0.5f, 0.3f, 0, 0}}};
+    float *truth = malloc(VALUES * sizeof *truth), *read = malloc(VALUES * sizeof *read);
+    paint(0.12f, 0.2f, truth);
+    for (size_t k = 0; k < sizeof off / sizeof *off; k++) {
+        memcpy(read, truth, VALUES * sizeof *read);
+        nn_set_levels(PIXELS, C, off[k].level, read);
+        find(truth, 2, read);
+        const int map[] = {MAP_SPECULAR, MAP_ROUGHNESS, MAP_DIFFUSE}, count[] = {3, 1, 3};
+        for (int m = 0; m < 3; m++) {
+            const double left = log((double)(mean_of(read, map[m], count[m]) / mean_of(truth, map[m], count[m]))),
+                         begun = (double)off[k].level[m];
+            CHECK(fabs(left) < fmax(0.4 * fabs(begun), 0.25),
+                  "%s: the level of map %d is off by e^%.2f, it was by e^%.2f", off[k].what, m, left, begun);
+        }
+    }
+    free(truth), free(read);
+}
+
+/* What looks like a metal with nearly black diffuse has some beneath. */
+TEST(levels_find_diffuse_that_a_metal_has_not)
+{
+    float *truth = malloc(VALUES * sizeof *truth), *read = malloc(VALUES * sizeof *read);
+    paint(0.15f, 0.25f, truth);
+    paint(0.005f, 0.4f, read);
+    find(truth, 1, read);
+    const float diffuse = mean_of(read, MAP_DIFFUSE, 3), f0 = mean_of(read, MAP_SPECULAR, 3);
+    CHECK(fabsf(diffuse - 0.15f) < 0.07f && fabsf(f0 - 0.25f) < 0.1f, "diffuse %g, F0 %g", (double)diffuse, (double)f0);
+    free(truth), free(read);
+}
+
+TEST(levels_that_are_right_stay)
+{
+    float *truth = malloc(VALUES * sizeof *truth), *read = malloc(VALUES * sizeof *read);
+    for (int metal = 0; metal < 2; metal++) {
+        paint(metal ? 0.02f : 0.3f, metal ? 0.6f : 0.04f, truth);
+        memcpy(read, truth, VALUES * sizeof *read);
+        find(truth, 2, read);
+        CHECK(!memcmp(read, truth, VALUES * sizeof *read), "%s", metal ? "a metal" : "a dielectric");
+    }
+    free(truth), free(read);
+}
+
+TEST(levels_do_not_depend_on_threads)
+{
+    static const float off[NN_LEVELS] = {0.5f, 0.3f, -0.2f, 0};
+    float *truth = malloc(VALUES * sizeof *truth), *one = malloc(VALUES * sizeof *one),
+          *three = malloc(VALUES * sizeof *three);
+    paint(0.12f, 0.2f, truth);
+    memcpy(one, truth, VALUES * sizeof *one);
+    nn_set_levels(PIXELS, C, off, one);
+    memcpy(three, one, VALUES * sizeof *one);
+    find(truth, 1, one), find(truth, 3, three);
+    CHECK(!memcmp(one, three, VALUES * sizeof *one), "three threads find other levels than one");
+    free(truth), free(one), free(three);
+}
