@@ -5,6 +5,8 @@
 
 enum { ROUNDS = 5 }; /* of the search; after one that finds nothing better it looks half as far */
 
+/* Standard deviations of the levels, and how far the search looks first. */
+static const float usual[NN_LEVELS] = {0.35f, 0.4f, 0.35f, 0.1f};
 static const float first_stride[NN_LEVELS] = {0.4f, 0.3f, 0.4f, 0.1f};
 
 void nn_set_levels(int64_t pixels, int channels, const float level[NN_LEVELS], float *maps)
@@ -23,14 +25,13 @@ void nn_set_levels(int64_t pixels, int channels, const float level[NN_LEVELS], f
 
 static double cost(nn_trial *t, const float level[NN_LEVELS])
 {
-    static const float deviation[NN_LEVELS] = NN_LEVEL_DEVIATIONS;
     const int pixels = t->side * t->side;
     const ts_prior prior = nn_step_prior(t->photos->known, 1);
     memcpy(t->tried, t->r0, (size_t)(pixels * t->channels) * sizeof *t->tried);
     nn_set_levels(pixels, t->channels, level, t->tried);
     double sum = nn_trial_misfit(t, &prior, NN_LEVEL_STEPS);
     for (int k = 0; k < NN_LEVELS; k++) {
-        const double far = (double)(level[k] / deviation[k]);
+        const double far = (double)(level[k] / usual[k]);
         sum += NN_LEVEL_COST * far * far;
     }
     return sum;

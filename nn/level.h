@@ -10,11 +10,7 @@
  * diffuse, which a metal that is none lacks; beneath >= 0. */
 enum { NN_LEVEL_F0, NN_LEVEL_ROUGHNESS, NN_LEVEL_DIFFUSE, NN_LEVEL_BENEATH, NN_LEVELS };
 
-/* Standard deviations of the four, and what a square of a deviation costs beside the misfit (nn/trial.h). */
-#define NN_LEVEL_DEVIATIONS      \
-    {                            \
-        0.35f, 0.4f, 0.35f, 0.1f \
-    }
+/* What the square of a level over its standard deviation (nn/level.c) costs beside the misfit (nn/trial.h). */
 #define NN_LEVEL_COST 0.02
 /* Pixels a side that are tried; steps of each trial; by how much the sum of misfit and cost must fall for r0 to change:
  * less is not to be told from what is wrong in each pixel. */

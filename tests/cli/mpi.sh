@@ -101,6 +101,15 @@ begin() {
     done
     fail "no checkpoint appeared: $(tail -n 1 "$T/err")"
 }
+# Waits until the run in FOLDER has made a hundred steps. Before that Adam's moments are means of few gradients, and
+# what other ranks round differently grows by much in ten steps.
+settle() {
+    for _ in $(seq 1 1200); do
+        [ "$(wc -l <"$T/$1/log.csv")" -gt 100 ] && return
+        sleep 0.05
+    done
+    fail "no hundred steps were made: $(tail -n 1 "$T/err")"
+}
 # The PID of a rank, from the first line of a run.
 pid_of() { sed -n "s/.*(PIDs \\([0-9 ]*\\)).*/\\1/p" "$T/err" | head -n 1 | cut -d' ' -f$(($1 + 1)); }
 
@@ -126,6 +135,7 @@ signals_save() {
         # Open MPI leaves what it ends a second; with this it also waits as long for ranks that are gone.
         if [ "$1" = openmpi ]; then LAUNCH="$plain --mca odls_base_sigkill_timeout 10"; fi
         begin 2 part
+        settle part
         LAUNCH=$plain
         case $1:$signal in
         *:TERM) kill -TERM "$(pid_of 1)" ;;

@@ -131,9 +131,11 @@ TEST(rounding_of_instruction_sets)
     photographs(ts_isa_name(now.isa), "models/single.safetensors", base, now, 1e-5, 1e-3);
 }
 
+/* The largest difference of ten million values is that of one glossy pixel, and which pixel it is depends on the order
+ * of an instruction set's sums: of single .15 with base, .205 with avx2. The shares and means above do not. */
 TEST(rounding_to_bf16)
 {
     const way f32 = {.isa = ts_isa_now()}, bf16 = {.isa = ts_isa_now(), .precision = LGD_BF16};
     photographs("bf16", "models/phone.safetensors", f32, bf16, 0.005, 0.8);
-    photographs("bf16", "models/single.safetensors", f32, bf16, 0.005, 0.2);
+    photographs("bf16", "models/single.safetensors", f32, bf16, 0.005, 0.3);
 }
