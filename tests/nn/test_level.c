@@ -44,6 +44,7 @@ static void find(const float *truth, int threads, float *read)
     free(image), free(deviation);
 }
 
+/* F0 and roughness change one highlight and are not told apart to less than a quarter. */
 TEST(levels_that_are_off_are_found)
 {
     static const struct {
