@@ -3,21 +3,27 @@
 #include <math.h>
 #include <string.h>
 
-enum { ROUNDS = 5 }; /* of the search; after one that finds nothing better it looks half as far */
+enum { ROUNDS = 8 }; /* of the search; after one that finds nothing better it looks half as far */
 
 /* Standard deviations of the levels, and how far the search looks first. */
-static const float usual[NN_LEVELS] = {0.35f, 0.4f, 0.35f, 0.1f};
-static const float first_stride[NN_LEVELS] = {0.4f, 0.3f, 0.4f, 0.1f};
+static const float usual[NN_LEVELS] = {0.35f, 0.35f, 0.4f, 0.1f, 0.15f, 0.15f, 0.1f, 0.1f};
+static const float first_stride[NN_LEVELS] = {0.4f, 0.4f, 0.3f, 0.1f, 0.2f, 0.2f, 0.1f, 0.1f};
 
 void nn_set_levels(int64_t pixels, int channels, const float level[NN_LEVELS], float *maps)
 {
-    const float f0 = expf(level[NN_LEVEL_F0]), rough = expf(level[NN_LEVEL_ROUGHNESS]),
-                diffuse = expf(level[NN_LEVEL_DIFFUSE]), beneath = level[NN_LEVEL_BENEATH];
+    const float beneath = level[NN_LEVEL_BENEATH], rough = expf(level[NN_LEVEL_ROUGHNESS]);
+    float diffuse[3], f0[3];
+    for (int c = 0; c < 3; c++) {
+        const bool red = c == 0, blue = c == 2;
+        diffuse[c] = expf(level[NN_LEVEL_DIFFUSE] + (float)red * level[NN_LEVEL_DIFFUSE_RED] +
+                          (float)blue * level[NN_LEVEL_DIFFUSE_BLUE]);
+        f0[c] = expf(level[NN_LEVEL_F0] + (float)red * level[NN_LEVEL_F0_RED] + (float)blue * level[NN_LEVEL_F0_BLUE]);
+    }
     for (int64_t i = 0; i < pixels; i++, maps += channels) {
         for (int c = 0; c < 3; c++) {
             float *of = &maps[MAP_DIFFUSE + c], *f = &maps[MAP_SPECULAR + c];
-            *of = fminf(fmaxf((*of + 1) * diffuse + beneath * (*f + 1) - 1, -1), 1);
-            *f = fminf(fmaxf((*f + 1) * f0 - 1, -1), 1);
+            *of = fminf(fmaxf((*of + 1) * diffuse[c] + beneath * (*f + 1) - 1, -1), 1);
+            *f = fminf(fmaxf((*f + 1) * f0[c] - 1, -1), 1);
         }
         maps[MAP_ROUGHNESS] = fminf(fmaxf((maps[MAP_ROUGHNESS] + 1) * rough - 1, -1), 1);
     }

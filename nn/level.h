@@ -6,9 +6,19 @@
 #define NN_LEVEL_H
 #include "nn/trial.h"
 
-/* Factors on maps of the whole sample: F0, roughness and diffuse times e to these, and so much of F0 (as it was) more
- * diffuse, which a metal that is none lacks; beneath >= 0. */
-enum { NN_LEVEL_F0, NN_LEVEL_ROUGHNESS, NN_LEVEL_DIFFUSE, NN_LEVEL_BENEATH, NN_LEVELS };
+/* Factors on maps of the whole sample: F0, roughness and diffuse times e to these; so much of F0 (as it was) more
+ * diffuse, which a metal that is none lacks, beneath >= 0; and red and blue of diffuse and of F0 times e to these. */
+enum {
+    NN_LEVEL_DIFFUSE,
+    NN_LEVEL_F0,
+    NN_LEVEL_ROUGHNESS,
+    NN_LEVEL_BENEATH,
+    NN_LEVEL_DIFFUSE_RED,
+    NN_LEVEL_DIFFUSE_BLUE,
+    NN_LEVEL_F0_RED,
+    NN_LEVEL_F0_BLUE,
+    NN_LEVELS
+};
 
 /* What the square of a level over its standard deviation (nn/level.c) costs beside the misfit (nn/trial.h). */
 #define NN_LEVEL_COST 0.02
@@ -19,7 +29,7 @@ enum { NN_LEVEL_F0, NN_LEVEL_ROUGHNESS, NN_LEVEL_DIFFUSE, NN_LEVEL_BENEATH, NN_L
 #define NN_LEVEL_SURE 0.85
 
 /* The maps r0 [grid.side][grid.side][channels] become those of the levels with the least sum, by a search along each of
- * the four in turn, if it is less than NN_LEVEL_SURE of what it is for r0. image [side][side][3], linear, taken under
+ * them in turn, if it is less than NN_LEVEL_SURE of what it is for r0. image [side][side][3], linear, taken under
  * view with light and camera as known; deviation [grid.side][grid.side][NN_SPREADS] as the steps believe it. The same
  * bytes for any number of threads. Fails where memory is out; r0 is then as it was. */
 ts_code nn_find_levels(rd_grid grid, const float *image, int side, const rd_view *view, const float *deviation,

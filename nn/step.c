@@ -150,7 +150,7 @@ ts_prior nn_step_prior(int known, int photographs)
     return (ts_prior){.hue = {0.1f, 0.1f},
                       .model = !careful     ? 0.1f
                           : photographs > 1 ? 0.01f
-                                            : 0.03f,
+                                            : 0.02f,
                       .noise = 0.002f,
                       .gain = careful ? 0 : 0.5f,
                       .share = photographs > 1 ? 0 : 0.5f};

@@ -50,24 +50,41 @@ TEST(levels_that_are_off_are_found)
     static const struct {
         const char *what;
         float level[NN_LEVELS];
-    } off[] = {{"F0", {0.5f, 0, 0, 0}},
-               {"roughness", {0, 0.4f, 0, 0}},
-               {"roughness, too smooth", {0, -0.4f, 0, 0}},
-               {"diffuse", {0, 0, 0.5f, 0}},
-               {"F0 and roughness", {0.5f, 0.3f, 0, 0}}};
+    } off[] = {{"F0", {[NN_LEVEL_F0] = 0.5f}},
+               {"roughness", {[NN_LEVEL_ROUGHNESS] = 0.4f}},
+               {"roughness, too smooth", {[NN_LEVEL_ROUGHNESS] = -0.4f}},
+               {"diffuse", {[NN_LEVEL_DIFFUSE] = 0.5f}},
+               {"F0 and roughness", {[NN_LEVEL_F0] = 0.5f, [NN_LEVEL_ROUGHNESS] = 0.3f}}};
     float *truth = malloc(VALUES * sizeof *truth), *read = malloc(VALUES * sizeof *read);
     paint(0.12f, 0.2f, truth);
     for (size_t k = 0; k < sizeof off / sizeof *off; k++) {
         memcpy(read, truth, VALUES * sizeof *read);
         nn_set_levels(PIXELS, C, off[k].level, read);
         find(truth, 2, read);
-        const int map[] = {MAP_SPECULAR, MAP_ROUGHNESS, MAP_DIFFUSE}, count[] = {3, 1, 3};
+        const int map[] = {MAP_DIFFUSE, MAP_SPECULAR, MAP_ROUGHNESS}, count[] = {3, 3, 1};
         for (int m = 0; m < 3; m++) {
             const double left = log((double)(mean_of(read, map[m], count[m]) / mean_of(truth, map[m], count[m]))),
                          begun = (double)off[k].level[m];
             CHECK(fabs(left) < fmax(0.4 * fabs(begun), 0.25),
                   "%s: the level of map %d is off by e^%.2f, it was by e^%.2f", off[k].what, m, left, begun);
         }
+    }
+    free(truth), free(read);
+}
+
+/* Red and blue of diffuse beside its green. */
+TEST(levels_find_a_hue)
+{
+    const float off[NN_LEVELS] = {[NN_LEVEL_DIFFUSE_RED] = 0.4f, [NN_LEVEL_DIFFUSE_BLUE] = -0.3f};
+    float *truth = malloc(VALUES * sizeof *truth), *read = malloc(VALUES * sizeof *read);
+    paint(0.12f, 0.2f, truth);
+    memcpy(read, truth, VALUES * sizeof *read);
+    nn_set_levels(PIXELS, C, off, read);
+    find(truth, 2, read);
+    for (int c = 0; c < 3; c += 2) {
+        const double left = log((double)(mean_of(read, MAP_DIFFUSE + c, 1) / mean_of(truth, MAP_DIFFUSE + c, 1))) -
+            log((double)(mean_of(read, MAP_DIFFUSE + 1, 1) / mean_of(truth, MAP_DIFFUSE + 1, 1)));
+        CHECK(fabs(left) < 0.12, "diffuse's channel %d over green is off by e^%.2f", c, left);
     }
     free(truth), free(read);
 }
@@ -98,7 +115,8 @@ TEST(levels_that_are_right_stay)
 
 TEST(levels_do_not_depend_on_threads)
 {
-    static const float off[NN_LEVELS] = {0.5f, 0.3f, -0.2f, 0};
+    static const float off[NN_LEVELS] = {
+        [NN_LEVEL_DIFFUSE] = -0.2f, [NN_LEVEL_F0] = 0.5f, [NN_LEVEL_ROUGHNESS] = 0.3f, [NN_LEVEL_F0_RED] = 0.2f};
     float *truth = malloc(VALUES * sizeof *truth), *one = malloc(VALUES * sizeof *one),
           *three = malloc(VALUES * sizeof *three);
     paint(0.12f, 0.2f, truth);
