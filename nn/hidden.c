@@ -10,22 +10,24 @@ enum {
     CELLS = 32, /* a side, at most */
     ROWS = 4    /* of pixels at a time, at least */
 };
-#define STIFFNESS 1        /* of the field between neighbours, beside a weight of 1 */
+#define STIFFNESS 1        /* of the field between neighbours of one material, beside a weight of 1 */
+#define SAME 0.05          /* squared difference of logarithms that neighbours of one material have */
+#define HIDES 0.3          /* the same that a highlight makes, where nothing is seen */
 #define WEIGHT_LEAST 1e-4  /* keeps the field defined where nothing is seen */
 #define VALUE_LEAST 0.004f /* whose logarithm is taken: one step of 8 bits */
 #define BURNT_OUT 2.94f    /* sum of a pixel's three values, of which noise leaves .98 */
 #define BURNT_OUT_TELLS 0.1f
 
-/* A map of three colours, seen in the part of the light that is mirrored or in the rest. sharpness: the power of what
- * is seen that weighs a cell. reach: how far a logarithm may be off that is not seen; what differs by more is another
- * material. */
+/* A map of three colours, seen in the part of the light that is mirrored or in the rest. edges: the level's field ends
+ * where a material does. sharpness: the power of what is seen that weighs a cell. reach: how far a logarithm may be off
+ * that is not seen; what differs by more is another material. */
 typedef struct hidden_map {
     int at;
-    bool mirrored;
+    bool mirrored, edges;
     double sharpness, reach;
 } hidden_map;
 enum { HIDDEN = 2 };
-static const hidden_map hidden[HIDDEN] = {{MAP_DIFFUSE, false, 6, INFINITY}, {MAP_SPECULAR, true, 4, 1}};
+static const hidden_map hidden[HIDDEN] = {{MAP_DIFFUSE, false, true, 6, INFINITY}, {MAP_SPECULAR, true, false, 4, 1}};
 
 /* The whole square is full; matt holds its maps without F0. */
 typedef struct pictures {
@@ -37,7 +39,7 @@ typedef struct pictures {
 typedef struct cells {
     double mean; /* of the sum of the map's three values */
     double seen[CELLS * CELLS], usual[CELLS * CELLS], weight[CELLS * CELLS], log_value[3][CELLS * CELLS],
-        change[3][CELLS * CELLS];
+        change[3][CELLS * CELLS], level[2][CELLS * CELLS]; /* level: its field, and that of its square */
 } cells;
 
 /* The maps' cells; [HIDDEN] where it says so. */
@@ -133,18 +135,31 @@ static void weigh(const hidden_map *map, int count, cells *c)
     }
 }
 
+static double squared(double x) { return x * x; }
+
+/* How much of one material neighbours are: as far as their colours differ by no more than a highlight may make them. */
+static double alike(const cells *c, int i, int j)
+{
+    const double may = SAME + HIDES * (squared(1 - c->usual[i]) + squared(1 - c->usual[j]));
+    double apart = 0;
+    for (int k = 0; k < 3; k++) apart += squared(c->log_value[k][i] - c->log_value[k][j]) / 3;
+    return squared(may / (may + apart));
+}
+
 /* The lower band of the symmetric matrix: row i has entries i - side .. i, of which those of the neighbours before it
  * and its own are not 0. */
-static void make_band(const cells *c, int side, double *band)
+static void make_band(const cells *c, int side, bool edges, double *band)
 {
-    const int width = side + 1;
+    const int width = side + 1, before[2] = {side, 1};
     memset(band, 0, (size_t)(side * side * width) * sizeof *band);
     for (int i = 0; i < side * side; i++) {
-        double *row = band + (size_t)i * (size_t)width;
-        const bool above = i >= side, below = i<side *(side - 1), left = i % side> 0, right = i % side < side - 1;
-        row[side] = c->weight[i] + WEIGHT_LEAST + STIFFNESS * (above + below + left + right);
-        if (above) row[0] = -STIFFNESS;
-        if (left) row[side - 1] += -STIFFNESS;
+        double *own = band + (size_t)i * (size_t)width + side;
+        *own += c->weight[i] + WEIGHT_LEAST;
+        for (int k = 0; k < 2; k++) { /* above, left */
+            if (k ? i % side == 0 : i < side) continue;
+            const double stiffness = STIFFNESS * (edges ? alike(c, i, i - before[k]) : 1);
+            own[-before[k]] -= stiffness, *own += stiffness, own[-before[k] * width] += stiffness;
+        }
     }
 }
 
@@ -165,21 +180,21 @@ static void factor(int count, int side, double *band)
     }
 }
 
-/* Three right-hand sides at once. */
-static void solve(int count, int side, const double *band, double x[3][CELLS * CELLS])
+/* Some right-hand sides at once. */
+static void solve(int count, int side, const double *band, int sides, double x[][CELLS * CELLS])
 {
     const int width = side + 1;
     for (int i = 0; i < count; i++) {
         const double *row = band + (size_t)i * (size_t)width;
         for (int k = i < side ? 0 : i - side; k < i; k++)
-            for (int c = 0; c < 3; c++) x[c][i] -= row[k - i + side] * x[c][k];
-        for (int c = 0; c < 3; c++) x[c][i] /= row[side];
+            for (int c = 0; c < sides; c++) x[c][i] -= row[k - i + side] * x[c][k];
+        for (int c = 0; c < sides; c++) x[c][i] /= row[side];
     }
     for (int i = count - 1; i >= 0; i--) {
         const double *row = band + (size_t)i * (size_t)width;
-        for (int c = 0; c < 3; c++) x[c][i] /= row[side];
+        for (int c = 0; c < sides; c++) x[c][i] /= row[side];
         for (int k = i < side ? 0 : i - side; k < i; k++)
-            for (int c = 0; c < 3; c++) x[c][k] -= row[k - i + side] * x[c][i];
+            for (int c = 0; c < sides; c++) x[c][k] -= row[k - i + side] * x[c][i];
     }
 }
 
@@ -224,6 +239,20 @@ static double believed(const hidden_map *map, double from)
     return from / (1 + far * far);
 }
 
+/* The level's field and that of its square, which end at edges: their difference is the variance around each cell. */
+static void find_levels(int side, double *band, cells *c)
+{
+    const int count = side * side;
+    make_band(c, side, true, band);
+    factor(count, side, band);
+    for (int i = 0; i < count; i++) {
+        const double level = mean_of_three(c->log_value, i);
+        c->level[0][i] = (c->weight[i] + WEIGHT_LEAST) * level;
+        c->level[1][i] = c->level[0][i] * level;
+    }
+    solve(count, side, band, 2, c->level);
+}
+
 /* A material that is light and dark may be of one hue all over: each has a part of its own. */
 static void find_changes(const void *job, int64_t which)
 {
@@ -233,18 +262,22 @@ static void find_changes(const void *job, int64_t which)
     cells *c = &j->c[which];
     double *band = j->band + which * count * (side + 1);
     weigh(map, count, c);
-    make_band(c, side, band);
+    make_band(c, side, false, band);
     factor(count, side, band);
     for (int k = 0; k < 3; k++)
         for (int i = 0; i < count; i++) c->change[k][i] = (c->weight[i] + WEIGHT_LEAST) * c->log_value[k][i];
-    solve(count, side, band, c->change);
-    double level, hue;
-    differ(c, count, &level, &hue);
+    solve(count, side, band, 3, c->change);
+    if (map->edges) find_levels(side, band, c);
+    double differs, hue;
+    differ(c, count, &differs, &hue);
     for (int i = 0; i < count; i++) {
-        for (int k = 0; k < 3; k++) c->change[k][i] -= c->log_value[k][i];
-        const double from = mean_of_three(c->change, i), tint = part_hidden(c->usual[i], hue),
-                     grey = part_hidden(c->usual[i], level) * believed(map, from);
-        for (int k = 0; k < 3; k++) c->change[k][i] = grey + tint * believed(map, c->change[k][i] - from);
+        const double own = mean_of_three(c->log_value, i), smooth = mean_of_three(c->change, i),
+                     level = map->edges ? c->level[0][i] : smooth,
+                     varies = map->edges ? fmax(c->level[1][i] - level * level, 0) : differs,
+                     tint = part_hidden(c->usual[i], hue),
+                     grey = part_hidden(c->usual[i], varies) * believed(map, level - own);
+        for (int k = 0; k < 3; k++)
+            c->change[k][i] = grey + tint * believed(map, c->change[k][i] - smooth - (c->log_value[k][i] - own));
     }
 }
 

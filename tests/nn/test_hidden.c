@@ -61,6 +61,28 @@ TEST(hidden_diffuse_is_that_of_the_surroundings)
                   "channel %d changed", k);
 }
 
+/* Black tiles beside the disk neither darken the wall nor keep the disk from being filled, and stay black. */
+TEST(hidden_diffuse_ends_where_the_material_does)
+{
+    const int edge = 5 * SIDE / 8;
+    make(0.25f, 0.3f, 0.08f);
+    for (int i = edge * SIDE; i < PIXELS; i++)
+        for (int k = 0; k < 3; k++) maps[i * C + MAP_DIFFUSE + k] = 2 * 0.02f - 1;
+    fill(1, filled);
+    double disk = 0;
+    float wall = 0, tiles = 0;
+    int count = 0;
+    for (int i = 0; i < PIXELS; i += 2) {
+        const float now = (filled[i * C] + 1) / 2, change = fabsf(logf(now / ((maps[i * C] + 1) / 2)));
+        if (distance(i) < 0.03f) disk += (double)now, count++;
+        else if (i / SIDE >= edge + 4) tiles = fmaxf(tiles, change);
+        else if (i / SIDE < edge - 4 && distance(i) > 0.16f) wall = fmaxf(wall, change);
+    }
+    CHECK(disk / count > 0.33 && disk / count < 0.43, "albedo .133 became %g, not .4", disk / count);
+    CHECK(wall < 0.1f, "the wall is changed by e^%g", wall);
+    CHECK(tiles < 0.3f, "black is changed by e^%g", tiles);
+}
+
 /* What is seen stays: a disk on a matt material is the material's own. */
 TEST(hidden_diffuse_leaves_what_is_seen)
 {
