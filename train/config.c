@@ -286,6 +286,14 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
                        "train.teacher is given: it teaches g alone, of one photograph, so train.steps must be 0, "
                        "model.images 1, model.channels %d and model.conditions, spread and scene yes",
                        MAP_CHANNELS);
+    if (c->data.measured > 0 &&
+        (c->train.steps || !c->arch.conditions || c->arch.images != 1 || tr_most_given(c) != 1 || c->data.sheet > 0))
+        return ts_fail(st, TS_INVALID,
+                       "data.measured is %g: g alone learns from such photographs, from one and told what is known, so "
+                       "train.steps and data.sheet must be 0, model.images 1 and model.conditions yes",
+                       c->data.measured);
+    if (c->train.lesson == TR_LESSON_KNOWN && c->data.measured == 0)
+        return ts_fail(st, TS_INVALID, "train.lesson is known and data.measured 0: nothing would be learned, use 0.5");
     if (c->train.lesson != TR_LESSON_DIFFUSE && !*c->train.teacher)
         return ts_fail(st, TS_INVALID,
                        "train.lesson is given without train.teacher, whose lesson it is: give both or none");

@@ -22,7 +22,7 @@ typedef struct tr_config {
         double hues, darker, relief, blend, uneven, closer, homogeneous;
         double noise, noise_spread, blur, exposure, vignette, white_balance, tilt, off_centre; /* as in io_camera */
         double fov_min, fov_max, meter, automatic, flash, flash_size, glare, lobes, soften, ambient, tone, sharpen;
-        double told_view, told_power;
+        double told_view, told_power, measured;
         double sheet, pose, shift, bracket; /* as in io_under_sheet */
         bool quantise;
         int jpeg, patch, prefetch, threads;

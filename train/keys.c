@@ -155,6 +155,9 @@ const tr_key tr_keys[] = {
      "share of the photographs whose field of view the model is given"},
     {"data", "told_power", TR_REAL, AT(data.told_power), 0, 1, "1", NULL, false,
      "share of the photographs whose light's power the model is given"},
+    {"data", "measured", TR_REAL, AT(data.measured), 0, 1, "0", NULL, false,
+     "share of the steps whose photographs are taken with care: light and camera are measured and given, in half of "
+     "them the default ones, nothing else shines, and no tone curve, vignetting or exposure is unknown"},
     {"data", "sheet", TR_REAL, AT(data.sheet), 0, 1, "0", NULL, false,
      "share of the materials whose photographs are those of a printed sheet (docs/capturing.md): exposure, meter, "
      "white_balance, tilt, off_centre, fov_min, fov_max and flash, which a sheet gives, are then 0, and the next three "
@@ -263,9 +266,8 @@ const tr_key tr_keys[] = {
      "(train/teach.c)"},
     {"train", "lesson", TR_CHOICE, AT(train.lesson), 0, TR_LESSON_KNOWN, "diffuse", lesson_names, false,
      "what is new to a student of train.teacher: diffuse as the teacher has it when it is told its own guess of a "
-     "camera that is not known; normals, which are the materials' own, by train.normal_rmse too; or known, all maps of "
-     "photographs whose light and camera are measured, which are half of the steps', by the losses of a g without a "
-     "teacher"},
+     "camera that is not known; normals, which are the materials' own, by train.normal_rmse too; or known, nothing but "
+     "what the steps of data.measured teach, whose losses are those of a g without a teacher"},
     {"train", "reduce", TR_CHOICE, AT(train.reduce), 0, TR_REDUCE_BF16, "f32", reduce_names, false,
      "how gradients are summed over the ranks of mpirun: as f32, or rounded to bf16 and summed as f32, which is half "
      "the bytes and off by at most a 256th of the sum of their magnitudes; one process sums nothing"},

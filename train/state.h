@@ -129,10 +129,10 @@ ts_code tr_teacher_load(tr_trainer *t, ts_status *st);
  * diffuse albedo where the camera is not known: that is what it says of one above the centre, at the distance that it
  * guesses. False after an error, which the tape has. */
 bool tr_taught(ag_tape *tape, const nn_model *teacher, const nn_input *in, nn_guess *said);
-/* Whether the materials themselves teach this step, from pictures under a light and a camera that are measured:
- * train.lesson = known, in half of the steps. */
-bool tr_teaches_known(const tr_config *c, int64_t step);
-/* Whose data photographs of this step are taken with: c, or in steps that teach what is known measured, which becomes c
+/* Whether this step is one of data.measured: of pictures under a light and a camera that are measured and given, which
+ * the materials teach, whoever else teaches. */
+bool tr_measured(const tr_config *c, int64_t step);
+/* Whose data photographs of this step are taken with: c, or in measured steps measured, which becomes c
  * without what cannot be measured, in half of them under the default flash. */
 const tr_config *tr_taken_with(const tr_config *c, int64_t step, tr_config *measured);
 /* How far the model is from what the teacher says, or with train.lesson = normals of the normals from target [batch,

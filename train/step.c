@@ -108,7 +108,7 @@ static ts_tensor cut(tr_trainer *t, const ts_tensor *whole, rd_grid g)
  * without its teacher, of camera and power, the teacher is not asked. */
 static void describe(tr_trainer *t, int given)
 {
-    const bool taught = t->config.train.lesson == TR_LESSON_KNOWN && !tr_teaches_known(&t->config, t->step);
+    const bool taught = t->config.train.lesson == TR_LESSON_KNOWN && !tr_measured(&t->config, t->step);
     ts_rng rng = ts_rng_make((uint64_t)t->config.train.seed, TS_STREAM_KNOWN, (uint64_t)t->step);
     for (int i = 0; i < t->first * given; i++) ts_rng_uniform(&rng); /* other ranks' */
     for (int i = 0; i < t->batch * given; i++) {
@@ -136,7 +136,7 @@ static ag_value *forward(tr_trainer *t, const float *target, int given, tr_row *
                    .given = given,
                    .recompute = c->train.checkpoint_steps};
     if (row->pretraining) {
-        const bool taught = t->teacher && !tr_teaches_known(c, t->step);
+        const bool taught = t->teacher && !tr_measured(c, t->step);
         return (taught ? tr_taught_loss : tr_guess_loss)(t, &in, ag_constant(t->tape, goals), row);
     }
     if (c->arch.revisions > 0) return tr_revision_loss(t, &in, ag_constant(t->tape, goals), row);

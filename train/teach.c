@@ -2,8 +2,9 @@
  * more of the diffuse albedo when it reads the photograph a second time and is told its own guess of the distance: a
  * student of diffuse learns to say that at once, and all else as the teacher's first answer has it. A student of
  * normals learns them from the materials, and keeps all else as the teacher has it: trained on the maps alone, levels
- * of F0 and roughness wander while normals gain (docs/training-over-phone.md). A student of what is known learns from
- * the materials what pictures say whose light and camera are measured, and keeps what the teacher says of others. */
+ * of F0 and roughness wander while normals gain (docs/training-over-phone.md). Steps of photographs whose light and
+ * camera are measured, data.measured, the materials teach; a student of what is known learns no more than these, and
+ * keeps what the teacher says of others. */
 #include "nn/weights/weights.h"
 #include "ops.h"
 #include "render/losses.h"
@@ -35,19 +36,19 @@ static ts_rng rng_of(const tr_config *c, int64_t step)
     return ts_rng_make((uint64_t)c->train.seed, TS_STREAM_LESSON, (uint64_t)step);
 }
 
-bool tr_teaches_known(const tr_config *c, int64_t step)
+bool tr_measured(const tr_config *c, int64_t step)
 {
     ts_rng rng = rng_of(c, step);
-    return c->train.lesson == TR_LESSON_KNOWN && ts_rng_uniform(&rng) < 0.5f;
+    return (double)ts_rng_uniform(&rng) < c->data.measured;
 }
 
 /* Who knows the light's power has its pictures in proportion to the light: they have no tone curve, and nothing else
  * shines. */
 const tr_config *tr_taken_with(const tr_config *c, int64_t step, tr_config *measured)
 {
-    if (!tr_teaches_known(c, step)) return c;
+    if (!tr_measured(c, step)) return c;
     ts_rng rng = rng_of(c, step);
-    ts_rng_uniform(&rng); /* tr_teaches_known's */
+    ts_rng_uniform(&rng); /* tr_measured's */
     tr_config *m = measured;
     *m = *c;
     m->data.told_view = m->data.told_power = 1;

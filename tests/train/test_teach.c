@@ -179,14 +179,14 @@ typedef struct hearing {
     int known, all, asked;
 } hearing;
 
-/* After each step: the materials taught it exactly where tr_teaches_known says so, and the teacher was not asked of
+/* After each step: the materials taught it exactly where tr_measured says so, and the teacher was not asked of
  * pictures that these teach. */
 static void count_known(const tr_row *row, void *user)
 {
     hearing *h = user;
     const tr_config *c = &h->t->config;
     const bool known = isfinite(row->render_start);
-    CHECK(known == tr_teaches_known(c, row->step - 1), "step %lld", (long long)row->step);
+    CHECK(known == tr_measured(c, row->step - 1), "step %lld", (long long)row->step);
     CHECK(known || row->spread < 1, "the teacher's are %g away", row->spread);
     h->known += known;
     for (int i = 0; i < RD_LOSS_VIEWS; i++)
@@ -196,6 +196,18 @@ static void count_known(const tr_row *row, void *user)
         CHECK(((told & sure) == sure) == known, "step %lld, photograph %d: %d is told", (long long)row->step, i, told);
         h->all += known && told == NN_KNOWN_ALL, h->asked += !known && (told & sure);
     }
+}
+
+/* After each step without a teacher: all of a measured one's photographs are given with camera and power. */
+static void count_given(const tr_row *row, void *user)
+{
+    hearing *h = user;
+    const int sure = NN_KNOWN_CAMERA | NN_KNOWN_POWER;
+    int all = 0;
+    for (int i = 0; i < h->t->batch; i++) all += (h->t->known[i] & sure) == sure;
+    const bool measured = tr_measured(&h->t->config, row->step - 1);
+    if (measured) CHECK(all == h->t->batch, "step %lld: %d are given", (long long)row->step, all);
+    h->known += measured, h->asked += !measured, h->all += !measured && all == h->t->batch;
 }
 
 /* Half of the steps are of pictures whose light and camera are measured, which are told and have no other light and no
@@ -212,12 +224,12 @@ TEST(trainer_learns_known_cameras_beside_a_teacher)
     tr_config c = lesson(path);
     c.data.tone = c.data.ambient = c.data.exposure = 1, c.data.flash = 0.2, c.data.fov_min = 20, c.data.fov_max = 70;
     for (int step = 0; step < STEPS; step++) {
-        c.train.lesson = TR_LESSON_NORMALS;
-        CHECK(!tr_teaches_known(&c, step), "a lesson of normals teaches cameras");
-        c.train.lesson = TR_LESSON_KNOWN;
+        c.data.measured = 0;
+        CHECK(!tr_measured(&c, step), "a share of 0 has measured steps");
+        c.data.measured = 0.5;
         tr_config measured;
         const tr_config *m = tr_taken_with(&c, step, &measured);
-        CHECK(m == (tr_teaches_known(&c, step) ? &measured : &c), "step %d is taken with another's", step);
+        CHECK(m == (tr_measured(&c, step) ? &measured : &c), "step %d is taken with another's", step);
         if (m == &c) continue;
         const rd_view planned = rd_flash();
         tr_shot shot;
@@ -232,8 +244,13 @@ TEST(trainer_learns_known_cameras_beside_a_teacher)
     CHECK(known > STEPS * 2 / 5 && known < STEPS * 3 / 5, "%d of %d steps are known", known, STEPS);
     CHECK(flash > known * 2 / 5 && flash < known * 3 / 5, "%d of %d under the flash", flash, known);
 
-    *c.train.teacher = 0, c.train.lesson = TR_LESSON_DIFFUSE;
-    CHECK(run(&c, folder("tellers"), &l, &st) == TS_OK, "%s", st.message);
+    *c.train.teacher = 0, c.data.told_power = 0.2;
+    const tr_listener plain = {.step = count_given, .user = &h};
+    h.t = tr_create(&c, folder("tellers"), false, NULL, &plain, &st);
+    CHECK(h.t && tr_run(h.t, &st) == TS_OK, "%s", st.message);
+    CHECK(h.known > 4 && h.asked > 4 && h.all == 0, "%d measured, of %d others %d", h.known, h.asked, h.all);
+    tr_destroy(&h.t);
+    h = (hearing){0};
     snprintf(c.train.teacher, sizeof c.train.teacher, "%s", path);
     snprintf(c.train.init, sizeof c.train.init, "%s", path);
     c.train.lesson = TR_LESSON_KNOWN, c.train.seed = 77;
@@ -244,4 +261,9 @@ TEST(trainer_learns_known_cameras_beside_a_teacher)
     CHECK(h.known > 4 && h.known < 20, "%d of 24 steps are known", h.known);
     CHECK(h.all > h.known / 4 && h.asked > 0, "light known in %d, the teacher told something in %d", h.all, h.asked);
     tr_destroy(&h.t);
+
+    c.data.measured = 0;
+    CHECK(run(&c, folder("none"), &l, &st) == TS_INVALID && strstr(st.message, "data.measured"), "%s", st.message);
+    c.data.measured = 0.5, c.data.sheet = 0.5;
+    CHECK(run(&c, folder("none"), &l, &st) == TS_INVALID && strstr(st.message, "data.sheet"), "%s", st.message);
 }
