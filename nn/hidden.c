@@ -239,18 +239,25 @@ static double believed(const hidden_map *map, double from)
     return from / (1 + far * far);
 }
 
+/* Some values of the cells become their fields. */
+static void find_fields(const cells *c, int side, bool edges, double *band, int sides, double x[][CELLS * CELLS])
+{
+    const int count = side * side;
+    make_band(c, side, edges, band);
+    factor(count, side, band);
+    for (int k = 0; k < sides; k++)
+        for (int i = 0; i < count; i++) x[k][i] *= c->weight[i] + WEIGHT_LEAST;
+    solve(count, side, band, sides, x);
+}
+
 /* The level's field and that of its square, which end at edges: their difference is the variance around each cell. */
 static void find_levels(int side, double *band, cells *c)
 {
-    const int count = side * side;
-    make_band(c, side, true, band);
-    factor(count, side, band);
-    for (int i = 0; i < count; i++) {
-        const double level = mean_of_three(c->log_value, i);
-        c->level[0][i] = (c->weight[i] + WEIGHT_LEAST) * level;
-        c->level[1][i] = c->level[0][i] * level;
+    for (int i = 0; i < side * side; i++) {
+        c->level[0][i] = mean_of_three(c->log_value, i);
+        c->level[1][i] = squared(c->level[0][i]);
     }
-    solve(count, side, band, 2, c->level);
+    find_fields(c, side, true, band, 2, c->level);
 }
 
 /* A material that is light and dark may be of one hue all over: each has a part of its own. */
@@ -262,11 +269,8 @@ static void find_changes(const void *job, int64_t which)
     cells *c = &j->c[which];
     double *band = j->band + which * count * (side + 1);
     weigh(map, count, c);
-    make_band(c, side, false, band);
-    factor(count, side, band);
-    for (int k = 0; k < 3; k++)
-        for (int i = 0; i < count; i++) c->change[k][i] = (c->weight[i] + WEIGHT_LEAST) * c->log_value[k][i];
-    solve(count, side, band, 3, c->change);
+    memcpy(c->change, c->log_value, sizeof c->change);
+    find_fields(c, side, false, band, 3, c->change);
     if (map->edges) find_levels(side, band, c);
     double differs, hue;
     differ(c, count, &differs, &hue);

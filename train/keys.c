@@ -157,7 +157,8 @@ const tr_key tr_keys[] = {
      "share of the photographs whose light's power the model is given"},
     {"data", "measured", TR_REAL, AT(data.measured), 0, 1, "0", NULL, false,
      "share of the steps whose photographs are taken with care: light and camera are measured and given, in half of "
-     "them the default ones, nothing else shines, and no tone curve, vignetting or exposure is unknown"},
+     "them the default ones, and nothing else shines; tone curve, vignetting, sharpening, glare and what varies of "
+     "exposure and white balance are off"},
     {"data", "sheet", TR_REAL, AT(data.sheet), 0, 1, "0", NULL, false,
      "share of the materials whose photographs are those of a printed sheet (docs/capturing.md): exposure, meter, "
      "white_balance, tilt, off_centre, fov_min, fov_max and flash, which a sheet gives, are then 0, and the next three "
