@@ -1,7 +1,9 @@
-/* A model starts from the parameters of another one, which may read fewer photographs or have a narrower g. */
+/* A model starts from the parameters of another one, which may read fewer photographs, or have a narrower or a deeper
+ * g. */
 #include "nn/layers.h"
 #include "nn/weights/weights.h"
 #include "tensor/rng.h"
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -80,9 +82,23 @@ typedef struct inputs {
 static bool may_grow(const nn_arch *narrow, const nn_arch *wide)
 {
     return narrow->g_width <= wide->g_width && narrow->g_width_max <= wide->g_width_max &&
-        narrow->g_levels == wide->g_levels && narrow->g_kernel == wide->g_kernel &&
-        narrow->g_kernel_first == wide->g_kernel_first && narrow->images == wide->images &&
-        narrow->compat == NN_COMPAT_NONE && wide->compat == NN_COMPAT_NONE;
+        (narrow->g_unshuffle == 1 || narrow->g_detail <= wide->g_detail) &&
+        (narrow->g_half == 0 || narrow->g_half == wide->g_half) && narrow->g_levels >= wide->g_levels &&
+        narrow->g_kernel == wide->g_kernel && narrow->g_kernel_first == wide->g_kernel_first &&
+        narrow->images == wide->images && narrow->compat == NN_COMPAT_NONE && wide->compat == NN_COMPAT_NONE;
+}
+
+/* What a file of that architecture calls parameter p: the way up is counted from below, where a deeper g has levels
+ * that this one lacks. there: NULL where it says none. */
+static const char *name_there(const nn_model *model, const nn_arch *there, const nn_param *p, char room[96])
+{
+    static const char up[] = "g.up";
+    const int more = there ? there->g_levels - model->arch.g_levels : 0;
+    if (more <= 0 || strncmp(p->name, up, sizeof up - 1) != 0) return p->name;
+    char *rest;
+    const long level = strtol(p->name + sizeof up - 1, &rest, 10);
+    snprintf(room, 96, "%s%ld%s", up, level + more, rest);
+    return room;
 }
 
 static inputs inputs_of(const nn_model *model, const nn_arch *narrow, int index, const int *from, const int *to)
@@ -98,17 +114,20 @@ static inputs inputs_of(const nn_model *model, const nn_arch *narrow, int index,
         if (index == l->down[i].global.weight || index == l->up[i].global.weight) /* [mean of the features, global] */
             return (inputs){2, {from[0], from[1] - from[0]}, {to[0], to[1] - to[0]}};
     }
+    if (index == l->detail[1].weight && model->arch.g_unshuffle > 1) /* [squares, the U-Net's features] */
+        return (inputs){
+            2, {narrow->g_detail, from[1] - narrow->g_detail}, {model->arch.g_detail, to[1] - model->arch.g_detail}};
     return (inputs){1, {from[1], 0}, {to[1], 0}};
 }
 
 /* A tensor of g starts from that of a narrower g (Chen, Goodfellow, Shlens, "Net2Net", ICLR 2016, section 2.2): channel
  * j is the narrow one's j mod c, and the layers that read it read its copies, each with a random share of the weight,
  * so that training separates them. The network computes the same as the narrow one. narrow: the list of parameters that
- * the file states. False where it has no such tensor. */
-static bool grown(const nn_model *model, const nn_model *narrow, int index, nn_file *f)
+ * the file states, name: of this one there. False where it has no such tensor. */
+static bool grown(const nn_model *model, const nn_model *narrow, int index, const char *name, nn_file *f)
 {
     const nn_param *p = &model->param[index];
-    const nn_param *q = nn_model_find(narrow, p->name);
+    const nn_param *q = nn_model_find(narrow, name);
     if (!q || strncmp(p->name, "g.", 2) != 0) return false;
     for (int i = 0; i < 4; i++)
         if (i < 2 ? q->dim[i] > p->dim[i] : q->dim[i] != p->dim[i]) return false;
@@ -144,18 +163,19 @@ ts_code nn_model_init_from(nn_model *model, const char *path, bool *begun, int *
     if (!f) return st ? st->code : TS_IO;
     *taken = *left = 0;
     nn_arch stated;
-    nn_model *narrow = !nn_arch_from_file(f, &stated, NULL) && may_grow(&stated, &model->arch)
-        ? nn_model_plan(&stated, NULL)
-        : NULL;
+    const bool says = !nn_arch_from_file(f, &stated, NULL);
+    nn_model *narrow = says && may_grow(&stated, &model->arch) ? nn_model_plan(&stated, NULL) : NULL;
     ts_code code = TS_OK;
     for (int i = 0; i < model->params && !code; i++) {
         const nn_param *p = &model->param[i];
         int64_t dim[4];
+        char room[96];
+        const char *name = name_there(model, says ? &stated : NULL, p, room);
         if (begun && begun[i]) continue;
         nn_param_dims(p, dim);
-        if (nn_file_read(f, p->name, p->rank, dim, model->value + p->offset, NULL) &&
+        if (nn_file_read(f, name, p->rank, dim, model->value + p->offset, NULL) &&
             !with_more_photographs(model, i, f) && !(narrow && with_more_channels(model, narrow, i, f)) &&
-            !(narrow && grown(model, narrow, i, f)))
+            !(narrow && grown(model, narrow, i, name, f)))
             ++*left;
         else if (!nn_all_finite(model->value + p->offset, p->count))
             code = ts_fail(st, TS_NUMERIC, "%s: tensor \"%s\" holds a value that is not finite", path, p->name);

@@ -29,7 +29,8 @@ ts_code nn_model_save(const nn_model *model, const float *values, const char *pa
                       ts_status *st);
 /* Takes the parameters of the same name and shape from the file. A model of several photographs also takes those of a
  * model of one, and then ignores all but the first photograph. A wider g also takes those of a narrower g, with
- * channels duplicated, and computes the same. taken and left: how many parameters were taken and were not. begun
+ * channels duplicated, and computes the same. A g with fewer levels takes those of the upper ones, whose deepest level
+ * was normalised there: it has to be trained again. taken and left: how many parameters were taken and were not. begun
  * (model->params of them, or NULL): marked parameters keep their values and are not counted; those taken are marked, so
  * that another file can supply the rest. TS_FORMAT when none was taken. */
 ts_code nn_model_init_from(nn_model *model, const char *path, bool *begun, int *taken, int *left, ts_status *st);

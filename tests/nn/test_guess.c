@@ -241,3 +241,60 @@ TEST(guess_architectures_are_checked)
     const nn_arch a = detailed();
     CHECK(!nn_arch_check(&a, &st), "%s", st.message);
 }
+
+static void begin_from(const nn_model *from, nn_model *m, int *left)
+{
+    char path[256];
+    ts_status st = {0};
+    int taken;
+    snprintf(path, sizeof path, "%s/from.safetensors", test_folder());
+    CHECK(!nn_model_save(from, from->value, path, NULL, 0, &st), "%s", st.message);
+    CHECK(!nn_model_init_from(m, path, NULL, &taken, left, &st) && taken + *left == m->params, "%s", st.message);
+}
+
+/* A g with wider levels and wider squares, whose further blocks add nothing yet, computes what it began as. */
+TEST(guess_of_a_narrower_g_is_the_same)
+{
+    nn_arch narrow = detailed(), wide = detailed();
+    narrow.g_half = wide.g_half = 4;
+    wide.g_width += 3, wide.g_width_max += 5, wide.g_detail = 15, wide.g_trunk = 2;
+    nn_model *from = create(&narrow, 81), *m = create(&wide, 82);
+    enliven_guess(from);
+    int left;
+    begin_from(from, m, &left);
+    CHECK(left == 3, "%d are left, not the second block's", left);
+    nn_input in = photographs(1, FINE, 83, NULL);
+    float a[2 * RD_SCENE_NUMBERS], b[2 * RD_SCENE_NUMBERS];
+    guess(from, &in, one, s1, a);
+    guess(m, &in, two, s2, b);
+    CHECK(difference(one, two, FINE * FINE * 9) < 2e-5 && difference(s1, s2, FINE * FINE * NN_SPREADS) < 2e-5 &&
+              difference(a, b, 2 * RD_SCENE_NUMBERS) < 2e-5,
+          "the maps differ by %g, the spread by %g, the scene by %g", difference(one, two, FINE * FINE * 9),
+          difference(s1, s2, FINE * FINE * NN_SPREADS), difference(a, b, 2 * RD_SCENE_NUMBERS));
+    nn_model_free(&from);
+    nn_model_free(&m);
+}
+
+/* The way up of a g with fewer levels is the upper part of a deeper one's. */
+TEST(guess_begins_as_the_upper_levels_of_a_deeper_g)
+{
+    nn_arch deep = detailed(), flat = detailed();
+    deep.g_width_max = flat.g_width_max = deep.g_width;
+    flat.g_levels = deep.g_levels - 1;
+    nn_model *from = create(&deep, 84), *m = create(&flat, 85);
+    int left;
+    begin_from(from, m, &left);
+    CHECK(left == 0, "%d are left", left);
+    for (int i = 0; i < m->params; i++) {
+        char name[sizeof m->param->name];
+        const nn_param *p = &m->param[i];
+        snprintf(name, sizeof name, "%s", p->name);
+        if (!strncmp(name, "g.up", 4)) name[4]++;
+        const nn_param *q = nn_model_find(from, name);
+        CHECK(q && q->count == p->count &&
+                  !memcmp(m->value + p->offset, from->value + q->offset, p->count * sizeof(float)),
+              "%s is not the deeper one's %s", p->name, name);
+    }
+    nn_model_free(&from);
+    nn_model_free(&m);
+}

@@ -297,7 +297,8 @@ TEST(weights_init_from_a_narrower_g_computes_the_same)
     wide.g_levels = 1;
     nn_model_free(&n);
     n = nn_model_create(&wide, &st);
-    CHECK(!nn_model_init_from(n, path, NULL, &taken, &left, &st) && left > 0, "another depth was taken");
+    CHECK(!nn_model_init_from(n, path, NULL, &taken, &left, &st) && left > 0,
+          "widths that are not there were taken of another depth");
     nn_model_free(&m), nn_model_free(&n);
 }
 
