@@ -21,6 +21,10 @@
 #define ROUGHNESS_LEVEL 0.15
 #define ROUGHNESS_LEVEL_IN_KNOWN_VIEW 0.4
 
+/* Tone curve, lens and other lights change a photograph that was not taken with care all over it, and alike in
+ * neighbours: to the numbers of the whole it tells less than to a pixel's maps. */
+#define LEFT_OUT_ALL_OVER 4
+
 enum { ROWS = 16 }; /* that another thread is worth */
 
 /* The numbers that are known have no error: the prior keeps them. */
@@ -96,11 +100,18 @@ static void copy_colours(const void *job, int64_t begin, int64_t end)
         }
 }
 
+static ts_prior of_the_whole(int known)
+{
+    ts_prior scale = nn_step_prior(known, 1);
+    if (!(known & NN_KNOWN_POWER)) scale.model *= LEFT_OUT_ALL_OVER, scale.gain *= LEFT_OUT_ALL_OVER;
+    return scale;
+}
+
 /* Scene and level, found from R_0; R_0's diffuse where that scene's highlight hides it; both again. */
 static ts_code fit(rd_grid grid, const float *image, int channels, int known, const rd_scene_prior *prior,
                    ts_arena *arena, nn_first_guess *g, ts_status *st)
 {
-    const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior(known, 1)};
+    const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = of_the_whole(known)};
     const int threads = grid.threads;
     const int64_t pixels = (int64_t)grid.h * grid.w;
     float unknown[RD_SCENE_UNKNOWNS], *rough = ts_arena_alloc(arena, (size_t)pixels * (size_t)channels * sizeof *rough);

@@ -2,6 +2,7 @@
 #include "infer/estimate.h"
 #include "infer/tiles.h"
 #include "nn/first_guess.h"
+#include "render/scene_model.h"
 #include "tests/support/networks.h"
 
 enum { PLACE = 64, WIDE = 600 };
@@ -137,6 +138,41 @@ TEST(first_guess_trusts_a_careful_photograph_more)
     free(maps), free(deviation);
     free(in.image.data);
     nn_model_free(&m);
+}
+
+/* What shades one side of a photograph whose power is not known is no place of the flash, which stays where g says. */
+TEST(first_guess_leaves_the_flash_where_another_light_shines)
+{
+    enum { PIXELS = PLACE * PLACE };
+    float scene[2 * RD_SCENE_NUMBERS] = {0}, *maps = calloc(PIXELS * 9, sizeof *maps),
+                    *image = malloc(PIXELS * 3 * sizeof *image);
+    for (int i = 0; i < PIXELS; i++) {
+        for (int k = 0; k < 3; k++) maps[i * 9 + MAP_DIFFUSE + k] = -0.4f, maps[i * 9 + MAP_SPECULAR + k] = -0.92f;
+        maps[i * 9 + MAP_ROUGHNESS] = 0;
+    }
+    for (int i = RD_SCENE_NUMBERS; i < 2 * RD_SCENE_NUMBERS; i++) scene[i] = -1;
+    rd_scene_photograph(rd_grid_full(PLACE), maps, 9, scene, false, image);
+    for (int i = 0; i < PIXELS * 3; i++) image[i] *= 1 + 0.3f * nn_place(i / 3 % PLACE, PLACE);
+    double moved[2];
+    for (int careful = 0; careful < 2; careful++) {
+        ts_status st = {0};
+        ag_tape *tape = tape_create(false);
+        ag_value *r0 = ag_empty(tape, (ts_shape){1, PLACE, PLACE, 9}),
+                 *spread = ag_empty(tape, (ts_shape){1, PLACE, PLACE, NN_SPREADS}),
+                 *deviation = ag_empty(tape, (ts_shape){1, PLACE, PLACE, NN_SPREADS});
+        CHECK(r0 && spread && deviation, "out of memory");
+        memcpy(r0->t.data, maps, PIXELS * 9 * sizeof *maps);
+        for (int i = 0; i < PIXELS * NN_SPREADS; i++) spread->t.data[i] = -1;
+        nn_first_guess g = {.r0 = r0->t.data, .spread = spread->t.data, .deviation = deviation->t.data};
+        const nn_taken taken = {rd_flash(), careful ? NN_KNOWN_POWER : 0, 1};
+        CHECK(!nn_first_guess_settle(rd_grid_full(PLACE), 9, image, scene, &taken, ag_arena(tape), &g, &st), "%s",
+              st.message);
+        moved[careful] = fabs((double)g.number[RD_SCENE_LIGHT_X]);
+        ag_tape_destroy(&tape);
+    }
+    CHECK(moved[1] > 0.3 && moved[0] < 0.1 * moved[1],
+          "the flash moved by %g of a tenth of a patch, with the power known by %g", moved[0], moved[1]);
+    free(maps), free(image);
 }
 
 /* A network that is sure of its maps keeps them. */
