@@ -100,18 +100,34 @@ static void copy_colours(const void *job, int64_t begin, int64_t end)
         }
 }
 
-static ts_prior of_the_whole(int known)
+static rd_scene_how of_the_whole(int known)
 {
-    ts_prior scale = nn_step_prior(known, 1);
-    if (!(known & NN_KNOWN_POWER)) scale.model *= LEFT_OUT_ALL_OVER, scale.gain *= LEFT_OUT_ALL_OVER;
-    return scale;
+    rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior(known, 1)};
+    if (!(known & NN_KNOWN_POWER)) how.scale.model *= LEFT_OUT_ALL_OVER, how.scale.gain *= LEFT_OUT_ALL_OVER;
+    return how;
 }
 
-/* Scene and level, found from R_0; R_0's diffuse where that scene's highlight hides it; both again. */
+/* The scene that explains the photograph best with R_0 as it is now: what the maps' levels were found with says less of
+ * it. */
+static void find_scene(rd_grid grid, const float *image, int channels, int known, const rd_scene_prior *prior,
+                       nn_first_guess *g)
+{
+    rd_scene_prior beside = *prior;
+    rd_scene_how how = of_the_whole(known);
+    float unknown[RD_SCENE_UNKNOWNS] = {0};
+    how.scale = nn_step_prior(known, 1);
+    beside.mean[RD_SCENE_ROUGHNESS] = beside.deviation[RD_SCENE_ROUGHNESS] = 0;
+    memcpy(unknown, g->number, sizeof g->number);
+    rd_scene_fit(grid, g->r0, channels, g->deviation, image, &beside, &how, unknown, NULL);
+    memcpy(g->number, unknown, sizeof g->number);
+}
+
+/* Scene and level, found from R_0; R_0's diffuse where that scene's highlight hides it; both again. Then the scene
+ * alone. */
 static ts_code fit(rd_grid grid, const float *image, int channels, int known, const rd_scene_prior *prior,
                    ts_arena *arena, nn_first_guess *g, ts_status *st)
 {
-    const rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = of_the_whole(known)};
+    const rd_scene_how how = of_the_whole(known);
     const int threads = grid.threads;
     const int64_t pixels = (int64_t)grid.h * grid.w;
     float unknown[RD_SCENE_UNKNOWNS], *rough = ts_arena_alloc(arena, (size_t)pixels * (size_t)channels * sizeof *rough);
@@ -126,6 +142,7 @@ static ts_code fit(rd_grid grid, const float *image, int channels, int known, co
     memcpy(g->number, unknown, sizeof g->number);
     rd_scene_roughen(pixels, g->r0, channels, unknown[RD_SCENE_ROUGHNESS], threads, g->r0);
     if (!(known & NN_KNOWN_LIGHT)) nn_share_lean(pixels, channels, threads, g->number, g->r0);
+    if (!(known & NN_KNOWN_POWER)) find_scene(grid, image, channels, known, prior, g);
     return TS_OK;
 }
 

@@ -140,8 +140,8 @@ TEST(first_guess_trusts_a_careful_photograph_more)
     nn_model_free(&m);
 }
 
-/* What shades one side of a photograph whose power is not known is no place of the flash, which stays where g says. */
-TEST(first_guess_leaves_the_flash_where_another_light_shines)
+/* What shades one side of a photograph whose power is not known is no slope of the sample. */
+TEST(first_guess_leaves_a_sample_flat_where_another_light_shines)
 {
     enum { PIXELS = PLACE * PLACE };
     float scene[2 * RD_SCENE_NUMBERS] = {0}, *maps = calloc(PIXELS * 9, sizeof *maps),
@@ -153,7 +153,7 @@ TEST(first_guess_leaves_the_flash_where_another_light_shines)
     for (int i = RD_SCENE_NUMBERS; i < 2 * RD_SCENE_NUMBERS; i++) scene[i] = -1;
     rd_scene_photograph(rd_grid_full(PLACE), maps, 9, scene, false, image);
     for (int i = 0; i < PIXELS * 3; i++) image[i] *= 1 + 0.3f * nn_place(i / 3 % PLACE, PLACE);
-    double moved[2];
+    double leans[2];
     for (int careful = 0; careful < 2; careful++) {
         ts_status st = {0};
         ag_tape *tape = tape_create(false);
@@ -167,11 +167,11 @@ TEST(first_guess_leaves_the_flash_where_another_light_shines)
         const nn_taken taken = {rd_flash(), careful ? NN_KNOWN_POWER : 0, 1};
         CHECK(!nn_first_guess_settle(rd_grid_full(PLACE), 9, image, scene, &taken, ag_arena(tape), &g, &st), "%s",
               st.message);
-        moved[careful] = fabs((double)g.number[RD_SCENE_LIGHT_X]);
+        leans[careful] = fabs((double)g.r0[MAP_NORMAL]);
         ag_tape_destroy(&tape);
     }
-    CHECK(moved[1] > 0.3 && moved[0] < 0.1 * moved[1],
-          "the flash moved by %g of a tenth of a patch, with the power known by %g", moved[0], moved[1]);
+    CHECK(leans[1] > 0.003 && leans[0] < 0.1 * leans[1], "it leans by %g, with the power known by %g", leans[0],
+          leans[1]);
     free(maps), free(image);
 }
 
