@@ -89,15 +89,15 @@ static bool may_grow(const nn_arch *narrow, const nn_arch *wide)
 }
 
 /* What a file of that architecture calls parameter p: the way up is counted from below, where a deeper g has levels
- * that this one lacks. there: NULL where it says none. */
-static const char *name_there(const nn_model *model, const nn_arch *there, const nn_param *p, char room[96])
+ * that this one lacks. there: NULL where it says none; room: as long as a name. */
+static const char *name_there(const nn_model *model, const nn_arch *there, const nn_param *p, char *room)
 {
     static const char up[] = "g.up";
     const int more = there ? there->g_levels - model->arch.g_levels : 0;
     if (more <= 0 || strncmp(p->name, up, sizeof up - 1) != 0) return p->name;
     char *rest;
     const long level = strtol(p->name + sizeof up - 1, &rest, 10);
-    snprintf(room, 96, "%s%ld%s", up, level + more, rest);
+    snprintf(room, sizeof p->name, "%s%ld%s", up, level + more, rest);
     return room;
 }
 
@@ -169,7 +169,7 @@ ts_code nn_model_init_from(nn_model *model, const char *path, bool *begun, int *
     for (int i = 0; i < model->params && !code; i++) {
         const nn_param *p = &model->param[i];
         int64_t dim[4];
-        char room[96];
+        char room[sizeof p->name];
         const char *name = name_there(model, says ? &stated : NULL, p, room);
         if (begun && begun[i]) continue;
         nn_param_dims(p, dim);
