@@ -35,7 +35,8 @@ enum {
     TS_STREAM_HOMOGENEOUS,
     TS_STREAM_CLOSER,
     TS_STREAM_DARKER,
-    TS_STREAM_LESSON
+    TS_STREAM_LESSON,
+    TS_STREAM_COLLECTED /* parts of map sets */
 };
 
 uint32_t ts_rng_u32(ts_rng *r);

@@ -306,6 +306,10 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
             st, TS_INVALID,
             "data.patch is %d and validate.size %d: revisions are of %d pixels a side, unshuffle times g_size",
             c->data.patch, c->validate.size, side);
+    if ((c->data.collected > 0) != (*c->data.collection != 0))
+        return ts_fail(st, TS_INVALID,
+                       "data.collected is %g and data.collection \"%s\": give both, the folder and the share, or none",
+                       c->data.collected, c->data.collection);
     const double narrow = c->data.fov_min, wide = c->data.fov_max;
     if ((narrow != 0 || wide != 0) && (narrow < 5 || wide < narrow))
         return ts_fail(st, TS_INVALID,

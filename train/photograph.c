@@ -17,7 +17,8 @@ io_procedural tr_materials_of(const tr_config *c)
                            .blend = (float)c->data.blend,
                            .uneven = (float)c->data.uneven,
                            .closer = (float)c->data.closer,
-                           .homogeneous = (float)c->data.homogeneous};
+                           .homogeneous = (float)c->data.homogeneous,
+                           .collected = (float)c->data.collected};
 }
 
 io_camera tr_camera_of(const tr_config *c)

@@ -54,6 +54,7 @@ typedef struct tr_trainer {
     ag_tape *tape;
     nn_model *teacher; /* train.teacher, or NULL */
     ag_tape *quiet;    /* of a fixed g, without gradients, whose packed weights are kept; NULL where none is read */
+    io_collection *collection; /* data.collection, or NULL */
     io_loader *loader;
     float *images;     /* [batch][given][patch][patch][3], given <= arch.images; batch: the share's, here and below */
     rd_view *captures; /* [batch][given] */

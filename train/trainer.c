@@ -209,7 +209,12 @@ static void leave_blocks(tr_trainer *t)
 static ts_code begin(tr_trainer *t, bool resume, ts_status *st)
 {
     const tr_config *c = &t->config;
-    const io_procedural source = tr_materials_of(c);
+    if (c->data.collected > 0) {
+        t->collection = io_collection_read(c->data.collection, 0, st);
+        if (!t->collection) return ts_context(st, "data.collection");
+    }
+    io_procedural source = tr_materials_of(c);
+    source.collection = t->collection;
     const io_share share = {c->train.batch, t->first, t->batch};
     t->loader = io_loader_create(&source, c->data.patch, share, (uint64_t)t->step, c->data.prefetch, c->data.threads,
                                  st);
@@ -291,6 +296,7 @@ void tr_destroy(tr_trainer **trainer)
     tr_trainer *t = *trainer;
     if (!t) return;
     io_loader_destroy(&t->loader);
+    io_collection_free(&t->collection);
     tr_log_close(t);
     tr_validator_free(&t->validator);
     leave_blocks(t);

@@ -186,6 +186,9 @@ int main(int argc, char **argv)
     if (code) return code;
     ts_threads_set((int)o.threads);
     cl_catch_interrupt();
+    io_collection *collection = o.collection ? io_collection_read(o.collection, 0, &st) : NULL;
+    if (st.code) return cl_finish(cl_failed("%s", st.message));
+    o.procedural.collection = collection;
     const bool there = o.output && access(o.output, F_OK) == 0;
     if (o.output) cl_make_folder(o.output, &st);
     if (!st.code && (o.format || o.photographs))
@@ -193,6 +196,7 @@ int main(int argc, char **argv)
     if (!st.code && o.sheet) make_sheet(&o, &st);
     if (!st.code && o.statistics) compare(&o, &st);
     if (!st.code && o.histograms) make_histograms(&o, &st);
+    io_collection_free(&collection);
     if (o.output && !there) rmdir(o.output); /* nothing came into it, or it stays */
     if (st.code == TS_INTERRUPTED) return cl_finish(cl_stopped("%s", st.message));
     return cl_finish(st.code ? cl_failed("%s", st.message) : CL_OK);

@@ -16,7 +16,8 @@ static const struct {
               {"blend", "that are a mean of two", offsetof(io_procedural, blend)},
               {"uneven", "that do not lie flat", offsetof(io_procedural, uneven)},
               {"closer", "seen from up to four times as near", offsetof(io_procedural, closer)},
-              {"homogeneous", "that are the same all over the patch", offsetof(io_procedural, homogeneous)}};
+              {"homogeneous", "that are the same all over the patch", offsetof(io_procedural, homogeneous)},
+              {"collected", "that are parts of --collection's", offsetof(io_procedural, collected)}};
 
 enum {
     SHARES = sizeof shares / sizeof *shares,
@@ -33,6 +34,7 @@ enum {
     OPT_STATISTICS,
     OPT_HISTOGRAMS,
     OPT_TESTDATA,
+    OPT_COLLECTION,
     OPT_THREADS,
     OPT_HELP,
     OPT_VERSION,
@@ -54,6 +56,7 @@ static const struct option plain_options[] = {{"output", required_argument, NULL
                                               {"statistics", no_argument, NULL, OPT_STATISTICS},
                                               {"histograms", no_argument, NULL, OPT_HISTOGRAMS},
                                               {"testdata", required_argument, NULL, OPT_TESTDATA},
+                                              {"collection", required_argument, NULL, OPT_COLLECTION},
                                               {"threads", required_argument, NULL, OPT_THREADS},
                                               {"help", no_argument, NULL, OPT_HELP},
                                               {"version", no_argument, NULL, OPT_VERSION},
@@ -91,6 +94,7 @@ static void print_help(void)
     for (int i = 0; i < SHARES; i++)
         printf("      --%s X%*sshare of the materials %s, 0 .. 1 (default 0)\n", shares[i].name,
                14 - (int)strlen(shares[i].name), "", shares[i].help);
+    printf("      --collection DIR  a folder of map folders of your own\n");
     printf("\nPhotographs, largest values of what each draws:\n");
     for (int i = 0; i < CL_CAMERA_OPTIONS; i++) {
         io_camera least = cl_camera_default;
@@ -168,6 +172,7 @@ int cl_data_options_read(int argc, char **argv, cl_data_options *o)
         case OPT_STATISTICS: o->statistics = true; break;
         case OPT_HISTOGRAMS: o->histograms = true; break;
         case OPT_TESTDATA: o->testdata = optarg; break;
+        case OPT_COLLECTION: o->collection = optarg; break;
         case OPT_THREADS: code = parse_number("threads", optarg, 1, 1024, &o->threads); break;
         case OPT_HELP: print_help(); exit(cl_finish(CL_OK));
         case OPT_VERSION: cl_print_version(); exit(cl_finish(CL_OK));
@@ -194,6 +199,8 @@ int cl_data_options_read(int argc, char **argv, cl_data_options *o)
     const float narrow = o->camera.fov_min, wide = o->camera.fov_max;
     if ((narrow != 0 || wide != 0) && (narrow < 5 || wide < narrow))
         return cl_usage("--fov-min and --fov-max go together: 5 <= fov-min <= fov-max");
+    if ((o->procedural.collected > 0) != (o->collection != NULL))
+        return cl_usage("--collection and --collected go together: the folder and the share");
     o->procedural.seed = (uint64_t)seed;
     return CL_OK;
 }

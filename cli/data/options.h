@@ -13,7 +13,7 @@ typedef enum cl_format {
 } cl_format;
 
 typedef struct cl_data_options {
-    const char *output, *testdata;
+    const char *output, *testdata, *collection;
     io_procedural procedural;
     int64_t first, count, size, threads, quality, width; /* count and size 0: not given */
     io_camera camera;

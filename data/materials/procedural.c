@@ -1,5 +1,6 @@
 #include "data/materials/procedural.h"
 #include "data/materials/blend.h"
+#include "data/materials/collected.h"
 #include "data/materials/darker.h"
 #include "data/materials/family.h"
 #include "data/materials/homogeneous.h"
@@ -175,6 +176,40 @@ static void look(const io_procedural *p, uint64_t index, io_canvas *c)
     cv_view(c, times, x, y);
 }
 
+/* A part of a map set, with its number for a name. False: this material is none. */
+static bool collect(const io_procedural *p, uint64_t index, io_canvas *c, char *name, size_t length)
+{
+    c->rng = ts_rng_make(p->seed, TS_STREAM_COLLECTED, index);
+    if (!p->collection || !cv_chance(c, p->collected)) return false;
+    const int number = ts_rng_int(&c->rng, io_collection_count(p->collection));
+    const io_collected set = io_collection_get(p->collection, number);
+    cv_collected(c, &set);
+    snprintf(name, length, "%05llu_collected_%d", (unsigned long long)index, number);
+    return true;
+}
+
+/* One family, or two mixed, on c, whose painted planes begin at first and, of two mixed, at second (true). */
+static bool paint(const io_procedural *p, uint64_t index, uint64_t allowed, io_canvas *c, float *first, float *second,
+                  char *name, size_t length)
+{
+    c->rng = ts_rng_make(p->seed, TS_STREAM_MATERIAL, index);
+    const int a = draw_family(&c->rng, allowed, p->often), b = draw_family(&c->rng, allowed, p->often);
+    const bool mixed = cv_chance(c, 0.27f);
+    families[a].paint(c);
+    if (mixed) {
+        c->used = 0;
+        painted_at(c, second);
+        families[b].paint(c);
+        c->used = 0;
+        mix(c, first);
+    }
+    c->used = 0;
+    if (a < CLASSIC) wear_calm(c);
+    snprintf(name, length, mixed ? "%05llu_%s_%s" : "%05llu_%s", (unsigned long long)index, families[a].name,
+             families[b].name);
+    return mixed;
+}
+
 void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
 {
     io_canvas c = {.size = m->size, .count = m->size * m->size};
@@ -185,25 +220,16 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
     float *first = memory + 2 * n, *second = first + CANVAS_PAINTED * n;
     c.planes = second + CANVAS_PAINTED * n;
     look(p, index, &c);
-    c.rng = ts_rng_make(p->seed, TS_STREAM_MATERIAL, index);
-    uint64_t all = io_family_mask("all"), allowed = p->families & all ? p->families & all : all;
-    int a = draw_family(&c.rng, allowed, p->often), b = draw_family(&c.rng, allowed, p->often);
-    bool mixed = cv_chance(&c, 0.27f);
+    const uint64_t all = io_family_mask("all"), allowed = p->families & all ? p->families & all : all;
     painted_at(&c, first);
-    families[a].paint(&c);
-    if (mixed) {
-        c.used = 0;
-        painted_at(&c, second);
-        families[b].paint(&c);
-        c.used = 0;
-        mix(&c, first);
-    }
+    float *other = second; /* room for another material */
+    if (!collect(p, index, &c, m->name, sizeof m->name) &&
+        paint(p, index, allowed, &c, first, second, m->name, sizeof m->name))
+        other = first;
     c.used = 0;
-    if (a < CLASSIC) wear_calm(&c);
+    blend(p, index, allowed, &c, other);
     c.used = 0;
-    blend(p, index, allowed, &c, mixed ? first : second);
-    c.used = 0;
-    exchange_relief(p, index, allowed, &c, mixed ? first : second);
+    exchange_relief(p, index, allowed, &c, other);
     c.used = 0;
     make_uneven(p, index, &c);
     c.used = 0;
@@ -213,6 +239,4 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
     ts_rng darker = ts_rng_make(p->seed, TS_STREAM_DARKER, index);
     if (ts_rng_uniform(&darker) < p->darker) cv_darker(&c, &darker);
     cv_write(&c, m->maps);
-    snprintf(m->name, sizeof m->name, mixed ? "%05llu_%s_%s" : "%05llu_%s", (unsigned long long)index, families[a].name,
-             families[b].name);
 }

@@ -4,6 +4,7 @@
  * version of it, or another CPU, for which it may choose other code, may round them differently. */
 #ifndef IO_PROCEDURAL_H
 #define IO_PROCEDURAL_H
+#include "data/collection.h"
 #include "data/material.h"
 
 /* The families, each a key that can be turned off. io_family_name(i) for i in 0 .. io_family_count()-1. */
@@ -25,6 +26,8 @@ typedef struct io_procedural {
     float uneven;      /* share of those that lean and undulate (materials/uneven.h) */
     float closer;      /* share of those of which only a part is seen, from a quarter of the patch's side on */
     float homogeneous; /* share of those that are the same all over the patch (materials/homogeneous.h) */
+    const io_collection *collection; /* not owned; map sets of which materials are parts (materials/collected.h) */
+    float collected; /* share of the materials that are, in place of a family's or two; 0 where there are none */
 } io_procedural;
 
 /* Material number index. m->size and m->maps are the caller's (io_material_create). Serial, thread safe. */

@@ -69,7 +69,7 @@ data_wrong_usage() {
     for bad in "--count 0" "--tilt 31" "--fov-min 20" "--fov-min 40 --fov-max 30" "--flash 0.6" "--tone 2" \
         "--ambient x" "--vignette 1" "--off-centre -1" "--exposure nan" "--count x" "--size 4" "--size 1e3" \
         "--format exe" "--noise 2" "--noise nan" "--seed -1" "--quality 0" "--threads 0" "stray" "--statistics" \
-        "--testdata ."; do
+        "--testdata ." "--collected 0.5" "--collection ."; do
         # shellcheck disable=SC2086
         expect 2 "$DATA" -o "$T/o" $bad
         [ -e "$T/o" ] && fail "$bad made the folder"
@@ -105,6 +105,20 @@ data_interrupted() {
     [ "$(find "$T/o" ! -name '*.jpg' -type f | wc -l)" -eq 0 ] || fail "temporary files are left: $(ls "$T/o")"
 }
 check data_interrupted data_interrupted
+
+# A library of one's own, here of two procedural materials.
+data_collection() {
+    expect 0 "$DATA" -o "$T/own" --count 2 --size 32
+    expect 0 "$DATA" -o "$T/parts" --collection "$T/own" --collected 1 --count 3 --size 32
+    [ "$(entries "$T/parts" '0*_collected_[01]')" -eq 3 ] || fail "these are no parts: $(ls "$T/parts")"
+    expect 1 "$DATA" -o "$T/o" --collection "$T/nowhere" --collected 1
+    says "$T/err" "$T/nowhere"
+    [ ! -e "$T/o" ] || fail "the folder was made"
+    rm "$T"/own/*/normal.png
+    expect 1 "$DATA" -o "$T/o" --collection "$T/own" --collected 1
+    says "$T/err" "no normal map"
+}
+check data_collection data_collection
 
 # $T/out: both sides are the same materials, those of --testdata through files: only 8 and 16 bits lie between.
 same_materials() {

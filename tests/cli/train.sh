@@ -131,6 +131,20 @@ changed_configuration_is_refused() {
     expect 0 train --resume --set data.threads=2
 }
 
+# A library of one's own: it is read, it changes what is trained on, and a run goes on with it.
+own_collection() {
+    config
+    expect 0 "$BIN/lgd-data" -o "$T/own" --count 2 --size 32
+    expect 0 train
+    mv "$T/run" "$T/plain"
+    expect 1 train --set data.collection="$T/nowhere" --set data.collected=0.5
+    says "$T/err" "data.collection: $T/nowhere"
+    expect 0 train --set data.collection="$T/own" --set data.collected=0.5
+    cmp -s "$T/run/last.safetensors" "$T/plain/last.safetensors" && fail "trained on the same materials"
+    mv "$T/own" "$T/moved"
+    expect 0 train --resume --set data.collection="$T/moved" --set data.collected=0.5
+}
+
 threads_do_not_change_bytes() {
     config
     expect 0 train --threads 1
@@ -329,6 +343,7 @@ check train_options_and_usage options_and_usage
 check train_errors_name_file_and_line errors_name_file_and_line
 check train_comma_locale comma_locale
 check train_changed_configuration_is_refused changed_configuration_is_refused
+check train_own_collection own_collection
 check train_threads_do_not_change_bytes threads_do_not_change_bytes
 check train_interrupt_saves_and_resume_is_exact interrupt_saves_and_resume_is_exact
 check train_hangup_is_ignored_under_nohup hangup_is_ignored_under_nohup

@@ -279,6 +279,8 @@ TEST(config_checks_keys_against_each_other)
                                          {"validate.seed=1", "data.seed"},
                                          {"data.fov_min=30", "fov_max"},
                                          {"data.fov_max=30", "fov_min"},
+                                         {"data.collected=0.5", "data.collection"},
+                                         {"data.collection=sets", "data.collected"},
                                          {"model.g_size=50", "g_size"},
                                          {"model.g_kernel=4", "g_kernel"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
