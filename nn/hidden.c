@@ -219,17 +219,23 @@ static double part_hidden(double usual, double differ)
 
 static double mean_of_three(double x[3][CELLS * CELLS], int i) { return (x[0][i] + x[1][i] + x[2][i]) / 3; }
 
-/* The variances of the colours' level, their mean logarithm, and of the hue, what each colour is beside it. */
-static void differ(cells *c, int count, double *level, double *hue)
+/* Of the colours' level, their mean logarithm. */
+static double level_variance(cells *c, int count)
 {
     double x[CELLS * CELLS];
     for (int i = 0; i < count; i++) x[i] = mean_of_three(c->log_value, i);
-    *level = variance(c, count, x);
-    *hue = 0;
+    return variance(c, count, x);
+}
+
+/* Of the hue, what each colour is beside the level. */
+static double hue_variance(cells *c, int count)
+{
+    double x[CELLS * CELLS], sum = 0;
     for (int k = 0; k < 3; k++) {
         for (int i = 0; i < count; i++) x[i] = c->log_value[k][i] - mean_of_three(c->log_value, i);
-        *hue += variance(c, count, x) / 3;
+        sum += variance(c, count, x) / 3;
     }
+    return sum;
 }
 
 /* How far a logarithm that is from away from the field is believed to be. */
@@ -272,8 +278,7 @@ static void find_changes(const void *job, int64_t which)
     memcpy(c->change, c->log_value, sizeof c->change);
     find_fields(c, side, false, band, 3, c->change);
     if (map->edges) find_levels(side, band, c);
-    double differs, hue;
-    differ(c, count, &differs, &hue);
+    const double hue = hue_variance(c, count), differs = map->edges ? 0 : level_variance(c, count);
     for (int i = 0; i < count; i++) {
         const double own = mean_of_three(c->log_value, i), smooth = mean_of_three(c->change, i),
                      level = map->edges ? c->level[0][i] : smooth,
