@@ -53,7 +53,7 @@ static ts_code read_sets(const char *path, struct dirent **list, int n, int thre
         c->set[c->count++] = set;
         if (read_set(folder, threads, set, st) != TS_OK) return st->code;
     }
-    return c->count ? TS_OK : ts_fail(st, TS_INVALID, "%s: no folders of maps in it", path);
+    return c->count ? TS_OK : ts_fail(st, TS_INVALID, "%s: no folders in it: every map set needs one of its own", path);
 }
 
 io_collection *io_collection_read(const char *path, int threads, ts_status *st)

@@ -157,7 +157,7 @@ TEST(collection_names_what_it_cannot_read)
     ts_status st = {0};
     char path[512], set[600];
     folder_of("bad", path);
-    CHECK(!io_collection_read(path, 1, &st) && strstr(st.message, "no folders of maps"), "%s", st.message);
+    CHECK(!io_collection_read(path, 1, &st) && strstr(st.message, "no folders in it"), "%s", st.message);
     write_set("bad", "good", 0.5f, 2, 0.1f, 0);
     folder_of("bad/wanting", set);
     CHECK(!io_collection_read(path, 1, &st) && strstr(st.message, "wanting") && st.code == TS_INVALID, "%s",

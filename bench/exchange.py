@@ -1,0 +1,121 @@
+#!/usr/bin/env python3
+"""Which map a capture's error is in: exchange.py CAPTURES ESTIMATES
+
+CAPTURES holds folders in MaterialGAN's layout with the maps that others made of all pictures (materialgan_tex.jpg),
+ESTIMATES a folder NAME/STEM of lgd-infer for each, with maps.exr. Prints the render RMSE of docs/real.md of the
+estimates, of the estimates with some maps of the others in place of their own (d diffuse, s specular, r roughness,
+n normal), and with the others' normals but for what is finer than a sigma in pixels. Needs numpy, Pillow, scipy and
+OpenEXR."""
+import sys
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+from PIL import Image
+from scipy.ndimage import gaussian_filter
+
+SIDE = 256
+EXCHANGED = "d s r n dn sr dsr srn dsrn".split()
+SIGMAS = 2, 12, 80
+rows, columns = np.mgrid[0:SIDE, 0:SIDE]
+PLACE = np.stack([(columns + 0.5) / SIDE - 0.5, 0.5 - (rows + 0.5) / SIDE, 0 * rows], -1)
+
+
+def numbers(path):
+    return np.array([[float(x) for x in line.replace(",", " ").split()] for line in open(path) if line.strip()])
+
+
+def capture(folder):
+    """Encoded pictures, cameras and lights in patch widths; first the picture nearest to the sample's axis."""
+    side = numbers(folder / "image_size.txt").flat[0]
+    cameras, lights = numbers(folder / "camera_pos.txt") / side, numbers(folder / "light_pos.txt") / side
+    first = int(np.argmin(np.hypot(cameras[:, 0], cameras[:, 1])))
+    order = [first] + [i for i in range(len(cameras)) if i != first]
+    pictures = [np.asarray(Image.open(folder / f"{i:02d}.png").convert("RGB"), np.float64) / 255 for i in order]
+    return pictures, cameras[order], lights[order]
+
+
+def estimate(folder):
+    with OpenEXR.File(str(next(folder.glob("*/maps.exr")))) as file:
+        c = {k: v.pixels.astype(np.float64) for k, v in file.channels().items()}
+    return {
+        "d": c["diffuse"],
+        "s": c["specular"],
+        "r": c["roughness.Y"][..., None],
+        "n": np.stack([c["normal.X"], c["normal.Y"]], -1),
+    }
+
+
+def others(folder):
+    image = np.asarray(Image.open(folder / "materialgan_tex.jpg").convert("RGB"), np.float64) / 255
+    half = len(image) // 2
+    normal = image[:half, :half] * 2 - 1
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    full = {"n": normal[..., :2], "d": image[:half, half:] ** 2.2, "s": image[half:, :half] ** 2.2}
+    full["r"] = image[half:, half:, :1] ** 2.2
+    k = half // SIDE
+    return {name: v.reshape(SIDE, k, SIDE, k, -1).mean((1, 3)) for name, v in full.items()}
+
+
+def dot(a, b):
+    return (a * b).sum(-1, keepdims=True)
+
+
+def unit(v):
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def render(maps, camera, light):
+    """docs/math.md, M1 to M5; the light's power is left out."""
+    to_light = light - PLACE
+    l, v = unit(to_light), unit(camera - PLACE)
+    h = unit(l + v)
+    x, y = maps["n"][..., :1], maps["n"][..., 1:]
+    n = unit(np.concatenate([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 1e-4))], -1))
+    alpha = np.maximum(maps["r"] ** 2, 1e-3)
+    k = alpha / 2
+    nl, nv, vh = np.maximum(dot(n, l), 0), np.maximum(dot(n, v), 0), dot(v, h)
+    d = alpha**2 / (np.pi * (dot(n, h) ** 2 * (alpha**2 - 1) + 1) ** 2)
+    g = 1 / ((nl * (1 - k) + k) * (nv * (1 - k) + k))
+    f = maps["s"] + (1 - maps["s"]) * 2 ** ((-5.55473 * vh - 6.98316) * vh)
+    return ((1 - maps["s"]) * maps["d"] / np.pi + d * g * f / 4) * nl / dot(to_light, to_light)
+
+
+def error(picture, rendered, factor):
+    return np.sqrt(((np.clip(rendered * factor, 0, 1) ** (1 / 2.2) - picture) ** 2).mean())
+
+
+def score(maps, pictures, cameras, lights):
+    """The factor is the one that makes the first rendering most like the first picture."""
+    first = render(maps, cameras[0], lights[0])
+    stops = np.arange(-10, 14, 0.5)
+    for step in (0.05, 0.005):
+        best = min(stops, key=lambda s: error(pictures[0], first, 2**s))
+        stops = np.arange(best - 10 * step, best + 10.5 * step, step)
+    factor = 2 ** min(stops, key=lambda s: error(pictures[0], first, 2**s))
+    seen = zip(pictures[1:], cameras[1:], lights[1:])
+    return np.mean([error(picture, render(maps, camera, light), factor) for picture, camera, light in seen])
+
+
+def smooth(v, sigma):
+    return np.stack([gaussian_filter(v[..., k], sigma, mode="nearest") for k in (0, 1)], -1)
+
+
+def main():
+    if len(sys.argv) != 3:
+        sys.exit(__doc__)
+    titles = ["own", *EXCHANGED, *(f"n/{s}" for s in SIGMAS)]
+    print(f"{'':26}" + "".join(f"{t:>7}" for t in titles))
+    table = []
+    for folder in sorted(Path(sys.argv[1]).iterdir()):
+        if not (folder / "materialgan_tex.jpg").exists():
+            continue
+        scene, own, other = capture(folder), estimate(Path(sys.argv[2]) / folder.name), others(folder)
+        tried = [own] + [own | {k: other[k] for k in which} for which in EXCHANGED]
+        tried += [own | {"n": own["n"] - smooth(own["n"], s) + smooth(other["n"], s)} for s in SIGMAS]
+        table.append([score(maps, *scene) for maps in tried])
+        print(f"{folder.name:26}" + "".join(f"{x:7.4f}" for x in table[-1]))
+    print(f"{'mean':26}" + "".join(f"{x:7.4f}" for x in np.mean(table, 0)))
+
+
+main()
