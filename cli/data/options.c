@@ -201,6 +201,7 @@ int cl_data_options_read(int argc, char **argv, cl_data_options *o)
         return cl_usage("--fov-min and --fov-max go together: 5 <= fov-min <= fov-max");
     if ((o->procedural.collected > 0) != (o->collection != NULL))
         return cl_usage("--collection and --collected go together: the folder and the share");
+    if (o->sheet && o->collection) return cl_usage("--contact-sheet draws the families, not those of --collection");
     o->procedural.seed = (uint64_t)seed;
     return CL_OK;
 }

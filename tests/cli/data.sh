@@ -69,7 +69,8 @@ data_wrong_usage() {
     for bad in "--count 0" "--tilt 31" "--fov-min 20" "--fov-min 40 --fov-max 30" "--flash 0.6" "--tone 2" \
         "--ambient x" "--vignette 1" "--off-centre -1" "--exposure nan" "--count x" "--size 4" "--size 1e3" \
         "--format exe" "--noise 2" "--noise nan" "--seed -1" "--quality 0" "--threads 0" "stray" "--statistics" \
-        "--testdata ." "--collected 0.5" "--collection ."; do
+        "--testdata ." "--collected 0.5" "--collection ." \
+        "--contact-sheet --collection . --collected 0.5"; do
         # shellcheck disable=SC2086
         expect 2 "$DATA" -o "$T/o" $bad
         [ -e "$T/o" ] && fail "$bad made the folder"
