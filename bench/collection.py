@@ -2,10 +2,10 @@
 """Map folders of the textures in Debian packages, for data.collection: collection.py OUT PACKAGE.deb...
 
 Takes colours that have a normal map beside them (NAME.png and NAME_norm.png, for instance), also from the archives in a
-package, if the package's copyright file gives both files one of the licences below. OUT/sources.tsv has the source and
-the licence of each. Games say nothing of metal, and of gloss little: roughness gets a level by chance, and what varies
-is the gloss map or else the colours' luminance; albedos are a fifth to all of what is stored, by chance too, and most
-of the grey ones get a colour. The same packages give the same files. Needs numpy, Pillow, scipy and dpkg-deb."""
+package, if the package's copyright file gives each of them one of the licences below. OUT/sources.tsv has the source
+and the licence of each. Games say nothing of metal, and of gloss little: roughness gets a level by chance, and what
+varies is the gloss map or else the colours' luminance; albedos are a fifth to all of what is stored, by chance too, and
+most of the grey ones get a colour. The same packages give the same files. Needs numpy, Pillow, scipy and dpkg-deb."""
 import colorsys
 import hashlib
 import io
@@ -23,7 +23,7 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 SIDE = 512
-LICENCES = re.compile(r"CC-?0|CC-BY|public-domain|Expat|MIT|zlib", re.I)
+LICENCES = re.compile(r"(CC-?0|CC-BY|CC-BY-SA|public-domain|Expat|MIT|zlib)(-[\d.]+\+?)?", re.I)
 IMAGE = re.compile(r"\.(png|jpg|jpeg|tga|dds)$", re.I)
 NORMAL = "_norm _normal _normals _normalmap _nrm _nm _n _local _nmap -normal -norm".split()
 GLOSS = "_gloss _spec _specular _s _gm _sm _glossiness".split()
@@ -66,6 +66,11 @@ def licence_of(rules, path):
     return fitting[-1] if fitting else ""
 
 
+def allows(licence):
+    """Whether all of what is joined by and, or one of what is joined by or, is in LICENCES."""
+    return any(all(LICENCES.fullmatch(t) for t in re.split(r",? and ", s)) for s in re.split(r",? or ", licence))
+
+
 def images(root):
     """Path (as in the package, or in an archive of it) and a function that gives the bytes."""
     for folder, _, names in os.walk(root):
@@ -106,9 +111,11 @@ def candidates(root):
 def opened(image):
     path, read = image
     picture = Image.open(io.BytesIO(read()))
+    if picture.mode.startswith("I"):  # 16 bits of grey, which convert() would clip
+        picture = Image.fromarray((np.asarray(picture) // 256).astype(np.uint8))
     if picture.mode == "P":
         picture = picture.convert("RGBA")
-    # A game of 0 A.D. keeps the players' colours in alpha; elsewhere it is a hole.
+    # The textures of 0 A.D. (.dds) keep where a player's colour goes in alpha; elsewhere it is a hole.
     clear = picture.mode in ("RGBA", "LA") and not path.endswith(".dds") and np.mean(picture.getchannel("A")) < 250
     return None if clear else picture.convert("RGB")
 
@@ -189,8 +196,10 @@ def convert(out, package, root, seen, sources):
     rules = licences(root)
     for colour, normal, gloss in candidates(root):
         path, terms = colour[0], {licence_of(rules, c[0]) for c in (colour, normal)}
-        if OTHER.search(path.lower()) or not all(LICENCES.match(t) for t in terms):
+        if OTHER.search(path.lower()) or not all(map(allows, terms)):
             continue
+        if gloss and not allows(licence_of(rules, gloss[0])):
+            gloss = None
         a, b = opened(colour), opened(normal)
         if a is None or b is None or not usable(a, b):
             continue

@@ -14,11 +14,10 @@ import OpenEXR
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
-SIDE = 256
+from shading import SIDE, radiance, unit
+
 EXCHANGED = "d s r n dn sr dsr srn dsrn".split()
 SIGMAS = 2, 12, 80
-rows, columns = np.mgrid[0:SIDE, 0:SIDE]
-PLACE = np.stack([(columns + 0.5) / SIDE - 0.5, 0.5 - (rows + 0.5) / SIDE, 0 * rows], -1)
 
 
 def numbers(path):
@@ -57,28 +56,10 @@ def others(folder):
     return {name: v.reshape(SIDE, k, SIDE, k, -1).mean((1, 3)) for name, v in full.items()}
 
 
-def dot(a, b):
-    return (a * b).sum(-1, keepdims=True)
-
-
-def unit(v):
-    return v / np.linalg.norm(v, axis=-1, keepdims=True)
-
-
 def render(maps, camera, light):
-    """docs/math.md, M1 to M5; the light's power is left out."""
-    to_light = light - PLACE
-    l, v = unit(to_light), unit(camera - PLACE)
-    h = unit(l + v)
     x, y = maps["n"][..., :1], maps["n"][..., 1:]
-    n = unit(np.concatenate([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 1e-4))], -1))
-    alpha = np.maximum(maps["r"] ** 2, 1e-3)
-    k = alpha / 2
-    nl, nv, vh = np.maximum(dot(n, l), 0), np.maximum(dot(n, v), 0), dot(v, h)
-    d = alpha**2 / (np.pi * (dot(n, h) ** 2 * (alpha**2 - 1) + 1) ** 2)
-    g = 1 / ((nl * (1 - k) + k) * (nv * (1 - k) + k))
-    f = maps["s"] + (1 - maps["s"]) * 2 ** ((-5.55473 * vh - 6.98316) * vh)
-    return ((1 - maps["s"]) * maps["d"] / np.pi + d * g * f / 4) * nl / dot(to_light, to_light)
+    normal = unit(np.concatenate([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 1e-4))], -1))
+    return radiance(normal, maps["d"], maps["r"], maps["s"], camera, light)
 
 
 def error(picture, rendered, factor):

@@ -13,42 +13,22 @@ import numpy as np
 from PIL import Image
 from scipy.optimize import least_squares
 
-SIDE = 256
+from shading import SIDE, radiance, unit
+
 DISTANCE = 250 / 256
 POWER = 329288 / SIDE**2 / DISTANCE**2  # over the distance's square
 STARTS = [(d, x, y) for d in (1, 2) for x, y in ((0, 0), (0.2, 0.2), (-0.2, 0.2), (0.2, -0.2), (-0.2, -0.2))]
-rows, columns = np.mgrid[0:SIDE, 0:SIDE]
-PLACE = np.stack([(columns + 0.5) / SIDE - 0.5, 0.5 - (rows + 0.5) / SIDE, 0 * rows], -1)
-
-
-def unit(v):
-    return v / np.linalg.norm(v, axis=-1, keepdims=True)
-
-
-def dot(a, b):
-    return (a * b).sum(-1, keepdims=True)
 
 
 def panels(path):
     image = np.asarray(Image.open(path).convert("RGB"), np.float64) / 255
     photo, normal, diffuse, roughness, specular = (image[:, i * SIDE : (i + 1) * SIDE] for i in range(5))
-    return photo, (unit(normal * 2 - 1), diffuse, np.maximum(roughness[..., :1], 0.02), specular)
+    return photo, (unit(normal * 2 - 1), diffuse, roughness[..., :1], specular)
 
 
 def render(maps, camera, light, power):
     """Encoded as sRGB; power is over the distance's square, of a light as far as the camera."""
-    normal, diffuse, roughness, specular = maps
-    to_light = light - PLACE
-    l, v = unit(to_light), unit(camera - PLACE)
-    h = unit(l + v)
-    alpha = roughness**2
-    k = alpha / 2
-    nl, nv = np.maximum(dot(normal, l), 0), np.maximum(dot(normal, v), 1e-3)
-    d = alpha**2 / (np.pi * (dot(normal, h) ** 2 * (alpha**2 - 1) + 1) ** 2)
-    g = 1 / ((nl * (1 - k) + k) * (nv * (1 - k) + k))
-    f = specular + (1 - specular) * 2 ** ((-5.55473 * dot(v, h) - 6.98316) * dot(v, h))
-    brdf = (1 - specular) * diffuse / np.pi + d * g * f / 4
-    x = np.clip(brdf * nl * power * light[2] ** 2 / dot(to_light, to_light), 0, 1)
+    x = np.clip(radiance(*maps, camera, light) * power * light[2] ** 2, 0, 1)
     return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
 
 

@@ -7,18 +7,19 @@
 
 enum { IO_COLLECTION_SIDE = 512, IO_COLLECTED = 7 };
 
-/* One set, of IO_COLLECTION_SIDE pixels a side. Its maps are taken to repeat. */
+/* A pixel of a set. The sets are taken to repeat. */
 typedef struct io_collected {
-    const float *height;                 /* in sides of the set, mean 0 */
-    const uint16_t *value[IO_COLLECTED]; /* diffuse 3, F0 3, roughness; 65535 is 1 */
+    float height;                 /* in sides of the set, mean 0 */
+    uint16_t value[IO_COLLECTED]; /* diffuse 3, F0 3, roughness; 65535 is 1 */
 } io_collected;
 
 typedef struct io_collection io_collection;
 
-/* Every folder in path is a map folder (data/material.h), in the order of their names; 4.7 MB of memory for each. One
+/* Every folder in path is a map folder (data/material.h), in the order of their names; 5.2 MB of memory for each. One
  * that cannot be read is an error that names it. NULL on failure. io_collection_free takes NULL too. */
 io_collection *io_collection_read(const char *path, int threads, ts_status *st);
 int io_collection_count(const io_collection *collection);
-io_collected io_collection_get(const io_collection *collection, int number);
+/* Of set number 0 .. count - 1, the collection's: [IO_COLLECTION_SIDE][IO_COLLECTION_SIDE]. */
+const io_collected *io_collection_get(const io_collection *collection, int number);
 void io_collection_free(io_collection **collection);
 #endif

@@ -100,11 +100,16 @@ static void copy_colours(const void *job, int64_t begin, int64_t end)
         }
 }
 
-static rd_scene_how of_the_whole(int known)
+static ts_prior of_the_whole(int known)
 {
-    rd_scene_how how = {.steps = 4, .every = 8, .correlated = 256, .scale = nn_step_prior(known, 1)};
-    if (!(known & NN_KNOWN_POWER)) how.scale.model *= LEFT_OUT_ALL_OVER, how.scale.gain *= LEFT_OUT_ALL_OVER;
-    return how;
+    ts_prior scale = nn_step_prior(known, 1);
+    if (!(known & NN_KNOWN_POWER)) scale.model *= LEFT_OUT_ALL_OVER, scale.gain *= LEFT_OUT_ALL_OVER;
+    return scale;
+}
+
+static rd_scene_how with_errors(ts_prior scale)
+{
+    return (rd_scene_how){.steps = 4, .every = 8, .correlated = 256, .scale = scale};
 }
 
 /* The scene that explains the photograph best with R_0 as it is now: what the maps' levels were found with says less of
@@ -112,10 +117,9 @@ static rd_scene_how of_the_whole(int known)
 static void find_scene(rd_grid grid, const float *image, int channels, int known, const rd_scene_prior *prior,
                        nn_first_guess *g)
 {
+    const rd_scene_how how = with_errors(nn_step_prior(known, 1));
     rd_scene_prior beside = *prior;
-    rd_scene_how how = of_the_whole(known);
     float unknown[RD_SCENE_UNKNOWNS] = {0};
-    how.scale = nn_step_prior(known, 1);
     beside.mean[RD_SCENE_ROUGHNESS] = beside.deviation[RD_SCENE_ROUGHNESS] = 0;
     memcpy(unknown, g->number, sizeof g->number);
     rd_scene_fit(grid, g->r0, channels, g->deviation, image, &beside, &how, unknown, NULL);
@@ -127,7 +131,7 @@ static void find_scene(rd_grid grid, const float *image, int channels, int known
 static ts_code fit(rd_grid grid, const float *image, int channels, int known, const rd_scene_prior *prior,
                    ts_arena *arena, nn_first_guess *g, ts_status *st)
 {
-    const rd_scene_how how = of_the_whole(known);
+    const rd_scene_how how = with_errors(of_the_whole(known));
     const int threads = grid.threads;
     const int64_t pixels = (int64_t)grid.h * grid.w;
     float unknown[RD_SCENE_UNKNOWNS], *rough = ts_arena_alloc(arena, (size_t)pixels * (size_t)channels * sizeof *rough);

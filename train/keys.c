@@ -111,7 +111,7 @@ const tr_key tr_keys[] = {
     {"data", "homogeneous", TR_REAL, AT(data.homogeneous), 0, 1, "0", NULL, false,
      "share of the materials that are the same all over the patch: what varies slowly in colour and roughness is less"},
     {"data", "collection", TR_TEXT, AT(data.collection), 0, sizeof((tr_config *)0)->data.collection, "", NULL, true,
-     "a folder of map folders of your own, of which materials are parts; each takes 4.7 MB of memory"},
+     "a folder of map folders of your own, of which materials are parts; each takes 5.2 MB of memory"},
     {"data", "collected", TR_REAL, AT(data.collected), 0, 1, "0", NULL, false,
      "share of the materials that are parts of the map sets in data.collection, in place of procedural ones"},
     {"data", "noise", TR_REAL, AT(data.noise), 0, 1, "0.3", NULL, false,

@@ -185,10 +185,10 @@ int main(int argc, char **argv)
     if (!code) code = cl_data_options_read(argc, argv, &o);
     if (code) return code;
     ts_threads_set((int)o.threads);
-    cl_catch_interrupt();
     io_collection *collection = o.collection ? io_collection_read(o.collection, 0, &st) : NULL;
     if (st.code) return cl_finish(cl_failed("%s", st.message));
     o.procedural.collection = collection;
+    cl_catch_interrupt();
     const bool there = o.output && access(o.output, F_OK) == 0;
     if (o.output) cl_make_folder(o.output, &st);
     if (!st.code && (o.format || o.photographs))

@@ -47,8 +47,9 @@ static void add(const io_collected *set, const place *p, float share, float sum[
 {
     for (int n = 0; n < 4; n++) {
         const float w = share * p->weight[n];
-        sum[0] += w * set->height[p->at[n]];
-        for (int k = 0; k < IO_COLLECTED; k++) sum[1 + k] += w * (float)set->value[k][p->at[n]];
+        const io_collected *from = &set[p->at[n]];
+        sum[0] += w * from->height;
+        for (int k = 0; k < IO_COLLECTED; k++) sum[1 + k] += w * (float)from->value[k];
     }
 }
 

@@ -182,8 +182,7 @@ static bool collect(const io_procedural *p, uint64_t index, io_canvas *c, char *
     c->rng = ts_rng_make(p->seed, TS_STREAM_COLLECTED, index);
     if (!p->collection || !cv_chance(c, p->collected)) return false;
     const int number = ts_rng_int(&c->rng, io_collection_count(p->collection));
-    const io_collected set = io_collection_get(p->collection, number);
-    cv_collected(c, &set);
+    cv_collected(c, io_collection_get(p->collection, number));
     snprintf(name, length, "%05llu_collected_%d", (unsigned long long)index, number);
     return true;
 }

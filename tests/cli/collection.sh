@@ -20,11 +20,12 @@ package() {
     texture "$root/wall/again" 0
     texture "$root/skybox/above" 2
     cp "$T"/made/00003_*/diffuse.png "$root/wall/alone.png"
+    copyright=$T/root/usr/share/doc/quarry-data/copyright
     mkdir -p "$T/root/DEBIAN" "$T/root/usr/share/doc/quarry-data"
     printf 'Package: quarry-data\nVersion: 1\nArchitecture: all\nMaintainer: x <x@x>\nDescription: x\n' \
         >"$T/root/DEBIAN/control"
     printf 'Format: x\n\nFiles: *\nCopyright: x\nLicense: CC-BY-3.0\n\nFiles: data/wall/closed*\nLicense: GPL-2\n' \
-        >"$T/root/usr/share/doc/quarry-data/copyright"
+        >"$copyright"
     dpkg-deb --root-owner-group -b "$T/root" "$T/quarry.deb" >/dev/null || fail "no package"
 }
 
@@ -40,3 +41,20 @@ collection_takes_what_it_may() {
     [ "$(find "$T/o" -name '0*_collected_0' | wc -l)" -eq 2 ] || fail "$(ls "$T/o")"
 }
 check collection_takes_what_it_may collection_takes_what_it_may
+
+# A gloss map that may not be used changes nothing, one that may does.
+collection_leaves_closed_gloss() {
+    package
+    expect 0 "$PYTHON" bench/collection.py "$T/without" "$T/quarry.deb"
+    for gloss in closed free; do
+        cp "$T"/made/00001_*/roughness.png "$root/wall/again_gloss.png"
+        [ "$gloss" = free ] || printf '\nFiles: data/wall/again_gloss*\nLicense: CC-BY-NC-3.0\n' >>"$copyright"
+        dpkg-deb --root-owner-group -b "$T/root" "$T/quarry.deb" >/dev/null || fail "no package"
+        expect 0 "$PYTHON" bench/collection.py "$T/$gloss" "$T/quarry.deb"
+        sed -i '/again_gloss/,$d' "$copyright"
+    done
+    cmp -s "$T/without/0001_again/roughness.png" "$T/closed/0001_again/roughness.png" || fail "closed gloss was used"
+    cmp -s "$T/without/0001_again/roughness.png" "$T/free/0001_again/roughness.png" && fail "free gloss was not"
+    return 0
+}
+check collection_leaves_closed_gloss collection_leaves_closed_gloss

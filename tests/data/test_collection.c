@@ -4,10 +4,8 @@
 #include "data/loader.h"
 #include "tests/test.h"
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 enum { SIDE = 128, SIZE = 128 };
 #define TURN 6.283185307179586f
