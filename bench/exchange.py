@@ -4,8 +4,9 @@
 CAPTURES holds folders in MaterialGAN's layout with the maps that others made of all pictures (materialgan_tex.jpg),
 ESTIMATES a folder NAME/STEM of lgd-infer for each, with maps.exr. Prints the render RMSE of docs/real.md of the
 estimates, of the estimates with some maps of the others in place of their own (d diffuse, s specular, r roughness,
-n normal), and with the others' normals but for what is finer than a sigma in pixels. Needs numpy, Pillow, scipy and
-OpenEXR."""
+n normal), and with the others' normals but for what is finer than a sigma in pixels; and k: pictures over renderings
+of the others' maps go with the k-th power of the cosine of the angle with the camera's axis. Needs numpy, Pillow,
+scipy and OpenEXR."""
 import sys
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import OpenEXR
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
-from shading import SIDE, radiance, unit
+from shading import PLACE, SIDE, radiance, unit
 
 EXCHANGED = "d s r n dn sr dsr srn dsrn".split()
 SIGMAS = 2, 12, 80
@@ -82,11 +83,23 @@ def smooth(v, sigma):
     return np.stack([gaussian_filter(v[..., k], sigma, mode="nearest") for k in (0, 1)], -1)
 
 
+def falloff(maps, pictures, cameras, lights):
+    """By least squares over the logarithms of what is neither dark nor burnt out, a factor free for each picture."""
+    product = square = 0
+    for picture, camera, light in zip(pictures, cameras, lights):
+        seen = (picture.max(-1) < 0.9) & (picture.min(-1) > 0.05)
+        cosine = np.log((unit(PLACE - camera) @ unit(-camera))[seen])
+        left = np.log((picture**2.2).mean(-1)[seen] / np.maximum(render(maps, camera, light).mean(-1)[seen], 1e-4))
+        cosine, left = cosine - np.median(cosine), np.clip(left - np.median(left), -1.5, 1.5)
+        product, square = product + cosine @ left, square + cosine @ cosine
+    return product / square
+
+
 def main():
     if len(sys.argv) != 3:
         sys.exit(__doc__)
-    titles = ["own", *EXCHANGED, *(f"n/{s}" for s in SIGMAS)]
-    print(f"{'':26}" + "".join(f"{t:>7}" for t in titles))
+    titles = ["own", *EXCHANGED, *(f"n/{s}" for s in SIGMAS), "k"]
+    print(f"{'':26}" + "".join(f"{t:>8}" for t in titles))
     table = []
     for folder in sorted(Path(sys.argv[1]).iterdir()):
         if not (folder / "materialgan_tex.jpg").exists():
@@ -94,9 +107,9 @@ def main():
         scene, own, other = capture(folder), estimate(Path(sys.argv[2]) / folder.name), others(folder)
         tried = [own] + [own | {k: other[k] for k in which} for which in EXCHANGED]
         tried += [own | {"n": own["n"] - smooth(own["n"], s) + smooth(other["n"], s)} for s in SIGMAS]
-        table.append([score(maps, *scene) for maps in tried])
-        print(f"{folder.name:26}" + "".join(f"{x:7.4f}" for x in table[-1]))
-    print(f"{'mean':26}" + "".join(f"{x:7.4f}" for x in np.mean(table, 0)))
+        table.append([*(score(maps, *scene) for maps in tried), falloff(other, *scene)])
+        print(f"{folder.name:26}" + "".join(f"{x:8.4f}" for x in table[-1]))
+    print(f"{'mean':26}" + "".join(f"{x:8.4f}" for x in np.mean(table, 0)))
 
 
 main()
