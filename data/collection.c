@@ -36,10 +36,16 @@ static ts_code read_set(const char *path, int threads, float *height, io_collect
     return code;
 }
 
-static ts_code read_sets(const char *path, struct dirent **list, int n, int threads, float *height, io_collection *c,
-                         ts_status *st)
+typedef struct asked {
+    bool (*stop)(void *user);
+    void *user;
+} asked;
+
+static ts_code read_sets(const char *path, struct dirent **list, int n, int threads, asked a, float *height,
+                         io_collection *c, ts_status *st)
 {
     for (int i = 0; i < n; i++) {
+        if (a.stop && a.stop(a.user)) return ts_fail(st, TS_INTERRUPTED, "%s: interrupted while it was read", path);
         char folder[PATH_MAX];
         struct stat about;
         if (snprintf(folder, sizeof folder, "%s/%s", path, list[i]->d_name) >= (int)sizeof folder)
@@ -53,7 +59,7 @@ static ts_code read_sets(const char *path, struct dirent **list, int n, int thre
     return c->count ? TS_OK : ts_fail(st, TS_INVALID, "%s: no folders in it: every map set needs one of its own", path);
 }
 
-io_collection *io_collection_read(const char *path, int threads, ts_status *st)
+io_collection *io_collection_read(const char *path, int threads, bool (*stop)(void *user), void *user, ts_status *st)
 {
     struct dirent **list;
     const int n = scandir(path, &list, visible, alphasort);
@@ -65,7 +71,7 @@ io_collection *io_collection_read(const char *path, int threads, ts_status *st)
     float *height = malloc(PIXELS * sizeof *height); /* of one set */
     const bool room = c && height;
     if (!room) ts_fail(st, TS_NOMEM, "%s: out of memory", path);
-    if (!room || read_sets(path, list, n, threads, height, c, st) != TS_OK) io_collection_free(&c);
+    if (!room || read_sets(path, list, n, threads, (asked){stop, user}, height, c, st) != TS_OK) io_collection_free(&c);
     free(height);
     for (int i = 0; i < n; i++) free(list[i]);
     free(list);

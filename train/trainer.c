@@ -210,7 +210,7 @@ static ts_code begin(tr_trainer *t, bool resume, ts_status *st)
 {
     const tr_config *c = &t->config;
     if (c->data.collected > 0) {
-        t->collection = io_collection_read(c->data.collection, 0, st);
+        t->collection = io_collection_read(c->data.collection, 0, t->listener.stop, t->listener.user, st);
         if (!t->collection) return ts_context(st, "data.collection");
     }
     io_procedural source = tr_materials_of(c);

@@ -185,7 +185,7 @@ int main(int argc, char **argv)
     if (!code) code = cl_data_options_read(argc, argv, &o);
     if (code) return code;
     ts_threads_set((int)o.threads);
-    io_collection *collection = o.collection ? io_collection_read(o.collection, 0, &st) : NULL;
+    io_collection *collection = o.collection ? io_collection_read(o.collection, 0, NULL, NULL, &st) : NULL;
     if (st.code) return cl_finish(cl_failed("%s", st.message));
     o.procedural.collection = collection;
     cl_catch_interrupt();

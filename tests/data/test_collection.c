@@ -44,7 +44,7 @@ static io_collection *read_collection(const char *of)
     ts_status st = {0};
     char path[512];
     snprintf(path, sizeof path, "%s/%s", test_folder(), of);
-    io_collection *c = io_collection_read(path, 1, &st);
+    io_collection *c = io_collection_read(path, 1, NULL, NULL, &st);
     CHECK(c, "%s", st.message);
     return c;
 }
@@ -155,11 +155,25 @@ TEST(collection_names_what_it_cannot_read)
     ts_status st = {0};
     char path[512], set[600];
     folder_of("bad", path);
-    CHECK(!io_collection_read(path, 1, &st) && strstr(st.message, "no folders in it"), "%s", st.message);
+    CHECK(!io_collection_read(path, 1, NULL, NULL, &st) && strstr(st.message, "no folders in it"), "%s", st.message);
     write_set("bad", "good", 0.5f, 2, 0.1f, 0);
     folder_of("bad/wanting", set);
-    CHECK(!io_collection_read(path, 1, &st) && strstr(st.message, "wanting") && st.code == TS_INVALID, "%s",
+    CHECK(!io_collection_read(path, 1, NULL, NULL, &st) && strstr(st.message, "wanting") && st.code == TS_INVALID, "%s",
           st.message);
     snprintf(path, sizeof path, "%s/nowhere", test_folder());
-    CHECK(!io_collection_read(path, 1, &st) && strstr(st.message, "nowhere") && st.code == TS_IO, "%s", st.message);
+    CHECK(!io_collection_read(path, 1, NULL, NULL, &st) && strstr(st.message, "nowhere") && st.code == TS_IO, "%s",
+          st.message);
+}
+
+static bool after_one(void *calls) { return ++*(int *)calls > 1; }
+
+TEST(collection_stops_where_it_is_asked_to)
+{
+    ts_status st = {0};
+    char path[512];
+    int calls = 0;
+    folder_of("stopped", path);
+    for (int i = 0; i < 3; i++) write_set("stopped", (const char *[]){"a", "b", "c"}[i], 0.5f, 2, 0.1f, 0);
+    CHECK(!io_collection_read(path, 1, after_one, &calls, &st) && st.code == TS_INTERRUPTED && calls == 2,
+          "%d calls: %s", calls, st.message);
 }
