@@ -112,9 +112,11 @@ static int train(const tr_config *config, const char *folder, bool resume, const
     shown s = {.log_every = config->train.log_every, .ranks = ranks->count};
     const tr_listener listener = {
         .step = show_step, .validated = show_validation, .note = show_note, .stop = stop, .user = &s};
+    const bool made = ranks->rank == 0 && access(folder, F_OK) != 0;
     if (tr_agree(ranks, ranks->rank ? TS_OK : find_folder(folder, resume, &st), &st) != TS_OK) return failed(&st);
     cl_catch_interrupt();
     tr_trainer *t = tr_create(config, folder, resume, ranks, &listener, &st);
+    if (!t && made) rmdir(folder); /* of a run that did not begin */
     if (!t) return failed(&st);
     const int64_t total = config->train.pretrain_steps + config->train.steps;
     s.first = tr_step_now(t);

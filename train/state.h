@@ -49,6 +49,7 @@ typedef struct tr_trainer {
     double waited;      /* seconds, of all steps here */
     double busy;        /* seconds of all steps here */
     int lock;           /* descriptor, -1: none */
+    bool new_lock;      /* no run was here before */
     nn_model *model;
     nn_adam adam;
     ag_tape *tape;

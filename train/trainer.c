@@ -29,13 +29,26 @@ static ts_code lock_folder(tr_trainer *t, ts_status *st)
 {
     char path[TR_PATH];
     tr_path(t, "lock", path);
-    t->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+    t->lock = open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    const bool made = t->lock >= 0;
+    if (!made) t->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
     if (t->lock < 0) return ts_fail(st, TS_IO, "%s: %s", path, strerror(errno));
-    if (flock(t->lock, LOCK_EX | LOCK_NB) == 0) return TS_OK;
+    if (flock(t->lock, LOCK_EX | LOCK_NB) == 0) {
+        t->new_lock = made;
+        return TS_OK;
+    }
     if (errno == EWOULDBLOCK)
         return ts_fail(st, TS_INVALID,
                        "%s: another lgd-train is at work in this folder (output.folder chooses another)", t->folder);
     return ts_fail(st, TS_IO, "%s: %s", path, strerror(errno));
+}
+
+/* A run that cannot begin leaves the folder as it was. */
+static void remove_lock(const tr_trainer *t)
+{
+    char path[TR_PATH];
+    tr_path(t, "lock", path);
+    unlink(path);
 }
 
 /* A run that was not asked to go on never overwrites one that can be gone on with. One without a checkpoint is begun
@@ -284,6 +297,7 @@ tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, 
     if (code == TS_OK) code = tr_config_check(config, st);
     if (code == TS_OK) code = build(t, resume, st);
     if (code != TS_OK) {
+        if (t->new_lock) remove_lock(t);
         tr_destroy(&t);
     }
     return t;

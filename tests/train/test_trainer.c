@@ -322,6 +322,17 @@ TEST(trainer_locks_its_folder)
     tr_destroy(&t);
 }
 
+TEST(trainer_that_cannot_begin_leaves_nothing)
+{
+    tr_config c = small();
+    ts_status st = {0};
+    const char *where = folder("run");
+    snprintf(c.train.init, sizeof c.train.init, "%s/none.safetensors", where);
+    tr_trainer *t = tr_create(&c, where, false, NULL, NULL, &st);
+    CHECK(!t && st.code != TS_OK, "weights that are not there are taken");
+    CHECK(rmdir(where) == 0, "%s: files are left", where);
+}
+
 TEST(trainer_rejects_damaged_checkpoints)
 {
     const tr_config c = small();
