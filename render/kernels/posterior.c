@@ -132,15 +132,15 @@ V_INLINE void widen(const spread *a, const vf z[MAP_CHANNELS], vf x[MAP_CHANNELS
     for (int i = 0; i < SHARED; i++) x[shared_map[i]] = z[OWN + i] * a->deviation[shared_group[i]];
 }
 
-V_INLINE bool look_at(const ts_shade_view *view, const ts_shade_row *row, int first, int n, const float *image,
-                      const surface *s, sight *t)
+V_INLINE bool look_at(const ts_shade_view *view, const ts_shade_row *row, int first, int n, bool dark,
+                      const float *image, const surface *s, sight *t)
 {
     return view->kind == TS_SHADE_COLLOCATED
-        ? look(view, TS_SHADE_COLLOCATED, row, first, n, false, TS_PRIOR_FADE, image, s, t)
-        : look(view, TS_SHADE_POSITIONS, row, first, n, false, TS_PRIOR_FADE, image, s, t);
+        ? look(view, TS_SHADE_COLLOCATED, row, first, n, dark, TS_PRIOR_FADE, image, s, t)
+        : look(view, TS_SHADE_POSITIONS, row, first, n, dark, TS_PRIOR_FADE, image, s, t);
 }
 
-/* False where no photograph tells anything. */
+/* False where no photograph tells anything. Of several, maps without light that a photograph shows bright misfit. */
 V_INLINE bool learn(const ts_shade_view *views, const float *const *images, int count, const ts_shade_row *row,
                     int first, int n, const surface *s, const ts_prior *prior, const spread *a,
                     const vf m[MAP_CHANNELS], bool doubts, estimate *e)
@@ -150,12 +150,12 @@ V_INLINE bool learn(const ts_shade_view *views, const float *const *images, int 
     bool informed = false;
     e->misfit = v_set(0);
     if (count == 1) {
-        if (!look_at(views, row, first, n, images[0], s, &t)) return false;
+        if (!look_at(views, row, first, n, false, images[0], s, &t)) return false;
         settle(s, &t, prior, a, m, doubts, e);
         return true;
     }
     for (int v = 0; v < count; v++) {
-        if (!look_at(views + v, row, first, n, images[v], s, &t)) continue;
+        if (!look_at(views + v, row, first, n, true, images[v], s, &t)) continue;
         if (informed) take(s, &t, false, prior, a, m, &q, &e->misfit);
         else take(s, &t, true, prior, a, m, &q, &e->misfit);
         informed = true;

@@ -1,4 +1,5 @@
 /* How far steps go: those of one photograph, and the search of several. */
+#include "tensor/cpu.h"
 #include "tests/support/posterior.h"
 #include <math.h>
 
@@ -107,6 +108,29 @@ TEST(search_keeps_the_best_maps_of_each_pixel)
           "the misfit fell from %g to %g, without a search to %g", first, last, without_search(91));
     free(best), free(least), free(before), free(kept);
     end(&j);
+}
+
+/* All pixels face away from some lights: what the photographs show there counts, whatever a pixel's neighbours are. */
+TEST(search_counts_what_faces_away_from_the_light)
+{
+    for (int isa = TS_BASE; isa <= (int)ts_isa_best(); isa++) {
+        ts_isa_use((ts_isa)isa);
+        job j = careful(93);
+        float *best = floats(PIXELS * C), *least = floats(PIXELS);
+        const rd_search search = {best, least, false};
+        int dark = 0;
+        for (int p = 0; p < PIXELS; p++) j.maps[p * C + MAP_NORMAL] = 0.99f, j.maps[p * C + MAP_NORMAL + 1] = 0;
+        step(&j, 1, &search);
+        for (int p = 0; p < PIXELS; p++) {
+            const double e = misfit(&j, p, j.maps + p * C), x = (p % SIDE + 0.5) / SIDE - 0.5;
+            for (int k = 0; k < VIEWS; k++) dark += 0.99 * ((double)j.views[k].light[0] - x) + 0.15 < 0;
+            CHECK(fabs((double)least[p] - e) < 1e-3 * (e + 1), "%s, pixel %d: misfit %g, not %g",
+                  ts_isa_name((ts_isa)isa), p, (double)least[p], e);
+        }
+        CHECK(dark > PIXELS, "%d times no light says nothing", dark);
+        free(best), free(least);
+        end(&j);
+    }
 }
 
 /* Maps that are not numbers are never kept, nor gone to. */
