@@ -106,6 +106,10 @@ static ag_value *mean_scene(ag_tape *tape, const ag_value *from)
         for (int v = RD_SCENE_LIGHT_X; v <= RD_SCENE_CAMERA_X; v += 2) {
             const float vector[2] = {x[v], x[v + 1]};
             normal_back(orientations[k], vector, x + v);
+            if (!(orientations[k] & 4)) continue; /* x and y have changed places, and so have their errors */
+            const float error = x[RD_SCENE_NUMBERS + v];
+            x[RD_SCENE_NUMBERS + v] = x[RD_SCENE_NUMBERS + v + 1];
+            x[RD_SCENE_NUMBERS + v + 1] = error;
         }
         for (int c = 0; c < 2 * RD_SCENE_NUMBERS; c++) mean->t.data[c] += x[c] / (float)from->t.shape.n;
     }

@@ -182,6 +182,12 @@ TEST(guess_turns_with_the_photograph)
               fabs((double)(n2[RD_SCENE_LIGHT_Y] - n1[RD_SCENE_LIGHT_X])) < 2e-5,
           "the light %g %g became %g %g", (double)n1[RD_SCENE_LIGHT_X], (double)n1[RD_SCENE_LIGHT_Y],
           (double)n2[RD_SCENE_LIGHT_X], (double)n2[RD_SCENE_LIGHT_Y]);
+    const float *e1 = n1 + RD_SCENE_NUMBERS, *e2 = n2 + RD_SCENE_NUMBERS;
+    for (int v = RD_SCENE_LIGHT_X; v <= RD_SCENE_CAMERA_X; v += 2) {
+        CHECK(fabsf(e1[v] - e1[v + 1]) > 1e-3f, "errors that are alike say nothing");
+        CHECK(fabsf(e2[v] - e1[v + 1]) < 2e-5f && fabsf(e2[v + 1] - e1[v]) < 2e-5f, "errors %g %g became %g %g",
+              (double)e1[v], (double)e1[v + 1], (double)e2[v], (double)e2[v + 1]);
+    }
     nn_model_free(&m);
     free(own);
     free(turned);
