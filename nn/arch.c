@@ -133,8 +133,9 @@ ts_code nn_arch_check(const nn_arch *a, ts_status *st)
     if (a->spread && a->g_unshuffle == 1) return ts_fail(st, TS_INVALID, "spread is set: that needs unshuffle above 1");
     if (a->descent == NN_DESCENT_POSTERIOR && (!a->spread || !a->scene || a->coarse_steps > 0 || a->h_width > 0))
         return ts_fail(st, TS_INVALID, "descent is posterior: that needs spread, scene, h_width 0 and coarse_steps 0");
-    if (a->revisions > 0 && (a->descent != NN_DESCENT_POSTERIOR || a->g_size % 4 != 0))
-        return ts_fail(st, TS_INVALID, "revisions is %d: that needs descent = posterior and a g_size that 4 divides",
+    if (a->revisions > 0 && (a->descent != NN_DESCENT_POSTERIOR || a->g_size % 4 != 0 || a->iterations == 0))
+        return ts_fail(st, TS_INVALID,
+                       "revisions is %d: that needs descent = posterior, iterations and a g_size that 4 divides",
                        a->revisions);
     if (a->scene && a->images > 1) return ts_fail(st, TS_INVALID, "scene is set: that needs images 1");
     if (a->images > 1 && a->rmse == NN_RMSE_BATCH)

@@ -222,6 +222,8 @@ TEST(revise_refuses)
     ts_status st = {0};
     a.descent = NN_DESCENT_NEWTON;
     CHECK(nn_arch_check(&a, &st) == TS_INVALID && strstr(st.message, "revisions"), "%s", st.message);
+    a = m->arch, a.iterations = 0;
+    CHECK(nn_arch_check(&a, &st) == TS_INVALID && strstr(st.message, "revisions"), "%s", st.message);
     a = m->arch, a.g_size = 18, a.g_levels = 1;
     CHECK(nn_arch_check(&a, &st) == TS_INVALID && strstr(st.message, "revisions"), "%s", st.message);
     for (int photographs = 1; photographs <= 2; photographs++)
