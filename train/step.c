@@ -172,14 +172,18 @@ static double rate_now(const tr_config *c, int64_t step)
                                     (float)(pre ? c->train.pretrain_floor : c->train.rate_floor), at, warmup, length);
 }
 
-/* The second phase has another loss: Adam restarts. */
+/* The second phase has another loss: Adam restarts. A g that is fixed from now on is the one that is saved. */
 static void begin_phase(tr_trainer *t)
 {
+    size_t first, last;
     if (t->step == 0 || t->step != t->config.train.pretrain_steps) return;
     memset(t->adam.m, 0, t->adam.count * sizeof(float));
     memset(t->adam.v, 0, t->adam.count * sizeof(float));
     t->adam.step = 0;
     t->best = INFINITY; /* R_0's error before, R_T's from now on */
+    if (t->config.train.g_rate > 0 || !t->adam.ema) return;
+    nn_model_range(t->model, NN_G, &first, &last);
+    memcpy(t->model->value + first, t->adam.ema + first, (last - first) * sizeof(float));
 }
 
 #define NORM_DECAY 0.98
