@@ -1,5 +1,6 @@
 #include "data/collection.h"
 #include "data/height.h"
+#include "tensor/hash.h"
 #include <dirent.h>
 #include <errno.h>
 #include <limits.h>
@@ -51,7 +52,7 @@ static ts_code read_sets(const char *path, struct dirent **list, int n, int thre
         if (snprintf(folder, sizeof folder, "%s/%s", path, list[i]->d_name) >= (int)sizeof folder)
             return ts_fail(st, TS_INVALID, "%s: name too long", path);
         if (stat(folder, &about) || !S_ISDIR(about.st_mode)) continue;
-        io_collected *set = malloc(PIXELS * sizeof *set);
+        io_collected *set = calloc(PIXELS, sizeof *set); /* what lies between the numbers is hashed too */
         if (!set) return ts_fail(st, TS_NOMEM, "%s: no memory for set %d of %d (put fewer there)", path, i + 1, n);
         c->set[c->count++] = set;
         if (read_set(folder, threads, height, set, st) != TS_OK) return st->code;
@@ -79,6 +80,13 @@ io_collection *io_collection_read(const char *path, int threads, bool (*stop)(vo
 }
 
 int io_collection_count(const io_collection *c) { return c->count; }
+
+uint64_t io_collection_hash(const io_collection *c)
+{
+    uint64_t hash = 0;
+    for (int i = 0; i < c->count; i++) hash = ts_hash(c->set[i], PIXELS * sizeof *c->set[i], hash);
+    return hash;
+}
 
 const io_collected *io_collection_get(const io_collection *c, int number) { return c->set[number]; }
 

@@ -80,18 +80,19 @@ static ts_code save(tr_trainer *t, ts_status *st)
     snprintf(number[5], sizeof number[5], "%" PRId64, t->best_step);
     snprintf(number[6], sizeof number[6], "%.17g", t->mean_norm);
     snprintf(number[7], sizeof number[7], "%d", t->ranks.count);
-    const nn_meta meta[] = {{"format", format_name},
-                            {"step", number[0]},
-                            {"adam_step", number[1]},
-                            {"skipped", number[2]},
-                            {"skipped_in_a_row", number[3]},
-                            {"best", number[4]},
-                            {"best_step", number[5]},
-                            {"mean_norm", number[6]},
-                            {"isa", ts_isa_name(ts_isa_now())},
-                            {"config", text},
-                            {"ranks", number[7]}}; /* of one process there is none */
-    const int metas = (int)(sizeof meta / sizeof *meta) - (t->ranks.count == 1);
+    nn_meta meta[12] = {{"format", format_name},
+                        {"step", number[0]},
+                        {"adam_step", number[1]},
+                        {"skipped", number[2]},
+                        {"skipped_in_a_row", number[3]},
+                        {"best", number[4]},
+                        {"best_step", number[5]},
+                        {"mean_norm", number[6]},
+                        {"isa", ts_isa_name(ts_isa_now())},
+                        {"config", text}};
+    int metas = 10; /* of one process, and of procedural materials alone, no more */
+    if (t->ranks.count > 1) meta[metas++] = (nn_meta){"ranks", number[7]};
+    if (*t->collection_hash) meta[metas++] = (nn_meta){"collection", t->collection_hash};
     const ts_code code = nn_safetensors_write(path, block, n, meta, metas, st);
     free(text);
     return code;
@@ -152,6 +153,8 @@ static ts_code restore(tr_trainer *t, const nn_file *file, const char *path, ts_
     if (!best || !mean) return ts_fail(st, TS_FORMAT, "%s: %s is missing", path, best ? "mean_norm" : "best");
     if (t->step > tr_total(&t->config))
         return ts_fail(st, TS_FORMAT, "%s: step %" PRId64 " is beyond the end of the run", path, t->step);
+    const char *collection = nn_file_meta(file, "collection");
+    snprintf(t->collection_hash, sizeof t->collection_hash, "%s", collection ? collection : "");
     t->best = strtod(best, NULL);
     t->mean_norm = strtod(mean, NULL);
     t->in_a_row = (int)(in_a_row < 1000000 ? in_a_row : 1000000);

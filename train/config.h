@@ -67,7 +67,7 @@ typedef struct tr_key {
     double lo, hi;             /* numbers; TR_TEXT: hi is the size of the array */
     const char *initial;       /* the default as text; NULL: nn_arch_default()'s */
     const char *const *choice; /* TR_CHOICE: names in the order of the enum, NULL at the end */
-    bool neutral;              /* changes no byte of the weights: free to change on resume, not kept in checkpoints */
+    bool neutral; /* changes no byte of what a run still makes: free to change on resume, not kept in checkpoints */
     const char *help;
 } tr_key;
 

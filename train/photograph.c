@@ -4,6 +4,8 @@
 #include "tensor/maps.h"
 #include "tensor/team.h"
 #include "train/state.h"
+#include <inttypes.h>
+#include <stdio.h>
 #include <string.h>
 
 io_procedural tr_materials_of(const tr_config *c)
@@ -19,6 +21,20 @@ io_procedural tr_materials_of(const tr_config *c)
                            .closer = (float)c->data.closer,
                            .homogeneous = (float)c->data.homogeneous,
                            .collected = (float)c->data.collected};
+}
+
+ts_code tr_read_collection(tr_trainer *t, ts_status *st)
+{
+    const char *path = t->config.data.collection;
+    char hash[TR_HASH];
+    t->collection = io_collection_read(path, 0, t->listener.stop, t->listener.user, st);
+    if (!t->collection) return st->code;
+    snprintf(hash, sizeof hash, "%016" PRIx64, io_collection_hash(t->collection));
+    if (*t->collection_hash && strcmp(hash, t->collection_hash) != 0)
+        return ts_fail(st, TS_INVALID, "%s: has other maps than the run was begun with (--resume needs the same)",
+                       path);
+    strcpy(t->collection_hash, hash);
+    return TS_OK;
 }
 
 io_camera tr_camera_of(const tr_config *c)

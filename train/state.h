@@ -10,6 +10,7 @@
 #include "train/ranks.h"
 #include "train/reduce.h"
 
+enum { TR_HASH = 17 };   /* as text */
 enum { TR_PATH = 1200 }; /* a folder and one of our names */
 
 /* What is true of a photograph: the radiance under view, with the ambient light, is what the camera saw before its
@@ -55,9 +56,10 @@ typedef struct tr_trainer {
     ag_tape *tape;
     nn_model *teacher; /* train.teacher, or NULL */
     ag_tape *quiet;    /* of a fixed g, without gradients, whose packed weights are kept; NULL where none is read */
-    io_collection *collection; /* data.collection, or NULL */
+    io_collection *collection;     /* data.collection, or NULL */
+    char collection_hash[TR_HASH]; /* of that, or of the one that the checkpoint was made with; empty: there is none */
     io_loader *loader;
-    float *images;     /* [batch][given][patch][patch][3], given <= arch.images; batch: the share's, here and below */
+    float *images;     /* [batch][given][patch][patch][3], given <= tr_most_given; batch: the share's, here and below */
     rd_view *captures; /* [batch][given] */
     tr_shot *shots;    /* [batch][given] */
     float *scenes;     /* [batch][given][RD_SCENE_NUMBERS] */
@@ -90,6 +92,8 @@ nn_model *tr_model_create(const tr_config *c, ts_status *st);
 /* photograph.c: the materials and the camera of [data]. */
 io_procedural tr_materials_of(const tr_config *c);
 io_camera tr_camera_of(const tr_config *c);
+/* Reads data.collection; TS_INVALID where the checkpoint was made with another. */
+ts_code tr_read_collection(tr_trainer *t, ts_status *st);
 
 /* Number photographs of each material [count][size][size][9], with the faults of [data]; images
  * [count][number][size][size][3], under views [count][number] as tr_capture_views draws them (NULL: the flash for

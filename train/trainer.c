@@ -222,10 +222,7 @@ static void leave_blocks(tr_trainer *t)
 static ts_code begin(tr_trainer *t, bool resume, ts_status *st)
 {
     const tr_config *c = &t->config;
-    if (c->data.collected > 0) {
-        t->collection = io_collection_read(c->data.collection, 0, t->listener.stop, t->listener.user, st);
-        if (!t->collection) return ts_context(st, "data.collection");
-    }
+    if (c->data.collected > 0 && tr_read_collection(t, st) != TS_OK) return ts_context(st, "data.collection");
     io_procedural source = tr_materials_of(c);
     source.collection = t->collection;
     const io_share share = {c->train.batch, t->first, t->batch};

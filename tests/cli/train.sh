@@ -141,6 +141,9 @@ own_collection() {
     says "$T/err" "data.collection: $T/nowhere"
     expect 0 train --set data.collection="$T/own" --set data.collected=0.5
     cmp -s "$T/run/last.safetensors" "$T/plain/last.safetensors" && fail "trained on the same materials"
+    expect 0 "$BIN/lgd-data" -o "$T/other" --count 2 --size 32 --seed 2
+    expect 1 train --resume --set data.collection="$T/other" --set data.collected=0.5
+    says "$T/err" "$T/other: has other maps than the run was begun with"
     mv "$T/own" "$T/moved"
     expect 0 train --resume --set data.collection="$T/moved" --set data.collected=0.5
 }
