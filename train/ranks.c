@@ -1,5 +1,6 @@
 #include "train/ranks.h"
 #include "data/library.h"
+#include "tensor/hash.h"
 #include <stdlib.h>
 #include <string.h>
 
@@ -83,16 +84,8 @@ ts_code tr_agree(const tr_ranks *ranks, ts_code code, ts_status *st)
 ts_code tr_same_bytes(const tr_ranks *ranks, const void *data, size_t bytes, const char *what, ts_status *st)
 {
     if (!ranks->mpi) return TS_OK;
-    uint64_t mine = 14695981039346656037u, first; /* FNV-1a, of words where there are any */
-    const unsigned char *p = data;
-    size_t i = 0;
-    for (; i + sizeof first <= bytes; i += sizeof first) {
-        memcpy(&first, p + i, sizeof first);
-        mine = (mine ^ first) * 1099511628211u;
-        mine ^= mine >> 32;
-    }
-    for (; i < bytes; i++) mine = (mine ^ p[i]) * 1099511628211u;
-    first = mine;
+    const uint64_t mine = ts_hash(data, bytes, 0);
+    uint64_t first = mine;
     ranks->mpi->broadcast(&first, sizeof first);
     return tr_agree(ranks, first == mine ? TS_OK : ts_fail(st, TS_INVALID, "%s rank 0's", what), st);
 }
