@@ -127,7 +127,6 @@ static void newton_step(const ag_tape *tape, const nn_model *model, const nn_inp
     const ts_shape s = maps->shape;
     const int64_t pixels = (int64_t)s.h * s.w;
     const int count = nn_given(in);
-    if (s.c > MAP_CHANNELS) memset(to, 0, (size_t)ts_count(s) * sizeof *to);
     for (int n = 0; n < s.n; n++) {
         rd_view view[NN_MAX_IMAGES];
         const float *image[NN_MAX_IMAGES];

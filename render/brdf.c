@@ -72,13 +72,6 @@ static void decode(const ts_shade_guards *guards, const double maps[MAP_CHANNELS
 
 void rd_decode_double(const double maps[MAP_CHANNELS], rd_surface *s) { decode(&rd_guards, maps, s); }
 
-void rd_decode(const float maps[MAP_CHANNELS], rd_surface *s)
-{
-    double m[MAP_CHANNELS];
-    for (int i = 0; i < MAP_CHANNELS; i++) m[i] = maps[i];
-    rd_decode_double(m, s);
-}
-
 double rd_fresnel(double vh) { return exp2((-5.55473 * vh - 6.98316) * vh); }
 
 double rd_half(const double l[3], const double v[3], double h[3])

@@ -44,7 +44,6 @@ typedef struct rd_surface {
     double slope[MAP_CHANNELS]; /* d decoded / d encoded: 1/2 or 1, 0 where the value was clamped */
     double dn[2][3];            /* d n / d x and d n / d y before the clamp */
 } rd_surface;
-void rd_decode(const float maps[MAP_CHANNELS], rd_surface *s);
 void rd_decode_double(const double maps[MAP_CHANNELS], rd_surface *s);
 
 /* f for unit l and v: f[3], and the specular part alone when specular is not NULL. */

@@ -25,10 +25,10 @@ ag_value *ag_scene_render(ag_tape *tape, ag_value *maps, ag_value *numbers, bool
 
 static void forward(ag_tape *tape, ag_node *node)
 {
-    (void)tape;
     const ts_tensor *maps = &node->in[0]->t, *out = &node->out->t;
+    const rd_grid grid = rd_grid_on(rd_grid_full(maps->shape.h), ag_threads(tape));
     for (int n = 0; n < maps->shape.n; n++)
-        rd_scene_photograph(rd_grid_full(maps->shape.h), maps->data + n * maps->stride_n, maps->shape.c,
+        rd_scene_photograph(grid, maps->data + n * maps->stride_n, maps->shape.c,
                             node->in[1]->t.data + n * RD_SCENE_NUMBERS, *(const bool *)node->attr,
                             out->data + n * out->stride_n);
 }

@@ -45,7 +45,7 @@ typedef struct rd_search {
 #define RD_SEARCH_LONGEST 0.7f
 float rd_step_length(int photographs, int steps);
 
-/* step: length times delta, 0 < length <= 1, [h, w, channels], channels beyond the ninth are not written; where maps +
+/* step: length times delta, 0 < length <= 1, [h, w, channels], 0 in channels beyond the ninth; where maps +
  * delta would leave [-1, 1] delta ends there. after (may be NULL): [h, w, MAP_GROUPS], what is left of the prior's
  * standard deviations, of several values the root of their mean variance. Views are RD_POINT,
  * 1 <= count <= RD_CAPTURE_VIEWS; image[k] [h, w, 3] belongs to views[k]. search: NULL, and of one photograph always.

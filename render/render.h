@@ -33,8 +33,8 @@ void rd_flash_gradient(rd_grid grid, const float *maps, int channels, const rd_v
 
 /* The Gauss-Newton step of each pixel by itself (S8 of docs/math.md, equation in render/kernels/newton.h): toward maps
  * that fit count photographs (RD_POINT views, image[k] [h, w, 3] belongs to views[k]), damped by
- * damping[MAP_CHANNELS] > 0 (Levenberg and Marquardt). step: [h, w, channels]; channels beyond the ninth
- * are not written. Finite for finite maps. */
+ * damping[MAP_CHANNELS] > 0 (Levenberg and Marquardt). step: [h, w, channels]; 0 in channels beyond
+ * the ninth. Finite for finite maps. */
 void rd_newton_step(rd_grid grid, const float *maps, int channels, const rd_view *views, const float *const *image,
                     int count, const float *damping, float *step);
 #endif

@@ -166,7 +166,7 @@ static void sums_of_rows(const void *job, int64_t begin, int64_t end)
         rd_scene_roughen(j->grid.w, j->maps + at * j->channels, j->channels, j->level, 1, maps);
         ts_shade_row row = rd_shade_row(j->grid, y, j->maps, j->channels);
         row.maps = maps;
-        j->part[i] = (ts_scene_sums){.misfit = 0};
+        j->part[i] = (ts_scene_sums){.right = {0}};
         ts_scene_k()->normal(&j->scene, &row, j->image + at * 3, &j->how->scale, j->deviation + at * MAP_GROUPS,
                              &j->part[i]);
     }
@@ -180,7 +180,7 @@ static ts_scene_sums sums_of(rd_grid grid, const float *maps, int channels, cons
     const int first = how->every / 2 < grid.h ? how->every / 2 : 0,
               rows = (grid.h - first + how->every - 1) / how->every;
     scene.least = least;
-    ts_scene_sums *part = ts_scratch(0, (size_t)rows * sizeof *part), all = {.misfit = 0};
+    ts_scene_sums *part = ts_scratch(0, (size_t)rows * sizeof *part), all = {.right = {0}};
     ts_for(grid.threads, rows, 1, sums_of_rows,
            &(sums_job){grid, maps, deviation, image, unknown[RD_SCENE_ROUGHNESS], channels, first, how, scene, part});
     for (int i = 0; i < rows; i++) {

@@ -68,8 +68,9 @@ const tr_key tr_keys[] = {
     {"model", "gradient", TR_BOOL, AT(arch.gradient), 0, 1, NULL, NULL, false,
      "h reads the gradient of the reconstruction error (no: zeros, an ablation)"},
     {"model", "descent", TR_CHOICE, AT(arch.descent), 0, NN_DESCENT_POSTERIOR, NULL, descent_names, false,
-     "what is added to the maps beside h, through a learned matrix over the channels: nothing (none, published), the "
-     "gradient, or the Gauss-Newton step of each pixel (newton)"},
+     "what is added to the maps beside h: nothing (none, published), through a learned matrix over the channels the "
+     "gradient or the Gauss-Newton step of each pixel (newton), or the whole step to the most probable maps "
+     "(posterior: needs spread and scene)"},
     {"model", "mean_before_norm", TR_BOOL, AT(arch.mean_before_norm), 0, 1, NULL, NULL, false,
      "g's global track takes its means before the normalisation (no: after it, as published)"},
     {"model", "rmse", TR_CHOICE, AT(arch.rmse), 0, 1, NULL, rmse_names, false,

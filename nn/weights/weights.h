@@ -16,8 +16,8 @@ typedef struct nn_block {
 ts_code nn_safetensors_write(const char *path, const nn_block *blocks, int count, const nn_meta *meta, int metas,
                              ts_status *st);
 
-/* A model with its parameters from a file whose metadata has the architecture. Tensors with other names than "g.…",
- * "h.…" and "a.…" (a checkpoint's) are ignored. */
+/* A model with its parameters from a file whose metadata has the architecture. Tensors whose names are
+ * no network's (those of a checkpoint's moments) are ignored. */
 nn_model *nn_model_load(const char *path, ts_status *st);
 /* The same to compute with on a tape without gradients: weights that the file has as plain F16 are not in
  * model->value but stay in the file, which the model holds open, and are taken from there: their tape gets

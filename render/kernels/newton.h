@@ -14,7 +14,7 @@ struct ts_newton_kernels {
      *
      * where seen and J are of the maps cut to [-1, 1]. The step leads from the maps as they are and is cut where they
      * would end outside [-1, 1]. images[v][count, 3], in [0, 1], belongs to views[v]; damping[MAP_CHANNELS] > 0.
-     * Channels beyond the maps' are not written. */
+     * Channels beyond the maps' become 0. */
     void (*step)(const ts_shade_view *views, const float *const *images, int count, const ts_shade_row *row,
                  const float *damping, float *step);
 };

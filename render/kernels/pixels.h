@@ -48,7 +48,7 @@ V_INLINE void v_apart(vf a, vf b, vf c, vf out[3])
 }
 #endif
 
-/* 3 or 9 channels of n pixels, stride values apart, to lanes; lanes from n on repeat pixel 0, so that they are valid
+/* Some channels of n pixels, stride values apart, to lanes; lanes from n on repeat pixel 0, so that they are valid
  * numbers. */
 V_INLINE void v_load_pixels(const float *p, int stride, int n, int channels, vf *out)
 {

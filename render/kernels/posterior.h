@@ -35,7 +35,7 @@ typedef struct ts_search {
 struct ts_posterior_kernels {
     /* step[count, channels]; mean[count, channels]; deviation[count, MAP_GROUPS]; after[count, MAP_GROUPS] and search
      * may be NULL, search of one photograph is. images[v][count, 3] belongs to views[v]. length: the part of a whole
-     * step that maps go on by. Channels of step beyond the maps' are not written. */
+     * step that maps go on by. Channels of step beyond the maps' become 0. */
     void (*step)(const ts_shade_view *views, const float *const *images, int count, const ts_shade_row *row,
                  const ts_prior *prior, const float *mean, const float *deviation, float length,
                  const ts_search *search, float *step, float *after);

@@ -139,7 +139,7 @@ static void normal(const ts_scene *scene, const ts_shade_row *row, const float *
                    const float *deviation, ts_scene_sums *sums)
 {
     spread a;
-    vf matrix[TS_SCENE_PAIRS] = {{0}}, right[TS_SCENE_UNKNOWNS] = {{0}}, misfit = {0};
+    vf matrix[TS_SCENE_PAIRS] = {{0}}, right[TS_SCENE_UNKNOWNS] = {{0}};
     set_hue(prior, &a);
     for (int i = 0; i < row->count; i += VL) {
         const int n = lanes_left(row, i);
@@ -183,7 +183,6 @@ static void normal(const ts_scene *scene, const ts_shade_row *row, const float *
 #pragma GCC unroll 3
         for (int c = 0; c < 3; c++) {
             const vf weight = v_select(live, g.inverse[c], v_set(0));
-            misfit += weight * error[c] * error[c];
 #pragma GCC unroll 9
             for (int j = 0, at = 0; j < TS_SCENE_UNKNOWNS; j++) {
                 const vf weighted = weight * by[c][j];
@@ -194,7 +193,6 @@ static void normal(const ts_scene *scene, const ts_shade_row *row, const float *
     }
     for (int j = 0; j < TS_SCENE_PAIRS; j++) sums->matrix[j] += (double)v_sum(matrix[j]);
     for (int j = 0; j < TS_SCENE_UNKNOWNS; j++) sums->right[j] += (double)v_sum(right[j]);
-    sums->misfit += (double)v_sum(misfit);
 }
 
 const struct ts_scene_kernels TS_TABLE(scene) = {.render = render, .backward = backward, .normal = normal};

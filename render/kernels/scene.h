@@ -21,7 +21,7 @@ typedef struct ts_scene {
 
 /* Sums over pixels of the normal equations, the upper triangle of the matrix by rows. */
 typedef struct ts_scene_sums {
-    double matrix[TS_SCENE_PAIRS], right[TS_SCENE_UNKNOWNS], misfit;
+    double matrix[TS_SCENE_PAIRS], right[TS_SCENE_UNKNOWNS];
 } ts_scene_sums;
 
 struct ts_scene_kernels {
@@ -31,7 +31,7 @@ struct ts_scene_kernels {
      * the numbers; gradient[count, channels] (may be NULL): by the maps. */
     void (*backward)(const ts_scene *scene, const ts_shade_row *row, float limit, const float *up, double *sums,
                      float *gradient);
-    /* Adds J_t' V J_t, J_t' V e and e' V e, where V = (J Sigma J' + S)^-1, J = d seen / d maps, J_t = d seen / d
+    /* Adds J_t' V J_t and J_t' V e, where V = (J Sigma J' + S)^-1, J = d seen / d maps, J_t = d seen / d
      * numbers and level, e = image - seen. */
     void (*normal)(const ts_scene *scene, const ts_shade_row *row, const float *image, const ts_prior *prior,
                    const float *deviation, ts_scene_sums *sums);

@@ -1,7 +1,6 @@
 /* Winograd's convolutions F(4 x 4, 3 x 3), 36 products in place of 144 for 4 x 4 pixels (Lavin and Gray 2016), and
- * F(2 x 2, 5 x 5), 36 in place of 100 for 2 x 2. Some
- * tiles at a time are transformed, multiplied as 36 small matrix products, and transformed back. The gradient of the
- * input is a convolution too (conv_gradient.c). */
+ * F(2 x 2, 5 x 5), 36 in place of 100 for 2 x 2. Some tiles at a time are transformed, multiplied as 36 small matrix
+ * products, and transformed back. The gradient of the input is a convolution of the output's, with mirrored taps. */
 #include "tensor/conv/conv_winograd.h"
 #include "tensor/kernels/elementwise.h"
 #include "tensor/kernels/winograd.h"

@@ -22,7 +22,8 @@ ts_conv ts_gru_input(const ts_gru *g);
 ts_conv ts_gru_hidden(const ts_gru *g);
 
 /* x [pixels][ic], old [pixels][c] or NULL = 0 (hh_packed may then be NULL), weights packed for TS_CONV_FORWARD, biases
- * [3c]. saved: [pixels][4c] = z, r, n, hh_n for backward, or NULL. y [pixels][c] overlaps nothing else. */
+ * [3c]. saved: [pixels][4c] = z, r, n, hh_n for backward, or NULL. y [pixels][c] may be old, and overlaps nothing
+ * else. */
 void ts_gru_forward(const ts_gru *g, const float *x, const float *old, const float *ih_packed, const float *ih_bias,
                     const float *hh_packed, const float *hh_bias, float *y, float *saved);
 

@@ -150,7 +150,7 @@ TEST(scene_normal_equations_equal_their_double_twin)
             rd_scene_photograph(grid, maps, C, truth, true, image);
             ts_scene scene = rd_scene_of(number);
             scene.least = round % 3 != 0;
-            ts_scene_sums sums = {.misfit = 0};
+            ts_scene_sums sums = {.right = {0}};
             for (int y = 0; y < W; y++) {
                 const ts_shade_row row = rd_shade_row(grid, y, maps, C);
                 ts_scene_k()->normal(&scene, &row, image + y * W * 3, &prior, deviation + y * W * G, &sums);
