@@ -47,12 +47,12 @@ static void write_lines(const ev_report *r, void (*put)(const ev_report *r, int 
         if (set == r->sets && r->sets == 1) continue; /* "all" would repeat it */
         for (int c = 0; c < r->columns; c++) {
             ev_row mean, deviation;
-            const int n = ev_report_summary(r, set == r->sets ? -1 : set, c, &mean, &deviation);
-            if (n == 0) continue;
+            const int which = set == r->sets ? -1 : set;
+            if (ev_report_materials(r, which) == 0) continue;
             ev_csv_field(f, set == r->sets ? "all" : r->set_name[set]);
-            fprintf(f, ",%d", n);
+            fprintf(f, ",%d", ev_report_summary(r, which, c, &mean, &deviation));
             put_column(r, c, f);
-            put(r, set == r->sets ? -1 : set, c, f);
+            put(r, which, c, f);
             fputc('\n', f);
         }
     }

@@ -50,25 +50,25 @@ static bool measured(const ev_report *r, const shown *s, int set, int metric)
 static void table(const ev_report *r, const shown *s, int set, FILE *f)
 {
     ev_row mean, deviation;
-    const int n = ev_report_summary(r, set, 0, &mean, &deviation);
+    const int all = ev_report_materials(r, set);
     bool has[EV_METRICS];
-    if (n == 0) return;
+    if (all == 0) return;
     fputs("<h2>", f);
     io_put_text(f, set < 0 ? "all sets" : r->set_name[set]);
     fprintf(f,
             "</h2>\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Means\"><table><tr><th>%d "
             "material%s</th><th>time<br><small>seconds</small></th><th>peak<br><small>GFLOP/s</small></th>"
             "<th>memory<br><small>MB</small></th>",
-            n, n == 1 ? "" : "s");
+            all, all == 1 ? "" : "s");
     for (int k = 0; k < EV_METRICS; k++)
         if ((has[k] = measured(r, s, set, k)))
             fprintf(f, "<th>%s<br><small>%s</small></th>", ev_metric_name[k], unit(k));
     fputs("</tr>\n", f);
     for (int i = 0; i < s->columns; i++) {
-        const int c = s->column[i], m = ev_report_method(r, c);
-        ev_report_summary(r, set, c, &mean, &deviation);
+        const int c = s->column[i], m = ev_report_method(r, c), n = ev_report_summary(r, set, c, &mean, &deviation);
         fputs("<tr><td>", f);
         put_name(r, c, f);
+        if (n != all) fprintf(f, " <small>%d of %d</small>", n, all);
         fputs("</td><td>", f);
         number(f, ev_report_seconds(r, set, c), 3);
         fputs("</td><td>", f);

@@ -48,6 +48,9 @@ void ev_report_free(ev_report *r)
     r->results = r->capacity = 0;
 }
 
+static bool belongs(const ev_report *r, int set, int i) { return set < 0 || r->result[i].set == set; }
+static bool is_estimated(const ev_report *r, int i, int column) { return !isnan(r->result[i].seconds[column]); }
+
 static int by_size(const void *a, const void *b)
 {
     const double x = *(const double *)a, y = *(const double *)b;
@@ -60,7 +63,7 @@ static double median(const ev_report *r, int set, const double *(*of)(const ev_r
     int n = 0;
     for (int i = 0; i < r->results && all; i++) {
         const double v = of(&r->result[i])[index];
-        if ((set < 0 || r->result[i].set == set) && !isnan(v)) all[n++] = v;
+        if (belongs(r, set, i) && !isnan(v)) all[n++] = v;
     }
     if (n) {
         qsort(all, (size_t)n, sizeof *all, by_size);
@@ -76,17 +79,24 @@ static const double *peak_of(const ev_result *m) { return m->peak; }
 double ev_report_seconds(const ev_report *r, int set, int column) { return median(r, set, seconds_of, column); }
 double ev_report_peak(const ev_report *r, int set, int method) { return median(r, set, peak_of, method); }
 
+int ev_report_materials(const ev_report *r, int set)
+{
+    int n = 0;
+    for (int i = 0; i < r->results; i++) n += belongs(r, set, i);
+    return n;
+}
+
 int ev_report_summary(const ev_report *r, int set, int column, ev_row *mean, ev_row *deviation)
 {
     int n = 0;
-    for (int i = 0; i < r->results; i++) n += set < 0 || r->result[i].set == set;
+    for (int i = 0; i < r->results; i++) n += belongs(r, set, i) && is_estimated(r, i, column);
     for (int k = 0; k < EV_METRICS; k++) {
         int measured = 0;
         double sum = 0, squares = 0;
         for (int pass = 0; pass < 2; pass++) /* the mean first: differences from it lose no digits */
             for (int i = 0; i < r->results; i++) {
                 const double v = r->result[i].row[column].value[k];
-                if ((set >= 0 && r->result[i].set != set) || isnan(v)) continue;
+                if (!belongs(r, set, i) || isnan(v)) continue;
                 if (pass == 0) sum += v, measured++;
                 else squares += (v - sum / measured) * (v - sum / measured);
             }
@@ -121,37 +131,62 @@ const char *ev_report_name(const ev_report *r, int column, char name[EV_NAME])
     return name;
 }
 
+/* Whether two columns' means are of the same materials. */
+static bool are_of_the_same(const ev_report *r, int set, int a, int b)
+{
+    for (int i = 0; i < r->results; i++)
+        if (belongs(r, set, i) && is_estimated(r, i, a) != is_estimated(r, i, b)) return false;
+    return true;
+}
+
+/* "-" where there is no number. */
+static void put_number(FILE *out, int width, int digits, double v)
+{
+    if (isnan(v)) fprintf(out, "  %*s", width, "-");
+    else fprintf(out, "  %*.*f", width, digits, v);
+}
+
+/* The table's first lines; partial: some of the others are not of all materials. any: what any column has. */
+static void print_head(const ev_report *r, int set, const ev_row *any, int width, bool partial, FILE *out)
+{
+    const int n = ev_report_materials(r, set);
+    fprintf(out, "%s%s: %d %s, %d x %d pixels", set != 0 ? "\n" : "", set < 0 ? "all sets" : r->set_name[set], n,
+            n == 1 ? "material" : "materials", r->size, r->size);
+    if (isnan(any->value[EV_DIFFUSE]) && !isnan(any->value[EV_RENDER])) fputs(", each picture but the first", out);
+    else if (!isnan(any->value[EV_DIFFUSE])) fprintf(out, ", %d renderings each", RD_EVAL_VIEWS);
+    fprintf(out,
+            "; RMSE (angle: degrees; ssim, flip, exposure, lpips: themselves), mean +- standard deviation; %d "
+            "thread%s%s, seconds: median\n%*s",
+            r->threads, r->threads == 1 ? "" : "s", r->pinned ? ", pinned" : "", width, "");
+    if (partial) fputs("  materials", out);
+    for (int k = 0; k < EV_METRICS; k++)
+        if (!isnan(any->value[k])) fprintf(out, "  %-16s", ev_metric_name[k]);
+    fputs("  render change  seconds  GFLOP/s peak      MB\n", out);
+}
+
 /* One set's table, or that of all with set = -1. */
 static void print_table(const ev_report *r, int set, const int *column, int columns, FILE *out)
 {
     ev_row mean, deviation, any = {{0}};
     char name[EV_NAME];
-    int n = 0, width = 5;
+    int width = 5;
+    bool partial = false;
+    const int all = ev_report_materials(r, set);
+    if (all == 0) return;
     for (int i = 0; i < columns; i++) { /* what no column has is no column of the table */
         const int length = (int)strlen(ev_report_name(r, column[i], name));
-        n = ev_report_summary(r, set, column[i], &mean, &deviation);
+        partial = ev_report_summary(r, set, column[i], &mean, &deviation) != all || partial;
         if (length > width) width = length;
         for (int k = 0; k < EV_METRICS; k++)
             if (i == 0 || isnan(any.value[k])) any.value[k] = mean.value[k];
     }
-    if (n == 0) return;
     ev_report_summary(r, set, column[0], &mean, &deviation);
     const double start = mean.value[EV_RENDER];
-    fprintf(out, "%s%s: %d %s, %d x %d pixels", set != 0 ? "\n" : "", set < 0 ? "all sets" : r->set_name[set], n,
-            n == 1 ? "material" : "materials", r->size, r->size);
-    if (isnan(any.value[EV_DIFFUSE]) && !isnan(any.value[EV_RENDER])) fputs(", each picture but the first", out);
-    else if (!isnan(any.value[EV_DIFFUSE])) fprintf(out, ", %d renderings each", RD_EVAL_VIEWS);
-    fprintf(out,
-            "; RMSE (angle: degrees; ssim, flip, exposure, lpips: themselves), mean +- standard deviation; %d "
-            "thread%s%s, seconds: median\n%*s",
-            r->threads, r->threads == 1 ? "" : "s", r->pinned ? ", pinned" : "", width, "");
-    for (int k = 0; k < EV_METRICS; k++)
-        if (!isnan(any.value[k])) fprintf(out, "  %-16s", ev_metric_name[k]);
-    fputs("  render change  seconds  GFLOP/s peak      MB\n", out);
+    print_head(r, set, &any, width, partial, out);
     for (int i = 0; i < columns; i++) {
-        const int m = ev_report_method(r, column[i]);
-        ev_report_summary(r, set, column[i], &mean, &deviation);
+        const int m = ev_report_method(r, column[i]), n = ev_report_summary(r, set, column[i], &mean, &deviation);
         fprintf(out, "%-*s", width, ev_report_name(r, column[i], name));
+        if (partial) fprintf(out, "  %9d", n);
         for (int k = 0; k < EV_METRICS; k++) {
             if (isnan(any.value[k])) continue;
             if (isnan(mean.value[k])) fprintf(out, "  %-16s", "-");
@@ -159,9 +194,13 @@ static void print_table(const ev_report *r, int set, const int *column, int colu
                 fprintf(out, k == EV_ANGLE || k == EV_EXPOSURE ? "  %6.2f +- %6.2f" : "  %.4f +- %.4f", mean.value[k],
                         deviation.value[k]);
         }
-        fprintf(out, "  %+12.1f%%  %7.3f  %12.0f  %6.0f\n", start > 0 ? 100 * (mean.value[EV_RENDER] / start - 1) : 0,
-                ev_report_seconds(r, set, column[i]), 1e-9 * ev_report_peak(r, set, m),
-                1e-6 * (double)r->method[m].bytes);
+        if (start > 0 && !isnan(mean.value[EV_RENDER]) && are_of_the_same(r, set, column[0], column[i]))
+            fprintf(out, "  %+12.1f%%", 100 * (mean.value[EV_RENDER] / start - 1));
+        else fprintf(out, "  %13s", "-");
+        put_number(out, 7, 3, ev_report_seconds(r, set, column[i]));
+        put_number(out, 12, 0, 1e-9 * ev_report_peak(r, set, m));
+        put_number(out, 6, 0, 1e-6 * (double)r->method[m].bytes);
+        fputc('\n', out);
     }
 }
 

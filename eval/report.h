@@ -42,8 +42,11 @@ typedef struct ev_report {
 int ev_report_add(ev_report *r, int set, const char *material, ts_status *st);
 void ev_report_free(ev_report *r);
 
+/* How many materials of a set, or of all sets with set = -1, have been estimated by any method. */
+int ev_report_materials(const ev_report *r, int set);
+
 /* Mean and (with n - 1) standard deviation over the materials of a set, or of all sets with set = -1, that have the
- * number (NaN: none has); how many materials there are. */
+ * number (NaN: none has); how many of them the column's method has estimated. */
 int ev_report_summary(const ev_report *r, int set, int column, ev_row *mean, ev_row *deviation);
 
 /* Medians over the materials of a set (-1: of all) of the seconds to a column, and of the FLOP/s beside a method; NaN
@@ -59,7 +62,8 @@ const char *ev_report_name(const ev_report *r, int column, char name[EV_NAME]);
 int ev_report_method(const ev_report *r, int column);
 
 /* For each set, and for all together when there are several: a line for each shown column, and how far the renderings'
- * error is from the first's. */
+ * error is from the first's where both are of the same materials. Where a line is not of all materials of the table,
+ * each says of how many it is. */
 void ev_report_print(const ev_report *r, FILE *out);
 
 /* folder/results.csv: a line for each material, method and step; folder/summary.csv: a line for each set, method and

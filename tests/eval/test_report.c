@@ -20,6 +20,17 @@ static char *written(void (*write_to)(const ev_report *, FILE *), const ev_repor
     return text;
 }
 
+static char *printed(const ev_report *r)
+{
+    char *text = NULL;
+    size_t size;
+    FILE *f = open_memstream(&text, &size);
+    CHECK(f, "open_memstream");
+    ev_report_print(r, f);
+    fclose(f);
+    return text;
+}
+
 static int count(const char *text, const char *what)
 {
     int n = 0;
@@ -149,24 +160,65 @@ TEST(report_of_several_methods)
 {
     ev_report r;
     make(&r, 2);
-    char *text = written(ev_html_write, &r), *json = written(ev_json_write, &r);
+    char *text = written(ev_html_write, &r), *json = written(ev_json_write, &r), *table = printed(&r);
     CHECK(count(text, "<th>lgd&lt;1&gt;</th><th>descent:steps=2</th>") == 3, "a column for each method");
     CHECK(count(text, "<option ") == 2 && count(text, "data-render-1=\"0.125000\"") == 1 &&
               count(text, "data-render=\"0.250000\"") == 1,
           "the sort keys");
     CHECK(count(text, "<circle") == 2 + 2, "%d points in the plot", count(text, "<circle"));
     CHECK(!strstr(text, "nan") && !strstr(text, "inf") && *blank(value(blank(json))) == 0, "a number is none");
-    char *table = NULL;
-    size_t size;
-    FILE *f = open_memstream(&table, &size);
-    CHECK(f, "open_memstream");
-    ev_report_print(&r, f);
-    fclose(f);
     CHECK(count(table, "\nlgd<1>  ") == 3 && count(table, "\ndescent:steps=2  ") == 3 && count(table, "-50.0%") == 3,
           "%s", table);
     free(text);
     free(json);
     free(table);
+    ev_report_free(&r);
+}
+
+/* A line that is not of all materials says of how many it is, and is not compared with one that is of others. */
+TEST(report_says_of_how_many_materials_a_line_is)
+{
+    ev_report r;
+    ts_status st = {0};
+    ev_row mean, deviation;
+    make(&r, 2);
+    char *table = printed(&r);
+    CHECK(!strstr(table, "  materials"), "all lines are of all materials: %s", table);
+    free(table);
+    for (int i = 1; i < 3; i++) { /* the second method estimates one of the first set's two, and not the second set's */
+        r.result[i].seconds[1] = NAN;
+        for (int k = 0; k < EV_METRICS; k++) r.result[i].row[1].value[k] = NAN;
+    }
+    CHECK(ev_report_materials(&r, 0) == 2 && ev_report_materials(&r, -1) == 3, "materials");
+    CHECK(ev_report_summary(&r, 0, 1, &mean, &deviation) == 1 && ev_report_summary(&r, 1, 1, &mean, &deviation) == 0 &&
+              ev_report_summary(&r, -1, 0, &mean, &deviation) == 3,
+          "materials of a column");
+    table = printed(&r);
+    char *html = written(ev_html_write, &r), *json = written(ev_json_write, &r);
+    CHECK(strstr(table, ": 2 materials") && strstr(table, "all sets: 3 materials") &&
+              count(table, "  materials  diffuse") == 3 && count(table, "\ndescent:steps=2          1  ") == 2 &&
+              count(table, "\ndescent:steps=2          0  -  ") == 1 &&
+              count(table, "\nlgd<1>                   3  ") == 1,
+          "%s", table);
+    CHECK(!strstr(table, "nan") && !strstr(table, "-50.0%") && count(table, "+0.0%") == 3, "unlike means: %s", table);
+    CHECK(strstr(html, "descent:steps=2 <small>1 of 2</small>") &&
+              strstr(html, "descent:steps=2 <small>0 of 1</small>") &&
+              strstr(html, "descent:steps=2 <small>1 of 3</small>") && !strstr(html, "lgd&lt;1&gt; <small>"),
+          "the page does not say it");
+    CHECK(count(json, "\"materials\": 1, ") == 2 && count(json, "\"materials\": 0, ") == 1, "results.json: %s", json);
+    CHECK(ev_report_write(&r, test_folder(), &st) == TS_OK, "%s", st.message);
+    char path[400], summary[8192] = "";
+    snprintf(path, sizeof path, "%s/summary.csv", test_folder());
+    FILE *f = fopen(path, "r");
+    CHECK(f && fread(summary, 1, sizeof summary - 1, f) > 0, "%s", path);
+    fclose(f);
+    CHECK(strstr(summary, "\",2,lgd<1>,0,") && strstr(summary, "\",1,descent:steps=2,0,") &&
+              strstr(summary, "\",0,descent:steps=2,0,,") && strstr(summary, "\nall,3,lgd<1>,0,") &&
+              strstr(summary, "\nall,1,descent:steps=2,0,"),
+          "%s", summary);
+    free(table);
+    free(html);
+    free(json);
     ev_report_free(&r);
 }
 
