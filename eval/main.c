@@ -4,6 +4,7 @@
 #include "eval/figure.h"
 #include "eval/methods/tune.h"
 #include "eval/shards.h"
+#include "eval/usable.h"
 #include "infer/model_path.h"
 #include "tensor/conv/conv.h"
 #include "tensor/pin.h"
@@ -197,6 +198,11 @@ static int evaluate(work *w, ts_status *st)
     return c->pareto ? CL_OK : c->shards ? finish_part(w, st) : finish(w, st);
 }
 
+static int refuse(const ts_status *st)
+{
+    return st->code == TS_INVALID ? cl_usage("%s", st->message) : cl_failed("%s", st->message);
+}
+
 static int start(const ev_command *c)
 {
     work *w = calloc(1, sizeof *w);
@@ -205,14 +211,18 @@ static int start(const ev_command *c)
     int code = CL_OK;
     w->c = c;
     for (int s = 0; s < c->sets && code == CL_OK; s++)
-        if (ev_set_open(c->spec[s], &c->convention, &w->set[s], &st) != TS_OK)
-            code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
+        if (ev_set_open(c->spec[s], &c->convention, &w->set[s], &st) != TS_OK) code = refuse(&st);
         else w->set[s].peers = c->peer_maps;
+    if (code == CL_OK && ev_usable_options(c, w->set, &st) != TS_OK) code = refuse(&st);
     ts_threads_set(c->threads);
     if (code == CL_OK && lgd_model_path(c->model, LGD_DEFAULT_MODEL, w->model, &st) != TS_OK)
         code = cl_failed("%s", st.message);
-    if (code == CL_OK && (c->tune ? parse_tuning(w, &st) : c->pareto ? TS_OK : parse_methods(w, &st)) != TS_OK)
-        code = st.code == TS_INVALID ? cl_usage("%s", st.message) : cl_failed("%s", st.message);
+    if (code == CL_OK &&
+        ((c->tune         ? parse_tuning(w, &st)
+              : c->pareto ? TS_OK
+                          : parse_methods(w, &st)) != TS_OK ||
+         ev_usable_methods(w->run.method, w->run.methods, w->set, c->sets, &st) != TS_OK))
+        code = refuse(&st);
     const bool there = access(c->out, F_OK) == 0;
     if (code == CL_OK) code = evaluate(w, &st);
     if (!there) { /* nothing came into them, or they stay */

@@ -210,11 +210,26 @@ static ts_code entry_path(const ev_set *set, const char *folder, const char *ent
     return ts_fail(st, TS_INVALID, "%s: the name is too long", set->where);
 }
 
+/* Where a peer's maps of photograph i would be. */
+static ts_code peer_path(const ev_set *set, int i, char path[PATH_LENGTH], ts_status *st)
+{
+    char stem[sizeof((io_material *)0)->name], name[sizeof stem + 4];
+    io_name_from_path(set->entry[i], stem, sizeof stem);
+    snprintf(name, sizeof name, "%s.png", stem);
+    return entry_path(set, set->peers, name, path, st);
+}
+
+bool ev_set_has_peer(const ev_set *set, int i)
+{
+    char path[PATH_LENGTH];
+    if (set->kind != EV_PHOTOS || !set->peers) return set->kind == EV_PEERS;
+    return peer_path(set, i, path, NULL) == TS_OK && access(path, F_OK) == 0;
+}
+
 ts_code ev_set_load_photo(const ev_set *set, int i, int size, float **image, double *fov, io_material *truth,
                           io_material *peer, ts_status *st)
 {
-    char path[PATH_LENGTH], name[sizeof truth->name + 4];
-    char from[128];
+    char path[PATH_LENGTH], from[128];
     io_photo_facts facts;
     io_image square;
     *image = NULL;
@@ -230,8 +245,7 @@ ts_code ev_set_load_photo(const ev_set *set, int i, int size, float **image, dou
     *image = square.data;
     io_name_from_path(path, truth->name, sizeof truth->name);
     if (!set->peers) return TS_OK;
-    snprintf(name, sizeof name, "%s.png", truth->name);
-    code = entry_path(set, set->peers, name, path, st);
+    code = peer_path(set, i, path, st);
     return code || access(path, F_OK) != 0 ? code : ev_read_four_panels(path, size, peer, st);
 }
 

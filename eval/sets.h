@@ -52,6 +52,9 @@ ts_code ev_set_load_under_sheet(const ev_set *set, int i, int inputs, int size, 
 ts_code ev_set_load_photo(const ev_set *set, int i, int size, float **image, double *fov, io_material *truth,
                           io_material *peer, ts_status *st);
 
+/* Whether ev_set_load_photo finds a peer's maps of material i; false of the other kinds. */
+bool ev_set_has_peer(const ev_set *set, int i);
+
 /* A number of the material, independent of its place in the set: the seed of its evaluation views. The same of both
  * kinds under a sheet. */
 uint64_t ev_set_identity(const ev_set *set, int i);

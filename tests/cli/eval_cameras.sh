@@ -102,10 +102,37 @@ photographs() {
     [ "$(column "$T/o/results.csv" render | tr -d '\n')" = "" ] || fail "an error without a truth"
     [ "$(ls "$T/o/images" | tr '\n' ' ')" = "1-a.png 1-b.png contact.png " ] || fail "images: $(ls "$T/o/images")"
     [ "$(grep -c 'data:image/png' "$T/o/report.html")" = 2 ] || fail "no pictures in the report"
-    expect 0 evaluate --set "photos:$T/photos" --peer-maps "$T/peers" --method lgd --method peer -o "$T/p"
-    says "$T/out" "2 materials"
     expect 1 evaluate --set "peers:$T/photos" -o "$T/q"
     says "$T/err" "a.jpg"
+}
+
+# A peer's maps of some of the photographs: each line says of how many materials it is. That there are none is said
+# before any work.
+peers() {
+    model
+    mkdir "$T/photos" "$T/peers"
+    cp demo/flash.jpg "$T/photos/a.jpg"
+    cp demo/flash.jpg "$T/photos/b.jpg"
+    set -- --set "photos:$T/photos" --method mean --method peer -o "$T/o"
+    expect 1 evaluate --peer-maps "$T/absent" "$@"
+    says "$T/err" "--peer-maps $T/absent: cannot be read"
+    expect 1 evaluate --peer-maps "$T/peers" "$@"
+    says "$T/err" "--peer-maps $T/peers: has maps of none of the photographs"
+    expect 2 evaluate "$@"
+    says "$T/err" "--method peer: no set has a peer's maps"
+    expect 2 evaluate --peer-maps "$T/peers" --set procedural:1,1 -o "$T/o"
+    says "$T/err" "--peer-maps"
+    [ ! -e "$T/o" ] || fail "work was begun"
+    # four grey panels; what an image is, its first bytes say
+    { printf 'P6\n128 32\n255\n'; head -c 12288 /dev/zero | tr '\0' '\200'; } >"$T/peers/b.png"
+    expect 0 evaluate --peer-maps "$T/peers" "$@"
+    says "$T/out" "2 materials"
+    grep -q '^mean  *2 ' "$T/out" && grep -q '^peer  *1 ' "$T/out" || fail "the lines are of: $(cat "$T/out")"
+    if grep -q nan "$T/out"; then fail "nan: $(cat "$T/out")"; fi
+    [ "$(column "$T/o/summary.csv" materials | tr '\n' ' ')" = "2 1 " ] || fail "$(cat "$T/o/summary.csv")"
+    says "$T/o/report.html" "peer <small>1 of 2</small>"
+    expect 0 evaluate --peer-maps "$T/peers" --set "photos:$T/photos" --method peer -o "$T/p"
+    says "$T/out" "1 material,"
 }
 
 # Nobody tells the light: one factor is fitted, and the estimate finds the power.
@@ -149,5 +176,6 @@ check eval_field_of_view field_of_view
 check eval_tells_g_what_is_known what_g_is_told
 check eval_tilt tilt
 check eval_photographs photographs
+check eval_peers peers
 check eval_untold untold
 check eval_light light
