@@ -6,6 +6,7 @@
 #include "eval/shards.h"
 #include "eval/usable.h"
 #include "infer/model_path.h"
+#include "infer/output.h"
 #include "tensor/conv/conv.h"
 #include "tensor/pin.h"
 #include "tensor/threads.h"
@@ -100,6 +101,7 @@ static ts_code parse_tuning(work *w, ts_status *st)
     return TS_OK;
 }
 
+/* The table is printed also where a file cannot be written: hours may be in it. */
 static int finish(work *w, ts_status *st)
 {
     ev_run *r = &w->run;
@@ -108,13 +110,13 @@ static int finish(work *w, ts_status *st)
     ts_code code = w->c->tune ? ev_tune_write(&r->report, out, st) : ev_report_write(&r->report, out, st);
     if (!code && w->c->iterations_figure) code = ev_figure_iterations(&r->report, out, st);
     if (!code && w->c->methods_figure) code = ev_figure_methods(&r->report, out, st);
-    if (code) return cl_failed("%s", st->message);
     if (w->c->tune) ev_tune_print(&w->tuning, &r->report, stdout);
     else ev_report_print(&r->report, stdout);
+    if (code) cl_failed("%s", st->message);
     if (r->failures > 0)
         return cl_failed("%d of %" PRId64 " %s failed: they are not in the means", r->failures, w->total,
                          r->methods > 1 ? "estimates" : "materials");
-    return CL_OK;
+    return code ? CL_FAILED : CL_OK;
 }
 
 /* A part of the evaluation. The process that finds all parts writes the results of all. */
@@ -145,6 +147,12 @@ static int finish_part(work *w, ts_status *st)
     return code;
 }
 
+/* A folder in which something can be written. */
+static ts_code prepare(const char *folder, ts_status *st)
+{
+    return cl_make_folder(folder, st) != TS_OK ? st->code : lgd_output_check(folder, st);
+}
+
 /* Folders, memory and numbers. */
 static int evaluate(work *w, ts_status *st)
 {
@@ -152,10 +160,10 @@ static int evaluate(work *w, ts_status *st)
     const char *name[EV_SETS_MAX],
         *slash = strrchr(w->model, '/'); /* where it lay says nothing to whom the report is sent */
     for (int s = 0; s < c->sets; s++) name[s] = c->spec[s];
-    if (cl_make_folder(c->out, st) != TS_OK) return cl_failed("%s", st->message);
+    if (prepare(c->out, st) != TS_OK) return cl_failed("%s", st->message);
     if (snprintf(w->images, sizeof w->images, "%s/images", c->out) >= (int)sizeof w->images)
         return cl_failed("%s: the name is too long", c->out);
-    if (c->images && cl_make_folder(w->images, st) != TS_OK) return cl_failed("%s", st->message);
+    if (c->images && prepare(w->images, st) != TS_OK) return cl_failed("%s", st->message);
     if (c->pin && !ts_threads_pin()) return cl_failed("--pin: there are fewer CPUs than the %d threads", ts_threads());
     if (c->lpips[0] && c->size < EV_LPIPS_SIDE)
         return cl_failed("LPIPS needs pictures of at least %d x %d pixels: --size", EV_LPIPS_SIDE, EV_LPIPS_SIDE);
