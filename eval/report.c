@@ -103,7 +103,8 @@ int ev_report_summary(const ev_report *r, int set, int column, ev_row *mean, ev_
         mean->value[k] = measured ? sum / measured : NAN;
         deviation->value[k] = measured > 1 ? sqrt(squares / (measured - 1)) : measured ? 0 : NAN;
     }
-    mean->value[EV_OVER_FLAT] = mean->value[EV_NORMAL] / mean->value[EV_FLAT]; /* smooth materials do not decide it */
+    if (!isnan(mean->value[EV_OVER_FLAT])) /* the quotient of the means: smooth materials do not decide it */
+        mean->value[EV_OVER_FLAT] = mean->value[EV_NORMAL] / mean->value[EV_FLAT];
     return n;
 }
 
@@ -146,14 +147,35 @@ static void put_number(FILE *out, int width, int digits, double v)
     else fprintf(out, "  %*.*f", width, digits, v);
 }
 
+/* What the estimate's renderings are compared with, where they are. */
+static void put_compared(const ev_report *r, int set, FILE *out)
+{
+    int captures = 0, known = 0, inputs = 1;
+    for (int i = 0; i < r->results; i++) {
+        const ev_sheet_shape *shape = &r->result[i].sheet;
+        if (!belongs(r, set, i)) continue;
+        captures += shape->kind == EV_SHEET_CAPTURE;
+        known += shape->kind == EV_SHEET_MAPS;
+        if (shape->kind == EV_SHEET_CAPTURE) inputs = shape->inputs;
+    }
+    if (known) fprintf(out, ", %d renderings each", RD_EVAL_VIEWS);
+    if (known && captures) fputs(" of known maps", out);
+    if (captures && inputs == 1)
+        fputs(", each picture of a capture but the input, the nearest to the sample's axis", out);
+    if (captures && inputs > 1)
+        fprintf(out,
+                ", each picture of a capture but the %d of the input: the nearest to the sample's axis and the "
+                "first others",
+                inputs);
+}
+
 /* The table's first lines; partial: some of the others are not of all materials. any: what any column has. */
 static void print_head(const ev_report *r, int set, const ev_row *any, int width, bool partial, FILE *out)
 {
     const int n = ev_report_materials(r, set);
     fprintf(out, "%s%s: %d %s, %d x %d pixels", set != 0 ? "\n" : "", set < 0 ? "all sets" : r->set_name[set], n,
             n == 1 ? "material" : "materials", r->size, r->size);
-    if (isnan(any->value[EV_DIFFUSE]) && !isnan(any->value[EV_RENDER])) fputs(", each picture but the first", out);
-    else if (!isnan(any->value[EV_DIFFUSE])) fprintf(out, ", %d renderings each", RD_EVAL_VIEWS);
+    put_compared(r, set, out);
     fprintf(out,
             "; RMSE (angle: degrees; ssim, flip, exposure, lpips: themselves), mean +- standard deviation; %d "
             "thread%s%s, seconds: median\n%*s",

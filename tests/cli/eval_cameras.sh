@@ -11,6 +11,7 @@ captures() {
     [ "$(ls "$T"/c/*/ | grep -c 'png$')" = 18 ] || fail "pictures: $(ls "$T"/c/*)"
     expect 0 evaluate --told --set "multiview:$T/c" --images -o "$T/o"
     says "$T/out" exposure
+    says "$T/out" "but the input, the nearest to the sample's axis"
     lines "$T/o/results.csv" 7
     awk -F, 'NR > 1 && !($5 == "" && $9 > 0 && $9 < 0.5 && $13 > 0.3 && $13 < 3) { exit 1 }' "$T/o/results.csv" ||
         fail "$(cat "$T/o/results.csv")"

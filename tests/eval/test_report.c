@@ -222,6 +222,57 @@ TEST(report_says_of_how_many_materials_a_line_is)
     ev_report_free(&r);
 }
 
+TEST(report_has_no_quotient_of_nothing)
+{
+    for (int nothing = 0; nothing < 2; nothing++) { /* a flat map of eight bits, and no relief at all */
+        ev_report r;
+        make(&r, 1);
+        for (int i = 0; i < 3; i++)
+            for (int c = 0; c < 2; c++) {
+                r.result[i].row[c].value[EV_FLAT] = nothing ? 0 : 0.004;
+                r.result[i].row[c].value[EV_OVER_FLAT] = i == 2 ? 0.5 : NAN;
+                if (i == 2) r.result[i].row[c].value[EV_FLAT] = 0.25;
+            }
+        ev_row mean, deviation;
+        ev_report_summary(&r, 0, 0, &mean, &deviation);
+        CHECK(isnan(mean.value[EV_OVER_FLAT]) && isnan(deviation.value[EV_OVER_FLAT]), "%g over nothing",
+              mean.value[EV_OVER_FLAT]);
+        ev_report_summary(&r, 1, 0, &mean, &deviation);
+        CHECK(fabs(mean.value[EV_OVER_FLAT] - 3) < 1e-12, "%g of one with relief", mean.value[EV_OVER_FLAT]);
+        char *table = printed(&r), *html = written(ev_html_write, &r);
+        CHECK(!strstr(table, "nan") && !strstr(table, "inf"), "%s", table);
+        CHECK(count(table, "over_flat") == 2, "a column of the set that has it, and of all: %s", table);
+        CHECK(!strstr(html, "nan") && !strstr(html, "inf"), "the page has a number that is none");
+        free(table);
+        free(html);
+        ev_report_free(&r);
+    }
+}
+
+/* The heading says what renderings are compared with. */
+TEST(report_says_what_is_compared)
+{
+    static const char *const one = "each picture of a capture but the input, the nearest to the sample's axis;",
+                             *const two = "each picture of a capture but the 2 of the input: the nearest to the "
+                                          "sample's axis and the first others;";
+    for (int inputs = 1; inputs <= 2; inputs++) {
+        ev_report r;
+        make(&r, 1);
+        for (int i = 0; i < 3; i++) r.result[i].sheet = (ev_sheet_shape){EV_SHEET_ALONE, 6, 1, 1};
+        char *table = printed(&r);
+        CHECK(!strstr(table, "each"), "photographs alone: %s", table);
+        free(table);
+        r.result[0].sheet = r.result[1].sheet = (ev_sheet_shape){EV_SHEET_CAPTURE, 8, 3, inputs};
+        r.result[2].sheet = (ev_sheet_shape){EV_SHEET_MAPS, 8, 3, 1};
+        table = printed(&r);
+        CHECK(count(table, inputs == 1 ? one : two) == 2 && count(table, ", 20 renderings each;") == 1 &&
+                  count(table, ", 20 renderings each of known maps, each picture") == 1,
+              "%s", table);
+        free(table);
+        ev_report_free(&r);
+    }
+}
+
 TEST(report_plot)
 {
     const cl_point some[] = {
