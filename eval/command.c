@@ -100,7 +100,9 @@ static const cl_argument arguments[] = {
      "write only DIR/pareto.svg and .csv: lgd's time against error at 128, 256, 512 pixels, for T = 0 .. 24, f32 and\n"
      "bf16, and tolerances"},
     {TUNE, "tune", NULL,
-     "write only DIR/tune.csv: search the methods' settings (default: of those that need no weights)"},
+     "write only DIR/tune.csv: search the methods' settings (default: of mean, lgd, descent, newton and finetune, "
+     "which\n"
+     "need no weights of their own)"},
     {SHARD, "shard", "I/N",
      "do part I of N of the materials, 1 .. N; the call with the same DIR that ends last writes the results of all, "
      "as\n"

@@ -88,14 +88,16 @@ static ts_code parse_methods(work *w, ts_status *st)
     return TS_OK;
 }
 
-/* All combinations of the grids; without methods of those that need no weights of their own. */
+/* All combinations of the grids. */
 static ts_code parse_tuning(work *w, ts_status *st)
 {
-    static const char *const some[] = {"mean", "lgd", "descent", "finetune"};
     const ev_command *c = w->c;
-    const int count = c->methods ? c->methods : (int)(sizeof some / sizeof *some);
-    for (int i = 0; i < count; i++)
-        if (ev_tune_add(&w->tuning, c->methods ? c->method[i] : some[i], i, w->model, st) != TS_OK) return st->code;
+    for (int i = 0; i < c->methods; i++)
+        if (ev_tune_add(&w->tuning, c->method[i], i, w->model, st) != TS_OK) return st->code;
+    for (int i = 0, of = 0; ev_methods[i] && !c->methods; i++)
+        if (ev_tune_by_default(ev_methods[i]) &&
+            ev_tune_add(&w->tuning, ev_methods[i]->name, of++, w->model, st) != TS_OK)
+            return st->code;
     w->run.method = w->tuning.method;
     w->run.methods = w->tuning.methods;
     return TS_OK;

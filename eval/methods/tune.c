@@ -6,6 +6,16 @@
 
 enum { SPEC = EV_METHOD_TEXT };
 
+bool ev_tune_by_default(const ev_method *m)
+{
+    bool grid = false;
+    for (const ev_setting *s = m->settings; s->key; s++) {
+        if (s->type == EV_WEIGHTS && !s->initial) return false;
+        grid = grid || s->grid;
+    }
+    return grid;
+}
+
 /* Word number i of words separated by blanks; false: there are fewer. */
 static bool word(const char *words, int i, char *out, size_t size)
 {

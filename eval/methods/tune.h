@@ -9,6 +9,9 @@ typedef struct ev_tuning {
     int methods, capacity;
 } ev_tuning;
 
+/* Whether it is searched where no method is named: it has a grid, and needs no weights of its own. */
+bool ev_tune_by_default(const ev_method *m);
+
 /* Adds all combinations of the grid of spec (NAME[:key=value,...]; what is given is not searched). */
 ts_code ev_tune_add(ev_tuning *t, const char *spec, int of, const char *model, ts_status *st);
 void ev_tune_free(ev_tuning *t);

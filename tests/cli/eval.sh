@@ -5,6 +5,7 @@ help_names_the_options() {
     expect 0 "$BIN/lgd-eval" --help
     for o in method repeat pin tune figure pareto descent finetune fast set iterations model threads seed noise images \
         size output procedural strips maps told untold peer-maps photos peers shard; do says "$T/out" "$o"; done
+    says "$T/out" "default: of mean, lgd, descent, newton and finetune"
 }
 
 wrong_usage() {

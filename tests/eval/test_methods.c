@@ -288,6 +288,15 @@ TEST(methods_mean_is_as_bright_as_the_photograph)
     }
 }
 
+/* --help and docs/methods.md name them. */
+TEST(methods_that_are_searched_by_default)
+{
+    char names[200] = "";
+    for (int i = 0; ev_methods[i]; i++)
+        if (ev_tune_by_default(ev_methods[i])) strcat(strcat(names, ev_methods[i]->name), " ");
+    CHECK(!strcmp(names, "mean lgd descent newton finetune "), "%s", names);
+}
+
 TEST(methods_points_and_settings)
 {
     ev_estimator e;
