@@ -19,12 +19,48 @@ static bool has_peers(const ev_set *set, int sets, unsigned kinds)
     return false;
 }
 
+/* An option and the kinds of sets that use it. */
+typedef struct use {
+    const char *option;
+    bool given;
+    unsigned kinds;
+    const char *sets;
+} use;
+
+static ts_code check_uses(const ev_command *c, const ev_set *set, ts_status *st)
+{
+    /* rendered: their photographs are made here. Of sheets --exposure, --untold and --camera decide whether a factor is
+     * fitted. */
+    const unsigned rendered = 1u << EV_PROCEDURAL | 1u << EV_STRIPS | 1u << EV_MAPS, captures = 1u << EV_MULTIVIEW,
+                   sheets = 1u << EV_UNDER_SHEET | 1u << EV_UNDER_SHEET_EXACT, photos = 1u << EV_PHOTOS;
+    const char *const known = "generated materials, strips or map folders", *const scored = "a set of another kind";
+    const use uses[] = {
+        {"peer-maps", c->peer_maps, photos, "photographs (photos:)"},
+        {"noise", c->noise > 0, rendered, known},
+        {"light", c->light[0] != 0 || c->light[1] != 0, rendered, known},
+        {"fov", c->fov > 0, rendered, known},
+        {"tilt", c->tilt > 0, rendered, known},
+        {"exposure", c->exposure > 0, rendered | sheets, known},
+        {"camera", c->photographed, rendered | sheets, known},
+        {"untold", c->light_unknown, rendered | sheets, known},
+        {"told", c->light_known, captures | (c->photographed ? rendered | sheets : 0),
+         "captures, or known materials and --camera"},
+        {"tune", c->tune, ~photos, scored}, /* photographs without known maps have no error */
+        {"pareto", c->pareto, ~photos, scored},
+        {"figure", c->iterations_figure || c->methods_figure, ~photos, scored},
+    };
+    for (size_t i = 0; i < sizeof uses / sizeof *uses; i++)
+        if (uses[i].given && !has_kind(set, c->sets, uses[i].kinds))
+            return ts_fail(st, TS_INVALID, "--%s: no set that is given uses it: leave it out, or add %s",
+                           uses[i].option, uses[i].sets);
+    return TS_OK;
+}
+
 ts_code ev_usable_options(const ev_command *c, const ev_set *set, ts_status *st)
 {
     const unsigned photos = 1u << EV_PHOTOS;
+    if (check_uses(c, set, st) != TS_OK) return st->code;
     if (!c->peer_maps) return TS_OK;
-    if (!has_kind(set, c->sets, photos))
-        return ts_fail(st, TS_INVALID, "--peer-maps: they are of photographs: give --set photos:FOLDER too");
     DIR *d = opendir(c->peer_maps);
     if (!d) return ts_fail(st, TS_IO, "--peer-maps %s: cannot be read: %s", c->peer_maps, strerror(errno));
     closedir(d);

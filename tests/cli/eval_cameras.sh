@@ -172,6 +172,24 @@ light() {
     if cmp -s "$T/side/results.csv" "$T/middle/results.csv"; then fail "--light changes nothing"; fi
 }
 
+# An option that no set uses is wrong usage; beside one that uses it a set may have none.
+unused() {
+    model
+    mkdir "$T/photos"
+    cp demo/flash.jpg "$T/photos/a.jpg"
+    for o in --camera=phone --light=1,1 --noise=1 --exposure=2 --fov=30 --tilt=10 --untold --told --tune --pareto \
+        --figure=methods; do
+        expect 2 "$BIN/lgd-eval" --set "photos:$T/photos" $o -o "$T/o"
+        says "$T/err" "${o%%=*}: no set that is given uses it"
+        lines "$T/err" 2
+    done
+    expect 2 evaluate --told --set procedural:1,1 -o "$T/o"
+    says "$T/err" "--told"
+    [ ! -e "$T/o" ] || fail "work was begun"
+    expect 0 evaluate --told --camera phone --set procedural:1,1 -o "$T/p"
+    expect 0 evaluate --noise 1 --light 1,1 --method lgd --set procedural:1,1 --set "photos:$T/photos" -o "$T/q"
+}
+
 check eval_captures captures
 check eval_field_of_view field_of_view
 check eval_tells_g_what_is_known what_g_is_told
@@ -180,3 +198,4 @@ check eval_photographs photographs
 check eval_peers peers
 check eval_untold untold
 check eval_light light
+check eval_unused_options unused
