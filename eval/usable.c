@@ -29,8 +29,8 @@ typedef struct use {
 
 static ts_code check_uses(const ev_command *c, const ev_set *set, ts_status *st)
 {
-    /* rendered: their photographs are made here. Of sheets --exposure, --untold and --camera decide whether a factor is
-     * fitted. */
+    /* rendered: their photographs are made here, and told unless --camera or --untold is given. Of sheets --exposure
+     * and --camera decide whether a factor is fitted. */
     const unsigned rendered = 1u << EV_PROCEDURAL | 1u << EV_STRIPS | 1u << EV_MAPS, captures = 1u << EV_MULTIVIEW,
                    sheets = 1u << EV_UNDER_SHEET | 1u << EV_UNDER_SHEET_EXACT, photos = 1u << EV_PHOTOS;
     const char *const known = "generated materials, strips or map folders", *const scored = "a set of another kind";
@@ -42,9 +42,7 @@ static ts_code check_uses(const ev_command *c, const ev_set *set, ts_status *st)
         {"tilt", c->tilt > 0, rendered, known},
         {"exposure", c->exposure > 0, rendered | sheets, known},
         {"camera", c->photographed, rendered | sheets, known},
-        {"untold", c->light_unknown, rendered | sheets, known},
-        {"told", c->light_known, captures | (c->photographed ? rendered | sheets : 0),
-         "captures, or known materials and --camera"},
+        {"told", c->light_known, captures | rendered | sheets, "captures (multiview:)"},
         {"tune", c->tune, ~photos, scored}, /* photographs without known maps have no error */
         {"pareto", c->pareto, ~photos, scored},
         {"figure", c->iterations_figure || c->methods_figure, ~photos, scored},

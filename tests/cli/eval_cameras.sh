@@ -177,14 +177,12 @@ unused() {
     model
     mkdir "$T/photos"
     cp demo/flash.jpg "$T/photos/a.jpg"
-    for o in --camera=phone --light=1,1 --noise=1 --exposure=2 --fov=30 --tilt=10 --untold --told --tune --pareto \
+    for o in --camera=phone --light=1,1 --noise=1 --exposure=2 --fov=30 --tilt=10 --told --tune --pareto \
         --figure=methods; do
         expect 2 "$BIN/lgd-eval" --set "photos:$T/photos" $o -o "$T/o"
         says "$T/err" "${o%%=*}: no set that is given uses it"
         lines "$T/err" 2
     done
-    expect 2 evaluate --told --set procedural:1,1 -o "$T/o"
-    says "$T/err" "--told"
     [ ! -e "$T/o" ] || fail "work was begun"
     expect 0 evaluate --told --camera phone --set procedural:1,1 -o "$T/p"
     expect 0 evaluate --noise 1 --light 1,1 --method lgd --set procedural:1,1 --set "photos:$T/photos" -o "$T/q"
