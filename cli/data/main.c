@@ -2,6 +2,7 @@
  * others' materials. */
 #include "cli/cli.h"
 #include "cli/data/histograms.h"
+#include "cli/data/new_set.h"
 #include "cli/data/options.h"
 #include "cli/data/pictures.h"
 #include "cli/data/sheet_captures.h"
@@ -21,35 +22,35 @@ static ts_code make_path(char path[4096], const cl_data_options *o, const char *
     return TS_OK;
 }
 
+/* The maps or the capture of a material, a folder that is there when it is complete. */
+static ts_code write_folder(const char *path, cl_format format, const io_material *m, ts_status *st)
+{
+    const bool maps = format == CL_FORMAT_FOLDERS;
+    cl_new_set set;
+    ts_code code = cl_new_set_begin(&set, path, maps ? "meta.txt" : "camera_pos.txt", st);
+    if (code) return code;
+    code = maps ? io_write_maps(set.hidden, m, IO_MAPS_ALL, false, st) : cl_write_capture(set.hidden, m, st);
+    return cl_new_sets_end(&set, 1, code, st);
+}
+
 /* One material and its photograph, to the files that were asked for. */
 static ts_code write_material(const cl_data_options *o, uint64_t index, io_material *m, io_image *photo, ts_status *st)
 {
     char path[4096];
     rd_view flash = rd_flash();
     io_procedural_make(&o->procedural, index, m);
-    ts_code code = TS_OK;
-    if (o->format == CL_FORMAT_FOLDERS) {
-        code = make_path(path, o, m->name, "", st);
-        if (!code) code = cl_make_folder(path, st);
-        if (!code) code = io_write_maps(path, m, IO_MAPS_ALL, false, st);
-    }
-    if (!code && o->format == CL_FORMAT_STRIPS) {
+    ts_code code = o->format ? make_path(path, o, m->name, o->format == CL_FORMAT_STRIPS ? ".png" : "", st) : TS_OK;
+    if (code) return code;
+    switch (o->format) {
+    case CL_FORMAT_NONE: break;
+    case CL_FORMAT_FOLDERS:
+    case CL_FORMAT_CAPTURES: code = write_folder(path, o->format, m, st); break;
+    case CL_FORMAT_STRIPS:
         rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &flash, true, photo->data);
-        code = make_path(path, o, m->name, ".png", st);
-        if (!code) code = io_write_strip(path, m, photo, st);
-    }
-    if (!code && o->format == CL_FORMAT_CAPTURES) {
-        code = make_path(path, o, m->name, "", st);
-        if (!code) code = cl_make_folder(path, st);
-        if (!code) code = cl_write_capture(path, m, st);
-    }
-    if (!code && o->format == CL_FORMAT_SHEETS) {
-        code = make_path(path, o, m->name, "/maps", st);
-        if (!code) code = cl_make_folder(path, st);
-        if (!code) code = io_write_maps(path, m, IO_MAPS_ALL, false, st);
-        if (!code) code = make_path(path, o, m->name, "", st);
-        if (!code)
-            code = cl_write_sheet_captures(path, m, o->procedural.seed, index, (int)o->width, (int)o->quality, st);
+        code = io_write_strip(path, m, photo, st);
+        break;
+    case CL_FORMAT_SHEETS:
+        code = cl_write_sheet_captures(path, m, o->procedural.seed, index, (int)o->width, (int)o->quality, st);
     }
     if (!code && o->photographs) {
         cl_photograph(&o->camera, o->procedural.seed, index, &flash, m->size, m->maps, photo->data);

@@ -1,5 +1,6 @@
 #include "cli/data/sheet_captures.h"
 #include "cli/cli.h"
+#include "cli/data/new_set.h"
 #include "data/capture.h"
 #include "data/image/jpeg_write.h"
 #include "data/rectify/paper_light.h"
@@ -11,6 +12,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #define PI 3.14159265358979323846
 #define DEGREE (PI / 180)
@@ -170,8 +172,9 @@ static ts_code take(const char *path, const scene *s, uint64_t seed, uint64_t in
     return code;
 }
 
-ts_code cl_write_sheet_captures(const char *folder, const io_material *m, uint64_t seed, uint64_t index, int width,
-                                int quality, ts_status *st)
+/* The photographs into the folder photos, what they are without faults into exact. */
+static ts_code take_all(const char *photos, const char *exact_folder, const io_material *m, uint64_t seed,
+                        uint64_t index, int width, int quality, ts_status *st)
 {
     const size_t values = (size_t)m->size * (size_t)m->size * 3;
     char path[4096];
@@ -192,7 +195,7 @@ ts_code cl_write_sheet_captures(const char *folder, const io_material *m, uint64
         scene s = {.shot = &shot[i], .radiance = radiance, .size = m->size, .black = black};
         for (int id = 0; id < IO_SHEET_TAGS; id++) io_tag_centre(id, s.centre[id]);
         rd_render(rd_grid_full(m->size), m->maps, MAP_CHANNELS, &view, false, radiance);
-        snprintf(path, sizeof path, "%s/photo_%d.jpg", folder, i + 1);
+        snprintf(path, sizeof path, "%s/photo_%d.jpg", photos, i + 1);
         code = take(path, &s, seed, index * CL_SHEET_SHOTS + (uint64_t)i, quality, st);
         /* as bright as the default flash makes the sample from nearer by than any of the lights: nothing is clipped
          * that is not under that flash */
@@ -202,11 +205,30 @@ ts_code cl_write_sheet_captures(const char *folder, const io_material *m, uint64
         for (int c = 0; c < 3; c++) exact.power[c] = power;
         for (size_t k = 0; k < values; k++) exact.image[(size_t)i * values + k] = fminf(radiance[k] * power, 1);
     }
-    if (!code && snprintf(path, sizeof path, "%s/exact", folder) >= (int)sizeof path)
-        code = ts_fail(st, TS_INVALID, "%s: the path is too long", folder);
-    if (!code) code = cl_make_folder(path, st);
-    if (!code) code = io_write_capture(path, &exact, st);
+    if (!code) code = io_write_capture(exact_folder, &exact, st);
     io_capture_free(&exact);
     free(radiance);
+    return code;
+}
+
+ts_code cl_write_sheet_captures(const char *folder, const io_material *m, uint64_t seed, uint64_t index, int width,
+                                int quality, ts_status *st)
+{
+    enum { PHOTOS, EXACT, MAPS, SETS };
+    static const char *const names[SETS] = {"", "/exact", "/maps"},
+                             *const marks[SETS] = {NULL, "camera_pos.txt", "meta.txt"};
+    char path[4096];
+    cl_new_set set[SETS];
+    int begun = 0;
+    const bool there = access(folder, F_OK) == 0;
+    ts_code code = cl_make_folder(folder, st);
+    for (; begun < SETS && !code; begun += !code)
+        code = snprintf(path, sizeof path, "%s%s", folder, names[begun]) < (int)sizeof path
+            ? cl_new_set_begin(&set[begun], path, marks[begun], st)
+            : ts_fail(st, TS_INVALID, "%s: the path is too long", folder);
+    if (!code) code = io_write_maps(set[MAPS].hidden, m, IO_MAPS_ALL, false, st);
+    if (!code) code = take_all(set[PHOTOS].hidden, set[EXACT].hidden, m, seed, index, width, quality, st);
+    code = cl_new_sets_end(set, begun, code, st);
+    if (code && !there) rmdir(folder); /* nothing came into it, or it stays */
     return code;
 }

@@ -19,8 +19,8 @@ typedef struct cl_sheet_shot {
  */
 void cl_sheet_shots(uint64_t seed, uint64_t index, int width, cl_sheet_shot shot[CL_SHEET_SHOTS]);
 
-/* DIR/photo_1.jpg ... with sensor noise and JPEG, and DIR/exact/: the window alone under the same lights from the same
- * cameras without any fault, which says where they are (data/capture.h). */
+/* DIR/photo_1.jpg ... with sensor noise and JPEG, DIR/maps/ of the material, and DIR/exact/: the window alone under the
+ * same lights from the same cameras without any fault, which says where they are (data/capture.h). All or nothing. */
 ts_code cl_write_sheet_captures(const char *folder, const io_material *m, uint64_t seed, uint64_t index, int width,
                                 int quality, ts_status *st);
 #endif

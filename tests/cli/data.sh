@@ -93,6 +93,29 @@ data_cannot_write() {
 }
 check data_cannot_write data_cannot_write
 
+# The largest file of a set does not fit: of the set that is there none is replaced, of one that is not none is left.
+data_set_is_whole() {
+    for format in folders captures sheet-captures; do
+        set -- "$DATA" --count 1 --threads 1 --photo-width 600 --format $format
+        "$@" --size 32 -o "$T/$format" >"$T/out" 2>"$T/err" || { says "$T/err" apriltag; continue; }
+        expect 0 "$@" --size 96 -o "$T/large"
+        largest=$(find "$T/large" -type f -printf '%s\n' | sort -n | tail -n 1)
+        cp -r "$T/$format" "$T/before"
+        ( trap '' XFSZ
+          ulimit -f $((largest / 512 - 2))
+          expect 1 "$@" --size 96 -o "$T/$format"
+          expect 1 "$@" --size 96 -o "$T/fresh" ) || exit 1
+        lines "$T/err" 1
+        says "$T/err" "cannot be written"
+        expect 0 diff -r "$T/before" "$T/$format"
+        [ ! -e "$T/fresh" ] || fail "left: $(find "$T/fresh")"
+        expect 0 "$@" --size 96 -o "$T/$format"
+        expect 0 diff -r "$T/large" "$T/$format"
+        rm -r "$T/before" "$T/large"
+    done
+}
+check data_set_is_whole data_set_is_whole
+
 data_interrupted() {
     "$DATA" -o "$T/o" --count 100000 --size 64 --photographs >"$T/out" 2>"$T/err" &
     pid=$!

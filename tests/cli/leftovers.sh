@@ -74,6 +74,13 @@ eval_and_data_sweep() {
         expect 0 "$@"
         [ -z "$(hidden "$T/$format")" ] || fail "lgd-data: left over: $(hidden "$T/$format")"
     done
+    # a set that is there already stays as it is
+    cp -r "$T/folders" "$T/before"
+    killed 4 "$BIN/lgd-data" --count 1 --size 96 --threads 1 -o "$T/folders"
+    [ -n "$(hidden "$T/folders")" ] || fail "lgd-data leaves nothing in the set: the test is none"
+    expect 0 diff -r -x '.*' "$T/before" "$T/folders"
+    expect 0 "$BIN/lgd-data" --count 1 --size 64 --threads 1 -o "$T/folders"
+    expect 0 diff -r "$T/before" "$T/folders"
 }
 
 # Each of them is done, and what stays is one's.
