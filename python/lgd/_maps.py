@@ -39,7 +39,8 @@ def version() -> str:
 
 @dataclass
 class Photo:
-    """A photograph of the sample: (side, side, 3) linear values, or None, and where it was taken."""
+    """A photograph of the sample, or None, and where it was taken. (side, side, 3): uint8 and uint16 are sRGB, floats
+    linear; image is linear float32 from then on."""
 
     image: Optional[np.ndarray]
     light: Sequence[float] = ()
@@ -48,7 +49,7 @@ class Photo:
 
     def __post_init__(self) -> None:
         if self.image is not None:
-            self.image = np.ascontiguousarray(self.image, np.float32)
+            self.image = linear(np.asarray(self.image))
         flash = lib.lgd_flash_photo(None)
         self.light = tuple(self.light) or tuple(flash.light)
         self.camera = tuple(self.camera) or tuple(flash.camera)
@@ -205,6 +206,15 @@ def square(pixels: np.ndarray, size: int) -> np.ndarray:
     image, error = np.empty((size, size, 3), np.float32), c.Failure()
     check(lib.lgd_square(pixels.ctypes.data, encoding, width, height, size, floats(image), error), error)
     return image
+
+
+def linear(image: np.ndarray) -> np.ndarray:
+    """A photograph that covers the sample as linear float32."""
+    if np.issubdtype(image.dtype, np.floating):
+        return np.ascontiguousarray(image, np.float32)
+    if image.ndim != 3 or image.shape != (image.shape[0], image.shape[0], 3):
+        raise ValueError(f"a photograph of shape {image.shape}: all must be (side, side, 3)")
+    return square(image, image.shape[0])
 
 
 def cut_mask(mask: Union[Path, np.ndarray], size: int, width: int, height: int) -> np.ndarray:

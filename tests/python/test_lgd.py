@@ -166,6 +166,21 @@ class Estimates(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "side, side, 3"):
             lgd.estimate_photos([lgd.Photo(None)], model=model)
 
+    def test_levels_of_a_photograph_are_srgb(self):
+        levels, model = bump(SIZE, SIZE), lgd.Model()
+        v = levels / 255
+        linear = np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
+        for image in (levels, levels.astype(np.uint16) * 257, linear):
+            photo = lgd.Photo(image)
+            self.assertEqual(photo.image.dtype, np.float32)
+            np.testing.assert_allclose(photo.image, linear, atol=1e-5)
+        photo.image = levels
+        maps = lgd.estimate_photos([photo], model=model, iterations=0)
+        np.testing.assert_allclose(maps.photo.image, linear, atol=1e-5)
+        for image in (levels[1:], levels.astype(np.int64)):
+            with self.assertRaisesRegex(ValueError, "side, side, 3|int64"):
+                lgd.Photo(image)
+
     def test_what_is_wrong_is_said(self):
         for options, kind, text in [
             ({"image": "absent.jpg"}, lgd.Error, "absent.jpg"),
