@@ -87,6 +87,16 @@ def _shipped() -> Model:
         return _default
 
 
+def _loaded(model: Union[Model, Path, None]) -> Model:
+    if model is None:
+        return _shipped()
+    if isinstance(model, Model):
+        return model
+    if isinstance(model, (str, os.PathLike)):
+        return Model(model)
+    raise TypeError(f"model must be an lgd.Model, a name or a file of weights, not {model!r}")
+
+
 def _run(
     model: Model,
     photos: Sequence[Photo],
@@ -148,7 +158,7 @@ def _run(
 def estimate(
     image: Image,
     *,
-    model: Optional[Model] = None,
+    model: Union[Model, Path, None] = None,
     fov: Optional[float] = None,
     mask: Optional[Image] = None,
     size: int = 256,
@@ -163,12 +173,12 @@ def estimate(
 ) -> Maps:
     """Maps of size x size pixels from one photograph.
 
-    model: by default phone, the shipped one for photographs. image: a file; or an array, (height, width, 3): uint8 and
-    uint16 are sRGB, floats are linear. Its largest centred square is used. fov: degrees across that square; None: from
-    the file's EXIF, else what the model assumes or estimates. mask: a file, or an array of the photograph's height and
-    width: only where it is not black the maps are refined. iterations: None: as usual, or "auto". The rest is as
-    lgd-infer --help says."""
-    model = model or _shipped()
+    model: by default phone, the shipped one for photographs; a name or a file is loaded at each call, a Model is not.
+    image: a file; or an array, (height, width, 3): uint8 and uint16 are sRGB, floats are linear. Its largest centred
+    square is used. fov: degrees across that square; None: from the file's EXIF, else what the model assumes or
+    estimates. mask: a file, or an array of the photograph's height and width: only where it is not black the maps are
+    refined. iterations: None: as usual, or "auto". The rest is as lgd-infer --help says."""
+    model = _loaded(model)
     if size < 1:
         raise ValueError(f"size is {size} and must be 1 or more")
     if isinstance(image, np.ndarray):
@@ -206,16 +216,16 @@ def estimate(
 def estimate_photos(
     photos: Sequence[Photo],
     *,
-    model: Model,
+    model: Union[Model, Path],
     iterations: Union[int, str, None] = None,
     light_power: Union[float, str] = 1.0,
     threads: int = 0,
     progress: Optional[Progress] = None,
 ) -> Maps:
-    """Maps from 1 .. most_photos photographs under known lights. Their images are rectified to the sample, of one
-    size, float32."""
+    """Maps from 1 .. most_photos photographs under known lights. Their images are rectified to the sample and of one
+    size. model: as of estimate."""
     return _run(
-        model,
+        _loaded(model),
         photos, c.OF_PHOTO if len(photos) == 1 else c.UNKNOWN, None, iterations, light_power, None, 2, False,
         "f32", threads, progress,
     )

@@ -37,6 +37,15 @@ def version() -> str:
     return lib.lgd_version().decode()
 
 
+def three(name: str, numbers: Sequence[float]) -> "tuple[float, float, float]":
+    """A position that the library reads."""
+    try:
+        x, y, z = (float(v) for v in numbers)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be three numbers, not {numbers!r}") from None
+    return x, y, z
+
+
 @dataclass
 class Photo:
     """A photograph of the sample, or None, and where it was taken. (side, side, 3): uint8 and uint16 are sRGB, floats
@@ -51,8 +60,8 @@ class Photo:
         if self.image is not None:
             self.image = linear(np.asarray(self.image))
         flash = lib.lgd_flash_photo(None)
-        self.light = tuple(self.light) or tuple(flash.light)
-        self.camera = tuple(self.camera) or tuple(flash.camera)
+        self.light = three("light", self.light if len(self.light) else flash.light)
+        self.camera = three("camera", self.camera if len(self.camera) else flash.camera)
         self.power = self.power or flash.power
 
     def struct(self) -> c.PhotoStruct:
@@ -122,8 +131,8 @@ class Maps:
         power: Optional[float] = None,
     ) -> np.ndarray:
         """(size, size, 3) linear values under a point light; by default as the photograph was taken."""
-        light = self.photo.light if light is None else light
-        camera = self.photo.camera if camera is None else camera
+        light = three("light", self.photo.light if light is None else light)
+        camera = three("camera", self.photo.camera if camera is None else camera)
         values, error = self._values(), c.Failure()
         image = np.empty(values.shape[:2] + (3,), np.float32)
         code = lib.lgd_render(

@@ -193,11 +193,27 @@ class Estimates(unittest.TestCase):
             ({"image": bump(), "light_power": "all"}, ValueError, "all"),
             ({"image": bump(), "orientations": 3}, lgd.Error, "orientations is 3"),
             ({"image": bump(), "threads": -1}, lgd.Error, "threads is -1"),
+            ({"image": bump(), "model": "absent"}, lgd.Error, "absent"),
+            ({"image": bump(), "model": 3}, TypeError, "model must be an lgd.Model, a name or a file .*, not 3"),
         ]:
             with self.subTest(text), self.assertRaisesRegex(kind, text):
                 quick(**options)
         with self.assertRaisesRegex(lgd.Error, "absent.safetensors"):
             lgd.Model("absent.safetensors")
+        maps = quick(bump())
+        for wrong in ((0, 0), (0, 0, 1, 1), 1, "up"):
+            for place in ("light", "camera"):
+                with self.subTest(place), self.assertRaisesRegex(ValueError, f"{place} must be three numbers"):
+                    maps.render(**{place: wrong})
+        with self.assertRaisesRegex(ValueError, "light must be three numbers"):
+            lgd.Photo(None, light=(0, 1))
+
+    def test_a_model_by_its_name(self):
+        model = lgd.Model()
+        for name in (model.weights, pathlib.Path(model.weights)):
+            np.testing.assert_array_equal(quick(bump(), model=name).array, quick(bump(), model=model).array)
+            photos = [lgd.Photo(bump(SIZE, SIZE))]
+            lgd.estimate_photos(photos, model=name, iterations=0)
 
 
 class Files(unittest.TestCase):
