@@ -5,6 +5,7 @@
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* Reads one map; its normals as unit vectors, OpenGL y. */
@@ -26,6 +27,30 @@ static ts_code read_map(const char *folder, const io_map_set *set, int kind, io_
 }
 
 static int short_side(const io_image *image) { return image->width < image->height ? image->width : image->height; }
+
+/* Of two maps the sides of the smaller are those of the larger times one number, to rounding of less than a pixel. A
+ * map of one pixel is the same everywhere and lies right on any other. */
+static bool are_alike(const io_image *a, const io_image *b)
+{
+    const int64_t across = (int64_t)a->width * b->height, down = (int64_t)b->width * a->height;
+    const int most = (int64_t)a->width * a->height > (int64_t)b->width * b->height
+        ? (a->width > a->height ? a->width : a->height)
+        : (b->width > b->height ? b->width : b->height);
+    const bool one = (a->width == 1 && a->height == 1) || (b->width == 1 && b->height == 1);
+    return one || llabs(across - down) < most;
+}
+
+/* The centre squares of maps of several shapes do not lie on each other. */
+static ts_code check_shapes(const char *folder, const io_map_set *set, const io_image map[IO_MAP_KINDS], ts_status *st)
+{
+    for (int a = 0; a < IO_MAP_KINDS; a++)
+        for (int b = a + 1; b < IO_MAP_KINDS; b++)
+            if (map[a].data && map[b].data && !are_alike(&map[a], &map[b]))
+                return ts_fail(st, TS_INVALID, "%s: %s is %d x %d and %s %d x %d: not the same shape, crop them alike",
+                               folder, set->file[a], map[a].width, map[a].height, set->file[b], map[b].width,
+                               map[b].height);
+    return TS_OK;
+}
 
 static ts_code to_square(io_image *image, int size, ts_status *st)
 {
@@ -100,10 +125,8 @@ ts_code io_read_map_folder(const char *path, const io_map_convention *given, int
             !(k == IO_SPECULAR_MAP && !set.specular);
         if (wanted) code = read_map(path, &set, k, &map[k], st);
     }
-    if (code == TS_OK) {
-        code = combine(&set, map, size, m, st);
-        if (code != TS_OK) ts_context(st, "%s", path);
-    }
+    if (code == TS_OK) code = check_shapes(path, &set, map, st);
+    if (code == TS_OK && combine(&set, map, size, m, st) != TS_OK) code = ts_context(st, "%s", path);
     for (int k = 0; k < IO_MAP_KINDS; k++) io_image_free(&map[k]);
     if (code == TS_OK) io_name_from_path(path, m->name, sizeof m->name);
     return code;

@@ -17,8 +17,9 @@ ts_code io_material_create(io_material *m, int size, ts_status *st);
 void io_material_free(io_material *m);
 
 /* A map folder: basecolor/albedo/diffuse, normal, roughness, metallic or specular; conventions from meta.txt (see the
- * reader) or from the options; ambiguity is an error. Resampled to size (0: the largest map's centre square).
- * The option wins over a meta.txt, which io_write_maps writes and data/map_names.c describes. */
+ * reader) or from the options; ambiguity is an error, and so are maps of several shapes, whatever their sizes.
+ * Resampled to size (0: the largest map's centre square). The option wins over a meta.txt, which io_write_maps writes
+ * and data/map_names.c describes. */
 typedef enum io_normal { IO_NORMAL_FROM_FILE, IO_NORMAL_GL, IO_NORMAL_DX } io_normal;
 typedef enum io_workflow { IO_WORKFLOW_FROM_FILE, IO_WORKFLOW_METALLIC, IO_WORKFLOW_SPECULAR } io_workflow;
 typedef enum io_encoding {

@@ -196,7 +196,7 @@ TEST(map_folder_sizes)
     for (int i = 0; i < 27; i++) memset(wide + 3 * i, i % 9 < 3 ? 0 : i % 9 < 6 ? 128 : 255, 3);
     png_begin(&f, 9, 3, 8, 2), png_pixels(&f, wide, 27, 3), png_end(&f);
     bytes_save(&f, folder, "color.png");
-    flat(folder, "roughness.png", 1, 1, 51, 51, 51), flat(folder, "normal.png", 2, 30, 128, 204, 230);
+    flat(folder, "roughness.png", 1, 1, 51, 51, 51), flat(folder, "normal.png", 6, 2, 128, 204, 230);
     ts_status st = {0};
     io_material m;
     for (int size = 0; size <= 12; size += 4) {
@@ -222,6 +222,29 @@ TEST(map_folder_sizes)
     io_texel t = first(slopes, IO_NORMAL_GL, 1);
     CHECK(near(t.normal[0], 0, 0.01f) && near(t.normal[2], 1, 1e-3f), "mean normal %g %g %g", (double)t.normal[0],
           (double)t.normal[1], (double)t.normal[2]);
+}
+
+/* Maps of one shape at other sizes, with sides rounded either way; of several shapes no pixel lies on its own. */
+TEST(map_folder_shapes)
+{
+    static const struct {
+        int width, height;
+        bool alike;
+    } normal[] = {{30, 20, true},  {15, 10, true},  {8, 5, true},    {7, 5, true},  {1, 1, true},
+                  {30, 19, false}, {20, 30, false}, {20, 20, false}, {8, 8, false}, {9, 5, false}};
+    char name[16];
+    for (int i = 0; i < (int)(sizeof normal / sizeof *normal); i++) {
+        snprintf(name, sizeof name, "shape%d", i);
+        const char *folder = fresh(name);
+        flat(folder, "basecolor.png", 30, 20, 128, 128, 128);
+        flat(folder, "roughness.png", 30, 20, 51, 51, 51);
+        flat(folder, "normal_gl.png", normal[i].width, normal[i].height, 128, 204, 230);
+        if (normal[i].alike) CHECK(near(first(folder, IO_NORMAL_FROM_FILE, 0).normal[1], 0.6f, 0.01f), "%s", name);
+        else refused(folder, IO_NORMAL_FROM_FILE, "not the same shape");
+    }
+    char path[600];
+    snprintf(path, sizeof path, "%s/shape7", test_folder());
+    refused(path, IO_NORMAL_FROM_FILE, "basecolor.png is 30 x 20 and normal_gl.png 20 x 20: not the same shape");
 }
 
 /* --- the sets of TESTDATA --- */
