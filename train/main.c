@@ -208,6 +208,10 @@ int main(int argc, char **argv)
                 code = cl_usage("--init may be given twice, not more often");
                 goto end;
             }
+            if (!*optarg) { /* as it comes from a shell's variable: a run would begin from nothing */
+                code = cl_usage("--init: the file's name is empty");
+                goto end;
+            }
             init[init[0] != NULL] = optarg;
             break;
         case INITIAL: initial = optarg; break;
@@ -240,6 +244,10 @@ int main(int argc, char **argv)
         code = cl_usage(files ? "one configuration file is expected, not %d"
                               : "a configuration file is expected, for example configs/single.ini",
                         files);
+        goto end;
+    }
+    if ((files && !*argv[optind]) || (initial && !*initial)) {
+        code = cl_usage("%s: the file's name is empty", initial && !*initial ? "--initial" : "the configuration");
         goto end;
     }
     if (init[0] && resume) {
