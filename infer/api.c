@@ -36,6 +36,13 @@ ts_code lgd_take_struct(const char *call, const void *given, size_t least, void 
     return TS_OK;
 }
 
+bool lgd_photo_can_be(const lgd_photo *p)
+{
+    bool fine = isfinite(p->power) && p->power > 0 && p->light[2] > 0 && p->camera[2] > 0;
+    for (int i = 0; i < 3; i++) fine = fine && isfinite(p->light[i]) && isfinite(p->camera[i]);
+    return fine;
+}
+
 typedef struct encoding {
     const float *maps;
     float *encoded;

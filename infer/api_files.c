@@ -148,6 +148,23 @@ static ts_code split(const char *folder, char path[LGD_PATH_MAX], const char **p
     return TS_OK;
 }
 
+/* What would make files that say nothing. */
+static ts_code check_values(const float *maps, int side, const lgd_photo *photo, const char *fov_from, ts_status *st)
+{
+    if (!lgd_photo_can_be(photo))
+        return ts_fail(
+            st, TS_INVALID,
+            "lgd_write_maps: light and camera of the photograph must be above the sample, its power above 0");
+    for (const char *c = fov_from ? fov_from : ""; *c; c++)
+        if ((unsigned char)*c < ' ')
+            return ts_fail(st, TS_INVALID, "lgd_write_maps: fov_from must be one line without control characters");
+    for (size_t i = 0; i < (size_t)side * (size_t)side * MAP_CHANNELS; i++)
+        if (!isfinite(maps[i]))
+            return ts_fail(st, TS_NUMERIC, "lgd_write_maps: maps must be finite: value %zu of pixel %zu is not",
+                           i % MAP_CHANNELS, i / MAP_CHANNELS);
+    return TS_OK;
+}
+
 static ts_code order_of(const lgd_write_options *o, int side, bool photograph, lgd_order *order, ts_status *st)
 {
     unsigned which = LGD_OUT_DEFAULT & ~(photograph ? 0u : LGD_OUT_RENDER);
@@ -184,6 +201,7 @@ int lgd_write_maps(const char *folder, const float *maps, int side, const lgd_ph
     else if (check_side(call, side, &st) == TS_OK &&
              lgd_take_struct(call, options, sizeof o.size, &o, sizeof o, &st) == TS_OK &&
              order_of(&o, side, taken->image, &order, &st) == TS_OK &&
+             check_values(maps, side, taken, o.fov_from, &st) == TS_OK &&
              split(folder, path, &parent, &stem, &st) == TS_OK && io_material_create(&m, side, &st) == TS_OK) {
         lgd_encode(maps, side, order.threads, m.maps);
         lgd_output_write(parent, stem, &m, taken, &order, NULL, &st);

@@ -128,9 +128,7 @@ void lgd_free(lgd_model **model)
 static ts_code check_photo(const lgd_photo *p, int number, ts_status *st)
 {
     if (!p->image) return ts_fail(st, TS_INVALID, "lgd_estimate: photograph %d has no image", number);
-    bool fine = isfinite(p->power) && p->power > 0 && p->light[2] > 0 && p->camera[2] > 0;
-    for (int i = 0; i < 3; i++) fine = fine && isfinite(p->light[i]) && isfinite(p->camera[i]);
-    if (!fine)
+    if (!lgd_photo_can_be(p))
         return ts_fail(st, TS_INVALID,
                        "lgd_estimate: light and camera of photograph %d must be above the sample, its power above 0",
                        number);

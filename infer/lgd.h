@@ -205,13 +205,14 @@ typedef struct lgd_write_options {
     int seamless;         /* the maps are made to repeat; side must be 16 or more */
     int exr;              /* LGD_EXR_... */
     int threads;          /* 0: as many as the process may use */
-    const char *fov_from; /* where the field of view is known from, for meta.txt: NULL: "given" */
+    const char *fov_from; /* where the field of view is known from, for meta.txt, one line; NULL: "given" */
 } lgd_write_options;
 
 /* Writes maps as returned by lgd_estimate, and meta.txt, into folder, whose parent exists. All files appear together
  * when they are complete; a failure leaves what was there. Files that an earlier call wrote there for other maps are
- * removed. photo: with light and camera as they were taken (lgd_options.taken) and the image that was read, side x
- * side, for render and page; NULL: lgd_flash_photo(NULL). options may be NULL. */
+ * removed. Values that are not finite are an error. photo: with light and camera as they were taken
+ * (lgd_options.taken) and the image that was read, side x side, for render and page; NULL: lgd_flash_photo(NULL).
+ * options may be NULL. */
 LGD_API int lgd_write_maps(const char *folder, const float *maps, int side, const lgd_photo *photo,
                            const lgd_write_options *options, lgd_error *error);
 

@@ -201,5 +201,18 @@ TEST(infer_writing_says_what_is_wrong)
               "%zu: '%s' has no '%s'", k, e.message, wrong[k].says);
     }
     CHECK(lgd_write_maps("x", NULL, SIDE, NULL, NULL, NULL) == TS_INVALID, "no maps");
+    const lgd_write_options lines = {.size = sizeof lines, .fov_from = "a lens\nworkflow: metallic"};
+    CHECK(lgd_write_maps("x", maps, SIDE, NULL, &lines, &e) && strstr(e.message, "fov_from must be one line"), "%s",
+          e.message);
+    for (int k = 0; k < 4; k++) {
+        lgd_photo photo = lgd_flash_photo(NULL);
+        float *values[] = {&photo.camera[2], &photo.camera[2], &photo.light[0], &photo.power};
+        *values[k] = (float[]){-1, NAN, INFINITY, 0}[k];
+        CHECK(lgd_write_maps("x", maps, SIDE, &photo, NULL, &e) && strstr(e.message, "must be above the sample"), "%s",
+              e.message);
+    }
+    maps[VALUES - 1] = NAN;
+    CHECK(lgd_write_maps("x", maps, SIDE, NULL, NULL, &e) == TS_NUMERIC && strstr(e.message, "must be finite"), "%s",
+          e.message);
     CHECK(!there(test_folder(), "x") && !there(test_folder(), "absent"), "something is left");
 }
