@@ -179,6 +179,11 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
                        "lgd_estimate: orientations is %d and must be 1, 2, 4 or 8, or 0 as suits the model",
                        o->orientations);
     if (check_fov(o->fov, photos, st) != TS_OK) return st->code;
+    if (o->sample != LGD_SAMPLE_UNKNOWN && o->sample != LGD_SAMPLE_DIELECTRIC && o->sample != LGD_SAMPLE_METAL)
+        return ts_fail(st, TS_INVALID, "lgd_estimate: sample is %d and must be one of LGD_SAMPLE_...", o->sample);
+    if (o->sample != LGD_SAMPLE_UNKNOWN && model->net->arch.descent != NN_DESCENT_POSTERIOR)
+        return ts_fail(st, TS_UNSUPPORTED,
+                       "lgd_estimate: these weights do not guess the scene: they cannot be told what the sample is");
     if ((o->tolerance > 0 || o->mask) && !lgd_tiles_exact(&model->net->arch))
         return ts_fail(st, TS_UNSUPPORTED,
                        "lgd_estimate: these weights' loss is taken anew over the whole photograph at every step: no "

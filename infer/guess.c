@@ -58,7 +58,10 @@ ts_code lgd_guess_revise(ag_tape *tape, const nn_model *net, lgd_given *p, int r
         return st->code;
     }
     const nn_belief belief = {.photographs = p->count, .revised = true, .finer = p->side > size};
-    if (*made > 0) nn_deviations((int64_t)size * size, g->spread, belief, ag_compute(tape)->threads, g->deviation);
+    if (*made > 0) {
+        nn_deviations((int64_t)size * size, g->spread, belief, ag_compute(tape)->threads, g->deviation);
+        nn_deviations_of_kind(p->kind, (int64_t)size * size, g->deviation);
+    }
     p->r0 = g->r0;
     return TS_OK;
 }
@@ -71,7 +74,7 @@ ts_code lgd_guess_first(ag_tape *tape, const nn_model *net, lgd_given *p, const 
     const double before = lgd_irradiance(&p->views[0]);
     const nn_first_ask ask = {.image = p->image[0],
                               .side = p->side,
-                              .taken = {p->views[0], lgd_guess_known(o), p->count},
+                              .taken = {p->views[0], lgd_guess_known(o), p->count, p->kind},
                               .orientations = o->orientations};
     const ts_code code = nn_first_guess_make(tape, net, &ask, guess, st);
     if (code) return code;
@@ -86,6 +89,6 @@ ts_code lgd_guess_first(ag_tape *tape, const nn_model *net, lgd_given *p, const 
     const nn_photos photos = {p->image, p->views, p->count, p->side, lgd_guess_known(o)};
     if (p->count == 1 && photos.known == NN_KNOWN_ALL)
         return nn_find_levels(grid, p->image[0], p->side, &p->views[0], guess->deviation, a->channels, guess->r0, st);
-    if (p->count == 1) return TS_OK;
+    if (p->count == 1 || p->kind != NN_KIND_UNKNOWN) return TS_OK;
     return nn_tell_metal(grid, &photos, guess->deviation, nn_arch_steps(a, p->count), a->channels, guess->r0, st);
 }

@@ -70,6 +70,8 @@ enum { LGD_F32, LGD_BF16 };
 #define LGD_FOV_LEAST 1.0
 #define LGD_FOV_MOST 170.0
 
+enum { LGD_SAMPLE_UNKNOWN, LGD_SAMPLE_DIELECTRIC, LGD_SAMPLE_METAL };
+
 typedef struct lgd_photo lgd_photo;
 
 /* New fields are added at the end. Begin with lgd_options_default(). */
@@ -121,6 +123,10 @@ typedef struct lgd_options {
     /* NULL, or room for as many photographs as are given: each with light, camera and power as they were taken. May be
      * the given ones. */
     lgd_photo *taken;
+    /* What the sample is known to be, all of it: LGD_SAMPLE_UNKNOWN (the default), LGD_SAMPLE_DIELECTRIC (wood, stone,
+     * cloth, leather, plastic, paint; F0 near .04) or LGD_SAMPLE_METAL (bare metal: next to no diffuse). One photograph
+     * often leaves it open. Only of models that guess the scene. */
+    int sample;
 } lgd_options;
 /* Fills size bytes with the defaults, whichever version the library has. */
 LGD_API void lgd_options_init(lgd_options *options, size_t size);

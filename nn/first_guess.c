@@ -3,6 +3,7 @@
 #include "nn/clip.h"
 #include "nn/deviation.h"
 #include "nn/hidden.h"
+#include "nn/kind.h"
 #include "nn/lattice.h"
 #include "nn/lean.h"
 #include "nn/relief.h"
@@ -167,11 +168,14 @@ ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, co
 {
     const int64_t pixels = (int64_t)grid.h * grid.w;
     rd_scene_prior prior;
+    const float stops = nn_take_kind(taken->kind, taken->known & NN_KNOWN_POWER, pixels, channels, g->r0);
     const bool told = taken->photographs > 1 || (taken->known & NN_KNOWN_POWER);
     ts_code code = nn_weigh_relief(grid.side, channels, g->spread, !told, grid.threads, arena, g->r0, st);
     if (code) return code;
     nn_deviations(pixels, g->spread, (nn_belief){.photographs = taken->photographs}, grid.threads, g->deviation);
+    nn_deviations_of_kind(taken->kind, pixels, g->deviation);
     scene_prior(scene, &taken->view, taken->known, &prior);
+    prior.mean[RD_SCENE_EXPOSURE] += stops;
     level_prior(grid, g, channels, taken->known, &prior);
     const ts_mark mark = ts_arena_mark(arena);
     code = fit(grid, image, channels, taken->known, &prior, arena, g, st);

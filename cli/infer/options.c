@@ -20,6 +20,7 @@ enum {
     MASK,
     TOLERANCE,
     ORIENTATIONS,
+    SAMPLE,
     EXACT,
     PRECISION,
     MAX_PIXELS,
@@ -41,6 +42,10 @@ const cl_argument cl_infer_arguments[] = {
      "the first estimate is the mean over N orientations of the photograph: 1 (as it is), 2 (and a quarter turn), 4\n"
      "(all quarter turns), 8 (and their mirror images) or auto (the default: 1 where the model guesses the camera\n"
      "or the light's power, else 2)"},
+    {SAMPLE, "sample", "metal|dielectric|auto",
+     "what the sample is, all of it: bare metal, or none (wood, stone, cloth, leather, plastic, paint); one "
+     "photograph\n"
+     "often leaves it open (default auto: the model decides). Not with single"},
     {EXACT, "exact", NULL,
      "compute convolutions directly; the default is Winograd's algorithm where it is faster: the maps differ by less\n"
      "than 1e-5 (RMS), single values by less than 1e-3"},
@@ -176,6 +181,13 @@ ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st)
             if (!strcmp(value, "auto")) c->orientations = LGD_ORIENTATIONS_DEFAULT;
             else if (strlen(value) == 1 && strchr("1248", *value)) c->orientations = *value - '0';
             else code = ts_fail(st, TS_INVALID, "--orientations: '%s' is not 1, 2, 4, 8 or auto", value);
+            break;
+        case SAMPLE:
+            c->sample = !strcmp(value, "metal") ? LGD_SAMPLE_METAL
+                : !strcmp(value, "dielectric")  ? LGD_SAMPLE_DIELECTRIC
+                                                : LGD_SAMPLE_UNKNOWN;
+            if (c->sample == LGD_SAMPLE_UNKNOWN && strcmp(value, "auto") != 0)
+                code = ts_fail(st, TS_INVALID, "--sample: '%s' is not metal, dielectric or auto", value);
             break;
         case EXACT: c->exact = true; break;
         case SKIP_EXISTING: c->skip_existing = true; break;

@@ -15,6 +15,7 @@ typedef struct cl_command {
     double max_memory; /* bytes; 0: tensor/budget.h's default */
     double tolerance;
     int orientations;  /* 1, 2, 4 or 8; 0: LGD_ORIENTATIONS_DEFAULT */
+    int sample;        /* LGD_SAMPLE_... */
     double fov;        /* degrees across the square, with corners across the shorter side; 0: from the file */
     io_corners angle;  /* of the square in the photograph, where corners is true */
     double power;      /* of the light, in default ones; 0: estimated */

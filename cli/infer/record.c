@@ -38,6 +38,8 @@ char *cl_recipe(const cl_command *c, const char *weights, uint64_t hash, ts_stat
             c->seamless ? ", seamless" : "");
     for (int k = 0; k < 4 && c->corners; k++)
         fprintf(f, "%s %.9g,%.9g", k ? "" : ", corners", c->angle.at[k][0], c->angle.at[k][1]);
+    if (c->sample != LGD_SAMPLE_UNKNOWN)
+        fprintf(f, ", sample %s", c->sample == LGD_SAMPLE_METAL ? "metal" : "dielectric");
     if (c->mask) fprintf(f, ", mask %016" PRIx64, mask);
     fputs(", maps ", f);
     put_outputs(f, c->outputs);

@@ -156,7 +156,8 @@ void cl_item_estimate(const cl_command *c, lgd_model *model, cl_item *item, cl_i
                                  .tolerance = c->tolerance,
                                  .tile = before_tile,
                                  .fov = item->fov,
-                                 .taken = item->photo};
+                                 .taken = item->photo,
+                                 .sample = c->sample};
     item->photo[0] = c->corners ? item->angle.photo : lgd_flash_photo(item->image);
     item->photos = item->capture.images ? lgd_capture_photos(&item->capture, lgd_most_photos(model), item->photo) : 1;
     t.steps = cl_command_steps(c, model, item->photos);

@@ -20,7 +20,7 @@ typedef struct ev_setting {
     bool steps;          /* the number of steps: one run of the most gives the results of all */
     const char *help;
 } ev_setting;
-enum { EV_SETTINGS = 8, EV_POINTS = 1024, EV_METHOD_TEXT = 4096 };
+enum { EV_SETTINGS = 9, EV_POINTS = 1024, EV_METHOD_TEXT = 4096 };
 
 typedef struct ev_estimator ev_estimator;
 

@@ -1,6 +1,7 @@
 /* unet, unet-joint, lgd, lgd-nograd, frozen: networks that only run. They differ in the weights that they ask for. */
 #include "eval/methods/method_internal.h"
 #include "infer/tiles.h"
+#include "tensor/maps.h"
 
 static int photos(const ev_estimator *e)
 {
@@ -22,6 +23,9 @@ static ts_code open_lgd(ev_estimator *e, ts_status *st)
     const nn_arch *a = &e->net->arch;
     e->last_alone = ev_number(e, "tolerance") > 0;
     const int most = nn_most_photographs(a);
+    if (ev_number(e, "sample") != 0 && a->descent != NN_DESCENT_POSTERIOR)
+        return ts_fail(st, TS_UNSUPPORTED, "%s: does not guess the scene: it cannot be told what a sample is",
+                       ev_text(e, "model"));
     if (photos(e) > most)
         return ts_fail(st, TS_UNSUPPORTED, "%s: reads at most %d photographs", ev_text(e, "model"), most);
     if (steps(e) > 0 && !nn_arch_refines(a))
@@ -42,6 +46,8 @@ static ts_code open_nograd(ev_estimator *e, ts_status *st)
     return TS_OK;
 }
 
+#define LEAST_F0_OF_METAL 0.15f
+enum { FEW = 50 }; /* a pixel in so many, of another kind, does not make a sample a mixed one */
 enum { POWER_GIVEN, POWER_AUTO, POWER_KNOWN };
 enum { VIEW_SET, VIEW_TOLD, VIEW_UNKNOWN };
 
@@ -61,6 +67,22 @@ static void photographs(const ev_estimator *e, const ev_case *c, ev_run_how *how
                                                   : LGD_FOV_UNKNOWN;
 }
 
+/* What somebody would say of a sample with these maps: nothing where only a part of it is metal. */
+static int sample_of(const io_material *truth)
+{
+    const int64_t pixels = (int64_t)truth->size * truth->size;
+    int64_t metal = 0;
+    for (int64_t i = 0; i < pixels; i++) {
+        const float *m = truth->maps + i * MAP_CHANNELS;
+        float diffuse = 0, f0 = 0;
+        for (int c = 0; c < 3; c++) diffuse += (m[MAP_DIFFUSE + c] + 1) / 6, f0 += (m[MAP_SPECULAR + c] + 1) / 6;
+        metal += f0 > LEAST_F0_OF_METAL && f0 > diffuse;
+    }
+    return metal >= pixels - pixels / FEW ? LGD_SAMPLE_METAL
+        : metal <= pixels / FEW           ? LGD_SAMPLE_DIELECTRIC
+                                          : LGD_SAMPLE_UNKNOWN;
+}
+
 /* As lgd-infer estimates. */
 static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *user, ts_status *st)
 {
@@ -71,6 +93,7 @@ static ts_code run_lgd(ev_estimator *e, const ev_case *c, ev_seen seen, void *us
                                   .tolerance = ev_number(e, "tolerance"),
                                   .power = (int)ev_number(e, "power") == POWER_AUTO ? &factor : NULL}};
     photographs(e, c, &how);
+    if (c->truth && ev_number(e, "sample") != 0) how.options.sample = sample_of(c->truth);
     return ev_run(e, c, &how, seen, user, st);
 }
 
@@ -122,8 +145,13 @@ static ts_code run_g(ev_estimator *e, const ev_case *c, ev_seen seen, void *user
         .key = "precision", .type = EV_WORD, .words = "f32 bf16", .initial = "f32", \
         .help = "of the products in convolutions, as lgd-infer --precision"         \
     }
+#define SAMPLE                                                                                                        \
+    {                                                                                                                 \
+        .key = "sample", .type = EV_WORD, .words = "auto told", .initial = "auto",                                    \
+        .help = "told = whether it is metal or dielectric, as lgd-infer --sample, of materials that are one all over" \
+    }
 #define REFINER \
-    ITERATIONS, TOLERANCE, EV_ORIENTATIONS, PHOTOS, POWER, VIEW, PRECISION, { 0 }
+    ITERATIONS, TOLERANCE, EV_ORIENTATIONS, PHOTOS, POWER, VIEW, PRECISION, SAMPLE, { 0 }
 
 static const ev_setting unet[] = {MODEL_GIVEN("weights of a g that was trained alone"), POWER, VIEW, {0}};
 static const ev_setting joint[] = {

@@ -108,9 +108,12 @@ def _run(
     orientations: Union[int, str],
     exact: bool,
     precision: str,
+    sample: str,
     threads: int,
     progress: Optional[Progress],
 ) -> Maps:
+    if sample not in c.SAMPLES:
+        raise ValueError(f"sample {sample!r} is none of {', '.join(c.SAMPLES)}")
     if precision not in c.PRECISIONS:
         raise ValueError(f"precision {precision!r} is none of {', '.join(c.PRECISIONS)}")
     if isinstance(iterations, str) and iterations != "auto":
@@ -135,7 +138,7 @@ def _run(
         structs[k].power *= power.value
     lib.lgd_options_init(options, ctypes.sizeof(options))
     options.iterations = -1 if iterations is None else c.AUTO if iterations == "auto" else steps
-    options.exact, options.precision = exact, c.PRECISIONS[precision]
+    options.exact, options.precision, options.sample = exact, c.PRECISIONS[precision], c.SAMPLES[sample]
     options.orientations = 0 if orientations == "auto" else int(orientations)
     options.threads, options.fov = threads, fov
     options.progress, options.tile, options.taken = calls.step, calls.tile, taken
@@ -168,6 +171,7 @@ def estimate(
     orientations: Union[int, str] = "auto",
     exact: bool = False,
     precision: str = "f32",
+    sample: str = "auto",
     threads: int = 0,
     progress: Optional[Progress] = None,
 ) -> Maps:
@@ -202,6 +206,7 @@ def estimate(
         orientations,
         exact,
         precision,
+        sample,
         threads,
         progress,
     )
@@ -219,6 +224,7 @@ def estimate_photos(
     model: Union[Model, Path],
     iterations: Union[int, str, None] = None,
     light_power: Union[float, str] = 1.0,
+    sample: str = "auto",
     threads: int = 0,
     progress: Optional[Progress] = None,
 ) -> Maps:
@@ -227,5 +233,5 @@ def estimate_photos(
     return _run(
         _loaded(model),
         photos, c.OF_PHOTO if len(photos) == 1 else c.UNKNOWN, None, iterations, light_power, None, 2, False,
-        "f32", threads, progress,
+        "f32", sample, threads, progress,
     )

@@ -12,6 +12,7 @@ AUTO = -2  # LGD_AUTO
 AUTO_MOST = 24  # LGD_AUTO_MOST
 SRGB8, SRGB16, LINEAR = range(3)
 PRECISIONS = {"f32": 0, "bf16": 1}
+SAMPLES = {"auto": 0, "dielectric": 1, "metal": 2}
 EXR = {"auto": 0, "half": 1, "float": 2}
 
 Progress = CFUNCTYPE(c_int, c_int, c_double, c_void_p)
@@ -43,6 +44,7 @@ class Options(ctypes.Structure):  # lgd_options
         ("power", POINTER(c_double)),
         ("fov", c_double),
         ("taken", POINTER(PhotoStruct)),
+        ("sample", c_int),
     ]
 
 

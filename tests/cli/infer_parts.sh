@@ -54,6 +54,10 @@ mask_and_tolerance() {
     says "$T/err" "long.ppm is 40 x 20"
     expect 1 infer --mask "$T/absent.png" "$T/p.ppm" -o "$T/o"
     says "$T/err" "absent.png"
+    expect 2 infer --sample wood "$T/p.ppm" -o "$T/o"
+    says "$T/err" "--sample: 'wood' is not metal, dielectric or auto"
+    expect 0 infer --model phone --sample metal "$T/p.ppm" -o "$T/metal"
+    says "$T/metal/p/meta.txt" ", sample metal"
     expect 2 infer --orientations 3 "$T/p.ppm" -o "$T/o"
     says "$T/err" "--orientations"
     for x in -1 2 x 0,5; do

@@ -164,7 +164,7 @@ TEST(first_guess_leaves_a_sample_flat_where_another_light_shines)
         memcpy(r0->t.data, maps, PIXELS * 9 * sizeof *maps);
         for (int i = 0; i < PIXELS * NN_SPREADS; i++) spread->t.data[i] = -1;
         nn_first_guess g = {.r0 = r0->t.data, .spread = spread->t.data, .deviation = deviation->t.data};
-        const nn_taken taken = {rd_flash(), careful ? NN_KNOWN_POWER : 0, 1};
+        const nn_taken taken = {.view = rd_flash(), .known = careful ? NN_KNOWN_POWER : 0, .photographs = 1};
         CHECK(!nn_first_guess_settle(rd_grid_full(PLACE), 9, image, scene, &taken, ag_arena(tape), &g, &st), "%s",
               st.message);
         leans[careful] = fabs((double)g.r0[MAP_NORMAL]);
@@ -207,7 +207,7 @@ TEST(first_guess_keeps_what_is_known)
     for (int known = 0; known <= NN_KNOWN_ALL; known++) {
         nn_first_guess g;
         float want[RD_SCENE_NUMBERS];
-        const nn_first_ask ask = {.image = in.image.data, .side = PLACE, .taken = {view, known, 1}};
+        const nn_first_ask ask = {.image = in.image.data, .side = PLACE, .taken = {view, known, 1, NN_KIND_UNKNOWN}};
         CHECK(!nn_first_guess_make(tape, m, &ask, &g, &st), "%s", st.message);
         rd_scene_numbers(&view, 0, 0, want);
         for (int i = 0; i < RD_SCENE_NUMBERS; i++) CHECK(isfinite(g.number[i]), "number %d is not finite", i);

@@ -5,6 +5,7 @@
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 enum { SIDE = 256, PIXELS = SIDE * SIDE };
 
@@ -56,5 +57,43 @@ TEST(phone_keeps_hues)
         CHECK(sqrt(relief / PIXELS) < 0.05, "colour %d: relief %.3f of a plain surface", i, sqrt(relief / PIXELS));
     }
     lgd_free(&model);
+    free(maps), free(image);
+}
+
+static double mean_f0(const float *maps)
+{
+    double sum = 0;
+    for (int p = 0; p < PIXELS; p++)
+        for (int c = 0; c < 3; c++) sum += (double)maps[p * MAP_CHANNELS + MAP_SPECULAR + c] / 3;
+    return sum / PIXELS;
+}
+
+/* What somebody says of a sample holds, whatever one photograph looks like; models without a scene cannot be told. */
+TEST(phone_takes_a_sample_for_what_it_is_told)
+{
+    float *maps = malloc(sizeof *maps * PIXELS * MAP_CHANNELS), *image = malloc(sizeof *image * PIXELS * 3);
+    lgd_error e;
+    lgd_model *model = lgd_load("models/phone.safetensors", &e), *other = lgd_load("models/single.safetensors", &e);
+    CHECK(model && other, "%s", e.message);
+    double power, f0[3];
+    for (int dark = 0; dark < 2; dark++) {
+        for (int sample = LGD_SAMPLE_UNKNOWN; sample <= LGD_SAMPLE_METAL; sample++) {
+            const float grey = dark ? 0.01f : 0.5f, colour[] = {grey, grey, grey};
+            lgd_options o = lgd_options_default();
+            o.power = &power, o.sample = sample;
+            plain(colour, 0.4f, 1, maps, image);
+            CHECK(!lgd_estimate(model, image, SIDE, &o, maps, &e), "%s", e.message);
+            f0[sample] = mean_f0(maps);
+        }
+        printf("  F0 %.3f, of a dielectric %.3f, of a metal %.3f\n", f0[0], f0[1], f0[2]);
+        CHECK(f0[LGD_SAMPLE_DIELECTRIC] < 0.1, "a dielectric's F0 is %.3f", f0[LGD_SAMPLE_DIELECTRIC]);
+        CHECK(dark || f0[LGD_SAMPLE_METAL] > 0.4, "a metal's F0 is %.3f", f0[LGD_SAMPLE_METAL]);
+    }
+    lgd_options o = lgd_options_default();
+    o.sample = LGD_SAMPLE_METAL;
+    CHECK(lgd_estimate(other, image, SIDE, &o, maps, &e) && strstr(e.message, "what the sample is"), "%s", e.message);
+    o.sample = 3;
+    CHECK(lgd_estimate(model, image, SIDE, &o, maps, &e) && strstr(e.message, "sample is 3"), "%s", e.message);
+    lgd_free(&model), lgd_free(&other);
     free(maps), free(image);
 }

@@ -121,7 +121,7 @@ static double settled(int known, int photographs)
     enum { S = 64 };
     static float r0[S * S * C], image[S * S * 3], deviation[S * S * NN_SPREADS];
     const float scene[2 * RD_SCENE_NUMBERS] = {0};
-    const nn_taken taken = {rd_flash(), known, photographs};
+    const nn_taken taken = {.view = rd_flash(), .known = known, .photographs = photographs};
     ts_status st = {0};
     for (int i = 0; i < S * S * C; i++) r0[i] = i % C == MAP_NORMAL ? 0.2f : i % C == MAP_NORMAL + 1 ? 0 : -0.4f;
     for (int i = 0; i < S * S * 3; i++) image[i] = 0.3f;

@@ -192,6 +192,7 @@ class Estimates(unittest.TestCase):
             ({"image": bump(), "precision": "f16"}, ValueError, "f16"),
             ({"image": bump(), "light_power": "all"}, ValueError, "all"),
             ({"image": bump(), "orientations": 3}, lgd.Error, "orientations is 3"),
+            ({"image": bump(), "sample": "wood"}, ValueError, "wood"),
             ({"image": bump(), "threads": -1}, lgd.Error, "threads is -1"),
             ({"image": bump(), "model": "absent"}, lgd.Error, "absent"),
             ({"image": bump(), "model": 3}, TypeError, "model must be an lgd.Model, a name or a file .*, not 3"),
