@@ -2,6 +2,7 @@
 #include "data/image/colour.h"
 #include "data/material.h"
 #include "infer/api.h"
+#include "infer/api_model.h"
 #include "infer/model_path.h"
 #include "infer/output.h"
 #include "infer/photograph.h"
@@ -180,8 +181,7 @@ static ts_code order_of(const lgd_write_options *o, int side, bool photograph, l
                          .metallic = o->metallic,
                          .half = o->exr == LGD_EXR_HALF || (o->exr == LGD_EXR_AUTO && side > LGD_HALF_ABOVE),
                          .repeats = o->seamless,
-                         .threads = ts_threads_of(o->threads),
-                         .fov_from = o->fov_from ? o->fov_from : "given"};
+                         .threads = ts_threads_of(o->threads)};
     if (lgd_order_check(order, st) != TS_OK) return ts_context(st, "lgd_write_maps");
     return TS_OK;
 }
@@ -195,7 +195,7 @@ int lgd_write_maps(const char *folder, const float *maps, int side, const lgd_ph
     lgd_order order;
     io_material m = {0};
     const lgd_photo flash = lgd_flash_photo(NULL), *taken = photo ? photo : &flash;
-    char path[LGD_PATH_MAX];
+    char path[LGD_PATH_MAX], *from = NULL;
     const char *parent = NULL, *stem = NULL;
     if (!folder || !maps) ts_fail(&st, TS_INVALID, "%s: folder and maps must be given", call);
     else if (check_side(call, side, &st) == TS_OK &&
@@ -204,8 +204,16 @@ int lgd_write_maps(const char *folder, const float *maps, int side, const lgd_ph
              check_values(maps, side, taken, o.fov_from, &st) == TS_OK &&
              split(folder, path, &parent, &stem, &st) == TS_OK && io_material_create(&m, side, &st) == TS_OK) {
         lgd_encode(maps, side, order.threads, m.maps);
-        lgd_output_write(parent, stem, &m, taken, &order, NULL, &st);
+        const char *how = o.fov_unknown ? lgd_fov_assumption(taken) : "";
+        if (asprintf(&from, "%s%s", how, o.fov_from ? o.fov_from : "given") < 0) {
+            from = NULL;
+            ts_fail(&st, TS_NOMEM, "%s: out of memory", call);
+        } else {
+            order.fov_from = from;
+            lgd_output_write(parent, stem, &m, taken, &order, NULL, &st);
+        }
     }
+    free(from);
     io_material_free(&m);
     return lgd_report(error, &st);
 }

@@ -63,6 +63,11 @@ lgd_photo lgd_flash_photo(const float *image)
     return p;
 }
 
+const char *lgd_fov_assumption(const lgd_photo *taken)
+{
+    return taken->camera[2] == lgd_flash_photo(NULL).camera[2] ? "assumed: " : "estimated: ";
+}
+
 static workspace *make_workspace(ag_tape *tape, ts_status *st)
 {
     workspace *w = tape ? malloc(sizeof *w) : NULL;

@@ -12,6 +12,10 @@
 ts_code lgd_model_estimate(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,
                            bool encoded, float *maps, ts_status *st);
 
+/* "assumed: " or "estimated: ": what was done about a field of view that is not known, by where the photograph was
+ * taken at last. */
+const char *lgd_fov_assumption(const lgd_photo *taken);
+
 /* Bytes that such an estimate holds at once, at most, beside its photographs and maps. */
 double lgd_model_bytes(const lgd_model *model, int side, const lgd_options *options);
 

@@ -176,7 +176,7 @@ typedef struct lgd_facts {
     size_t size;       /* sizeof(lgd_facts), set by the caller; lgd_read_photo fills the others */
     int width, height; /* of the whole photograph, upright */
     double fov; /* degrees across its largest centred square, from EXIF: for lgd_options.fov; or LGD_FOV_UNKNOWN */
-    char fov_from[128]; /* where fov is known from, or why it is not */
+    char fov_from[128]; /* where fov is known from, or why it is not: for lgd_write_options, with fov_unknown */
     char profile[96];   /* the name of a colour profile that cannot be used: sRGB was assumed; or empty */
 } lgd_facts;
 
@@ -212,6 +212,8 @@ typedef struct lgd_write_options {
     int exr;              /* LGD_EXR_... */
     int threads;          /* 0: as many as the process may use */
     const char *fov_from; /* where the field of view is known from, for meta.txt, one line; NULL: "given" */
+    int fov_unknown;      /* fov_from says why it is not known: meta.txt then says "assumed: " before it where the
+                           * camera is as high as lgd_flash_photo's, else "estimated: " */
 } lgd_write_options;
 
 /* Writes maps as returned by lgd_estimate, and meta.txt, into folder, whose parent exists. All files appear together

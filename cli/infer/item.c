@@ -1,4 +1,5 @@
 #include "cli/infer/item.h"
+#include "infer/api_model.h"
 #include <stdlib.h>
 
 const char *const cl_warning_names[CL_WARNINGS] = {"black",
@@ -12,7 +13,7 @@ const char *cl_item_assumption(const cl_item *item)
 {
     if (item->angle.assumed) return "assumed: ";
     if (item->fov != LGD_FOV_UNKNOWN) return "";
-    return item->photo[0].camera[2] == lgd_flash_photo(NULL).camera[2] ? "assumed: " : "estimated: ";
+    return lgd_fov_assumption(&item->photo[0]);
 }
 
 const char *cl_item_fov_is(const cl_item *item)

@@ -73,6 +73,7 @@ class WriteOptions(ctypes.Structure):  # lgd_write_options
         ("exr", c_int),
         ("threads", c_int),
         ("fov_from", c_char_p),
+        ("fov_unknown", c_int),
     ]
 
 

@@ -1,5 +1,6 @@
 /* The public C API's files: photographs and masks in, maps out. */
 #include "data/material.h"
+#include "infer/meta.h"
 #include "infer/output.h"
 #include "tests/support/inference.h"
 #include <sys/stat.h>
@@ -171,6 +172,33 @@ TEST(infer_maps_are_written_and_read_back)
     const lgd_write_options few = {.size = sizeof few, .maps = "normal,height", .directx = 1, .fov_from = "a test"};
     CHECK(!lgd_write_maps("here", maps, SIDE, NULL, &few, &e), "%s", e.message);
     CHECK(there(in_folder("here"), "height.png") && !there(in_folder("here"), "maps.exr"), "other files");
+}
+
+static bool meta_says(const char *folder, const char *text)
+{
+    char *meta = lgd_meta_read(folder);
+    const bool says = meta && strstr(meta, text);
+    free(meta);
+    return says;
+}
+
+TEST(infer_meta_says_how_the_field_of_view_is_known)
+{
+    static float maps[VALUES];
+    lgd_error e;
+    make_maps(maps);
+    lgd_photo photo = lgd_flash_photo(NULL);
+    lgd_write_options o = {.size = sizeof o, .maps = "normal"};
+    const char *folder = in_folder("wall");
+    CHECK(!lgd_write_maps(folder, maps, SIDE, &photo, &o, &e) && meta_says(folder, "(given)"), "%s", e.message);
+    o.fov_from = "no EXIF", o.fov_unknown = 1;
+    CHECK(!lgd_write_maps(folder, maps, SIDE, &photo, &o, &e) && meta_says(folder, "(assumed: no EXIF)"), "%s",
+          e.message);
+    photo.camera[2] = photo.light[2] = 1.5f;
+    CHECK(!lgd_write_maps(folder, maps, SIDE, &photo, &o, &e) && meta_says(folder, "(estimated: no EXIF)"), "%s",
+          e.message);
+    o.size = offsetof(lgd_write_options, fov_unknown); /* a caller that was compiled without it */
+    CHECK(!lgd_write_maps(folder, maps, SIDE, &photo, &o, &e) && meta_says(folder, "(no EXIF)"), "%s", e.message);
 }
 
 TEST(infer_writing_says_what_is_wrong)
