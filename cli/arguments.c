@@ -60,6 +60,11 @@ const char *cl_argument_second(int argc, char **argv)
     return optind < argc && argv[optind][0] != '-' ? argv[optind++] : NULL;
 }
 
+ts_code cl_check_name(const char *what, const char *name, ts_status *st)
+{
+    return *name ? TS_OK : ts_fail(st, TS_INVALID, "%s: the name is empty", what);
+}
+
 void cl_argument_help(const cl_argument *table, FILE *out)
 {
     for (int i = 0; table[i].key; i++) {

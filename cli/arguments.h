@@ -25,6 +25,10 @@ int cl_option_next(int argc, char **argv, const char *shorts, const struct optio
 /* The word behind that value, for an option that has two; NULL when there is none. */
 const char *cl_argument_second(int argc, char **argv);
 
+/* TS_INVALID with st where the name of a file or folder is empty, as a shell's variable may be. what: the option, or
+ * what the name is of. */
+ts_code cl_check_name(const char *what, const char *name, ts_status *st);
+
 /* A line (or more) for each option. */
 void cl_argument_help(const cl_argument *table, FILE *out);
 #endif

@@ -32,13 +32,14 @@ static bool shipped(const char *name, char path[LGD_PATH_MAX])
 
 static bool is_name(const char *option)
 {
-    return *option && strlen(option) < LGD_NAME_MAX && !strpbrk(option, "/.") && access(option, F_OK) != 0;
+    return strlen(option) < LGD_NAME_MAX && !strpbrk(option, "/.") && access(option, F_OK) != 0;
 }
 
 ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_MAX], ts_status *st)
 {
     const char *variable = getenv("LGD_MODEL");
     if (!option && variable && *variable) option = variable;
+    if (option && !*option) return ts_fail(st, TS_INVALID, "the name of the weights is empty");
     if (option && !is_name(option)) return take(option, path, st);
     if (option) name = option;
     if (shipped(name, path)) return TS_OK;

@@ -208,8 +208,8 @@ int main(int argc, char **argv)
                 code = cl_usage("--init may be given twice, not more often");
                 goto end;
             }
-            if (!*optarg) { /* as it comes from a shell's variable: a run would begin from nothing */
-                code = cl_usage("--init: the file's name is empty");
+            if (cl_check_name("--init", optarg, &st) != TS_OK) { /* a run would begin from nothing */
+                code = cl_usage("%s", st.message);
                 goto end;
             }
             init[init[0] != NULL] = optarg;
@@ -246,8 +246,9 @@ int main(int argc, char **argv)
                         files);
         goto end;
     }
-    if ((files && !*argv[optind]) || (initial && !*initial)) {
-        code = cl_usage("%s: the file's name is empty", initial && !*initial ? "--initial" : "the configuration");
+    if ((files && cl_check_name("CONFIG", argv[optind], &st) != TS_OK) ||
+        (initial && cl_check_name("--initial", initial, &st) != TS_OK)) {
+        code = cl_usage("%s", st.message);
         goto end;
     }
     if (init[0] && resume) {

@@ -57,7 +57,10 @@ static ts_code parse(int argc, char **argv, command *c, int *operands, ts_status
     while (!code && !c->help && !c->version &&
            (key = cl_argument_next(argc, argv, arguments, &value, operands, st)) != CL_ARGUMENT_END)
         switch (key) {
-        case 'o': c->output = value; break;
+        case 'o':
+            c->output = value;
+            code = cl_check_name("-o", value, st);
+            break;
         case PAPER: code = take_paper(value, c, st); break;
         case FOV:
             if (!cl_parse_real(value, IO_FOV_LEAST, IO_FOV_MOST, &c->fov))
@@ -149,6 +152,8 @@ static int work(const command *c, char **word, int words)
     if (strcmp(word[0], "check") != 0) return cl_usage("'%s' is neither sheet nor check", word[0]);
     if (c->output) return cl_usage("check writes no file: no -o");
     if (words == 1) return cl_usage("check: no photograph is given");
+    for (int i = 1; i < words; i++)
+        if (cl_check_name("check", word[i], &st) != TS_OK) return cl_usage("%s", st.message);
     return check_operands(c, word + 1, words - 1);
 }
 

@@ -72,9 +72,11 @@ static ts_code parse(int argc, char **argv, command *c, ts_status *st)
     if (argc - operands != (c->list ? 1 : 2))
         return ts_fail(st, TS_INVALID, "%s", c->list ? "--list takes one file" : "two files are needed: IN OUT");
     c->in = argv[operands];
+    if (cl_check_name("IN", c->in, st) != TS_OK) return st->code;
     if (c->list)
         return c->real == NN_DTYPES ? TS_OK : ts_fail(st, TS_INVALID, "--list writes nothing: --dtype has no use");
     c->out = argv[operands + 1];
+    if (cl_check_name("OUT", c->out, st) != TS_OK) return st->code;
     if (ends_with(c->out, ".safetensors")) c->form = NN_FORM_SAFETENSORS;
     else if (ends_with(c->out, ".pth") || ends_with(c->out, ".pt")) c->form = NN_FORM_TORCH_ZIP;
     else

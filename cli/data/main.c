@@ -11,8 +11,11 @@
 #include "render/render.h"
 #include "tensor/team.h"
 #include "tensor/threads.h"
+#include <errno.h>
 #include <pthread.h>
 #include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 static ts_code make_path(char path[4096], const cl_data_options *o, const char *name, const char *suffix, ts_status *st)
@@ -165,6 +168,13 @@ static ts_code make_sheet(const cl_data_options *o, ts_status *st)
     return code;
 }
 
+static ts_code check_folder(const char *path, ts_status *st)
+{
+    struct stat info;
+    if (stat(path, &info) != 0) return ts_fail(st, TS_IO, "--testdata: %s: %s", path, strerror(errno));
+    return S_ISDIR(info.st_mode) ? TS_OK : ts_fail(st, TS_IO, "--testdata: %s: is not a folder", path);
+}
+
 static ts_code compare(const cl_data_options *o, ts_status *st)
 {
     const int count = o->count ? (int)o->count : 512, size = o->size ? (int)o->size : 128;
@@ -186,6 +196,7 @@ int main(int argc, char **argv)
     if (!code) code = cl_data_options_read(argc, argv, &o);
     if (code) return code;
     ts_threads_set((int)o.threads);
+    if (o.testdata && check_folder(o.testdata, &st) != TS_OK) return cl_finish(cl_failed("%s", st.message));
     io_collection *collection = o.collection ? io_collection_read(o.collection, 0, NULL, NULL, &st) : NULL;
     if (st.code) return cl_finish(cl_failed("%s", st.message));
     o.procedural.collection = collection;

@@ -129,6 +129,13 @@ static int parse_number(const char *option, const char *text, int64_t lo, int64_
         : cl_usage("--%s: '%s' is not a whole number from %lld to %lld", option, text, (long long)lo, (long long)hi);
 }
 
+static int take_name(const char *option, const char *name, const char **value)
+{
+    ts_status st;
+    *value = name;
+    return cl_check_name(option, name, &st) == TS_OK ? CL_OK : cl_usage("%s", st.message);
+}
+
 static int parse_share(const char *option, const char *text, double hi, float *value)
 {
     double v;
@@ -150,7 +157,7 @@ int cl_data_options_read(int argc, char **argv, cl_data_options *o)
     memcpy(long_options + SHARES + CL_CAMERA_OPTIONS, plain_options, sizeof plain_options);
     ts_status st;
     while (code == CL_OK && (c = cl_option_next(argc, argv, ":o:", long_options, &st)) != CL_ARGUMENT_END) switch (c) {
-        case 'o': o->output = optarg; break;
+        case 'o': code = take_name("-o", optarg, &o->output); break;
         case OPT_SEED: code = parse_number("seed", optarg, 0, INT64_MAX, &seed); break;
         case OPT_FIRST: code = parse_number("first", optarg, 0, INT64_C(1) << 60, &o->first); break;
         case OPT_COUNT: code = parse_number("count", optarg, 1, 10000000, &o->count); break;
@@ -171,8 +178,8 @@ int cl_data_options_read(int argc, char **argv, cl_data_options *o)
         case OPT_WIDTH: code = parse_number("photo-width", optarg, 400, 8000, &o->width); break;
         case OPT_STATISTICS: o->statistics = true; break;
         case OPT_HISTOGRAMS: o->histograms = true; break;
-        case OPT_TESTDATA: o->testdata = optarg; break;
-        case OPT_COLLECTION: o->collection = optarg; break;
+        case OPT_TESTDATA: code = take_name("--testdata", optarg, &o->testdata); break;
+        case OPT_COLLECTION: code = take_name("--collection", optarg, &o->collection); break;
         case OPT_THREADS: code = parse_number("threads", optarg, 1, 1024, &o->threads); break;
         case OPT_HELP: print_help(); exit(cl_finish(CL_OK));
         case OPT_VERSION: cl_print_version(); exit(cl_finish(CL_OK));

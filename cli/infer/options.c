@@ -131,8 +131,8 @@ static ts_code take_capture(const char *value, cl_command *c, ts_status *st)
 {
     size_t n = strlen(value);
     while (n > 1 && value[n - 1] == '/') n--;
-    if (n == 0 || n >= sizeof c->capture)
-        return ts_fail(st, TS_INVALID, "--capture: the name is %s", n ? "too long" : "empty");
+    if (cl_check_name("--capture", value, st) != TS_OK) return st->code;
+    if (n >= sizeof c->capture) return ts_fail(st, TS_INVALID, "--capture: the name is too long");
     memcpy(c->capture, value, n);
     c->capture[n] = 0;
     return TS_OK;
@@ -153,8 +153,14 @@ ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st)
     while (!code && !c->help && !c->version &&
            (key = cl_argument_next(argc, argv, cl_infer_arguments, &value, &operands, st)) != CL_ARGUMENT_END) {
         switch (key) {
-        case 'o': c->out = value; break;
-        case 'm': c->model = value; break;
+        case 'o':
+            c->out = value;
+            code = cl_check_name("-o", value, st);
+            break;
+        case 'm':
+            c->model = value;
+            code = cl_check_name("--model", value, st);
+            break;
         case 'q': c->quiet = true; break;
         case HELP: c->help = true; break;
         case VERSION: c->version = true; break;
@@ -214,7 +220,10 @@ ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st)
                 code = ts_fail(st, TS_INVALID, "--light-power: '%s' is neither auto nor a number in 0.01 .. 100",
                                value);
             break;
-        case MASK: c->mask = value; break;
+        case MASK:
+            c->mask = value;
+            code = cl_check_name("--mask", value, st);
+            break;
         case CAPTURE: code = take_capture(value, c, st); break;
         case TOLERANCE:
             if (!cl_parse_real(value, 0, 1, &c->tolerance))
@@ -278,7 +287,6 @@ ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st)
     }
     if (c->photos == 0) return ts_fail(st, TS_INVALID, "no photograph is given");
     if (!c->out) return ts_fail(st, TS_INVALID, "no output folder is given: -o DIR");
-    if (!*c->out) return ts_fail(st, TS_INVALID, "-o: the name of the output folder is empty");
     return TS_OK;
 }
 

@@ -10,6 +10,10 @@ usage() {
         expect 2 "$BIN/lgd-convert" $a
         says "$T/err" "lgd-convert:"
     done
+    expect 2 "$BIN/lgd-convert" "" b.pth
+    says "$T/err" "IN: the name is empty"
+    expect 2 "$BIN/lgd-convert" a.pth ""
+    says "$T/err" "OUT: the name is empty"
     expect 0 "$BIN/lgd-convert" --help
     for o in list dtype prefix safetensors .pth; do says "$T/out" "$o"; done
     expect 0 "$BIN/lgd-convert" --version

@@ -79,6 +79,14 @@ data_wrong_usage() {
 }
 check data_wrong_usage data_wrong_usage
 
+data_empty_names() {
+    for option in -o --testdata --collection; do
+        expect 2 "$DATA" --statistics --collected 1 $option ""
+        says "$T/err" "$option: the name is empty"
+    done
+}
+check data_empty_names data_empty_names
+
 data_cannot_write() {
     : >"$T/file"
     for what in "" --contact-sheet --photographs "--format strips"; do
@@ -153,8 +161,13 @@ same_materials() {
 }
 
 data_statistics() {
-    expect 1 "$DATA" --statistics --testdata "$T/none"
-    says "$T/err" "$T/none"
+    for wrong in "$T/none: No such file or directory" "$T/.log: is not a folder"; do
+        expect 1 "$DATA" --statistics --testdata "${wrong%%: *}"
+        says "$T/err" "$wrong"
+        expect 1 "$DATA" --histograms --testdata "${wrong%%: *}" -o "$T/h"
+        says "$T/err" "$wrong"
+    done
+    [ ! -e "$T/h" ] || fail "the folder was made"
     mkdir -p "$T/own"
     expect 0 "$DATA" -o "$T/own/maps" --count 24 --size 32
     expect 0 "$DATA" -o "$T/own/strips" --first 24 --count 24 --size 32 --format strips

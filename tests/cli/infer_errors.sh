@@ -234,6 +234,16 @@ max_memory() {
     expect 0 infer --max-memory 1G "$T/p.ppm" -o "$T/o"
 }
 
+empty_names() {
+    photo "$T/p.ppm" 10 10
+    for option in --model --mask --capture -o; do
+        expect 2 infer "$T/p.ppm" -o "$T/o" $option ""
+        says "$T/err" "$option: the name is empty"
+    done
+    [ ! -e "$T/o" ] || fail "the folder was made"
+}
+
+check infer_empty_names empty_names
 check infer_bad_photographs_do_not_stop_the_rest bad_ones_do_not_stop
 check infer_same_stem same_stem
 check infer_odd_stems odd_stems

@@ -122,6 +122,14 @@ no_field_of_view() {
     done
 }
 
+empty_names() {
+    expect 2 capture sheet -o ""
+    says "$T/err" "-o: the name is empty"
+    expect 2 capture check ""
+    says "$T/err" "check: the name is empty"
+}
+
+check sheet_empty_names empty_names
 check sheet_drawing drawing
 check sheet_measures measures
 check sheet_no_field_of_view no_field_of_view

@@ -93,10 +93,10 @@ options_and_usage() {
     expect 2 train --resume --init x.safetensors
     for empty in --init --initial; do
         expect 2 train $empty ""
-        says "$T/err" "$empty: the file's name is empty"
+        says "$T/err" "$empty: the name is empty"
     done
     expect 2 "$BIN/lgd-train" ""
-    says "$T/err" "the configuration: the file's name is empty"
+    says "$T/err" "CONFIG: the name is empty"
     expect 1 "$TRAIN" "$T/none.ini"
     says "$T/err" "$T/none.ini"
     expect 1 "$TRAIN" "$T"

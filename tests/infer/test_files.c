@@ -117,6 +117,7 @@ TEST(infer_find_weights)
     setenv("LGD_MODEL", "/a/b.safetensors", 1);
     CHECK(!lgd_find_weights(NULL, path, sizeof path, &e) && !strcmp(path, "/a/b.safetensors"), "%s", e.message);
     CHECK(!lgd_find_weights("c.safetensors", path, sizeof path, &e) && !strcmp(path, "c.safetensors"), "%s", e.message);
+    CHECK(lgd_find_weights("", path, sizeof path, &e) == TS_INVALID && strstr(e.message, "empty"), "%s", e.message);
     CHECK(lgd_find_weights(NULL, path, 5, &e) == TS_INVALID && strstr(e.message, "5 bytes"), "%s", e.message);
     CHECK(lgd_find_weights("no-such-model", path, sizeof path, &e) == TS_IO && strstr(e.message, "no-such-model"), "%s",
           e.message);
