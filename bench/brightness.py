@@ -10,6 +10,8 @@ import sys
 import numpy as np
 from PIL import Image
 
+from messages import fail, usage
+
 SIDE, QUANTILES = 128, (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
@@ -23,12 +25,13 @@ def measure(path):
 
 
 def main():
+    sets = [argument.split("=", 1) for argument in sys.argv[1:]]
+    for _, pattern in sets:
+        if not glob.glob(pattern):
+            fail(f"{pattern}: no such file")
     print(f"{'':12}{'images':>7}  linear mean, quantiles               burnt out, quantiles")
-    for argument in sys.argv[1:]:
-        name, _, pattern = argument.partition("=")
+    for name, pattern in sets:
         found = np.array([measure(path) for path in sorted(glob.glob(pattern))])
-        if not len(found):
-            sys.exit(f"{pattern}: no such file")
         mean, burnt = np.quantile(found, QUANTILES, axis=0).T
         print(f"{name:12}{len(found):7}  " + " ".join(f"{x:.3f}" for x in mean) + "   " +
               " ".join(f"{x:.3f}" for x in burnt))
@@ -36,5 +39,5 @@ def main():
 
 if __name__ == "__main__":
     if len(sys.argv) < 2 or any("=" not in a for a in sys.argv[1:]):
-        sys.exit(__doc__)
+        usage(__doc__)
     main()

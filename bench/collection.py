@@ -22,6 +22,8 @@ import numpy as np
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
+from messages import fail, usage
+
 SIDE = 512
 LICENCES = re.compile(r"(CC-?0|CC-BY|CC-BY-SA|public-domain|Expat|MIT|zlib)(-[\d.]+\+?)?", re.I)
 IMAGE = re.compile(r"\.(png|jpg|jpeg|tga|dds)$", re.I)
@@ -216,20 +218,42 @@ def convert(out, package, root, seen, sources):
         sources.write("\t".join([name, package, path, ", ".join(sorted(terms))]) + "\n")
 
 
-def main():
-    if len(sys.argv) < 3:
-        sys.exit(__doc__)
-    out, packages = sys.argv[1], sys.argv[2:]
-    Image.MAX_IMAGE_PIXELS = None
-    os.makedirs(out)
+def unpack(package, root):
+    try:
+        subprocess.run(["dpkg-deb", "-x", package, root], check=True, stderr=subprocess.PIPE, text=True)
+    except FileNotFoundError:
+        fail("dpkg-deb is not installed")
+    except subprocess.CalledProcessError as error:
+        fail(f"{package}: cannot be unpacked: {(error.stderr.strip().splitlines() or ['no reason'])[-1]}")
+
+
+def collect(out, packages):
     seen = set()
+    os.mkdir(out)
     with open(os.path.join(out, "sources.tsv"), "w") as sources:
         for package in packages:
             with tempfile.TemporaryDirectory() as root:
-                subprocess.run(["dpkg-deb", "-x", package, root], check=True)
+                unpack(package, root)
                 before = len(seen)
                 convert(out, os.path.basename(package), root, seen, sources)
                 print(f"{package}: {len(seen) - before} map folders")
+
+
+def main():
+    if len(sys.argv) < 3:
+        usage(__doc__)
+    out, packages = sys.argv[1], sys.argv[2:]
+    Image.MAX_IMAGE_PIXELS = None
+    if os.path.lexists(out):
+        fail(f"{out}: is there already")
+    for package in packages:
+        if not os.path.isfile(package):
+            fail(f"{package}: no such file")
+    parent = os.path.dirname(os.path.abspath(out))
+    os.makedirs(parent, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".", dir=parent) as hidden:  # out appears when it is complete
+        collect(os.path.join(hidden, "sets"), packages)
+        os.rename(os.path.join(hidden, "sets"), out)
 
 
 main()

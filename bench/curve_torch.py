@@ -13,8 +13,14 @@ import subprocess
 import sys
 import tempfile
 
+from messages import fail, usage
+
+try:
+    import torch
+except ImportError:
+    fail("there is no PyTorch here: make bench-deps installs it")
+
 import peer_torch as peer
-from peer_torch import torch
 
 MEAN = 50
 
@@ -69,14 +75,14 @@ def load(net, path):
             p.copy_(value.reshape(p.shape))
             left.discard(names[id(p)])
     if left:
-        sys.exit(f"{path} has nothing for {', '.join(sorted(left))}")
+        fail(f"{path} has nothing for {', '.join(sorted(left))}")
 
 
 def floats(stream, *shape):
     count = math.prod(shape)
     data = stream.read(4 * count)
     if len(data) < 4 * count:
-        sys.exit("the batches end early")
+        fail("the batches end early")
     return torch.frombuffer(bytearray(data), dtype=torch.float32).reshape(shape)
 
 
@@ -160,7 +166,7 @@ def draw(path, curves):
 
 def main():
     if len(sys.argv) not in (3, 4):
-        sys.exit(__doc__)
+        usage(__doc__)
     config, out, build = sys.argv[1], sys.argv[2], sys.argv[3] if len(sys.argv) == 4 else "build"
     keys = configuration(build, config)
     torch.set_num_threads(int(os.environ.get("OMP_NUM_THREADS", os.cpu_count())))

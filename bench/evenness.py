@@ -8,7 +8,7 @@ RMS of the logarithm of the mean colour, from .4 to 1.6 and from 1.6 to 4 cycles
 import numpy as np
 from PIL import Image
 
-from sets import sets
+from sets import cut, sets
 
 SIDE = 128
 DARKEST = 0.004
@@ -21,8 +21,7 @@ def linear(path, panel):
         half = image.shape[0] // 2
         return image[:half, half:] ** 2.2
     if panel:
-        left = int(panel) * image.shape[0]
-        return image[:, left : left + image.shape[0]]
+        return cut(image, path, panel)
     return np.where(image <= 0.04045, image / 12.92, ((image + 0.055) / 1.055) ** 2.4)
 
 
@@ -39,7 +38,7 @@ def row(path, panel):
 
 
 def main():
-    for name, paths, panel in sets("evenness.py", __doc__):
+    for name, paths, panel in sets(__doc__):
         rows = np.percentile([row(p, panel) for p in paths], [25, 50, 75], axis=0)
         print(f"{name} {len(paths)}", *("%.3f %.3f %.3f;" % tuple(band) for band in rows.T))
 

@@ -15,6 +15,7 @@ import OpenEXR
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
+from messages import fail, usage
 from shading import PLACE, SIDE, radiance, unit
 
 EXCHANGED = "d s r n dn sr dsr srn dsrn".split()
@@ -35,8 +36,8 @@ def capture(folder):
     return pictures, cameras[order], lights[order]
 
 
-def estimate(folder):
-    with OpenEXR.File(str(next(folder.glob("*/maps.exr")))) as file:
+def estimate(path):
+    with OpenEXR.File(str(path)) as file:
         c = {k: v.pixels.astype(np.float64) for k, v in file.channels().items()}
     return {
         "d": c["diffuse"],
@@ -97,14 +98,19 @@ def falloff(maps, pictures, cameras, lights):
 
 def main():
     if len(sys.argv) != 3:
-        sys.exit(__doc__)
+        usage(__doc__)
+    captures, estimates = map(Path, sys.argv[1:])
+    folders = [path.parent for path in sorted(captures.glob("*/materialgan_tex.jpg"))]
+    if not folders:
+        fail(f"{captures}: there is no */materialgan_tex.jpg in it")
+    found = [next((estimates / folder.name).glob("*/maps.exr"), None) for folder in folders]
+    if None in found:
+        fail(f"{estimates / folders[found.index(None)].name}: there is no */maps.exr in it")
     titles = ["own", *EXCHANGED, *(f"n/{s}" for s in SIGMAS), "k"]
     print(f"{'':26}" + "".join(f"{t:>8}" for t in titles))
     table = []
-    for folder in sorted(Path(sys.argv[1]).iterdir()):
-        if not (folder / "materialgan_tex.jpg").exists():
-            continue
-        scene, own, other = capture(folder), estimate(Path(sys.argv[2]) / folder.name), others(folder)
+    for folder, maps in zip(folders, found):
+        scene, own, other = capture(folder), estimate(maps), others(folder)
         tried = [own] + [own | {k: other[k] for k in which} for which in EXCHANGED]
         tried += [own | {"n": own["n"] - smooth(own["n"], s) + smooth(other["n"], s)} for s in SIGMAS]
         table.append([*(score(maps, *scene) for maps in tried), falloff(other, *scene)])

@@ -10,6 +10,8 @@ import sys
 import numpy as np
 from PIL import Image
 
+from messages import fail, usage
+
 SQUARES = 8
 
 
@@ -29,11 +31,11 @@ def excess(path):
 
 def main():
     if len(sys.argv) < 2:
-        sys.exit(__doc__)
+        usage(__doc__)
     for pattern in sys.argv[1:]:
         rows = [excess(path) for path in sorted(glob.glob(pattern))]
         if not rows:
-            sys.exit(f"lattice.py: {pattern}: there is no such file")
+            fail(f"{pattern}: there is no such file")
         print(f"{pattern} {len(rows)} mean {np.mean(rows):.4f} largest {np.max(rows):.4f}")
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from PIL import Image
 from scipy.optimize import least_squares
 
+from messages import fail, usage
 from shading import SIDE, radiance, unit
 
 DISTANCE = 250 / 256
@@ -48,9 +49,12 @@ def fit(photo, maps):
 
 def main():
     if len(sys.argv) != 3:
-        sys.exit(__doc__.splitlines()[0])
+        usage(__doc__)
+    paths = sorted(Path(sys.argv[1]).glob("*.png"))
+    if not paths:
+        fail(f"{sys.argv[1]}: there is no *.png in it")
     straight = np.array([0, 0, DISTANCE])
-    for path in sorted(Path(sys.argv[1]).glob("*.png")):
+    for path in paths:
         photo, maps = panels(path)
         t = fit(photo, maps)
         error = np.sqrt(np.mean((render(maps, *places(t), np.exp(t[5])) - photo) ** 2))

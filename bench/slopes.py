@@ -8,7 +8,7 @@ Pillow."""
 import numpy as np
 from PIL import Image
 
-from sets import sets
+from sets import cut, sets
 
 SIDE = 128
 BANDS = (0.5, 2), (2, 8), (8, 32), (32, 64)
@@ -19,8 +19,7 @@ def slopes(path, panel):
     if panel == "q":
         image = image[: image.shape[0] // 2, : image.shape[1] // 2]
     elif panel:
-        left = int(panel) * image.shape[0]
-        image = image[:, left : left + image.shape[0]]
+        image = cut(image, path, panel)
     normal = image * 2 - 1
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
     slope = normal[..., :2] / np.maximum(normal[..., 2:], 0.1)
@@ -38,7 +37,7 @@ def row(path, panel):
 
 
 def main():
-    for name, paths, panel in sets("slopes.py", __doc__):
+    for name, paths, panel in sets(__doc__):
         print(f"{name} {len(paths)}", *(f"{v:.3f}" for v in np.median([row(p, panel) for p in paths], axis=0)))
 
 

@@ -42,6 +42,21 @@ collection_takes_what_it_may() {
 }
 check collection_takes_what_it_may collection_takes_what_it_may
 
+collection_says_what_is_wrong() {
+    package
+    expect 2 "$PYTHON" bench/collection.py "$T/o"
+    echo "no package" >"$T/bad.deb"
+    for wrong in "$T/absent.deb: no such file" "$T/bad.deb: cannot be unpacked: "; do
+        expect 1 "$PYTHON" bench/collection.py "$T/new/o" "$T/quarry.deb" "${wrong%%: *}"
+        lines "$T/err" 1
+        says "$T/err" "collection.py: $wrong"
+        [ -z "$(ls -A "$T/new" 2>/dev/null)" ] || fail "left: $(ls -A "$T/new")"
+    done
+    expect 1 "$PYTHON" bench/collection.py "$T/made" "$T/quarry.deb"
+    says "$T/err" "$T/made: is there already"
+}
+check collection_says_what_is_wrong collection_says_what_is_wrong
+
 # A gloss map that may not be used changes nothing, one that may does.
 collection_leaves_closed_gloss() {
     package

@@ -1,0 +1,54 @@
+#!/bin/sh
+# The scripts in bench/ that read people's files: what they say where there are none.
+. tests/cli/lib.sh
+: "${PYTHON:=python3}"
+export PYTHONDONTWRITEBYTECODE=1
+
+# wrong STATUS TEXT SCRIPT ARGUMENTS...: one line of the script's, with the text.
+wrong() {
+    status=$1 text=$2 script=$3
+    shift 3
+    expect "$status" "$PYTHON" "bench/$script.py" "$@"
+    [ ! -s "$T/out" ] || fail "$script.py prints $(head -n 1 "$T/out")"
+    lines "$T/err" 1
+    says "$T/err" "$script.py: $text"
+}
+
+usage() {
+    "$PYTHON" -c 'import numpy, PIL, scipy' 2>/dev/null || skip "$PYTHON has no numpy, Pillow and scipy"
+    for script in relight evenness slopes lattice brightness collection; do
+        expect 2 "$PYTHON" "bench/$script.py"
+        says "$T/err" "$script.py"
+    done
+}
+check scripts_usage usage
+
+missing_files() {
+    "$PYTHON" -c 'import numpy, PIL, scipy' 2>/dev/null || skip "$PYTHON has no numpy, Pillow and scipy"
+    wrong 1 "$T/none: there is no *.png in it" relight "$T/none" "$T/o"
+    for script in evenness slopes brightness; do wrong 1 "$T/none: no such file" $script "a=$T/none"; done
+    wrong 1 "$T/none: there is no such file" lattice "$T/none"
+    for script in evenness slopes; do
+        wrong 2 "a=demo/flash.jpg:x: the panel 'x' is neither a number nor q" $script a=demo/flash.jpg:x
+        wrong 1 "demo/flash.jpg: has no panel 7" $script a=demo/flash.jpg:7
+    done
+    [ ! -e "$T/o" ] || fail "a folder is left"
+}
+check scripts_missing_files missing_files
+
+exchange() {
+    "$PYTHON" -c 'import numpy, PIL, scipy, OpenEXR' 2>/dev/null || skip "$PYTHON has no scipy or no OpenEXR"
+    expect 2 "$PYTHON" bench/exchange.py
+    wrong 1 "$T/none: there is no */materialgan_tex.jpg in it" exchange "$T/none" "$T/none"
+    mkdir -p "$T/captures/book"
+    cp demo/flash.jpg "$T/captures/book/materialgan_tex.jpg"
+    wrong 1 "$T/none/book: there is no */maps.exr in it" exchange "$T/captures" "$T/none"
+}
+check scripts_exchange exchange
+
+without_pytorch() {
+    command -v "$PYTHON" >/dev/null || skip "$PYTHON is not installed"
+    "$PYTHON" -c 'import torch' 2>/dev/null && skip "$PYTHON has PyTorch"
+    wrong 1 "there is no PyTorch here" curve_torch configs/curve.ini "$T/loss.svg"
+}
+check scripts_without_pytorch without_pytorch
