@@ -14,18 +14,19 @@ enum { PAPER = 256, FOV, MAX_PIXELS, HELP = 'h', VERSION = 'V' };
 static const cl_argument arguments[] = {
     {'o', "output", "FILE", "of sheet: where the drawing goes, a name that ends in .pdf or .svg (required)"},
     {PAPER, "paper", "a4|letter", "of sheet: its paper (default a4)"},
-    {FOV, "fov", "DEG", "of check: field of view across the photographs' shorter side (default: from EXIF)"},
+    {FOV, "fov", "DEG",
+     "of check: field of view across the photographs' shorter side, 3 .. 150 degrees\n(default: from EXIF)"},
     {'t', "threads", "N", "number of threads, 1 .. 1024; 0 = all that are allowed (default 0)"},
-    {MAX_PIXELS, "max-pixels", "N", "refuse photographs with more pixels (default 268435456)"},
+    {MAX_PIXELS, "max-pixels", "N", "of check: refuse photographs with more pixels (default 268435456)"},
     {HELP, "help", NULL, "print this help"},
     {VERSION, "version", NULL, "print the version"},
     {0, NULL, NULL, NULL}};
 
 typedef struct command {
     const char *output;
-    const io_paper *paper;
-    double fov;
-    int64_t threads, max_pixels;
+    const io_paper *paper;       /* NULL: not given */
+    double fov;                  /* 0: not given */
+    int64_t threads, max_pixels; /* max_pixels 0: not given */
     bool help, version;
 } command;
 
@@ -108,8 +109,8 @@ static int check(const command *c, char **paths, int count)
 {
     io_sheet_set set;
     ts_status st = {0};
-    if (io_sheet_set_read(paths, count, c->fov, c->max_pixels, 0, &set, &st) != TS_OK)
-        return cl_failed("%s", st.message);
+    const int64_t pixels = c->max_pixels > 0 ? c->max_pixels : IO_MAX_PIXELS_DEFAULT;
+    if (io_sheet_set_read(paths, count, c->fov, pixels, 0, &set, &st) != TS_OK) return cl_failed("%s", st.message);
     bool fine = true;
     for (int i = 0; i < count; i++) fine = say(&set.photo[i]) && fine;
     if (set.good > 1 && io_sheet_apart(&set) < IO_SHEET_APART) {
@@ -145,12 +146,15 @@ static int work(const command *c, char **word, int words)
     if (words == 0) return cl_usage("what to do? sheet or check");
     if (!strcmp(word[0], "sheet")) {
         if (words > 1) return cl_usage("sheet: '%s' is one word too many", word[1]);
+        if (c->fov > 0) return cl_usage("sheet reads no photograph: no --fov");
+        if (c->max_pixels > 0) return cl_usage("sheet reads no photograph: no --max-pixels");
         if (!c->output) return cl_usage("sheet: where to? Give -o FILE.pdf or -o FILE.svg");
-        const ts_code code = io_sheet_print(c->output, c->paper, &st);
+        const ts_code code = io_sheet_print(c->output, c->paper ? c->paper : io_papers, &st);
         return code == TS_INVALID ? cl_usage("%s", st.message) : code ? cl_failed("%s", st.message) : CL_OK;
     }
     if (strcmp(word[0], "check") != 0) return cl_usage("'%s' is neither sheet nor check", word[0]);
     if (c->output) return cl_usage("check writes no file: no -o");
+    if (c->paper) return cl_usage("check reads either paper's sheet: no --paper");
     if (words == 1) return cl_usage("check: no photograph is given");
     for (int i = 1; i < words; i++)
         if (cl_check_name("check", word[i], &st) != TS_OK) return cl_usage("%s", st.message);
@@ -160,7 +164,7 @@ static int work(const command *c, char **word, int words)
 int main(int argc, char **argv)
 {
     cl_open_streams();
-    command c = {.paper = io_papers, .max_pixels = IO_MAX_PIXELS_DEFAULT};
+    command c = {0};
     ts_status st = {0};
     int operands = argc;
     const int bad = cl_init("lgd-capture");

@@ -144,10 +144,23 @@ static int parse_share(const char *option, const char *text, double hi, float *v
     return CL_OK;
 }
 
+/* Options of which nothing is made. of_camera: one of cl_camera_options, or NULL. */
+static int check_uses(const cl_data_options *o, const char *of_camera, bool quality, bool width)
+{
+    const bool sheets = o->format == CL_FORMAT_SHEETS;
+    if (of_camera && !o->photographs) return cl_usage("--%s is for --photographs", of_camera);
+    if (quality && !o->photographs && !sheets)
+        return cl_usage("--quality is for --photographs and --format sheet-captures");
+    if (width && !sheets) return cl_usage("--photo-width is for --format sheet-captures");
+    return CL_OK;
+}
+
 int cl_data_options_read(int argc, char **argv, cl_data_options *o)
 {
     int code = CL_OK, c;
     int64_t seed = 1;
+    bool quality = false, width = false;
+    const char *of_camera = NULL;
     enum { PLAIN = sizeof plain_options / sizeof *plain_options };
     struct option long_options[SHARES + CL_CAMERA_OPTIONS + PLAIN];
     for (int i = 0; i < SHARES; i++)
@@ -174,8 +187,14 @@ int cl_data_options_read(int argc, char **argv, cl_data_options *o)
             break;
         case OPT_SHEET: o->sheet = true; break;
         case OPT_PHOTOGRAPHS: o->photographs = true; break;
-        case OPT_QUALITY: code = parse_number("quality", optarg, 1, 100, &o->quality); break;
-        case OPT_WIDTH: code = parse_number("photo-width", optarg, 400, 8000, &o->width); break;
+        case OPT_QUALITY:
+            quality = true;
+            code = parse_number("quality", optarg, 1, 100, &o->quality);
+            break;
+        case OPT_WIDTH:
+            width = true;
+            code = parse_number("photo-width", optarg, 400, 8000, &o->width);
+            break;
         case OPT_STATISTICS: o->statistics = true; break;
         case OPT_HISTOGRAMS: o->histograms = true; break;
         case OPT_TESTDATA: code = take_name("--testdata", optarg, &o->testdata); break;
@@ -191,6 +210,7 @@ int cl_data_options_read(int argc, char **argv, cl_data_options *o)
                 break;
             }
             const cl_camera_option *k = &cl_camera_options[c - OPT_CAMERA];
+            of_camera = k->name;
             code = parse_share(k->name, optarg, k->most, cl_camera_value(&o->camera, c - OPT_CAMERA));
         }
         }
@@ -203,6 +223,7 @@ int cl_data_options_read(int argc, char **argv, cl_data_options *o)
     if (compares && !o->testdata)
         return cl_usage("%s needs --testdata DIR", o->statistics ? "--statistics" : "--histograms");
     if (o->testdata && !compares) return cl_usage("--testdata is for --statistics and --histograms");
+    if (check_uses(o, of_camera, quality, width) != CL_OK) return CL_USAGE;
     const float narrow = o->camera.fov_min, wide = o->camera.fov_max;
     if ((narrow != 0 || wide != 0) && (narrow < 5 || wide < narrow))
         return cl_usage("--fov-min and --fov-max go together: 5 <= fov-min <= fov-max");

@@ -139,6 +139,13 @@ static void look_at(const cl_command *c, cl_item *item)
         (item->mask && wanted == pixels ? CL_WARN_MASK : 0) | (item->last > CL_FAR ? CL_WARN_DIFFERENT : 0);
 }
 
+/* Whether g sees the photographs in several orientations where they are asked for. */
+static bool can_turn(const cl_item *item)
+{
+    const lgd_photo *p = &item->photo[0];
+    return item->photos == 1 && p->light[0] == 0 && p->light[1] == 0 && p->camera[0] == 0 && p->camera[1] == 0;
+}
+
 void cl_item_estimate(const cl_command *c, lgd_model *model, cl_item *item, cl_item_progress progress, void *user)
 {
     const bool fixed = c->power > 0;
@@ -160,6 +167,12 @@ void cl_item_estimate(const cl_command *c, lgd_model *model, cl_item *item, cl_i
                                  .sample = c->sample};
     item->photo[0] = c->corners ? item->angle.photo : lgd_flash_photo(item->image);
     item->photos = item->capture.images ? lgd_capture_photos(&item->capture, lgd_most_photos(model), item->photo) : 1;
+    if (*c->capture && c->orientations > 1 && !can_turn(item)) {
+        ts_fail(&item->st, TS_INVALID,
+                "%s: --orientations is for one photograph with light and camera above its centre: leave it out",
+                c->capture);
+        return;
+    }
     t.steps = cl_command_steps(c, model, item->photos);
     item->power = fixed ? c->power : 1;
     for (int k = 0; k < item->photos; k++) item->photo[k].power *= (float)item->power;

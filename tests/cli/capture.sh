@@ -66,6 +66,9 @@ list() {
     { printf '[capture]\nside = %s\npower = %s\n' "$side" "$power"; sed -n 5,8p "$T/photos"; sed -n 1,4p "$T/photos"
     } >"$T/c/two.ini"
     expect 0 infer --capture "$T/c/two.ini" -o "$T/o"
+    expect 1 infer --capture "$T/c/two.ini" --orientations 4 -o "$T/turned"
+    says "$T/err" "two.ini: --orientations is for one photograph"
+    [ ! -e "$T/turned/two" ] || fail "maps in spite of --orientations"
     if cmp -s "$T/o/two/maps.exr" "$T/o/three/maps.exr"; then
         fail "the order and number of photographs change nothing"
     fi
@@ -84,7 +87,7 @@ light = 0, 0, 2
 camera = 0, 0, 2'
     printf 'P6\n2 2\n255\n............' >"$T/a.ppm"
     printf '%s\n' "$good" >"$T/c.ini"
-    expect 0 infer --capture "$T/c.ini" -o "$T/o"
+    expect 0 infer --capture "$T/c.ini" --orientations 4 -o "$T/o"
     while IFS='|' read -r edit word; do
         printf '%s\n' "$good" | sed "$edit" >"$T/c.ini"
         expect 1 infer --capture "$T/c.ini" -o "$T/bad"

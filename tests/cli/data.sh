@@ -79,6 +79,18 @@ data_wrong_usage() {
 }
 check data_wrong_usage data_wrong_usage
 
+data_options_without_use() {
+    expect 2 "$DATA" -o "$T/o" --quality 50
+    says "$T/err" "--quality is for --photographs and --format sheet-captures"
+    expect 2 "$DATA" -o "$T/o" --noise 0.2 --format sheet-captures
+    says "$T/err" "--noise is for --photographs"
+    expect 2 "$DATA" -o "$T/o" --photo-width 600 --photographs
+    says "$T/err" "--photo-width is for --format sheet-captures"
+    [ ! -e "$T/o" ] || fail "the folder was made"
+    expect 0 "$DATA" -o "$T/o" --quality 50 --noise 0.2 --photographs --count 1 --size 16
+}
+check data_options_without_use data_options_without_use
+
 data_empty_names() {
     for option in -o --testdata --collection; do
         expect 2 "$DATA" --statistics --collected 1 $option ""
@@ -104,7 +116,8 @@ check data_cannot_write data_cannot_write
 # The largest file of a set does not fit: of the set that is there none is replaced, of one that is not none is left.
 data_set_is_whole() {
     for format in folders captures sheet-captures; do
-        set -- "$DATA" --count 1 --threads 1 --photo-width 600 --format $format
+        set -- "$DATA" --count 1 --threads 1 --format $format
+        [ $format != sheet-captures ] || set -- "$@" --photo-width 600
         "$@" --size 32 -o "$T/$format" >"$T/out" 2>"$T/err" || { says "$T/err" apriltag; continue; }
         expect 0 "$@" --size 96 -o "$T/large"
         largest=$(find "$T/large" -type f -printf '%s\n' | sort -n | tail -n 1)

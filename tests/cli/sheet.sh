@@ -36,6 +36,14 @@ drawing() {
     expect 2 capture sheet -o "$T/sheet.png"
     expect 2 capture sheet --paper a5 -o "$T/sheet.pdf"
     expect 2 capture sheet
+    for option in "--fov 40" "--max-pixels 9"; do
+        # shellcheck disable=SC2086
+        expect 2 capture sheet $option -o "$T/none.svg"
+        says "$T/err" "sheet reads no photograph: no ${option% *}"
+    done
+    [ ! -e "$T/none.svg" ] || fail "a sheet was drawn"
+    expect 2 capture check --paper letter a.jpg
+    says "$T/err" "no --paper"
     expect 2 capture draw
     expect 2 capture
     expect 2 capture check
@@ -67,6 +75,8 @@ leaves_out() {
     lines "$T/err" 1
     [ ! -e "$T/p/bare" ] || fail "maps of a photograph without a sheet"
     expect 2 infer --sheet --corners 1,1 9,1 9,9 1,9 "$T/bare.ppm" -o "$T/p"
+    expect 2 infer --sheet --orientations 2 "$T/bare.ppm" -o "$T/p"
+    says "$T/err" "--orientations"
 }
 
 checks() {
