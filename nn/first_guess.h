@@ -28,10 +28,11 @@ typedef struct nn_taken {
 
 /* From what g says (r0 and spread of guess, scene [2 RD_SCENE_NUMBERS]) of image [side][side][3], linear in [0, 1]:
  * the numbers of the scene that are not known are the network's, then those of rd_scene_fit, whose prior they are;
- * with them it finds the level of r0's roughness. r0 is taken as the sample's kind has it, first of all. r0's diffuse
- * and F0 are filled where they are not seen (nn/hidden.h); of a light that is not known a part of its place is taken
- * for a slope of the sample (nn/lean.h). Where the light's power is not known the scene is found once more from what
- * r0 is then. r0, spread and deviation are the caller's memory. arena: for what it holds meanwhile. TS_NOMEM with st. */
+ * with them it finds the level of r0's roughness. r0 is taken as the sample's kind has it, first of all. r0's
+ * diffuse and F0 are filled where they are not seen (nn/hidden.h); of a light that is not known a part of its place
+ * is taken for a slope of the sample (nn/lean.h). Where the light's power is not known the scene is found once more
+ * from what r0 is then. r0, spread and deviation are the caller's memory. arena: for what it holds meanwhile.
+ * TS_NOMEM with st. */
 ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, const float *scene, const nn_taken *taken,
                               ts_arena *arena, nn_first_guess *guess, ts_status *st);
 
