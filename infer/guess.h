@@ -11,7 +11,7 @@ typedef struct lgd_given {
     unsigned char known[NN_MAX_IMAGES]; /* what of the views is true, nn_known */
     int order[NN_MAX_IMAGES];           /* the caller's number of each */
     int count, side;
-    nn_kind kind; /* of the sample, where it is told */
+    nn_kind kind;                /* of the sample, where it is told */
     const float *r0, *deviation; /* r0: where it is known, as in nn_input; deviation: of a model that says it */
 } lgd_given;
 
