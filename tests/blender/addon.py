@@ -26,6 +26,14 @@ def image_behind(socket):
     return None
 
 
+def image_mean(material, socket):
+    """Of the values of the image at the shader's socket, alpha left out."""
+    nodes = bpy.data.materials[material].node_tree.nodes
+    shader = [n for n in nodes if n.type == "BSDF_PRINCIPLED"][0]
+    values = [v for i, v in enumerate(image_behind(shader.inputs[socket]).pixels) if i % 4 < 3]
+    return sum(values) / len(values)
+
+
 def fails(text, **options):
     try:
         bpy.ops.import_image.lgd_material(**options)
@@ -65,6 +73,10 @@ def main():
     result = bpy.ops.import_image.lgd_material(filepath=PHOTO, size=SIZE, fov=28, seamless=True)
     expect(result == {"FINISHED"} and bpy.data.materials["flash.001"].users == 1, "without an object")
     expect(bpy.data.materials["flash.001"]["lgd_field_of_view"].startswith("28.0"), "the field of view is another")
+
+    result = bpy.ops.import_image.lgd_material(filepath=PHOTO, size=SIZE, sample="metal")
+    diffuse = [image_mean(name, "Base Color") for name in ("flash.001", "flash.002")]
+    expect(result == {"FINISHED"} and diffuse[1] < 0.17 < diffuse[0], f"diffuse is {diffuse}, of a metal last")
 
     materials = len(bpy.data.materials)
     fails("absent.jpg", filepath=os.path.join(os.path.dirname(PHOTO), "absent.jpg"))

@@ -4,7 +4,7 @@ import os
 import tempfile
 
 import bpy
-from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 bl_info = {  # for Blender before 4.2, which knows no blender_manifest.toml
@@ -60,6 +60,16 @@ class IMPORT_IMAGE_OT_lgd_material(bpy.types.Operator, ImportHelper):
         min=0,
         max=170,
     )
+    sample: EnumProperty(
+        name="Sample",
+        description="What all of the sample is: one photograph often leaves it open",
+        items=[
+            ("auto", "Unknown", "The model decides"),
+            ("dielectric", "No metal", "Wood, stone, cloth, leather, plastic, paint"),
+            ("metal", "Metal", "Bare metal"),
+        ],
+        default="auto",
+    )
     seamless: BoolProperty(name="Seamless", description="Make the maps repeat without a visible border", default=False)
 
     def execute(self, context):
@@ -76,6 +86,7 @@ class IMPORT_IMAGE_OT_lgd_material(bpy.types.Operator, ImportHelper):
                 self.filepath,
                 size=self.size,
                 fov=self.fov or None,
+                sample=self.sample,
                 progress=lambda done, rmse: manager.progress_update(int(100 * done)),
             )
             with tempfile.TemporaryDirectory() as folder:
