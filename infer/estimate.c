@@ -323,6 +323,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     o.orientations = orientations_of(a, &o);
     lgd_given p = in_order(photo, photos, side, o.fov);
     for (int k = 0; k < photos; k++) p.known[k] = (unsigned char)lgd_guess_known(&o);
+    _Static_assert(LGD_SAMPLE_DIELECTRIC == (int)NN_KIND_DIELECTRIC && LGD_SAMPLE_METAL == (int)NN_KIND_METAL, "kinds");
     p.kind = (nn_kind)o.sample;
     float *r0 = NULL;
     o.tolerance = tolerance(a, given);

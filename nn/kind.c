@@ -5,9 +5,10 @@
 #define DIFFUSE_OF_METAL 0.05f
 #define F0_OF_PLASTIC 0.04f
 
-/* Of samples whose kind is told: the most that a metal scatters, the most mean F0 that is a dielectric's, and the
- * standard deviations of encoded values. */
+/* Of samples whose kind is told: the most that a metal scatters, the least mean F0 that is a metal's and the most that
+ * is a dielectric's, and the standard deviations of encoded values. */
 #define MOST_DIFFUSE_OF_METAL 0.02f
+#define LEAST_F0_OF_METAL 0.4f
 #define MOST_F0_OF_DIELECTRIC 0.1f
 #define DEVIATION_OF_KIND 0.02f
 
@@ -46,6 +47,12 @@ static void make_metal(int64_t pixels, int channels, float *maps)
         }
 }
 
+static void brighten(float by, int64_t pixels, int channels, float *maps)
+{
+    for (int64_t i = 0; i < pixels; i++, maps += channels)
+        for (int c = 0; c < 3; c++) maps[MAP_SPECULAR + c] = encoded(by * (maps[MAP_SPECULAR + c] + 1) / 2);
+}
+
 /* F0 times keep; diffuse too, or, added, what F0 loses. */
 static void make_dielectric(float keep, bool added, int64_t pixels, int channels, float *maps)
 {
@@ -59,13 +66,15 @@ static void make_dielectric(float keep, bool added, int64_t pixels, int channels
 
 float nn_take_kind(nn_kind kind, bool power_known, int64_t pixels, int channels, float *maps)
 {
+    if (kind == NN_KIND_UNKNOWN) return 0;
     if (kind == NN_KIND_METAL) make_metal(pixels, channels, maps);
-    if (kind != NN_KIND_DIELECTRIC) return 0;
-    const double f0 = mean_of(pixels, channels, maps, MAP_SPECULAR);
-    if (f0 <= (double)MOST_F0_OF_DIELECTRIC) return 0;
-    const float keep = F0_OF_PLASTIC / (float)f0;
-    make_dielectric(keep, power_known, pixels, channels, maps);
-    return power_known ? 0 : -log2f(keep);
+    const float f0 = (float)mean_of(pixels, channels, maps, MAP_SPECULAR);
+    const bool metal = kind == NN_KIND_METAL, fits = metal ? f0 >= LEAST_F0_OF_METAL : f0 <= MOST_F0_OF_DIELECTRIC;
+    if (fits || (metal && power_known)) return 0;
+    const float by = (metal ? LEAST_F0_OF_METAL : F0_OF_PLASTIC) / fmaxf(f0, 1e-3f);
+    if (metal) brighten(by, pixels, channels, maps);
+    else make_dielectric(by, power_known, pixels, channels, maps);
+    return power_known ? 0 : -log2f(by);
 }
 
 void nn_deviations_of_kind(nn_kind kind, int64_t pixels, float *deviation)

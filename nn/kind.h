@@ -18,9 +18,10 @@ bool nn_is_metal(int64_t pixels, int channels, const float *maps);
 void nn_change_kind(bool metal, int64_t pixels, int channels, float *maps);
 
 /* Maps as a sample of the kind has them, and the deviations [pixels][MAP_GROUPS] of what it leaves open. A metal has
- * NN_METAL_F0 diffuse more F0 in every pixel and next to no diffuse. The maps of a dielectric whose mean F0 is above
- * what dielectrics have are darker until it is plastic's: what looked like a metal is dark under a stronger light, by
- * as many stops as are returned; where the light's power is known what F0 loses goes to diffuse, and 0 is returned. */
+ * NN_METAL_F0 diffuse more F0 in every pixel and next to no diffuse; where its mean F0 is still below what metals have,
+ * it is that under a weaker light. The maps of a dielectric whose mean F0 is above what dielectrics have are darker
+ * until it is plastic's: what looked like a metal is dark under a stronger light. Returns by how many stops the light
+ * is stronger; where its power is known 0: a metal's F0 stays, and what a dielectric's loses goes to diffuse. */
 float nn_take_kind(nn_kind kind, bool power_known, int64_t pixels, int channels, float *maps);
 void nn_deviations_of_kind(nn_kind kind, int64_t pixels, float *deviation);
 #endif

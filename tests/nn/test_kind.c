@@ -52,6 +52,24 @@ TEST(kind_metal_has_its_brightness_in_f0)
     }
 }
 
+/* What looked dark and smooth under a strong light is a metal under a weak one. */
+TEST(kind_metal_is_no_black_plastic)
+{
+    float before[VALUES], maps[VALUES];
+    draw(0.01f, 0.04f, before);
+    memcpy(maps, before, sizeof maps);
+    const double stops = (double)nn_take_kind(NN_KIND_METAL, false, PIXELS, C, maps);
+    CHECK(others_stay(before, maps) && fabs(mean(maps, MAP_SPECULAR) - 0.4) < 1e-5, "F0 %g", mean(maps, MAP_SPECULAR));
+    for (int i = 0; i < PIXELS * 3; i++) {
+        const int p = i / 3, d = MAP_DIFFUSE + i % 3, f = MAP_SPECULAR + i % 3;
+        CHECK(fabs(value(maps, p, f) * exp2(stops) - value(before, p, f) - (double)NN_METAL_F0 * value(before, p, d)) <
+                  1e-6,
+              "value %d: F0 %g", i, value(maps, p, f));
+    }
+    memcpy(maps, before, sizeof maps);
+    CHECK(nn_take_kind(NN_KIND_METAL, true, PIXELS, C, maps) == 0 && mean(maps, MAP_SPECULAR) < 0.1, "a known light");
+}
+
 /* Two readings of one photograph: as bright for each pixel under the light that is stronger by what is returned; or, if
  * the light may not change, F0's loss is in diffuse. */
 TEST(kind_dielectric_is_no_metal)
