@@ -3,6 +3,7 @@
 #include "infer/guess.h"
 #include "infer/power.h"
 #include "infer/tiles.h"
+#include "nn/burnt.h"
 #include "nn/clip.h"
 #include "nn/need.h"
 #include "nn/revise.h"
@@ -147,7 +148,9 @@ static int tile_side(const lgd_estimator *e, int side, const lgd_options *o)
 /* What an estimate holds at once, at most: g, or a step; beside them the whole photograph's maps. */
 static double most_bytes(const nn_arch *a, int photos, int side, int tile, int orientations)
 {
-    const int part = tile < side ? tile : side, coarse = a->coarse_size < side ? a->coarse_size : side;
+    const int around = a->descent == NN_DESCENT_POSTERIOR ? 2 * a->iterations * nn_burnt_reach(side) : 0,
+              part = tile + around < side ? tile + around : side,
+              coarse = a->coarse_size < side ? a->coarse_size : side;
     double most = fmax(nn_guess_bytes(a, orientations), step_bytes(a, photos, part, a->h_width, a->h_gru));
     if (a->coarse_steps > 0) most = fmax(most, step_bytes(a, photos, coarse, a->coarse_width, a->coarse_gru));
     if (a->revisions > 0 && photos > 1) most = fmax(most, nn_revision_bytes(a, photos));

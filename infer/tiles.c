@@ -1,5 +1,6 @@
 #include "infer/tiles.h"
 #include "infer/detail.h"
+#include "nn/burnt.h"
 #include "nn/clip.h"
 #include "nn/window.h"
 #include "tensor/resample.h"
@@ -144,6 +145,13 @@ static bool prior(const work *w, rd_grid window, const float *image, float *maps
         lgd_detail_add(window, &down, &across, w->levels, image, &w->t->views[0], deviation, w->channels,
                        ag_arena(w->tape), maps, &st))
         return ag_fail(w->tape, st.code, "%s", st.message), false;
+    const nn_input in = input(w, window, w->photo);
+    if (nn_settles_burnt(w->model, &in)) {
+        bool any;
+        float *burnt = nn_burnt_find(window, image, ag_arena(w->tape), &any);
+        if (!burnt) return ag_fail(w->tape, TS_NOMEM, "out of memory"), false;
+        if (any) state->burnt = burnt;
+    }
     memcpy(mean, maps, pixels * (size_t)w->channels * sizeof *mean);
     state->mean = mean;
     state->deviation = deviation;
@@ -208,14 +216,21 @@ static void put(const work *w, rd_grid g, const float *from)
     ts_for(w->threads, g.h, 1, put_rows, &(rows_job){w, g, from, w->maps});
 }
 
+/* A tile, and what its last step depends on. */
+static rd_grid surrounded(const work *w, rd_grid core)
+{
+    const nn_input in = input(w, core, w->photo);
+    if (!nn_arch_refines_full(&w->model->arch)) return core;
+    const rd_grid window = nn_window_grown(core, nn_steps_reach(w->model, &in, w->coarse_steps, w->t->steps));
+    return nn_settles_burnt(w->model, &in) && !nn_burnt_any(window, w->t->image[0]) ? core : window;
+}
+
 /* Of several tiles one: what the coarse steps leave everywhere, and what is refined over it. */
 static void tile(work *w, rd_grid a)
 {
     const ts_mark mark = ag_scope_begin(w->tape);
     const rd_grid core = wanted(w->t, a);
-    const bool full = nn_arch_refines_full(&w->model->arch);
-    const rd_grid window = nn_window_grown(core,
-                                           full ? nn_refiner_reach(w->model) * (w->t->steps - w->coarse_steps) : 0);
+    const rd_grid window = surrounded(w, core);
     const size_t most = nn_window_pixels(a) > nn_window_pixels(window) ? nn_window_pixels(a) : nn_window_pixels(window);
     float *maps = ts_arena_alloc(ag_arena(w->tape), most * (size_t)w->channels * sizeof *maps);
     if (!maps) ag_fail(w->tape, TS_NOMEM, "out of memory for a tile of %d x %d pixels", a.w, a.h);

@@ -58,7 +58,7 @@ static ag_value *step_and_release(ag_tape *tape, const nn_model *model, nn_loop 
                                   bool *rests)
 {
     const rd_grid now = l->in.grid;
-    const int reach = nn_refiner_reach(model) * (l->steps - l->state.step - 1);
+    const int reach = nn_steps_reach(model, &l->in, l->state.step + 1, l->steps);
     const rd_grid next = nn_window_same(l->core, now) ? now : nn_window_grown(l->core, reach);
     const ts_mark mark = ag_scope_begin(tape);
     l->state.into = l->tolerance > 0 ? NULL : to;
@@ -73,6 +73,9 @@ static ag_value *step_and_release(ag_tape *tape, const nn_model *model, nn_loop 
         ts_tensor *image = &l->in.image;
         nn_window_crop(now, next, image->shape.n, 3, image->data, image->data);
         *image = ts_view(image->data, (ts_shape){image->shape.n, next.h, next.w, 3});
+        if (l->state.mean) nn_window_crop(now, next, 1, model->arch.channels, l->state.mean, l->state.mean);
+        if (l->state.deviation) nn_window_crop(now, next, 1, NN_SPREADS, l->state.deviation, l->state.deviation);
+        if (l->state.burnt) nn_window_crop(now, next, 1, 1, l->state.burnt, l->state.burnt);
         l->in.grid = next;
     }
     return to;

@@ -209,15 +209,20 @@ bool nn_orients(const nn_model *model, const nn_input *in);
 
 /* How many pixels away from an output pixel h reads, in one step. */
 int nn_refiner_reach(const nn_model *model);
+/* The same of all steps first .. end - 1 of these photographs, by h or to the most probable maps. */
+int nn_steps_reach(const nn_model *model, const nn_input *in, int first, int end);
+/* Whether the steps want nn_state.burnt. */
+bool nn_settles_burnt(const nn_model *model, const nn_input *in);
 
 /* What is carried from step to step; zero-initialise it. */
 typedef struct nn_state {
     ag_value *gru[2],
         *to[2];     /* to: NULL, or where the new states are written (a tape without gradients); to[i] may be gru[i] */
     ag_value *into; /* NULL, or where nn_refine writes R_{t+1} (a tape without gradients); may be R_t */
-    const float *mean, *deviation; /* NN_DESCENT_POSTERIOR: R_0 and its errors' standard deviations in the grid's
-                                    * window, [h, w, channels] and [h, w, NN_SPREADS] */
-    float *best, *misfit;          /* of several photographs: what rd_search keeps, [h, w, MAP_CHANNELS] and [h, w] */
+    float *mean, *deviation; /* NN_DESCENT_POSTERIOR: R_0 and its errors' standard deviations in the grid's window,
+                              * [h, w, channels] and [h, w, NN_SPREADS]; nn_steps cuts them where it cuts the window */
+    float *burnt;            /* the same: nn/burnt.h's of the window's photograph, [h, w], or NULL */
+    float *best, *misfit;    /* of several photographs: what rd_search keeps, [h, w, MAP_CHANNELS] and [h, w] */
     double *rmse0; /* of each whole photograph by R_0, in the tape's arena; NULL: nn_refine measures it on its maps */
     int step;      /* steps done; those beyond arch.iterations are shortened (docs/math.md, S7), but if compat is
                       published */

@@ -1,4 +1,5 @@
 /* A refinement step: the gradient and the Newton step of R_t, and R_{t+1} from them (docs/math.md, S4 to S11). */
+#include "nn/burnt.h"
 #include "nn/lgd_internal.h"
 #include "ops.h"
 #include "render/posterior.h"
@@ -155,6 +156,31 @@ ts_prior nn_step_prior(int known, int photographs)
                       .share = photographs > 1 ? 0 : 0.5f};
 }
 
+/* A photograph whose light's power is known was taken with care: there a pixel may say more than its neighbours. */
+bool nn_settles_burnt(const nn_model *model, const nn_input *in)
+{
+    return nn_descends(model, NN_DESCENT_POSTERIOR) && nn_given(in) == 1 && in->known &&
+        !(in->known[0] & NN_KNOWN_POWER);
+}
+
+int nn_steps_reach(const nn_model *model, const nn_input *in, int first, int end)
+{
+    if (!nn_settles_burnt(model, in)) return nn_refiner_reach(model) * (end - first);
+    const int settling = model->arch.iterations < end ? model->arch.iterations : end;
+    return first < settling ? nn_burnt_reach(in->grid.side) * (settling - first) : 0;
+}
+
+/* Steps beyond those that the model is made for would need ever more of what is around a tile: there the maps rest. */
+static bool settle(ag_tape *tape, const nn_model *model, rd_grid grid, const ts_tensor *maps, const nn_state *state,
+                   float *step)
+{
+    const int channels = maps->shape.c;
+    if (state->step >= model->arch.iterations) nn_burnt_hold(grid, state->burnt, channels, step);
+    else if (!nn_burnt_settle(grid, state->burnt, state->mean, maps->data, channels, ag_arena(tape), step))
+        return ag_fail(tape, TS_NOMEM, "no memory for a step of %d x %d pixels", grid.w, grid.h), false;
+    return true;
+}
+
 /* The step to the most probable maps, given all photographs of one material: to is [1, H, W, channels]. */
 static bool posterior_step(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps,
                            const nn_state *state, float *to)
@@ -175,7 +201,7 @@ static bool posterior_step(ag_tape *tape, const nn_model *model, const nn_input 
     const rd_search search = {state->best, state->misfit, state->step > 0};
     rd_posterior_step(rd_grid_on(in->grid, ag_compute(tape)->threads), maps->data, s.c, view, image, count, &prior,
                       rd_step_length(count, state->step), count > 1 ? &search : NULL, to, NULL);
-    return true;
+    return !state->burnt || settle(tape, model, rd_grid_on(in->grid, ag_compute(tape)->threads), maps, state, to);
 }
 
 bool nn_read(ag_tape *tape, const nn_model *model, const nn_input *in, const ts_tensor *maps, const double *rmse0,

@@ -257,27 +257,42 @@ TEST(first_guess_is_told_view_and_power_apart)
     nn_model_free(&m);
 }
 
-/* In tiles as in one piece. */
+/* In tiles as in one piece; of a photograph whose power is not known, burnt out in places, also with more steps than
+ * the model's. */
 TEST(first_guess_in_tiles)
 {
+    static const struct {
+        bool power;
+        int steps;
+    } given[] = {{true, 2}, {false, 2}, {false, 5}};
     nn_model *m = guessing();
+    CHECK(m->arch.iterations < 5, "the model makes %d steps", m->arch.iterations);
     const nn_input in = photographs(1, WIDE, 85, NULL);
-    float *tiles = estimate(m, in.image.data, WIDE, 2, NULL);
-    ts_status st = {0};
+    for (int i = 0; i < WIDE * WIDE * 3; i++) in.image.data[i] = fminf(2.5f * in.image.data[i], 1);
     float *whole = malloc(sizeof *whole * WIDE * WIDE * 9);
-    ag_tape *tape = tape_create(false);
-    ag_freeze(tape, true);
     unsigned char *mask = malloc((size_t)WIDE * WIDE);
     memset(mask, 1, (size_t)WIDE * WIDE);
-    const lgd_photo photo = lgd_flash_photo(in.image.data);
-    const lgd_options o = {.size = sizeof o, .iterations = 2, .mask = mask, .fov = LGD_FOV_OF_PHOTO}; /* other tiles */
-    const lgd_estimator e = {.net = m, .tape = tape, .encoded = true};
-    CHECK(!lgd_estimator_run(&e, &photo, 1, WIDE, &o, whole, &st), "%s", st.message);
-    CHECK(!memcmp(tiles, whole, sizeof *whole * WIDE * WIDE * 9), "tiles of another size give other maps");
-    ag_tape_destroy(&tape);
+    for (size_t k = 0; k < sizeof given / sizeof *given; k++) {
+        double power = 0;
+        float *tiles = estimate(m, in.image.data, WIDE, given[k].steps, given[k].power ? NULL : &power);
+        ts_status st = {0};
+        ag_tape *tape = tape_create(false);
+        ag_freeze(tape, true);
+        const lgd_photo photo = lgd_flash_photo(in.image.data);
+        const lgd_options o = {.size = sizeof o,
+                               .iterations = given[k].steps,
+                               .mask = mask, /* other tiles */
+                               .power = given[k].power ? NULL : &power,
+                               .fov = given[k].power ? LGD_FOV_OF_PHOTO : LGD_FOV_UNKNOWN};
+        const lgd_estimator e = {.net = m, .tape = tape, .encoded = true};
+        CHECK(!lgd_estimator_run(&e, &photo, 1, WIDE, &o, whole, &st), "%s", st.message);
+        CHECK(!memcmp(tiles, whole, sizeof *whole * WIDE * WIDE * 9), "case %d: tiles of another size give other maps",
+              (int)k);
+        ag_tape_destroy(&tape);
+        free(tiles);
+    }
     free(mask);
     free(whole);
-    free(tiles);
     free(in.image.data);
     nn_model_free(&m);
 }
