@@ -1,6 +1,6 @@
 #include "nn/burnt.h"
+#include "tensor/kernels/resample.h"
 #include "tensor/maps.h"
-#include "tensor/resample.h"
 #include "tensor/team.h"
 
 /* From here to 1 a photograph burns out: what a value above it says is bent by the tone curve, blurred or noise. */
@@ -47,17 +47,6 @@ bool nn_burnt_any(rd_grid window, const float *image)
     return false;
 }
 
-typedef struct find_job {
-    const float *image;
-    float *t;
-} find_job;
-
-static void brightnesses(const void *of, int64_t begin, int64_t end)
-{
-    const find_job *j = of;
-    for (int64_t i = begin; i < end; i++) j->t[i] = brightness(j->image + 3 * i);
-}
-
 static void limit(const void *of, int64_t begin, int64_t end)
 {
     float *const *burnt = of;
@@ -90,14 +79,72 @@ static part bright(rd_grid g, const float *v, int by)
     return (part){y0, x0, y1 - y0, x1 - x0};
 }
 
-/* to = from [p.rows, p.columns, channels] by the filter. */
-static bool blur(rd_grid grid, part p, int channels, ts_arena *arena, const float *from, float *to)
+/* The triangle filter, of rows that reach beyond what is wanted by as many pixels as it reads. */
+typedef struct filter {
+    int rows, columns, channels, reach;
+    float weight[2 * MOST + 1];
+    float *wide, *across, *to; /* [rows, columns + 2 reach, channels]; [rows, columns, channels] */
+} filter;
+
+static bool make_filter(rd_grid grid, int rows, int columns, int channels, ts_arena *arena, float *to, filter *f)
 {
-    const int width = nn_burnt_reach(grid.side) + 1;
-    const ts_taps down = ts_taps_blur(arena, p.rows, width), across = ts_taps_blur(arena, p.columns, width);
-    if (!down.weight || !across.weight) return false;
-    ts_resample(1, channels, &down, &across, from, to, false, grid.threads);
-    return true;
+    const int reach = nn_burnt_reach(grid.side), width = reach + 1;
+    *f = (filter){.rows = rows, .columns = columns, .channels = channels, .reach = reach, .to = to};
+    for (int i = 0; i <= 2 * reach; i++)
+        f->weight[i] = (float)(width - (i < reach ? reach - i : i - reach)) / (float)(width * width);
+    const size_t row = (size_t)channels * sizeof(float);
+    f->wide = ts_arena_alloc(arena, (size_t)rows * (size_t)(columns + 2 * reach) * row);
+    f->across = f->wide ? ts_arena_alloc(arena, (size_t)rows * (size_t)columns * row) : NULL;
+    return f->across != NULL;
+}
+
+/* Where row y of what is wanted begins. */
+static float *row_of(const filter *f, int64_t y)
+{
+    return f->wide + (y * (f->columns + 2 * f->reach) + f->reach) * f->channels;
+}
+
+/* A row's ends are repeated beyond it, and it is filtered. */
+static void filter_across(const filter *f, int64_t y)
+{
+    const int c = f->channels, n = f->columns * c;
+    float *row = row_of(f, y);
+    for (int i = 0; i < f->reach * c; i++) {
+        row[i - f->reach * c] = row[i % c];
+        row[n + i] = row[n - c + i % c];
+    }
+    ts_resample_k()->rows(n, 2 * f->reach + 1, f->weight, row - f->reach * c, c, f->across + y * n);
+}
+
+static void filter_down(const void *of, int64_t begin, int64_t end)
+{
+    const filter *f = of;
+    const int64_t n = (int64_t)f->columns * f->channels;
+    for (int64_t y = begin; y < end; y++) {
+        const int64_t first = y > f->reach ? y - f->reach : 0,
+                      last = y + f->reach < f->rows ? y + f->reach : f->rows - 1;
+        float weight[2 * MOST + 1] = {0};
+        for (int k = 0; k <= 2 * f->reach; k++) {
+            const int64_t at = y + k - f->reach;
+            weight[at < first ? 0 : at > last ? last - first : at - first] += f->weight[k];
+        }
+        ts_resample_k()->rows(n, (int)(last - first + 1), weight, f->across + first * n, n, f->to + y * n);
+    }
+}
+
+typedef struct find_job {
+    const float *image;
+    filter f;
+} find_job;
+
+static void brightness_rows(const void *of, int64_t begin, int64_t end)
+{
+    const find_job *j = of;
+    for (int64_t y = begin; y < end; y++) {
+        float *t = row_of(&j->f, y);
+        for (int x = 0; x < j->f.columns; x++) t[x] = brightness(j->image + (y * j->f.columns + x) * 3);
+        filter_across(&j->f, y);
+    }
 }
 
 float *nn_burnt_find(rd_grid grid, const float *image, ts_arena *arena, bool *any)
@@ -105,14 +152,13 @@ float *nn_burnt_find(rd_grid grid, const float *image, ts_arena *arena, bool *an
     const int64_t pixels = (int64_t)grid.h * grid.w;
     float *burnt = ts_arena_alloc(arena, (size_t)pixels * sizeof *burnt);
     const ts_mark mark = ts_arena_mark(arena);
-    float *t = burnt ? ts_arena_alloc(arena, (size_t)pixels * sizeof *t) : NULL;
-    bool done = t != NULL;
-    *any = false;
+    find_job j = {.image = image};
+    const bool done = burnt && make_filter(grid, grid.h, grid.w, 1, arena, burnt, &j.f);
     if (done) {
-        ts_for(grid.threads, pixels, VALUES, brightnesses, &(find_job){image, t});
-        *any = bright(grid, t, 0).rows > 0;
-        if (*any) done = blur(grid, (part){0, 0, grid.h, grid.w}, 1, arena, t, burnt);
-        if (*any && done) ts_for(grid.threads, pixels, VALUES, limit, &(float *){burnt});
+        ts_for(grid.threads, grid.h, ROWS, brightness_rows, &j);
+        ts_for(grid.threads, grid.h, ROWS, filter_down, &j.f);
+        ts_for(grid.threads, pixels, VALUES, limit, &(float *){burnt});
+        *any = bright(grid, burnt, 0).rows > 0;
     }
     ts_arena_release(arena, mark);
     return done ? burnt : NULL;
@@ -123,32 +169,35 @@ typedef struct settle_job {
     part p;
     int channels;
     const float *burnt, *mean, *maps;
-    float *own, *around; /* [p.rows, p.columns, SETTLED] */
+    filter f;
     float *step;
 } settle_job;
 
 static int64_t pixel_of(const settle_job *j, int64_t y) { return (j->p.y0 + y) * j->grid.w + j->p.x0; }
 
-static void gather_rows(const void *of, int64_t begin, int64_t end)
+static void change_rows(const void *of, int64_t begin, int64_t end)
 {
     const settle_job *j = of;
     for (int64_t y = begin; y < end; y++) {
-        float *to = j->own + y * j->p.columns * SETTLED;
+        float *to = row_of(&j->f, y);
         const int64_t first = pixel_of(j, y) * j->channels;
         for (int64_t from = first; from < first + (int64_t)j->p.columns * j->channels; from += j->channels)
             for (int k = 0; k < SETTLED; k++)
                 *to++ = j->maps[from + settled[k]] + j->step[from + settled[k]] - j->mean[from + settled[k]];
+        filter_across(&j->f, y);
     }
 }
 
 static void settle_rows(const void *of, int64_t begin, int64_t end)
 {
     const settle_job *j = of;
+    filter_down(&j->f, begin, end);
     for (int64_t y = begin; y < end; y++) {
-        const float *burnt = j->burnt + pixel_of(j, y);
+        const float *burnt = j->burnt + pixel_of(j, y), *own = row_of(&j->f, y),
+                    *around = j->f.to + y * j->p.columns * SETTLED;
         float *to = j->step + pixel_of(j, y) * j->channels;
-        for (int64_t x = 0, at = y * j->p.columns * SETTLED; x < j->p.columns; x++, to += j->channels)
-            for (int k = 0; k < SETTLED; k++, at++) to[settled[k]] += burnt[x] * (j->around[at] - j->own[at]);
+        for (int x = 0; x < j->p.columns; x++, to += j->channels)
+            for (int k = 0; k < SETTLED; k++) to[settled[k]] += burnt[x] * (*around++ - *own++);
     }
 }
 
@@ -158,15 +207,13 @@ bool nn_burnt_settle(rd_grid grid, const float *burnt, const float *mean, const 
     const part p = bright(grid, burnt, nn_burnt_reach(grid.side));
     if (p.rows == 0) return true;
     const ts_mark mark = ts_arena_mark(arena);
-    const size_t bytes = (size_t)p.rows * (size_t)p.columns * SETTLED * sizeof(float);
-    settle_job j = {grid, p, channels, burnt, mean, maps, NULL, NULL, step};
-    j.own = ts_arena_alloc(arena, bytes);
-    j.around = j.own ? ts_arena_alloc(arena, bytes) : NULL;
-    bool done = j.around != NULL;
+    settle_job j = {
+        .grid = grid, .p = p, .channels = channels, .burnt = burnt, .mean = mean, .maps = maps, .step = step};
+    float *around = ts_arena_alloc(arena, (size_t)p.rows * (size_t)p.columns * SETTLED * sizeof *around);
+    const bool done = around && make_filter(grid, p.rows, p.columns, SETTLED, arena, around, &j.f);
     if (done) {
-        ts_for(grid.threads, p.rows, ROWS, gather_rows, &j);
-        done = blur(grid, p, SETTLED, arena, j.own, j.around);
-        if (done) ts_for(grid.threads, p.rows, ROWS, settle_rows, &j);
+        ts_for(grid.threads, p.rows, ROWS, change_rows, &j);
+        ts_for(grid.threads, p.rows, ROWS, settle_rows, &j);
     }
     ts_arena_release(arena, mark);
     return done;

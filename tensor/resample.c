@@ -76,11 +76,6 @@ ts_taps ts_taps_triangle(ts_arena *arena, int in, int out)
     return make_filter(arena, in, out, in > out ? (double)in / out : 1, 1, triangle);
 }
 
-ts_taps ts_taps_blur(ts_arena *arena, int count, int radius)
-{
-    return make_filter(arena, count, count, radius, 1, triangle);
-}
-
 ts_taps ts_taps_smooth(ts_arena *arena, int in, int out)
 {
     return out > in ? make_filter(arena, in, out, 1, 2, cubic) : ts_taps_triangle(arena, in, out);

@@ -21,10 +21,6 @@ ts_taps ts_taps_aligned(ts_arena *arena, int in, int out);
  * value. */
 ts_taps ts_taps_triangle(ts_arena *arena, int in, int out);
 
-/* To as many: the triangle filter of a half-width of so many positions, at least 1, where the weight is 0. Away from
- * the edges the same for every position. */
-ts_taps ts_taps_blur(ts_arena *arena, int count, int radius);
-
 /* To more positions by Mitchell and Netravali's cubic with B = .6 and C = .2, of half-width 2: with continuous slopes,
  * which linear interpolation has not, a little blurred, and up to 1.3% of a step beyond the values. To as many or fewer
  * the triangle filter. */
