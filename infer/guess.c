@@ -88,7 +88,8 @@ ts_code lgd_guess_first(ag_tape *tape, const nn_model *net, lgd_given *p, const 
     }
     const nn_photos photos = {p->image, p->views, p->count, p->side, lgd_guess_known(o)};
     if (p->count == 1 && photos.known == NN_KNOWN_ALL)
-        return nn_find_levels(grid, p->image[0], p->side, &p->views[0], guess->deviation, a->channels, guess->r0, st);
+        return nn_find_levels(grid, p->image[0], p->side, &p->views[0], p->kind, guess->deviation, a->channels,
+                              guess->r0, st);
     if (p->count == 1 || p->kind != NN_KIND_UNKNOWN) return TS_OK;
     return nn_tell_metal(grid, &photos, guess->deviation, nn_arch_steps(a, p->count), a->channels, guess->r0, st);
 }

@@ -56,8 +56,17 @@ static bool go(nn_trial *t, int k, float stride, float level[NN_LEVELS], double 
     return false;
 }
 
-ts_code nn_find_levels(rd_grid grid, const float *image, int side, const rd_view *view, const float *deviation,
-                       int channels, float *r0, ts_status *st)
+/* Of a told kind the map that tells kinds apart is known: a metal's diffuse, a dielectric's F0. */
+static bool is_told(nn_kind kind, int k)
+{
+    const bool diffuse = k == NN_LEVEL_DIFFUSE || k == NN_LEVEL_BENEATH || k == NN_LEVEL_DIFFUSE_RED ||
+        k == NN_LEVEL_DIFFUSE_BLUE,
+               f0 = k == NN_LEVEL_F0 || k == NN_LEVEL_F0_RED || k == NN_LEVEL_F0_BLUE;
+    return kind == NN_KIND_METAL ? diffuse : kind == NN_KIND_DIELECTRIC && f0;
+}
+
+ts_code nn_find_levels(rd_grid grid, const float *image, int side, const rd_view *view, nn_kind kind,
+                       const float *deviation, int channels, float *r0, ts_status *st)
 {
     /* Steps that come with a misfit are those of several photographs: this one is there twice. */
     const float *const twice[] = {image, image};
@@ -71,7 +80,7 @@ ts_code nn_find_levels(rd_grid grid, const float *image, int side, const rd_view
     double best = as_read;
     for (int round = 0; round < ROUNDS; round++) {
         bool better = false;
-        for (int k = 0; k < NN_LEVELS; k++) better |= go(&t, k, stride[k], level, &best);
+        for (int k = 0; k < NN_LEVELS; k++) better |= !is_told(kind, k) && go(&t, k, stride[k], level, &best);
         for (int k = 0; k < NN_LEVELS && !better; k++) stride[k] *= 0.5f;
     }
     nn_trial_end(&t);

@@ -4,6 +4,7 @@
  * all of them say together. */
 #ifndef NN_LEVEL_H
 #define NN_LEVEL_H
+#include "nn/kind.h"
 #include "nn/trial.h"
 
 /* Factors on maps of the whole sample: F0, roughness and diffuse times e to these; so much of F0 (as it was) more
@@ -30,10 +31,11 @@ enum {
 
 /* The maps r0 [grid.side][grid.side][channels] become those of the levels with the least sum, by a search along each of
  * them in turn, if it is less than NN_LEVEL_SURE of what it is for r0. image [side][side][3], linear, taken under
- * view with light and camera as known; deviation [grid.side][grid.side][NN_SPREADS] as the steps believe it. The same
- * bytes for any number of threads. Fails where memory is out; r0 is then as it was. */
-ts_code nn_find_levels(rd_grid grid, const float *image, int side, const rd_view *view, const float *deviation,
-                       int channels, float *r0, ts_status *st);
+ * view with light and camera as known; kind: what the sample is known to be, a metal's diffuse and a dielectric's F0
+ * stay as they are; deviation [grid.side][grid.side][NN_SPREADS] as the steps believe it. The same bytes for any number
+ * of threads. Fails where memory is out; r0 is then as it was. */
+ts_code nn_find_levels(rd_grid grid, const float *image, int side, const rd_view *view, nn_kind kind,
+                       const float *deviation, int channels, float *r0, ts_status *st);
 
 /* maps [pixels][channels] with these levels; each value ends in [-1, 1]. */
 void nn_set_levels(int64_t pixels, int channels, const float level[NN_LEVELS], float *maps);

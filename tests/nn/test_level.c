@@ -32,17 +32,19 @@ static float mean_of(const float *maps, int first, int count)
 }
 
 /* R_0 = read after a photograph of truth. */
-static void find(const float *truth, int threads, float *read)
+static void find_of(nn_kind kind, const float *truth, int threads, float *read)
 {
     float *image = malloc(PIXELS * 3 * sizeof *image), *deviation = malloc(PIXELS * NN_SPREADS * sizeof *deviation);
     const rd_view view = rd_flash();
     ts_status st = {0};
     for (int i = 0; i < PIXELS * NN_SPREADS; i++) deviation[i] = 0.04f;
     rd_render(rd_grid_full(EDGE), truth, C, &view, false, image);
-    CHECK(!nn_find_levels(rd_grid_on(rd_grid_full(EDGE), threads), image, EDGE, &view, deviation, C, read, &st), "%s",
-          st.message);
+    CHECK(!nn_find_levels(rd_grid_on(rd_grid_full(EDGE), threads), image, EDGE, &view, kind, deviation, C, read, &st),
+          "%s", st.message);
     free(image), free(deviation);
 }
+
+static void find(const float *truth, int threads, float *read) { find_of(NN_KIND_UNKNOWN, truth, threads, read); }
 
 /* F0 and roughness change one highlight and are not told apart to less than a quarter. */
 TEST(levels_that_are_off_are_found)
@@ -99,6 +101,42 @@ TEST(levels_find_diffuse_that_a_metal_has_not)
     const float diffuse = mean_of(read, MAP_DIFFUSE, 3), f0 = mean_of(read, MAP_SPECULAR, 3);
     CHECK(fabsf(diffuse - 0.15f) < 0.07f && fabsf(f0 - 0.25f) < 0.1f, "diffuse %g, F0 %g", (double)diffuse, (double)f0);
     free(truth), free(read);
+}
+
+/* Of a sample that is told to be a dielectric F0 stays, of a metal diffuse; the other levels are found. */
+TEST(levels_of_a_told_kind)
+{
+    static const struct {
+        nn_kind kind;
+        float diffuse, f0, off[NN_LEVELS];
+        int told, other;
+    } of[] = {{NN_KIND_DIELECTRIC,
+               0.12f,
+               0.2f,
+               {[NN_LEVEL_DIFFUSE] = 0.5f, [NN_LEVEL_F0] = 0.3f, [NN_LEVEL_F0_RED] = 0.1f},
+               MAP_SPECULAR,
+               MAP_DIFFUSE},
+              {NN_KIND_METAL,
+               0.02f,
+               0.4f,
+               {[NN_LEVEL_DIFFUSE] = 0.5f, [NN_LEVEL_F0] = 0.6f, [NN_LEVEL_DIFFUSE_RED] = 0.2f},
+               MAP_DIFFUSE,
+               MAP_SPECULAR}};
+    float *truth = malloc(VALUES * sizeof *truth), *read = malloc(VALUES * sizeof *read),
+          *before = malloc(VALUES * sizeof *before);
+    for (int k = 0; k < 2; k++) {
+        paint(of[k].diffuse, of[k].f0, truth);
+        memcpy(before, truth, VALUES * sizeof *before);
+        nn_set_levels(PIXELS, C, of[k].off, before);
+        memcpy(read, before, VALUES * sizeof *read);
+        find_of(of[k].kind, truth, 2, read);
+        for (int i = 0; i < PIXELS; i++) {
+            const int at = i * C + of[k].told;
+            CHECK(!memcmp(read + at, before + at, 3 * sizeof *read), "case %d: pixel %d of the told map", k, i);
+        }
+        CHECK(mean_of(read, of[k].other, 3) < 0.9f * mean_of(before, of[k].other, 3), "case %d: the other stays", k);
+    }
+    free(truth), free(read), free(before);
 }
 
 TEST(levels_that_are_right_stay)
