@@ -15,8 +15,8 @@ bool nn_burnt_any(rd_grid window, const float *image);
 
 /* Of a window's photograph image [h, w, 3] how much each pixel goes with those around, [h, w] in the arena: min(1, 4 t)
  * with t the mean of (max image - 0.85) / 0.15, within [0, 1], by the triangle filter of a half-width of
- * nn_burnt_reach(grid.side) + 1, the window's edges repeated. any: whether it is above 0 anywhere. NULL: no memory. Here
- * and below: away from edges that are not the photograph's by nn_burnt_reach the same bytes for any window and any
+ * nn_burnt_reach(grid.side) + 1, the window's edges repeated. any: whether it is above 0 anywhere. NULL: no memory.
+ * Here and below: away from edges that are not the photograph's by nn_burnt_reach the same bytes for any window and any
  * number of threads. */
 float *nn_burnt_find(rd_grid grid, const float *image, ts_arena *arena, bool *any);
 
