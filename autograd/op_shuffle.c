@@ -1,8 +1,10 @@
-/* y[n,i,j,(a r + b) C + c] = x[n, i r + a, j r + b, c] (space to depth), or its inverse (depth to space);   dx: the
- * other of the two on dy x: [N,H,W,C], y: [N,H/r,W/r,C r r], or the other way round */
+/* y[n,i,j,(a r + b) C + c] = x[n, i r + a, j r + b, c] (space to depth), or its inverse (depth to space), plus what is
+ * added, of y's shape;   dx: the other of the two on dy, dadded = dy   x: [N,H,W,C], y: [N,H/r,W/r,C r r], or the other
+ * way round */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
+#include "tensor/kernels/elementwise.h"
 #include "tensor/threads.h"
 #include <string.h>
 
@@ -10,9 +12,12 @@
 /* Squares of r x r pixels of x [N,H,W,C] become one with their channels side by side: [N,H/r,W/r,C r r]. H and W are
  * multiples of r. */
 ag_value *ag_space_to_depth(ag_tape *tape, ag_value *x, int r);
-/* The inverse: [N,H,W,C r r] to [N,H r,W r,C]. */
+/* The inverse: [N,H,W,C r r] to [N,H r,W r,C]; the second plus added, of the result's shape. */
 ag_value *ag_depth_to_space(ag_tape *tape, ag_value *x, int r);
+ag_value *ag_depth_to_space_add(ag_tape *tape, ag_value *x, int r, ag_value *added);
 #endif
+
+enum { X, ADDED, INPUTS };
 
 typedef struct shuffle_attr {
     int r;
@@ -23,8 +28,8 @@ typedef struct shuffle_attr {
 typedef struct moving {
     ts_shape large;
     int r;
-    bool to_deep, accumulate;
-    const float *from;
+    bool to_deep;
+    const float *from, *added; /* added: NULL, or of to's shape; may be to */
     float *to;
 } moving;
 
@@ -39,34 +44,62 @@ static void move_rows(const void *job, int64_t begin, int64_t end)
             const int64_t a = y * row + x * run, b = deep + x * run * m->r;
             const float *s = m->from + (m->to_deep ? a : b);
             float *d = m->to + (m->to_deep ? b : a);
-            if (!m->accumulate) memcpy(d, s, (size_t)run * sizeof *d);
+            const float *more = m->added ? m->added + (m->to_deep ? b : a) : NULL;
+            if (!more) memcpy(d, s, (size_t)run * sizeof *d);
             else
-                for (int64_t i = 0; i < run; i++) d[i] += s[i];
+                for (int64_t i = 0; i < run; i++) d[i] = s[i] + more[i];
         }
     }
 }
 
-static void move(int threads, ts_shape large, int r, bool to_deep, const float *from, float *to, bool accumulate)
+static void move(int threads, const moving *m)
 {
-    ts_for(threads, (int64_t)large.n * large.h, ag_pixel_chunk(large.w * large.c), move_rows,
-           &(moving){large, r, to_deep, accumulate, from, to});
+    ts_for(threads, (int64_t)m->large.n * m->large.h, ag_pixel_chunk(m->large.w * m->large.c), move_rows, m);
+}
+
+static moving of(const ag_node *node)
+{
+    const shuffle_attr *a = node->attr;
+    return (moving){.large = a->deep ? node->in[X]->t.shape : node->out->t.shape, .r = a->r, .to_deep = a->deep};
 }
 
 static void forward(ag_tape *tape, ag_node *node)
 {
-    const shuffle_attr *a = node->attr;
-    move(ag_threads(tape), a->deep ? node->in[0]->t.shape : node->out->t.shape, a->r, a->deep, node->in[0]->t.data,
-         node->out->t.data, false);
+    moving m = of(node);
+    m.from = node->in[X]->t.data;
+    m.added = node->in[ADDED] ? node->in[ADDED]->t.data : NULL;
+    m.to = node->out->t.data;
+    move(ag_threads(tape), &m);
+}
+
+typedef struct passing {
+    const float *dy;
+    float *dx;
+    bool accumulate;
+} passing;
+
+static void pass_range(const void *job, int64_t begin, int64_t end)
+{
+    const passing *p = job;
+    ts_elementwise_k()->scale(end - begin, 1.0f, p->dy + begin, p->dx + begin, p->accumulate);
 }
 
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const shuffle_attr *a = node->attr;
     bool accumulate;
-    float *dx = ag_grad_target(tape, node->in[0], &accumulate);
-    if (dx)
-        move(ag_threads(tape), a->deep ? node->in[0]->t.shape : node->out->t.shape, a->r, !a->deep, node->out->grad, dx,
-             accumulate);
+    float *dx = ag_grad_target(tape, node->in[X], &accumulate);
+    if (dx) {
+        moving m = of(node);
+        m.to_deep = !m.to_deep;
+        m.from = node->out->grad;
+        m.added = accumulate ? dx : NULL;
+        m.to = dx;
+        move(ag_threads(tape), &m);
+    }
+    if (!node->in[ADDED] || ag_grad_move(node->out, node->in[ADDED])) return;
+    passing p = {.dy = node->out->grad};
+    p.dx = ag_grad_target(tape, node->in[ADDED], &p.accumulate);
+    if (p.dx) ts_for(ag_threads(tape), ts_count(node->out->t.shape), AG_CHUNK, pass_range, &p);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)
@@ -77,31 +110,39 @@ static void reference(const ag_node *node, const double *const *in, double *out)
     for (int64_t q = 0; q < ts_count(s); q++) {
         const int64_t c = q % s.c, j = q / s.c % s.w, i = q / s.c / s.w % s.h, n = q / s.c / s.w / s.h;
         const int64_t p = ((n * d.h + i / a->r) * d.w + j / a->r) * d.c + (i % a->r * a->r + j % a->r) * s.c + c;
-        if (a->deep) out[p] = in[0][q];
-        else out[q] = in[0][p];
+        if (a->deep) out[p] = in[X][q];
+        else out[q] = in[X][p] + (node->in[ADDED] ? in[ADDED][q] : 0);
     }
 }
 
 static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
 {
     const shuffle_attr *a = user;
-    return (a->deep ? ag_space_to_depth : ag_depth_to_space)(tape, in[0], a->r);
+    return (a->deep ? ag_space_to_depth : ag_depth_to_space)(tape, in[X], a->r);
+}
+
+static ag_value *build_sum(ag_tape *tape, ag_value *const *in, const void *user)
+{
+    return ag_depth_to_space_add(tape, in[X], ((const shuffle_attr *)user)->r, in[ADDED]);
 }
 
 static void cases(ag_gradcheck *check)
 {
     ts_rng *r = ag_gradcheck_rng(check);
-    for (int i = 0; i < 8; i++) {
-        const shuffle_attr a = {1 + ts_rng_int(r, 4), i % 2 == 0};
+    for (int i = 0; i < 12; i++) {
+        const shuffle_attr a = {1 + ts_rng_int(r, 4), i < 8 && i % 2 == 0};
+        const bool sum = i >= 8;
         ts_shape s = {1 + ts_rng_int(r, 3), 1 + ts_rng_int(r, 4), 1 + ts_rng_int(r, 4), 1 + ts_rng_int(r, 5)};
         if (a.deep) s.h *= a.r, s.w *= a.r;
         else s.c *= a.r * a.r;
-        ag_case c = {.label = a.deep ? "space to depth" : "depth to space",
-                     .inputs = 1,
-                     .shape = {s},
+        ag_case c = {.label = a.deep ? "space to depth"
+                         : sum       ? "depth to space, and a sum"
+                                     : "depth to space",
+                     .inputs = sum ? INPUTS : ADDED,
+                     .shape = {s, {s.n, s.h * a.r, s.w * a.r, s.c / (a.r * a.r)}},
                      .lo = -1,
                      .hi = 1,
-                     .build = build,
+                     .build = sum ? build_sum : build,
                      .user = &a};
         ag_gradcheck_run(check, &c);
     }
@@ -111,23 +152,38 @@ const ag_op op_shuffle = {"shuffle", forward, backward, reference, cases};
 
 ag_value *ag_space_to_depth(ag_tape *tape, ag_value *x, int r)
 {
+    ag_value *in[INPUTS] = {x};
     char text[AG_SHAPE_TEXT];
-    if (!ag_ready(tape, "space_to_depth", 1, &x)) return NULL;
+    if (!ag_ready(tape, "space_to_depth", ADDED, in)) return NULL;
     const ts_shape s = x->t.shape;
     if (r < 1 || s.h % r || s.w % r)
         return ag_fail(tape, TS_INVALID, "space_to_depth: %s is not of squares of %d", ag_shape_text(text, s), r);
     const shuffle_attr a = {r, true};
-    return ag_apply(tape, &op_shuffle, 1, &x, (ts_shape){s.n, s.h / r, s.w / r, s.c * r * r}, &a, sizeof a);
+    return ag_apply(tape, &op_shuffle, INPUTS, in, (ts_shape){s.n, s.h / r, s.w / r, s.c * r * r}, &a, sizeof a);
 }
 
-ag_value *ag_depth_to_space(ag_tape *tape, ag_value *x, int r)
+static ag_value *to_space(ag_tape *tape, int r, int inputs, ag_value *const in[INPUTS])
 {
-    char text[AG_SHAPE_TEXT];
-    if (!ag_ready(tape, "depth_to_space", 1, &x)) return NULL;
-    const ts_shape s = x->t.shape;
+    char text[AG_SHAPE_TEXT], more[AG_SHAPE_TEXT];
+    if (!ag_ready(tape, "depth_to_space", inputs, in)) return NULL;
+    const ts_shape s = in[X]->t.shape;
     if (r < 1 || s.c % (r * r))
         return ag_fail(tape, TS_INVALID, "depth_to_space: %s has not a multiple of %d channels", ag_shape_text(text, s),
                        r * r);
     const shuffle_attr a = {r, false};
-    return ag_apply(tape, &op_shuffle, 1, &x, (ts_shape){s.n, s.h * r, s.w * r, s.c / (r * r)}, &a, sizeof a);
+    const ts_shape out = {s.n, s.h * r, s.w * r, s.c / (r * r)};
+    if (in[ADDED] && !ts_same(in[ADDED]->t.shape, out))
+        return ag_fail(tape, TS_INVALID, "depth_to_space: what is added is %s, not %s",
+                       ag_shape_text(text, in[ADDED]->t.shape), ag_shape_text(more, out));
+    return ag_apply(tape, &op_shuffle, INPUTS, in, out, &a, sizeof a);
+}
+
+ag_value *ag_depth_to_space(ag_tape *tape, ag_value *x, int r)
+{
+    return to_space(tape, r, ADDED, (ag_value *const[INPUTS]){x});
+}
+
+ag_value *ag_depth_to_space_add(ag_tape *tape, ag_value *x, int r, ag_value *added)
+{
+    return to_space(tape, r, INPUTS, (ag_value *const[INPUTS]){x, added});
 }

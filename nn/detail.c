@@ -102,11 +102,11 @@ static ag_value *pixels(ag_tape *tape, const nn_model *model, ag_value *photo, a
     const ts_shape s = photo->t.shape, fine = {s.n, s.h, s.w, NN_FINE};
     ag_value *to = room(tape, fine), *half = NULL;
     const ts_mark mark = ag_scope_begin(tape);
-    if (model->arch.g_half > 0) half = from_half(tape, model, photo, y, room(tape, fine));
+    if (model->arch.g_half > 0) half = from_half(tape, model, photo, y, to);
     y = nn_conv(tape, model, l->detail[2], y, 1, TS_PAD_ZERO, NN_LEAK_G);
-    ag_into(tape, to);
-    y = ag_depth_to_space(tape, y, model->arch.g_unshuffle);
-    if (half) y = ag_add(tape, in_place(tape, y), half);
+    ag_into(tape, to); /* where half is, which is added pixel by pixel */
+    y = half ? ag_depth_to_space_add(tape, y, model->arch.g_unshuffle, half)
+             : ag_depth_to_space(tape, y, model->arch.g_unshuffle);
     ag_scope_end(tape, mark, NULL, 0);
     y = nn_conv_with_constants(tape, model, l->detail[3], y, ag_concat(tape, photo, coordinates), 1, TS_PAD_REPLICATE,
                                NN_LEAK_G);
