@@ -196,8 +196,12 @@ static void settle_rows(const void *of, int64_t begin, int64_t end)
         const float *burnt = j->burnt + pixel_of(j, y), *own = row_of(&j->f, y),
                     *around = j->f.to + y * j->p.columns * SETTLED;
         float *to = j->step + pixel_of(j, y) * j->channels;
-        for (int x = 0; x < j->p.columns; x++, to += j->channels)
-            for (int k = 0; k < SETTLED; k++) to[settled[k]] += burnt[x] * (*around++ - *own++);
+        const float *maps = j->maps + pixel_of(j, y) * j->channels;
+        for (int x = 0; x < j->p.columns; x++, to += j->channels, maps += j->channels)
+            for (int k = 0; k < SETTLED; k++) {
+                const float from = maps[settled[k]], step = to[settled[k]] + burnt[x] * (*around++ - *own++);
+                to[settled[k]] = from + step > 1 ? 1 - from : from + step < -1 ? -1 - from : step;
+            }
     }
 }
 

@@ -21,7 +21,7 @@ bool nn_burnt_any(rd_grid window, const float *image);
 float *nn_burnt_find(rd_grid grid, const float *image, ts_arena *arena, bool *any);
 
 /* step [h, w, channels], to be added to maps: of roughness and F0 D = maps + step - mean becomes D + burnt (E - D), E
- * being D by the same filter. arena: for what is held meanwhile. False: no memory. */
+ * being D by the same filter; maps + step ends in [-1, 1]. arena: for what is held meanwhile. False: no memory. */
 bool nn_burnt_settle(rd_grid grid, const float *burnt, const float *mean, const float *maps, int channels,
                      ts_arena *arena, float *step);
 

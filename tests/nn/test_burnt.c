@@ -98,6 +98,28 @@ TEST(burnt_as_plainly_written)
     ts_arena_destroy(&arena);
 }
 
+/* Neighbours that change by more than a pixel's range leaves do not take it out of the range. */
+TEST(burnt_stays_in_the_range_of_maps)
+{
+    ts_status st = {0};
+    ts_arena *arena = ts_arena_create(0, &st);
+    scene *s = make();
+    bool any;
+    for (int i = 0; i < PIXELS * 3; i++) s->image[i] = 1;
+    for (int i = 0; i < VALUES; i++) {
+        const bool odd = i / C % 2;
+        s->mean[i] = s->maps[i] = odd ? 0.95f : 0;
+        s->step[i] = odd ? 0 : 0.9f;
+    }
+    const float *burnt = nn_burnt_find(rd_grid_full(EDGE), s->image, arena, &any);
+    CHECK(burnt && nn_burnt_settle(rd_grid_full(EDGE), burnt, s->mean, s->maps, C, arena, s->step), "no memory");
+    float most = -1;
+    for (int i = 0; i < VALUES; i++) most = fmaxf(most, s->maps[i] + s->step[i]);
+    CHECK(most == 1, "the largest is %g", (double)most);
+    free(s);
+    ts_arena_destroy(&arena);
+}
+
 /* A change that is the same everywhere stays, and where nothing is bright every change does. */
 TEST(burnt_keeps_what_all_pixels_change)
 {
