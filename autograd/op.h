@@ -22,6 +22,9 @@ typedef struct ag_back {
 /* to[n,h,w,:] = a[n,h,w,:] followed by b[n,h,w,:] (op_concat.c). */
 void ag_join(ag_tape *tape, const ag_value *a, const ag_value *b, float *to);
 
+/* Adds dy, of v's shape, to the gradient of v, if it needs one (op_add.c). */
+void ag_grad_pass(ag_tape *tape, const float *dy, ag_value *v);
+
 /* The recorded operation that made v, or NULL. */
 const ag_node *ag_node_of(const ag_tape *tape, const ag_value *v);
 

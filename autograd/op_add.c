@@ -33,15 +33,20 @@ static void pass_range(const void *job, int64_t begin, int64_t end)
     ts_elementwise_k()->scale(end - begin, 1.0f, p->dy + begin, p->dx + begin, p->accumulate);
 }
 
+void ag_grad_pass(ag_tape *tape, const float *dy, ag_value *v)
+{
+    passing p = {.dy = dy};
+    p.dx = ag_grad_target(tape, v, &p.accumulate);
+    if (p.dx) ts_for(ag_threads(tape), ts_count(v->t.shape), AG_CHUNK, pass_range, &p);
+}
+
 /* One input gets dy itself where it can. */
 static void backward(ag_tape *tape, ag_node *node)
 {
-    passing p = {.dy = node->out->grad};
+    const float *dy = node->out->grad;
     const int moved = ag_grad_move(node->out, node->in[0]) ? 0 : ag_grad_move(node->out, node->in[1]) ? 1 : -1;
-    for (int j = 0; j < 2; j++) {
-        p.dx = j == moved ? NULL : ag_grad_target(tape, node->in[j], &p.accumulate);
-        if (p.dx) ts_for(ag_threads(tape), ts_count(node->out->t.shape), AG_CHUNK, pass_range, &p);
-    }
+    for (int j = 0; j < 2; j++)
+        if (j != moved) ag_grad_pass(tape, dy, node->in[j]);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)

@@ -4,7 +4,6 @@
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
-#include "tensor/kernels/elementwise.h"
 #include "tensor/threads.h"
 #include <string.h>
 
@@ -72,18 +71,6 @@ static void forward(ag_tape *tape, ag_node *node)
     move(ag_threads(tape), &m);
 }
 
-typedef struct passing {
-    const float *dy;
-    float *dx;
-    bool accumulate;
-} passing;
-
-static void pass_range(const void *job, int64_t begin, int64_t end)
-{
-    const passing *p = job;
-    ts_elementwise_k()->scale(end - begin, 1.0f, p->dy + begin, p->dx + begin, p->accumulate);
-}
-
 static void backward(ag_tape *tape, ag_node *node)
 {
     bool accumulate;
@@ -96,10 +83,8 @@ static void backward(ag_tape *tape, ag_node *node)
         m.to = dx;
         move(ag_threads(tape), &m);
     }
-    if (!node->in[ADDED] || ag_grad_move(node->out, node->in[ADDED])) return;
-    passing p = {.dy = node->out->grad};
-    p.dx = ag_grad_target(tape, node->in[ADDED], &p.accumulate);
-    if (p.dx) ts_for(ag_threads(tape), ts_count(node->out->t.shape), AG_CHUNK, pass_range, &p);
+    ag_value *added = node->in[ADDED];
+    if (added && !ag_grad_move(node->out, added)) ag_grad_pass(tape, node->out->grad, added);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)

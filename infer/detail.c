@@ -1,4 +1,5 @@
 #include "infer/detail.h"
+#include "nn/clip.h"
 #include "nn/model.h"
 #include "render/render.h"
 #include "tensor/maps.h"
@@ -24,10 +25,7 @@ typedef struct level_job {
 /* 1 for what is far from burnt out, 0 from TS_NEWTON_BURNT on. */
 static float trust(const float v[3])
 {
-    const float largest = v[0] > v[1] ? v[0] > v[2] ? v[0] : v[2]
-        : v[1] > v[2] ? v[1]
-                                      : v[2],
-                left = (TS_NEWTON_BURNT - largest) / (TS_NEWTON_BURNT - BRIGHT);
+    const float left = (TS_NEWTON_BURNT - nn_brightest(v)) / (TS_NEWTON_BURNT - BRIGHT);
     return left < 0 ? 0 : left < 1 ? left : 1;
 }
 

@@ -146,11 +146,9 @@ static bool prior(const work *w, rd_grid window, const float *image, float *maps
                        ag_arena(w->tape), maps, &st))
         return ag_fail(w->tape, st.code, "%s", st.message), false;
     const nn_input in = input(w, window, w->photo);
-    if (nn_settles_burnt(w->model, &in)) {
-        bool any;
-        float *burnt = nn_burnt_find(window, image, ag_arena(w->tape), &any);
-        if (!burnt) return ag_fail(w->tape, TS_NOMEM, "out of memory"), false;
-        if (any) state->burnt = burnt;
+    if (nn_settles_burnt(w->model, &in) && nn_burnt_any(window, w->t->image[0])) {
+        state->burnt = nn_burnt_find(window, image, ag_arena(w->tape));
+        if (!state->burnt) return ag_fail(w->tape, TS_NOMEM, "out of memory"), false;
     }
     memcpy(mean, maps, pixels * (size_t)w->channels * sizeof *mean);
     state->mean = mean;

@@ -1,4 +1,5 @@
 #include "nn/burnt.h"
+#include "nn/clip.h"
 #include "tensor/kernels/resample.h"
 #include "tensor/maps.h"
 #include "tensor/team.h"
@@ -11,9 +12,8 @@ enum {
     SETTLED = 4,    /* maps: roughness, F0 */
     PIXELS_OF = 32, /* a photograph's side over the reach */
     LEAST = 2,
-    MOST = 8,        /* pixels: a larger photograph's tiles are not to be little beside what is around them */
-    ROWS = 4,        /* at a time, at least */
-    VALUES = 1 << 12 /* the same */
+    MOST = 8, /* pixels: a larger photograph's tiles are not to be little beside what is around them */
+    ROWS = 4  /* at a time, at least */
 };
 static const int settled[SETTLED] = {MAP_ROUGHNESS, MAP_SPECULAR, MAP_SPECULAR + 1, MAP_SPECULAR + 2};
 
@@ -30,10 +30,7 @@ typedef struct part {
 
 static float brightness(const float v[3])
 {
-    const float largest = v[0] > v[1] ? v[0] > v[2] ? v[0] : v[2]
-        : v[1] > v[2] ? v[1]
-                                      : v[2],
-                t = (largest - BRIGHT) / (1 - BRIGHT);
+    const float t = (nn_brightest(v) - BRIGHT) / (1 - BRIGHT);
     return t < 0 ? 0 : t < 1 ? t : 1;
 }
 
@@ -45,15 +42,6 @@ bool nn_burnt_any(rd_grid window, const float *image)
             if (brightness(row + 3 * x) > 0) return true;
     }
     return false;
-}
-
-static void limit(const void *of, int64_t begin, int64_t end)
-{
-    float *const *burnt = of;
-    for (int64_t i = begin; i < end; i++) {
-        const float b = WITH_THEM * (*burnt)[i];
-        (*burnt)[i] = b < 1 ? b : 1;
-    }
 }
 
 /* Rows and columns in which v [h, w] is not 0, and by more on either side, as far as the window goes. */
@@ -147,18 +135,25 @@ static void brightness_rows(const void *of, int64_t begin, int64_t end)
     }
 }
 
-float *nn_burnt_find(rd_grid grid, const float *image, ts_arena *arena, bool *any)
+static void burnt_rows(const void *of, int64_t begin, int64_t end)
 {
-    const int64_t pixels = (int64_t)grid.h * grid.w;
-    float *burnt = ts_arena_alloc(arena, (size_t)pixels * sizeof *burnt);
+    const filter *f = of;
+    filter_down(f, begin, end);
+    for (int64_t i = begin * f->columns; i < end * f->columns; i++) {
+        const float b = WITH_THEM * f->to[i];
+        f->to[i] = b < 1 ? b : 1;
+    }
+}
+
+float *nn_burnt_find(rd_grid grid, const float *image, ts_arena *arena)
+{
+    float *burnt = ts_arena_alloc(arena, (size_t)grid.h * (size_t)grid.w * sizeof *burnt);
     const ts_mark mark = ts_arena_mark(arena);
     find_job j = {.image = image};
     const bool done = burnt && make_filter(grid, grid.h, grid.w, 1, arena, burnt, &j.f);
     if (done) {
         ts_for(grid.threads, grid.h, ROWS, brightness_rows, &j);
-        ts_for(grid.threads, grid.h, ROWS, filter_down, &j.f);
-        ts_for(grid.threads, pixels, VALUES, limit, &(float *){burnt});
-        *any = bright(grid, burnt, 0).rows > 0;
+        ts_for(grid.threads, grid.h, ROWS, burnt_rows, &j.f);
     }
     ts_arena_release(arena, mark);
     return done ? burnt : NULL;
@@ -197,9 +192,10 @@ static void settle_rows(const void *of, int64_t begin, int64_t end)
                     *around = j->f.to + y * j->p.columns * SETTLED;
         float *to = j->step + pixel_of(j, y) * j->channels;
         const float *maps = j->maps + pixel_of(j, y) * j->channels;
-        for (int x = 0; x < j->p.columns; x++, to += j->channels, maps += j->channels)
-            for (int k = 0; k < SETTLED; k++) {
-                const float from = maps[settled[k]], step = to[settled[k]] + burnt[x] * (*around++ - *own++);
+        for (int x = 0; x < j->p.columns;
+             x++, to += j->channels, maps += j->channels, own += SETTLED, around += SETTLED)
+            for (int k = 0; k < SETTLED && burnt[x] > 0; k++) {
+                const float from = maps[settled[k]], step = to[settled[k]] + burnt[x] * (around[k] - own[k]);
                 to[settled[k]] = from + step > 1 ? 1 - from : from + step < -1 ? -1 - from : step;
             }
     }

@@ -72,10 +72,9 @@ TEST(burnt_as_plainly_written)
     scene *s = make();
     double *burnt = malloc(PIXELS * sizeof *burnt), *change = malloc(VALUES * sizeof *change), far = 0;
     float *settled = malloc(sizeof s->step);
-    bool any;
     plain_burnt(s->image, burnt);
-    const float *found = nn_burnt_find(rd_grid_full(EDGE), s->image, arena, &any);
-    CHECK(found && any, "nothing is found");
+    const float *found = nn_burnt_find(rd_grid_full(EDGE), s->image, arena);
+    CHECK(found, "no memory");
     for (int i = 0; i < PIXELS; i++) far = fmax(far, fabs((double)found[i] - burnt[i]));
     CHECK(far < 1e-6, "burnt is %g off", far);
     CHECK(burnt[43 * EDGE + 52] > 0.5 && burnt[60 * EDGE + 20] == 0, "the case has no spot");
@@ -104,14 +103,13 @@ TEST(burnt_stays_in_the_range_of_maps)
     ts_status st = {0};
     ts_arena *arena = ts_arena_create(0, &st);
     scene *s = make();
-    bool any;
     for (int i = 0; i < PIXELS * 3; i++) s->image[i] = 1;
     for (int i = 0; i < VALUES; i++) {
         const bool odd = i / C % 2;
         s->mean[i] = s->maps[i] = odd ? 0.95f : 0;
         s->step[i] = odd ? 0 : 0.9f;
     }
-    const float *burnt = nn_burnt_find(rd_grid_full(EDGE), s->image, arena, &any);
+    const float *burnt = nn_burnt_find(rd_grid_full(EDGE), s->image, arena);
     CHECK(burnt && nn_burnt_settle(rd_grid_full(EDGE), burnt, s->mean, s->maps, C, arena, s->step), "no memory");
     float most = -1;
     for (int i = 0; i < VALUES; i++) most = fmaxf(most, s->maps[i] + s->step[i]);
@@ -127,8 +125,9 @@ TEST(burnt_keeps_what_all_pixels_change)
     ts_arena *arena = ts_arena_create(0, &st);
     scene *s = make();
     float *before = malloc(sizeof s->step);
-    bool any;
-    const float *burnt = nn_burnt_find(rd_grid_full(EDGE), s->image, arena, &any);
+    const float *burnt = nn_burnt_find(rd_grid_full(EDGE), s->image, arena);
+    CHECK(nn_burnt_any(rd_grid_full(EDGE), s->image), "nothing is burnt out");
+    CHECK(!nn_burnt_any((rd_grid){20, 20, 60, 10, EDGE, 1}, s->image), "a dark window is burnt out");
     for (int i = 0; i < VALUES; i++) s->step[i] = s->mean[i] + 0.1f - s->maps[i];
     memcpy(before, s->step, sizeof s->step);
     CHECK(burnt && nn_burnt_settle(rd_grid_full(EDGE), burnt, s->mean, s->maps, C, arena, s->step), "no memory");
@@ -136,8 +135,9 @@ TEST(burnt_keeps_what_all_pixels_change)
     for (int i = 0; i < VALUES; i++) far = fmax(far, fabs((double)(s->step[i] - before[i])));
     CHECK(far < 1e-6, "a step of all pixels changes by %g", far);
     for (int i = 0; i < PIXELS * 3; i++) s->image[i] = fminf(s->image[i], 0.85f);
-    burnt = nn_burnt_find(rd_grid_full(EDGE), s->image, arena, &any);
-    CHECK(burnt && !any, "a dark photograph is burnt out");
+    burnt = nn_burnt_find(rd_grid_full(EDGE), s->image, arena);
+    CHECK(!nn_burnt_any(rd_grid_full(EDGE), s->image), "a dark photograph is burnt out");
+    for (int i = 0; i < PIXELS; i++) CHECK(burnt[i] == 0, "pixel %d of a dark photograph is burnt out", i);
     free(before), free(s);
     ts_arena_destroy(&arena);
 }
@@ -159,10 +159,8 @@ TEST(burnt_of_a_window)
         memcpy(image + y * W * 3, s->image + at * 3, sizeof(float) * W * 3);
         for (int k = 0; k < 3; k++) memcpy(map[k] + y * W * C, from[k] + at * C, sizeof(float) * W * C);
     }
-    bool any;
-    const float *all = nn_burnt_find(rd_grid_full(EDGE), s->image, arena, &any),
-                *part = nn_burnt_find(grid, image, arena, &any);
-    CHECK(all && part && any, "nothing is found");
+    const float *all = nn_burnt_find(rd_grid_full(EDGE), s->image, arena), *part = nn_burnt_find(grid, image, arena);
+    CHECK(all && part, "no memory");
     CHECK(nn_burnt_settle(rd_grid_full(EDGE), all, s->mean, s->maps, C, arena, s->step) &&
               nn_burnt_settle(grid, part, map[0], map[1], C, arena, map[2]),
           "no memory");
