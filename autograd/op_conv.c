@@ -1,6 +1,7 @@
-/* u[n,i,j,o] = bias[o] + sum_{ky,kx,c} x[n, i + d (ky - K/2), j + d (kx - K/2), c] weight[o,c,ky,kx],   y = u > 0 ? u :
- * leak u du = y > 0 ? dy : leak dy, then dx, dweight and dbias as in tensor/conv/conv.h x: [N,H,W,I], or its first
- * channels, and the others as constants; weight: {O,I,K,K}, bias: [1,1,1,O], y: [N,H,W,O] */
+/* u[n,i,j,o] = bias[o] + base[n,i,j,o] + sum_{ky,kx,c} x[n, i + d (ky - K/2), j + d (kx - K/2), c] weight[o,c,ky,kx],
+ * y = u > 0 ? u : leak u;   du = y > 0 ? dy : leak dy, then dx, dweight and dbias as in tensor/conv/conv.h, dbase = du
+ * x: [N,H,W,I], or its first channels, and the others as constants; weight: {O,I,K,K}, bias: [1,1,1,O], y and base:
+ * [N,H,W,O] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
@@ -15,9 +16,12 @@ ag_value *ag_conv(ag_tape *tape, ag_value *x, ag_value *weight, ag_value *bias, 
  * is computed: an error if they want one. NULL: of x alone. */
 ag_value *ag_conv_with_constants(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias,
                                  int dilation, ts_pad pad, float leak);
+/* base [N,H,W,oc] + the convolution of x, without an activation; ag_into base: in its place. */
+ag_value *ag_conv_add(ag_tape *tape, ag_value *base, ag_value *x, ag_value *weight, ag_value *bias, int dilation,
+                      ts_pad pad);
 #endif
 
-enum { X, WEIGHT, BIAS, CONSTANTS, INPUTS };
+enum { X, WEIGHT, BIAS, CONSTANTS, BASE, INPUTS };
 
 typedef struct conv_attr {
     ts_conv conv;
@@ -53,8 +57,7 @@ static void weight_gradient(const ts_conv *c, const float *x, const float *dy, f
     ts_conv_weight_gradient(c, x, dy, winograd || bf16 ? NULL : dweight, dbias);
 }
 
-typedef void forward_function(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
-                              float *y);
+typedef void forward_function(const ts_conv *c, const ts_conv_inputs *in, const float *packed, float leak, float *y);
 static forward_function *const forwards[TS_CONV_USES] = {[TS_CONV_FORWARD] = ts_conv_forward,
                                                          [TS_CONV_WINOGRAD] = ts_conv_forward_winograd,
                                                          [TS_CONV_FORWARD_BF16] = ts_conv_forward_bf16,
@@ -67,19 +70,53 @@ static data_gradient_function *const data_gradients[TS_CONV_USES] = {
     [TS_CONV_DATA_GRADIENT_BF16] = ts_conv_data_gradient_bf16,
     [TS_CONV_DATA_GRADIENT_WINOGRAD_BF16] = ts_conv_data_gradient_winograd_bf16};
 
+static const float *data(const ag_value *v) { return v ? v->t.data : NULL; }
+
+typedef struct adding {
+    const float *base, *change;
+    float *y;
+} adding;
+
+static void add_range(const void *job, int64_t begin, int64_t end)
+{
+    const adding *a = job;
+    ts_elementwise_k()->add(end - begin, a->base + begin, a->change + begin, a->y + begin);
+}
+
+/* Where a convolution's way adds no base, its result is made apart. */
+static void run(ag_tape *tape, const conv_attr *a, ts_conv_inputs in, const float *packed, ag_value *out)
+{
+    forward_function *const forward = forwards[ts_conv_packing(&a->conv, TS_CONV_OUTPUT)];
+    if (!in.base || ts_conv_adds(&a->conv)) {
+        forward(&a->conv, &in, packed, a->leak, out->t.data);
+        return;
+    }
+    adding sum = {in.base, ts_new(ag_arena(tape), out->t.shape).data, out->t.data};
+    in.base = NULL;
+    if (!sum.change) {
+        ag_fail(tape, TS_NOMEM, "conv: no memory for %lld values", (long long)ts_count(out->t.shape));
+        return;
+    }
+    forward(&a->conv, &in, packed, 1, (float *)(uintptr_t)sum.change);
+    ts_for(ag_threads(tape), ts_count(out->t.shape), AG_CHUNK, add_range, &sum);
+}
+
 static void forward(ag_tape *tape, ag_node *node)
 {
     const conv_attr *a = node->attr;
     const ts_conv_use use = ts_conv_packing(&a->conv, TS_CONV_OUTPUT);
     if (ag_traced()) ag_trace_way(tape, ts_conv_way_name(ts_conv_choose(&a->conv, TS_CONV_OUTPUT)));
     ts_mark mark = ts_arena_mark(ag_arena(tape));
-    const float *x = input(tape, node), *bias = node->in[BIAS] ? node->in[BIAS]->t.data : NULL;
-    if (reads_input(tape, node)) {
-        node->saved = (void *)(uintptr_t)x;
+    ts_conv_inputs in = {.x = data(node->in[X]), .bias = data(node->in[BIAS]), .base = data(node->in[BASE])};
+    const bool saves = reads_input(tape, node);
+    if (!saves && ts_conv_joins(&a->conv)) in.constants = data(node->in[CONSTANTS]);
+    else in.x = input(tape, node);
+    if (saves) {
+        node->saved = (void *)(uintptr_t)in.x;
         mark = ts_arena_mark(ag_arena(tape));
     }
     const float *packed = ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data);
-    if (x && packed) forwards[use](&a->conv, x, packed, bias, a->leak, node->out->t.data);
+    if (in.x && packed) run(tape, a, in, packed, node->out);
     ts_arena_release(ag_arena(tape), mark);
 }
 
@@ -105,6 +142,7 @@ static void backward(ag_tape *tape, ag_node *node)
     if (ag_traced()) ag_trace_way(tape, ts_conv_way_name(ts_conv_choose(&a->conv, TS_CONV_INPUT)));
     const float *packed = dx ? ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data) : NULL;
     if (packed) data_gradients[use](&a->conv, dy, packed, dx, accumulate);
+    if (node->in[BASE] && !ag_grad_move(node->out, node->in[BASE])) ag_grad_pass(tape, dy, node->in[BASE]);
 }
 
 /* Where a tap falls; -1: on a zero. */
@@ -142,19 +180,21 @@ static void reference(const ag_node *node, const double *const *in, double *out)
             for (int j = 0; j < c->w; j++)
                 for (int o = 0; o < c->oc; o++, out++) {
                     double u = plain(c, in, n, i, j, o);
+                    if (in[BASE]) u += in[BASE][((int64_t)(n * c->h + i) * c->w + j) * c->oc + o];
                     *out = u > 0 ? u : a->leak * u;
                 }
 }
 
 typedef struct conv_case {
     conv_attr attr;
-    bool bias;
+    bool bias, base;
 } conv_case;
 
 static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
 {
     const conv_case *c = user;
     const ts_conv *v = &c->attr.conv;
+    if (c->base) return ag_conv_add(tape, in[BASE], in[X], in[WEIGHT], c->bias ? in[BIAS] : NULL, v->dilation, v->pad);
     return ag_conv_with_constants(tape, in[X], v->constants ? in[CONSTANTS] : NULL, in[WEIGHT],
                                   c->bias ? in[BIAS] : NULL, v->dilation, v->pad, c->attr.leak);
 }
@@ -195,6 +235,7 @@ static void cases(ag_gradcheck *check)
         {"narrower than the kernel, dilated", 3, 2, 1, 1, 5, 2, TS_PAD_ZERO},
         {"18 channels, 1x1", 3, 4, 18, 5, 1, 1, TS_PAD_ZERO},
         {"3x3 to 9 channels, replicate", 5, 4, 7, 9, 3, 1, TS_PAD_REPLICATE},
+        {"3x3, Winograd's tiles", 16, 32, 16, 16, 3, 1, TS_PAD_REPLICATE},
     };
     const int edges = (int)(sizeof edge / sizeof *edge);
     for (int t = 0; t < edges + 8; t++) {
@@ -216,10 +257,12 @@ static void cases(ag_gradcheck *check)
                                     {0}};
         ts_conv *v = &k.attr.conv;
         v->constants = t % 4 == 1 ? v->ic / 2 : 0;
+        k.base = k.attr.leak == 1.0f && !v->constants;
         ag_case c = {.label = t < edges ? edge[t].label : "random",
-                     .inputs = v->constants ? INPUTS
-                         : k.bias           ? CONSTANTS
-                                            : BIAS,
+                     .inputs = k.base   ? INPUTS
+                         : v->constants ? BASE
+                         : k.bias       ? CONSTANTS
+                                        : BIAS,
                      .lo = -1,
                      .hi = 1,
                      .kink = kink,
@@ -228,7 +271,8 @@ static void cases(ag_gradcheck *check)
                      .shape = {{v->n, v->h, v->w, ts_conv_variables(v)},
                                {v->oc, v->ic, v->k, v->k},
                                {1, 1, 1, v->oc},
-                               {v->n, v->h, v->w, v->constants}}};
+                               {v->n, v->h, v->w, v->constants ? v->constants : 1},
+                               {v->n, v->h, v->w, v->oc}}};
         c.fixed[CONSTANTS] = true;
         c.fixed[BIAS] = !k.bias;
         ag_gradcheck_run(check, &c);
@@ -237,10 +281,9 @@ static void cases(ag_gradcheck *check)
 
 const ag_op op_conv = {"conv", forward, backward, reference, cases};
 
-ag_value *ag_conv_with_constants(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias,
-                                 int dilation, ts_pad pad, float leak)
+static ag_value *convolve(ag_tape *tape, ag_value *const in[INPUTS], int dilation, ts_pad pad, float leak)
 {
-    ag_value *in[INPUTS] = {x, weight, bias, constants};
+    ag_value *x = in[X], *weight = in[WEIGHT], *bias = in[BIAS], *constants = in[CONSTANTS], *base = in[BASE];
     char text[AG_SHAPE_TEXT], more[AG_SHAPE_TEXT];
     if (!ag_ready(tape, "conv", BIAS, in)) return NULL;
     ts_shape s = x->t.shape, w = weight->t.shape; /* w: n = oc, h = ic, w = c = k */
@@ -262,7 +305,24 @@ ag_value *ag_conv_with_constants(ag_tape *tape, ag_value *x, ag_value *constants
     const conv_attr a = {{s.n, s.h, s.w, s.c, w.n, w.c, dilation, pad, s.c - x->t.shape.c, *ag_compute(tape)}, leak};
     ts_status st = {0};
     if (ts_conv_check(&a.conv, &st) != TS_OK) return ag_fail(tape, st.code, "%s", st.message);
-    return ag_apply(tape, &op_conv, INPUTS, in, (ts_shape){s.n, s.h, s.w, w.n}, &a, sizeof a);
+    const ts_shape y = {s.n, s.h, s.w, w.n};
+    if (base && !ts_same(base->t.shape, y))
+        return ag_fail(tape, TS_INVALID, "conv: %s is added to %s, which differs", ag_shape_text(text, y),
+                       ag_shape_text(more, base->t.shape));
+    return ag_apply(tape, &op_conv, INPUTS, in, y, &a, sizeof a);
+}
+
+ag_value *ag_conv_with_constants(ag_tape *tape, ag_value *x, ag_value *constants, ag_value *weight, ag_value *bias,
+                                 int dilation, ts_pad pad, float leak)
+{
+    return convolve(tape, (ag_value *[INPUTS]){x, weight, bias, constants}, dilation, pad, leak);
+}
+
+ag_value *ag_conv_add(ag_tape *tape, ag_value *base, ag_value *x, ag_value *weight, ag_value *bias, int dilation,
+                      ts_pad pad)
+{
+    if (!ag_ready(tape, "conv", 1, &base)) return NULL;
+    return convolve(tape, (ag_value *[INPUTS]){x, weight, bias, NULL, base}, dilation, pad, 1);
 }
 
 ag_value *ag_conv(ag_tape *tape, ag_value *x, ag_value *weight, ag_value *bias, int dilation, ts_pad pad, float leak)

@@ -1,17 +1,22 @@
-/* y = A x B^T for every image and channel: A and B hold a filter of tensor/resample.h for rows and columns;   dx = A^T
- * dy B x: [N,H,W,C], y: [N,h,w,C] */
+/* y = base + A x B^T for every image and channel: A and B hold a filter of tensor/resample.h for rows and columns;
+ * dx = A^T dy B, dbase = dy   x: [N,H,W,C], y and base: [N,h,w,C] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
 #include "tensor/resample.h"
 #include <math.h>
+#include <string.h>
 
 #ifdef AG_API
 /* x [N,H,W,C] resampled to [N,h,w,C] as ts_resize does. */
 ag_value *ag_resize(ag_tape *tape, ag_value *x, int h, int w);
 /* The same, but larger images as ts_taps_smooth makes them. */
 ag_value *ag_resize_smooth(ag_tape *tape, ag_value *x, int h, int w);
+/* base [N,h,w,C] + the same of x; ag_into base: in its place. */
+ag_value *ag_resize_smooth_add(ag_tape *tape, ag_value *base, ag_value *x);
 #endif
+
+enum { X, BASE, INPUTS };
 
 typedef struct resize_attr {
     bool smooth;
@@ -23,13 +28,21 @@ static ts_taps taps(ag_tape *tape, const ag_node *node, int in, int out)
     return (a->smooth ? ts_taps_smooth : ts_taps_triangle)(ag_arena(tape), in, out);
 }
 
+static void copy_range(const void *job, int64_t begin, int64_t end)
+{
+    const ag_node *node = job;
+    memcpy(node->out->t.data + begin, node->in[BASE]->t.data + begin, sizeof(float) * (size_t)(end - begin));
+}
+
 static void forward(ag_tape *tape, ag_node *node)
 {
-    const ts_shape s = node->in[0]->t.shape, d = node->out->t.shape;
+    const ts_shape s = node->in[X]->t.shape, d = node->out->t.shape;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
     const ts_taps rows = taps(tape, node, s.h, d.h), columns = taps(tape, node, s.w, d.w);
+    const ag_value *base = node->in[BASE];
+    if (base && base->t.data != node->out->t.data) ts_for(ag_threads(tape), ts_count(d), AG_CHUNK, copy_range, node);
     if (rows.weight && columns.weight)
-        ts_resample(s.n, s.c, &rows, &columns, node->in[0]->t.data, node->out->t.data, false, ag_threads(tape));
+        ts_resample(s.n, s.c, &rows, &columns, node->in[X]->t.data, node->out->t.data, base != NULL, ag_threads(tape));
     else ag_fail(tape, TS_NOMEM, "resize: no memory for the filter");
     ts_arena_release(ag_arena(tape), mark);
 }
@@ -38,18 +51,20 @@ static void backward(ag_tape *tape, ag_node *node)
 {
     const ts_shape s = node->in[0]->t.shape, d = node->out->t.shape;
     bool accumulate;
-    float *dx = ag_grad_target(tape, node->in[0], &accumulate);
-    if (!dx) return;
+    float *dx = ag_grad_target(tape, node->in[X], &accumulate);
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
-    const ts_taps rows = taps(tape, node, s.h, d.h), columns = taps(tape, node, s.w, d.w);
+    const ts_taps rows = dx ? taps(tape, node, s.h, d.h) : (ts_taps){0},
+                  columns = dx ? taps(tape, node, s.w, d.w) : (ts_taps){0};
     ts_taps up = {0}, left = {0};
     if (rows.weight && columns.weight) {
         up = ts_taps_transpose(ag_arena(tape), &rows);
         left = ts_taps_transpose(ag_arena(tape), &columns);
     }
     if (up.weight && left.weight) ts_resample(s.n, s.c, &up, &left, node->out->grad, dx, accumulate, ag_threads(tape));
-    else ag_fail(tape, TS_NOMEM, "resize: no memory for the filter");
+    else if (dx) ag_fail(tape, TS_NOMEM, "resize: no memory for the filter");
     ts_arena_release(ag_arena(tape), mark);
+    ag_value *base = node->in[BASE];
+    if (base && !ag_grad_move(node->out, base)) ag_grad_pass(tape, node->out->grad, base);
 }
 
 /* Weight of (any, also outside) source position i in output j, before the sum over i is made 1. */
@@ -82,13 +97,14 @@ static void reference(const ag_node *node, const double *const *in, double *out)
                 weights += w;
                 sum += w * in[0][(((int64_t)n * s.h + edge(y, s.h)) * s.w + edge(x, s.w)) * s.c + c];
             }
-        out[q] = sum / weights;
+        out[q] = sum / weights + (in[BASE] ? in[BASE][q] : 0);
     }
 }
 
 static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
 {
     const int *size = user;
+    if (in[BASE]) return ag_resize_smooth_add(tape, in[BASE], in[X]);
     return (size[2] ? ag_resize_smooth : ag_resize)(tape, in[0], size[0], size[1]);
 }
 
@@ -111,8 +127,8 @@ static void cases(ag_gradcheck *check)
     ts_rng *r = ag_gradcheck_rng(check);
     for (size_t i = 0; i < sizeof edges / sizeof *edges; i++) {
         ag_case c = {.label = edges[i].label,
-                     .inputs = 1,
-                     .shape = {edges[i].in},
+                     .inputs = edges[i].out[2] ? INPUTS : BASE,
+                     .shape = {edges[i].in, {edges[i].in.n, edges[i].out[0], edges[i].out[1], edges[i].in.c}},
                      .lo = -1,
                      .hi = 1,
                      .build = build,
@@ -130,13 +146,23 @@ static void cases(ag_gradcheck *check)
 
 const ag_op op_resize = {"resize", forward, backward, reference, cases};
 
-static ag_value *resize(ag_tape *tape, ag_value *x, int h, int w, bool smooth)
+static ag_value *resize(ag_tape *tape, ag_value *x, ag_value *base, int h, int w, bool smooth)
 {
     const resize_attr attr = {smooth};
     if (!ag_ready(tape, "resize", 1, &x)) return NULL;
     if (h < 1 || w < 1) return ag_fail(tape, TS_INVALID, "resize: to %d x %d pixels", h, w);
-    return ag_apply(tape, &op_resize, 1, &x, (ts_shape){x->t.shape.n, h, w, x->t.shape.c}, &attr, sizeof attr);
+    const ts_shape y = {x->t.shape.n, h, w, x->t.shape.c};
+    char text[AG_SHAPE_TEXT], more[AG_SHAPE_TEXT];
+    if (base && !ts_same(base->t.shape, y))
+        return ag_fail(tape, TS_INVALID, "resize: %s is added to %s, which differs", ag_shape_text(text, y),
+                       ag_shape_text(more, base->t.shape));
+    return ag_apply(tape, &op_resize, INPUTS, (ag_value *[INPUTS]){x, base}, y, &attr, sizeof attr);
 }
 
-ag_value *ag_resize(ag_tape *tape, ag_value *x, int h, int w) { return resize(tape, x, h, w, false); }
-ag_value *ag_resize_smooth(ag_tape *tape, ag_value *x, int h, int w) { return resize(tape, x, h, w, true); }
+ag_value *ag_resize(ag_tape *tape, ag_value *x, int h, int w) { return resize(tape, x, NULL, h, w, false); }
+ag_value *ag_resize_smooth(ag_tape *tape, ag_value *x, int h, int w) { return resize(tape, x, NULL, h, w, true); }
+ag_value *ag_resize_smooth_add(ag_tape *tape, ag_value *base, ag_value *x)
+{
+    if (!ag_ready(tape, "resize", 1, &base)) return NULL;
+    return resize(tape, x, base, base->t.shape.h, base->t.shape.w, true);
+}

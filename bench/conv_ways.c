@@ -55,13 +55,13 @@ void bench_conv_discard(bench_conv *w)
 static void forward(void *user)
 {
     bench_conv *w = user;
-    ts_conv_forward(&w->c, w->x, w->packed, w->bias, 0.2f, w->y);
+    ts_conv_forward(&w->c, &(ts_conv_inputs){.x = w->x, .bias = w->bias}, w->packed, 0.2f, w->y);
 }
 
 static void winograd(void *user)
 {
     bench_conv *w = user;
-    ts_conv_forward_winograd(&w->c, w->x, w->packed_winograd, w->bias, 0.2f, w->y);
+    ts_conv_forward_winograd(&w->c, &(ts_conv_inputs){.x = w->x, .bias = w->bias}, w->packed_winograd, 0.2f, w->y);
 }
 
 static void data_gradient(void *user)
@@ -91,7 +91,7 @@ static void weight_gradient_winograd(void *user)
 static void forward_bf16(void *user)
 {
     bench_conv *w = user;
-    ts_conv_forward_bf16(&w->c, w->x, w->packed_bf16, w->bias, 0.2f, w->y);
+    ts_conv_forward_bf16(&w->c, &(ts_conv_inputs){.x = w->x, .bias = w->bias}, w->packed_bf16, 0.2f, w->y);
 }
 
 static void data_gradient_bf16(void *user)
@@ -109,7 +109,8 @@ static void weight_gradient_bf16(void *user)
 static void winograd_bf16(void *user)
 {
     bench_conv *w = user;
-    ts_conv_forward_winograd_bf16(&w->c, w->x, w->packed_winograd_bf16, w->bias, 0.2f, w->y);
+    ts_conv_forward_winograd_bf16(&w->c, &(ts_conv_inputs){.x = w->x, .bias = w->bias}, w->packed_winograd_bf16, 0.2f,
+                                  w->y);
 }
 
 static void data_gradient_winograd_bf16(void *user)
@@ -127,7 +128,7 @@ static void weight_gradient_winograd_bf16(void *user)
 static void forward_naive(void *user)
 {
     bench_conv *w = user;
-    ts_conv_forward_naive(&w->c, w->x, w->weight, w->bias, 0.2f, w->y);
+    ts_conv_forward_naive(&w->c, &(ts_conv_inputs){.x = w->x, .bias = w->bias}, w->weight, 0.2f, w->y);
 }
 
 const bench_way bench_ways[] = {

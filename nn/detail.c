@@ -63,8 +63,7 @@ ag_value *nn_squares(ag_tape *tape, const nn_model *model, ag_value *seen, ag_va
     for (int i = 0; i < model->arch.g_trunk; i++) {
         mark = ag_scope_begin(tape);
         ag_value *change = nn_conv(tape, model, l->trunk[i][0], y, 2, TS_PAD_ZERO, NN_LEAK_G);
-        change = nn_conv(tape, model, l->trunk[i][1], change, 1, TS_PAD_ZERO, 1);
-        y = ag_add(tape, in_place(tape, y), change);
+        y = nn_conv_add(tape, model, l->trunk[i][1], in_place(tape, y), change, 1, TS_PAD_ZERO);
         ag_scope_end(tape, mark, NULL, 0);
     }
     return y;
@@ -85,8 +84,7 @@ static ag_value *from_half(ag_tape *tape, const nn_model *model, ag_value *photo
     y = nn_conv_with_constants(tape, model, l->half[1], y, four, 1, TS_PAD_REPLICATE, NN_LEAK_G);
     ag_scope_end(tape, inner, NULL, 0);
     ag_value *change = nn_conv(tape, model, l->half[2], y, 1, TS_PAD_REPLICATE, NN_LEAK_G);
-    change = nn_conv(tape, model, l->half[3], change, 1, TS_PAD_REPLICATE, 1);
-    y = ag_add(tape, in_place(tape, y), change);
+    y = nn_conv_add(tape, model, l->half[3], in_place(tape, y), change, 1, TS_PAD_REPLICATE);
     y = nn_conv(tape, model, l->half[4], y, 1, TS_PAD_ZERO, 1);
     ag_into(tape, to);
     y = ag_depth_to_space(tape, y, 2);
@@ -165,10 +163,8 @@ static bool full_size(ag_tape *tape, const nn_model *model, ag_value *photo, ag_
     if (ag_gradients(tape))
         take_apart(tape, model, pixels(tape, model, photo, nn_coordinates(tape, s.n, s.h), y), 0, guess);
     else in_bands(tape, model, photo, y, guess);
-    ag_value *sum = ag_resize_smooth(tape, coarse, s.h, s.w);
-    sum = in_place(tape, ag_add(tape, in_place(tape, sum), guess->maps));
-    in_place(tape, guess->maps);
-    guess->maps = ag_tanh(tape, sum);
+    guess->maps = ag_resize_smooth_add(tape, in_place(tape, guess->maps), coarse);
+    guess->maps = ag_tanh(tape, in_place(tape, guess->maps));
     return guess->maps && (guess->spread || !model->arch.spread);
 }
 

@@ -76,6 +76,9 @@ bool nn_all_finite(const float *v, size_t count);
 ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index);
 ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, int dilation, ts_pad pad,
                   float leak);
+/* base + the convolution of x, without an activation. */
+ag_value *nn_conv_add(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *base, ag_value *x, int dilation,
+                      ts_pad pad);
 /* constants: NULL, or further channels of the input, as ag_conv_with_constants has them. */
 ag_value *nn_conv_with_constants(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x, ag_value *constants,
                                  int dilation, ts_pad pad, float leak);

@@ -376,6 +376,13 @@ ag_value *nn_conv(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value
     return nn_conv_with_constants(tape, model, layer, x, NULL, dilation, pad, leak);
 }
 
+ag_value *nn_conv_add(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *base, ag_value *x, int dilation,
+                      ts_pad pad)
+{
+    return ag_conv_add(tape, base, x, nn_parameter(tape, model, layer.weight), nn_parameter(tape, model, layer.bias),
+                       dilation, pad);
+}
+
 ag_value *nn_linear(ag_tape *tape, const nn_model *model, nn_layer layer, ag_value *x)
 {
     return ag_linear(tape, x, nn_parameter(tape, model, layer.weight), nn_parameter(tape, model, layer.bias));

@@ -47,22 +47,25 @@ static ts_conv_way choose_direct(const ts_conv *c, ts_conv_direction direction, 
     return ts_conv_choose(&direct, direction);
 }
 
-static void forward(const ts_conv *c, bool bf16, const float *x, const float *packed, const float *bias, float leak,
-                    float *y)
+static void forward(const ts_conv *c, bool bf16, const ts_conv_inputs *in, const float *packed, float leak, float *y)
 {
+    const int apart = in->constants ? c->constants : 0;
     const conv_plan p = {.n = c->n,
                          .h = c->h,
                          .w = c->w,
                          .ic = bf16 ? conv_bf16_depth(c->ic) : c->ic,
-                         .channels = c->ic,
+                         .channels = c->ic - apart,
+                         .constants = apart,
                          .oc = c->oc,
                          .k = c->k,
                          .dilation = c->dilation,
                          .first = -c->dilation * (c->k / 2),
                          .replicate = c->pad == TS_PAD_REPLICATE,
-                         .x = x,
+                         .x = in->x,
+                         .more = in->constants,
                          .packed = packed,
-                         .bias = bias,
+                         .bias = in->bias,
+                         .base = in->base,
                          .y = y,
                          .leak = leak,
                          .bf16 = bf16,
@@ -70,15 +73,14 @@ static void forward(const ts_conv *c, bool bf16, const float *x, const float *pa
     run(&p, choose_direct(c, TS_CONV_OUTPUT, bf16 ? TS_BF16 : TS_F32));
 }
 
-void ts_conv_forward(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y)
+void ts_conv_forward(const ts_conv *c, const ts_conv_inputs *in, const float *packed, float leak, float *y)
 {
-    forward(c, false, x, packed, bias, leak, y);
+    forward(c, false, in, packed, leak, y);
 }
 
-void ts_conv_forward_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
-                          float *y)
+void ts_conv_forward_bf16(const ts_conv *c, const ts_conv_inputs *in, const float *packed, float leak, float *y)
 {
-    forward(c, true, x, packed, bias, leak, y);
+    forward(c, true, in, packed, leak, y);
 }
 
 /* A convolution of dy with mirrored, transposed weights. */
@@ -99,7 +101,7 @@ static void data_gradient(const ts_conv *c, bool bf16, const float *dy, const fl
                          .packed = packed,
                          .y = dx,
                          .leak = 1,
-                         .add = accumulate,
+                         .base = accumulate ? dx : NULL,
                          .bf16 = bf16,
                          .threads = c->compute.threads};
     run(&p, choose_direct(c, TS_CONV_INPUT, bf16 ? TS_BF16 : TS_F32));
@@ -132,16 +134,15 @@ void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float 
     else conv_direct_weight_gradient(c, true, x, dy, dweight, NULL);
 }
 
-void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
-                              float *y)
+void ts_conv_forward_winograd(const ts_conv *c, const ts_conv_inputs *in, const float *packed, float leak, float *y)
 {
-    conv_winograd_forward(c, false, x, packed, bias, leak, y);
+    conv_winograd_forward(c, false, in, packed, leak, y);
 }
 
-void ts_conv_forward_winograd_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
+void ts_conv_forward_winograd_bf16(const ts_conv *c, const ts_conv_inputs *in, const float *packed, float leak,
                                    float *y)
 {
-    conv_winograd_forward(c, true, x, packed, bias, leak, y);
+    conv_winograd_forward(c, true, in, packed, leak, y);
 }
 
 void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate)

@@ -15,16 +15,23 @@ void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight /* [oc]
 /* The same of IEEE 754 halves, in this machine's byte order and aligned to nothing; false: no memory. */
 bool ts_conv_pack_half(const ts_conv *c, ts_conv_use use, const void *weight, float *packed);
 
-/* y[n,i,j,o] = act(bias[o] + sum_{ky,kx,c} x[n, i + d(ky-k/2), j + d(kx-k/2), c] weight[o,c,ky,kx]),
- * act(v) = v > 0 ? v : leak v (0 <= leak <= 1; 1: the identity, 0: ReLU). bias may be NULL. x and y contiguous, not
- * overlapping. */
-void ts_conv_forward(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak, float *y);
+/* What is read of an output beside weights. */
+typedef struct ts_conv_inputs {
+    const float *x;         /* [n,h,w,ic]; without the last channels where these are in constants */
+    const float *bias;      /* [oc], or NULL */
+    const float *constants; /* [n,h,w,c->constants], or NULL; where ts_conv_joins says so alone */
+    const float *base;      /* [n,h,w,oc], y or not overlapping it, or NULL; where ts_conv_adds says so alone */
+} ts_conv_inputs;
+
+/* y[n,i,j,o] = act(bias[o] + base[n,i,j,o] + sum_{ky,kx,c} x[n, i + d(ky-k/2), j + d(kx-k/2), c] weight[o,c,ky,kx]),
+ * act(v) = v > 0 ? v : leak v (0 <= leak <= 1; 1: the identity, 0: ReLU). All contiguous, x and constants not
+ * overlapping y. */
+void ts_conv_forward(const ts_conv *c, const ts_conv_inputs *in, const float *packed, float leak, float *y);
 
 /* The same y, and the gradients below, by Winograd's F(4 x 4, 3 x 3) or F(2 x 2, 5 x 5) with weights packed for the use
  * of that name; c->k must be 3, or 5 (of weights 3). Its products are a quarter of the direct way's (of side 5 .36),
  * its rounding errors about ten times as large (1e-5 of the largest value, not 1e-6). */
-void ts_conv_forward_winograd(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
-                              float *y);
+void ts_conv_forward_winograd(const ts_conv *c, const ts_conv_inputs *in, const float *packed, float leak, float *y);
 void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
 void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const float *dy, float *dweight);
 
@@ -34,15 +41,14 @@ void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packe
 /* Both with x, dy and the weights rounded to bf16 (the nearest, ties to even), products and sums in f32, weights packed
  * for the use of that name: vdpbf16ps where the CPU has it, the same sum from floats elsewhere. Bias, activation and
  * results are f32. */
-void ts_conv_forward_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
-                          float *y);
+void ts_conv_forward_bf16(const ts_conv *c, const ts_conv_inputs *in, const float *packed, float leak, float *y);
 void ts_conv_data_gradient_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
 
 /* Both by Winograd's way for c->k = 3 with what it multiplies rounded to bf16, transforms and sums in f32, and the
  * gradient of the weights too. Transforms magnify the rounding of numbers that do not resemble their neighbours': the
  * RMS of errors is 1.1% of the results' RMS, in place of the direct way's 0.24%, where inputs are random, and the same
  * 0.24% where they are as smooth as images (tensor/kernels/winograd.h). */
-void ts_conv_forward_winograd_bf16(const ts_conv *c, const float *x, const float *packed, const float *bias, float leak,
+void ts_conv_forward_winograd_bf16(const ts_conv *c, const ts_conv_inputs *in, const float *packed, float leak,
                                    float *y);
 void ts_conv_data_gradient_winograd_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx,
                                          bool accumulate);
@@ -57,8 +63,7 @@ void ts_conv_weight_gradient(const ts_conv *c, const float *x, const float *dy, 
 /* Naive twins: loop nests, sums in double; the same arguments with unpacked weights. Those of bf16 are the same on
  * rounded arguments. */
 float ts_bf16_naive(float x); /* the bf16 value nearest to x */
-void ts_conv_forward_naive(const ts_conv *c, const float *x, const float *weight, const float *bias, float leak,
-                           float *y);
+void ts_conv_forward_naive(const ts_conv *c, const ts_conv_inputs *in, const float *weight, float leak, float *y);
 void ts_conv_data_gradient_naive(const ts_conv *c, const float *dy, const float *weight, float *dx, bool accumulate);
 void ts_conv_weight_gradient_naive(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias);
 #endif

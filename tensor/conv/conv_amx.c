@@ -97,14 +97,16 @@ static void put(const conv_plan *p, const float *sums, int pixels, int channels,
 {
     const struct ts_amx_kernels *k = ts_amx_k();
     if (!p->fold) {
-        k->finish(sums, TS_AMX_BLOCK, pixels, channels, bias, p->add, p->leak, y + (ptrdiff_t)column * p->oc, p->oc);
+        float *to = y + (ptrdiff_t)column * p->oc;
+        k->finish(sums, TS_AMX_BLOCK, pixels, channels, bias, p->base ? p->base + (to - p->y) : NULL, p->leak, to,
+                  p->oc);
         return;
     }
     for (int done = 0, run; done < pixels; done += run) { /* a run within the image, or one pixel beside it */
         const int at = column + done - p->fold, to = conv_clamp(at, p->w);
         run = at == to ? (pixels - done < p->w - at ? pixels - done : p->w - at) : 1;
-        k->finish(sums + (ptrdiff_t)done * TS_AMX_BLOCK, TS_AMX_BLOCK, run, channels, NULL, true, 1,
-                  y + (ptrdiff_t)to * p->oc, p->oc);
+        float *sum = y + (ptrdiff_t)to * p->oc;
+        k->finish(sums + (ptrdiff_t)done * TS_AMX_BLOCK, TS_AMX_BLOCK, run, channels, NULL, sum, 1, sum, p->oc);
     }
 }
 
@@ -168,9 +170,11 @@ static void fill_window(const frame *f, int image, int e0, int e1, float *to)
             memset(to, 0, sizeof(float) * (size_t)row);
             continue;
         }
-        const float *from = p->x + ((ptrdiff_t)image * p->h + source) * p->w * p->channels;
+        const ptrdiff_t at = ((ptrdiff_t)image * p->h + source) * p->w;
         float *in = to + (ptrdiff_t)left * p->ic, *end = in + (ptrdiff_t)p->w * p->ic;
-        conv_put_pixels(p, from, p->w, in, p->ic);
+        conv_put_pixels(p, p->x + at * p->channels, p->w, in, p->ic);
+        if (p->more) /* behind whole pairs */
+            ts_pairs_k()->of_channels(p->more + at * p->constants, p->w, p->constants, in + p->channels / 2, p->ic);
         const size_t pixel = sizeof(float) * (size_t)p->ic;
         for (int j = 0; j < left; j++) {
             if (p->replicate) memcpy(to + (ptrdiff_t)j * p->ic, in, pixel);
@@ -195,7 +199,7 @@ static void run_band(const frame *f, int image, int begin, int end, int panel0, 
     fill_window(f, image, e0, e1, window);
     for (int i = 0; i < rows; i++)
         y_row[i] = p->y + ((ptrdiff_t)image * p->h + conv_clamp(e0 + i - p->fold, p->h)) * p->w * p->oc;
-    if (p->fold && !p->add) {
+    if (p->fold && !p->base) {
         const int o0 = panel0 * TS_AMX_BLOCK, o1 = panel1 * TS_AMX_BLOCK < p->oc ? panel1 * TS_AMX_BLOCK : p->oc;
         for (ptrdiff_t q = (ptrdiff_t)begin * p->w; q < (ptrdiff_t)end * p->w; q++)
             memset(p->y + ((ptrdiff_t)image * p->h * p->w + q) * p->oc + o0, 0, sizeof(float) * (size_t)(o1 - o0));

@@ -98,6 +98,17 @@ ts_conv_way ts_conv_choose(const ts_conv *c, ts_conv_direction direction)
     return narrow;
 }
 
+bool ts_conv_adds(const ts_conv *c)
+{
+    const ts_conv_way way = ts_conv_choose(c, TS_CONV_OUTPUT);
+    return way == TS_CONV_BY_WINOGRAD || way == TS_CONV_BY_AMX;
+}
+
+bool ts_conv_joins(const ts_conv *c)
+{
+    return ts_conv_adds(c) && (c->compute.precision == TS_F32 || ts_conv_variables(c) % 2 == 0);
+}
+
 bool ts_conv_rounds_weights(const ts_conv *c)
 {
     if (c->compute.precision != TS_BF16) return false;

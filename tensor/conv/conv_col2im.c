@@ -49,7 +49,8 @@ static float *row_of(const job *g, const sums *s, int row) { return s->memory + 
 static void put_row(const job *g, float *sum, int image, int row)
 {
     const conv_plan *p = g->p;
-    g->kernels->finish(sum, p->w, p->oc, p->add, p->leak, p->y + ((ptrdiff_t)image * p->h + row) * p->w * p->oc);
+    g->kernels->finish(sum, p->w, p->oc, p->base != NULL, p->leak,
+                       p->y + ((ptrdiff_t)image * p->h + row) * p->w * p->oc);
 }
 
 /* Output columns [begin, end) tap by tap: where borders are replicated, columns outside have the border's products, and

@@ -223,7 +223,7 @@ static void run_band(const conv_plan *p, weight_part part, const band *b)
             const int ky_end = ky + part.ky < p->k ? ky + part.ky : p->k;
             for (int e = e0, before = -1; e < e1; e++) {
                 const int row = conv_clamp(e - p->fold, p->h);
-                run_row(&r, e, ky, ky_end, panel0, panel1, !p->add && ky == 0 && row != before);
+                run_row(&r, e, ky, ky_end, panel0, panel1, !p->base && ky == 0 && row != before);
                 before = row;
             }
         }

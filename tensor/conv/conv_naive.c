@@ -41,22 +41,27 @@ float ts_bf16_naive(float x)
     return below < above || (below == above && !(low >> 16 & 1)) ? a : b;
 }
 
-void ts_conv_forward_naive(const ts_conv *c, const float *x, const float *weight, const float *bias, float leak,
-                           float *y)
+void ts_conv_forward_naive(const ts_conv *c, const ts_conv_inputs *in, const float *weight, float leak, float *y)
 {
+    const int first = in->constants ? ts_conv_variables(c) : c->ic; /* channels of x */
     for (int n = 0; n < c->n; n++)
         for (int i = 0; i < c->h; i++)
             for (int j = 0; j < c->w; j++)
                 for (int o = 0; o < c->oc; o++) {
-                    double sum = bias ? bias[o] : 0;
+                    const int64_t to = at(c, n, i, j, c->oc) + o;
+                    double sum = (in->bias ? in->bias[o] : 0) + (in->base ? (double)in->base[to] : 0);
                     for (int ky = 0; ky < c->k; ky++)
                         for (int kx = 0; kx < c->k; kx++) {
                             int si = source(i, ky, c, c->h), sj = source(j, kx, c, c->w);
                             if (si < 0 || sj < 0) continue;
-                            const float *p = x + at(c, n, si, sj, c->ic);
-                            for (int ch = 0; ch < c->ic; ch++) sum += (double)p[ch] * weight[tap(c, o, ch, ky, kx)];
+                            const float *p = in->x + at(c, n, si, sj, first);
+                            for (int ch = 0; ch < first; ch++) sum += (double)p[ch] * weight[tap(c, o, ch, ky, kx)];
+                            if (first == c->ic) continue;
+                            p = in->constants + at(c, n, si, sj, c->constants);
+                            for (int ch = first; ch < c->ic; ch++)
+                                sum += (double)p[ch - first] * weight[tap(c, o, ch, ky, kx)];
                         }
-                    y[at(c, n, i, j, c->oc) + o] = (float)(sum > 0 ? sum : leak * sum);
+                    y[to] = (float)(sum > 0 ? sum : leak * sum);
                 }
 }
 

@@ -13,7 +13,7 @@ ts_tile conv_panel_tile(const conv_plan *p, int panel)
     return (ts_tile){.w = p->packed + (ptrdiff_t)o0 * p->ic * p->k * p->k,
                      .bias = p->bias ? p->bias + o0 : NULL,
                      .channels = p->oc - o0,
-                     .add = p->add,
+                     .add = p->base != NULL,
                      .leak = p->leak,
                      .y_stride = p->oc,
                      .fetch = {p->packed, p->packed}};

@@ -126,8 +126,8 @@ static void put_row(const conv_plan *p, const rows *s, const float *out, float *
     const int begin = s->begin > p->fold ? s->begin - p->fold : 0, inside = s->begin + s->width - p->fold,
               end = inside < p->w ? inside : p->w; /* columns of y */
     if (end > begin)
-        ts_conv_k()->collect(out + begin + p->fold - s->begin, s->width, end - begin, p->oc, p->fold ? !first : p->add,
-                             p->leak, y + (ptrdiff_t)begin * p->oc, p->oc);
+        ts_conv_k()->collect(out + begin + p->fold - s->begin, s->width, end - begin, p->oc,
+                             p->fold ? !first : p->base != NULL, p->leak, y + (ptrdiff_t)begin * p->oc, p->oc);
     for (int j = 0; j < s->width; j++) {
         const int at = s->begin + j - p->fold;
         if ((at >= 0 && at < p->w) || at >= p->w + p->fold) continue;
@@ -150,7 +150,7 @@ static void run_band(const conv_plan *p, int image, int begin, int end)
             const int row = conv_clamp(e - p->fold, p->h);
             fill(&s, p, image, conv_clamp(e + p->first, p->h), conv_clamp(e + p->first + reach, p->h));
             sum_row(p, &s, e, out);
-            put_row(p, &s, out, p->y + ((ptrdiff_t)image * p->h + row) * p->w * p->oc, !p->add && row != before);
+            put_row(p, &s, out, p->y + ((ptrdiff_t)image * p->h + row) * p->w * p->oc, !p->base && row != before);
             before = row;
         }
     }

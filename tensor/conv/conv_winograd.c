@@ -130,15 +130,15 @@ void winograd_locate(const winograd_grid *g, int64_t first, int count, winograd_
     }
 }
 
-void winograd_sources(const winograd_grid *g, const float *x, const float *nothing, winograd_place at,
+void winograd_sources(const winograd_grid *g, const float *x, int channels, const float *nothing, winograd_place at,
                       const float *pixel[WINOGRAD_AREA])
 {
     ptrdiff_t row[WINOGRAD_REACH], column[WINOGRAD_REACH]; /* offsets; -1: outside */
     for (int a = 0; a < WINOGRAD_REACH; a++) {
         const int r = at.i + g->first_row + a * g->dilation, i = conv_clamp(r, g->h),
                   s = at.j + g->first_column + a * g->dilation, j = conv_clamp(s, g->w);
-        row[a] = !g->replicate && i != r ? -1 : ((ptrdiff_t)at.image * g->h + i) * g->w * g->ic;
-        column[a] = !g->replicate && j != s ? -1 : (ptrdiff_t)j * g->ic;
+        row[a] = !g->replicate && i != r ? -1 : ((ptrdiff_t)at.image * g->h + i) * g->w * channels;
+        column[a] = !g->replicate && j != s ? -1 : (ptrdiff_t)j * channels;
     }
     for (int a = 0; a < WINOGRAD_REACH; a++)
         for (int b = 0; b < WINOGRAD_REACH; b++)
@@ -187,21 +187,31 @@ static void multiply(const winograd_grid *g, const float *u, const float *v, int
         }
 }
 
-static void put_targets(const winograd_grid *g, winograd_place tile, float *y, float *pixel[WINOGRAD_OUTPUTS])
-{
-    ptrdiff_t at[WINOGRAD_OUTPUTS];
-    winograd_targets(g, tile, at);
-    for (int i = 0; i < g->side * g->side; i++) pixel[i] = at[i] < 0 ? NULL : y + at[i];
-}
-
 typedef struct run_job {
     const winograd_grid *g;
-    const float *x, *packed, *bias;
+    const ts_conv_inputs *in;
+    const float *packed;
     float leak;
-    bool add;
     float *y;
-    int step; /* tiles of a task */
+    int constants; /* channels of in->constants */
+    int step;      /* tiles of a task */
 } run_job;
+
+/* v [36][tile][to ..] of channels that lie in an array of their own. */
+static void transform(const winograd_grid *g, const float *x, int channels, const winograd_place *place, int count,
+                      float *v, ptrdiff_t plane)
+{
+    const ts_winograd_form form = g->bf16 ? TS_WINOGRAD_CHANNELS : TS_WINOGRAD_F32;
+    const int depth = depth_of(g->ic, g->bf16);
+    float *nothing = ts_scratch(2, sizeof(float) * (size_t)channels);
+    memset(nothing, 0, sizeof(float) * (size_t)channels);
+    const float *from[2][WINOGRAD_AREA];
+    winograd_sources(g, x, channels, nothing, place[0], from[0]);
+    for (int i = 0; i < count; i++) {
+        winograd_sources(g, x, channels, nothing, place[i + 1], from[(i + 1) & 1]);
+        ts_winograd_k()->input[form](from[i & 1], from[(i + 1) & 1], channels, v + (ptrdiff_t)i * depth, plane);
+    }
+}
 
 static void run_tiles(const void *job, int64_t group)
 {
@@ -209,34 +219,28 @@ static void run_tiles(const void *job, int64_t group)
     const winograd_grid *g = j->g;
     const int depth = depth_of(g->ic, g->bf16);
     const ptrdiff_t in = winograd_plane(TILES, depth), out = winograd_plane(TILES, g->oc);
-    const struct ts_winograd_kernels *kernels = ts_winograd_k();
-    const ts_winograd_form form = g->bf16 ? TS_WINOGRAD_CHANNELS : TS_WINOGRAD_F32;
     const int64_t first = group * j->step;
     const int count = (int)(g->tiles - first < j->step ? g->tiles - first : j->step);
     float *v = ts_scratch(0, sizeof(float) * (size_t)(in * WINOGRAD_AREA)),
           *m = ts_scratch(1, sizeof(float) * (size_t)(out * WINOGRAD_AREA));
-    float *nothing = ts_scratch(2, sizeof(float) * (size_t)g->ic);
-    memset(nothing, 0, sizeof(float) * (size_t)g->ic);
-    const float *from[2][WINOGRAD_AREA];
     winograd_place place[TILES + 1];
     winograd_locate(g, first, count, place);
     place[count] = place[count - 1];
-    winograd_sources(g, j->x, nothing, place[0], from[0]);
-    for (int i = 0; i < count; i++) {
-        winograd_sources(g, j->x, nothing, place[i + 1], from[(i + 1) & 1]);
-        kernels->input[form](from[i & 1], from[(i + 1) & 1], g->ic, v + (ptrdiff_t)i * depth, in);
-    }
+    const int channels = g->ic - j->constants;
+    transform(g, j->in->x, channels, place, count, v, in);
+    if (j->constants) /* behind whole pairs */
+        transform(g, j->in->constants, j->constants, place, count, v + (g->bf16 ? channels / 2 : channels), in);
     multiply(g, j->packed, v, count, m);
-    float *to[2][WINOGRAD_OUTPUTS];
-    put_targets(g, place[0], j->y, to[0]);
+    ptrdiff_t to[2][WINOGRAD_OUTPUTS];
+    winograd_targets(g, place[0], to[0]);
     for (int i = 0; i < count; i++) {
-        put_targets(g, place[i + 1], j->y, to[(i + 1) & 1]);
-        kernels->output[g->side == 2][g->bf16](m + (ptrdiff_t)i * g->oc, out, g->oc, j->bias, j->leak, j->add,
-                                               to[i & 1], to[(i + 1) & 1]);
+        winograd_targets(g, place[i + 1], to[(i + 1) & 1]);
+        ts_winograd_k()->output[g->side == 2][g->bf16](m + (ptrdiff_t)i * g->oc, out, g->oc, j->in->bias, j->in->base,
+                                                       j->leak, j->y, to[i & 1], to[(i + 1) & 1]);
     }
 }
 
-static void run(const winograd_grid *g, const float *x, const float *packed, const float *bias, float leak, bool add,
+static void run(const winograd_grid *g, const ts_conv_inputs *in, int constants, const float *packed, float leak,
                 float *y)
 {
     /* As many to each thread; a tile's values do not depend on those that it is computed with. */
@@ -244,14 +248,14 @@ static void run(const winograd_grid *g, const float *x, const float *packed, con
     const int64_t groups = ((g->tiles + TILES - 1) / TILES + threads - 1) / threads * threads;
     const int step = (int)((g->tiles + groups - 1) / groups);
     ts_spread_tasks(g->threads, (g->tiles + step - 1) / step, run_tiles,
-                    &(run_job){g, x, packed, bias, leak, add, y, step});
+                    &(run_job){g, in, packed, leak, y, in->constants ? constants : 0, step});
 }
 
-void conv_winograd_forward(const ts_conv *c, bool bf16, const float *x, const float *packed, const float *bias,
-                           float leak, float *y)
+void conv_winograd_forward(const ts_conv *c, bool bf16, const ts_conv_inputs *in, const float *packed, float leak,
+                           float *y)
 {
     const winograd_grid g = winograd_grid_forward(c, bf16);
-    run(&g, x, packed, bias, leak, false, y);
+    run(&g, in, c->constants, packed, leak, y);
 }
 
 typedef struct add_job {
@@ -284,7 +288,7 @@ void conv_winograd_data_gradient(const ts_conv *c, bool bf16, const float *dy, c
                                  bool accumulate)
 {
     winograd_grid g = winograd_grid_gradient(c, (winograd_part){0, 0, c->h, c->w}, bf16);
-    run(&g, dy, packed, NULL, 1, accumulate, dx);
+    run(&g, &(ts_conv_inputs){.x = dy, .base = accumulate ? dx : NULL}, 0, packed, 1, dx);
     if (c->pad != TS_PAD_REPLICATE) return;
     const int more = c->dilation * (c->k / 2), channels = ts_conv_variables(c);
     const winograd_part around[] = {{-more, -more, more, c->w + 2 * more},
@@ -295,7 +299,7 @@ void conv_winograd_data_gradient(const ts_conv *c, bool bf16, const float *dy, c
     float *part = ts_scratch(3, sizeof(float) * (size_t)c->n * (size_t)(most * more) * (size_t)channels);
     for (size_t i = 0; i < sizeof around / sizeof *around; i++) {
         g = winograd_grid_gradient(c, around[i], bf16);
-        run(&g, dy, packed, NULL, 1, false, part);
+        run(&g, &(ts_conv_inputs){.x = dy}, 0, packed, 1, part);
         ts_for(c->compute.threads, c->n, 1, add_images, &(add_job){c, around[i], channels, part, dx});
     }
 }

@@ -41,8 +41,8 @@ typedef struct winograd_place {
 void winograd_locate(const winograd_grid *g, int64_t first, int count,
                      winograd_place *place); /* of tiles first, first + 1, ... */
 
-/* The 6 x 6 pixels of x that a tile reads; nothing, a pixel of zeros, for those outside. */
-void winograd_sources(const winograd_grid *g, const float *x, const float *nothing, winograd_place at,
+/* The 6 x 6 pixels of x, of so many channels, that a tile reads; nothing, a pixel of zeros, for those outside. */
+void winograd_sources(const winograd_grid *g, const float *x, int channels, const float *nothing, winograd_place at,
                       const float *pixel[WINOGRAD_AREA]);
 
 /* Offsets of a tile's side x side outputs; -1: no such pixel. */

@@ -85,10 +85,10 @@ static void transform(const job *j, part of, int64_t first, int count, const flo
     winograd_place place[2 * GROUP_TILES + 1];
     winograd_locate(g, first, count, place);
     place[count] = place[count - 1];
-    winograd_sources(g, j->x + of.i0, nothing, place[0], x[0]);
+    winograd_sources(g, j->x + of.i0, g->ic, nothing, place[0], x[0]);
     put_sources(j, of, place[0], nothing, dy[0]);
     for (int i = 0; i < count; i++) {
-        winograd_sources(g, j->x + of.i0, nothing, place[i + 1], x[(i + 1) & 1]);
+        winograd_sources(g, j->x + of.i0, g->ic, nothing, place[i + 1], x[(i + 1) & 1]);
         put_sources(j, of, place[i + 1], nothing, dy[(i + 1) & 1]);
         const ts_winograd_form form = !g->bf16 ? TS_WINOGRAD_F32 : i % 2 ? TS_WINOGRAD_ODD : TS_WINOGRAD_EVEN;
         const ptrdiff_t row = g->bf16 ? i / 2 : i;

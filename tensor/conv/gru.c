@@ -90,7 +90,7 @@ static void product(const float *a, ptrdiff_t a_stride, const ts_segment *segmen
                     const float *packed, int oc, float *y, bool add, int count)
 {
     const struct ts_conv_kernels *k = ts_conv_k();
-    const conv_plan plan = {.ic = depth, .oc = oc, .k = 1, .packed = packed, .leak = 1, .add = add};
+    const conv_plan plan = {.ic = depth, .oc = oc, .k = 1, .packed = packed, .leak = 1, .base = add ? y : NULL};
     for (int panel = 0; panel < conv_panels(oc); panel++) {
         ts_tile t = conv_panel_tile(&plan, panel);
         t.segment = segment;

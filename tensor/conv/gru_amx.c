@@ -39,7 +39,8 @@ void gru_amx_product(const gru_rounded *r, bool hidden, const float *packed, int
     ptrdiff_t *at = ts_scratch(3, sizeof *at * (size_t)steps);
     for (int s = 0; s < steps; s++)
         at[s] = (s < of_n || hidden ? c / 2 + s * TS_AMX_PAIRS : (s - of_n) * TS_AMX_PAIRS) * (ptrdiff_t)sizeof(float);
-    const conv_plan p = {.ic = 2 * c, .oc = oc, .k = 1, .x = r->pairs, .packed = packed, .y = y, .leak = 1, .add = add};
+    const conv_plan p = {
+        .ic = 2 * c, .oc = oc, .k = 1, .x = r->pairs, .packed = packed, .y = y, .leak = 1, .base = add ? y : NULL};
     conv_amx_steps(&p, at, steps, r->count);
 }
 

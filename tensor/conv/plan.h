@@ -23,10 +23,10 @@
  */
 #ifndef TS_CONV_PLAN_H
 #define TS_CONV_PLAN_H
-#include "tensor/conv/shape.h"
+#include "tensor/conv/conv.h"
 #include "tensor/kernels/conv.h"
 
-/* y[n, i, j, o] (+)= act(bias[o] + sum x[n, i + first + d ky, j + first + d kx, c] w[ky, kx, c, o]).
+/* y[n, i, j, o] = act(base[n, i, j, o] + bias[o] + sum x[n, i + first + d ky, j + first + d kx, c] w[ky, kx, c, o]).
  * The gradient under replicate padding is computed on a domain that is larger by fold on each side, and what falls
  * outside is added to the nearest border pixel: that is exactly the transpose of replicating it. */
 typedef struct conv_plan {
@@ -35,12 +35,13 @@ typedef struct conv_plan {
     int first;      /* coordinate that tap 0 reads for output 0 */
     bool replicate; /* else zeros */
     int fold;       /* output domain [-fold, h + fold) x [-fold, w + fold), folded into [0, h) x [0, w) */
-    const float *x, *packed, *bias;
+    const float *x, *more, *packed, *bias;
+    const float *base; /* NULL or y; of the ways of ts_conv_adds any array */
     float *y;
     float leak;
-    bool add;
-    bool bf16;    /* weights, and x as tiles read it, are pairs of bf16 values, each where a float would be; */
-    int channels; /* x itself is floats, so many a pixel */
+    bool bf16;     /* weights, and x as tiles read it, are pairs of bf16 values, each where a float would be; */
+    int channels;  /* x itself is floats, so many a pixel, */
+    int constants; /* and behind them so many of more; of the ways of ts_conv_joins */
     int threads;
 } conv_plan;
 
@@ -152,8 +153,8 @@ void conv_pack_pixel_lanes(int ic, int oc, int k, bool mirrored, const float *we
 
 size_t conv_winograd_count(int ic, int oc, bool bf16);
 void conv_winograd_pack(const ts_conv *c, bool forward, bool bf16, const conv_weights *w, float *packed);
-void conv_winograd_forward(const ts_conv *c, bool bf16, const float *x, const float *packed, const float *bias,
-                           float leak, float *y);
+void conv_winograd_forward(const ts_conv *c, bool bf16, const ts_conv_inputs *in, const float *packed, float leak,
+                           float *y);
 void conv_winograd_data_gradient(const ts_conv *c, bool bf16, const float *dy, const float *packed, float *dx,
                                  bool accumulate);
 void conv_winograd_weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight);

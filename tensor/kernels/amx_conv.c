@@ -46,8 +46,8 @@ PRODUCT(product_1_2, 0, 1)
 PRODUCT(product_2_1, 1, 0)
 PRODUCT(product_2_2, 1, 1)
 
-static void finish(const float *c, ptrdiff_t c_row, int pixels, int channels, const float *bias, bool add, float leak,
-                   float *y, ptrdiff_t y_row)
+static void finish(const float *c, ptrdiff_t c_row, int pixels, int channels, const float *bias, const float *base,
+                   float leak, float *y, ptrdiff_t y_row)
 {
     const vf slope = v_set(leak);
     for (int o = 0; o < channels; o += VL) {
@@ -58,7 +58,7 @@ static void finish(const float *c, ptrdiff_t c_row, int pixels, int channels, co
             __builtin_prefetch(to + TS_AMX_BLOCK * y_row,
                                1); /* where the next product's go: stores that miss would hold up what follows */
             vf v = v_load(c + p * c_row + o) + b;
-            if (add) v += v_load_part(to, left);
+            if (base) v += v_load_part(base + p * y_row + o, left);
             v_store_part(to, v_max(slope * v, v), left);
         }
     }

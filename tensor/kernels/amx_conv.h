@@ -33,10 +33,10 @@ struct ts_amx_kernels {
     void (*end)(void);   /* gives the tiles back: until then the system saves them at every switch */
     /* [rows > 16][columns > 16]: all 16 or 32 of both are read and written. */
     void (*product[2][2])(const ts_amx_product *m);
-    /* y[p y_row + o] = act(c[p c_row + o] + bias[o] (+ y[p y_row + o])), act as in tensor/conv/conv.h; bias may be NULL
-     */
-    void (*finish)(const float *c, ptrdiff_t c_row, int pixels, int channels, const float *bias, bool add, float leak,
-                   float *y, ptrdiff_t y_row);
+    /* y[p y_row + o] = act(c[p c_row + o] + bias[o] + base[p y_row + o]), act as in tensor/conv/conv.h; bias and base
+     * may be NULL, base may be y. */
+    void (*finish)(const float *c, ptrdiff_t c_row, int pixels, int channels, const float *bias, const float *base,
+                   float leak, float *y, ptrdiff_t y_row);
     /* to[c plane + p] = x[p x_row + c] and to[i to_row + c] = x[2i x_row + c], x[(2i + 1) x_row + c], as the nearest
      * bf16; behind an odd last pixel a zero. The second writes zeros for c up to a multiple of 16. */
     void (*planes)(const float *x, ptrdiff_t x_row, int pixels, int channels, uint16_t *to, ptrdiff_t plane);

@@ -13,11 +13,14 @@
 #define EVERY_OTHER(first) first, first + 2, first + 4, first + 6
 #endif
 
+#if defined(__AVX512BF16__)
+enum { DENORMAL = 0x20 }; /* which the conversion would take for zeros */
+#endif
+
 /* The values of a, and those of b behind them. */
 static inline vf both(vf a, vf b)
 {
 #if defined(__AVX512BF16__)
-    enum { DENORMAL = 0x20 }; /* which the conversion would take for zeros */
     if (!(_mm512_fpclass_ps_mask((__m512)a, DENORMAL) | _mm512_fpclass_ps_mask((__m512)b, DENORMAL)))
         return (vf)_mm512_cvtne2ps_pbh((__m512)b, (__m512)a);
 #endif
@@ -26,10 +29,32 @@ static inline vf both(vf a, vf b)
     return (vf)(even >> 16 | (odd & 0xffff0000));
 }
 
+#if defined(__AVX512BF16__)
+/* Pixels of one vector at most, before the first that has a denormal; returns how many. */
+static int64_t of_one_vector(const float *x, int64_t pixels, int channels, float *to, ptrdiff_t stride)
+{
+    const __mmask16 from = (__mmask16)((1u << channels) - 1);
+    const __mmask8 put = (__mmask8)((1u << (channels + 1) / 2) - 1);
+    int64_t p = 0;
+    for (; p < pixels; p++, x += channels, to += stride) {
+        const __m512 v = _mm512_maskz_loadu_ps(from, x);
+        if (_mm512_fpclass_ps_mask(v, DENORMAL)) break;
+        _mm256_mask_storeu_epi32(to, put, (__m256i)_mm512_cvtneps_pbh(v));
+    }
+    return p;
+}
+#endif
+
 static void of_channels(const float *x, int64_t pixels, int channels, float *to, ptrdiff_t stride)
 {
     int64_t run = channels; /* of values without a gap */
     if (channels % 2 == 0 && stride == channels / 2) run *= pixels, pixels = 1;
+#if defined(__AVX512BF16__)
+    else if (channels <= VL) {
+        const int64_t done = of_one_vector(x, pixels, channels, to, stride);
+        pixels -= done, x += done * run, to += done * stride;
+    }
+#endif
     for (; pixels > 0; pixels--, x += run, to += stride)
         for (int64_t i = 0; i < run; i += 2 * VL) {
             const int64_t left = run - i;

@@ -93,7 +93,8 @@ INLINE void input(const ts_winograd_form form, const float *const pixel[36], con
 
 /* side: of the tile of outputs. */
 INLINE void output(const ts_winograd_form form, const int side, const float *m, ptrdiff_t plane, int channels,
-                   const float *bias, float leak, bool add, float *const *y, float *const *next)
+                   const float *bias, const float *base, float leak, float *y, const ptrdiff_t *to_y,
+                   const ptrdiff_t *next)
 {
     const points at = points_of(form);
     void (*const make)(points, const vf *, vf *) = side == 4 ? four : two;
@@ -114,10 +115,10 @@ INLINE void output(const ts_winograd_form form, const int side, const float *m, 
             UNROLL for (int j = 0; j < side; j++)
             {
                 const int k = side * i + j;
-                if (next[k]) __builtin_prefetch(next[k] + c, 1);
-                if (!y[k]) continue;
-                const vf u = add ? to[j] + init + v_load_part(y[k] + c, channels - c) : to[j] + init;
-                v_store_part(y[k] + c, v_max(v_set(leak) * u, u), channels - c);
+                if (next[k] >= 0) __builtin_prefetch(y + next[k] + c, 1);
+                if (to_y[k] < 0) continue;
+                const vf u = base ? to[j] + init + v_load_part(base + to_y[k] + c, channels - c) : to[j] + init;
+                v_store_part(y + to_y[k] + c, v_max(v_set(leak) * u, u), channels - c);
             }
         }
     }
@@ -270,11 +271,12 @@ INLINE void weights_gradient(const ts_winograd_form form, const float *u, ptrdif
     {                                                                                                                  \
         output_gradient(form, dy, next, channels, m, plane);                                                           \
     }
-#define OUTPUT(name, form, k)                                                                                     \
-    static void output_##k##_##name(const float *m, ptrdiff_t plane, int channels, const float *bias, float leak, \
-                                    bool add, float *const *y, float *const *next)                                \
-    {                                                                                                             \
-        output(form, 7 - k, m, plane, channels, bias, leak, add, y, next);                                        \
+#define OUTPUT(name, form, k)                                                                         \
+    static void output_##k##_##name(const float *m, ptrdiff_t plane, int channels, const float *bias, \
+                                    const float *base, float leak, float *y, const ptrdiff_t *at,     \
+                                    const ptrdiff_t *next)                                            \
+    {                                                                                                 \
+        output(form, 7 - k, m, plane, channels, bias, base, leak, y, at, next);                       \
     }
 #define WEIGHTS_GRADIENT(name, form)                                                                          \
     static void weights_gradient_##name(const float *u, ptrdiff_t plane, int sums, ptrdiff_t sum, float *tap) \

@@ -27,12 +27,11 @@ struct ts_winograd_kernels {
      * tile, to be fetched. An odd number of channels ends with a pair of one and a zero. */
     void (*input[TS_WINOGRAD_FORMS])(const float *const pixel[36], const float *const next[36], int channels, float *v,
                                      ptrdiff_t plane);
-    /* y[(7 - k) i + j][c] = act(bias[c] + (A' m A)[c] (+ y[..][c])) where that y is not NULL; bias may be NULL; 0 <=
-     * leak
-     * <= 1 as in tensor/conv/conv.h. next: the next tile's y, to be fetched. [k = 3, 5][whether products are of bf16]
-     */
-    void (*output[2][2])(const float *m, ptrdiff_t plane, int channels, const float *bias, float leak, bool add,
-                         float *const *y, float *const *next);
+    /* y[at[(7 - k) i + j] + c] = act(bias[c] + base[at[..] + c] + (A' m A)[c]) where that at is not negative; bias and
+     * base may be NULL, base may be y; 0 <= leak <= 1 as in tensor/conv/conv.h. next: where the next tile's go, to be
+     * fetched. [k = 3, 5][whether products are of bf16] */
+    void (*output[2][2])(const float *m, ptrdiff_t plane, int channels, const float *bias, const float *base,
+                         float leak, float *y, const ptrdiff_t *at, const ptrdiff_t *next);
     /* u[36 planes][o] = (G g G')[o] of tap[(k i + j) step + o], o over whole vectors. [k = 3, 5] */
     void (*weights[2][TS_WINOGRAD_FORMS])(const float *tap, ptrdiff_t step, int vectors, float *u, ptrdiff_t plane);
     /* What output and weights do where k = 3, transposed. m[36 planes][c] = (A dy A')[c], its last vector whole, with

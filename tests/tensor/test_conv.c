@@ -108,7 +108,8 @@ static buffer packed(const problem *p, ts_conv_use use)
 static buffer forward(const problem *p, bool bias)
 {
     buffer w = packed(p, TS_CONV_FORWARD), y = make(out_count(&p->c));
-    ts_conv_forward(&p->c, p->x.data, w.data, bias ? p->bias.data : NULL, p->leak, y.data);
+    ts_conv_forward(&p->c, &(ts_conv_inputs){.x = p->x.data, .bias = bias ? p->bias.data : NULL}, w.data, p->leak,
+                    y.data);
     finish(&w, "packed");
     return y;
 }
@@ -128,7 +129,8 @@ static void check_forward(const problem *p)
     const double terms = (double)p->c.ic * p->c.k * p->c.k;
     for (int bias = 0; bias < 2; bias++) {
         buffer y = forward(p, bias), naive = make(y.count);
-        ts_conv_forward_naive(&p->c, p->x.data, p->weight.data, bias ? p->bias.data : NULL, p->leak, naive.data);
+        ts_conv_forward_naive(&p->c, &(ts_conv_inputs){.x = p->x.data, .bias = bias ? p->bias.data : NULL},
+                              p->weight.data, p->leak, naive.data);
         same(&y, &naive, terms, "forward", &p->c);
         finish(&y, "y");
         finish(&naive, "naive y");
@@ -328,12 +330,12 @@ TEST(conv_long_sums_stay_accurate)
     const size_t count = (size_t)c.h * (size_t)c.w * (size_t)c.oc;
     buffer x = make_random((size_t)(c.h * c.w * c.ic), &r), w = make_random((size_t)(c.oc * c.ic * c.k * c.k), &r),
            y = make(count), y2 = make(count);
-    ts_conv_forward_naive(&c, x.data, w.data, NULL, 1, y2.data);
+    ts_conv_forward_naive(&c, &(ts_conv_inputs){.x = x.data}, w.data, 1, y2.data);
     for (int isa = TS_BASE; isa <= (int)ts_isa_best(); isa++) {
         ts_isa_use((ts_isa)isa);
         buffer packed = make(ts_conv_packed_count(&c, TS_CONV_FORWARD));
         ts_conv_pack(&c, TS_CONV_FORWARD, w.data, packed.data);
-        ts_conv_forward(&c, x.data, packed.data, NULL, 1, y.data);
+        ts_conv_forward(&c, &(ts_conv_inputs){.x = x.data}, packed.data, 1, y.data);
         double error = 0, size = 0;
         for (size_t i = 0; i < count; i++) {
             error += ((double)y.data[i] - y2.data[i]) * ((double)y.data[i] - y2.data[i]);

@@ -171,7 +171,7 @@ static float *run(const problem *p, ts_conv_use use, const float *bias, const fl
     float *packed = values(ts_conv_packed_count(&p->c, use), NULL), *y = values(count + 2 * GUARD, NULL);
     if (start) memcpy(y + GUARD, start, count * sizeof(float));
     ts_conv_pack(&p->c, use, p->weight, packed);
-    if (forward) ts_conv_forward_bf16(&p->c, p->x, packed, bias, p->leak, y + GUARD);
+    if (forward) ts_conv_forward_bf16(&p->c, &(ts_conv_inputs){.x = p->x, .bias = bias}, packed, p->leak, y + GUARD);
     else ts_conv_data_gradient_bf16(&p->c, p->dy, packed, y + GUARD, start != NULL);
     for (size_t i = 0; i < GUARD; i++)
         CHECK(isnan(y[i]) && isnan(y[GUARD + count + i]), "written %zu floats outside the result", i);
@@ -210,7 +210,7 @@ static void against_naive(ts_conv c, ts_rng *r)
           *weight = rounded(p.weight, weight_count(&c));
     for (int b = 0; b < 2; b++) {
         float *y = run(&p, TS_CONV_FORWARD_BF16, b ? p.bias : NULL, NULL), *naive = values(out_count(&c), NULL);
-        ts_conv_forward_naive(&c, x, weight, b ? p.bias : NULL, p.leak, naive);
+        ts_conv_forward_naive(&c, &(ts_conv_inputs){.x = x, .bias = b ? p.bias : NULL}, weight, p.leak, naive);
         same(y, naive, out_count(&c), (double)c.ic * c.k * c.k, "forward", &c);
         free(y), free(naive);
         problem q = p;
@@ -365,7 +365,7 @@ TEST(bf16_in_ag_conv)
         if (i < 2) on_tape(i ? TS_BF16 : TS_F32, &p, y[i], dx[i], dweight[i]);
     }
     float *x = rounded(p.x, in_count(c)), *weight = rounded(p.weight, weight_count(c));
-    ts_conv_forward_naive(c, x, weight, NULL, 1, y[2]);
+    ts_conv_forward_naive(c, &(ts_conv_inputs){.x = x}, weight, 1, y[2]);
     same(y[1], y[2], out_count(c), 9. * c->ic, "forward", c);
     for (size_t i = 0; i < out_count(c); i++) p.dy[i] = 1 / 512.f; /* a bf16 value as it is */
     ts_conv_data_gradient_naive(c, p.dy, weight, dx[2], false);

@@ -30,7 +30,8 @@ static float *run(const ts_conv *c, const float *x, const float *weight, const f
     const ts_conv_use use = rounded(c) ? TS_CONV_WINOGRAD_BF16 : TS_CONV_WINOGRAD;
     float *packed = values(ts_conv_packed_count(c, use), NULL), *y = values(count_y(c) + 2 * GUARD, NULL);
     ts_conv_pack(c, use, weight, packed);
-    (rounded(c) ? ts_conv_forward_winograd_bf16 : ts_conv_forward_winograd)(c, x, packed, bias, leak, y + GUARD);
+    (rounded(c) ? ts_conv_forward_winograd_bf16 : ts_conv_forward_winograd)(c, &(ts_conv_inputs){.x = x, .bias = bias},
+                                                                            packed, leak, y + GUARD);
     for (int i = 0; i < GUARD; i++)
         CHECK(isnan(y[i]) && isnan(y[GUARD + count_y(c) + (size_t)i]), "written %d floats outside y", i);
     memmove(y, y + GUARD, count_y(c) * sizeof(float));
@@ -65,7 +66,7 @@ static void against_naive(ts_conv c, ts_rng *r)
           *naive = values(count_y(&c), NULL);
     for (int b = 0; b < 2; b++) {
         float *y = run(&c, x, weight, b ? bias : NULL, leak);
-        ts_conv_forward_naive(&c, x, weight, b ? bias : NULL, leak, naive);
+        ts_conv_forward_naive(&c, &(ts_conv_inputs){.x = x, .bias = b ? bias : NULL}, weight, leak, naive);
         close_to(y, naive, count_y(&c), (double)c.k * c.k * c.ic, "forward", &c);
         free(y);
     }
@@ -183,9 +184,9 @@ TEST(winograd_bf16_of_smooth_inputs)
         for (int p = 0; p < c.h * c.w; p++)
             x[(size_t)p * (size_t)c.ic + (size_t)ch] = (float)sin(w + u * (p / c.w) + v * (p % c.w));
     }
-    ts_conv_forward_naive(&c, x, weight, NULL, 1, naive);
+    ts_conv_forward_naive(&c, &(ts_conv_inputs){.x = x}, weight, 1, naive);
     ts_conv_pack(&c, TS_CONV_FORWARD_BF16, weight, packed);
-    ts_conv_forward_bf16(&c, x, packed, NULL, 1, direct);
+    ts_conv_forward_bf16(&c, &(ts_conv_inputs){.x = x}, packed, 1, direct);
     float *winograd = run(&c, x, weight, NULL, 1);
     double error[2] = {0}, size = 0;
     for (size_t i = 0; i < count_y(&c); i++) {
