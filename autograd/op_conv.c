@@ -41,20 +41,20 @@ static const float *input(ag_tape *tape, const ag_node *node)
     return both;
 }
 
-/* Whether backward reads the input. */
-static bool reads_input(const ag_tape *tape, const ag_node *node)
+/* Whether backward reads the input's channels joined. */
+static bool saves(const ag_tape *tape, const ag_node *node)
 {
-    const ag_value *bias = node->in[BIAS];
-    return ag_gradients(tape) && (node->in[WEIGHT]->needs_grad || (bias && bias->needs_grad));
+    const conv_attr *a = node->attr;
+    return ag_gradients(tape) && node->in[WEIGHT]->needs_grad && !ts_conv_joins(&a->conv, TS_CONV_WEIGHTS);
 }
 
-static void weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias)
+static void weight_gradient(const ts_conv *c, const ts_conv_inputs *in, const float *dy, float *dweight, float *dbias)
 {
     const ts_conv_way way = dweight ? ts_conv_choose(c, TS_CONV_WEIGHTS) : TS_CONV_DIRECTLY;
     const bool winograd = way == TS_CONV_BY_WINOGRAD, bf16 = dweight && ts_conv_rounds_weights(c);
-    if (winograd) (bf16 ? ts_conv_weight_gradient_winograd_bf16 : ts_conv_weight_gradient_winograd)(c, x, dy, dweight);
-    else if (bf16) ts_conv_weight_gradient_bf16(c, x, dy, dweight);
-    ts_conv_weight_gradient(c, x, dy, winograd || bf16 ? NULL : dweight, dbias);
+    if (winograd) (bf16 ? ts_conv_weight_gradient_winograd_bf16 : ts_conv_weight_gradient_winograd)(c, in, dy, dweight);
+    else if (bf16) ts_conv_weight_gradient_bf16(c, in, dy, dweight);
+    ts_conv_weight_gradient(c, in->x, dy, winograd || bf16 ? NULL : dweight, dbias);
 }
 
 typedef void forward_function(const ts_conv *c, const ts_conv_inputs *in, const float *packed, float leak, float *y);
@@ -108,10 +108,10 @@ static void forward(ag_tape *tape, ag_node *node)
     if (ag_traced()) ag_trace_way(tape, ts_conv_way_name(ts_conv_choose(&a->conv, TS_CONV_OUTPUT)));
     ts_mark mark = ts_arena_mark(ag_arena(tape));
     ts_conv_inputs in = {.x = data(node->in[X]), .bias = data(node->in[BIAS]), .base = data(node->in[BASE])};
-    const bool saves = reads_input(tape, node);
-    if (!saves && ts_conv_joins(&a->conv)) in.constants = data(node->in[CONSTANTS]);
+    const bool saved = saves(tape, node);
+    if (!saved && ts_conv_joins(&a->conv, TS_CONV_OUTPUT)) in.constants = data(node->in[CONSTANTS]);
     else in.x = input(tape, node);
-    if (saves) {
+    if (saved) {
         node->saved = (void *)(uintptr_t)in.x;
         mark = ts_arena_mark(ag_arena(tape));
     }
@@ -135,7 +135,9 @@ static void backward(ag_tape *tape, ag_node *node)
     if (a->leak != 1.0f) /* in place: nobody reads this gradient afterwards */
         ts_for(ag_threads(tape), ts_count(node->out->t.shape), AG_CHUNK, leaky_range, node);
     float *dweight = ag_grad_add(tape, node->in[WEIGHT]), *dbias = ag_grad_add(tape, node->in[BIAS]);
-    if (dweight || dbias) weight_gradient(&a->conv, node->saved, dy, dweight, dbias);
+    ts_conv_inputs in = {.x = node->saved};
+    if (!in.x) in = (ts_conv_inputs){.x = data(node->in[X]), .constants = data(node->in[CONSTANTS])};
+    if (dweight || dbias) weight_gradient(&a->conv, &in, dy, dweight, dbias);
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[X], &accumulate);
     const ts_conv_use use = ts_conv_packing(&a->conv, TS_CONV_INPUT);

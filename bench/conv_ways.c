@@ -85,7 +85,7 @@ static void data_gradient_winograd(void *user)
 static void weight_gradient_winograd(void *user)
 {
     bench_conv *w = user;
-    ts_conv_weight_gradient_winograd(&w->c, w->x, w->y, w->weight);
+    ts_conv_weight_gradient_winograd(&w->c, &(ts_conv_inputs){.x = w->x}, w->y, w->weight);
 }
 
 static void forward_bf16(void *user)
@@ -103,7 +103,7 @@ static void data_gradient_bf16(void *user)
 static void weight_gradient_bf16(void *user)
 {
     bench_conv *w = user;
-    ts_conv_weight_gradient_bf16(&w->c, w->x, w->y, w->weight);
+    ts_conv_weight_gradient_bf16(&w->c, &(ts_conv_inputs){.x = w->x}, w->y, w->weight);
 }
 
 static void winograd_bf16(void *user)
@@ -122,7 +122,7 @@ static void data_gradient_winograd_bf16(void *user)
 static void weight_gradient_winograd_bf16(void *user)
 {
     bench_conv *w = user;
-    ts_conv_weight_gradient_winograd_bf16(&w->c, w->x, w->y, w->weight);
+    ts_conv_weight_gradient_winograd_bf16(&w->c, &(ts_conv_inputs){.x = w->x}, w->y, w->weight);
 }
 
 static void forward_naive(void *user)

@@ -126,12 +126,12 @@ void ts_conv_weight_gradient(const ts_conv *c, const float *x, const float *dy, 
     if (dweight || dbias) conv_direct_weight_gradient(c, false, x, dy, dweight, dbias);
 }
 
-void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight)
+void ts_conv_weight_gradient_bf16(const ts_conv *c, const ts_conv_inputs *in, const float *dy, float *dweight)
 {
     const ts_conv_way way = choose_direct(c, TS_CONV_WEIGHTS, TS_BF16);
-    if (way == TS_CONV_BY_AMX) conv_amx_weight_gradient(c, x, dy, dweight);
-    else if (way == TS_CONV_BY_BATCH) conv_batch_weight_gradient(c, true, x, dy, dweight);
-    else conv_direct_weight_gradient(c, true, x, dy, dweight, NULL);
+    if (way == TS_CONV_BY_AMX) conv_amx_weight_gradient(c, in, dy, dweight);
+    else if (way == TS_CONV_BY_BATCH) conv_batch_weight_gradient(c, true, in->x, dy, dweight);
+    else conv_direct_weight_gradient(c, true, in->x, dy, dweight, NULL);
 }
 
 void ts_conv_forward_winograd(const ts_conv *c, const ts_conv_inputs *in, const float *packed, float leak, float *y)
@@ -156,12 +156,12 @@ void ts_conv_data_gradient_winograd_bf16(const ts_conv *c, const float *dy, cons
     conv_winograd_data_gradient(c, true, dy, packed, dx, accumulate);
 }
 
-void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const float *dy, float *dweight)
+void ts_conv_weight_gradient_winograd(const ts_conv *c, const ts_conv_inputs *in, const float *dy, float *dweight)
 {
-    conv_winograd_weight_gradient(c, false, x, dy, dweight);
+    conv_winograd_weight_gradient(c, false, in, dy, dweight);
 }
 
-void ts_conv_weight_gradient_winograd_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight)
+void ts_conv_weight_gradient_winograd_bf16(const ts_conv *c, const ts_conv_inputs *in, const float *dy, float *dweight)
 {
-    conv_winograd_weight_gradient(c, true, x, dy, dweight);
+    conv_winograd_weight_gradient(c, true, in, dy, dweight);
 }

@@ -15,11 +15,11 @@ void ts_conv_pack(const ts_conv *c, ts_conv_use use, const float *weight /* [oc]
 /* The same of IEEE 754 halves, in this machine's byte order and aligned to nothing; false: no memory. */
 bool ts_conv_pack_half(const ts_conv *c, ts_conv_use use, const void *weight, float *packed);
 
-/* What is read of an output beside weights. */
+/* What an output, or a gradient of weights (x and constants alone), is made of. */
 typedef struct ts_conv_inputs {
     const float *x;         /* [n,h,w,ic]; without the last channels where these are in constants */
     const float *bias;      /* [oc], or NULL */
-    const float *constants; /* [n,h,w,c->constants], or NULL; where ts_conv_joins says so alone */
+    const float *constants; /* [n,h,w,c->constants], or NULL; where ts_conv_joins says so for the direction alone */
     const float *base;      /* [n,h,w,oc], y or not overlapping it, or NULL; where ts_conv_adds says so alone */
 } ts_conv_inputs;
 
@@ -33,7 +33,7 @@ void ts_conv_forward(const ts_conv *c, const ts_conv_inputs *in, const float *pa
  * its rounding errors about ten times as large (1e-5 of the largest value, not 1e-6). */
 void ts_conv_forward_winograd(const ts_conv *c, const ts_conv_inputs *in, const float *packed, float leak, float *y);
 void ts_conv_data_gradient_winograd(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
-void ts_conv_weight_gradient_winograd(const ts_conv *c, const float *x, const float *dy, float *dweight);
+void ts_conv_weight_gradient_winograd(const ts_conv *c, const ts_conv_inputs *in, const float *dy, float *dweight);
 
 /* dx [n,h,w,ts_conv_variables] (+)= the gradient of the input given dy = the gradient before the activation. */
 void ts_conv_data_gradient(const ts_conv *c, const float *dy, const float *packed, float *dx, bool accumulate);
@@ -52,10 +52,10 @@ void ts_conv_forward_winograd_bf16(const ts_conv *c, const ts_conv_inputs *in, c
                                    float *y);
 void ts_conv_data_gradient_winograd_bf16(const ts_conv *c, const float *dy, const float *packed, float *dx,
                                          bool accumulate);
-void ts_conv_weight_gradient_winograd_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight);
+void ts_conv_weight_gradient_winograd_bf16(const ts_conv *c, const ts_conv_inputs *in, const float *dy, float *dweight);
 
 /* dweight[oc][ic][k][k] += with x and dy rounded so. Pairs are of pixels, or of images, not of channels. */
-void ts_conv_weight_gradient_bf16(const ts_conv *c, const float *x, const float *dy, float *dweight);
+void ts_conv_weight_gradient_bf16(const ts_conv *c, const ts_conv_inputs *in, const float *dy, float *dweight);
 
 /* dweight[oc][ic][k][k] += , dbias[oc] += (either may be NULL). */
 void ts_conv_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight, float *dbias);

@@ -18,7 +18,9 @@ enum {
 
 typedef struct job {
     const ts_conv *c;
-    const float *x, *dy;
+    const ts_conv_inputs *x;
+    const float *dy;
+    int first;           /* channels of x->x */
     int reach, columns;  /* columns of a line: even, so that pairs of pixels do not straddle rows */
     int ic, oc;          /* whole tiles */
     int chunks, groups;  /* of rows over all images; of parts of the inputs */
@@ -55,18 +57,29 @@ static void pack_band(const job *g, int image, int begin, int end, int c0, int c
 {
     const ts_conv *c = g->c;
     const struct ts_amx_kernels *k = ts_amx_k();
-    const int half = g->reach / 2, rows = end - begin, exist = (c1 < c->ic ? c1 : c->ic) - c0;
-    memset(x, 0, (size_t)plane * (size_t)(c1 - c0) * sizeof *x);
+    const int half = g->reach / 2, rows = end - begin, exist = (c1 < c->ic ? c1 : c->ic) - c0,
+              left = g->first > c0 ? g->first - c0 : 0, before = left < exist ? left : exist; /* of x->x */
     for (int r = 0; r < rows + g->reach; r++) {
         const int at = begin + r - half, source = conv_clamp(at, c->h);
-        if (source != at && c->pad == TS_PAD_ZERO) continue;
-        const float *from = g->x + ((ptrdiff_t)image * c->h + source) * c->w * c->ic + c0;
-        uint16_t *to = x + (ptrdiff_t)r * g->columns + half;
-        k->planes(from, c->ic, c->w, exist, to, plane);
-        if (c->pad == TS_PAD_ZERO) continue;
-        for (int i = 0; i < exist; i++, to += plane)
-            for (int j = 1; j <= half; j++) to[-j] = to[0], to[c->w - 1 + j] = to[c->w - 1];
+        const ptrdiff_t from = ((ptrdiff_t)image * c->h + source) * c->w;
+        uint16_t *to = x + (ptrdiff_t)r * g->columns;
+        if (source != at && c->pad == TS_PAD_ZERO) {
+            for (int i = 0; i < exist; i++) memset(to + i * plane, 0, sizeof *x * (size_t)g->columns);
+            continue;
+        }
+        k->planes(g->x->x + from * g->first + c0, g->first, c->w, before, to + half, plane);
+        if (before < exist)
+            k->planes(g->x->constants + from * c->constants + c0 + before - g->first, c->constants, c->w,
+                      exist - before, to + half + before * plane, plane);
+        for (int i = 0; i < exist; i++, to += plane) {
+            const bool zero = c->pad == TS_PAD_ZERO;
+            for (int j = 0; j < half; j++) to[j] = zero ? 0 : to[half];
+            for (int j = half + c->w; j < g->columns; j++) to[j] = zero ? 0 : to[half + c->w - 1];
+        }
     }
+    const ptrdiff_t there = (ptrdiff_t)(rows + g->reach) * g->columns; /* behind, dy is zero; x must be finite */
+    for (int i = 0; i < exist; i++) memset(x + i * plane + there, 0, sizeof *x * (size_t)(plane - there));
+    memset(x + exist * plane, 0, sizeof *x * (size_t)(plane * (c1 - c0 - exist)));
     const int pairs = line_pixels(g, rows) / 2, in_row = (c->w + 1) / 2;
     for (int r = 0; r < rows; r++) {
         float *to = dy + (ptrdiff_t)r * (g->columns / 2) * g->oc;
@@ -159,12 +172,13 @@ static void reduce_parts(const void *made, int64_t begin, int64_t end)
     }
 }
 
-void conv_amx_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight)
+void conv_amx_weight_gradient(const ts_conv *c, const ts_conv_inputs *x, const float *dy, float *dweight)
 {
     job g = {.c = c,
              .x = x,
              .dy = dy,
              .dweight = dweight,
+             .first = x->constants ? ts_conv_variables(c) : c->ic,
              .reach = (c->k - 1) * c->dilation,
              .ic = round_up(c->ic, TS_AMX_SIDE),
              .oc = round_up(c->oc, TS_AMX_SIDE)};

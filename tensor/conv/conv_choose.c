@@ -98,15 +98,19 @@ ts_conv_way ts_conv_choose(const ts_conv *c, ts_conv_direction direction)
     return narrow;
 }
 
-bool ts_conv_adds(const ts_conv *c)
+static bool transforms(const ts_conv *c, ts_conv_direction direction)
 {
-    const ts_conv_way way = ts_conv_choose(c, TS_CONV_OUTPUT);
+    const ts_conv_way way = ts_conv_choose(c, direction);
     return way == TS_CONV_BY_WINOGRAD || way == TS_CONV_BY_AMX;
 }
 
-bool ts_conv_joins(const ts_conv *c)
+bool ts_conv_adds(const ts_conv *c) { return transforms(c, TS_CONV_OUTPUT); }
+
+/* The output's pairs are of channels: none may be of both arrays. */
+bool ts_conv_joins(const ts_conv *c, ts_conv_direction direction)
 {
-    return ts_conv_adds(c) && (c->compute.precision == TS_F32 || ts_conv_variables(c) % 2 == 0);
+    return transforms(c, direction) &&
+        (direction == TS_CONV_WEIGHTS || c->compute.precision == TS_F32 || ts_conv_variables(c) % 2 == 0);
 }
 
 bool ts_conv_rounds_weights(const ts_conv *c)

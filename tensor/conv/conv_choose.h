@@ -7,9 +7,9 @@
 ts_conv_way ts_conv_choose(const ts_conv *c, ts_conv_direction direction);
 /* What its weights are packed for; not for TS_CONV_WEIGHTS. */
 ts_conv_use ts_conv_packing(const ts_conv *c, ts_conv_direction direction);
-/* Whether the output is made of constants in an array of their own, and added to a base (tensor/conv/conv.h), on the
- * way. */
-bool ts_conv_joins(const ts_conv *c);
+/* Whether the output, or the gradient of weights, is made of constants in an array of their own (tensor/conv/conv.h),
+ * and whether the output is added to a base. */
+bool ts_conv_joins(const ts_conv *c, ts_conv_direction direction);
 bool ts_conv_adds(const ts_conv *c);
 /* Whether gradients of weights are made of rounded values: of those of c->compute, where that costs no time. */
 bool ts_conv_rounds_weights(const ts_conv *c);

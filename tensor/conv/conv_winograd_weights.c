@@ -18,7 +18,9 @@ enum {
 
 typedef struct job {
     winograd_grid g;
-    const float *x, *dy;
+    const ts_conv_inputs *x;
+    const float *dy;
+    int first;                      /* channels of x->x */
     int padded;                     /* output channels in whole vectors */
     int group, chunks;              /* tiles transformed together; chunks of tiles */
     int parts, input_parts;         /* of the panels of outputs; of the inputs */
@@ -30,9 +32,10 @@ typedef struct job {
 /* Of bf16, V and M hold pairs of tiles. */
 static int rows_of(const job *j, int tiles) { return j->g.bf16 ? (tiles + 1) / 2 : tiles; }
 
-static job make_job(const ts_conv *c, bool bf16, const float *x, const float *dy)
+static job make_job(const ts_conv *c, bool bf16, const ts_conv_inputs *x, const float *dy)
 {
-    job j = {.g = winograd_grid_forward(c, bf16), .x = x, .dy = dy};
+    job j = {
+        .g = winograd_grid_forward(c, bf16), .x = x, .dy = dy, .first = x->constants ? ts_conv_variables(c) : c->ic};
     const int lanes = conv_lanes();
     j.padded = (c->oc + lanes - 1) / lanes * lanes;
     j.group = GROUP_BYTES / (WINOGRAD_AREA * (int)sizeof(float) * (c->ic + j.padded));
@@ -76,24 +79,41 @@ static void put_sources(const job *j, part of, winograd_place tile, const float 
     for (int i = 0; i < WINOGRAD_OUTPUTS; i++) pixel[i] = at[i] < 0 ? nothing : j->dy + at[i] + of.o0;
 }
 
+static ts_winograd_form form_of(const job *j, int tile)
+{
+    return !j->g.bf16 ? TS_WINOGRAD_F32 : tile % 2 ? TS_WINOGRAD_ODD : TS_WINOGRAD_EVEN;
+}
+
+/* V of count channels of an array whose pixels have all of them. */
+static void transform_inputs(const job *j, const float *x, int all, int count, const winograd_place *place, int tiles,
+                             const float *nothing, float *v)
+{
+    const float *pixel[2][WINOGRAD_AREA];
+    if (count < 1) return;
+    winograd_sources(&j->g, x, all, nothing, place[0], pixel[0]);
+    for (int i = 0; i < tiles; i++) {
+        winograd_sources(&j->g, x, all, nothing, place[i + 1], pixel[(i + 1) & 1]);
+        ts_winograd_k()->input[form_of(j, i)](pixel[i & 1], pixel[(i + 1) & 1], count,
+                                              v + (ptrdiff_t)(j->g.bf16 ? i / 2 : i) * j->g.ic, j->in);
+    }
+}
+
 /* V of a part of the inputs, and M of a part of the outputs, of some tiles. */
 static void transform(const job *j, part of, int64_t first, int count, const float *nothing, float *v, float *m)
 {
-    const struct ts_winograd_kernels *k = ts_winograd_k();
-    const winograd_grid *g = &j->g;
-    const float *x[2][WINOGRAD_AREA], *dy[2][WINOGRAD_OUTPUTS];
+    const float *dy[2][WINOGRAD_OUTPUTS];
     winograd_place place[2 * GROUP_TILES + 1];
-    winograd_locate(g, first, count, place);
+    winograd_locate(&j->g, first, count, place);
     place[count] = place[count - 1];
-    winograd_sources(g, j->x + of.i0, g->ic, nothing, place[0], x[0]);
+    const int middle = j->first < of.i0 ? of.i0 : j->first < of.i1 ? j->first : of.i1; /* where constants begin */
+    transform_inputs(j, j->x->x + of.i0, j->first, middle - of.i0, place, count, nothing, v + of.i0);
+    transform_inputs(j, j->x->constants ? j->x->constants + (middle - j->first) : NULL, j->g.ic - j->first,
+                     of.i1 - middle, place, count, nothing, v + middle);
     put_sources(j, of, place[0], nothing, dy[0]);
     for (int i = 0; i < count; i++) {
-        winograd_sources(g, j->x + of.i0, g->ic, nothing, place[i + 1], x[(i + 1) & 1]);
         put_sources(j, of, place[i + 1], nothing, dy[(i + 1) & 1]);
-        const ts_winograd_form form = !g->bf16 ? TS_WINOGRAD_F32 : i % 2 ? TS_WINOGRAD_ODD : TS_WINOGRAD_EVEN;
-        const ptrdiff_t row = g->bf16 ? i / 2 : i;
-        k->input[form](x[i & 1], x[(i + 1) & 1], of.i1 - of.i0, v + of.i0 + row * g->ic, j->in);
-        k->output_gradient[form](dy[i & 1], dy[(i + 1) & 1], of.count, m + of.o0 + row * j->padded, j->out);
+        ts_winograd_k()->output_gradient[form_of(j, i)](
+            dy[i & 1], dy[(i + 1) & 1], of.count, m + of.o0 + (ptrdiff_t)(j->g.bf16 ? i / 2 : i) * j->padded, j->out);
     }
 }
 
@@ -164,7 +184,8 @@ static void reduce_inputs(const void *made, int64_t begin, int64_t end)
     }
 }
 
-void conv_winograd_weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight)
+void conv_winograd_weight_gradient(const ts_conv *c, bool bf16, const ts_conv_inputs *x, const float *dy,
+                                   float *dweight)
 {
     job j = make_job(c, bf16, x, dy);
     j.dweight = dweight;

@@ -157,7 +157,8 @@ void conv_winograd_forward(const ts_conv *c, bool bf16, const ts_conv_inputs *in
                            float *y);
 void conv_winograd_data_gradient(const ts_conv *c, bool bf16, const float *dy, const float *packed, float *dx,
                                  bool accumulate);
-void conv_winograd_weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight);
+void conv_winograd_weight_gradient(const ts_conv *c, bool bf16, const ts_conv_inputs *x, const float *dy,
+                                   float *dweight);
 
 /* dweight += for at most CONV_BATCH_PIXELS pixels an image. */
 void conv_batch_weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight);
@@ -165,5 +166,5 @@ void conv_batch_weight_gradient(const ts_conv *c, bool bf16, const float *x, con
 void conv_direct_weight_gradient(const ts_conv *c, bool bf16, const float *x, const float *dy, float *dweight,
                                  float *dbias);
 /* Where there is a matrix unit. */
-void conv_amx_weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight);
+void conv_amx_weight_gradient(const ts_conv *c, const ts_conv_inputs *x, const float *dy, float *dweight);
 #endif

@@ -64,29 +64,34 @@ static void finish(const float *c, ptrdiff_t c_row, int pixels, int channels, co
     }
 }
 
+/* Pairs of pixels are 16 channels of 32 bits; transposed, 32 pixels of a channel. */
 static void planes(const float *x, ptrdiff_t x_row, int pixels, int channels, uint16_t *to, ptrdiff_t plane)
 {
-    for (int p = 0; p < pixels; p += VL)
+    for (int p = 0; p < pixels; p += 2 * VL)
         for (int c = 0; c < channels; c += VL) {
-            const int count = pixels - p < VL ? pixels - p : VL;
+            const int count = pixels - p < 2 * VL ? pixels - p : 2 * VL;
+            const float *from = x + p * x_row + c;
             vf r[VL];
             _Pragma("GCC unroll 16") for (int i = 0; i < VL; i++)
-                r[i] = v_load_part(x + (p + (i < count ? i : 0)) * x_row + c, channels - c);
+            {
+                const int even = 2 * i < count ? 2 * i : 0, odd = 2 * i + 1 < count ? 2 * i + 1 : 0;
+                r[i] = v_pairs(v_load_part(from + even * x_row, channels - c),
+                               v_load_part(from + odd * x_row, channels - c));
+            }
             v_turn(r);
-            const __mmask16 exist = (__mmask16)((1u << count) - 1);
+            const __mmask32 exist = (__mmask32)(0xffffffffu >> (2 * VL - count));
             _Pragma("GCC unroll 16") for (int i = 0; i < VL; i++) if (i < channels - c)
-                _mm512_mask_cvtepi32_storeu_epi16(to + (c + i) * plane + p, exist, (__m512i)(v_bf16(r[i]) >> 16));
+                _mm512_mask_storeu_epi16(to + (c + i) * plane + p, exist, (__m512i)r[i]);
         }
 }
 
 static void pixel_pairs(const float *x, ptrdiff_t x_row, int pixels, int channels, float *to, ptrdiff_t to_row)
 {
     for (int p = 0; p < pixels; p += 2, x += 2 * x_row, to += to_row)
-        for (int c = 0; c < channels; c += VL) {
-            const vu even = v_bf16(v_load_part(x + c, channels - c)),
-                     odd = p + 1 < pixels ? v_bf16(v_load_part(x + x_row + c, channels - c)) : (vu){0};
-            v_store(to + c, (vf)(even >> 16 | (odd & 0xffff0000)));
-        }
+        for (int c = 0; c < channels; c += VL)
+            v_store(to + c,
+                    v_pairs(v_load_part(x + c, channels - c),
+                            p + 1 < pixels ? v_load_part(x + x_row + c, channels - c) : (vf){0}));
 }
 
 const struct ts_amx_kernels TS_TABLE(amx) = {.begin = tiles_begin,

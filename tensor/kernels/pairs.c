@@ -63,32 +63,18 @@ static void of_channels(const float *x, int64_t pixels, int channels, float *to,
         }
 }
 
-/* The bf16 values of each lane of two vectors, those of even in the low halves. */
-static inline vf halves(vf even, vf odd)
-{
-#if defined(__AVX512BF16__)
-    static const uint16_t order[2 * VL] = {0, 16, 1, 17, 2,  18, 3,  19, 4,  20, 5,  21, 6,  22, 7,  23,
-                                           8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31};
-    const __m512i both = (__m512i)_mm512_cvtne2ps_pbh((__m512)odd, (__m512)even);
-    return (vf)_mm512_permutexvar_epi16(_mm512_loadu_si512(order), both);
-#else
-    const vu low = __builtin_convertvector(v_bf16_half(even), vu), high = __builtin_convertvector(v_bf16_half(odd), vu);
-    return (vf)(low | high << 16);
-#endif
-}
-
 static void of_two(const float *even, const float *odd, ptrdiff_t step, int64_t pixels, int64_t count, int64_t width,
                    float *to, ptrdiff_t to_step)
 {
     const int64_t whole = odd ? (count < width ? count : width) / VL * VL : 0;
     for (int64_t p = 0; p < pixels; p++, even += step, odd += odd ? step : 0, to += to_step) {
         int64_t i = 0;
-        for (; i < whole; i += VL) v_store(to + i, halves(v_load(even + i), v_load(odd + i)));
+        for (; i < whole; i += VL) v_store(to + i, v_pairs(v_load(even + i), v_load(odd + i)));
         for (; i < width; i += VL) {
             const bool there = i < count;
             const vf a = there ? v_load_part(even + i, count - i) : (vf){0},
                      b = there && odd ? v_load_part(odd + i, count - i) : (vf){0};
-            v_store_part(to + i, halves(a, b), width - i);
+            v_store_part(to + i, v_pairs(a, b), width - i);
         }
     }
 }

@@ -75,6 +75,20 @@ static inline vu16 v_bf16_half(vf x)
 #endif
 }
 
+/* The bf16 values of each lane of two vectors, those of even in the low halves; denormals as above. */
+static inline vf v_pairs(vf even, vf odd)
+{
+#if defined(__AVX512BF16__)
+    static const uint16_t order[2 * VL] = {0, 16, 1, 17, 2,  18, 3,  19, 4,  20, 5,  21, 6,  22, 7,  23,
+                                           8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31};
+    const __m512i both = (__m512i)_mm512_cvtne2ps_pbh((__m512)odd, (__m512)even);
+    return (vf)_mm512_permutexvar_epi16(_mm512_loadu_si512(order), both);
+#else
+    const vu low = __builtin_convertvector(v_bf16_half(even), vu), high = __builtin_convertvector(v_bf16_half(odd), vu);
+    return (vf)(low | high << 16);
+#endif
+}
+
 static inline vf v_sqrt(vf x)
 {
 #if defined(__AVX512F__)

@@ -59,7 +59,11 @@ INLINE void put(ts_winograd_form form, float *to, vf x, int64_t left)
     if (form == TS_WINOGRAD_CHANNELS) {
         const vu16 rounded = v_bf16_half(x);
         if (left >= VL) memcpy(to, &rounded, sizeof rounded);
+#if defined(__AVX512VL__)
+        else _mm256_mask_storeu_epi32(to, (__mmask8)((1u << (left + 1) / 2) - 1), (__m256i)rounded);
+#else
         else memcpy(to, &rounded, (size_t)((left + 1) / 2) * sizeof *to);
+#endif
         return;
     }
     const vu rounded = __builtin_convertvector(v_bf16_half(x), vu);

@@ -186,7 +186,7 @@ static float *gradient_of_weights(const problem *p)
     const size_t count = weight_count(&p->c);
     float *dweight = values(count + 2 * GUARD, NULL);
     memcpy(dweight + GUARD, p->weight, count * sizeof(float));
-    ts_conv_weight_gradient_bf16(&p->c, p->x, p->dy, dweight + GUARD);
+    ts_conv_weight_gradient_bf16(&p->c, &(ts_conv_inputs){.x = p->x}, p->dy, dweight + GUARD);
     for (size_t i = 0; i < GUARD; i++)
         CHECK(isnan(dweight[i]) && isnan(dweight[GUARD + count + i]), "written %zu floats outside the gradient", i);
     memmove(dweight, dweight + GUARD, count * sizeof(float));

@@ -49,6 +49,20 @@ static float *run(const ts_conv *c, const ts_conv_inputs *in, const float *weigh
     return y;
 }
 
+static float *gradient(const ts_conv *c, const ts_conv_inputs *in, const float *dy)
+{
+    const size_t count = (size_t)(c->k * c->k * c->ic) * (size_t)c->oc;
+    float *dweight = values(count + 2 * GUARD, NULL);
+    memset(dweight + GUARD, 0, count * sizeof(float));
+    (ts_conv_choose(c, TS_CONV_WEIGHTS) == TS_CONV_BY_AMX ? ts_conv_weight_gradient_bf16
+         : ts_conv_rounds_weights(c)                      ? ts_conv_weight_gradient_winograd_bf16
+                                     : ts_conv_weight_gradient_winograd)(c, in, dy, dweight + GUARD);
+    for (size_t i = 0; i < GUARD; i++)
+        CHECK(isnan(dweight[i]) && isnan(dweight[GUARD + count + i]), "written %zu floats outside the gradient", i);
+    memmove(dweight, dweight + GUARD, count * sizeof(float));
+    return dweight;
+}
+
 static const char *text(const ts_conv *c)
 {
     static char line[160];
@@ -64,7 +78,7 @@ static bool as_if_joined(const ts_conv *c, ts_rng *r)
     const size_t pixels = (size_t)c->n * (size_t)c->h * (size_t)c->w, outputs = pixels * (size_t)c->oc,
                  bytes = outputs * sizeof(float);
     if (!ts_conv_adds(c)) {
-        CHECK(!ts_conv_joins(c), "%s: joins constants, adds no base", text(c));
+        CHECK(!ts_conv_joins(c, TS_CONV_OUTPUT), "%s: joins constants, adds no base", text(c));
         return false;
     }
     const int variables = ts_conv_variables(c);
@@ -73,10 +87,17 @@ static bool as_if_joined(const ts_conv *c, ts_rng *r)
           *first = channels_of(x, pixels, c->ic, 0, variables),
           *rest = channels_of(x, pixels, c->ic, variables, c->constants);
     float *plain = run(c, &(ts_conv_inputs){.x = x, .bias = bias}, weight, 0.2f, NULL);
-    if (ts_conv_joins(c) && c->constants) {
+    if (ts_conv_joins(c, TS_CONV_OUTPUT) && c->constants) {
         float *y = run(c, &(ts_conv_inputs){.x = first, .bias = bias, .constants = rest}, weight, 0.2f, NULL);
         CHECK(!memcmp(y, plain, bytes), "%s: constants apart give other bytes", text(c));
         free(y);
+    }
+    if (ts_conv_joins(c, TS_CONV_WEIGHTS) && c->constants) {
+        float *joined = gradient(c, &(ts_conv_inputs){.x = x}, base),
+              *apart = gradient(c, &(ts_conv_inputs){.x = first, .constants = rest}, base);
+        CHECK(!memcmp(joined, apart, sizeof(float) * (size_t)(c->k * c->k * c->ic) * (size_t)c->oc),
+              "%s: constants apart give another gradient of weights", text(c));
+        free(joined), free(apart);
     }
     free(plain);
     /* Without an activation a base is added to the sum: one rounding. */

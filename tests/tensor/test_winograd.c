@@ -92,7 +92,8 @@ static float *data_gradient(const ts_conv *c, const float *dy, const float *weig
 
 static void weight_gradient(const ts_conv *c, const float *x, const float *dy, float *dweight)
 {
-    (rounded(c) ? ts_conv_weight_gradient_winograd_bf16 : ts_conv_weight_gradient_winograd)(c, x, dy, dweight);
+    (rounded(c) ? ts_conv_weight_gradient_winograd_bf16
+                : ts_conv_weight_gradient_winograd)(c, &(ts_conv_inputs){.x = x}, dy, dweight);
 }
 
 static void gradients_against_naive(ts_conv c, ts_rng *r)
