@@ -91,13 +91,14 @@ static void run(ag_tape *tape, const conv_attr *a, ts_conv_inputs in, const floa
         forward(&a->conv, &in, packed, a->leak, out->t.data);
         return;
     }
-    adding sum = {in.base, ts_new(ag_arena(tape), out->t.shape).data, out->t.data};
+    float *change = ts_new(ag_arena(tape), out->t.shape).data;
+    const adding sum = {in.base, change, out->t.data};
     in.base = NULL;
-    if (!sum.change) {
+    if (!change) {
         ag_fail(tape, TS_NOMEM, "conv: no memory for %lld values", (long long)ts_count(out->t.shape));
         return;
     }
-    forward(&a->conv, &in, packed, 1, (float *)(uintptr_t)sum.change);
+    forward(&a->conv, &in, packed, 1, change);
     ts_for(ag_threads(tape), ts_count(out->t.shape), AG_CHUNK, add_range, &sum);
 }
 
