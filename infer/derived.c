@@ -1,10 +1,8 @@
 #include "infer/derived.h"
 #include "data/height.h"
 #include "data/occlusion.h"
+#include "tensor/new_file.h"
 #include <math.h>
-#include <stdio.h>
-
-enum { PATH_LENGTH = 4096 };
 
 /* Each empty where it is not needed. */
 typedef struct derived {
@@ -14,12 +12,10 @@ typedef struct derived {
 
 static ts_code write_png(const char *folder, unsigned which, const io_image *image, int bits, bool srgb, ts_status *st)
 {
-    char path[PATH_LENGTH];
+    char path[TS_PATH_LENGTH];
     int k = 0;
     while (which >> k != 1) k++;
-    if (snprintf(path, sizeof path, "%s/%s", folder, lgd_files[k]) >= PATH_LENGTH)
-        return ts_fail(st, TS_INVALID, "%.200s...: the name is too long", folder);
-    return io_write_png(path, image, bits, srgb, st);
+    return ts_path_in(path, folder, lgd_files[k], st) ? st->code : io_write_png(path, image, bits, srgb, st);
 }
 
 static ts_code compute(derived *d, unsigned which, bool repeats, lgd_output_result *facts, ts_status *st)

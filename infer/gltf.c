@@ -3,6 +3,7 @@
 #include "data/html.h"
 #include "data/text.h"
 #include "infer/export.h"
+#include "tensor/new_file.h"
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -32,7 +33,7 @@ static void square(unsigned char out[BUFFER])
     for (int i = 0; i < 6; i++) *at++ = index[i], *at++ = 0;
 }
 
-enum { IMAGES_MOST = 4, PATH_LENGTH = 4096 };
+enum { IMAGES_MOST = 4 };
 #define IMAGE_LIMIT ((size_t)1 << 31) /* of a binary file the lengths have 32 bits */
 
 /* The images in the order of the document's textures. */
@@ -171,13 +172,13 @@ ts_code lgd_write_glb(const char *path, const char *folder, const lgd_gltf *kind
 {
     const int images = kind->metallic ? 3 : 4;
     const char *const *name = kind->metallic ? metallic_images : f0_images;
-    char file[PATH_LENGTH], *image[IMAGES_MOST] = {NULL};
+    char file[TS_PATH_LENGTH], *image[IMAGES_MOST] = {NULL};
     size_t size[IMAGES_MOST] = {0};
     ts_code code = TS_OK;
-    for (int k = 0; k < images && !code; k++)
-        if (snprintf(file, sizeof file, "%s/%s", folder, name[k]) >= PATH_LENGTH)
-            code = ts_fail(st, TS_INVALID, "%.200s...: the name is too long", folder);
-        else code = io_read_bytes(file, IMAGE_LIMIT, &image[k], &size[k], st);
+    for (int k = 0; k < images && !code; k++) {
+        code = ts_path_in(file, folder, name[k], st);
+        if (!code) code = io_read_bytes(file, IMAGE_LIMIT, &image[k], &size[k], st);
+    }
     if (!code) code = put_together(path, kind, images, image, size, st);
     for (int k = 0; k < images; k++) free(image[k]);
     return code;

@@ -20,16 +20,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { PATH_LENGTH = 4096 };
-
-/* folder/name; TS_INVALID when it is too long. */
-static ts_code join(char path[PATH_LENGTH], const char *folder, const char *name, ts_status *st)
-{
-    if (snprintf(path, PATH_LENGTH, "%s/%s", folder, name) >= PATH_LENGTH)
-        return ts_fail(st, TS_INVALID, "%.200s...: the name is too long", folder);
-    return TS_OK;
-}
-
 ts_code lgd_output_check(const char *folder, ts_status *st)
 {
     char *hidden;
@@ -75,20 +65,22 @@ typedef struct task {
 
 static ts_code write_portion(const task *t, unsigned which, lgd_output_result *facts, ts_status *st)
 {
-    char path[PATH_LENGTH];
+    char path[TS_PATH_LENGTH];
     switch (which) {
     case 0: return TS_OK;
     case LGD_OUT_RENDER:
-        return join(path, t->folder, "render.png", st) ? st->code : lgd_write_render(path, t->estimate, t->photo, st);
+        return ts_path_in(path, t->folder, "render.png", st) ? st->code
+                                                             : lgd_write_render(path, t->estimate, t->photo, st);
     case LGD_OUT_PREVIEW:
-        return join(path, t->folder, "preview.png", st) ? st->code : lgd_write_preview(path, t->m, t->photo, st);
+        return ts_path_in(path, t->folder, "preview.png", st) ? st->code : lgd_write_preview(path, t->m, t->photo, st);
     case LGD_OUT_PAGE:
-        return join(path, t->folder, "view.html", st) ? st->code
-                                                      : lgd_write_page(path, t->stem, t->m, t->photo, t->order, st);
+        return ts_path_in(path, t->folder, "view.html", st)
+            ? st->code
+            : lgd_write_page(path, t->stem, t->m, t->photo, t->order, st);
     case LGD_OUT_GLTF:
-        return join(path, t->folder, "material.gltf", st) ? st->code : lgd_write_gltf(path, &t->gltf, st);
+        return ts_path_in(path, t->folder, "material.gltf", st) ? st->code : lgd_write_gltf(path, &t->gltf, st);
     case LGD_OUT_MATERIALX:
-        return join(path, t->folder, "material.mtlx", st) ? st->code : lgd_write_materialx(path, st);
+        return ts_path_in(path, t->folder, "material.mtlx", st) ? st->code : lgd_write_materialx(path, st);
     default:
         return which & LGD_DERIVED
             ? lgd_write_derived(t->folder, t->m, which, t->order->repeats, facts, st)
@@ -100,11 +92,12 @@ static ts_code write_portion(const task *t, unsigned which, lgd_output_result *f
 /* material.glb from the maps beside it, then those of them that nobody ordered are taken away. */
 static ts_code write_glb(const task *t, unsigned written, ts_status *st)
 {
-    char path[PATH_LENGTH];
-    ts_code code = join(path, t->folder, "material.glb", st);
+    char path[TS_PATH_LENGTH];
+    ts_code code = ts_path_in(path, t->folder, "material.glb", st);
     if (!code) code = lgd_write_glb(path, t->folder, &t->gltf, st);
     for (int k = 0; k < LGD_OUTPUTS && !code; k++)
-        if (written & ~t->order->which & 1u << k && join(path, t->folder, lgd_files[k], st) == TS_OK) unlink(path);
+        if (written & ~t->order->which & 1u << k && ts_path_in(path, t->folder, lgd_files[k], st) == TS_OK)
+            unlink(path);
     return code;
 }
 
@@ -131,9 +124,9 @@ static ts_code write_all(const task *t, lgd_output_result *facts, ts_status *st)
     for (int i = 0; i < PORTIONS; i++)
         if (failure[i].code) return ts_fail(st, failure[i].code, "%s", failure[i].message);
     if (glb && write_glb(t, which, st) != TS_OK) return st->code;
-    char path[PATH_LENGTH];
-    return join(path, t->folder, "meta.txt", st) ? st->code
-                                                 : lgd_write_meta(path, t->photo, t->order, facts, t->mark, st);
+    char path[TS_PATH_LENGTH];
+    return ts_path_in(path, t->folder, "meta.txt", st) ? st->code
+                                                       : lgd_write_meta(path, t->photo, t->order, facts, t->mark, st);
 }
 
 enum { MARK = 40 };
@@ -156,10 +149,10 @@ static bool is_marked(const char *folder, const char *mark)
 
 bool lgd_output_is(const char *folder, unsigned which, const char *record, char **meta)
 {
-    char path[PATH_LENGTH], *text = lgd_meta_read(folder);
+    char path[TS_PATH_LENGTH], *text = lgd_meta_read(folder);
     bool is = text && strstr(text, record);
     for (int k = 0; k < LGD_OUTPUTS && is; k++)
-        is = !(which >> k & 1) || (join(path, folder, lgd_files[k], NULL) == TS_OK && access(path, F_OK) == 0);
+        is = !(which >> k & 1) || (ts_path_in(path, folder, lgd_files[k], NULL) == TS_OK && access(path, F_OK) == 0);
     if (is) *meta = text;
     else free(text);
     return is;
@@ -170,23 +163,22 @@ bool lgd_output_is(const char *folder, unsigned which, const char *record, char 
  * not replaced are removed; *removed gets their bits. */
 static ts_code move_files(const char *hidden, const char *folder, const char *mark, unsigned *removed, ts_status *st)
 {
-    char from[PATH_LENGTH], to[PATH_LENGTH];
+    char from[TS_PATH_LENGTH], to[TS_PATH_LENGTH];
     const bool same = is_marked(folder, mark);
     unsigned moved = 0;
     const int meta = LGD_FILES - 1;
-    if (join(to, folder, lgd_files[meta], st) != TS_OK) return st->code;
+    if (ts_path_in(to, folder, lgd_files[meta], st) != TS_OK) return st->code;
     if (unlink(to) != 0 && errno != ENOENT)
         return ts_fail(st, TS_IO, "%s: cannot be replaced: %s", to, strerror(errno));
     for (int i = 0; i < LGD_FILES; i++) {
         if (i == meta) ts_sync_folder(folder);
-        if (join(from, hidden, lgd_files[i], st) != TS_OK || join(to, folder, lgd_files[i], st) != TS_OK)
-            return st->code;
+        if (ts_path_in(from, hidden, lgd_files[i], st) != TS_OK) return st->code;
         if (access(from, F_OK) != 0) continue; /* not asked for */
-        if (rename(from, to) != 0) return ts_fail(st, TS_IO, "%s: cannot be replaced: %s", to, strerror(errno));
+        if (ts_move_file(hidden, folder, lgd_files[i], st) != TS_OK) return st->code;
         moved |= 1u << i;
     }
     for (int i = 0; i < LGD_FILES && !same; i++) {
-        if (moved >> i & 1 || join(to, folder, lgd_files[i], st) != TS_OK) continue;
+        if (moved >> i & 1 || ts_path_in(to, folder, lgd_files[i], st) != TS_OK) continue;
         if (unlink(to) == 0) *removed |= 1u << i;
         else if (errno != ENOENT && errno != EISDIR) /* a folder is nothing of ours */
             return ts_fail(st, TS_IO, "%s: cannot be removed: %s", to, strerror(errno));
@@ -208,10 +200,10 @@ static ts_code move_locked(const char *hidden, const char *folder, const char *m
 static ts_code write_folder(const char *parent, const char *stem, const io_material *m, const io_material *estimate,
                             const lgd_photo *photo, const lgd_order *order, lgd_output_result *r, ts_status *st)
 {
-    char folder[PATH_LENGTH], mark[MARK], *hidden;
+    char folder[TS_PATH_LENGTH], mark[MARK], *hidden;
     struct stat info;
     int lock;
-    if (join(folder, parent, stem, st) != TS_OK) return st->code;
+    if (ts_path_in(folder, parent, stem, st) != TS_OK) return st->code;
     const bool there = stat(folder, &info) == 0;
     if (there && !S_ISDIR(info.st_mode)) return ts_fail(st, TS_IO, "%s: is in the way: it is not a folder", folder);
     if (there) ts_sweep(folder);

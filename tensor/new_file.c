@@ -86,6 +86,20 @@ char *ts_folder_of(const char *path)
     return !slash ? strdup(".") : slash == path ? strdup("/") : strndup(path, (size_t)(slash - path));
 }
 
+ts_code ts_path_in(char path[TS_PATH_LENGTH], const char *folder, const char *name, ts_status *st)
+{
+    if (snprintf(path, TS_PATH_LENGTH, "%s/%s", folder, name) >= TS_PATH_LENGTH)
+        return ts_fail(st, TS_INVALID, "%.200s...: the name is too long", folder);
+    return TS_OK;
+}
+
+ts_code ts_move_file(const char *from, const char *to, const char *name, ts_status *st)
+{
+    char old[TS_PATH_LENGTH], path[TS_PATH_LENGTH];
+    if (ts_path_in(old, from, name, st) != TS_OK || ts_path_in(path, to, name, st) != TS_OK) return st->code;
+    return rename(old, path) == 0 ? TS_OK : ts_fail(st, TS_IO, "%s: cannot be replaced: %s", path, strerror(errno));
+}
+
 ts_code ts_new_file_begin(ts_new_file *f, const char *name, ts_status *st)
 {
     struct stat info;

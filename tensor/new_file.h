@@ -35,6 +35,13 @@ void ts_hidden_folder_remove(const char *path, int *lock);
 /* The folder that path stands in, malloced and the caller's; NULL: no memory. */
 char *ts_folder_of(const char *path);
 
+/* path = folder/name; TS_INVALID: it is too long. */
+enum { TS_PATH_LENGTH = 4096 };
+ts_code ts_path_in(char path[TS_PATH_LENGTH], const char *folder, const char *name, ts_status *st);
+
+/* from/name becomes to/name, in place of what has that name there. */
+ts_code ts_move_file(const char *from, const char *to, const char *name, ts_status *st);
+
 /* Writes the names in folder to the disk. 0, or errno; a file system that cannot do so is no error. */
 int ts_sync_folder(const char *folder);
 

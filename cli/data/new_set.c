@@ -10,8 +10,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { PATH_LENGTH = sizeof((cl_new_set *)0)->folder };
-
 ts_code cl_new_set_begin(cl_new_set *s, const char *folder, const char *mark, ts_status *st)
 {
     struct stat info;
@@ -28,31 +26,17 @@ ts_code cl_new_set_begin(cl_new_set *s, const char *folder, const char *mark, ts
     return code;
 }
 
-static ts_code join(char path[PATH_LENGTH], const char *folder, const char *name, ts_status *st)
-{
-    if (snprintf(path, PATH_LENGTH, "%s/%s", folder, name) >= PATH_LENGTH)
-        return ts_fail(st, TS_INVALID, "%.200s...: the name is too long", folder);
-    return TS_OK;
-}
-
 /* One process at a time, so that the files that stay are of one run. Without locks they come in any order. */
 static ts_code remove_mark(cl_new_set *s, ts_status *st)
 {
-    char mark[PATH_LENGTH];
+    char mark[TS_PATH_LENGTH];
     s->moving = open(s->folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (s->moving >= 0) (void)!flock(s->moving, LOCK_EX);
     if (!s->mark) return TS_OK;
-    if (join(mark, s->folder, s->mark, st) != TS_OK) return st->code;
+    if (ts_path_in(mark, s->folder, s->mark, st) != TS_OK) return st->code;
     if (unlink(mark) != 0 && errno != ENOENT)
         return ts_fail(st, TS_IO, "%s: cannot be replaced: %s", mark, strerror(errno));
     return TS_OK;
-}
-
-static ts_code move_file(const cl_new_set *s, const char *name, ts_status *st)
-{
-    char from[PATH_LENGTH], to[PATH_LENGTH];
-    if (join(from, s->hidden, name, st) != TS_OK || join(to, s->folder, name, st) != TS_OK) return st->code;
-    return rename(from, to) == 0 ? TS_OK : ts_fail(st, TS_IO, "%s: cannot be replaced: %s", to, strerror(errno));
 }
 
 static int visible(const struct dirent *entry) { return *entry->d_name != '.'; }
@@ -64,12 +48,13 @@ static ts_code move_files(const cl_new_set *s, ts_status *st)
     if (n < 0) return ts_fail(st, TS_IO, "%s: cannot be read: %s", s->hidden, strerror(errno));
     ts_code code = TS_OK;
     for (int i = 0; i < n; i++) {
-        if (!code && !(s->mark && strcmp(list[i]->d_name, s->mark) == 0)) code = move_file(s, list[i]->d_name, st);
+        if (!code && !(s->mark && strcmp(list[i]->d_name, s->mark) == 0))
+            code = ts_move_file(s->hidden, s->folder, list[i]->d_name, st);
         free(list[i]);
     }
     free(list);
     if (!code) ts_sync_folder(s->folder);
-    return code || !s->mark ? code : move_file(s, s->mark, st);
+    return code || !s->mark ? code : ts_move_file(s->hidden, s->folder, s->mark, st);
 }
 
 static ts_code publish(cl_new_set *s, ts_status *st)
