@@ -22,8 +22,12 @@ typedef struct ag_back {
 /* to[n,h,w,:] = a[n,h,w,:] followed by b[n,h,w,:] (op_concat.c). */
 void ag_join(ag_tape *tape, const ag_value *a, const ag_value *b, float *to);
 
-/* Adds dy, of v's shape, to the gradient of v, if it needs one (op_add.c). */
-void ag_grad_pass(ag_tape *tape, const float *dy, ag_value *v);
+/* to = a + b, of shape s; to may be one of them (op_add.c). */
+void ag_sum(ag_tape *tape, ts_shape s, const float *a, const float *b, float *to);
+
+/* Adds the gradient of from, of v's shape, to that of v, if there is a v that needs one; from's own becomes v's where v
+ * has none yet, so nothing reads it afterwards (op_add.c). */
+void ag_grad_give(ag_tape *tape, ag_value *from, ag_value *v);
 
 /* The recorded operation that made v, or NULL. */
 const ag_node *ag_node_of(const ag_tape *tape, const ag_value *v);

@@ -9,16 +9,25 @@
 ag_value *ag_add(ag_tape *tape, ag_value *a, ag_value *b);
 #endif
 
-static void forward_range(const void *job, int64_t begin, int64_t end)
+typedef struct adding {
+    const float *a, *b;
+    float *to;
+} adding;
+
+static void add_range(const void *job, int64_t begin, int64_t end)
 {
-    const ag_node *node = job;
-    ts_elementwise_k()->add(end - begin, node->in[0]->t.data + begin, node->in[1]->t.data + begin,
-                            node->out->t.data + begin);
+    const adding *s = job;
+    ts_elementwise_k()->add(end - begin, s->a + begin, s->b + begin, s->to + begin);
+}
+
+void ag_sum(ag_tape *tape, ts_shape s, const float *a, const float *b, float *to)
+{
+    ts_for(ag_threads(tape), ts_count(s), AG_CHUNK, add_range, &(adding){a, b, to});
 }
 
 static void forward(ag_tape *tape, ag_node *node)
 {
-    ts_for(ag_threads(tape), ts_count(node->out->t.shape), AG_CHUNK, forward_range, node);
+    ag_sum(tape, node->out->t.shape, node->in[0]->t.data, node->in[1]->t.data, node->out->t.data);
 }
 
 typedef struct passing {
@@ -33,11 +42,16 @@ static void pass_range(const void *job, int64_t begin, int64_t end)
     ts_elementwise_k()->scale(end - begin, 1.0f, p->dy + begin, p->dx + begin, p->accumulate);
 }
 
-void ag_grad_pass(ag_tape *tape, const float *dy, ag_value *v)
+static void pass(ag_tape *tape, const float *dy, ag_value *v)
 {
     passing p = {.dy = dy};
     p.dx = ag_grad_target(tape, v, &p.accumulate);
     if (p.dx) ts_for(ag_threads(tape), ts_count(v->t.shape), AG_CHUNK, pass_range, &p);
+}
+
+void ag_grad_give(ag_tape *tape, ag_value *from, ag_value *v)
+{
+    if (v && !ag_grad_move(from, v)) pass(tape, from->grad, v);
 }
 
 /* One input gets dy itself where it can. */
@@ -46,7 +60,7 @@ static void backward(ag_tape *tape, ag_node *node)
     const float *dy = node->out->grad;
     const int moved = ag_grad_move(node->out, node->in[0]) ? 0 : ag_grad_move(node->out, node->in[1]) ? 1 : -1;
     for (int j = 0; j < 2; j++)
-        if (j != moved) ag_grad_pass(tape, dy, node->in[j]);
+        if (j != moved) pass(tape, dy, node->in[j]);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)

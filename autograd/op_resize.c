@@ -5,7 +5,6 @@
 #include "ops.h"
 #include "tensor/resample.h"
 #include <math.h>
-#include <string.h>
 
 #ifdef AG_API
 /* x [N,H,W,C] resampled to [N,h,w,C] as ts_resize does. */
@@ -28,22 +27,18 @@ static ts_taps taps(ag_tape *tape, const ag_node *node, int in, int out)
     return (a->smooth ? ts_taps_smooth : ts_taps_triangle)(ag_arena(tape), in, out);
 }
 
-static void copy_range(const void *job, int64_t begin, int64_t end)
-{
-    const ag_node *node = job;
-    memcpy(node->out->t.data + begin, node->in[BASE]->t.data + begin, sizeof(float) * (size_t)(end - begin));
-}
-
 static void forward(ag_tape *tape, ag_node *node)
 {
     const ts_shape s = node->in[X]->t.shape, d = node->out->t.shape;
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
     const ts_taps rows = taps(tape, node, s.h, d.h), columns = taps(tape, node, s.w, d.w);
     const ag_value *base = node->in[BASE];
-    if (base && base->t.data != node->out->t.data) ts_for(ag_threads(tape), ts_count(d), AG_CHUNK, copy_range, node);
-    if (rows.weight && columns.weight)
-        ts_resample(s.n, s.c, &rows, &columns, node->in[X]->t.data, node->out->t.data, base != NULL, ag_threads(tape));
-    else ag_fail(tape, TS_NOMEM, "resize: no memory for the filter");
+    float *y = node->out->t.data;
+    const bool in_place = base && base->t.data == y;
+    if (rows.weight && columns.weight) {
+        ts_resample(s.n, s.c, &rows, &columns, node->in[X]->t.data, y, in_place, ag_threads(tape));
+        if (base && !in_place) ag_sum(tape, d, y, base->t.data, y);
+    } else ag_fail(tape, TS_NOMEM, "resize: no memory for the filter");
     ts_arena_release(ag_arena(tape), mark);
 }
 
@@ -63,8 +58,7 @@ static void backward(ag_tape *tape, ag_node *node)
     if (up.weight && left.weight) ts_resample(s.n, s.c, &up, &left, node->out->grad, dx, accumulate, ag_threads(tape));
     else if (dx) ag_fail(tape, TS_NOMEM, "resize: no memory for the filter");
     ts_arena_release(ag_arena(tape), mark);
-    ag_value *base = node->in[BASE];
-    if (base && !ag_grad_move(node->out, base)) ag_grad_pass(tape, node->out->grad, base);
+    ag_grad_give(tape, node->out, node->in[BASE]);
 }
 
 /* Weight of (any, also outside) source position i in output j, before the sum over i is made 1. */

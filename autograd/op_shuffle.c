@@ -83,8 +83,7 @@ static void backward(ag_tape *tape, ag_node *node)
         m.to = dx;
         move(ag_threads(tape), &m);
     }
-    ag_value *added = node->in[ADDED];
-    if (added && !ag_grad_move(node->out, added)) ag_grad_pass(tape, node->out->grad, added);
+    ag_grad_give(tape, node->out, node->in[ADDED]);
 }
 
 static void reference(const ag_node *node, const double *const *in, double *out)
