@@ -32,8 +32,14 @@ static void on_warning(png_structp png, png_const_charp message)
     ((reading *)png_get_error_ptr(png))->odd = true;
 }
 
-/* Texts may carry EXIF or XMP, with an orientation in it: only those that are known to be words are passed over. */
-static bool plain_texts(reading *r)
+/* XMP that says how the picture is to be seen, or the only one that says how it was taken. */
+static bool xmp_is_needed(const char *text, bool exif)
+{
+    return strstr(text, "rientation") || strstr(text, "nteroperability") || (!exif && strstr(text, "FocalLength"));
+}
+
+/* Texts may carry EXIF, with an orientation in it: only those that are known to be words are passed over. */
+static bool plain_texts(reading *r, bool exif)
 {
     static const char *const plain[] = {"Software",    "Comment",     "Title",         "Author",
                                         "Description", "Copyright",   "Source",        "Creation Time",
@@ -41,23 +47,37 @@ static bool plain_texts(reading *r)
     png_textp text;
     const int count = png_get_text(r->png, r->info, &text, NULL);
     for (int i = 0; i < count; i++) {
-        bool known = false;
+        bool known = strcmp(text[i].key, "XML:com.adobe.xmp") == 0 && !xmp_is_needed(text[i].text, exif);
         for (size_t k = 0; k < sizeof plain / sizeof *plain; k++) known |= strcmp(text[i].key, plain[k]) == 0;
         if (!known) return false;
     }
     return true;
 }
 
+/* What may say how the pixels are to be seen: before them, or all of it, for more may stand behind them. */
+static bool beside(reading *r, bool all)
+{
+    static const char prefix[6] = "Exif\0"; /* io_exif's; the chunk begins with the TIFF header */
+    png_bytep chunk;
+    png_uint_32 size;
+    if (!png_get_eXIf_1(r->png, r->info, &size, &chunk)) return plain_texts(r, !all);
+    unsigned char *segment = malloc(sizeof prefix + size);
+    if (!segment) return false;
+    memcpy(segment, prefix, sizeof prefix);
+    memcpy(segment + sizeof prefix, chunk, size);
+    oi_image *image = r->image;
+    const bool ordinary = io_exif(segment, sizeof prefix + size, &image->orientation, &image->adobe, &image->lens);
+    free(segment);
+    return ordinary && plain_texts(r, true);
+}
+
 static bool supported(reading *r)
 {
-    png_bytep exif;
-    png_uint_32 exif_size;
     const bool profile = png_get_valid(r->png, r->info, PNG_INFO_iCCP),
                other = png_get_valid(r->png, r->info, PNG_INFO_gAMA | PNG_INFO_cHRM | PNG_INFO_sRGB);
     return r->bits >= 8 && png_get_color_type(r->png, r->info) != PNG_COLOR_TYPE_PALETTE &&
         !png_get_valid(r->png, r->info, PNG_INFO_tRNS) &&
-        png_get_interlace_type(r->png, r->info) == PNG_INTERLACE_NONE &&
-        !png_get_eXIf_1(r->png, r->info, &exif_size, &exif) && !(profile && other) && plain_texts(r);
+        png_get_interlace_type(r->png, r->info) == PNG_INTERLACE_NONE && !(profile && other) && beside(r, false);
 }
 
 static bool profile(reading *r)
@@ -98,18 +118,18 @@ static bool work(reading *r)
     r->refused = io_check_claim(
         r->path, png_get_image_width(r->png, r->info), png_get_image_height(r->png, r->info), r->max_pixels,
         (double)png_get_rowbytes(r->png, r->info) * png_get_image_height(r->png, r->info), r->st);
+    image->orientation = 1;
     if (r->refused || !supported(r)) return false;
     image->width = (int)png_get_image_width(r->png, r->info);
     image->height = (int)png_get_image_height(r->png, r->info);
     image->channels = png_get_channels(r->png, r->info);
     image->levels = r->bits == 8 ? 256 : 65536;
-    image->orientation = 1;
     image->grey = image->channels < 3;
     image->alpha = image->channels % 2 == 0 ? image->channels - 1 : -1;
     for (int c = 0; c < 3; c++) image->colour[c] = image->grey ? 0 : c;
     if (!profile(r) || !pixels(r)) return false;
     png_read_end(r->png, r->info);
-    return plain_texts(r) && !r->odd; /* texts may stand behind the pixels too */
+    return beside(r, true) && !r->odd;
 }
 
 ts_code io_read_png_file(const char *path, int64_t max_pixels, oi_image *image, bool *read, ts_status *st)

@@ -62,6 +62,11 @@ static bool check_same(const char *path)
               quick.floating == slow.floating,
           "%s: orientation %d and %d, Adobe %d and %d, linear %d and %d, primaries %d and %d", path, quick.orientation,
           slow.orientation, quick.adobe, slow.adobe, quick.linear, slow.linear, quick.primaries, slow.primaries);
+    const io_lens *l = &quick.lens, *m = &slow.lens;
+    CHECK(l->focal_35mm == m->focal_35mm && fabs(l->focal - m->focal) < 1e-6 * m->focal + 1e-9 &&
+              fabs(l->plane - m->plane) < 1e-6 * m->plane + 1e-9 && fabs(l->zoom - m->zoom) < 1e-6 &&
+              l->width == m->width && l->height == m->height && l->zoom_in_focal35 == m->zoom_in_focal35,
+          "%s: lens %g and %g mm, %g and %g on 35 mm film", path, l->focal, m->focal, l->focal_35mm, m->focal_35mm);
     CHECK(quick.icc_size == slow.icc_size && (!quick.icc_size || memcmp(quick.icc, slow.icc, quick.icc_size) == 0),
           "%s: profiles", path);
     const size_t values = (size_t)quick.width * (size_t)quick.height * (size_t)quick.channels;
@@ -119,6 +124,48 @@ TEST(quick_readers_read_what_the_library_reads)
     const uint8_t rgb[6] = {1, 2, 3, 200, 150, 100};
     png_begin(&b, 2, 1, 8, 2), png_chunk(&b, "tEXt", "Software\0none", 13), png_pixels(&b, rgb, 6, 1), png_end(&b);
     CHECK(check_same(bytes_save(&b, test_folder(), "words.png")), "a PNG with a word about its software is passed on");
+}
+
+/* iTXt: keyword, uncompressed, no language, no translated keyword, text. */
+static void png_xmp(bytes *b, const char *text)
+{
+    char chunk[256];
+    static const char head[] = "XML:com.adobe.xmp\0\0\0\0"; /* and its own zero */
+    memcpy(chunk, head, sizeof head);
+    strcpy(chunk + sizeof head, text);
+    png_chunk(b, "iTXt", chunk, sizeof head + strlen(text));
+}
+
+TEST(quick_reader_of_png_reads_exif_and_passes_over_xmp)
+{
+    const uint8_t four[4] = {0, 128, 255, 64};
+    uint8_t exif[] = "II*\0\10\0\0\0\2\0\22\1\3\0\1\0\0\0\6\0\0\0\151\207\4\0\1\0\0\0\46\0\0\0\0\0\0\0"
+                     "\1\0\5\244\3\0\1\0\0\0\32\0\0\0\0\0\0\0";
+    static const char *const xmp[] = {"<x exif:FocalLength='4/1'>", "<x tiff:Orientation='6'>", "<x dc:creator='me'>"};
+    for (int k = 1; k <= 8; k++)
+        for (int behind = 0; behind < 2; behind++) {
+            bytes b = {0};
+            exif[18] = (uint8_t)k;
+            png_begin(&b, 4, 1, 8, 0);
+            if (!behind) png_chunk(&b, "eXIf", exif, sizeof exif - 1);
+            if (k % 3 != 1) png_xmp(&b, xmp[k % 3]);
+            png_pixels(&b, four, 4, 1);
+            if (behind) png_chunk(&b, "eXIf", exif, sizeof exif - 1);
+            png_end(&b);
+            const char *name = bytes_save(&b, test_folder(), "exif.png");
+            /* the library reads what stands before the pixels alone */
+            CHECK(behind || check_same(name), "orientation %d: passed on", k);
+            oi_image quick;
+            CHECK(read_quickly(name, 1 << 20, &quick) && quick.orientation == k && quick.lens.focal_35mm == 26,
+                  "behind %d: orientation %d, %g mm, not %d and 26", behind, quick.orientation, quick.lens.focal_35mm,
+                  k);
+            oi_free(&quick);
+        }
+    for (size_t i = 0; i < sizeof xmp / sizeof *xmp; i++) {
+        bytes b = {0};
+        png_begin(&b, 4, 1, 8, 0), png_xmp(&b, xmp[i]), png_pixels(&b, four, 4, 1), png_end(&b);
+        CHECK(check_same(bytes_save(&b, test_folder(), "xmp.png")) == (i == 2), "%s", xmp[i]);
+    }
 }
 
 /* Whatever may change how a picture is seen is left to the library. */
