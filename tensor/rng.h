@@ -36,7 +36,8 @@ enum {
     TS_STREAM_CLOSER,
     TS_STREAM_DARKER,
     TS_STREAM_LESSON,
-    TS_STREAM_COLLECTED /* parts of map sets */
+    TS_STREAM_COLLECTED, /* parts of map sets */
+    TS_STREAM_PLAIN
 };
 
 uint32_t ts_rng_u32(ts_rng *r);

@@ -20,6 +20,7 @@ io_procedural tr_materials_of(const tr_config *c)
                            .uneven = (float)c->data.uneven,
                            .closer = (float)c->data.closer,
                            .homogeneous = (float)c->data.homogeneous,
+                           .plain = (float)c->data.plain,
                            .collected = (float)c->data.collected};
 }
 

@@ -5,6 +5,7 @@
 #include "data/materials/family.h"
 #include "data/materials/homogeneous.h"
 #include "data/materials/hues.h"
+#include "data/materials/plain.h"
 #include "data/materials/relief.h"
 #include "data/materials/uneven.h"
 #include "tensor/scratch.h"
@@ -154,6 +155,12 @@ static void exchange_relief(const io_procedural *p, uint64_t index, uint64_t all
     cv_other_relief(c, &relief, other.height, other.roughness);
 }
 
+static void make_plain(const io_procedural *p, uint64_t index, io_canvas *c)
+{
+    c->rng = ts_rng_make(p->seed, TS_STREAM_PLAIN, index);
+    if (cv_chance(c, p->plain)) cv_plain(c);
+}
+
 static void make_uneven(const io_procedural *p, uint64_t index, io_canvas *c)
 {
     c->rng = ts_rng_make(p->seed, TS_STREAM_UNEVEN, index);
@@ -230,6 +237,7 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
     c.used = 0;
     exchange_relief(p, index, allowed, &c, other);
     c.used = 0;
+    make_plain(p, index, &c);
     make_uneven(p, index, &c);
     c.used = 0;
     make_homogeneous(p, index, &c);

@@ -338,3 +338,57 @@ TEST(closer_materials_are_of_larger_parts)
     CHECK(halves > COUNT / 4 && halves < 3 * COUNT / 4, "%d of %d at a share of a half", halves, COUNT);
     CHECK(times > 1.4 && times < 2.6, "parts are %.2f times as large; the mean of the logarithm is that of 2", times);
 }
+
+/* RMS of a map's differences from its mean, of normals from straight up. */
+static double varied(const io_material *m, int map)
+{
+    double sum = 0, squares = 0;
+    const int count = m->size * m->size;
+    for (int i = 0; i < count; i++) {
+        const double v = (double)m->maps[i * MAP_CHANNELS + map];
+        sum += map == MAP_NORMAL || map == MAP_NORMAL + 1 ? 0 : v;
+        squares += v * v;
+    }
+    return sqrt(fmax(squares / count - sum / count * (sum / count), 0));
+}
+
+static float largest(const io_material *m, int map, int channels)
+{
+    float most = -1;
+    for (int i = 0; i < m->size * m->size; i++)
+        for (int k = 0; k < channels; k++) most = fmaxf(most, m->maps[i * MAP_CHANNELS + map + k]);
+    return most;
+}
+
+/* A third of the differences is left in the mean of u^2. */
+TEST(plain_materials_have_one_gloss_and_hardly_any_relief)
+{
+    enum { COUNT = 96, SIZE = 64 };
+    const io_procedural families = {.seed = 5}, plain = {.seed = 5, .plain = 1}, half = {.seed = 5, .plain = 0.5f};
+    int halves = 0, dielectrics = 0;
+    double relief[2] = {0}, gloss[2] = {0};
+    for (int i = 0; i < COUNT; i++) {
+        io_material a = new_material(SIZE), b = new_material(SIZE);
+        io_procedural_make(&families, (uint64_t)i, &a);
+        io_procedural_make(&plain, (uint64_t)i, &b);
+        halves += varies(&half, i, &a, &b);
+        relief[0] += varied(&a, MAP_NORMAL), relief[1] += varied(&b, MAP_NORMAL);
+        gloss[0] += varied(&a, MAP_ROUGHNESS), gloss[1] += varied(&b, MAP_ROUGHNESS);
+        const bool dielectric = largest(&a, MAP_SPECULAR, 3) <= 2 * 0.2f - 1;
+        dielectrics += dielectric;
+        for (int k = 0; k < SIZE * SIZE; k++) {
+            const float *from = a.maps + k * MAP_CHANNELS, *to = b.maps + k * MAP_CHANNELS;
+            for (int c = 0; c < 3; c++) {
+                const int map = MAP_SPECULAR + c;
+                CHECK(from[MAP_DIFFUSE + c] == to[MAP_DIFFUSE + c], "material %d: diffuse of pixel %d", i, k);
+                CHECK(to[map] == (dielectric ? b.maps : from)[map], "material %d: F0 of pixel %d", i, k);
+            }
+        }
+        io_material_free(&a);
+        io_material_free(&b);
+    }
+    CHECK(halves > COUNT / 4 && halves < 3 * COUNT / 4, "%d of %d at a share of a half", halves, COUNT);
+    CHECK(dielectrics > COUNT / 3 && dielectrics < COUNT, "%d of %d are dielectrics", dielectrics, COUNT);
+    CHECK(relief[1] < 0.5 * relief[0] && relief[1] > 0.15 * relief[0], "relief %g of %g", relief[1], relief[0]);
+    CHECK(gloss[1] < 0.5 * gloss[0] && gloss[1] > 0.15 * gloss[0], "gloss %g of %g", gloss[1], gloss[0]);
+}
