@@ -11,12 +11,12 @@ import sys
 from pathlib import Path
 
 import numpy as np
-import OpenEXR
 from PIL import Image
 from scipy.ndimage import gaussian_filter
 
+from maps import read
 from messages import fail, usage
-from shading import PLACE, SIDE, radiance, unit
+from shading import PLACE, SIDE, radiance, unit, upright
 
 EXCHANGED = "d s r n dn sr dsr srn dsrn".split()
 SIGMAS = 2, 12, 80
@@ -36,17 +36,6 @@ def capture(folder):
     return pictures, cameras[order], lights[order]
 
 
-def estimate(path):
-    with OpenEXR.File(str(path)) as file:
-        c = {k: v.pixels.astype(np.float64) for k, v in file.channels().items()}
-    return {
-        "d": c["diffuse"],
-        "s": c["specular"],
-        "r": c["roughness.Y"][..., None],
-        "n": np.stack([c["normal.X"], c["normal.Y"]], -1),
-    }
-
-
 def others(folder):
     image = np.asarray(Image.open(folder / "materialgan_tex.jpg").convert("RGB"), np.float64) / 255
     half = len(image) // 2
@@ -59,8 +48,7 @@ def others(folder):
 
 
 def render(maps, camera, light):
-    x, y = maps["n"][..., :1], maps["n"][..., 1:]
-    normal = unit(np.concatenate([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 1e-4))], -1))
+    normal = upright(maps["n"][..., 0], maps["n"][..., 1])
     return radiance(normal, maps["d"], maps["r"], maps["s"], camera, light)
 
 
@@ -109,8 +97,8 @@ def main():
     titles = ["own", *EXCHANGED, *(f"n/{s}" for s in SIGMAS), "k"]
     print(f"{'':26}" + "".join(f"{t:>8}" for t in titles))
     table = []
-    for folder, maps in zip(folders, found):
-        scene, own, other = capture(folder), estimate(maps), others(folder)
+    for folder, path in zip(folders, found):
+        scene, own, other = capture(folder), read(path), others(folder)
         tried = [own] + [own | {k: other[k] for k in which} for which in EXCHANGED]
         tried += [own | {"n": own["n"] - smooth(own["n"], s) + smooth(other["n"], s)} for s in SIGMAS]
         table.append([*(score(maps, *scene) for maps in tried), falloff(other, *scene)])

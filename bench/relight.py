@@ -14,7 +14,7 @@ from PIL import Image
 from scipy.optimize import least_squares
 
 from messages import fail, usage
-from shading import SIDE, radiance, unit
+from shading import SIDE, encoded, radiance, unit
 
 DISTANCE = 250 / 256
 POWER = 329288 / SIDE**2 / DISTANCE**2  # over the distance's square
@@ -29,8 +29,7 @@ def panels(path):
 
 def render(maps, camera, light, power):
     """Encoded as sRGB; power is over the distance's square, of a light as far as the camera."""
-    x = np.clip(radiance(*maps, camera, light) * power * light[2] ** 2, 0, 1)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
+    return encoded(radiance(*maps, camera, light) * power * light[2] ** 2)
 
 
 def places(t):

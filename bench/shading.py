@@ -14,6 +14,17 @@ def dot(a, b):
     return (a * b).sum(-1, keepdims=True)
 
 
+def upright(x, y):
+    """Unit normals of these x and y, whose z is above 0."""
+    return unit(np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 1e-4))], -1))
+
+
+def encoded(x):
+    """Linear values as sRGB, clamped."""
+    x = np.clip(x, 0, 1)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
+
+
 def radiance(normal, diffuse, roughness, specular, camera, light):
     """Linear, of a light of power 1; maps [SIDE, SIDE, 3] but for roughness [SIDE, SIDE, 1], places in patch widths."""
     to_light = light - PLACE

@@ -12,28 +12,19 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-import OpenEXR
 from PIL import Image
 
+from maps import read
 from messages import fail, usage
-from shading import SIDE, radiance, unit
+from shading import SIDE, encoded, radiance, upright
 
 ROUGHNESSES = 0.2, 0.35, 0.5, 0.65, 0.8
 MEDIAN = 0.16  # of the pictures
 
 
-def read(path):
-    with OpenEXR.File(str(path)) as file:
-        c = {k: v.pixels.astype(np.float64) for k, v in file.channels().items()}
-    x, y = c["normal.X"], c["normal.Y"]
-    normal = unit(np.stack([x, y, np.sqrt(np.maximum(1 - x * x - y * y, 1e-4))], -1))
-    return normal, c["diffuse"], c["roughness.Y"][..., None], c["specular"]
-
-
 def write(maps, place, path):
     x = radiance(*maps, place, place)
-    x = np.clip(x * MEDIAN / np.median(x.mean(-1)), 0, 1)
-    x = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-9) ** (1 / 2.4) - 0.055)
+    x = encoded(x * MEDIAN / np.median(x.mean(-1)))
     Image.fromarray((x * 255 + 0.5).astype(np.uint8)).save(path)
 
 
@@ -52,14 +43,22 @@ def main():
     paths = sorted(Path(sys.argv[1]).glob("*/maps.exr"))
     if not paths:
         fail(f"{sys.argv[1]}: there is no */maps.exr in it")
-    degrees = float(sys.argv[2]) if len(sys.argv) == 3 else 30
+    text = sys.argv[2] if len(sys.argv) == 3 else "30"
+    try:
+        degrees = float(text)
+    except ValueError:
+        degrees = 0
+    if not 5 <= degrees <= 120:
+        fail(f"{text}: is no angle of 5 to 120 degrees", 2)
     place = np.array([0, 0, 0.5 / np.tan(np.radians(degrees / 2))])
     with tempfile.TemporaryDirectory() as folder:
         for kind in ("own", *ROUGHNESSES):
             pictures = Path(folder) / f"{kind}"
             pictures.mkdir()
             for path in paths:
-                normal, diffuse, roughness, specular = read(path)
+                maps = read(path)
+                normal, diffuse = upright(maps["n"][..., 0], maps["n"][..., 1]), maps["d"]
+                roughness, specular = maps["r"], maps["s"]
                 if diffuse.shape != (SIDE, SIDE, 3):
                     fail(f"{path}: has not {SIDE} x {SIDE} pixels")
                 if kind != "own":

@@ -46,6 +46,21 @@ exchange() {
 }
 check scripts_exchange exchange
 
+# An angle for each kind, and what is wrong in one line.
+view_guess() {
+    "$PYTHON" -c 'import numpy, PIL, OpenEXR' 2>/dev/null || skip "$PYTHON has no Pillow or no OpenEXR"
+    expect 2 "$PYTHON" bench/view_guess.py
+    wrong 1 "$T/none: there is no */maps.exr in it" view_guess "$T/none"
+    expect 0 "$BUILD/bin/lgd-data" --count 1 --size 64 -o "$T/small"
+    wrong 2 "wide: is no angle of 5 to 120 degrees" view_guess "$T/small" wide
+    wrong 1 "$(echo "$T"/small/*/maps.exr): has not 256 x 256 pixels" view_guess "$T/small"
+    expect 0 "$BUILD/bin/lgd-data" --count 2 -o "$T/materials"
+    PATH=$BUILD/bin:$PATH expect 0 "$PYTHON" bench/view_guess.py "$T/materials"
+    lines "$T/out" 6
+    [ "$(awk '$2 > 5 && $2 <= $3 && $3 <= $4 && $4 < 120' "$T/out" | wc -l)" = 6 ] || fail "$(cat "$T/out")"
+}
+check scripts_view_guess view_guess
+
 without_pytorch() {
     command -v "$PYTHON" >/dev/null || skip "$PYTHON is not installed"
     "$PYTHON" -c 'import torch' 2>/dev/null && skip "$PYTHON has PyTorch"
