@@ -21,6 +21,7 @@ io_procedural tr_materials_of(const tr_config *c)
                            .closer = (float)c->data.closer,
                            .homogeneous = (float)c->data.homogeneous,
                            .plain = (float)c->data.plain,
+                           .smoother = (float)c->data.smoother,
                            .collected = (float)c->data.collected};
 }
 

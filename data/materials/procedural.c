@@ -7,6 +7,7 @@
 #include "data/materials/hues.h"
 #include "data/materials/plain.h"
 #include "data/materials/relief.h"
+#include "data/materials/smoother.h"
 #include "data/materials/uneven.h"
 #include "tensor/scratch.h"
 #include <math.h>
@@ -245,5 +246,7 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
     if (ts_rng_uniform(&hues) < p->hues) cv_other_hues(&c, &hues);
     ts_rng darker = ts_rng_make(p->seed, TS_STREAM_DARKER, index);
     if (ts_rng_uniform(&darker) < p->darker) cv_darker(&c, &darker);
+    ts_rng smoother = ts_rng_make(p->seed, TS_STREAM_SMOOTHER, index);
+    if (ts_rng_uniform(&smoother) < p->smoother) cv_smoother(&c, &smoother);
     cv_write(&c, m->maps);
 }

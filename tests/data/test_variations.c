@@ -1,12 +1,10 @@
-/* What training varies of the procedural materials: families, hues, brightness, relief, blends, slopes. */
+/* What training varies of the procedural materials: families, hues, relief, blends, slopes. */
 #include "data/materials/blend.h"
 #include "data/materials/procedural.h"
 #include "tests/data/new_material.h"
 #include "tests/test.h"
 #include <math.h>
 #include <string.h>
-
-static size_t values(int size) { return (size_t)size * (size_t)size * MAP_CHANNELS; }
 
 static int drawn(const io_procedural *p, const char *family, int count)
 {
@@ -33,18 +31,6 @@ TEST(procedural_families_are_drawn_more_often)
     CHECK(drawn(&both, "wood", COUNT) == half, "all three times as often is not the same as none");
 }
 
-/* Whether material i of a share of a half is varied; it must be that or plain. */
-static bool varies(const io_procedural *half, int i, const io_material *plain, const io_material *varied)
-{
-    io_material m = new_material(plain->size);
-    const size_t bytes = values(plain->size) * sizeof(float);
-    io_procedural_make(half, (uint64_t)i, &m);
-    const bool is_plain = !memcmp(m.maps, plain->maps, bytes);
-    CHECK(is_plain || !memcmp(m.maps, varied->maps, bytes), "material %d is neither plain nor varied", i);
-    io_material_free(&m);
-    return !is_plain;
-}
-
 TEST(procedural_other_relief_leaves_colours)
 {
     enum { COUNT = 64, SIZE = 32 };
@@ -55,7 +41,7 @@ TEST(procedural_other_relief_leaves_colours)
         io_material a = new_material(SIZE), b = new_material(SIZE);
         io_procedural_make(&plain, (uint64_t)i, &a);
         io_procedural_make(&other, (uint64_t)i, &b);
-        halves += varies(&half, i, &a, &b);
+        halves += material_varies(&half, i, &a, &b);
         bool relief = false, rougher = false;
         for (int k = 0; k < SIZE * SIZE; k++) {
             const float *from = a.maps + k * MAP_CHANNELS, *to = b.maps + k * MAP_CHANNELS;
@@ -91,8 +77,8 @@ TEST(procedural_other_hues_change_diffuse_colours_alone)
         io_material a = new_material(SIZE), b = new_material(SIZE);
         io_procedural_make(&plain, (uint64_t)i, &a);
         io_procedural_make(&hued, (uint64_t)i, &b);
-        halves += varies(&half, i, &a, &b);
-        changed += memcmp(a.maps, b.maps, values(SIZE) * sizeof(float)) != 0;
+        halves += material_varies(&half, i, &a, &b);
+        changed += memcmp(a.maps, b.maps, material_values(SIZE) * sizeof(float)) != 0;
         float blue[2] = {0, 0};
         for (int k = 0; k < SIZE * SIZE; k++) {
             const float *from = a.maps + k * MAP_CHANNELS, *to = b.maps + k * MAP_CHANNELS;
@@ -110,42 +96,6 @@ TEST(procedural_other_hues_change_diffuse_colours_alone)
     CHECK(changed > COUNT / 2 && halves > COUNT / 6 && halves < changed, "%d and %d of %d changed", changed, halves,
           COUNT);
     CHECK(bluer > before + COUNT / 8, "%d materials are more blue than red, %d before", bluer, before);
-}
-
-TEST(procedural_darker_multiplies_diffuse_colours_by_one_factor)
-{
-    enum { COUNT = 48, SIZE = 16 };
-    const io_procedural plain = {.seed = 5}, dark = {.seed = 5, .darker = 1}, half = {.seed = 5, .darker = 0.5f};
-    int changed = 0, halves = 0;
-    double stops = 0;
-    for (int i = 0; i < COUNT; i++) {
-        io_material a = new_material(SIZE), b = new_material(SIZE);
-        io_procedural_make(&plain, (uint64_t)i, &a);
-        io_procedural_make(&dark, (uint64_t)i, &b);
-        halves += varies(&half, i, &a, &b);
-        double least = 1, most = 0, wrong = 0;
-        for (int k = 0; k < SIZE * SIZE; k++) {
-            const float *from = a.maps + k * MAP_CHANNELS, *to = b.maps + k * MAP_CHANNELS;
-            CHECK(!memcmp(from + MAP_NORMAL, to + MAP_NORMAL, (MAP_CHANNELS - MAP_NORMAL) * sizeof(float)),
-                  "material %d: F0, roughness or normals changed with the diffuse colours", i);
-            for (int v = MAP_DIFFUSE; v < MAP_DIFFUSE + 3; v++) {
-                const double before = (from[v] + 1) / 2, after = (to[v] + 1) / 2;
-                wrong = fmax(wrong, after - before);
-                if (after < 0.005) continue; /* at the least albedo, or near enough for its rounding to show */
-                least = fmin(least, after / before), most = fmax(most, after / before);
-            }
-        }
-        CHECK(wrong < 1e-6, "material %d: a value is %g brighter", i, wrong);
-        if (most > 0) { /* a bare metal has no diffuse colour */
-            CHECK(least > 0.1249 && most - least < 2e-4, "material %d: factors of %g to %g", i, least, most);
-            stops -= log2(most), changed++;
-        }
-        io_material_free(&a);
-        io_material_free(&b);
-    }
-    CHECK(changed > COUNT / 2 && halves > COUNT / 6 && halves < 5 * COUNT / 6, "%d and %d of %d changed", changed,
-          halves, COUNT);
-    CHECK(fabs(stops / changed - 1.5) < 0.4, "darker by %g stops, 1.5 is the mean of 0 .. 3", stops / changed);
 }
 
 /* All eight planes of a canvas, at v[0] .. v[8 count - 1]. */
@@ -185,9 +135,9 @@ TEST(procedural_blends_are_a_share)
         io_material a = new_material(SIZE), b = new_material(SIZE);
         io_procedural_make(&plain, (uint64_t)i, &a);
         io_procedural_make(&blended, (uint64_t)i, &b);
-        halves += varies(&half, i, &a, &b);
+        halves += material_varies(&half, i, &a, &b);
         bool changed[MAP_CHANNELS] = {false};
-        for (size_t k = 0; k < values(SIZE); k++) {
+        for (size_t k = 0; k < material_values(SIZE); k++) {
             changed[k % MAP_CHANNELS] |= a.maps[k] != b.maps[k];
             CHECK(b.maps[k] >= -1 && b.maps[k] <= 1, "material %d: a value of %g", i, (double)b.maps[k]);
         }
@@ -220,7 +170,7 @@ TEST(uneven_materials_lean_and_keep_their_colours)
         io_material a = new_material(SIZE), b = new_material(SIZE);
         io_procedural_make(&plain, (uint64_t)i, &a);
         io_procedural_make(&uneven, (uint64_t)i, &b);
-        halves += varies(&half, i, &a, &b);
+        halves += material_varies(&half, i, &a, &b);
         const double slope = patch_slope(&b);
         before += patch_slope(&a) / COUNT;
         after += slope / COUNT;
@@ -272,7 +222,7 @@ static void homogeneous(float closer)
             diffuse = diffuse || (other && map == MAP_DIFFUSE + 1 && a.maps[k] > 2e-3f - 1);
             CHECK(!other || map < MAP_NORMAL || map == MAP_ROUGHNESS, "material %d: map value %d", i, map);
         }
-        if (memcmp(a.maps, b.maps, values(SIZE) * sizeof(float))) halves += varies(&half, i, &a, &b);
+        if (memcmp(a.maps, b.maps, material_values(SIZE) * sizeof(float))) halves += material_varies(&half, i, &a, &b);
         if (diffuse) {
             double all;
             changed++;
@@ -328,7 +278,7 @@ TEST(closer_materials_are_of_larger_parts)
         io_material a = new_material(SIZE), b = new_material(SIZE);
         io_procedural_make(&plain, (uint64_t)i, &a);
         io_procedural_make(&near, (uint64_t)i, &b);
-        halves += varies(&half, i, &a, &b);
+        halves += material_varies(&half, i, &a, &b);
         periods[0] += log(strongest(&a)) / COUNT;
         periods[1] += log(strongest(&b)) / COUNT;
         io_material_free(&a);
@@ -337,58 +287,4 @@ TEST(closer_materials_are_of_larger_parts)
     const double times = exp(periods[0] - periods[1]);
     CHECK(halves > COUNT / 4 && halves < 3 * COUNT / 4, "%d of %d at a share of a half", halves, COUNT);
     CHECK(times > 1.4 && times < 2.6, "parts are %.2f times as large; the mean of the logarithm is that of 2", times);
-}
-
-/* RMS of a map's differences from its mean, of normals from straight up. */
-static double varied(const io_material *m, int map)
-{
-    double sum = 0, squares = 0;
-    const int count = m->size * m->size;
-    for (int i = 0; i < count; i++) {
-        const double v = (double)m->maps[i * MAP_CHANNELS + map];
-        sum += map == MAP_NORMAL || map == MAP_NORMAL + 1 ? 0 : v;
-        squares += v * v;
-    }
-    return sqrt(fmax(squares / count - sum / count * (sum / count), 0));
-}
-
-static float largest(const io_material *m, int map, int channels)
-{
-    float most = -1;
-    for (int i = 0; i < m->size * m->size; i++)
-        for (int k = 0; k < channels; k++) most = fmaxf(most, m->maps[i * MAP_CHANNELS + map + k]);
-    return most;
-}
-
-/* A third of the differences is left in the mean of u^2. */
-TEST(plain_materials_have_one_gloss_and_hardly_any_relief)
-{
-    enum { COUNT = 96, SIZE = 64 };
-    const io_procedural families = {.seed = 5}, plain = {.seed = 5, .plain = 1}, half = {.seed = 5, .plain = 0.5f};
-    int halves = 0, dielectrics = 0;
-    double relief[2] = {0}, gloss[2] = {0};
-    for (int i = 0; i < COUNT; i++) {
-        io_material a = new_material(SIZE), b = new_material(SIZE);
-        io_procedural_make(&families, (uint64_t)i, &a);
-        io_procedural_make(&plain, (uint64_t)i, &b);
-        halves += varies(&half, i, &a, &b);
-        relief[0] += varied(&a, MAP_NORMAL), relief[1] += varied(&b, MAP_NORMAL);
-        gloss[0] += varied(&a, MAP_ROUGHNESS), gloss[1] += varied(&b, MAP_ROUGHNESS);
-        const bool dielectric = largest(&a, MAP_SPECULAR, 3) <= 2 * 0.2f - 1;
-        dielectrics += dielectric;
-        for (int k = 0; k < SIZE * SIZE; k++) {
-            const float *from = a.maps + k * MAP_CHANNELS, *to = b.maps + k * MAP_CHANNELS;
-            for (int c = 0; c < 3; c++) {
-                const int map = MAP_SPECULAR + c;
-                CHECK(from[MAP_DIFFUSE + c] == to[MAP_DIFFUSE + c], "material %d: diffuse of pixel %d", i, k);
-                CHECK(to[map] == (dielectric ? b.maps : from)[map], "material %d: F0 of pixel %d", i, k);
-            }
-        }
-        io_material_free(&a);
-        io_material_free(&b);
-    }
-    CHECK(halves > COUNT / 4 && halves < 3 * COUNT / 4, "%d of %d at a share of a half", halves, COUNT);
-    CHECK(dielectrics > COUNT / 3 && dielectrics < COUNT, "%d of %d are dielectrics", dielectrics, COUNT);
-    CHECK(relief[1] < 0.5 * relief[0] && relief[1] > 0.15 * relief[0], "relief %g of %g", relief[1], relief[0]);
-    CHECK(gloss[1] < 0.5 * gloss[0] && gloss[1] > 0.15 * gloss[0], "gloss %g of %g", gloss[1], gloss[0]);
 }
