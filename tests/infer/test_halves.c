@@ -1,20 +1,12 @@
 /* Weights in halves, which stay in their file until they are packed. */
 #include "nn/weights/weights.h"
+#include "tests/support/files.h"
 #include "tests/support/inference.h"
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
 enum { MOST = 128 };
-
-static const char *path_of(const char *name)
-{
-    static char path[2][300];
-    static int turn;
-    turn ^= 1;
-    snprintf(path[turn], sizeof path[turn], "%s/%s", test_folder(), name);
-    return path[turn];
-}
 
 /* The file from, with tensors of that type, one of whose first numbers is replaced where a name is given. */
 static void write_as(const char *from, const char *to, nn_dtype type, const char *name, uint16_t number)

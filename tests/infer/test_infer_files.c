@@ -6,6 +6,7 @@
 #include "infer/output.h"
 #include "infer/preview.h"
 #include "tensor/rng.h"
+#include "tests/support/files.h"
 #include "tests/test.h"
 #include <getopt.h>
 #include <math.h>
@@ -62,12 +63,6 @@ TEST(infer_same_stem_is_refused_with_both_names)
     cl_plan_free(&p);
 }
 
-static void put_file(const char *path)
-{
-    FILE *f = fopen(path, "w");
-    CHECK(f && fputs("old", f) >= 0 && fclose(f) == 0, "cannot write %s", path);
-}
-
 TEST(infer_a_photograph_is_never_replaced)
 {
     char folder[200], photo[256], linked[256], out[256];
@@ -76,7 +71,7 @@ TEST(infer_a_photograph_is_never_replaced)
     snprintf(linked, sizeof linked, "%s/link", test_folder());
     snprintf(out, sizeof out, "%s/link/..", test_folder());
     CHECK(mkdir(folder, 0777) == 0 && symlink("diffuse", linked) == 0, "set-up");
-    put_file(photo);
+    spill(photo, "old", 3);
     char *photos[] = {photo};
     cl_plan p;
     ts_status st = {0};
@@ -86,7 +81,7 @@ TEST(infer_a_photograph_is_never_replaced)
     CHECK(cl_plan_make(photos, 1, folder, &p, &st) == TS_OK, "its own folder is fine: %s", st.message);
     cl_plan_free(&p);
     snprintf(photo, sizeof photo, "%s/noextension", test_folder());
-    put_file(photo);
+    spill(photo, "old", 3);
     CHECK(cl_plan_make(photos, 1, test_folder(), &p, &st) == TS_INVALID, "a file would become a folder");
 }
 
@@ -157,7 +152,7 @@ TEST(infer_output_failure_leaves_nothing)
     char path[300];
     make_material(&m, &photo, 4);
     snprintf(path, sizeof path, "%s/x", test_folder());
-    put_file(path);
+    spill(path, "old", 3);
     const lgd_photo flash = lgd_flash_photo(photo.data);
     CHECK(lgd_output_write(test_folder(), "x", &m, &flash, &everything, NULL, &st) == TS_IO && strstr(st.message, "/x"),
           "a file in the way: %s", st.message);

@@ -1,24 +1,12 @@
 /* The safetensors reader: every way in which a file can be something else than it claims. */
 #include "nn/weights/weights.h"
+#include "tests/support/files.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-static const char *path_of(const char *name)
-{
-    static char path[512];
-    snprintf(path, sizeof path, "%s/%s", test_folder(), name);
-    return path;
-}
-
-static void spill(const char *path, const void *data, size_t size)
-{
-    FILE *f = fopen(path, "wb");
-    CHECK(f && fwrite(data, 1, size, f) == size && !fclose(f), "%s cannot be written", path);
-}
 
 /* A file of that header and of bytes of values. */
 static const char *craft(const char *header, size_t bytes)

@@ -1,35 +1,13 @@
 /* PyTorch's files: those of tests/corpus/torch (tests/nn/make_torch_files.py makes them) give what expected.tsv says,
  * and what is written comes back. */
 #include "nn/weights/weights.h"
+#include "tests/support/files.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 static const char corpus[] = "tests/corpus/torch";
-
-static const char *path_of(const char *name)
-{
-    static char path[512];
-    snprintf(path, sizeof path, "%s/%s", test_folder(), name);
-    return path;
-}
-
-static char *slurp(const char *path, size_t *size)
-{
-    FILE *f = fopen(path, "rb");
-    CHECK(f, "%s cannot be read", path);
-    char *data = malloc(1 << 20);
-    *size = fread(data, 1, 1 << 20, f);
-    fclose(f);
-    return data;
-}
-
-static void spill(const char *path, const void *data, size_t size)
-{
-    FILE *f = fopen(path, "wb");
-    CHECK(f && fwrite(data, 1, size, f) == size && !fclose(f), "%s cannot be written", path);
-}
 
 /* tensors: NAME DTYPE 2x3 0,1,2,3,4,5;… */
 static void check_good(const char *path, char *tensors)

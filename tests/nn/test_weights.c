@@ -3,6 +3,7 @@
 #include "tensor/hash.h"
 #include "tensor/maps.h"
 #include "tensor/rng.h"
+#include "tests/support/files.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
@@ -15,29 +16,6 @@ static nn_arch small(void)
     nn_arch a = nn_arch_default();
     a.g_width = 3, a.g_width_max = 5, a.g_levels = 2, a.g_size = 8, a.h_width = 6, a.h_gru = 2;
     return a;
-}
-
-static const char *path_of(const char *name)
-{
-    static char path[512];
-    snprintf(path, sizeof path, "%s/%s", test_folder(), name);
-    return path;
-}
-
-static char *slurp(const char *path, size_t *size)
-{
-    FILE *f = fopen(path, "rb");
-    CHECK(f, "%s cannot be read", path);
-    char *data = malloc(1 << 20);
-    *size = fread(data, 1, 1 << 20, f);
-    fclose(f);
-    return data;
-}
-
-static void spill(const char *path, const void *data, size_t size)
-{
-    FILE *f = fopen(path, "wb");
-    CHECK(f && fwrite(data, 1, size, f) == size && !fclose(f), "%s cannot be written", path);
 }
 
 TEST(weights_round_trip_is_exact)

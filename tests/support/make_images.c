@@ -1,4 +1,5 @@
 #include "tests/support/make_images.h"
+#include "tests/support/files.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
@@ -33,10 +34,7 @@ const char *bytes_save(bytes *b, const char *folder, const char *name)
     static int next;
     char *p = path[next++ % 8];
     snprintf(p, sizeof path[0], "%s/%s", folder, name);
-    FILE *f = fopen(p, "wb");
-    CHECK(f, "cannot write %s", p);
-    CHECK(b->size == 0 || fwrite(b->data, b->size, 1, f) == 1, "cannot write %s", p);
-    fclose(f);
+    spill(p, b->data, b->size);
     bytes_free(b);
     return p;
 }
@@ -44,11 +42,8 @@ const char *bytes_save(bytes *b, const char *folder, const char *name)
 bytes bytes_load(const char *path)
 {
     bytes b = {0};
-    uint8_t block[4096];
-    FILE *f = fopen(path, "rb");
-    CHECK(f, "cannot read %s", path);
-    for (size_t n; (n = fread(block, 1, sizeof block, f));) put(&b, block, n);
-    fclose(f);
+    b.data = (uint8_t *)slurp(path, &b.size);
+    b.capacity = b.size;
     return b;
 }
 

@@ -2,6 +2,7 @@
 #ifndef TESTS_RUNS_H
 #define TESTS_RUNS_H
 #include "tensor/threads.h"
+#include "tests/support/files.h"
 #include "tests/test.h"
 #include "train/state.h"
 #include "train/trainer.h"
@@ -34,19 +35,5 @@ static inline const char *folder(const char *name)
     snprintf(p, 600, "%s/%s", test_folder(), name);
     mkdir(p, 0777);
     return p;
-}
-
-static inline size_t read_all(const char *path, char **data)
-{
-    FILE *f = fopen(path, "rb");
-    CHECK(f, "%s cannot be read", path);
-    fseek(f, 0, SEEK_END);
-    const size_t n = (size_t)ftell(f);
-    rewind(f);
-    *data = malloc(n + 1);
-    CHECK(fread(*data, 1, n, f) == n, "%s cannot be read", path);
-    (*data)[n] = 0;
-    fclose(f);
-    return n;
 }
 #endif

@@ -1,13 +1,8 @@
 /* XXH64 against numbers that its authors' program prints, from memory and from files of every kind of length. */
 #include "tensor/hash.h"
+#include "tests/support/files.h"
 #include "tests/test.h"
 #include <stdlib.h>
-
-static void write_file(const char *path, const unsigned char *bytes, size_t size)
-{
-    FILE *f = fopen(path, "wb");
-    CHECK(f && fwrite(bytes, 1, size, f) == size && fclose(f) == 0, "%s", path);
-}
 
 TEST(hash_is_xxh64)
 {
@@ -36,7 +31,7 @@ TEST(hash_of_a_file_is_that_of_its_bytes)
     for (size_t i = 0; i < MOST; i++) bytes[i] = (unsigned char)(i * i >> 7 ^ i);
     snprintf(path, sizeof path, "%s/f", test_folder());
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
-        write_file(path, bytes, sizes[i]);
+        spill(path, bytes, sizes[i]);
         CHECK(ts_hash_file(path, &h, &st) == TS_OK, "%s", st.message);
         CHECK(h == ts_hash(bytes, sizes[i], 0), "%zu bytes", sizes[i]);
     }

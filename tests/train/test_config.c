@@ -1,5 +1,6 @@
 /* The INI reader and the table of configuration keys. */
 #include "data/ini.h"
+#include "tests/support/files.h"
 #include "tests/test.h"
 #include "train/config.h"
 #include "train/trainer.h"
@@ -22,17 +23,6 @@ static void expect_error(const char *text, const char *part)
     CHECK(strstr(st.message, part), "\"%s\" is not in: %s", part, st.message);
     CHECK(!strchr(st.message, '\n'), "more than one line: %s", st.message);
     CHECK(!ini.entry && !ini.text, "the reader left memory behind");
-}
-
-static const char *write_file(const char *name, const char *text)
-{
-    static char path[600];
-    snprintf(path, sizeof path, "%s/%s", test_folder(), name);
-    FILE *f = fopen(path, "wb");
-    CHECK(f, "cannot write %s", path);
-    fputs(text, f);
-    fclose(f);
-    return path;
 }
 
 TEST(ini_reads_sections_comments_and_blanks)
@@ -245,7 +235,9 @@ TEST(config_file_errors_have_the_line)
 {
     tr_config c = tr_config_default();
     ts_status st = {0};
-    const char *path = write_file("bad.ini", "\xef\xbb\xbf[train]\r\nbatch = 4\r\nrate = 1e-3\r\nwarmpu = 3\r\n");
+    static const char text[] = "\xef\xbb\xbf[train]\r\nbatch = 4\r\nrate = 1e-3\r\nwarmpu = 3\r\n";
+    const char *path = path_of("bad.ini");
+    spill(path, text, sizeof text - 1);
     char want[700];
     CHECK(tr_config_read(&c, path, &st) == TS_INVALID, "accepted");
     snprintf(want, sizeof want, "%s:4: ", path);

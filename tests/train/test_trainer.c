@@ -14,11 +14,9 @@ typedef struct watch {
 
 static void copy(const char *from, const char *to)
 {
-    char *data;
-    const size_t n = read_all(from, &data);
-    FILE *f = fopen(to, "wb");
-    CHECK(f && fwrite(data, 1, n, f) == n, "%s cannot be written", to);
-    fclose(f);
+    size_t size;
+    char *data = slurp(from, &size);
+    spill(to, data, size);
     free(data);
 }
 
@@ -85,11 +83,12 @@ static void expect_same_run(const char *a, const char *b)
     static const char *const names[] = {"checkpoint.safetensors", "last.safetensors", "best.safetensors", "val.csv",
                                         "log.csv"};
     for (int i = 0; i < 5; i++) {
-        char path[700], *x, *y;
+        char path[700];
+        size_t n, m;
         snprintf(path, sizeof path, "%s/%s", a, names[i]);
-        size_t n = read_all(path, &x);
+        char *x = slurp(path, &n);
         snprintf(path, sizeof path, "%s/%s", b, names[i]);
-        size_t m = read_all(path, &y);
+        char *y = slurp(path, &m);
         if (i == 4) {
             blank_speed(x);
             blank_speed(y);
@@ -338,24 +337,21 @@ TEST(trainer_rejects_damaged_checkpoints)
     const tr_config c = small();
     ts_status st;
     watch w = {.stop_at = 1};
-    char path[700], *data;
+    char path[700];
     const char *where = folder("run");
     CHECK(run(&c, where, false, &w, &st) == TS_INTERRUPTED, "%s", st.message);
     snprintf(path, sizeof path, "%s/checkpoint.safetensors", where);
-    const size_t n = read_all(path, &data);
+    size_t n;
+    char *data = slurp(path, &n);
     const size_t cut[] = {0, 7, 8, 100, n / 2, n - 1};
     for (int i = 0; i < 6; i++) {
-        FILE *f = fopen(path, "wb");
-        fwrite(data, 1, cut[i], f);
-        fclose(f);
+        spill(path, data, cut[i]);
         CHECK(run(&c, where, true, &w, &st) != TS_OK && strstr(st.message, path), "cut to %d bytes: %s", (int)cut[i],
               st.message);
     }
     const float nan = NAN;
     memcpy(data + n - sizeof nan, &nan, sizeof nan);
-    FILE *f = fopen(path, "wb");
-    fwrite(data, 1, n, f);
-    fclose(f);
+    spill(path, data, n);
     CHECK(run(&c, where, true, &w, &st) == TS_NUMERIC, "a value that is not finite was accepted: %s", st.message);
     char last[700];
     snprintf(last, sizeof last, "%s/last.safetensors", where);
