@@ -46,6 +46,22 @@ exchange() {
 }
 check scripts_exchange exchange
 
+# Captures that the program rendered, with their own maps as everybody's: no error but that of bytes and of the falloff,
+# whose power is found, and with another material's maps a large one.
+exchange_numbers() {
+    "$PYTHON" -c 'import numpy, PIL, scipy, OpenEXR' 2>/dev/null || skip "$PYTHON has no scipy or no OpenEXR"
+    expect 0 "$BUILD/bin/lgd-data" --format captures --count 1 --first 1 -o "$T/rendered"
+    expect 0 "$BUILD/bin/lgd-data" --count 2 -o "$T/truth"
+    expect 0 "$PYTHON" tests/cli/beside_captures.py "$T/rendered" "$T/truth"
+    expect 0 "$PYTHON" bench/exchange.py "$T/rendered" "$T/truth"
+    tail -n 1 "$T/out" | awk '{ for (i = 2; i < 15; i++) bad += $i <= 0 || $i > .02
+                                exit bad || $15 < 1.9 || $15 > 2.1 }' || fail "$(cat "$T/out")"
+    mv "$T"/truth/00000*/maps.exr "$T"/truth/00001*/own/
+    expect 0 "$PYTHON" bench/exchange.py "$T/rendered" "$T/truth"
+    tail -n 1 "$T/out" | awk '{ exit $2 < .05 || $11 > .02 }' || fail "$(cat "$T/out")"
+}
+check scripts_exchange_numbers exchange_numbers
+
 # An angle for each kind, and what is wrong in one line.
 view_guess() {
     "$PYTHON" -c 'import numpy, PIL, OpenEXR' 2>/dev/null || skip "$PYTHON has no Pillow or no OpenEXR"
