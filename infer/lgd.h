@@ -54,7 +54,7 @@ LGD_API int lgd_find_weights(const char *name, char *path, size_t size, lgd_erro
  * are counted on the photograph at 256 x 256 pixels. */
 enum { LGD_AUTO = -2, LGD_AUTO_MOST = 24 };
 
-/* The tolerance of least time whose renderings are at most 1% worse than those of all steps (docs/performance.md). */
+/* The tolerance of least time whose renderings are at most 1% worse than those of all steps (docs/accuracy.md). */
 #define LGD_TOLERANCE 0.003
 #define LGD_TOLERANCE_DEFAULT (-1.0)
 /* As suits what is known: 1 where the model guesses the camera or the light's power, else 2 (docs/accuracy.md). */
@@ -81,11 +81,11 @@ typedef struct lgd_options {
     int exact;        /* 0: convolutions use Winograd's algorithm where it is faster; else all are computed directly.
                        * In f32 g of the published network always is, but for its last block. The shipped model's maps
                        * of real photographs differ by less than 1e-5 (RMS of a map), single values by less than 1e-3,
-                       * as they do between instruction sets (docs/performance.md) */
+                       * as they do between instruction sets (docs/accuracy.md) */
     int precision;    /* LGD_F32; LGD_BF16: inputs and weights of convolutions are rounded to bf16, for CPUs with AMX or
                        * AVX512-BF16 (much slower on others). Sums, renderer and maps stay f32. Maps differ by
                        * less than 0.005 (RMS), fewer than one value in 10,000 by more than 0.05, single ones by up to
-                       * 0.8 (docs/performance.md) */
+                       * 0.8 (docs/accuracy.md) */
     int orientations; /* R_0 is the mean over so many orientations of the photograph: 1: as it is, 2: and turned by a
                        * quarter, 4: all quarter turns, 8: and their mirror images; 0: LGD_ORIENTATIONS_DEFAULT. Only
                        * for a single photograph with light and camera above its centre, and not with published weights
