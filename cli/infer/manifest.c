@@ -30,7 +30,7 @@ struct cl_manifest {
     int photos;
 };
 
-/* The key of a line; 0: it is none of ours. */
+/* The key of a line; 0: it is none of ours, and stays as it is. */
 static uint64_t key_of(const char *line, size_t size)
 {
     const size_t head = sizeof HEAD - 1;
@@ -114,7 +114,7 @@ static int by_line(const void *a, const void *b)
 }
 
 typedef struct lines {
-    last *of; /* every line of ours, in its order; after keep_last the last of each key */
+    last *of; /* every line, in its order; after keep_last the last of each key, and those that have none */
     int64_t count, capacity, all;
 } lines;
 
@@ -128,7 +128,6 @@ static ts_code look(cl_manifest *m, FILE *f, lines *l, ts_status *st)
     while ((size = getline(&line, &capacity, f)) > 0) {
         const uint64_t key = key_of(line, (size_t)size);
         const int64_t number = l->all++;
-        if (!key) continue;
         if (l->count == l->capacity) {
             const int64_t wider = l->capacity ? 2 * l->capacity : 1024;
             last *more = realloc(l->of, (size_t)wider * sizeof *more);
@@ -137,7 +136,7 @@ static ts_code look(cl_manifest *m, FILE *f, lines *l, ts_status *st)
             l->capacity = wider;
         }
         l->of[l->count++] = (last){key, number};
-        known *k = find(m, key);
+        known *k = key ? find(m, key) : NULL;
         if (k) k->there = true, k->tail = tail_of(line, (size_t)size);
     }
     const bool whole = feof(f) && !ferror(f);
@@ -150,7 +149,7 @@ static void keep_last(lines *l)
     int64_t n = 0;
     qsort(l->of, (size_t)l->count, sizeof *l->of, by_last);
     for (int64_t i = 0; i < l->count; i++)
-        if (i == 0 || l->of[i].key != l->of[i - 1].key) l->of[n++] = l->of[i];
+        if (i == 0 || !l->of[i].key || l->of[i].key != l->of[i - 1].key) l->of[n++] = l->of[i];
     l->count = n;
     qsort(l->of, (size_t)n, sizeof *l->of, by_line);
 }

@@ -1,6 +1,7 @@
 /* DIR/results.jsonl: a line of JSON for each photograph whose maps are in DIR, or which failed. Several processes may
  * write it at once. The folders' meta.txt is the truth, and what a killed process owes is added when its photographs
- * are met again; a photograph that is done again gets a new line, and the old one goes at the end of the call. */
+ * are met again; a photograph that is done again gets a new line, and the old one goes at the end of the call. Lines
+ * that others wrote stay. */
 #ifndef CL_MANIFEST_H
 #define CL_MANIFEST_H
 #include "cli/infer/item.h"

@@ -133,6 +133,13 @@ lists() {
     expect 0 few "$T/in/p0.ppm" "$T/in/p1.ppm" -o "$T/o"
     listed "$T/o" 4
     if grep -q '"folder": "p1".*"seconds": null' "$T/o/results.jsonl"; then fail "the new line is not taken"; fi
+    # what others wrote stays, where it stands
+    { echo '{"folder":"p9","note":"not ours"}'; cat "$T/o/results.jsonl"; echo 'a note'; } >"$T/noted"
+    cp "$T/noted" "$T/o/results.jsonl"
+    expect 0 few "$T/in/p0.ppm" "$T/in/p1.ppm" -o "$T/o"
+    lines "$T/o/results.jsonl" 6
+    [ "$(head -n 1 "$T/o/results.jsonl")" = '{"folder":"p9","note":"not ours"}' ] || fail "a line of others is gone"
+    says "$T/o/results.jsonl" "a note"
     # of a lone photograph there is none
     expect 0 few "$T/in/p0.ppm" -o "$T/lone"
     [ "$(ls -A "$T/lone")" = p0 ] || fail "a lone photograph: $(ls -A "$T/lone")"
