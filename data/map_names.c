@@ -4,7 +4,8 @@
  *   workflow: metallic | specular ...        needed when both a metallic and a specular map exist
  *   basecolor, diffuse, specular: sRGB | linear ...
  *   normal: ... OpenGL ... | ... DirectX ...  (y up or y down)
- *   file.MAP: NAME                           when its name does not say so; MAP as in io_map_kind_name */
+ *   file.MAP: NAME                           when its name does not say so, or several do; MAP as in io_map_kind_name
+ */
 #include "data/file.h"
 #include "data/image/oiio.h"
 #include "data/map_folder.h"
@@ -113,7 +114,24 @@ static bool choose_normal(io_map_set *set, side *have, const char *name, side y,
     return true;
 }
 
-static ts_code scan(const char *path, io_map_set *set, side wanted, side *file_side, ts_status *st)
+/* This map and the one that would stand in its place, bits 1 << kind. */
+static unsigned alternatives(int kind)
+{
+    const unsigned colours = 1u << IO_BASECOLOR | 1u << IO_DIFFUSE_MAP,
+                   gloss = 1u << IO_ROUGHNESS_MAP | 1u << IO_GLOSS_MAP;
+    return colours >> kind & 1 ? colours : gloss >> kind & 1 ? gloss : 1u << kind;
+}
+
+static bool is_named(const io_map_set *set, unsigned named, const char *file)
+{
+    for (int k = 0; k < IO_MAP_KINDS; k++)
+        if (named >> k & 1 && !strcmp(set->file[k], file)) return true;
+    return false;
+}
+
+/* named: the maps that meta.txt has named, bits 1 << kind. For those and their alternatives
+ * no other name counts. */
+static ts_code scan(const char *path, io_map_set *set, unsigned named, side wanted, side *file_side, ts_status *st)
 {
     DIR *folder = opendir(path);
     if (!folder) return ts_fail(st, TS_IO, "%s: %s", path, errno == ENOTDIR ? "not a folder of maps" : strerror(errno));
@@ -122,6 +140,7 @@ static ts_code scan(const char *path, io_map_set *set, side wanted, side *file_s
         side y;
         int kind = entry->d_name[0] == '.' ? -1 : kind_of_name(entry->d_name, &y);
         if (kind < 0 || strlen(entry->d_name) >= sizeof set->file[0]) continue;
+        if (named & alternatives(kind) || is_named(set, named, entry->d_name)) continue;
         char *file = set->file[kind];
         if (!file[0]) {
             strcpy(file, entry->d_name);
@@ -138,16 +157,16 @@ static ts_code scan(const char *path, io_map_set *set, side wanted, side *file_s
     return code;
 }
 
-/* Files named in meta.txt come first: they decide where names are ambiguous. */
-static bool named_files(const char *meta, io_map_set *set)
+/* Files named in meta.txt come first: they decide where names are ambiguous. Bits 1 << kind. */
+static unsigned named_files(const char *meta, io_map_set *set)
 {
-    bool any = false;
+    unsigned named = 0;
     for (int k = 0; k < IO_MAP_KINDS; k++) {
         char key[32];
         snprintf(key, sizeof key, "file.%s", io_map_kind_name[k]);
-        any = find_key(meta, key, set->file[k], sizeof set->file[k]) || any;
+        if (find_key(meta, key, set->file[k], sizeof set->file[k])) named |= 1u << k;
     }
-    return any;
+    return named;
 }
 
 static ts_code settle_normal(const char *path, const char *meta, io_normal convention, side file_side, io_map_set *set,
@@ -196,8 +215,9 @@ static ts_code settle_workflow(const char *path, const char *meta, io_workflow g
     if (set->specular && !specular)
         return ts_fail(st, TS_INVALID, "%s: should be of the specular workflow, but there is no specular map", path);
     if (set->file[IO_ROUGHNESS_MAP][0] && set->file[IO_GLOSS_MAP][0])
-        return ts_fail(st, TS_INVALID, "%s: has both %s and %s; remove one", path, set->file[IO_ROUGHNESS_MAP],
-                       set->file[IO_GLOSS_MAP]);
+        return ts_fail(st, TS_INVALID,
+                       "%s: has both %s and %s; remove one, or name it in meta.txt (file.roughness: ...)", path,
+                       set->file[IO_ROUGHNESS_MAP], set->file[IO_GLOSS_MAP]);
     if (!base && !diffuse)
         return ts_fail(st, TS_INVALID, "%s: no colour map (basecolor, albedo, diffuse or color in its file name)",
                        path);
@@ -225,8 +245,8 @@ ts_code io_describe_map_folder(const char *path, const io_map_convention *given,
         code = io_read_bytes(meta_path, 1 << 20, &meta, &size, st);
     }
     const char *words_of = meta ? meta : "";
-    if (code == TS_OK && !named_files(words_of, set))
-        code = scan(path, set,
+    if (code == TS_OK)
+        code = scan(path, set, named_files(words_of, set),
                     say.normal == IO_NORMAL_DX       ? DX
                         : say.normal == IO_NORMAL_GL ? GL
                                                      : UNKNOWN,

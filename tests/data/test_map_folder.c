@@ -156,6 +156,25 @@ TEST(map_folder_names)
     CHECK(near(first(folder, IO_NORMAL_FROM_FILE, 0).normal[1], 0.6f, 0.01f), "named in meta.txt");
 }
 
+/* meta.txt names what several files could be; the others are found by their names. */
+TEST(map_folder_named_in_part)
+{
+    const char *folder = fresh("part");
+    flat(folder, "a_albedo.png", 4, 4, 1, 2, 3), flat(folder, "a_color.png", 4, 4, 128, 128, 128);
+    flat(folder, "a_normal_gl.png", 4, 4, 128, 204, 230), flat(folder, "a_roughness.png", 4, 4, 51, 51, 51);
+    refused(folder, IO_NORMAL_FROM_FILE, "name it in meta.txt (file.basecolor: ...)");
+    words(folder, "meta.txt", "file.basecolor: a_color.png\n");
+    const io_texel t = first(folder, IO_NORMAL_FROM_FILE, 0);
+    CHECK(near(t.diffuse[0], io_srgb_to_linear(128 / 255.f), 1e-6f), "another colour map than the named one");
+    CHECK(near(t.normal[1], 0.6f, 0.01f) && near(t.roughness, 0.2f, 1e-6f), "normals and roughness are not found");
+    flat(folder, "a_diffuse.png", 4, 4, 1, 2, 3), flat(folder, "a_gloss.png", 4, 4, 1, 2, 3);
+    refused(folder, IO_NORMAL_FROM_FILE, "both a_roughness.png and a_gloss.png");
+    words(folder, "meta.txt", "file.basecolor: a_color.png\nfile.roughness: a_roughness.png\n");
+    CHECK(near(first(folder, IO_NORMAL_FROM_FILE, 0).roughness, 0.2f, 1e-6f), "gloss in place of the named roughness");
+    words(folder, "meta.txt", "file.basecolor: a_color.png\nfile.roughness: a_gloss.png\n");
+    CHECK(near(first(folder, IO_NORMAL_FROM_FILE, 0).roughness, 1 / 255.f, 1e-2f), "a file is what meta.txt says");
+}
+
 TEST(map_folder_refused)
 {
     char path[600];
