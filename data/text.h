@@ -1,6 +1,8 @@
-/* A text that is printed into memory, to be written as one file. Printing says nothing of what failed: the end does. */
+/* A text that is printed into memory, to be written as one file. Printing says nothing of what failed: the end does.
+ * Between begin and end, which one thread calls, numbers have a decimal point whatever the user's language. */
 #ifndef IO_TEXT_H
 #define IO_TEXT_H
+#include "tensor/plain_locale.h"
 #include "tensor/status.h"
 #include <stdio.h>
 
@@ -8,6 +10,7 @@ typedef struct io_text {
     FILE *f; /* what is printed to, between begin and end */
     char *bytes;
     size_t size;
+    locale_t before; /* the thread's */
 } io_text;
 
 /* name: what the message of a failure begins with. After a failure there is nothing to end. */

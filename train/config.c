@@ -2,28 +2,19 @@
 #include "train/config.h"
 #include "data/ini.h"
 #include "tensor/maps.h"
+#include "tensor/plain_locale.h"
 #include <errno.h>
-#include <locale.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
-/* Numbers are written with a point whatever the user's language. */
-static locale_t plain_locale(void)
-{
-    static locale_t plain;
-    if (!plain) plain = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-    return plain;
-}
-
 static bool parse_real(const char *text, double *value)
 {
-    const locale_t plain = plain_locale();
-    const locale_t before = plain ? uselocale(plain) : (locale_t)0;
+    const locale_t before = ts_locale_plain();
     char *end;
     *value = strtod(text, &end);
-    if (plain) uselocale(before);
+    ts_locale_back(before);
     return end != text && !*end && *text != ' ';
 }
 

@@ -1,10 +1,10 @@
 /* The INI reader and the table of configuration keys. */
 #include "data/ini.h"
+#include "tests/support/comma.h"
 #include "tests/support/files.h"
 #include "tests/test.h"
 #include "train/config.h"
 #include "train/trainer.h"
-#include <locale.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -247,11 +247,7 @@ TEST(config_file_errors_have_the_line)
 
 TEST(config_numbers_do_not_depend_on_the_locale)
 {
-    static const char *const names[] = {"de_DE.UTF-8", "de_DE.utf8", "fr_FR.UTF-8", "nl_NL.UTF-8", "de_DE", "fr_FR"};
-    bool found = false;
-    for (size_t i = 0; i < sizeof names / sizeof *names && !found; i++)
-        found = setlocale(LC_ALL, names[i]) && *localeconv()->decimal_point == ',';
-    if (!found) test_skip("no locale with a decimal comma is installed");
+    comma_locale();
     tr_config c = tr_config_default();
     ts_status st = {0};
     char text[64];
