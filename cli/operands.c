@@ -1,18 +1,15 @@
 #include "cli/operands.h"
 #include "data/file.h"
+#include "data/name.h"
 #include <dirent.h>
 #include <errno.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 
 #define LIST_LIMIT ((size_t)1 << 26) /* bytes of a list: a larger file is none */
-
-static const char *const endings[] = {"jpg", "jpeg", "png", "heic", "heif", "avif", "webp", "tif", "tiff",
-                                      "exr", "hdr",  "bmp", "tga",  "ppm",  "pgm",  "dng",  "jp2", "jxl"};
 
 static ts_code add(cl_operands *all, const char *name, ts_status *st)
 {
@@ -29,15 +26,6 @@ static ts_code add(cl_operands *all, const char *name, ts_status *st)
     return TS_OK;
 }
 
-static bool is_image(const char *name)
-{
-    const char *dot = strrchr(name, '.');
-    if (name[0] == '.' || !dot) return false;
-    for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
-        if (strcasecmp(dot + 1, endings[i]) == 0) return true;
-    return false;
-}
-
 static int by_name(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
 static ts_code add_folder(cl_operands *all, const char *folder, ts_status *st)
@@ -50,7 +38,7 @@ static ts_code add_folder(cl_operands *all, const char *folder, ts_status *st)
     for (struct dirent *e; !code && (e = readdir(d));) {
         char *path = NULL;
         struct stat info;
-        if (!is_image(e->d_name)) continue;
+        if (!io_is_image_name(e->d_name)) continue;
         if (asprintf(&path, "%s%s%s", folder, length && folder[length - 1] == '/' ? "" : "/", e->d_name) < 0) {
             path = NULL; /* undefined after a failure */
             code = ts_fail(st, TS_NOMEM, "%s: out of memory", folder);

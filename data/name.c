@@ -1,6 +1,7 @@
 #include "data/name.h"
 #include <math.h>
 #include <string.h>
+#include <strings.h>
 
 void io_name_from_path(const char *path, char *name, size_t capacity)
 {
@@ -17,6 +18,16 @@ void io_name_from_path(const char *path, char *name, size_t capacity)
     if (length >= capacity) length = capacity - 1;
     memcpy(name, path + start, length);
     name[length] = 0;
+}
+
+bool io_is_image_name(const char *name)
+{
+    static const char *const endings[] = {"jpg", "jpeg", "png", "heic", "heif", "avif", "webp", "tif", "tiff",
+                                          "exr", "hdr",  "bmp", "tga",  "ppm",  "pgm",  "dng",  "jp2", "jxl"};
+    const char *dot = strrchr(name, '.');
+    for (size_t i = 0; name[0] != '.' && dot && i < sizeof endings / sizeof *endings; i++)
+        if (strcasecmp(dot + 1, endings[i]) == 0) return true;
+    return false;
 }
 
 void io_normal_decode(const float stored[3], bool directx, float normal[3])

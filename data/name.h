@@ -8,6 +8,9 @@
  */
 void io_name_from_path(const char *path, char *name, size_t capacity);
 
+/* Whether the extension is one of images that photographs are stored as; of hidden files it is not. */
+bool io_is_image_name(const char *name);
+
 /* A stored normal, (n + 1) / 2 per channel, to a unit vector with z > 0; directx: its y points down. */
 void io_normal_decode(const float stored[3], bool directx, float normal[3]);
 #endif

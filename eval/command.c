@@ -4,6 +4,7 @@
 #include "cli/cli.h"
 #include "eval/launcher.h"
 #include "eval/methods/method.h"
+#include "eval/metrics/lpips.h"
 #include "eval/set_ini.h"
 #include "infer/lgd.h"
 #include <stdlib.h>
@@ -249,6 +250,11 @@ ts_code ev_command_parse(int argc, char **argv, ev_command *c, ts_status *st)
     if (!c->shards) ev_shard_of_launcher(&c->shard, &c->shards);
     if (c->pareto && c->shards)
         return ts_fail(st, TS_INVALID, "--pareto measures times: it is one process's work, without --shard or mpirun");
+    if (c->tune && c->iterations >= 0)
+        return ts_fail(st, TS_INVALID, "--tune: --iterations does not go with it: give each method iterations=");
+    if (c->lpips[0] && c->size < EV_LPIPS_SIDE && !c->pareto)
+        return ts_fail(st, TS_INVALID, "--lpips-weights needs pictures of at least %d x %d pixels: --size",
+                       EV_LPIPS_SIDE, EV_LPIPS_SIDE);
     if ((c->tune || c->pareto) && c->images)
         return ts_fail(st, TS_INVALID, "--images does not go with --tune or --pareto");
     if (c->iterations_figure && c->iterations < 0) c->iterations = 24;

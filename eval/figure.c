@@ -145,7 +145,7 @@ static bool add_size(figure *g, const ev_report *r, const char *const *tolerance
     return true;
 }
 
-ts_code ev_pareto(const ev_run *r, const int *sizes, int count, const char *model, const char *folder, ts_status *st)
+ts_code ev_pareto(ev_run *r, const int *sizes, int count, const char *model, const char *folder, ts_status *st)
 {
     static const char *const tolerance[] = {"0.003", "0.006", "0.0125", "0.025", "0.05"};
     enum { TOLERANCES = 5 };
@@ -165,7 +165,9 @@ ts_code ev_pareto(const ev_run *r, const int *sizes, int count, const char *mode
         at.method = method;
         at.methods = 2 + TOLERANCES;
         at.perceptual = at.pictures = false;
+        at.failures = 0;
         code = ev_run_all(&at, st);
+        r->failures += at.failures;
         if (!code && at.report.results == 0)
             code = ts_fail(st, TS_INVALID, "no material could be evaluated at %d pixels", at.size);
         if (!code && !add_size(&g, &at.report, tolerance)) code = ts_fail(st, TS_NOMEM, "out of memory for a figure");

@@ -9,7 +9,7 @@ ts_code ev_figure_iterations(const ev_report *r, const char *folder, ts_status *
 ts_code ev_figure_methods(const ev_report *r, const char *folder, ts_status *st);
 
 /* folder/pareto.svg and .csv: lgd's time against its error at sizes[0 .. count - 1] pixels, over T = 0 .. 24 in f32 and
- * in bf16, and over the tolerance at which tiles end. r: as for ev_run_all, without methods and size. TS_INTERRUPTED
- * after Ctrl-C. */
-ts_code ev_pareto(const ev_run *r, const int *sizes, int count, const char *model, const char *folder, ts_status *st);
+ * in bf16, and over the tolerance at which tiles end. r: as for ev_run_all, without methods and size; its failures are
+ * those of all sizes. TS_INTERRUPTED after Ctrl-C. */
+ts_code ev_pareto(ev_run *r, const int *sizes, int count, const char *model, const char *folder, ts_status *st);
 #endif

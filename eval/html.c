@@ -3,7 +3,6 @@
 #include "data/html.h"
 #include "eval/text.h"
 #include "pages.h"
-#include "tensor/conv/conv.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

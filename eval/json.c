@@ -1,7 +1,6 @@
 /* results.json. */
 #include "data/json.h"
 #include "eval/html.h"
-#include "tensor/conv/conv.h"
 
 static void put_row(FILE *f, const ev_row *row)
 {

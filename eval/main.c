@@ -7,7 +7,6 @@
 #include "eval/usable.h"
 #include "infer/model_path.h"
 #include "infer/output.h"
-#include "tensor/conv/conv.h"
 #include "tensor/pin.h"
 #include "tensor/threads.h"
 #include <inttypes.h>
@@ -167,8 +166,6 @@ static int evaluate(work *w, ts_status *st)
         return cl_failed("%s: the name is too long", c->out);
     if (c->images && prepare(w->images, st) != TS_OK) return cl_failed("%s", st->message);
     if (c->pin && !ts_threads_pin()) return cl_failed("--pin: there are fewer CPUs than the %d threads", ts_threads());
-    if (c->lpips[0] && c->size < EV_LPIPS_SIDE)
-        return cl_failed("LPIPS needs pictures of at least %d x %d pixels: --size", EV_LPIPS_SIDE, EV_LPIPS_SIDE);
     if (c->lpips[0] && !(w->lpips = ev_lpips_load(c->lpips[0], c->lpips[1], st))) return cl_failed("%s", st->message);
     ev_run *r = &w->run;
     r->lpips = w->lpips;
@@ -205,6 +202,7 @@ static int evaluate(work *w, ts_status *st)
         return cl_stopped("interrupted after %" PRId64 " of %" PRId64 " %s: no results are written", w->done, w->total,
                           r->methods != 1 ? "estimates" : "materials");
     if (code) return cl_failed("%s", st->message);
+    if (c->pareto && r->failures > 0) return cl_failed("%d estimates failed: they are not in the figure", r->failures);
     return c->pareto ? CL_OK : c->shards ? finish_part(w, st) : finish(w, st);
 }
 
@@ -225,8 +223,7 @@ static int start(const ev_command *c)
         else w->set[s].peers = c->peer_maps;
     if (code == CL_OK && ev_usable_options(c, w->set, &st) != TS_OK) code = refuse(&st);
     ts_threads_set(c->threads);
-    if (code == CL_OK && lgd_model_path(c->model, LGD_DEFAULT_MODEL, w->model, &st) != TS_OK)
-        code = cl_failed("%s", st.message);
+    if (code == CL_OK && lgd_model_path(c->model, LGD_DEFAULT_MODEL, w->model, &st) != TS_OK) code = refuse(&st);
     if (code == CL_OK &&
         ((c->tune         ? parse_tuning(w, &st)
               : c->pareto ? TS_OK

@@ -10,7 +10,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -21,10 +20,14 @@ static const char *const kind_name[EV_KINDS] = {"procedural", "strips", "maps", 
 
 static int by_name(const void *a, const void *b) { return strcmp(*(char *const *)a, *(char *const *)b); }
 
+static bool of_images(const ev_set *set)
+{
+    return set->kind == EV_STRIPS || set->kind == EV_PHOTOS || set->kind == EV_PEERS;
+}
+
 /* Whether the folder's entry is a material of that kind. Hidden files are not. */
 static bool belongs(const ev_set *set, const char *name)
 {
-    static const char *const images[] = {"png", "jpg", "jpeg", "tif", "tiff", "exr", "bmp", "webp", "tga", "ppm"};
     char path[PATH_LENGTH];
     struct stat info;
     if (name[0] == '.' || snprintf(path, sizeof path, "%s/%s", set->where, name) >= (int)sizeof path ||
@@ -34,10 +37,23 @@ static bool belongs(const ev_set *set, const char *name)
     if (set->kind == EV_MULTIVIEW) return S_ISDIR(info.st_mode) && io_is_capture(path);
     if (set->kind == EV_UNDER_SHEET || set->kind == EV_UNDER_SHEET_EXACT)
         return S_ISDIR(info.st_mode) && ev_is_under_sheet(path);
-    const char *dot = strrchr(name, '.');
-    for (size_t i = 0; dot && i < sizeof images / sizeof *images; i++)
-        if (strcasecmp(dot + 1, images[i]) == 0) return S_ISREG(info.st_mode);
-    return false;
+    return io_is_image_name(name) && S_ISREG(info.st_mode);
+}
+
+/* Results and pictures go by the names without extensions. */
+static ts_code check_names(const ev_set *set, ts_status *st)
+{
+    char stem[PATH_LENGTH], other[PATH_LENGTH];
+    for (int i = 0; i < set->count; i++) {
+        io_name_from_path(set->entry[i], stem, sizeof stem);
+        for (int j = i + 1; j < set->count && !strncmp(set->entry[j], stem, strlen(stem)); j++) {
+            io_name_from_path(set->entry[j], other, sizeof other);
+            if (!strcmp(stem, other))
+                return ts_fail(st, TS_INVALID, "%s: %s and %s would have the same name in the results: rename one",
+                               set->where, set->entry[i], set->entry[j]);
+        }
+    }
+    return TS_OK;
 }
 
 static ts_code list_folder(ev_set *set, ts_status *st)
@@ -69,7 +85,7 @@ static ts_code list_folder(ev_set *set, ts_status *st)
                            ? "folder with maps/ and photo_1.jpg, as lgd-data --format sheet-captures writes them"
                            : "capture (a folder with 00.png, camera_pos.txt ...)");
     if (!code) qsort(set->entry, (size_t)set->count, sizeof *set->entry, by_name);
-    return code;
+    return code || !of_images(set) ? code : check_names(set, st);
 }
 
 static ts_code parse_procedural(ev_set *set, ts_status *st)

@@ -28,6 +28,21 @@ typedef struct entry {
     char material[128];
 } entry;
 
+/* Of a file that cannot be read, which may be one that a method does without, 0. */
+static void put_hash(FILE *f, const char *path)
+{
+    uint64_t hash = 0;
+    if (!path || !*path || ts_hash_file(path, &hash, NULL) != TS_OK) hash = 0;
+    fprintf(f, "%016llx ", (unsigned long long)hash);
+}
+
+static void put_weights(FILE *f, const ev_estimator *e)
+{
+    const ev_setting *s = e->method->settings;
+    for (int i = 0; s[i].key; i++)
+        if (s[i].type == EV_WEIGHTS) put_hash(f, e->value[i]);
+}
+
 uint64_t ev_shards_print(const ev_command *c, const ev_run *r, const char *model)
 {
     io_text t;
@@ -41,7 +56,11 @@ uint64_t ev_shards_print(const ev_command *c, const ev_run *r, const char *model
     fprintf(f, " %d%d%d%d%d%d%d%d %s\n%s\n%s\n%s\n", c->light_known, c->light_unknown, c->photographed, c->fast,
             c->exact, c->tune, c->iterations_figure, c->methods_figure, c->camera_spec ? c->camera_spec : "",
             c->peer_maps ? c->peer_maps : "", c->lpips[0] ? c->lpips[0] : "", c->lpips[1] ? c->lpips[1] : "");
-    for (int m = 0; m < r->methods; m++) fprintf(f, "%s\n", r->method[m].label);
+    for (int m = 0; m < r->methods; m++) {
+        fprintf(f, "%s\n", r->method[m].label);
+        put_weights(f, &r->method[m]);
+    }
+    for (int k = 0; k < 2; k++) put_hash(f, c->lpips[k]);
     for (int m = 0; m < c->methods; m++) fprintf(f, "%s\n", c->method[m]);
     for (int s = 0; s < r->sets; s++) {
         const ev_set *set = &r->set[s];

@@ -32,7 +32,9 @@ static ts_code check_uses(const ev_command *c, const ev_set *set, ts_status *st)
     /* rendered: their photographs are made here, and told unless --camera or --untold is given. Of sheets --exposure
      * and --camera decide whether a factor is fitted. */
     const unsigned rendered = 1u << EV_PROCEDURAL | 1u << EV_STRIPS | 1u << EV_MAPS, captures = 1u << EV_MULTIVIEW,
-                   sheets = 1u << EV_UNDER_SHEET | 1u << EV_UNDER_SHEET_EXACT, photos = 1u << EV_PHOTOS;
+                   sheets = 1u << EV_UNDER_SHEET | 1u << EV_UNDER_SHEET_EXACT, photos = 1u << EV_PHOTOS,
+                   folders = 1u << EV_MAPS | sheets;
+    const char *const maps = "map folders (maps:)";
     const char *const known = "generated materials, strips or map folders", *const scored = "a set of another kind";
     const use uses[] = {
         {"peer-maps", c->peer_maps, photos, "photographs (photos:)"},
@@ -42,6 +44,10 @@ static ts_code check_uses(const ev_command *c, const ev_set *set, ts_status *st)
         {"tilt", c->tilt > 0, rendered, known},
         {"exposure", c->exposure > 0, rendered | sheets, known},
         {"camera", c->photographed, rendered | sheets, known},
+        {"untold", c->light_unknown, rendered, known},
+        {"normal", c->convention.normal != IO_NORMAL_FROM_FILE, folders, maps},
+        {"workflow", c->convention.workflow != IO_WORKFLOW_FROM_FILE, folders, maps},
+        {"colour", c->convention.colour != IO_ENCODING_FROM_FILE, folders, maps},
         {"told", c->light_known, captures | rendered | sheets, "captures (multiview:)"},
         {"tune", c->tune, ~photos, scored}, /* photographs without known maps have no error */
         {"pareto", c->pareto, ~photos, scored},

@@ -14,6 +14,11 @@ wrong_usage() {
         expect 2 "$BIN/lgd-eval" --set procedural:1,1 "$o" -o "$T/o"
         says "$T/err" "${o%%=*}"
     done
+    expect 2 "$BIN/lgd-eval" --set procedural:1,1 --model "" -o "$T/o"
+    says "$T/err" "the name of the weights is empty"
+    expect 2 "$BIN/lgd-eval" --set procedural:1,1 --size 16 --lpips-weights a.pth b.pth -o "$T/o"
+    says "$T/err" "at least 31 x 31 pixels"
+    [ ! -e "$T/o" ] || fail "work was begun"
     expect 2 "$BIN/lgd-eval" -o "$T/o"
     expect 2 "$BIN/lgd-eval" --set procedural:1,1
     expect 2 "$BIN/lgd-eval" procedural:1,1 -o "$T/o"
@@ -95,7 +100,10 @@ bad_material() {
     expect 1 evaluate --set "strips:$T/s" -o "$T/o"
     says "$T/err" "bad.png"
     lines "$T/o/results.csv" 4
-    rm "$T/s/good.png"
+    cp "$T/s/good.png" "$T/s/good.jpg"
+    expect 2 evaluate --set "strips:$T/s" -o "$T/none"
+    says "$T/err" "good.jpg and good.png would have the same name"
+    rm "$T/s"/good.*
     expect 1 evaluate --set "strips:$T/s" -o "$T/none"
     [ ! -e "$T/none/results.csv" ] || fail "results of nothing"
 }
@@ -244,7 +252,8 @@ methods() {
 
 searches_and_figures() {
     model
-    for o in "--tune --pareto" "--tune --figure methods" "--pareto --method mean" "--figure pie" "--tune --images"; do
+    for o in "--tune --pareto" "--tune --figure methods" "--pareto --method mean" "--figure pie" "--tune --images" \
+        "--tune --iterations 2"; do
         expect 2 "$BIN/lgd-eval" --set procedural:1,1 $o -o "$T/o"
         lines "$T/err" 2
     done

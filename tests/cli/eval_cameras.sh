@@ -177,8 +177,8 @@ unused() {
     model
     mkdir "$T/photos"
     cp demo/flash.jpg "$T/photos/a.jpg"
-    for o in --camera=phone --light=1,1 --noise=1 --exposure=2 --fov=30 --tilt=10 --told --tune --pareto \
-        --figure=methods; do
+    for o in --camera=phone --light=1,1 --noise=1 --exposure=2 --fov=30 --tilt=10 --told --untold --tune --pareto \
+        --figure=methods --normal=opengl --workflow=specular --colour=linear; do
         expect 2 "$BIN/lgd-eval" --set "photos:$T/photos" $o -o "$T/o"
         says "$T/err" "${o%%=*}: no set that is given uses it"
         lines "$T/err" 2

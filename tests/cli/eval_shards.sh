@@ -50,6 +50,17 @@ strangers() {
     same "$T/one" "$T/o"
 }
 
+# Nor are parts whose weights are no longer the same.
+other_weights() {
+    model
+    cp "$MODEL" "$T/w.safetensors"
+    expect 0 evaluate --fast --method "lgd:model=$T/w.safetensors" --shard 1/2 -o "$T/o"
+    expect 0 "$BIN/lgd-train" configs/tiny.ini --initial "$T/w.safetensors"
+    expect 0 evaluate --fast --method "lgd:model=$T/w.safetensors" --shard 2/2 -o "$T/o"
+    says "$T/err" "the first is part 1"
+    [ ! -e "$T/o/results.csv" ] || fail "parts of two models are put together"
+}
+
 # A material that fails does so in its part and in the results.
 failures() {
     model
@@ -70,8 +81,9 @@ failures() {
 tuning() {
     model
     set -- --tune --method mean --method descent:rate=0.01,start=r0
-    expect 0 evaluate "$@" -o "$T/one"
-    for i in 1 2; do expect 0 evaluate "$@" --shard $i/2 -o "$T/o"; done
+    tune() { "$BIN/lgd-eval" --size 32 --threads 1 --set procedural:1,5 --set procedural:9,2 "$@"; }
+    expect 0 tune "$@" -o "$T/one"
+    for i in 1 2; do expect 0 tune "$@" --shard $i/2 -o "$T/o"; done
     for d in one o; do sed 's/,[^,]*$//' "$T/$d/tune.csv" >"$T/$d.csv"; done # without the seconds
     cmp -s "$T/one.csv" "$T/o.csv" || fail "tune.csv: $(diff "$T/one.csv" "$T/o.csv" | head -n 2)"
     [ "$(ls "$T/o")" = tune.csv ] || fail "left over: $(ls "$T/o")"
@@ -116,6 +128,7 @@ under_mpirun() {
 
 check eval_shards_parts parts
 check eval_shards_strangers strangers
+check eval_shards_other_weights other_weights
 check eval_shards_failures failures
 check eval_shards_tuning tuning
 check eval_shards_launchers launchers

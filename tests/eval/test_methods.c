@@ -7,10 +7,12 @@
 #include "render/render.h"
 #include "tensor/peak.h"
 #include "tensor/threads.h"
+#include "tests/support/files.h"
 #include "tests/test.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum { SIZE = 32, VALUES = SIZE * SIZE * MAP_CHANNELS };
 
@@ -365,12 +367,15 @@ TEST(methods_grids_are_at_least_as_large_as_lgd_s)
 
 TEST(methods_pareto_has_every_size)
 {
-    ev_set set;
+    ev_set set[2];
     ts_status st = {0};
-    const char *const name = "procedural:5,1";
-    char path[400], line[200];
-    CHECK(ev_set_open(name, NULL, &set, &st) == TS_OK, "%s", st.message);
-    const ev_run r = {.set = &set, .set_name = &name, .sets = 1, .repeat = 1, .seed = 1};
+    char path[400], line[200], bad[400];
+    mkdir(path_of("strips"), 0700);
+    spill(path_of("strips/bad.png"), "no strip", 8);
+    snprintf(bad, sizeof bad, "strips:%s", path_of("strips"));
+    const char *const name[] = {"procedural:5,1", bad};
+    for (int s = 0; s < 2; s++) CHECK(ev_set_open(name[s], NULL, &set[s], &st) == TS_OK, "%s", st.message);
+    ev_run r = {.set = set, .set_name = name, .sets = 2, .repeat = 1, .seed = 1};
     const int sizes[] = {16, 32};
     CHECK(ev_pareto(&r, sizes, 2, weights(false, true), test_folder(), &st) == TS_OK, "%s", st.message);
     snprintf(path, sizeof path, "%s/pareto.csv", test_folder());
@@ -384,5 +389,6 @@ TEST(methods_pareto_has_every_size)
     }
     CHECK(f && lines == 1 + 2 * (2 * 25 + 5), "%d lines", lines);
     CHECK(finite >= 2 * (2 * 5 + 5), "%d labelled lines with numbers", finite);
-    ev_set_close(&set);
+    CHECK(r.failures == 2, "%d failures of a strip that is none, at two sizes", r.failures);
+    for (int s = 0; s < 2; s++) ev_set_close(&set[s]);
 }
