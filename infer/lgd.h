@@ -192,8 +192,8 @@ LGD_API int lgd_read_photo(const char *path, int side, const lgd_read_options *o
 LGD_API int lgd_read_mask(const char *path, int side, int width, int height, const lgd_read_options *options,
                           unsigned char *mask, lgd_error *error);
 
-/* The same for a photograph in memory: height x width x 3 values, top row first. LGD_SRGB8: unsigned char, LGD_SRGB16:
- * unsigned short, of sRGB; LGD_LINEAR: float. Not as published weights want it. */
+/* What lgd_read_photo does, of a photograph in memory: height x width x 3 values, top row first. LGD_SRGB8: unsigned
+ * char, LGD_SRGB16: unsigned short, of sRGB; LGD_LINEAR: float. Not as published weights want it. */
 enum { LGD_SRGB8, LGD_SRGB16, LGD_LINEAR };
 LGD_API int lgd_square(const void *pixels, int encoding, int width, int height, int side, float *image,
                        lgd_error *error);

@@ -200,7 +200,7 @@ int main(int argc, char **argv)
     io_collection *collection = o.collection ? io_collection_read(o.collection, 0, NULL, NULL, &st) : NULL;
     if (st.code) return cl_finish(cl_failed("%s", st.message));
     o.procedural.collection = collection;
-    cl_catch_interrupt();
+    if (!o.statistics) cl_catch_interrupt(); /* those leave nothing half-done: the signal may end them at once */
     const bool there = o.output && access(o.output, F_OK) == 0;
     if (o.output) cl_make_folder(o.output, &st);
     if (!st.code && (o.format || o.photographs))

@@ -50,7 +50,7 @@ typedef struct cl_item {
     bool was_done;     /* its folder was complete already: nothing is read, estimated or written */
     char *result;      /* members for results.jsonl (cli/infer/record.h), once there are complete files */
     double full, over; /* parts of the photograph's values: not below white, and above it */
-    unsigned warnings; /* LGD_WARN_ */
+    unsigned warnings; /* CL_WARN_ */
     double seconds;    /* of reading, estimating and writing */
     int threads;       /* to compute and write it on, the calling thread's own (tensor/threads.h) */
     double shown;      /* the progress function's: how much of it the progress bar has, 0 .. 1 */

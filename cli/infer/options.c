@@ -276,8 +276,9 @@ ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st)
                        *c->capture      ? "capture"
                            : c->corners ? "corners"
                                         : "mask");
-    if (c->sheet && c->orientations > 1)
-        return ts_fail(st, TS_INVALID, "--orientations is for a light above the sample's centre: not with --sheet");
+    if ((c->sheet || c->corners) && c->orientations > 1)
+        return ts_fail(st, TS_INVALID, "--orientations is for a light above the sample's centre: not with --%s",
+                       c->sheet ? "sheet" : "corners");
     if (c->sheet && !power_given) c->power = 1;
     if ((*c->capture || c->sheet) && (c->skip_existing || c->shards))
         return ts_fail(st, TS_INVALID, "--%s is one material: no --%s", c->sheet ? "sheet" : "capture",

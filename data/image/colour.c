@@ -10,7 +10,7 @@ float io_linear_to_srgb(float v) { return v <= 0.0031308f ? v * 12.92f : 1.055f 
 static float table_value(const io_curve *curve, float v)
 {
     float x = v * (float)(curve->count - 1);
-    int i = x <= 0 ? 0 : x >= (float)(curve->count - 1) ? curve->count - 2 : (int)x;
+    int i = !(x > 0) ? 0 : x >= (float)(curve->count - 1) ? curve->count - 2 : (int)x;
     const uint8_t *t = curve->table + 2 * i;
     float a = (float)(t[0] << 8 | t[1]) / 65535, b = (float)(t[2] << 8 | t[3]) / 65535;
     return a + (b - a) * (x - (float)i); /* beyond the ends, the last piece goes on */
@@ -126,13 +126,6 @@ bool io_space_primaries(const float xy[8], float gamma, io_space *space)
              linear = {.kind = IO_CURVE_LINEAR};
     set_curves(space, gamma == 0 ? srgb : gamma == 1 ? linear : power);
     return true;
-}
-
-io_space io_space_display_p3(void)
-{
-    static const float xy[8] = {.68f, .32f, .265f, .69f, .15f, .06f, .3127f, .329f};
-    io_space s;
-    return io_space_primaries(xy, 0, &s) ? s : io_space_srgb();
 }
 
 io_space io_space_adobe_rgb(void)

@@ -25,7 +25,6 @@ io_space io_space_linear(void);
 /* A power law with the given primaries and white (x, y of red, green, blue, white), adapted to sRGB's white. gamma 0:
  * the sRGB curve. False when the primaries span nothing. */
 bool io_space_primaries(const float xy[8], float gamma, io_space *space);
-io_space io_space_display_p3(void);
 io_space io_space_adobe_rgb(void);
 
 /* From an ICC profile of the matrix and curve kind (or grey with a curve); false when it is another kind or damaged.

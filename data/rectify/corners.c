@@ -25,6 +25,10 @@ ts_code io_corners_parse(const char *const *words, int count, io_corners *corner
             points++;
             p = end;
         }
+    for (int k = 0; k < points; k++)
+        if (corners->at[k][0] < 0 || corners->at[k][1] < 0)
+            return ts_fail(st, TS_INVALID, "corner %d at %g,%g is outside the photograph", k + 1, corners->at[k][0],
+                           corners->at[k][1]);
     if (points == 4) return io_corners_check((const double(*)[2])corners->at, INT_MAX, INT_MAX, st);
     return ts_fail(st, TS_INVALID,
                    "%d corners are given: four x,y are needed, top left, top right, bottom right, "

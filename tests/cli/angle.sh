@@ -19,6 +19,10 @@ mistakes() {
     photo "$T/a.ppm" 60 40
     expect 2 infer --corners 10,5 42,35 40,8 8,30 "$T/a.ppm" -o "$T/o"
     says "$T/err" cross
+    expect 2 infer --corners=-3,5 40,8 42,35 8,30 "$T/a.ppm" -o "$T/o"
+    says "$T/err" "corner 1 at -3,5 is outside the photograph"
+    expect 2 infer --corners 10,5 40,8 42,35 8,30 --orientations 2 "$T/a.ppm" -o "$T/o"
+    says "$T/err" "not with --corners"
     expect 2 infer --corners 10,5 40,8 42,35 "$T/a.ppm" -o "$T/o"
     says "$T/err" a.ppm
     expect 2 infer --corners 10,5 40,8 42,35 8,30 "$T/a.ppm" "$T/b.ppm" -o "$T/o"
