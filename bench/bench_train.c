@@ -29,7 +29,7 @@ static ag_value *loss_of(subject *s, ag_value *maps)
 {
     ag_value *goal = ag_constant(s->tape, ts_view(s->goal, maps->t.shape));
     return ag_add(s->tape, ag_render_loss(s->tape, maps, goal, s->views, RD_LOSS_VIEWS),
-                  ag_map_loss(s->tape, maps, goal));
+                  ag_map_loss(s->tape, maps, goal, NULL));
 }
 
 static void step(void *user)

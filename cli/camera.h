@@ -29,7 +29,7 @@ ts_code cl_camera_parse(const char *text, io_camera *camera, ts_status *st);
  * other faults, tone curve and clipping. */
 typedef struct cl_shot {
     rd_view view;  /* the light's power has the exposure in it */
-    float ambient; /* as a share of the light at the centre of a flat matt sample */
+    float ambient; /* the other light's share (render/ambient.h) */
     float tone;    /* contrast of the tone curve, 0: none */
 } cl_shot;
 

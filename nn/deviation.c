@@ -51,11 +51,11 @@ static float for_all_maps(nn_belief b)
 
 void nn_deviations(int64_t pixels, const float *spread, nn_belief b, int threads, float *deviation)
 {
-    const bool several = b.photographs > 1, found = b.scene_found && !several, levels = several && b.revised;
+    const bool several = b.photographs > 1, levels = several && b.revised;
     const float all = for_all_maps(b),
-                factor[NN_SPREADS] = {[GROUP_NORMAL] = found ? NORMAL_DETAIL : 1,
+                factor[NN_SPREADS] = {[GROUP_NORMAL] = 1,
                                       [GROUP_DIFFUSE] = 1,
-                                      [GROUP_ROUGHNESS] = found || levels ? ROUGHNESS_DETAIL : 1,
+                                      [GROUP_ROUGHNESS] = levels ? ROUGHNESS_DETAIL : 1,
                                       [GROUP_SPECULAR] = several && !levels ? 1 : F0_DETAIL};
     job j = {.spread = spread, .to = deviation};
     for (int k = 0; k < NN_SPREADS; k++) j.factor[k] = all * factor[k];

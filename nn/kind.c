@@ -12,8 +12,6 @@
 #define MOST_F0_OF_DIELECTRIC 0.1f
 #define DEVIATION_OF_KIND 0.02f
 
-static float encoded(float v) { return 2 * fminf(fmaxf(v, 0), 1) - 1; }
-
 static double mean_of(int64_t pixels, int channels, const float *maps, int map)
 {
     double sum = 0;
@@ -32,8 +30,8 @@ void nn_change_kind(bool metal, int64_t pixels, int channels, float *maps)
     for (int64_t i = 0; i < pixels; i++, maps += channels)
         for (int c = 0; c < 3; c++) {
             const float diffuse = (maps[MAP_DIFFUSE + c] + 1) / 2, f0 = (maps[MAP_SPECULAR + c] + 1) / 2;
-            maps[MAP_DIFFUSE + c] = encoded(metal ? diffuse + f0 / NN_METAL_F0 : DIFFUSE_OF_METAL);
-            maps[MAP_SPECULAR + c] = encoded(metal ? F0_OF_PLASTIC : f0 + NN_METAL_F0 * diffuse);
+            maps[MAP_DIFFUSE + c] = map_stored(metal ? diffuse + f0 / NN_METAL_F0 : DIFFUSE_OF_METAL);
+            maps[MAP_SPECULAR + c] = map_stored(metal ? F0_OF_PLASTIC : f0 + NN_METAL_F0 * diffuse);
         }
 }
 
@@ -42,15 +40,15 @@ static void make_metal(int64_t pixels, int channels, float *maps)
     for (int64_t i = 0; i < pixels; i++, maps += channels)
         for (int c = 0; c < 3; c++) {
             const float diffuse = (maps[MAP_DIFFUSE + c] + 1) / 2, f0 = (maps[MAP_SPECULAR + c] + 1) / 2;
-            maps[MAP_SPECULAR + c] = encoded(f0 + NN_METAL_F0 * diffuse);
-            maps[MAP_DIFFUSE + c] = encoded(fminf(diffuse, MOST_DIFFUSE_OF_METAL));
+            maps[MAP_SPECULAR + c] = map_stored(f0 + NN_METAL_F0 * diffuse);
+            maps[MAP_DIFFUSE + c] = map_stored(fminf(diffuse, MOST_DIFFUSE_OF_METAL));
         }
 }
 
 static void brighten(float by, int64_t pixels, int channels, float *maps)
 {
     for (int64_t i = 0; i < pixels; i++, maps += channels)
-        for (int c = 0; c < 3; c++) maps[MAP_SPECULAR + c] = encoded(by * (maps[MAP_SPECULAR + c] + 1) / 2);
+        for (int c = 0; c < 3; c++) maps[MAP_SPECULAR + c] = map_stored(by * (maps[MAP_SPECULAR + c] + 1) / 2);
 }
 
 /* F0 times keep; diffuse too, or, added, what F0 loses. */
@@ -59,8 +57,8 @@ static void make_dielectric(float keep, bool added, int64_t pixels, int channels
     for (int64_t i = 0; i < pixels; i++, maps += channels)
         for (int c = 0; c < 3; c++) {
             const float diffuse = (maps[MAP_DIFFUSE + c] + 1) / 2, f0 = (maps[MAP_SPECULAR + c] + 1) / 2;
-            maps[MAP_SPECULAR + c] = encoded(keep * f0);
-            maps[MAP_DIFFUSE + c] = encoded(added ? diffuse + (1 - keep) * f0 / NN_METAL_F0 : keep * diffuse);
+            maps[MAP_SPECULAR + c] = map_stored(keep * f0);
+            maps[MAP_DIFFUSE + c] = map_stored(added ? diffuse + (1 - keep) * f0 / NN_METAL_F0 : keep * diffuse);
         }
 }
 

@@ -92,10 +92,10 @@ enum { NN_CONDITIONS = 8, NN_COORDINATES = 2, NN_FRAME = 2 };
 /* Channels that a revision reads of each pixel, and those of its convolutions at the full size (nn/revise.c). */
 enum { NN_REVISION_READS = 34, NN_REVISION_FINE = 24 };
 
-/* Channels of the photograph's pixels in squares and between the last two convolutions of nn_detail. */
+/* Channels of the photograph's pixels in squares and between the last two convolutions of nn_full_size. */
 enum { NN_FINE = 12, NN_FINER = 16 };
 
-/* Channels that g's first layers read, and that the last of nn_detail writes: the maps', two of the shading's frame
+/* Channels that g's first layers read, and that the last of nn_full_size writes: the maps', two of the shading's frame
  * (render/op_shading_frame.c), and the spreads. */
 int nn_g_reads(const nn_arch *a);
 int nn_detail_writes(const nn_arch *a);

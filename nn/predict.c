@@ -87,8 +87,9 @@ static bool run_g(ag_tape *tape, const nn_model *model, const nn_input *small, n
 {
     const ts_shape s = small->image.shape;
     const int images = model->arch.images, count = nn_given(small);
-    const ts_mark mark = ag_scope_begin(tape);
     *guess = (nn_guess){0};
+    if (count > images) return ag_fail(tape, TS_INVALID, "g reads %d photographs, not %d", images, count), false;
+    const ts_mark mark = ag_scope_begin(tape);
     ag_value *x = ag_empty(tape, (ts_shape){s.n / count, s.h, s.w, 3 * images}),
              *each = images == 1 ? x : ag_empty(tape, s);
     if (!x || !each) return false;

@@ -35,7 +35,7 @@ void rd_ambient_add(rd_grid grid, const float *maps, int channels, const rd_view
                     float *image)
 {
     enum { FAR = 100 }; /* patch widths: its directions are parallel */
-    /* A white flat matt sample sends power / (pi distance^2) from its centre. */
+    /* A white matt sample that is turned to the light sends power / (pi distance^2) from its centre. */
     const float *p = view->light;
     const float white = view->power / (3.14159265f * (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]));
     rd_view from_side = {.kind = RD_NEAR}; /* a white flat matt sample has radiance 1 */

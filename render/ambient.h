@@ -3,7 +3,7 @@
 #define RD_AMBIENT_H
 #include "render/scene.h"
 
-/* Shares of the radiance that a flat matt sample has at its centre under the photograph's own light. */
+/* Shares of the radiance that a flat matt sample, turned to the photograph's own light, has at its centre. */
 typedef struct rd_ambient {
     float uniform[3];   /* from everywhere; a surface reflects diffuse (1 - F0) + F0 of it */
     float side[3];      /* from far away */

@@ -29,15 +29,10 @@ static ag_value *apply(ag_tape *tape, ag_value *maps, ag_value *target, const we
     return ag_apply(tape, &op_map_loss, 2, in, (ts_shape){1, 1, 1, 1}, w, sizeof *w);
 }
 
-ag_value *ag_map_loss(ag_tape *tape, ag_value *maps, ag_value *target)
+ag_value *ag_map_loss(ag_tape *tape, ag_value *maps, ag_value *target, const float *weight)
 {
-    return apply(tape, maps, target, &(weights){.given = false});
-}
-
-ag_value *ag_map_loss_weighted(ag_tape *tape, ag_value *maps, ag_value *target, const float *weight)
-{
-    weights w = {.given = true};
-    memcpy(w.of, weight, sizeof w.of);
+    weights w = {.given = weight};
+    if (weight) memcpy(w.of, weight, sizeof w.of);
     return apply(tape, maps, target, &w);
 }
 
@@ -145,7 +140,7 @@ static bool kink(const double *const *in, int input, int64_t i, double step, con
 static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
 {
     static const float weight[MAP_CHANNELS] = {1, 0.5f, 1, 3, 3, 1, 2, 0, 2};
-    return *(const bool *)user ? ag_map_loss_weighted(tape, in[0], in[1], weight) : ag_map_loss(tape, in[0], in[1]);
+    return ag_map_loss(tape, in[0], in[1], *(const bool *)user ? weight : NULL);
 }
 
 static void cases(ag_gradcheck *g)

@@ -64,7 +64,8 @@ void rd_scene_numbers(const rd_view *view, float ambient, float tone, float numb
         number[RD_SCENE_CAMERA_X + i] = view->camera[i] / RD_SCENE_OFFSET;
     }
     number[RD_SCENE_EXPOSURE] = stops(view);
-    number[RD_SCENE_AMBIENT] = ambient / RD_SCENE_AMBIENTS;
+    const float *l = view->light, far2 = l[0] * l[0] + l[1] * l[1] + l[2] * l[2];
+    number[RD_SCENE_AMBIENT] = far2 > 0 ? ambient * l[2] * l[2] / far2 / RD_SCENE_AMBIENTS : 0;
     number[RD_SCENE_TONE] = tone;
 }
 
@@ -164,6 +165,7 @@ typedef struct standing {
     double distance; /* of light and camera */
     double aslant;   /* tangent of the camera's angle with the normal */
     double angle;    /* direction of the light from the cameras' mean */
+    const rd_view *view;
 } standing;
 #define ROUNDING 1e-5
 
@@ -172,7 +174,8 @@ static standing standing_of(const rd_view *v, const double mean[2])
     const double x = (double)v->light[0] - (double)v->camera[0], y = (double)v->light[1] - (double)v->camera[1],
                  z = (double)v->light[2] - (double)v->camera[2];
     const double right = (double)v->light[0] - mean[0], up = (double)v->light[1] - mean[1];
-    standing p = {.distance = sqrt(x * x + y * y + z * z),
+    standing p = {.view = v,
+                  .distance = sqrt(x * x + y * y + z * z),
                   .aslant = hypot((double)v->camera[0], (double)v->camera[1]) / (double)v->camera[2],
                   .angle = hypot(right, up) < ROUNDING ? 0 : atan2(up, right)};
     if (p.angle < -ROUNDING) p.angle += 2 * M_PI;
@@ -183,7 +186,12 @@ static bool before(const standing *a, const standing *b, bool first)
 {
     if (fabs(a->distance - b->distance) > ROUNDING) return a->distance < b->distance;
     if (first && fabs(a->aslant - b->aslant) > ROUNDING) return a->aslant < b->aslant;
-    return a->angle < b->angle;
+    if (fabs(a->angle - b->angle) > ROUNDING) return a->angle < b->angle;
+    for (int k = 0; k < 3; k++) { /* any order will do, as long as it is one */
+        if (a->view->camera[k] != b->view->camera[k]) return a->view->camera[k] < b->view->camera[k];
+        if (a->view->light[k] != b->view->light[k]) return a->view->light[k] < b->view->light[k];
+    }
+    return false;
 }
 
 void rd_capture_order(const rd_view *views, int count, int order[])

@@ -54,8 +54,9 @@ typedef struct rd_scene_how {
  * With e = image - seen (as in render/posterior.h: a logarithm above 1, nothing where both are burnt out), J_t = d seen
  * / d t, J = d seen / d maps and the covariance Sigma of a pixel's maps, the sums over the pixels that are read are V =
  * (J Sigma J' + S)^-1,   A = w sum J_t' V J_t,   b = w sum J_t' V e,   w = min(every / correlated, 1). S has the
- * variance model^2 + noise min(value, 1) of the rendering's value: with the photograph's, what is darker by chance
- * would weigh more. With the prior's mean m and its deviations in the diagonal matrix Q a step goes to t = m + Q z, (I
+ * variance model^2 + noise v + (gain v)^2, v = min(value, 1), of the rendering's value: with the photograph's, what is
+ * darker by chance would weigh more. With the prior's mean m and its deviations in the diagonal matrix Q a step goes to
+ * t = m + Q z, (I
  * + Q A Q) z = Q (b + A (t_before - m)), at most RD_SCENE_STRIDE in any number. The ambient light is not let below 0,
  * nor the tone curve's strength out of +-RD_SCENE_TONE_MOST.
  * In the first half of the steps, values of the photograph that are burnt out tell nothing; from then on they tell that

@@ -3,6 +3,8 @@
  * n_z = sqrt(1 - x^2 - y^2) >= 0. A published network's tenth channel (light intensity) follows these nine. */
 #ifndef TS_MAPS_H
 #define TS_MAPS_H
+#include <math.h>
+
 enum {
     MAP_DIFFUSE = 0,   /* 3 channels: red, green, blue */
     MAP_NORMAL = 3,    /* 2 channels: x, y */
@@ -12,4 +14,7 @@ enum {
 };
 /* The four maps that these channels are, for what is said of each as a whole. */
 enum { GROUP_DIFFUSE, GROUP_NORMAL, GROUP_ROUGHNESS, GROUP_SPECULAR, MAP_GROUPS };
+
+/* An albedo, F0 or roughness, clamped to [0, 1], as it is stored. */
+static inline float map_stored(float v) { return 2 * fminf(fmaxf(v, 0), 1) - 1; }
 #endif

@@ -58,7 +58,7 @@ static int blocks(const tr_trainer *t, nn_block out[4])
 
 static ts_code save(tr_trainer *t, ts_status *st)
 {
-    char path[TR_PATH], number[8][32];
+    char path[TR_PATH], number[7][32];
     nn_block block[4];
     const int n = blocks(t, block);
     for (int i = 0; i < n; i++)
@@ -77,21 +77,19 @@ static ts_code save(tr_trainer *t, ts_status *st)
     snprintf(number[2], sizeof number[2], "%" PRId64, t->skipped);
     snprintf(number[3], sizeof number[3], "%d", t->in_a_row);
     snprintf(number[4], sizeof number[4], "%.17g", t->best);
-    snprintf(number[5], sizeof number[5], "%" PRId64, t->best_step);
-    snprintf(number[6], sizeof number[6], "%.17g", t->mean_norm);
-    snprintf(number[7], sizeof number[7], "%d", t->ranks.count);
-    nn_meta meta[12] = {{"format", format_name},
+    snprintf(number[5], sizeof number[5], "%.17g", t->mean_norm);
+    snprintf(number[6], sizeof number[6], "%d", t->ranks.count);
+    nn_meta meta[11] = {{"format", format_name},
                         {"step", number[0]},
                         {"adam_step", number[1]},
                         {"skipped", number[2]},
                         {"skipped_in_a_row", number[3]},
                         {"best", number[4]},
-                        {"best_step", number[5]},
-                        {"mean_norm", number[6]},
+                        {"mean_norm", number[5]},
                         {"isa", ts_isa_name(ts_isa_now())},
                         {"config", text}};
-    int metas = 10; /* of one process, and of procedural materials alone, no more */
-    if (t->ranks.count > 1) meta[metas++] = (nn_meta){"ranks", number[7]};
+    int metas = 9; /* of one process, and of procedural materials alone, no more */
+    if (t->ranks.count > 1) meta[metas++] = (nn_meta){"ranks", number[6]};
     if (*t->collection_hash) meta[metas++] = (nn_meta){"collection", t->collection_hash};
     const ts_code code = nn_safetensors_write(path, block, n, meta, metas, st);
     free(text);
@@ -147,8 +145,7 @@ static ts_code restore(tr_trainer *t, const nn_file *file, const char *path, ts_
     if (read_count(file, path, "step", &t->step, st) != TS_OK ||
         read_count(file, path, "adam_step", &t->adam.step, st) != TS_OK ||
         read_count(file, path, "skipped", &t->skipped, st) != TS_OK ||
-        read_count(file, path, "skipped_in_a_row", &in_a_row, st) != TS_OK ||
-        read_count(file, path, "best_step", &t->best_step, st) != TS_OK)
+        read_count(file, path, "skipped_in_a_row", &in_a_row, st) != TS_OK)
         return st->code;
     if (!best || !mean) return ts_fail(st, TS_FORMAT, "%s: %s is missing", path, best ? "mean_norm" : "best");
     if (t->step > tr_total(&t->config))

@@ -270,6 +270,12 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
             "train.disturb is %g: it makes worse what h learns to revise, so model.revisions and train.steps "
             "must be above 0",
             c->train.disturb);
+    if (c->train.steps && c->arch.descent == NN_DESCENT_POSTERIOR && c->arch.revisions == 0)
+        return ts_fail(
+            st, TS_INVALID,
+            "train.steps is %lld, but with model.descent = posterior only h of several photographs is trained "
+            "after g: set model.revisions, or train.steps to 0",
+            (long long)c->train.steps);
     if (*c->train.teacher &&
         (c->train.steps || !c->arch.conditions || !c->arch.spread || !c->arch.scene || c->arch.images != 1 ||
          c->arch.channels != MAP_CHANNELS))

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BINS = 200, FIELDS = 64, LINE = 4096 };
+enum { BINS = 200, FIELDS = TR_MOST_ITERATIONS + 8 };
 #define LOG_LIMIT ((size_t)1 << 30)
 
 /* The columns of a log that are drawn, one after the other: means over BINS equal parts of the steps. */

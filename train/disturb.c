@@ -12,7 +12,6 @@
 #define KIND_SHARE 0.06f /* of the materials that are taken for a metal, or for none */
 #define STEEPEST 0.95f
 
-static float encoded(float v) { return 2 * fminf(fmaxf(v, 0), 1) - 1; }
 static float value(float x) { return (fminf(fmaxf(x, -1), 1) + 1) / 2; }
 
 void tr_disturb(double share, uint64_t seed, uint64_t index, int side, float *maps)
@@ -28,10 +27,10 @@ void tr_disturb(double share, uint64_t seed, uint64_t index, int side, float *ma
     for (int64_t i = 0; i < pixels; i++) {
         float *m = maps + i * MAP_CHANNELS;
         for (int k = 0; k < 3; k++) {
-            m[MAP_DIFFUSE + k] = encoded(value(m[MAP_DIFFUSE + k]) * by[GROUP_DIFFUSE]);
-            m[MAP_SPECULAR + k] = encoded(value(m[MAP_SPECULAR + k]) * by[GROUP_SPECULAR]);
+            m[MAP_DIFFUSE + k] = map_stored(value(m[MAP_DIFFUSE + k]) * by[GROUP_DIFFUSE]);
+            m[MAP_SPECULAR + k] = map_stored(value(m[MAP_SPECULAR + k]) * by[GROUP_SPECULAR]);
         }
-        m[MAP_ROUGHNESS] = encoded(value(m[MAP_ROUGHNESS]) * by[GROUP_ROUGHNESS]);
+        m[MAP_ROUGHNESS] = map_stored(value(m[MAP_ROUGHNESS]) * by[GROUP_ROUGHNESS]);
         for (int k = 0; k < 2; k++)
             m[MAP_NORMAL + k] = fminf(fmaxf(m[MAP_NORMAL + k] * by[GROUP_NORMAL], -STEEPEST), STEEPEST);
     }

@@ -27,7 +27,6 @@ typedef struct tr_validation {
     double render[TR_MOST_ITERATIONS + 1]; /* mean RMSE of 20 renderings of R_0 … R_iterations, see render/error.h */
     double diffuse, specular, roughness, normal; /* mean RMSE of the last maps */
     bool best;                                   /* the least so far in this phase, and therefore saved */
-    double seconds;
 } tr_validation;
 
 /* Callbacks, on the calling thread; any may be NULL. note: one line. stop: asked between steps. Of several ranks, rank

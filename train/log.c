@@ -9,10 +9,17 @@
 static const char log_header[] =
     "step,phase,loss,render_0,map_0,render_T,map_T,spread,scene,iterations,gradient_norm,rate,samples_per_s,skipped\n";
 
+/* The most maps after R_0 that are validated. */
+static int most_maps(const tr_trainer *t)
+{
+    const nn_arch *a = &t->config.arch;
+    return a->iterations > a->revisions ? a->iterations : a->revisions;
+}
+
 static void validation_header(const tr_trainer *t, char *text, size_t size)
 {
     int n = snprintf(text, size, "step,");
-    for (int k = 0; k <= t->config.arch.iterations; k++) n += snprintf(text + n, size - (size_t)n, "render_%d,", k);
+    for (int k = 0; k <= most_maps(t); k++) n += snprintf(text + n, size - (size_t)n, "render_%d,", k);
     snprintf(text + n, size - (size_t)n, "diffuse,specular,roughness,normal,best\n");
 }
 
@@ -100,7 +107,7 @@ ts_code tr_log_validation(tr_trainer *t, const tr_validation *v, ts_status *st)
 {
     FILE *f = t->validation_log;
     fprintf(f, "%lld,", (long long)v->step);
-    for (int k = 0; k <= t->config.arch.iterations; k++) put(f, k <= v->iterations ? v->render[k] : NAN, true);
+    for (int k = 0; k <= most_maps(t); k++) put(f, k <= v->iterations ? v->render[k] : NAN, true);
     put(f, v->diffuse, false);
     put(f, v->specular, false);
     put(f, v->roughness, false);

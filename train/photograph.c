@@ -114,7 +114,7 @@ static void take(const void *job, int64_t i)
 }
 
 /* The radiance of a photograph of a printed sheet, whose camera and flash are planned to be where they are thought. */
-static tr_shot shoot(const io_camera *camera, const io_under_sheet *sheet, uint64_t seed, uint64_t which,
+static cl_shot shoot(const io_camera *camera, const io_under_sheet *sheet, uint64_t seed, uint64_t which,
                      const rd_view *planned, int size, const float *maps, float *image)
 {
     const io_camera known = measured(*camera);
@@ -125,8 +125,7 @@ static tr_shot shoot(const io_camera *camera, const io_under_sheet *sheet, uint6
     io_under_sheet_move(sheet, seed, which, &rig);
     memcpy(view.camera, rig.camera, sizeof rig.camera);
     memcpy(view.light, rig.light, sizeof rig.light);
-    const cl_shot s = cl_expose(&known, seed, which, &view, size, maps, image);
-    return (tr_shot){.view = s.view, .ambient = s.ambient, .tone = s.tone};
+    return cl_expose(&known, seed, which, &view, size, maps, image);
 }
 
 void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
@@ -143,12 +142,13 @@ void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count
         const float *material = maps + (size_t)(i / number) * pixels * MAP_CHANNELS;
         float *image = images + (size_t)i * pixels * 3;
         const rd_view *view = views ? &views[i] : &flash;
-        tr_shot shot;
-        if (tr_under_sheet(share, seed, index + (uint64_t)(i / number)))
-            shot = shoot(&camera, &sheet, seed, which, view, size, material, image);
-        else {
-            const cl_shot s = cl_expose(&camera, seed, which, view, size, material, image);
-            shot = (tr_shot){.view = s.view, .ambient = s.ambient, .tone = s.tone};
+        const bool of_sheet = tr_under_sheet(share, seed, index + (uint64_t)(i / number));
+        tr_shot shot = {.is = of_sheet ? shoot(&camera, &sheet, seed, which, view, size, material, image)
+                                       : cl_expose(&camera, seed, which, view, size, material, image)};
+        shot.thought = shot.is.view;
+        if (of_sheet) {
+            memcpy(shot.thought.camera, view->camera, sizeof view->camera);
+            memcpy(shot.thought.light, view->light, sizeof view->light);
         }
         if (!shots) continue;
         io_camera_told(&camera, seed, which, &shot.told_view, &shot.told_power);
@@ -168,6 +168,6 @@ void tr_capture_views(double sheet, uint64_t seed, uint64_t index, int count, in
 
 void tr_describe_several(const tr_shot *shots, int photographs, rd_view *views, unsigned char *known)
 {
-    for (int i = 0; i < photographs; i++) views[i] = shots[i].view;
+    for (int i = 0; i < photographs; i++) views[i] = shots[i].thought;
     memset(known, NN_KNOWN_ALL, (size_t)photographs);
 }

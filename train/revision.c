@@ -1,6 +1,7 @@
 /* The second phase of a model with arch.revisions: h learns to revise what a fixed g and the steps make of several
  * photographs. */
 #include "nn/first_guess.h"
+#include "nn/lattice.h"
 #include "nn/metal.h"
 #include "nn/revise.h"
 #include "ops.h"
@@ -57,6 +58,18 @@ static void disturb_one(const void *job, int64_t i)
                j->maps + i * j->side * j->side * MAP_CHANNELS);
 }
 
+/* As nn_first_guess does. */
+static bool take_lattices(ag_tape *tape, const nn_model *model, ag_value *maps)
+{
+    const int period = model->arch.g_unshuffle, side = nn_arch_side(&model->arch), channels = model->arch.channels;
+    ts_status st = {0};
+    for (int n = 0; period > 1 && n < maps->t.shape.n; n++)
+        if (nn_take_lattice(period, side, channels, ag_compute(tape)->threads, ag_arena(tape),
+                            maps->t.data + (size_t)n * (size_t)side * (size_t)side * (size_t)channels, &st) != TS_OK)
+            return ag_fail(tape, st.code, "%s", st.message), false;
+    return true;
+}
+
 bool tr_first_guesses(ag_tape *tape, const nn_model *model, const nn_input *in, const tr_trainer *disturbed,
                       nn_revision *r)
 {
@@ -77,7 +90,7 @@ bool tr_first_guesses(ag_tape *tape, const nn_model *model, const nn_input *in, 
                values * sizeof(float));
     }
     const nn_input read = {.image = first->t, .grid = in->grid, .views = own, .known = known, .given = 1};
-    if (!nn_guess_from(tape, model, &read, &said)) return false;
+    if (!nn_guess_from(tape, model, &read, &said) || !take_lattices(tape, model, said.maps)) return false;
     if (disturbed && disturbed->config.train.disturb > 0)
         ts_tasks(0, count, disturb_one, &(disturbing){disturbed, said.maps->t.data, side});
     for (int n = 0; n < count; n++)

@@ -1,6 +1,7 @@
 /* The state of a run, and what the files of the trainer do with it. */
 #ifndef TR_STATE_H
 #define TR_STATE_H
+#include "cli/camera.h"
 #include "data/camera.h"
 #include "data/loader.h"
 #include "nn/adam.h"
@@ -13,12 +14,10 @@
 enum { TR_HASH = 17 };   /* as text */
 enum { TR_PATH = 1200 }; /* a folder and one of our names */
 
-/* What is true of a photograph: the radiance under view, with the ambient light, is what the camera saw before its
- * other faults, tone curve and clipping. */
+/* A photograph, what is true of it, and what the model is given. */
 typedef struct tr_shot {
-    rd_view view;               /* the light's power has the exposure in it */
-    float ambient;              /* as a share of the light at the centre of a flat matt sample */
-    float tone;                 /* contrast of the tone curve, 0: none */
+    cl_shot is;
+    rd_view thought;            /* is.view, but of a printed sheet where its tags put camera and light */
     bool told_view, told_power; /* whether the model is given them */
 } tr_shot;
 
@@ -73,7 +72,6 @@ typedef struct tr_trainer {
     int in_a_row;     /* of those, the latest without one that worked */
     double mean_norm; /* of the gradient, a moving average */
     double best;      /* least validated error in this phase; infinity: none yet */
-    int64_t best_step;
 } tr_trainer;
 
 /* state.c */
@@ -101,7 +99,8 @@ ts_code tr_read_collection(tr_trainer *t, ts_status *st);
  * shots [count][number]: the truth of each; NULL: not wanted. */
 void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count, int size, const float *maps,
                     const rd_view *views, int number, float *images, tr_shot *shots);
-/* Of photographs that h revises light and camera are known: views and known [photographs], of nn_known, say so. */
+/* Of photographs that h revises light and camera are known, as well as they are: views and known [photographs], of
+ * nn_known, say so. */
 void tr_describe_several(const tr_shot *shots, int photographs, rd_view *views, unsigned char *known);
 /* Whether the photographs of material number index are those of a printed sheet, of which there is this share. */
 bool tr_under_sheet(double share, uint64_t seed, uint64_t index);

@@ -20,7 +20,7 @@ ag_value *tr_add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value *ta
     if (map_weight > 0) {
         const float normal = (float)t->config.train.normal_weight, f0 = (float)t->config.train.specular_weight;
         const float of[MAP_CHANNELS] = {1, 1, 1, normal, normal, 1, f0, f0, f0};
-        ag_value *l1 = ag_map_loss_weighted(tape, maps, target, of);
+        ag_value *l1 = ag_map_loss(tape, maps, target, of);
         if (l1) *map = (double)l1->t.data[0];
         loss = ag_add(tape, loss, map_weight == 1 ? l1 : ag_scale(tape, l1, (float)map_weight));
     }
@@ -104,21 +104,22 @@ static ts_tensor cut(tr_trainer *t, const ts_tensor *whole, rd_grid g)
 }
 
 /* What g may read of each photograph, and what it is to guess. The place of a light is known where the camera's is, in
- * half of the photographs; a camera whose field of view alone is known stands above the centre. What a student learns
- * without its teacher, of camera and power, the teacher is not asked. */
+ * half of the photographs, in a measured step in all; a camera whose field of view alone is known stands above the
+ * centre. What a student learns without its teacher, of camera and power, the teacher is not asked. */
 static void describe(tr_trainer *t, int given)
 {
-    const bool taught = t->config.train.lesson == TR_LESSON_KNOWN && !tr_measured(&t->config, t->step);
+    const bool measured = tr_measured(&t->config, t->step),
+               taught = t->config.train.lesson == TR_LESSON_KNOWN && !measured;
     ts_rng rng = ts_rng_make((uint64_t)t->config.train.seed, TS_STREAM_KNOWN, (uint64_t)t->step);
     for (int i = 0; i < t->first * given; i++) ts_rng_uniform(&rng); /* other ranks' */
     for (int i = 0; i < t->batch * given; i++) {
         const tr_shot *s = &t->shots[i];
-        const bool light = ts_rng_uniform(&rng) < 0.5f && s->told_view,
+        const bool half = ts_rng_uniform(&rng) < 0.5f, light = (half || measured) && s->told_view,
                    power = s->told_power && !(taught && s->told_view);
-        rd_scene_numbers(&s->view, s->ambient, s->tone, t->scenes + (size_t)i * RD_SCENE_NUMBERS);
+        rd_scene_numbers(&s->is.view, s->is.ambient, s->is.tone, t->scenes + (size_t)i * RD_SCENE_NUMBERS);
         t->known[i] = (unsigned char)((s->told_view ? NN_KNOWN_CAMERA : 0) | (light ? NN_KNOWN_LIGHT : 0) |
                                       (power ? NN_KNOWN_POWER : 0));
-        t->captures[i] = s->view;
+        t->captures[i] = s->thought;
         if (s->told_view && !light) t->captures[i].camera[0] = t->captures[i].camera[1] = 0;
     }
 }

@@ -172,7 +172,7 @@ static void share_state(tr_trainer *t)
 {
     const tr_mpi *mpi = t->ranks.mpi;
     float *const block[] = {t->model->value, t->adam.m, t->adam.v, t->adam.ema};
-    int64_t count[] = {t->step, t->adam.step, t->skipped, t->in_a_row, t->best_step, t->saved};
+    int64_t count[] = {t->step, t->adam.step, t->skipped, t->in_a_row, t->saved};
     double real[] = {t->best, t->mean_norm};
     if (!mpi) return;
     for (int i = 0; i < 4; i++)
@@ -180,7 +180,7 @@ static void share_state(tr_trainer *t)
     mpi->broadcast(count, sizeof count);
     mpi->broadcast(real, sizeof real);
     t->step = count[0], t->adam.step = count[1], t->skipped = count[2], t->in_a_row = (int)count[3];
-    t->best_step = count[4], t->saved = count[5];
+    t->saved = count[4];
     t->best = real[0], t->mean_norm = real[1];
 }
 

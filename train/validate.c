@@ -156,7 +156,6 @@ ts_code tr_validate(tr_trainer *t, tr_validation *out, ts_status *st)
     const int count = c->validate.count;
     /* Where an RMSE over the batch scales the gradient, a material's result must not depend on its neighbours. */
     const int together = c->arch.rmse == NN_RMSE_BATCH ? 1 : TOGETHER;
-    const double start = tr_seconds();
     /* A step of the first phase has been made last: there is no refiner to speak of. */
     *out = (tr_validation){.step = t->step,
                            .iterations = tr_pretraining(c, t->step - 1) ? 0
@@ -185,10 +184,6 @@ ts_code tr_validate(tr_trainer *t, tr_validation *out, ts_status *st)
     out->normal /= count;
     const double error = out->render[out->iterations];
     out->best = error < t->best;
-    if (out->best) {
-        t->best = error;
-        t->best_step = t->step;
-    }
-    out->seconds = tr_seconds() - start;
+    if (out->best) t->best = error;
     return tr_agree(&t->ranks, out->best ? tr_save_weights(t, "best.safetensors", st) : TS_OK, st);
 }

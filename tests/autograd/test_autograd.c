@@ -93,7 +93,8 @@ static ts_code train_step(ag_tape *tape)
     ag_reset(tape);
     memset(gradients, 0, sizeof gradients);
     ag_value *maps = network(tape);
-    return ag_backward(tape, ag_map_loss(tape, maps, ag_constant(tape, ts_view(truth, (ts_shape){N, SIDE, SIDE, 9}))));
+    return ag_backward(tape,
+                       ag_map_loss(tape, maps, ag_constant(tape, ts_view(truth, (ts_shape){N, SIDE, SIDE, 9})), NULL));
 }
 
 static ag_tape *prepared(bool needs)
@@ -289,7 +290,8 @@ TEST(tape_scope_gives_memory_back)
     ag_value *maps = network(tape), *keep[1] = {maps};
     ag_scope_end(tape, mark, keep, 1);
     CHECK(keep[0] == maps, "a scope moved a value that backward needs");
-    CHECK(ag_backward(tape, ag_map_loss(tape, maps, ag_constant(tape, ts_view(truth, (ts_shape){N, SIDE, SIDE, 9})))) ==
+    CHECK(ag_backward(tape,
+                      ag_map_loss(tape, maps, ag_constant(tape, ts_view(truth, (ts_shape){N, SIDE, SIDE, 9})), NULL)) ==
               TS_OK,
           "%s", ag_status(tape)->message);
     ag_tape_destroy(&tape);

@@ -18,7 +18,7 @@ static float *gradient(nn_model *m, const nn_input *in, const float *target, int
         nn_lgd(t, m, &now, steps, true, maps, NULL);
         check_tape(t);
         ag_value *goal = ag_constant(t, ts_view((float *)(uintptr_t)target, maps[0]->t.shape));
-        ag_value *loss = ag_add(t, ag_map_loss(t, maps[steps], goal), ag_map_loss(t, maps[0], goal));
+        ag_value *loss = ag_add(t, ag_map_loss(t, maps[steps], goal, NULL), ag_map_loss(t, maps[0], goal, NULL));
         ag_backward(t, loss);
         check_tape(t);
         *loss_value = (double)loss->t.data[0];

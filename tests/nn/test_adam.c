@@ -22,7 +22,7 @@ TEST(nn_tiny_network_learns_one_material)
         ag_value *maps[3];
         ag_reset(t);
         nn_lgd(t, m, &in, 2, true, maps, NULL);
-        ag_value *loss = ag_map_loss(t, maps[2], ag_constant(t, ts_view(target, (ts_shape){1, SIDE, SIDE, 9})));
+        ag_value *loss = ag_map_loss(t, maps[2], ag_constant(t, ts_view(target, (ts_shape){1, SIDE, SIDE, 9})), NULL);
         CHECK(!ag_backward(t, loss), "%s", ag_status(t)->message);
         last = loss->t.data[0];
         if (!step) first = last;
@@ -121,7 +121,7 @@ TEST(nn_same_bytes_for_any_number_of_threads)
             ag_reset(t);
             nn_lgd(t, m, &in, 3, true, maps, NULL);
             ag_value *goal = ag_constant(t, ts_view(target, (ts_shape){2, SIDE, SIDE, 9}));
-            CHECK(!ag_backward(t, ag_map_loss(t, maps[3], goal)), "%s", ag_status(t)->message);
+            CHECK(!ag_backward(t, ag_map_loss(t, maps[3], goal, NULL)), "%s", ag_status(t)->message);
             double norm = nn_gradient_norm(m, 0, m->count);
             nn_adam_next(&adam);
             nn_adam_step(&adam, m, 0, m->count, 1e-2f, (float)(1 / norm));

@@ -107,8 +107,8 @@ TEST(nn_parts_can_be_fixed)
         for (int k = NN_G; k <= NN_COARSE; k++) m->fixed[k] = k == part;
         CHECK(!nn_lgd(t, m, &in, STEPS, true, maps, NULL), "%s", ag_status(t)->message);
         float *goal = numbers((size_t)ts_count(maps[STEPS]->t.shape), 5, -0.5f, 0.5f);
-        CHECK(!ag_backward(t, ag_map_loss(t, maps[STEPS], ag_constant(t, ts_view(goal, maps[STEPS]->t.shape)))), "%s",
-              ag_status(t)->message);
+        CHECK(!ag_backward(t, ag_map_loss(t, maps[STEPS], ag_constant(t, ts_view(goal, maps[STEPS]->t.shape)), NULL)),
+              "%s", ag_status(t)->message);
         for (int k = NN_G; k <= NN_COARSE; k++) {
             size_t first, last, nonzero = 0;
             nn_model_range(m, (nn_part)k, &first, &last);

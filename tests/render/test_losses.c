@@ -142,7 +142,7 @@ TEST(map_loss_value_and_gradient)
     ag_tape *tape = ag_tape_create(true, NULL);
     CHECK(tape, "no memory");
     ts_shape s = {1, 1, 1, 4};
-    ag_value *l = ag_map_loss(tape, ag_parameter(tape, ts_view(a, s), g), ag_constant(tape, ts_view(b, s)));
+    ag_value *l = ag_map_loss(tape, ag_parameter(tape, ts_view(a, s), g), ag_constant(tape, ts_view(b, s)), NULL);
     CHECK(l && ag_backward(tape, l) == TS_OK, "%s", ag_status(tape)->message);
     CHECK(l->t.data[0] == 3.25f / 4, "loss %g", (double)l->t.data[0]);
     static const float expected[4] = {-0.25f, 0.25f, 0, 0.25f};
@@ -169,7 +169,7 @@ TEST(losses_refuse_what_makes_no_sense)
             maps = ag_constant(p.tape, ts_view(room, i < 3 ? wrong[i] : shape));
             target = i == 3 ? ag_parameter(p.tape, ts_view(p.target, shape), p.gradient)
                             : ag_constant(p.tape, ts_view(p.target, shape));
-            l = ag_map_loss(p.tape, maps, target);
+            l = ag_map_loss(p.tape, maps, target, NULL);
             CHECK(!l && ag_status(p.tape)->code == TS_INVALID && strstr(ag_status(p.tape)->message, "map_loss"),
                   "map loss, case %d was accepted", i);
         }

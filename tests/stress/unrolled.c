@@ -92,7 +92,7 @@ bool stress_unrolled(const stress *s)
         nn_lgd(tape, m, &in, steps, true, maps, NULL);
         ag_value *goal = ag_constant(tape, ts_view(truth, (ts_shape){1, SIDE, SIDE, C}));
         ag_value *loss = ag_add(tape, ag_render_loss(tape, maps[steps], goal, views, RD_LOSS_VIEWS),
-                                ag_map_loss(tape, maps[steps], goal));
+                                ag_map_loss(tape, maps[steps], goal, NULL));
         if (ag_backward(tape, loss)) {
             printf("%s\n", ag_status(tape)->message);
             ok = false;

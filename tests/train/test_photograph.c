@@ -112,59 +112,6 @@ TEST(photographs_under_the_flash_are_the_single_ones)
     CHECK(!memcmp(one[2], many[0][0], sizeof one[2]), "a photograph depends on the batch that it comes in");
 }
 
-TEST(capture_order_is_that_of_the_views)
-{
-    ts_rng r = ts_rng_make(4, TS_STREAM_TEST, 0);
-    for (int trial = 0; trial < 50; trial++) {
-        const int count = 1 + trial % RD_CAPTURE_VIEWS;
-        rd_view views[RD_CAPTURE_VIEWS], shuffled[RD_CAPTURE_VIEWS];
-        int order[RD_CAPTURE_VIEWS];
-        rd_capture_draw(&r, count, views);
-        for (int i = 0; i < count; i++) {
-            const int to = ts_rng_int(&r, i + 1);
-            shuffled[i] = shuffled[to];
-            shuffled[to] = views[i];
-        }
-        rd_capture_order(shuffled, count, order);
-        for (int i = 0; i < count; i++)
-            CHECK(!memcmp(views[i].light, shuffled[order[i]].light, sizeof views[i].light),
-                  "view %d of %d depends on the order that is given", i, count);
-    }
-}
-
-/* All cameras with the flash beside the lens: the light's distance from the camera, and its direction, which is the
- * phone's roll, say nothing of where the phone was. */
-TEST(capture_order_of_a_sheet_is_from_above_then_around)
-{
-    ts_rng r = ts_rng_make(5, TS_STREAM_TEST, 0);
-    for (int trial = 0; trial < 200; trial++) {
-        const int count = 2 + trial % 4;
-        rd_view views[NUMBER + 2], shuffled[NUMBER + 2];
-        int order[NUMBER + 2];
-        double mean[2] = {0, 0}, last = -1e-4;
-        rd_sheet_draw(&r, count, views);
-        for (int i = 0; i < count; i++) {
-            const int to = ts_rng_int(&r, i + 1);
-            for (int k = 0; k < 2; k++) mean[k] += (double)views[i].camera[k] / count;
-            shuffled[i] = shuffled[to];
-            shuffled[to] = views[i];
-        }
-        rd_capture_order(shuffled, count, order);
-        for (int i = 0; i < count; i++) {
-            const rd_view *v = &shuffled[order[i]];
-            const double slope = hypot((double)v->camera[0], (double)v->camera[1]) / (double)v->camera[2];
-            CHECK(!memcmp(views[i].camera, v->camera, sizeof v->camera), "view %d of %d depends on the order", i,
-                  count);
-            CHECK((i == 0) == (slope < 0.15), "the camera of view %d of %d has a slope of %g", i, count, slope);
-            if (i == 0) continue;
-            double angle = atan2((double)v->light[1] - mean[1], (double)v->light[0] - mean[0]);
-            if (angle < 0) angle += 6.283185307179586;
-            CHECK(angle >= last, "view %d is at %g, the one before at %g", i, angle, last);
-            last = angle;
-        }
-    }
-}
-
 TEST(sheet_views_are_a_phones_around_the_sheet)
 {
     ts_rng r = ts_rng_make(6, TS_STREAM_TEST, 0);
@@ -224,7 +171,8 @@ TEST(photographs_of_a_sheet_are_a_share_and_change_no_others)
 TEST(photographs_of_a_sheet_have_the_faults_of_their_keys)
 {
     make();
-    rd_view views[COUNT][NUMBER];
+    rd_view views[COUNT][NUMBER], told[COUNT][NUMBER];
+    unsigned char known[COUNT * NUMBER];
     tr_shot shots[COUNT][NUMBER];
     for (int fault = 0; fault < 4; fault++) {
         tr_config c = without_faults();
@@ -236,14 +184,18 @@ TEST(photographs_of_a_sheet_have_the_faults_of_their_keys)
         if (fault == 3) c.data.bracket = 0.9, c.data.noise = 1, c.data.noise_spread = 0;
         tr_capture_views(1, 1, 7, COUNT, NUMBER, views[0]);
         tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, many[0][0], shots[0]);
+        tr_describe_several(shots[0], COUNT * NUMBER, told[0], known);
         for (int i = 0; i < COUNT; i++)
             for (int k = 0; k < NUMBER; k++) {
                 double far = 0;
+                CHECK(!memcmp(told[i][k].camera, views[i][k].camera, sizeof views[i][k].camera) &&
+                          !memcmp(told[i][k].light, views[i][k].light, sizeof views[i][k].light),
+                      "fault %d: h is told another place than the tags say", fault);
                 for (int d = 0; d < 3; d++)
-                    far += pow((double)shots[i][k].view.camera[d] - (double)views[i][k].camera[d], 2);
+                    far += pow((double)shots[i][k].is.view.camera[d] - (double)views[i][k].camera[d], 2);
                 CHECK(fault == 1 ? far > 0 && far <= 0.05 * 0.05 : far == 0, "fault %d: the camera moved by %g", fault,
                       sqrt(far));
-                rd_render(rd_grid_full(SIZE), maps[i], MAP_CHANNELS, &shots[i][k].view, true, one[0]);
+                rd_render(rd_grid_full(SIZE), maps[i], MAP_CHANNELS, &shots[i][k].is.view, true, one[0]);
                 for (int p = 0; p < PIXELS * 3; p++) most = fmax(most, fabs((double)one[0][p] - (double)many[i][k][p]));
             }
         CHECK(fault < 2 ? most < 1e-6 : most > 1e-3, "fault %d: the photographs are %g off", fault, most);
@@ -304,7 +256,7 @@ TEST(photographs_are_the_renderings_of_their_shots)
     tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, many[0][0], shots[0]);
     for (int i = 0; i < COUNT; i++)
         for (int k = 0; k < NUMBER; k++) {
-            rd_render(rd_grid_full(SIZE), maps[i], MAP_CHANNELS, &shots[i][k].view, true, one[0]);
+            rd_render(rd_grid_full(SIZE), maps[i], MAP_CHANNELS, &shots[i][k].is.view, true, one[0]);
             CHECK(!memcmp(one[0], many[i][k], sizeof one[0]), "photograph %d of material %d is another", k, i);
             told += shots[i][k].told_view;
             CHECK(shots[i][k].told_power, "a share of 1 leaves a photograph untold");
@@ -316,12 +268,12 @@ TEST(photographs_are_the_renderings_of_their_shots)
     tr_photographs(&c, 1, 7, COUNT, SIZE, maps[0], views[0], NUMBER, many[0][0], shots[0]);
     for (int i = 0; i < COUNT; i++)
         for (int k = 0; k < NUMBER; k++) {
-            rd_render(rd_grid_full(SIZE), maps[i], MAP_CHANNELS, &shots[i][k].view, true, one[0]);
+            rd_render(rd_grid_full(SIZE), maps[i], MAP_CHANNELS, &shots[i][k].is.view, true, one[0]);
             for (int p = 0; p < PIXELS * 3; p++) {
                 CHECK(fabsf(one[0][p] - many[i][k][p]) < 1e-6f, "photograph %d of material %d: %g, its shot %g", k, i,
                       many[i][k][p], one[0][p]);
             }
-            differ = differ || memcmp(&shots[i][k].view, &shots[0][0].view, sizeof(rd_view));
+            differ = differ || memcmp(&shots[i][k].is.view, &shots[0][0].is.view, sizeof(rd_view));
         }
     CHECK(differ, "all photographs have one view");
 }
@@ -342,7 +294,7 @@ TEST(photographs_are_exposed_alike_at_any_field_of_view)
     for (uint64_t index = 0; index < 60; index++) {
         tr_shot shot;
         tr_photographs(&c, 1, index, 1, SIDE, grey[0], NULL, 1, image[0], &shot);
-        const double d = shot.view.camera[2], fov = 2 * atan(0.5 / d) * 57.29577951308232;
+        const double d = shot.is.view.camera[2], fov = 2 * atan(0.5 / d) * 57.29577951308232;
         CHECK(fabsf(image[MIDDLE][1] / usual - 1) < 0.01f, "%g at %g degrees, %g usually", image[MIDDLE][1], fov,
               usual);
         CHECK(fov > 19.99 && fov < 75.01, "field of view %g", fov);
@@ -363,11 +315,11 @@ TEST(photographs_have_their_share_of_ambient_light)
     for (uint64_t index = 0; index < 20; index++) {
         tr_shot shot;
         tr_photographs(&c, 1, index, 1, SIDE, grey[0], NULL, 1, lit[0], &shot);
-        rd_render(rd_grid_full(SIDE), grey[0], MAP_CHANNELS, &shot.view, false, flash[0]);
+        rd_render(rd_grid_full(SIDE), grey[0], MAP_CHANNELS, &shot.is.view, false, flash[0]);
         for (int p = 0; p < SIDE * SIDE; p++) {
             const float share = (lit[p][1] - flash[p][1]) / flash[MIDDLE][1];
-            CHECK(fabsf(share - shot.ambient) < 0.02f * shot.ambient + 1e-5f, "pixel %d: %g in place of %g", p, share,
-                  shot.ambient);
+            CHECK(fabsf(share - shot.is.ambient) < 0.02f * shot.is.ambient + 1e-5f, "pixel %d: %g in place of %g", p,
+                  share, shot.is.ambient);
         }
     }
 }
@@ -388,7 +340,8 @@ TEST(photographs_of_validation_have_the_camera_that_is_asked_for)
         CHECK(tr_validator_create(&t, &st) == TS_OK, "%s", st.message);
         if (i == 0) memcpy(usual, t.validator.images, sizeof usual);
         CHECK((memcmp(usual, t.validator.images, sizeof usual) == 0) == (i < 2), "validation %d", i);
-        CHECK(i < 2 || t.validator.shots[0].view.camera[2] > 2, "distance %g", t.validator.shots[0].view.camera[2]);
+        CHECK(i < 2 || t.validator.shots[0].is.view.camera[2] > 2, "distance %g",
+              t.validator.shots[0].is.view.camera[2]);
         tr_validator_free(&t.validator);
     }
 }

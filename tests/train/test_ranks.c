@@ -69,7 +69,7 @@ static void check_buckets(const nn_arch *arch, int steps, bool recompute, int fi
         ag_reset(t);
         nn_lgd(t, m, &in, steps, true, maps, NULL);
         ag_value *goal = ag_constant(t, ts_view(target, maps[0]->t.shape));
-        ag_value *loss = ag_add(t, ag_map_loss(t, maps[steps], goal), ag_map_loss(t, maps[0], goal));
+        ag_value *loss = ag_add(t, ag_map_loss(t, maps[steps], goal, NULL), ag_map_loss(t, maps[0], goal, NULL));
         tr_reduce_begin(&r);
         ag_backward(t, loss);
         check_tape(t);

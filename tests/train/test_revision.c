@@ -84,6 +84,8 @@ TEST(trainer_teaches_revisions)
     CHECK(run(&c, folder("both"), false, 0, &st) == TS_INVALID && strstr(st.message, "given_max"), "%s", st.message);
     c.train.pretrain_steps = 0, c.train.given_min = c.train.given_max = c.arch.revisions = 0;
     CHECK(run(&c, folder("both"), false, 0, &st) == TS_INVALID && strstr(st.message, "disturb"), "%s", st.message);
+    c.train.disturb = 0;
+    CHECK(run(&c, folder("both"), false, 0, &st) == TS_INVALID && strstr(st.message, "train.steps"), "%s", st.message);
     c.arch.revisions = 2, c.train.given_max = 2, c.train.iterations_max = 2;
     CHECK(run(&c, folder("both"), false, 0, &st) == TS_INVALID && strstr(st.message, "iterations_max"), "%s",
           st.message);

@@ -237,8 +237,8 @@ TEST(trainer_learns_known_cameras_beside_a_teacher)
               *image = calloc((size_t)SIDE * SIDE, 3 * sizeof(float));
         CHECK(maps && image, "no memory");
         tr_photographs(m, 3, (uint64_t)step, 1, SIDE, maps, NULL, 1, image, &shot);
-        CHECK(shot.told_view && shot.told_power && shot.tone == 0 && shot.ambient == 0, "step %d", step);
-        known++, flash += memcmp(&shot.view, &planned, sizeof planned) == 0;
+        CHECK(shot.told_view && shot.told_power && shot.is.tone == 0 && shot.is.ambient == 0, "step %d", step);
+        known++, flash += memcmp(&shot.is.view, &planned, sizeof planned) == 0;
         free(maps), free(image);
     }
     CHECK(known > STEPS * 2 / 5 && known < STEPS * 3 / 5, "%d of %d steps are known", known, STEPS);
