@@ -169,7 +169,7 @@ $(BUILD)/bin/lgd-faults: tests/faults/main.c $(BUILD)/gen/flags
 	@mkdir -p $(@D)
 	$(Q)$(CC) $(CPPFLAGS_ALL) -std=c11 -O1 -g $(WARN) -o $@ $<
 
-$(BUILD)/lib/lgd-faults.so: tests/faults/shim.c $(BUILD)/gen/flags
+$(BUILD)/lib/lgd-faults.so: tests/faults/shim.c tests/faults/calls.h $(BUILD)/gen/flags
 	$(call step,LD,$@)
 	@mkdir -p $(@D)
 	$(Q)$(CC) $(CPPFLAGS_ALL) -std=c11 -O1 -g $(WARN) -fPIC -shared -o $@ $< -ldl -lpthread
@@ -233,10 +233,16 @@ $(MPI_LINKS): $(BUILD)/mpi/link_%.so: bench/mpi/link.c $(BUILD)/gen/flags
 
 # Every object is rebuilt when the flags change, and data/folders.o when PREFIX does, tags.o when its library comes or
 # goes; what is made of many files, when one of them comes or goes.
-FLAGS_NOW := $(CC) $(CXX) $(WHOLE_JUMPS) $(OPT) $(SANITIZE) $(CFLAGS) $(CPPFLAGS) $(VERSION)
+# Products and sums of kernels are fused, but for what must be the same bytes on every machine.
+CONTRACT ?= fast
+CONTRACT_noise := off
+FLAGS_NOW := $(CC) $(CXX) $(WHOLE_JUMPS) $(CFLAGS_ALL) $(CXXFLAGS_ALL) $(CPPFLAGS) $(LDLIBS) $(VERSION) \
+  $(CONTRACT) $(CONTRACT_noise) $(foreach isa,$(ISAS),$(ISA_FLAGS_$(isa)))
 changed = $(shell mkdir -p $(BUILD)/gen; echo '$(2)' | cmp -s - $(BUILD)/gen/$(1) || echo '$(2)' > $(BUILD)/gen/$(1))
 $(call changed,flags,$(FLAGS_NOW))
 $(call changed,sources,$(LIB_C) $(KERNELS) $(OPS) $(PAGES))
+$(call changed,tests,$(TEST_C) $(BENCH_C))
+$(TEST_BIN) $(BENCH_BIN) $(STRESS_BIN): $(BUILD)/gen/tests
 $(INTERNAL) $(addprefix $(BUILD)/gen/,ops.h op_list.c pages.h pages.c): $(BUILD)/gen/sources
 $(call changed,prefix,$(PREFIX) $(LIBDIR))
 $(OBJ)/data/folders.o: $(BUILD)/gen/prefix
@@ -262,8 +268,6 @@ $(OBJ)/%.o: %.cpp $(BUILD)/gen/flags
 
 # One kernel source, once per instruction set. Contraction to FMA is part of what a kernel is, but for those whose bytes
 # must not depend on the machine.
-CONTRACT ?= fast
-CONTRACT_noise := off
 define KERNEL_RULE
 $(OBJ)/%.$(1).o: %.c $(BUILD)/gen/flags
 	$$(call step,CC,$$< [$(1)])
@@ -313,7 +317,7 @@ test: deps
 
 bench: needs
 	@$(MAKE) --no-print-directory programs $(BENCH_BIN)
-	@TESTDATA=$(TESTDATA) $(BENCH_BIN) $(BENCH)
+	@BUILD=$(BUILD) TESTDATA=$(TESTDATA) $(BENCH_BIN) $(BENCH)
 
 test-blender: programs
 	@BUILD=$(BUILD) sh tests/blender/run.sh

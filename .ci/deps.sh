@@ -6,8 +6,9 @@ missing=
 optional=
 lost=
 have() { command -v "$1" >/dev/null 2>&1; }
-have "${CC:-gcc}" || missing="$missing gcc"
-have "${CXX:-g++}" || missing="$missing g++"
+cc=${CC:-gcc} cxx=${CXX:-g++}
+have "${cc%% *}" || missing="$missing gcc" # they may be of two words, such as ccache gcc
+have "${cxx%% *}" || missing="$missing g++"
 have pkg-config || missing="$missing pkg-config"
 for module in "$@"; do
     if [ "$module" = help2man ]; then # manual pages

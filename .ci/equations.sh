@@ -2,7 +2,7 @@
 # Every `FILE:FUNCTION` in docs/math.md is defined in that file: prints those that are not and ends with 1.
 cd "$(dirname "$0")/.." || exit 1
 bad=0
-named=$(grep -o '`[a-z_/]*\.[ch]:[A-Za-z_0-9]*`' docs/math.md | tr -d '`' | sort -u)
+named=$(grep -o '`[a-z_0-9/]*\.[ch]:[A-Za-z_0-9]*`' docs/math.md | tr -d '`' | sort -u)
 [ -n "$named" ] || { echo "docs/math.md names no function" >&2; exit 1; }
 for place in $named; do
     file=${place%:*} function=${place#*:}

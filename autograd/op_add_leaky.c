@@ -1,5 +1,7 @@
 /* u[n,p,c] = x[n,p,c] + g[n,c],   y = u > 0 ? u : leak u;   dx = y > 0 ? dy : leak dy,   dg[n,c] = sum over the pixels
- * p of dx[n,p,c] x, y: [N,H,W,C], g: [N,1,1,C] */
+ * p of dx[n,p,c]
+ *
+ * x, y: [N,H,W,C], g: [N,1,1,C] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"

@@ -1,6 +1,8 @@
 /* ih = x W_ih' + b_ih,  hh = old W_hh' + b_hh,  z = sigmoid(ih_z + hh_z),  r = sigmoid(ih_r + hh_r),  m = tanh(ih_n + r
  * hh_n), y = (1 - z) old + z m; its gradients as in tensor/kernels/elementwise.h and tensor/conv/gru.h, where the
- * source is named x: [N,H,W,I], old: [N,H,W,C] or NULL = 0, W_ih: {3C,I,1,1}, W_hh: {3C,C,1,1} in chunks z, r, n,
+ * source is named
+ *
+ * x: [N,H,W,I], old: [N,H,W,C] or NULL = 0, W_ih: {3C,I,1,1}, W_hh: {3C,C,1,1} in chunks z, r, n,
  * biases: [1,1,1,3C], y: [N,H,W,C] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
@@ -30,7 +32,7 @@ static const float *packed(ag_tape *tape, ts_conv c, ts_conv_use use, const ag_v
 
 static void forward(ag_tape *tape, ag_node *node)
 {
-    const ts_gru g = shape(*ag_compute(tape), node);
+    const ts_gru g = shape(*(const ts_compute *)node->attr, node);
     const ts_conv_use use = g.bf16 ? TS_CONV_FORWARD_BF16 : TS_CONV_FORWARD;
     const float *ih = packed(tape, ts_gru_input(&g), use, node->in[IH]),
                 *old = node->in[OLD] ? node->in[OLD]->t.data : NULL;
@@ -49,7 +51,7 @@ static void forward(ag_tape *tape, ag_node *node)
 
 static void backward(ag_tape *tape, ag_node *node)
 {
-    const ts_gru g = shape(*ag_compute(tape), node);
+    const ts_gru g = shape(*(const ts_compute *)node->attr, node);
     const float *old = node->in[OLD] ? node->in[OLD]->t.data : NULL;
     ts_gru_gradients to = {0};
     /* The state first: it may be x itself. */
@@ -155,5 +157,5 @@ ag_value *ag_gru(ag_tape *tape, ag_value *x, ag_value *old, ag_value *ih, ag_val
     if (old && !ts_same(old->t.shape, s))
         return ag_fail(tape, TS_INVALID, "gru: the state is %s, not %s", ag_shape_text(b, old->t.shape),
                        ag_shape_text(a, s));
-    return ag_apply(tape, &op_gru, INPUTS, in, s, NULL, 0);
+    return ag_apply(tape, &op_gru, INPUTS, in, s, ag_compute(tape), sizeof(ts_compute));
 }

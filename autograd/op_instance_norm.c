@@ -1,6 +1,8 @@
 /* y[n,p,c] = (x[n,p,c] - mean_nc) q_nc,   q = 1 / sqrt(variance_nc + epsilon), both over the P pixels p of one image,
- * variance biased dx = q (dy - mean_p(dy) - y mean_p(dy y)) Ulyanov et al., "Instance Normalization", 2016, equation 1;
- * without scale and shift. x, y: [N,H,W,C]; q: [N,C]. epsilon keeps a constant channel finite: it becomes 0. */
+ * the variance biased;   dx = q (dy - mean_p(dy) - y mean_p(dy y))
+ *
+ * Ulyanov et al., "Instance Normalization", 2016, equation 1; without scale and shift. x, y: [N,H,W,C]; q: [N,C].
+ * epsilon keeps a constant channel finite: it becomes 0. */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"

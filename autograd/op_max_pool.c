@@ -1,5 +1,7 @@
 /* y[n,i,j,c] = max of x[n, 2i + {0,1}, 2j + {0,1}, c];   dy goes to the largest, to the first in reading order of equal
- * ones x: [N,2H,2W,C], y: [N,H,W,C] */
+ * ones
+ *
+ * x: [N,2H,2W,C], y: [N,H,W,C] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"

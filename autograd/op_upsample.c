@@ -1,5 +1,7 @@
 /* y[n,i,j,c] = bilinear x[n, i (H-1)/(2H-1), j (W-1)/(2W-1), c]: twice the size, corners on corners;   dx = the
- * transposed weights on dy x: [N,H,W,C], y: [N,2H,2W,C] */
+ * transposed weights on dy
+ *
+ * x: [N,H,W,C], y: [N,2H,2W,C] */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"

@@ -182,27 +182,24 @@ BENCH(peer_conv)
     }
 }
 
-BENCH(two_threads)
+BENCH(conv_threads)
 {
     static const ts_conv shape[] = {{1, 256, 256, 64, 64, 3, 1, TS_PAD_ZERO, 0, {0}},
                                     {1, 256, 256, 20, 256, 5, 1, TS_PAD_REPLICATE, 0, {0}},
                                     {1, 256, 256, 64, 256, 3, 2, TS_PAD_REPLICATE, 0, {0}}};
     static const int ways[] = {BENCH_FORWARD, BENCH_DATA, BENCH_WEIGHTS, BENCH_WINOGRAD};
-    const int all = ts_threads();
     bench_heading("all threads beside one, and what the peak gains");
     for (size_t i = 0; i < sizeof shape / sizeof *shape; i++)
         for (int k = 0; k < 4; k++) {
             if (k == 3 && ts_conv_choose(&shape[i], TS_CONV_OUTPUT) != TS_CONV_BY_WINOGRAD) continue;
             const bench_way *by = &bench_ways[ways[k]];
             bench_conv w = bench_conv_make(shape[i]);
-            ts_threads_set(1);
-            const bench_time one = bench_measure(by->run, &w);
-            ts_threads_set(all);
-            const bench_time t = bench_measure(by->run, &w);
             char label[96];
-            snprintf(label, sizeof label, "%s %d->%d %dx%d: %.2f x (peak %.2f x)", by->name, shape[i].ic, shape[i].oc,
-                     shape[i].k, shape[i].k, one.seconds / t.seconds, t.peak / one.peak);
-            bench_row_unit(label, t, all, "threads");
+            snprintf(label, sizeof label, "%s %d->%d %dx%d", by->name, shape[i].ic, shape[i].oc, shape[i].k,
+                     shape[i].k);
+            const ts_conv *c = &shape[i];
+            bench_row(label, bench_measure(by->run, &w), 2.0 * c->n * c->h * c->w * c->ic * c->oc * c->k * c->k);
+            bench_row_threads(by->run, &w);
             bench_conv_discard(&w);
         }
 }

@@ -156,6 +156,9 @@ static void train(const char *config, const char *heading, void (*rows)(subject 
     if (!s.tape || tr_config_read(&s.c, config, &st) || !(s.model = nn_model_create(&s.c.arch, &st)) ||
         nn_model_train(s.model, &st) || nn_adam_create(&s.adam, s.model, 0, &st)) {
         printf("  %s\n", st.message);
+        ag_tape_destroy(&s.tape);
+        nn_model_free(&s.model);
+        nn_adam_free(&s.adam);
         return;
     }
     nn_model_init(s.model, 1);

@@ -160,11 +160,12 @@ const bench_way bench_ways[] = {
 
 bench_arrays bench_conv_arrays(const bench_conv *w, const bench_way *by)
 {
-    const int64_t pixels = (int64_t)w->c.n * w->c.h * w->c.w, in = pixels * w->c.ic, out = pixels * w->c.oc;
+    const int64_t pixels = (int64_t)w->c.n * w->c.h * w->c.w, in = pixels * w->c.ic, out = pixels * w->c.oc,
+                  variables = pixels * ts_conv_variables(&w->c);
     if (by->makes == BENCH_KERNEL)
         return (bench_arrays){{w->x, w->y}, w->weight, {in, out}, (int64_t)w->c.ic * w->c.oc * w->c.k * w->c.k, true};
     const float *packed = *(float *const *)((const char *)w + by->packed);
     const int64_t kernel = (int64_t)ts_conv_packed_count(&w->c, by->use);
-    if (by->makes == BENCH_INPUT) return (bench_arrays){{w->y, packed}, w->x, {out, kernel}, in, false};
+    if (by->makes == BENCH_INPUT) return (bench_arrays){{w->y, packed}, w->x, {out, kernel}, variables, false};
     return (bench_arrays){{w->x, packed}, w->y, {in, kernel}, out, false};
 }

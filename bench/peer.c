@@ -20,9 +20,6 @@ static struct engine {
 } engines[] = {{"eager", "eager PyTorch", ""}, {"compile", "torch.compile", ""}, {"openvino", "OpenVINO", ""}};
 enum { ENGINES = sizeof engines / sizeof *engines };
 
-/* The one that make bench-deps made, and the system's. */
-static const char *const interpreters[] = {"build/venv/bin/python3", "/usr/bin/python3"};
-
 static void stop(void)
 {
     if (to) fclose(to);
@@ -78,7 +75,10 @@ static bool start_with(const char *interpreter)
 static void start(void)
 {
     asked = true;
-    if (start_with(interpreters[0]) || start_with(interpreters[1])) atexit(stop);
+    char made[4096]; /* by make bench-deps; then the system's */
+    const char *build = getenv("BUILD");
+    snprintf(made, sizeof made, "%s/venv/bin/python3", build && *build ? build : "build");
+    if (start_with(made) || start_with("/usr/bin/python3")) atexit(stop);
     else printf("  (peers skipped: there is no PyTorch here; make bench-deps gets it, torch.compile and OpenVINO)\n");
 }
 

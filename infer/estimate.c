@@ -342,7 +342,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     if (more > 0 && ts_budget_check(more, st) != TS_OK)
         return ts_context(st, "%d x %d pixels, of which the network reads %d x %d", side, side, nn_arch_side(a),
                           nn_arch_side(a));
-    if (more > 0) ts_arena_reserve(arena, (size_t)most);
+    if (more > 0) ts_arena_reserve(arena, (size_t)most, ag_compute(e->tape)->threads);
     nn_first_guess guess = {0};
     ts_code code = TS_OK;
     revision_watch user = {e, &p, &o, false};

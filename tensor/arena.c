@@ -19,6 +19,7 @@ struct ts_arena {
     size_t at, used; /* the chunk in use and the bytes taken from it */
     size_t fetched;  /* bytes of the first chunk whose pages are there, if it was reserved */
     bool reserved;
+    int threads; /* that fetch them */
     size_t total, peak;
 };
 
@@ -79,11 +80,11 @@ static int add_chunk(ts_arena *a, size_t bytes)
  * number would bring by one thread, and two threads in one page clear it twice. */
 static void fetch(ts_arena *a)
 {
-    const size_t each = CHUNK_STEP, threads = (size_t)ts_threads(), step = each * (threads < 8 ? threads : 8),
-                 size = a->chunk[0].size;
+    const size_t each = CHUNK_STEP, threads = (size_t)(a->threads ? a->threads : ts_threads()),
+                 step = each * (threads < 8 ? threads : 8), size = a->chunk[0].size;
     size_t to = (a->used + step - 1) / step * step;
     if (to > size) to = size;
-    ts_memory_fetch(a->chunk[0].base + a->fetched, to - a->fetched);
+    ts_memory_fetch(a->chunk[0].base + a->fetched, to - a->fetched, a->threads);
     a->fetched = to;
 }
 
@@ -125,11 +126,12 @@ void ts_arena_release(ts_arena *a, ts_mark mark)
     a->total = mark.total;
 }
 
-void ts_arena_reserve(ts_arena *a, size_t bytes)
+void ts_arena_reserve(ts_arena *a, size_t bytes, int threads)
 {
     if (a->total > 0 || bytes > SIZE_MAX / 4 || (a->chunks > 0 && a->chunk[0].size >= bytes)) return;
     free_chunks(a);
     a->reserved = add_chunk(a, bytes);
+    a->threads = threads;
     a->fetched = 0;
 }
 

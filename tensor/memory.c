@@ -43,7 +43,7 @@ static void fetch_pages(const void *job, int64_t begin, int64_t end)
 #endif
 }
 
-void ts_memory_fetch(void *p, size_t bytes) { ts_for(0, (int64_t)bytes, HUGE, fetch_pages, p); }
+void ts_memory_fetch(void *p, size_t bytes, int threads) { ts_for(threads, (int64_t)bytes, HUGE, fetch_pages, p); }
 
 enum { PART = 128 << 10 };
 

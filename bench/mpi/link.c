@@ -5,9 +5,10 @@
  *   LGD_LINK="LATENCY SPEED"   microseconds, bytes a microsecond
  *   LGD_LINK_LOG=FILE          at the end rank 0 writes for each bucket of a step: bytes, and the mean microseconds
  *                              from the beginning of backward to its sending, by the clock and of the thread's
- * processor time (which other programs do not lengthen); then "step" and a step's processor time LGD_LINK_HOSTS=N the
- * ranks are as if on N hosts; with the two above each is on one of its own LGD_LINK_POISON=STEP       the last rank's
- * loss in that step (from 1 on) is not a number */
+ *                              processor time (which other programs do not lengthen); then "step" and a step's
+ *                              processor time
+ *   LGD_LINK_HOSTS=N           the ranks are as if on N hosts; with the two above each is on one of its own
+ *   LGD_LINK_POISON=STEP       the last rank's loss in that step (from 1 on) is not a number */
 #include <math.h>
 #include <mpi.h>
 #include <stdio.h>

@@ -28,8 +28,8 @@ static void put_pair(const ts_conv *c, const float *x, int channels, int n, int 
 
 static operands gather(const ts_conv *c, bool bf16, const float *x, const float *dy)
 {
-    const int lanes = conv_lanes(), positions = c->h * c->w, panels = conv_panels(c->oc),
-              padded = (c->oc + lanes - 1) / lanes * lanes, step = bf16 ? 2 : 1, images = (c->n + step - 1) / step;
+    const int lanes = conv_lanes(), positions = c->h * c->w, panels = conv_panels(c->oc), padded = conv_whole(c->oc),
+              step = bf16 ? 2 : 1, images = (c->n + step - 1) / step;
     const ptrdiff_t pixel = c->ic % 512 ? c->ic : c->ic + 16, pixels = (ptrdiff_t)positions * images;
     float *to_x = ts_scratch(0, sizeof(float) * (size_t)(pixels * pixel)),
           *to_dy = ts_scratch(1, sizeof(float) * (size_t)(pixels * padded));

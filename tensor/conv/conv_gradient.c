@@ -64,7 +64,7 @@ static job make_job(const ts_conv *c, bool bf16, const float *x, const float *dy
     g.m = g.swapped ? c->oc : g.length;
     g.n = g.swapped ? g.length : c->oc;
     const int lanes = conv_lanes();
-    g.padded = (g.n + lanes - 1) / lanes * lanes;
+    g.padded = conv_whole(g.n);
     g.size = (ptrdiff_t)g.lines * g.m * g.padded;
     g.direct_dy = !bf16 && (g.swapped || (c->oc % lanes == 0 && c->oc <= 8 * lanes));
     /* By shape alone, so that the sums do not depend on the number of threads. */

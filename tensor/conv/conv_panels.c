@@ -1,11 +1,7 @@
 /* Panels of packed weights and the register tiles that multiply them: what the ways have in common. */
 #include "tensor/conv/plan.h"
 
-ptrdiff_t conv_panels_count(int ic, int oc, int k)
-{
-    const int lanes = conv_lanes();
-    return (ptrdiff_t)((oc + lanes - 1) / lanes * lanes) * ic * k * k;
-}
+ptrdiff_t conv_panels_count(int ic, int oc, int k) { return (ptrdiff_t)conv_whole(oc) * ic * k * k; }
 
 ts_tile conv_panel_tile(const conv_plan *p, int panel)
 {

@@ -44,7 +44,7 @@ static rows rows_make(const conv_plan *p, int pixels)
     rows s = {.width = 4 * lanes, .count = reach + 1 < p->h ? reach + 1 : p->h};
     for (;; s.width = 2 * lanes) {
         if (s.width > pixels) s.width = pixels;
-        s.plane = s.width + (reach + lanes - 1) / lanes * lanes;
+        s.plane = s.width + conv_whole(reach);
         s.row = s.plane * p->ic;
         if (s.width <= 2 * lanes || s.row * s.count * (ptrdiff_t)sizeof(float) <= ROWS_BYTES) return s;
     }

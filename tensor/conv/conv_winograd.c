@@ -197,7 +197,7 @@ typedef struct run_job {
     int step;      /* tiles of a task */
 } run_job;
 
-/* v [36][tile][to ..] of channels that lie in an array of their own. */
+/* v [36][tile][depth] of channels that lie in an array of their own, plane numbers from one of the 36 to the next. */
 static void transform(const winograd_grid *g, const float *x, int channels, const winograd_place *place, int count,
                       float *v, ptrdiff_t plane)
 {

@@ -36,8 +36,7 @@ static job make_job(const ts_conv *c, bool bf16, const ts_conv_inputs *x, const 
 {
     job j = {
         .g = winograd_grid_forward(c, bf16), .x = x, .dy = dy, .first = x->constants ? ts_conv_variables(c) : c->ic};
-    const int lanes = conv_lanes();
-    j.padded = (c->oc + lanes - 1) / lanes * lanes;
+    j.padded = conv_whole(c->oc);
     j.group = GROUP_BYTES / (WINOGRAD_AREA * (int)sizeof(float) * (c->ic + j.padded));
     if (j.group > GROUP_TILES) j.group = GROUP_TILES;
     if (j.group < GROUP_TILES_LEAST) j.group = GROUP_TILES_LEAST;

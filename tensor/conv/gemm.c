@@ -111,8 +111,8 @@ static void run_unit(const void *job, int64_t unit)
 void ts_gemm(bool ta, bool tb, int m, int n, int k, float alpha, const float *a, const float *b, float beta, float *c,
              int threads)
 {
-    const int lanes = conv_lanes(), panels = conv_panels(n), units = (m + ROWS - 1) / ROWS;
-    float *packed = ts_scratch(2, sizeof(float) * (size_t)k * (size_t)((n + lanes - 1) / lanes * lanes));
+    const int panels = conv_panels(n), units = (m + ROWS - 1) / ROWS;
+    float *packed = ts_scratch(2, sizeof(float) * (size_t)k * (size_t)conv_whole(n));
     pack_b(tb, n, k, alpha, b, packed, threads);
     product p = {.ta = ta,
                  .scale = beta != 0 && beta != 1,

@@ -102,8 +102,6 @@ static void product(const float *a, ptrdiff_t a_stride, const ts_segment *segmen
     }
 }
 
-static int padded(int channels) { return (channels + conv_lanes() - 1) / conv_lanes() * conv_lanes(); }
-
 /* Private sums of a part: [3c][padded ic], [3c][padded c], and in double [4c]. The 4c gradients of a pixel before the
  * activations come as n, z, r, n' (n' that of hh_n), so that both ih's and hh's three are neighbours. */
 typedef struct sums {
@@ -115,7 +113,7 @@ typedef struct sums {
 static void add_products(const float *d, int c, const float *b, int channels, int count, float *sum)
 {
     const struct ts_conv_kernels *k = ts_conv_k();
-    const int width = padded(channels), tiles = (3 * c + k->rows - 1) / k->rows;
+    const int width = conv_whole(channels), tiles = (3 * c + k->rows - 1) / k->rows;
     const ptrdiff_t zero = 0;
     ptrdiff_t b_stride = channels;
     if (width != channels) { /* whole vectors are read */
@@ -219,9 +217,10 @@ static void reduce_rows(const void *job, int64_t begin, int64_t end)
     const float *first = (const float *)(const void *)(j->memory + 4 * c);
     for (int64_t m = begin; m < end; m++) {
         if (j->to->ih_weight)
-            reduce_row(first + m * padded(ic), 2 * j->size, j->parts, ic, j->to->ih_weight + (m + 2 * c) % gates * ic);
+            reduce_row(first + m * conv_whole(ic), 2 * j->size, j->parts, ic,
+                       j->to->ih_weight + (m + 2 * c) % gates * ic);
         if (j->to->hh_weight && j->old)
-            reduce_row(first + j->input + m * padded(c), 2 * j->size, j->parts, c, j->to->hh_weight + m * c);
+            reduce_row(first + j->input + m * conv_whole(c), 2 * j->size, j->parts, c, j->to->hh_weight + m * c);
     }
 }
 
@@ -231,7 +230,7 @@ void ts_gru_backward(const ts_gru *g, const float *x, const float *old, const fl
     const int c = g->c, gates = 3 * c;
     const int64_t most = g->pixels / PART_PIXELS;
     const int parts = most < 1 ? 1 : most > PARTS ? PARTS : (int)most;
-    const ptrdiff_t input = (ptrdiff_t)gates * padded(g->ic), hidden = (ptrdiff_t)gates * padded(c);
+    const ptrdiff_t input = (ptrdiff_t)gates * conv_whole(g->ic), hidden = (ptrdiff_t)gates * conv_whole(c);
     const ptrdiff_t size = 4 * c + (input + hidden + 1) / 2;
     double *memory = ts_scratch(2, sizeof(double) * (size_t)(size * parts));
     const backward_job j = {g, x, old, ih_packed, hh_packed, saved, dy, to, parts, input, size, memory};

@@ -20,7 +20,7 @@ TEST(blocks_are_aligned_whole_and_refused)
         unsigned char *p = ts_memory(sizes[i]);
         CHECK(p && (uintptr_t)p % 64 == 0, "%zu bytes", sizes[i]);
         memset(p, 0x5a, sizes[i]); /* the sanitizer sees a block that is too short */
-        ts_memory_fetch(p, sizes[i]);
+        ts_memory_fetch(p, sizes[i], 0);
         CHECK(p[0] == 0x5a && p[sizes[i] - 1] == 0x5a, "%zu bytes do not hold what was written", sizes[i]);
         free(p);
     }
@@ -81,13 +81,13 @@ TEST(arena_reserves_one_piece)
 {
     enum { BLOCKS = 40, BYTES = 1 << 20 };
     ts_arena *a = ts_arena_create(0, NULL);
-    ts_arena_reserve(a, SIZE_MAX / 2); /* a hint that nothing can follow */
+    ts_arena_reserve(a, SIZE_MAX / 2, 0); /* a hint that nothing can follow */
     unsigned char *first = ts_arena_alloc(a, BYTES);
     CHECK(first != NULL, "an arena without room for the hint");
-    ts_arena_reserve(a, 2 * BLOCKS * BYTES);
+    ts_arena_reserve(a, 2 * BLOCKS * BYTES, 0);
     CHECK(ts_arena_alloc(a, BYTES) == first + BYTES, "an arena that is not empty changes");
     ts_arena_reset(a);
-    ts_arena_reserve(a, BLOCKS * BYTES);
+    ts_arena_reserve(a, BLOCKS * BYTES, 0);
     first = ts_arena_alloc(a, BYTES);
     for (int i = 1; i < BLOCKS; i++)
         CHECK(ts_arena_alloc(a, BYTES) == first + (ptrdiff_t)i * BYTES, "block %d lies elsewhere", i);
