@@ -1,6 +1,8 @@
 #include "data/capture.h"
 #include "data/file.h"
+#include "data/image/image.h"
 #include "data/name.h"
+#include "tensor/budget.h"
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
@@ -17,6 +19,9 @@ ts_code io_capture_create(io_capture *c, int images, int size, ts_status *st)
     *c = (io_capture){.images = images, .size = size, .side = 1};
     if (images < 1 || images > IO_CAPTURE_IMAGES)
         return ts_fail(st, TS_INVALID, "a capture of %d pictures: 1 to %d are possible", images, IO_CAPTURE_IMAGES);
+    const double bytes = (double)images * size * size * 3 * sizeof(float);
+    if (bytes > IO_LARGE && ts_budget_check(bytes, st) != TS_OK)
+        return ts_context(st, "%d pictures of %d x %d pixels", images, size, size);
     c->image = calloc((size_t)images * (size_t)size * (size_t)size * 3, sizeof *c->image);
     return c->image ? TS_OK
                     : ts_fail(st, TS_NOMEM, "out of memory for %d pictures of %d x %d pixels", images, size, size);

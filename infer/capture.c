@@ -13,9 +13,10 @@ static bool is_folder(const char *path)
 
 void lgd_capture_gain(const io_capture *c, bool as_taken, float gain[3])
 {
-    const float *l = c->light[0], distance2 = l[0] * l[0] + l[1] * l[1] + l[2] * l[2];
+    const float *l = c->light[0], distance2 = l[0] * l[0] + l[1] * l[1] + l[2] * l[2], cosine = l[2] / sqrtf(distance2);
     const float white = cbrtf(c->power[0] * c->power[1] * c->power[2]),
-                all = as_taken ? 1 : RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE) * distance2 / white;
+                all = as_taken ? 1
+                               : RD_FLASH_POWER / (RD_FLASH_DISTANCE * RD_FLASH_DISTANCE) * distance2 / cosine / white;
     for (int i = 0; i < 3; i++) gain[i] = all * (white / c->power[i]);
 }
 

@@ -5,8 +5,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define LARGE 64e6 /* bytes from which on it is asked whether they are there */
-
 ts_code io_image_create(io_image *image, int width, int height, int channels, ts_status *st)
 {
     memset(image, 0, sizeof *image);
@@ -15,7 +13,7 @@ ts_code io_image_create(io_image *image, int width, int height, int channels, ts
     size_t pixels = (size_t)width * (size_t)height,
            most = (size_t)1 << 37; /* floats: half a terabyte, beyond which no allocator need be asked */
     const double bytes = (double)pixels * channels * sizeof(float);
-    if (bytes > LARGE && ts_budget_check(bytes, st) != TS_OK)
+    if (bytes > IO_LARGE && ts_budget_check(bytes, st) != TS_OK)
         return ts_context(st, "an image of %d x %d pixels", width, height);
     if (pixels <= most / (size_t)channels) image->data = calloc(pixels, (size_t)channels * sizeof(float));
     if (!image->data) return ts_fail(st, TS_NOMEM, "no memory for an image of %d x %d pixels", width, height);

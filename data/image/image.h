@@ -7,6 +7,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#define IO_LARGE 64e6 /* bytes of pictures from which on it is asked whether there is memory (tensor/budget.h) */
+
 typedef struct io_image {
     int width, height, channels;
     float *data; /* owned; freed by io_image_free */

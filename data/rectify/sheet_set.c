@@ -39,17 +39,25 @@ static void guess_focal(io_sheet_set *set)
     }
 }
 
+/* A photograph whose pose cannot be is left out: some other sheet has such tags too. */
 static ts_code solve(io_sheet_set *set, ts_status *st)
 {
     io_sight *sight = calloc((size_t)set->photos, sizeof *sight);
-    int n = 0;
+    int n, bad = -1, of[IO_SOLVE_MOST];
+    ts_code code;
     if (!sight) return ts_fail(st, TS_NOMEM, "out of memory for %d photographs", set->photos);
-    for (int i = 0; i < set->photos; i++)
-        if (!set->photo[i].st.code) sight[n++] = set->photo[i].sight;
-    const ts_code code = io_solve(sight, n, set->sure, st);
-    n = 0;
-    for (int i = 0; i < set->photos && !code; i++)
-        if (!set->photo[i].st.code) set->photo[i].sight = sight[n++];
+    do {
+        *st = (ts_status){0};
+        n = 0;
+        for (int i = 0; i < set->photos; i++)
+            if (!set->photo[i].st.code) of[n] = i, sight[n++] = set->photo[i].sight;
+        code = n ? io_solve(sight, n, set->sure, &bad, st) : TS_OK;
+        if (code == TS_INVALID && bad >= 0) {
+            io_sheet_photo *p = &set->photo[of[bad]];
+            ts_fail(&p->st, TS_INVALID, "%s: its tags do not lie as those of the sheet do: %s", p->path, st->message);
+        }
+    } while (code == TS_INVALID && bad >= 0);
+    for (int i = 0; i < n && !code; i++) set->photo[of[i]].sight = sight[i];
     free(sight);
     return code;
 }

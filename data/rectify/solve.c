@@ -84,7 +84,7 @@ static bool clean(io_sight *s)
 }
 
 /* From the focal lengths as they are known, and from the factor and the distortion of an earlier fit. */
-static ts_code refine(io_sight *sight, int count, bool sure, double shared[SHARED], ts_status *st)
+static ts_code refine(io_sight *sight, int count, bool sure, double shared[SHARED], int *bad, ts_status *st)
 {
     double x[SHARED + POSE * IO_SOLVE_MOST] = {shared[0], shared[1]}, step[SHARED + POSE * IO_SOLVE_MOST];
     fit f = {sight, count, sure ? SURE : GUESS};
@@ -102,15 +102,18 @@ static ts_code refine(io_sight *sight, int count, bool sure, double shared[SHARE
         s->rms = 0;
         for (int t = 0; t < s->tags.count; t++) s->rms += pow(tag_rms(s, t), 2) / s->tags.count;
         s->rms = sqrt(s->rms);
-        if (!(s->camera.at[2] > 0)) return ts_fail(st, TS_INVALID, "the tags put a camera below the sheet");
+        if (s->camera.at[2] > 0) continue;
+        *bad = i;
+        return ts_fail(st, TS_INVALID, "the tags put the camera below the sheet");
     }
     return TS_OK;
 }
 
-ts_code io_solve(io_sight *sight, int count, bool sure, ts_status *st)
+ts_code io_solve(io_sight *sight, int count, bool sure, int *bad, ts_status *st)
 {
     double known[IO_SOLVE_MOST], shared[SHARED] = {0};
     bool again = false;
+    *bad = -1;
     for (int i = 0; i < count; i++) {
         io_sight *s = &sight[i];
         double point[IO_SHEET_TAGS][4][2];
@@ -118,12 +121,14 @@ ts_code io_solve(io_sight *sight, int count, bool sure, ts_status *st)
         known[i] = s->camera.focal;
         s->camera.radial = 0;
         if (io_pinhole_pose(4 * s->tags.count, (const double(*)[2])point, (const double(*)[2])s->tags.corner,
-                            &s->camera, NULL, st) != TS_OK)
+                            &s->camera, NULL, st) != TS_OK) {
+            *bad = i;
             return st->code;
+        }
     }
-    if (refine(sight, count, sure, shared, st) != TS_OK) return st->code;
+    if (refine(sight, count, sure, shared, bad, st) != TS_OK) return st->code;
     for (int i = 0; i < count; i++) again = clean(&sight[i]) || again;
     if (!again) return TS_OK;
     for (int i = 0; i < count; i++) sight[i].camera.focal = known[i];
-    return refine(sight, count, sure, shared, st);
+    return refine(sight, count, sure, shared, bad, st);
 }

@@ -58,7 +58,8 @@ TEST(sheet_solve_is_exact)
         }
         s->tags.corner[3][1][0] += 40; /* a tag that something hides in part */
     }
-    CHECK(!io_solve(sight, CL_SHEET_SHOTS, false, &st), "%s", st.message);
+    int bad;
+    CHECK(!io_solve(sight, CL_SHEET_SHOTS, false, &bad, &st) && bad == -1, "%s", st.message);
     for (int i = 0; i < CL_SHEET_SHOTS; i++) {
         const io_pinhole *c = &sight[i].camera, *t = &shot[i].camera;
         const double away = hypot(hypot(c->at[0] - t->at[0], c->at[1] - t->at[1]), c->at[2] - t->at[2]);
@@ -67,6 +68,10 @@ TEST(sheet_solve_is_exact)
         CHECK(fabs(c->focal / t->focal - 1) < 1e-4 && fabs(c->radial - t->radial) < 1e-3,
               "focal %g of %g, radial %g of %g", c->focal, t->focal, c->radial, t->radial);
     }
+    for (int t = 0; t < sight[2].tags.count; t++) /* as in a mirror: seen from below */
+        for (int k = 0; k < 4; k++) sight[2].tags.corner[t][k][0] = 4000 - sight[2].tags.corner[t][k][0];
+    CHECK(io_solve(sight, CL_SHEET_SHOTS, false, &bad, &st) == TS_INVALID && bad == 2, "sight %d: '%s'", bad,
+          st.message);
 }
 
 /* The windows come out as what is under them, as bright as their light makes them. */
