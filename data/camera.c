@@ -2,11 +2,11 @@
 #include "data/develop.h"
 #include "data/glare.h"
 #include "data/image/image.h"
+#include "data/image/srgb_code.h"
 #include "data/materials/noise.h"
 #include "tensor/rng.h"
 #include "tensor/scratch.h"
 #include <math.h>
-#include <pthread.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -201,39 +201,6 @@ float io_camera_meter(const io_camera *c, uint64_t seed, uint64_t index, int siz
     return factor;
 }
 
-/* The 8-bit codes of io_linear_to_srgb without its powf for every value: guess[] by the linear value's leading 12 bits,
- * where a code spans more than one step, then the exact threshold. */
-enum { GUESSES = 4096 };
-static float threshold[257], linear[256]; /* threshold[c]: the least value that has code c */
-static uint8_t guess[GUESSES + 1];
-
-static int code_of(float v) { return (int)floorf(io_linear_to_srgb(v) * 255 + 0.5f); }
-
-static void make_codes(void)
-{
-    for (int c = 0; c < 256; c++) {
-        uint32_t lo = 0, hi = 0x3f800000; /* the bits of 0 and 1: floats of one sign are in the order of their bits */
-        while (lo < hi) {
-            const uint32_t middle = lo + (hi - lo) / 2;
-            float v;
-            memcpy(&v, &middle, sizeof v);
-            if (code_of(v) >= c) hi = middle;
-            else lo = middle + 1;
-        }
-        memcpy(&threshold[c], &lo, sizeof lo);
-        linear[c] = io_srgb_to_linear((float)c / 255);
-    }
-    threshold[256] = 2;
-    for (int k = 0; k <= GUESSES; k++) guess[k] = (uint8_t)code_of((float)k / GUESSES);
-}
-
-static inline int srgb_code(float v)
-{
-    int c = guess[(int)(v * GUESSES)];
-    while (v >= threshold[c + 1]) c++;
-    return c;
-}
-
 static void expose(const io_camera *c, const faults *f, uint64_t seed, uint64_t index, int size, float *image)
 {
     const float exposure = io_camera_exposure(c, seed, index), loss = c->vignette * f->vignette;
@@ -270,7 +237,6 @@ static void develop(const io_camera *c, const io_tone *tone, uint64_t seed, uint
 
 void io_camera_apply(const io_camera *c, uint64_t seed, uint64_t index, int size, float *image)
 {
-    static pthread_once_t once = PTHREAD_ONCE_INIT;
     ts_rng rng = ts_rng_make(seed, TS_STREAM_CAMERA, index);
     const faults f = draw(seed, index);
     float sigma = c->blur * ts_rng_uniform(&rng) * (float)size / 256;
@@ -298,12 +264,12 @@ void io_camera_apply(const io_camera *c, uint64_t seed, uint64_t index, int size
     if (developed && !coded)
         for (size_t i = 0; i < count; i++) image[i] = io_srgb_to_linear(image[i]);
     if (!coded) return;
-    pthread_once(&once, make_codes);
+    const io_srgb_codes *srgb = io_srgb_codes_made();
     uint8_t *codes = ts_scratch(TS_SCRATCH_SLOTS - 1, count); /* the blur's: it is done */
     if (developed)
         for (size_t i = 0; i < count; i++) codes[i] = (uint8_t)(image[i] * 255 + 0.5f);
     else
-        for (size_t i = 0; i < count; i++) codes[i] = (uint8_t)srgb_code(nz_clamp(image[i], 0, 1));
+        for (size_t i = 0; i < count; i++) codes[i] = (uint8_t)io_srgb_code(srgb, nz_clamp(image[i], 0, 1));
     if (c->jpeg) io_jpeg_codes(size, c->jpeg + (int)(f.jpeg * (float)(99 - c->jpeg)), f.halved, codes);
-    for (size_t i = 0; i < count; i++) image[i] = linear[codes[i]];
+    for (size_t i = 0; i < count; i++) image[i] = srgb->linear[codes[i]];
 }

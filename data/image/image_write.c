@@ -2,17 +2,19 @@
 #include "data/file.h"
 #include "data/image/image.h"
 #include "data/image/oiio.h"
+#include "data/image/srgb_code.h"
 #include <stdlib.h>
 
 /* sRGB-encoded values in [0, 1] (NaN to 0), rounded to nearest. */
 static void quantise(const io_image *image, int channels, uint8_t *out)
 {
     const size_t pixels = (size_t)image->width * (size_t)image->height;
+    const io_srgb_codes *codes = io_srgb_codes_made();
     for (size_t i = 0; i < pixels; i++)
         for (int c = 0; c < channels; c++) {
             float v = image->data[i * (size_t)image->channels + (size_t)c];
             v = v > 0 ? v < 1 ? v : 1 : 0;
-            *out++ = (uint8_t)(io_linear_to_srgb(v) * 255 + 0.5f);
+            *out++ = (uint8_t)io_srgb_code(codes, v);
         }
 }
 

@@ -2,48 +2,9 @@
 #include "data/file.h"
 #include "data/image/image.h"
 #include "data/image/png_pack.h"
-#include <math.h>
-#include <pthread.h>
+#include "data/image/srgb_code.h"
 #include <stdlib.h>
 #include <string.h>
-
-/* The least float whose sRGB-encoded value rounds to each of the 256 levels, and the level of the middle of each of
- * GUESSES steps: eight bits without a power for every value, and the same bytes as with it. */
-enum { GUESSES = 4096 };
-#define NEAR 1e-5f /* relative: farther from its equation no threshold is looked for at first */
-static float threshold[257];
-static unsigned char guess[GUESSES + 1];
-
-static unsigned level_of(float v, float top) { return (unsigned)(io_linear_to_srgb(v) * top + 0.5f); }
-
-static void make_levels(void)
-{
-    threshold[0] = 0;
-    threshold[256] = INFINITY;
-    for (unsigned k = 1; k < 256; k++) {
-        const float near = io_srgb_to_linear(((float)k - 0.5f) / 255);
-        float below = near * (1 - NEAR), at = near * (1 + NEAR);
-        if (level_of(below, 255) >= k || level_of(at, 255) < k) below = threshold[k - 1], at = 1;
-        for (;;) {
-            const float middle = below + (at - below) * 0.5f;
-            if (middle <= below || middle >= at) break;
-            if (level_of(middle, 255) >= k) at = middle;
-            else below = middle;
-        }
-        threshold[k] = at;
-    }
-    for (int i = 0, k = 0; i <= GUESSES; i++) {
-        while (threshold[k + 1] <= (float)i / GUESSES) k++;
-        guess[i] = (unsigned char)k;
-    }
-}
-
-/* Thresholds are farther apart than steps, so that a step has one at most. */
-static unsigned srgb_level(float v)
-{
-    const unsigned k = guess[(int)(v * GUESSES)];
-    return k + (v >= threshold[k + 1]);
-}
 
 static float within(float v) { return v > 0 ? v < 1 ? v : 1 : 0; }
 
@@ -51,11 +12,10 @@ static float within(float v) { return v > 0 ? v < 1 ? v : 1 : 0; }
  */
 static void quantise(const float *values, size_t pixels, int channels, int bits, bool srgb, unsigned char *out)
 {
-    static pthread_once_t once = PTHREAD_ONCE_INIT;
-    if (srgb && bits == 8) pthread_once(&once, make_levels);
+    const io_srgb_codes *codes = srgb && bits == 8 ? io_srgb_codes_made() : NULL;
     const size_t count = pixels * (size_t)channels;
-    if (srgb && bits == 8 && channels != 4) {
-        for (size_t i = 0; i < count; i++) out[i] = (unsigned char)srgb_level(within(values[i]));
+    if (codes && channels != 4) {
+        for (size_t i = 0; i < count; i++) out[i] = (unsigned char)io_srgb_code(codes, within(values[i]));
         return;
     }
     if (!srgb && bits == 16) {
@@ -70,9 +30,9 @@ static void quantise(const float *values, size_t pixels, int channels, int bits,
         for (int c = 0; c < channels; c++) {
             const float v = within(*values++);
             const bool curve = srgb && c < 3;
-            if (bits == 8) *out++ = (unsigned char)(curve ? srgb_level(v) : (unsigned)(v * 255 + 0.5f));
+            if (bits == 8) *out++ = (unsigned char)(curve ? io_srgb_code(codes, v) : (unsigned)(v * 255 + 0.5f));
             else {
-                const unsigned level = curve ? level_of(v, 65535) : (unsigned)(v * 65535 + 0.5f);
+                const unsigned level = (unsigned)((curve ? io_linear_to_srgb(v) : v) * 65535 + 0.5f);
                 *out++ = (unsigned char)(level >> 8);
                 *out++ = (unsigned char)(level & 255);
             }
