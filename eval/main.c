@@ -202,8 +202,8 @@ static int evaluate(work *w, ts_status *st)
         return cl_stopped("interrupted after %" PRId64 " of %" PRId64 " %s: no results are written", w->done, w->total,
                           r->methods != 1 ? "estimates" : "materials");
     if (code) return cl_failed("%s", st->message);
-    if (c->pareto && r->failures > 0) return cl_failed("%d estimates failed: they are not in the figure", r->failures);
-    return c->pareto ? CL_OK : c->shards ? finish_part(w, st) : finish(w, st);
+    if (!c->pareto) return c->shards ? finish_part(w, st) : finish(w, st);
+    return r->failures ? cl_failed("%d estimates failed: they are not in the figure", r->failures) : CL_OK;
 }
 
 static int refuse(const ts_status *st)

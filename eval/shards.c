@@ -36,29 +36,30 @@ static void put_hash(FILE *f, const char *path)
     fprintf(f, "%016llx ", (unsigned long long)hash);
 }
 
-static void put_weights(FILE *f, const ev_estimator *e)
+/* Of those that are not the program's model. */
+static void put_weights(FILE *f, const ev_estimator *e, const char *model)
 {
     const ev_setting *s = e->method->settings;
     for (int i = 0; s[i].key; i++)
-        if (s[i].type == EV_WEIGHTS) put_hash(f, e->value[i]);
+        if (s[i].type == EV_WEIGHTS && strcmp(e->value[i], model) != 0) put_hash(f, e->value[i]);
 }
 
 uint64_t ev_shards_print(const ev_command *c, const ev_run *r, const char *model)
 {
     io_text t;
-    uint64_t print, weights = 0;
+    uint64_t print;
     if (io_text_begin(&t, "", NULL) != TS_OK) return 0;
     FILE *f = t.f;
-    if (ts_hash_file(model, &weights, NULL) != TS_OK) weights = 0; /* methods without weights need none */
-    fprintf(f, LGD_VERSION " %s %d %d %lld %d %.17g %.17g %.17g %.17g %.17g %.17g %016llx", ts_isa_name(ts_isa_now()),
-            c->size, c->iterations, (long long)c->seed, c->repeat, c->noise, c->exposure, c->fov, c->tilt, c->light[0],
-            c->light[1], (unsigned long long)weights);
+    put_hash(f, model);
+    fprintf(f, LGD_VERSION " %s %d %d %lld %d %.17g %.17g %.17g %.17g %.17g %.17g", ts_isa_name(ts_isa_now()), c->size,
+            c->iterations, (long long)c->seed, c->repeat, c->noise, c->exposure, c->fov, c->tilt, c->light[0],
+            c->light[1]);
     fprintf(f, " %d%d%d%d%d%d%d%d %s\n%s\n%s\n%s\n", c->light_known, c->light_unknown, c->photographed, c->fast,
             c->exact, c->tune, c->iterations_figure, c->methods_figure, c->camera_spec ? c->camera_spec : "",
             c->peer_maps ? c->peer_maps : "", c->lpips[0] ? c->lpips[0] : "", c->lpips[1] ? c->lpips[1] : "");
     for (int m = 0; m < r->methods; m++) {
         fprintf(f, "%s\n", r->method[m].label);
-        put_weights(f, &r->method[m]);
+        put_weights(f, &r->method[m], model);
     }
     for (int k = 0; k < 2; k++) put_hash(f, c->lpips[k]);
     for (int m = 0; m < c->methods; m++) fprintf(f, "%s\n", c->method[m]);

@@ -44,7 +44,7 @@ static ts_code check_uses(const ev_command *c, const ev_set *set, ts_status *st)
         {"tilt", c->tilt > 0, rendered, known},
         {"exposure", c->exposure > 0, rendered | sheets, known},
         {"camera", c->photographed, rendered | sheets, known},
-        {"untold", c->light_unknown, rendered, known},
+        {"untold", c->light_unknown, rendered | sheets, known},
         {"normal", c->convention.normal != IO_NORMAL_FROM_FILE, folders, maps},
         {"workflow", c->convention.workflow != IO_WORKFLOW_FROM_FILE, folders, maps},
         {"colour", c->convention.colour != IO_ENCODING_FROM_FILE, folders, maps},

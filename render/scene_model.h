@@ -56,13 +56,11 @@ typedef struct rd_scene_how {
  * (J Sigma J' + S)^-1,   A = w sum J_t' V J_t,   b = w sum J_t' V e,   w = min(every / correlated, 1). S has the
  * variance model^2 + noise v + (gain v)^2, v = min(value, 1), of the rendering's value: with the photograph's, what is
  * darker by chance would weigh more. With the prior's mean m and its deviations in the diagonal matrix Q a step goes to
- * t = m + Q z, (I
- * + Q A Q) z = Q (b + A (t_before - m)), at most RD_SCENE_STRIDE in any number. The ambient light is not let below 0,
- * nor the tone curve's strength out of +-RD_SCENE_TONE_MOST.
- * In the first half of the steps, values of the photograph that are burnt out tell nothing; from then on they tell that
- * the rendering is no darker. Where much is burnt out and the maps are uncertain, exposure and tone curve lean to what
- * by chance is not. The maps are the mean of what the material may be: of maps that were fitted to this photograph the
- * errors depend on it, which is not foreseen.
+ * t = m + Q z, (I + Q A Q) z = Q (b + A (t_before - m)), at most RD_SCENE_STRIDE in any number. The ambient light is
+ * not let below 0, nor the tone curve's strength out of +-RD_SCENE_TONE_MOST. In the first half of the steps, values of
+ * the photograph that are burnt out tell nothing; from then on they tell that the rendering is no darker. Where much is
+ * burnt out and the maps are uncertain, exposure and tone curve lean to what by chance is not. The maps are the mean of
+ * what the material may be: of maps that were fitted to this photograph the errors depend on it, which is not foreseen.
  * unknown begins with the caller's values. after (may be NULL): the square roots of the diagonal of
  * Q (I + Q A Q)^-1 Q at the last step. deviation: of the maps, [h, w, MAP_GROUPS]; image: [h, w, 3]. Threaded; the same
  * bytes for any number of threads. */

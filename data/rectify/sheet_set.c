@@ -52,11 +52,12 @@ static ts_code solve(io_sheet_set *set, ts_status *st)
         for (int i = 0; i < set->photos; i++)
             if (!set->photo[i].st.code) of[n] = i, sight[n++] = set->photo[i].sight;
         code = n ? io_solve(sight, n, set->sure, &bad, st) : TS_OK;
-        if (code == TS_INVALID && bad >= 0) {
+        if (code == TS_NOMEM) bad = -1;
+        if (code && bad >= 0) {
             io_sheet_photo *p = &set->photo[of[bad]];
-            ts_fail(&p->st, TS_INVALID, "%s: its tags do not lie as those of the sheet do: %s", p->path, st->message);
+            ts_fail(&p->st, code, "%s: its tags do not lie as those of the sheet do: %s", p->path, st->message);
         }
-    } while (code == TS_INVALID && bad >= 0);
+    } while (code && bad >= 0);
     for (int i = 0; i < n && !code; i++) set->photo[of[i]].sight = sight[i];
     free(sight);
     return code;

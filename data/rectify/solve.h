@@ -15,7 +15,7 @@ typedef struct io_sight {
 /* The least squares of the corners over every pose, one factor on all focal lengths and one radial distortion. A corner
  * counts with a deviation of 0.25 pixels, the factor with 0.02 (sure: the focal lengths are EXIF's) or 0.3 (they are a
  * guess), the distortion with 0.1: few photographs, or all from straight above, do not tell these two from the
- * distance. Several cameras in one set have lenses of their own, which this does not know. TS_INVALID where a pose
- * cannot be; *bad is then its sight, or -1 where it is no single one's. */
+ * distance. Several cameras in one set have lenses of their own, which this does not know. TS_INVALID or
+ * TS_NUMERIC where a pose cannot be; *bad is then its sight, or -1 where it is no single one's. */
 ts_code io_solve(io_sight *sight, int count, bool sure, int *bad, ts_status *st);
 #endif

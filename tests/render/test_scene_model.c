@@ -1,4 +1,5 @@
 /* A photograph as a function of its scene, of every instruction set, and what is found of the scene from it. */
+#include "render/ambient.h"
 #include "render/kernels/newton.h"
 #include "render/rows.h"
 #include "render/scene_model.h"
@@ -365,5 +366,23 @@ TEST(scene_fit_is_finite)
                       (double)after[i]);
         }
         end(&j);
+    }
+}
+
+/* A share of the ambient light comes back from its number as the radiance that rd_ambient_add gives it, wherever the
+ * light is. */
+TEST(scene_ambient_light_has_one_unit)
+{
+    float number[RD_SCENE_NUMBERS], image[3] = {0}, maps[MAP_CHANNELS] = {0};
+    const rd_ambient ambient = {.uniform = {0.2f, 0.2f, 0.2f}, .direction = {0, 0, 1}};
+    for (int side = 0; side < 3; side++) {
+        rd_view view = rd_flash();
+        view.light[0] = 0.3f * (float)side;
+        for (int k = 0; k < 3; k++) image[k] = 0, maps[MAP_DIFFUSE + k] = 1, maps[MAP_SPECULAR + k] = -1;
+        rd_ambient_add(rd_grid_full(1), maps, MAP_CHANNELS, &view, &ambient, image);
+        rd_scene_numbers(&view, 0.2f, 0, number);
+        const double found = (double)rd_scene_view(number).ambient;
+        CHECK(fabs(found - (double)image[0]) < 1e-4 * found, "light at %g: %g, not %g", (double)view.light[0], found,
+              (double)image[0]);
     }
 }

@@ -198,11 +198,11 @@ static void count_known(const tr_row *row, void *user)
     }
 }
 
-/* After each step without a teacher: all of a measured one's photographs are given with camera and power. */
+/* After each step without a teacher: all of a measured one's photographs are given with camera, light and power. */
 static void count_given(const tr_row *row, void *user)
 {
     hearing *h = user;
-    const int sure = NN_KNOWN_CAMERA | NN_KNOWN_POWER;
+    const int sure = NN_KNOWN_CAMERA | NN_KNOWN_LIGHT | NN_KNOWN_POWER;
     int all = 0;
     for (int i = 0; i < h->t->batch; i++) all += (h->t->known[i] & sure) == sure;
     const bool measured = tr_measured(&h->t->config, row->step - 1);
