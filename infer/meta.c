@@ -4,6 +4,7 @@
 #include "render/scene.h"
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* In the order of lgd_files. */
 static const char *const meaning[LGD_OUTPUTS] = {
@@ -34,16 +35,42 @@ static void print_scene(FILE *f, const lgd_photo *p, const lgd_order *order)
             (double)p->power);
 }
 
-static void print(FILE *f, const lgd_photo *photo, const lgd_order *order, const lgd_output_result *facts)
+/* The line of a file in a meta.txt, with its end; NULL: it has none. */
+static const char *line_of(const char *text, const char *file, size_t *size)
+{
+    const size_t length = strlen(file);
+    for (const char *line = text, *end; *line; line = end) {
+        end = strchr(line, '\n');
+        end = end ? end + 1 : line + strlen(line);
+        if (strncmp(line, file, length) != 0 || line[length] != ':') continue;
+        *size = (size_t)(end - line);
+        return line;
+    }
+    return NULL;
+}
+
+unsigned lgd_meta_files(const char *text)
+{
+    unsigned files = 0;
+    size_t size;
+    for (int k = 0; k < LGD_OUTPUTS; k++)
+        if (line_of(text, lgd_files[k], &size)) files |= 1u << k;
+    return files;
+}
+
+static void print(FILE *f, const lgd_photo *photo, const lgd_order *order, const lgd_output_result *facts,
+                  const char *before, unsigned kept)
 {
     char height[128];
     snprintf(height, sizeof height, "value v is %.6f + %.6f v sides of the square, up is toward the camera",
              (double)facts->low, (double)(facts->high - facts->low));
-    io_print_conventions(f,
-                         order->which & (LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR) ? IO_MAPS_DIFFUSE | IO_MAPS_SPECULAR : 0,
-                         order->directx);
+    const bool colours = (order->which | kept) & (LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR);
+    io_print_conventions(f, colours ? IO_MAPS_DIFFUSE | IO_MAPS_SPECULAR : 0, order->directx);
     for (int k = 0; k < LGD_OUTPUTS; k++) {
-        if (!(order->which >> k & 1)) continue;
+        size_t size = 0;
+        const char *line = kept >> k & 1 ? line_of(before, lgd_files[k], &size) : NULL;
+        if (line) fwrite(line, 1, size, f);
+        if (line || !(order->which >> k & 1)) continue;
         const char *more = 1u << k == LGD_OUT_EXR ? order->half ? "half float" : "float"
             : 1u << k == LGD_OUT_HEIGHT           ? height
             : order->directx                      ? "down (DirectX)"
@@ -60,13 +87,23 @@ static void print(FILE *f, const lgd_photo *photo, const lgd_order *order, const
 }
 
 ts_code lgd_write_meta(const char *path, const lgd_photo *photo, const lgd_order *order, const lgd_output_result *facts,
-                       const char *mark, ts_status *st)
+                       const char *mark, const char *before, unsigned kept, ts_status *st)
 {
     io_text text;
     if (io_text_begin(&text, path, st) != TS_OK) return st->code;
-    print(text.f, photo, order, facts);
+    print(text.f, photo, order, facts, before, kept);
     if (order->record) fputs(order->record, text.f);
     fputs(mark, text.f);
+    return io_text_write(&text, path, st);
+}
+
+ts_code lgd_write_meta_begun(const char *path, unsigned files, ts_status *st)
+{
+    io_text text;
+    if (io_text_begin(&text, path, st) != TS_OK) return st->code;
+    fputs("incomplete: these files are being replaced, or a process was killed that did\n", text.f);
+    for (int k = 0; k < LGD_OUTPUTS; k++)
+        if (files >> k & 1) fprintf(text.f, "%s: of this estimate or of the one before\n", lgd_files[k]);
     return io_text_write(&text, path, st);
 }
 

@@ -125,8 +125,9 @@ static ts_code write_all(const task *t, lgd_output_result *facts, ts_status *st)
         if (failure[i].code) return ts_fail(st, failure[i].code, "%s", failure[i].message);
     if (glb && write_glb(t, which, st) != TS_OK) return st->code;
     char path[TS_PATH_LENGTH];
-    return ts_path_in(path, t->folder, "meta.txt", st) ? st->code
-                                                       : lgd_write_meta(path, t->photo, t->order, facts, t->mark, st);
+    return ts_path_in(path, t->folder, "meta.txt", st)
+        ? st->code
+        : lgd_write_meta(path, t->photo, t->order, facts, t->mark, NULL, 0, st);
 }
 
 enum { MARK = 40 };
@@ -138,60 +139,67 @@ static void mark_of(const io_material *m, bool directx, char mark[MARK])
     snprintf(mark, MARK, "estimate: %016" PRIx64 "\n", ts_hash(m->maps, values * sizeof *m->maps, directx));
 }
 
-/* Whether the folder's files are of the estimate with that mark. */
-static bool is_marked(const char *folder, const char *mark)
+/* The bits of files that are in folder. */
+static unsigned files_in(const char *folder, unsigned files)
 {
-    char *text = lgd_meta_read(folder);
-    const bool marked = text && strstr(text, mark);
-    free(text);
-    return marked;
+    char path[TS_PATH_LENGTH];
+    unsigned there = 0;
+    for (int k = 0; k < LGD_OUTPUTS; k++)
+        if (files >> k & 1 && ts_path_in(path, folder, lgd_files[k], NULL) == TS_OK && access(path, F_OK) == 0)
+            there |= 1u << k;
+    return there;
 }
 
 bool lgd_output_is(const char *folder, unsigned which, const char *record, char **meta)
 {
-    char path[TS_PATH_LENGTH], *text = lgd_meta_read(folder);
-    bool is = text && strstr(text, record);
-    for (int k = 0; k < LGD_OUTPUTS && is; k++)
-        is = !(which >> k & 1) || (ts_path_in(path, folder, lgd_files[k], NULL) == TS_OK && access(path, F_OK) == 0);
+    char *text = lgd_meta_read(folder);
+    const bool is = text && strstr(text, record) && files_in(folder, which) == which;
     if (is) *meta = text;
     else free(text);
     return is;
 }
 
-/* Every complete file from the hidden folder over the one in folder, meta.txt last; until then there is none, so that
- * what a killed process leaves is not taken for whole. Where the folder has another estimate's files, those that were
- * not replaced are removed; *removed gets their bits. */
-static ts_code move_files(const char *hidden, const char *folder, const char *mark, unsigned *removed, ts_status *st)
+static ts_code remove_files(const char *folder, unsigned files, unsigned *removed, ts_status *st)
 {
-    char from[TS_PATH_LENGTH], to[TS_PATH_LENGTH];
-    const bool same = is_marked(folder, mark);
-    unsigned moved = 0;
-    const int meta = LGD_FILES - 1;
-    if (ts_path_in(to, folder, lgd_files[meta], st) != TS_OK) return st->code;
-    if (unlink(to) != 0 && errno != ENOENT)
-        return ts_fail(st, TS_IO, "%s: cannot be replaced: %s", to, strerror(errno));
-    for (int i = 0; i < LGD_FILES; i++) {
-        if (i == meta) ts_sync_folder(folder);
-        if (ts_path_in(from, hidden, lgd_files[i], st) != TS_OK) return st->code;
-        if (access(from, F_OK) != 0) continue; /* not asked for */
-        if (ts_move_file(hidden, folder, lgd_files[i], st) != TS_OK) return st->code;
-        moved |= 1u << i;
-    }
-    for (int i = 0; i < LGD_FILES && !same; i++) {
-        if (moved >> i & 1 || ts_path_in(to, folder, lgd_files[i], st) != TS_OK) continue;
-        if (unlink(to) == 0) *removed |= 1u << i;
+    char path[TS_PATH_LENGTH];
+    for (int k = 0; k < LGD_OUTPUTS; k++) {
+        if (!(files >> k & 1) || ts_path_in(path, folder, lgd_files[k], st) != TS_OK) continue;
+        if (unlink(path) == 0) *removed |= 1u << k;
         else if (errno != ENOENT && errno != EISDIR) /* a folder is nothing of ours */
-            return ts_fail(st, TS_IO, "%s: cannot be removed: %s", to, strerror(errno));
+            return ts_fail(st, TS_IO, "%s: cannot be removed: %s", path, strerror(errno));
     }
     return TS_OK;
 }
 
+/* Every complete file from the hidden folder over the one in folder, meta.txt last; until then one is there that names
+ * what may be of either call, so that what a killed process leaves is neither taken for whole nor for somebody else's.
+ * What the folder's meta.txt names and is not replaced stays where it is of the same estimate, else it is removed;
+ * facts->removed gets its bits. No other file is touched. */
+static ts_code move_files(const char *folder, const task *t, lgd_output_result *facts, ts_status *st)
+{
+    const char *hidden = t->folder, *meta = lgd_files[LGD_OUTPUTS];
+    char whole[TS_PATH_LENGTH], begun[TS_PATH_LENGTH], *before = lgd_meta_read(folder);
+    const unsigned fresh = files_in(hidden, ~0u), old = before ? lgd_meta_files(before) & ~fresh : 0;
+    const unsigned kept = before && strstr(before, t->mark) ? files_in(folder, old) : 0;
+    ts_code code = ts_path_in(whole, hidden, meta, st);
+    if (!code) code = ts_path_in(begun, folder, meta, st);
+    if (!code && kept) code = lgd_write_meta(whole, t->photo, t->order, facts, t->mark, before, kept, st);
+    free(before);
+    if (!code) code = lgd_write_meta_begun(begun, old | fresh, st);
+    for (int k = 0; k < LGD_OUTPUTS && !code; k++)
+        if (fresh >> k & 1) code = ts_move_file(hidden, folder, lgd_files[k], st);
+    if (!code) code = remove_files(folder, old & ~kept, &facts->removed, st);
+    if (code) return code;
+    ts_sync_folder(folder);
+    return ts_move_file(hidden, folder, meta, st);
+}
+
 /* One process at a time, so that the files that stay are of one run. Without locks they come in any order. */
-static ts_code move_locked(const char *hidden, const char *folder, const char *mark, unsigned *removed, ts_status *st)
+static ts_code move_locked(const char *folder, const task *t, lgd_output_result *facts, ts_status *st)
 {
     const int lock = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     if (lock >= 0) (void)!flock(lock, LOCK_EX);
-    const ts_code code = move_files(hidden, folder, mark, removed, st);
+    const ts_code code = move_files(folder, t, facts, st);
     if (lock >= 0) close(lock);
     return code;
 }
@@ -217,7 +225,7 @@ static ts_code write_folder(const char *parent, const char *stem, const io_mater
         if (errno == ENOTEMPTY || errno == EEXIST) moves = true; /* another process has made it meanwhile */
         else code = ts_fail(st, TS_IO, "%s: cannot be made: %s", folder, strerror(errno));
     }
-    if (!code && moves) code = move_locked(hidden, folder, mark, &r->removed, st);
+    if (!code && moves) code = move_locked(folder, &t, r, st);
     if (code || moves) ts_hidden_folder_remove(hidden, &lock);
     else close(lock);
     free(hidden);

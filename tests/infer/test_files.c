@@ -2,6 +2,7 @@
 #include "data/material.h"
 #include "infer/meta.h"
 #include "infer/output.h"
+#include "tests/support/files.h"
 #include "tests/support/inference.h"
 #include <sys/stat.h>
 #include <unistd.h>
@@ -200,6 +201,37 @@ TEST(infer_meta_says_how_the_field_of_view_is_known)
           e.message);
     o.size = offsetof(lgd_write_options, fov_unknown); /* a caller that was compiled without it */
     CHECK(!lgd_write_maps(folder, maps, SIDE, &photo, &o, &e) && meta_says(folder, "(no EXIF)"), "%s", e.message);
+}
+
+/* What meta.txt names is ours: of the same maps it stays and keeps its line, of others it goes. The rest is not. */
+TEST(infer_writing_keeps_what_is_not_its_own)
+{
+    static float maps[VALUES];
+    lgd_error e;
+    make_maps(maps);
+    const char *folder = path_of("wall"), *theirs = path_of("wall/preview.png");
+    CHECK(mkdir(folder, 0777) == 0, "set-up");
+    spill(theirs, "theirs", 6);
+    const lgd_write_options height = {.size = sizeof height, .maps = "height,diffuse"},
+                            normal = {.size = sizeof normal, .maps = "normal"};
+    CHECK(!lgd_write_maps(folder, maps, SIDE, NULL, &height, &e), "%s", e.message);
+    CHECK(there(folder, "preview.png"), "a file that no meta.txt names is gone");
+    CHECK(!lgd_write_maps(folder, maps, SIDE, NULL, &normal, &e), "%s", e.message);
+    CHECK(there(folder, "height.png") && meta_says(folder, "\nheight.png: linear, 16 bit: height, value v is "),
+          "of the same maps height.png stays, with its scale");
+    CHECK(meta_says(folder, "\ndiffuse: sRGB\n") && meta_says(folder, "\nnormal.png: "), "lines are lost");
+    maps[0] = 0.5f;
+    CHECK(!lgd_write_maps(folder, maps, SIDE, NULL, &normal, &e), "%s", e.message);
+    CHECK(!there(folder, "height.png") && !there(folder, "diffuse.png"), "of other maps a file stays");
+    CHECK(!meta_says(folder, "height.png") && !meta_says(folder, "diffuse"), "of other maps a line stays");
+    CHECK(there(folder, "preview.png"), "a file that no meta.txt names is gone");
+    /* a process that was killed while it moved its files: what it named goes as well */
+    ts_status st = {0};
+    CHECK(lgd_write_meta_begun(path_of("wall/meta.txt"), LGD_OUT_NORMAL | LGD_OUT_PREVIEW, &st) == TS_OK, "%s",
+          st.message);
+    CHECK(!lgd_write_maps(folder, maps, SIDE, NULL, &height, &e), "%s", e.message);
+    CHECK(there(folder, "height.png") && !there(folder, "normal.png") && !there(folder, "preview.png"),
+          "what a killed process left is kept");
 }
 
 TEST(infer_writing_says_what_is_wrong)
