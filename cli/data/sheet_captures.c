@@ -59,8 +59,8 @@ void cl_sheet_shots(uint64_t seed, uint64_t index, int width, cl_sheet_shot shot
                        {away * sin(tilt) * cos(around), away * sin(tilt) * sin(around), away * cos(tilt)}},
             .light = {20 * MM, 0, 0},
             .exposure = 0.6 * (1 + (double)ts_rng_range(&r, -0.3f, 0.3f))};
-        const double target[2] = {(double)ts_rng_range(&r, -6, 6) * MM, (double)ts_rng_range(&r, -6, 6) * MM};
-        aim(&s->camera, target, (double)ts_rng_range(&r, -0.15f, 0.15f));
+        const double right = (double)ts_rng_range(&r, -6, 6) * MM, up = (double)ts_rng_range(&r, -6, 6) * MM;
+        aim(&s->camera, (double[2]){right, up}, (double)ts_rng_range(&r, -0.15f, 0.15f));
     }
 }
 

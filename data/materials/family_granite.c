@@ -14,7 +14,8 @@ static void grains(io_canvas *c, float scale, float share, float flat)
     const nz_frame f = cv_bend(c, cv_frame(c, scale, stretch, turns), 0.7f, 3, bend);
     nz_cells cells = cv_cells(c);
     nz_cell(f, 1, 1, 0, cv_seed(c), cells);
-    float *where = cv_noise(c, cv_frame(c, 1, 1, 0), NZ_SMOOTH, cv_log_range(c, 1, 6), 3, 0.6f);
+    const float clumps = cv_log_range(c, 1, 6);
+    float *where = cv_noise(c, cv_frame(c, 1, 1, 0), NZ_SMOOTH, clumps, 3, 0.6f);
     io_substance mineral[3];
     for (int k = 0; k < 3; k++) mineral[k] = fin_dielectric(c, minerals, PAL_COUNT(minerals), 0.1f, 0.4f);
     const float clouds = cv_range(c, 0, 0.3f), blend = 0.5f * flat;

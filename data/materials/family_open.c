@@ -120,7 +120,8 @@ void io_family_lattice(io_canvas *c)
     const float rows = cv_log_range(c, 2.5f, 16), gap = cv_log_range(c, 0.1f, 1.5f), loose = cv_range(c, 0, 0.5f);
     const int way = ts_rng_int(&c->rng, PAL_COUNT(turned));
     const float turns = cv_chance(c, 0.5f) ? cv_range(c, -0.02f, 0.02f) : cv_range(c, 0, 1);
-    strands w = {.width = cv_range(c, 0.15f, 0.7f), .flat = cv_range(c, 0.4f, 1)};
+    strands w = {.width = cv_range(c, 0.15f, 0.7f)};
+    w.flat = cv_range(c, 0.4f, 1);
     const bool layers = cv_chance(c, 0.35f); /* each set lies over the one before */
     const float ride = layers ? 0 : cv_range(c, 0.3f, 1);
     w.tones = cv_range(c, 0, 0.7f);

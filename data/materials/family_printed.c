@@ -23,10 +23,9 @@ static float *shape(io_canvas *c)
     }
     const nz_frame f = cv_bend(c, cv_frame(c, scale, 1, turns), 0.5f, 2, 0.3f * loose * loose);
     nz_cells cells = cv_cells(c);
-    const nz_brick_shape block = {.width = kind == 1 ? 64 : cv_range(c, 0.5f, 6),
-                                  .shift = 0.5f,
-                                  .loose = loose,
-                                  .round = kind == 1 ? 0 : cv_range(c, 0, 0.3f)};
+    nz_brick_shape block = {.width = 64, .shift = 0.5f, .loose = loose};
+    if (kind != 1) block.width = cv_range(c, 0.5f, 6);
+    if (kind != 1) block.round = cv_range(c, 0, 0.3f);
     if (kind == 3) nz_cell(f, 1, loose, 0.5f, cv_seed(c), cells);
     else nz_brick(f, block, cv_seed(c), cells);
     const float radius = cv_range(c, 0.15f, 0.45f), inset = cv_range(c, 0.05f, 0.3f);
@@ -58,7 +57,8 @@ void io_family_printed(io_canvas *c)
         c->used = 0;
     }
     if (cv_chance(c, 0.3f)) { /* a shaded picture */
-        float *shade = cv_noise(c, cv_frame(c, 1, 1, 0), NZ_SMOOTH, cv_log_range(c, 1, 6), 5, 0.5f);
+        const float parts = cv_log_range(c, 1, 6);
+        float *shade = cv_noise(c, cv_frame(c, 1, 1, 0), NZ_SMOOTH, parts, 5, 0.5f);
         cv_shade(c, shade, cv_range(c, 0.05f, 0.35f));
         c->used = 0;
     }

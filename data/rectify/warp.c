@@ -46,9 +46,9 @@ static bool bounds(const io_photo_rows *photo, const io_view_of *view, part *p)
     enum { STEPS = 64 };
     double lo[2] = {INFINITY, INFINITY}, hi[2] = {-INFINITY, -INFINITY};
     for (int side = 0; side < 4; side++)
-        for (int i = 0; i < STEPS; i++) {
+        for (int i = 0; i <= STEPS; i++) {
             const double along = (double)i / STEPS, end = side & 1;
-            const double point[2] = {side < 2 ? along : end, side < 2 ? end : along + 1.0 / STEPS};
+            const double point[2] = {side < 2 ? along : end, side < 2 ? end : along};
             double pixel[2];
             view->pixel(point, pixel, view->user);
             for (int k = 0; k < 2; k++) {

@@ -124,6 +124,47 @@ TEST(angle_shrinks_by_area)
     io_image_free(&square);
 }
 
+/* A square of 560 pixels around the middle of 800, turned by *user. */
+static void turned(const double point[2], double pixel[2], const void *user)
+{
+    const double turn = *(const double *)user, x = 560 * (point[0] - 0.5), y = 560 * (point[1] - 0.5);
+    pixel[0] = 400 + x * cos(turn) - y * sin(turn);
+    pixel[1] = 400 + x * sin(turn) + y * cos(turn);
+}
+
+/* Whichever corner of the square lies farthest out, the photograph is read up to it. */
+TEST(angle_reads_up_to_every_corner)
+{
+    enum { SIDE = 800, SIZE = 280 };
+    char path[512];
+    ts_status st = {0};
+    io_image ramps, square;
+    io_photo_rows photo;
+    CHECK(!io_image_create(&ramps, SIDE, SIDE, 3, &st), "%s", st.message);
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        ramps.data[3 * i] = (float)(i % SIDE) / SIDE;
+        ramps.data[3 * i + 1] = (float)(i / SIDE) / SIDE;
+    }
+    snprintf(path, sizeof path, "%s/ramps.png", test_folder());
+    CHECK(!io_write_png(path, &ramps, 16, true, &st), "%s", st.message);
+    CHECK(!io_photo_open(path, 1 << 20, true, &photo, &st), "%s", st.message);
+    for (int turns = 0; turns < 8; turns++) {
+        const double turn = turns * 0.78539816;
+        double worst = 0;
+        CHECK(!io_warp(&photo, &(io_view_of){turned, &turn}, SIZE, 1, &square, &st), "%s", st.message);
+        for (int i = 0; i < SIZE * SIZE; i++) {
+            double want[2];
+            turned((double[2]){(i % SIZE + 0.5) / SIZE, (i / SIZE + 0.5) / SIZE}, want, &turn);
+            for (int k = 0; k < 2; k++)
+                worst = fmax(worst, fabs((double)square.data[3 * i + k] - (want[k] - 0.5) / SIDE));
+        }
+        CHECK(worst < 1e-4, "turned by %d eighths: %g off", turns, worst);
+        io_image_free(&square);
+    }
+    io_photo_close(&photo);
+    io_image_free(&ramps);
+}
+
 TEST(angle_corners_that_cannot_be)
 {
     const struct {
