@@ -14,6 +14,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/ioctl.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
@@ -195,6 +196,27 @@ static void print_duration(char *out, size_t size, double s)
     else snprintf(out, size, "%ld:%02ld", t / 60, t % 60);
 }
 
+/* Of the terminal. */
+static int columns(void)
+{
+    struct winsize size;
+    return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+}
+
+/* What of the text's end has room, so that the line stays one: a path's end says more than its beginning. */
+static void print_end(const char *text, int room)
+{
+    const size_t length = strlen(text);
+    if (room < 4) return;
+    if (length <= (size_t)room) {
+        fputs(text, stderr);
+        return;
+    }
+    const char *end = text + length - (size_t)room + 3;
+    while ((*end & 0xc0) == 0x80) end++; /* a whole character of UTF-8 */
+    fprintf(stderr, "...%s", end);
+}
+
 void cl_progress_show(cl_progress *p, int64_t done, const char *extra)
 {
     const double now = cl_seconds();
@@ -203,8 +225,11 @@ void cl_progress_show(cl_progress *p, int64_t done, const char *extra)
     const double elapsed = now - p->start, rate = elapsed > 0 ? (double)done / elapsed : 0;
     char eta[32] = "-";
     if (rate > 0) print_duration(eta, sizeof eta, (double)(p->total - done) / rate);
-    fprintf(stderr, "\r\033[K%s %lld/%lld  %.2f/s  ETA %s  %s", p->what, (long long)done, (long long)p->total, rate,
-            eta, extra ? extra : "");
+    char line[160];
+    const int used = snprintf(line, sizeof line, "%s %lld/%lld  %.2f/s  ETA %s  ", p->what, (long long)done,
+                              (long long)p->total, rate, eta);
+    fprintf(stderr, "\r\033[K%s", line);
+    print_end(extra ? extra : "", columns() - used - 1);
 }
 
 void cl_progress_end(cl_progress *p)
@@ -236,6 +261,30 @@ void cl_catch_interrupt(void)
 }
 
 bool cl_interrupted(void) { return interrupted != 0; }
+
+size_t cl_made_already(const char *path)
+{
+    char part[4096];
+    size_t there = 0;
+    for (size_t i = 1, length = strlen(path); i <= length && i < sizeof part; i++) {
+        if (path[i] != '/' && path[i] != 0) continue;
+        memcpy(part, path, i);
+        part[i] = 0;
+        if (access(part, F_OK) == 0) there = i;
+    }
+    return there;
+}
+
+void cl_remove_made(const char *path, size_t there)
+{
+    char part[4096];
+    for (size_t i = strlen(path); i > there && i < sizeof part; i--) {
+        if ((path[i] != '/' && path[i] != 0) || path[i - 1] == '/') continue;
+        memcpy(part, path, i);
+        part[i] = 0;
+        if (rmdir(part) != 0 && errno != ENOENT) return;
+    }
+}
 
 ts_code cl_make_folder(const char *path, ts_status *st)
 {

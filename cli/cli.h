@@ -68,4 +68,9 @@ bool cl_interrupted(void);
 /* Creates an output folder and its parents. An existing folder is fine: what killed processes have left in it is
  * removed (ts_sweep). */
 ts_code cl_make_folder(const char *path, ts_status *st);
+
+/* How much of path, an output folder, is there already, in bytes; and, after cl_make_folder, removes what of the rest
+ * is empty. */
+size_t cl_made_already(const char *path);
+void cl_remove_made(const char *path, size_t there);
 #endif

@@ -100,13 +100,13 @@ static ts_code read_places(const char *folder, const char *name, float side, flo
     return TS_OK;
 }
 
-static ts_code read_picture(const char *folder, int number, io_capture *c, int size, ts_status *st)
+static ts_code read_picture(const char *folder, int number, io_capture *c, int size, int64_t max_pixels, ts_status *st)
 {
     char path[PATH_MAX], name[16];
     io_image image = {0}, square = {0};
     snprintf(name, sizeof name, "%02d.png", number);
     ts_code code = join(path, folder, name, st);
-    if (!code) code = io_read_data(path, 3, IO_MAX_PIXELS_DEFAULT, &image, st);
+    if (!code) code = io_read_data(path, 3, max_pixels, &image, st);
     if (!code && image.width != image.height)
         code = ts_fail(st, TS_FORMAT, "%s: %d x %d pixels: a rectified picture of the sample should be square", path,
                        image.width, image.height);
@@ -120,7 +120,7 @@ static ts_code read_picture(const char *folder, int number, io_capture *c, int s
         memcpy(c->power, before.power, sizeof c->power);
         c->side = before.side;
     }
-    if (!code) code = io_centre_square(&image, c->size, &square, st);
+    if (!code) code = io_centre_square(&image, c->size, 0, &square, st);
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
     if (!code) memcpy(c->image + (size_t)number * values, square.data, values * sizeof(float));
     io_image_free(&image);
@@ -128,7 +128,7 @@ static ts_code read_picture(const char *folder, int number, io_capture *c, int s
     return code;
 }
 
-ts_code io_read_capture(const char *folder, int size, io_capture *c, ts_status *st)
+ts_code io_read_capture(const char *folder, int size, int64_t max_pixels, io_capture *c, ts_status *st)
 {
     *c = (io_capture){0};
     if (!io_is_capture(folder))
@@ -155,7 +155,7 @@ ts_code io_read_capture(const char *folder, int size, io_capture *c, ts_status *
     if (!code && c->images < IO_CAPTURE_IMAGES && join(path, folder, name, st) == TS_OK && access(path, F_OK) == 0)
         code = ts_fail(st, TS_FORMAT, "%s: there is a %s, but %s has only %d lines", folder, name, camera_file,
                        c->images);
-    for (int i = 0; i < c->images && !code; i++) code = read_picture(folder, i, c, size, st);
+    for (int i = 0; i < c->images && !code; i++) code = read_picture(folder, i, c, size, max_pixels, st);
     if (code) io_capture_free(c);
     else io_name_from_path(folder, c->name, sizeof c->name);
     return code;

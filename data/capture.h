@@ -21,6 +21,8 @@ typedef struct io_capture {
     float power[3];                                                  /* with distances in patch widths */
     float side;                                                      /* of the sample, centimetres */
     char name[128];
+    char profile[96], profile_of[128]; /* a colour profile that cannot be used and the first photograph that has it:
+                                          sRGB is assumed; empty: there is none */
 } io_capture;
 
 /* images pictures of size x size, all zero, side 1. */
@@ -28,9 +30,9 @@ ts_code io_capture_create(io_capture *c, int images, int size, ts_status *st);
 void io_capture_free(io_capture *c); /* and zeroes the struct */
 
 /* Pictures are resampled to size x size in linear light (0: the size of the first). A file that is missing, not square
- * or has the wrong number of lines, and a position not above the sample, are errors that name the file. c is empty
- * after a failure. */
-ts_code io_read_capture(const char *folder, int size, io_capture *c, ts_status *st);
+ * or has the wrong number of lines, and a position not above the sample, are errors that name the file, as is a picture
+ * of more than max_pixels. c is empty after a failure. */
+ts_code io_read_capture(const char *folder, int size, int64_t max_pixels, io_capture *c, ts_status *st);
 /* Whether the folder has a camera_pos.txt. */
 bool io_is_capture(const char *folder);
 

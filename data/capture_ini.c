@@ -107,6 +107,13 @@ static ts_code take(const char *path, const io_ini *ini, photo *photos, io_captu
     return TS_OK;
 }
 
+static void note_profile(io_capture *c, const char *file, const char *profile)
+{
+    if (*c->profile || !*profile) return;
+    snprintf(c->profile, sizeof c->profile, "%s", profile);
+    snprintf(c->profile_of, sizeof c->profile_of, "%s", file);
+}
+
 /* The square that has the corners, and the camera that sees it so, where the file does not say another. */
 static ts_code read_angled(const char *name, const photo *p, int64_t max_pixels, int k, io_capture *c, io_image *square,
                            ts_status *st)
@@ -123,6 +130,7 @@ static ts_code read_angled(const char *name, const photo *p, int64_t max_pixels,
         ? TS_OK
         : ts_fail(st, TS_INVALID, "%s; [%s] needs a focal length: focal = 26, in mm on 35 mm film", why, p->section);
     if (!code) code = io_corners_rectify(&rows, &p->corners, fov, c->size, 0, square, &camera, NULL, st);
+    note_profile(c, p->file, rows.unread);
     io_photo_close(&rows);
     if (code) return ts_context(st, "%s", name);
     for (int i = 0; i < 3; i++) {
@@ -141,8 +149,10 @@ static ts_code read_square(const char *path, const photo *p, int64_t max_pixels,
     if (snprintf(name, sizeof name, "%.*s%s", folder, path, p->file) >= PATH_MAX)
         return ts_fail(st, TS_INVALID, "%s:%d: the file's name is too long", path, p->line);
     io_image square;
+    io_photo_facts facts = {0};
     const ts_code code = p->angled ? read_angled(name, p, max_pixels, k, c, &square, st)
-                                   : io_read_photo_square(name, max_pixels, c->size, 0, &square, NULL, st);
+                                   : io_read_photo_square(name, max_pixels, c->size, 0, &square, &facts, st);
+    note_profile(c, p->file, facts.profile);
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
     const float gain = p->exposure > 0 ? 1 / p->exposure : 1;
     for (size_t i = 0; i < values && !code; i++) c->image[(size_t)k * values + i] = square.data[i] * gain;

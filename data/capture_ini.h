@@ -4,7 +4,7 @@
  *   side = 20            ; of the sample, in the unit of the positions; default: positions are in patch widths
  *   power = 480          ; radiance = BRDF max(n.l, 0) power / distance^2 in that unit; default: the default light's
  *   [photo_1]            ; a section for each photograph, in any order, with any name
- *   file = left.jpg      ; relative to the INI file, or absolute
+ *   file = left.jpg      ; relative to the INI file, or absolute; "wood #2.jpg" in quotation marks
  *   light = -5, 0, 20    ; x right, y up, z toward the camera, from the sample's centre
  *   camera = 0, 0, 20
  *   exposure = 1.3       ; so many times brighter than the others; default 1

@@ -19,10 +19,16 @@ static char *trim(char *s)
     return s;
 }
 
+/* What stands between quotation marks behind the equals sign has no comment. */
 static void cut_comment(char *line)
 {
+    char *value = strchr(line, '=');
+    if (value)
+        for (value++; blank(*value);) value++;
+    char *quoted = value && *value == '"' ? strchr(value + 1, '"') : NULL;
     for (char *p = line; *p; p++)
-        if ((*p == '#' || *p == ';') && (p == line || blank(p[-1]))) {
+        if (p == value && quoted) p = quoted;
+        else if ((*p == '#' || *p == ';') && (p == line || blank(p[-1]))) {
             *p = 0;
             return;
         }
@@ -72,7 +78,16 @@ static ts_code parse_line(io_ini *ini, int *capacity, char *line, int number, co
     char *equals = strchr(s, '=');
     if (!equals) return ts_fail(st, TS_INVALID, "%s:%d: expected key = value, not \"%.60s\"", ini->name, number, s);
     *equals = 0;
-    io_ini_entry e = {.section = *section, .key = trim(s), .value = trim(equals + 1), .line = number};
+    char *value = trim(equals + 1);
+    const size_t length = strlen(value);
+    if (*value == '"') {
+        if (length < 2 || strchr(value + 1, '"') != value + length - 1)
+            return ts_fail(st, TS_INVALID, "%s:%d: a value that begins with a quotation mark ends with the next one",
+                           ini->name, number);
+        value[length - 1] = 0;
+        value++;
+    }
+    const io_ini_entry e = {.section = *section, .key = trim(s), .value = value, .line = number};
     if (!is_name(e.key)) return ts_fail(st, TS_INVALID, "%s:%d: \"%.60s\" is no key name", ini->name, number, e.key);
     if (!e.section)
         return ts_fail(st, TS_INVALID, "%s:%d: %s stands before the first [section]", ini->name, number, e.key);

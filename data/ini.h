@@ -1,6 +1,6 @@
 /* INI files: [section], key = value, comments from # or ; (at the start of a line or after a blank), CRLF or LF, an
- * optional UTF-8 byte-order mark. Any other line, a key outside a section and a repeated key are errors with
- * FILE:LINE. */
+ * optional UTF-8 byte-order mark. A value may stand in quotation marks, which take comments' signs in it. Any other
+ * line, a key outside a section and a repeated key are errors with FILE:LINE. */
 #ifndef IO_INI_H
 #define IO_INI_H
 #include "tensor/status.h"

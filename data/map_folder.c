@@ -56,7 +56,7 @@ static ts_code to_square(io_image *image, int size, ts_status *st)
 {
     if (image->width == size && image->height == size) return TS_OK;
     io_image square;
-    ts_code code = io_centre_square(image, size, &square, st);
+    ts_code code = io_centre_square(image, size, 0, &square, st);
     if (code != TS_OK) return code;
     io_image_free(image);
     *image = square;

@@ -14,7 +14,7 @@ static ts_code cut_panel(const io_image *strip, int panel, int size, io_image *o
         memcpy(whole.data + (size_t)y * (size_t)side * 3,
                strip->data + ((size_t)y * (size_t)strip->width + (size_t)panel * (size_t)side) * 3,
                (size_t)side * 3 * sizeof(float));
-    ts_code code = io_centre_square(&whole, size, out, st);
+    ts_code code = io_centre_square(&whole, size, 0, out, st);
     io_image_free(&whole);
     return code;
 }

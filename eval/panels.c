@@ -17,7 +17,7 @@ static ts_code cut(const io_image *sheet, int panel, int size, float (*decode)(f
             const float v = sheet->data[(y * (size_t)sheet->width + (size_t)panel * side) * 3 + i];
             whole.data[y * row + i] = decode ? decode(v) : v;
         }
-    code = io_centre_square(&whole, size, out, st);
+    code = io_centre_square(&whole, size, 0, out, st);
     io_image_free(&whole);
     return code;
 }

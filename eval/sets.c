@@ -213,7 +213,7 @@ ts_code ev_set_load_capture(const ev_set *set, int i, int size, io_capture *c, t
     io_capture_free(c);
     if (snprintf(path, sizeof path, "%s%s%s", set->where, *set->entry[i] ? "/" : "", set->entry[i]) >= (int)sizeof path)
         return ts_fail(st, TS_INVALID, "%s: the name is too long", set->where);
-    const ts_code code = io_read_capture(path, size, c, st);
+    const ts_code code = io_read_capture(path, size, IO_MAX_PIXELS_DEFAULT, c, st);
     if (!code && c->images < 2)
         return ts_fail(st, TS_FORMAT, "%s: has one picture: one is the input, the others are compared", path);
     return code;

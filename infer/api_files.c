@@ -6,6 +6,7 @@
 #include "infer/model_path.h"
 #include "infer/output.h"
 #include "infer/photograph.h"
+#include "tensor/new_file.h"
 #include "tensor/threads.h"
 #include <math.h>
 #include <stdio.h>
@@ -88,7 +89,7 @@ int lgd_read_mask(const char *path, int side, int width, int height, const lgd_r
     if (!st.code && width > 0 && height > 0 && fabs(difference) > fmax(whole.width, whole.height) + fmax(width, height))
         ts_fail(&st, TS_INVALID, "the mask %s is %d x %d pixels and the photograph %d x %d: not the same shape", path,
                 whole.width, whole.height, width, height);
-    if (!st.code && io_centre_square(&whole, side, &square, &st) == TS_OK)
+    if (!st.code && io_centre_square(&whole, side, o.threads, &square, &st) == TS_OK)
         for (size_t i = 0; i < (size_t)side * (size_t)side; i++) mask[i] = square.data[i] > 0;
     io_image_free(&whole);
     io_image_free(&square);
@@ -125,7 +126,7 @@ int lgd_square(const void *pixels, int encoding, int width, int height, int side
     for (int y = 0; y < height && !st.code; y++)
         take_row(pixels, encoding, (size_t)y * (size_t)width, width, &space,
                  whole.data + (size_t)y * (size_t)width * 3);
-    if (!st.code && io_centre_square(&whole, side, &square, &st) == TS_OK)
+    if (!st.code && io_centre_square(&whole, side, 0, &square, &st) == TS_OK)
         memcpy(image, square.data, (size_t)side * (size_t)side * 3 * sizeof *image);
     io_image_free(&whole);
     io_image_free(&square);
@@ -210,6 +211,7 @@ int lgd_write_maps(const char *folder, const float *maps, int side, const lgd_ph
             ts_fail(&st, TS_NOMEM, "%s: out of memory", call);
         } else {
             order.fov_from = from;
+            ts_sweep(parent);
             lgd_output_write(parent, stem, &m, taken, &order, NULL, &st);
         }
     }

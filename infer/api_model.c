@@ -153,6 +153,20 @@ static ts_code check_fov(double fov, int photos, ts_status *st)
     return TS_OK;
 }
 
+ts_code lgd_model_takes(const lgd_model *model, const lgd_options *o, ts_status *st)
+{
+    if (o->sample != LGD_SAMPLE_UNKNOWN && model->net->arch.descent != NN_DESCENT_POSTERIOR)
+        return ts_fail(st, TS_UNSUPPORTED,
+                       "these weights do not guess the scene: they cannot be told what the sample is");
+    if ((o->tolerance > 0 || o->mask) && !lgd_tiles_exact(&model->net->arch))
+        return ts_fail(st, TS_UNSUPPORTED,
+                       "these weights' loss is taken anew over the whole photograph at every step: no mask and no "
+                       "tolerance");
+    if (o->iterations > 0 && !nn_arch_refines(&model->net->arch))
+        return ts_fail(st, TS_UNSUPPORTED, "these weights have no refiner: only 0 iterations are possible");
+    return TS_OK;
+}
+
 static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, int photos, int side,
                                const lgd_options *o, const float *maps, ts_status *st)
 {
@@ -186,17 +200,7 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
     if (check_fov(o->fov, photos, st) != TS_OK) return st->code;
     if (o->sample != LGD_SAMPLE_UNKNOWN && o->sample != LGD_SAMPLE_DIELECTRIC && o->sample != LGD_SAMPLE_METAL)
         return ts_fail(st, TS_INVALID, "lgd_estimate: sample is %d and must be one of LGD_SAMPLE_...", o->sample);
-    if (o->sample != LGD_SAMPLE_UNKNOWN && model->net->arch.descent != NN_DESCENT_POSTERIOR)
-        return ts_fail(st, TS_UNSUPPORTED,
-                       "lgd_estimate: these weights do not guess the scene: they cannot be told what the sample is");
-    if ((o->tolerance > 0 || o->mask) && !lgd_tiles_exact(&model->net->arch))
-        return ts_fail(st, TS_UNSUPPORTED,
-                       "lgd_estimate: these weights' loss is taken anew over the whole photograph at every step: no "
-                       "mask and no tolerance");
-    if (o->iterations > 0 && !nn_arch_refines(&model->net->arch))
-        return ts_fail(st, TS_UNSUPPORTED,
-                       "lgd_estimate: these weights have no refiner: only 0 iterations are possible");
-    return TS_OK;
+    return lgd_model_takes(model, o, st) == TS_OK ? TS_OK : ts_context(st, "lgd_estimate");
 }
 
 ts_code lgd_model_estimate(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,

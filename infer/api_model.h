@@ -12,6 +12,9 @@
 ts_code lgd_model_estimate(lgd_model *model, const lgd_photo *photo, int photos, int side, const lgd_options *options,
                            bool encoded, float *maps, ts_status *st);
 
+/* Whether these weights can do what the options ask for: sample, mask, tolerance and iterations. TS_UNSUPPORTED. */
+ts_code lgd_model_takes(const lgd_model *model, const lgd_options *options, ts_status *st);
+
 /* "assumed: " or "estimated: ": what was done about a field of view that is not known, by where the photograph was
  * taken at last. */
 const char *lgd_fov_assumption(const lgd_photo *taken);

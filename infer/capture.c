@@ -22,7 +22,7 @@ void lgd_capture_gain(const io_capture *c, bool as_taken, float gain[3])
 
 ts_code lgd_read_capture(const char *path, int size, int64_t max_pixels, bool as_taken, io_capture *c, ts_status *st)
 {
-    const ts_code code = is_folder(path) ? io_read_capture(path, size, c, st)
+    const ts_code code = is_folder(path) ? io_read_capture(path, size, max_pixels, c, st)
                                          : io_read_capture_ini(path, size, RD_FLASH_POWER, max_pixels, c, st);
     if (code) return code;
     float gain[3];

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 enum { LGD_NAME_MAX = 64 }; /* of a shipped model's name */
@@ -32,7 +33,9 @@ static bool shipped(const char *name, char path[LGD_PATH_MAX])
 
 static bool is_name(const char *option)
 {
-    return strlen(option) < LGD_NAME_MAX && !strpbrk(option, "/.") && access(option, F_OK) != 0;
+    struct stat info;
+    const bool file = stat(option, &info) == 0 && !S_ISDIR(info.st_mode); /* a folder holds no weights */
+    return strlen(option) < LGD_NAME_MAX && !strpbrk(option, "/.") && !file;
 }
 
 ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_MAX], ts_status *st)

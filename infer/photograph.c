@@ -13,14 +13,14 @@ ts_code lgd_weights_published(const char *path, bool *published, ts_status *st)
     return code;
 }
 
-static ts_code published_square(const char *path, int64_t max_pixels, int size, io_image *square, io_photo_facts *facts,
-                                ts_status *st)
+static ts_code published_square(const char *path, int64_t max_pixels, int size, int threads, io_image *square,
+                                io_photo_facts *facts, ts_status *st)
 {
     io_image whole;
     *square = (io_image){0};
     ts_code code = io_read_stored(path, max_pixels, rd_published.gamma, &whole, facts, st);
     if (code) return code;
-    code = io_centre_square_scikit(&whole, size, square, st);
+    code = io_centre_square_scikit(&whole, size, threads, square, st);
     if (code) ts_context(st, "%s", path);
     const int64_t values = code ? 0 : (int64_t)size * size * 3;
     for (int64_t i = 0; i < values; i++) square->data[i] = powf(square->data[i], (float)rd_published.gamma);
@@ -31,6 +31,6 @@ static ts_code published_square(const char *path, int64_t max_pixels, int size, 
 ts_code lgd_photograph_square(const char *path, bool published, int64_t max_pixels, int size, int threads,
                               io_image *square, io_photo_facts *facts, ts_status *st)
 {
-    return published ? published_square(path, max_pixels, size, square, facts, st)
+    return published ? published_square(path, max_pixels, size, threads, square, facts, st)
                      : io_read_photo_square(path, max_pixels, size, threads, square, facts, st);
 }

@@ -2,11 +2,28 @@
 #include <stdio.h>
 #include <string.h>
 
+enum { LONGEST = 1 << 13 }; /* two paths and some words */
+
+/* What is too long for a message loses its middle: the file is named at its beginning, what is wrong at its end. */
+static void put(ts_status *st, const char *text)
+{
+    static const char gap[] = " ... ";
+    const size_t size = strlen(text), room = sizeof st->message - 1, begin = room / 2 - sizeof gap;
+    if (size <= room) {
+        memcpy(st->message, text, size + 1);
+        return;
+    }
+    const size_t end = room - begin - (sizeof gap - 1);
+    memcpy(st->message, text, begin);
+    memcpy(st->message + begin, gap, sizeof gap - 1);
+    memcpy(st->message + begin + sizeof gap - 1, text + size - end, end + 1);
+}
+
 ts_code ts_fail(ts_status *st, ts_code code, const char *format, ...)
 {
     if (!st) return code;
     /* The arguments may point into the old message. */
-    char text[sizeof st->message];
+    char text[LONGEST];
     va_list args;
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
@@ -14,24 +31,20 @@ ts_code ts_fail(ts_status *st, ts_code code, const char *format, ...)
     for (char *p = text; *p; p++)
         if (*p == '\n' || *p == '\r') *p = ' ';
     st->code = code;
-    memcpy(st->message, text, sizeof text);
+    put(st, text);
     return code;
 }
 
 ts_code ts_context(ts_status *st, const char *format, ...)
 {
     if (!st || st->code == TS_OK) return st ? st->code : TS_OK;
-    char text[sizeof st->message], old[sizeof st->message];
+    char text[LONGEST];
     va_list args;
     va_start(args, format);
-    vsnprintf(text, sizeof text, format, args);
+    const int used = vsnprintf(text, sizeof text - sizeof st->message, format, args);
     va_end(args);
-    memcpy(old, st->message, sizeof old);
-    /* What does not fit is cut at the end: the context, which names the file, comes first. */
-    size_t used = 0;
-    for (const char *part = text; *part && used + 1 < sizeof st->message; part++) st->message[used++] = *part;
-    for (const char *part = ": "; *part && used + 1 < sizeof st->message; part++) st->message[used++] = *part;
-    for (const char *part = old; *part && used + 1 < sizeof st->message; part++) st->message[used++] = *part;
-    st->message[used] = 0;
+    char *end = used < 0 ? text : text + strlen(text);
+    snprintf(end, (size_t)(text + sizeof text - end), ": %s", st->message);
+    put(st, text);
     return st->code;
 }

@@ -8,11 +8,26 @@
 #include <string.h>
 #include <sys/stat.h>
 
+#define ABOUT "Made by lgd-infer " /* at the page's end */
+
 enum {
     PANEL = 128,
     LIGHT = 1,     /* upper left, of the preview's */
     PICTURES = 500 /* at most 50 MB: later materials have a name alone */
 };
+
+/* Whether the page ends as those of cl_index_end do. */
+static bool is_ours(const char *path)
+{
+    enum { TAIL = 256 };
+    char tail[TAIL + 1] = "";
+    FILE *f = fopen(path, "rb");
+    if (!f) return false;
+    if (fseek(f, -TAIL, SEEK_END) != 0) rewind(f);
+    tail[fread(tail, 1, TAIL, f)] = 0;
+    fclose(f);
+    return strstr(tail, ABOUT);
+}
 
 static ts_code check(const cl_plan *plan, const char *folder, ts_status *st)
 {
@@ -30,6 +45,8 @@ static ts_code check(const cl_plan *plan, const char *folder, ts_status *st)
         else if (exists && stat(name, &photo) == 0 && photo.st_dev == there.st_dev && photo.st_ino == there.st_ino)
             code = ts_fail(st, TS_INVALID, "%s would replace the photograph %s: use another output folder", path, name);
     }
+    if (!code && exists && !is_ours(path))
+        code = ts_fail(st, TS_INVALID, "%s: is in the way: lgd-infer did not make it; use another output folder", path);
     free(path);
     return code;
 }
@@ -49,8 +66,8 @@ static ts_code picture(const cl_item *item, unsigned char **bytes, size_t *size,
                    photo = {side, side, 3, (float *)item->image}; /* only read */
     const rd_view view = lgd_preview_view(LIGHT, &item->photo[0]);
     io_image small = {0}, square = {0}, both = {0}, scratch = {0};
-    ts_code code = io_centre_square(&maps, panel, &small, st);
-    if (!code) code = io_centre_square(&photo, panel, &square, st);
+    ts_code code = io_centre_square(&maps, panel, 0, &small, st);
+    if (!code) code = io_centre_square(&photo, panel, 0, &square, st);
     if (!code) code = io_image_create(&both, 2 * panel, panel, 3, st);
     if (!code) code = io_image_create(&scratch, panel, panel, 3, st);
     if (!code) {
@@ -123,7 +140,7 @@ ts_code cl_index_end(cl_index *index, const char *folder, ts_status *st)
     static const io_slot slots[] = {{"style", page_index_css, NULL},
                                     {"summary", NULL, put_summary},
                                     {"cards", NULL, put_cards},
-                                    {"about", "Made by lgd-infer " LGD_VERSION ".", NULL},
+                                    {"about", ABOUT LGD_VERSION ".", NULL},
                                     {NULL, NULL, NULL}};
     char *path = NULL;
     io_text page = {0};

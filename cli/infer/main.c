@@ -153,7 +153,7 @@ static void say_all(run *r, const cl_item *item)
     if (item->warnings & CL_WARN_MASK) /* of another photograph, or black and white exchanged */
         cl_note("%s: warning: the mask %s is black all over its square: nothing is refined", item->job->photo,
                 r->command->mask);
-    say_profile(item->job->photo, item->profile);
+    say_profile(*item->capture.profile ? item->capture.profile_of : item->job->photo, item->profile);
     const char *why = item->image ? look_at(item, r->command->size) : NULL;
     if (item->st.code) return;
     if (!why && item->last > CL_FAR) why = "its maps do not look like it";
@@ -263,7 +263,9 @@ static int end_index(run *r, int code)
 {
     const bool any = r->index.materials + r->index.failed > 0;
     if (cl_index_end(&r->index, r->command->out, &r->index_st) != TS_OK) return cl_failed("%s", r->index_st.message);
-    if (any && !r->command->quiet) cl_note("%s/%s shows all of them", r->command->out, CL_INDEX_NAME);
+    if (any && !r->command->quiet)
+        cl_note("%s/%s shows %s", r->command->out, CL_INDEX_NAME,
+                r->done + r->failed + r->there < r->jobs ? "those" : "all of them");
     return code;
 }
 
@@ -335,7 +337,7 @@ static int work(const cl_command *given)
     int code = CL_FAILED;
     uint64_t hash;
     bool published = false;
-    const bool there = access(c->out, F_OK) == 0;
+    const size_t there = cl_made_already(c->out);
     cl_pipeline *pipeline = NULL;
     if (lgd_model_path(c->model, LGD_DEFAULT_MODEL, weights, &st) != TS_OK) cl_failed("%s", st.message);
     else if (lgd_weights_published(weights, &published, &st) != TS_OK ||
@@ -346,6 +348,7 @@ static int work(const cl_command *given)
         cl_failed("%s", st.message); /* decodes while the weights are read */
     else if (!(r.model = load_beside_decoder(c, weights, &error))) cl_failed("%s", error.message);
     else if (!recipe && !(recipe = cl_recipe(c, weights, lgd_model_hash(r.model), &st))) cl_failed("%s", st.message);
+    else if (cl_command_suits(c, r.model, &st) != TS_OK) code = cl_usage("%s", st.message);
     else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK ||
              (several && !(r.manifest = cl_manifest_open(&plan, c->out, &st))))
         cl_failed("%s", st.message);
@@ -358,7 +361,7 @@ static int work(const cl_command *given)
     }
     code = end_index(&r, code);
     cl_pipeline_end(&pipeline);
-    if (!there) rmdir(c->out); /* nothing came into it, or it stays */
+    cl_remove_made(c->out, there); /* nothing came into it, or it stays */
     lgd_free(&r.model);
     cl_plan_free(&plan);
     cl_operands_free(&operands);

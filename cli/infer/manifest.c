@@ -80,7 +80,8 @@ static void let_go(cl_manifest *m)
     if (m->fd >= 0) (void)!flock(m->fd, LOCK_UN);
 }
 
-/* Cuts off half a line that a killed process has left at the end. The file is held. */
+/* Cuts off half a line that a killed process has left at the end, and ends one that is none of ours. The file is held.
+ */
 static ts_code cut(cl_manifest *m, off_t *size, ts_status *st)
 {
     struct stat info;
@@ -89,7 +90,12 @@ static ts_code cut(cl_manifest *m, off_t *size, ts_status *st)
     off_t end = info.st_size;
     while (end > 0 && pread(m->fd, &c, 1, end - 1) == 1 && c != '\n') end--;
     *size = end;
-    if (end < info.st_size && ftruncate(m->fd, end) != 0)
+    if (end == info.st_size) return TS_OK;
+    char head[sizeof HEAD - 1];
+    const ssize_t n = pread(m->fd, head, sizeof head, end);
+    const bool ours = n > 0 && memcmp(head, HEAD, (size_t)n) == 0;
+    if (!ours) *size = info.st_size + 1;
+    if (ours ? ftruncate(m->fd, end) != 0 : write(m->fd, "\n", 1) != 1)
         return ts_fail(st, TS_IO, "%s: cannot be written: %s", m->path, strerror(errno));
     return TS_OK;
 }

@@ -9,9 +9,24 @@
 
 static bool no_name(const char *s) { return !*s || strcmp(s, ".") == 0 || strcmp(s, "..") == 0; }
 
+/* The name that a folder has, however it is reached; NULL: path is none. The caller frees it. */
+static char *folder_name(const char *path)
+{
+    struct stat info;
+    char *whole = stat(path, &info) == 0 && S_ISDIR(info.st_mode) ? realpath(path, NULL) : NULL;
+    char *name = whole ? strdup(strrchr(whole, '/') + 1) : NULL;
+    free(whole);
+    return name;
+}
+
 /* A copy of the stem, or NULL. *bad: the path has no usable name. */
 static char *stem_of(const char *path, bool *bad)
 {
+    char *folder = folder_name(path);
+    if (folder) {
+        *bad = no_name(folder);
+        return folder;
+    }
     const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
     char *stem = strdup(name);
     *bad = no_name(name);

@@ -5,7 +5,7 @@
 
 typedef struct cl_job {
     const char *photo; /* the caller's */
-    char *stem;        /* the file name without its extension */
+    char *stem;        /* the file's name without its extension, or a folder's name */
     char *folder;      /* DIR/STEM */
 } cl_job;
 
@@ -14,9 +14,10 @@ typedef struct cl_plan {
     int jobs;
 } cl_plan;
 
-/* Rules: STEM is the file's name up to its last dot; a name that would leave an empty stem, "." or ".." is used whole,
- * and refused when it is one of these itself. Two photographs with the same stem are refused, both named; so is a
- * photograph that one of the outputs would replace. TS_INVALID. The caller frees the plan after success. */
+/* Rules: STEM is the file's name up to its last dot, or a folder's whole name; a name that would leave an empty stem,
+ * "." or ".." is used whole, and refused when it is one of these itself. Two photographs with the same stem are
+ * refused, both named; so is a photograph that one of the outputs would replace. TS_INVALID. The caller frees the plan
+ * after success. */
 ts_code cl_plan_make(char *const *photos, int count, const char *out, cl_plan *plan, ts_status *st);
 
 /* Leaves the jobs of part shard, 1 .. shards, in their order. The STEM alone decides, whatever other photographs there

@@ -80,6 +80,7 @@ static void read_input(const cl_command *c, bool published, cl_item *item)
         item->image = item->capture.image;
         item->fov = LGD_FOV_OF_PHOTO;
         snprintf(item->fov_from, sizeof item->fov_from, "the capture");
+        snprintf(item->profile, sizeof item->profile, "%s", item->capture.profile);
     }
 }
 
@@ -180,6 +181,17 @@ void cl_item_estimate(const cl_command *c, lgd_model *model, cl_item *item, cl_i
         lgd_model_estimate(model, item->photo, item->photos, c->size, &options, true, item->m.maps, &item->st))
         ts_context(&item->st, "%s", item->job->photo);
     look_at(c, item);
+}
+
+ts_code cl_command_suits(const cl_command *c, const lgd_model *model, ts_status *st)
+{
+    const unsigned char some = 1;
+    return lgd_model_takes(model,
+                           &(lgd_options){.iterations = c->iterations,
+                                          .tolerance = c->tolerance,
+                                          .mask = c->mask ? &some : NULL,
+                                          .sample = c->sample},
+                           st);
 }
 
 double cl_item_bytes(const cl_command *c, const lgd_model *model)

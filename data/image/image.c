@@ -29,33 +29,33 @@ void io_image_free(io_image *image)
     memset(image, 0, sizeof *image);
 }
 
-static ts_code resample(const io_image *in, io_image *out, ts_status *st)
+static ts_code resample(const io_image *in, int threads, io_image *out, ts_status *st)
 {
     ts_arena *arena = ts_arena_create(0, st);
     if (!arena) return TS_NOMEM;
     ts_tensor src = ts_view(in->data, (ts_shape){1, in->height, in->width, in->channels});
     ts_tensor dst = ts_view(out->data, (ts_shape){1, out->height, out->width, out->channels});
-    ts_code code = ts_resize(&dst, &src, arena, 0, st);
+    ts_code code = ts_resize(&dst, &src, arena, threads, st);
     ts_arena_destroy(&arena);
     return code;
 }
 
-static ts_code resample_scikit(const io_image *in, io_image *out, ts_status *st)
+static ts_code resample_scikit(const io_image *in, int threads, io_image *out, ts_status *st)
 {
     ts_arena *arena = ts_arena_create(0, st);
     if (!arena) return TS_NOMEM;
     const ts_taps rows = io_taps_scikit(arena, in->height, out->height),
                   columns = io_taps_scikit(arena, in->width, out->width);
     const bool fine = rows.weight && columns.weight;
-    if (fine) ts_resample(1, in->channels, &rows, &columns, in->data, out->data, false, 0);
+    if (fine) ts_resample(1, in->channels, &rows, &columns, in->data, out->data, false, threads);
     ts_arena_destroy(&arena);
     return fine ? TS_OK
                 : ts_fail(st, TS_NOMEM, "no memory to resample an image of %d x %d pixels", in->width, in->height);
 }
 
-typedef ts_code resampler(const io_image *in, io_image *out, ts_status *st);
+typedef ts_code resampler(const io_image *in, int threads, io_image *out, ts_status *st);
 
-static ts_code centre_square(const io_image *in, int size, resampler *by, io_image *out, ts_status *st)
+static ts_code centre_square(const io_image *in, int size, int threads, resampler *by, io_image *out, ts_status *st)
 {
     int side = in->width < in->height ? in->width : in->height, x0 = (in->width - side) / 2,
         y0 = (in->height - side) / 2;
@@ -72,18 +72,18 @@ static ts_code centre_square(const io_image *in, int size, resampler *by, io_ima
         return TS_OK;
     }
     ts_code code = io_image_create(out, size, size, in->channels, st);
-    if (code == TS_OK) code = by(&square, out, st);
+    if (code == TS_OK) code = by(&square, threads, out, st);
     if (code != TS_OK) io_image_free(out);
     io_image_free(&square);
     return code;
 }
 
-ts_code io_centre_square(const io_image *in, int size, io_image *out, ts_status *st)
+ts_code io_centre_square(const io_image *in, int size, int threads, io_image *out, ts_status *st)
 {
-    return centre_square(in, size, resample, out, st);
+    return centre_square(in, size, threads, resample, out, st);
 }
 
-ts_code io_centre_square_scikit(const io_image *in, int size, io_image *out, ts_status *st)
+ts_code io_centre_square_scikit(const io_image *in, int size, int threads, io_image *out, ts_status *st)
 {
-    return centre_square(in, size, resample_scikit, out, st);
+    return centre_square(in, size, threads, resample_scikit, out, st);
 }

@@ -51,13 +51,14 @@ ts_code io_read_data(const char *path, int channels, int64_t max_pixels, io_imag
 ts_code io_read_mask(const char *path, int64_t max_pixels, io_image *image, ts_status *st);
 
 /* The largest centred square, resampled to size x size by an antialiased filter in linear light (ts_resize: no
- * ringing). in may have any number of channels; out is created, also where size is the square's own. */
-ts_code io_centre_square(const io_image *in, int size, io_image *out, ts_status *st);
+ * ringing). in may have any number of channels; out is created, also where size is the square's own.
+ * threads: 0 is the process's number. */
+ts_code io_centre_square(const io_image *in, int size, int threads, io_image *out, ts_status *st);
 
 /* The same by the filter of scikit-image's transform.resize (0.20 to 0.26) with its defaults (order 1, mode "reflect",
  * anti-aliasing where it shrinks): a Gaussian of sigma (in / size - 1) / 2 cut off at 4 sigma, then linear
  * interpolation at (j + 1/2) in / size - 1/2, both axes mirrored about the outermost pixels' centres. */
-ts_code io_centre_square_scikit(const io_image *in, int size, io_image *out, ts_status *st);
+ts_code io_centre_square_scikit(const io_image *in, int size, int threads, io_image *out, ts_status *st);
 
 /* PNG, bits 8 or 16; srgb: encode linear values by the sRGB curve and tag the file so. Values are clamped to [0, 1],
  * NaN becomes 0; a fourth channel is straight alpha and never encoded. Written to a temporary file in the same folder,

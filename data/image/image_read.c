@@ -62,8 +62,9 @@ ts_code io_read_stored(const char *path, int64_t max_pixels, double gamma, io_im
     return code == TS_OK ? code : ts_context(st, "%s", path);
 }
 
-static ts_code read_data(const char *path, int channels, bool upright, int64_t max_pixels, io_image *image,
-                         ts_status *st)
+/* over_black: what is transparent counts as black. */
+static ts_code read_data(const char *path, int channels, bool upright, bool over_black, int64_t max_pixels,
+                         io_image *image, ts_status *st)
 {
     oi_image raw;
     *image = (io_image){0};
@@ -77,7 +78,9 @@ static ts_code read_data(const char *path, int channels, bool upright, int64_t m
         for (int x = 0; x < image->width; x++, out += channels) {
             const size_t at = io_stored_at(orientation, x, y, raw.width, raw.height) * (size_t)raw.channels;
             float in[3];
-            for (int c = 0; c < 3; c++) in[c] = oi_value(&raw, at + (size_t)raw.colour[c]);
+            const bool covered = over_black && raw.alpha >= 0 && !raw.associated;
+            const float alpha = covered ? oi_value(&raw, at + (size_t)raw.alpha) : 1;
+            for (int c = 0; c < 3; c++) in[c] = oi_value(&raw, at + (size_t)raw.colour[c]) * alpha;
             if (channels == 1) *out = raw.grey ? in[0] : (in[0] + in[1] + in[2]) / 3;
             else
                 for (int c = 0; c < 3; c++) out[c] = in[c];
@@ -90,10 +93,10 @@ ts_code io_read_data(const char *path, int channels, int64_t max_pixels, io_imag
 {
     *image = (io_image){0};
     if (channels != 1 && channels != 3) return ts_fail(st, TS_INVALID, "%s: %d channels asked for", path, channels);
-    return read_data(path, channels, false, max_pixels, image, st);
+    return read_data(path, channels, false, false, max_pixels, image, st);
 }
 
 ts_code io_read_mask(const char *path, int64_t max_pixels, io_image *image, ts_status *st)
 {
-    return read_data(path, 1, true, max_pixels, image, st);
+    return read_data(path, 1, true, true, max_pixels, image, st);
 }

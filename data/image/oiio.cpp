@@ -38,11 +38,41 @@ static int channel(const ImageSpec &spec, const char *name)
     return -1;
 }
 
-/* Which channels are the colours: R, G, B by name, or the first ones that are not alpha. */
-static void choose_channels(const ImageSpec &spec, oi_image *image)
+/* The layers of an image that have R, G and B, "beauty.R" and so on: their names with the full stop. */
+static std::vector<std::string> colour_layers(const ImageSpec &spec)
+{
+    std::vector<std::string> layers;
+    for (const std::string &name : spec.channelnames) {
+        const size_t stop = name.rfind('.');
+        if (stop == std::string::npos || !Strutil::iequals(name.substr(stop + 1), "R")) continue;
+        const std::string layer = name.substr(0, stop + 1);
+        if (channel(spec, (layer + "G").c_str()) >= 0 && channel(spec, (layer + "B").c_str()) >= 0)
+            layers.push_back(layer);
+    }
+    return layers;
+}
+
+/* Which channels are the colours: R, G, B by name, those of the only layer that has them, or the first ones that are
+ * not alpha where there are no layers. */
+static ts_code choose_channels(const char *path, const ImageSpec &spec, oi_image *image, ts_status *st)
 {
     int n = spec.nchannels, r = channel(spec, "R"), g = channel(spec, "G"), b = channel(spec, "B");
-    image->alpha = spec.alpha_channel >= 0 && spec.alpha_channel < n && n > 1 ? spec.alpha_channel : -1;
+    int alpha = spec.alpha_channel;
+    const std::vector<std::string> layers = r < 0 || g < 0 || b < 0 ? colour_layers(spec) : std::vector<std::string>();
+    if (layers.size() > 1) {
+        std::string names;
+        for (const std::string &layer : layers)
+            names += (names.empty() ? "" : ", ") + layer.substr(0, layer.size() - 1);
+        return ts_fail(st, TS_UNSUPPORTED, "%s: several layers have colours (%s): save one of them alone", path,
+                       names.substr(0, 200).c_str());
+    }
+    if (layers.size() == 1) {
+        r = channel(spec, (layers[0] + "R").c_str());
+        g = channel(spec, (layers[0] + "G").c_str());
+        b = channel(spec, (layers[0] + "B").c_str());
+        alpha = channel(spec, (layers[0] + "A").c_str());
+    }
+    image->alpha = alpha < n && n > 1 ? alpha : -1;
     if (r < 0 || g < 0 || b < 0) {
         int others[3] = {0, 0, 0}, found = 0;
         for (int c = 0; c < n && found < 3; c++)
@@ -55,6 +85,7 @@ static void choose_channels(const ImageSpec &spec, oi_image *image)
     image->colour[1] = g;
     image->colour[2] = b;
     image->grey = r == g && g == b;
+    return TS_OK;
 }
 
 static double number(const ImageSpec &spec, const char *name)
@@ -137,7 +168,7 @@ static ts_code read_file(const char *path, int64_t max_pixels, double max_bytes,
     if (spec.depth > 1) return ts_fail(st, TS_UNSUPPORTED, "%s: a volume, not an image", path);
     if (spec.deep) return ts_fail(st, TS_UNSUPPORTED, "%s: a deep image; flatten it first", path);
     const bool webp = !strcmp(in->format_name(), "webp");
-    choose_channels(spec, image);
+    if (choose_channels(path, spec, image, st) != TS_OK) return st->code;
     describe(spec, image);
 
     /* Only the channels that are wanted: a file may hold hundreds. */

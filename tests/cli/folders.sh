@@ -134,7 +134,7 @@ lists() {
     listed "$T/o" 4
     if grep -q '"folder": "p1".*"seconds": null' "$T/o/results.jsonl"; then fail "the new line is not taken"; fi
     # what others wrote stays, where it stands
-    { echo '{"folder":"p9","note":"not ours"}'; cat "$T/o/results.jsonl"; echo 'a note'; } >"$T/noted"
+    { echo '{"folder":"p9","note":"not ours"}'; cat "$T/o/results.jsonl"; printf 'a note'; } >"$T/noted"
     cp "$T/noted" "$T/o/results.jsonl"
     expect 0 few "$T/in/p0.ppm" "$T/in/p1.ppm" -o "$T/o"
     lines "$T/o/results.jsonl" 6

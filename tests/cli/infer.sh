@@ -38,7 +38,7 @@ empty_folders() {
     model
     echo text >"$T/notes.txt"
     expect 1 infer -q "$T/notes.txt" -o "$T/new/o"
-    [ ! -e "$T/new/o" ] || fail "an empty folder is left"
+    [ ! -e "$T/new" ] || fail "an empty folder is left"
     mkdir "$T/there"
     expect 1 infer -q "$T/notes.txt" -o "$T/there"
     [ -d "$T/there" ] || fail "a folder that was there is removed"

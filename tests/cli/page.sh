@@ -70,6 +70,12 @@ is_asked_for() {
     mkdir -p "$T/r/index.html"
     expect 2 infer --maps page "$T/a.ppm" "$T/b.ppm" -o "$T/r"
     says "$T/err" "it is a folder"
+    mkdir "$T/t"
+    echo mine >"$T/t/index.html"
+    expect 2 infer --maps page "$T/a.ppm" "$T/b.ppm" -o "$T/t"
+    says "$T/err" "lgd-infer did not make it"
+    [ "$(cat "$T/t/index.html")" = mine ] || fail "a page of the user's was replaced"
+    expect 0 infer --maps page "$T/a.ppm" "$T/b.ppm" -o "$T/o"
     # what failed is listed where nothing else is
     echo "no picture" >"$T/c.png"
     echo "no picture" >"$T/d.png"

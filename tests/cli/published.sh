@@ -39,7 +39,7 @@ runs_with_and_without_metadata() {
     for f in diffuse.png specular.png roughness.png normal.png maps.exr render.png; do
         cmp -s "$T/one/p/$f" "$T/two/p/$f" || fail "$f: the .pth gives another"
     done
-    expect 1 "$BIN/lgd-infer" --tolerance 0.1 --model "$T/a.pth" "$T/p.ppm" -o "$T/three"
+    expect 2 "$BIN/lgd-infer" --tolerance 0.1 --model "$T/a.pth" "$T/p.ppm" -o "$T/three"
     says "$T/err" "no mask and no tolerance"
 }
 

@@ -42,7 +42,7 @@ TEST(capture_comes_back)
     make(&c);
     CHECK(!io_is_capture(test_folder()), "an empty folder is a capture");
     CHECK(io_write_capture(test_folder(), &c, &st) == TS_OK && io_is_capture(test_folder()), "%s", st.message);
-    CHECK(io_read_capture(test_folder(), 0, &back, &st) == TS_OK, "%s", st.message);
+    CHECK(io_read_capture(test_folder(), 0, IO_MAX_PIXELS_DEFAULT, &back, &st) == TS_OK, "%s", st.message);
     CHECK(back.images == IMAGES && back.size == SIZE && back.side == c.side, "%d images of %d, side %g", back.images,
           back.size, (double)back.side);
     for (int i = 0; i < IMAGES; i++)
@@ -58,7 +58,8 @@ TEST(capture_comes_back)
               pow(stored, 2.2));
     }
     io_capture_free(&back);
-    CHECK(io_read_capture(test_folder(), 6, &back, &st) == TS_OK && back.size == 6, "%s", st.message);
+    CHECK(io_read_capture(test_folder(), 6, IO_MAX_PIXELS_DEFAULT, &back, &st) == TS_OK && back.size == 6, "%s",
+          st.message);
     double a = 0, b = 0;
     for (int i = 0; i < SIZE * SIZE * 3; i++) a += (double)c.image[i] / (SIZE * SIZE);
     for (int i = 0; i < 6 * 6 * 3; i++) b += (double)back.image[i] / (6 * 6);
@@ -77,7 +78,7 @@ TEST(capture_text_as_people_write_it)
          "\xef\xbb\xbf"
          "0,0,10\r\n\r\n 1, -2 ,\t3e1\r\n-1 2 20");
     text("image_size.txt", "10\n\n");
-    CHECK(io_read_capture(test_folder(), 0, &back, &st) == TS_OK, "%s", st.message);
+    CHECK(io_read_capture(test_folder(), 0, IO_MAX_PIXELS_DEFAULT, &back, &st) == TS_OK, "%s", st.message);
     const float expected[3][3] = {{0, 0, 1}, {0.1f, -0.2f, 3}, {-0.1f, 0.2f, 2}};
     for (int i = 0; i < 9; i++)
         CHECK(fabsf(back.camera[i / 3][i % 3] - expected[i / 3][i % 3]) < 1e-6f, "camera %d: %g", i,
@@ -113,7 +114,8 @@ TEST(capture_that_is_wrong_is_refused)
         ts_status st = {0};
         CHECK(io_write_capture(test_folder(), &c, &st) == TS_OK, "%s", st.message);
         text(wrong[i].file, wrong[i].content);
-        CHECK(io_read_capture(test_folder(), 0, &back, &st) != TS_OK && !back.image, "case %zu was read", i);
+        CHECK(io_read_capture(test_folder(), 0, IO_MAX_PIXELS_DEFAULT, &back, &st) != TS_OK && !back.image,
+              "case %zu was read", i);
         CHECK(strstr(st.message, wrong[i].says), "case %zu: no '%s' in: %s", i, wrong[i].says, st.message);
     }
     static const char *const files[] = {"00.png",        "02.png",         "camera_pos.txt",
@@ -124,8 +126,9 @@ TEST(capture_that_is_wrong_is_refused)
         CHECK(io_write_capture(test_folder(), &c, &st) == TS_OK, "%s", st.message);
         snprintf(path, sizeof path, "%s/%s", test_folder(), files[i]);
         CHECK(unlink(path) == 0, "unlink");
-        CHECK(io_read_capture(test_folder(), 0, &back, &st) != TS_OK && strstr(st.message, files[i]), "without %s: %s",
-              files[i], st.message);
+        CHECK(io_read_capture(test_folder(), 0, IO_MAX_PIXELS_DEFAULT, &back, &st) != TS_OK &&
+                  strstr(st.message, files[i]),
+              "without %s: %s", files[i], st.message);
     }
     ts_status st = {0};
     io_image wide;
@@ -134,8 +137,8 @@ TEST(capture_that_is_wrong_is_refused)
           st.message);
     snprintf(path, sizeof path, "%s/01.png", test_folder());
     CHECK(io_write_png(path, &wide, 8, false, &st) == TS_OK, "%s", st.message);
-    CHECK(io_read_capture(test_folder(), 0, &back, &st) != TS_OK && strstr(st.message, "square"), "a wide picture: %s",
-          st.message);
+    CHECK(io_read_capture(test_folder(), 0, IO_MAX_PIXELS_DEFAULT, &back, &st) != TS_OK && strstr(st.message, "square"),
+          "a wide picture: %s", st.message);
     io_image_free(&wide);
     io_capture_free(&c);
 }

@@ -165,6 +165,7 @@ TEST(orientation)
 TEST(grey_alpha_palette_16_bit)
 {
     const char *folder = test_folder();
+    char path[512];
     const uint8_t grey[4] = {0, 128, 255, 64}, grey_alpha[4] = {128, 255, 255, 51},
                   rgba[8] = {255, 128, 0, 255, 255, 255, 255, 0};
     const uint8_t wide[6] = {0x80, 0, 0xff, 0xff, 0x01, 0x02}, index[2] = {1, 0}, palette[6] = {255, 0, 0, 0, 128, 255},
@@ -182,6 +183,11 @@ TEST(grey_alpha_palette_16_bit)
     p = photo(bytes_save(&b, folder, "rgba.png"));
     check_colour(&p, 0, 0, 1, middle, 0, 1e-6f, "opaque");
     check_colour(&p, 1, 0, 0, 0, 0, 0, "transparent white over black");
+    ts_status st = {0};
+    snprintf(path, sizeof path, "%s/rgba.png", folder);
+    CHECK(!io_read_mask(path, 4, &p, &st) && p.data[0] > 0.5f && p.data[1] == 0, "a mask is what is opaque: %s",
+          st.message);
+    io_image_free(&p);
     png_begin(&b, 1, 1, 16, 2), png_pixels(&b, wide, 6, 1), png_end(&b);
     p = photo(bytes_save(&b, folder, "wide.png"));
     check_colour(&p, 0, 0, io_srgb_to_linear(32768 / 65535.0f), 1, io_srgb_to_linear(258 / 65535.0f), 1e-6f, "16 bits");
@@ -340,6 +346,22 @@ TEST(linear_floats)
     b = exr_file(1, 1, one, p3);
     p = photo(bytes_save(&b, test_folder(), "p3.exr"));
     check_colour(&p, 0, 0, 0.5f, 0.5f, 1.0982735f * 0.25f - 0.0982737f * 0.5f, 2e-3f, "EXR with chromaticities");
+}
+
+/* Layers of an EXR are not mixed. */
+TEST(layers)
+{
+    static const char *const one[] = {"Depth.Z", "beauty.A", "beauty.B", "beauty.G", "beauty.R"},
+                             *const two[] = {"a.B", "a.G", "a.R", "b.B", "b.G", "b.R"};
+    const float of_one[] = {9, 1, 0.1f, 0.4f, 0.8f}, of_two[] = {1, 2, 3, 4, 5, 6};
+    bytes b = exr_row(1, 5, one, of_one);
+    io_image p = photo(bytes_save(&b, test_folder(), "one.exr"));
+    check_colour(&p, 0, 0, 0.8f, 0.4f, 0.1f, 1e-6f, "the layer with colours");
+    b = exr_row(1, 6, two, of_two);
+    ts_status st = {0};
+    CHECK(io_read_photo(bytes_save(&b, test_folder(), "two.exr"), 1 << 20, &p, &st) == TS_UNSUPPORTED &&
+              strstr(st.message, "several layers have colours (a, b)"),
+          "%s", st.message);
 }
 
 TEST(first_page)

@@ -191,7 +191,9 @@ TEST(eval_multiview_of_others)
     io_image strip;
     io_material m = {0};
     snprintf(path, sizeof path, "%s/multiview/dir_leatherXmarble/gt_svbrdf.png", test_data());
-    CHECK(io_read_capture(test_folder(), 0, &c, &st) == TS_OK && c.images == PICTURES && c.size == N, "%s", st.message);
+    CHECK(io_read_capture(test_folder(), 0, IO_MAX_PIXELS_DEFAULT, &c, &st) == TS_OK && c.images == PICTURES &&
+              c.size == N,
+          "%s", st.message);
     CHECK(io_read_data(path, 3, 1 << 20, &strip, &st) == TS_OK && strip.width == 4 * N &&
               io_material_create(&m, N, &st) == TS_OK,
           "%s", st.message);

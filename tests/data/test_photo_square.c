@@ -11,7 +11,7 @@ static io_image square_of(const io_image *in, int size)
 {
     ts_status st = {0};
     io_image out;
-    CHECK(io_centre_square(in, size, &out, &st) == TS_OK, "%s", st.message);
+    CHECK(io_centre_square(in, size, 0, &out, &st) == TS_OK, "%s", st.message);
     CHECK(out.width == size && out.height == size && out.channels == in->channels, "%d x %d", out.width, out.height);
     return out;
 }
@@ -84,7 +84,7 @@ TEST(photo_square_is_centred)
     }
     ts_status st = {0};
     io_image in = blank(3, 3, 1), out = {0};
-    CHECK(io_centre_square(&in, 0, &out, &st) == TS_INVALID && !out.data, "size 0");
+    CHECK(io_centre_square(&in, 0, 0, &out, &st) == TS_INVALID && !out.data, "size 0");
     io_image_free(&in);
 }
 
@@ -105,7 +105,8 @@ static void same_square(const char *path, int size)
     io_image whole, cut, square;
     ts_status st = {0};
     io_photo_facts facts;
-    CHECK(!io_read_photo(path, 1 << 20, &whole, &st) && !io_centre_square(&whole, size, &cut, &st), "%s", st.message);
+    CHECK(!io_read_photo(path, 1 << 20, &whole, &st) && !io_centre_square(&whole, size, 0, &cut, &st), "%s",
+          st.message);
     for (int threads = 1; threads <= 3; threads++) {
         ts_threads_set(threads);
         CHECK(!io_read_photo_square(path, 1 << 20, size, 0, &square, &facts, &st), "%s", st.message);

@@ -25,7 +25,7 @@ static double difference(int from, int to, const float *expected, int step)
 {
     ts_status st = {0};
     io_image in = picture(from), out;
-    CHECK(!io_centre_square_scikit(&in, to, &out, &st), "%s", st.message);
+    CHECK(!io_centre_square_scikit(&in, to, 0, &out, &st), "%s", st.message);
     double worst = 0;
     for (int i = 0; i < to * to * 3; i += step)
         worst = fmax(worst, fabs((double)out.data[i] - (double)expected[i / step]));
@@ -54,10 +54,10 @@ TEST(scikit_square_is_the_centre)
     io_image wide, out;
     CHECK(!io_image_create(&wide, 30, 10, 1, &st), "%s", st.message);
     for (int i = 0; i < 300; i++) wide.data[i] = (float)(i % 30);
-    CHECK(!io_centre_square_scikit(&wide, 10, &out, &st) && out.data[0] == 10 && out.data[9] == 19,
+    CHECK(!io_centre_square_scikit(&wide, 10, 0, &out, &st) && out.data[0] == 10 && out.data[9] == 19,
           "the middle third is not taken as it is");
     io_image_free(&out);
-    CHECK(io_centre_square_scikit(&wide, 0, &out, &st) == TS_INVALID, "size 0");
+    CHECK(io_centre_square_scikit(&wide, 0, 0, &out, &st) == TS_INVALID, "size 0");
     io_image_free(&wide);
 }
 

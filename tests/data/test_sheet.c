@@ -85,7 +85,7 @@ TEST(sheet_windows_of_a_set)
     make_set(test_folder(), WIDTH, 1);
     name_photos(test_folder(), path, paths);
     snprintf(exact_path, sizeof exact_path, "%s/exact", test_folder());
-    CHECK(!io_read_capture(exact_path, SIZE, &exact, &st), "%s", st.message);
+    CHECK(!io_read_capture(exact_path, SIZE, IO_MAX_PIXELS_DEFAULT, &exact, &st), "%s", st.message);
     CHECK(!io_sheet_set_read(paths, CL_SHEET_SHOTS, 0, 1 << 26, 1, &set, &st), "%s", st.message);
     CHECK(!lgd_sheet_capture(&set, 3, SIZE, 1 << 26, 1, &c, &st), "%s", st.message);
     CHECK(c.images == 3, "%d windows", c.images);

@@ -29,8 +29,8 @@ static void one_photo(const char *path)
     CHECK(io_read_photo(path, IO_MAX_PIXELS_DEFAULT, &image, &st) == TS_OK, "%s", st.message);
     CHECK(image.width >= 256 && image.height >= 256 && image.channels == 3, "%s: %d x %d", path, image.width,
           image.height);
-    CHECK(io_centre_square(&image, 128, &square, &st) == TS_OK && square.width == 128 && square.height == 128, "%s: %s",
-          path, st.message);
+    CHECK(io_centre_square(&image, 128, 0, &square, &st) == TS_OK && square.width == 128 && square.height == 128,
+          "%s: %s", path, st.message);
     double sum = 0, centre = 0;
     for (int i = 0; i < 128 * 128 * 3; i++) {
         float v = square.data[i];

@@ -54,7 +54,8 @@ void fuzz_folder(const uint8_t *data, size_t size)
         code = io_describe_map_folder(fuzz_where, NULL, &set, &st);
     } else {
         io_capture c;
-        code = kind == 6 ? io_read_capture_ini(path, 8, 1, 1 << 16, &c, &st) : io_read_capture(fuzz_where, 8, &c, &st);
+        code = kind == 6 ? io_read_capture_ini(path, 8, 1, 1 << 16, &c, &st)
+                         : io_read_capture(fuzz_where, 8, 1 << 16, &c, &st);
         if (!code) io_capture_free(&c);
     }
     if (code && (!*st.message || strchr(st.message, '\n'))) abort();

@@ -44,8 +44,11 @@ TEST(infer_stems)
     expect_stem("...jpg", "...jpg");
     expect_stem("....jpg", "...");
     expect_stem("-.png", "-");
-    expect_stem("..", NULL);
-    expect_stem(".", NULL);
+    CHECK(mkdir(path_of("wood.v1"), 0777) == 0 && chdir(path_of("wood.v1")) == 0, "set-up");
+    expect_stem(".", "wood.v1");
+    expect_stem("../wood.v1", "wood.v1");
+    expect_stem("../wood.v1/", "wood.v1");
+    expect_stem("/", NULL);
     expect_stem("a/..", NULL);
     expect_stem("a/", NULL);
     expect_stem("", NULL);

@@ -293,14 +293,14 @@ static void attribute(bytes *b, const char *name, const char *type, const void *
     put(b, data, size);
 }
 
-bytes exr_file(int width, int height, const float *pixels, const float *chromaticities)
+static bytes exr_head(int width, int height, int channels, const char *const *names, const float *chromaticities)
 {
     bytes b = {0}, list = {0};
     const int32_t box[4] = {0, 0, width - 1, height - 1};
     const float one = 1, centre[2] = {0, 0};
     put(&b, "\x76\x2f\x31\x01\2\0\0\0", 8);
-    for (int c = 0; c < 3; c++) {
-        put(&list, &"BGR"[c], 1), put8(&list, 0);
+    for (int c = 0; c < channels; c++) {
+        put(&list, names[c], strlen(names[c]) + 1);
         put32le(&list, 2), put32le(&list, 0), put32le(&list, 1), put32le(&list, 1);
     }
     put8(&list, 0);
@@ -314,6 +314,22 @@ bytes exr_file(int width, int height, const float *pixels, const float *chromati
     attribute(&b, "screenWindowWidth", "float", &one, 4);
     if (chromaticities) attribute(&b, "chromaticities", "chromaticities", chromaticities, 32);
     put8(&b, 0);
+    bytes_free(&list);
+    return b;
+}
+
+bytes exr_row(int width, int channels, const char *const *names, const float *pixels)
+{
+    bytes b = exr_head(width, 1, channels, names, NULL);
+    put32le(&b, (uint32_t)b.size + 8), put32le(&b, 0);
+    put32le(&b, 0), put32le(&b, (uint32_t)(width * channels) * 4);
+    put(&b, pixels, (size_t)(width * channels) * 4);
+    return b;
+}
+
+bytes exr_file(int width, int height, const float *pixels, const float *chromaticities)
+{
+    bytes b = exr_head(width, height, 3, (const char *const[]){"B", "G", "R"}, chromaticities);
     uint64_t row = 8 + (uint64_t)width * 12, first = b.size + 8 * (uint64_t)(pixels ? height : 0);
     for (int y = 0; y < height && pixels; y++) put32le(&b, (uint32_t)(first + row * (uint64_t)y)), put32le(&b, 0);
     for (int y = 0; y < height && pixels; y++) {
@@ -322,6 +338,5 @@ bytes exr_file(int width, int height, const float *pixels, const float *chromati
             for (int x = 0; x < width; x++)
                 put(&b, &pixels[((size_t)y * (size_t)width + (size_t)x) * 3 + (size_t)c], 4);
     }
-    bytes_free(&list);
     return b;
 }

@@ -51,4 +51,6 @@ bytes tiff_file(const tiff_page *pages, int count);
 /* An uncompressed EXR with float channels B G R; chromaticities: eight numbers or NULL. pixels: [height][width][3] red
  * first. */
 bytes exr_file(int width, int height, const float *pixels, const float *chromaticities);
+/* A row of pixels with channels of such names, which are sorted; pixels: [channels][width]. */
+bytes exr_row(int width, int channels, const char *const *names, const float *pixels);
 #endif

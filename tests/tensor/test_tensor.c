@@ -38,9 +38,11 @@ TEST(status_keeps_one_line_and_puts_context_first)
     char text[2000];
     memset(text, 'x', sizeof text - 1);
     text[sizeof text - 1] = 0;
-    ts_fail(&st, TS_IO, "%s", text);
-    ts_context(&st, "%s", text);
+    ts_fail(&st, TS_IO, "%s: no room", text);
+    ts_context(&st, "a photograph: %s", text);
     CHECK(strlen(st.message) == sizeof st.message - 1, "a long message must be cut, got %zu", strlen(st.message));
+    CHECK(!strncmp(st.message, "a photograph: x", 15) && strstr(st.message, "xxx ... xxx"), "got '%s'", st.message);
+    CHECK(!strcmp(strchr(st.message, 0) - 10, "x: no room"), "the reason is cut off: '%s'", st.message);
     CHECK(ts_fail(NULL, TS_IO, "x") == TS_IO, "NULL status");
 }
 

@@ -67,6 +67,13 @@ TEST(ini_errors_name_file_and_line)
     expect_error("[]\n", "x.ini:1:");
     io_ini ini;
     ts_status st = {0};
+    CHECK(!parse("[a]\nfile = \"wood #2 ; old.jpg\" # the second\nplain = 5\" ; inches\nempty = \"\"\n", &ini, &st) &&
+              !strcmp(ini.entry[0].value, "wood #2 ; old.jpg") && !strcmp(ini.entry[1].value, "5\"") &&
+              !*ini.entry[2].value,
+          "%s", st.message);
+    io_ini_free(&ini);
+    CHECK(parse("[a]\nfile = \"wood #2.jpg\n", &ini, &st) == TS_INVALID && strstr(st.message, "x.ini:2: a value"), "%s",
+          st.message);
     CHECK(io_ini_parse("x.ini", "[a]\0\n", 5, &ini, &st) == TS_INVALID && strstr(st.message, "zero byte"), "%s",
           st.message);
     CHECK(io_ini_read("/nonexistent/x.ini", &ini, &st) == TS_IO && strstr(st.message, "/nonexistent/x.ini"), "%s",
