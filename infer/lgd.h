@@ -5,7 +5,8 @@
  *     lgd_estimate                       its maps
  *     lgd_write_maps, or lgd_render      files, or another picture
  *
- * Functions that return int return 0, or nonzero with error set, which may be NULL, and what they fill unspecified.
+ * Functions that return int return 0, or nonzero with error set, which may be NULL, and what they fill unspecified. The
+ * small buffers of convolutions (tensor/scratch.h) are the exception: where they cannot be had the process is aborted.
  * Structs that may grow begin with their size where the caller was compiled. Fields beyond it have their defaults. */
 #ifndef LGD_H
 #define LGD_H

@@ -54,7 +54,7 @@ double nn_guess_bytes(const nn_arch *a, int orientations)
 {
     const double side = nn_arch_side(a), pixels = (double)a->g_size * a->g_size, photo = 3.0 * a->images,
                  maps = a->channels + (a->spread ? NN_SPREADS : 0);
-    const bool turned = orientations > 1 && a->images == 1 && a->compat == NN_COMPAT_NONE, detail = a->g_unshuffle > 1;
+    const bool turned = orientations > 1 && a->compat == NN_COMPAT_NONE, detail = a->g_unshuffle > 1;
     const int images = turned ? orientations : 1;
     /* the photographs at g's size and encoded; of several orientations their maps' mean */
     const double once = side * side * (3 * photo + (turned ? 2 * maps : 0)),

@@ -3,10 +3,10 @@
  * one that the system gives no time to holds nobody up but for the range that it has begun, and one that comes late
  * finds the work done. Threads that wait spin for some microseconds and then sleep.
  *
- * Who works on which range is not known, so results must not depend on it. Loops inside of a loop's ranges are run by
- * the thread that meets them. Any number of threads may call at once. After a fork the child begins with no workers. A
- * worker that the system refuses is done without, since its ranges are for anybody: the loop is slower, not wrong; it
- * is asked for again a second later, and a program can be notified. */
+ * Who works on which range is not known, so results must not depend on it. Loops inside of the ranges of a loop that
+ * several threads share are run by the thread that meets them. Any number of threads may call at once. After a fork the
+ * child begins with no workers. A worker that the system refuses is done without, since its ranges are for anybody: the
+ * loop is slower, not wrong; it is asked for again a second later, and a program can be notified. */
 #ifndef TS_TEAM_H
 #define TS_TEAM_H
 #include <stdbool.h>

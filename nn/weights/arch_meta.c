@@ -93,6 +93,7 @@ ts_code nn_arch_from_file(const nn_file *file, nn_arch *arch, ts_status *st)
                            name, text);
         nn_arch_set(arch, &nn_arch_fields[i], v);
     }
-    if (nn_arch_check(arch, st)) return ts_context(st, "%s: architecture", nn_file_path(file));
-    return TS_OK;
+    const ts_code code = nn_arch_check(arch, st);
+    if (code) ts_context(st, "%s: architecture", nn_file_path(file));
+    return code;
 }

@@ -38,6 +38,7 @@ ts_code nn_coder_from_file(const nn_file *file, nn_coder *c, ts_status *st)
                            key[i], text ? "not one" : "missing");
         *field(c, i) = atoi(text);
     }
-    if (nn_coder_check(c, st)) return ts_context(st, "%s", nn_file_path(file));
-    return TS_OK;
+    const ts_code code = nn_coder_check(c, st);
+    if (code) ts_context(st, "%s", nn_file_path(file));
+    return code;
 }

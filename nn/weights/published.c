@@ -105,7 +105,9 @@ ts_code nn_published_arch(const nn_file *file, nn_arch *arch, ts_status *st)
     a.h_gru = dim_of(file, "main_net.rnn.layers.0.rnn_cell.hh.weight", 1);
     if (a.h_width < 0) a.h_width = a.iterations = 0, a.h_gru = nn_arch_default().h_gru; /* g alone */
     *arch = a;
-    if (nn_arch_check(&a, st))
-        return ts_context(st, "%s: the published network's tensors in shapes that it cannot have", nn_file_path(file));
+    ts_status why = {0};
+    if (nn_arch_check(&a, &why))
+        return ts_fail(st, TS_FORMAT, "%s: the published network's tensors in shapes that it cannot have: %s",
+                       nn_file_path(file), why.message);
     return TS_OK;
 }

@@ -77,8 +77,10 @@ static ts_code add_tensor(reader *r, const torch_tensor *t)
     const size_t length = strlen(r->name);
     char *name = ts_arena_alloc(r->f->arena, length + 1);
     r->names += length + 1;
-    if (!e || !name || r->names > MOST_NAMES)
-        return ts_fail(r->st, TS_NOMEM, "%s: no memory for the list of tensors", r->f->path);
+    if (r->names > MOST_NAMES)
+        return ts_fail(r->st, TS_FORMAT, "%s: the names of its tensors are longer than %d MB together", r->f->path,
+                       MOST_NAMES >> 20);
+    if (!e || !name) return ts_fail(r->st, TS_NOMEM, "%s: no memory for the list of tensors", r->f->path);
     memcpy(name, r->name, length + 1);
     *e = (nn_tensor){.name = name, .dtype = t->dtype, .swapped = r->swapped, .rank = t->rank};
     memcpy(e->dim, t->dim, sizeof e->dim);
@@ -87,9 +89,9 @@ static ts_code add_tensor(reader *r, const torch_tensor *t)
     memcpy(e->stride, t->stride, sizeof e->stride);
     const int size = nn_dtype_size(t->dtype), unit = nn_dtype_size(s->dtype);
     /* In numbers of the tensor's type; an untyped storage counts bytes. */
-    const int64_t has = s->dtype == t->dtype ? s->view_size : s->view_size / size * unit;
-    int64_t last = t->offset;
-    bool inside = t->offset <= has;
+    int64_t last = t->offset, has = s->view_size;
+    bool inside = s->dtype == t->dtype || !__builtin_mul_overflow(s->view_size / size, unit, &has);
+    inside = inside && t->offset <= has;
     for (int i = 0; i < t->rank && e->count; i++) {
         int64_t reach;
         inside = inside && !__builtin_mul_overflow(t->dim[i] - 1, t->stride[i], &reach) &&

@@ -12,7 +12,7 @@ const char *ts_conv_way_name(ts_conv_way way)
  * than 8 images the tile is half empty and pays only up to 16 pixels. */
 static bool small_maps(const ts_conv *c)
 {
-    return c->n >= 4 && c->h * c->w <= (c->n < 8 ? CONV_BATCH_PIXELS / 4 : CONV_BATCH_PIXELS);
+    return c->n >= 4 && (int64_t)c->h * c->w <= (c->n < 8 ? CONV_BATCH_PIXELS / 4 : CONV_BATCH_PIXELS);
 }
 
 /* In twelfths of an FMA per input, pixel and tap: panels of one vector are held back by their loads. */
@@ -77,7 +77,8 @@ static ts_conv_way choose_weights(const ts_conv *c, bool bf16)
 {
     if (bf16 && conv_amx_present()) return TS_CONV_BY_AMX;
     if (!c->compute.exact && winograd_pays_for_weights(c)) return TS_CONV_BY_WINOGRAD;
-    if (c->k > 1 && c->h * c->w <= CONV_BATCH_PIXELS) return TS_CONV_BY_BATCH; /* padding is never multiplied */
+    if (c->k > 1 && (int64_t)c->h * c->w <= CONV_BATCH_PIXELS)
+        return TS_CONV_BY_BATCH; /* padding is never multiplied */
     return TS_CONV_DIRECTLY;
 }
 

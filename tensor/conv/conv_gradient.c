@@ -328,10 +328,10 @@ void conv_direct_weight_gradient(const ts_conv *c, bool bf16, const float *x, co
                                  float *dbias)
 {
     job made = make_job(c, bf16, x, dy), *g = &made;
-    const size_t count = (size_t)(g->size * g->chunks) + (size_t)(c->oc * g->chunks);
+    const size_t of_weights = dweight ? (size_t)(g->size * g->chunks) : 0;
     g->weights = dweight;
-    g->sums = ts_scratch(2, sizeof(float) * count);
-    g->bias_sums = dbias ? g->sums + g->size * g->chunks : NULL;
+    g->sums = ts_scratch(2, sizeof(float) * (of_weights + (size_t)(c->oc * g->chunks)));
+    g->bias_sums = dbias ? g->sums + of_weights : NULL;
     const int groups = dweight ? g->groups : 1, o_parts = dweight ? (c->oc + REDUCE_OUTPUTS - 1) / REDUCE_OUTPUTS : 0;
     const int c_parts = (c->ic + REDUCE_INPUTS - 1) / REDUCE_INPUTS;
     ts_spread_tasks(c->compute.threads, (int64_t)g->chunks * groups, run_unit, g);

@@ -2,12 +2,12 @@
 #include "nn/need.h"
 #include "tests/support/networks.h"
 
-static void fits(const char *what, const nn_arch *a, int orientations)
+static void fits_given(const char *what, const nn_arch *a, int given, int orientations)
 {
     nn_model *m = create(a, 5);
     const int side = nn_arch_side(a) / 2; /* resampled to g's size */
-    nn_input in = photographs(a->images, side, 6, NULL);
-    in.given = a->images;
+    nn_input in = photographs(given, side, 6, NULL);
+    in.given = given;
     in.orientations = orientations;
     ag_tape *tape = tape_create(false);
     nn_guess g;
@@ -18,6 +18,8 @@ static void fits(const char *what, const nn_arch *a, int orientations)
     nn_model_free(&m);
     free(in.image.data);
 }
+
+static void fits(const char *what, const nn_arch *a, int orientations) { fits_given(what, a, a->images, orientations); }
 
 TEST(need_of_g_is_counted)
 {
@@ -32,6 +34,8 @@ TEST(need_of_g_is_counted)
             fits("conditions", &a, 1);
             a.images = 5;
             fits("five photographs", &a, 1);
+            fits_given("one of five photographs", &a, 1, 2);
+            fits_given("one of five photographs", &a, 1, 8);
         }
     for (int detail = 4; detail <= 64; detail *= 4)
         for (int trunk = 0; trunk <= 4; trunk += 4) {

@@ -280,6 +280,62 @@ TEST(weights_init_from_a_narrower_g_computes_the_same)
     nn_model_free(&m), nn_model_free(&n);
 }
 
+/* g's first layer from a file whose weights of channel c are c + 1: want[c] in the model; NAN: as it was drawn. */
+static void reads_as(const char *what, nn_arch from, nn_arch to, const double *want)
+{
+    static const char name[] = "g.input.conv.weight";
+    ts_status st = {0};
+    from.h_width = to.h_width = 0;
+    nn_model *m = nn_model_create(&from, &st), *n = nn_model_create(&to, &st);
+    CHECK(m && n, "%s: %s", what, st.message);
+    nn_model_init(m, 3);
+    nn_model_init(n, 4);
+    const nn_param *q = nn_model_find(m, name), *p = nn_model_find(n, name);
+    for (size_t i = 0; i < q->count; i++) m->value[q->offset + i] = (float)(i / 9 % (size_t)q->dim[1] + 1);
+    float *drawn = malloc(p->count * sizeof *drawn);
+    memcpy(drawn, n->value + p->offset, p->count * sizeof *drawn);
+    const char *path = path_of("seen.safetensors");
+    int taken, left;
+    CHECK(!nn_model_save(m, m->value, path, NULL, 0, &st) && !nn_model_init_from(n, path, NULL, &taken, &left, &st),
+          "%s: %s", what, st.message);
+    for (size_t i = 0; i < p->count; i++) {
+        const size_t c = i / 9 % (size_t)p->dim[1];
+        const double is = (double)n->value[p->offset + i], should = isnan(want[c]) ? (double)drawn[i] : want[c];
+        CHECK(fabs(is - should) < 1e-6, "%s: channel %zu has %g, not %g", what, c, is, should);
+    }
+    free(drawn);
+    nn_model_free(&m), nn_model_free(&n);
+}
+
+/* Colours, coordinates and what is known of a photograph keep their weights, whatever else is read. */
+TEST(weights_init_from_knows_what_a_channel_is)
+{
+    nn_arch one = small(), known = small(), squares = small(), many = small();
+    known.conditions = many.conditions = squares.conditions = true;
+    many.images = 2;
+    squares.g_unshuffle = 2, squares.g_detail = 4;
+    const double quarter[] = {.25, .5, .75};
+    double want[80];
+    for (int c = 0; c < 22; c++) /* of the second photograph nothing */
+        want[c] = c < 3 ? c + 1 : c < 6 ? 0 : c < 14 ? c - 2 : 0;
+    reads_as("a second photograph", known, many, want);
+    for (int c = 0; c < 22; c++) /* the mean of four pixels, no coordinates, what is known */
+        want[c] = c < 12 ? quarter[c % 3] : c < 14 ? 0 : c - 10;
+    reads_as("squares", known, squares, want);
+    squares.g_width = 6, squares.g_width_max = 10;
+    reads_as("squares, wider", known, squares, want);
+    for (int c = 12; c < 22; c++) want[c] = 0;
+    reads_as("squares, wider, conditions too", one, squares, want);
+    squares.conditions = false;
+    for (int c = 0; c < 14; c++) want[c] = c + 1;
+    nn_arch narrow = squares, larger = squares;
+    narrow.g_width = 3, narrow.g_width_max = 5;
+    reads_as("wider", narrow, squares, want);
+    larger.g_unshuffle = 4;
+    for (int c = 0; c < 80; c++) want[c] = NAN;
+    reads_as("other squares", squares, larger, want);
+}
+
 /* As data/file.c: the file that the link leads to is replaced, and a device is written to. */
 TEST(weights_writing_follows_links)
 {
