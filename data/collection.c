@@ -12,6 +12,7 @@ enum { PIXELS = IO_COLLECTION_SIDE * IO_COLLECTION_SIDE };
 
 struct io_collection {
     int count;
+    uint64_t hash;
     io_collected *set[]; /* [PIXELS] each */
 };
 
@@ -42,6 +43,28 @@ typedef struct asked {
     void *user;
 } asked;
 
+/* Takes the names and bytes of a set's files into the hash: what is computed of them depends on the CPU. */
+static ts_code add_hash(const char *folder, uint64_t *hash, ts_status *st)
+{
+    struct dirent **list;
+    const int n = scandir(folder, &list, visible, alphasort);
+    ts_code code = n < 0 ? ts_fail(st, TS_IO, "%s: %s", folder, strerror(errno)) : TS_OK;
+    for (int i = 0; i < n; i++) {
+        char path[PATH_MAX];
+        struct stat about;
+        uint64_t bytes = 0;
+        if (!code && snprintf(path, sizeof path, "%s/%s", folder, list[i]->d_name) >= (int)sizeof path)
+            code = ts_fail(st, TS_INVALID, "%s: name too long", folder);
+        if (!code && stat(path, &about) == 0 && S_ISREG(about.st_mode)) {
+            code = ts_hash_file(path, &bytes, st);
+            *hash = ts_hash(list[i]->d_name, strlen(list[i]->d_name), ts_hash(&bytes, sizeof bytes, *hash));
+        }
+        free(list[i]);
+    }
+    if (n >= 0) free(list);
+    return code;
+}
+
 static ts_code read_sets(const char *path, struct dirent **list, int n, int threads, asked a, float *height,
                          io_collection *c, ts_status *st)
 {
@@ -52,10 +75,11 @@ static ts_code read_sets(const char *path, struct dirent **list, int n, int thre
         if (snprintf(folder, sizeof folder, "%s/%s", path, list[i]->d_name) >= (int)sizeof folder)
             return ts_fail(st, TS_INVALID, "%s: name too long", path);
         if (stat(folder, &about) || !S_ISDIR(about.st_mode)) continue;
-        io_collected *set = calloc(PIXELS, sizeof *set); /* what lies between the numbers is hashed too */
+        io_collected *set = malloc(PIXELS * sizeof *set);
         if (!set) return ts_fail(st, TS_NOMEM, "%s: no memory for set %d of %d (put fewer there)", path, i + 1, n);
         c->set[c->count++] = set;
-        if (read_set(folder, threads, height, set, st) != TS_OK) return st->code;
+        if (read_set(folder, threads, height, set, st) != TS_OK || add_hash(folder, &c->hash, st) != TS_OK)
+            return st->code;
     }
     return c->count ? TS_OK : ts_fail(st, TS_INVALID, "%s: no folders in it: every map set needs one of its own", path);
 }
@@ -81,12 +105,7 @@ io_collection *io_collection_read(const char *path, int threads, bool (*stop)(vo
 
 int io_collection_count(const io_collection *c) { return c->count; }
 
-uint64_t io_collection_hash(const io_collection *c)
-{
-    uint64_t hash = 0;
-    for (int i = 0; i < c->count; i++) hash = ts_hash(c->set[i], PIXELS * sizeof *c->set[i], hash);
-    return hash;
-}
+uint64_t io_collection_hash(const io_collection *c) { return c->hash; }
 
 const io_collected *io_collection_get(const io_collection *c, int number) { return c->set[number]; }
 

@@ -21,7 +21,7 @@ typedef struct io_collection io_collection;
  * on failure. io_collection_free takes NULL too. */
 io_collection *io_collection_read(const char *path, int threads, bool (*stop)(void *user), void *user, ts_status *st);
 int io_collection_count(const io_collection *collection);
-/* Of all that materials are made of: it tells collections apart, not the places where they are. */
+/* Of the sets' files: it tells collections apart, not the places where they are. */
 uint64_t io_collection_hash(const io_collection *collection);
 /* Of set number 0 .. count - 1, the collection's: [IO_COLLECTION_SIDE][IO_COLLECTION_SIDE]. */
 const io_collected *io_collection_get(const io_collection *collection, int number);

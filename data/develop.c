@@ -50,14 +50,14 @@ void io_tone_encode(const io_tone *t, size_t count, float *image)
 
 void io_blur(int size, int channels, float sigma, float *image)
 {
-    enum { REACH = 12 };
+    enum { REACH = 192 }; /* of sigma 8 at 256 pixels, at 2048 */
     int reach = (int)ceilf(3 * sigma);
     if (reach > REACH) reach = REACH;
     float tap[2 * REACH + 1], total = 0;
     for (int k = -reach; k <= reach; k++) total += tap[k + reach] = expf(-0.5f * (float)(k * k) / (sigma * sigma));
     for (int k = 0; k <= 2 * reach; k++) tap[k] /= total;
     const size_t row = (size_t)size * (size_t)channels;
-    const size_t values = (size_t)size * row + row + 2 * REACH * (size_t)channels;
+    const size_t values = (size_t)size * row + row + 2 * (size_t)(reach * channels);
     float *work = ts_scratch(TS_SCRATCH_SLOTS - 1, values * sizeof *work);
     float *padded = work + (size_t)size * row;
     for (int y = 0; y < size; y++) { /* along rows */

@@ -79,7 +79,7 @@ static ts_code save(tr_trainer *t, ts_status *st)
     snprintf(number[4], sizeof number[4], "%.17g", t->best);
     snprintf(number[5], sizeof number[5], "%.17g", t->mean_norm);
     snprintf(number[6], sizeof number[6], "%d", t->ranks.count);
-    nn_meta meta[11] = {{"format", format_name},
+    nn_meta meta[12] = {{"format", format_name},
                         {"step", number[0]},
                         {"adam_step", number[1]},
                         {"skipped", number[2]},
@@ -88,8 +88,9 @@ static ts_code save(tr_trainer *t, ts_status *st)
                         {"mean_norm", number[5]},
                         {"isa", ts_isa_name(ts_isa_now())},
                         {"config", text}};
-    int metas = 9; /* of one process, and of procedural materials alone, no more */
+    int metas = 9; /* of one process, without a teacher, of procedural materials alone, no more */
     if (t->ranks.count > 1) meta[metas++] = (nn_meta){"ranks", number[6]};
+    if (*t->teacher_hash) meta[metas++] = (nn_meta){"teacher", t->teacher_hash};
     if (*t->collection_hash) meta[metas++] = (nn_meta){"collection", t->collection_hash};
     const ts_code code = nn_safetensors_write(path, block, n, meta, metas, st);
     free(text);
@@ -150,7 +151,8 @@ static ts_code restore(tr_trainer *t, const nn_file *file, const char *path, ts_
     if (!best || !mean) return ts_fail(st, TS_FORMAT, "%s: %s is missing", path, best ? "mean_norm" : "best");
     if (t->step > tr_total(&t->config))
         return ts_fail(st, TS_FORMAT, "%s: step %" PRId64 " is beyond the end of the run", path, t->step);
-    const char *collection = nn_file_meta(file, "collection");
+    const char *collection = nn_file_meta(file, "collection"), *teacher = nn_file_meta(file, "teacher");
+    snprintf(t->teacher_hash, sizeof t->teacher_hash, "%s", teacher ? teacher : "");
     snprintf(t->collection_hash, sizeof t->collection_hash, "%s", collection ? collection : "");
     t->best = strtod(best, NULL);
     t->mean_norm = strtod(mean, NULL);

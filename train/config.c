@@ -59,7 +59,7 @@ static int distance(const char *a, const char *b)
 }
 
 /* Names or groups, removed by "-name", in any order after it. */
-static ts_code parse_families(const char *where, const char *text, uint64_t *mask, ts_status *st)
+static ts_code parse_families(const char *where, const char *key, const char *text, uint64_t *mask, ts_status *st)
 {
     const int count = io_family_count();
     uint64_t bits = 0;
@@ -68,7 +68,7 @@ static ts_code parse_families(const char *where, const char *text, uint64_t *mas
         const size_t skip = strspn(p, " \t,"), n = strcspn(p + skip, " \t,");
         p += skip;
         if (!n) break;
-        if (n >= sizeof word) return ts_fail(st, TS_INVALID, "%s: data.families: \"%.60s\" is no family", where, p);
+        if (n >= sizeof word) return ts_fail(st, TS_INVALID, "%s: data.%s: \"%.60s\" is no family", where, key, p);
         memcpy(word, p, n);
         word[n] = 0;
         p += n;
@@ -79,12 +79,12 @@ static ts_code parse_families(const char *where, const char *text, uint64_t *mas
             int best = 0;
             for (int i = 1; i < count; i++)
                 if (distance(name, io_family_name(i)) < distance(name, io_family_name(best))) best = i;
-            return ts_fail(st, TS_INVALID, "%s: data.families: there is no family %s, did you mean %s?", where, name,
+            return ts_fail(st, TS_INVALID, "%s: data.%s: there is no family %s, did you mean %s?", where, key, name,
                            io_family_name(best));
         }
         bits = remove ? bits & ~named : bits | named;
     }
-    if (!bits) return ts_fail(st, TS_INVALID, "%s: data.families names no family that may be drawn", where);
+    if (!bits) return ts_fail(st, TS_INVALID, "%s: data.%s names no family that may be drawn", where, key);
     *mask = bits == io_family_mask("all") ? 0 : bits;
     return TS_OK;
 }
@@ -148,7 +148,7 @@ static ts_code set_value(tr_config *c, const char *where, const tr_key *k, const
                 return TS_OK;
             }
         return bad_value(where, k, value, st);
-    case TR_FAMILIES: return parse_families(where, value, (uint64_t *)(void *)at, st);
+    case TR_FAMILIES: return parse_families(where, k->key, value, (uint64_t *)(void *)at, st);
     case TR_TEXT: break;
     }
     return set_text(at, where, k, value, st);

@@ -178,8 +178,8 @@ const tr_key tr_keys[] = {
      "a sheet's windows are at most this far beside their places, and again as far bent by what is left of the lens's "
      "distortion; in pixels of 512"},
     {"data", "bracket", TR_REAL, AT(data.bracket), 0, 0.9, "0", NULL, false,
-     "a sheet's photographs are up to this share brighter or darker, which its paper shows: noise and what clips "
-     "differ"},
+     "a sheet's photographs are up to this share brighter or darker, which its paper shows: their noise "
+     "differs"},
     {"data", "jpeg", TR_INT, AT(data.jpeg), 0, 98, "75", NULL, false,
      "lowest quality of the photographs' JPEG, drawn up to 98, half of them with halved chroma; 0: no JPEG"},
     {"data", "quantise", TR_BOOL, AT(data.quantise), 0, 1, "yes", NULL, false,

@@ -30,8 +30,8 @@ static const char usage[] =
 typedef struct shown {
     cl_progress progress;
     int64_t first, log_every;
-    double loss, seconds, waited; /* sums since the last line */
-    int steps, samples, ranks;
+    double loss, seconds, waited;    /* sums since the last line */
+    int steps, made, samples, ranks; /* steps: those that were not skipped */
 } shown;
 
 static const char *trained(const tr_row *row)
@@ -44,6 +44,7 @@ static void show_step(const tr_row *row, void *user)
     shown *s = user;
     char extra[160];
     if (!row->skip) s->loss += row->loss;
+    s->made++;
     s->steps += !row->skip;
     s->samples += row->batch;
     s->seconds += row->seconds;
@@ -57,13 +58,13 @@ static void show_step(const tr_row *row, void *user)
         cl_progress_show(&s->progress, done, extra);
     } else if (line) {
         /* From the last lines' speed: a step of the second phase takes several times as long as one of the first. */
-        const long left = s->steps ? lround(s->seconds / s->steps * (double)(row->total - row->step)) : 0;
+        const long left = s->made ? lround(s->seconds / s->made * (double)(row->total - row->step)) : 0;
         if (s->ranks > 1) snprintf(extra, sizeof extra, "  waiting %.1f%%", 100 * s->waited / s->seconds);
         cl_note("step %lld/%lld  %s  loss %.4f  rate %.2e  %.1f samples/s%s  ETA %ld:%02ld:%02ld", (long long)row->step,
                 (long long)row->total, trained(row), mean, row->rate, speed, s->ranks > 1 ? extra : "", left / 3600,
                 left / 60 % 60, left % 60);
     }
-    if (line) s->loss = s->seconds = s->waited = 0, s->steps = s->samples = 0;
+    if (line) s->loss = s->seconds = s->waited = 0, s->steps = s->made = s->samples = 0;
 }
 
 /* The results of a run are its validations: they go to standard output. */
@@ -128,7 +129,8 @@ static int train(const tr_config *config, const char *folder, bool resume, const
     cl_progress_end(&s.progress);
     tr_destroy(&t);
     if (code != TS_OK) return failed(&st);
-    if (ranks->rank == 0) cl_note("done: %s/best.safetensors and last.safetensors", folder);
+    if (ranks->rank == 0)
+        cl_note("done: %s/%slast.safetensors", folder, config->validate.every ? "best.safetensors and " : "");
     return CL_OK;
 }
 

@@ -25,18 +25,23 @@ io_procedural tr_materials_of(const tr_config *c)
                            .collected = (float)c->data.collected};
 }
 
+ts_code tr_same_source(uint64_t hash, const char *path, const char *what, char known[TR_HASH], ts_status *st)
+{
+    char text[TR_HASH];
+    snprintf(text, sizeof text, "%016" PRIx64, hash);
+    if (*known && strcmp(text, known) != 0)
+        return ts_fail(st, TS_INVALID, "%s: has other %s than the run was begun with (--resume needs the same)", path,
+                       what);
+    strcpy(known, text);
+    return TS_OK;
+}
+
 ts_code tr_read_collection(tr_trainer *t, ts_status *st)
 {
     const char *path = t->config.data.collection;
-    char hash[TR_HASH];
     t->collection = io_collection_read(path, 0, t->listener.stop, t->listener.user, st);
     if (!t->collection) return st->code;
-    snprintf(hash, sizeof hash, "%016" PRIx64, io_collection_hash(t->collection));
-    if (*t->collection_hash && strcmp(hash, t->collection_hash) != 0)
-        return ts_fail(st, TS_INVALID, "%s: has other maps than the run was begun with (--resume needs the same)",
-                       path);
-    strcpy(t->collection_hash, hash);
-    return TS_OK;
+    return tr_same_source(io_collection_hash(t->collection), path, "maps", t->collection_hash, st);
 }
 
 io_camera tr_camera_of(const tr_config *c)
@@ -86,6 +91,9 @@ bool tr_under_sheet(double share, uint64_t seed, uint64_t index)
     return share > 0 && (double)ts_rng_uniform(&rng) < share;
 }
 
+/* The number of a material's photograph k, from 0, whose faults it decides: nobody else's, however many there are. */
+static uint64_t number_of(uint64_t material, int k) { return material + ((uint64_t)k << 40); }
+
 typedef struct taking {
     const io_camera *camera;
     const io_under_sheet *sheet;
@@ -98,10 +106,10 @@ typedef struct taking {
 static void take(const void *job, int64_t i)
 {
     const taking *t = job;
-    const uint64_t which = t->first + (uint64_t)i;
+    const uint64_t material = t->first + (uint64_t)(i / t->number), which = number_of(material, (int)(i % t->number));
     const size_t values = (size_t)t->size * (size_t)t->size * 3;
     float *image = t->images + (size_t)i * values;
-    if (!tr_under_sheet(t->share, t->seed, which / (uint64_t)t->number)) {
+    if (!tr_under_sheet(t->share, t->seed, material)) {
         io_camera_apply(t->camera, t->seed, which, t->size, image);
         return;
     }
@@ -136,9 +144,8 @@ void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count
     const rd_view flash = rd_flash();
     const double share = views ? c->data.sheet : 0; /* the flash for all is no sheet's */
     const size_t pixels = (size_t)size * (size_t)size;
-    const uint64_t first = index * (uint64_t)number;
     for (int i = 0; i < count * number; i++) {
-        const uint64_t which = first + (uint64_t)i;
+        const uint64_t which = number_of(index + (uint64_t)(i / number), i % number);
         const float *material = maps + (size_t)(i / number) * pixels * MAP_CHANNELS;
         float *image = images + (size_t)i * pixels * 3;
         const rd_view *view = views ? &views[i] : &flash;
@@ -154,7 +161,7 @@ void tr_photographs(const tr_config *c, uint64_t seed, uint64_t index, int count
         io_camera_told(&camera, seed, which, &shot.told_view, &shot.told_power);
         shots[i] = shot;
     }
-    ts_tasks(0, (int64_t)count * number, take, &(taking){&camera, &sheet, share, seed, first, size, number, images});
+    ts_tasks(0, (int64_t)count * number, take, &(taking){&camera, &sheet, share, seed, index, size, number, images});
 }
 
 void tr_capture_views(double sheet, uint64_t seed, uint64_t index, int count, int number, rd_view *views)

@@ -31,7 +31,7 @@ typedef struct tr_validator {
     float *images;        /* [count][given][size][size][3], owned */
     rd_view *captures;    /* [count][given], owned */
     tr_shot *shots;       /* [count][given], owned */
-    unsigned char *known; /* [count][given] of nn_known, where h is trained */
+    unsigned char *known; /* [count][given] of nn_known, where h is trained, or where all is known */
     rd_view *views;       /* [count][RD_EVAL_VIEWS], owned */
     double *errors;       /* [validate.count][TR_ERRORS] of all, owned */
     nn_model *model;      /* holds what is validated: the moving average, or a copy of the weights */
@@ -55,8 +55,9 @@ typedef struct tr_trainer {
     ag_tape *tape;
     nn_model *teacher; /* train.teacher, or NULL */
     ag_tape *quiet;    /* of a fixed g, without gradients, whose packed weights are kept; NULL where none is read */
-    io_collection *collection;     /* data.collection, or NULL */
-    char collection_hash[TR_HASH]; /* of that, or of the one that the checkpoint was made with; empty: there is none */
+    io_collection *collection;                            /* data.collection, or NULL */
+    char collection_hash[TR_HASH], teacher_hash[TR_HASH]; /* of these, or of those that the checkpoint was made with;
+                                                            empty: there is none */
     io_loader *loader;
     float *images;     /* [batch][given][patch][patch][3], given <= tr_most_given; batch: the share's, here and below */
     rd_view *captures; /* [batch][given] */
@@ -92,6 +93,8 @@ io_procedural tr_materials_of(const tr_config *c);
 io_camera tr_camera_of(const tr_config *c);
 /* Reads data.collection; TS_INVALID where the checkpoint was made with another. */
 ts_code tr_read_collection(tr_trainer *t, ts_status *st);
+/* known: the hash that the checkpoint has, or empty: it becomes hash. TS_INVALID where it is another; what: of whom. */
+ts_code tr_same_source(uint64_t hash, const char *path, const char *what, char known[TR_HASH], ts_status *st);
 
 /* Number photographs of each material [count][size][size][9], with the faults of [data]; images
  * [count][number][size][size][3], under views [count][number] as tr_capture_views draws them (NULL: the flash for
@@ -140,6 +143,8 @@ bool tr_measured(const tr_config *c, int64_t step);
 /* Whose data photographs of this step are taken with: c, or in measured steps measured, which becomes c
  * without what cannot be measured, in half of them under the default flash. */
 const tr_config *tr_taken_with(const tr_config *c, int64_t step, tr_config *measured);
+/* c without what cannot be measured, all told. */
+tr_config tr_measured_camera(const tr_config *c);
 /* How far the model is from what the teacher says, or with train.lesson = normals of the normals from target [batch,
  * patch, patch, 9], by train.normal_rmse too: of maps in the teacher's own deviations, of their logarithms and the
  * scene as they are. NULL after an error. */

@@ -81,7 +81,7 @@ static int draw_iterations(const tr_config *c, int64_t step)
 static int draw_given(const tr_config *c, int64_t step)
 {
     const int hi = tr_most_given(c), lo = c->train.given_min ? c->train.given_min : hi;
-    ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_CAPTURE, (uint64_t)step);
+    ts_rng rng = ts_rng_make((uint64_t)c->train.seed, TS_STREAM_GIVEN, (uint64_t)step);
     return lo + ts_rng_int(&rng, hi - lo + 1);
 }
 
@@ -103,6 +103,13 @@ static ts_tensor cut(tr_trainer *t, const ts_tensor *whole, rd_grid g)
     return copy;
 }
 
+/* The camera as far away, above the centre: where a field of view alone puts it (infer/estimate.c). */
+static void stand_above(float camera[3])
+{
+    camera[2] = sqrtf(camera[0] * camera[0] + camera[1] * camera[1] + camera[2] * camera[2]);
+    camera[0] = camera[1] = 0;
+}
+
 /* What g may read of each photograph, and what it is to guess. The place of a light is known where the camera's is, in
  * half of the photographs, in a measured step in all; a camera whose field of view alone is known stands above the
  * centre. What a student learns without its teacher, of camera and power, the teacher is not asked. */
@@ -120,7 +127,7 @@ static void describe(tr_trainer *t, int given)
         t->known[i] = (unsigned char)((s->told_view ? NN_KNOWN_CAMERA : 0) | (light ? NN_KNOWN_LIGHT : 0) |
                                       (power ? NN_KNOWN_POWER : 0));
         t->captures[i] = s->thought;
-        if (s->told_view && !light) t->captures[i].camera[0] = t->captures[i].camera[1] = 0;
+        if (s->told_view && !light) stand_above(t->captures[i].camera);
     }
 }
 

@@ -9,6 +9,7 @@
 #include "ops.h"
 #include "render/losses.h"
 #include "render/scene.h"
+#include "tensor/hash.h"
 #include "tensor/maps.h"
 #include "train/state.h"
 #include <string.h>
@@ -18,7 +19,10 @@ ts_code tr_teacher_load(tr_trainer *t, ts_status *st)
     const tr_config *c = &t->config;
     const char *path = c->train.teacher;
     t->teacher = nn_model_load(path, st);
-    if (!t->teacher) return ts_context(st, "train.teacher");
+    uint64_t hash;
+    if (!t->teacher || ts_hash_file(path, &hash, st) != TS_OK ||
+        tr_same_source(hash, path, "weights", t->teacher_hash, st) != TS_OK)
+        return ts_context(st, "train.teacher");
     const nn_arch *a = &t->teacher->arch;
     if (!a->conditions || !a->spread || !a->scene || a->images != 1 || a->channels != MAP_CHANNELS)
         return ts_fail(
@@ -44,16 +48,22 @@ bool tr_measured(const tr_config *c, int64_t step)
 
 /* Who knows the light's power has its pictures in proportion to the light: they have no tone curve, and nothing else
  * shines. */
+tr_config tr_measured_camera(const tr_config *c)
+{
+    tr_config m = *c;
+    m.data.told_view = m.data.told_power = 1;
+    m.data.exposure = m.data.meter = m.data.automatic = m.data.white_balance = m.data.vignette = 0;
+    m.data.ambient = m.data.tone = m.data.sharpen = m.data.glare = 0;
+    return m;
+}
+
 const tr_config *tr_taken_with(const tr_config *c, int64_t step, tr_config *measured)
 {
     if (!tr_measured(c, step)) return c;
     ts_rng rng = rng_of(c, step);
     ts_rng_uniform(&rng); /* tr_measured's */
     tr_config *m = measured;
-    *m = *c;
-    m->data.told_view = m->data.told_power = 1;
-    m->data.exposure = m->data.meter = m->data.automatic = m->data.white_balance = m->data.vignette = 0;
-    m->data.ambient = m->data.tone = m->data.sharpen = m->data.glare = 0;
+    *m = tr_measured_camera(c);
     if (ts_rng_uniform(&rng) < 0.5f)
         m->data.fov_min = m->data.fov_max = m->data.flash = m->data.flash_size = m->data.tilt = m->data.off_centre = 0;
     return m;

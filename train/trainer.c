@@ -270,7 +270,11 @@ static ts_code build(tr_trainer *t, bool resume, ts_status *st)
     if (tr_agree(&t->ranks, prepare(t, &resume, st), st) != TS_OK) return st->code;
     share_state(t);
     share_blocks(t);
-    return tr_agree(&t->ranks, begin(t, resume, st), st);
+    ts_code code = tr_agree(&t->ranks, begin(t, resume, st), st);
+    if (!code && t->teacher) code = tr_same_bytes(&t->ranks, t->teacher_hash, TR_HASH, "its train.teacher is not", st);
+    if (!code && t->collection)
+        code = tr_same_bytes(&t->ranks, t->collection_hash, TR_HASH, "its data.collection is not", st);
+    return code;
 }
 
 tr_trainer *tr_create(const tr_config *config, const char *folder, bool resume, const tr_ranks *ranks,

@@ -41,6 +41,13 @@ static bool make_materials(const tr_config *c, int first, int count, float *maps
     return fine;
 }
 
+/* Whether the materials teach photographs alone whose light and camera are known: then such ones are validated. */
+static bool learns_known(const tr_config *c)
+{
+    return c->arch.conditions && c->arch.images == 1 &&
+        (c->train.lesson == TR_LESSON_KNOWN || (c->data.told_view == 1 && c->data.told_power == 1));
+}
+
 ts_code tr_validator_create(tr_trainer *t, ts_status *st)
 {
     const tr_config *c = &t->config;
@@ -66,10 +73,13 @@ ts_code tr_validator_create(tr_trainer *t, ts_status *st)
     const uint64_t first = (uint64_t)v->first;
     tr_config camera = *c;
     if (c->validate.camera == TR_CAMERA_DEFAULT) camera.data = tr_config_default().data;
+    const bool known = learns_known(c);
+    if (known && c->train.lesson == TR_LESSON_KNOWN) camera = tr_measured_camera(&camera);
     tr_capture_views(camera.data.sheet, (uint64_t)c->validate.seed, first, v->count, (int)given, v->captures);
     tr_photographs(&camera, (uint64_t)c->validate.seed, first, v->count, c->validate.size, v->maps, v->captures,
                    (int)given, v->images, v->shots);
-    if (c->arch.revisions > 0 && given > 1) tr_describe_several(v->shots, v->count * (int)given, v->captures, v->known);
+    if (known || (c->arch.revisions > 0 && given > 1))
+        tr_describe_several(v->shots, v->count * (int)given, v->captures, v->known);
     for (int i = 0; i < v->count; i++) {
         ts_rng rng = ts_rng_make((uint64_t)c->validate.seed, TS_STREAM_EVAL, first + (uint64_t)i);
         rd_eval_views(&rng, RD_EVAL_VIEWS, v->views + (size_t)i * RD_EVAL_VIEWS);
@@ -109,7 +119,7 @@ static void revise(ag_tape *tape, const nn_model *model, const nn_input *in, int
 static ts_code measure(tr_trainer *t, int first, int n, int iterations, ts_status *st)
 {
     const tr_validator *v = &t->validator;
-    const int size = t->config.validate.size, channels = t->config.arch.channels;
+    const int size = t->config.validate.size;
     const size_t pixels = (size_t)size * (size_t)size;
     const rd_grid grid = rd_grid_full(size);
     const size_t given = (size_t)tr_most_given(&t->config), photograph = (size_t)first * given;
@@ -119,7 +129,7 @@ static ts_code measure(tr_trainer *t, int first, int n, int iterations, ts_statu
                    .known = t->config.arch.conditions ? nothing : NULL,
                    .given = (int)given};
     ag_value *maps[TR_MOST_ITERATIONS + 1];
-    if (v->model->arch.revisions > 0 && given > 1) in.known = v->known + photograph;
+    if (learns_known(&t->config) || (v->model->arch.revisions > 0 && given > 1)) in.known = v->known + photograph;
     ag_reset(v->tape);
     if (v->model->coder.code > 0) { /* how well the maps themselves come back */
         float *truth = v->maps + (size_t)first * pixels * MAP_CHANNELS;
@@ -132,6 +142,7 @@ static ts_code measure(tr_trainer *t, int first, int n, int iterations, ts_statu
         *st = *ag_status(v->tape);
         return st->code;
     }
+    const int channels = maps[0]->t.shape.c; /* an auto-encoder's are those of maps, whatever g says */
     for (int i = 0; i < n; i++) {
         const float *target = v->maps + (size_t)(first + i) * pixels * MAP_CHANNELS;
         const size_t at = (size_t)i * pixels * (size_t)channels;

@@ -1,6 +1,7 @@
 #include "data/materials/statistics.h"
 #include "tensor/rng.h"
 #include <dirent.h>
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -102,7 +103,7 @@ static ts_code visit_folder(const char *folder, bool strips, int size, io_visit 
     struct dirent **list = NULL;
     int n = scandir(folder, &list, not_hidden, alphasort);
     ts_code code = TS_OK;
-    if (n < 0) return TS_OK;
+    if (n < 0) return errno == ENOENT ? TS_OK : ts_fail(st, TS_IO, "%s: %s", folder, strerror(errno));
     for (int i = 0; i < n; i++) {
         char path[4096];
         io_material m = {0};
