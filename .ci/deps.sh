@@ -55,7 +55,9 @@ if [ -t 0 ] && [ -t 2 ] && [ -z "${YES:-}${CI:-}" ]; then
     read -r _ || exit 1
 fi
 export DEBIAN_FRONTEND=noninteractive
-if $run apt-get update -qq >&2 && $run apt-get install -y -qq --no-install-recommends $missing $optional >&2; then
+get() { $run apt-get install -y -qq --no-install-recommends "$@" >&2; }
+if $run apt-get update -qq >&2 && { [ -z "$missing" ] || get $missing; }; then
+    [ -z "$optional" ] || get $optional || without
     exit 0
 fi
 [ -z "$missing" ] && without

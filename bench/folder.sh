@@ -19,12 +19,13 @@ for round in $(seq 0 "$rounds"); do
     for infer in "$a" "$b"; do
         begin=$(date +%s%N)
         "$infer" -q --size 256 --maps diffuse,specular,roughness,normal "$@" "$folder"/in/*.jpg -o "$folder/out" \
-            >/dev/null
+            >/dev/null || { echo "$infer: failed" >&2; exit 1; }
         end=$(date +%s%N)
         rm -rf "$folder/out"
-        [ "$round" -eq 0 ] || echo "$((end - begin))"
+        [ "$round" -eq 0 ] || echo "$((end - begin))" >>"$folder/times"
     done
-done | paste - - | awk '
+done
+paste - - <"$folder/times" | awk '
     function median(v, n, i, j, t) {
         for (i = 2; i <= n; i++) for (j = i; j > 1 && v[j] < v[j - 1]; j--) { t = v[j]; v[j] = v[j - 1]; v[j - 1] = t }
         return n % 2 ? v[(n + 1) / 2] : (v[n / 2] + v[n / 2 + 1]) / 2

@@ -8,16 +8,24 @@ shift 3
 for build in "$a" "$b"; do
     [ -x "$build/bin/lgd-bench" ] || { echo "$build/bin/lgd-bench: make it first" >&2; exit 1; }
 done
+out=$(mktemp)
+rows=$(mktemp)
+trap 'rm -f "$out" "$rows"' EXIT
+trap 'exit 130' INT TERM
 for round in $(seq "$rounds"); do
-    for build in "$a" "$b"; do
-        "$build/bin/lgd-bench" "$@" | awk -v round="$round" -v build="$([ "$build" = "$a" ] && echo a || echo b)" '
+    for side in a b; do
+        [ $side = a ] && build=$a || build=$b
+        "$build/bin/lgd-bench" "$@" >"$out" || { echo "$build/bin/lgd-bench $*: failed" >&2; exit 1; }
+        awk -v round="$round" -v build=$side '
             match($0, / +[0-9.]+ ms/) {
                 time = $0; sub(/ ms.*/, "", time); sub(/.* /, "", time)
                 label = substr($0, 1, RSTART - 1); seen[label]++
                 print build "\t" round "\t" label " " seen[label] "\t" time
-            }'
+            }' "$out" >>"$rows"
     done
-done | awk -F '\t' '
+done
+[ -s "$rows" ] || { echo "lgd-bench $*: no row has a time" >&2; exit 1; }
+awk -F '\t' '
     function median(v, n, i, j, t) {
         for (i = 2; i <= n; i++) for (j = i; j > 1 && v[j] < v[j - 1]; j--) { t = v[j]; v[j] = v[j - 1]; v[j - 1] = t }
         return n % 2 ? v[(n + 1) / 2] : (v[n / 2] + v[n / 2 + 1]) / 2
@@ -33,4 +41,4 @@ done | awk -F '\t' '
             }
             if (n) printf "%-60s %10.3f %10.3f ms  B/A %.3f\n", label[l], median(x, n), median(y, n), median(q, n)
         }
-    }'
+    }' "$rows"

@@ -54,7 +54,7 @@ static const cl_argument arguments[] = {
      "sheets-exact:FOLDER  the same materials from the windows without faults and the true lights and cameras"},
     {TOLD, "told", NULL, "captures, and with --camera: the methods know light and camera (default: they know neither)"},
     {UNTOLD, "untold", NULL,
-     "generated materials, strips and map folders: the methods do not know the light's power; renderings are\n"
+     "generated materials, strips, map folders and sheets: the methods do not know the light's power; renderings are\n"
      "compared after fitting one factor to the estimate's"},
     {PEER_MAPS, "peer-maps", "FOLDER",
      "photos: a peer's maps of some of them, images of four panels: normal, diffuse, roughness, specular"},

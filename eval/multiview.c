@@ -1,5 +1,6 @@
 #include "eval/multiview.h"
 #include "eval/metrics/flip.h"
+#include "eval/metrics/metrics.h"
 #include "eval/metrics/ssim.h"
 #include "infer/capture.h"
 #include "render/render.h"
@@ -137,6 +138,7 @@ ev_row ev_capture_score(const io_capture *c, int inputs, const float *maps, int 
     row.value[EV_RENDER] = rmse / (c->images - inputs);
     if (perceptual) row.value[EV_SSIM] = ssim / (c->images - inputs), row.value[EV_FLIP] = flip / (c->images - inputs);
     if (lpips) row.value[EV_LPIPS] = distance / (c->images - inputs);
+    if (!ev_perceived(c->size, perceptual, lpips, row.value)) row.value[EV_RENDER] = NAN;
     free(memory);
     return row;
 }

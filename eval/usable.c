@@ -29,8 +29,8 @@ typedef struct use {
 
 static ts_code check_uses(const ev_command *c, const ev_set *set, ts_status *st)
 {
-    /* rendered: their photographs are made here, and told unless --camera or --untold is given. Of sheets --exposure
-     * and --camera decide whether a factor is fitted. */
+    /* rendered: their photographs are made here, and told unless --camera or --untold is given. Of sheets
+     * --camera decides whether a factor is fitted. */
     const unsigned rendered = 1u << EV_PROCEDURAL | 1u << EV_STRIPS | 1u << EV_MAPS, captures = 1u << EV_MULTIVIEW,
                    sheets = 1u << EV_UNDER_SHEET | 1u << EV_UNDER_SHEET_EXACT, photos = 1u << EV_PHOTOS,
                    folders = 1u << EV_MAPS | sheets;
@@ -42,13 +42,14 @@ static ts_code check_uses(const ev_command *c, const ev_set *set, ts_status *st)
         {"light", c->light[0] != 0 || c->light[1] != 0, rendered, known},
         {"fov", c->fov > 0, rendered, known},
         {"tilt", c->tilt > 0, rendered, known},
-        {"exposure", c->exposure > 0, rendered | sheets, known},
+        {"exposure", c->exposure > 0, rendered, known},
         {"camera", c->photographed, rendered | sheets, known},
         {"untold", c->light_unknown, rendered | sheets, known},
         {"normal", c->convention.normal != IO_NORMAL_FROM_FILE, folders, maps},
         {"workflow", c->convention.workflow != IO_WORKFLOW_FROM_FILE, folders, maps},
         {"colour", c->convention.colour != IO_ENCODING_FROM_FILE, folders, maps},
-        {"told", c->light_known, captures | rendered | sheets, "captures (multiview:)"},
+        {"told", c->light_known, captures | sheets | (c->photographed ? rendered : 0),
+         "captures (multiview:), or --camera"},
         {"tune", c->tune, ~photos, scored}, /* photographs without known maps have no error */
         {"pareto", c->pareto, ~photos, scored},
         {"figure", c->iterations_figure || c->methods_figure, ~photos, scored},
@@ -64,6 +65,8 @@ ts_code ev_usable_options(const ev_command *c, const ev_set *set, ts_status *st)
 {
     const unsigned photos = 1u << EV_PHOTOS;
     if (check_uses(c, set, st) != TS_OK) return st->code;
+    if (c->light_known && c->light_unknown)
+        return ts_fail(st, TS_INVALID, "--told and --untold: the methods know the light or they do not");
     if (!c->peer_maps) return TS_OK;
     DIR *d = opendir(c->peer_maps);
     if (!d) return ts_fail(st, TS_IO, "--peer-maps %s: cannot be read: %s", c->peer_maps, strerror(errno));

@@ -141,8 +141,16 @@ int main(int argc, char **argv)
         return 2;
     }
     qsort(tests, (size_t)count, sizeof tests[0], by_name);
-    int failed = 0;
-    for (int i = 0; i < count; i++)
-        if (argc < 2 || strstr(tests[i].name, argv[1])) failed += run(i) == 1;
-    return failed != 0;
+    int failed = 0, ran = 0;
+    if (argc > 2) {
+        fprintf(stderr, "lgd-test takes one word of the tests' names at most\n");
+        return 2;
+    }
+    for (int i = 0; i < count; i++) {
+        if (argc > 1 && !strstr(tests[i].name, argv[1])) continue;
+        failed += run(i) == 1;
+        ran++;
+    }
+    if (!ran) fprintf(stderr, "lgd-test: no test's name has the word '%s'\n", argc > 1 ? argv[1] : "");
+    return !ran ? 2 : failed != 0;
 }

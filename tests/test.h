@@ -2,6 +2,7 @@
  * own. */
 #ifndef TEST_H
 #define TEST_H
+#include "tests/support/farther.h"
 #include <stdbool.h>
 #include <stdio.h>
 

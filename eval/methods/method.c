@@ -132,6 +132,11 @@ void ev_close(ev_estimator *e)
     e->bytes = e->count = 0;
 }
 
+bool ev_ends_early(const ev_estimator *e)
+{
+    return ev_find(e->method->settings, "tolerance") >= 0 && ev_number(e, "tolerance") > 0;
+}
+
 int ev_points(const ev_estimator *e, int step[EV_POINTS])
 {
     const int steps = e->method->steps ? e->method->steps(e) : 0;

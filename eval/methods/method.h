@@ -71,6 +71,9 @@ void ev_method_help(FILE *f);
 ts_code ev_open(ev_estimator *e, ts_status *st);
 void ev_close(ev_estimator *e);
 
+/* Whether a tolerance decides how many steps are made, so that the last alone is scored. Parsed, not yet open. */
+bool ev_ends_early(const ev_estimator *e);
+
 /* The steps that are scored, the first and the last among them: ascending, at most EV_POINTS. Of an open one. */
 int ev_points(const ev_estimator *e, int step[EV_POINTS]);
 

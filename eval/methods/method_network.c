@@ -21,7 +21,7 @@ static ts_code open_lgd(ev_estimator *e, ts_status *st)
 {
     if (ev_open_net(e, "model", st) != TS_OK) return st->code;
     const nn_arch *a = &e->net->arch;
-    e->last_alone = ev_number(e, "tolerance") > 0;
+    e->last_alone = ev_ends_early(e);
     const int most = nn_most_photographs(a);
     if (ev_number(e, "sample") != 0 && a->descent != NN_DESCENT_POSTERIOR)
         return ts_fail(st, TS_UNSUPPORTED, "%s: does not guess the scene: it cannot be told what a sample is",

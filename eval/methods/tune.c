@@ -58,6 +58,8 @@ static ts_code add(ev_tuning *t, const char *spec, int of, const char *model, co
     }
     ev_estimator *e = &t->method[t->methods];
     if (ev_method_parse(spec, model, -1, e, st) != TS_OK) return st->code;
+    if (ev_ends_early(e))
+        return ts_fail(st, TS_INVALID, "--method %s: --tune tries numbers of steps, and tolerance decides them", spec);
     e->tried = tried;
     t->of[t->methods++] = of;
     return TS_OK;
@@ -140,7 +142,7 @@ ts_code ev_tune_write(const ev_report *r, const char *folder, ts_status *st)
 static bool complete(const ev_report *r, int column)
 {
     for (int i = 0; i < r->results; i++)
-        if (isnan(r->result[i].row[column].value[EV_RENDER])) return false;
+        if (isnan(r->result[i].seconds[column])) return false;
     return r->results > 0;
 }
 

@@ -58,7 +58,7 @@ static void load(int size, const float *maps, int channels, complex_t *plane)
     }
 }
 
-void ev_band_correlation(int size, const float *maps, int channels, const float *truth, int truth_channels,
+bool ev_band_correlation(int size, const float *maps, int channels, const float *truth, int truth_channels,
                          double correlation[EV_BANDS])
 {
     const double rounding = 1e-6, relief = EV_LEAST_RELIEF; /* RMS; rounding: what floats leave in a band */
@@ -68,7 +68,7 @@ void ev_band_correlation(int size, const float *maps, int channels, const float 
     for (int k = 0; k < EV_BANDS; k++) correlation[k] = NAN;
     if (!memory || size < 1) {
         free(memory);
-        return;
+        return false;
     }
     complex_t *a = memory, *b = memory + pixels, *root = b + pixels, *line = root + size;
     for (int i = 0; i < size; i++) root[i] = cexp(-2 * I * 3.14159265358979323846 * i / size);
@@ -92,4 +92,5 @@ void ev_band_correlation(int size, const float *maps, int channels, const float 
         if (theirs[k] > relief * relief * square)
             correlation[k] = mine[k] > rounding * rounding * square ? products[k] / sqrt(mine[k] * theirs[k]) : 0;
     free(memory);
+    return true;
 }

@@ -48,7 +48,13 @@ void ev_input_views(const rd_view *given, int count, uint64_t seed, uint64_t ide
     input[0] = *given; /* instead of the flash */
 }
 
-/* SSIM and LPIPS as RMSE in gamma space; FLIP takes linear values. */
+bool ev_perceived(int size, bool perceptual, bool lpips, const double value[EV_METRICS])
+{
+    return !(perceptual && isnan(value[EV_FLIP])) && !(perceptual && size >= EV_SSIM_SIDE && isnan(value[EV_SSIM])) &&
+        !(lpips && size >= EV_LPIPS_SIDE && isnan(value[EV_LPIPS]));
+}
+
+/* SSIM and LPIPS as RMSE in gamma space; FLIP takes linear values. Where a factor is fitted the estimate has it. */
 static void perceive(const ev_case *c, const float *maps, int channels, ev_row *row)
 {
     const int size = c->truth->size;
@@ -56,7 +62,9 @@ static void perceive(const ev_case *c, const float *maps, int channels, ev_row *
     float *mine = malloc(2 * values * sizeof *mine), *truth = mine ? mine + values : NULL;
     double ssim = mine && c->perceptual ? 0 : NAN, flip = ssim, lpips = mine && c->lpips ? 0 : NAN;
     for (int v = 0; v < RD_EVAL_VIEWS && mine; v++) {
-        rd_render(rd_grid_full(size), maps, channels, &c->views[v], true, mine);
+        rd_view view = c->views[v];
+        if (c->fit) view.power *= (float)row->value[EV_EXPOSURE];
+        rd_render(rd_grid_full(size), maps, channels, &view, true, mine);
         rd_render(rd_grid_full(size), c->truth->maps, MAP_CHANNELS, &c->views[v], true, truth);
         if (c->perceptual) flip += ev_flip(size, size, mine, truth, NULL) / RD_EVAL_VIEWS;
         for (size_t i = 0; i < 2 * values; i++) mine[i] = rd_gamma(mine[i]);
@@ -66,6 +74,7 @@ static void perceive(const ev_case *c, const float *maps, int channels, ev_row *
     row->value[EV_SSIM] = ssim;
     row->value[EV_FLIP] = flip;
     row->value[EV_LPIPS] = lpips;
+    if (!ev_perceived(size, c->perceptual, c->lpips, row->value)) row->value[EV_RENDER] = NAN;
     free(mine);
 }
 
@@ -185,8 +194,8 @@ static ev_row score_photo(const ev_case *c, const float *maps, int channels)
     return row;
 }
 
-/* Those that compare normals alone. */
-static void score_normals(const io_material *truth, const float *maps, int channels, ev_row *row)
+/* Those that compare normals alone. False: there is no memory. */
+static bool score_normals(const io_material *truth, const float *maps, int channels, ev_row *row)
 {
     const float flat[MAP_CHANNELS] = {0};
     const int64_t pixels = (int64_t)truth->size * truth->size;
@@ -197,7 +206,7 @@ static void score_normals(const io_material *truth, const float *maps, int chann
     }
     row->value[EV_FLAT] = sqrt(squares);
     row->value[EV_OVER_FLAT] = sqrt(squares) > EV_LEAST_RELIEF ? row->value[EV_NORMAL] / sqrt(squares) : NAN;
-    ev_band_correlation(truth->size, maps, channels, truth->maps, MAP_CHANNELS, row->value + EV_BAND);
+    return ev_band_correlation(truth->size, maps, channels, truth->maps, MAP_CHANNELS, row->value + EV_BAND);
 }
 
 ev_row ev_score(const ev_case *c, const float *maps, int channels)
@@ -213,12 +222,12 @@ ev_row ev_score(const ev_case *c, const float *maps, int channels)
     row.value[EV_ROUGHNESS] = e.roughness;
     row.value[EV_NORMAL] = e.normal;
     row.value[EV_ANGLE] = e.angle;
-    score_normals(truth, maps, channels, &row);
+    const bool measured = score_normals(truth, maps, channels, &row);
     if (c->fit) fit(c, maps, channels, &row);
     else
         row.value[EV_RENDER] = rd_render_rmse(rd_grid_full(truth->size), maps, channels, truth->maps, MAP_CHANNELS,
                                               c->views, RD_EVAL_VIEWS);
-    if (row.value[EV_RENDER] < 0) row.value[EV_RENDER] = NAN; /* no memory: the caller says so */
     if (c->perceptual || c->lpips) perceive(c, maps, channels, &row);
+    if (!measured || row.value[EV_RENDER] < 0) row.value[EV_RENDER] = NAN; /* no memory: the caller says so */
     return row;
 }

@@ -55,6 +55,9 @@ void ev_input_views(const rd_view *given, int count, uint64_t seed, uint64_t ide
  * c^(1/2.2) gamma(a). Both linear; 1 where all are clipped or black. */
 double ev_factor(size_t values, const float *a, const float *b);
 
-/* The scores of one estimate. */
+/* Whether SSIM, FLIP and LPIPS of pictures of that size are there where they are asked for: else memory was short. */
+bool ev_perceived(int size, bool perceptual, bool lpips, const double value[EV_METRICS]);
+
+/* The scores of one estimate. EV_RENDER is not finite where memory for any of them could not be had. */
 ev_row ev_score(const ev_case *c, const float *maps, int channels);
 #endif

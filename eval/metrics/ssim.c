@@ -24,7 +24,7 @@ static double channel(int h, int w, double *moment[MOMENTS])
 
 double ev_ssim(int h, int w, const float *a, const float *b)
 {
-    if (h <= 2 * RADIUS || w <= 2 * RADIUS) return NAN;
+    if (h < EV_SSIM_SIDE || w < EV_SSIM_SIDE) return NAN;
     const ev_taps window = ev_gauss_taps(1.5, RADIUS);
     const size_t pixels = (size_t)h * (size_t)w;
     double *memory = malloc((MOMENTS + 1) * pixels * sizeof *memory), *moment[MOMENTS], sum = 0;

@@ -41,7 +41,7 @@ static void compare(nn_arch arch, int steps)
           *b = gradient(m, &in, target, steps, true, &memory[1], &loss[1]);
     CHECK(loss[0] == loss[1], "the loss is %.9g, and %.9g when steps are computed again", loss[0], loss[1]);
     double largest = 0;
-    for (size_t i = 0; i < m->count; i++) largest = fmax(largest, fabs((double)a[i]));
+    for (size_t i = 0; i < m->count; i++) largest = farther(largest, fabs((double)a[i]));
     CHECK(largest > 0, "no gradient");
     for (size_t i = 0; i < m->count; i++)
         CHECK(a[i] == b[i], "gradient %zu is %.9g, and %.9g when steps are computed again", i, a[i], b[i]);

@@ -2,7 +2,7 @@
 # What make promises: who includes whom, how it installs packages, and what every program shares. The library:
 # library.sh
 . tests/cli/lib.sh
-PROGRAMS="train infer eval data"
+PROGRAMS="train infer eval data convert capture"
 
 includes_follow_the_layout() { expect 0 sh .ci/includes.sh; }
 check includes_follow_the_layout includes_follow_the_layout

@@ -206,7 +206,7 @@ lpips() {
     expect 0 "$BIN/lgd-eval" -i 1 --fast --size 48 --set procedural:1,3 -o "$T/p" \
         --lpips-weights "$T/alexnet.pth" "$T/alex.safetensors"
     says "$T/out" "lpips"
-    awk -F, 'NR == 1 && $14 != "lpips" || NR > 1 && !($15 > 0 && $14 < 5) { exit 1 }' "$T/p/results.csv" ||
+    awk -F, 'NR == 1 && $14 != "lpips" || NR > 1 && !($15 > 0 && $15 < 5) { exit 1 }' "$T/p/results.csv" ||
         fail "$(cat "$T/p/results.csv")"
     says "$T/p/summary.csv" "lpips_mean,lpips_deviation"
     says "$T/p/results.json" '"lpips": 0.'

@@ -43,7 +43,7 @@ static double relief_error(int size, double *spread)
     CHECK(fabs(got) < 1e-6, "the mean height is %g", got);
     for (int k = 0; k < size * size; k++) {
         const double want = relief((k % size + 0.5) / size - 0.5, 0.5 - (k / size + 0.5) / size) - mean;
-        worst = fmax(worst, fabs((double)height[k] - want));
+        worst = farther(worst, fabs((double)height[k] - want));
         square += want * want;
     }
     *spread = sqrt(square / pixels);

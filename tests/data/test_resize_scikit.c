@@ -28,7 +28,7 @@ static double difference(int from, int to, const float *expected, int step)
     CHECK(!io_centre_square_scikit(&in, to, 0, &out, &st), "%s", st.message);
     double worst = 0;
     for (int i = 0; i < to * to * 3; i += step)
-        worst = fmax(worst, fabs((double)out.data[i] - (double)expected[i / step]));
+        worst = farther(worst, fabs((double)out.data[i] - (double)expected[i / step]));
     io_image_free(&in);
     io_image_free(&out);
     return worst;

@@ -106,7 +106,7 @@ TEST(sheet_windows_of_a_set)
                 sum += (double)(a[at] - fminf(b[at] * ratio, 1));
                 bright += (double)a[at];
             }
-            worst = fmax(worst, fabs(sum) / fmax(bright, 1));
+            worst = farther(worst, fabs(sum) / fmax(bright, 1));
         }
         CHECK(worst < 0.05, "window %d: a part is %g brighter or darker", k, worst);
         for (int i = 0; i < 3; i++)

@@ -149,6 +149,21 @@ TEST(eval_a_peer_that_has_the_truth_has_no_error)
           "over flat: %g", row.value[EV_OVER_FLAT]);
     CHECK(row.value[EV_BAND] > 0.999, "band: %g", row.value[EV_BAND]);
     CHECK(isnan(row.value[EV_RESIDUE_HUE]), "a residue where the truth is known");
+    /* half of all reflectances under twice the light look the same, but for Fresnel's rise at the edges */
+    ev_case fitted = c;
+    fitted.fit = fitted.perceptual = true;
+    for (size_t i = 0; i < (size_t)m.size * (size_t)m.size; i++)
+        for (int k = 0; k < 3; k++) {
+            float *v = m.maps + i * MAP_CHANNELS;
+            v[MAP_DIFFUSE + k] = 0.5f * (v[MAP_DIFFUSE + k] + 1) - 1;
+            v[MAP_SPECULAR + k] = 0.5f * (v[MAP_SPECULAR + k] + 1) - 1;
+        }
+    const ev_row half = ev_score(&fitted, m.maps, MAP_CHANNELS), plain = ev_score(&c, m.maps, MAP_CHANNELS);
+    CHECK(fabs(half.value[EV_EXPOSURE] - 2) < 0.05, "a factor of %g for one of 2", half.value[EV_EXPOSURE]);
+    CHECK(half.value[EV_RENDER] < 0.1 * plain.value[EV_RENDER], "RMSE %g with the factor, %g without",
+          half.value[EV_RENDER], plain.value[EV_RENDER]);
+    CHECK(half.value[EV_FLIP] < 0.02 && half.value[EV_SSIM] > 0.99, "pictures are compared without the factor: %g, %g",
+          half.value[EV_FLIP], half.value[EV_SSIM]);
     free(image);
     /* wrong shapes are named */
     CHECK(ev_read_four_panels(path, 32, &peer, &st) == TS_OK, "%s", st.message);

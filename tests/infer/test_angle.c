@@ -80,7 +80,7 @@ TEST(angle_rectifies)
             for (int i = 0; i < 48; i++)
                 for (int k = 0; k < 3; k++) {
                     const double at[2] = {(i + 0.5) / 48 - 0.5, 0.5 - (j + 0.5) / 48};
-                    worst = fmax(worst, fabs((double)(r.square.data[(j * 48 + i) * 3 + k] - angled_pattern(at, k))));
+                    worst = farther(worst, fabs((double)(r.square.data[(j * 48 + i) * 3 + k] - angled_pattern(at, k))));
                 }
         CHECK(worst < 2e-3, "the square misses the pattern by %g", worst);
         for (int k = 0; k < 3; k++)
@@ -156,7 +156,7 @@ TEST(angle_reads_up_to_every_corner)
             double want[2];
             turned((double[2]){(i % SIZE + 0.5) / SIZE, (i / SIZE + 0.5) / SIZE}, want, &turn);
             for (int k = 0; k < 2; k++)
-                worst = fmax(worst, fabs((double)square.data[3 * i + k] - (want[k] - 0.5) / SIDE));
+                worst = farther(worst, fabs((double)square.data[3 * i + k] - (want[k] - 0.5) / SIDE));
         }
         CHECK(worst < 1e-4, "turned by %d eighths: %g off", turns, worst);
         io_image_free(&square);

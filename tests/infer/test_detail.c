@@ -87,7 +87,7 @@ TEST(detail_stays_away_from_burnt_out_pixels)
             for (int k = 0; k < C; k++) {
                 const int i = (y * SIDE + x) * C + k;
                 const double change = fabs((double)(maps[i] - before[i]));
-                beyond = fmax(beyond, fabs((double)maps[i]) - 1);
+                beyond = farther(beyond, fabs((double)maps[i]) - 1);
                 if (far < BURNT / 2) most = fmax(most, change);
                 else if (far < BURNT / 2 + 8 && k < MAP_NORMAL)
                     rim = fmax(rim, change - fabs((double)(truth[i] - before[i])));

@@ -90,7 +90,7 @@ TEST(estimator_watcher_of_a_large_photograph)
     estimate(m, true, in.image.data, &o, &t, one);
     CHECK(t.count == STEPS + 1, "%d calls", t.count);
     double far = 0;
-    for (size_t i = 0; i < count; i++) far = fmax(far, fabs((double)tiles[i] - one[i]));
+    for (size_t i = 0; i < count; i++) far = farther(far, fabs((double)tiles[i] - one[i]));
     CHECK(far < 2e-5, "%g away", far);
     estimate(m, true, in.image.data, &tolerant, &t, one);
     CHECK(t.count == 1 && t.steps[0] == STEPS, "%d calls, the first of step %d", t.count, t.steps[0]);

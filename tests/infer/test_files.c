@@ -38,7 +38,7 @@ static const char *make_photo(unsigned char levels[W * H * 3])
 static double most_apart(const float *a, const float *b, int count)
 {
     double most = 0;
-    for (int i = 0; i < count; i++) most = fmax(most, fabs((double)a[i] - b[i]));
+    for (int i = 0; i < count; i++) most = farther(most, fabs((double)a[i] - b[i]));
     return most;
 }
 

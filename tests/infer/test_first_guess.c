@@ -72,8 +72,8 @@ TEST(first_guess_reads_unknown_powers_darker)
         said_of(tape, m, in, NN_READ_AT, &darker);
         double as_it_is = 0, as_darker = 0;
         for (int i = 0; i < PLACE * PLACE * NN_SPREADS; i++) {
-            as_it_is = fmax(as_it_is, fabs((double)(g.spread[i] - same.spread->t.data[i])));
-            as_darker = fmax(as_darker, fabs((double)(g.spread[i] - darker.spread->t.data[i])));
+            as_it_is = farther(as_it_is, fabs((double)(g.spread[i] - same.spread->t.data[i])));
+            as_darker = farther(as_darker, fabs((double)(g.spread[i] - darker.spread->t.data[i])));
         }
         CHECK((k ? as_it_is : as_darker) == 0, "it is read otherwise: off by %g, %g", as_it_is, as_darker);
         CHECK((k ? as_darker : as_it_is) > 1e-4, "brightness changes nothing: %g, %g", as_it_is, as_darker);

@@ -73,7 +73,7 @@ static void untiled(ag_tape *tape, const nn_model *m, float *image, int side, fl
 static double farthest(const float *a, const float *b, size_t values)
 {
     double most = 0;
-    for (size_t i = 0; i < values; i++) most = fmax(most, fabs((double)a[i] - b[i]));
+    for (size_t i = 0; i < values; i++) most = farther(most, fabs((double)a[i] - b[i]));
     return most;
 }
 

@@ -75,7 +75,7 @@ TEST(burnt_as_plainly_written)
     plain_burnt(s->image, burnt);
     const float *found = nn_burnt_find(rd_grid_full(EDGE), s->image, arena);
     CHECK(found, "no memory");
-    for (int i = 0; i < PIXELS; i++) far = fmax(far, fabs((double)found[i] - burnt[i]));
+    for (int i = 0; i < PIXELS; i++) far = farther(far, fabs((double)found[i] - burnt[i]));
     CHECK(far < 1e-6, "burnt is %g off", far);
     CHECK(burnt[43 * EDGE + 52] > 0.5 && burnt[60 * EDGE + 20] == 0, "the case has no spot");
     memcpy(settled, s->step, sizeof s->step);
@@ -86,7 +86,7 @@ TEST(burnt_as_plainly_written)
         const double to = settles(i % C)
             ? (double)s->step[i] + burnt[i / C] * (filtered(change, C, i % C, i / C / EDGE, i / C % EDGE) - change[i])
             : (double)s->step[i];
-        far = fmax(far, fabs((double)settled[i] - to));
+        far = farther(far, fabs((double)settled[i] - to));
     }
     CHECK(far < 1e-6, "a step is %g off", far);
     nn_burnt_hold(rd_grid_full(EDGE), found, C, s->step);
@@ -132,7 +132,7 @@ TEST(burnt_keeps_what_all_pixels_change)
     memcpy(before, s->step, sizeof s->step);
     CHECK(burnt && nn_burnt_settle(rd_grid_full(EDGE), burnt, s->mean, s->maps, C, arena, s->step), "no memory");
     double far = 0;
-    for (int i = 0; i < VALUES; i++) far = fmax(far, fabs((double)(s->step[i] - before[i])));
+    for (int i = 0; i < VALUES; i++) far = farther(far, fabs((double)(s->step[i] - before[i])));
     CHECK(far < 1e-6, "a step of all pixels changes by %g", far);
     for (int i = 0; i < PIXELS * 3; i++) s->image[i] = fminf(s->image[i], 0.85f);
     burnt = nn_burnt_find(rd_grid_full(EDGE), s->image, arena);

@@ -82,8 +82,8 @@ TEST(nn_coarse_steps_read_the_photograph_at_up_to_twice_their_size)
         double worst = 0, most = 0;
         for (int64_t i = 0; i < ts_count(maps[1]->t.shape); i++) {
             const double change = maps[1]->t.data[i] - from->t.data[i];
-            worst = fmax(worst, fabs(change - 0.5 * newton->t.data[i]));
-            most = fmax(most, fabs(change));
+            worst = farther(worst, fabs(change - 0.5 * newton->t.data[i]));
+            most = farther(most, fabs(change));
         }
         CHECK(worst < 1e-6 && most > 1e-3, "%d pixels: the step is up to %g off, itself up to %g", side, worst, most);
         ag_tape_destroy(&t);

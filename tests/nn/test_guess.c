@@ -43,7 +43,7 @@ static void guess(nn_model *m, const nn_input *in, float *maps, float *spread, f
 static double difference(const float *a, const float *b, size_t n)
 {
     double most = 0;
-    for (size_t i = 0; i < n; i++) most = fmax(most, fabs((double)a[i] - (double)b[i]));
+    for (size_t i = 0; i < n; i++) most = farther(most, fabs((double)a[i] - (double)b[i]));
     return most;
 }
 
@@ -171,7 +171,7 @@ TEST(guess_turns_with_the_photograph)
             const float *p = one + (x * FINE + FINE - 1 - y) * 9, *q = two + (y * FINE + x) * 9;
             for (int c = 0; c < 9; c++) {
                 const float want = c == 3 ? -p[4] : c == 4 ? p[3] : p[c];
-                most = fmax(most, fabs((double)q[c] - (double)want));
+                most = farther(most, fabs((double)q[c] - (double)want));
             }
             spread = fmax(
                 spread,
@@ -221,7 +221,7 @@ TEST(guess_begins_as_a_smaller_g)
     const ag_value *maps = nn_predict(tape, from, &in);
     CHECK(maps, "%s", ag_status(tape)->message);
     double most = 0; /* tanh is applied before the one enlargement and after the other */
-    for (int i = 0; i < FINE * FINE * 9; i++) most = fmax(most, fabs((double)one[i] - (double)maps->t.data[i]));
+    for (int i = 0; i < FINE * FINE * 9; i++) most = farther(most, fabs((double)one[i] - (double)maps->t.data[i]));
     CHECK(most < 0.02, "the maps differ by %g", most);
     ag_tape_destroy(&tape);
     nn_model_free(&from);

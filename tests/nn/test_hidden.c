@@ -105,7 +105,7 @@ static float change_of_stripes(int at, int width, float a, float b)
     fill(1, filled);
     for (int i = 0; i < PIXELS; i++)
         for (int k = at; k < at + 3; k++)
-            most = fmaxf(most, fabsf(logf((filled[i * C + k] + 1) / (maps[i * C + k] + 1))));
+            most = (float)farther((double)most, (double)fabsf(logf((filled[i * C + k] + 1) / (maps[i * C + k] + 1))));
     return most;
 }
 

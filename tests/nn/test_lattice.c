@@ -28,7 +28,7 @@ static double off(const float *want)
 {
     double most = 0;
     for (int i = 0; i < VALUES; i++)
-        if (!at_border(i)) most = fmax(most, fabs((double)(after[i] - want[i])));
+        if (!at_border(i)) most = farther(most, fabs((double)(after[i] - want[i])));
     return most;
 }
 
@@ -49,7 +49,7 @@ TEST(lattice_goes_and_a_slope_stays)
             const float own = pattern[(y % period * period + x % period) * C + c];
             slope[i] = 0.002f * (float)x - 0.003f * (float)y + 0.1f * (float)c;
             before[i] = slope[i] + own - sum[c] / (float)(period * period);
-            faint = fmax(faint, fabs((double)(before[i] - slope[i])));
+            faint = farther(faint, fabs((double)(before[i] - slope[i])));
         }
         take(period, 2);
         CHECK(faint > 0.002 && off(slope) < 0.15 * faint, "period %d: %g is left of a lattice of %g", period,
@@ -127,7 +127,7 @@ TEST(lattice_is_what_its_equation_says)
         take(period, 2);
         for (int i = 0; i < VALUES; i++) {
             const double want = said(period, i / C / SIDE, i / C % SIDE, i % C);
-            most = fmax(most, fabs(want - (double)after[i]));
+            most = farther(most, fabs(want - (double)after[i]));
         }
         CHECK(most < 1e-6, "period %d: %g from the equation", period, most);
     }

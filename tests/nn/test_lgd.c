@@ -49,7 +49,7 @@ TEST(nn_steps_beyond_the_trained_ones_are_shortened)
         double worst = 0;
         for (int64_t i = 0; i < ts_count(x[3]->t.shape); i++) {
             const double from = x[2]->t.data[i], step = y[3]->t.data[i] - from, weight = variant == 3 ? 1 : 4.0 / 9;
-            worst = fmax(worst, fabs(x[3]->t.data[i] - (from + weight * step)));
+            worst = farther(worst, fabs(x[3]->t.data[i] - (from + weight * step)));
         }
         CHECK(worst < 1e-6 && !same(x[2], x[3]), "the third step of two is off by %g (variant %d)", worst, variant);
         ag_tape_destroy(&short_of);
@@ -138,7 +138,7 @@ TEST(nn_refiner_is_translation_equivariant)
             for (int c = 0; c < 9; c++) {
                 double p = out[0]->t.data[((i + DY) * W + j + DX) * 9 + c], q = out[1]->t.data[(i * W + j) * 9 + c];
                 CHECK(fabs(p - q) < 1e-5, "row %d, column %d, channel %d: %g and %g", i, j, c, p, q);
-                size = fmax(size, fabs(p));
+                size = farther(size, fabs(p));
             }
     CHECK(size > 0.01, "the changes are too small to say anything: %g", size);
 }
@@ -177,7 +177,7 @@ static void check_window(int coarse_steps)
                         const double p = maps[0][k]->t.data[big], q = maps[1][k]->t.data[small];
                         CHECK(fabs(p - q) < 1e-5, "R_%d, image %d, row %d, column %d, channel %d: %g and %g", k, n, i,
                               j, c, p, q);
-                        moved = fmax(moved, fabs(p - maps[0][0]->t.data[big]));
+                        moved = farther(moved, fabs(p - maps[0][0]->t.data[big]));
                     }
     CHECK(moved > 0.01, "the refinement is too small to say anything: %g", moved);
     ts_arena_destroy(&arena);
@@ -241,7 +241,7 @@ TEST(nn_global_mean_before_or_after_the_norm)
         check_tape(u);
         double difference = 0;
         for (int64_t i = 0; i < ts_count(x->t.shape); i++)
-            difference = fmax(difference, fabs((double)x->t.data[i] - y->t.data[i]));
+            difference = farther(difference, fabs((double)x->t.data[i] - y->t.data[i]));
         if (before) CHECK(difference > 1e-2, "the mean moves the maps by %g only", difference);
         else CHECK(difference < 1e-4, "a zero mean moves the maps by %g", difference);
     }

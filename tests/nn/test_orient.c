@@ -54,7 +54,7 @@ static void turn(const nn_model *m, const nn_input *photographed, int count)
         check_tape(tape);
         double worst = 0;
         for (int i = 0; i < SIDE * SIDE * MAP_CHANNELS; i++)
-            worst = fmax(worst, fabs((double)maps->t.data[i] - want[i]));
+            worst = farther(worst, fabs((double)maps->t.data[i] - want[i]));
         CHECK(!within || worst < 1e-5, "%d orientations, turned by %d quarters, mirrored %d: R_0 is another one by %g",
               count, way & 3, way >> 2, worst);
         CHECK(within || worst > 1e-3, "%d orientations, turned by %d quarters, mirrored %d: R_0 is the same", count,
@@ -65,7 +65,7 @@ static void turn(const nn_model *m, const nn_input *photographed, int count)
     const ag_value *plain = nn_predict(tape, m, &in);
     double most = 0;
     for (int i = 0; i < SIDE * SIDE * MAP_CHANNELS; i++)
-        most = fmax(most, fabs((double)plain->t.data[i] - first->t.data[i]));
+        most = farther(most, fabs((double)plain->t.data[i] - first->t.data[i]));
     CHECK(count == 1 ? most == 0 : most > 1e-3, "%d orientations are %g from the one", count, most);
     ag_tape_destroy(&tape);
 }
@@ -96,7 +96,7 @@ TEST(nn_two_orientations_are_the_photograph_and_a_quarter_turn)
     turn_normals(back, 1, false);
     double worst = 0;
     for (int i = 0; i < SIDE * SIDE * MAP_CHANNELS; i++)
-        worst = fmax(worst, fabs(both->t.data[i] - 0.5 * ((double)plain->t.data[i] + back[i])));
+        worst = farther(worst, fabs(both->t.data[i] - 0.5 * ((double)plain->t.data[i] + back[i])));
     CHECK(worst < 1e-6, "two orientations are %g from the mean of their maps", worst);
     ag_tape_destroy(&tape);
     nn_model_free(&m);

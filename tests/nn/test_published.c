@@ -167,7 +167,7 @@ TEST(published_renderer_is_the_stated_one)
         const int c = t % 3;
         if (!sound(m)) continue;
         const double expected = plain(m, at, c);
-        worst = fmax(worst, fabs(value[c] - expected) / (expected + 1e-6));
+        worst = farther(worst, fabs(value[c] - expected) / (expected + 1e-6));
         for (int i = 0; i < 9; i++) {
             const double step = 1e-6, edge = fabs(m[3]) < 1 && fabs(m[4]) < 1 ? m[3] * m[3] + m[4] * m[4] - 1 : 0;
             if (fabs(fabs(m[i]) - 1) < 2 * step || fabs(edge) < 1e-3)
@@ -178,7 +178,7 @@ TEST(published_renderer_is_the_stated_one)
             const double slope = (plain(high, at, c) - plain(low, at, c)) / (2 * step),
                          scale = fabs(slope) + 10 * expected + 1e-3;
             if (expected == 0 || plain(low, at, c) == 0 || plain(high, at, c) == 0) continue;
-            worst_gradient = fmax(worst_gradient, fabs(by[c][i] - slope) / scale);
+            worst_gradient = farther(worst_gradient, fabs(by[c][i] - slope) / scale);
         }
     }
     printf("  value %.2g, gradient %.2g\n", worst, worst_gradient);
@@ -235,14 +235,14 @@ TEST(published_kernels_match_the_reference)
                 if (xy > 1 - 1e-3 && xy < 1 + 1e-3) continue; /* n_z's slope grows without bound */
                 for (int c = 0; c < 3; c++) {
                     const double shown = fmin(value[c], 1), unit = rd_published.gradient / (3.0 * 256 * 256);
-                    worst = fmax(worst, fabs((double)image[p * 3 + c] - shown) / (shown + 1e-3));
+                    worst = farther(worst, fabs((double)image[p * 3 + c] - shown) / (shown + 1e-3));
                     for (int i = 0; i < 9 && value[c] <= 1; i++) {
                         sum[i] += unit * (shown - (double)target[p * 3 + c]) * by[c][i];
                         scale = fmax(scale, unit * fabs(by[c][i]));
                     }
                 }
                 for (int i = 0; i < 9; i++)
-                    worst_gradient = fmax(worst_gradient, fabs((double)gradient[p * C + i] - sum[i]) / scale);
+                    worst_gradient = farther(worst_gradient, fabs((double)gradient[p * C + i] - sum[i]) / scale);
                 CHECK(gradient[p * C + 9] == 0, "the tenth channel has a gradient");
             }
         }

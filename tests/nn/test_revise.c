@@ -96,7 +96,7 @@ TEST(revise_begins_with_the_steps)
             const float own = r.maps->t.data[n * VALUES + k];
             CHECK(fabsf(maps[k] - own) < 1e-5f, "the steps make %g, and without a change it is %g", (double)maps[k],
                   (double)own);
-            change = fmax(change, fabs((double)changed[n * VALUES + k] - (double)own));
+            change = farther(change, fabs((double)changed[n * VALUES + k] - (double)own));
         }
         CHECK(change > 1e-3, "h changes by %g at most", change);
     }
@@ -121,7 +121,7 @@ TEST(revise_materials_apart)
         CHECK(nn_revise(alone, m, &one) && nn_revise(alone, m, &one), "%s", ag_status(alone)->message);
         double most = 0;
         for (int k = 0; k < VALUES; k++)
-            most = fmax(most, fabs((double)one.maps->t.data[k] - (double)all.maps->t.data[(int64_t)i * VALUES + k]));
+            most = farther(most, fabs((double)one.maps->t.data[k] - (double)all.maps->t.data[(int64_t)i * VALUES + k]));
         CHECK(most < 1e-5, "material %d differs by %g from itself in a batch", i, most);
     }
     ag_tape_destroy(&tape);

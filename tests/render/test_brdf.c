@@ -178,7 +178,7 @@ TEST(brdf_gradient)
         maps[MAP_ROUGHNESS] = fmax(maps[MAP_ROUGHNESS], -0.95);
         rd_radiance(maps, point, &view, at, g);
         for (int c = 0; c < 3; c++)
-            for (int m = 0; m < MAP_CHANNELS; m++) scale = fmax(scale, fabs(g[c][m]));
+            for (int m = 0; m < MAP_CHANNELS; m++) scale = farther(scale, fabs(g[c][m]));
         for (int m = 0; m < MAP_CHANNELS; m++) {
             double h = 1e-6, up[3], down[3], keep = maps[m];
             maps[m] = keep + h;

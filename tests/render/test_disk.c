@@ -43,7 +43,7 @@ TEST(render_disk_is_the_mean_over_its_points)
             double point[2], value[3];
             rd_centre(rd_grid_full(SIDE), p % SIDE, p / SIDE, point);
             under_disk(maps + p * C, point, &view, radius, value);
-            for (int c = 0; c < 3; c++) most = fmax(most, fabs((double)image[p * 3 + c] / value[c] - 1));
+            for (int c = 0; c < 3; c++) most = farther(most, fabs((double)image[p * 3 + c] / value[c] - 1));
         }
         const double alpha = roughness * roughness;
         printf("roughness %.2f, alpha %.1f half angles: off by at most %.4f\n", roughness, alpha / half, most);

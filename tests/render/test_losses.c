@@ -77,11 +77,11 @@ TEST(render_loss_matches_reference)
                     for (int c = 0; c < C; c++) {
                         double d = g[k][c] / (ra[k] + 0.01) * mean;
                         by[c] += ra[k] > rb[k] ? d : -d;
-                        pull = fmax(pull, fabs(d));
+                        pull = farther(pull, fabs(d));
                     }
                 }
             }
-            for (int c = 0; c < C; c++) worst = fmax(worst, fabs((double)p.gradient[i * C + c] - by[c]) / pull);
+            for (int c = 0; c < C; c++) worst = farther(worst, fabs((double)p.gradient[i * C + c] - by[c]) / pull);
         }
         CHECK(fabs(got - expected) < 1e-6 * expected, "%s: %.9g instead of %.9g", ts_isa_name((ts_isa)isa), got,
               expected);

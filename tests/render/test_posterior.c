@@ -41,7 +41,7 @@ TEST(posterior_is_where_the_objective_is_flat)
                     for (int i = 0; i < C; i++) error -= o[c].by[i] * delta[i];
                     for (int i = 0; i < C; i++) {
                         push[i] += o[c].by[i] * error / o[c].variance;
-                        size = fmax(size, fabs(o[c].by[i] * o[c].residual / o[c].variance));
+                        size = farther(size, fabs(o[c].by[i] * o[c].residual / o[c].variance));
                     }
                 }
             }
@@ -131,8 +131,8 @@ TEST(posterior_has_no_edge_where_burning_out_begins)
             memcpy(step[side], j.step + p * C, sizeof step[side]);
         }
         for (int i = 0; i < C; i++) {
-            worst = fmax(worst, fabs((double)step[1][i] - (double)step[0][i]));
-            moved = fmax(moved, fabs((double)(j.maps[p * C + i] + step[0][i] - j.mean[p * C + i])));
+            worst = farther(worst, fabs((double)step[1][i] - (double)step[0][i]));
+            moved = farther(moved, fabs((double)(j.maps[p * C + i] + step[0][i] - j.mean[p * C + i])));
         }
         end(&j);
     }

@@ -61,7 +61,7 @@ TEST(render_flash_gradient_is_the_scaled_derivative)
         if (near_one) continue;
         for (int i = 0; i < C; i++) {
             double h = 1e-5, keep = m[i], side[2], largest = 0;
-            for (int j = 0; j < C; j++) largest = fmax(largest, fabs((double)gradient[p * C + j]));
+            for (int j = 0; j < C; j++) largest = farther(largest, fabs((double)gradient[p * C + j]));
             for (int k = 0; k < 2; k++) {
                 double value[3], sum = squares;
                 m[i] = keep + (k ? h : -h);

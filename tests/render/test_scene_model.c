@@ -164,9 +164,9 @@ TEST(scene_normal_equations_equal_their_double_twin)
             }
             for (int i = 0; i < K; i++) size[i] = sqrt(matrix[i][i]);
             for (int i = 0, at = 0; i < K; i++) {
-                worst = fmax(worst, fabs(sums.right[i] - right[i]) / (size[i] * W));
+                worst = farther(worst, fabs(sums.right[i] - right[i]) / (size[i] * W));
                 for (int j = i; j < K; j++, at++)
-                    worst = fmax(worst, fabs(sums.matrix[at] - matrix[i][j]) / (size[i] * size[j]));
+                    worst = farther(worst, fabs(sums.matrix[at] - matrix[i][j]) / (size[i] * size[j]));
             }
             CHECK(worst < 1e-4, "%s, round %d: off by %g", ts_isa_name((ts_isa)isa), round, worst);
         }
@@ -247,7 +247,7 @@ TEST(scene_is_found_from_true_maps)
         float number[K], after[K];
         fit(&j, number, after);
         for (int i = 0; i < K; i++) {
-            worst[i] = fmax(worst[i], fabs((double)number[i] - (double)j.truth[i]));
+            worst[i] = farther(worst[i], fabs((double)number[i] - (double)j.truth[i]));
             CHECK(fabsf(number[i] - j.truth[i]) < 0.02f, "round %d: number %d is %g, not %g", (int)round, i,
                   (double)number[i], (double)j.truth[i]);
             CHECK(after[i] > 0 && after[i] < j.prior.deviation[i], "number %d is left with %g", i, (double)after[i]);

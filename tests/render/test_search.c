@@ -176,7 +176,7 @@ static double settled(bool whole, int steps, double *apart)
         end(&j);
     }
     *apart = 0;
-    for (int i = 0; i < PIXELS * C; i++) *apart = fmax(*apart, fabs((double)ends[0][i] - (double)ends[1][i]));
+    for (int i = 0; i < PIXELS * C; i++) *apart = farther(*apart, fabs((double)ends[0][i] - (double)ends[1][i]));
     free(ends[0]), free(ends[1]);
     return sum;
 }

@@ -53,8 +53,8 @@ static double gradient_error(const float *a, const double *b, double floor)
     for (int k = 0; k < 4; k++) {
         double error = 0, scale = floor;
         for (int i = first[k]; i < first[k + 1]; i++) {
-            error = fmax(error, fabs((double)a[i] - b[i]));
-            scale = fmax(scale, fabs(b[i]));
+            error = farther(error, fabs((double)a[i] - b[i]));
+            scale = farther(scale, fabs(b[i]));
         }
         worst = fmax(worst, error / scale);
     }
@@ -126,7 +126,7 @@ TEST(render_kernels_match_reference)
                         expected[i] += by[c][i] / (value[c] + 0.01) * (value[c] > b[c] ? 1 : -1);
                 }
                 /* colours of about the same radiance may pull in opposite directions: compared with what each pulls */
-                double error = fmax(gradient_error(g, expected, 0.1 * strength), fabs(got - sum) / (sum + 0.1) * 10);
+                double error = farther(gradient_error(g, expected, 0.1 * strength), fabs(got - sum) / (sum + 0.1) * 10);
                 worst_log = fmax(worst_log, error);
                 CHECK(error <= 1e-4, "%s: log loss %.9g instead of %.9g, or its gradient, off by %g", name, got, sum,
                       error);

@@ -62,7 +62,7 @@ static void pixel(ts_rng *rng, int count, worst *w)
         const double at = (double)maps[i], to = at + x[i], clamped = fmin(fmax(to, -1), 1) - at;
         finite = finite && isfinite(step[i]);
         inside = inside && to == clamped + at && fabs(at + (double)step[i]) < 1;
-        error = fmax(error, fabs((double)step[i] - clamped));
+        error = farther(error, fabs((double)step[i] - clamped));
         best += b[i] * x[i] / 2;
         reached += b[i] * (double)step[i];
         for (int j = 0; j < C; j++) reached -= a[i][j] * (double)step[i] * (double)step[j] / 2;

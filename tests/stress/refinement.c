@@ -25,7 +25,7 @@ static bool after(int step, const ag_value *maps, void *user)
     watch *w = user;
     for (int64_t i = 0; i < ts_count(maps->t.shape); i++) {
         w->finite = w->finite && isfinite(maps->t.data[i]);
-        w->largest = fmax(w->largest, fabs((double)maps->t.data[i]));
+        w->largest = farther(w->largest, fabs((double)maps->t.data[i]));
     }
     w->rmse[step] = w->truth
         ? rd_render_rmse(rd_grid_full(w->size), maps->t.data, maps->t.shape.c, w->truth, C, w->views, RD_EVAL_VIEWS)

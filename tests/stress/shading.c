@@ -38,8 +38,8 @@ static double gradient_error(const float *a, const double *b, double value, doub
     for (int k = 0; k < 4; k++) {
         double error = 0, scale = 0.1 * value * (k == 2 ? fmax(1, 2 / roughness) : 1);
         for (int i = first[k]; i < first[k + 1]; i++) {
-            error = fmax(error, fabs((double)a[i] - b[i]));
-            scale = fmax(scale, fabs(b[i]));
+            error = farther(error, fabs((double)a[i] - b[i]));
+            scale = farther(scale, fabs(b[i]));
         }
         if (scale > 0) most = fmax(most, error / scale);
     }
@@ -74,7 +74,8 @@ static void pixel(const float *maps, const rd_view *view, rd_grid grid, worst *w
     const int region = region_of(m, &s, l, v);
     if (!finite || !(value[0] > 0)) return; /* not seen, and so told by both: no relative error */
     w->pixels[region]++;
-    for (int c = 0; c < 3; c++) w->value[region] = fmax(w->value[region], fabs((double)image[c] - value[c]) / value[c]);
+    for (int c = 0; c < 3; c++)
+        w->value[region] = farther(w->value[region], fabs((double)image[c] - value[c]) / value[c]);
     w->gradient[region] = fmax(w->gradient[region], gradient_error(gradient, by[1], value[1], s.roughness));
 }
 

@@ -44,8 +44,8 @@ static void compare(const io_sheet_set *set, const cl_sheet_shot *shot, errors *
                      want = shot[i].exposure / shot[0].exposure;
         e->camera = fmax(e->camera, away * IO_SHEET_WINDOW);
         e->window = fmax(e->window, misregistered(c, t));
-        e->exposure = fmax(e->exposure, fabs(relative / want - 1));
-        e->focal = fmax(e->focal, fabs(c->focal / t->focal - 1));
+        e->exposure = farther(e->exposure, fabs(relative / want - 1));
+        e->focal = farther(e->focal, fabs(c->focal / t->focal - 1));
     }
     const double aside[2] = {set->aside[0] - shot[0].light[0], set->aside[1] - shot[0].light[1]};
     e->flash = fmax(e->flash, hypot(aside[0], aside[1]) * IO_SHEET_WINDOW);
@@ -97,9 +97,9 @@ bool stress_sheets(const stress *s)
     }
     snprintf(what, sizeof what, "sheets: camera, mm (%d sets of %d photographs, %d pixels wide)", sets, CL_SHEET_SHOTS,
              width);
-    ok = stress_row(what, e.camera, 0.5) && ok;
-    ok = stress_row("sheets: window, pixels of 512", e.window, 0.3) && ok;
-    ok = stress_row("sheets: exposure, relative to the first photograph's", e.exposure, 0.02) && ok;
-    ok = stress_row("sheets: flash beside the lens, mm", e.flash, 2) && ok;
-    return stress_row("sheets: focal length, relative", e.focal, INFINITY) && ok;
+    ok = stress_row(what, e.camera, 0.4) && ok;
+    ok = stress_row("sheets: window, pixels of 512", e.window, 0.2) && ok;
+    ok = stress_row("sheets: exposure, relative to the first photograph's", e.exposure, 0.0015) && ok;
+    ok = stress_row("sheets: flash beside the lens, mm", e.flash, 0.25) && ok;
+    return stress_row("sheets: focal length, relative", e.focal, 0.0005) && ok;
 }

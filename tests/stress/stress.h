@@ -2,6 +2,7 @@
  * runs them in full (minutes), the test runner a short form. */
 #ifndef STRESS_H
 #define STRESS_H
+#include "tests/support/farther.h"
 #include <stdbool.h>
 #include <stdio.h>
 

@@ -89,7 +89,7 @@ static bool adam(bool full)
     for (int i = 0; i < LANES; i++) {
         finite = finite && isfinite(m->value[i]) && isfinite(adam.m[i]) && isfinite(adam.v[i]) && isfinite(adam.ema[i]);
         const double g = (double)gradient[i], expected = -1e-3 * g / (fabs(g) + 1e-8);
-        worst = fmax(worst, fabs((double)m->value[i] - expected) / 1e-3);
+        worst = farther(worst, fabs((double)m->value[i] - expected) / 1e-3);
     }
     char what[96];
     snprintf(what, sizeof what, "Adam after %ld steps: a step against its limit, in steps", steps);

@@ -112,7 +112,7 @@ bool stress_unrolled(const stress *s)
                 direction[i] /= sqrt(length), slope += direction[i] * (double)m->grad[i];
             const double h = 1e-6, difference = (loss_at(r, loss, h) - loss_at(r, loss, -h)) / (2 * h);
             /* what a random direction sees of a gradient of this length */
-            worst = fmax(worst, fabs(slope - difference) / (norm / sqrt((double)m->count)));
+            worst = farther(worst, fabs(slope - difference) / (norm / sqrt((double)m->count)));
         }
         char what[96];
         snprintf(what, sizeof what, "unrolled loop, T = %d: |gradient| %.4g, worst of %d slopes", steps, norm,

@@ -103,7 +103,7 @@ static results naive(const subject *s, bool old, bool add)
 static void same(const char *what, const subject *s, const float *a, const float *b, size_t count, double bound)
 {
     double most = 1;
-    for (size_t i = 0; i < count; i++) most = fmax(most, fabs(b[i]));
+    for (size_t i = 0; i < count; i++) most = farther(most, fabs(b[i]));
     for (size_t i = 0; i < count; i++)
         CHECK(fabs((double)a[i] - b[i]) <= bound * most, "%s, %s: %d pixels, %d to %d: value %zu is %.9g, naive %.9g",
               ts_isa_name(ts_isa_now()), what, (int)s->g.pixels, s->g.ic, s->g.c, i, a[i], b[i]);

@@ -196,7 +196,8 @@ TEST(photographs_of_a_sheet_have_the_faults_of_their_keys)
                 CHECK(fault == 1 ? far > 0 && far <= 0.05 * 0.05 : far == 0, "fault %d: the camera moved by %g", fault,
                       sqrt(far));
                 rd_render(rd_grid_full(SIZE), maps[i], MAP_CHANNELS, &shots[i][k].is.view, true, one[0]);
-                for (int p = 0; p < PIXELS * 3; p++) most = fmax(most, fabs((double)one[0][p] - (double)many[i][k][p]));
+                for (int p = 0; p < PIXELS * 3; p++)
+                    most = farther(most, fabs((double)one[0][p] - (double)many[i][k][p]));
             }
         CHECK(fault < 2 ? most < 1e-6 : most > 1e-3, "fault %d: the photographs are %g off", fault, most);
     }

@@ -28,7 +28,7 @@ static double apart(const ag_value *a, const ag_value *b, int n, int first, int 
     double most = 0;
     for (int64_t i = n * pixels; i < (n + 1) * pixels; i++)
         for (int k = first; k < last; k++)
-            most = fmax(most, fabs((double)a->t.data[i * s.c + k] - (double)b->t.data[i * s.c + k]));
+            most = farther(most, fabs((double)a->t.data[i * s.c + k] - (double)b->t.data[i * s.c + k]));
     return most;
 }
 
