@@ -312,7 +312,7 @@ deps:
 	@sh .ci/deps.sh $(PKG) $(PKG_IMAGE) $(PKG_TAGS) $(PKG_openmpi)
 
 test: deps
-	@$(MAKE) --no-print-directory programs $(TEST_BIN) $(FAULTS)
+	@$(MAKE) --no-print-directory programs $(TEST_BIN) $(FAULTS) $(BENCH_BIN) $(STRESS_BIN)
 	@BUILD=$(BUILD) TESTDATA=$(TESTDATA) FIXTURES=$(FIXTURES) sh tests/run.sh
 
 bench: needs

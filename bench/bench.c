@@ -40,13 +40,16 @@ bool bench_cpu(void) { return processor_time; }
 
 /* Wall time; or the processor time of all threads over their number, which does not see what other programs take on a
  * busy machine (nor threads that wait for each other). */
-static double now(void)
+static double read_clock(clockid_t clock)
 {
     struct timespec t;
-    clock_gettime(processor_time ? CLOCK_PROCESS_CPUTIME_ID : CLOCK_MONOTONIC, &t);
-    const double seconds = (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-    return processor_time ? seconds / ts_threads() : seconds;
+    clock_gettime(clock, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
+
+double bench_wall(void) { return read_clock(CLOCK_MONOTONIC); }
+
+static double now(void) { return processor_time ? read_clock(CLOCK_PROCESS_CPUTIME_ID) / ts_threads() : bench_wall(); }
 
 static double peak(void) { return ts_peak_of(ts_peak_k()->run, now); }
 
@@ -104,10 +107,11 @@ static int by_value(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
-/* Of count values, which it sorts. */
-static double median(double *v, int count)
+void bench_sort(double *v, int count) { qsort(v, (size_t)count, sizeof *v, by_value); }
+
+double bench_median(double *v, int count)
 {
-    qsort(v, (size_t)count, sizeof *v, by_value);
+    bench_sort(v, count);
     return count % 2 ? v[count / 2] : 0.5 * (v[count / 2 - 1] + v[count / 2]);
 }
 
@@ -132,8 +136,8 @@ bench_time bench_measure(void (*f)(void *user), void *user)
     const double apart = bench_apart();
     if (apart > t.apart) t.apart = apart;
     t.peak = 0.5 * (t.peak + peak());
-    t.loop = median(loops, looped);
-    t.seconds = median(times, t.runs);
+    t.loop = bench_median(loops, looped);
+    t.seconds = bench_median(times, t.runs);
     t.best = times[0];
     return t;
 }
@@ -152,8 +156,8 @@ void bench_row_threads(void (*f)(void *user), void *user)
         gain[i] = one.seconds / many.seconds;
         of_peak[i] = many.peak / one.peak;
     }
-    printf("    %d threads: %.2f times as fast as one, the peak %.2f times\n", all, median(gain, ROUNDS),
-           median(of_peak, ROUNDS));
+    printf("    %d threads: %.2f times as fast as one, the peak %.2f times\n", all, bench_median(gain, ROUNDS),
+           bench_median(of_peak, ROUNDS));
     fflush(stdout);
 }
 

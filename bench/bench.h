@@ -46,6 +46,10 @@ void bench_heading(const char *text);
  * peak. Wall time only. */
 void bench_row_threads(void (*f)(void *user), void *user);
 
+void bench_sort(double *v, int count);     /* ascending */
+double bench_median(double *v, int count); /* which it sorts */
+double bench_wall(void);                   /* seconds of a clock that only goes on */
+
 /* Below a row: its floor (flop at the peak), and what the peers take for the same work (bench/peer_torch.py, whose head
  * lists the jobs; "bf16 " before one that has its networks in bf16, so that bf16 is held against bf16). One that is not
  * there is named once, one that has not this work each time. */

@@ -59,7 +59,7 @@ static const ts_conv refiner[] = {
     {8, 64, 64, 64, 9, 3, 1, TS_PAD_REPLICATE, 0, {0}},
 };
 
-/* Its g, some layers of each size; and larger kernels. */
+/* Some layers of each size of a U-Net that is 24 channels wide; and larger kernels. */
 static const ts_conv unet[] = {
     {8, 64, 64, 3, 24, 3, 1, TS_PAD_ZERO, 0, {0}},  {8, 32, 32, 24, 48, 3, 1, TS_PAD_ZERO, 0, {0}},
     {8, 16, 16, 96, 96, 3, 1, TS_PAD_ZERO, 0, {0}}, {8, 8, 8, 192, 192, 3, 1, TS_PAD_ZERO, 0, {0}},

@@ -10,36 +10,22 @@
 #include <stdlib.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 enum { ROUNDS = 7, CASES = 3, MOST_BUSY = 64 };
 #define SHARE 0.4 /* seconds of a case without others; with them, so many times as long as CPUs are shared */
 
-static double seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 /* Of one call, the mean over so much time. */
 static double mean(void (*f)(void *user), void *user, double time)
 {
-    const double begin = seconds();
+    const double begin = bench_wall();
     double now = begin;
     int runs = 0;
     for (; now < begin + time || runs < 3; runs++) {
         f(user);
-        now = seconds();
+        now = bench_wall();
     }
     return (now - begin) / runs;
-}
-
-static int ascending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
 }
 
 static pid_t start_busy(void)
@@ -76,7 +62,7 @@ void bench_load(const char *label, void (*f)(void *user), void *user)
         for (int round = 0; round < ROUNDS && c > 0; round++)
             if (c == CASES - 1 && time[c][round] > worst) worst = time[c][round];
         for (int round = 0; round < ROUNDS && c > 0; round++) time[c][round] /= time[0][round];
-        qsort(time[c], ROUNDS, sizeof **time, ascending);
+        bench_sort(time[c], ROUNDS);
     }
     printf("  %-48s %9.2f ms alone; %d busy processes beside it: %.2f times, %d: %.2f times (worst round %.0f ms)\n",
            label, 1e3 * time[0][ROUNDS / 2], most / 2, time[1][ROUNDS / 2], most, time[2][ROUNDS / 2], 1e3 * worst);

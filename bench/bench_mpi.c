@@ -33,18 +33,6 @@ static bool run(const char *const *word, const char *messages)
     return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-static int ascending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-static double median(double *v, int n)
-{
-    qsort(v, (size_t)n, sizeof *v, ascending);
-    return v[n / 2];
-}
-
 /* The median of log.csv's samples_per_s, the last column but one, after the first rows; NaN where there is none. */
 static double speed_in(const char *log)
 {
@@ -60,7 +48,7 @@ static double speed_in(const char *log)
         if (value) speed[n++] = atof(value + 1);
     }
     if (f) fclose(f);
-    return n > 0 ? median(speed, n) : (double)NAN;
+    return n > 0 ? bench_median(speed, n) : (double)NAN;
 }
 
 /* What the ranks say of their waiting at the end. */
@@ -111,13 +99,13 @@ static void compare(const char *config, const char *phase, int steps, const char
         }
         ratio[round] = time[1][round] / time[0][round];
     }
-    const double one = median(time[0], ROUNDS), two = median(time[1], ROUNDS);
+    const double one = bench_median(time[0], ROUNDS), two = bench_median(time[1], ROUNDS);
     char label[160];
     snprintf(label, sizeof label, "%s, one process, two threads", config);
     bench_row_unit(label, (bench_time){.seconds = 1 / one}, one, "patches/s");
     snprintf(label, sizeof label, "%s, two ranks, one thread each", config);
     bench_row_unit(label, (bench_time){.seconds = 1 / two}, two, "patches/s");
-    printf("    two ranks are %.3f times as fast (median of %d, in turn)\n", median(ratio, ROUNDS), ROUNDS);
+    printf("    two ranks are %.3f times as fast (median of %d, in turn)\n", bench_median(ratio, ROUNDS), ROUNDS);
     show_waiting(messages);
 }
 

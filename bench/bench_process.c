@@ -13,7 +13,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 enum { SIDE = 256, ROUNDS = 7, FOLDER = 26, MOST_ARGUMENTS = FOLDER + 16, NAME = 300 };
@@ -34,19 +33,6 @@ static int run(const char *const *argv)
         status = -1;
     posix_spawn_file_actions_destroy(&actions);
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
-
-static double seconds(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-static int ascending(const void *a, const void *b)
-{
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
 }
 
 typedef struct command {
@@ -85,9 +71,9 @@ static bool round_of(command *c, int round, const char *program, const char *out
     int n = 4;
     for (const char *const *w = c->word; *w; w++) argv[n++] = *w;
     for (int i = 0; i < c->photographs; i++) argv[n++] = c->large ? large : link[i];
-    const double begin = seconds();
+    const double begin = bench_wall();
     const int status = run(argv);
-    c->time[round] = seconds() - begin;
+    c->time[round] = bench_wall() - begin;
     if (status != c->status) printf("  %s: exit status %d\n", c->label, status);
     return status == c->status;
 }
@@ -174,7 +160,7 @@ BENCH(process)
         for (int i = 0; i < COMMANDS && fine; i++)
             fine = round_of(&all[i], round < 0 ? 0 : round, program, out, link, large);
     for (int i = 0; i < COMMANDS && fine; i++) {
-        qsort(all[i].time, ROUNDS, sizeof *all[i].time, ascending);
+        bench_sort(all[i].time, ROUNDS);
         const bench_time t = {.seconds = all[i].time[ROUNDS / 2]};
         if (all[i].photographs > 1) bench_row_unit(all[i].label, t, all[i].photographs / t.seconds, "photographs/s");
         else bench_row(all[i].label, t, 0);

@@ -194,6 +194,7 @@ static int evaluate(work *w, ts_status *st)
     r->failed = show_failure;
     r->done = show_progress;
     r->user = w;
+    for (int s = 0; s < c->sets; s++) w->total += (int64_t)w->set[s].count * r->methods; /* of a part with no work */
     w->bar = cl_progress_start(r->methods != 1 ? "estimate" : "material", 0);
     static const int sizes[] = {128, 256, 512};
     const ts_code code = c->pareto ? ev_pareto(r, sizes, 3, w->model, c->out, st) : ev_run_all(r, st);
