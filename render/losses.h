@@ -19,9 +19,10 @@ ag_value *ag_flash_loss(ag_tape *tape, ag_value *maps, ag_value *image, const rd
  * top + H - 1 of squares of S rows. */
 ag_value *ag_shading_frame(ag_tape *tape, ag_value *x, int channels, int top);
 
-/* The mean over images of the root of the mean squared difference in channels first .. first + count - 1: the measure
- * of the evaluation (docs/math.md, Evaluation). Where relief is uncertain its best answer is the mean of what may be,
- * that of L1 the median, which is flat. A squared error of 1e-6 is added, for the gradient of a perfect image. */
+/* The mean over images of the root of the mean squared difference in channels first .. first + count - 1: as the
+ * evaluation measures maps (docs/math.md, Evaluation), whose normals have three components. Where relief is uncertain
+ * its best answer is the mean of what may be, that of L1 the median, which is flat. A squared error of 1e-6 is added,
+ * for the gradient of a perfect image. */
 ag_value *ag_rmse_loss(ag_tape *tape, ag_value *maps, ag_value *target, int first, int count);
 
 /* mean w |maps - target| over all values, w the weight of their channel: the L1 of S15 in docs/math.md. weight: of the

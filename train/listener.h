@@ -11,7 +11,8 @@ typedef struct tr_row {
     const char *skip;                                          /* why the step made no update; NULL: it made one */
     int iterations;                                            /* refinement steps that were drawn */
     double loss, render_start, map_start, render_end, map_end; /* of R_0 and R_T */
-    double spread, scene; /* likelihoods of R_0's errors and of the scene (model.spread, model.scene) */
+    double spread, scene; /* likelihoods of R_0's errors and of the scene (model.spread, model.scene); of a step that
+                             train.teacher teaches, how far the model says others than it */
     double norm, rate;
     double seconds; /* that the step took */
     double waited;  /* of them, for other ranks' gradients */

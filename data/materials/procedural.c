@@ -15,7 +15,10 @@
 #include <string.h>
 
 #define MOST_CLOSER 4.0f
-enum { CLASSIC = 17 }; /* the first so many families are finished by wear_calm, the others by fin_any */
+enum {
+    CLASSIC = 17
+}; /* the first so many families are finished by wear_calm, of two that are mixed where
+     the first is one of them; the others by fin_any */
 
 /* Every family: its key, how often it is drawn beside the others, and what it paints. */
 static const struct {
