@@ -23,7 +23,7 @@ bool ev_is_under_sheet(const char *folder)
 static ts_code read_photographs(char *const *paths, int count, int most, int size, io_capture *c, ts_status *st)
 {
     io_sheet_set set;
-    if (io_sheet_set_read(paths, count, 0, IO_MAX_PIXELS_DEFAULT, 0, &set, st) != TS_OK) return st->code;
+    if (io_sheet_set_read(paths, count, 0, IO_MAX_PIXELS_DEFAULT, 0, NULL, &set, st) != TS_OK) return st->code;
     ts_code code = TS_OK;
     for (int i = 0; i < count && !code; i++)
         if (set.photo[i].st.code) {

@@ -110,7 +110,8 @@ static int check(const command *c, char **paths, int count)
     io_sheet_set set;
     ts_status st = {0};
     const int64_t pixels = c->max_pixels > 0 ? c->max_pixels : IO_MAX_PIXELS_DEFAULT;
-    if (io_sheet_set_read(paths, count, c->fov, pixels, 0, &set, &st) != TS_OK) return cl_failed("%s", st.message);
+    if (io_sheet_set_read(paths, count, c->fov, pixels, 0, NULL, &set, &st) != TS_OK)
+        return cl_failed("%s", st.message);
     bool fine = true;
     for (int i = 0; i < count; i++) fine = say(&set.photo[i]) && fine;
     if (set.good > 1 && io_sheet_apart(&set) < IO_SHEET_APART) {

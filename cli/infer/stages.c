@@ -1,4 +1,5 @@
 #include "cli/infer/stages.h"
+#include "cli/cli.h"
 #include "cli/infer/record.h"
 #include "infer/api_model.h"
 #include "infer/output.h"
@@ -60,7 +61,8 @@ static void read_angle(const cl_command *c, bool published, cl_item *item)
 static void read_sheet(const cl_command *c, cl_item *item)
 {
     io_sheet_set *set = &item->sheet;
-    if (io_sheet_set_read(c->photo, c->photos, c->fov, c->max_pixels, item->threads, set, &item->st)) return;
+    if (io_sheet_set_read(c->photo, c->photos, c->fov, c->max_pixels, item->threads, cl_interrupted, set, &item->st))
+        return;
     if (set->good == 0) item->st = set->photo[0].st;
     else if (lgd_sheet_capture(set, NN_MAX_IMAGES, c->size, c->max_pixels, item->threads, &item->capture, &item->st))
         return;

@@ -183,19 +183,25 @@ static int count_good(io_sheet_set *set)
     return set->good;
 }
 
-ts_code io_sheet_set_read(char *const *paths, int count, double fov, int64_t max_pixels, int threads, io_sheet_set *set,
-                          ts_status *st)
+static ts_code go_on(bool (*stop)(void), ts_status *st)
+{
+    return stop && stop() ? ts_fail(st, TS_INTERRUPTED, "interrupted while the sheet was read") : TS_OK;
+}
+
+ts_code io_sheet_set_read(char *const *paths, int count, double fov, int64_t max_pixels, int threads,
+                          bool (*stop)(void), io_sheet_set *set, ts_status *st)
 {
     *set = (io_sheet_set){.photo = calloc((size_t)count, sizeof *set->photo), .photos = count};
     if (!set->photo) return ts_fail(st, TS_NOMEM, "out of memory for %d photographs", count);
-    for (int i = 0; i < count; i++) {
+    ts_code code = TS_OK;
+    for (int i = 0; i < count && !code; i++) {
         set->photo[i].path = paths[i];
-        find(&set->photo[i], fov, max_pixels, threads);
+        if (!(code = go_on(stop, st))) find(&set->photo[i], fov, max_pixels, threads);
     }
-    guess_focal(set);
-    ts_code code = count_good(set) > 0 ? solve(set, st) : TS_OK;
+    if (!code) guess_focal(set);
+    if (!code && count_good(set) > 0) code = solve(set, st);
     for (int i = 0; i < count && !code; i++)
-        if (!set->photo[i].st.code) look(&set->photo[i], max_pixels);
+        if (!set->photo[i].st.code && !(code = go_on(stop, st))) look(&set->photo[i], max_pixels);
     if (!code && count_good(set) > 0) code = light(set, st);
     if (code) io_sheet_set_free(set);
     return code;

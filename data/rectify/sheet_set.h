@@ -26,9 +26,10 @@ typedef struct io_sheet_set {
 
 /* count <= IO_SOLVE_MOST. fov: degrees across the photographs' shorter side; 0: from EXIF, or, where none has it,
  * fitted from a phone's. A photograph that cannot be used has its own st, and the rest are solved without it; good may
- * be 0. The caller frees after success; set is empty after a failure (memory, or a fit of all). */
-ts_code io_sheet_set_read(char *const *paths, int count, double fov, int64_t max_pixels, int threads, io_sheet_set *set,
-                          ts_status *st);
+ * be 0. The caller frees after success; set is empty after a failure (memory, a fit of all, or TS_INTERRUPTED). stop:
+ * asked before each photograph whether to go no further; may be NULL. */
+ts_code io_sheet_set_read(char *const *paths, int count, double fov, int64_t max_pixels, int threads,
+                          bool (*stop)(void), io_sheet_set *set, ts_status *st);
 void io_sheet_set_free(io_sheet_set *set);
 
 /* The window of a good photograph, size x size, linear, as it is exposed; the caller frees it. */

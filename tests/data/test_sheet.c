@@ -86,7 +86,7 @@ TEST(sheet_windows_of_a_set)
     name_photos(test_folder(), path, paths);
     snprintf(exact_path, sizeof exact_path, "%s/exact", test_folder());
     CHECK(!io_read_capture(exact_path, SIZE, IO_MAX_PIXELS_DEFAULT, &exact, &st), "%s", st.message);
-    CHECK(!io_sheet_set_read(paths, CL_SHEET_SHOTS, 0, 1 << 26, 1, &set, &st), "%s", st.message);
+    CHECK(!io_sheet_set_read(paths, CL_SHEET_SHOTS, 0, 1 << 26, 1, NULL, &set, &st), "%s", st.message);
     CHECK(!lgd_sheet_capture(&set, 3, SIZE, 1 << 26, 1, &c, &st), "%s", st.message);
     CHECK(c.images == 3, "%d windows", c.images);
     int order[IO_SOLVE_MOST];
@@ -166,7 +166,7 @@ TEST(sheet_photographs_that_cannot_be_used)
         copy_photo(path[0], to, i == 1 ? 2 : 1, i == 2 ? right[0] : 1e9, i == 0 ? 0 : i == 2 ? low[1] : 1e9);
     }
     for (int i = 0; i < 4; i++) snprintf(path[i + 1], 512, "%s/%s", test_folder(), file[i]);
-    CHECK(!io_sheet_set_read(paths, 5, 0, 1 << 26, 1, &set, &st), "%s", st.message);
+    CHECK(!io_sheet_set_read(paths, 5, 0, 1 << 26, 1, NULL, &set, &st), "%s", st.message);
     CHECK(set.good == 1 && !set.photo[0].st.code, "%d are good: %s", set.good, set.photo[0].st.message);
     for (int i = 0; i < 4; i++)
         CHECK(strstr(set.photo[i + 1].st.message, says[i]) && strstr(set.photo[i + 1].st.message, file[i]), "%s: %s",
@@ -201,6 +201,17 @@ static void spoil(const char *from, const char *to, const io_pinhole *camera, in
     io_image_free(&out);
 }
 
+static bool at_once(void) { return true; }
+
+TEST(sheet_reading_stops)
+{
+    char *paths[] = {(char *)"absent.png"};
+    io_sheet_set set;
+    ts_status st = {0};
+    CHECK(io_sheet_set_read(paths, 1, 0, 1 << 26, 1, at_once, &set, &st) == TS_INTERRUPTED && !set.photo, "%s",
+          st.message);
+}
+
 TEST(sheet_faults_are_named)
 {
     need_tags();
@@ -218,7 +229,7 @@ TEST(sheet_faults_are_named)
         snprintf(path[i + 1], 512, "%s/%s", test_folder(), file[i]);
         spoil(from, path[i + 1], &shot[0].camera, i == 0 ? 2 : 0, i == 1 ? 6 : i == 3 ? 0.002f : 1, i == 2);
     }
-    CHECK(!io_sheet_set_read(paths, 4, 54, 1 << 26, 1, &set, &st), "%s", st.message);
+    CHECK(!io_sheet_set_read(paths, 4, 54, 1 << 26, 1, NULL, &set, &st), "%s", st.message);
     CHECK(!set.photo[0].st.code && io_sheet_faults(&set.photo[0]) == 0, "the good one: %u",
           io_sheet_faults(&set.photo[0]));
     CHECK(!set.photo[1].st.code && io_sheet_faults(&set.photo[1]) & IO_FAULT_BLURRED, "blurred: %s edges of %g",
@@ -228,7 +239,7 @@ TEST(sheet_faults_are_named)
           set.photo[3].st.message, io_sheet_faults(&set.photo[3]));
     CHECK(io_sheet_apart(&set) < IO_SHEET_APART, "one place is %g degrees from itself", io_sheet_apart(&set));
     io_sheet_set_free(&set);
-    CHECK(!io_sheet_set_read(paths + 4, 1, 54, 1 << 26, 1, &set, &st), "%s", st.message);
+    CHECK(!io_sheet_set_read(paths + 4, 1, 54, 1 << 26, 1, NULL, &set, &st), "%s", st.message);
     CHECK(set.good == 0 && *set.photo[0].st.message, "a dark one can be used");
     io_sheet_set_free(&set);
 }

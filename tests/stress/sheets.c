@@ -69,7 +69,7 @@ static bool measure(const char *folder, int width, uint64_t index, errors *e, ts
         code = cl_write_sheet_captures(folder, &m, SEED, index, width, 92, st);
     }
     io_material_free(&m);
-    if (!code) code = io_sheet_set_read(paths, CL_SHEET_SHOTS, 0, IO_MAX_PIXELS_DEFAULT, 0, &set, st);
+    if (!code) code = io_sheet_set_read(paths, CL_SHEET_SHOTS, 0, IO_MAX_PIXELS_DEFAULT, 0, NULL, &set, st);
     if (code) return false;
     const bool all = set.good == CL_SHEET_SHOTS;
     for (int i = 0; i < CL_SHEET_SHOTS && !all; i++)
