@@ -262,23 +262,10 @@ void cl_catch_interrupt(void)
 
 bool cl_interrupted(void) { return interrupted != 0; }
 
-size_t cl_made_already(const char *path)
+void cl_remove_made(const char *path, size_t made)
 {
     char part[4096];
-    size_t there = 0;
-    for (size_t i = 1, length = strlen(path); i <= length && i < sizeof part; i++) {
-        if (path[i] != '/' && path[i] != 0) continue;
-        memcpy(part, path, i);
-        part[i] = 0;
-        if (access(part, F_OK) == 0) there = i;
-    }
-    return there;
-}
-
-void cl_remove_made(const char *path, size_t there)
-{
-    char part[4096];
-    for (size_t i = strlen(path); i > there && i < sizeof part; i--) {
+    for (size_t i = strlen(path); made > 0 && i >= made && i < sizeof part; i--) {
         if ((path[i] != '/' && path[i] != 0) || path[i - 1] == '/') continue;
         memcpy(part, path, i);
         part[i] = 0;
@@ -286,17 +273,20 @@ void cl_remove_made(const char *path, size_t there)
     }
 }
 
-ts_code cl_make_folder(const char *path, ts_status *st)
+ts_code cl_make_folder(const char *path, size_t *made, ts_status *st)
 {
     char part[4096];
     const size_t length = strlen(path);
+    if (made) *made = 0;
     if (length == 0) return ts_fail(st, TS_INVALID, "an empty folder name");
     if (length >= sizeof part) return ts_fail(st, TS_INVALID, "a folder name of %zu characters is too long", length);
     for (size_t i = 1; i <= length; i++) {
         if (path[i] != '/' && path[i] != 0) continue;
         memcpy(part, path, i);
         part[i] = 0;
-        if (mkdir(part, 0777) != 0 && errno != EEXIST)
+        const bool own = mkdir(part, 0777) == 0;
+        if (own && made && *made == 0) *made = i;
+        if (!own && errno != EEXIST)
             return ts_fail(st, TS_IO, "%s: cannot create the folder: %s", part, strerror(errno));
     }
     struct stat info;

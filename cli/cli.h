@@ -66,11 +66,9 @@ void cl_catch_interrupt(void);
 bool cl_interrupted(void);
 
 /* Creates an output folder and its parents. An existing folder is fine: what killed processes have left in it is
- * removed (ts_sweep). */
-ts_code cl_make_folder(const char *path, ts_status *st);
+ * removed (ts_sweep). made (may be NULL): how long the path of the first is that this call has created, 0: none. */
+ts_code cl_make_folder(const char *path, size_t *made, ts_status *st);
 
-/* How much of path, an output folder, is there already, in bytes; and, after cl_make_folder, removes what of the rest
- * is empty. */
-size_t cl_made_already(const char *path);
-void cl_remove_made(const char *path, size_t there);
+/* Removes what of a path is empty, from its end to the first made bytes of it. */
+void cl_remove_made(const char *path, size_t made);
 #endif

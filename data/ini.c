@@ -143,6 +143,15 @@ ts_code io_ini_read(const char *path, io_ini *ini, ts_status *st)
     return code;
 }
 
+bool io_ini_needs_quotes(const char *value)
+{
+    const size_t length = strlen(value);
+    if (length > 0 && (*value == '"' || blank(*value) || blank(value[length - 1]))) return true;
+    for (const char *p = value; *p; p++)
+        if ((*p == '#' || *p == ';') && (p == value || blank(p[-1]))) return true;
+    return false;
+}
+
 void io_ini_free(io_ini *ini)
 {
     free(ini->name);

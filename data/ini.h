@@ -4,6 +4,7 @@
 #ifndef IO_INI_H
 #define IO_INI_H
 #include "tensor/status.h"
+#include <stdbool.h>
 #include <stddef.h>
 
 typedef struct io_ini_entry {
@@ -21,5 +22,8 @@ typedef struct io_ini {
  * success. */
 ts_code io_ini_read(const char *path, io_ini *ini, ts_status *st);
 ts_code io_ini_parse(const char *name, const char *text, size_t size, io_ini *ini, ts_status *st);
+
+/* Whether a value has to stand in quotation marks to be read again as it is. */
+bool io_ini_needs_quotes(const char *value);
 void io_ini_free(io_ini *ini); /* and zeroes the struct */
 #endif

@@ -151,7 +151,7 @@ static int finish_part(work *w, ts_status *st)
 /* A folder in which something can be written. */
 static ts_code prepare(const char *folder, ts_status *st)
 {
-    return cl_make_folder(folder, st) != TS_OK ? st->code : lgd_output_check(folder, st);
+    return cl_make_folder(folder, NULL, st) != TS_OK ? st->code : lgd_output_check(folder, st);
 }
 
 /* Folders, memory and numbers. */

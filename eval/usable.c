@@ -35,20 +35,21 @@ static ts_code check_uses(const ev_command *c, const ev_set *set, ts_status *st)
                    sheets = 1u << EV_UNDER_SHEET | 1u << EV_UNDER_SHEET_EXACT, photos = 1u << EV_PHOTOS,
                    folders = 1u << EV_MAPS | sheets;
     const char *const maps = "map folders (maps:)";
-    const char *const known = "generated materials, strips or map folders", *const scored = "a set of another kind";
+    const char *const known = "generated materials, strips, map folders or sheets",
+                      *const scored = "a set of another kind";
     const use uses[] = {
         {"peer-maps", c->peer_maps, photos, "photographs (photos:)"},
         {"noise", c->noise > 0, rendered, known},
         {"light", c->light[0] != 0 || c->light[1] != 0, rendered, known},
         {"fov", c->fov > 0, rendered, known},
         {"tilt", c->tilt > 0, rendered, known},
-        {"exposure", c->exposure > 0, rendered, known},
+        {"exposure", c->exposure > 0, rendered, "generated materials, strips or map folders"},
         {"camera", c->photographed, rendered | sheets, known},
         {"untold", c->light_unknown, rendered | sheets, known},
         {"normal", c->convention.normal != IO_NORMAL_FROM_FILE, folders, maps},
         {"workflow", c->convention.workflow != IO_WORKFLOW_FROM_FILE, folders, maps},
         {"colour", c->convention.colour != IO_ENCODING_FROM_FILE, folders, maps},
-        {"told", c->light_known, captures | sheets | (c->photographed ? rendered : 0),
+        {"told", c->light_known, captures | (c->photographed ? rendered | sheets : 0),
          "captures (multiview:), or --camera"},
         {"tune", c->tune, ~photos, scored}, /* photographs without known maps have no error */
         {"pareto", c->pareto, ~photos, scored},
@@ -65,8 +66,6 @@ ts_code ev_usable_options(const ev_command *c, const ev_set *set, ts_status *st)
 {
     const unsigned photos = 1u << EV_PHOTOS;
     if (check_uses(c, set, st) != TS_OK) return st->code;
-    if (c->light_known && c->light_unknown)
-        return ts_fail(st, TS_INVALID, "--told and --untold: the methods know the light or they do not");
     if (!c->peer_maps) return TS_OK;
     DIR *d = opendir(c->peer_maps);
     if (!d) return ts_fail(st, TS_IO, "--peer-maps %s: cannot be read: %s", c->peer_maps, strerror(errno));

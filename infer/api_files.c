@@ -6,9 +6,11 @@
 #include "infer/model_path.h"
 #include "infer/output.h"
 #include "infer/photograph.h"
+#include "tensor/hash.h"
 #include "tensor/new_file.h"
 #include "tensor/threads.h"
 #include <math.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -187,6 +189,14 @@ static ts_code order_of(const lgd_write_options *o, int side, bool photograph, l
     return TS_OK;
 }
 
+/* Of many folders in one parent the first alone reads it to its end. */
+static void sweep_once(const char *parent)
+{
+    static atomic_uint_least64_t last;
+    const uint64_t hash = ts_hash(parent, strlen(parent), 1);
+    if (atomic_exchange(&last, hash) != hash) ts_sweep(parent);
+}
+
 int lgd_write_maps(const char *folder, const float *maps, int side, const lgd_photo *photo,
                    const lgd_write_options *options, lgd_error *error)
 {
@@ -211,7 +221,7 @@ int lgd_write_maps(const char *folder, const float *maps, int side, const lgd_ph
             ts_fail(&st, TS_NOMEM, "%s: out of memory", call);
         } else {
             order.fov_from = from;
-            ts_sweep(parent);
+            sweep_once(parent);
             lgd_output_write(parent, stem, &m, taken, &order, NULL, &st);
         }
     }

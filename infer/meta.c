@@ -35,6 +35,8 @@ static void print_scene(FILE *f, const lgd_photo *p, const lgd_order *order)
             (double)p->power);
 }
 
+static const char incomplete[] = "incomplete";
+
 /* The line of a file in a meta.txt, with its end; NULL: it has none. */
 static const char *line_of(const char *text, const char *file, size_t *size)
 {
@@ -53,6 +55,7 @@ unsigned lgd_meta_files(const char *text)
 {
     unsigned files = 0;
     size_t size;
+    if (!strstr(text, "\nestimate: ") && strncmp(text, incomplete, strlen(incomplete)) != 0) return 0;
     for (int k = 0; k < LGD_OUTPUTS; k++)
         if (line_of(text, lgd_files[k], &size)) files |= 1u << k;
     return files;
@@ -101,7 +104,7 @@ ts_code lgd_write_meta_begun(const char *path, unsigned files, ts_status *st)
 {
     io_text text;
     if (io_text_begin(&text, path, st) != TS_OK) return st->code;
-    fputs("incomplete: these files are being replaced, or a process was killed that did\n", text.f);
+    fprintf(text.f, "%s: these files are being replaced, or a process was killed that did\n", incomplete);
     for (int k = 0; k < LGD_OUTPUTS; k++)
         if (files >> k & 1) fprintf(text.f, "%s: of this estimate or of the one before\n", lgd_files[k]);
     return io_text_write(&text, path, st);

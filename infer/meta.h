@@ -14,7 +14,7 @@ ts_code lgd_write_meta(const char *path, const lgd_photo *photo, const lgd_order
 /* What stands in its place while files (bits) of a folder are replaced: it names them, and is nobody's estimate. */
 ts_code lgd_write_meta_begun(const char *path, unsigned files, ts_status *st);
 
-/* The files that a meta.txt has a line of, bits in the order of lgd_files. */
+/* The files that a meta.txt of lgd_output_write has a line of, bits in the order of lgd_files; 0: another program's. */
 unsigned lgd_meta_files(const char *text);
 
 /* folder/meta.txt, which the caller frees; NULL when there is none that can be read. */

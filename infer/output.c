@@ -171,21 +171,48 @@ static ts_code remove_files(const char *folder, unsigned files, unsigned *remove
     return TS_OK;
 }
 
-/* Every complete file from the hidden folder over the one in folder, meta.txt last; until then one is there that names
- * what may be of either call, so that what a killed process leaves is neither taken for whole nor for somebody else's.
- * What the folder's meta.txt names and is not replaced stays where it is of the same estimate, else it is removed;
- * facts->removed gets its bits. No other file is touched. */
+/* Whether every file of which (bits) can be put into folder: a folder of its name is in the way. */
+static ts_code check_room(const char *folder, unsigned which, ts_status *st)
+{
+    char path[TS_PATH_LENGTH];
+    struct stat info;
+    for (int k = 0; k < LGD_FILES; k++) {
+        if (!(which >> k & 1)) continue;
+        if (ts_path_in(path, folder, lgd_files[k], st) != TS_OK) return st->code;
+        if (lstat(path, &info) == 0 && S_ISDIR(info.st_mode))
+            return ts_fail(st, TS_IO, "%s: is in the way: it is a folder", path);
+    }
+    return TS_OK;
+}
+
+/* Puts a meta.txt in folder that says that its files are being replaced. It is made in the hidden folder: a link of
+ * that name is replaced, not what it leads to. */
+static ts_code begin_meta(const char *hidden, const char *folder, unsigned files, ts_status *st)
+{
+    char from[TS_PATH_LENGTH], to[TS_PATH_LENGTH];
+    ts_code code = ts_path_in(from, hidden, "begun", st);
+    if (!code) code = ts_path_in(to, folder, lgd_files[LGD_OUTPUTS], st);
+    if (!code) code = lgd_write_meta_begun(from, files, st);
+    if (!code && rename(from, to) != 0) code = ts_fail(st, TS_IO, "%s: cannot be replaced: %s", to, strerror(errno));
+    return code;
+}
+
+/* Every complete file from the hidden folder over the one in folder, meta.txt last. What the folder's meta.txt names
+ * stays where it is of the same estimate; else it is removed, facts->removed gets its bits, and until the end there is
+ * a meta.txt that names what may be of either, so that what a killed process leaves is neither taken for whole nor for
+ * somebody else's. No other file is touched. */
 static ts_code move_files(const char *folder, const task *t, lgd_output_result *facts, ts_status *st)
 {
     const char *hidden = t->folder, *meta = lgd_files[LGD_OUTPUTS];
-    char whole[TS_PATH_LENGTH], begun[TS_PATH_LENGTH], *before = lgd_meta_read(folder);
-    const unsigned fresh = files_in(hidden, ~0u), old = before ? lgd_meta_files(before) & ~fresh : 0;
-    const unsigned kept = before && strstr(before, t->mark) ? files_in(folder, old) : 0;
-    ts_code code = ts_path_in(whole, hidden, meta, st);
-    if (!code) code = ts_path_in(begun, folder, meta, st);
+    char whole[TS_PATH_LENGTH], *before = lgd_meta_read(folder);
+    const bool same = before && strstr(before, t->mark);
+    const unsigned fresh = files_in(hidden, ~0u), old = before ? lgd_meta_files(before) & ~fresh : 0,
+                   kept = same ? files_in(folder, old) : 0;
+    ts_code code = check_room(folder, fresh | 1u << LGD_OUTPUTS, st);
+    if (!code) code = ts_path_in(whole, hidden, meta, st);
     if (!code && kept) code = lgd_write_meta(whole, t->photo, t->order, facts, t->mark, before, kept, st);
     free(before);
-    if (!code) code = lgd_write_meta_begun(begun, old | fresh, st);
+    if (!code && !same) code = begin_meta(hidden, folder, old | fresh, st);
     for (int k = 0; k < LGD_OUTPUTS && !code; k++)
         if (fresh >> k & 1) code = ts_move_file(hidden, folder, lgd_files[k], st);
     if (!code) code = remove_files(folder, old & ~kept, &facts->removed, st);

@@ -26,7 +26,8 @@ begin() {
 # The folders that are complete, with what meta.txt is: its inode and time. In hidden ones it is not yet any.
 complete()
 {
-    find "$T/o" -mindepth 2 -maxdepth 2 -name meta.txt ! -path '*/.lgd-*' -printf '%h %i %T@\n' 2>/dev/null | sort
+    find "$T/o" -mindepth 2 -maxdepth 2 -name meta.txt ! -path '*/.lgd-*' -exec grep -q '^estimate: ' {} \; \
+        -printf '%h %i %T@\n' 2>/dev/null | sort
 }
 noted() { if [ -f "$T/o/results.jsonl" ]; then wc -l <"$T/o/results.jsonl"; else echo 0; fi; }
 random() { od -An -N4 -tu4 /dev/urandom | tr -d ' '; }

@@ -91,7 +91,7 @@ static ts_code save(tr_trainer *t, ts_status *st)
     int metas = 9; /* of one process, without a teacher, of procedural materials alone, no more */
     if (t->ranks.count > 1) meta[metas++] = (nn_meta){"ranks", number[6]};
     if (*t->teacher_hash) meta[metas++] = (nn_meta){"teacher", t->teacher_hash};
-    if (*t->collection_hash) meta[metas++] = (nn_meta){"collection", t->collection_hash};
+    if (*t->collection_hash) meta[metas++] = (nn_meta){"collection_files", t->collection_hash};
     const ts_code code = nn_safetensors_write(path, block, n, meta, metas, st);
     free(text);
     return code;
@@ -151,7 +151,7 @@ static ts_code restore(tr_trainer *t, const nn_file *file, const char *path, ts_
     if (!best || !mean) return ts_fail(st, TS_FORMAT, "%s: %s is missing", path, best ? "mean_norm" : "best");
     if (t->step > tr_total(&t->config))
         return ts_fail(st, TS_FORMAT, "%s: step %" PRId64 " is beyond the end of the run", path, t->step);
-    const char *collection = nn_file_meta(file, "collection"), *teacher = nn_file_meta(file, "teacher");
+    const char *collection = nn_file_meta(file, "collection_files"), *teacher = nn_file_meta(file, "teacher");
     snprintf(t->teacher_hash, sizeof t->teacher_hash, "%s", teacher ? teacher : "");
     snprintf(t->collection_hash, sizeof t->collection_hash, "%s", collection ? collection : "");
     t->best = strtod(best, NULL);

@@ -117,9 +117,11 @@ static ts_code set_text(char *to, const char *where, const tr_key *k, const char
     if (strlen(value) >= (size_t)k->hi)
         return ts_fail(st, TS_INVALID, "%s: %s.%s is longer than %.0f bytes", where, k->section, k->key, k->hi - 1);
     /* What an INI file could not say again must not get in by --set. */
-    if (strpbrk(value, "\r\n") || strstr(value, " #") || strstr(value, " ;") || value[0] == '#' || value[0] == ';')
-        return ts_fail(st, TS_INVALID, "%s: %s.%s must not contain a line break or the start of a comment", where,
-                       k->section, k->key);
+    if (strpbrk(value, "\r\n") || (io_ini_needs_quotes(value) && strchr(value, '"')))
+        return ts_fail(st, TS_INVALID,
+                       "%s: %s.%s must not contain a line break, nor a quotation mark at its beginning or beside a "
+                       "comment's sign",
+                       where, k->section, k->key);
     strcpy(to, value);
     return TS_OK;
 }

@@ -1,4 +1,5 @@
 /* A configuration as text: values, the whole file, the help, and the comparison of two. */
+#include "data/ini.h"
 #include "train/config.h"
 #include <stdlib.h>
 #include <string.h>
@@ -55,7 +56,8 @@ void tr_config_print(const tr_config *c, bool neutral, FILE *f)
         if (strcmp(section, k->section)) fprintf(f, "%s[%s]\n", *section ? "\n" : "", k->section);
         section = k->section;
         tr_config_format(c, k, text, sizeof text);
-        fprintf(f, "%s =%s%s\n", k->key, *text ? " " : "", text);
+        const char *mark = io_ini_needs_quotes(text) ? "\"" : "";
+        fprintf(f, "%s =%s%s%s%s\n", k->key, *text ? " " : "", mark, text, mark);
     }
 }
 

@@ -292,7 +292,8 @@ const tr_key tr_keys[] = {
     {"validate", "size", TR_INT, AT(validate.size), 8, 2048, "64", NULL, false,
      "side of the validation materials in pixels"},
     {"validate", "camera", TR_CHOICE, AT(validate.camera), 0, TR_CAMERA_DEFAULT, "data", camera_names, false,
-     "their photographs' camera: as [data] says (data), or with the defaults of its keys (default), by which runs with "
+     "their photographs' camera: as [data] says (data; measured where train.lesson or data.measured lets the "
+     "materials teach such ones alone), or with the defaults of its keys (default), by which runs with "
      "different cameras compare"},
 
     {"output", "folder", TR_TEXT, AT(output.folder), 0, sizeof((tr_config *)0)->output.folder, "", NULL, true,

@@ -103,7 +103,7 @@ static int failed(const ts_status *st)
 /* Rank 0's folder. */
 static ts_code find_folder(const char *folder, bool resume, ts_status *st)
 {
-    if (!resume) return cl_make_folder(folder, st);
+    if (!resume) return cl_make_folder(folder, NULL, st);
     return access(folder, F_OK) == 0 ? TS_OK : ts_fail(st, TS_IO, "%s: there is no run to resume", folder);
 }
 

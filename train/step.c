@@ -103,7 +103,7 @@ static ts_tensor cut(tr_trainer *t, const ts_tensor *whole, rd_grid g)
     return copy;
 }
 
-/* The camera as far away, above the centre: where a field of view alone puts it (infer/estimate.c). */
+/* The camera as far from the centre, above it: where a field of view alone puts one that is tilted. */
 static void stand_above(float camera[3])
 {
     camera[2] = sqrtf(camera[0] * camera[0] + camera[1] * camera[1] + camera[2] * camera[2]);

@@ -45,7 +45,8 @@ static bool make_materials(const tr_config *c, int first, int count, float *maps
 static bool learns_known(const tr_config *c)
 {
     return c->arch.conditions && c->arch.images == 1 &&
-        (c->train.lesson == TR_LESSON_KNOWN || (c->data.told_view == 1 && c->data.told_power == 1));
+        (c->train.lesson == TR_LESSON_KNOWN || c->data.measured == 1 ||
+         (c->data.told_view == 1 && c->data.told_power == 1));
 }
 
 ts_code tr_validator_create(tr_trainer *t, ts_status *st)
@@ -74,7 +75,7 @@ ts_code tr_validator_create(tr_trainer *t, ts_status *st)
     tr_config camera = *c;
     if (c->validate.camera == TR_CAMERA_DEFAULT) camera.data = tr_config_default().data;
     const bool known = learns_known(c);
-    if (known && c->train.lesson == TR_LESSON_KNOWN) camera = tr_measured_camera(&camera);
+    if (known && (c->train.lesson == TR_LESSON_KNOWN || c->data.measured == 1)) camera = tr_measured_camera(&camera);
     tr_capture_views(camera.data.sheet, (uint64_t)c->validate.seed, first, v->count, (int)given, v->captures);
     tr_photographs(&camera, (uint64_t)c->validate.seed, first, v->count, c->validate.size, v->maps, v->captures,
                    (int)given, v->images, v->shots);

@@ -202,7 +202,7 @@ int main(int argc, char **argv)
     o.procedural.collection = collection;
     if (!o.statistics) cl_catch_interrupt(); /* those leave nothing half-done: the signal may end them at once */
     const bool there = o.output && access(o.output, F_OK) == 0;
-    if (o.output) cl_make_folder(o.output, &st);
+    if (o.output) cl_make_folder(o.output, NULL, &st);
     if (!st.code && (o.format || o.photographs))
         run(&o, "materials", write_task, o.count ? o.count : 16, o.size ? (int)o.size : 256, NULL, &st);
     if (!st.code && o.sheet) make_sheet(&o, &st);

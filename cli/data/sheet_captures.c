@@ -221,7 +221,7 @@ ts_code cl_write_sheet_captures(const char *folder, const io_material *m, uint64
     cl_new_set set[SETS];
     int begun = 0;
     const bool there = access(folder, F_OK) == 0;
-    ts_code code = cl_make_folder(folder, st);
+    ts_code code = cl_make_folder(folder, NULL, st);
     for (; begun < SETS && !code; begun += !code)
         code = snprintf(path, sizeof path, "%s%s", folder, names[begun]) < (int)sizeof path
             ? cl_new_set_begin(&set[begun], path, marks[begun], st)

@@ -337,7 +337,7 @@ static int work(const cl_command *given)
     int code = CL_FAILED;
     uint64_t hash;
     bool published = false;
-    const size_t there = cl_made_already(c->out);
+    size_t made = 0;
     cl_pipeline *pipeline = NULL;
     if (lgd_model_path(c->model, LGD_DEFAULT_MODEL, weights, &st) != TS_OK) cl_failed("%s", st.message);
     else if (lgd_weights_published(weights, &published, &st) != TS_OK ||
@@ -349,7 +349,7 @@ static int work(const cl_command *given)
     else if (!(r.model = load_beside_decoder(c, weights, &error))) cl_failed("%s", error.message);
     else if (!recipe && !(recipe = cl_recipe(c, weights, lgd_model_hash(r.model), &st))) cl_failed("%s", st.message);
     else if (cl_command_suits(c, r.model, &st) != TS_OK) code = cl_usage("%s", st.message);
-    else if (cl_make_folder(c->out, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK ||
+    else if (cl_make_folder(c->out, &made, &st) != TS_OK || lgd_output_check(c->out, &st) != TS_OK ||
              (several && !(r.manifest = cl_manifest_open(&plan, c->out, &st))))
         cl_failed("%s", st.message);
     else {
@@ -361,7 +361,7 @@ static int work(const cl_command *given)
     }
     code = end_index(&r, code);
     cl_pipeline_end(&pipeline);
-    cl_remove_made(c->out, there); /* nothing came into it, or it stays */
+    cl_remove_made(c->out, made); /* nothing came into it, or it stays */
     lgd_free(&r.model);
     cl_plan_free(&plan);
     cl_operands_free(&operands);

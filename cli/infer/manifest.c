@@ -93,7 +93,8 @@ static ts_code cut(cl_manifest *m, off_t *size, ts_status *st)
     if (end == info.st_size) return TS_OK;
     char head[sizeof HEAD - 1];
     const ssize_t n = pread(m->fd, head, sizeof head, end);
-    const bool ours = n > 0 && memcmp(head, HEAD, (size_t)n) == 0;
+    const bool ours = n > 0 && memcmp(head, HEAD, (size_t)n) == 0 &&
+        !(pread(m->fd, &c, 1, info.st_size - 1) == 1 && c == '}'); /* a whole one, as an editor leaves it */
     if (!ours) *size = info.st_size + 1;
     if (ours ? ftruncate(m->fd, end) != 0 : write(m->fd, "\n", 1) != 1)
         return ts_fail(st, TS_IO, "%s: cannot be written: %s", m->path, strerror(errno));

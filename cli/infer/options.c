@@ -33,7 +33,8 @@ enum {
 
 const cl_argument cl_infer_arguments[] = {
     {'o', "output", "DIR",
-     "output folder (required); each photograph gets DIR/STEM/, STEM = its file name without extension"},
+     "output folder (required); each photograph gets DIR/STEM/, STEM = its file name without extension, of\n"
+     "a capture's folder its whole name"},
     {'s', "size", "N", "side of the maps in pixels, 1 .. 8192 (default 256)"},
     {'i', "iterations", "N|auto",
      "refinement steps, 0 .. 1000; 0 = the first estimate only; auto = as long as the reconstruction improves,\n"
@@ -71,8 +72,8 @@ const cl_argument cl_infer_arguments[] = {
      "0.01 .. 100, or auto = estimated from the photograph and printed, of a capture from each (default auto; of a\n"
      "sheet 1)"},
     {MASK, "mask", "FILE",
-     "an image of the photographs' shape, upright as they are: refine only where it is not black; there the maps are\n"
-     "the same as without it, elsewhere they may be those of an earlier step"},
+     "an image of the photographs' shape, upright as they are: refine only where it is neither black nor transparent;\n"
+     "there the maps are the same as without it, elsewhere they may be those of an earlier step"},
     {TOLERANCE, "tolerance", "X",
      "early stop, 0 .. 1: a tile is done when one step changes its maps by less than X (RMS, maps in -1 .. 1);\n"
      "photographs up to 512 pixels are one tile; 0 = never (default: 0.003 for models whose network works at the\n"
@@ -87,7 +88,7 @@ const cl_argument cl_infer_arguments[] = {
      "of these), basecolor, metallic, height, ao (ambient occlusion), orm (occlusion, roughness and metalness in "
      "one),\n"
      "gltf, glb (glTF as one file), materialx, page (view.html lights the material in a browser; of several\n"
-     "photographs index.html too); those of another estimate in DIR/STEM/ are removed"},
+     "photographs index.html too); those of another estimate in DIR/STEM/, by its meta.txt, are removed"},
     {AO, "ao", NULL, "also write occlusion.png: ambient occlusion of the height"},
     {SEAMLESS, "seamless", NULL,
      "all maps repeat without a visible border: the same seam is cut through all of them; 7/8 of the square remain"},

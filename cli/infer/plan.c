@@ -9,12 +9,21 @@
 
 static bool no_name(const char *s) { return !*s || strcmp(s, ".") == 0 || strcmp(s, "..") == 0; }
 
-/* The name that a folder has, however it is reached; NULL: path is none. The caller frees it. */
+/* The name of a folder, of one that is given as "." or the like the one it has; NULL: path is none. The caller frees
+ * it. */
 static char *folder_name(const char *path)
 {
     struct stat info;
-    char *whole = stat(path, &info) == 0 && S_ISDIR(info.st_mode) ? realpath(path, NULL) : NULL;
-    char *name = whole ? strdup(strrchr(whole, '/') + 1) : NULL;
+    if (stat(path, &info) != 0 || !S_ISDIR(info.st_mode)) return NULL;
+    size_t end = strlen(path);
+    while (end > 0 && path[end - 1] == '/') end--;
+    size_t begin = end;
+    while (begin > 0 && path[begin - 1] != '/') begin--;
+    char *name = strndup(path + begin, end - begin);
+    if (!name || !no_name(name)) return name;
+    char *whole = realpath(path, NULL);
+    free(name);
+    name = whole ? strdup(strrchr(whole, '/') + 1) : NULL;
     free(whole);
     return name;
 }

@@ -38,14 +38,20 @@ static int channel(const ImageSpec &spec, const char *name)
     return -1;
 }
 
+/* "beauty." of "beauty.R", or nothing. */
+static std::string layer_of(const std::string &name)
+{
+    const size_t stop = name.rfind('.');
+    return stop == std::string::npos ? "" : name.substr(0, stop + 1);
+}
+
 /* The layers of an image that have R, G and B, "beauty.R" and so on: their names with the full stop. */
 static std::vector<std::string> colour_layers(const ImageSpec &spec)
 {
     std::vector<std::string> layers;
     for (const std::string &name : spec.channelnames) {
-        const size_t stop = name.rfind('.');
-        if (stop == std::string::npos || !Strutil::iequals(name.substr(stop + 1), "R")) continue;
-        const std::string layer = name.substr(0, stop + 1);
+        const std::string layer = layer_of(name);
+        if (layer.empty() || !Strutil::iequals(name.substr(layer.size()), "R")) continue;
         if (channel(spec, (layer + "G").c_str()) >= 0 && channel(spec, (layer + "B").c_str()) >= 0)
             layers.push_back(layer);
     }
@@ -77,6 +83,10 @@ static ts_code choose_channels(const char *path, const ImageSpec &spec, oi_image
         int others[3] = {0, 0, 0}, found = 0;
         for (int c = 0; c < n && found < 3; c++)
             if (c != image->alpha) others[found++] = c;
+        for (int k = 1; k < found; k++)
+            if (layer_of(spec.channelnames[others[k]]) != layer_of(spec.channelnames[others[0]]))
+                return ts_fail(st, TS_UNSUPPORTED, "%s: no layer has the channels R, G and B: save its colours alone",
+                               path);
         r = others[0];
         g = found == 3 ? others[1] : r; /* two channels that are no colour: the first is taken as grey */
         b = found == 3 ? others[2] : r;

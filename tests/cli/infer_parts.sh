@@ -57,6 +57,9 @@ mask_and_tolerance() {
     expect 2 infer --model single --sample metal "$T/p.ppm" -o "$T/o"
     says "$T/err" "these weights do not guess the scene"
     [ ! -e "$T/o" ] || fail "something was written"
+    # a folder of the model's name hides nothing
+    mkdir "$T/named" "$T/named/phone"
+    (cd "$T/named" && expect 0 infer --model phone "$T/p.ppm" -o "$T/hidden") || exit 1
     expect 2 infer --sample wood "$T/p.ppm" -o "$T/o"
     says "$T/err" "--sample: 'wood' is not metal, dielectric or auto"
     expect 0 infer --model phone --sample metal "$T/p.ppm" -o "$T/metal"

@@ -75,14 +75,15 @@ TEST(cli_folders)
     char path[300];
     ts_status st = {0};
     snprintf(path, sizeof path, "%s/a/b/c", test_folder());
-    CHECK(cl_make_folder(path, &st) == TS_OK && cl_make_folder(path, &st) == TS_OK, "%s", st.message);
+    CHECK(cl_make_folder(path, NULL, &st) == TS_OK && cl_make_folder(path, NULL, &st) == TS_OK, "%s", st.message);
     struct stat info;
     CHECK(stat(path, &info) == 0 && S_ISDIR(info.st_mode), "not made");
     snprintf(path, sizeof path, "%s/file", test_folder());
     FILE *f = fopen(path, "w");
     CHECK(f && fclose(f) == 0, "file");
-    CHECK(cl_make_folder(path, &st) == TS_IO && strstr(st.message, "file"), "a file is not a folder: '%s'", st.message);
-    CHECK(cl_make_folder("", &st) == TS_INVALID, "empty");
+    CHECK(cl_make_folder(path, NULL, &st) == TS_IO && strstr(st.message, "file"), "a file is not a folder: '%s'",
+          st.message);
+    CHECK(cl_make_folder("", NULL, &st) == TS_INVALID, "empty");
 }
 
 TEST(cli_progress_is_silent_without_a_terminal)

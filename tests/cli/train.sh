@@ -150,6 +150,9 @@ own_collection() {
     expect 0 "$BIN/lgd-data" -o "$T/other" --count 2 --size 32 --seed 2
     expect 1 train --resume --set data.collection="$T/other" --set data.collected=0.5
     says "$T/err" "$T/other: has other maps than the run was begun with"
+    echo "another file" >>"$T/own/$(ls "$T/own" | head -n 1)/notes.txt"
+    expect 1 train --resume --set data.collection="$T/own" --set data.collected=0.5
+    rm "$T/own"/*/notes.txt
     mv "$T/own" "$T/moved"
     expect 0 train --resume --set data.collection="$T/moved" --set data.collected=0.5
 }

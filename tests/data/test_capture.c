@@ -58,6 +58,9 @@ TEST(capture_comes_back)
               pow(stored, 2.2));
     }
     io_capture_free(&back);
+    CHECK(io_read_capture(test_folder(), 6, 3, &back, &st) == TS_UNSUPPORTED && !back.image,
+          "more pixels than allowed");
+    st = (ts_status){0};
     CHECK(io_read_capture(test_folder(), 6, IO_MAX_PIXELS_DEFAULT, &back, &st) == TS_OK && back.size == 6, "%s",
           st.message);
     double a = 0, b = 0;

@@ -362,6 +362,11 @@ TEST(layers)
     CHECK(io_read_photo(bytes_save(&b, test_folder(), "two.exr"), 1 << 20, &p, &st) == TS_UNSUPPORTED &&
               strstr(st.message, "several layers have colours (a, b)"),
           "%s", st.message);
+    static const char *const none[] = {"Depth.Z", "Normal.X", "Normal.Y", "Normal.Z"};
+    b = exr_row(1, 4, none, of_two);
+    CHECK(io_read_photo(bytes_save(&b, test_folder(), "none.exr"), 1 << 20, &p, &st) == TS_UNSUPPORTED &&
+              strstr(st.message, "no layer has the channels R, G and B"),
+          "%s", st.message);
 }
 
 TEST(first_page)

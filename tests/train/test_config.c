@@ -152,7 +152,9 @@ TEST(config_rejects_bad_values)
                                          {"data", "families", ""},
                                          {"data", "families", "all, -all"},
                                          {"data", "families", "granit"},
-                                         {"output", "folder", "a # b"},
+                                         {"output", "folder", "a # \"b\""},
+                                         {"output", "folder", "\"b"},
+                                         {"output", "folder", "a\nb"},
                                          {"train", "steps", "1e3"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         tr_config c = tr_config_default();
@@ -162,6 +164,30 @@ TEST(config_rejects_bad_values)
         CHECK(!strncmp(st.message, "c.ini:7: ", 9) && strstr(st.message, bad[i][1]),
               "the message names neither place nor key: %s", st.message);
         CHECK(tr_config_same(&c, &(tr_config){0}, "x", NULL) != TS_OK, "nothing is compared");
+    }
+}
+
+/* Names of files with comments' signs and blanks at their ends. */
+TEST(config_text_that_needs_quotation_marks_comes_back)
+{
+    static const char *const names[] = {"a # b", " a", "a ", "#a", "a\t; b", "a#b", "say \"a\""};
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+        tr_config c = tr_config_default(), back = tr_config_default();
+        ts_status st = {0};
+        io_ini ini;
+        CHECK(!tr_config_set(&c, "x", "output", "folder", names[i], &st), "%s", st.message);
+        char *text = NULL;
+        size_t size = 0;
+        FILE *f = open_memstream(&text, &size);
+        tr_config_print(&c, true, f);
+        fclose(f);
+        CHECK(!io_ini_parse("x.ini", text, size, &ini, &st), "%s", st.message);
+        for (int k = 0; k < ini.count; k++)
+            CHECK(!tr_config_set(&back, "x", ini.entry[k].section, ini.entry[k].key, ini.entry[k].value, &st), "%s",
+                  st.message);
+        CHECK(!strcmp(back.output.folder, names[i]), "'%s' comes back as '%s'", names[i], back.output.folder);
+        io_ini_free(&ini);
+        free(text);
     }
 }
 
