@@ -152,7 +152,7 @@ light() {
     model
     expect 2 evaluate --set procedural:1,1 --told -o "$T/o"
     says "$T/err" "told"
-    expect 2 evaluate --set procedural:1,1 --tune --method lgd:tolerance=0.1 -o "$T/o"
+    expect 2 "$BIN/lgd-eval" --size 32 --set procedural:1,1 --tune --method lgd:tolerance=0.1 -o "$T/o"
     says "$T/err" "tolerance"
     for o in --exposure=0 --exposure=x --light=1 --light=a,b --light=9,0; do
         expect 2 "$BIN/lgd-eval" --set procedural:1,1 "$o" -o "$T/o"
