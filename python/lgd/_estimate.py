@@ -2,7 +2,9 @@
 
 import ctypes
 import math
+import operator
 import os
+import signal
 import threading
 from typing import Callable, List, Optional, Sequence, Union
 
@@ -17,11 +19,13 @@ Progress = Callable[[float, float], None]
 
 
 class _Calls:
-    """The library's calls into Python. What these raise ends the work and is raised again behind it."""
+    """The library's calls into Python. What these raise ends the work and is raised again behind it, as does Ctrl-C:
+    what a signal's handler raises at the beginning of such a call would be lost, so it runs behind the work."""
 
     def __init__(self, progress: Optional[Progress], steps: int):
         self.progress, self.steps = progress, steps
         self.raised: Optional[BaseException] = None
+        self.interrupt: Optional[tuple] = None  # the handler's arguments
         self.done = 0.0
         self.rmse: List[float] = []
         self.step, self.tile = c.Progress(self._step), c.Tile(self._tile)
@@ -33,19 +37,40 @@ class _Calls:
                 self.progress(self.done, rmse)
         except BaseException as error:  # KeyboardInterrupt too
             self.raised = error
-        return self.raised is not None
+        return self.raised is not None or self.interrupt is not None
 
     def _step(self, step: int, rmse: float, user: object) -> int:
         self.rmse = self.rmse[:step] + [rmse]
         return self._tell((step + 1) / (self.steps + 1), rmse)
+
+    def _interrupted(self, number: int, frame: object) -> None:
+        self.interrupt = (number, frame)
+
+    def run(self, call: Callable[[], int]) -> int:
+        handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
+        if not callable(handler):  # another thread's, ignored, or not Python's
+            return self._raise(call())
+        signal.signal(signal.SIGINT, self._interrupted)
+        try:
+            code = call()
+        finally:
+            signal.signal(signal.SIGINT, handler)
+        if self.interrupt:
+            handler(*self.interrupt)
+        return self._raise(code)
+
+    def _raise(self, code: int) -> int:
+        if self.raised:
+            raise self.raised
+        return code
 
     def _tile(self, done: float, user: object) -> int:
         return self._tell(done, math.nan)
 
 
 class Model:
-    """Weights: a file, or the name of a model that ships with lgd ("phone", "single"). Any number of threads
-    may use one model at once."""
+    """Weights: a file, or the name of a model that is installed with lgd ("phone", "single"; the wheel with a library
+    of its own has phone alone). Any number of threads may use one model at once."""
 
     def __init__(self, weights: Optional[Path] = None):
         path, error = ctypes.create_string_buffer(4096), c.Failure()
@@ -118,6 +143,8 @@ def _run(
         raise ValueError(f"precision {precision!r} is none of {', '.join(c.PRECISIONS)}")
     if isinstance(iterations, str) and iterations != "auto":
         raise ValueError(f"iterations {iterations!r} is neither a number nor 'auto'")
+    if iterations is not None and not isinstance(iterations, str) and not 0 <= operator.index(iterations) < 1 << 31:
+        raise ValueError(f"iterations is {iterations} and must be 0 or more")
     if isinstance(light_power, str) and light_power != "auto":
         raise ValueError(f"light_power {light_power!r} is neither a number nor 'auto'")
     if isinstance(orientations, str) and orientations != "auto":
@@ -149,10 +176,10 @@ def _run(
     if mask is not None:
         options.mask = mask.ctypes.data_as(ctypes.POINTER(ctypes.c_ubyte))
     maps = np.empty((side, side, 9), np.float32)
-    code = lib.lgd_estimate_photos(model._model, structs, len(given), side, options, floats(maps), error)
-    if calls.raised:
-        raise calls.raised
-    check(code, error)
+    call = lambda: lib.lgd_estimate_photos(  # noqa: E731
+        model._model, structs, len(given), side, options, floats(maps), error
+    )
+    check(calls.run(call), error)
     first = taken[0]
     photo = Photo(given[0].image, tuple(first.light), tuple(first.camera), first.power)
     return Maps(maps, photo, rmse=calls.rmse)
@@ -232,6 +259,6 @@ def estimate_photos(
     size. model: as of estimate."""
     return _run(
         _loaded(model),
-        photos, c.OF_PHOTO if len(photos) == 1 else c.UNKNOWN, None, iterations, light_power, None, 2, False,
+        photos, c.OF_PHOTO if len(photos) == 1 else c.UNKNOWN, None, iterations, light_power, None, "auto", False,
         "f32", sample, threads, progress,
     )

@@ -46,7 +46,7 @@ def three(name: str, numbers: Sequence[float]) -> "tuple[float, float, float]":
     return x, y, z
 
 
-@dataclass
+@dataclass(eq=False)
 class Photo:
     """A photograph of the sample, or None, and where it was taken. (side, side, 3): uint8 and uint16 are sRGB, floats
     linear; image is linear float32 from then on."""
@@ -54,7 +54,7 @@ class Photo:
     image: Optional[np.ndarray]
     light: Sequence[float] = ()
     camera: Sequence[float] = ()
-    power: float = 0.0
+    power: Optional[float] = None  # the default light's
 
     def __post_init__(self) -> None:
         if self.image is not None:
@@ -62,9 +62,11 @@ class Photo:
         flash = lib.lgd_flash_photo(None)
         self.light = three("light", self.light if len(self.light) else flash.light)
         self.camera = three("camera", self.camera if len(self.camera) else flash.camera)
-        self.power = self.power or flash.power
+        self.power = flash.power if self.power is None else self.power
 
     def struct(self) -> c.PhotoStruct:
+        if self.image is not None:  # it may be another than at first
+            self.image = linear(np.asarray(self.image))
         image = None if self.image is None else floats(self.image)
         return c.PhotoStruct(image, (ctypes.c_float * 3)(*self.light), (ctypes.c_float * 3)(*self.camera), self.power)
 
@@ -84,7 +86,7 @@ class Facts(NamedTuple):
     profile: str  # a colour profile that cannot be used: sRGB was assumed
 
 
-@dataclass
+@dataclass(eq=False)
 class Maps:
     """Maps, (size, size, 9) float32 as lgd.h has them: diffuse rgb, normal x y, roughness, specular F0 rgb."""
 
@@ -219,7 +221,7 @@ def square(pixels: np.ndarray, size: int) -> np.ndarray:
 
 def linear(image: np.ndarray) -> np.ndarray:
     """A photograph that covers the sample as linear float32."""
-    if np.issubdtype(image.dtype, np.floating):
+    if np.issubdtype(image.dtype, np.floating) and image.ndim == 3:
         return np.ascontiguousarray(image, np.float32)
     if image.ndim != 3 or image.shape != (image.shape[0], image.shape[0], 3):
         raise ValueError(f"a photograph of shape {image.shape}: all must be (side, side, 3)")

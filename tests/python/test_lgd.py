@@ -5,6 +5,7 @@ import math
 import os
 import pathlib
 import re
+import signal
 import tempfile
 import threading
 import unittest
@@ -141,6 +142,28 @@ class Estimates(unittest.TestCase):
                 quick(bump(), iterations=5, progress=stop, **options)
             self.assertEqual(len(calls), 1)
 
+    def test_ctrl_c_ends_the_work(self):
+        for after in (0.05, 0.1, 0.2):
+            timer = threading.Timer(after, os.kill, (os.getpid(), signal.SIGINT))
+            with self.assertRaises(KeyboardInterrupt):
+                timer.start()
+                for _ in range(1000):
+                    lgd.estimate(PHOTO, size=128, iterations=40)
+            timer.join()
+        self.assertIs(signal.getsignal(signal.SIGINT), signal.default_int_handler)
+
+    def test_an_image_that_was_exchanged_is_read_as_it_is(self):
+        maps = lgd.estimate(PHOTO, size=64)
+        with tempfile.TemporaryDirectory() as folder:
+            maps.save(folder + "/a", ["render"])
+            maps.photo.image = maps.photo.image[::-1].copy()[::-1].astype(np.float64)
+            maps.save(folder + "/b", ["render"])
+            files = [pathlib.Path(folder, name, "render.png").read_bytes() for name in "ab"]
+            self.assertEqual(files[0], files[1])
+            maps.photo.image = np.zeros((32, 32, 3), np.uint8)
+            with self.assertRaises(ValueError):
+                maps.save(folder + "/c", ["render"])
+
     def test_several_threads_share_a_model(self):
         model, results = lgd.Model(), [None] * 4
 
@@ -189,6 +212,9 @@ class Estimates(unittest.TestCase):
             ({"image": bump(), "size": 0}, ValueError, "size is 0"),
             ({"image": bump(), "iterations": "often"}, ValueError, "often"),
             ({"image": bump(), "iterations": 5000}, lgd.Error, "iterations is 5000"),
+            ({"image": bump(), "iterations": -1}, ValueError, "iterations is -1"),
+            ({"image": bump(), "iterations": 1 << 32}, ValueError, "iterations is 4294967296"),
+            ({"image": bump(), "iterations": 1.7}, TypeError, "float"),
             ({"image": bump(), "precision": "f16"}, ValueError, "f16"),
             ({"image": bump(), "light_power": "all"}, ValueError, "all"),
             ({"image": bump(), "orientations": 3}, lgd.Error, "orientations is 3"),
