@@ -330,9 +330,10 @@ wheel: library
 # The add-on for Blender 4.2 and later, with that wheel in it.
 blender: wheel
 	@rm -rf $(WHEELS)/blender && mkdir -p $(WHEELS)/blender/lgd_material/wheels
-	@cp $(WHEELS)/lgd-$(VERSION)-*.whl $(WHEELS)/blender/lgd_material/wheels/
-	@cp python/blender/lgd_material/__init__.py LICENSE $(WHEELS)/blender/lgd_material/
-	@cd $(WHEELS)/blender/lgd_material && sed "s/@VERSION@/$(VERSION)/; s/@WHEEL@/$$(ls wheels)/" \
+	@cp "$(WHEELS)/$$($(PYTHON) python/backend.py --name)" $(WHEELS)/blender/lgd_material/wheels/
+	@cp python/blender/lgd_material/__init__.py LICENSE NOTICE $(WHEELS)/blender/lgd_material/
+	@cd $(WHEELS)/blender/lgd_material && sed "s/@VERSION@/$(VERSION)/; s/@WHEEL@/$$(ls wheels)/; \
+	  s/@PLATFORM@/$$(uname -m | sed 's,x86_64,linux-x64,; s,aarch64,linux-arm64,')/" \
 	  $(CURDIR)/python/blender/lgd_material/blender_manifest.toml.in > blender_manifest.toml
 	@rm -f $(WHEELS)/lgd_material-$(VERSION).zip
 	@cd $(WHEELS)/blender && $(PYTHON) -m zipfile -c ../lgd_material-$(VERSION).zip lgd_material && rm -rf lgd_material
@@ -438,8 +439,9 @@ $(BUILD)/share/zsh/site-functions/_lgd-%: $(BUILD)/bin/lgd-% .ci/completions.sh
 	$(Q)sh .ci/completions.sh zsh $< > $@.new && mv $@.new $@
 
 manuals:
-	@sh .ci/deps.sh help2man
-	@$(MAKE) --no-print-directory $(MAN:%=$(BUILD)/%) $(COMPLETIONS:%=$(BUILD)/%)
+	@$(MAKE) --no-print-directory $(COMPLETIONS:%=$(BUILD)/%)
+	@if sh .ci/deps.sh help2man; then $(MAKE) --no-print-directory $(MAN:%=$(BUILD)/%); \
+	  else echo "make: manual pages are left out: they need help2man" >&2; fi
 
 # Where make install puts things.
 TO := $(DESTDIR)$(PREFIX)
@@ -459,7 +461,8 @@ install: all
 	  $(TO_LIB)/$(notdir $(SHARED)) $(TO_LIB)/lgd/*.so
 	$(STRIP) --strip-debug $(TO_LIB)/liblgd.a
 	install -m 644 infer/lgd.h $(TO)/include
-	for f in $(MAN) $(COMPLETIONS); do install -D -m 644 $(BUILD)/$$f $(TO)/$$f || exit 1; done
+	for f in $(MAN) $(COMPLETIONS); do \
+	  [ ! -e $(BUILD)/$$f ] || install -D -m 644 $(BUILD)/$$f $(TO)/$$f || exit 1; done
 	install -m 644 $(MODELS) $(TO)/share/lgd
 	@printf '%s\n' 'prefix=$(PREFIX)' 'libdir=$(LIBDIR:$(PREFIX)/%=$${prefix}/%)' 'Name: lgd' \
 	  'Description: material of a surface from one flash photograph' 'Version: $(VERSION)' \

@@ -7,14 +7,16 @@
 set -eu
 version=$1 out=$2
 fail() { echo "deb: $*" >&2; exit 1; }
-for tool in dpkg-deb dpkg-shlibdeps dpkg-architecture; do
-    command -v $tool >/dev/null || fail "there is no $tool: apt-get install dpkg-dev"
+for tool in dpkg-deb dpkg-shlibdeps dpkg-architecture help2man; do
+    command -v $tool >/dev/null || fail "there is no $tool: apt-get install dpkg-dev help2man"
 done
 name=${DEBFULLNAME:-$(git config user.name 2>/dev/null || :)} \
     mail=${DEBEMAIL:-$(git config user.email 2>/dev/null || :)}
 [ -n "$name" ] && [ -n "$mail" ] || fail "who maintains them? Set DEBFULLNAME and DEBEMAIL"
 arch=$(dpkg-architecture -qDEB_HOST_ARCH) libdir=/usr/lib/$(dpkg-architecture -qDEB_HOST_MULTIARCH)
-day=$(LC_ALL=C date -R -u ${SOURCE_DATE_EPOCH:+-d @$SOURCE_DATE_EPOCH})
+# The sources' date: what packages of several architectures share must be the same bytes.
+: "${SOURCE_DATE_EPOCH:=$(git log -1 --format=%ct 2>/dev/null || date +%s)}"
+day=$(LC_ALL=C date -R -u -d "@$SOURCE_DATE_EPOCH")
 mkdir -p "$out"
 work=$(mktemp -d "$out/.lgd-deb.XXXXXX")
 trap 'rm -rf "$work"' EXIT
@@ -53,7 +55,8 @@ needs() {
     mkdir -p "$work/debian"
     printf 'Source: lgd\n\nPackage: %s\nArchitecture: any\n' "$1" >"$work/debian/control"
     (cd "$work" && dpkg-shlibdeps -O $(find "$1" -type f -exec sh -c 'readelf -h "$1" >/dev/null 2>&1' - {} \; -print) \
-        2>"$work/warnings") | sed -n 's/^shlibs:Depends=//p' || fail "$(cat "$work/warnings")"
+        >"$work/substvars" 2>"$work/warnings") || fail "$(cat "$work/warnings")"
+    sed -n 's/^shlibs:Depends=//p' "$work/substvars"
 }
 
 # make_deb PACKAGE SECTION ARCHITECTURE DEPENDS SHORT LONG FIELD...
@@ -110,6 +113,12 @@ make_deb liblgd-dev libdevel "$arch" \
 make_deb lgd-models graphics all '' 'material of a surface from one flash photograph - weights' "$what
  .
  These are the weights of its networks." 'Multi-Arch: foreign'
+mkdir -p "$work/python3-lgd/DEBIAN"
+{
+    printf '#!/bin/sh\nset -e\n# what Python compiled\n'
+    printf 'rm -rf /usr/lib/python3/dist-packages/lgd/__pycache__\n'
+} >"$work/python3-lgd/DEBIAN/prerm"
+chmod 755 "$work/python3-lgd/DEBIAN/prerm"
 make_deb python3-lgd python all "python3 (>= 3.9), python3-numpy, liblgd0 (>= $version), lgd-models (= $version)" \
     'material of a surface from one flash photograph - Python' "$what
  .

@@ -61,7 +61,7 @@ static void table(const ev_report *r, const shown *s, int set, FILE *f)
             all, all == 1 ? "" : "s");
     for (int k = 0; k < EV_METRICS; k++)
         if ((has[k] = measured(r, s, set, k)))
-            fprintf(f, "<th>%s<br><small>%s</small></th>", ev_metric_name[k], unit(k));
+            fprintf(f, "<th scope=\"col\">%s<br><small>%s</small></th>", ev_metric_name[k], unit(k));
     fputs("</tr>\n", f);
     for (int i = 0; i < s->columns; i++) {
         const int c = s->column[i], m = ev_report_method(r, c), n = ev_report_summary(r, set, c, &mean, &deviation);
@@ -139,7 +139,9 @@ static void sheet(const ev_result *m, int method, FILE *f)
     for (int i = 0; i < shape->columns; i++) fprintf(f, "<span>%s</span>", ev_sheet_column(shape, i, label));
     fputs("</div><div class=\"rows\">", f);
     for (int i = 0; i < shape->rows; i++) fprintf(f, "<span>%s</span>", ev_sheet_row(shape, i));
-    fputs("</div><img alt=\"\" src=\"data:image/png;base64,", f);
+    fputs("</div><img alt=\"", f);
+    io_put_text(f, m->material);
+    fputs(": pictures in the rows and columns that are named beside\" src=\"data:image/png;base64,", f);
     io_put_base64(f, m->png[method], m->png_size[method]);
     fputs("\"></div>", f);
 }
@@ -158,10 +160,12 @@ static void material(const ev_report *r, const shown *s, const ev_result *m, FIL
     fputs(" <small>", f);
     io_put_text(f, r->set_name[m->set]);
     fputs("</small></h3>\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" "
-          "aria-label=\"Errors\"><table><tr><th></th>",
+          "aria-label=\"Errors of ",
           f);
+    io_put_text(f, m->material);
+    fputs("\"><table><tr><th></th>", f);
     for (int i = 0; i < columns; i++) {
-        fputs("<th>", f);
+        fputs("<th scope=\"col\">", f);
         put_name(r, column[i], f);
         fputs("</th>", f);
     }
@@ -181,7 +185,9 @@ static void material(const ev_report *r, const shown *s, const ev_result *m, FIL
     fputs("</table></div>\n", f);
     for (int i = 0; i < r->methods; i++) {
         if (!m->png[i]) continue;
-        fputs("<figure><div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Pictures\">", f);
+        fputs("<figure><div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Pictures of ", f);
+        io_put_text(f, m->material);
+        fputs("\">", f);
         if (r->methods > 1) {
             fputs("<figcaption>", f);
             io_put_text(f, r->method[i].label);

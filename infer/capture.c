@@ -1,5 +1,6 @@
 #include "infer/capture.h"
 #include "data/capture_ini.h"
+#include "nn/clip.h"
 #include "render/render.h"
 #include <math.h>
 #include <string.h>
@@ -29,7 +30,8 @@ ts_code lgd_read_capture(const char *path, int size, int64_t max_pixels, bool as
     lgd_capture_gain(c, as_taken, gain);
     for (int i = 0; i < 3; i++) c->power[i] *= gain[i];
     const size_t values = (size_t)c->images * (size_t)size * (size_t)size * 3;
-    for (size_t i = 0; i < values; i++) c->image[i] = fminf(c->image[i] * gain[i % 3], 1);
+    for (size_t i = 0; i < values; i++) c->image[i] *= gain[i % 3];
+    nn_clip((int64_t)values, c->image, c->image);
     return TS_OK;
 }
 

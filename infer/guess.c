@@ -43,7 +43,7 @@ ts_code lgd_guess_revise(ag_tape *tape, const nn_model *net, lgd_given *p, int r
     const ts_shape maps = {1, size, size, MAP_CHANNELS}, spread = {1, size, size, NN_SPREADS};
     *made = 0;
     ag_value *image = revisions > 0 ? photographs_for_h(tape, size, p) : NULL;
-    nn_revision r = {.given = p->count, .views = p->views, .known = p->known};
+    nn_revision r = {.given = p->count, .views = p->views, .known = p->known, .kind = p->kind};
     if (image) {
         r.image = image->t;
         r.maps = ag_constant(tape, ts_view(g->r0, maps));

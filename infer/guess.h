@@ -15,7 +15,7 @@ typedef struct lgd_given {
     const float *r0, *deviation; /* r0: where it is known, as in nn_input; deviation: of a model that says it */
 } lgd_given;
 
-/* The first guess from the photograph that is taken most from above. given gets its view, its r0 and deviation, which
+/* The first guess from the first photograph in rd_capture_order. given gets its view, its r0 and deviation, which
  * are the tape's memory, and where o->power is wanted the exposures of all. */
 ts_code lgd_guess_first(ag_tape *tape, const nn_model *net, lgd_given *given, const lgd_options *o,
                         nn_first_guess *guess, ts_status *st);

@@ -82,6 +82,7 @@ static void put_facts(FILE *f, void *user)
             SPHERE);
     put_vector(f, "guards", guards);
     put_vector(f, "flash", p->photo->light);
+    put_vector(f, "flashCamera", p->photo->camera);
     put_vector(f, "camera", first.camera);
     fprintf(f, "\"flashPower\": %.7g, \"power\": %.7g, \"lights\": [", (double)p->photo->power, (double)first.power);
     for (int i = 0; i < LGD_PREVIEW_LIGHTS; i++) {

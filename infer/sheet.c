@@ -1,5 +1,6 @@
 #include "infer/sheet.h"
 #include "infer/angle.h"
+#include "nn/clip.h"
 #include "render/scene.h"
 #include <math.h>
 #include <string.h>
@@ -38,7 +39,8 @@ static ts_code add(const io_sheet_set *set, const io_sheet_photo *p, int k, int6
     for (int i = 0; i < 3; i++) gain[i] = c->power[i] * (float)(IO_SHEET_PAPER / (pi * p->exposure[i]));
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
     float *to = c->image + (size_t)k * values;
-    for (size_t i = 0; i < values; i++) to[i] = fminf(window.data[i] * gain[i % 3], 1);
+    for (size_t i = 0; i < values; i++) to[i] = window.data[i] * gain[i % 3];
+    nn_clip((int64_t)values, to, to);
     io_image_free(&window);
     return TS_OK;
 }

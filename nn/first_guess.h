@@ -14,7 +14,7 @@ typedef struct nn_first_guess {
     float *spread;    /* [side][side][NN_SPREADS]: the logarithms of the maps' expected errors, as nn_guess has them */
     float *deviation; /* [side][side][NN_SPREADS]: the standard deviations that the steps believe */
     float number[RD_SCENE_NUMBERS];
-    rd_view view; /* light and camera of number, those that are known as they were given */
+    rd_view view; /* light and camera of number; the light's place and the camera's height as given where known */
 } nn_first_guess;
 
 /* How a photograph was taken. */

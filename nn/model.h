@@ -146,9 +146,10 @@ void nn_model_range(const nn_model *model, nn_part part, size_t *first, size_t *
 
 /* What is known of a photograph's scene: a model with arch.conditions reads it, others assume all of it. */
 typedef enum nn_known {
-    NN_KNOWN_CAMERA = 1, /* its place */
-    NN_KNOWN_LIGHT = 2,  /* its place */
-    NN_KNOWN_POWER = 4,  /* the light's */
+    NN_KNOWN_CAMERA =
+        1, /* its height, as of a field of view; of its place beside the centre the first guess may move it */
+    NN_KNOWN_LIGHT = 2, /* its place */
+    NN_KNOWN_POWER = 4, /* the light's */
     NN_KNOWN_ALL = 7
 } nn_known;
 

@@ -125,6 +125,7 @@ static bool read_one(ag_tape *tape, const nn_model *model, const nn_revision *r,
     for (int k = 0; k < r->given; k++) image[k] = r->image.data + ((size_t)(n * r->given + k)) * pixels * 3;
     nn_deviations((int64_t)pixels, spread, (nn_belief){.photographs = r->given, .revised = r->made > 0}, threads,
                   m.deviation);
+    nn_deviations_of_kind(r->kind, (int64_t)pixels, m.deviation);
     const rd_prior prior = {before, m.deviation, nn_step_prior(r->known[n * r->given], r->given)};
     rd_posterior_steps(grid, MAP_CHANNELS, views, image, r->given, &prior, nn_arch_steps(&model->arch, r->given),
                        (rd_search){.best = m.best, .misfit = m.misfit}, m.maps, m.step, m.after);
@@ -188,6 +189,15 @@ static bool fits(ag_tape *tape, const nn_model *model, const nn_revision *r)
     return !ag_status(tape)->code;
 }
 
+/* A metal's diffuse, a dielectric's F0: h, which does not know of kinds, does not move them. */
+static void hold_kind(const nn_revision *r, ag_value *maps)
+{
+    const int first = r->kind == NN_KIND_METAL ? MAP_DIFFUSE : MAP_SPECULAR;
+    const int64_t pixels = ts_count(maps->t.shape) / MAP_CHANNELS;
+    for (int64_t i = 0; i < pixels; i++)
+        memcpy(maps->t.data + i * MAP_CHANNELS + first, r->maps->t.data + i * MAP_CHANNELS + first, 3 * sizeof(float));
+}
+
 bool nn_revise(ag_tape *tape, const nn_model *model, nn_revision *r)
 {
     if (!fits(tape, model, r)) return false;
@@ -212,6 +222,7 @@ bool nn_revise(ag_tape *tape, const nn_model *model, nn_revision *r)
     ag_value *keep[2] = {ag_add(tape, found, ag_channels(tape, y, 0, MAP_CHANNELS)),
                          ag_add(tape, r->spread, ag_channels(tape, y, MAP_CHANNELS, NN_SPREADS))};
     if (ag_status(tape)->code) return false;
+    if (r->kind != NN_KIND_UNKNOWN) hold_kind(r, keep[0]);
     ag_scope_end(tape, mark, keep, 2);
     r->maps = keep[0], r->spread = keep[1], r->made++;
     return true;

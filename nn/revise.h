@@ -2,6 +2,7 @@
  * (docs/math.md, S26). */
 #ifndef NN_REVISE_H
 #define NN_REVISE_H
+#include "nn/kind.h"
 #include "nn/model.h"
 
 /* What a revision reads, and what it leaves: photographs of nn_arch_side pixels a side, of n materials. */
@@ -13,6 +14,7 @@ typedef struct nn_revision {
     ag_value *maps;             /* in and out: [n, side, side, channels], first R_0 */
     ag_value *spread;           /* in and out: [n, side, side, NN_SPREADS], as in nn_guess */
     int made;                   /* revisions so far */
+    nn_kind kind;               /* what the sample is known to be: that map stays */
 } nn_revision;
 
 /* One revision. From R, which with spread is the prior, all steps to the most probable maps (render/posterior.h) lead

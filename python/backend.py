@@ -68,14 +68,22 @@ def _library(folder):
     return made + [(ROOT / "models" / "phone.safetensors", "share/lgd/phone.safetensors")]
 
 
+def _own_tag():
+    return "py3-none-" + re.sub(r"[^A-Za-z0-9]", "_", sysconfig.get_platform())
+
+
+def _wheel_name(tag):
+    return f"lgd-{_version()}-{tag}.whl"
+
+
 def _write(directory, tag, files, texts):
     """files: pairs of a file and its name in the wheel; texts: pairs of a name and what is in it."""
     info = f"lgd-{_version()}.dist-info"
-    name = f"lgd-{_version()}-{tag}.whl"
+    name = _wheel_name(tag)
     wheel = f"Wheel-Version: 1.0\nGenerator: lgd\nRoot-Is-Purelib: {str(tag.endswith('any')).lower()}\nTag: {tag}\n"
     texts = texts + [(f"{info}/METADATA", _metadata()), (f"{info}/WHEEL", wheel)]
     content = [(place, source.read_bytes()) for source, place in files] + [(n, t.encode()) for n, t in texts]
-    content.append((f"{info}/LICENSE", (ROOT / "LICENSE").read_bytes()))
+    content += [(f"{info}/{legal}", (ROOT / legal).read_bytes()) for legal in ("LICENSE", "NOTICE")]
     record = ""
     with zipfile.ZipFile(pathlib.Path(directory) / name, "w", zipfile.ZIP_DEFLATED) as z:
         for place, data in content:
@@ -91,7 +99,7 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     files = [(f, f"lgd/{f.name}") for f in package]
     if not _own():
         return _write(wheel_directory, "py3-none-any", files, [])
-    tag = "py3-none-" + re.sub(r"[^A-Za-z0-9]", "_", sysconfig.get_platform())
+    tag = _own_tag()
     with tempfile.TemporaryDirectory() as folder:
         files += [(source, f"lgd/{place}") for source, place in _library(folder)]
         return _write(wheel_directory, tag, files, [])
@@ -108,4 +116,7 @@ def build_sdist(sdist_directory, config_settings=None):
 if __name__ == "__main__":
     import sys
 
-    print(build_wheel(sys.argv[1]))
+    if sys.argv[1:] == ["--name"]:  # of the wheel with a library
+        print(_wheel_name(_own_tag()))
+    else:
+        print(build_wheel(sys.argv[1]))

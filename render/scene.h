@@ -111,7 +111,7 @@ void rd_sheet_draw(ts_rng *rng, int count, rd_view views[]);
 /* The order in which models read count <= RD_CAPTURE_MOST photographs of a capture: by the light's distance from the
  * camera, the flash first; of equal ones, that from nearest to straight above is the first of all, and the others come
  * by the light's direction from the cameras' mean place, from x toward y. order[0 .. count-1]: indices into views. The
- * result does not depend on the order of the views. */
+ * result does not depend on the order of the views, unless some differ by no more than rounding does. */
 enum { RD_CAPTURE_MOST = 16 };
 void rd_capture_order(const rd_view *views, int count, int order[]);
 #endif

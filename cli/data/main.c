@@ -200,7 +200,8 @@ int main(int argc, char **argv)
     io_collection *collection = o.collection ? io_collection_read(o.collection, 0, NULL, NULL, &st) : NULL;
     if (st.code) return cl_finish(cl_failed("%s", st.message));
     o.procedural.collection = collection;
-    if (!o.statistics) cl_catch_interrupt(); /* those leave nothing half-done: the signal may end them at once */
+    if (!o.statistics || o.output)
+        cl_catch_interrupt(); /* statistics alone leave nothing half-done: a signal ends them */
     const bool there = o.output && access(o.output, F_OK) == 0;
     if (o.output) cl_make_folder(o.output, NULL, &st);
     if (!st.code && (o.format || o.photographs))

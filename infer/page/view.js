@@ -117,7 +117,7 @@
     }
 
     /* What is in the form, as the shader has it; panel: of the canvas. */
-    function draw(panel, light, power, shown) {
+    function draw(panel, light, power, camera, shown) {
         const sphere = field.shape.value === 'sphere';
         gl.viewport(...panel);
         gl.uniform4fv(uniform.panel, panel);
@@ -125,7 +125,7 @@
         if (sphere) [light, power] = aroundSphere(light, power);
         gl.uniform3fv(uniform.lightPlace, light);
         gl.uniform1f(uniform.radius, facts.radius);
-        gl.uniform3fv(uniform.cameraPlace, sphere ? [0, 0, 100] : facts.camera);
+        gl.uniform3fv(uniform.cameraPlace, sphere ? [0, 0, 100] : camera);
         gl.uniform1f(uniform.power, power * 2 ** Number(field.stops.value));
         gl.uniform1f(uniform.ambient, Number(field.ambient.value));
         gl.uniform1f(uniform.roughnessFactor, Number(field.roughness.value));
@@ -142,14 +142,15 @@
         stage.style.width = canvas.width / devicePixelRatio + 'px';
         stage.style.height = canvas.height / devicePixelRatio + 'px';
         facts.lights.forEach((light, i) => draw([i * facts.size, 0, facts.size, facts.size], light, facts.power,
-            { split: 0, left: 'lit', right: 'lit' }));
+            facts.camera, { split: 0, left: 'lit', right: 'lit' }));
     }
 
     function drawStage() {
         const side = Math.max(1, Math.round(stage.clientWidth * Math.min(devicePixelRatio, 2)));
         if (canvas.width !== side || canvas.height !== side) canvas.width = canvas.height = side;
         const other = field.other.value;
-        draw([0, 0, side, side], [place.x, place.y, place.z], place.power,
+        const camera = place.preset === 'flash' ? facts.flashCamera : facts.camera;
+        draw([0, 0, side, side], [place.x, place.y, place.z], place.power, camera,
             { split: other ? Number(field.split.value) : 0, left: other || 'lit', right: field.show.value });
     }
 

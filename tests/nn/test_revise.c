@@ -149,6 +149,31 @@ static double loss_of(const nn_model *m, const scene *s, bool gradients)
 
 /* A loss' slope along a random direction of each of h's layers, against the difference quotient. What h reads is a
  * constant for back-propagation: of one revision the two agree. */
+/* What the sample is known to be h leaves alone: a metal's diffuse, a dielectric's F0. */
+TEST(revise_keeps_what_a_kind_says)
+{
+    nn_model *m = revising();
+    scene s = scene_make();
+    for (int kind = NN_KIND_DIELECTRIC; kind <= NN_KIND_METAL; kind++) {
+        ag_tape *tape = tape_create(false);
+        nn_revision r = begin(tape, &s, 0, MATERIALS), free_one = r;
+        r.kind = (nn_kind)kind;
+        const float *before = r.maps->t.data;
+        CHECK(nn_revise(tape, m, &r) && nn_revise(tape, m, &free_one), "%s", ag_status(tape)->message);
+        const int held = kind == NN_KIND_METAL ? MAP_DIFFUSE : MAP_SPECULAR;
+        bool moves = false;
+        for (int i = 0; i < MATERIALS * VALUES; i++) {
+            const bool here = i % 9 >= held && i % 9 < held + 3;
+            CHECK(!here || r.maps->t.data[i] == before[i], "kind %d: value %d moves", kind, i);
+            moves = moves || (here && free_one.maps->t.data[i] != before[i]);
+        }
+        CHECK(moves, "kind %d: nothing would move: the test is none", kind);
+        ag_tape_destroy(&tape);
+    }
+    scene_free(&s);
+    nn_model_free(&m);
+}
+
 TEST(revise_has_a_gradient)
 {
     static const char *const layers[] = {"read.conv1", "read.conv2", "down1.conv1", "down2.conv2",

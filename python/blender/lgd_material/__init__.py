@@ -23,7 +23,14 @@ def take_material(path, name):
     kinds = (bpy.data.objects, bpy.data.meshes, bpy.data.materials, bpy.data.images, bpy.data.collections)
     before = [set(kind) for kind in kinds]
     active, selected = bpy.context.view_layer.objects.active, list(bpy.context.selected_objects)
-    bpy.ops.import_scene.gltf(filepath=path)
+    mode = active.mode if active else "OBJECT"
+    try:
+        bpy.ops.import_scene.gltf(filepath=path)
+    except Exception:
+        for kind, old in zip(kinds, before):
+            for block in set(kind) - old:
+                kind.remove(block)
+        raise
     objects, meshes, materials, images, collections = (list(set(k) - b) for k, b in zip(kinds, before))
     for block, kind in [(o, bpy.data.objects) for o in objects] + [(m, bpy.data.meshes) for m in meshes]:
         kind.remove(block)
@@ -32,6 +39,8 @@ def take_material(path, name):
     for o in selected:
         o.select_set(True)
     bpy.context.view_layer.objects.active = active
+    if active and active.mode != mode:  # the importer leaves it
+        bpy.ops.object.mode_set(mode=mode)
     material = materials[0]
     material.name = name
     material.use_fake_user = True  # it stays in the file though nothing may use it yet
@@ -78,6 +87,9 @@ class IMPORT_IMAGE_OT_lgd_material(bpy.types.Operator, ImportHelper):
         except ImportError as error:
             self.report({"ERROR"}, f"the Python package lgd cannot be loaded: {error}")
             return {"CANCELLED"}
+        if not hasattr(bpy.types, "IMPORT_SCENE_OT_gltf"):
+            self.report({"ERROR"}, "the add-on glTF 2.0 is not enabled, which brings the material in")
+            return {"CANCELLED"}
         name = os.path.splitext(os.path.basename(self.filepath))[0]
         manager = context.window_manager
         manager.progress_begin(0, 100)
@@ -93,7 +105,7 @@ class IMPORT_IMAGE_OT_lgd_material(bpy.types.Operator, ImportHelper):
                 files = os.path.join(folder, "material")
                 maps.save(files, ["glb"], seamless=self.seamless)
                 material = take_material(os.path.join(files, "material.glb"), name)
-        except (lgd.Error, OSError) as error:
+        except (lgd.Error, OSError, RuntimeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         finally:
