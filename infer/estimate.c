@@ -283,7 +283,7 @@ typedef struct revision_watch {
     bool stopped;
 } revision_watch;
 
-/* R_t before its revision, at the photographs' size, with its error in the first of them. */
+/* R_t before its revision, at the photographs' size, with its error in all of them. */
 static bool see_revision(int step, const float *r, void *user)
 {
     revision_watch *u = user;
@@ -304,12 +304,16 @@ static bool see_revision(int step, const float *r, void *user)
         if (!taps.weight) ag_fail(tape, TS_NOMEM, "out of memory for maps of %d x %d pixels", side, side);
         if (!taps.weight || !v || !image) return false;
         ts_resample(1, channels, &taps, &taps, r, v->t.data, false, threads);
-        nn_clip(ts_count(image->t.shape), u->given->image[0], image->t.data);
-        const nn_input in = {
-            .image = image->t, .grid = rd_grid_on(rd_grid_full(side), threads), .views = u->given->views, .given = 1};
         double squares = 0;
-        nn_add_squares(net, &in, v->t.data, channels, &squares);
-        rmse = nn_rmse_of(&squares, 1, (double)side * side);
+        for (int k = 0; k < u->given->count; k++) {
+            nn_clip(ts_count(image->t.shape), u->given->image[k], image->t.data);
+            const nn_input in = {.image = image->t,
+                                 .grid = rd_grid_on(rd_grid_full(side), threads),
+                                 .views = &u->given->views[k],
+                                 .given = 1};
+            nn_add_squares(net, &in, v->t.data, channels, &squares);
+        }
+        rmse = nn_rmse_of(&squares, 1, u->given->count * (double)side * side);
         maps = v->t.data;
     }
     u->stopped = !show(&w, step, rmse, maps);
