@@ -143,6 +143,8 @@ class Estimates(unittest.TestCase):
             self.assertEqual(len(calls), 1)
 
     def test_ctrl_c_ends_the_work(self):
+        before = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in a shell's background
+        self.addCleanup(signal.signal, signal.SIGINT, before)
         for after in (0.05, 0.1, 0.2):
             timer = threading.Timer(after, os.kill, (os.getpid(), signal.SIGINT))
             with self.assertRaises(KeyboardInterrupt):
