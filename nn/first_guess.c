@@ -2,6 +2,7 @@
 #include "autograd/log_scale.h"
 #include "nn/clip.h"
 #include "nn/deviation.h"
+#include "nn/facing.h"
 #include "nn/hidden.h"
 #include "nn/kind.h"
 #include "nn/lattice.h"
@@ -182,6 +183,7 @@ ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, co
     ts_arena_release(arena, mark);
     if (taken->photographs <= 1) nn_deviations_of_found_scene(pixels, grid.threads, g->deviation);
     g->view = view_of(g->number, taken);
+    if (code == TS_OK) nn_face_camera(grid, g->view.camera, channels, g->r0);
     return code;
 }
 

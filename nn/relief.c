@@ -65,14 +65,17 @@ static ts_code broaden(int side, int threads, ts_arena *arena, relief_job *j, ts
     return TS_OK;
 }
 
+/* Slopes are n / n_z: m in the place of n with the same n_z, then as long as a normal. */
 static void multiply(const void *job, int64_t begin, int64_t end)
 {
     const relief_job *j = job;
-    for (int64_t i = begin; i < end; i++)
-        for (int k = 0; k < 2; k++) {
-            float *n = &j->maps[i * j->channels + MAP_NORMAL + k];
-            *n = fminf(fmaxf(*n * j->factor + (j->broad ? j->broad[i * 2 + k] * j->more : 0), -1), 1);
-        }
+    for (int64_t i = begin; i < end; i++) {
+        float *n = &j->maps[i * j->channels + MAP_NORMAL], m[2];
+        for (int k = 0; k < 2; k++) m[k] = n[k] * j->factor + (j->broad ? j->broad[i * 2 + k] * j->more : 0);
+        const float up = 1 - fminf(n[0] * n[0] + n[1] * n[1], 0.99f); /* steeper is no slope */
+        const float length = sqrtf(up + m[0] * m[0] + m[1] * m[1]);
+        for (int k = 0; k < 2; k++) n[k] = m[k] / length;
+    }
 }
 
 ts_code nn_weigh_relief(int side, int channels, const float *spread, bool steeper, int threads, ts_arena *arena,

@@ -10,15 +10,17 @@
  * on its relief is as g says. */
 #define NN_RELIEF_NONE 0.1f
 #define NN_RELIEF_SURE 0.25f
-/* By which the slopes of one photograph are multiplied beside that where the light's power is not known: what
- * NN_RELIEF_CELLS cells a side can show, and the rest. Several photographs show for themselves how steep they are. */
-#define NN_RELIEF_BROAD 1.8f
+/* By which the slopes n_x / n_z and n_y / n_z of one photograph are multiplied beside that where the light's power is
+ * not known: what NN_RELIEF_CELLS cells a side can show, and the rest. Several photographs show for themselves how
+ * steep they are. */
+#define NN_RELIEF_BROAD 2.0f
 #define NN_RELIEF_FINE 1.15f
 #define NN_RELIEF_CELLS 24
 
-/* The normals of maps [side][side][channels] are multiplied by what their size makes of them, and if steeper by the two
- * factors above; each ends in [-1, 1]. spread [side][side][NN_SPREADS] as in nn_guess. The same bytes for any number of
- * threads. arena: for what it holds meanwhile. TS_NOMEM with st. */
+/* The slopes of maps [side][side][channels] are multiplied by what their size makes of them, and if steeper by the two
+ * factors above; x and y of a normal end shorter together than 1, also where they were longer. spread
+ * [side][side][NN_SPREADS] as in nn_guess. The same bytes for any number of threads. arena: for what it holds
+ * meanwhile. TS_NOMEM with st. */
 ts_code nn_weigh_relief(int side, int channels, const float *spread, bool steeper, int threads, ts_arena *arena,
                         float *maps, ts_status *st);
 #endif

@@ -1,0 +1,12 @@
+/* What a camera sees faces it. Normals that g or a factor on its relief (nn/relief.h) turned away from the camera are
+ * black under a flash beside the lens, and no step finds back from there: black has no slope. */
+#ifndef NN_FACING_H
+#define NN_FACING_H
+#include "render/scene.h"
+
+/* The cosine between a normal and the direction to the camera is NN_FACING at least: normals of maps, [the grid's
+ * pixels, channels], that have less are turned towards the camera until they have it, in the plane of both. camera: its
+ * place, in patch widths. The same bytes for any number of threads. */
+#define NN_FACING 0.2f
+void nn_face_camera(rd_grid grid, const float camera[3], int channels, float *maps);
+#endif
