@@ -145,8 +145,9 @@ static int tile_side(const lgd_estimator *e, int side, const lgd_options *o)
     return o->tolerance > 0 ? TILE_EARLY : TILE;
 }
 
-/* What an estimate holds at once, at most: g, or a step; beside them the whole photograph's maps. */
-static double most_bytes(const nn_arch *a, int photos, int side, int tile, int orientations)
+/* What an estimate holds at once, at most: g, or a step; beside them the whole photograph's maps, and photographs that
+ * are clipped as a whole. */
+static double most_bytes(const nn_arch *a, int photos, int copied, int side, int tile, int orientations)
 {
     const int around = a->descent == NN_DESCENT_POSTERIOR ? 2 * a->iterations * nn_burnt_reach(side) : 0,
               part = tile + around < side ? tile + around : side,
@@ -155,7 +156,7 @@ static double most_bytes(const nn_arch *a, int photos, int side, int tile, int o
     if (a->coarse_steps > 0) most = fmax(most, step_bytes(a, photos, coarse, a->coarse_width, a->coarse_gru));
     if (a->revisions > 0 && photos > 1) most = fmax(most, nn_revision_bytes(a, photos));
     if (a->scene) most += nn_first_guess_bytes(a);
-    return most + 2.0 * a->channels * sizeof(float) * side * side;
+    return most + (2.0 * a->channels + 3.0 * copied) * sizeof(float) * side * side;
 }
 
 /* Where camera and power are known a second orientation pays (docs/accuracy.md). Models that do not guess them take
@@ -170,7 +171,14 @@ static int orientations_of(const nn_arch *a, const lgd_options *o)
 double lgd_estimator_bytes(const lgd_estimator *e, int side, const lgd_options *o)
 {
     const nn_arch *a = &e->net->arch;
-    return most_bytes(a, a->images, side, tile_side(e, side, o), orientations_of(a, o));
+    return most_bytes(a, a->images, a->images > 1 ? a->images : 0, side, tile_side(e, side, o), orientations_of(a, o));
+}
+
+/* Of the photographs those that infer/tiles.c clips as a whole. */
+static int copied(const nn_arch *a, const lgd_given *p, bool tiled, int threads)
+{
+    if (p->count > 1) return tiled && a->descent == NN_DESCENT_POSTERIOR ? 0 : p->count;
+    return !nn_clipped((int64_t)p->side * p->side * 3, p->image[0], threads);
 }
 
 /* The RMSE and maps of R_0 and R_steps alone are wanted. */
@@ -336,12 +344,14 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     o.tolerance = tolerance(a, given);
     int steps = o.iterations == -1 ? nn_arch_steps(a, photos) : o.iterations;
     if (o.iterations == LGD_AUTO) steps = nn_arch_refines(a) ? LGD_AUTO_MOST : 0;
-    const bool choose = o.iterations == LGD_AUTO && tile_side(e, side, &o) == side && !apart(&o);
+    const int tile = tile_side(e, side, &o);
+    const bool choose = o.iterations == LGD_AUTO && tile == side && !apart(&o);
     /* Once: memory that one stage has touched is there for the next, and touching it first costs as much as computing.
      */
     ag_reset(e->tape);
     ts_arena *arena = ag_arena(e->tape);
-    const double most = most_bytes(a, photos, side, tile_side(e, side, &o), o.orientations),
+    const int copies = copied(a, &p, tile < side || o.mask, ag_compute(e->tape)->threads);
+    const double most = most_bytes(a, photos, copies, side, tile, o.orientations),
                  more = most - (double)ts_arena_peak(arena); /* than earlier calls left */
     if (more > 0 && ts_budget_check(more, st) != TS_OK)
         return ts_context(st, "%d x %d pixels, of which the network reads %d x %d", side, side, nn_arch_side(a),

@@ -319,7 +319,8 @@ static ts_code prepare(work *w)
         return ag_fail(w->tape, TS_NOMEM, "out of memory"), TS_NOMEM;
     ts_mark mark = ag_scope_begin(w->tape);
     w->photo = ts_view((float *)(uintptr_t)t->image[0], (ts_shape){t->given, side, side, 3});
-    if (t->given > 1 || !nn_clipped(ts_count(w->photo.shape), t->image[0], w->threads)) {
+    const bool read = w->one || !t->r0 || w->coarse_steps > 0 || w->levels; /* else each tile has its part */
+    if (read && (t->given > 1 || !nn_clipped(ts_count(w->photo.shape), t->image[0], w->threads))) {
         const ag_value *clipped = ag_empty(w->tape, w->photo.shape);
         if (!clipped) return ag_status(w->tape)->code;
         photographs(w, whole(w), clipped->t.data);
