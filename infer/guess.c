@@ -6,7 +6,6 @@
 #include "nn/metal.h"
 #include "nn/revise.h"
 #include "tensor/maps.h"
-#include "tensor/resize.h"
 
 int lgd_guess_known(const lgd_options *o)
 {
@@ -16,25 +15,6 @@ int lgd_guess_known(const lgd_options *o)
                                           : 0);
 }
 
-/* The photographs, clamped, at g's size: [count, size, size, 3]. NULL after an error. */
-static ag_value *photographs_for_h(ag_tape *tape, int size, const lgd_given *p)
-{
-    ag_value *small = ag_empty(tape, (ts_shape){p->count, size, size, 3});
-    const ts_mark mark = ag_scope_begin(tape);
-    const int64_t whole = (int64_t)p->side * p->side * 3, values = (int64_t)size * size * 3;
-    ag_value *full = p->side == size ? NULL : ag_empty(tape, (ts_shape){1, p->side, p->side, 3});
-    ts_status st = {0};
-    for (int k = 0; k < p->count && !ag_status(tape)->code; k++) {
-        ts_tensor to = ts_view(small->t.data + k * values, (ts_shape){1, size, size, 3});
-        nn_clip(whole, p->image[k], full ? full->t.data : to.data);
-        if (full && ts_resize(&to, &full->t, ag_arena(tape), ag_compute(tape)->threads, &st))
-            ag_fail(tape, st.code, "%s", st.message);
-    }
-    if (ag_status(tape)->code) return NULL;
-    ag_scope_end(tape, mark, NULL, 0);
-    return small;
-}
-
 ts_code lgd_guess_revise(ag_tape *tape, const nn_model *net, lgd_given *p, int revisions,
                          bool (*seen)(int step, const float *maps, void *user), void *user, nn_first_guess *g,
                          int *made, ts_status *st)
@@ -42,7 +22,9 @@ ts_code lgd_guess_revise(ag_tape *tape, const nn_model *net, lgd_given *p, int r
     const int size = nn_arch_side(&net->arch);
     const ts_shape maps = {1, size, size, MAP_CHANNELS}, spread = {1, size, size, NN_SPREADS};
     *made = 0;
-    ag_value *image = revisions > 0 ? photographs_for_h(tape, size, p) : NULL;
+    const ag_value *image = revisions > 0 ? ag_empty(tape, (ts_shape){p->count, size, size, 3}) : NULL;
+    if (image && nn_clip_to(p->image, p->side, &image->t, ag_arena(tape), ag_compute(tape)->threads, st))
+        return st->code;
     nn_revision r = {.given = p->count, .views = p->views, .known = p->known, .kind = p->kind};
     if (image) {
         r.image = image->t;

@@ -1,7 +1,6 @@
 #include "infer/power.h"
 #include "nn/clip.h"
 #include "render/render.h"
-#include "tensor/resize.h"
 #include "tensor/team.h"
 #include <math.h>
 #include <stdint.h>
@@ -65,19 +64,12 @@ static ts_code fit(ag_tape *tape, const nn_model *model, const float *const *ima
 {
     const int size = nn_arch_side(&model->arch);
     const rd_grid grid = rd_grid_on(rd_grid_full(size), ag_compute(tape)->threads);
-    const size_t values = (size_t)size * (size_t)size * 3, whole = (size_t)side * (size_t)side * 3;
+    const size_t values = (size_t)size * (size_t)size * 3;
     *factor = 1;
     ag_value *small = ag_empty(tape, (ts_shape){given, size, size, 3}),
              *rendered = ag_empty(tape, (ts_shape){given, size, size, 3});
-    const ts_mark mark = ag_scope_begin(tape);
-    ts_tensor full = ts_view((float *)(uintptr_t)image[0], (ts_shape){given, side, side, 3});
-    if (given > 1 || !nn_clipped((int64_t)whole, image[0], grid.threads)) full = ts_new(ag_arena(tape), full.shape);
-    if (!small || !rendered || !full.data) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
-    for (int k = 0; k < given && full.data != image[0]; k++)
-        nn_clip((int64_t)whole, image[k], full.data + (size_t)k * whole);
-    if (side == size) memcpy(small->t.data, full.data, (size_t)given * values * sizeof(float));
-    else if (ts_resize(&small->t, &full, ag_arena(tape), grid.threads, st)) return st->code;
-    ag_scope_end(tape, mark, NULL, 0);
+    if (!small || !rendered) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", size, size);
+    if (nn_clip_to(image, side, &small->t, ag_arena(tape), grid.threads, st)) return st->code;
     const nn_input in = {.image = small->t, .grid = grid, .views = views, .given = given, .orientations = orientations};
     const ag_value *maps = nn_predict(tape, model, &in);
     if (!maps) {

@@ -11,7 +11,6 @@
 #include "render/scene_model.h"
 #include "tensor/maps.h"
 #include "tensor/memory.h"
-#include "tensor/resize.h"
 #include "tensor/scratch.h"
 #include "tensor/team.h"
 #include <math.h>
@@ -209,15 +208,10 @@ ts_code nn_first_guess_make(ag_tape *tape, const nn_model *model, const nn_first
                             ts_status *st)
 {
     const int size = nn_arch_side(&model->arch), side = ask->side, threads = ag_compute(tape)->threads;
-    const int64_t whole = (int64_t)side * side * 3;
     *g = (nn_first_guess){0};
-    ag_value *small = ag_empty(tape, (ts_shape){1, size, size, 3});
-    const ts_mark mark = ag_scope_begin(tape);
-    ag_value *full = side == size ? small : ag_empty(tape, (ts_shape){1, side, side, 3});
-    if (!small || !full) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", side, side);
-    nn_clip(whole, ask->image, full->t.data);
-    if (side != size && ts_resize(&small->t, &full->t, ag_arena(tape), threads, st)) return st->code;
-    ag_scope_end(tape, mark, NULL, 0);
+    const ag_value *small = ag_empty(tape, (ts_shape){1, size, size, 3});
+    if (!small) return ts_fail(st, TS_NOMEM, "out of memory for %d x %d pixels", size, size);
+    if (nn_clip_to(&ask->image, side, &small->t, ag_arena(tape), threads, st)) return st->code;
     const unsigned char is_known = (unsigned char)ask->taken.known;
     const nn_input in = {.image = small->t,
                          .grid = rd_grid_full(size),
