@@ -174,7 +174,7 @@ double lgd_estimator_bytes(const lgd_estimator *e, int side, const lgd_options *
     return most_bytes(a, a->images, a->images > 1 ? a->images : 0, side, tile_side(e, side, o), orientations_of(a, o));
 }
 
-/* Of the photographs those that infer/tiles.c clips as a whole. */
+/* At most so many of the photographs are clipped as a whole. */
 static int copied(const nn_arch *a, const lgd_given *p, bool tiled, int threads)
 {
     if (p->count > 1) return tiled && a->descent == NN_DESCENT_POSTERIOR ? 0 : p->count;

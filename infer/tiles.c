@@ -19,7 +19,7 @@ typedef struct work {
     int threads;       /* the tape's */
     float *maps;       /* the caller's */
     bool one;          /* the photograph is one tile, which works on the caller's maps */
-    ts_tensor photo;   /* of it: the photographs, clipped */
+    ts_tensor photo;   /* the photographs, clipped; where nothing reads them whole, their shape alone */
     ag_value **coarse; /* [coarse_steps + 1]: R_0 at g's size, then those of the coarse steps at theirs */
     int coarse_steps;  /* of t->steps */
     ts_taps taps[2];   /* from R_0 and from the others to side, along rows and columns alike */

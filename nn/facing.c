@@ -14,14 +14,17 @@ enum { WORTH = 16 }; /* rows that another thread is worth */
 
 static void turn(const float v[3], float *normal)
 {
-    const float across = normal[0] * normal[0] + normal[1] * normal[1];
-    const float n[3] = {normal[0], normal[1], sqrtf(fmaxf(1 - across, 0))};
-    const float seen = n[0] * v[0] + n[1] * v[1] + n[2] * v[2];
-    if (seen >= NN_FACING) return;
+    const float across = normal[0] * normal[0] + normal[1] * normal[1], flat = across > 1 ? 1 / sqrtf(across) : 1;
+    const float n[3] = {flat * normal[0], flat * normal[1], sqrtf(fmaxf(1 - across, 0))};
+    const float seen = n[0] * v[0] + n[1] * v[1] + n[2] * v[2], least = fminf(NN_FACING, v[2]);
+    if (seen >= least) {
+        normal[0] = n[0], normal[1] = n[1];
+        return;
+    }
     float beside[3], square = 0;
     for (int k = 0; k < 3; k++) beside[k] = n[k] - seen * v[k], square += beside[k] * beside[k];
-    const float length = sqrtf((1 - NN_FACING * NN_FACING) / fmaxf(square, 1e-12f));
-    for (int k = 0; k < 2; k++) normal[k] = NN_FACING * v[k] + length * beside[k];
+    const float length = sqrtf((1 - least * least) / fmaxf(square, 1e-12f));
+    for (int k = 0; k < 2; k++) normal[k] = least * v[k] + length * beside[k];
 }
 
 static void turn_rows(const void *job, int64_t begin, int64_t end)

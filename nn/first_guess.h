@@ -31,8 +31,9 @@ typedef struct nn_taken {
  * with them it finds the level of r0's roughness. r0 is taken as the sample's kind has it, first of all. r0's
  * diffuse and F0 are filled where they are not seen (nn/hidden.h); of a light that is not known a part of its place
  * is taken for a slope of the sample (nn/lean.h). Where the light's power is not known the scene is found once more
- * from what r0 is then. r0, spread and deviation are the caller's memory. arena: for what it holds meanwhile.
- * TS_NOMEM with st. */
+ * from what r0 is then. How much relief there is is decided before (nn/relief.h), and in the end normals face the
+ * camera that was found (nn/facing.h). r0, spread and deviation are the caller's memory. arena: for what it holds
+ * meanwhile. TS_NOMEM with st. */
 ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, const float *scene, const nn_taken *taken,
                               ts_arena *arena, nn_first_guess *guess, ts_status *st);
 

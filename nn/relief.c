@@ -12,7 +12,7 @@ typedef struct relief_job {
     int64_t pixels;
     int channels;
     const float *spread;
-    float *maps, *slopes, *broad; /* [pixels][2] the last two: the normals' x and y, and what cells show of them */
+    float *maps, *slopes, *broad; /* [pixels][2] the last two: the slopes, and what cells show of them */
     float factor, more;           /* of the slopes, and by how much more of the broad ones */
     double *slope, *error;        /* [PARTS]: sums */
 } relief_job;
@@ -42,11 +42,17 @@ static float sure_of(relief_job *j, int threads)
     return fminf(fmaxf((shown - NN_RELIEF_NONE) / (NN_RELIEF_SURE - NN_RELIEF_NONE), 0), 1);
 }
 
+/* n_x / n_z and n_y / n_z; those that are steeper than a normal of n_z = .1 count as that. */
+static void slopes_of(const float *n, float slope[2])
+{
+    const float up = sqrtf(1 - fminf(n[0] * n[0] + n[1] * n[1], 0.99f));
+    for (int k = 0; k < 2; k++) slope[k] = n[k] / up;
+}
+
 static void take_slopes(const void *job, int64_t begin, int64_t end)
 {
     const relief_job *j = job;
-    for (int64_t i = begin; i < end; i++)
-        for (int k = 0; k < 2; k++) j->slopes[i * 2 + k] = j->maps[i * j->channels + MAP_NORMAL + k];
+    for (int64_t i = begin; i < end; i++) slopes_of(j->maps + i * j->channels + MAP_NORMAL, j->slopes + i * 2);
 }
 
 /* The slopes as cells show them: broad. */
@@ -65,16 +71,15 @@ static ts_code broaden(int side, int threads, ts_arena *arena, relief_job *j, ts
     return TS_OK;
 }
 
-/* Slopes are n / n_z: m in the place of n with the same n_z, then as long as a normal. */
 static void multiply(const void *job, int64_t begin, int64_t end)
 {
     const relief_job *j = job;
     for (int64_t i = begin; i < end; i++) {
-        float *n = &j->maps[i * j->channels + MAP_NORMAL], m[2];
-        for (int k = 0; k < 2; k++) m[k] = n[k] * j->factor + (j->broad ? j->broad[i * 2 + k] * j->more : 0);
-        const float up = 1 - fminf(n[0] * n[0] + n[1] * n[1], 0.99f); /* steeper is no slope */
-        const float length = sqrtf(up + m[0] * m[0] + m[1] * m[1]);
-        for (int k = 0; k < 2; k++) n[k] = m[k] / length;
+        float *n = &j->maps[i * j->channels + MAP_NORMAL], slope[2];
+        slopes_of(n, slope);
+        for (int k = 0; k < 2; k++) slope[k] = slope[k] * j->factor + (j->broad ? j->broad[i * 2 + k] * j->more : 0);
+        const float length = sqrtf(1 + slope[0] * slope[0] + slope[1] * slope[1]);
+        for (int k = 0; k < 2; k++) n[k] = slope[k] / length;
     }
 }
 

@@ -6,8 +6,8 @@
 #define NN_RELIEF_H
 #include "tensor/tensor.h"
 
-/* Of the mean slope over the mean expected error of normals: up to NN_RELIEF_NONE a sample is flat, from NN_RELIEF_SURE
- * on its relief is as g says. */
+/* Of the mean length of the normals' x and y over the mean of its expected errors: up to NN_RELIEF_NONE a sample is
+ * flat, from NN_RELIEF_SURE on its relief is as g says. */
 #define NN_RELIEF_NONE 0.1f
 #define NN_RELIEF_SURE 0.25f
 /* By which the slopes n_x / n_z and n_y / n_z of one photograph are multiplied beside that where the light's power is
@@ -18,7 +18,7 @@
 #define NN_RELIEF_CELLS 24
 
 /* The slopes of maps [side][side][channels] are multiplied by what their size makes of them, and if steeper by the two
- * factors above; x and y of a normal end shorter together than 1, also where they were longer. spread
+ * factors above; where that changes any, x and y of each normal end shorter together than 1. spread
  * [side][side][NN_SPREADS] as in nn_guess. The same bytes for any number of threads. arena: for what it holds
  * meanwhile. TS_NOMEM with st. */
 ts_code nn_weigh_relief(int side, int channels, const float *spread, bool steeper, int threads, ts_arena *arena,

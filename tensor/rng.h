@@ -39,7 +39,8 @@ enum {
     TS_STREAM_COLLECTED, /* parts of map sets */
     TS_STREAM_PLAIN,
     TS_STREAM_SMOOTHER,
-    TS_STREAM_GIVEN /* how many photographs of a material */
+    TS_STREAM_GIVEN, /* how many photographs of a material */
+    TS_STREAM_STEEPER
 };
 
 uint32_t ts_rng_u32(ts_rng *r);

@@ -19,7 +19,7 @@ typedef struct tr_config {
     struct {        /* [data] */
         int64_t seed;
         uint64_t families, often; /* bits as in io_procedural; 0: all */
-        double hues, darker, relief, blend, uneven, closer, homogeneous, plain, smoother, collected;
+        double hues, darker, relief, blend, uneven, closer, homogeneous, plain, smoother, steeper, collected;
         char collection[1024];
         double noise, noise_spread, blur, exposure, vignette, white_balance, tilt, off_centre; /* as in io_camera */
         double fov_min, fov_max, meter, automatic, flash, flash_size, glare, lobes, soften, ambient, tone, sharpen;

@@ -113,6 +113,8 @@ const tr_key tr_keys[] = {
      "share of the materials that are the same all over the patch: what varies slowly in colour and roughness is less"},
     {"data", "smoother", TR_REAL, AT(data.smoother), 0, 1, "0", NULL, false,
      "share of the materials that get a smoother surface, down to .45 times their roughness"},
+    {"data", "steeper", TR_REAL, AT(data.steeper), 0, 1, "0", NULL, false,
+     "share of the materials that get a steeper relief, up to four times as high"},
     {"data", "plain", TR_REAL, AT(data.plain), 0, 1, "0", NULL, false,
      "share of the materials that have one gloss and hardly any relief: print, laminate, paint"},
     {"data", "collection", TR_TEXT, AT(data.collection), 0, sizeof((tr_config *)0)->data.collection, "", NULL, true,

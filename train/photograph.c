@@ -22,6 +22,7 @@ io_procedural tr_materials_of(const tr_config *c)
                            .homogeneous = (float)c->data.homogeneous,
                            .plain = (float)c->data.plain,
                            .smoother = (float)c->data.smoother,
+                           .steeper = (float)c->data.steeper,
                            .collected = (float)c->data.collected};
 }
 

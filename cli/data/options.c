@@ -18,6 +18,7 @@ static const struct {
               {"closer", "seen from up to four times as near", offsetof(io_procedural, closer)},
               {"homogeneous", "that are the same all over the patch", offsetof(io_procedural, homogeneous)},
               {"smoother", "with smoother surfaces", offsetof(io_procedural, smoother)},
+              {"steeper", "with a steeper relief", offsetof(io_procedural, steeper)},
               {"plain", "of one gloss, with hardly any relief", offsetof(io_procedural, plain)},
               {"collected", "that are parts of --collection's", offsetof(io_procedural, collected)}};
 

@@ -8,6 +8,7 @@
 #include "data/materials/plain.h"
 #include "data/materials/relief.h"
 #include "data/materials/smoother.h"
+#include "data/materials/steeper.h"
 #include "data/materials/uneven.h"
 #include "tensor/scratch.h"
 #include <math.h>
@@ -241,6 +242,8 @@ void io_procedural_make(const io_procedural *p, uint64_t index, io_material *m)
     c.used = 0;
     exchange_relief(p, index, allowed, &c, other);
     c.used = 0;
+    ts_rng steeper = ts_rng_make(p->seed, TS_STREAM_STEEPER, index);
+    if (ts_rng_uniform(&steeper) < p->steeper) cv_steeper(&c, &steeper);
     make_plain(p, index, &c);
     make_uneven(p, index, &c);
     c.used = 0;

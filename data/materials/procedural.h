@@ -27,6 +27,7 @@ typedef struct io_procedural {
     float closer;      /* share of those of which only a part is seen, from a quarter of the patch's side on */
     float homogeneous; /* share of those that are the same all over the patch (materials/homogeneous.h) */
     float smoother;    /* share of those with a smoother surface (materials/smoother.h) */
+    float steeper;     /* share of those with a steeper relief (materials/steeper.h) */
     float plain;       /* share of those of one gloss, with hardly any relief (materials/plain.h) */
     const io_collection *collection; /* not owned; map sets of which materials are parts (materials/collected.h) */
     float collected; /* share of the materials that are, in place of a family's or two; 0 where there are none */

@@ -1,4 +1,4 @@
-/* Levels of the procedural materials that training varies: brightness, gloss, and relief and gloss of plain ones. */
+/* Levels of the procedural materials that training varies: brightness, gloss, relief, and both of plain ones. */
 #include "data/materials/procedural.h"
 #include "tests/data/new_material.h"
 #include "tests/test.h"
@@ -70,6 +70,50 @@ TEST(procedural_smoother_multiplies_roughness_by_one_factor)
     }
     CHECK(halves > COUNT / 4 && halves < 3 * COUNT / 4, "%d of %d at a share of a half", halves, COUNT);
     CHECK(fabs(logs / COUNT + 0.4) < 0.1, "log factors have a mean of %g, -.4 is that of -.8 .. 0", logs / COUNT);
+}
+
+/* The height's slope along x or y, which maps have as s / sqrt(1 + .16 |s|^2): 2.5 at most. */
+static double slope_of(const float *pixel, int k)
+{
+    const double x = (double)pixel[MAP_NORMAL], y = (double)pixel[MAP_NORMAL + 1], square = x * x + y * y;
+    return (k ? y : x) / sqrt(1 - square - 0.16 * square);
+}
+
+TEST(procedural_steeper_multiplies_slopes_by_one_factor)
+{
+    enum { COUNT = 48, SIZE = 16 };
+    const io_procedural families = {.seed = 5}, steep = {.seed = 5, .steeper = 1}, half = {.seed = 5, .steeper = 0.5f};
+    int changed = 0, halves = 0;
+    double logs = 0, smallest = 4, largest = 1;
+    for (int i = 0; i < COUNT; i++) {
+        io_material a = new_material(SIZE), b = new_material(SIZE);
+        io_procedural_make(&families, (uint64_t)i, &a);
+        io_procedural_make(&steep, (uint64_t)i, &b);
+        halves += material_varies(&half, i, &a, &b);
+        double least = INFINITY, most = 0;
+        for (int k = 0; k < SIZE * SIZE; k++) {
+            float *from = a.maps + k * MAP_CHANNELS, *to = b.maps + k * MAP_CHANNELS;
+            for (int c = 0; c < 2; c++) {
+                const double before = slope_of(from, c), after = slope_of(to, c);
+                if (fabs(before) < 0.01 || fabs(after) > 5) continue; /* where rounding shows */
+                least = fmin(least, after / before), most = fmax(most, after / before);
+            }
+            memcpy(to + MAP_NORMAL, from + MAP_NORMAL, 2 * sizeof *to);
+        }
+        CHECK(!memcmp(a.maps, b.maps, material_values(SIZE) * sizeof(float)), "material %d: another map changed", i);
+        io_material_free(&a);
+        io_material_free(&b);
+        if (most == 0) continue; /* it is flat */
+        CHECK(least > 0.999 && most < 4.004 && most - least < 2e-3 * most, "material %d: factors of %g to %g", i, least,
+              most);
+        smallest = fmin(smallest, most), largest = fmax(largest, most);
+        logs += log(most), changed++;
+    }
+    CHECK(smallest < 1.15 && largest > 3.5, "factors of %g to %g", smallest, largest);
+    CHECK(changed > COUNT / 2 && halves > COUNT / 4 && halves < 3 * COUNT / 4, "%d, and %d at a share of a half",
+          changed, halves);
+    CHECK(fabs(logs / changed - log(2)) < 0.15, "log factors have a mean of %g, log 2 is that of 0 .. log 4",
+          logs / changed);
 }
 
 /* RMS of a map's differences from its mean, of normals from straight up. */

@@ -82,6 +82,49 @@ TEST(several_photographs_are_fitted_at_once)
     nn_model_free(&m);
 }
 
+/* Three photographs larger than g's maps, one with values that no camera gives, in tiles of tile pixels. Returns the
+ * most that the arena held. */
+static size_t fit_in_tiles(const nn_model *m, const sample *s, const float *const *image, int side, int tile,
+                           float *maps)
+{
+    ts_status st = {0};
+    float *deviation = malloc(PIXELS * NN_SPREADS * sizeof *deviation);
+    for (int i = 0; i < PIXELS * NN_SPREADS; i++) deviation[i] = 0.2f;
+    ag_tape *tape = tape_create(false);
+    ag_freeze(tape, true);
+    lgd_tiles t = {.image = image,
+                   .views = s->view,
+                   .given = 3,
+                   .r0 = s->truth,
+                   .deviation = deviation,
+                   .side = side,
+                   .tile = tile,
+                   .steps = 2};
+    CHECK(!lgd_tiles_run(tape, m, &t, maps, &st), "%s", st.message);
+    const size_t peak = ts_arena_peak(ag_arena(tape));
+    ag_tape_destroy(&tape);
+    free(deviation);
+    return peak;
+}
+
+TEST(several_photographs_in_tiles_are_those_of_one_tile_and_never_held_whole)
+{
+    enum { LARGE = 384, TILE = 100 };
+    const size_t values = (size_t)LARGE * LARGE * MAP_CHANNELS, photo = (size_t)LARGE * LARGE * 3;
+    nn_model *m = guessing();
+    sample s = take();
+    float *image[3], *whole = malloc(values * sizeof *whole), *tiled = malloc(values * sizeof *tiled);
+    for (int v = 0; v < 3; v++) image[v] = numbers((int)photo, 20 + v, v == 1 ? -0.5f : 0, v == 1 ? 2 : 1);
+    fit_in_tiles(m, &s, (const float *const *)image, LARGE, LARGE, whole);
+    const size_t peak = fit_in_tiles(m, &s, (const float *const *)image, LARGE, TILE, tiled);
+    CHECK(!memcmp(whole, tiled, values * sizeof *whole), "tiles have other maps");
+    CHECK(peak < 3 * photo * sizeof(float), "%zu bytes, three photographs are %zu", peak, 3 * photo * sizeof(float));
+    for (int v = 0; v < 3; v++) free(image[v]);
+    free(whole), free(tiled);
+    leave(&s);
+    nn_model_free(&m);
+}
+
 static void estimate(const nn_model *m, const lgd_photo *photo, double *power, lgd_photo *taken, float *maps)
 {
     ts_status st = {0};

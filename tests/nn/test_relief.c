@@ -105,6 +105,19 @@ TEST(relief_that_is_broad_gets_steeper_than_what_is_fine)
     }
 }
 
+/* What cells show are means of slopes: a steep pixel counts in them as much as it rises. */
+TEST(relief_of_a_steep_pixel_in_a_lean_is_that_of_slopes)
+{
+    draw();
+    for (int i = 0; i < PIXELS; i++) maps[i * C + MAP_NORMAL] = 0.2f, maps[i * C + MAP_NORMAL + 1] = 0;
+    float *steep = &maps[(SIDE / 2 * SIDE + SIDE / 2) * C];
+    steep[MAP_NORMAL] = 0.8f;
+    const double lean = 0.2 / sqrt(1 - 0.04), rise = 0.8 / 0.6, fine = (double)NN_RELIEF_FINE,
+                 expected = fine * rise + ((double)NN_RELIEF_BROAD - fine) * lean;
+    weigh(true, 1);
+    CHECK(fabs(slope_of(steep, 0) - expected) < 0.04, "a slope of %g, about %g is right", slope_of(steep, 0), expected);
+}
+
 /* Also from what no normal is: x and y together longer than 1. */
 TEST(relief_stays_a_normal)
 {
