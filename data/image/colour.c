@@ -135,6 +135,16 @@ io_space io_space_adobe_rgb(void)
     return io_space_primaries(xy, 563 / 256.0f, &s) ? s : io_space_srgb(); /* Adobe RGB (1998), 4.3.1.2 */
 }
 
+bool io_space_code_points(const int point[2], io_space *space)
+{
+    static const float bt2020[8] = {.708f, .292f, .17f, .797f, .131f, .046f, .3127f, .329f};
+    static const float bt709[8] = {.64f, .33f, .3f, .6f, .15f, .06f, .3127f, .329f};
+    static const float p3[8] = {.68f, .32f, .265f, .69f, .15f, .06f, .3127f, .329f};
+    const float *xy = point[0] == 9 ? bt2020 : point[0] == 12 ? p3 : point[0] == 1 ? bt709 : NULL;
+    if (!xy || (point[1] != 8 && point[1] != 13 && point[1] != 1 && point[1] != 6)) return false;
+    return io_space_primaries(xy, point[1] == 8 ? 1 : 0, space);
+}
+
 void io_space_matrix(const io_space *space, float rgb[3])
 {
     float in[3] = {rgb[0], rgb[1], rgb[2]};

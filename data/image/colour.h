@@ -26,6 +26,9 @@ io_space io_space_linear(void);
  * the sRGB curve. False when the primaries span nothing. */
 bool io_space_primaries(const float xy[8], float gamma, io_space *space);
 io_space io_space_adobe_rgb(void);
+/* Of coding-independent code points (ITU-T H.273): primaries 1, 9 or 12; transfer 8 linear, 13 sRGB, 1 and 6 taken as
+ * sRGB's. False for others, HDR transfers among them. */
+bool io_space_code_points(const int point[2], io_space *space);
 
 /* From an ICC profile of the matrix and curve kind (or grey with a curve); false when it is another kind or damaged.
  * The profile's bytes stay in use. A profile that describes sRGB up to rounding gives exactly sRGB. */

@@ -16,6 +16,8 @@ ts_code io_read_jpeg_file(const char *path, int64_t max_pixels, oi_image *image,
  * lens is only not said. */
 bool io_exif(const unsigned char *segment, size_t size, int *orientation, bool *adobe, io_lens *lens);
 
-/* Of a WebP file that oi_read has read: what its EXIF says. Other files are left alone. */
-void io_webp_exif(const char *path, oi_image *image);
+/* Of a file that oi_read has read, what OpenImageIO passes over: of WebP the EXIF and the profile, of HEIF and AVIF the
+ * profile or code points of the primary image. Other files are left alone, and what is damaged is not said. */
+void io_webp_chunks(const char *path, oi_image *image);
+void io_heif_colours(const char *path, oi_image *image);
 #endif

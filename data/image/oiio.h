@@ -32,6 +32,8 @@ typedef struct oi_image {
     float chromaticities[8];
     unsigned char *icc; /* ICC profile, or NULL */
     size_t icc_size;
+    bool code_points; /* code_point holds primaries and transfer as of ITU-T H.273 */
+    int code_point[2];
     io_lens lens;
 } oi_image;
 

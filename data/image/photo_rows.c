@@ -18,7 +18,10 @@ ts_code io_read_raw(const char *path, int64_t max_pixels, oi_image *raw, ts_stat
     if (!code && !read) code = io_read_jpeg_file(path, max_pixels, raw, &read, st);
     if (!code && !read) code = io_check_header(path, max_pixels, st);
     if (!code && !read) code = oi_read(path, max_pixels, ts_budget_left(), raw, st);
-    if (!code && !read) io_webp_exif(path, raw);
+    if (!code && !read) {
+        io_webp_chunks(path, raw);
+        io_heif_colours(path, raw);
+    }
     return code;
 }
 
@@ -50,6 +53,7 @@ static io_space space_of(const char *path, io_photo_rows *p)
         p->profile = io_profile_open(image->icc, image->icc_size, image->grey, name, sizeof name);
         if (!p->profile) memcpy(p->unread, name, sizeof name);
     }
+    if (image->code_points && io_space_code_points(image->code_point, &space)) return space;
     if (image->primaries && io_space_primaries(image->chromaticities, image->floating ? 1 : 0, &space)) return space;
     if (image->floating || image->linear) return io_space_linear();
     return image->adobe ? io_space_adobe_rgb() : io_space_srgb();

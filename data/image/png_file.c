@@ -51,18 +51,7 @@ ts_code io_check_png(const char *path, ts_status *st)
     return fault ? ts_fail(st, TS_FORMAT, "%s: damaged PNG file: %s", path, fault) : TS_OK;
 }
 
-static const float bt2020[8] = {.708f, .292f, .17f, .797f, .131f, .046f, .3127f, .329f};
 static const float bt709[8] = {.64f, .33f, .3f, .6f, .15f, .06f, .3127f, .329f};
-static const float p3[8] = {.68f, .32f, .265f, .69f, .15f, .06f, .3127f, .329f};
-
-/* Coding-independent code points (ITU-T H.273): primaries 1, 9, 12; transfer 8 linear, 13 sRGB, 1 and 6 taken as
- * sRGB's. HDR transfers are not. */
-static bool from_cicp(const uint8_t *d, io_space *space)
-{
-    const float *xy = d[0] == 9 ? bt2020 : d[0] == 12 ? p3 : d[0] == 1 ? bt709 : NULL;
-    if (!xy || (d[1] != 8 && d[1] != 13 && d[1] != 1 && d[1] != 6)) return false;
-    return io_space_primaries(xy, d[1] == 8 ? 1 : 0, space);
-}
 
 bool io_space_png(const char *path, io_space *space)
 {
@@ -75,7 +64,8 @@ bool io_space_png(const char *path, io_space *space)
         uint32_t length = be32(head);
         size_t take = length < sizeof d ? length : sizeof d;
         if (length > 0x7fffffff || fread(d, 1, take, f) != take) break;
-        if (!memcmp(head + 4, "cICP", 4) && length == 4 && from_cicp(d, space)) cicp = true;
+        if (!memcmp(head + 4, "cICP", 4) && length == 4 && io_space_code_points((int[]){d[0], d[1]}, space))
+            cicp = true;
         else if (!memcmp(head + 4, "sRGB", 4) || !memcmp(head + 4, "iCCP", 4)) named = true;
         else if (!memcmp(head + 4, "gAMA", 4) && length == 4 && be32(d) > 0) gamma = (float)(100000.0 / be32(d));
         else if (!memcmp(head + 4, "cHRM", 4) && length == 32) {

@@ -1,4 +1,4 @@
-/* Colour profiles that are look-up tables; WebP's orientation and alpha. */
+/* Colour profiles that are look-up tables; WebP's orientation, alpha and profile. */
 #include "data/image/image.h"
 #include "infer/angle.h"
 #include "tests/support/make_images.h"
@@ -141,4 +141,27 @@ TEST(webp_is_turned_and_transparent_as_png)
             }
         io_image_free(&image);
     }
+}
+
+/* A profile that exchanges red and blue. */
+TEST(webp_has_the_colours_that_its_profile_says)
+{
+    const uint8_t extended[10] = {0x30, 0, 0, 0, 3, 0, 0, 1, 0, 0}; /* a profile, alpha; 4 x 2 */
+    bytes inner = {0}, b = {0}, table = table_profile(cmsSigRgbData);
+    put(&inner, "WEBP", 4);
+    chunk(&inner, "VP8X", extended, sizeof extended);
+    chunk(&inner, "ICCP", table.data, table.size);
+    chunk(&inner, "VP8L", lossless, sizeof lossless);
+    chunk(&b, "RIFF", inner.data, inner.size);
+    bytes_free(&inner), bytes_free(&table);
+    io_image image;
+    ts_status st = {0};
+    CHECK(!io_read_photo(bytes_save(&b, test_folder(), "p.webp"), 1 << 20, &image, &st), "%s", st.message);
+    for (int c = 0; c < 3; c++) {
+        static const float seen[3] = {50, 100, 200};
+        const float want = io_srgb_to_linear(seen[c] / 255);
+        CHECK(fabsf(image.data[c] - want) < 0.03f * want + 2e-3f, "channel %d: %g, not %g", c, (double)image.data[c],
+              (double)want);
+    }
+    io_image_free(&image);
 }
