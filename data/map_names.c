@@ -181,8 +181,8 @@ static ts_code settle_normal(const char *path, const char *meta, io_normal conve
         return TS_OK;
     }
     return ts_fail(st, TS_INVALID,
-                   "%s: %s; put \"normal: OpenGL y\" or \"normal: DirectX y\" into meta.txt, or say which by "
-                   "lgd-eval's --normal or a set.ini",
+                   "%s: %s; put \"normal: OpenGL y\" or \"normal: DirectX y\" into meta.txt (of "
+                   "lgd-eval's sets also: --normal, or a set.ini)",
                    path,
                    y == BOTH ? "meta.txt names both conventions for the normal's y"
                              : "nothing says whether the normal's y is OpenGL or DirectX");
@@ -208,8 +208,8 @@ static ts_code settle_workflow(const char *path, const char *meta, io_workflow g
             path, set->file[IO_BASECOLOR], set->file[IO_DIFFUSE_MAP]);
     if (metallic && specular && !said_specular && !said_metallic)
         return ts_fail(st, TS_INVALID,
-                       "%s: has both %s and %s; put \"workflow: metallic\" or \"workflow: specular\" into meta.txt, or "
-                       "say which by lgd-eval's --workflow or a set.ini",
+                       "%s: has both %s and %s; put \"workflow: metallic\" or \"workflow: specular\" into meta.txt "
+                       "(of lgd-eval's sets also: --workflow, or a set.ini)",
                        path, set->file[IO_METALLIC_MAP], set->file[IO_SPECULAR_MAP]);
     set->specular = said_specular || (specular && !said_metallic);
     if (set->specular && !specular)

@@ -149,7 +149,8 @@ static ts_code put_together(const char *path, const lgd_gltf *kind, int images, 
     unsigned char *bytes = total < IMAGE_LIMIT ? calloc(total, 1) : NULL, *at = bytes;
     ts_code code = TS_OK;
     if (total >= IMAGE_LIMIT)
-        code = ts_fail(st, TS_UNSUPPORTED, "%s: %zu bytes are more than a .glb can have: use --maps gltf", path, total);
+        code = ts_fail(st, TS_UNSUPPORTED, "%s: %zu bytes are more than a .glb can have: gltf has no such limit", path,
+                       total);
     else if (!bytes) code = ts_fail(st, TS_NOMEM, "%s: no memory for %zu bytes", path, total);
     if (!code) {
         put_word(&at, 0x46546c67), put_word(&at, 2), put_word(&at, total);

@@ -5,8 +5,9 @@
  *     lgd_estimate                       its maps
  *     lgd_write_maps, or lgd_render      files, or another picture
  *
- * Functions that return int return 0, or nonzero with error set, which may be NULL, and what they fill unspecified. The
- * small buffers of convolutions (tensor/scratch.h) are the exception: where they cannot be had the process is aborted.
+ * Functions that return int and take an error return 0, or nonzero with it set, and what they fill unspecified; it may
+ * be NULL. The small buffers of convolutions (tensor/scratch.h) are the exception: where they cannot be had the process
+ * is aborted.
  * Structs that may grow begin with their size where the caller was compiled. Fields beyond it have their defaults. */
 #ifndef LGD_H
 #define LGD_H
@@ -182,9 +183,10 @@ typedef struct lgd_facts {
 } lgd_facts;
 
 /* A photograph's largest centred square as side x side x 3 linear values (sRGB primaries; above 1 only from files that
- * say so), top row first. Upright by its EXIF orientation; colour profiles are honoured, alpha lies on black. PNG and
- * JPEG are read by this library, other formats by OpenImageIO in lgd/liblgd_image.so beside it. options and facts may
- * be NULL. */
+ * say so), top row first. Upright by its EXIF orientation; colour profiles are honoured, alpha lies on black (neither
+ * with options.published). Ordinary PNG and JPEG files are read by this library; other formats, palettes, CMYK and
+ * files with IPTC or an orientation in XMP by OpenImageIO in lgd/liblgd_image.so beside it. options and facts may be
+ * NULL. */
 LGD_API int lgd_read_photo(const char *path, int side, const lgd_read_options *options, float *image, lgd_facts *facts,
                            lgd_error *error);
 

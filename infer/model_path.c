@@ -49,6 +49,6 @@ ts_code lgd_model_path(const char *option, const char *name, char path[LGD_PATH_
     return ts_fail(
         st, TS_IO,
         "no %s.safetensors found in ../share/lgd or ../../models beside the program's folder, ../models beside "
-        "the library's, or in %s: name a file with --model or LGD_MODEL",
+        "the library's, or in %s: name a file with lgd-infer --model, or by LGD_MODEL",
         name, io_data_folder);
 }

@@ -88,7 +88,9 @@ double ts_budget_left(void) { return fmin(most(), find().left); }
 ts_code ts_budget_check(double bytes, ts_status *st)
 {
     if (bytes > most())
-        return ts_fail(st, TS_NOMEM, "about %.3g GB of memory are needed and the limit is %.3g GB (--max-memory)",
+        return ts_fail(st, TS_NOMEM,
+                       "about %.3g GB of memory are needed and the limit is %.3g GB (lgd-infer "
+                       "--max-memory)",
                        bytes * 1e-9, most() * 1e-9);
     const double left = find().left;
     if (bytes <= left) return TS_OK;

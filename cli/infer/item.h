@@ -37,7 +37,7 @@ typedef struct cl_item {
     const float *image;  /* the photograph, or the first of the capture: in one of these; NULL: not read */
     unsigned char *mask; /* [size][size] from command->mask, or NULL */
     double fov;          /* of the photograph, in degrees across the square; LGD_FOV_UNKNOWN, LGD_FOV_OF_PHOTO */
-    char fov_from[128];  /* where it is known from, or why it is not */
+    char fov_from[192];  /* where it is known from, or why it is not */
     char profile[96];    /* io_photo_facts.profile */
     int photo_side;      /* the shorter side of the photograph in pixels */
     lgd_photo photo[IO_CAPTURE_IMAGES];

@@ -158,7 +158,8 @@ static void say_all(run *r, const cl_item *item)
     if (item->st.code) return;
     if (!why && item->last > CL_FAR) why = "its maps do not look like it";
     if (why && r->poor) fprintf(r->poor, "%s: %s\n", item->job->photo, why);
-    if (r->command->outputs & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC | LGD_OUT_ORM))
+    const bool one_file = r->command->metallic && r->command->outputs & LGD_OUT_GLB;
+    if (one_file || r->command->outputs & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC | LGD_OUT_ORM))
         cl_note("%s: base colour and metalness miss diffuse by %.4f and F0 by %.4f (RMS, linear)", item->job->photo,
                 item->written.lost.diffuse, item->written.lost.specular);
     if (r->command->corners) say_angle(item);

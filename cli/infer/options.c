@@ -82,13 +82,15 @@ const cl_argument cl_infer_arguments[] = {
      "weights: a file, or the name of a shipped model: phone, or single for pictures whose light and camera are the\n"
      "default ones (default: $LGD_MODEL, else phone)"},
     {'t', "threads", "N", "number of threads, 1 .. 1024; 0 = all that are allowed (default 0)"},
-    {NORMAL, "normal", "gl|dx", "y of normal.png: up (gl, OpenGL, default) or down (dx, DirectX)"},
+    {NORMAL, "normal", "gl|dx",
+     "y of the normals in normal.png and maps.exr: up (gl, OpenGL, default) or down (dx, DirectX)"},
     {MAPS, "maps", "LIST",
      "files to write, separated by commas: diffuse, specular, roughness, normal, exr, render, preview (default: all\n"
      "of these), basecolor, metallic, height, ao (ambient occlusion), orm (occlusion, roughness and metalness in "
      "one),\n"
      "gltf, glb (glTF as one file), materialx, page (view.html lights the material in a browser; of several\n"
-     "photographs index.html too); those of another estimate in DIR/STEM/, by its meta.txt, are removed"},
+     "photographs, not with --shard, index.html too); those of another estimate in DIR/STEM/, by its meta.txt, are "
+     "removed"},
     {AO, "ao", NULL, "also write occlusion.png: ambient occlusion of the height"},
     {SEAMLESS, "seamless", NULL,
      "all maps repeat without a visible border: the same seam is cut through all of them; 7/8 of the square remain"},

@@ -55,7 +55,8 @@ static void read_angle(const cl_command *c, bool published, cl_item *item)
     item->image = item->square = r->square.data;
     item->photo_side = (int)ceil(r->side);
     item->fov = LGD_FOV_OF_PHOTO;
-    snprintf(item->fov_from, sizeof item->fov_from, "%s", r->fov_from);
+    snprintf(item->fov_from, sizeof item->fov_from, "by the corners; %.1f degrees across the photograph: %s", r->fov,
+             r->fov_from);
 }
 
 static void read_sheet(const cl_command *c, cl_item *item)

@@ -141,7 +141,9 @@ static bool openexr(header *h)
 ts_code io_check_claim(const char *path, double width, double height, int64_t max_pixels, double bytes, ts_status *st)
 {
     if (width * height > (double)max_pixels)
-        return ts_fail(st, TS_UNSUPPORTED, "%s: %.0f x %.0f pixels are more than the limit of %lld (--max-pixels)",
+        return ts_fail(st, TS_UNSUPPORTED,
+                       "%s: %.0f x %.0f pixels are more than the limit of %lld (lgd-infer "
+                       "--max-pixels)",
                        path, width, height, (long long)max_pixels);
     if (ts_budget_check(bytes, st) != TS_OK) return ts_context(st, "%s: %.0f x %.0f pixels", path, width, height);
     return TS_OK;

@@ -173,8 +173,10 @@ static ts_code read_file(const char *path, int64_t max_pixels, double max_bytes,
         return ts_fail(st, TS_FORMAT, "%s: claims %d x %d pixels of %d channels", path, spec.width, spec.height,
                        spec.nchannels);
     if ((int64_t)spec.width * spec.height > max_pixels)
-        return ts_fail(st, TS_UNSUPPORTED, "%s: %d x %d pixels are more than the limit of %lld (--max-pixels)", path,
-                       spec.width, spec.height, (long long)max_pixels);
+        return ts_fail(st, TS_UNSUPPORTED,
+                       "%s: %d x %d pixels are more than the limit of %lld (lgd-infer "
+                       "--max-pixels)",
+                       path, spec.width, spec.height, (long long)max_pixels);
     if (spec.depth > 1) return ts_fail(st, TS_UNSUPPORTED, "%s: a volume, not an image", path);
     if (spec.deep) return ts_fail(st, TS_UNSUPPORTED, "%s: a deep image; flatten it first", path);
     const bool webp = !strcmp(in->format_name(), "webp");
@@ -197,7 +199,8 @@ static ts_code read_file(const char *path, int64_t max_pixels, double max_bytes,
     const double bytes = (double)sizeof(float) * spec.width * spec.height * image->channels;
     if (bytes > max_bytes)
         return ts_fail(st, TS_NOMEM,
-                       "%s: %d x %d pixels: about %.3g GB of memory are needed and %.3g GB may be taken (--max-memory)",
+                       "%s: %d x %d pixels: about %.3g GB of memory are needed and %.3g GB may be taken (lgd-infer "
+                       "--max-memory)",
                        path, spec.width, spec.height, bytes * 1e-9, max_bytes * 1e-9);
     image->data = calloc((size_t)spec.width * spec.height * image->channels, sizeof(float));
     if (!image->data) return ts_fail(st, TS_NOMEM, "%s: no memory for %d x %d pixels", path, spec.width, spec.height);

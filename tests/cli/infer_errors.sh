@@ -228,7 +228,7 @@ max_memory() {
     says "$T/err" "--max-memory: '4T'"
     expect 1 infer --max-memory 1M "$T/p.ppm" -o "$T/o"
     says "$T/err" "p.ppm: "
-    says "$T/err" "(--max-memory)"
+    says "$T/err" "(lgd-infer --max-memory)"
     lines "$T/err" 1
     [ -z "$(ls -A "$T/o")" ] || fail "left over: $(ls -A "$T/o")"
     expect 0 infer --max-memory 1G "$T/p.ppm" -o "$T/o"
