@@ -14,10 +14,10 @@ bool nn_clipped(int64_t count, const float *from, int threads);
 ts_code nn_clip_to(const float *const *image, int side, const ts_tensor *small, ts_arena *arena, int threads,
                    ts_status *st);
 
-/* The largest of a pixel's three values. */
+/* The largest of a pixel's three values and 0; of what is no number nothing. */
 static inline float nn_brightest(const float v[3])
 {
-    const float a = v[0] > v[1] ? v[0] : v[1];
-    return a > v[2] ? a : v[2];
+    const float a = v[0] > 0 ? v[0] : 0, b = v[1] > a ? v[1] : a;
+    return v[2] > b ? v[2] : b;
 }
 #endif

@@ -1,4 +1,5 @@
 #include "nn/trial.h"
+#include "nn/clip.h"
 #include "tensor/maps.h"
 #include <math.h>
 #include <stdlib.h>
@@ -14,8 +15,7 @@ static void take(rd_grid from, const float *r0, const float *deviation, nn_trial
                      photo = (size_t)(y * p->side) * (size_t)p->side + (size_t)(x * p->side);
         memcpy(t->r0 + (size_t)(i * channels), r0 + map * (size_t)channels, (size_t)channels * sizeof *r0);
         memcpy(t->deviation + (size_t)(i * NN_SPREADS), deviation + map * NN_SPREADS, NN_SPREADS * sizeof *deviation);
-        for (int k = 0; k < p->given; k++)
-            for (int c = 0; c < 3; c++) t->image[k][i * 3 + c] = fminf(fmaxf(p->image[k][photo * 3 + (size_t)c], 0), 1);
+        for (int k = 0; k < p->given; k++) nn_clip(3, p->image[k] + photo * 3, t->image[k] + (size_t)i * 3);
     }
 }
 

@@ -51,9 +51,9 @@ rd_view rd_view_tilted(rd_view view, double degrees);
 /* What is global about a photograph, as numbers of about the size of 1: the logarithm of the camera's height over
  * RD_FLASH_DISTANCE; the light's place beside the camera, x and y, in RD_SCENE_OFFSET patch widths; the camera's place
  * beside the centre, x and y, in the same; the light's power over the square of its height in stops above the default
- * flash's; the ambient light in RD_SCENE_AMBIENTS of the flash's at the centre of the sample; the strength of the tone
- * curve. The light is as high as the camera; one at another height is put there along its ray to the centre of the
- * sample, which looks the same from there. */
+ * flash's; the ambient light in RD_SCENE_AMBIENTS of the power over the square of the light's height; the strength of
+ * the tone curve. The light is as high as the camera; one at another height is put there along its ray to the centre of
+ * the sample, which looks the same from there. */
 typedef enum rd_scene_number {
     RD_SCENE_DISTANCE,
     RD_SCENE_LIGHT_X,

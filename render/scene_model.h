@@ -58,12 +58,13 @@ typedef struct rd_scene_how {
  * darker by chance would weigh more. With the prior's mean m and its deviations in the diagonal matrix Q a step goes to
  * t = m + Q z, (I + Q A Q) z = Q (b + A (t_before - m)), at most RD_SCENE_STRIDE in any number. The ambient light is
  * not let below 0, nor the tone curve's strength out of +-RD_SCENE_TONE_MOST. In the first half of the steps, values of
- * the photograph that are burnt out tell nothing; from then on they tell that the rendering is no darker. Where much is
- * burnt out and the maps are uncertain, exposure and tone curve lean to what by chance is not. The maps are the mean of
- * what the material may be: of maps that were fitted to this photograph the errors depend on it, which is not foreseen.
- * unknown begins with the caller's values. after (may be NULL): the square roots of the diagonal of
- * Q (I + Q A Q)^-1 Q at the last step. deviation: of the maps, [h, w, MAP_GROUPS]; image: [h, w, 3]. Threaded; the same
- * bytes for any number of threads. */
+ * the photograph that are burnt out tell nothing; from then on they tell nothing where the rendering is above 1: were
+ * they ignored wherever it is brighter than they are, true maps would not lead to the scene in as many steps. Where
+ * much is burnt out and the maps are uncertain, exposure and tone curve lean to what by chance is not. The maps are the
+ * mean of what the material may be: of maps that were fitted to this photograph the errors depend on it, which is not
+ * foreseen. unknown begins with the caller's values. after (may be NULL): the square roots of the diagonal of Q (I + Q
+ * A Q)^-1 Q at the last step. deviation: of the maps, [h, w, MAP_GROUPS]; image: [h, w, 3]. Threaded; the same bytes
+ * for any number of threads. */
 #define RD_SCENE_STRIDE 1.0
 #define RD_SCENE_TONE_MOST 1.5f
 void rd_scene_fit(rd_grid grid, const float *maps, int channels, const float *deviation, const float *image,

@@ -16,7 +16,7 @@ typedef struct ts_scene {
     float offset;       /* patch widths for one number of a place */
     float ambient;      /* radiance for one number of the ambient light */
     float tone;         /* strength of the tone curve */
-    bool least;         /* a burnt-out value means that the rendering is no darker; else it is ignored */
+    bool least;         /* a burnt-out value is ignored where the rendering is above 1; else everywhere */
 } ts_scene;
 
 /* Sums over pixels of the normal equations, the upper triangle of the matrix by rows. */

@@ -96,6 +96,25 @@ TEST(hidden_diffuse_leaves_what_is_seen)
         CHECK(fabsf((filled[i] + 1) / (maps[i] + 1) - 1) < 0.02f, "without a disk %g became %g", maps[i], filled[i]);
 }
 
+/* Where the photograph burnt out next to nothing is seen, though the rendering has no highlight there. */
+TEST(hidden_diffuse_is_filled_where_the_photograph_burnt_out)
+{
+    double sum[2] = {0};
+    int count = 0;
+    for (int burnt = 0; burnt < 2; burnt++) {
+        make(0.9f, 0.04f, 0.08f);
+        for (int i = 0; i < PIXELS; i++)
+            for (int k = 0; k < 3; k++) image[i * 3 + k] = burnt && distance(i) < 0.1f ? 1 : 0.2f;
+        fill(1, filled);
+        for (int i = 0; i < PIXELS; i += 2)
+            if (distance(i) < 0.03f) sum[burnt] += ((double)filled[i * C] + 1) / 2, count++;
+    }
+    memset(image, 0, sizeof image);
+    CHECK(sum[0] / (count / 2) < 0.16, "albedo .133 that is seen became %g", sum[0] / (count / 2));
+    CHECK(sum[1] / (count / 2) > 0.25, "albedo .133 that is not seen became %g, about .4 is right",
+          sum[1] / (count / 2));
+}
+
 /* The largest change of a logarithm where a map's three values are a and b in stripes. */
 static float change_of_stripes(int at, int width, float a, float b)
 {
