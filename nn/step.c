@@ -1,5 +1,6 @@
 /* A refinement step: the gradient and the Newton step of R_t, and R_{t+1} from them (docs/math.md, S4 to S11). */
 #include "nn/burnt.h"
+#include "nn/facing.h"
 #include "nn/lgd_internal.h"
 #include "ops.h"
 #include "render/posterior.h"
@@ -263,7 +264,11 @@ ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag
         if (!step || !posterior_step(tape, model, in, &maps->t, state, step->t.data)) return NULL;
         state->step++;
         ag_into(tape, state->into);
-        return ag_add(tape, maps, step);
+        ag_value *next = ag_add(tape, maps, step);
+        if (next && nn_given(in) == 1)
+            nn_face_camera(rd_grid_on(in->grid, ag_compute(tape)->threads), nn_view_of(model, in, 0).camera, s.c,
+                           next->t.data);
+        return next;
     }
     if (nn_descends(model, NN_DESCENT_NEWTON)) newton = ag_empty(tape, s);
     if (ag_status(tape)->code) return NULL;

@@ -367,3 +367,38 @@ TEST(first_guess_is_revised_in_the_first_steps)
     free(in.image.data);
     nn_model_free(&m);
 }
+
+/* Steps from normals that lie nearly in the sample's plane and lean outwards end at such as the camera sees. */
+TEST(first_guess_is_refined_to_normals_that_face_the_camera)
+{
+    enum { PIXELS = PLACE * PLACE };
+    nn_model *m = guessing();
+    const rd_view view = rd_flash();
+    float *r0 = numbers(PIXELS * 9, 3, -0.3f, 0.3f), *image = numbers(PIXELS * 3, 4, 0, 1),
+          *deviation = malloc(PIXELS * NN_SPREADS * sizeof *deviation), *maps = malloc(PIXELS * 9 * sizeof *maps);
+    for (int i = 0; i < PIXELS; i++) r0[i * 9 + MAP_NORMAL] = i % PLACE < PLACE / 2 ? -0.97f : 0.97f;
+    for (int i = 0; i < PIXELS; i++) r0[i * 9 + MAP_NORMAL + 1] = 0;
+    for (int i = 0; i < PIXELS * NN_SPREADS; i++) deviation[i] = 0.05f;
+    ts_status st = {0};
+    ag_tape *tape = tape_create(false);
+    ag_freeze(tape, true);
+    lgd_tiles t = {.image = (const float *const[]){image},
+                   .views = &view,
+                   .given = 1,
+                   .r0 = r0,
+                   .deviation = deviation,
+                   .side = PLACE,
+                   .tile = PLACE,
+                   .steps = 1};
+    CHECK(!lgd_tiles_run(tape, m, &t, maps, &st), "%s", st.message);
+    for (int i = 0; i < PIXELS; i++) {
+        const double x = (i % PLACE + 0.5) / PLACE - 0.5, y = 0.5 - (i / PLACE + 0.5) / PLACE,
+                     n[2] = {(double)maps[i * 9 + MAP_NORMAL], (double)maps[i * 9 + MAP_NORMAL + 1]},
+                     up = sqrt(fmax(1 - n[0] * n[0] - n[1] * n[1], 0)), height = (double)view.camera[2],
+                     seen = (height * up - x * n[0] - y * n[1]) / sqrt(height * height + x * x + y * y);
+        CHECK(seen > 0.199, "pixel %d has a cosine of %g", i, seen);
+    }
+    ag_tape_destroy(&tape);
+    free(r0), free(image), free(deviation), free(maps);
+    nn_model_free(&m);
+}
