@@ -31,15 +31,15 @@ const cl_camera_option cl_camera_options[CL_CAMERA_OPTIONS] = {
 };
 
 const io_camera cl_camera_default = {.noise = 0.5f, .blur = 0.6f, .quantise = true},
-                cl_camera_phone = {.noise = 0.3f,
-                                   .noise_spread = 1,
-                                   .blur = 0.7f,
+                cl_camera_phone = {.noise = 0.04f,
+                                   .noise_spread = 3,
+                                   .blur = 0.4f,
                                    .quantise = true,
                                    .exposure = 1.5f,
                                    .meter = 0.5f,
                                    .vignette = 0.35f,
                                    .white_balance = 0.08f,
-                                   .jpeg = 75,
+                                   .jpeg = 92,
                                    .tilt = 10,
                                    .off_centre = 0.08f,
                                    .fov_min = 12,
@@ -49,7 +49,7 @@ const io_camera cl_camera_default = {.noise = 0.5f, .blur = 0.6f, .quantise = tr
                                    .glare = 0.1f,
                                    .ambient = 0.15f,
                                    .tone = 0.6f,
-                                   .sharpen = 0.5f};
+                                   .sharpen = 0.3f};
 
 float *cl_camera_value(io_camera *camera, int option)
 {

@@ -1,4 +1,4 @@
-/* What a camera sees faces it. Normals that g or a factor on its relief (nn/relief.h) turned away from the camera are
+/* What a camera sees faces it. Normals that g, a factor on its relief (nn/relief.h) or a step turned away from it are
  * black under a flash beside the lens, and no step finds back from there: black has no slope. */
 #ifndef NN_FACING_H
 #define NN_FACING_H

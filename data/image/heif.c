@@ -63,7 +63,7 @@ static void take_property(part properties, int n, oi_image *image)
 {
     const uint8_t *type;
     part content;
-    for (int i = 1; take_box(&properties, &type, &content); i++)
+    for (int i = 1; i <= n && take_box(&properties, &type, &content); i++)
         if (i == n && !memcmp(type, "colr", 4)) take_colour(content, image);
 }
 
@@ -78,18 +78,40 @@ static void take_properties(part associations, uint64_t item, part properties, o
         int count = p[id];
         for (p += id + 1; count > 0 && end - p >= index; count--, p += index)
             if (wanted) take_property(properties, (int)big_endian(p, index) & (index == 2 ? 0x7fff : 0x7f), image);
+        if (wanted) return;
     }
 }
 
+/* Of an iref box: the first image that an item is put together of, a tile. False: it is none of tiles. */
+static bool first_tile(part references, uint64_t item, uint64_t *tile)
+{
+    if (references.size < 4) return false;
+    const int id = references.at[0] < 1 ? 2 : 4;
+    part rest = {references.at + 4, references.size - 4}, of;
+    const uint8_t *type;
+    while (take_box(&rest, &type, &of)) {
+        if (memcmp(type, "dimg", 4) || of.size < 2 * (size_t)id + 2 || big_endian(of.at, id) != item) continue;
+        *tile = big_endian(of.at + id + 2, id);
+        return true;
+    }
+    return false;
+}
+
+/* Of the primary image; of one of tiles where only they say it, as the first iPhones wrote. */
 static void take_meta(part meta, oi_image *image)
 {
-    part primary, of, properties, associations;
+    part primary, of, properties, associations, references;
     if (!find_box(meta, "pitm", &primary) || !find_box(meta, "iprp", &of) || !find_box(of, "ipco", &properties) ||
         !find_box(of, "ipma", &associations) || primary.size < 6)
         return;
     const int id = primary.at[0] < 1 ? 2 : 4;
-    if (primary.size >= 4 + (size_t)id)
-        take_properties(associations, big_endian(primary.at + 4, id), properties, image);
+    if (primary.size < 4 + (size_t)id) return;
+    const uint64_t item = big_endian(primary.at + 4, id);
+    uint64_t tile;
+    take_properties(associations, item, properties, image);
+    if (!image->icc && !image->code_points && find_box(meta, "iref", &references) &&
+        first_tile(references, item, &tile))
+        take_properties(associations, tile, properties, image);
 }
 
 /* The content of the meta box, malloced; NULL: there is none, or the file is of another format. */

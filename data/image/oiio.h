@@ -75,7 +75,7 @@ typedef struct oi_library {
     bool (*knows_extension)(const char *extension);
 } oi_library;
 #define OI_LIBRARY "lgd_image_library"
-#define OI_BUILD "lgd " LGD_VERSION " image library 3"
+#define OI_BUILD "lgd " LGD_VERSION " image library 4"
 
 #ifdef __cplusplus
 }

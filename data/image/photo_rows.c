@@ -51,6 +51,7 @@ static io_space space_of(const char *path, io_photo_rows *p)
     if (io_space_icc(image->icc, image->icc_size, &space)) return space;
     if (image->icc) {
         p->profile = io_profile_open(image->icc, image->icc_size, image->grey, name, sizeof name);
+        if (!p->profile && image->code_points && io_space_code_points(image->code_point, &space)) return space;
         if (!p->profile) memcpy(p->unread, name, sizeof name);
     }
     if (image->code_points && io_space_code_points(image->code_point, &space)) return space;

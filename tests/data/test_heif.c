@@ -33,11 +33,11 @@ static void code_points(bytes *properties, uint8_t primaries, uint8_t transfer)
     box(properties, "colr", &c);
 }
 
-/* version 1: items of 32 bits, properties of 16. The primary item has the properties from first on, another one the
- * first of all. */
-static bytes file_of(bytes *properties, int first, int count, int version)
+/* version 1: items of 32 bits, properties of 16. The primary item has the properties from first on, another one, its
+ * tile where tiled, the first of all. */
+static bytes file_of(bytes *properties, int first, int count, int version, bool tiled)
 {
-    bytes b = {0}, c = {0}, inside = {0}, meta = {0};
+    bytes b = {0}, c = {0}, inside = {0}, meta = {0}, references = {0};
     put(&c, "heic\0\0\0\0mif1", 12);
     box(&b, "ftyp", &c);
     put32(&c, 0), put(&c, "no handler", 10);
@@ -47,6 +47,17 @@ static bytes file_of(bytes *properties, int first, int count, int version)
     if (version < 1) put16(&c, ITEM);
     else put32(&c, ITEM);
     box(&meta, "pitm", &c);
+    const int from_to[][2] = {{ITEM - 1, ITEM}, {ITEM, ITEM - 1}};
+    put32(&references, (uint32_t)version << 24);
+    for (int k = 0; k < 2; k++) { /* a thumbnail's, then the tile's */
+        if (version < 1) put16(&c, (unsigned)from_to[k][0]);
+        else put32(&c, (uint32_t)from_to[k][0]);
+        put16(&c, 1);
+        if (version < 1) put16(&c, (unsigned)from_to[k][1]);
+        else put32(&c, (uint32_t)from_to[k][1]);
+        box(&references, k && tiled ? "dimg" : "thmb", &c);
+    }
+    box(&meta, "iref", &references);
     box(&inside, "ipco", properties);
     put32(&c, (uint32_t)version << 24 | (uint32_t)version), put32(&c, 2);
     for (int item = ITEM - 1; item <= ITEM; item++) {
@@ -81,11 +92,46 @@ TEST(heif_profile_is_that_of_the_primary_image)
         put32(&size, 0), put32(&size, 64), put32(&size, 64);
         box(&properties, "ispe", &size);
         profile(&properties, 9);
-        bytes b = file_of(&properties, 2, 2, version);
+        bytes b = file_of(&properties, 2, 2, version, true);
         const oi_image image = read_colours(&b);
         CHECK(image.icc && image.icc_size == PROFILE && !image.code_points, "version %d: no profile", version);
         for (int i = 0; i < PROFILE; i++)
             CHECK(image.icc[i] == 9, "version %d: byte %d is %d", version, i, image.icc[i]);
+        free(image.icc);
+    }
+}
+
+TEST(heif_profile_of_the_tiles_is_that_of_an_image_without)
+{
+    for (int k = 0; k < 4; k++) {
+        bytes properties = {0}, size = {0};
+        profile(&properties, 7);
+        put32(&size, 0), put32(&size, 64), put32(&size, 64);
+        box(&properties, "ispe", &size);
+        const bool tiled = k % 2;
+        bytes b = file_of(&properties, 2, 1, k / 2, tiled);
+        const oi_image image = read_colours(&b);
+        CHECK(tiled == (image.icc && image.icc[0] == 7), "case %d: a profile of %zu bytes", k, image.icc_size);
+        free(image.icc);
+    }
+}
+
+/* Both are kept, in whatever order; a profile that an image has already stays. */
+TEST(heif_profile_and_code_points)
+{
+    for (int k = 0; k < 2; k++) {
+        bytes properties = {0};
+        if (k) code_points(&properties, 12, 13);
+        profile(&properties, 9);
+        if (!k) code_points(&properties, 12, 13);
+        bytes b = file_of(&properties, 1, 2, 0, false);
+        uint8_t own[PROFILE];
+        oi_image image = {0}, with = {.icc = own, .icc_size = sizeof own};
+        const char *path = bytes_save(&b, test_folder(), "a.heic");
+        io_heif_colours(path, &image);
+        io_heif_colours(path, &with);
+        CHECK(image.icc && image.icc_size == PROFILE && image.code_points && image.code_point[0] == 12, "case %d", k);
+        CHECK(with.icc == own && with.icc_size == sizeof own && with.code_points, "the image's own profile is gone");
         free(image.icc);
     }
 }
@@ -95,7 +141,7 @@ TEST(heif_code_points_are_a_space)
     bytes properties = {0};
     profile(&properties, 7);
     code_points(&properties, 12, 13);
-    bytes b = file_of(&properties, 2, 1, 0);
+    bytes b = file_of(&properties, 2, 1, 0, true);
     const oi_image image = read_colours(&b);
     io_space space;
     CHECK(!image.icc && image.code_points && image.code_point[0] == 12 && image.code_point[1] == 13, "not as told");
@@ -109,12 +155,12 @@ TEST(heif_code_points_are_a_space)
     CHECK(!io_space_code_points(hdr, &space), "PQ is taken for a curve of sRGB's kind");
 }
 
-/* A profile that an image has already stays; what is cut short or damaged says nothing and reads nothing beyond it. */
+/* What is cut short or damaged says nothing and reads nothing beyond it. */
 TEST(heif_that_is_damaged_says_nothing)
 {
     bytes properties = {0};
     profile(&properties, 7);
-    bytes whole = file_of(&properties, 1, 1, 0);
+    bytes whole = file_of(&properties, 1, 1, 0, false);
     uint8_t *copy = malloc(whole.size);
     const size_t size = whole.size;
     memcpy(copy, whole.data, size);

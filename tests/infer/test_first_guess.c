@@ -376,20 +376,14 @@ TEST(first_guess_is_refined_to_normals_that_face_the_camera)
     const rd_view view = rd_flash();
     float *r0 = numbers(PIXELS * 9, 3, -0.3f, 0.3f), *image = numbers(PIXELS * 3, 4, 0, 1),
           *deviation = malloc(PIXELS * NN_SPREADS * sizeof *deviation), *maps = malloc(PIXELS * 9 * sizeof *maps);
-    for (int i = 0; i < PIXELS; i++) r0[i * 9 + MAP_NORMAL] = i % PLACE < PLACE / 2 ? -0.97f : 0.97f;
-    for (int i = 0; i < PIXELS; i++) r0[i * 9 + MAP_NORMAL + 1] = 0;
+    for (int i = 0; i < PIXELS; i++)
+        r0[i * 9 + MAP_NORMAL] = i % PLACE < PLACE / 2 ? -0.97f : 0.97f, r0[i * 9 + MAP_NORMAL + 1] = 0;
     for (int i = 0; i < PIXELS * NN_SPREADS; i++) deviation[i] = 0.05f;
     ts_status st = {0};
     ag_tape *tape = tape_create(false);
     ag_freeze(tape, true);
-    lgd_tiles t = {.image = (const float *const[]){image},
-                   .views = &view,
-                   .given = 1,
-                   .r0 = r0,
-                   .deviation = deviation,
-                   .side = PLACE,
-                   .tile = PLACE,
-                   .steps = 1};
+    lgd_tiles t = {.image = (const float *const[]){image}, .views = &view, .given = 1, .r0 = r0, .steps = 1};
+    t.deviation = deviation, t.side = t.tile = PLACE;
     CHECK(!lgd_tiles_run(tape, m, &t, maps, &st), "%s", st.message);
     for (int i = 0; i < PIXELS; i++) {
         const double x = (i % PLACE + 0.5) / PLACE - 0.5, y = 0.5 - (i / PLACE + 0.5) / PLACE,
