@@ -7,7 +7,7 @@ angle() {
     expect 0 infer --corners 10,5 40,8 42,35 8,30 "$T/a.ppm" --fov 50 -o "$T/o"
     complete "$T/o/a"
     says "$T/err" "from straight above"
-    says "$T/o/a/meta.txt" "(--fov)"
+    says "$T/o/a/meta.txt" "across the square (by the corners; 50.0 degrees across the photograph: --fov)"
     expect 0 infer "$T/a.ppm" --corners "10,5 40,8 42,35 8,30" -o "$T/p"
     says "$T/err" "warning: assumed"
     says "$T/p/a/meta.txt" "assumed"
