@@ -5,6 +5,7 @@
 #include "infer/tiles.h"
 #include "nn/burnt.h"
 #include "nn/clip.h"
+#include "nn/middle_view.h"
 #include "nn/need.h"
 #include "nn/revise.h"
 #include "tensor/budget.h"
@@ -145,20 +146,6 @@ static int tile_side(const lgd_estimator *e, int side, const lgd_options *o)
     return o->tolerance > 0 ? TILE_EARLY : TILE;
 }
 
-/* What an estimate holds at once, at most: g, or a step; beside them the whole photograph's maps, and photographs that
- * are clipped as a whole. */
-static double most_bytes(const nn_arch *a, int photos, int copied, int side, int tile, int orientations)
-{
-    const int around = a->descent == NN_DESCENT_POSTERIOR ? 2 * a->iterations * nn_burnt_reach(side) : 0,
-              part = tile + around < side ? tile + around : side,
-              coarse = a->coarse_size < side ? a->coarse_size : side;
-    double most = fmax(nn_guess_bytes(a, orientations), step_bytes(a, photos, part, a->h_width, a->h_gru));
-    if (a->coarse_steps > 0) most = fmax(most, step_bytes(a, photos, coarse, a->coarse_width, a->coarse_gru));
-    if (a->revisions > 0 && photos > 1) most = fmax(most, nn_revision_bytes(a, photos));
-    if (a->scene) most += nn_first_guess_bytes(a);
-    return most + (2.0 * a->channels + 3.0 * copied) * sizeof(float) * side * side;
-}
-
 /* Where camera and power are known a second orientation pays (docs/accuracy.md). Models that do not guess them take
  * them for known. */
 static int orientations_of(const nn_arch *a, const lgd_options *o)
@@ -168,10 +155,25 @@ static int orientations_of(const nn_arch *a, const lgd_options *o)
     return a->scene && (lgd_guess_known(o) & SURE) != SURE ? 1 : 2;
 }
 
+/* What an estimate holds at once, at most: g, or a step; beside them the whole photograph's maps, and photographs that
+ * are clipped as a whole. */
+static double most_bytes(const nn_arch *a, int photos, int copied, int side, int tile, const lgd_options *o)
+{
+    const int around = a->descent == NN_DESCENT_POSTERIOR ? 2 * a->iterations * nn_burnt_reach(side) : 0,
+              part = tile + around < side ? tile + around : side,
+              coarse = a->coarse_size < side ? a->coarse_size : side;
+    double most = fmax(nn_guess_bytes(a, orientations_of(a, o), nn_tellings(a, lgd_guess_known(o))),
+                       step_bytes(a, photos, part, a->h_width, a->h_gru));
+    if (a->coarse_steps > 0) most = fmax(most, step_bytes(a, photos, coarse, a->coarse_width, a->coarse_gru));
+    if (a->revisions > 0 && photos > 1) most = fmax(most, nn_revision_bytes(a, photos));
+    if (a->scene) most += nn_first_guess_bytes(a);
+    return most + (2.0 * a->channels + 3.0 * copied) * sizeof(float) * side * side;
+}
+
 double lgd_estimator_bytes(const lgd_estimator *e, int side, const lgd_options *o)
 {
     const nn_arch *a = &e->net->arch;
-    return most_bytes(a, a->images, a->images > 1 ? a->images : 0, side, tile_side(e, side, o), orientations_of(a, o));
+    return most_bytes(a, a->images, a->images > 1 ? a->images : 0, side, tile_side(e, side, o), o);
 }
 
 /* At most so many of the photographs are clipped as a whole. */
@@ -351,7 +353,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
     ag_reset(e->tape);
     ts_arena *arena = ag_arena(e->tape);
     const int copies = copied(a, &p, tile < side || o.mask, ag_compute(e->tape)->threads);
-    const double most = most_bytes(a, photos, copies, side, tile, o.orientations),
+    const double most = most_bytes(a, photos, copies, side, tile, &o),
                  more = most - (double)ts_arena_peak(arena); /* than earlier calls left */
     if (more > 0 && ts_budget_check(more, st) != TS_OK)
         return ts_context(st, "%d x %d pixels, of which the network reads %d x %d", side, side, nn_arch_side(a),

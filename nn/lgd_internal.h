@@ -6,11 +6,13 @@
 
 int nn_given(const nn_input *in);
 int nn_materials(const nn_input *in);
+int nn_tellings_of(const nn_input *in);
 
 /* Under which a photograph was taken, as the model's renderer has it. */
 rd_view nn_view_of(const nn_model *model, const nn_input *in, int photograph);
 
-/* What g reads beside the photographs: [N, g_size, g_size, NN_CONDITIONS images] (nn/layers.h). NULL after an error. */
+/* What g reads beside the photographs: [tellings N, g_size, g_size, NN_CONDITIONS images] (nn/layers.h). NULL after an
+ * error. */
 ag_value *nn_conditions(ag_tape *tape, const nn_model *model, const nn_input *in);
 
 /* The input fits the model, and no error is on the tape; else the tape gets one. */

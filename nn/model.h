@@ -164,6 +164,9 @@ typedef struct nn_input {
     const rd_view *views;       /* [N * given], or NULL */
     const unsigned char *known; /* [N * given] of nn_known: what of views is true; NULL: all of it */
     int given;                  /* 1 .. nn_most_photographs; 0 stands for 1 */
+    int tellings;               /* of 2 or more g is told the photographs' scenes so many times: views and known are
+                                 * [tellings][N * given], and R_0 is made of the mean of what the U-Net says then. On a
+                                 * tape without gradients; the steps have the first. 0 stands for 1 */
     int orientations; /* 2, 4, 8: R_0 is the mean of g's maps over so many orientations of the photograph (as it is and
                        * a quarter turn, all quarter turns, and their mirror images), if nn_orients; on a tape without
                        * gradients. 0, 1: as it is */
@@ -178,8 +181,8 @@ typedef struct nn_guess {
     ag_value *maps;   /* R_0, [N, side, side, channels], side = nn_arch_side */
     ag_value *spread; /* [N, side, side, NN_SPREADS]: the logarithm of the expected absolute error of diffuse, normal,
                        * roughness and F0, in the encoding of tensor/maps.h, over NN_SPREAD_UNIT */
-    ag_value *scene;  /* [N, 1, 1, 2 RD_SCENE_NUMBERS]: render/scene.h's numbers of the photograph, then the logarithms
-                       * of their expected absolute errors */
+    ag_value *scene;  /* [tellings N, 1, 1, 2 RD_SCENE_NUMBERS]: render/scene.h's numbers of the photograph, then the
+                       * logarithms of their expected absolute errors */
 } nn_guess;
 enum { NN_SPREADS = 4 };
 #define NN_SPREAD_UNIT 0.1f

@@ -50,7 +50,14 @@ static double full_floats(const nn_arch *a)
     return side * side * (NN_COORDINATES + fmax(band, a->channels));
 }
 
-double nn_guess_bytes(const nn_arch *a, int orientations)
+/* The means over the tellings, of one image. */
+static double means_floats(const nn_arch *a)
+{
+    const double pixels = (double)a->g_size * a->g_size;
+    return pixels * (nn_g_reads(a) + nn_level_width(a, 0) + a->channels);
+}
+
+double nn_guess_bytes(const nn_arch *a, int orientations, int tellings)
 {
     const double side = nn_arch_side(a), pixels = (double)a->g_size * a->g_size, photo = 3.0 * a->images,
                  maps = a->channels + (a->spread ? NN_SPREADS : 0);
@@ -59,7 +66,8 @@ double nn_guess_bytes(const nn_arch *a, int orientations)
     /* the photographs at g's size and encoded; of several orientations their maps' mean */
     const double once = side * side * (3 * photo + (turned ? 2 * maps : 0)),
                  left = detail ? pixels * (a->g_detail + a->channels) : 0; /* of the U-Net */
-    const double unet = images * (unet_floats(a) + (detail ? squares_floats(a) : 0)),
+    const double means = tellings > 1 ? means_floats(a) : 0,
+                 unet = images * (tellings * unet_floats(a) + means + (detail ? squares_floats(a) : 0)),
                  full = detail ? full_floats(a) + images * side * side * maps : 0;
     return (once + images * (side * side * photo + left) + fmax(unet, full)) * sizeof(float);
 }

@@ -3,8 +3,8 @@
 #define NN_NEED_H
 #include "nn/model.h"
 
-/* Bytes that nn_guess_from takes for one material on a tape without gradients, with so many orientations (nn_input):
- * what it holds at once, at most. An upper bound that is less than twice what is taken; packed weights and the threads'
- * scratch are not in it. */
-double nn_guess_bytes(const nn_arch *a, int orientations);
+/* Bytes that nn_guess_from takes for one material on a tape without gradients, with so many orientations and tellings
+ * (nn_input): what it holds at once, at most. An upper bound that is less than twice what is taken; packed weights and
+ * the threads' scratch are not in it. */
+double nn_guess_bytes(const nn_arch *a, int orientations, int tellings);
 #endif

@@ -94,24 +94,26 @@ static ag_value *mean_back(ag_tape *tape, const ag_value *from, int vector)
     return mean;
 }
 
-/* The same of the scene's numbers, of which two pairs are vectors. */
-static ag_value *mean_scene(ag_tape *tape, const ag_value *from)
+/* The same of the scene's numbers of each telling, of which two pairs are vectors. */
+static ag_value *mean_scene(ag_tape *tape, const ag_value *from, int tellings)
 {
-    ag_value *mean = ag_empty(tape, (ts_shape){1, 1, 1, from->t.shape.c});
+    const int count = from->t.shape.n / tellings;
+    ag_value *mean = ag_empty(tape, (ts_shape){tellings, 1, 1, from->t.shape.c});
     if (!mean) return NULL;
-    memset(mean->t.data, 0, (size_t)from->t.shape.c * sizeof(float));
-    for (int k = 0; k < from->t.shape.n; k++) {
-        float x[2 * RD_SCENE_NUMBERS];
-        memcpy(x, from->t.data + (size_t)k * 2 * RD_SCENE_NUMBERS, sizeof x);
+    memset(mean->t.data, 0, (size_t)ts_count(mean->t.shape) * sizeof(float));
+    for (int i = 0; i < from->t.shape.n; i++) {
+        const int k = orientations[i % count];
+        float x[2 * RD_SCENE_NUMBERS], *to = mean->t.data + (size_t)(i / count) * 2 * RD_SCENE_NUMBERS;
+        memcpy(x, from->t.data + (size_t)i * 2 * RD_SCENE_NUMBERS, sizeof x);
         for (int v = RD_SCENE_LIGHT_X; v <= RD_SCENE_CAMERA_X; v += 2) {
             const float vector[2] = {x[v], x[v + 1]};
-            normal_back(orientations[k], vector, x + v);
-            if (!(orientations[k] & 4)) continue; /* x and y have changed places, and so have their errors */
+            normal_back(k, vector, x + v);
+            if (!(k & 4)) continue; /* x and y have changed places, and so have their errors */
             const float error = x[RD_SCENE_NUMBERS + v];
             x[RD_SCENE_NUMBERS + v] = x[RD_SCENE_NUMBERS + v + 1];
             x[RD_SCENE_NUMBERS + v + 1] = error;
         }
-        for (int c = 0; c < 2 * RD_SCENE_NUMBERS; c++) mean->t.data[c] += x[c] / (float)from->t.shape.n;
+        for (int c = 0; c < 2 * RD_SCENE_NUMBERS; c++) to[c] += x[c] / (float)count;
     }
     return mean;
 }
@@ -128,8 +130,8 @@ static void turn_rows(const void *job, int64_t begin, int64_t end)
     }
 }
 
-bool nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *photo, ag_value *conditions, int count,
-                      nn_guess *guess)
+bool nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *photo, ag_value *conditions, int tellings,
+                      int count, nn_guess *guess)
 {
     if (!photo) return false;
     const int side = photo->t.shape.h, read = photo->t.shape.c;
@@ -138,10 +140,10 @@ bool nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *phot
     if (!all) return false;
     ts_for(ag_compute(tape)->threads, (int64_t)count * side, ROWS, turn_rows,
            &(turn_job){.from = photo->t.data, .side = side, .channels = read, .to = all->t.data});
-    if (!nn_unet(tape, model, all, conditions, guess)) return false;
+    if (!nn_unet(tape, model, all, conditions, tellings, guess)) return false;
     ag_value *keep[3] = {mean_back(tape, guess->maps, MAP_NORMAL),
                          guess->spread ? mean_back(tape, guess->spread, -1) : NULL,
-                         guess->scene ? mean_scene(tape, guess->scene) : NULL};
+                         guess->scene ? mean_scene(tape, guess->scene, tellings) : NULL};
     ag_scope_end(tape, mark, keep, 3);
     *guess = (nn_guess){keep[0], keep[1], keep[2]};
     return !ag_status(tape)->code;

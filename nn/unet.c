@@ -1,6 +1,7 @@
 /* g: a U-Net with a global track (Deschaintre et al. 2018, as changed by Luo et al. 2024). */
 #include "nn/layers.h"
 #include "ops.h"
+#include "tensor/team.h"
 #include <string.h>
 
 #define NORM_EPSILON 1e-5f /* as published; a constant channel becomes zero instead of 0/0 */
@@ -18,21 +19,55 @@ static void block(ag_tape *tape, const nn_model *model, const nn_unet_block *b, 
     *global = ag_selu(tape, nn_linear(tape, model, b->global, ag_concat(tape, mean, *global)));
 }
 
-/* The same for each of n images. */
-static ag_value *repeated(ag_tape *tape, ag_value *x, int n)
+/* n images: each of x's as often as the others, one after the other, or all of them over and over. */
+static ag_value *repeated(ag_tape *tape, ag_value *x, int n, bool over_and_over)
 {
     if (!x || x->t.shape.n == n) return x;
     ts_shape s = x->t.shape;
-    const size_t one = (size_t)(ts_count(s) / s.n);
+    const int have = s.n;
+    const size_t one = (size_t)(ts_count(s) / have);
     s.n = n;
     ag_value *all = ag_empty(tape, s);
-    for (int i = 0; all && i < n; i++) memcpy(all->t.data + (size_t)i * one, x->t.data, one * sizeof(float));
+    for (int i = 0; all && i < n; i++)
+        memcpy(all->t.data + (size_t)i * one, x->t.data + (size_t)(over_and_over ? i % have : i / (n / have)) * one,
+               one * sizeof(float));
     return all;
+}
+
+typedef struct mean_job {
+    const float *from;
+    int64_t apart; /* from telling to telling */
+    int tellings;
+    float *to;
+} mean_job;
+
+static void mean_range(const void *job, int64_t begin, int64_t end)
+{
+    const mean_job *j = job;
+    for (int64_t i = begin; i < end; i++) {
+        float sum = 0;
+        for (int t = 0; t < j->tellings; t++) sum += j->from[t * j->apart + i];
+        j->to[i] = sum / (float)j->tellings;
+    }
+}
+
+/* [N, ...] of x [tellings N, ...]. */
+static ag_value *mean_of(ag_tape *tape, ag_value *x, int tellings)
+{
+    enum { WORTH = 1 << 15 }; /* values that another thread is worth */
+    if (!x || tellings == 1) return x;
+    ts_shape s = x->t.shape;
+    s.n /= tellings;
+    ag_value *mean = ag_empty(tape, s);
+    if (mean)
+        ts_for(ag_compute(tape)->threads, ts_count(s), WORTH, mean_range,
+               &(mean_job){x->t.data, ts_count(s), tellings, mean->t.data});
+    return mean;
 }
 
 /* What the first layers read: the photograph's pixels at g_size, where they are squares their place, and what is known.
  */
-static ag_value *seen_by(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions)
+static ag_value *seen_by(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, int tellings)
 {
     const int r = model->arch.g_unshuffle, n = photo ? photo->t.shape.n : 0;
     const ts_mark mark = ag_scope_begin(tape);
@@ -41,7 +76,8 @@ static ag_value *seen_by(ag_tape *tape, const nn_model *model, ag_value *photo, 
         x = ag_space_to_depth(tape, x, r);
         x = x ? ag_concat(tape, x, nn_coordinates(tape, n, x->t.shape.h)) : NULL;
     }
-    if (conditions) x = ag_concat(tape, x, repeated(tape, conditions, n));
+    x = repeated(tape, x, tellings * n, true);
+    if (conditions) x = ag_concat(tape, x, repeated(tape, conditions, tellings * n, false));
     ag_scope_end(tape, mark, &x, 1);
     return x;
 }
@@ -56,7 +92,8 @@ static ts_compute careful(const ag_tape *tape, const nn_model *model)
     return c;
 }
 
-static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, nn_guess *guess)
+static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, int tellings,
+                nn_guess *guess)
 {
     const nn_layers *l = model->layers;
     const int levels = model->arch.g_levels;
@@ -66,7 +103,7 @@ static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value 
     ag_compute_set(tape, careful(tape, model));
     ag_value *squares = nn_squares_room(tape, model, photo->t.shape.n);
     const ts_mark begun = ag_scope_begin(tape);
-    ag_value *seen = seen_by(tape, model, photo, conditions);
+    ag_value *seen = seen_by(tape, model, photo, conditions, tellings);
     ag_value *skip[NN_MAX_LEVELS],
         *global = ag_selu(tape, nn_linear(tape, model, l->input_global, ag_channel_mean(tape, seen)));
     ag_value *x = nn_conv(tape, model, l->input_conv, seen, 1, TS_PAD_ZERO, NN_LEAK_G);
@@ -94,8 +131,10 @@ static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value 
     x = nn_conv(tape, model, l->output_conv1, x, 1, TS_PAD_ZERO, 1);
     x = nn_conv(tape, model, l->output_conv2, x, 1, TS_PAD_ZERO, 1);
     x = ag_add_leaky(tape, x, nn_linear(tape, model, l->output_add, global), 1);
+    x = mean_of(tape, x, tellings);
     const bool detailed = model->arch.g_unshuffle > 1;
-    if (detailed) squares = nn_squares(tape, model, seen, features, squares);
+    if (detailed)
+        squares = nn_squares(tape, model, mean_of(tape, seen, tellings), mean_of(tape, features, tellings), squares);
     else x = ag_tanh(tape, x);
     ag_value *keep[3] = {x, squares, guess->scene};
     ag_scope_end(tape, begun, keep, 3);
@@ -103,10 +142,10 @@ static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value 
     return detailed ? nn_full_size(tape, model, photo, keep[1], keep[0], guess) : guess->maps != NULL;
 }
 
-bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, nn_guess *guess)
+bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, int tellings, nn_guess *guess)
 {
     ag_pass(tape, model->g_once);
-    const bool done = run(tape, model, photo, conditions, guess);
+    const bool done = run(tape, model, photo, conditions, tellings, guess);
     ag_pass(tape, false);
     return done;
 }

@@ -2,21 +2,28 @@
 #include "nn/need.h"
 #include "tests/support/networks.h"
 
-static void fits_given(const char *what, const nn_arch *a, int given, int orientations)
+static void fits_told(const char *what, const nn_arch *a, int given, int orientations, int tellings)
 {
     nn_model *m = create(a, 5);
     const int side = nn_arch_side(a) / 2; /* resampled to g's size */
     nn_input in = photographs(given, side, 6, NULL);
     in.given = given;
     in.orientations = orientations;
+    const rd_view views[2] = {rd_flash(), rd_flash()};
+    if (tellings > 1) in.views = views, in.tellings = tellings;
     ag_tape *tape = tape_create(false);
     nn_guess g;
     CHECK(nn_guess_from(tape, m, &in, &g), "%s: %s", what, ag_status(tape)->message);
-    const double taken = (double)ts_arena_peak(ag_arena(tape)), counted = nn_guess_bytes(a, orientations);
+    const double taken = (double)ts_arena_peak(ag_arena(tape)), counted = nn_guess_bytes(a, orientations, tellings);
     CHECK(taken <= counted && counted < 2 * taken, "%s: %.0f bytes are counted and %.0f taken", what, counted, taken);
     ag_tape_destroy(&tape);
     nn_model_free(&m);
     free(in.image.data);
+}
+
+static void fits_given(const char *what, const nn_arch *a, int given, int orientations)
+{
+    fits_told(what, a, given, orientations, 1);
 }
 
 static void fits(const char *what, const nn_arch *a, int orientations) { fits_given(what, a, a->images, orientations); }
@@ -46,5 +53,7 @@ TEST(need_of_g_is_counted)
             fits("detail and half of the side", &a, 1);
             a.spread = a.scene = a.conditions = true;
             fits("detail, spread, scene and conditions", &a, 2);
+            fits_told("the same, told twice", &a, 1, 1, 2);
+            fits_told("the same in two orientations", &a, 1, 2, 2);
         }
 }

@@ -1,0 +1,131 @@
+/* g told a photograph's scene more than once, and what a camera that is not known is taken for. */
+#include "nn/middle_view.h"
+#include "tensor/maps.h"
+#include "tests/support/networks.h"
+
+enum { FINE = 4 * SIDE, NUMBERS = 2 * RD_SCENE_NUMBERS };
+
+/* Layers that begin as zero say something of what they read. */
+static nn_model *talking(bool detailed)
+{
+    nn_arch a = tiny();
+    a.conditions = a.scene = true;
+    if (detailed) a.g_unshuffle = 4, a.g_detail = 6, a.spread = true;
+    nn_model *m = create(&a, 91);
+    const nn_param *p = nn_model_find(m, "g.scene.numbers.weight");
+    ts_rng r = ts_rng_make(11, TS_STREAM_TEST, 0);
+    for (size_t i = 0; p && i < p->count; i++) m->value[p->offset + i] = ts_rng_range(&r, -0.1f, 0.1f);
+    return m;
+}
+
+static rd_view from(float distance)
+{
+    rd_view view = rd_flash();
+    view.camera[2] = distance;
+    return view;
+}
+
+static double apart(const ag_value *a, const float *b)
+{
+    double most = 0;
+    for (int64_t i = 0; i < ts_count(a->t.shape); i++) most = farther(most, fabs((double)a->t.data[i] - (double)b[i]));
+    return most;
+}
+
+/* Told the same over and over, g says what it says when it is told once, in every orientation. */
+TEST(middle_view_tellings_of_one_scene_are_one)
+{
+    for (int detailed = 0; detailed < 2; detailed++) {
+        nn_model *m = talking(detailed);
+        nn_input in = photographs(1, detailed ? FINE : SIDE, 92, NULL);
+        const rd_view views[4] = {from(2), from(2), from(2), from(2)};
+        const unsigned char known[4] = {NN_KNOWN_CAMERA, NN_KNOWN_CAMERA, NN_KNOWN_CAMERA, NN_KNOWN_CAMERA};
+        in.views = views, in.known = known;
+        for (int orientations = 1; orientations <= 4; orientations *= 2)
+            for (int tellings = 2; tellings <= 4; tellings += 2) {
+                ag_tape *tape = tape_create(false);
+                nn_guess once, more;
+                in.orientations = orientations;
+                in.tellings = 1;
+                CHECK(nn_guess_from(tape, m, &in, &once), "%s", ag_status(tape)->message);
+                in.tellings = tellings;
+                CHECK(nn_guess_from(tape, m, &in, &more), "%s", ag_status(tape)->message);
+                const double maps = apart(once.maps, more.maps->t.data),
+                             spread = detailed ? apart(once.spread, more.spread->t.data) : 0;
+                CHECK(maps < 1e-5 && spread < 1e-5, "%d tellings, %d orientations: maps %g, spread %g", tellings,
+                      orientations, maps, spread);
+                CHECK(more.scene->t.shape.n == tellings, "%d scenes of %d tellings", more.scene->t.shape.n, tellings);
+                for (int t = 0; t < tellings; t++)
+                    CHECK(apart(once.scene, more.scene->t.data + (ptrdiff_t)t * NUMBERS) < 1e-5,
+                          "%d tellings, %d orientations: the scene of number %d is another", tellings, orientations, t);
+                ag_tape_destroy(&tape);
+            }
+        nn_model_free(&m);
+        free(in.image.data);
+    }
+}
+
+/* Where the U-Net's maps are the maps, those of two tellings are the mean of both before the tanh. */
+TEST(middle_view_is_the_mean_of_the_tellings)
+{
+    nn_model *m = talking(false);
+    nn_input in = photographs(1, SIDE, 93, NULL);
+    const rd_view views[2] = {from(0.7f), from(4)};
+    const unsigned char known[2] = {0, NN_KNOWN_CAMERA};
+    ag_tape *tape = tape_create(false);
+    nn_guess first, second, both;
+    in.views = views, in.known = known;
+    CHECK(nn_guess_from(tape, m, &in, &first), "%s", ag_status(tape)->message);
+    in.views = views + 1, in.known = known + 1;
+    CHECK(nn_guess_from(tape, m, &in, &second), "%s", ag_status(tape)->message);
+    in.views = views, in.known = known, in.tellings = 2;
+    CHECK(nn_guess_from(tape, m, &in, &both), "%s", ag_status(tape)->message);
+    double worst = 0, differ = 0;
+    for (int64_t i = 0; i < ts_count(both.maps->t.shape); i++) {
+        const double a = (double)first.maps->t.data[i], b = (double)second.maps->t.data[i],
+                     want = tanh((atanh(a) + atanh(b)) / 2);
+        worst = farther(worst, fabs((double)both.maps->t.data[i] - want));
+        differ = farther(differ, fabs(a - b));
+    }
+    CHECK(worst < 1e-5 && differ > 1e-3, "%g from the mean of tellings that are %g apart", worst, differ);
+    CHECK(apart(first.scene, both.scene->t.data) < 1e-5 && apart(second.scene, both.scene->t.data + NUMBERS) < 1e-5,
+          "the scenes are not those of the tellings");
+    ag_tape_destroy(&tape);
+    nn_model_free(&m);
+    free(in.image.data);
+}
+
+/* A camera that is known is believed; of one that is not known the guess is drawn to the middle distance, and where the
+ * view says that it is does not matter. */
+TEST(middle_view_is_for_a_camera_that_is_not_known)
+{
+    nn_model *m = talking(true);
+    nn_input in = photographs(1, FINE, 94, NULL);
+    for (int known = 0; known <= NN_KNOWN_ALL; known++) {
+        const unsigned char flags = (unsigned char)known;
+        const rd_view near = from(0.8f), far = from(5);
+        ag_tape *tape = tape_create(false);
+        nn_guess alone, guess[2];
+        in.known = &flags, in.views = &near;
+        CHECK(nn_guess_from(tape, m, &in, &alone), "%s", ag_status(tape)->message);
+        CHECK(nn_guess_in_middle_view(tape, m, &in, &guess[0]), "%s", ag_status(tape)->message);
+        in.views = &far;
+        CHECK(nn_guess_in_middle_view(tape, m, &in, &guess[1]), "%s", ag_status(tape)->message);
+        const double moved = apart(alone.maps, guess[0].maps->t.data),
+                     differ = apart(guess[0].maps, guess[1].maps->t.data);
+        if (known & NN_KNOWN_CAMERA)
+            CHECK(moved == 0 && differ > 1e-7 && nn_tellings(&m->arch, known) == 1, "known %d: moved by %g", known,
+                  moved);
+        else {
+            const float said = alone.scene->t.data[RD_SCENE_DISTANCE], is = guess[0].scene->t.data[RD_SCENE_DISTANCE],
+                        middle = logf(NN_MIDDLE_DISTANCE / RD_FLASH_DISTANCE);
+            CHECK(moved > 1e-6 && differ == 0 && nn_tellings(&m->arch, known) == 2,
+                  "known %d: moved by %g, and by %g where the view is another", known, moved, differ);
+            CHECK(fabsf(is - (said + middle) / 2) < 1e-5f, "known %d: the distance is %g, said %g", known, (double)is,
+                  (double)said);
+        }
+        ag_tape_destroy(&tape);
+    }
+    nn_model_free(&m);
+    free(in.image.data);
+}
