@@ -108,8 +108,8 @@ ag_value *nn_coordinates(ag_tape *tape, int n, int side);
 
 /* g on its own input: photo [N, side, side, 3 images] log-encoded, side = nn_arch_side; conditions [tellings or
  * tellings N, g_size, g_size, NN_CONDITIONS images], telling by telling, or NULL where the architecture has none.
- * tellings: as in nn_input, 1 or more. */
-bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, int tellings,
+ * in: of which tellings and parts are read. */
+bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, const nn_input *in,
              nn_guess *guess);
 
 /* What R_0 has at the photograph's size beyond the U-Net's coarse maps is made of squares of its pixels: [N, g_size,
@@ -138,10 +138,10 @@ bool nn_full_size(ag_tape *tape, const nn_model *model, ag_value *photo, ag_valu
                   nn_guess *guess);
 
 /* The mean of g's guesses of photo [1, ...] in 2, 4 or 8 of its orientations, each turned back: of a photograph that
- * the light and the camera above its centre show alike in all of them. conditions [tellings, ...], tellings: as above.
+ * the light and the camera above its centre show alike in all of them. conditions [tellings, ...]; in: as above.
  * On a tape without gradients. */
-bool nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *photo, ag_value *conditions, int tellings,
-                      int count, nn_guess *guess);
+bool nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *photo, ag_value *conditions,
+                      const nn_input *in, int count, nn_guess *guess);
 
 /* h: R_t [N, H, W, channels], its encoded gradients [N, H, W, images channels] (constants) and the states (updated;
  * NULL = zero) -> the change of the maps. to: NULL, or for each new state the value to write it into, which may be the

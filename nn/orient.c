@@ -1,5 +1,5 @@
 /* g of a photograph in its orientations (docs/math.md, S1). */
-#include "nn/layers.h"
+#include "nn/lgd_internal.h"
 #include "tensor/maps.h"
 #include "tensor/team.h"
 #include <string.h>
@@ -130,8 +130,8 @@ static void turn_rows(const void *job, int64_t begin, int64_t end)
     }
 }
 
-bool nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *photo, ag_value *conditions, int tellings,
-                      int count, nn_guess *guess)
+bool nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *photo, ag_value *conditions,
+                      const nn_input *in, int count, nn_guess *guess)
 {
     if (!photo) return false;
     const int side = photo->t.shape.h, read = photo->t.shape.c;
@@ -140,10 +140,10 @@ bool nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *phot
     if (!all) return false;
     ts_for(ag_compute(tape)->threads, (int64_t)count * side, ROWS, turn_rows,
            &(turn_job){.from = photo->t.data, .side = side, .channels = read, .to = all->t.data});
-    if (!nn_unet(tape, model, all, conditions, tellings, guess)) return false;
+    if (!nn_unet(tape, model, all, conditions, in, guess)) return false;
     ag_value *keep[3] = {mean_back(tape, guess->maps, MAP_NORMAL),
                          guess->spread ? mean_back(tape, guess->spread, -1) : NULL,
-                         guess->scene ? mean_scene(tape, guess->scene, tellings) : NULL};
+                         guess->scene ? mean_scene(tape, guess->scene, nn_tellings_of(in)) : NULL};
     ag_scope_end(tape, mark, keep, 3);
     *guess = (nn_guess){keep[0], keep[1], keep[2]};
     return !ag_status(tape)->code;

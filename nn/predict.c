@@ -70,6 +70,7 @@ static bool resample_for_g(ag_tape *tape, const nn_model *model, const nn_input 
                         .known = in->known,
                         .given = in->given,
                         .tellings = in->tellings,
+                        .parts = in->parts,
                         .orientations = in->orientations};
     return whole->shape.h == size || nn_resized(tape, whole, size, &small->image);
 }
@@ -99,8 +100,8 @@ static bool run_g(ag_tape *tape, const nn_model *model, const nn_input *small, n
     ag_value *conditions = model->arch.conditions ? nn_conditions(tape, model, small) : NULL;
     if (model->arch.conditions && !conditions) return false;
     if (small->orientations > 1 && !ag_gradients(tape) && nn_orients(model, small))
-        nn_unet_oriented(tape, model, x, conditions, nn_tellings_of(small), small->orientations, guess);
-    else nn_unet(tape, model, x, conditions, nn_tellings_of(small), guess);
+        nn_unet_oriented(tape, model, x, conditions, small, small->orientations, guess);
+    else nn_unet(tape, model, x, conditions, small, guess);
     ag_value *keep[3] = {guess->maps, guess->spread, guess->scene};
     ag_scope_end(tape, mark, keep, 3);
     *guess = (nn_guess){keep[0], keep[1], keep[2]};

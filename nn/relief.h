@@ -13,7 +13,7 @@
 /* By which the slopes n_x / n_z and n_y / n_z of one photograph are multiplied beside that where the light's power is
  * not known: what NN_RELIEF_CELLS cells a side can show, and the rest. Several photographs show for themselves how
  * steep they are. */
-#define NN_RELIEF_BROAD 1.76f
+#define NN_RELIEF_BROAD 1.92f
 #define NN_RELIEF_FINE 1.15f
 #define NN_RELIEF_CELLS 24
 

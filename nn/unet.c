@@ -1,5 +1,5 @@
 /* g: a U-Net with a global track (Deschaintre et al. 2018, as changed by Luo et al. 2024). */
-#include "nn/layers.h"
+#include "nn/lgd_internal.h"
 #include "ops.h"
 #include "tensor/team.h"
 #include <string.h>
@@ -37,7 +37,7 @@ static ag_value *repeated(ag_tape *tape, ag_value *x, int n, bool over_and_over)
 typedef struct mean_job {
     const float *from;
     int64_t apart; /* from telling to telling */
-    int tellings;
+    const nn_input *in;
     float *to;
 } mean_job;
 
@@ -46,22 +46,22 @@ static void mean_range(const void *job, int64_t begin, int64_t end)
     const mean_job *j = job;
     for (int64_t i = begin; i < end; i++) {
         float sum = 0;
-        for (int t = 0; t < j->tellings; t++) sum += j->from[t * j->apart + i];
-        j->to[i] = sum / (float)j->tellings;
+        for (int t = 0; t < j->in->tellings; t++) sum += j->in->parts[t] * j->from[t * j->apart + i];
+        j->to[i] = sum;
     }
 }
 
 /* [N, ...] of x [tellings N, ...]. */
-static ag_value *mean_of(ag_tape *tape, ag_value *x, int tellings)
+static ag_value *mean_of(ag_tape *tape, ag_value *x, const nn_input *in)
 {
     enum { WORTH = 1 << 15 }; /* values that another thread is worth */
-    if (!x || tellings == 1) return x;
+    if (!x || in->tellings < 2) return x;
     ts_shape s = x->t.shape;
-    s.n /= tellings;
+    s.n /= in->tellings;
     ag_value *mean = ag_empty(tape, s);
     if (mean)
         ts_for(ag_compute(tape)->threads, ts_count(s), WORTH, mean_range,
-               &(mean_job){x->t.data, ts_count(s), tellings, mean->t.data});
+               &(mean_job){x->t.data, ts_count(s), in, mean->t.data});
     return mean;
 }
 
@@ -92,7 +92,7 @@ static ts_compute careful(const ag_tape *tape, const nn_model *model)
     return c;
 }
 
-static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, int tellings,
+static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, const nn_input *in,
                 nn_guess *guess)
 {
     const nn_layers *l = model->layers;
@@ -103,7 +103,7 @@ static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value 
     ag_compute_set(tape, careful(tape, model));
     ag_value *squares = nn_squares_room(tape, model, photo->t.shape.n);
     const ts_mark begun = ag_scope_begin(tape);
-    ag_value *seen = seen_by(tape, model, photo, conditions, tellings);
+    ag_value *seen = seen_by(tape, model, photo, conditions, nn_tellings_of(in));
     ag_value *skip[NN_MAX_LEVELS],
         *global = ag_selu(tape, nn_linear(tape, model, l->input_global, ag_channel_mean(tape, seen)));
     ag_value *x = nn_conv(tape, model, l->input_conv, seen, 1, TS_PAD_ZERO, NN_LEAK_G);
@@ -131,10 +131,9 @@ static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value 
     x = nn_conv(tape, model, l->output_conv1, x, 1, TS_PAD_ZERO, 1);
     x = nn_conv(tape, model, l->output_conv2, x, 1, TS_PAD_ZERO, 1);
     x = ag_add_leaky(tape, x, nn_linear(tape, model, l->output_add, global), 1);
-    x = mean_of(tape, x, tellings);
+    x = mean_of(tape, x, in);
     const bool detailed = model->arch.g_unshuffle > 1;
-    if (detailed)
-        squares = nn_squares(tape, model, mean_of(tape, seen, tellings), mean_of(tape, features, tellings), squares);
+    if (detailed) squares = nn_squares(tape, model, mean_of(tape, seen, in), mean_of(tape, features, in), squares);
     else x = ag_tanh(tape, x);
     ag_value *keep[3] = {x, squares, guess->scene};
     ag_scope_end(tape, begun, keep, 3);
@@ -142,10 +141,11 @@ static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value 
     return detailed ? nn_full_size(tape, model, photo, keep[1], keep[0], guess) : guess->maps != NULL;
 }
 
-bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, int tellings, nn_guess *guess)
+bool nn_unet(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value *conditions, const nn_input *in,
+             nn_guess *guess)
 {
     ag_pass(tape, model->g_once);
-    const bool done = run(tape, model, photo, conditions, tellings, guess);
+    const bool done = run(tape, model, photo, conditions, in, guess);
     ag_pass(tape, false);
     return done;
 }

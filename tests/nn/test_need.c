@@ -10,7 +10,8 @@ static void fits_told(const char *what, const nn_arch *a, int given, int orienta
     in.given = given;
     in.orientations = orientations;
     const rd_view views[2] = {rd_flash(), rd_flash()};
-    if (tellings > 1) in.views = views, in.tellings = tellings;
+    const float parts[2] = {0.5f, 0.5f};
+    if (tellings > 1) in.views = views, in.tellings = tellings, in.parts = parts;
     ag_tape *tape = tape_create(false);
     nn_guess g;
     CHECK(nn_guess_from(tape, m, &in, &g), "%s: %s", what, ag_status(tape)->message);
