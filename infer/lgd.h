@@ -33,8 +33,8 @@ typedef struct lgd_error {
 
 /* Reads a weights file (safetensors or PyTorch). NULL and error on failure. The file stays mapped: it may be replaced
  * or removed meanwhile, but not be written over in place. The caller frees the model, when no call uses it. Any number
- * of threads may call lgd_estimate with one model at once. Each such call has memory of its own (30 MB at 256 x 256
- * pixels), which the model keeps for later calls up to 512 pixels a side. */
+ * of threads may call lgd_estimate with one model at once. Each such call has memory of its own (up to 47 MB at 256 x
+ * 256 pixels), which the model keeps for later calls up to 512 pixels a side. */
 LGD_API lgd_model *lgd_load(const char *weights, lgd_error *error);
 LGD_API void lgd_free(lgd_model **model);
 

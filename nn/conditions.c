@@ -20,7 +20,7 @@ static void towards(const float place[3], rd_grid grid, int channels, float *to)
 ag_value *nn_conditions(ag_tape *tape, const nn_model *model, const nn_input *in)
 {
     const int images = model->arch.images, size = model->arch.g_size, count = nn_given(in),
-              n = nn_tellings_of(in) * nn_materials(in);
+              n = nn_times_told(in) * nn_materials(in);
     const int channels = NN_CONDITIONS * images;
     const int64_t pixels = (int64_t)size * size;
     ag_value *v = ag_empty(tape, (ts_shape){n, size, size, channels});

@@ -6,7 +6,7 @@
 
 int nn_given(const nn_input *in);
 int nn_materials(const nn_input *in);
-int nn_tellings_of(const nn_input *in);
+int nn_times_told(const nn_input *in);
 
 /* Under which a photograph was taken, as the model's renderer has it. */
 rd_view nn_view_of(const nn_model *model, const nn_input *in, int photograph);

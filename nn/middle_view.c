@@ -3,14 +3,14 @@
 
 enum { TELLINGS = 2 };
 
-int nn_tellings(const nn_arch *a, int known)
+int nn_middle_tellings(const nn_arch *a, int known)
 {
-    return a->conditions && a->scene && !(known & NN_KNOWN_CAMERA) ? TELLINGS : 1;
+    return a->conditions && a->descent == NN_DESCENT_POSTERIOR && !(known & NN_KNOWN_CAMERA) ? TELLINGS : 1;
 }
 
 bool nn_guess_in_middle_view(ag_tape *tape, const nn_model *model, const nn_input *in, nn_guess *guess)
 {
-    if (nn_tellings(&model->arch, in->known[0]) == 1) return nn_guess_from(tape, model, in, guess);
+    if (nn_middle_tellings(&model->arch, in->known[0]) == 1) return nn_guess_from(tape, model, in, guess);
     rd_view views[TELLINGS] = {in->views[0], in->views[0]};
     const unsigned char known[TELLINGS] = {in->known[0], in->known[0] | NN_KNOWN_CAMERA};
     views[1].camera[0] = views[1].camera[1] = 0;

@@ -11,8 +11,9 @@
  * real materials, whose cameras g takes for nearer than they are, and worse on renderings from .98 widths. */
 #define NN_MIDDLE_PART 0.4f
 
-/* What g is told of a photograph of which known (nn_known) is true: 2 where it guesses the camera, else 1. */
-int nn_tellings(const nn_arch *a, int known);
+/* How often the first guess tells g of a photograph of which known (nn_known) is true: 2 where the camera is guessed,
+ * else 1. */
+int nn_middle_tellings(const nn_arch *a, int known);
 
 /* g's guess of a photograph [1, S, S, 3] (docs/math.md, S33). Where its camera is not known g is told both that and
  * that the camera is NN_MIDDLE_DISTANCE above the centre; the scene is then the mean of both guesses, its distance of

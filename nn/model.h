@@ -166,7 +166,8 @@ typedef struct nn_input {
     int given;                  /* 1 .. nn_most_photographs; 0 stands for 1 */
     int tellings;               /* of 2 or more g is told the photographs' scenes so many times: views and known are
                                    [tellings][N * given], and R_0 is made of the mean of what the U-Net says then. On a
-                                   tape without gradients; the steps have the first. 0 stands for 1 */
+                                   tape without gradients, else the tape gets an error; the steps have the first. 0
+                                   stands for 1 */
     const float *parts;         /* [tellings], in that mean; their sum is 1. Of one telling not read */
     int orientations; /* 2, 4, 8: R_0 is the mean of g's maps over so many orientations of the photograph (as it is and
                        * a quarter turn, all quarter turns, and their mirror images), if nn_orients; on a tape without

@@ -143,7 +143,7 @@ bool nn_unet_oriented(ag_tape *tape, const nn_model *model, const ag_value *phot
     if (!nn_unet(tape, model, all, conditions, in, guess)) return false;
     ag_value *keep[3] = {mean_back(tape, guess->maps, MAP_NORMAL),
                          guess->spread ? mean_back(tape, guess->spread, -1) : NULL,
-                         guess->scene ? mean_scene(tape, guess->scene, nn_tellings_of(in)) : NULL};
+                         guess->scene ? mean_scene(tape, guess->scene, nn_times_told(in)) : NULL};
     ag_scope_end(tape, mark, keep, 3);
     *guess = (nn_guess){keep[0], keep[1], keep[2]};
     return !ag_status(tape)->code;

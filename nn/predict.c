@@ -19,6 +19,8 @@ bool nn_input_check(ag_tape *tape, const nn_model *model, const nn_input *in)
                 nn_most_photographs(&model->arch));
     else if (s.n % nn_given(in) != 0)
         ag_fail(tape, TS_INVALID, "%d photographs are not a multiple of %d", s.n, nn_given(in));
+    else if (in->tellings > 1 && (ag_gradients(tape) || !in->parts))
+        ag_fail(tape, TS_INVALID, "g is told %d scenes: that is for estimates, and needs their parts", in->tellings);
     else if (!ts_contiguous(&in->image)) ag_fail(tape, TS_INVALID, "the photograph is not contiguous");
     else if (s.h != in->grid.h || s.w != in->grid.w)
         ag_fail(tape, TS_INVALID, "the photograph is %d x %d pixels, its grid %d x %d", s.w, s.h, in->grid.w,

@@ -103,7 +103,7 @@ static bool run(ag_tape *tape, const nn_model *model, ag_value *photo, ag_value 
     ag_compute_set(tape, careful(tape, model));
     ag_value *squares = nn_squares_room(tape, model, photo->t.shape.n);
     const ts_mark begun = ag_scope_begin(tape);
-    ag_value *seen = seen_by(tape, model, photo, conditions, nn_tellings_of(in));
+    ag_value *seen = seen_by(tape, model, photo, conditions, nn_times_told(in));
     ag_value *skip[NN_MAX_LEVELS],
         *global = ag_selu(tape, nn_linear(tape, model, l->input_global, ag_channel_mean(tape, seen)));
     ag_value *x = nn_conv(tape, model, l->input_conv, seen, 1, TS_PAD_ZERO, NN_LEAK_G);

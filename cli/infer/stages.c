@@ -199,9 +199,17 @@ ts_code cl_command_suits(const cl_command *c, const lgd_model *model, ts_status 
 
 double cl_item_bytes(const cl_command *c, const lgd_model *model)
 {
-    const lgd_options options = {
-        .size = sizeof options, .orientations = c->orientations, .tolerance = fmax(c->tolerance, 0)};
-    return lgd_model_bytes(model, c->size, &options);
+    double any;
+    double most = 0;
+    for (int known = 0; known < 2; known++) {
+        const lgd_options options = {.size = sizeof options,
+                                     .orientations = c->orientations,
+                                     .tolerance = fmax(c->tolerance, 0),
+                                     .fov = known ? LGD_FOV_OF_PHOTO : LGD_FOV_UNKNOWN,
+                                     .power = known ? NULL : &any};
+        most = fmax(most, lgd_model_bytes(model, c->size, &options));
+    }
+    return most;
 }
 
 void cl_item_write(const cl_command *c, const char *recipe, cl_item *item)

@@ -10,7 +10,7 @@ static nn_model *talking(bool detailed)
 {
     nn_arch a = tiny();
     a.conditions = a.scene = true;
-    if (detailed) a.g_unshuffle = 4, a.g_detail = 6, a.spread = true;
+    if (detailed) a.g_unshuffle = 4, a.g_detail = 6, a.spread = true, a.h_width = 0, a.descent = NN_DESCENT_POSTERIOR;
     nn_model *m = create(&a, 91);
     const nn_param *p = nn_model_find(m, "g.scene.numbers.weight");
     ts_rng r = ts_rng_make(11, TS_STREAM_TEST, 0);
@@ -93,7 +93,39 @@ TEST(middle_view_is_the_mean_of_the_tellings)
     CHECK(worst < 1e-5 && differ > 1e-3, "%g from the mean of tellings that are %g apart", worst, differ);
     CHECK(apart(first.scene, both.scene->t.data) < 1e-5 && apart(second.scene, both.scene->t.data + NUMBERS) < 1e-5,
           "the scenes are not those of the tellings");
+    /* In several orientations each telling's scene is the mean of its own. */
+    for (int orientations = 2; orientations <= 4; orientations *= 2) {
+        in.orientations = orientations;
+        in.tellings = 1;
+        CHECK(nn_guess_from(tape, m, &in, &first), "%s", ag_status(tape)->message);
+        in.views = views + 1, in.known = known + 1;
+        CHECK(nn_guess_from(tape, m, &in, &second), "%s", ag_status(tape)->message);
+        in.views = views, in.known = known, in.tellings = 2;
+        CHECK(nn_guess_from(tape, m, &in, &both), "%s", ag_status(tape)->message);
+        CHECK(apart(first.scene, second.scene->t.data) > 1e-4, "both tellings have one scene");
+        CHECK(apart(first.scene, both.scene->t.data) < 1e-5 && apart(second.scene, both.scene->t.data + NUMBERS) < 1e-5,
+              "%d orientations: the scenes are not those of the tellings", orientations);
+    }
     ag_tape_destroy(&tape);
+    nn_model_free(&m);
+    free(in.image.data);
+}
+
+TEST(middle_view_tellings_are_for_estimates)
+{
+    nn_model *m = talking(true);
+    nn_input in = photographs(1, FINE, 95, NULL);
+    const rd_view views[2] = {from(1), from(2)};
+    const float parts[2] = {0.5f, 0.5f};
+    in.views = views, in.tellings = 2;
+    for (int gradients = 0; gradients < 2; gradients++) {
+        ag_tape *tape = tape_create(gradients);
+        nn_guess guess;
+        in.parts = gradients ? parts : NULL;
+        CHECK(!nn_guess_from(tape, m, &in, &guess) && ag_status(tape)->code == TS_INVALID, "gradients %d: no error",
+              gradients);
+        ag_tape_destroy(&tape);
+    }
     nn_model_free(&m);
     free(in.image.data);
 }
@@ -117,14 +149,25 @@ TEST(middle_view_is_for_a_camera_that_is_not_known)
         const double moved = apart(alone.maps, guess[0].maps->t.data),
                      differ = apart(guess[0].maps, guess[1].maps->t.data);
         if (known & NN_KNOWN_CAMERA)
-            CHECK(moved == 0 && differ > 1e-7 && nn_tellings(&m->arch, known) == 1, "known %d: moved by %g", known,
-                  moved);
+            CHECK(moved == 0 && differ > 1e-7 && nn_middle_tellings(&m->arch, known) == 1, "known %d: moved by %g",
+                  known, moved);
         else {
             const float said = alone.scene->t.data[RD_SCENE_DISTANCE], is = guess[0].scene->t.data[RD_SCENE_DISTANCE],
                         middle = logf(NN_MIDDLE_DISTANCE / RD_FLASH_DISTANCE),
                         want = said + NN_MIDDLE_PART * (middle - said);
-            CHECK(moved > 1e-6 && differ == 0 && nn_tellings(&m->arch, known) == 2,
+            CHECK(moved > 1e-6 && differ == 0 && nn_middle_tellings(&m->arch, known) == 2,
                   "known %d: moved by %g, and by %g where the view is another", known, moved, differ);
+            const rd_view middle_view = from(NN_MIDDLE_DISTANCE);
+            const unsigned char told = flags | NN_KNOWN_CAMERA;
+            nn_guess second;
+            in.known = &told, in.views = &middle_view;
+            CHECK(nn_guess_from(tape, m, &in, &second), "%s", ag_status(tape)->message);
+            for (int i = 0; i < NUMBERS; i++) {
+                const float a = alone.scene->t.data[i], b = second.scene->t.data[i],
+                            mean = a + NN_MIDDLE_PART * (b - a);
+                CHECK(i == RD_SCENE_DISTANCE || fabsf(guess[0].scene->t.data[i] - mean) < 1e-5f,
+                      "known %d: number %d of the scene is no mean", known, i);
+            }
             CHECK(fabsf(is - want) < 1e-5f, "known %d: the distance is %g, said %g", known, (double)is, (double)said);
         }
         ag_tape_destroy(&tape);

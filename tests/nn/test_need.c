@@ -40,6 +40,8 @@ TEST(need_of_g_is_counted)
             fits("two orientations", &a, 2);
             a.conditions = true;
             fits("conditions", &a, 1);
+            fits_told("told twice", &a, 1, 1, 2);
+            fits_told("two orientations, told twice", &a, 1, 2, 2);
             a.images = 5;
             fits("five photographs", &a, 1);
             fits_given("one of five photographs", &a, 1, 2);
