@@ -199,14 +199,13 @@ ts_code cl_command_suits(const cl_command *c, const lgd_model *model, ts_status 
 
 double cl_item_bytes(const cl_command *c, const lgd_model *model)
 {
-    double any;
-    double most = 0;
-    for (int known = 0; known < 2; known++) {
+    double found, most = 0;
+    for (int view_known = 0; view_known < 2; view_known++) { /* the photographs' EXIF says it, or does not */
         const lgd_options options = {.size = sizeof options,
                                      .orientations = c->orientations,
                                      .tolerance = fmax(c->tolerance, 0),
-                                     .fov = known ? LGD_FOV_OF_PHOTO : LGD_FOV_UNKNOWN,
-                                     .power = known ? NULL : &any};
+                                     .fov = view_known ? LGD_FOV_OF_PHOTO : LGD_FOV_UNKNOWN,
+                                     .power = c->power > 0 ? NULL : &found};
         most = fmax(most, lgd_model_bytes(model, c->size, &options));
     }
     return most;
