@@ -2,6 +2,7 @@
 #include "data/image/common_read.h"
 #include "data/image/header.h"
 #include "tensor/memory.h"
+#include <ctype.h>
 #include <png.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -32,13 +33,19 @@ static void on_warning(png_structp png, png_const_charp message)
     ((reading *)png_get_error_ptr(png))->odd = true;
 }
 
-/* XMP that says how the picture is to be seen, or the only one that says how it was taken. */
-static bool xmp_is_needed(const char *text, bool exif)
+static const char exif_key[] = "Raw profile type exif", exif_prefix[6] = "Exif\0";
+
+/* XMP that says how the picture is to be seen, or the only one that says how it was taken. GIMP writes orientation 1
+ * into every file. */
+static bool xmp_is_needed(const char *text, bool exif, int orientation)
 {
-    return strstr(text, "rientation") || strstr(text, "nteroperability") || (!exif && strstr(text, "FocalLength"));
+    static const char upright[] = "tiff:Orientation=\"1\"";
+    for (const char *at = text; (at = strstr(at, "rientation")); at++)
+        if (orientation != 1 || at - text < 6 || strncmp(at - 6, upright, sizeof upright - 1) != 0) return true;
+    return strstr(text, "nteroperability") || (!exif && strstr(text, "FocalLength"));
 }
 
-/* Texts may carry EXIF, with an orientation in it: only those that are known to be words are passed over. */
+/* Only texts that are known to be words, or EXIF that has been read, are passed over. */
 static bool plain_texts(reading *r, bool exif)
 {
     static const char *const plain[] = {"Software",    "Comment",     "Title",         "Author",
@@ -47,28 +54,70 @@ static bool plain_texts(reading *r, bool exif)
     png_textp text;
     const int count = png_get_text(r->png, r->info, &text, NULL);
     for (int i = 0; i < count; i++) {
-        bool known = strcmp(text[i].key, "XML:com.adobe.xmp") == 0 && !xmp_is_needed(text[i].text, exif);
+        bool known = strcmp(text[i].key, exif_key) == 0 ||
+            (strcmp(text[i].key, "XML:com.adobe.xmp") == 0 &&
+             !xmp_is_needed(text[i].text, exif, r->image->orientation));
         for (size_t k = 0; k < sizeof plain / sizeof *plain; k++) known |= strcmp(text[i].key, plain[k]) == 0;
         if (!known) return false;
     }
     return true;
 }
 
+/* The bytes of a profile as ImageMagick, exiv2 and GIMP write it: a name, how many, hexadecimal digits. Malloc'd; NULL
+ * where it is none. */
+static unsigned char *profile_of_text(const char *text, size_t *size)
+{
+    static const char digits[] = "0123456789abcdef";
+    size_t given = 0, nibbles = 0;
+    int used = 0;
+    if (sscanf(text, " exif %zu%n", &given, &used) != 1 || given > strlen(text) / 2) return NULL;
+    unsigned char *bytes = calloc(given + 1, 1);
+    bool good = bytes;
+    for (const char *at = text + used; good && *at; at++) {
+        const char *digit = strchr(digits, tolower((unsigned char)*at));
+        if (isspace((unsigned char)*at)) continue;
+        good = digit && nibbles < 2 * given;
+        if (good) bytes[nibbles / 2] = (unsigned char)(bytes[nibbles / 2] << 4 | (digit - digits)), nibbles++;
+    }
+    if (good && nibbles == 2 * given) return *size = given, bytes;
+    free(bytes);
+    return NULL;
+}
+
+/* The picture's EXIF, from exif_prefix on, malloc'd; NULL where there is none or it cannot be read. How many it has. */
+static int find_exif(reading *r, unsigned char **segment, size_t *size)
+{
+    png_bytep chunk;
+    png_uint_32 length;
+    png_textp text;
+    int found = 0;
+    *segment = NULL;
+    if (png_get_eXIf_1(r->png, r->info, &length, &chunk)) {
+        *size = sizeof exif_prefix + length;
+        *segment = malloc(*size);
+        if (*segment) {
+            memcpy(*segment, exif_prefix, sizeof exif_prefix);
+            memcpy(*segment + sizeof exif_prefix, chunk, length); /* the chunk begins with the TIFF header */
+        }
+        found++;
+    }
+    const int count = png_get_text(r->png, r->info, &text, NULL);
+    for (int i = 0; i < count; i++)
+        if (strcmp(text[i].key, exif_key) == 0 && found++ == 0) *segment = profile_of_text(text[i].text, size);
+    return found;
+}
+
 /* What may say how the pixels are to be seen: before them, or all of it, for more may stand behind them. */
 static bool beside(reading *r, bool all)
 {
-    static const char prefix[6] = "Exif\0"; /* io_exif's; the chunk begins with the TIFF header */
-    png_bytep chunk;
-    png_uint_32 size;
-    if (!png_get_eXIf_1(r->png, r->info, &size, &chunk)) return plain_texts(r, !all);
-    unsigned char *segment = malloc(sizeof prefix + size);
-    if (!segment) return false;
-    memcpy(segment, prefix, sizeof prefix);
-    memcpy(segment + sizeof prefix, chunk, size);
+    unsigned char *segment;
+    size_t size = 0;
     oi_image *image = r->image;
-    const bool ordinary = io_exif(segment, sizeof prefix + size, &image->orientation, &image->adobe, &image->lens);
+    const int found = find_exif(r, &segment, &size);
+    const bool ordinary = !found ||
+        (found == 1 && segment && io_exif(segment, size, &image->orientation, &image->adobe, &image->lens));
     free(segment);
-    return ordinary && plain_texts(r, true);
+    return ordinary && plain_texts(r, found || !all);
 }
 
 static bool supported(reading *r)
