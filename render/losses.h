@@ -25,6 +25,10 @@ ag_value *ag_shading_frame(ag_tape *tape, ag_value *x, int channels, int top);
  * for the gradient of a perfect image. */
 ag_value *ag_rmse_loss(ag_tape *tape, ag_value *maps, ag_value *target, int first, int count);
 
+/* The mean over images of that root's square: of all that may be its best answer is the mean where it is uncertain
+ * whether an image has any relief too, and steep images weigh more. */
+ag_value *ag_mse_loss(ag_tape *tape, ag_value *maps, ag_value *target, int first, int count);
+
 /* mean w |maps - target| over all values, w the weight of their channel: the L1 of S15 in docs/math.md. weight: of the
  * nine channels, copied; NULL: 1. */
 ag_value *ag_map_loss(ag_tape *tape, ag_value *maps, ag_value *target, const float *weight);

@@ -1,4 +1,4 @@
-/* The mean over images of the RMSE of some channels (render/losses.h). */
+/* The mean over images of the RMSE of some channels, or of its square (render/losses.h). */
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "render/losses.h"
@@ -9,11 +9,12 @@ extern const ag_op op_rmse_loss;
 
 typedef struct range {
     int first, count;
+    bool squared;
 } range;
 
 #define LEAST 1e-6 /* squared error that is as good as none: it keeps the gradient of a perfect image finite */
 
-ag_value *ag_rmse_loss(ag_tape *tape, ag_value *maps, ag_value *target, int first, int count)
+static ag_value *apply(ag_tape *tape, ag_value *maps, ag_value *target, int first, int count, bool squared)
 {
     ag_value *in[2] = {maps, target};
     if (!ag_ready(tape, "rmse_loss", 2, in)) return NULL;
@@ -25,7 +26,17 @@ ag_value *ag_rmse_loss(ag_tape *tape, ag_value *maps, ag_value *target, int firs
     if (first < 0 || count < 1 || first + count > maps->t.shape.c)
         return ag_fail(tape, TS_INVALID, "rmse_loss: maps %s have no %d channels from channel %d",
                        ag_shape_text(text[0], maps->t.shape), count, first);
-    return ag_apply(tape, &op_rmse_loss, 2, in, (ts_shape){1, 1, 1, 1}, &(range){first, count}, sizeof(range));
+    return ag_apply(tape, &op_rmse_loss, 2, in, (ts_shape){1, 1, 1, 1}, &(range){first, count, squared}, sizeof(range));
+}
+
+ag_value *ag_rmse_loss(ag_tape *tape, ag_value *maps, ag_value *target, int first, int count)
+{
+    return apply(tape, maps, target, first, count, false);
+}
+
+ag_value *ag_mse_loss(ag_tape *tape, ag_value *maps, ag_value *target, int first, int count)
+{
+    return apply(tape, maps, target, first, count, true);
 }
 
 typedef struct loss_job {
@@ -80,9 +91,10 @@ static float *rmse_of(ag_tape *tape, const ag_node *node)
 static void forward(ag_tape *tape, ag_node *node)
 {
     const int n = node->in[0]->t.shape.n;
+    const range *r = node->attr;
     const float *rmse = node->saved = rmse_of(tape, node);
     double sum = 0;
-    for (int i = 0; i < n && rmse; i++) sum += (double)rmse[i];
+    for (int i = 0; i < n && rmse; i++) sum += (double)rmse[i] * (r->squared ? (double)rmse[i] : 1);
     node->out->t.data[0] = (float)(sum / n);
 }
 
@@ -93,7 +105,7 @@ static void backward_rows(const void *job, int64_t begin, int64_t end)
     const range *r = j->node->attr;
     const float *a = j->node->in[0]->t.data, *b = j->node->in[1]->t.data;
     for (int64_t y = begin; y < end; y++) {
-        const float w = (float)(j->up / (double)j->rmse[y / s.h]);
+        const float w = (float)(r->squared ? 2 * j->up : j->up / (double)j->rmse[y / s.h]);
         const int64_t row = y * s.w * s.c;
         if (!j->add) memset(j->to + row, 0, sizeof *j->to * (size_t)(s.w * s.c));
         for (int64_t p = row + r->first; p < row + (int64_t)s.w * s.c; p += s.c)
@@ -122,22 +134,23 @@ static void reference(const ag_node *node, const double *const *in, double *out)
         for (int64_t p = i * pixels; p < (i + 1) * pixels; p++)
             for (int c = r->first; c < r->first + r->count; c++)
                 sum += (in[0][p * s.c + c] - in[1][p * s.c + c]) * (in[0][p * s.c + c] - in[1][p * s.c + c]);
-        out[0] += sqrt(sum / (double)(pixels * r->count) + LEAST) / s.n;
+        const double mean = sum / (double)(pixels * r->count) + LEAST;
+        out[0] += (r->squared ? mean : sqrt(mean)) / s.n;
     }
 }
 
 static ag_value *build(ag_tape *tape, ag_value *const *in, const void *user)
 {
     const range *r = user;
-    return ag_rmse_loss(tape, in[0], in[1], r->first, r->count);
+    return (r->squared ? ag_mse_loss : ag_rmse_loss)(tape, in[0], in[1], r->first, r->count);
 }
 
 static void cases(ag_gradcheck *g)
 {
-    static const ts_shape shapes[] = {{1, 1, 1, 1}, {2, 3, 5, 9}, {3, 17, 9, 9}};
-    static const range ranges[] = {{0, 1}, {3, 2}, {6, 3}};
+    static const ts_shape shapes[] = {{1, 1, 1, 1}, {2, 3, 5, 9}, {3, 17, 9, 9}, {1, 1, 1, 1}, {3, 17, 9, 9}};
+    static const range ranges[] = {{0, 1, false}, {3, 2, false}, {6, 3, false}, {0, 1, true}, {3, 2, true}};
     for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
-        ag_case c = {.label = i ? "images" : "one value",
+        ag_case c = {.label = shapes[i].c > 1 ? "images" : "one value",
                      .inputs = 2,
                      .shape = {shapes[i], shapes[i]},
                      .fixed = {false, true},

@@ -32,8 +32,8 @@ typedef struct tr_config {
         int batch, window; /* window 0: whole patches */
         int64_t pretrain_steps, steps, warmup;
         double pretrain_rate, pretrain_floor, rate, g_rate, coarse_rate, rate_floor;
-        double clip, spike, ema, start_weight, map_weight, normal_weight, normal_rmse, specular_weight, spread_weight,
-            disturb, scene_weight;
+        double clip, spike, ema, start_weight, map_weight, normal_weight, normal_rmse, normal_mse, specular_weight,
+            spread_weight, disturb, scene_weight;
         int iterations_min, iterations_max; /* 0: arch.iterations */
         int given_min;                      /* 0: tr_most_given */
         int given_max;                      /* 0: arch.images */

@@ -231,6 +231,8 @@ const tr_key tr_keys[] = {
      "in place of mirrored grazing ones"},
     {"train", "normal_rmse", TR_REAL, AT(train.normal_rmse), 0, 1e3, "0", NULL, false,
      "weight of the normals' RMSE of each material, which relief that is uncertain does not pull to flat"},
+    {"train", "normal_mse", TR_REAL, AT(train.normal_mse), 0, 1e3, "0", NULL, false,
+     "weight of the normals' mean squared error, which does not pull materials to flat that may have none"},
     {"train", "specular_weight", TR_REAL, AT(train.specular_weight), 0, 1e3, "1", NULL, false,
      "weight of F0 in the maps' L1"},
     {"train", "spread_weight", TR_REAL, AT(train.spread_weight), 0, 1e3, "0.05", NULL, false,

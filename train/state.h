@@ -119,6 +119,10 @@ ts_code tr_step(tr_trainer *t, tr_row *row, ts_status *st);
 ag_value *tr_add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value *target, double weight, double *render,
                       double *map);
 
+/* Adds the errors of the maps' normals by train.normal_rmse and train.normal_mse to loss. NULL after an error, which
+ * the tape has. */
+ag_value *tr_add_normal_errors(tr_trainer *t, ag_value *loss, ag_value *maps, ag_value *target);
+
 /* The loss of all that g says of in's photographs: R_0, how far that may be off (which moves R_0 nowhere), and the
  * scene. target [batch, patch, patch, 9]; its parts go to *row. NULL after an error, which the tape has. */
 ag_value *tr_guess_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr_row *row);
@@ -146,8 +150,8 @@ const tr_config *tr_taken_with(const tr_config *c, int64_t step, tr_config *meas
 /* c without what cannot be measured, all told. */
 tr_config tr_measured_camera(const tr_config *c);
 /* How far the model is from what the teacher says, or with train.lesson = normals of the normals from target [batch,
- * patch, patch, 9], by train.normal_rmse too: of maps in the teacher's own deviations, of their logarithms and the
- * scene as they are. NULL after an error. */
+ * patch, patch, 9], by train.normal_rmse and normal_mse too: of maps in the teacher's own deviations, of their
+ * logarithms and the scene as they are. NULL after an error. */
 ag_value *tr_taught_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr_row *row);
 
 /* validate.c */

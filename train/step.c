@@ -8,6 +8,16 @@
 #include <math.h>
 #include <string.h>
 
+ag_value *tr_add_normal_errors(tr_trainer *t, ag_value *loss, ag_value *maps, ag_value *target)
+{
+    const float rmse = (float)t->config.train.normal_rmse, mse = (float)t->config.train.normal_mse;
+    if (rmse > 0)
+        loss = ag_add(t->tape, loss, ag_scale(t->tape, ag_rmse_loss(t->tape, maps, target, MAP_NORMAL, 2), rmse));
+    if (mse > 0)
+        loss = ag_add(t->tape, loss, ag_scale(t->tape, ag_mse_loss(t->tape, maps, target, MAP_NORMAL, 2), mse));
+    return loss;
+}
+
 ag_value *tr_add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value *target, double weight, double *render,
                       double *map)
 {
@@ -24,10 +34,7 @@ ag_value *tr_add_loss(tr_trainer *t, ag_value *sum, ag_value *maps, ag_value *ta
         if (l1) *map = (double)l1->t.data[0];
         loss = ag_add(tape, loss, map_weight == 1 ? l1 : ag_scale(tape, l1, (float)map_weight));
     }
-    if (t->config.train.normal_rmse > 0)
-        loss = ag_add(
-            tape, loss,
-            ag_scale(tape, ag_rmse_loss(tape, maps, target, MAP_NORMAL, 2), (float)t->config.train.normal_rmse));
+    loss = tr_add_normal_errors(t, loss, maps, target);
     if (weight != 1) loss = ag_scale(tape, loss, (float)weight);
     return sum ? ag_add(tape, sum, loss) : loss;
 }

@@ -145,10 +145,7 @@ ag_value *tr_taught_loss(tr_trainer *t, const nn_input *in, ag_value *target, tr
     ag_value *loss = ag_add(tape, maps,
                             ag_add(tape, ag_scale(tape, spread, (float)c->train.spread_weight),
                                    ag_scale(tape, scene, (float)c->train.scene_weight)));
-    if (normals && c->train.normal_rmse > 0)
-        loss = ag_add(
-            tape, loss,
-            ag_scale(tape, ag_rmse_loss(tape, guess.maps, target, MAP_NORMAL, 2), (float)c->train.normal_rmse));
+    if (normals) loss = tr_add_normal_errors(t, loss, guess.maps, target);
     if (!loss) return NULL;
     row->map_start = (double)maps->t.data[0];
     row->spread = (double)spread->t.data[0], row->scene = (double)scene->t.data[0];

@@ -166,6 +166,12 @@ TEST(trainer_learns_normals_beside_a_teacher)
     c.train.normal_rmse = 5;
     CHECK(run(&c, folder("of_squares"), &rmse, &st) == TS_OK, "%s", st.message);
     CHECK(rmse.first > normals.first + 0.1, "train.normal_rmse adds nothing: %g, %g", normals.first, rmse.first);
+    losses mse;
+    c.train.normal_rmse = 0, c.train.normal_mse = 20;
+    CHECK(run(&c, folder("of_means"), &mse, &st) == TS_OK, "%s", st.message);
+    CHECK(mse.first > normals.first + 0.01 && fabs(mse.first - rmse.first) > 1e-3,
+          "train.normal_mse: %g, without it %g, the roots %g", mse.first, normals.first, rmse.first);
+    c.train.normal_rmse = 5, c.train.normal_mse = 0;
     *c.train.init = 0, c.train.seed = 77, c.train.pretrain_steps = steps;
     CHECK(run(&c, folder("of_both"), &rmse, &st) == TS_OK, "%s", st.message);
     CHECK(rmse.last < rmse.first - 0.1, "the loss goes from %g to %g", rmse.first, rmse.last);
