@@ -16,6 +16,21 @@ static float table_value(const io_curve *curve, float v)
     return a + (b - a) * (x - (float)i); /* beyond the ends, the last piece goes on */
 }
 
+/* ITU-R BT.2100, table 4, over the 203 cd/m² of HDR's reference white (ITU-R BT.2408). */
+static float pq(float v)
+{
+    const float p = powf(fmaxf(v, 0), 32 / 2523.0f),
+                light = fmaxf(p - 3424 / 4096.0f, 0) / fmaxf(2413 / 128.0f - 2392 / 128.0f * p, 1e-6f);
+    return powf(light, 8192 / 1305.0f) * (10000 / 203.0f);
+}
+
+/* BT.2100, table 5, the light of the scene; reference white is at .75 of the signal. */
+static float hlg_scene(float v)
+{
+    return v <= 0.5f ? v * v / 3 : (expf((v - 0.55991073f) / 0.17883277f) + 0.28466892f) / 12;
+}
+static float hlg(float v) { return hlg_scene(fmaxf(v, 0)) / hlg_scene(0.75f); }
+
 float io_curve_value(const io_curve *curve, float v)
 {
     const float *p = curve->p;
@@ -24,6 +39,8 @@ float io_curve_value(const io_curve *curve, float v)
     case IO_CURVE_SRGB: return io_srgb_to_linear(v);
     case IO_CURVE_PARAMETRIC: return v >= p[4] ? powf(fmaxf(p[1] * v + p[2], 0), p[0]) + p[5] : p[3] * v + p[6];
     case IO_CURVE_TABLE: return table_value(curve, v);
+    case IO_CURVE_PQ: return pq(v);
+    case IO_CURVE_HLG: return hlg(v);
     }
     return v;
 }
@@ -141,8 +158,21 @@ bool io_space_code_points(const int point[2], io_space *space)
     static const float bt709[8] = {.64f, .33f, .3f, .6f, .15f, .06f, .3127f, .329f};
     static const float p3[8] = {.68f, .32f, .265f, .69f, .15f, .06f, .3127f, .329f};
     const float *xy = point[0] == 9 ? bt2020 : point[0] == 12 ? p3 : point[0] == 1 ? bt709 : NULL;
-    if (!xy || (point[1] != 8 && point[1] != 13 && point[1] != 1 && point[1] != 6)) return false;
-    return io_space_primaries(xy, point[1] == 8 ? 1 : 0, space);
+    io_curve curve = {.kind = IO_CURVE_LINEAR};
+    switch (point[1]) {
+    case 1:
+    case 6:
+    case 13:
+    case 14:
+    case 15: curve.kind = IO_CURVE_SRGB; break;
+    case 8: break;
+    case 16: curve.kind = IO_CURVE_PQ; break;
+    case 18: curve.kind = IO_CURVE_HLG; break;
+    default: return false;
+    }
+    if (!xy || !io_space_primaries(xy, 0, space)) return false;
+    set_curves(space, curve);
+    return true;
 }
 
 void io_space_matrix(const io_space *space, float rgb[3])

@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 typedef struct io_curve {
-    enum { IO_CURVE_LINEAR, IO_CURVE_SRGB, IO_CURVE_PARAMETRIC, IO_CURVE_TABLE } kind;
+    enum { IO_CURVE_LINEAR, IO_CURVE_SRGB, IO_CURVE_PARAMETRIC, IO_CURVE_TABLE, IO_CURVE_PQ, IO_CURVE_HLG } kind;
     float p[7];           /* parametric: g a b c d e f; v >= d: (a v + b)^g + e, else c v + f */
     const uint8_t *table; /* big-endian 16 bit, inside the profile's bytes */
     int count;
@@ -26,8 +26,9 @@ io_space io_space_linear(void);
  * the sRGB curve. False when the primaries span nothing. */
 bool io_space_primaries(const float xy[8], float gamma, io_space *space);
 io_space io_space_adobe_rgb(void);
-/* Of coding-independent code points (ITU-T H.273): primaries 1, 9 or 12; transfer 8 linear, 13 sRGB, 1 and 6 taken as
- * sRGB's. False for others, HDR transfers among them. */
+/* Of coding-independent code points (ITU-T H.273): primaries 1, 9 or 12; transfer 8 linear, 13 sRGB, 1, 6, 14 and 15
+ * taken as sRGB's, 16 PQ, 18 HLG. Of the last two HDR's reference white is 1, and what is brighter is above. False for
+ * others. */
 bool io_space_code_points(const int point[2], io_space *space);
 
 /* From an ICC profile of the matrix and curve kind (or grey with a curve); false when it is another kind or damaged.

@@ -151,8 +151,37 @@ TEST(heif_code_points_are_a_space)
     for (int k = 0; k < 3; k++) CHECK(fabsf(out[k] - 0.21404f) < 1e-4f, "grey has %g in channel %d", (double)out[k], k);
     io_space_apply(&space, (float[]){1, 0, 0}, out);
     CHECK(fabsf(out[0] - 1.2249f) < 2e-3f, "its red has %g of sRGB's, 1.2249 is right", (double)out[0]);
-    const int hdr[2] = {9, 16};
-    CHECK(!io_space_code_points(hdr, &space), "PQ is taken for a curve of sRGB's kind");
+    CHECK(!io_space_code_points((const int[]){9, 5}, &space), "a gamma of 2.8 is taken for another curve");
+}
+
+/* Signals and light of ITU-R BT.2100 and BT.2408, table 1, relative to the 203 cd/m² of reference white; HLG's of
+ * BT.2100, table 5: (1/12) ^ (1/2) 3 ^ (1/2) is a half. */
+TEST(heif_of_hdr)
+{
+    static const struct {
+        int transfer;
+        float signal, light, bound;
+    } cases[] = {{16, 0, 0, 1e-6f},
+                 {16, 0.58f, 1, 0.006f},          /* reference white, two digits of the signal */
+                 {16, 0.38f, 26.0f / 203, 0.01f}, /* a grey card of 18% */
+                 {16, 0.5080784f, 100 / 203.0f, 1e-4f},
+                 {16, 1, 10000 / 203.0f, 1e-2f},
+                 {18, 0, 0, 1e-6f},
+                 {18, 0.5f, 0.3145f, 1e-4f}, /* 1/12 of the peak's light over .26496 */
+                 {18, 0.75f, 1, 1e-6f},
+                 {18, 0.38f, 0.1817f, 1e-4f},
+                 {18, 1, 3.7742f, 1e-3f}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        io_space space;
+        float out[3];
+        CHECK(io_space_code_points((const int[]){9, cases[i].transfer}, &space), "no space of transfer %d",
+              cases[i].transfer);
+        io_space_apply(&space, (float[]){cases[i].signal, cases[i].signal, cases[i].signal}, out);
+        for (int c = 0; c < 3; c++)
+            CHECK(fabsf(out[c] - cases[i].light) <= cases[i].bound + 1e-3f * cases[i].light,
+                  "transfer %d, signal %g: %g in channel %d, not %g", cases[i].transfer, (double)cases[i].signal,
+                  (double)out[c], c, (double)cases[i].light);
+    }
 }
 
 /* What is cut short or damaged says nothing and reads nothing beyond it. */
