@@ -153,12 +153,15 @@ static ts_code split(const char *folder, char path[LGD_PATH_MAX], const char **p
 }
 
 /* What would make files that say nothing. */
-static ts_code check_values(const float *maps, int side, const lgd_photo *photo, const char *fov_from, ts_status *st)
+static ts_code check_values(const float *maps, int side, const lgd_photo *photo, double ambient, const char *fov_from,
+                            ts_status *st)
 {
     if (!lgd_photo_can_be(photo))
         return ts_fail(
             st, TS_INVALID,
             "lgd_write_maps: light and camera of the photograph must be above the sample, its power above 0");
+    if (!(ambient >= 0) || !isfinite(ambient))
+        return ts_fail(st, TS_INVALID, "lgd_write_maps: ambient is %g and must be 0 or more", ambient);
     for (const char *c = fov_from ? fov_from : ""; *c; c++)
         if ((unsigned char)*c < ' ')
             return ts_fail(st, TS_INVALID, "lgd_write_maps: fov_from must be one line without control characters");
@@ -184,6 +187,7 @@ static ts_code order_of(const lgd_write_options *o, int side, bool photograph, l
                          .metallic = o->metallic,
                          .half = o->exr == LGD_EXR_HALF || (o->exr == LGD_EXR_AUTO && side > LGD_HALF_ABOVE),
                          .repeats = o->seamless,
+                         .ambient = o->ambient,
                          .threads = ts_threads_of(o->threads)};
     if (lgd_order_check(order, st) != TS_OK) return ts_context(st, "lgd_write_maps");
     return TS_OK;
@@ -212,7 +216,7 @@ int lgd_write_maps(const char *folder, const float *maps, int side, const lgd_ph
     else if (check_side(call, side, &st) == TS_OK &&
              lgd_take_struct(call, options, sizeof o.size, &o, sizeof o, &st) == TS_OK &&
              order_of(&o, side, taken->image, &order, &st) == TS_OK &&
-             check_values(maps, side, taken, o.fov_from, &st) == TS_OK &&
+             check_values(maps, side, taken, o.ambient, o.fov_from, &st) == TS_OK &&
              split(folder, path, &parent, &stem, &st) == TS_OK && io_material_create(&m, side, &st) == TS_OK) {
         lgd_encode(maps, side, order.threads, m.maps);
         const char *how = o.fov_unknown ? lgd_fov_assumption(taken) : "";

@@ -251,10 +251,8 @@ static ts_code count_steps(const lgd_estimator *e, const lgd_given *p, int orien
     ts_code code = photo && maps && arena ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory");
     reduced.side = small;
     for (int k = 0; k < given && !code; k++) {
-        ts_tensor to = ts_view(photo + (size_t)k * pixels * 3, (ts_shape){1, small, small, 3});
-        const ts_tensor from = ts_view((float *)(uintptr_t)p->image[k], (ts_shape){1, side, side, 3});
-        if (small == side) memcpy(to.data, p->image[k], pixels * 3 * sizeof *photo);
-        else code = ts_resize(&to, &from, arena, ag_compute(e->tape)->threads, st);
+        const ts_tensor to = ts_view(photo + (size_t)k * pixels * 3, (ts_shape){1, small, small, 3});
+        code = nn_clip_to(&p->image[k], side, &to, arena, ag_compute(e->tape)->threads, st);
         reduced.image[k] = to.data;
     }
     if (!code) code = refine(&quiet, &reduced, &o, true, 0, true, steps, maps, st);
@@ -371,6 +369,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
                                 o.progress || e->seen ? see_revision : NULL, &user, &guess, &revised, st);
     if (!code && user.stopped) steps = revised;
     else if (!code && o.iterations == LGD_AUTO && !choose) {
+        steps -= revised; /* of the most */
         code = count_steps(e, &p, o.orientations, &steps, st);
         steps += revised;
     }
@@ -380,6 +379,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
         memcpy(to->light, p.views[k].light, sizeof to->light);
         memcpy(to->camera, p.views[k].camera, sizeof to->camera);
     }
+    if (o.ambient) *o.ambient = code ? 0 : (double)p.views[0].ambient;
     if (!code) code = refine(e, &p, &o, choose && !user.stopped, revised, !user.stopped, &steps, maps, st);
     if (side > ONE_TILE) ag_drop(e->tape); /* what is done with such maps needs memory of its own */
     free(r0);

@@ -23,6 +23,6 @@ typedef struct lgd_estimator {
 ts_code lgd_estimator_run(const lgd_estimator *e, const lgd_photo *photo, int photos, int side, const lgd_options *o,
                           float *maps, ts_status *st);
 
-/* Bytes that such an estimate holds at once, at most, beside its photographs and maps. Needs no tape. */
+/* Bytes that such an estimate of one photograph holds at once, at most, beside it and its maps. Needs no tape. */
 double lgd_estimator_bytes(const lgd_estimator *e, int side, const lgd_options *o);
 #endif

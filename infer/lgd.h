@@ -90,8 +90,8 @@ typedef struct lgd_options {
                        * 0.8 (docs/accuracy.md) */
     int orientations; /* R_0 is the mean over so many orientations of the photograph: 1: as it is, 2: and turned by a
                        * quarter, 4: all quarter turns, 8: and their mirror images; 0: LGD_ORIENTATIONS_DEFAULT. Only
-                       * for a single photograph with light and camera above its centre, and not with published weights
-                       */
+                       * of a photograph with light and camera above its centre, and not with published weights; of
+                       * several only with models that guess the scene, the one that they read first */
     int threads;      /* that the call computes on; 0: as many as the process may use */
     /* Called after R_0 (step 0) and after every step; return nonzero to stop there. May be NULL. rmse: the
      * reconstruction RMSE after R_0 and after the last step. Between them it is NAN, unless iterations is LGD_AUTO or
@@ -129,6 +129,10 @@ typedef struct lgd_options {
      * cloth, leather, plastic, paint; F0 near .04) or LGD_SAMPLE_METAL (bare metal: next to no diffuse). One photograph
      * often leaves it open. Only of models that guess the scene. */
     int sample;
+    /* NULL, or where the ambient light goes that models which guess the scene find with it: the radiance A of uniform
+     * surroundings, A (F0 + (1 - F0) diffuse) more in the photograph's rendering, which lgd_render leaves out. Of
+     * several photographs that of the one that is read first; of other models 0. */
+    double *ambient;
 } lgd_options;
 /* Fills size bytes with the defaults, whichever version the library has. */
 LGD_API void lgd_options_init(lgd_options *options, size_t size);
@@ -217,6 +221,7 @@ typedef struct lgd_write_options {
     const char *fov_from; /* where the field of view is known from, for meta.txt, one line; NULL: "given" */
     int fov_unknown;      /* fov_from says why it is not known: meta.txt then says "assumed: " before it where the
                            * camera is as high as lgd_flash_photo's, else "estimated: " */
+    double ambient;       /* that was found (lgd_options.ambient), for render, page and meta.txt */
 } lgd_write_options;
 
 /* Writes maps as returned by lgd_estimate, and meta.txt, into folder, whose parent exists. All files appear together

@@ -31,6 +31,7 @@ static void print_scene(FILE *f, const lgd_photo *p, const lgd_order *order)
             order->fov_from);
     fprintf(f, "camera: %.4f %.4f %.4f, in sides of the square, from its centre\n", (double)p->camera[0],
             (double)p->camera[1], (double)p->camera[2]);
+    if (order->ambient > 0) fprintf(f, "ambient light: of radiance %.4f\n", order->ambient);
     fprintf(f, "light: %.4f %.4f %.4f, of power %.4f\n", (double)p->light[0], (double)p->light[1], (double)p->light[2],
             (double)p->power);
 }

@@ -45,6 +45,7 @@ typedef struct lgd_order {
     bool repeats;         /* the maps are made seamless (data/seamless.h) */
     int threads;          /* that files are made on */
     const char *fov_from; /* where photo's field of view is known from, for meta.txt */
+    double ambient;       /* light of the photograph that is not the flash's (lgd_options.ambient) */
     const char *record;   /* lines more for meta.txt, or NULL */
 } lgd_order;
 

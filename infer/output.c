@@ -69,8 +69,9 @@ static ts_code write_portion(const task *t, unsigned which, lgd_output_result *f
     switch (which) {
     case 0: return TS_OK;
     case LGD_OUT_RENDER:
-        return ts_path_in(path, t->folder, "render.png", st) ? st->code
-                                                             : lgd_write_render(path, t->estimate, t->photo, st);
+        return ts_path_in(path, t->folder, "render.png", st)
+            ? st->code
+            : lgd_write_render(path, t->estimate, t->photo, t->order->ambient, st);
     case LGD_OUT_PREVIEW:
         return ts_path_in(path, t->folder, "preview.png", st) ? st->code : lgd_write_preview(path, t->m, t->photo, st);
     case LGD_OUT_PAGE:

@@ -84,7 +84,8 @@ static void put_facts(FILE *f, void *user)
     put_vector(f, "flash", p->photo->light);
     put_vector(f, "flashCamera", p->photo->camera);
     put_vector(f, "camera", first.camera);
-    fprintf(f, "\"flashPower\": %.7g, \"power\": %.7g, \"lights\": [", (double)p->photo->power, (double)first.power);
+    fprintf(f, "\"flashPower\": %.7g, \"flashAmbient\": %.7g, \"power\": %.7g, \"lights\": [", (double)p->photo->power,
+            p->order->ambient, (double)first.power);
     for (int i = 0; i < LGD_PREVIEW_LIGHTS; i++) {
         const rd_view view = lgd_preview_view(i, p->photo);
         fprintf(f, "%s[%.7g, %.7g, %.7g]", i ? ", " : "", (double)view.light[0], (double)view.light[1],

@@ -37,10 +37,10 @@ static ts_code write_strip(const char *path, strip *s, ts_status *st)
     return io_write_png_rows(path, &rows, 8, true, st);
 }
 
-ts_code lgd_write_render(const char *path, const io_material *m, const lgd_photo *photo, ts_status *st)
+ts_code lgd_write_render(const char *path, const io_material *m, const lgd_photo *photo, double ambient, ts_status *st)
 {
     strip s = {.m = m, .photo = photo, .panels = 2};
-    s.view[1] = (rd_view){.kind = RD_POINT, .power = photo->power};
+    s.view[1] = (rd_view){.kind = RD_POINT, .power = photo->power, .ambient = (float)ambient};
     memcpy(s.view[1].light, photo->light, sizeof photo->light);
     memcpy(s.view[1].camera, photo->camera, sizeof photo->camera);
     return write_strip(path, &s, st);

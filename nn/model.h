@@ -205,12 +205,12 @@ typedef struct nn_watch {
     bool ends_alone; /* after gets only the maps of R_0 and R_steps, which saves resampling, and NULL between */
 } nn_watch;
 
-/* maps[0] = R_0 at g_size, maps[1] … maps[steps] at coarse_size or the photographs' size, by g and the coarse steps:
- * steps <= arch.coarse_steps. after (may be NULL): called with t when maps[t] is there; false: stop. */
+/* maps[0] = R_0 at nn_arch_side, maps[1] … maps[steps] at coarse_size or the photographs' size, by g and the coarse
+ * steps: steps <= arch.coarse_steps. after (may be NULL): called with t when maps[t] is there; false: stop. */
 ts_code nn_coarse_steps(ag_tape *tape, const nn_model *model, const nn_input *in, int steps, ag_value **maps,
                         bool (*after)(int t, void *user), void *user);
 
-/* One photograph is given, its light and camera are above the centre, and the weights are not published ones. */
+/* g reads one photograph, its light and camera are above the centre, and the weights are not published ones. */
 bool nn_orients(const nn_model *model, const nn_input *in);
 
 /* How many pixels away from an output pixel h reads, in one step. */

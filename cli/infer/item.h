@@ -41,6 +41,7 @@ typedef struct cl_item {
     char profile[96];    /* io_photo_facts.profile */
     int photo_side;      /* the shorter side of the photograph in pixels */
     lgd_photo photo[IO_CAPTURE_IMAGES];
+    double ambient;     /* light beside the flash's that was found */
     int photos;         /* of these, the ones that the weights read */
     io_material m;      /* in the encoding of tensor/maps.h */
     double first, last; /* reconstruction RMSE of R_0 and of the last R_t */

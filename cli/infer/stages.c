@@ -168,7 +168,8 @@ void cl_item_estimate(const cl_command *c, lgd_model *model, cl_item *item, cl_i
                                  .tile = before_tile,
                                  .fov = item->fov,
                                  .taken = item->photo,
-                                 .sample = c->sample};
+                                 .sample = c->sample,
+                                 .ambient = &item->ambient};
     item->photo[0] = c->corners ? item->angle.photo : lgd_flash_photo(item->image);
     item->photos = item->capture.images ? lgd_capture_photos(&item->capture, lgd_most_photos(model), item->photo) : 1;
     if (*c->capture && c->orientations > 1 && !can_turn(item)) {
@@ -229,6 +230,7 @@ void cl_item_write(const cl_command *c, const char *recipe, cl_item *item)
                              .repeats = c->seamless,
                              .threads = item->threads,
                              .fov_from = from,
+                             .ambient = item->ambient,
                              .record = record};
     if (lgd_output_write(c->out, item->job->stem, &item->m, &item->photo[0], &order, &item->written, &item->st))
         ts_context(&item->st, "%s", item->job->photo);

@@ -91,7 +91,8 @@ static bool to_d50(const float xy[8], double out[3][3])
     double primaries[3][3], inverse[3][3], back[3][3], adapt[3][3], scaled[3][3], white[3], gain[3];
     for (int c = 0; c < 4; c++) {
         double x = xy[2 * c], y = xy[2 * c + 1];
-        if (!(y > 1e-4) || !(fabs(x) < 10)) return false;
+        /* primaries may be imaginary, as those of ACES2065-1 (SMPTE ST 2065-1), whose blue has a y below 0 */
+        if (!((c < 3 ? fabs(y) : y) > 1e-4) || !(fabs(x) < 10)) return false;
         double xyz[3] = {x / y, 1, (1 - x - y) / y};
         for (int i = 0; i < 3; i++) {
             if (c < 3) primaries[i][c] = xyz[i];

@@ -221,12 +221,12 @@ static ts_code read(const char *path, int64_t max_pixels, double max_bytes, oi_i
 static ts_code encode(const char *name, const oi_encoding *e, const uint8_t *pixels, unsigned char **bytes,
                       size_t *size, ts_status *st)
 {
+    Filesystem::IOVecOutput memory; /* outlives out, which writes to it to its end */
     auto out = ImageOutput::create("jpeg");
     if (!out) return ts_fail(st, TS_UNSUPPORTED, "%s: this OpenImageIO cannot write JPEG", name);
     ImageSpec spec(e->width, e->height, e->channels, TypeDesc::UINT8);
     spec.attribute("oiio:ColorSpace", "sRGB");
     spec.attribute("Compression", "jpeg:" + std::to_string(e->quality));
-    Filesystem::IOVecOutput memory;
     if (!out->supports("ioproxy") || !out->set_ioproxy(&memory))
         return ts_fail(st, TS_UNSUPPORTED, "%s: this OpenImageIO cannot write JPEG to memory", name);
     if (!out->open("image.jpg", spec) || !out->write_image(TypeDesc::UINT8, pixels) || !out->close())

@@ -63,15 +63,24 @@ static void make_part(const void *job, int64_t k)
 static ts_code resample(const io_photo_rows *photo, const cut *c, int most_threads, ts_arena *arena, io_image *square,
                         ts_status *st)
 {
-    const int size = c->taps->out, useful = c->side < LARGE ? 1 : ts_threads_of(most_threads),
-              threads = useful < size ? useful : size, each = (size + threads - 1) / threads;
+    const int size = c->taps->out, useful = c->side < LARGE ? 1 : ts_threads_of(most_threads);
+    int threads = useful < size ? useful : size;
     size_t most = 0;
     for (int j = 0; j < size; j++) { /* wherever a band begins */
         int first;
         const int last = read_by(c->taps, j, j + BAND < size ? BAND : size - j, &first);
         if ((size_t)(last - first) > most) most = (size_t)(last - first);
     }
-    float *rows = ts_arena_alloc(arena, (size_t)threads * most * (size_t)c->side * 3 * sizeof *rows);
+    /* together they hold no more than the photograph does */
+    const size_t part = most * (size_t)c->side * 3 * sizeof(float),
+                 held = (size_t)photo->width * (size_t)photo->height * (size_t)photo->raw.channels *
+        (photo->raw.type == OI_U8        ? 1
+             : photo->raw.type == OI_U16 ? 2
+                                         : 4),
+                 parts = held / part;
+    if (parts < (size_t)threads) threads = parts > 1 ? (int)parts : 1;
+    const int each = (size + threads - 1) / threads;
+    float *rows = ts_arena_alloc(arena, (size_t)threads * part);
     if (!rows) return ts_fail(st, TS_NOMEM, "no memory for a square of %d x %d pixels", photo->width, photo->height);
     ts_tasks(threads, threads, make_part, &(resampling){c, size, each, most * (size_t)c->side * 3, rows, square->data});
     return TS_OK;

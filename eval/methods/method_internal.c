@@ -91,13 +91,14 @@ ts_code ev_run(ev_estimator *e, const ev_case *c, const ev_run_how *how, ev_seen
     options.orientations = ev_orientations(e);
     options.threads = ts_threads();
     lgd_photo taken[NN_MAX_IMAGES] = {0};
-    options.taken = taken;
+    double ambient = 0;
+    options.taken = taken, options.ambient = &ambient;
     float *maps = malloc((size_t)c->size * (size_t)c->size * MAP_CHANNELS * sizeof *maps);
     const ts_code code = maps ? lgd_estimator_run(&estimator, how->photo, how->photos, c->size, &options, maps, st)
                               : ts_fail(st, TS_NOMEM, "out of memory for maps of %d x %d pixels", c->size, c->size);
     free(maps);
     if (!code && !how->g_alone) {
-        e->found = (rd_view){.kind = RD_POINT, .power = taken[0].power};
+        e->found = (rd_view){.kind = RD_POINT, .power = taken[0].power, .ambient = (float)ambient};
         memcpy(e->found.light, taken[0].light, sizeof e->found.light);
         memcpy(e->found.camera, taken[0].camera, sizeof e->found.camera);
     }

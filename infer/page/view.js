@@ -127,7 +127,7 @@
         gl.uniform1f(uniform.radius, facts.radius);
         gl.uniform3fv(uniform.cameraPlace, sphere ? [0, 0, 100] : camera);
         gl.uniform1f(uniform.power, power * 2 ** Number(field.stops.value));
-        gl.uniform1f(uniform.ambient, Number(field.ambient.value));
+        gl.uniform1f(uniform.ambient, Number(field.ambient.value) + shown.ambient);
         gl.uniform1f(uniform.roughnessFactor, Number(field.roughness.value));
         gl.uniform1f(uniform.relief, Number(field.relief.value));
         gl.uniform1f(uniform.split, shown.split);
@@ -142,16 +142,17 @@
         stage.style.width = canvas.width / devicePixelRatio + 'px';
         stage.style.height = canvas.height / devicePixelRatio + 'px';
         facts.lights.forEach((light, i) => draw([i * facts.size, 0, facts.size, facts.size], light, facts.power,
-            facts.camera, { split: 0, left: 'lit', right: 'lit' }));
+            facts.camera, { split: 0, left: 'lit', right: 'lit', ambient: 0 }));
     }
 
     function drawStage() {
         const side = Math.max(1, Math.round(stage.clientWidth * Math.min(devicePixelRatio, 2)));
         if (canvas.width !== side || canvas.height !== side) canvas.width = canvas.height = side;
         const other = field.other.value;
-        const camera = place.preset === 'flash' ? facts.flashCamera : facts.camera;
+        const asTaken = place.preset === 'flash', camera = asTaken ? facts.flashCamera : facts.camera;
         draw([0, 0, side, side], [place.x, place.y, place.z], place.power, camera,
-            { split: other ? Number(field.split.value) : 0, left: other || 'lit', right: field.show.value });
+            { split: other ? Number(field.split.value) : 0, left: other || 'lit', right: field.show.value,
+                ambient: asTaken ? facts.flashAmbient : 0 });
     }
 
     function redraw() {

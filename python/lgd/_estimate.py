@@ -169,6 +169,8 @@ def _run(
     options.orientations = 0 if orientations == "auto" else int(orientations)
     options.threads, options.fov = threads, fov
     options.progress, options.tile, options.taken = calls.step, calls.tile, taken
+    ambient = ctypes.c_double(0)
+    options.ambient = ctypes.pointer(ambient)
     if tolerance is not None:
         options.tolerance = tolerance
     if light_power == "auto":
@@ -182,7 +184,7 @@ def _run(
     check(calls.run(call), error)
     first = taken[0]
     photo = Photo(given[0].image, tuple(first.light), tuple(first.camera), first.power)
-    return Maps(maps, photo, rmse=calls.rmse)
+    return Maps(maps, photo, rmse=calls.rmse, ambient=ambient.value)
 
 
 def estimate(

@@ -45,6 +45,7 @@ class Options(ctypes.Structure):  # lgd_options
         ("fov", c_double),
         ("taken", POINTER(PhotoStruct)),
         ("sample", c_int),
+        ("ambient", POINTER(c_double)),
     ]
 
 
@@ -74,6 +75,7 @@ class WriteOptions(ctypes.Structure):  # lgd_write_options
         ("threads", c_int),
         ("fov_from", c_char_p),
         ("fov_unknown", c_int),
+        ("ambient", c_double),
     ]
 
 

@@ -94,6 +94,7 @@ class Maps:
     photo: Photo  # light, camera and power as they were taken, and the image that was read
     fov_from: str = "given"
     rmse: List[float] = field(default_factory=list)  # of R_0 and each step from the photograph; NaN: not computed
+    ambient: float = 0.0  # radiance of the surroundings that was found with photo's light
 
     @property
     def size(self) -> int:
@@ -132,7 +133,9 @@ class Maps:
         camera: Optional[Sequence[float]] = None,
         power: Optional[float] = None,
     ) -> np.ndarray:
-        """(size, size, 3) linear values under a point light; by default as the photograph was taken."""
+        """(size, size, 3) linear values under a point light; by default as the photograph was taken, with the ambient
+        light."""
+        as_taken = light is None and camera is None and power is None
         light = three("light", self.photo.light if light is None else light)
         camera = three("camera", self.photo.camera if camera is None else camera)
         values, error = self._values(), c.Failure()
@@ -147,6 +150,8 @@ class Maps:
             error,
         )
         check(code, error)
+        if as_taken and self.ambient:
+            image += np.float32(self.ambient) * (self.specular + (1 - self.specular) * self.diffuse)
         return image
 
     def save(
@@ -180,6 +185,8 @@ class Maps:
             c.EXR[exr],
             threads,
             self.fov_from.encode("utf-8", "surrogateescape"),
+            False,
+            self.ambient,
         )
         code = lib.lgd_write_maps(os.fsencode(folder), floats(values), values.shape[0], photo, options, error)
         check(code, error)

@@ -280,6 +280,18 @@ TEST(other_colour_spaces)
     p = photo(png_with_profile(icc_adobe_rgb, 563 / 256.0, "adobe.png"));
     float r = powf(200 / 255.f, 563 / 256.f), g = powf(150 / 255.f, 563 / 256.f), b = powf(100 / 255.f, 563 / 256.f);
     check_colour(&p, 0, 0, 1.3984f * r - 0.3984f * g, g, 1.0429f * b - 0.0429f * g, 2e-3f, "Adobe RGB");
+    /* ACES2065-1 (SMPTE ST 2065-1), whose primaries are imaginary, by Bradford's adaptation of its white */
+    static const float aces[8] = {.7347f, .2653f, 0, 1, .0001f, -.077f, .32168f, .33767f}, in[3] = {.5f, .3f, .2f};
+    static const float to_srgb[3][3] = {
+        {2.5217f, -1.1341f, -.3876f}, {-.2765f, 1.3727f, -.0962f}, {-.0154f, -.1530f, 1.1684f}};
+    io_space space;
+    float out[3];
+    CHECK(io_space_primaries(aces, 1, &space), "ACES2065-1 is no space");
+    io_space_apply(&space, in, out);
+    for (int c = 0; c < 3; c++) {
+        const float right = to_srgb[c][0] * in[0] + to_srgb[c][1] * in[1] + to_srgb[c][2] * in[2];
+        CHECK(fabsf(out[c] - right) < 1e-3f, "ACES2065-1: channel %d is %g, not %g", c, (double)out[c], (double)right);
+    }
     bytes f = {0}, gamma = {0};
     put32(&gamma, 100000);
     png_begin(&f, 1, 1, 8, 2), png_chunk(&f, "gAMA", gamma.data, 4), png_pixels(&f, stored, 3, 1), png_end(&f);

@@ -47,6 +47,8 @@ TEST(not_an_image)
         put(&b, "just some words, and no picture at all\n\n", 40);
         refused(bytes_save(&b, folder, (const char *[]){"words.txt", "words.png", "words.jpg", "words"}[k]), ": ");
     }
+    put(&b, "BMW, photographs of the paint, all of them\n", 43); /* begins as a bitmap does */
+    refused(bytes_save(&b, folder, "notes.txt"), "is no image");
     snprintf(path, sizeof path, "%s/pipe.png", folder);
     CHECK(!mkfifo(path, 0600), "mkfifo");
     refused(path, "not a regular file");

@@ -29,6 +29,26 @@ TEST(infer_auto_stops_where_the_loss_no_longer_falls)
     lgd_free(&m);
 }
 
+/* Of a photograph in tiles they are counted at fewer pixels; what is above 1 counts as 1, what is no number as 0. */
+TEST(infer_auto_counts_steps_of_what_the_steps_read)
+{
+    enum { LARGE = 520, NUMBERS = LARGE * LARGE * 3 };
+    lgd_model *m = load(tiny());
+    lgd_error e;
+    float *image = malloc(NUMBERS * sizeof *image), *maps = malloc((size_t)NUMBERS * 3 * sizeof *maps),
+          *same = malloc((size_t)NUMBERS * 3 * sizeof *same);
+    for (int odd = 0; odd < 2; odd++) {
+        make_image(image, LARGE);
+        for (int i = 0; i < NUMBERS; i += 51) image[i] = odd ? 60 : 1;
+        for (int i = 17; i < NUMBERS; i += 5003) image[i] = odd ? NAN : 0;
+        const lgd_options o = {.size = sizeof o, .iterations = LGD_AUTO};
+        CHECK(!lgd_estimate(m, image, LARGE, &o, odd ? maps : same, &e), "%s", e.message);
+    }
+    CHECK(!memcmp(maps, same, (size_t)NUMBERS * 3 * sizeof *maps), "another number of steps");
+    free(image), free(maps), free(same);
+    lgd_free(&m);
+}
+
 TEST(infer_progress_sees_every_step)
 {
     static float image[SIDE * SIDE * 3], maps[VALUES];

@@ -60,6 +60,49 @@ TEST(phone_keeps_hues)
     free(maps), free(image);
 }
 
+static int last_rmse(int step, double rmse, void *user)
+{
+    (void)step;
+    if (rmse >= 0) *(double *)user = rmse;
+    return 0;
+}
+
+/* The rendering under light, camera and ambient light as they were taken is as far from the photograph as is said. */
+TEST(phone_says_what_light_it_found)
+{
+    static const float colour[3] = {0.4f, 0.3f, 0.2f};
+    float *maps = malloc(sizeof *maps * PIXELS * MAP_CHANNELS), *image = malloc(sizeof *image * PIXELS * 3),
+          *seen = malloc(sizeof *seen * PIXELS * 3);
+    lgd_error e;
+    lgd_model *model = lgd_load("models/phone.safetensors", &e);
+    CHECK(model, "%s", e.message);
+    plain(colour, 0.04f, 0.5f, 1, maps, image);
+    for (int i = 0; i < PIXELS * 3; i++) image[i] = fminf(image[i] + 0.1f * (0.04f + 0.96f * colour[i % 3]), 1);
+    double power, rmse = 0, ambient = 0, sums[2] = {0, 0};
+    lgd_photo taken;
+    lgd_options o = lgd_options_default();
+    o.power = &power, o.taken = &taken, o.ambient = &ambient, o.progress = last_rmse, o.user = &rmse;
+    CHECK(!lgd_estimate(model, image, SIDE, &o, maps, &e), "%s", e.message);
+    CHECK(!lgd_render(maps, SIDE, taken.light, taken.camera, taken.power, seen, &e), "%s", e.message);
+    for (int with = 0; with < 2; with++) {
+        for (int i = 0; i < PIXELS * 3; i++) {
+            const float *m = maps + i / 3 * MAP_CHANNELS + i % 3, f0 = m[MAP_SPECULAR];
+            const double around = with ? ambient * (double)(f0 + (1 - f0) * m[MAP_DIFFUSE]) : 0;
+            sums[with] += pow(fmin((double)seen[i] + around, 1) - (double)image[i], 2);
+        }
+        sums[with] = sqrt(sums[with] / (PIXELS * 3));
+    }
+    printf("  %.5f reported, %.5f rendered, without the ambient light of %.4f %.5f\n", rmse, sums[1], ambient, sums[0]);
+    CHECK(fabs(rmse - sums[1]) < 1e-4, "%.5f is reported, %.5f rendered", rmse, sums[1]);
+    CHECK(ambient > 0.01 && sums[0] > 1.2 * sums[1], "ambient light of %g makes no difference: %g", ambient, sums[0]);
+    lgd_free(&model);
+    lgd_model *other = lgd_load("models/single.safetensors", &e);
+    CHECK(other && !lgd_estimate(other, image, SIDE, &o, maps, &e) && ambient == 0, "single finds ambient light: %g",
+          ambient);
+    lgd_free(&other);
+    free(maps), free(image), free(seen);
+}
+
 static double mean_f0(const float *maps)
 {
     double sum = 0;

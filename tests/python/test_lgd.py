@@ -273,9 +273,18 @@ class Files(unittest.TestCase):
                     maps.save(path, **options)
 
     def test_a_rendering_under_the_photographs_light_is_the_photograph(self):
-        maps = quick(PHOTO, iterations=None)
-        apart = np.clip(maps.render(), 0, 1) - np.clip(maps.photo.image, 0, 1)
-        self.assertAlmostEqual(math.sqrt((apart**2).mean()), maps.rmse[-1], delta=1e-3)
+        hazy = (bump(256, 256) // 2 + 60).astype(np.uint8)  # as if there were light beside the flash's
+        phone = pathlib.Path(__file__).parents[2] / "models" / "phone.safetensors"
+        for image, model in ((hazy, lgd.Model(phone)), (PHOTO, None)):
+            maps = quick(image, model=model, iterations=None)
+            apart = np.clip(maps.render(), 0, 1) - np.clip(maps.photo.image, 0, 1)
+            self.assertAlmostEqual(math.sqrt((apart**2).mean()), maps.rmse[-1], delta=1e-3)
+            if image is hazy:
+                self.assertGreater(maps.ambient, 0.01)
+            with tempfile.TemporaryDirectory() as folder:
+                maps.save(folder + "/a", ["render"])
+                text = pathlib.Path(folder, "a", "meta.txt").read_text()
+                self.assertEqual("ambient light: of radiance" in text, maps.ambient > 0)
         dark = maps.render(light=(0, 0, 1.0), camera=np.array([0, 0, 1.0]), power=0)
         self.assertEqual(dark.max(), 0)
 
