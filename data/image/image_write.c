@@ -22,7 +22,7 @@ ts_code io_write_jpeg(const char *path, const io_image *image, int quality, ts_s
 {
     if (quality < 1 || quality > 100)
         return ts_fail(st, TS_INVALID, "%s: JPEG quality %d is not in 1 .. 100", path, quality);
-    const int channels = image->channels > 3 ? 3 : image->channels; /* JPEG has no alpha */
+    const int channels = image->channels < 3 ? 1 : 3; /* JPEG has no alpha */
     const oi_encoding e = {image->width, image->height, channels, quality};
     uint8_t *pixels = malloc((size_t)e.width * (size_t)e.height * (size_t)e.channels);
     if (!pixels) return ts_fail(st, TS_NOMEM, "%s: out of memory", path);

@@ -8,13 +8,14 @@
 
 static float within(float v) { return v > 0 ? v < 1 ? v : 1 : 0; }
 
-/* Values in [0, 1] (NaN to 0) to integers, rounded to nearest, big-endian. The alpha of four channels is never encoded.
- */
+/* Values in [0, 1] (NaN to 0) to integers, rounded to nearest, big-endian. The alpha of two and of four channels is
+ * never encoded. */
 static void quantise(const float *values, size_t pixels, int channels, int bits, bool srgb, unsigned char *out)
 {
     const io_srgb_codes *codes = srgb && bits == 8 ? io_srgb_codes_made() : NULL;
     const size_t count = pixels * (size_t)channels;
-    if (codes && channels != 4) {
+    const int alpha = channels % 2 == 0 ? channels - 1 : channels;
+    if (codes && alpha == channels) {
         for (size_t i = 0; i < count; i++) out[i] = (unsigned char)io_srgb_code(codes, within(values[i]));
         return;
     }
@@ -29,7 +30,7 @@ static void quantise(const float *values, size_t pixels, int channels, int bits,
     for (size_t i = 0; i < pixels; i++)
         for (int c = 0; c < channels; c++) {
             const float v = within(*values++);
-            const bool curve = srgb && c < 3;
+            const bool curve = srgb && c < alpha;
             if (bits == 8) *out++ = (unsigned char)(curve ? io_srgb_code(codes, v) : (unsigned)(v * 255 + 0.5f));
             else {
                 const unsigned level = (unsigned)((curve ? io_linear_to_srgb(v) : v) * 65535 + 0.5f);

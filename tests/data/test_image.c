@@ -112,6 +112,11 @@ TEST(alpha_is_not_encoded)
     CHECK(io_write_png(path, &image, 16, true, &st) == TS_OK, "%s", st.message);
     io_image back = photo(path);
     check_colour(&back, 1, 1, 0.1f, 0.2f, 0.3f, 1e-4f, "half transparent over black");
+    image = blank(1, 1, 2);
+    image.data[0] = 0.4f, image.data[1] = 0.5f;
+    CHECK(io_write_png(path, &image, 16, true, &st) == TS_OK, "%s", st.message);
+    back = photo(path);
+    check_colour(&back, 0, 0, 0.2f, 0.2f, 0.2f, 1e-4f, "half transparent grey over black");
 }
 
 /* EXIF orientation: which stored corner is seen at the upper left and at the upper right (corners clockwise from the
