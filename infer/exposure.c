@@ -60,10 +60,8 @@ ts_code lgd_expose_others(rd_grid grid, const float *maps, int channels, int cou
     for (int k = 1; k < count; k++) {
         double own;
         views[k].power *= (float)factor;
-        views[k].ambient = views[0].ambient;
         if (lgd_exposure_beside(grid, maps, channels, &views[k], image[k], side, &own, st)) return st->code;
         views[k].power *= (float)own;
-        views[k].ambient *= (float)own;
     }
     return TS_OK;
 }

@@ -14,9 +14,8 @@ ts_code lgd_exposure_beside(rd_grid grid, const float *maps, int channels, const
 /* The power over the squared height of a view's light: as bright as it makes the middle of a sample. */
 double lgd_irradiance(const rd_view *view);
 
-/* The powers of views 1 .. count - 1, whose exposures are not known, and their ambient light, the first one's: factor
- * is what the first one's irradiance turned out to be over what was supposed. The rest of each is
- * lgd_exposure_beside's. */
+/* The powers of views 1 .. count - 1, whose exposures are not known: factor is what the first one's irradiance turned
+ * out to be over what was supposed. The rest of each is lgd_exposure_beside's. */
 ts_code lgd_expose_others(rd_grid grid, const float *maps, int channels, int count, rd_view *views,
                           const float *const *image, int side, double factor, ts_status *st);
 #endif

@@ -13,8 +13,8 @@
 /* By which the slopes n_x / n_z and n_y / n_z of one photograph are multiplied beside that where the light's power is
  * not known: what NN_RELIEF_CELLS cells a side can show, and the rest. Several photographs show for themselves how
  * steep they are. */
-#define NN_RELIEF_BROAD 1.92f
-#define NN_RELIEF_FINE 1.15f
+#define NN_RELIEF_BROAD 1.7f
+#define NN_RELIEF_FINE 1.1f
 #define NN_RELIEF_CELLS 24
 
 /* The slopes of maps [side][side][channels] are multiplied by what their size makes of them, and if steeper by the two

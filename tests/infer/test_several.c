@@ -196,27 +196,6 @@ TEST(several_photographs_keep_known_lights)
     nn_model_free(&m);
 }
 
-/* Photographs of one exposure have one, whatever light there is beside the flash's. */
-TEST(several_photographs_share_their_ambient_light)
-{
-    sample s = take();
-    const rd_grid grid = rd_grid_full(EDGE);
-    rd_view views[TAKEN];
-    const float *image[TAKEN];
-    ts_status st = {0};
-    for (int k = 0; k < TAKEN; k++) {
-        views[k] = s.view[k], views[k].ambient = 0.1f, image[k] = s.image[k];
-        rd_render(grid, s.truth, MAP_CHANNELS, &views[k], false, s.image[k]);
-        if (k) views[k].ambient = 0, views[k].power /= 1.25f;
-    }
-    CHECK(!lgd_expose_others(grid, s.truth, MAP_CHANNELS, TAKEN, views, image, EDGE, 1.25, &st), "%s", st.message);
-    for (int k = 1; k < TAKEN; k++)
-        CHECK(fabsf(views[k].power / s.view[k].power - 1) < 1e-4f && fabsf(views[k].ambient - 0.1f) < 1e-5f,
-              "photograph %d: %g times its power, ambient light %g", k, (double)(views[k].power / s.view[k].power),
-              (double)views[k].ambient);
-    leave(&s);
-}
-
 /* Of a photograph with another exposure, half of that is believed; what is black or burnt out tells nothing. */
 TEST(several_photographs_exposures)
 {
