@@ -379,7 +379,7 @@ static ts_code estimate(const lgd_estimator *e, const lgd_photo *photo, int phot
         memcpy(to->light, p.views[k].light, sizeof to->light);
         memcpy(to->camera, p.views[k].camera, sizeof to->camera);
     }
-    if (o.ambient) *o.ambient = code ? 0 : (double)p.views[0].ambient;
+    if (o.ambient) *o.ambient = code || p.order[0] != 0 ? 0 : (double)p.views[0].ambient;
     if (!code) code = refine(e, &p, &o, choose && !user.stopped, revised, !user.stopped, &steps, maps, st);
     if (side > ONE_TILE) ag_drop(e->tape); /* what is done with such maps needs memory of its own */
     free(r0);

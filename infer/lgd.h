@@ -129,9 +129,10 @@ typedef struct lgd_options {
      * cloth, leather, plastic, paint; F0 near .04) or LGD_SAMPLE_METAL (bare metal: next to no diffuse). One photograph
      * often leaves it open. Only of models that guess the scene. */
     int sample;
-    /* NULL, or where the ambient light goes that models which guess the scene find with it: the radiance A of uniform
-     * surroundings, A (F0 + (1 - F0) diffuse) more in the photograph's rendering, which lgd_render leaves out. Of
-     * several photographs that of the one that is read first; of other models 0. */
+    /* NULL, or where the ambient light in the first photograph goes that models which guess the scene find with it: the
+     * radiance A of uniform surroundings, A (F0 + (1 - F0) diffuse) more in its rendering, which lgd_render leaves out.
+     * Of several photographs it is found in the one that they read first, the flash straight above: of another that
+     * is given first it is 0, as of other models. */
     double *ambient;
 } lgd_options;
 /* Fills size bytes with the defaults, whichever version the library has. */

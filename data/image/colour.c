@@ -92,7 +92,7 @@ static bool to_d50(const float xy[8], double out[3][3])
     for (int c = 0; c < 4; c++) {
         double x = xy[2 * c], y = xy[2 * c + 1];
         /* primaries may be imaginary, as those of ACES2065-1 (SMPTE ST 2065-1), whose blue has a y below 0 */
-        if (!((c < 3 ? fabs(y) : y) > 1e-4) || !(fabs(x) < 10)) return false;
+        if (!((c < 3 ? fabs(y) : y) > 1e-4) || !(fabs(x) < 10) || !(fabs(y) < 10)) return false;
         double xyz[3] = {x / y, 1, (1 - x - y) / y};
         for (int i = 0; i < 3; i++) {
             if (c < 3) primaries[i][c] = xyz[i];
@@ -171,6 +171,7 @@ bool io_space_code_points(const int point[2], io_space *space)
     case 18: curve.kind = IO_CURVE_HLG; break;
     default: return false;
     }
+    if (point[0] == 2 && curve.kind != IO_CURVE_SRGB && curve.kind != IO_CURVE_LINEAR) xy = bt2020;
     if (!xy || !io_space_primaries(xy, 0, space)) return false;
     set_curves(space, curve);
     return true;

@@ -27,8 +27,8 @@ io_space io_space_linear(void);
 bool io_space_primaries(const float xy[8], float gamma, io_space *space);
 io_space io_space_adobe_rgb(void);
 /* Of coding-independent code points (ITU-T H.273): primaries 1, 9 or 12; transfer 8 linear, 13 sRGB, 1, 6, 14 and 15
- * taken as sRGB's, 16 PQ, 18 HLG. Of the last two HDR's reference white is 1, and what is brighter is above. False for
- * others. */
+ * taken as sRGB's, 16 PQ, 18 HLG. Of the last two HDR's reference white is 1, what is brighter is above, and primaries
+ * that are not said (2) are 9. False for others. */
 bool io_space_code_points(const int point[2], io_space *space);
 
 /* From an ICC profile of the matrix and curve kind (or grey with a curve); false when it is another kind or damaged.

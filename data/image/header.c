@@ -68,7 +68,7 @@ static bool radiance(header *h)
 /* Two letters alone do not make a bitmap: the size of its second header is one of those that exist. */
 static bool bitmap(header *h)
 {
-    static const int sizes[] = {12, 40, 52, 56, 64, 108, 124};
+    static const int sizes[] = {12, 16, 40, 52, 56, 64, 108, 124};
     if (!begins(h, 0, "BM", 2) || h->size < 26) return false;
     bool known = false;
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) known |= number(h, h->head + 14, 4) == (uint64_t)sizes[i];

@@ -71,7 +71,7 @@ static ts_code resample(const io_photo_rows *photo, const cut *c, int most_threa
         const int last = read_by(c->taps, j, j + BAND < size ? BAND : size - j, &first);
         if ((size_t)(last - first) > most) most = (size_t)(last - first);
     }
-    /* together they hold no more than the photograph does */
+    /* together parts hold no more than the photograph does, if one alone does not */
     const size_t part = most * (size_t)c->side * 3 * sizeof(float),
                  held = (size_t)photo->width * (size_t)photo->height * (size_t)photo->raw.channels *
         (photo->raw.type == OI_U8        ? 1

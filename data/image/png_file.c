@@ -70,7 +70,8 @@ bool io_space_png(const char *path, io_space *space)
         else if (!memcmp(head + 4, "gAMA", 4) && length == 4 && be32(d) > 0) gamma = (float)(100000.0 / be32(d));
         else if (!memcmp(head + 4, "cHRM", 4) && length == 32) {
             primaries = true;
-            for (int i = 0; i < 8; i++) xy[(i + 6) % 8] = (float)(be32(d + 4 * i) / 100000.0); /* stored white first */
+            for (int i = 0; i < 8; i++)
+                xy[(i + 6) % 8] = (float)((int32_t)be32(d + 4 * i) / 100000.0); /* stored white first */
         }
         if (fseek(f, (long)(length - take) + 4, SEEK_CUR)) break;
     }

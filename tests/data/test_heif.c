@@ -151,6 +151,8 @@ TEST(heif_code_points_are_a_space)
     for (int k = 0; k < 3; k++) CHECK(fabsf(out[k] - 0.21404f) < 1e-4f, "grey has %g in channel %d", (double)out[k], k);
     io_space_apply(&space, (float[]){1, 0, 0}, out);
     CHECK(fabsf(out[0] - 1.2249f) < 2e-3f, "its red has %g of sRGB's, 1.2249 is right", (double)out[0]);
+    CHECK(io_space_code_points((const int[]){2, 16}, &space) && !io_space_code_points((const int[]){2, 13}, &space),
+          "primaries that are not said are BT.2020's of HDR alone");
     CHECK(!io_space_code_points((const int[]){9, 5}, &space), "a gamma of 2.8 is taken for another curve");
 }
 

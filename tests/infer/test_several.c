@@ -125,6 +125,8 @@ TEST(several_photographs_in_tiles_are_those_of_one_tile_and_never_held_whole)
     nn_model_free(&m);
 }
 
+static double lit; /* ambient light of the first photograph that estimate was given */
+
 static void estimate(const nn_model *m, const lgd_photo *photo, double *power, lgd_photo *taken, float *maps)
 {
     ts_status st = {0};
@@ -134,6 +136,7 @@ static void estimate(const nn_model *m, const lgd_photo *photo, double *power, l
                            .iterations = 4,
                            .power = power,
                            .taken = taken,
+                           .ambient = &lit,
                            .fov = power ? LGD_FOV_UNKNOWN : LGD_FOV_OF_PHOTO};
     const lgd_estimator e = {.net = m, .tape = tape, .encoded = true};
     CHECK(!lgd_estimator_run(&e, photo, TAKEN, EDGE, &o, maps, &st), "%s", st.message);
@@ -158,7 +161,14 @@ TEST(several_photographs_in_any_order)
     estimate(m, photo, NULL, NULL, maps[0]);
     estimate(m, turned, NULL, NULL, maps[1]);
     CHECK(!memcmp(maps[0], maps[1], VALUES * sizeof(float)), "the order of the photographs changes the maps");
-    double factor = 0;
+    double factor = 0, ambient[2];
+    for (int k = 0; k < 2; k++) {
+        lit = -1;
+        estimate(m, k ? turned : photo, &factor, taken, maps[0]);
+        ambient[k] = lit;
+    }
+    CHECK(ambient[0] > 0 && ambient[1] == 0, "ambient light of the flash's photograph %g, of another %g", ambient[0],
+          ambient[1]);
     estimate(m, photo, &factor, taken, maps[0]);
     CHECK(factor > 0 && fabs(factor - 1) > 1e-3, "a factor of %g on the lights", factor);
     for (int k = 0; k < TAKEN; k++) { /* each photograph has an exposure of its own */
