@@ -6,6 +6,7 @@ import operator
 import os
 import signal
 import threading
+import warnings
 from typing import Callable, List, Optional, Sequence, Union
 
 import numpy as np
@@ -187,6 +188,16 @@ def _run(
     return Maps(maps, photo, rmse=calls.rmse, ambient=ambient.value)
 
 
+def _warn_of(image: np.ndarray) -> None:
+    """Levels of 0 to 255 that were made floats would be read as light, nearly all of it burnt out."""
+    if np.issubdtype(image.dtype, np.floating) and image.size and np.mean(image > 1) > 0.5:
+        warnings.warn(
+            "an array of floats is linear, from 0 to 1, and most values of this one are above 1: sRGB levels are given"
+            " as uint8 or uint16",
+            stacklevel=3,
+        )
+
+
 def estimate(
     image: Image,
     *,
@@ -215,12 +226,18 @@ def estimate(
     if size < 1:
         raise ValueError(f"size is {size} and must be 1 or more")
     if isinstance(image, np.ndarray):
+        _warn_of(image)
         cut, why = square(image, size), "an array has no EXIF"
         height, width, found = image.shape[0], image.shape[1], None
     else:
         cut, facts = read_photo(image, size, published=model.published, threads=threads)
         width, height, found, why = facts.width, facts.height, facts.fov, facts.fov_from
+        if facts.profile:
+            text = f"{image}: its colour profile ({facts.profile}) cannot be used: sRGB is assumed"
+            warnings.warn(text, stacklevel=2)
     wanted = None if mask is None else cut_mask(mask, size, width, height)
+    if wanted is not None and not wanted.any():
+        warnings.warn("the mask is black all over the photograph's square: nothing is refined", stacklevel=2)
     degrees = found if fov is None else fov
     if fov is not None and fov <= 0:
         raise ValueError(f"fov is {fov} degrees and must be above 0")
@@ -251,16 +268,41 @@ def estimate_photos(
     photos: Sequence[Photo],
     *,
     model: Union[Model, Path],
+    mask: Optional[np.ndarray] = None,
     iterations: Union[int, str, None] = None,
-    light_power: Union[float, str] = 1.0,
+    light_power: Union[float, str] = "auto",
+    tolerance: Optional[float] = None,
+    orientations: Union[int, str] = "auto",
+    exact: bool = False,
+    precision: str = "f32",
     sample: str = "auto",
     threads: int = 0,
     progress: Optional[Progress] = None,
 ) -> Maps:
-    """Maps from 1 .. most_photos photographs under known lights. Their images are rectified to the sample and of one
-    size. model: as of estimate."""
+    """Maps from 1 .. most_photos photographs whose lights and cameras are where each Photo says. Their images are
+    rectified to the sample and of one size. model: as of estimate. mask: an array of that size: only where it is not 0
+    the maps are refined. light_power: "auto": how bright each photograph is, is found, as phones need it; a number: by
+    which every Photo's power is multiplied, which is then believed: 1 where each Photo has a power that is true."""
+    photos = [Photo(p.image, p.light, p.camera, p.power) for p in photos]
+    for p in photos:
+        if p.image is not None:
+            _warn_of(p.image)
+    wanted = None
+    if mask is not None:
+        side = photos[0].image.shape[0] if photos and photos[0].image is not None else 0
+        wanted = cut_mask(np.asarray(mask), side, side, side)
     return _run(
         _loaded(model),
-        photos, c.OF_PHOTO if len(photos) == 1 else c.UNKNOWN, None, iterations, light_power, None, "auto", False,
-        "f32", sample, threads, progress,
+        photos,
+        c.OF_PHOTO if len(photos) == 1 else c.UNKNOWN,
+        wanted,
+        iterations,
+        light_power,
+        tolerance,
+        orientations,
+        exact,
+        precision,
+        sample,
+        threads,
+        progress,
     )

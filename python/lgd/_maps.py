@@ -171,8 +171,6 @@ class Maps:
         if exr not in c.EXR:
             raise ValueError(f"exr {exr!r} is none of {', '.join(c.EXR)}")
         names = maps if maps is None or isinstance(maps, str) else ",".join(maps)
-        parent = os.path.dirname(os.path.abspath(os.fspath(folder)))
-        os.makedirs(parent, exist_ok=True)
         values, error, photo = self._values(), c.Failure(), self.photo.struct()
         if self.photo.image is not None and self.photo.image.shape != values.shape[:2] + (3,):
             raise ValueError(f"maps of shape {values.shape} and a photograph of shape {self.photo.image.shape}")
@@ -188,8 +186,30 @@ class Maps:
             False,
             self.ambient,
         )
+        made = _make_parents(os.path.abspath(os.fspath(folder)))
         code = lib.lgd_write_maps(os.fsencode(folder), floats(values), values.shape[0], photo, options, error)
+        if code:
+            _remove_empty(made)
         check(code, error)
+
+
+def _make_parents(folder: str) -> List[str]:
+    """Those that there were not, the innermost first."""
+    made, parent = [], os.path.dirname(folder)
+    while not os.path.isdir(parent) and parent != os.path.dirname(parent):
+        made.append(parent)
+        parent = os.path.dirname(parent)
+    if made:
+        os.makedirs(made[0], exist_ok=True)
+    return made
+
+
+def _remove_empty(folders: List[str]) -> None:
+    for folder in folders:
+        try:
+            os.rmdir(folder)
+        except OSError:  # others have put something there
+            return
 
 
 def read_photo(path: Path, size: int = 256, *, published: bool = False, threads: int = 0) -> "tuple[np.ndarray, Facts]":

@@ -9,6 +9,7 @@ import signal
 import tempfile
 import threading
 import unittest
+import warnings
 
 import lgd
 import numpy as np
@@ -112,7 +113,9 @@ class Estimates(unittest.TestCase):
             return quick(image, iterations=6, **options)
 
         mask = np.zeros(levels.shape[:2], bool)
-        whole, none = refined(levels, mask=~mask), refined(levels, mask=mask)
+        whole = refined(levels, mask=~mask)
+        with self.assertWarnsRegex(UserWarning, "nothing is refined"):
+            none = refined(levels, mask=mask)
         np.testing.assert_allclose(whole.array, refined(levels).array, atol=1e-4)
         self.assertFalse(np.array_equal(none.array, whole.array))
         with self.assertRaisesRegex(ValueError, r"must be that of the photograph, \(30, 40\)"):
@@ -121,7 +124,8 @@ class Estimates(unittest.TestCase):
             path = os.path.join(folder, "m.pgm")
             with open(path, "wb") as f:
                 f.write(b"P5\n40 30\n255\n" + bytes(40 * 30))
-            np.testing.assert_array_equal(refined(levels, mask=path).array, none.array)
+            with self.assertWarnsRegex(UserWarning, "nothing is refined"):
+                np.testing.assert_array_equal(refined(levels, mask=path).array, none.array)
 
     def test_progress(self):
         seen = []
@@ -183,8 +187,40 @@ class Estimates(unittest.TestCase):
     def test_photos_with_known_lights(self):
         model, image = lgd.Model(), RNG.uniform(0.2, 0.6, (SIZE, SIZE, 3)).astype(np.float32)
         photo = lgd.Photo(image, light=(0.1, 0.2, 1.5), camera=(0, 0, 1.5), power=10)
-        maps = lgd.estimate_photos([photo], model=model, iterations=1)
+        maps = lgd.estimate_photos([photo], model=model, iterations=1, light_power=1)
         self.assertEqual(maps.photo.light, tuple(np.float32((0.1, 0.2, 1.5))))
+        self.assertAlmostEqual(maps.photo.power, 10, 4)
+        found = lgd.estimate_photos([photo], model=model, iterations=1)
+        self.assertGreater(abs(found.photo.power - 10), 0.01)
+
+    def test_photos_take_what_one_photograph_does(self):
+        model, photo = lgd.Model(), lgd.Photo(bump(SIZE, SIZE))
+        mask = np.zeros((SIZE, SIZE), np.uint8)
+        mask[8:24, 8:24] = 1
+        whole, first, part = (
+            lgd.estimate_photos([photo], model=model, iterations=n, threads=1, mask=m).array
+            for n, m in ((2, None), (0, None), (2, mask))
+        )
+        np.testing.assert_array_equal(part[0], first[0])
+        self.assertGreater(np.abs(part - first)[mask != 0].max(), 0)
+        for options in ({"tolerance": 0.5}, {"orientations": 2}, {"precision": "bf16"}, {"exact": True}):
+            other = lgd.estimate_photos([photo], model=model, iterations=2, threads=1, **options).array
+            self.assertEqual(other.shape, whole.shape)
+        with self.assertRaisesRegex(ValueError, "a mask of shape"):
+            lgd.estimate_photos([photo], model=model, mask=mask[1:])
+
+    def test_what_is_doubtful_is_warned_of(self):
+        levels = bump(SIZE, SIZE).astype(np.float32)
+        with self.assertWarnsRegex(UserWarning, "most values of this one are above 1"):
+            quick(levels)
+        with self.assertWarnsRegex(UserWarning, "most values of this one are above 1"):
+            lgd.estimate_photos([lgd.Photo(levels)], model=lgd.Model(), iterations=0)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            quick(levels / 255, mask=np.ones((SIZE, SIZE), np.uint8))
+
+    def test_as_many_photos_as_the_model_takes(self):
+        model, photo = lgd.Model(), lgd.Photo(bump(SIZE, SIZE))
         too_many = [photo] * (model.most_photos + 1)
         with self.assertRaisesRegex(lgd.Error, "photographs: these weights read"):
             lgd.estimate_photos(too_many, model=model)
@@ -255,6 +291,10 @@ class Files(unittest.TestCase):
         maps = quick(PHOTO)
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "a", "b", "wall")
+            for wrong in ({"maps": ["colour"]}, {"maps": "normal", "threads": -1}):
+                with self.assertRaises(lgd.Error):
+                    maps.save(path, **wrong)
+                self.assertEqual(os.listdir(folder), [])
             maps.save(path)
             self.assertEqual(len(os.listdir(path)), 8)
             maps.save(pathlib.Path(path), ["normal", "glb"], workflow="metallic")
