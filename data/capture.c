@@ -157,7 +157,7 @@ ts_code io_read_capture(const char *folder, int size, int64_t max_pixels, io_cap
                        c->images);
     for (int i = 0; i < c->images && !code; i++) code = read_picture(folder, i, c, size, max_pixels, st);
     if (code) io_capture_free(c);
-    else io_name_from_path(folder, c->name, sizeof c->name);
+    else io_name_of_folder(folder, c->name, sizeof c->name);
     return code;
 }
 

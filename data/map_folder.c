@@ -128,6 +128,6 @@ ts_code io_read_map_folder(const char *path, const io_map_convention *given, int
     if (code == TS_OK) code = check_shapes(path, &set, map, st);
     if (code == TS_OK && combine(&set, map, size, m, st) != TS_OK) code = ts_context(st, "%s", path);
     for (int k = 0; k < IO_MAP_KINDS; k++) io_image_free(&map[k]);
-    if (code == TS_OK) io_name_from_path(path, m->name, sizeof m->name);
+    if (code == TS_OK) io_name_of_folder(path, m->name, sizeof m->name);
     return code;
 }

@@ -3,15 +3,16 @@
 #include <string.h>
 #include <strings.h>
 
-void io_name_from_path(const char *path, char *name, size_t capacity)
+/* cut: without its extension. */
+static void last_part(const char *path, bool cut, char *name, size_t capacity)
 {
     size_t end = strlen(path);
     while (end > 1 && path[end - 1] == '/') end--;
     size_t start = end;
     while (start > 0 && path[start - 1] != '/') start--;
     size_t length = end - start;
-    for (size_t i = length; i-- > 1;)
-        if (path[start + i] == '.' && path[end] != '/') {
+    for (size_t i = length; cut && i-- > 1;)
+        if (path[start + i] == '.') {
             length = i;
             break;
         }
@@ -19,6 +20,10 @@ void io_name_from_path(const char *path, char *name, size_t capacity)
     memcpy(name, path + start, length);
     name[length] = 0;
 }
+
+void io_name_from_path(const char *path, char *name, size_t capacity) { last_part(path, true, name, capacity); }
+
+void io_name_of_folder(const char *path, char *name, size_t capacity) { last_part(path, false, name, capacity); }
 
 bool io_is_image_name(const char *name)
 {

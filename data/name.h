@@ -4,9 +4,10 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* The last part of a path without its extension ("a/b.c.png" gives "b.c", "a/b/" gives "b"), cut to capacity - 1 bytes.
- */
+/* The last part of a path without its extension ("a/b.c.png" gives "b.c"), cut to capacity - 1 bytes; of a folder
+ * ("a/wood_3.5cm/"), which has none, all of it. */
 void io_name_from_path(const char *path, char *name, size_t capacity);
+void io_name_of_folder(const char *path, char *name, size_t capacity);
 
 /* Whether the extension is one of images that photographs are stored as; of hidden files it is not. */
 bool io_is_image_name(const char *name);
