@@ -1,9 +1,10 @@
 /* Strips: five square panels side by side, input | normal | diffuse | roughness | specular, linear, OpenGL y. */
+#include "data/image/image_read.h"
 #include "data/material.h"
 #include "data/name.h"
 #include <string.h>
 
-enum { PANELS = 5 };
+enum { NORMAL = 1, PANELS = 5 };
 
 static ts_code cut_panel(const io_image *strip, int panel, int size, io_image *out, ts_status *st)
 {
@@ -14,6 +15,8 @@ static ts_code cut_panel(const io_image *strip, int panel, int size, io_image *o
         memcpy(whole.data + (size_t)y * (size_t)side * 3,
                strip->data + ((size_t)y * (size_t)strip->width + (size_t)panel * (size_t)side) * 3,
                (size_t)side * 3 * sizeof(float));
+    for (size_t i = 0; panel != NORMAL && i < (size_t)side * (size_t)side * 3; i++)
+        whole.data[i] = io_light(whole.data[i]);
     ts_code code = io_centre_square(&whole, size, 0, out, st);
     io_image_free(&whole);
     return code;
@@ -22,7 +25,7 @@ static ts_code cut_panel(const io_image *strip, int panel, int size, io_image *o
 static void join_panels(const io_image panel[PANELS], io_material *m)
 {
     for (size_t i = 0, n = (size_t)m->size * (size_t)m->size; i < n; i++) {
-        const float *normal = panel[1].data + 3 * i, *rough = panel[3].data + 3 * i;
+        const float *normal = panel[NORMAL].data + 3 * i, *rough = panel[3].data + 3 * i;
         io_texel t = {.roughness = (rough[0] + rough[1] + rough[2]) / 3};
         memcpy(t.diffuse, panel[2].data + 3 * i, sizeof t.diffuse);
         memcpy(t.specular, panel[4].data + 3 * i, sizeof t.specular);

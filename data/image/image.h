@@ -22,7 +22,8 @@ void io_image_free(io_image *image); /* and zeroes the struct */
 /* A photograph: any format that OpenImageIO reads, turned upright by its EXIF orientation, alpha dropped (composited on
  * black), grey spread to three channels, CMYK and other colour models converted, colour space honoured (sRGB by default
  * for integer formats, Display-P3 and Adobe RGB by their profile, linear for float formats), to LINEAR sRGB primaries.
- * Negative and NaN become 0; values over 1 stay. The size is checked against max_pixels before memory is taken. */
+ * Negative and NaN become 0; values over 1 stay. The size is checked against max_pixels before memory is taken. The
+ * programs read squares and rows of it; tests compare those with this. */
 ts_code io_read_photo(const char *path, int64_t max_pixels, io_image *image, ts_status *st);
 
 /* What is known of a photograph beside its pixels. */
@@ -44,7 +45,8 @@ ts_code io_read_stored(const char *path, int64_t max_pixels, double gamma, io_im
                        ts_status *st);
 
 /* A data image (a map): values as stored, integers / their maximum, no colour transform, orientation ignored. channels:
- * 1 or 3 forced. */
+ * 1 or 3 forced. Of one channel NaN and negative become 0 and infinity 65504; of three they stay, for a normal of them
+ * is none. */
 ts_code io_read_data(const char *path, int channels, int64_t max_pixels, io_image *image, ts_status *st);
 
 /* The same of a mask, one channel: upright, as the photograph that it belongs to. */

@@ -16,11 +16,11 @@ static void read_rows(const void *job, int64_t begin, int64_t end)
         io_photo_row(r->p, 0, (int)y, r->p->width, r->to + (size_t)y * (size_t)r->p->width * 3);
 }
 
-static ts_code read_colour(const char *path, int64_t max_pixels, bool upright, io_image *image, ts_status *st)
+static ts_code read_colour(const char *path, int64_t max_pixels, bool photograph, io_image *image, ts_status *st)
 {
     io_photo_rows p;
     *image = (io_image){0};
-    ts_code code = io_photo_open(path, max_pixels, upright, &p, st);
+    ts_code code = io_photo_open(path, max_pixels, photograph, &p, st);
     if (code) return code;
     code = io_image_create(image, p.width, p.height, 3, st);
     if (code) ts_context(st, "%s", path);
@@ -55,7 +55,7 @@ ts_code io_read_stored(const char *path, int64_t max_pixels, double gamma, io_im
             const size_t at = io_stored_at(raw.orientation, x, y, raw.width, raw.height) * (size_t)raw.channels;
             for (int c = 0; c < 3; c++) {
                 const float v = oi_value(&raw, at + (size_t)raw.colour[c]);
-                out[c] = !(v > 0) ? 0 : raw.floating ? powf(v, (float)(1 / gamma)) : v;
+                out[c] = raw.floating ? powf(io_light(v), (float)(1 / gamma)) : v;
             }
         }
     oi_free(&raw);
@@ -81,7 +81,7 @@ static ts_code read_data(const char *path, int channels, bool upright, bool over
             const bool covered = over_black && raw.alpha >= 0 && !raw.associated;
             const float alpha = covered ? oi_value(&raw, at + (size_t)raw.alpha) : 1;
             for (int c = 0; c < 3; c++) in[c] = oi_value(&raw, at + (size_t)raw.colour[c]) * alpha;
-            if (channels == 1) *out = raw.grey ? in[0] : (in[0] + in[1] + in[2]) / 3;
+            if (channels == 1) *out = io_light(raw.grey ? in[0] : (in[0] + in[1] + in[2]) / 3);
             else
                 for (int c = 0; c < 3; c++) out[c] = in[c];
         }

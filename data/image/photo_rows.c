@@ -78,13 +78,14 @@ static bool build_tables(io_photo_rows *p)
     return true;
 }
 
-ts_code io_photo_open(const char *path, int64_t max_pixels, bool upright, io_photo_rows *p, ts_status *st)
+ts_code io_photo_open(const char *path, int64_t max_pixels, bool photograph, io_photo_rows *p, ts_status *st)
 {
     *p = (io_photo_rows){0};
     const ts_code code = io_read_raw(path, max_pixels, &p->raw, st);
     if (code) return code;
     p->space = space_of(path, p);
-    p->orientation = upright ? p->raw.orientation : 1;
+    p->orientation = photograph ? p->raw.orientation : 1;
+    if (!photograph) p->raw.alpha = -1;
     const bool swap = p->orientation >= 5;
     p->width = swap ? p->raw.height : p->raw.width;
     p->height = swap ? p->raw.width : p->raw.height;

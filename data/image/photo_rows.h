@@ -18,8 +18,9 @@ typedef struct io_photo_rows {
     char unread[96];     /* empty, or the name of a profile that cannot be used: sRGB is assumed */
 } io_photo_rows;
 
-/* As io_read_photo; upright: turned by the file's orientation. On success the caller calls io_photo_close. */
-ts_code io_photo_open(const char *path, int64_t max_pixels, bool upright, io_photo_rows *p, ts_status *st);
+/* As io_read_photo; photograph: turned by the file's orientation, over black where it is transparent. Of a colour map
+ * neither counts: its alpha holds cut-outs or another map. On success the caller calls io_photo_close. */
+ts_code io_photo_open(const char *path, int64_t max_pixels, bool photograph, io_photo_rows *p, ts_status *st);
 void io_photo_close(io_photo_rows *p);
 
 /* Pixels x .. x + count - 1 of row y, [count][3]. Any threads may ask at once. */
