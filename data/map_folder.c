@@ -8,6 +8,27 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* A map whose name is of several may hold one alone (CarPaintMetallic_Roughness): then its channels are equal, but for
+ * what JPEG changes. */
+static ts_code check_channels(const char *path, int kind, ts_status *st)
+{
+    io_image image;
+    const ts_code code = io_read_data(path, 3, IO_MAX_PIXELS_DEFAULT, &image, st);
+    if (code != TS_OK) return code;
+    const size_t pixels = (size_t)image.width * (size_t)image.height;
+    double differ = 0;
+    for (size_t i = 0; i < pixels; i++) {
+        const float *v = image.data + 3 * i;
+        differ += (double)(fmaxf(v[0], fmaxf(v[1], v[2])) - fminf(v[0], fminf(v[1], v[2])));
+    }
+    io_image_free(&image);
+    if (!(differ > 0.05 * (double)pixels)) return TS_OK;
+    return ts_fail(st, TS_INVALID,
+                   "%s: a packed map must be taken apart (it is another in each channel); if it is not, name it in "
+                   "meta.txt (file.%s: ...)",
+                   path, io_map_kind_name[kind]);
+}
+
 /* Reads one map; its normals as unit vectors, OpenGL y. */
 static ts_code read_map(const char *folder, const io_map_set *set, int kind, io_image *image, ts_status *st)
 {
@@ -16,9 +37,13 @@ static ts_code read_map(const char *folder, const io_map_set *set, int kind, io_
         return ts_fail(st, TS_INVALID, "%s: name too long", folder);
     bool colour = kind == IO_BASECOLOR || kind == IO_DIFFUSE_MAP || kind == IO_SPECULAR_MAP;
     if (colour && !set->linear[kind]) return io_read_colour_map(path, IO_MAX_PIXELS_DEFAULT, image, st);
-    ts_code code = io_read_data(path, colour || kind == IO_NORMAL_MAP ? 3 : 1, IO_MAX_PIXELS_DEFAULT, image, st);
-    if (code != TS_OK || kind != IO_NORMAL_MAP) return code;
-    for (size_t i = 0, n = (size_t)image->width * (size_t)image->height; i < n; i++) {
+    ts_code code = set->packed[kind] ? check_channels(path, kind, st) : TS_OK;
+    if (code == TS_OK)
+        code = io_read_data(path, colour || kind == IO_NORMAL_MAP ? 3 : 1, IO_MAX_PIXELS_DEFAULT, image, st);
+    if (code != TS_OK) return code;
+    const size_t n = (size_t)image->width * (size_t)image->height;
+    for (size_t i = 0; colour && i < 3 * n; i++) image->data[i] = io_light(image->data[i]);
+    for (size_t i = 0; kind == IO_NORMAL_MAP && i < n; i++) {
         float stored[3];
         memcpy(stored, image->data + 3 * i, sizeof stored);
         io_normal_decode(stored, set->directx, image->data + 3 * i);

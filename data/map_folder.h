@@ -18,6 +18,7 @@ extern const char *const io_map_kind_name[IO_MAP_KINDS];
 typedef struct io_map_set {
     char file[IO_MAP_KINDS][256]; /* names inside the folder; empty: there is none */
     bool linear[IO_MAP_KINDS];    /* of colour maps: stored linear (otherwise as the file says, sRGB by default) */
+    bool packed[IO_MAP_KINDS];    /* of one channel: its name is of several, and one picture may hold them all */
     bool specular;                /* the workflow: diffuse and specular, otherwise base colour and metallic */
     bool directx;                 /* the normal's y points down */
 } io_map_set;

@@ -32,44 +32,106 @@ static const struct {
     {"nor", IO_NORMAL_MAP},        {"nrm", IO_NORMAL_MAP},         {"roughness", IO_ROUGHNESS_MAP},
     {"rough", IO_ROUGHNESS_MAP},   {"gloss", IO_GLOSS_MAP},        {"glossiness", IO_GLOSS_MAP},
     {"metallic", IO_METALLIC_MAP}, {"metalness", IO_METALLIC_MAP}, {"metal", IO_METALLIC_MAP},
-    {"specular", IO_SPECULAR_MAP}, {"spec", IO_SPECULAR_MAP},
+    {"specular", IO_SPECULAR_MAP}, {"spec", IO_SPECULAR_MAP},      {"reflection", IO_SPECULAR_MAP},
+    {"refl", IO_SPECULAR_MAP},
 };
+
+/* Words of maps and pictures that are not read, with a number behind them or without: rusty_metal_disp_1k is no
+ * metalness. specularlevel is a scale, of which .5 is an F0 of .04. */
+static const char *const others[] = {
+    "ao",         "occlusion",    "ambientocclusion", "height",    "heightmap",    "disp",      "displacement",
+    "bump",       "cavity",       "curvature",        "thickness", "emission",     "emissive",  "arm",
+    "orm",        "ior",          "anisotropy",       "aniso",     "translucency", "sss",       "subsurface",
+    "scattering", "transmission", "clearcoat",        "coat",      "sheen",        "speclevel", "specularlevel",
+    "nrm16",      "preview",      "sphere",           "thumbnail", "thumb",        "render",
+};
+/* Behind the name of a map they are in its channels: BaseColor_Alpha. */
+static const char *const parts[] = {"alpha", "opacity", "transparency", "mask"};
+
+enum { NONE = -1, OTHER = IO_MAP_KINDS, PART };
 
 /* The words of a file name, cut at everything that is no letter or digit and where a capital follows a small letter. */
 enum { WORDS = 16, WORD = 32 };
-static int split_words(const char *stem, size_t length, char word[WORDS][WORD])
+typedef struct split {
+    char word[WORDS][WORD];
+    int count;
+} split;
+
+/* False: the name is not that of an image. */
+static bool split_name(const char *name, split *s)
 {
-    int count = 0;
+    const char *dot = strrchr(name, '.');
+    if (!dot || dot == name || name[0] == '.' || !oi_knows_extension(dot + 1)) return false;
+    const size_t length = (size_t)(dot - name);
     size_t n = 0;
-    for (size_t i = 0; i <= length && count < WORDS; i++) {
-        unsigned char c = i < length ? (unsigned char)stem[i] : 0, before = i ? (unsigned char)stem[i - 1] : 0;
+    s->count = 0;
+    for (size_t i = 0; i <= length && s->count < WORDS; i++) {
+        unsigned char c = i < length ? (unsigned char)name[i] : 0, before = i ? (unsigned char)name[i - 1] : 0;
         bool end = !isalnum(c), camel = isupper(c) && islower(before);
-        if ((end || camel) && n) word[count++][n] = 0, n = 0;
-        if (!end && count < WORDS && n < WORD - 1) word[count][n++] = (char)tolower(c);
+        if ((end || camel) && n) s->word[s->count++][n] = 0, n = 0;
+        if (!end && s->count < WORDS && n < WORD - 1) s->word[s->count][n++] = (char)tolower(c);
     }
-    return count;
+    return true;
 }
+
+static int kind_of_word(const char *word)
+{
+    for (size_t w = 0; w < sizeof words / sizeof words[0]; w++)
+        if (!strcmp(word, words[w].word)) return words[w].kind;
+    size_t n = strlen(word);
+    while (n && isdigit((unsigned char)word[n - 1])) n--;
+    for (size_t w = 0; w < sizeof others / sizeof others[0]; w++)
+        if (!strcmp(word, others[w]) || (n && strlen(others[w]) == n && !strncmp(word, others[w], n))) return OTHER;
+    for (size_t w = 0; w < sizeof parts / sizeof parts[0]; w++)
+        if (!strcmp(word, parts[w])) return PART;
+    return NONE;
+}
+
+/* Words of maps that are as often part of an asset's own name. */
+static bool is_noun(const char *word) { return !strcmp(word, "metal") || !strcmp(word, "rough"); }
+
+/* The map that the first count words mean, by the last that says something: a kind, OTHER or NONE. *at: its number. */
+static int kind_of_words(const split *s, int count, int *at)
+{
+    for (int i = count - 1; i >= 0; i--) {
+        const int kind = kind_of_word(s->word[i]), before = i ? kind_of_word(s->word[i - 1]) : NONE;
+        const bool named = before >= 0 && before < IO_MAP_KINDS && !is_noun(s->word[i - 1]);
+        *at = i;
+        if (kind == PART && named) continue;
+        if (kind == PART || (before == IO_SPECULAR_MAP && !strcmp(s->word[i], "level"))) return OTHER;
+        if (kind != NONE) return kind;
+    }
+    return NONE;
+}
+
+static bool is_scalar(int kind) { return kind == IO_ROUGHNESS_MAP || kind == IO_GLOSS_MAP || kind == IO_METALLIC_MAP; }
 
 typedef enum side { UNKNOWN, GL, DX, BOTH } side;
 
-/* The map that a file name means, by its last word that names one, or -1; *y: OpenGL or DirectX if it says so. */
-static int kind_of_name(const char *name, side *y)
+typedef struct meaning {
+    int kind; /* -1: no map that is read */
+    side y;   /* OpenGL or DirectX if the name says so */
+    bool packed;
+} meaning;
+
+/* suffix: the last word is the workflow of all, and not the map, where one stands before it. */
+static meaning meaning_of(const split *s, bool suffix)
 {
-    const char *dot = strrchr(name, '.');
-    char word[WORDS][WORD];
-    *y = UNKNOWN;
-    if (!dot || dot == name || !oi_knows_extension(dot + 1)) return -1;
-    int count = split_words(name, (size_t)(dot - name), word), kind = -1;
-    for (int i = count - 1; i >= 0 && kind < 0; i--)
-        for (size_t w = 0; w < sizeof words / sizeof words[0]; w++)
-            if (!strcmp(word[i], words[w].word)) kind = words[w].kind;
-    for (int i = 0; i < count && kind == IO_NORMAL_MAP; i++) {
-        if (!strcmp(word[i], "gl") || !strcmp(word[i], "opengl") || !strcmp(word[i], "ogl") ||
-            !strcmp(word[i], "normalgl"))
-            *y = GL;
-        if (!strcmp(word[i], "dx") || !strcmp(word[i], "directx") || !strcmp(word[i], "normaldx")) *y = DX;
+    int at = 0, last = s->count - 1, kind = suffix ? kind_of_words(s, last, &at) : NONE;
+    if (kind == NONE) kind = kind_of_words(s, s->count, &at);
+    meaning m = {.kind = kind == OTHER ? NONE : kind};
+    if (is_scalar(m.kind) && at > 0) {
+        const int before = kind_of_word(s->word[at - 1]);
+        m.packed = (is_scalar(before) && before != m.kind) || !strcmp(s->word[at - 1], "ao") ||
+            !strcmp(s->word[at - 1], "occlusion");
     }
-    return kind;
+    for (int i = 0; i < s->count && m.kind == IO_NORMAL_MAP; i++) {
+        const char *word = s->word[i];
+        if (!strcmp(word, "gl") || !strcmp(word, "opengl") || !strcmp(word, "ogl") || !strcmp(word, "normalgl"))
+            m.y = GL;
+        if (!strcmp(word, "dx") || !strcmp(word, "directx") || !strcmp(word, "normaldx")) m.y = DX;
+    }
+    return m;
 }
 
 /* Finds "key" at the beginning of a line, followed by ':' or '='; value is the rest, trimmed. */
@@ -129,6 +191,25 @@ static bool is_named(const io_map_set *set, unsigned named, const char *file)
     return false;
 }
 
+/* Poliigon ends all names of a set in its workflow: Metal01_COL_2K_METALNESS. */
+static bool all_end_alike(DIR *folder, const io_map_set *set, unsigned named)
+{
+    char end[WORD] = "";
+    int count = 0;
+    rewinddir(folder);
+    for (struct dirent *entry; (entry = readdir(folder));) {
+        split s;
+        if (!split_name(entry->d_name, &s) || meaning_of(&s, false).kind == NONE || is_named(set, named, entry->d_name))
+            continue;
+        const char *last = s.word[s.count - 1];
+        if (count == 0 && (!strcmp(last, "metalness") || !strcmp(last, "metallic") || !strcmp(last, "specular")))
+            strcpy(end, last);
+        if (strcmp(last, end)) return false;
+        count++;
+    }
+    return count > 1;
+}
+
 /* named: the maps that meta.txt has named, bits 1 << kind. For those and their alternatives
  * no other name counts. */
 static ts_code scan(const char *path, io_map_set *set, unsigned named, side wanted, side *file_side, ts_status *st)
@@ -136,21 +217,24 @@ static ts_code scan(const char *path, io_map_set *set, unsigned named, side want
     DIR *folder = opendir(path);
     if (!folder) return ts_fail(st, TS_IO, "%s: %s", path, errno == ENOTDIR ? "not a folder of maps" : strerror(errno));
     ts_code code = TS_OK;
+    const bool suffix = all_end_alike(folder, set, named);
+    rewinddir(folder);
     for (struct dirent *entry; code == TS_OK && (entry = readdir(folder));) {
-        side y;
-        int kind = entry->d_name[0] == '.' ? -1 : kind_of_name(entry->d_name, &y);
-        if (kind < 0 || strlen(entry->d_name) >= sizeof set->file[0]) continue;
-        if (named & alternatives(kind) || is_named(set, named, entry->d_name)) continue;
-        char *file = set->file[kind];
+        split s;
+        if (!split_name(entry->d_name, &s) || strlen(entry->d_name) >= sizeof set->file[0]) continue;
+        const meaning m = meaning_of(&s, suffix);
+        if (m.kind < 0 || named & alternatives(m.kind) || is_named(set, named, entry->d_name)) continue;
+        char *file = set->file[m.kind];
         if (!file[0]) {
             strcpy(file, entry->d_name);
-            if (kind == IO_NORMAL_MAP) *file_side = y;
-        } else if (kind != IO_NORMAL_MAP || !choose_normal(set, file_side, entry->d_name, y, wanted)) {
+            set->packed[m.kind] = m.packed;
+            if (m.kind == IO_NORMAL_MAP) *file_side = m.y;
+        } else if (m.kind != IO_NORMAL_MAP || !choose_normal(set, file_side, entry->d_name, m.y, wanted)) {
             bool swap = strcmp(file, entry->d_name) > 0; /* the same message whatever order the system lists them in */
             code = ts_fail(st, TS_INVALID,
                            "%s: both %s and %s could be the %s map; remove one, or name it in meta.txt (file.%s: ...)",
-                           path, swap ? entry->d_name : file, swap ? file : entry->d_name, io_map_kind_name[kind],
-                           io_map_kind_name[kind]);
+                           path, swap ? entry->d_name : file, swap ? file : entry->d_name, io_map_kind_name[m.kind],
+                           io_map_kind_name[m.kind]);
         }
     }
     closedir(folder);

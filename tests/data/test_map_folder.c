@@ -1,76 +1,7 @@
 /* Map folders as people have them: names, conventions, sizes. */
 #include "data/map_folder.h"
-#include "tests/support/make_images.h"
-#include "tests/test.h"
-#include <math.h>
-#include <string.h>
-#include <sys/stat.h>
+#include "tests/support/map_folders.h"
 #include <unistd.h>
-
-/* A fresh folder of the test's folder. */
-static const char *fresh(const char *name)
-{
-    static char path[4][512];
-    static int next;
-    char *p = path[next++ % 4];
-    snprintf(p, sizeof path[0], "%s/%s", test_folder(), name);
-    CHECK(!mkdir(p, 0700), "mkdir %s", p);
-    return p;
-}
-
-/* A flat 8-bit PNG. */
-static void flat(const char *folder, const char *name, int width, int height, int r, int g, int b)
-{
-    bytes f = {0};
-    uint8_t pixels[32 * 32 * 3];
-    CHECK(width * height <= 32 * 32, "too large");
-    for (int i = 0; i < width * height; i++)
-        pixels[3 * i] = (uint8_t)r, pixels[3 * i + 1] = (uint8_t)g, pixels[3 * i + 2] = (uint8_t)b;
-    png_begin(&f, (uint32_t)width, (uint32_t)height, 8, 2), png_pixels(&f, pixels, (size_t)width * 3, height),
-        png_end(&f);
-    bytes_save(&f, folder, name);
-}
-
-static void words(const char *folder, const char *name, const char *text)
-{
-    bytes f = {0};
-    put(&f, text, strlen(text));
-    bytes_save(&f, folder, name);
-}
-
-/* Colour 128 = 0.2159 linear, normal with y = +0.6 as OpenGL writes it, roughness 51 = 0.2. */
-static const char *usual(const char *name)
-{
-    const char *folder = fresh(name);
-    flat(folder, "basecolor.png", 4, 4, 128, 128, 128);
-    flat(folder, "normal.png", 4, 4, 128, 204, 230);
-    flat(folder, "roughness.png", 4, 4, 51, 51, 51);
-    return folder;
-}
-
-static io_texel first(const char *folder, io_normal convention, int size)
-{
-    ts_status st = {0};
-    io_material m;
-    CHECK(io_read_map_folder(folder, &(io_map_convention){.normal = convention}, size, &m, &st) == TS_OK, "%s",
-          st.message);
-    io_texel t = io_texel_get(m.maps);
-    io_material_free(&m);
-    return t;
-}
-
-/* Refused in one line that names the folder and says word. */
-static void refused(const char *folder, io_normal convention, const char *word)
-{
-    ts_status st = {0};
-    io_material m;
-    CHECK(io_read_map_folder(folder, &(io_map_convention){.normal = convention}, 0, &m, &st) != TS_OK && !m.maps,
-          "%s was read", folder);
-    CHECK(strstr(st.message, folder) && strstr(st.message, word) && !strchr(st.message, '\n'), "no \"%s\" in: %s", word,
-          st.message);
-}
-
-static bool near(float a, float b, float tolerance) { return fabsf(a - b) <= tolerance; }
 
 TEST(map_folder_conventions)
 {
@@ -241,6 +172,27 @@ TEST(map_folder_sizes)
     io_texel t = first(slopes, IO_NORMAL_GL, 1);
     CHECK(near(t.normal[0], 0, 0.01f) && near(t.normal[2], 1, 1e-3f), "mean normal %g %g %g", (double)t.normal[0],
           (double)t.normal[1], (double)t.normal[2]);
+}
+
+/* A value that is no number does not spread to its neighbours. */
+TEST(map_folder_no_numbers)
+{
+    const char *folder = fresh("odd");
+    float values[4 * 4 * 3];
+    static const float odd[3] = {NAN, -INFINITY, NAN};
+    for (int i = 0; i < 48; i++) values[i] = i < 3 ? odd[i] : 0.25f;
+    bytes b = exr_file(4, 4, values, NULL);
+    bytes_save(&b, folder, "roughness.exr");
+    b = exr_file(4, 4, values, NULL);
+    bytes_save(&b, folder, "basecolor.exr");
+    words(folder, "meta.txt", "basecolor: linear\n");
+    for (int i = 3; i < 48; i++) values[i] = i % 3 == 2 ? 1 : 0.5f;
+    b = exr_file(4, 4, values, NULL);
+    bytes_save(&b, folder, "normal.exr");
+    const io_texel t = first(folder, IO_NORMAL_GL, 1);
+    CHECK(near(t.diffuse[0], 0.24f, 0.01f) && near(t.roughness, 0.24f, 0.01f), "%g, roughness %g", (double)t.diffuse[0],
+          (double)t.roughness);
+    CHECK(t.normal[2] > 0.999f, "a normal of no numbers is flat, not %g", (double)t.normal[2]);
 }
 
 /* Maps of one shape at other sizes, with sides rounded either way; of several shapes no pixel lies on its own. */
