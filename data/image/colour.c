@@ -264,6 +264,10 @@ bool io_space_icc(const uint8_t *b, size_t size, io_space *space)
 {
     static const char *const curves[] = {"rTRC", "gTRC", "bTRC"}, *const colorants[] = {"rXYZ", "gXYZ", "bXYZ"};
     if (!b || size < 132 || memcmp(b + 36, "acsp", 4)) return false;
+    /* Tables go before curves and a matrix (9.2), and of Lab a grey's curve gives L* (8.3). */
+    size_t table = 0;
+    if (find_tag(b, size, "A2B0", 8, &table) || find_tag(b, size, "A2B1", 8, &table)) return false;
+    if (memcmp(b + 20, "XYZ ", 4)) return false;
     if (!memcmp(b + 16, "GRAY", 4)) {
         io_curve curve;
         if (!read_curve(b, size, "kTRC", &curve)) return false;
@@ -271,7 +275,7 @@ bool io_space_icc(const uint8_t *b, size_t size, io_space *space)
         set_curves(space, nearly_srgb(&curve) ? (io_curve){.kind = IO_CURVE_SRGB} : curve);
         return true;
     }
-    if (memcmp(b + 16, "RGB ", 4) || memcmp(b + 20, "XYZ ", 4)) return false;
+    if (memcmp(b + 16, "RGB ", 4)) return false;
     double xyz[3][3];
     for (int c = 0; c < 3; c++) {
         size_t n = 0;

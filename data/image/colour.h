@@ -31,8 +31,9 @@ io_space io_space_adobe_rgb(void);
  * that are not said (2) are 9. False for others. */
 bool io_space_code_points(const int point[2], io_space *space);
 
-/* From an ICC profile of the matrix and curve kind (or grey with a curve); false when it is another kind or damaged.
- * The profile's bytes stay in use. A profile that describes sRGB up to rounding gives exactly sRGB. */
+/* From an ICC profile of the matrix and curve kind (or grey with a curve); false when it is another kind, has tables
+ * too, or is damaged. The profile's bytes stay in use. A profile that describes sRGB up to rounding gives exactly sRGB.
+ */
 bool io_space_icc(const uint8_t *bytes, size_t size, io_space *space);
 
 /* One pixel to linear sRGB: curves, matrix, NaN and negative to 0. */

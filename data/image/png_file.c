@@ -2,6 +2,7 @@
 #include "data/image/png_file.h"
 #include <errno.h>
 #include <isa-l/crc.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -58,7 +59,7 @@ bool io_space_png(const char *path, io_space *space)
     FILE *f = open_png(path);
     if (!f) return false;
     uint8_t head[8], d[32];
-    bool cicp = false, named = false, primaries = false;
+    bool cicp = false, srgb = false, profile = false, primaries = false;
     float xy[8] = {0}, gamma = -1;
     while (fread(head, 1, 8, f) == 8 && memcmp(head + 4, "IDAT", 4)) {
         uint32_t length = be32(head);
@@ -66,7 +67,8 @@ bool io_space_png(const char *path, io_space *space)
         if (length > 0x7fffffff || fread(d, 1, take, f) != take) break;
         if (!memcmp(head + 4, "cICP", 4) && length == 4 && io_space_code_points((int[]){d[0], d[1]}, space))
             cicp = true;
-        else if (!memcmp(head + 4, "sRGB", 4) || !memcmp(head + 4, "iCCP", 4)) named = true;
+        else if (!memcmp(head + 4, "sRGB", 4)) srgb = true;
+        else if (!memcmp(head + 4, "iCCP", 4)) profile = true;
         else if (!memcmp(head + 4, "gAMA", 4) && length == 4 && be32(d) > 0) gamma = (float)(100000.0 / be32(d));
         else if (!memcmp(head + 4, "cHRM", 4) && length == 32) {
             primaries = true;
@@ -77,9 +79,14 @@ bool io_space_png(const char *path, io_space *space)
     }
     fclose(f);
     if (cicp) return true;
-    if (named || (gamma < 0 && !primaries)) return false;
-    /* 1/2.2 is how a PNG without an sRGB chunk says sRGB. */
-    if (gamma < 0 || (gamma > 2.15f && gamma < 2.25f)) gamma = 0;
+    if (srgb && !profile) {
+        *space = io_space_srgb();
+        return true;
+    }
+    if (profile || (gamma < 0 && !primaries)) return false;
+    /* 1/2.2 is how a PNG without an sRGB chunk says sRGB; with Adobe RGB's primaries it is Adobe RGB's curve. */
+    const bool adobe = primaries && fabsf(xy[2] - .21f) < .005f && fabsf(xy[3] - .71f) < .005f;
+    if (gamma < 0 || (!adobe && gamma > 2.15f && gamma < 2.25f)) gamma = 0;
     if (gamma > 0.98f && gamma < 1.02f) gamma = 1;
     if (gamma > 5 || (gamma > 0 && gamma < 0.2f)) return false; /* not a plausible encoding */
     return io_space_primaries(primaries ? xy : bt709, gamma, space);

@@ -8,7 +8,7 @@
  * refused here, because libpng would print its own line about it to stderr. */
 ts_code io_check_png(const char *path, ts_status *st);
 
-/* From the colour chunks (cICP, gAMA, cHRM; a profile or sRGB chunk goes before the last two); false when it is no PNG
- * or they say nothing. */
+/* From the colour chunks (cICP, sRGB, gAMA, cHRM; a profile goes before all but the first); false when it is no PNG or
+ * they say nothing. */
 bool io_space_png(const char *path, io_space *space);
 #endif

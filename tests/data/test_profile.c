@@ -16,8 +16,20 @@ static cmsInt32Number sample(const cmsUInt16Number in[], cmsUInt16Number out[], 
     return 1;
 }
 
-/* kind: cmsSigRgbData, or another space, whose profile no RGB file can use. */
-static bytes table_profile(cmsColorSpaceSignature kind)
+static bytes saved(cmsHPROFILE p)
+{
+    cmsUInt32Number size = 0;
+    bytes b = {0};
+    CHECK(cmsSaveProfileToMem(p, NULL, &size) && size > 0, "the profile has no size");
+    uint8_t *memory = malloc(size);
+    CHECK(cmsSaveProfileToMem(p, memory, &size), "the profile is not saved");
+    put(&b, memory, size);
+    free(memory);
+    return b;
+}
+
+/* kind: cmsSigRgbData, or another space, whose profile no RGB file can use. both: sRGB's matrix and curves too. */
+static bytes table_profile(cmsColorSpaceSignature kind, bool both)
 {
     const unsigned channels = kind == cmsSigRgbData ? 3 : 4;
     cmsHPROFILE srgb = cmsCreate_sRGBProfile(), lab = cmsCreateLab4Profile(NULL), p = cmsCreateProfilePlaceholder(NULL);
@@ -40,13 +52,11 @@ static bytes table_profile(cmsColorSpaceSignature kind)
     CHECK(cmsWriteTag(p, cmsSigAToB0Tag, pipeline) && cmsWriteTag(p, cmsSigProfileDescriptionTag, name) &&
               cmsWriteTag(p, cmsSigMediaWhitePointTag, cmsD50_XYZ()),
           "the profile is not made");
-    cmsUInt32Number size = 0;
-    bytes b = {0};
-    CHECK(cmsSaveProfileToMem(p, NULL, &size) && size > 0, "the profile has no size");
-    uint8_t *memory = malloc(size);
-    CHECK(cmsSaveProfileToMem(p, memory, &size), "the profile is not saved");
-    put(&b, memory, size);
-    free(memory);
+    static const cmsTagSignature simple[] = {cmsSigRedColorantTag, cmsSigGreenColorantTag, cmsSigBlueColorantTag,
+                                             cmsSigRedTRCTag,      cmsSigGreenTRCTag,      cmsSigBlueTRCTag};
+    for (int i = 0; both && i < 6; i++)
+        CHECK(cmsWriteTag(p, simple[i], cmsReadTag(srgb, simple[i])), "tag %d is not made", i);
+    const bytes b = saved(p);
     cmsMLUfree(name);
     cmsPipelineFree(pipeline);
     cmsDeleteTransform(to_lab);
@@ -54,12 +64,12 @@ static bytes table_profile(cmsColorSpaceSignature kind)
     return b;
 }
 
-TEST(profile_of_tables)
+static void check_tables(bool both)
 {
     enum { N = 8 };
     uint8_t pixels[N * 3];
     for (int i = 0; i < N * 3; i++) pixels[i] = (uint8_t)(37 * i % 256);
-    bytes profile = table_profile(cmsSigRgbData), b = {0};
+    bytes profile = table_profile(cmsSigRgbData, both), b = {0};
     png_begin(&b, N, 1, 8, 2), png_profile(&b, &profile), png_pixels(&b, pixels, N * 3, 1), png_end(&b);
     bytes_free(&profile);
     const char *path = bytes_save(&b, test_folder(), "p.png");
@@ -77,6 +87,72 @@ TEST(profile_of_tables)
     io_image_free(&square);
 }
 
+/* Tables go before a matrix that stands beside them. */
+TEST(profile_of_tables)
+{
+    check_tables(false);
+    check_tables(true);
+}
+
+/* Of Lab a grey's curve gives L*: half of it is a Y of .18. */
+TEST(profile_of_grey_in_lab)
+{
+    cmsToneCurve *straight = cmsBuildGamma(NULL, 1);
+    cmsHPROFILE p = cmsCreateGrayProfile(cmsD50_xyY(), straight);
+    CHECK(straight && p, "lcms2 has no memory");
+    for (int lab = 0; lab < 2; lab++) {
+        const uint8_t half = 128;
+        const double l = (100 * half / 255.0 + 16) / 116, want = lab ? l * l * l : half / 255.0;
+        if (lab) cmsSetPCS(p, cmsSigLabData);
+        bytes profile = saved(p), b = {0};
+        png_begin(&b, 1, 1, 8, 0), png_profile(&b, &profile), png_pixels(&b, &half, 1, 1), png_end(&b);
+        bytes_free(&profile);
+        ts_status st = {0};
+        io_image image;
+        CHECK(!io_read_photo(bytes_save(&b, test_folder(), "g.png"), 1 << 20, &image, &st), "%s", st.message);
+        for (int c = 0; c < 3; c++)
+            CHECK(fabs((double)image.data[c] - want) < 2e-3, "Lab %d: %g, not %g", lab, (double)image.data[c], want);
+        io_image_free(&image);
+    }
+    cmsCloseProfile(p);
+    cmsFreeToneCurve(straight);
+}
+
+/* A PNG's chunks: sRGB goes before what EXIF says (R03 is Adobe RGB's), and with Adobe RGB's primaries a gamma of 1/2.2
+ * is no word for sRGB's curve. */
+TEST(png_chunks_of_colour)
+{
+    static const uint8_t exif[] = "II*\0\10\0\0\0\1\0\151\207\4\0\1\0\0\0\32\0\0\0\0\0\0\0"
+                                  "\1\0\5\240\4\0\1\0\0\0\54\0\0\0\0\0\0\0\1\0\1\0\2\0\4\0\0\0R03\0\0\0\0\0",
+                         pixel[3] = {200, 150, 100};
+    static const uint32_t adobe[8] = {31270, 32900, 64000, 33000, 21000, 71000, 15000, 6000};
+    float light[3], curve[3];
+    for (int c = 0; c < 3; c++) {
+        light[c] = powf((float)pixel[c] / 255, 2.19998f);
+        curve[c] = io_srgb_to_linear((float)pixel[c] / 255);
+    }
+    /* Adobe RGB to sRGB, both with white D65 */
+    const float wide[3] = {1.3984f * light[0] - 0.3984f * light[1], light[1], 1.0429f * light[2] - 0.0429f * light[1]};
+    for (int k = 0; k < 3; k++) {
+        bytes b = {0}, gamma = {0}, primaries = {0};
+        png_begin(&b, 1, 1, 8, 2);
+        if (k == 0) png_chunk(&b, "sRGB", "\0", 1);
+        if (k < 2) png_chunk(&b, "eXIf", exif, sizeof exif - 1);
+        put32(&gamma, 45455);
+        for (int i = 0; i < 8; i++) put32(&primaries, adobe[i]);
+        if (k == 2) png_chunk(&b, "gAMA", gamma.data, 4), png_chunk(&b, "cHRM", primaries.data, 32);
+        bytes_free(&gamma), bytes_free(&primaries);
+        png_pixels(&b, pixel, 3, 1), png_end(&b);
+        ts_status st = {0};
+        io_image image;
+        CHECK(!io_read_photo(bytes_save(&b, test_folder(), "c.png"), 1 << 20, &image, &st), "%s", st.message);
+        for (int c = 0; c < 3; c++)
+            CHECK(fabsf(image.data[c] - (k ? wide[c] : curve[c])) < 2e-3f, "case %d: channel %d is %g, not %g", k, c,
+                  (double)image.data[c], (double)(k ? wide[c] : curve[c]));
+        io_image_free(&image);
+    }
+}
+
 /* One of another kind of colours is named, and sRGB assumed. */
 TEST(profile_that_cannot_be_used_is_named)
 {
@@ -88,7 +164,7 @@ TEST(profile_that_cannot_be_used_is_named)
     for (int i = 0; i < 16 * 16 * 3; i++) image.data[i] = 0.25f;
     snprintf(path, sizeof path, "%s/a.jpg", test_folder());
     CHECK(!io_write_jpeg(path, &image, 95, &st), "%s", st.message);
-    bytes jpeg = bytes_load(path), profile = table_profile(cmsSigCmykData);
+    bytes jpeg = bytes_load(path), profile = table_profile(cmsSigCmykData, false);
     jpeg_profile(&jpeg, &profile);
     CHECK(!io_read_photo_square(bytes_save(&jpeg, test_folder(), "b.jpg"), 1 << 20, 4, 0, &square, &facts, &st), "%s",
           st.message);
@@ -147,7 +223,7 @@ TEST(webp_is_turned_and_transparent_as_png)
 TEST(webp_has_the_colours_that_its_profile_says)
 {
     const uint8_t extended[10] = {0x30, 0, 0, 0, 3, 0, 0, 1, 0, 0}; /* a profile, alpha; 4 x 2 */
-    bytes inner = {0}, b = {0}, table = table_profile(cmsSigRgbData);
+    bytes inner = {0}, b = {0}, table = table_profile(cmsSigRgbData, false);
     put(&inner, "WEBP", 4);
     chunk(&inner, "VP8X", extended, sizeof extended);
     chunk(&inner, "ICCP", table.data, table.size);
