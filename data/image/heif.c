@@ -68,7 +68,7 @@ static void take_property(part properties, int n, oi_image *image)
 }
 
 /* Of an ipma box: the properties of an item. */
-static void take_properties(part associations, uint64_t item, part properties, oi_image *image)
+static void take_associated(part associations, uint64_t item, part properties, oi_image *image)
 {
     if (associations.size < 8) return;
     const int id = associations.at[0] < 1 ? 2 : 4, index = associations.at[3] & 1 ? 2 : 1;
@@ -80,6 +80,15 @@ static void take_properties(part associations, uint64_t item, part properties, o
             if (wanted) take_property(properties, (int)big_endian(p, index) & (index == 2 ? 0x7fff : 0x7f), image);
         if (wanted) return;
     }
+}
+
+/* Of an iprp box, which may have several of associations: the properties of an item. */
+static void take_properties(part within, uint64_t item, part properties, oi_image *image)
+{
+    const uint8_t *type;
+    part associations;
+    while (take_box(&within, &type, &associations))
+        if (!memcmp(type, "ipma", 4)) take_associated(associations, item, properties, image);
 }
 
 /* Of an iref box: the first image that an item is put together of, a tile. False: it is none of tiles. */
@@ -100,18 +109,18 @@ static bool first_tile(part references, uint64_t item, uint64_t *tile)
 /* Of the primary image; of one of tiles where only they say it, as the first iPhones wrote. */
 static void take_meta(part meta, oi_image *image)
 {
-    part primary, of, properties, associations, references;
+    part primary, of, properties, references;
     if (!find_box(meta, "pitm", &primary) || !find_box(meta, "iprp", &of) || !find_box(of, "ipco", &properties) ||
-        !find_box(of, "ipma", &associations) || primary.size < 6)
+        primary.size < 6)
         return;
     const int id = primary.at[0] < 1 ? 2 : 4;
     if (primary.size < 4 + (size_t)id) return;
     const uint64_t item = big_endian(primary.at + 4, id);
     uint64_t tile;
-    take_properties(associations, item, properties, image);
+    take_properties(of, item, properties, image);
     if (!image->icc && !image->code_points && find_box(meta, "iref", &references) &&
         first_tile(references, item, &tile))
-        take_properties(associations, tile, properties, image);
+        take_properties(of, tile, properties, image);
 }
 
 /* The content of the meta box, malloced; NULL: there is none, or the file is of another format. */

@@ -34,8 +34,8 @@ static void code_points(bytes *properties, uint8_t primaries, uint8_t transfer)
 }
 
 /* version 1: items of 32 bits, properties of 16. The primary item has the properties from first on, another one, its
- * tile where tiled, the first of all. */
-static bytes file_of(bytes *properties, int first, int count, int version, bool tiled)
+ * tile where tiled, the first of all. apart: each item's are in a box of their own. */
+static bytes file_of(bytes *properties, int first, int count, int version, bool tiled, bool apart)
 {
     bytes b = {0}, c = {0}, inside = {0}, meta = {0}, references = {0};
     put(&c, "heic\0\0\0\0mif1", 12);
@@ -59,8 +59,8 @@ static bytes file_of(bytes *properties, int first, int count, int version, bool 
     }
     box(&meta, "iref", &references);
     box(&inside, "ipco", properties);
-    put32(&c, (uint32_t)version << 24 | (uint32_t)version), put32(&c, 2);
     for (int item = ITEM - 1; item <= ITEM; item++) {
+        if (apart || item < ITEM) put32(&c, (uint32_t)version << 24 | (uint32_t)version), put32(&c, apart ? 1 : 2);
         if (version < 1) put16(&c, (unsigned)item);
         else put32(&c, (uint32_t)item);
         const int begin = item == ITEM ? first : 1, end = item == ITEM ? first + count : 2;
@@ -69,8 +69,8 @@ static bytes file_of(bytes *properties, int first, int count, int version, bool 
             if (version > 0) put8(&c, 0x80);
             put8(&c, (uint8_t)(i | (version > 0 ? 0 : 0x80)));
         }
+        if (apart || item == ITEM) box(&inside, "ipma", &c);
     }
-    box(&inside, "ipma", &c);
     box(&meta, "iprp", &inside);
     box(&b, "meta", &meta);
     put32(&b, 8), put(&b, "mdat", 4);
@@ -86,13 +86,14 @@ static oi_image read_colours(bytes *b)
 
 TEST(heif_profile_is_that_of_the_primary_image)
 {
-    for (int version = 0; version < 2; version++) {
+    for (int k = 0; k < 4; k++) {
+        const int version = k % 2;
         bytes properties = {0}, size = {0};
         profile(&properties, 7);
         put32(&size, 0), put32(&size, 64), put32(&size, 64);
         box(&properties, "ispe", &size);
         profile(&properties, 9);
-        bytes b = file_of(&properties, 2, 2, version, true);
+        bytes b = file_of(&properties, 2, 2, version, true, k > 1);
         const oi_image image = read_colours(&b);
         CHECK(image.icc && image.icc_size == PROFILE && !image.code_points, "version %d: no profile", version);
         for (int i = 0; i < PROFILE; i++)
@@ -109,7 +110,7 @@ TEST(heif_profile_of_the_tiles_is_that_of_an_image_without)
         put32(&size, 0), put32(&size, 64), put32(&size, 64);
         box(&properties, "ispe", &size);
         const bool tiled = k % 2;
-        bytes b = file_of(&properties, 2, 1, k / 2, tiled);
+        bytes b = file_of(&properties, 2, 1, k / 2, tiled, false);
         const oi_image image = read_colours(&b);
         CHECK(tiled == (image.icc && image.icc[0] == 7), "case %d: a profile of %zu bytes", k, image.icc_size);
         free(image.icc);
@@ -124,7 +125,7 @@ TEST(heif_profile_and_code_points)
         if (k) code_points(&properties, 12, 13);
         profile(&properties, 9);
         if (!k) code_points(&properties, 12, 13);
-        bytes b = file_of(&properties, 1, 2, 0, false);
+        bytes b = file_of(&properties, 1, 2, 0, false, false);
         uint8_t own[PROFILE];
         oi_image image = {0}, with = {.icc = own, .icc_size = sizeof own};
         const char *path = bytes_save(&b, test_folder(), "a.heic");
@@ -141,7 +142,7 @@ TEST(heif_code_points_are_a_space)
     bytes properties = {0};
     profile(&properties, 7);
     code_points(&properties, 12, 13);
-    bytes b = file_of(&properties, 2, 1, 0, true);
+    bytes b = file_of(&properties, 2, 1, 0, true, false);
     const oi_image image = read_colours(&b);
     io_space space;
     CHECK(!image.icc && image.code_points && image.code_point[0] == 12 && image.code_point[1] == 13, "not as told");
@@ -191,7 +192,7 @@ TEST(heif_that_is_damaged_says_nothing)
 {
     bytes properties = {0};
     profile(&properties, 7);
-    bytes whole = file_of(&properties, 1, 1, 0, false);
+    bytes whole = file_of(&properties, 1, 1, 0, false, false);
     uint8_t *copy = malloc(whole.size);
     const size_t size = whole.size;
     memcpy(copy, whole.data, size);
