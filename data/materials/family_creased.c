@@ -2,24 +2,6 @@
 #include "data/materials/family.h"
 #include "data/materials/finish.h"
 
-/* Adds a folded sheet: heights linear in the triangles of a bent lattice. */
-static void folded(const io_canvas *c, nz_frame f, float amount, uint32_t seed)
-{
-    for (int i = 0; i < c->count; i++) {
-        const float u = nz_floor(f.u[i]), v = nz_floor(f.v[i]);
-        const int a = (int)u, b = (int)v;
-        const bool turned = nz_hash(a, b, seed + 1) & 1; /* which diagonal is the fold */
-        const float x = turned ? u + 1 - f.u[i] : f.u[i] - u, y = f.v[i] - v;
-        const int left = turned ? a + 1 : a, right = turned ? a : a + 1;
-        const float p = nz_unit(nz_hash(right, b, seed)), q = nz_unit(nz_hash(left, b + 1, seed));
-        const bool low = x + y < 1;
-        const float corner = nz_unit(low ? nz_hash(left, b, seed) : nz_hash(right, b + 1, seed));
-        const float h = low ? corner + x * (p - corner) + y * (q - corner)
-                            : corner + (1 - x) * (q - corner) + (1 - y) * (p - corner);
-        c->height[i] += amount * h;
-    }
-}
-
 void io_family_creased(io_canvas *c)
 {
     static const uint32_t sheet[] = {0xf2efe6, 0xe4e0d4, 0xd8c8a8, 0xb59a78, 0x9c8a6e,
@@ -33,7 +15,7 @@ void io_family_creased(io_canvas *c)
     for (int k = 0; k < layers; k++) {
         const float turns = cv_range(c, 0, 1), stretch = cv_range(c, 1, 2), bend = cv_range(c, 0.1f, 0.5f);
         const nz_frame f = cv_bend(c, cv_frame(c, cycles, stretch, turns), 0.8f, 2, bend);
-        folded(c, f, share / cycles, cv_seed(c));
+        fin_facets(c, f, true, share / cycles, cv_seed(c));
         c->used = 0;
         cycles = nz_min(60, cycles * cv_range(c, 1.3f, 3));
         share *= cv_range(c, 0.4f, 1);

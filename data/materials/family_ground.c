@@ -92,6 +92,7 @@ void io_family_ground(io_canvas *c)
         cv_tint(c, mask, cv_range(c, 0, 0.5f), b);
         lumps *= 0.1f;
     } else if (kind < 4) { /* mud cracked by drying, its plates curled */
+        const int before = c->used;
         float scale = cv_log_range(c, 2.5f, 9), gap = cv_range(c, 0.02f, 0.06f);
         nz_frame place = cv_bend(c, cv_frame(c, scale, 1, 0), 0.8f, 4, 0.05f);
         nz_cells cells = cv_cells(c);
@@ -104,7 +105,7 @@ void io_family_ground(io_canvas *c)
         }
         cv_shade(c, mask, -0.75f);
         lumps *= 0.25f;
-        cv_drop(c, 6 + 2);
+        cv_drop(c, before);
     }
     cv_raise(c, relief, lumps);
     for (int i = 0; i < c->count; i++) mask[i] = nz_smooth(-0.8f, 1.2f, relief[i]);

@@ -71,7 +71,7 @@ void io_family_scales(io_canvas *c)
     for (int i = 0; i < c->count; i++) {
         const float row = nz_floor(f.v[i]);
         float x = 0, y = 0, number = 0;
-        for (int k = 2; k >= 0; k--) { /* the scale of the highest row that reaches here lies on top */
+        for (int k = 1; k >= 0; k--) { /* the scale of the highest row that reaches here lies on top */
             const float r = row + (float)k, shift = (int)r & 1 ? 0.5f : 0, column = nz_floor(f.u[i] - shift);
             x = (f.u[i] - shift - column - 0.5f) / half;
             y = (r + 1 - f.v[i]) / reach; /* 0 at the root, 1 at the tip */

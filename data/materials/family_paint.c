@@ -83,8 +83,7 @@ void io_family_paint(io_canvas *c)
     int coats = 1 + ts_rng_int(&c->rng, 3);
     float bare = cv_chance(c, 0.3f) ? cv_range(c, 0.001f, 0.05f) : cv_range(c, 0.05f, 0.6f),
           crisp = cv_log_range(c, 0.02f, 0.12f), thick = cv_log_range(c, 0.0006f, 0.004f);
-    float level = -cv_level(bare);
-    level = -level;
+    const float level = cv_level(bare);
     for (int k = 0; k < coats; k++) {
         io_rgb colour;
         pal_paint(c, colour);

@@ -5,25 +5,6 @@
 static const uint32_t rock[] = {0x7b766e, 0x5d5a55, 0x96897a, 0x4a4947, 0xa89c88, 0x3a3a3b, 0x84705c, 0x8b8d8a,
                                 0xc9b994, 0xb59a78, 0xd8d2c4, 0x6b5a50, 0x9d6a52, 0xe8e4da, 0x2a2928};
 
-/* Heights on a bent lattice, linear in triangles between its points: chipped faces with sharp edges. */
-static void faces(const io_canvas *c, nz_frame f, float amount, uint32_t seed)
-{
-    for (int i = 0; i < c->count; i++) {
-        const float u = nz_floor(f.u[i]), v = nz_floor(f.v[i]), x = f.u[i] - u, y = f.v[i] - v;
-        const int a = (int)u, b = (int)v;
-        const float right = nz_unit(nz_hash(a + 1, b, seed)), up = nz_unit(nz_hash(a, b + 1, seed));
-        float h;
-        if (x + y < 1) {
-            const float corner = nz_unit(nz_hash(a, b, seed));
-            h = corner + x * (right - corner) + y * (up - corner);
-        } else {
-            const float corner = nz_unit(nz_hash(a + 1, b + 1, seed));
-            h = corner + (1 - x) * (up - corner) + (1 - y) * (right - corner);
-        }
-        c->height[i] += amount * h;
-    }
-}
-
 /* One layer of relief: lumps, ridges, chipped faces, trowel strokes or pits. */
 static void layer(io_canvas *c, float cycles, float amount)
 {
@@ -31,7 +12,7 @@ static void layer(io_canvas *c, float cycles, float amount)
     const float turns = cv_range(c, 0, 1), stretch = dice == 4 ? cv_range(c, 2, 6) : cv_range(c, 1, 1.5f),
                 bend = cv_range(c, 0.05f, 0.3f), gain = cv_range(c, 0.4f, 0.75f), low = cv_range(c, -0.5f, 1);
     const nz_frame f = cv_bend(c, cv_frame(c, cycles, stretch, turns), 0.7f, 2, bend);
-    if (dice == 3) faces(c, f, 2 * amount / cycles, cv_seed(c));
+    if (dice == 3) fin_facets(c, f, false, 2 * amount / cycles, cv_seed(c));
     else {
         const nz_kind kind = dice == 1 ? NZ_RIDGED : dice == 2 ? NZ_BILLOW : NZ_SMOOTH;
         float *relief = cv_noise(c, f, kind, 0.7f, 4, gain);

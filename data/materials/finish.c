@@ -54,6 +54,23 @@ void fin_grain(io_canvas *c, float steep)
     cv_drop(c, mark);
 }
 
+void fin_facets(io_canvas *c, nz_frame f, bool either, float amount, uint32_t seed)
+{
+    for (int i = 0; i < c->count; i++) {
+        const float u = nz_floor(f.u[i]), v = nz_floor(f.v[i]);
+        const int a = (int)u, b = (int)v;
+        const bool turned = either && nz_hash(a, b, seed + 1) & 1; /* which diagonal is the fold */
+        const float x = turned ? u + 1 - f.u[i] : f.u[i] - u, y = f.v[i] - v;
+        const int left = turned ? a + 1 : a, right = turned ? a : a + 1;
+        const float p = nz_unit(nz_hash(right, b, seed)), q = nz_unit(nz_hash(left, b + 1, seed));
+        const bool low = x + y < 1;
+        const float corner = nz_unit(low ? nz_hash(left, b, seed) : nz_hash(right, b + 1, seed));
+        const float h = low ? corner + x * (p - corner) + y * (q - corner)
+                            : corner + (1 - x) * (q - corner) + (1 - y) * (p - corner);
+        c->height[i] += amount * h;
+    }
+}
+
 void fin_swell(io_canvas *c)
 {
     const float cycles = cv_log_range(c, 1, 5), steep = cv_log_range(c, 0.02f, 0.25f), gain = cv_range(c, 0.3f, 0.5f),

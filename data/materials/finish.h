@@ -12,6 +12,9 @@ void fin_relief(io_canvas *c, float lo, float hi);
 /* Adds grain of 8 to 64 cycles a patch to some of relief (slopes up to steep), colour and roughness, drawn at random;
  * all from one noise, or the relief from a noise of its own. */
 void fin_grain(io_canvas *c, float steep);
+/* Adds heights that are linear in the triangles of the frame's lattice, 0 .. amount: chipped faces with sharp edges;
+ * either: a square is folded along the one diagonal or the other, as a creased sheet is. */
+void fin_facets(io_canvas *c, nz_frame f, bool either, float amount, uint32_t seed);
 /* Broad waves of 1 to 10 cycles a patch in the height. */
 void fin_swell(io_canvas *c);
 /* Changes deep and high places, each at random: deep ones become darker (occlusion), dusty or neither, and perhaps
