@@ -1,4 +1,5 @@
 #include "data/materials/statistics.h"
+#include "data/name.h"
 #include "tensor/rng.h"
 #include <dirent.h>
 #include <errno.h>
@@ -6,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 enum { DIFFUSE, ROUGHNESS, SPECULAR, SLOPE, PLANES, SATURATION = PLANES };
 
@@ -30,13 +32,13 @@ void io_values(const float *m, double out[IO_VALUES])
     out[SATURATION] = (hi - lo) / (hi + 0.02); /* black has no hue, only noise: 0.01 of albedo keeps it out */
 }
 
-void io_features(const float *maps, int size, double out[IO_FEATURES])
+ts_code io_features(const float *maps, int size, double out[IO_FEATURES], ts_status *st)
 {
     double sum[PLANES] = {0}, product[PLANES][PLANES] = {{0}}, gradient[PLANES] = {0}, colour = 0, metal = 0,
            *above = calloc((size_t)size, PLANES * sizeof *above);
-    double count = (double)size * size;
+    const double count = (double)size * size, inner = size > 1 ? (double)(size - 1) * (size - 1) : 1;
     memset(out, 0, IO_FEATURES * sizeof *out);
-    if (!above) return; /* no memory for one row: the caller's next allocation fails too and reports it */
+    if (!above) return ts_fail(st, TS_NOMEM, "statistics: no memory for a row of %d pixels", size);
     for (int y = 0; y < size; y++) {
         double left[PLANES] = {0};
         for (int x = 0; x < size; x++) {
@@ -59,7 +61,7 @@ void io_features(const float *maps, int size, double out[IO_FEATURES])
     for (int k = 0; k < PLANES; k++) {
         out[k] = sum[k] / count;
         out[PLANES + k] = deviation[k] = sqrt(fmax(0, product[k][k] / count - out[k] * out[k]));
-        out[2 * PLANES + k] = gradient[k] / count * size / 64;
+        out[2 * PLANES + k] = gradient[k] / inner * size / 64;
     }
     for (int j = 0; j < PLANES; j++)
         for (int k = j + 1; k < PLANES; k++, at++) {
@@ -69,6 +71,7 @@ void io_features(const float *maps, int size, double out[IO_FEATURES])
         }
     out[at] = colour / count;
     out[at + 1] = metal / count;
+    return TS_OK;
 }
 
 void io_feature_set_free(io_feature_set *set)
@@ -87,17 +90,27 @@ ts_code io_features_procedural(const io_procedural *p, uint64_t first, int count
         io_feature_set_free(set);
         return st ? st->code : TS_NOMEM;
     }
-    for (; set->count < count; set->count++) {
+    ts_code code = TS_OK;
+    for (; set->count < count && !code; set->count++) {
         io_procedural_make(p, first + (uint64_t)set->count, &m);
-        io_features(m.maps, size, set->values[set->count]);
+        code = io_features(m.maps, size, set->values[set->count], st);
     }
     io_material_free(&m);
-    return TS_OK;
+    if (code) io_feature_set_free(set);
+    return code;
 }
 
 static int not_hidden(const struct dirent *e) { return e->d_name[0] != '.'; }
 
-/* Calls visit for everything in one folder; an absent folder is empty. */
+/* What lies beside the materials is none. */
+static bool is_material(const char *path, const char *name, bool strips)
+{
+    struct stat about;
+    if (stat(path, &about)) return false;
+    return strips ? S_ISREG(about.st_mode) && io_is_image_name(name) : S_ISDIR(about.st_mode);
+}
+
+/* Calls visit for all materials of one folder; an absent folder is empty. */
 static ts_code visit_folder(const char *folder, bool strips, int size, io_visit *visit, void *context, ts_status *st)
 {
     struct dirent **list = NULL;
@@ -109,9 +122,10 @@ static ts_code visit_folder(const char *folder, bool strips, int size, io_visit 
         io_material m = {0};
         if (!code && snprintf(path, sizeof path, "%s/%s", folder, list[i]->d_name) >= (int)sizeof path)
             code = ts_fail(st, TS_INVALID, "%s: the path is too long", folder);
-        if (!code)
+        const bool wanted = !code && is_material(path, list[i]->d_name, strips);
+        if (wanted)
             code = strips ? io_read_strip(path, size, &m, NULL, st) : io_read_map_folder(path, NULL, size, &m, st);
-        if (!code) code = visit(context, &m, st);
+        if (wanted && !code) code = visit(context, &m, st);
         io_material_free(&m);
         free(list[i]);
     }
@@ -135,8 +149,7 @@ static ts_code add_features(void *context, const io_material *m, ts_status *st)
     double(*grown)[IO_FEATURES] = realloc(set->values, (size_t)(set->count + 1) * sizeof *grown);
     if (!grown) return ts_fail(st, TS_NOMEM, "statistics: no memory for %d materials", set->count + 1);
     set->values = grown;
-    io_features(m->maps, m->size, set->values[set->count++]);
-    return TS_OK;
+    return io_features(m->maps, m->size, set->values[set->count++], st);
 }
 
 ts_code io_features_folder(const char *folder, int size, io_feature_set *set, ts_status *st)

@@ -19,7 +19,7 @@ ts_code io_visit_materials(const char *folder, int size, io_visit *visit, void *
  * saturation and the share of metal (F0 over 0.15). */
 enum { IO_FEATURES = 20 };
 const char *io_feature_name(int feature);
-void io_features(const float *maps, int size, double out[IO_FEATURES]);
+ts_code io_features(const float *maps, int size, double out[IO_FEATURES], ts_status *st);
 
 typedef struct io_feature_set {
     int count;

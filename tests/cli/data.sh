@@ -184,6 +184,7 @@ data_statistics() {
     mkdir -p "$T/own"
     expect 0 "$DATA" -o "$T/own/maps" --count 24 --size 32
     expect 0 "$DATA" -o "$T/own/strips" --first 24 --count 24 --size 32 --format strips
+    for folder in maps strips; do echo "where they are from" >"$T/own/$folder/README.txt"; done
     expect 0 "$DATA" --statistics --testdata "$T/own" --count 48 --size 32
     says "$T/out" "distance of 48 procedural materials from 48"
     same_materials

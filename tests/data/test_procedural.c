@@ -259,11 +259,12 @@ TEST(statistics_measure_what_they_say)
             io_texel_put(m.maps + (size_t)(y * SIZE + x) * MAP_CHANNELS, &t);
         }
     double f[IO_FEATURES];
-    io_features(m.maps, SIZE, f);
+    ts_status st = {0};
+    CHECK(!io_features(m.maps, SIZE, f, &st), "%s", st.message);
     CHECK(fabs(f[0] - 0.5 * pow(0.25, 1 / 2.2)) < 1e-5 && fabs(f[1] - 0.5) < 1e-6 && fabs(f[3] - 0.3) < 1e-6,
           "means %g %g %g", f[0], f[1], f[3]);
     CHECK(fabs(f[5] - 0.25) < 1e-6 && fabs(f[7] - 0.3) < 1e-6, "spreads %g %g", f[5], f[7]);
-    CHECK(fabs(f[9] - 0.5 * (SIZE - 1.0) / (SIZE * SIZE) * SIZE / 64) < 1e-6, "gradient of roughness %g", f[9]);
+    CHECK(fabs(f[9] - 0.5 / (SIZE - 1) * SIZE / 64) < 1e-6, "gradient of roughness %g", f[9]);
     CHECK(fabs(f[12] - 1) < 1e-5 && fabs(f[13] + 1) < 1e-5 && fabs(f[16] - 1) < 1e-5, "correlations %g %g %g", f[12],
           f[13], f[16]);
     CHECK(f[18] < 1e-4 && fabs(f[19] - 0.5) < 1e-6, "saturation %g, metal %g", f[18], f[19]);
