@@ -15,14 +15,15 @@ typedef struct io_tone {
 float io_tone_curve(const io_tone *t, float v);
 
 /* Linear light >= 0 to [0, 1]: y = v below the knee k; above it y = 1 - (1 - k) (1 - t / 3)^3, t = (v - k) / (1 - k),
- * with the same slope at k, and 1 from t = 3 on. */
+ * with the same slope at k, and 1 from t = 3 on. Public for its test. */
 float io_tone_shoulder(const io_tone *t, float v);
 
 /* Both for count values in place: the shoulder of linear light, and linear light in [0, 1] to encoded values. */
 void io_tone_roll_off(const io_tone *t, size_t count, float *image);
 void io_tone_encode(const io_tone *t, size_t count, float *image);
 
-/* image [size][size][channels] in place: Gaussian blur, sigma in pixels, at most 12 pixels wide; edges repeated. */
+/* image [size][size][channels] in place: Gaussian blur, sigma in pixels, cut off at 3 sigma or 192 pixels; edges
+ * repeated. */
 void io_blur(int size, int channels, float sigma, float *image);
 
 /* Unsharp mask of encoded values [size][size][3] in place: each gets amount times the difference of its pixel's luma

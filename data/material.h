@@ -59,6 +59,6 @@ ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_
 void io_print_conventions(FILE *f, unsigned which, bool directx);
 /* A five-panel strip as io_read_strip reads it (16-bit PNG); input is linear, size x size. */
 ts_code io_write_strip(const char *path, const io_material *m, const io_image *input, ts_status *st);
-/* Reads maps.exr; the maps' normals have y up, whatever the file's have. */
+/* Reads maps.exr back, which only tests do; the maps' normals have y up, whatever the file's have. */
 ts_code io_read_maps_exr(const char *path, io_material *m, ts_status *st);
 #endif

@@ -23,7 +23,7 @@ static bool at(const relief *r, int i, int j, float *z)
     return true;
 }
 
-/* dz/dx by the neighbours that there are; along rows (x) or up the columns (y). */
+/* dz/dx by the neighbours that there are; along the rows (x) or down the columns (y). */
 static float slope(const relief *r, int i, int j, int di, int dj)
 {
     float before = 0, after = 0, here = 0;

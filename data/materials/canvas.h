@@ -60,7 +60,7 @@ float *cv_noise(io_canvas *c, nz_frame f, nz_kind kind, float frequency, int oct
 /* Planes for a cell pattern. */
 nz_cells cv_cells(io_canvas *c);
 
-/* In place: 0 where plane is below edge - width, 1 above edge + width; width is at least half of least. */
+/* In place: 0 where plane is below edge - width, 1 above edge + width, smooth between; width is at least 1e-5. */
 void cv_threshold(io_canvas *c, float *plane, float edge, float width);
 /* The value that coverage (0 .. 1) of a plane with mean 0 and standard deviation 1 lies above. */
 float cv_level(float coverage);

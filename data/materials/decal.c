@@ -27,7 +27,7 @@ static float letter(uint32_t bits, float x, float y)
                                        {-.3f, 0, .3f, 0},       {-.3f, -.5f, .3f, -.5f}, {-.3f, -.5f, .3f, .5f},
                                        {-.3f, .5f, .3f, -.5f},  {0, -.5f, 0, .5f}};
     float d = 1;
-    if (!(bits & 0x83)) bits |= 1; /* every letter stands on an upright */
+    if (!(bits & 0x83)) bits |= 1; /* nearly every letter stands on an upright */
     for (int k = 0; k < 8; k++)
         if (bits >> k & 1 && (k < 5 || bits >> (k + 8) & 1))
             d = nz_min(d, segment(x, y, stroke[k][0], stroke[k][1], stroke[k][2], stroke[k][3]));

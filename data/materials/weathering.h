@@ -5,7 +5,7 @@
 
 /* Dirt of one colour: in cavities (as seen at the given radius), and in patches; it is rough. amount 0 .. 1. */
 void wear_dirt(io_canvas *c, float radius, float amount);
-/* Convex edges rubbed down to s (NULL: only lighter and smoother), broken up by noise. amount 0 .. 1. */
+/* Convex edges rubbed down to s (NULL: only lighter, and mostly smoother), broken up by noise. amount 0 .. 1. */
 void wear_edges(io_canvas *c, float radius, float amount, const io_substance *s);
 /* Fine lines: rougher or smoother, lighter or darker, slightly cut in. bare: what they lay open, or NULL. */
 void wear_scratches(io_canvas *c, int count, float longest, const io_substance *bare);
