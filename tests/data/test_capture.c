@@ -61,6 +61,13 @@ TEST(capture_comes_back)
     CHECK(io_read_capture(test_folder(), 6, 3, &back, &st) == TS_UNSUPPORTED && !back.image,
           "more pixels than allowed");
     st = (ts_status){0};
+    char folder[256];
+    snprintf(folder, sizeof folder, "%s/wood_3.5cm", test_folder());
+    CHECK(!mkdir(folder, 0700) && !io_write_capture(folder, &c, &st) &&
+              !io_read_capture(folder, 6, 1 << 20, &back, &st),
+          "%s", st.message);
+    CHECK(!strcmp(back.name, "wood_3.5cm"), "named %s", back.name);
+    io_capture_free(&back);
     CHECK(io_read_capture(test_folder(), 6, IO_MAX_PIXELS_DEFAULT, &back, &st) == TS_OK && back.size == 6, "%s",
           st.message);
     double a = 0, b = 0;

@@ -8,11 +8,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Lab of sRGB with red and blue exchanged, so that taking the file for sRGB is seen. */
-static cmsInt32Number sample(const cmsUInt16Number in[], cmsUInt16Number out[], void *to_lab)
+/* Lab or XYZ of sRGB with red and blue exchanged, so that taking the file for sRGB is seen. */
+static cmsInt32Number sample(const cmsUInt16Number in[], cmsUInt16Number out[], void *transform)
 {
     const cmsUInt16Number exchanged[3] = {in[2], in[1], in[0]};
-    cmsDoTransform(to_lab, exchanged, out, 1);
+    cmsDoTransform(transform, exchanged, out, 1);
     return 1;
 }
 
@@ -28,18 +28,20 @@ static bytes saved(cmsHPROFILE p)
     return b;
 }
 
-/* kind: cmsSigRgbData, or another space, whose profile no RGB file can use. both: sRGB's matrix and curves too. */
+/* kind: cmsSigRgbData, or another space, whose profile no RGB file can use. both: of XYZ, with sRGB's matrix and curves
+ * too. */
 static bytes table_profile(cmsColorSpaceSignature kind, bool both)
 {
     const unsigned channels = kind == cmsSigRgbData ? 3 : 4;
-    cmsHPROFILE srgb = cmsCreate_sRGBProfile(), lab = cmsCreateLab4Profile(NULL), p = cmsCreateProfilePlaceholder(NULL);
-    cmsHTRANSFORM to_lab = cmsCreateTransform(srgb, TYPE_RGB_16, lab, TYPE_Lab_16, INTENT_RELATIVE_COLORIMETRIC,
-                                              cmsFLAGS_NOOPTIMIZE);
+    cmsHPROFILE srgb = cmsCreate_sRGBProfile(), to = both ? cmsCreateXYZProfile() : cmsCreateLab4Profile(NULL),
+                p = cmsCreateProfilePlaceholder(NULL);
+    cmsHTRANSFORM transform = cmsCreateTransform(srgb, TYPE_RGB_16, to, both ? TYPE_XYZ_16 : TYPE_Lab_16,
+                                                 INTENT_RELATIVE_COLORIMETRIC, cmsFLAGS_NOOPTIMIZE);
     cmsPipeline *pipeline = cmsPipelineAlloc(NULL, channels, 3);
     cmsStage *table = cmsStageAllocCLut16bit(NULL, channels == 3 ? 21 : 2, channels, 3, NULL);
     cmsMLU *name = cmsMLUalloc(NULL, 1);
-    CHECK(srgb && lab && p && to_lab && pipeline && table && name, "lcms2 has no memory");
-    CHECK(cmsStageSampleCLut16bit(table, sample, to_lab, 0) &&
+    CHECK(srgb && to && p && transform && pipeline && table && name, "lcms2 has no memory");
+    CHECK(cmsStageSampleCLut16bit(table, sample, transform, 0) &&
               cmsPipelineInsertStage(pipeline, cmsAT_END, cmsStageAllocToneCurves(NULL, channels, NULL)) &&
               cmsPipelineInsertStage(pipeline, cmsAT_END, table) &&
               cmsPipelineInsertStage(pipeline, cmsAT_END, cmsStageAllocToneCurves(NULL, 3, NULL)),
@@ -48,7 +50,7 @@ static bytes table_profile(cmsColorSpaceSignature kind, bool both)
     cmsSetProfileVersion(p, 4.3);
     cmsSetDeviceClass(p, cmsSigInputClass);
     cmsSetColorSpace(p, kind);
-    cmsSetPCS(p, cmsSigLabData);
+    cmsSetPCS(p, both ? cmsSigXYZData : cmsSigLabData);
     CHECK(cmsWriteTag(p, cmsSigAToB0Tag, pipeline) && cmsWriteTag(p, cmsSigProfileDescriptionTag, name) &&
               cmsWriteTag(p, cmsSigMediaWhitePointTag, cmsD50_XYZ()),
           "the profile is not made");
@@ -59,8 +61,8 @@ static bytes table_profile(cmsColorSpaceSignature kind, bool both)
     const bytes b = saved(p);
     cmsMLUfree(name);
     cmsPipelineFree(pipeline);
-    cmsDeleteTransform(to_lab);
-    cmsCloseProfile(p), cmsCloseProfile(lab), cmsCloseProfile(srgb);
+    cmsDeleteTransform(transform);
+    cmsCloseProfile(p), cmsCloseProfile(to), cmsCloseProfile(srgb);
     return b;
 }
 
