@@ -327,7 +327,7 @@ static double gamma_encode(double x) { return x > 0 ? x < 1 ? pow(x, 1 / 2.2) : 
 /* |got - want| in units in the last place of want as a float. */
 static double ulps(float got, double want)
 {
-    if (isnan(want)) return isnan(got) ? 0 : INFINITY;
+    if (isnan(got) || isnan(want)) return isnan(got) && isnan(want) ? 0 : INFINITY;
     if (isinf(got) || isinf((float)want)) {
         /* at the very end of the range either side is right to a rounding */
         bool edge = fabs(want) > 3.4028233e38 && fabsf(got) > 3.4028233e38f && (got > 0) == (want > 0);
