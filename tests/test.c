@@ -1,9 +1,12 @@
 /* Runs every registered test in a process of its own, so that a crash is one failure and not the end, and prints
- * "ok NAME", "FAIL NAME: why" or "skip NAME: why" for each. An argument selects the tests whose name contains it. */
+ * "ok NAME", "FAIL NAME: why" or "skip NAME: why" for each. An argument selects the tests whose name contains it.
+ * A test and what it starts are one process group, which ends with the test, and after LIMIT_SECONDS at the latest. */
 #include "tests/test.h"
 #include "cli/cli.h"
 #include "tensor/cpu.h"
 #include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
@@ -96,31 +99,74 @@ const char *test_folder(void)
 
 static int by_name(const void *a, const void *b) { return strcmp(*(const char *const *)a, *(const char *const *)b); }
 
+static volatile sig_atomic_t group, late; /* the group of the test that runs, 0: none */
+
+static void at_the_limit(int signal)
+{
+    (void)signal;
+    late = 1;
+    if (group) kill((pid_t)-group, SIGKILL);
+}
+
+/* A terminal's Ctrl-C does not reach the group of the test. */
+static void stopped(int number)
+{
+    if (group) kill((pid_t)-group, SIGKILL);
+    signal(number, SIG_DFL);
+    raise(number);
+}
+
+/* What is ignored stays so, as under nohup. */
+static void handle(bool in_runner)
+{
+    static const int ends[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGALRM};
+    for (size_t i = 0; i < sizeof ends / sizeof *ends; i++) {
+        struct sigaction action = {.sa_handler = SIG_DFL}, old;
+        if (in_runner) action.sa_handler = ends[i] == SIGALRM ? at_the_limit : stopped;
+        sigaction(ends[i], NULL, &old);
+        if (old.sa_handler != SIG_IGN || ends[i] == SIGALRM) sigaction(ends[i], &action, NULL);
+    }
+}
+
+static _Noreturn void be_test(int i, int out)
+{
+    handle(false);
+    report = out;
+    tests[i].f();
+    leave('O', "");
+}
+
 /* 0 ok, 1 failed, 2 skipped */
 static int run(int i)
 {
     int ends[2];
-    if (pipe(ends) != 0) abort();
+    if (pipe2(ends, O_CLOEXEC) != 0 || fcntl(ends[0], F_SETFL, O_NONBLOCK) != 0) abort();
     fflush(NULL);
+    late = 0;
     const pid_t child = fork();
     if (child < 0) abort();
     if (child == 0) {
+        setpgid(0, 0);
         close(ends[0]);
-        report = ends[1];
-        alarm(LIMIT_SECONDS);
-        tests[i].f();
-        leave('O', "");
+        be_test(i, ends[1]);
     }
+    setpgid(child, child); /* whichever of the two comes first */
+    group = child;
+    alarm(LIMIT_SECONDS);
     close(ends[1]);
-    char text[1024];
-    size_t used = 0;
-    for (ssize_t n; (n = read(ends[0], text + used, sizeof text - 1 - used)) > 0;) used += (size_t)n;
-    text[used] = 0;
-    close(ends[0]);
     int status;
-    waitpid(child, &status, 0);
+    while (waitpid(child, &status, 0) < 0)
+        if (errno != EINTR) abort();
+    alarm(0);
+    kill(-child, SIGKILL); /* what it has left running */
+    group = 0;
+    char text[1024]; /* written at once: all of it is there */
+    const ssize_t used = read(ends[0], text, sizeof text - 1);
+    text[used > 0 ? used : 0] = 0;
+    close(ends[0]);
     const int failed_exit = !(WIFEXITED(status) && WEXITSTATUS(status) == 0);
     if (text[0] == 'F') printf("FAIL %s: %s\n", tests[i].name, text + 1);
+    else if (late && failed_exit) printf("FAIL %s: not done after %d s\n", tests[i].name, LIMIT_SECONDS);
     else if (WIFSIGNALED(status))
         printf("FAIL %s: killed by signal %d (%s)\n", tests[i].name, WTERMSIG(status), strsignal(WTERMSIG(status)));
     else if (failed_exit || (text[0] != 'O' && text[0] != 'S'))
@@ -129,7 +175,7 @@ static int run(int i)
     else if (text[0] == 'S') printf("skip %s: %s\n", tests[i].name, text + 1);
     else printf("ok %s\n", tests[i].name);
     fflush(stdout);
-    return text[0] == 'F' || failed_exit ? 1 : text[0] == 'S' ? 2 : 0;
+    return failed_exit || (text[0] != 'O' && text[0] != 'S') ? 1 : text[0] == 'S' ? 2 : 0;
 }
 
 int main(int argc, char **argv)
@@ -141,6 +187,7 @@ int main(int argc, char **argv)
         return 2;
     }
     qsort(tests, (size_t)count, sizeof tests[0], by_name);
+    handle(true);
     int failed = 0, ran = 0;
     if (argc > 2) {
         fprintf(stderr, "lgd-test takes one word of the tests' names at most\n");
