@@ -11,6 +11,11 @@ export LC_ALL=C
 T=$(mktemp -d) || exit 1
 trap 'rm -rf "$T"' EXIT
 bad=0 injected=0
+for name in ${SCENARIOS:-}; do
+    grep -q "^scenario $name " "$0" && continue
+    echo "run.sh: SCENARIOS: there is no $name, but $(sed -n 's/^scenario \([a-z]*\) .*/\1/p' "$0" | xargs)" >&2
+    exit 2
+done
 
 # scenario NAME OPTIONS... -- PROGRAM ARGUMENTS...: %o stands for the folder that the program writes below.
 scenario() {
