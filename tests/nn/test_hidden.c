@@ -70,17 +70,17 @@ TEST(hidden_diffuse_ends_where_the_material_does)
         for (int k = 0; k < 3; k++) maps[i * C + MAP_DIFFUSE + k] = 2 * 0.02f - 1;
     fill(1, filled);
     double disk = 0;
-    float wall = 0, tiles = 0;
+    double wall = 0, tiles = 0;
     int count = 0;
     for (int i = 0; i < PIXELS; i += 2) {
         const float now = (filled[i * C] + 1) / 2, change = fabsf(logf(now / ((maps[i * C] + 1) / 2)));
         if (distance(i) < 0.03f) disk += (double)now, count++;
-        else if (i / SIDE >= edge + 4) tiles = fmaxf(tiles, change);
-        else if (i / SIDE < edge - 4 && distance(i) > 0.16f) wall = fmaxf(wall, change);
+        else if (i / SIDE >= edge + 4) tiles = farther(tiles, (double)change);
+        else if (i / SIDE < edge - 4 && distance(i) > 0.16f) wall = farther(wall, (double)change);
     }
     CHECK(disk / count > 0.33 && disk / count < 0.43, "albedo .133 became %g, not .4", disk / count);
-    CHECK(wall < 0.1f, "the wall is changed by e^%g", wall);
-    CHECK(tiles < 0.3f, "black is changed by e^%g", tiles);
+    CHECK(wall < 0.1, "the wall is changed by e^%g", wall);
+    CHECK(tiles < 0.3, "black is changed by e^%g", tiles);
 }
 
 /* What is seen stays: a disk on a matt material is the material's own. */
@@ -162,9 +162,9 @@ TEST(hidden_diffuse_leaves_what_is_dark)
     for (int i = 0; i < PIXELS; i++)
         for (int k = 0; k < 3; k++) maps[i * C + MAP_DIFFUSE + k] = i / SIDE < SIDE / 4 ? 2 * 0.01f - 1 : 2 * 0.7f - 1;
     fill(1, filled);
-    float most = 0;
-    for (int i = 0; i < PIXELS / 8; i++) most = fmaxf(most, (filled[i * C] + 1) / 2);
-    CHECK(most < 0.015f, "an albedo of .01 beside .7 becomes %g", most);
+    double most = 0;
+    for (int i = 0; i < PIXELS / 8; i++) most = farther(most, ((double)filled[i * C] + 1) / 2);
+    CHECK(most < 0.015, "an albedo of .01 beside .7 becomes %g", most);
 }
 
 /* F0 beside a highlight, a guess, goes most of the way to that of the highlight, and keeps its detail; that of the
