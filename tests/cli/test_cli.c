@@ -2,6 +2,7 @@
 #include "cli/arguments.h"
 #include "cli/camera.h"
 #include "cli/cli.h"
+#include "tests/support/comma.h"
 #include "tests/test.h"
 #include "train/state.h"
 #include <fcntl.h>
@@ -34,7 +35,7 @@ TEST(cli_numbers_are_whole_strings_in_range)
 
 TEST(cli_numbers_ignore_the_locale)
 {
-    if (setenv("LC_ALL", "de_DE.UTF-8", 1) != 0) test_skip("setenv");
+    comma_locale();
     CHECK(cl_init("test") == CL_OK, "init");
     double d = 0;
     CHECK(cl_parse_real("0.25", 0, 1, &d) && d == 0.25, "0.25 is %g", d);
