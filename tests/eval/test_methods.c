@@ -315,7 +315,8 @@ TEST(methods_points_and_settings)
     CHECK(ev_method_parse("lgd", weights(true, true), -1, &e, &st) == TS_OK && ev_open(&e, &st) == TS_UNSUPPORTED &&
               strstr(st.message, "auto-encoder"),
           "%s", st.message);
-    CHECK(ts_fma_peak() > 1e8, "the peak is %g FLOP/s", ts_fma_peak());
+    const double peak = ts_fma_peak();
+    CHECK(isfinite(peak) && peak > 0, "the peak is %g FLOP/s", peak);
 }
 
 /* A tile that nothing may end early is the whole photograph's result. */
