@@ -4,9 +4,12 @@
 
 enum { LONGEST = 1 << 13 }; /* two paths and some words */
 
-/* What is too long for a message loses its middle: the file is named at its beginning, what is wrong at its end. */
-static void put(ts_status *st, const char *text)
+/* One line. What is too long for a message loses its middle: the file is named at its beginning, what is wrong at its
+ * end. */
+static void put(ts_status *st, char *text)
 {
+    for (char *p = text; *p; p++)
+        if (*p == '\n' || *p == '\r') *p = ' ';
     static const char gap[] = " ... ";
     const size_t size = strlen(text), room = sizeof st->message - 1, begin = room / 2 - sizeof gap;
     if (size <= room) {
@@ -28,8 +31,6 @@ ts_code ts_fail(ts_status *st, ts_code code, const char *format, ...)
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
-    for (char *p = text; *p; p++)
-        if (*p == '\n' || *p == '\r') *p = ' ';
     st->code = code;
     put(st, text);
     return code;

@@ -33,8 +33,8 @@ TEST(status_keeps_one_line_and_puts_context_first)
     ts_status st = {0};
     CHECK(ts_context(&st, "file") == TS_OK && st.message[0] == 0, "context on success must do nothing");
     ts_fail(&st, TS_FORMAT, "bad\nvalue %d", 7);
-    ts_context(&st, "a/%s", "b.ini");
-    CHECK(!strcmp(st.message, "a/b.ini: bad value 7") && st.code == TS_FORMAT, "got '%s'", st.message);
+    ts_context(&st, "a\r/%s", "b\n.ini");
+    CHECK(!strcmp(st.message, "a /b .ini: bad value 7") && st.code == TS_FORMAT, "got '%s'", st.message);
     char text[2000];
     memset(text, 'x', sizeof text - 1);
     text[sizeof text - 1] = 0;
