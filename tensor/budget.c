@@ -3,6 +3,7 @@
 #include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -21,12 +22,14 @@ static double number_in(const char *folder, const char *name)
     return v;
 }
 
-/* The sum of the values, in units of unit, of those names in a file of lines "NAME VALUE"; -1: it has none of them. */
+/* The sum of the values, in units of unit, of those names in a file of lines "NAME VALUE"; -1: it does not have the
+ * first of them. */
 static double sum_in(const char *path, const char *const *names, double unit)
 {
     char line[256], name[64];
     double sum = 0, value;
     int found = 0;
+    bool first = false;
     FILE *f = fopen(path, "re");
     if (!f) return -1;
     int wanted = 0;
@@ -34,9 +37,9 @@ static double sum_in(const char *path, const char *const *names, double unit)
     while (found < wanted && fgets(line, sizeof line, f))
         for (int i = 0; i < wanted; i++)
             if (sscanf(line, "%63s %lf", name, &value) == 2 && strcmp(name, names[i]) == 0)
-                sum += value * unit, found++;
+                sum += value * unit, found++, first |= i == 0;
     fclose(f);
-    return found ? sum : -1;
+    return first ? sum : -1;
 }
 
 typedef struct memory {
