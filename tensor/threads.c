@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static atomic_int wanted;
 
@@ -75,7 +76,10 @@ int ts_threads_of_share(int cpus, int processes)
 int ts_threads_allowed(void)
 {
     cpu_set_t set;
-    return ts_threads_of_share(sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1, 1);
+    long cpus = 0;
+    if (sched_getaffinity(0, sizeof set, &set) == 0) cpus = CPU_COUNT(&set);
+    else cpus = sysconf(_SC_NPROCESSORS_ONLN); /* the set has no room for what a kernel for many CPUs tells */
+    return ts_threads_of_share(cpus < MOST_THREADS ? (int)cpus : MOST_THREADS, 1);
 }
 
 void ts_threads_set(int n) { atomic_store(&wanted, n >= 1 ? n : ts_threads_allowed()); }
