@@ -175,6 +175,21 @@ TEST(cpu_refuses_what_is_not_there)
     CHECK(ts_isa_init(&st) == TS_OK && ts_isa_now() == ts_isa_best(), "unset: the best");
 }
 
+/* The tests of kernels go through the instruction sets that there are: a skip here says which of them did not run. */
+static void kernels_run(ts_isa isa)
+{
+    if (isa > ts_isa_best())
+        test_skip("no kernels for %s were tested: this CPU or build has %s", ts_isa_name(isa),
+                  ts_isa_name(ts_isa_best()));
+    ts_isa_use(isa);
+    CHECK(ts_isa_now() == isa, "%s instead of %s", ts_isa_name(ts_isa_now()), ts_isa_name(isa));
+}
+
+TEST(cpu_has_avx2) { kernels_run(TS_AVX2); }
+TEST(cpu_has_avx512) { kernels_run(TS_AVX512); }
+TEST(cpu_has_avx512bf16) { kernels_run(TS_AVX512BF16); }
+TEST(cpu_has_amx) { kernels_run(TS_AMX); }
+
 static void *threads_seen(void *user)
 {
     *(int *)user = ts_threads();
