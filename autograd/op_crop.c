@@ -3,7 +3,6 @@
 #include "autograd/op.h"
 #include "autograd/gradcheck.h"
 #include "ops.h"
-#include "tensor/threads.h"
 #include <string.h>
 
 #ifdef AG_API

@@ -4,7 +4,6 @@
 #include "autograd/gradcheck.h"
 #include "autograd/op.h"
 #include "ops.h"
-#include "tensor/threads.h"
 #include <string.h>
 
 #ifdef AG_API
@@ -151,9 +150,9 @@ static ag_value *to_space(ag_tape *tape, int r, int inputs, ag_value *const in[I
     char text[AG_SHAPE_TEXT], more[AG_SHAPE_TEXT];
     if (!ag_ready(tape, "depth_to_space", inputs, in)) return NULL;
     const ts_shape s = in[X]->t.shape;
-    if (r < 1 || s.c % (r * r))
-        return ag_fail(tape, TS_INVALID, "depth_to_space: %s has not a multiple of %d channels", ag_shape_text(text, s),
-                       r * r);
+    if (r < 1 || (int64_t)s.c % ((int64_t)r * r))
+        return ag_fail(tape, TS_INVALID, "depth_to_space: %s has not a multiple of %lld channels",
+                       ag_shape_text(text, s), (long long)r * r);
     const shuffle_attr a = {r, false};
     const ts_shape out = {s.n, s.h * r, s.w * r, s.c / (r * r)};
     if (in[ADDED] && !ts_same(in[ADDED]->t.shape, out))

@@ -19,25 +19,11 @@ ts_tensor ts_view(float *data, ts_shape s)
 
 ts_tensor ts_new(ts_arena *arena, ts_shape s)
 {
-    float *data = NULL;
-    if (s.n >= 1 && s.h >= 1 && s.w >= 1 && s.c >= 1) data = ts_arena_alloc(arena, (size_t)ts_count(s) * sizeof(float));
-    return ts_view(data, s);
-}
-
-ts_tensor ts_images(const ts_tensor *t, int n0, int n)
-{
-    ts_tensor r = *t;
-    r.data += n0 * t->stride_n;
-    r.shape.n = n;
-    return r;
-}
-
-ts_tensor ts_channels(const ts_tensor *t, int c0, int c)
-{
-    ts_tensor r = *t;
-    r.data += c0;
-    r.shape.c = c;
-    return r;
+    size_t bytes = sizeof(float);
+    const int sides[] = {s.n, s.h, s.w, s.c};
+    for (int i = 0; i < 4; i++)
+        if (sides[i] < 1 || __builtin_mul_overflow(bytes, (size_t)sides[i], &bytes)) return (ts_tensor){.shape = s};
+    return ts_view(ts_arena_alloc(arena, bytes), s);
 }
 
 ts_tensor ts_window(const ts_tensor *t, int y, int x, int h, int w)

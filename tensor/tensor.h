@@ -27,10 +27,7 @@ ts_tensor ts_view(float *data, ts_shape shape);
 /* Contiguous, from the arena, uninitialised (data is NULL when there is no memory or a dimension is < 1). */
 ts_tensor ts_new(ts_arena *arena, ts_shape shape);
 
-/* Views without a copy: images n0 .. n0+n-1; channels c0 .. c0+c-1; the rectangle of h rows and w columns from (y, x).
- */
-ts_tensor ts_images(const ts_tensor *t, int n0, int n);
-ts_tensor ts_channels(const ts_tensor *t, int c0, int c);
+/* A view without a copy: the rectangle of h rows and w columns from (y, x) of each image. */
 ts_tensor ts_window(const ts_tensor *t, int y, int x, int h, int w);
 
 /* dst = src for any strides; shapes are equal. */

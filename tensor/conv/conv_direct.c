@@ -4,7 +4,6 @@
 #include "tensor/conv/plan.h"
 #include "tensor/scratch.h"
 #include "tensor/team.h"
-#include "tensor/threads.h"
 #include <string.h>
 
 typedef struct band {

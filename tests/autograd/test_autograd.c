@@ -219,10 +219,11 @@ TEST(tape_shape_messages)
     REFUSED(ag_gru(tape, x, NULL, gates, v, hidden, three), "biases");
     REFUSED(ag_gru(tape, x, NULL, gates, three, gates, three), "not {3c,c,1,1}");
     REFUSED(ag_resize(tape, x, 0, 4), "0 x 4");
+    REFUSED(ag_depth_to_space(tape, x, 1 << 16), "a multiple of 4294967296 channels");
     REFUSED(ag_leaky(tape, x, NAN), "leak");
     REFUSED(ag_instance_norm(tape, x, 0), "epsilon");
     REFUSED(ag_conv(tape, x, x, NULL, 1, TS_PAD_ZERO, 1), "not {oc,ic,k,k}");
-    REFUSED(ag_constant(tape, ts_channels(&x->t, 1, 2)), "strided");
+    REFUSED(ag_constant(tape, ts_window(&x->t, 1, 1, 2, 2)), "strided");
     REFUSED((ag_backward(tape, x), NULL), "144 values");
 #undef REFUSED
     ag_tape_destroy(&tape);
