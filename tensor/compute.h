@@ -13,6 +13,4 @@ typedef struct ts_compute {
                                gated unit's as tensor/conv/gru.h says */
     int threads;            /* of loops; 0: the process's number (tensor/threads.h) */
 } ts_compute;
-
-static inline const char *ts_precision_name(ts_precision p) { return p == TS_BF16 ? "bf16" : "f32"; }
 #endif

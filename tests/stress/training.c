@@ -79,10 +79,12 @@ static void step(const tr_row *row, void *user)
     t->skipped = (long)row->skipped_total;
 }
 
+static const char *name_of(ts_precision p) { return p == TS_BF16 ? "bf16" : "f32"; }
+
 static bool bound(ts_precision p, const char *what, double measured)
 {
     char text[128];
-    snprintf(text, sizeof text, "training, %s: %s", ts_precision_name(p), what);
+    snprintf(text, sizeof text, "training, %s: %s", name_of(p), what);
     return stress_row(text, measured, 0);
 }
 
@@ -112,7 +114,7 @@ static bool train(const stress *s, ts_precision precision)
     told seen = {0, 0};
     const tr_listener listener = {.step = step, .user = &seen};
     char folder[1200];
-    snprintf(folder, sizeof folder, "%s/%s", s->folder, ts_precision_name(precision));
+    snprintf(folder, sizeof folder, "%s/%s", s->folder, name_of(precision));
     mkdir(folder, 0777);
     tr_trainer *t = poison.maps ? tr_create(&c, folder, false, NULL, &listener, &st) : NULL;
     if (!t) {
@@ -125,8 +127,8 @@ static bool train(const stress *s, ts_precision precision)
     tr_destroy(&t);
     free(poison.maps);
     const long all = c.train.pretrain_steps + c.train.steps;
-    printf("training, %s: %ld of %ld steps, %ld inputs spoilt, %ld steps skipped; %s\n", ts_precision_name(precision),
-           seen.steps, all, poison.spoilt, seen.skipped, code ? st.message : "to its end");
+    printf("training, %s: %ld of %ld steps, %ld inputs spoilt, %ld steps skipped; %s\n", name_of(precision), seen.steps,
+           all, poison.spoilt, seen.skipped, code ? st.message : "to its end");
     bool ok = bound(precision, "stopped early without a reason", code ? !st.message[0] : seen.steps != all);
     ok = bound(precision, "no input was spoilt", poison.spoilt == 0) && ok;
     ok = bound(precision, "weights on disk that are not finite", !finite_weights(folder, "last.safetensors")) && ok;

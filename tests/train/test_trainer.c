@@ -249,7 +249,8 @@ static void learn(ts_precision precision, const char *where, double *first, doub
         if (i >= 50) late += row.loss / 10;
     }
     tr_destroy(&t);
-    CHECK(late < 0.8 * early, "%s: the loss went from %g to %g only", ts_precision_name(precision), early, late);
+    CHECK(late < 0.8 * early, "%s: the loss went from %g to %g only", precision == TS_BF16 ? "bf16" : "f32", early,
+          late);
     *last = late;
 }
 
