@@ -131,7 +131,7 @@ static void backward(ag_tape *tape, ag_node *node)
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[X], &accumulate);
     const ts_conv_use use = ts_conv_packing(&a->conv, TS_CONV_INPUT);
-    if (ag_traced()) ag_trace_way(tape, ts_conv_way_name(ts_conv_choose(&a->conv, TS_CONV_INPUT)));
+    if (dx && ag_traced()) ag_trace_way(tape, ts_conv_way_name(ts_conv_choose(&a->conv, TS_CONV_INPUT)));
     const float *packed = dx ? ag_packed(tape, &a->conv, use, node->in[WEIGHT]->t.data) : NULL;
     if (packed) data_gradients[use](&a->conv, dy, packed, dx, accumulate);
     ag_grad_give(tape, node->out, node->in[BASE]);

@@ -21,10 +21,12 @@ void ag_run_traced(ag_tape *tape, ag_node *node, bool backward)
     ag_trace r = {.op = node->op->name, .pass = backward ? "backward" : "forward", .out = node->out->t.shape};
     if (node->inputs > 0 && node->in[0]) r.in = node->in[0]->t.shape;
     if (node->inputs > 1 && node->in[1]) r.weight = node->in[1]->t.shape;
+    const char *outer = tape->way; /* of the part that this is an operation of */
     tape->way = NULL;
     const double start = now();
     (backward ? node->op->backward : node->op->forward)(tape, node);
     r.seconds = now() - start;
     r.way = tape->way;
+    tape->way = outer;
     sink(&r);
 }

@@ -8,7 +8,7 @@ typedef struct ag_trace {
     const char *pass;         /* "forward", "backward" */
     ts_shape in, weight, out; /* weight: of the second input, all 0 where there is none */
     const char *way; /* of the convolution, NULL of other operations; of backward that of the input's gradient */
-    double seconds;
+    double seconds;  /* of a part (ag_checkpoint) those of its operations too, which have records of their own */
 } ag_trace;
 
 /* Calls sink after each operation of every tape, from the thread that computes; NULL: never, which is how a process
