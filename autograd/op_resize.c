@@ -47,17 +47,14 @@ static void backward(ag_tape *tape, ag_node *node)
     const ts_shape s = node->in[0]->t.shape, d = node->out->t.shape;
     bool accumulate;
     float *dx = ag_grad_target(tape, node->in[X], &accumulate);
-    const ts_mark mark = ts_arena_mark(ag_arena(tape));
-    const ts_taps rows = dx ? taps(tape, node, s.h, d.h) : (ts_taps){0},
-                  columns = dx ? taps(tape, node, s.w, d.w) : (ts_taps){0};
-    ts_taps up = {0}, left = {0};
-    if (rows.weight && columns.weight) {
-        up = ts_taps_transpose(ag_arena(tape), &rows);
-        left = ts_taps_transpose(ag_arena(tape), &columns);
+    if (dx) {
+        const ts_mark mark = ts_arena_mark(ag_arena(tape));
+        const ts_taps rows = taps(tape, node, s.h, d.h), columns = taps(tape, node, s.w, d.w);
+        if (!ts_resample_transposed(ag_arena(tape), s.n, s.c, &rows, &columns, node->out->grad, dx, accumulate,
+                                    ag_threads(tape)))
+            ag_fail(tape, TS_NOMEM, "resize: no memory for the filter");
+        ts_arena_release(ag_arena(tape), mark);
     }
-    if (up.weight && left.weight) ts_resample(s.n, s.c, &up, &left, node->out->grad, dx, accumulate, ag_threads(tape));
-    else if (dx) ag_fail(tape, TS_NOMEM, "resize: no memory for the filter");
-    ts_arena_release(ag_arena(tape), mark);
     ag_grad_give(tape, node->out, node->in[BASE]);
 }
 

@@ -34,13 +34,9 @@ static void backward(ag_tape *tape, ag_node *node)
     const ts_mark mark = ts_arena_mark(ag_arena(tape));
     const ts_taps rows = ts_taps_aligned(ag_arena(tape), s.h, 2 * s.h),
                   columns = ts_taps_aligned(ag_arena(tape), s.w, 2 * s.w);
-    ts_taps up = {0}, left = {0};
-    if (rows.weight && columns.weight) {
-        up = ts_taps_transpose(ag_arena(tape), &rows);
-        left = ts_taps_transpose(ag_arena(tape), &columns);
-    }
-    if (up.weight && left.weight) ts_resample(s.n, s.c, &up, &left, node->out->grad, dx, accumulate, ag_threads(tape));
-    else ag_fail(tape, TS_NOMEM, "upsample: no memory for the weights");
+    if (!ts_resample_transposed(ag_arena(tape), s.n, s.c, &rows, &columns, node->out->grad, dx, accumulate,
+                                ag_threads(tape)))
+        ag_fail(tape, TS_NOMEM, "upsample: no memory for the weights");
     ts_arena_release(ag_arena(tape), mark);
 }
 

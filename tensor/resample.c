@@ -145,3 +145,15 @@ void ts_resample(int n, int c, const ts_taps *rows, const ts_taps *columns, cons
     ts_for(threads, (int64_t)n * rows->out, 1, resample_lines,
            &(resampling){c, rows, columns, x, y, accumulate, !accumulate && copies(columns)});
 }
+
+bool ts_resample_transposed(ts_arena *arena, int n, int c, const ts_taps *rows, const ts_taps *columns, const float *x,
+                            float *y, bool accumulate, int threads)
+{
+    if (!rows->weight || !columns->weight) return false;
+    const ts_mark mark = ts_arena_mark(arena);
+    const ts_taps up = ts_taps_transpose(arena, rows), left = ts_taps_transpose(arena, columns);
+    const bool held = up.weight && left.weight;
+    if (held) ts_resample(n, c, &up, &left, x, y, accumulate, threads);
+    ts_arena_release(arena, mark);
+    return held;
+}

@@ -40,4 +40,9 @@ ts_taps ts_taps_transpose(ts_arena *arena, const ts_taps *t);
  * threads 0: the process's number. */
 void ts_resample(int n, int c, const ts_taps *rows, const ts_taps *columns, const float *x, float *y, bool accumulate,
                  int threads);
+
+/* The same by the transposed filters, which the arena holds while it lasts: x: [n, rows->out, columns->out, c], y: [n,
+ * rows->in, columns->in, c]. False: no memory for them, or rows or columns have no weights. */
+bool ts_resample_transposed(ts_arena *arena, int n, int c, const ts_taps *rows, const ts_taps *columns, const float *x,
+                            float *y, bool accumulate, int threads);
 #endif
