@@ -133,8 +133,8 @@ void ag_freeze(ag_tape *tape, bool frozen);
  * each layer nor far from the caches. */
 void ag_pass(ag_tape *tape, bool passing);
 /* Weights of convolutions and linear layers that are in memory as IEEE 754 halves: halves returns where, or NULL for
- * others. The floats of such a weight are never read; its address is its name. For tapes that share packed weights too.
- */
+ * others. On a tape without gradients the floats of such a weight are never read; its address is its name. For tapes
+ * that share packed weights too. */
 typedef const void *(*ag_halves)(const float *weight, void *user);
 void ag_halves_from(ag_tape *tape, ag_halves halves, void *user);
 const void *ag_half(ag_tape *tape, const float *weight); /* what halves returns of it */

@@ -57,8 +57,8 @@ void ts_arena_destroy(ts_arena **arena)
     *arena = NULL;
 }
 
-/* A chunk of at least bytes as chunk number a->chunks; sizes double so that MAX_CHUNKS never ends before memory does.
- */
+/* A chunk of at least bytes as chunk number a->chunks. What is held grows by half each time, so that MAX_CHUNKS never
+ * ends before memory does. */
 static int add_chunk(ts_arena *a, size_t bytes)
 {
     if (a->chunks == MAX_CHUNKS) return 0;

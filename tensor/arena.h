@@ -29,7 +29,8 @@ void ts_arena_release(ts_arena *arena, ts_mark mark);
 
 /* For an arena that is empty: what is allocated next lies in one piece of at least bytes, so that memory that was given
  * back is the next to be used; of several pieces the later ones are new, and the system clears new memory, on so many
- * threads (0: the process's number). A hint: where there is less memory nothing changes. */
+ * threads (0: the process's number). Pieces that are too small are given back to the system first; what is larger
+ * already stays. A hint: where there is less memory, what is allocated comes in pieces as without. */
 void ts_arena_reserve(ts_arena *arena, size_t bytes, int threads);
 
 /* Gives everything back. Several chunks are merged into one of the peak's size, so that a repeated

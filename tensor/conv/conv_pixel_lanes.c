@@ -2,7 +2,7 @@
  * instead. A strip of columns goes down the image; its rows of input, transposed to [channel][column], stay in the
  * second cache, and a tile of output channels x pixels stays in registers over all taps and inputs.
  *
- * In the shipped models this is g's last layer, from 9 to 9 channels: .3 % of an estimate's time (LGD_TRACE=1). The
+ * In the shipped models this is g.output.conv2, from 9 to 9 channels: .3 % of an estimate's time (LGD_TRACE=1). The
  * direct way would fill 9 of 16 lanes there, and add in another order, so that results would have other bytes. */
 #include "tensor/conv/plan.h"
 #include "tensor/scratch.h"

@@ -1,8 +1,8 @@
 /* Vector exp, exp2, expm1, log, tanh, sigmoid, gamma. Largest error over all floats, in units in the last place of the
  * double result rounded to float: exp, exp2, expm1, log 2; tanh, sigmoid 3; gamma below
- * (tests/tensor/test_elementwise.c measures them). Everywhere: NaN gives NaN; results below FLT_MIN are rounded
- * denormals, never flushed; results above FLT_MAX are infinity. Polynomials are minimax fits (Remez) of the expression
- * that each comment names; only files in this folder include this. */
+ * (tests/tensor/test_elementwise.c measures them). NaN gives NaN, but 0 of gamma; everywhere results below FLT_MIN are
+ * rounded denormals, never flushed, and results above FLT_MAX infinity. Polynomials are minimax fits (Remez) of the
+ * expression that each comment names. Only files in this folder and in render/kernels include this. */
 #ifndef TS_VMATH_H
 #define TS_VMATH_H
 #include "tensor/kernels/vec.h"
