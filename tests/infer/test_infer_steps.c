@@ -168,3 +168,37 @@ TEST(infer_takes_orientations_that_suit_what_is_known)
         lgd_free(&m);
     }
 }
+
+/* What programs ask of a model, and of the library. */
+TEST(infer_usual_steps_and_the_published_network)
+{
+    nn_arch several = tiny(), published = tiny();
+    several.g_unshuffle = 4, several.g_detail = 6, several.h_width = 0, several.descent = NN_DESCENT_POSTERIOR;
+    several.conditions = several.spread = several.scene = true;
+    published.compat = NN_COMPAT_PUBLISHED, published.descent = NN_DESCENT_NONE, published.rmse = NN_RMSE_BATCH;
+    published.channels = 10, published.recurrent = false;
+    const struct {
+        nn_arch arch;
+        int one, three;
+        bool published;
+    } kinds[] = {{tiny(), T, T, false}, {several, T, 2 * T, false}, {published, T, T, true}};
+    for (int i = 0; i < 3; i++) {
+        lgd_model *m = load(kinds[i].arch);
+        CHECK(lgd_trained_iterations(m) == T && lgd_usual_iterations(m, 1) == kinds[i].one &&
+                  lgd_usual_iterations(m, 3) == kinds[i].three,
+              "kind %d: %d steps, %d of three photographs", i, lgd_usual_iterations(m, 1), lgd_usual_iterations(m, 3));
+        CHECK(!lgd_published(m) == !kinds[i].published, "kind %d: published %d", i, lgd_published(m));
+        lgd_free(&m);
+    }
+}
+
+TEST(infer_version_is_the_makefiles)
+{
+    char line[256], said[64] = "";
+    FILE *f = fopen("Makefile", "r");
+    CHECK(f, "no Makefile here");
+    while (!said[0] && fgets(line, sizeof line, f))
+        if (sscanf(line, "VERSION := %63s", said) != 1) said[0] = 0;
+    fclose(f);
+    CHECK(said[0] && !strcmp(lgd_version(), said), "%s, and the Makefile says %s", lgd_version(), said);
+}
