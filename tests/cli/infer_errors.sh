@@ -200,7 +200,7 @@ without_the_image_library() {
     cp "$BIN/lgd-infer" "$T/i/bin"
     expect 0 infer "$T/p.ppm" -o "$T/d"
     cp "$T/d/p/diffuse.png" "$T/q.png"
-    expect 0 "$T/i/bin/lgd-infer" -i 0 -s 8 "$T/q.png" -o "$T/o" # a PNG needs none
+    expect 0 "$T/i/bin/lgd-infer" -i 0 -s 8 "$T/q.png" "$ROOT/demo/flash.jpg" -o "$T/o" # a PNG or a JPEG needs none
     "$T/i/bin/lgd-infer" -i 0 -s 8 "$T/p.ppm" -o "$T/o" >"$T/out" 2>"$T/err" && skip "the image library is installed"
     lines "$T/err" 1
     says "$T/err" "p.ppm: this image needs liblgd_image.so"

@@ -87,6 +87,10 @@ TEST(png_and_jpeg_load_no_image_library)
     CHECK(io_write_png(path, &image, 16, true, &st) == TS_OK && io_read_photo(path, 1000, &back, &st) == TS_OK, "%s",
           st.message);
     CHECK(!library_is_loaded(), "a PNG needs the image library");
+    io_image_free(&back);
+    CHECK(io_read_photo("demo/flash.jpg", IO_MAX_PIXELS_DEFAULT, &back, &st) == TS_OK, "%s", st.message);
+    CHECK(!library_is_loaded(), "a JPEG needs the image library");
+    io_image_free(&back);
     snprintf(path, sizeof path, "%s/a.jpg", test_folder());
     CHECK(io_write_jpeg(path, &image, 90, &st) == TS_OK, "%s", st.message);
     CHECK(library_is_loaded(), "the image library is not seen in /proc/self/maps");
