@@ -174,6 +174,11 @@ await() {
     fail "$1 did not appear"
 }
 
+# Holds $job, whose whole log has so many lines, while it has steps to do.
+halted_before() {
+    kill -STOP $job && [ "$(wc -l <"$T/run/log.csv")" -lt "$1" ] || fail "it was halted too late: the test is none"
+}
+
 interrupt_saves_and_resume_is_exact() {
     config
     set -- --set train.steps=200 --set validate.every=100
@@ -187,7 +192,9 @@ interrupt_saves_and_resume_is_exact() {
             --set train.checkpoint_every=1 >"$T/out" 2>"$T/err" &
         job=$!
         await "$T/run/last.safetensors"
+        halted_before 205 # it ends at the step that it has come to, however fast it is
         kill -$signal $job
+        kill -CONT $job
         if [ $signal = HUP ]; then kill -HUP $job 2>/dev/null; fi # a closed terminal sends it twice
         wait $job
         [ $? -eq 130 ] || fail "SIG$signal: exit status is not 130: $(tail -n 1 "$T/err")"
@@ -207,8 +214,11 @@ hangup_is_ignored_under_nohup() {
     nohup "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 --set train.steps=100 >"$T/out" 2>"$T/err" &
     job=$!
     await "$T/run/last.safetensors"
-    kill -HUP $job 2>/dev/null
+    halted_before 105
+    kill -HUP $job || fail "it has ended: the test is none"
+    kill -CONT $job
     wait $job || fail "it was stopped: $(tail -n 1 "$T/err")"
+    lines "$T/run/log.csv" 105
 }
 
 # A run that was killed before its first checkpoint after step 1 goes on, and in a folder without a checkpoint one
