@@ -3,8 +3,9 @@
 
 help_names_the_options() {
     expect 0 "$BIN/lgd-eval" --help
-    for o in method repeat pin tune figure pareto descent finetune fast set iterations model threads seed noise images \
-        size output procedural strips maps told untold peer-maps photos peers shard; do says "$T/out" "$o"; done
+    for o in method repeat pin tune figure pareto fast set iterations model threads seed noise images size output told \
+        untold peer-maps shard; do grep -qE -- "--$o( |\$)" "$T/out" || fail "no --$o"; done
+    for word in procedural: strips: maps: photos: peers: " descent" " finetune"; do says "$T/out" "$word"; done
     says "$T/out" "default: of mean, lgd, descent, newton and finetune"
 }
 

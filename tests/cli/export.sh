@@ -110,6 +110,14 @@ packed() {
     for f in metallic occlusion orm roughness; do says "$T/o/flash/meta.txt" "$f.png: linear, "; done
 }
 
+occlusion() {
+    expect 0 infer --maps diffuse --ao
+    holds "diffuse.png meta.txt occlusion.png"
+    mv "$T/o" "$T/option"
+    expect 0 infer --maps diffuse,ao
+    cmp "$T/o/flash/occlusion.png" "$T/option/flash/occlusion.png" || fail "--ao and --maps ao differ"
+}
+
 materialx() {
     expect 0 infer --maps materialx
     holds "diffuse.png material.mtlx meta.txt normal.png roughness.png specular.png"
@@ -164,6 +172,7 @@ check export_metallic metallic
 check export_gltf gltf
 check export_glb glb
 check export_packed packed
+check export_occlusion occlusion
 check export_materialx materialx
 # Maps that repeat: another picture, of which meta.txt says so; the photograph's rendering stays that of the photograph.
 seamless() {
