@@ -36,6 +36,7 @@ metallic() {
 }
 
 gltf() {
+    command -v python3 >/dev/null || skip "python3 is not installed"
     expect 0 infer --maps gltf
     holds "diffuse.png material.gltf meta.txt normal.png roughness.png specular.png"
     # an index of refraction that makes specularColorTexture F0 itself, in Blender too
