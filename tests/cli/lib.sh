@@ -31,6 +31,17 @@ expect() {
     [ "$got" -eq "$want" ] || fail "'$*' exited with $got, not $want: $(head -n 1 "$T/err" | cut -c1-200)"
 }
 
+# Root may write everywhere: sets NOT_ROOT to what a command begins with that is to be another user's, who can read $T.
+# Skips where there is no other or not one who may run $1.
+not_root() {
+    NOT_ROOT=
+    [ "$(id -u)" -eq 0 ] || return 0
+    command -v setpriv >/dev/null || skip "root may write everywhere, and setpriv is not installed (util-linux)"
+    NOT_ROOT="setpriv --reuid=65534 --regid=65534 --clear-groups"
+    chmod -R a+rX "$T"
+    $NOT_ROOT "$1" --version >/dev/null 2>&1 || skip "root may write everywhere, and no other user may run $1"
+}
+
 # make install and make manuals need help2man, which make test installs where it may.
 has_help2man() { command -v help2man >/dev/null || skip "help2man is not installed"; }
 

@@ -329,12 +329,14 @@ unwritable_folder() {
     says "$T/err" "$T/file"
     expect 1 "$TRAIN" "$T/small.ini" --set output.folder="$T/file"
     says "$T/err" "$T/file"
-    if [ "$(id -u)" -ne 0 ]; then
-        mkdir "$T/closed"
-        chmod 555 "$T/closed"
-        expect 1 "$TRAIN" "$T/small.ini" --set output.folder="$T/closed/run"
-        says "$T/err" "$T/closed"
-    fi
+}
+
+folder_of_another() {
+    config
+    not_root "$TRAIN"
+    mkdir -m 555 "$T/closed"
+    expect 1 $NOT_ROOT "$TRAIN" "$T/small.ini" --set output.folder="$T/closed/run"
+    says "$T/err" "$T/closed"
 }
 
 # A limit on the size of files stands for a full disk.
@@ -375,5 +377,6 @@ check train_second_trainer_is_refused second_trainer_is_refused
 check train_init_from_weights init_from_weights
 check train_divergence_stops_with_a_reason divergence_stops_with_a_reason
 check train_unwritable_folder unwritable_folder
+check train_folder_of_another folder_of_another
 check train_full_disk full_disk
 check train_shipped_configurations_are_valid shipped_configurations_are_valid
