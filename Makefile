@@ -470,6 +470,7 @@ install: all
 	  'Description: material of a surface from one flash photograph' 'Version: $(VERSION)' \
 	  'Cflags: -I$${prefix}/include' 'Libs: -L$${libdir} -llgd' \
 	  'Libs.private: $(PKG_LIBS) -lpthread -ldl -lm' > $(TO_LIB)/pkgconfig/lgd.pc
+	@chmod 644 $(TO_LIB)/pkgconfig/lgd.pc # whatever the umask is
 	@[ -n "$(DESTDIR)" ] || ldconfig 2>/dev/null || true # the loader's list of libraries, where we may write it
 
 uninstall:

@@ -84,8 +84,11 @@ install_link_uninstall() {
     [ -z "$SANITIZED" ] || skip "the sanitizers' build is not installed"
     command -v pkg-config >/dev/null || skip "no pkg-config"
     has_help2man
-    expect 0 make --no-print-directory install BUILD="$BUILD" DESTDIR="$T/root" PREFIX=/usr/local
+    (umask 077 # what is installed is for all, whatever the umask is
+     expect 0 make --no-print-directory install BUILD="$BUILD" DESTDIR="$T/root" PREFIX=/usr/local) || exit 1
     root=$T/root/usr/local
+    find "$root" ! -type l ! -perm -444 >"$T/closed"
+    [ ! -s "$T/closed" ] || fail "not for all: $(head -n 3 "$T/closed")"
     for f in bin/lgd-infer bin/lgd-train bin/lgd-eval bin/lgd-data bin/lgd-convert bin/lgd-capture lib/liblgd.a \
         lib/liblgd.so \
         lib/liblgd.so.0 lib/lgd/liblgd_image.so include/lgd.h share/lgd/phone.safetensors lib/pkgconfig/lgd.pc \
