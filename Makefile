@@ -56,6 +56,12 @@ endif
 ifeq (0,$(MAKELEVEL)$(filter -j% --jobserver%,$(MAKEFLAGS)))
 MAKEFLAGS += -j$(shell nproc 2>/dev/null || echo 2)
 endif
+# Of several goals those that begin makes of their own meet in one folder: one after the other, each in parallel.
+ifeq (0,$(MAKELEVEL))
+ifneq (,$(and $(word 2,$(MAKECMDGOALS)),$(filter-out programs library $(BUILD)/%,$(MAKECMDGOALS))))
+.NOTPARALLEL:
+endif
+endif
 
 # What the programs read and write themselves, and what only the shared object needs that reads all other image formats.
 PKG := OpenEXR libpng libjpeg zlib libisal lcms2
@@ -256,7 +262,7 @@ $(OBJ)/%.o: %.c $(BUILD)/gen/flags | $(BUILD)/gen/ops.h $(BUILD)/gen/pages.h
 	@mkdir -p $(@D)
 	$(Q)$(CC) $(CPPFLAGS_ALL) $(if $(filter data/image/% nn/weights/%,$<),$(PKG_CFLAGS)) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
 
-$(OBJ)/gen/%.o: $(BUILD)/gen/%.c $(BUILD)/gen/flags
+$(OBJ)/gen/%.o: $(BUILD)/gen/%.c $(BUILD)/gen/flags | $(BUILD)/gen/ops.h $(BUILD)/gen/pages.h
 	$(call step,CC,$<)
 	@mkdir -p $(@D)
 	$(Q)$(CC) $(CPPFLAGS_ALL) $(CFLAGS_ALL) -MMD -MP -c -o $@ $<
@@ -485,4 +491,5 @@ clean:
 .PHONY: all needs programs library help deps test test-folders test-blender wheel blender manuals deb bench bench-deps \
   stress fuzz faults tsan asan demo install uninstall clean
 .SECONDARY:
+.DELETE_ON_ERROR:
 -include $(shell find $(OBJ) $(BUILD)/fuzz/obj -name '*.d' 2>/dev/null)
