@@ -2,13 +2,13 @@
 #: make              the programs, liblgd.a and liblgd.so, in build/
 #: make demo         the same, then demo/flash.jpg to maps in build/demo/
 #: make test         the same, then every test
-#: make deps         installs what the build needs (Debian, Ubuntu) and Open MPI; make test does so first, and the two
-#:                   above it without MPI
+#: make deps         installs what the build needs (Debian, Ubuntu) and Open MPI; make test does so first, make and make
+#:                   demo without MPI
 #: make test-blender material.glb and the add-on in Blender, with PYTHON= that has bpy; skipped without
 #: make test-folders 10,000 photographs under kill -9, and the memory over 100, 1,000 and 10,000: some minutes
 #: make install      into PREFIX (/usr/local), libraries into LIBDIR, below DESTDIR when given; make uninstall undoes it
 #: make manuals      manual pages and completions of bash and zsh, from --help: make install brings them
-#: make wheel        the Python package as build/lgd-VERSION-….whl, with the library and the weights in it
+#: make wheel        the Python package as build/lgd-VERSION-….whl, with the library and phone's weights in it
 #: make blender      the Blender add-on as build/lgd_material-VERSION.zip, with that wheel in it
 #: make deb          Debian packages into build/: lgd, liblgd0, liblgd-dev, lgd-models, python3-lgd
 #: make bench        times; BENCH="conv_ infer" runs the benchmarks whose names contain these words
