@@ -40,7 +40,7 @@ static void print_help(void)
          "for\n"
          "each on standard output. FOLDER stands for the photographs in it, LIST is a file that names one a line.\n");
     cl_argument_help(arguments, stdout);
-    puts("\nExit status: 0 done and nothing wrong, 1 something is wrong, 2 wrong usage.");
+    puts("\nExit status: 0 done and nothing wrong, 1 something is wrong, 2 wrong usage, 130 interrupted.");
 }
 
 static ts_code take_paper(const char *name, command *c, ts_status *st)
@@ -110,8 +110,8 @@ static int check(const command *c, char **paths, int count)
     io_sheet_set set;
     ts_status st = {0};
     const int64_t pixels = c->max_pixels > 0 ? c->max_pixels : IO_MAX_PIXELS_DEFAULT;
-    if (io_sheet_set_read(paths, count, c->fov, pixels, 0, NULL, &set, &st) != TS_OK)
-        return cl_failed("%s", st.message);
+    if (io_sheet_set_read(paths, count, c->fov, pixels, 0, cl_interrupted, &set, &st) != TS_OK)
+        return st.code == TS_INTERRUPTED ? cl_stopped("%s", st.message) : cl_failed("%s", st.message);
     bool fine = true;
     for (int i = 0; i < count; i++) fine = say(&set.photo[i]) && fine;
     if (set.good > 1 && io_sheet_apart(&set) < IO_SHEET_APART) {
@@ -175,6 +175,7 @@ int main(int argc, char **argv)
     int code = CL_OK;
     if (c.help) print_help();
     else if (c.version) cl_print_version();
+    cl_catch_interrupt();
     else code = work(&c, argv + operands, argc - operands);
     return cl_finish(code);
 }

@@ -37,7 +37,7 @@ static void print_help(void)
          "or \"model_state_dict\" outermost\n"
          "is left out. Integer tensors are kept as they are; tensors that share memory become separate ones.\n");
     cl_argument_help(arguments, stdout);
-    puts("\nExit status: 0 done, 1 IN cannot be read or OUT cannot be written, 2 wrong usage.");
+    puts("\nExit status: 0 done, 1 IN cannot be read or OUT cannot be written, 2 wrong usage, 130 interrupted.");
 }
 
 static bool ends_with(const char *s, const char *end)
@@ -134,7 +134,7 @@ static ts_code run(const command *c, ts_status *st)
     if (!code && *c->prefix && entries == 0)
         code = ts_fail(st, TS_FORMAT, "%s: no tensor's name begins with '%s'", c->in, c->prefix);
     if (!code && c->list) list(f, entry, entries);
-    else if (!code) code = nn_file_write(c->out, c->form, entry, entries, c->real, meta, metas, st);
+    else if (!code) code = nn_file_write(c->out, c->form, entry, entries, c->real, meta, metas, cl_interrupted, st);
     free(entry);
     free(meta);
     nn_file_close(&f);
@@ -149,8 +149,10 @@ int main(int argc, char **argv)
     int code = cl_init("lgd-convert");
     if (code) return code;
     if (parse(argc, argv, &c, &st) != TS_OK) return cl_usage("%s", st.message);
+    cl_catch_interrupt();
     if (c.help) print_help();
     else if (c.version) cl_print_version();
-    else if (run(&c, &st) != TS_OK) code = cl_failed("%s", st.message);
+    else if (run(&c, &st) != TS_OK)
+        code = st.code == TS_INTERRUPTED ? cl_stopped("%s", st.message) : cl_failed("%s", st.message);
     return cl_finish(code);
 }

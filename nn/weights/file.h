@@ -98,7 +98,8 @@ typedef struct nn_meta {
 
 /* Writes tensors in that form (not NN_FORM_TORCH_OLD) to a temporary file beside path, fsynced, renamed; nothing is
  * left on failure. real: the type that all tensors of real numbers get, NN_DTYPES to leave each as it is. Views of one
- * storage become tensors of their own. */
+ * storage become tensors of their own. stop: asked before each tensor whether to go no further (TS_INTERRUPTED); may be
+ * NULL. */
 ts_code nn_file_write(const char *path, nn_form form, const nn_tensor *tensor, int tensors, nn_dtype real,
-                      const nn_meta *meta, int metas, ts_status *st);
+                      const nn_meta *meta, int metas, bool (*stop)(void), ts_status *st);
 #endif

@@ -39,7 +39,7 @@ const void *nn_tensor_bytes(const nn_tensor *e, nn_dtype to, const char *path, v
 
 /* The forms' writers. */
 ts_code nn_safetensors_put(ts_new_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
-                           int metas, ts_status *st);
+                           int metas, bool (*stop)(void), ts_status *st);
 ts_code nn_torch_put(ts_new_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
-                     int metas, ts_status *st);
+                     int metas, bool (*stop)(void), ts_status *st);
 #endif

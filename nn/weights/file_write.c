@@ -12,7 +12,7 @@ static char *real_folder(const char *path)
 }
 
 ts_code nn_file_write(const char *path, nn_form form, const nn_tensor *tensor, int tensors, nn_dtype real,
-                      const nn_meta *meta, int metas, ts_status *st)
+                      const nn_meta *meta, int metas, bool (*stop)(void), ts_status *st)
 {
     ts_new_file o;
     if (form == NN_FORM_TORCH_OLD) return ts_fail(st, TS_INVALID, "%s: PyTorch's old form is not written", path);
@@ -22,7 +22,7 @@ ts_code nn_file_write(const char *path, nn_form form, const nn_tensor *tensor, i
     ts_code code = ts_new_file_begin(&o, path, st);
     if (!code) {
         code = (form == NN_FORM_TORCH_ZIP ? nn_torch_put : nn_safetensors_put)(&o, tensor, tensors, real, meta, metas,
-                                                                               st);
+                                                                               stop, st);
         code = ts_new_file_end(&o, code, st);
         /* makes the rename itself survive a power failure */
         const int error = code ? 0 : ts_sync_folder(folder);

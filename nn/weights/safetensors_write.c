@@ -64,7 +64,7 @@ static ts_code make_header(nn_text *t, const char *path, const nn_tensor *tensor
 }
 
 ts_code nn_safetensors_put(ts_new_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
-                           int metas, ts_status *st)
+                           int metas, bool (*stop)(void), ts_status *st)
 {
     nn_text t = {0};
     int *order = malloc(((size_t)tensors + 1) * sizeof *order), n = 0;
@@ -78,6 +78,10 @@ ts_code nn_safetensors_put(ts_new_file *o, const nn_tensor *tensor, int tensors,
     if (!code) code = make_header(&t, o->name, tensor, order, tensors, real, meta, metas, st);
     if (!code) ts_new_file_put(o, t.data, t.used);
     for (int i = 0; i < tensors && !code && !o->error; i++) {
+        if (stop && stop()) {
+            code = ts_fail(st, TS_INTERRUPTED, "%s: interrupted: it was not written", o->name);
+            break;
+        }
         const nn_tensor *e = &tensor[order[i]];
         const nn_dtype to = nn_dtype_out(e->dtype, real);
         const void *bytes = nn_tensor_bytes(e, to, o->name, &work, &work_size, st);

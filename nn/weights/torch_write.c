@@ -174,7 +174,7 @@ static void put_directory(archive *a)
 }
 
 ts_code nn_torch_put(ts_new_file *o, const nn_tensor *tensor, int tensors, nn_dtype real, const nn_meta *meta,
-                     int metas, ts_status *st)
+                     int metas, bool (*stop)(void), ts_status *st)
 {
     archive a = {.o = o};
     nn_text list = {0};
@@ -188,6 +188,10 @@ ts_code nn_torch_put(ts_new_file *o, const nn_tensor *tensor, int tensors, nn_dt
         put_entry(&a, "archive/byteorder", "little", 6);
     }
     for (int i = 0; i < tensors && !code && !o->error; i++) {
+        if (stop && stop()) {
+            code = ts_fail(st, TS_INTERRUPTED, "%s: interrupted: it was not written", o->name);
+            break;
+        }
         char name[40];
         const nn_dtype to = nn_dtype_out(tensor[i].dtype, real);
         const void *bytes = nn_tensor_bytes(&tensor[i], to, o->name, &work, &work_size, st);

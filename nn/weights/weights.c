@@ -154,7 +154,7 @@ ts_code nn_safetensors_write(const char *path, const nn_block *blocks, int count
         for (int j = 0; j < blocks[i].rank; j++) tensor[i].dim[j] = blocks[i].dim[j];
         nn_tensor_shape(&tensor[i]);
     }
-    ts_code code = nn_file_write(path, NN_FORM_SAFETENSORS, tensor, count, NN_DTYPES, meta, metas, st);
+    ts_code code = nn_file_write(path, NN_FORM_SAFETENSORS, tensor, count, NN_DTYPES, meta, metas, NULL, st);
     free(tensor);
     return code;
 }

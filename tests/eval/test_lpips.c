@@ -56,8 +56,8 @@ static ev_lpips *network(void)
     const char *where = getenv("LPIPS_OUT"); /* tests/cli/eval.sh wants them too */
     snprintf(trunk, sizeof trunk, "%s/alexnet.pth", where ? where : test_folder());
     snprintf(linear, sizeof linear, "%s/alex.safetensors", where ? where : test_folder());
-    CHECK(!nn_file_write(trunk, NN_FORM_TORCH_ZIP, t, 10, NN_DTYPES, NULL, 0, &st), "%s", st.message);
-    CHECK(!nn_file_write(linear, NN_FORM_SAFETENSORS, l, 5, NN_DTYPES, NULL, 0, &st), "%s", st.message);
+    CHECK(!nn_file_write(trunk, NN_FORM_TORCH_ZIP, t, 10, NN_DTYPES, NULL, 0, NULL, &st), "%s", st.message);
+    CHECK(!nn_file_write(linear, NN_FORM_SAFETENSORS, l, 5, NN_DTYPES, NULL, 0, NULL, &st), "%s", st.message);
     ev_lpips *net = ev_lpips_load(trunk, linear, &st);
     CHECK(net, "%s", st.message);
     return net;

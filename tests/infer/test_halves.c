@@ -32,7 +32,7 @@ static void write_as(const char *from, const char *to, nn_dtype type, const char
     CHECK(!name || changed, "no %s", name);
     for (const char *key; (key = nn_file_meta_key(f, metas)); metas++)
         meta[metas] = (nn_meta){key, nn_file_meta(f, key)};
-    CHECK(!nn_file_write(to, NN_FORM_SAFETENSORS, tensor, count, type, meta, metas, &st), "%s", st.message);
+    CHECK(!nn_file_write(to, NN_FORM_SAFETENSORS, tensor, count, type, meta, metas, NULL, &st), "%s", st.message);
     free(changed);
     nn_file_close(&f);
 }

@@ -3,6 +3,7 @@
 #include "nn/weights/weights.h"
 #include "tests/support/files.h"
 #include "tests/test.h"
+#include <dirent.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -106,6 +107,24 @@ TEST(torch_changed_bytes_do_no_harm)
     CHECK(sum > 0, "nothing was ever read");
 }
 
+static bool at_once(void) { return true; }
+
+TEST(torch_writing_is_interrupted)
+{
+    ts_status st = {0};
+    float value[] = {1, 2};
+    const nn_tensor entry = {"a", NN_F32, false, 1, {2}, {1}, 2, (unsigned char *)value};
+    for (int k = 0; k < 2; k++)
+        CHECK(nn_file_write(path_of("w"), k ? NN_FORM_TORCH_ZIP : NN_FORM_SAFETENSORS, &entry, 1, NN_DTYPES, NULL, 0,
+                            at_once, &st) == TS_INTERRUPTED,
+              "'%s'", st.message);
+    DIR *folder = opendir(test_folder());
+    int entries = 0;
+    while (readdir(folder)) entries++;
+    closedir(folder);
+    CHECK(entries == 2, "%d entries are left", entries - 2);
+}
+
 TEST(torch_writing_and_reading_is_exact)
 {
     ts_status st = {0};
@@ -118,8 +137,9 @@ TEST(torch_writing_and_reading_is_exact)
     nn_meta meta[] = {{"format", "lgd"}, {"note", "two\nlines \xf0\x9f\xaa\xa8"}};
     for (int k = 0; k < 2; k++) {
         const char *path = path_of(k ? "w.pth" : "w.safetensors");
-        CHECK(!nn_file_write(path, k ? NN_FORM_TORCH_ZIP : NN_FORM_SAFETENSORS, entry, 4, NN_DTYPES, meta, 2, &st),
-              "%s", st.message);
+        CHECK(
+            !nn_file_write(path, k ? NN_FORM_TORCH_ZIP : NN_FORM_SAFETENSORS, entry, 4, NN_DTYPES, meta, 2, NULL, &st),
+            "%s", st.message);
         nn_file *f = nn_file_open(path, &st);
         CHECK(f && nn_file_count(f) == 4, "%s", st.message);
         CHECK(!strcmp(nn_file_meta(f, "format"), "lgd") && !strcmp(nn_file_meta(f, "note"), meta[1].value) &&
@@ -136,7 +156,7 @@ TEST(torch_writing_and_reading_is_exact)
         nn_file_close(&f);
     }
     const char *path = path_of("half.pth");
-    CHECK(!nn_file_write(path, NN_FORM_TORCH_ZIP, entry, 4, NN_BF16, NULL, 0, &st), "%s", st.message);
+    CHECK(!nn_file_write(path, NN_FORM_TORCH_ZIP, entry, 4, NN_BF16, NULL, 0, NULL, &st), "%s", st.message);
     nn_file *f = nn_file_open(path, &st);
     CHECK(f && nn_file_find(f, "rows")->dtype == NN_BF16 && nn_file_find(f, "n")->dtype == NN_I64,
           "types of a converted file");
@@ -144,7 +164,7 @@ TEST(torch_writing_and_reading_is_exact)
     value[0] = 1e6f;
     size_t before, after;
     free(slurp(path, &before));
-    CHECK(nn_file_write(path, NN_FORM_TORCH_ZIP, entry, 4, NN_F16, NULL, 0, &st) == TS_NUMERIC &&
+    CHECK(nn_file_write(path, NN_FORM_TORCH_ZIP, entry, 4, NN_F16, NULL, 0, NULL, &st) == TS_NUMERIC &&
               strstr(st.message, "F16"),
           "'%s'", st.message);
     free(slurp(path, &after));
@@ -167,7 +187,7 @@ TEST(torch_model_round_trip)
     for (const char *key; (key = nn_file_meta_key(f, metas)); metas++)
         meta[metas] = (nn_meta){key, nn_file_meta(f, key)};
     CHECK(!nn_file_write(path_of("m.pth"), NN_FORM_TORCH_ZIP, nn_file_tensor(f, 0), nn_file_count(f), NN_DTYPES, meta,
-                         metas, &st),
+                         metas, NULL, &st),
           "%s", st.message);
     nn_file_close(&f);
     nn_model *back = nn_model_load(path_of("m.pth"), &st);
