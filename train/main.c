@@ -11,18 +11,20 @@
 static const char usage[] =
     "Usage: lgd-train CONFIG.ini [options]\n"
     "Trains a model on procedural materials with the configuration CONFIG.ini. The run's folder (output.folder,\n"
-    "default runs/CONFIG) gets best.safetensors, last.safetensors, a checkpoint, log.csv and val.csv.\n"
+    "default runs/CONFIG) gets best.safetensors, last.safetensors, checkpoint.safetensors, config.ini, log.csv,\n"
+    "val.csv and curve.svg.\n"
     "\n"
     "  --set SECTION.KEY=VALUE  change a key of the file; may be repeated\n"
-    "  --resume                 continue from the folder's checkpoint, exactly as if the run had not stopped\n"
+    "  --resume                 continue from the folder's checkpoint, exactly as if the run had not stopped, on the\n"
+    "                           same instruction set (LGD_ISA)\n"
     "  --init WEIGHTS           start from a weights file (the same as --set train.init=WEIGHTS); given twice, the\n"
     "                           second file has the parameters that the first lacks (train.init_rest)\n"
     "  --initial FILE           write the weights that the run would start from, and exit\n"
-    "  --threads N              number of threads (default: all that the process may use)\n"
+    "  --threads N              number of threads, 1 .. 1024; 0 = all that are allowed (default 0)\n"
     "  --help-config            print every key with its range, default and meaning\n"
     "  --print-config           print the configuration of the run\n"
-    "  --help                   print this\n"
-    "  --version                print the version\n"
+    "  -h, --help               print this\n"
+    "  -V, --version            print the version\n"
     "\n"
     "mpirun -np N lgd-train CONFIG.ini shares every batch out to N processes (docs/scaling.md).\n"
     "Ctrl-C, SIGTERM and SIGHUP finish the step, save a checkpoint and exit with status 130.\n";
@@ -134,7 +136,7 @@ static int train(const tr_config *config, const char *folder, bool resume, const
     return CL_OK;
 }
 
-enum { SET = 256, RESUME, INIT, INITIAL, THREADS, HELP_CONFIG, PRINT_CONFIG, HELP, VERSION };
+enum { SET = 256, RESUME, INIT, INITIAL, THREADS, HELP_CONFIG, PRINT_CONFIG, HELP = 'h', VERSION = 'V' };
 static const struct option options[] = {
     {"set", required_argument, NULL, SET},
     {"resume", no_argument, NULL, RESUME},
@@ -200,7 +202,7 @@ int main(int argc, char **argv)
     if (code == CL_OK && !set) code = cl_failed("out of memory");
     if (code != CL_OK) goto end;
     cl_trace();
-    while ((option = cl_option_next(argc, argv, ":", options, &st)) != CL_ARGUMENT_END) {
+    while ((option = cl_option_next(argc, argv, ":hV", options, &st)) != CL_ARGUMENT_END) {
         int64_t threads;
         switch (option) {
         case SET: set[sets++] = optarg; break;
@@ -219,12 +221,12 @@ int main(int argc, char **argv)
         case INITIAL: initial = optarg; break;
         case PRINT_CONFIG: print = true; break;
         case THREADS:
-            if (!cl_parse_int(optarg, 1, 1024, &threads)) {
-                code = cl_usage("--threads must be an integer from 1 to 1024, not \"%s\"", optarg);
+            if (!cl_parse_int(optarg, 0, 1024, &threads)) {
+                code = cl_usage("--threads must be an integer from 0 to 1024, not \"%s\"", optarg);
                 goto end;
             }
             ts_threads_set((int)threads);
-            threads_given = true;
+            threads_given = threads > 0;
             break;
         case HELP_CONFIG:
             tr_config_help(stdout);

@@ -39,8 +39,6 @@ enum {
     OPT_TESTDATA,
     OPT_COLLECTION,
     OPT_THREADS,
-    OPT_HELP,
-    OPT_VERSION,
     OPT_SHARE,                      /* and more: shares */
     OPT_CAMERA = OPT_SHARE + SHARES /* and more: cl_camera_options */
 };
@@ -61,8 +59,8 @@ static const struct option plain_options[] = {{"output", required_argument, NULL
                                               {"testdata", required_argument, NULL, OPT_TESTDATA},
                                               {"collection", required_argument, NULL, OPT_COLLECTION},
                                               {"threads", required_argument, NULL, OPT_THREADS},
-                                              {"help", no_argument, NULL, OPT_HELP},
-                                              {"version", no_argument, NULL, OPT_VERSION},
+                                              {"help", no_argument, NULL, 'h'},
+                                              {"version", no_argument, NULL, 'V'},
                                               {NULL, 0, NULL, 0}};
 
 static void print_help(void)
@@ -70,6 +68,7 @@ static void print_help(void)
     printf(
         "Usage: lgd-data [options] -o DIR\n"
         "  or:  lgd-data --statistics --testdata DIR [options]\n"
+        "  or:  lgd-data --histograms --testdata DIR [options] -o DIR\n"
         "Writes procedural materials number FIRST .. FIRST+COUNT-1 of the sequence of SEED.\n\n"
         "What to write (the default is --format folders):\n"
         "  -o, --output DIR      output folder; created when absent\n"
@@ -106,11 +105,13 @@ static void print_help(void)
                (double)*cl_camera_value(&least, i));
     }
     printf("\nOther:\n"
-           "      --quality N       of photographs' JPEG, 1 .. 100 (default 90)\n"
+           "      --quality N       of the JPEG of photographs and sheet-captures, 1 .. 100 (default 90)\n"
            "      --photo-width N   of sheet-captures, 400 .. 8000 pixels (default 4000)\n"
            "      --testdata DIR    folder with maps/ (map folders) and strips/ to compare with\n"
-           "      --threads N       number of threads (default: as many as the process may use)\n"
-           "      --help, --version\n");
+           "      --threads N       number of threads, 1 .. 1024; 0 = all that are allowed (default 0)\n"
+           "  -h, --help            print this help\n"
+           "  -V, --version         print the version\n\n"
+           "Exit status: 0 done, 1 something cannot be read or written, 2 wrong usage, 130 interrupted.\n");
 }
 
 static int parse_families(char *list, uint64_t *families)
@@ -172,7 +173,8 @@ int cl_data_options_read(int argc, char **argv, cl_data_options *o)
         long_options[SHARES + i] = (struct option){cl_camera_options[i].name, required_argument, NULL, OPT_CAMERA + i};
     memcpy(long_options + SHARES + CL_CAMERA_OPTIONS, plain_options, sizeof plain_options);
     ts_status st;
-    while (code == CL_OK && (c = cl_option_next(argc, argv, ":o:", long_options, &st)) != CL_ARGUMENT_END) switch (c) {
+    while (code == CL_OK && (c = cl_option_next(argc, argv, ":o:hV", long_options, &st)) != CL_ARGUMENT_END)
+        switch (c) {
         case 'o': code = take_name("-o", optarg, &o->output); break;
         case OPT_SEED: code = parse_number("seed", optarg, 0, INT64_MAX, &seed); break;
         case OPT_FIRST: code = parse_number("first", optarg, 0, INT64_C(1) << 60, &o->first); break;
@@ -202,9 +204,9 @@ int cl_data_options_read(int argc, char **argv, cl_data_options *o)
         case OPT_HISTOGRAMS: o->histograms = true; break;
         case OPT_TESTDATA: code = take_name("--testdata", optarg, &o->testdata); break;
         case OPT_COLLECTION: code = take_name("--collection", optarg, &o->collection); break;
-        case OPT_THREADS: code = parse_number("threads", optarg, 1, 1024, &o->threads); break;
-        case OPT_HELP: print_help(); exit(cl_finish(CL_OK));
-        case OPT_VERSION: cl_print_version(); exit(cl_finish(CL_OK));
+        case OPT_THREADS: code = parse_number("threads", optarg, 0, 1024, &o->threads); break;
+        case 'h': print_help(); exit(cl_finish(CL_OK));
+        case 'V': cl_print_version(); exit(cl_finish(CL_OK));
         case CL_ARGUMENT_BAD: code = cl_usage("%s", st.message); break;
         default: { /* a share, or of the camera's */
             if (c < OPT_CAMERA) {

@@ -68,7 +68,7 @@ data_wrong_usage() {
     says "$T/err" "-o DIR"
     for bad in "--count 0" "--tilt 31" "--fov-min 20" "--fov-min 40 --fov-max 30" "--flash 0.6" "--tone 2" \
         "--ambient x" "--vignette 1" "--off-centre -1" "--exposure nan" "--count x" "--size 4" "--size 1e3" \
-        "--format exe" "--noise 2" "--noise nan" "--seed -1" "--quality 0" "--threads 0" "stray" "--statistics" \
+        "--format exe" "--noise 2" "--noise nan" "--seed -1" "--quality 0" "--threads -1" "stray" "--statistics" \
         "--testdata ." "--collected 0.5" "--collection ." \
         "--contact-sheet --collection . --collected 0.5"; do
         # shellcheck disable=SC2086
@@ -78,6 +78,15 @@ data_wrong_usage() {
     return 0
 }
 check data_wrong_usage data_wrong_usage
+
+data_letters_and_all_threads() {
+    expect 0 "$DATA" -h
+    says "$T/out" "lgd-data --histograms --testdata DIR"
+    expect 0 "$DATA" -V
+    says "$T/out" "lgd-data (lgd)"
+    expect 0 "$DATA" -o "$T/o" --threads 0 --count 1 --size 8
+}
+check data_letters_and_all_threads data_letters_and_all_threads
 
 data_options_without_use() {
     expect 2 "$DATA" -o "$T/o" --quality 50

@@ -79,7 +79,12 @@ options_and_usage() {
     config
     expect 0 "$TRAIN" --help
     says "$T/out" "Usage: lgd-train"
+    expect 0 "$TRAIN" -h
+    says "$T/out" "Usage: lgd-train"
     expect 0 "$TRAIN" --version
+    expect 0 "$TRAIN" -V
+    says "$T/out" "lgd-train (lgd)"
+    expect 0 "$TRAIN" --threads 0 --print-config
     expect 0 "$TRAIN" --help-config
     says "$T/out" "map_weight = 1"
     expect 0 "$TRAIN" --print-config
@@ -88,7 +93,7 @@ options_and_usage() {
     expect 2 "$TRAIN" a.ini b.ini
     expect 2 "$TRAIN" --nonsense
     says "$T/err" "lgd-train: there is no option --nonsense"
-    expect 2 train --threads 0
+    expect 2 train --threads -1
     expect 2 train --threads two
     expect 2 train --resume --init x.safetensors
     for empty in --init --initial; do
