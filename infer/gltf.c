@@ -1,6 +1,7 @@
 /* glTF 2.0 documents, and the same with their images as one binary file (section 4 of the specification). */
 #include "data/file.h"
 #include "data/html.h"
+#include "data/json.h"
 #include "data/text.h"
 #include "infer/export.h"
 #include "tensor/new_file.h"
@@ -65,15 +66,21 @@ static void print_gltf(FILE *f, const lgd_gltf *kind, const size_t *size)
             "%s"
             "  \"scene\": 0,\n"
             "  \"scenes\": [{\"nodes\": [0]}],\n"
-            "  \"nodes\": [{\"mesh\": 0, \"name\": \"sample\"}],\n"
-            "  \"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0, \"NORMAL\": 1, \"TANGENT\": 2, "
-            "\"TEXCOORD_0\": 3}, \"indices\": 4, \"material\": 0}]}],\n"
-            "  \"materials\": [{\n"
-            "    \"name\": \"sample\",\n"
+            "  \"nodes\": [{\"mesh\": 0, \"name\": ",
+            kind->metallic ? "" : "  \"extensionsUsed\": [\"KHR_materials_specular\", \"KHR_materials_ior\"],\n");
+    io_put_json(f, kind->name);
+    fputs("}],\n"
+          "  \"meshes\": [{\"primitives\": [{\"attributes\": {\"POSITION\": 0, \"NORMAL\": 1, \"TANGENT\": 2, "
+          "\"TEXCOORD_0\": 3}, \"indices\": 4, \"material\": 0}]}],\n"
+          "  \"materials\": [{\n"
+          "    \"name\": ",
+          f);
+    io_put_json(f, kind->name);
+    fprintf(f,
+            ",\n"
             "%s"
             "  }],\n"
             "  \"textures\": [",
-            kind->metallic ? "" : "  \"extensionsUsed\": [\"KHR_materials_specular\", \"KHR_materials_ior\"],\n",
             kind->metallic ? metallic_material : f0_material);
     for (int k = 0; k < images; k++) fprintf(f, "%s{\"source\": %d, \"sampler\": 0}", k ? ", " : "", k);
     fprintf(f, "],\n  \"samplers\": [{\"magFilter\": 9729, \"minFilter\": 9987, \"wrapS\": %d, \"wrapT\": %d}],\n",

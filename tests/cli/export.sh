@@ -83,6 +83,7 @@ size, kind = struct.unpack_from("<I4s", b, 20 + n)
 binary = b[28 + n :]
 assert kind == b"BIN\0" and size == len(binary) == d["buffers"][0]["byteLength"] and "uri" not in d["buffers"][0]
 other = json.load(open(sys.argv[1] + "/material.gltf"))
+assert d["nodes"][0]["name"] == d["materials"][0]["name"] == "flash"
 assert d["materials"] == other["materials"] and len(d["images"]) == len(other["images"])
 for image, named in zip(d["images"], other["images"]):
     v = d["bufferViews"][image["bufferView"]]
