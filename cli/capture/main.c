@@ -38,7 +38,9 @@ static void print_help(void)
          "camera\n"
          "and light of photographs of a sample in that window. check says what is wrong with such photographs, a line "
          "for\n"
-         "each on standard output. FOLDER stands for the photographs in it, LIST is a file that names one a line.\n");
+         "each on standard output. FOLDER stands for the photographs in it, LIST is a file or a pipe that names one a "
+         "line,\n"
+         "@- is standard input; a photograph whose name begins with @ is written ./@NAME.\n");
     cl_argument_help(arguments, stdout);
     puts("\nExit status: 0 done and nothing wrong, 1 something is wrong, 2 wrong usage, 130 interrupted.");
 }
@@ -130,7 +132,8 @@ static int check_operands(const command *c, char **word, int words)
 {
     cl_operands all;
     ts_status st = {0};
-    if (cl_operands_expand(word, words, say_failed, &all, &st) != TS_OK) return cl_failed("%s", st.message);
+    if (cl_operands_expand(word, words, say_failed, &all, &st) != TS_OK)
+        return st.code == TS_INTERRUPTED ? cl_stopped("%s", st.message) : cl_failed("%s", st.message);
     int code = all.failed ? CL_FAILED : CL_OK;
     if (all.photos > IO_SOLVE_MOST) code = cl_usage("check: %d photographs at most, not %d", IO_SOLVE_MOST, all.photos);
     else if (all.photos > 0) {
@@ -172,10 +175,10 @@ int main(int argc, char **argv)
     if (bad) return bad;
     if (parse(argc, argv, &c, &operands, &st) != TS_OK) return cl_usage("%s", st.message);
     ts_threads_set((int)c.threads);
+    cl_catch_interrupt();
     int code = CL_OK;
     if (c.help) print_help();
     else if (c.version) cl_print_version();
-    cl_catch_interrupt();
     else code = work(&c, argv + operands, argc - operands);
     return cl_finish(code);
 }

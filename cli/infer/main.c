@@ -236,11 +236,12 @@ static void print_help(void)
 {
     puts("Usage: lgd-infer [options] PHOTO|FOLDER|@LIST... -o DIR\n"
          "  or:  lgd-infer [options] --corners X,Y X,Y X,Y X,Y PHOTO -o DIR\n"
-         "  or:  lgd-infer [options] --sheet PHOTO... -o DIR\n"
+         "  or:  lgd-infer [options] --sheet PHOTO|FOLDER|@LIST... -o DIR\n"
          "  or:  lgd-infer [options] --capture WHERE -o DIR\n"
          "Estimates the material of a flat surface from a photograph taken straight on with a flash beside the lens.\n"
-         "The largest centred square is used. FOLDER stands for the photographs in it, LIST is a file that names one a "
-         "line.\n");
+         "The largest centred square is used. FOLDER stands for the photographs in it, LIST is a file or a pipe that "
+         "names one a\n"
+         "line, @- is standard input; a photograph whose name begins with @ is written ./@NAME.\n");
     cl_argument_help(cl_infer_arguments, stdout);
     puts("\n"
          "DIR/STEM/ gets diffuse.png, specular.png (sRGB), roughness.png, normal.png (linear), maps.exr (all channels, "
@@ -308,7 +309,7 @@ static int work(const cl_command *given)
     cl_plan plan;
     char weights[LGD_PATH_MAX], *recipe = NULL;
     if (!*c->capture && cl_operands_expand(c->photo, c->photos, say_failed, &operands, &st) != TS_OK)
-        return cl_failed("%s", st.message);
+        return st.code == TS_INTERRUPTED ? cl_stopped("%s", st.message) : cl_failed("%s", st.message);
     if (!*c->capture) own.photo = operands.photo, own.photos = operands.photos;
     char *const *photo = c->photo;
     const int photos = c->photos, missing = operands.failed;

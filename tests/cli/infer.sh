@@ -61,6 +61,25 @@ folders_and_lists() {
     { printf '\357\273\277%s\r\n\r\n' "$T/in/b.ppm"; echo "$T/in/deeper"; } >"$T/list.txt"
     expect 0 infer --maps render "@$T/list.txt" -o "$T/l"
     [ "$(cat "$T/out")" = "$(printf '%s\n' "$T/l/b" "$T/l/c")" ] || fail "not b and c: $(cat "$T/out")"
+    # a list may be a pipe; a photograph that is named twice is done once
+    echo "$T/in/b.ppm" >"$T/one.txt"
+    expect 0 infer --maps render @- "$T/in" -o "$T/r" <"$T/one.txt"
+    [ "$(cat "$T/out")" = "$(printf '%s\n' "$T/r/b" "$T/r/a")" ] || fail "not b and a: $(cat "$T/out")"
+    mkfifo "$T/pipe"
+    cat "$T/list.txt" >"$T/pipe" &
+    expect 0 infer --maps render "@$T/pipe" -o "$T/s"
+    [ "$(cat "$T/out")" = "$(printf '%s\n' "$T/s/b" "$T/s/c")" ] || fail "not b and c: $(cat "$T/out")"
+    # a name with an @ is not a list
+    cp "$T/in/b.ppm" "$T/@b.ppm"
+    (cd "$T" && expect 1 infer --maps render @b.ppm -o s && says err "write ./@b.ppm for the photograph" &&
+        expect 0 infer --maps render ./@b.ppm -o s) || exit 1
+    # a link that leads nowhere is named, the rest of the folder is done
+    mkdir "$T/links"
+    ln -s "$T/absent.png" "$T/links/gone.png"
+    cp "$T/in/b.ppm" "$T/links"
+    expect 1 infer --maps render "$T/links" -o "$T/t"
+    says "$T/err" "$T/links/gone.png: "
+    [ "$(cat "$T/out")" = "$T/t/b" ] || fail "not b: $(cat "$T/out")"
     # what has no photographs is named, the others are done
     expect 1 infer --maps render "$T/empty" "$T/in/b.ppm" "@$T/none.txt" -o "$T/p"
     [ "$(cat "$T/out")" = "$T/p/b" ] || fail "not b: $(cat "$T/out")"
