@@ -30,7 +30,15 @@ ts_code io_capture_create(io_capture *c, int images, int size, ts_status *st)
 void io_capture_free(io_capture *c)
 {
     free(c->image);
+    for (int i = 0; i < IO_CAPTURE_IMAGES; i++) free(c->source[i].file);
     *c = (io_capture){0};
+}
+
+ts_code io_capture_note(io_capture *c, int picture, const char *file, int side, const float *square, ts_status *st)
+{
+    io_capture_source *s = &c->source[picture];
+    *s = (io_capture_source){strdup(file), side, io_levels_of(square, (int64_t)c->size * c->size * 3)};
+    return s->file ? TS_OK : ts_fail(st, TS_NOMEM, "%s: out of memory", file);
 }
 
 static ts_code join(char path[PATH_MAX], const char *folder, const char *name, ts_status *st)
@@ -123,6 +131,7 @@ static ts_code read_picture(const char *folder, int number, io_capture *c, int s
     if (!code) code = io_centre_square(&image, c->size, 0, &square, st);
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
     if (!code) memcpy(c->image + (size_t)number * values, square.data, values * sizeof(float));
+    if (!code) code = io_capture_note(c, number, path, image.width, square.data, st);
     io_image_free(&image);
     io_image_free(&square);
     return code;

@@ -11,8 +11,16 @@
 #ifndef IO_CAPTURE_H
 #define IO_CAPTURE_H
 #include "data/image/image.h"
+#include "data/levels.h"
 
 enum { IO_CAPTURE_IMAGES = 100 };
+
+/* What is known of a picture as its file has it. */
+typedef struct io_capture_source {
+    char *file;       /* its path, owned; NULL: it is from none */
+    int side;         /* of the square in that file, in pixels */
+    io_levels levels; /* of the square, before any gain */
+} io_capture_source;
 
 typedef struct io_capture {
     int images, size;
@@ -20,6 +28,7 @@ typedef struct io_capture {
     float camera[IO_CAPTURE_IMAGES][3], light[IO_CAPTURE_IMAGES][3]; /* patch widths */
     float power[3];                                                  /* with distances in patch widths */
     float side;                                                      /* of the sample, centimetres */
+    io_capture_source source[IO_CAPTURE_IMAGES];
     char name[128];
     char profile[96], profile_of[128]; /* a colour profile that cannot be used and the first photograph that has it:
                                           sRGB is assumed; empty: there is none */
@@ -27,6 +36,8 @@ typedef struct io_capture {
 
 /* images pictures of size x size, all zero, side 1. */
 ts_code io_capture_create(io_capture *c, int images, int size, ts_status *st);
+/* Fills the picture's source; square: [size][size][3], linear. */
+ts_code io_capture_note(io_capture *c, int picture, const char *file, int side, const float *square, ts_status *st);
 void io_capture_free(io_capture *c); /* and zeroes the struct */
 
 /* Pictures are resampled to size x size in linear light (0: the size of the first). A file that is missing, not square

@@ -2,7 +2,6 @@
 #include "data/ini.h"
 #include "data/name.h"
 #include "data/rectify/corners.h"
-#include <limits.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -116,7 +115,7 @@ static void note_profile(io_capture *c, const char *file, const char *profile)
 
 /* The square that has the corners, and the camera that sees it so, where the file does not say another. */
 static ts_code read_angled(const char *name, const photo *p, int64_t max_pixels, int k, io_capture *c, io_image *square,
-                           ts_status *st)
+                           double *side, ts_status *st)
 {
     char why[128];
     io_photo_rows rows;
@@ -129,7 +128,7 @@ static ts_code read_angled(const char *name, const photo *p, int64_t max_pixels,
     ts_code code = fov > 0
         ? TS_OK
         : ts_fail(st, TS_INVALID, "%s; [%s] needs a focal length: focal = 26, in mm on 35 mm film", why, p->section);
-    if (!code) code = io_corners_rectify(&rows, &p->corners, fov, c->size, 0, square, &camera, NULL, st);
+    if (!code) code = io_corners_rectify(&rows, &p->corners, fov, c->size, 0, square, &camera, side, st);
     note_profile(c, p->file, rows.unread);
     io_photo_close(&rows);
     if (code) return ts_context(st, "%s", name);
@@ -140,19 +139,42 @@ static ts_code read_angled(const char *name, const photo *p, int64_t max_pixels,
     return TS_OK;
 }
 
+/* Beside the INI file, or absolute. The caller frees it. */
+static char *path_beside(const char *ini, const char *file, ts_status *st)
+{
+    char *path = NULL;
+    const char *slash = strrchr(ini, '/');
+    const int folder = slash && file[0] != '/' ? (int)(slash + 1 - ini) : 0;
+    if (asprintf(&path, "%.*s%s", folder, ini, file) >= 0) return path;
+    ts_fail(st, TS_NOMEM, "%s: out of memory", ini);
+    return NULL;
+}
+
+ts_code io_capture_ini_files(const char *path, char *file[IO_CAPTURE_IMAGES], int *files, ts_status *st)
+{
+    io_ini ini;
+    *files = 0;
+    if (io_ini_read(path, &ini, st) != TS_OK) return st->code;
+    for (int i = 0; i < ini.count && *files < IO_CAPTURE_IMAGES && !st->code; i++)
+        if (!strcmp(ini.entry[i].key, "file") && (file[*files] = path_beside(path, ini.entry[i].value, st))) ++*files;
+    io_ini_free(&ini);
+    return st->code;
+}
+
 /* The photograph's square as picture number k of c. */
 static ts_code read_square(const char *path, const photo *p, int64_t max_pixels, int k, io_capture *c, ts_status *st)
 {
-    char name[PATH_MAX];
-    const char *slash = strrchr(path, '/');
-    const int folder = slash && p->file[0] != '/' ? (int)(slash + 1 - path) : 0;
-    if (snprintf(name, sizeof name, "%.*s%s", folder, path, p->file) >= PATH_MAX)
-        return ts_fail(st, TS_INVALID, "%s:%d: the file's name is too long", path, p->line);
-    io_image square;
+    io_image square = {0};
     io_photo_facts facts = {0};
-    const ts_code code = p->angled ? read_angled(name, p, max_pixels, k, c, &square, st)
-                                   : io_read_photo_square(name, max_pixels, c->size, 0, &square, &facts, st);
+    double side = 0;
+    char *name = path_beside(path, p->file, st);
+    if (!name) return st->code;
+    ts_code code = p->angled ? read_angled(name, p, max_pixels, k, c, &square, &side, st)
+                             : io_read_photo_square(name, max_pixels, c->size, 0, &square, &facts, st);
     note_profile(c, p->file, facts.profile);
+    if (!p->angled) side = facts.width < facts.height ? facts.width : facts.height;
+    if (!code) code = io_capture_note(c, k, name, (int)ceil(side), square.data, st);
+    free(name);
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
     const float gain = p->exposure > 0 ? 1 / p->exposure : 1;
     for (size_t i = 0; i < values && !code; i++) c->image[(size_t)k * values + i] = square.data[i] * gain;

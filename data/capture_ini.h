@@ -20,4 +20,7 @@
  * success; c is empty after a failure, which names the file and the line or key. */
 ts_code io_read_capture_ini(const char *path, int size, float default_power, int64_t max_pixels, io_capture *c,
                             ts_status *st);
+
+/* The paths of the files that it lists, each malloced, which the caller frees; after a failure *files are there. */
+ts_code io_capture_ini_files(const char *path, char *file[IO_CAPTURE_IMAGES], int *files, ts_status *st);
 #endif

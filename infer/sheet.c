@@ -35,6 +35,7 @@ static ts_code add(const io_sheet_set *set, const io_sheet_photo *p, int k, int6
     memcpy(c->light[k], photo.light, sizeof photo.light);
     if (k == 0)
         for (int i = 0; i < 3; i++) c->power[i] = photo.power;
+    const ts_code code = io_capture_note(c, k, p->path, (int)ceil(io_sheet_window_side(p)), window.data, st);
     float gain[3];
     for (int i = 0; i < 3; i++) gain[i] = c->power[i] * (float)(IO_SHEET_PAPER / (pi * p->exposure[i]));
     const size_t values = (size_t)c->size * (size_t)c->size * 3;
@@ -42,7 +43,7 @@ static ts_code add(const io_sheet_set *set, const io_sheet_photo *p, int k, int6
     for (size_t i = 0; i < values; i++) to[i] = window.data[i] * gain[i % 3];
     nn_clip((int64_t)values, to, to);
     io_image_free(&window);
-    return TS_OK;
+    return code;
 }
 
 ts_code lgd_sheet_capture(const io_sheet_set *set, int most, int size, int64_t max_pixels, int threads, io_capture *c,

@@ -22,6 +22,24 @@ const char *cl_item_fov_is(const cl_item *item)
     return !*how ? "known" : *how == 'e' ? "estimated" : "assumed";
 }
 
+int cl_item_sources(const cl_item *item) { return item->capture.images ? item->photos : 1; }
+
+const io_capture_source *cl_item_source(const cl_item *item, int k)
+{
+    return item->capture.images ? &item->capture.source[k] : &item->source;
+}
+
+const char *cl_item_file(const cl_item *item, int k)
+{
+    const char *file = cl_item_source(item, k)->file;
+    return file ? file : item->job->photo;
+}
+
+unsigned cl_item_light(const io_levels *levels)
+{
+    return levels->dark >= 1 ? CL_WARN_BLACK : levels->full > 0.9 ? CL_WARN_FULL : 0;
+}
+
 void cl_item_clear(cl_item *item)
 {
     free(item->square);

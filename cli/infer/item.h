@@ -27,19 +27,19 @@ extern const char *const cl_warning_names[CL_WARNINGS];
 
 typedef struct cl_item {
     const cl_job *job;
-    int index;           /* into the plan */
-    uint64_t hash;       /* of the photograph's file (tensor/hash.h); of a capture 0 */
-    ts_status st;        /* the first failure on the way; later stages leave the item alone */
-    float *square;       /* linear, [size][size][3], or NULL: of a capture or a sheet */
-    lgd_rectified angle; /* with corners; its square's values are item->square */
-    io_capture capture;  /* images 0: there is none */
-    io_sheet_set sheet;  /* with --sheet: what was found in each photograph; capture has the windows */
-    const float *image;  /* the photograph, or the first of the capture: in one of these; NULL: not read */
-    unsigned char *mask; /* [size][size] from command->mask, or NULL */
-    double fov;          /* of the photograph, in degrees across the square; LGD_FOV_UNKNOWN, LGD_FOV_OF_PHOTO */
-    char fov_from[192];  /* where it is known from, or why it is not */
-    char profile[96];    /* io_photo_facts.profile */
-    int photo_side;      /* the shorter side of the photograph in pixels */
+    int index;                /* into the plan */
+    uint64_t hash;            /* of the photograph's file (tensor/hash.h); of a capture 0 */
+    ts_status st;             /* the first failure on the way; later stages leave the item alone */
+    float *square;            /* linear, [size][size][3], or NULL: of a capture or a sheet */
+    lgd_rectified angle;      /* with corners; its square's values are item->square */
+    io_capture capture;       /* images 0: there is none */
+    io_sheet_set sheet;       /* with --sheet: what was found in each photograph; capture has the windows */
+    const float *image;       /* the photograph, or the first of the capture: in one of these; NULL: not read */
+    unsigned char *mask;      /* [size][size] from command->mask, or NULL */
+    double fov;               /* of the photograph, in degrees across the square; LGD_FOV_UNKNOWN, LGD_FOV_OF_PHOTO */
+    char fov_from[192];       /* where it is known from, or why it is not */
+    char profile[96];         /* io_photo_facts.profile */
+    io_capture_source source; /* of a photograph: without a file; of a capture or a sheet: see cl_item_source */
     lgd_photo photo[IO_CAPTURE_IMAGES];
     double ambient;     /* light beside the flash's that was found */
     int photos;         /* of these, the ones that the weights read */
@@ -48,9 +48,9 @@ typedef struct cl_item {
     int steps;          /* t of that */
     double power;       /* of the light that was taken, in those that the photographs name */
     lgd_output_result written;
+    bool replaced;     /* the maps of another photograph were in its folder */
     bool was_done;     /* its folder was complete already: nothing is read, estimated or written */
     char *result;      /* members for results.jsonl (cli/infer/record.h), once there are complete files */
-    double full, over; /* parts of the photograph's values: not below white, and above it */
     unsigned warnings; /* CL_WARN_ */
     double seconds;    /* of reading, estimating and writing */
     int threads;       /* to compute and write it on, the calling thread's own (tensor/threads.h) */
@@ -63,6 +63,12 @@ typedef struct cl_item {
 const char *cl_item_assumption(const cl_item *item);
 /* "known", "estimated" or "assumed". */
 const char *cl_item_fov_is(const cl_item *item);
+/* The photographs whose maps these are, and the file of each. */
+int cl_item_sources(const cl_item *item);
+const io_capture_source *cl_item_source(const cl_item *item, int k);
+const char *cl_item_file(const cl_item *item, int k);
+/* CL_WARN_BLACK, CL_WARN_FULL or 0. */
+unsigned cl_item_light(const io_levels *levels);
 /* Before the next photograph: all but the maps, whose memory it writes again. */
 void cl_item_clear(cl_item *item);
 void cl_item_free(cl_item *item);

@@ -301,3 +301,5 @@ int cl_command_steps(const cl_command *c, const lgd_model *model, int photos)
     if (c->iterations == LGD_AUTO) return LGD_AUTO_MOST;
     return c->iterations < 0 ? lgd_usual_iterations(model, photos) : c->iterations;
 }
+bool cl_command_one_file(const cl_command *c) { return !*c->capture && !c->sheet; }
+

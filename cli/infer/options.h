@@ -33,6 +33,9 @@ extern const cl_argument cl_infer_arguments[];
 /* TS_INVALID and st on wrong usage. With help or version set nothing else is checked. */
 ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st);
 
+/* Whether the maps are of one file: not of a capture or of photographs of a sheet. */
+bool cl_command_one_file(const cl_command *c);
+
 /* Refinement steps of so many photographs of one sample, at most. */
 int cl_command_steps(const cl_command *c, const lgd_model *model, int photos);
 #endif

@@ -48,9 +48,10 @@ char *cl_recipe(const cl_command *c, const char *weights, uint64_t hash, ts_stat
 }
 
 /* What makes one way of making the files differ from another. */
-static void put_key(FILE *f, const cl_item *item, const char *recipe)
+static void put_key(FILE *f, bool one_file, const cl_item *item, const char *recipe)
 {
-    fprintf(f, "photograph: %016" PRIx64 "\n%s", item->hash, recipe);
+    if (one_file) fprintf(f, "photograph: %016" PRIx64 "\n", item->hash); /* no one hash stands for several files */
+    fputs(recipe, f);
 }
 
 static void put_warnings(FILE *f, const cl_item *item)
@@ -71,8 +72,12 @@ char *cl_record(const cl_command *c, const cl_item *item, const char *recipe)
     io_text t;
     if (io_text_begin(&t, "", NULL) != TS_OK) return NULL;
     FILE *f = t.f;
-    if (!*c->capture && !c->sheet) put_key(f, item, recipe); /* several files: no one hash stands for them */
-    fprintf(f, RESULT "\"hash\": \"%016" PRIx64 "\", \"steps\": %d, \"rmse_first\": ", item->hash, item->steps);
+    const bool one_file = cl_command_one_file(c);
+    put_key(f, one_file, item, recipe);
+    fputs(RESULT "\"hash\": ", f);
+    if (one_file) fprintf(f, "\"%016" PRIx64 "\"", item->hash);
+    else fputs("null", f);
+    fprintf(f, ", \"steps\": %d, \"rmse_first\": ", item->steps);
     io_put_json_number(f, item->first);
     fputs(", \"rmse\": ", f);
     io_put_json_number(f, item->last);
@@ -89,7 +94,6 @@ char *cl_record(const cl_command *c, const cl_item *item, const char *recipe)
 char *cl_record_result(const char *text)
 {
     const char *at = text ? strstr(text, "\n" RESULT) : NULL;
-    if (!at && text && strncmp(text, RESULT, sizeof RESULT - 1) == 0) at = text - 1;
     if (!at) return NULL;
     at += sizeof RESULT;
     return strndup(at, strcspn(at, "\n"));
@@ -101,7 +105,7 @@ bool cl_record_is_done(const cl_command *c, const cl_item *item, const char *rec
     io_text key;
     *result = NULL;
     if (io_text_begin(&key, "", NULL) != TS_OK) return false;
-    put_key(key.f, item, recipe);
+    put_key(key.f, true, item, recipe);
     if (io_text_end(&key, "", NULL) == TS_OK && lgd_output_is(item->job->folder, c->outputs, key.bytes, &meta))
         *result = cl_record_result(meta);
     free(meta);

@@ -2,12 +2,14 @@
 #include "cli/cli.h"
 #include "cli/infer/record.h"
 #include "infer/api_model.h"
+#include "infer/meta.h"
 #include "infer/output.h"
 #include "nn/model.h"
 #include "tensor/hash.h"
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* The last of an item's steps failed in a public function. */
 static void failed(cl_item *item, const lgd_error *error) { ts_fail(&item->st, error->code, "%s", error->message); }
@@ -17,6 +19,12 @@ static void *take(cl_item *item, const cl_command *c, size_t pixel)
     void *buffer = malloc((size_t)c->size * (size_t)c->size * pixel);
     if (!buffer) ts_fail(&item->st, TS_NOMEM, "%s: out of memory", item->job->photo);
     return buffer;
+}
+
+/* Of a photograph that is no capture: item->image, from a square of so many pixels a side. */
+static void note_source(const cl_command *c, int side, cl_item *item)
+{
+    item->source = (io_capture_source){NULL, side, io_levels_of(item->image, (int64_t)c->size * c->size * 3)};
 }
 
 static void read_photo(const cl_command *c, bool published, cl_item *item)
@@ -31,7 +39,7 @@ static void read_photo(const cl_command *c, bool published, cl_item *item)
         return;
     }
     item->image = item->square;
-    item->photo_side = facts.width < facts.height ? facts.width : facts.height;
+    note_source(c, facts.width < facts.height ? facts.width : facts.height, item);
     item->fov = c->fov > 0 ? c->fov : facts.fov;
     snprintf(item->fov_from, sizeof item->fov_from, "%s", c->fov > 0 ? "--fov" : facts.fov_from);
     snprintf(item->profile, sizeof item->profile, "%s", facts.profile);
@@ -53,7 +61,7 @@ static void read_angle(const cl_command *c, bool published, cl_item *item)
     if (lgd_rectify(item->job->photo, &c->angle, c->max_pixels, c->size, c->fov, item->threads, r, &item->st)) return;
     snprintf(item->profile, sizeof item->profile, "%s", r->profile);
     item->image = item->square = r->square.data;
-    item->photo_side = (int)ceil(r->side);
+    note_source(c, (int)ceil(r->side), item);
     item->fov = LGD_FOV_OF_PHOTO;
     snprintf(item->fov_from, sizeof item->fov_from, "by the corners; %.1f degrees across the photograph: %s", r->fov,
              r->fov_from);
@@ -68,7 +76,6 @@ static void read_sheet(const cl_command *c, cl_item *item)
     else if (lgd_sheet_capture(set, NN_MAX_IMAGES, c->size, c->max_pixels, item->threads, &item->capture, &item->st))
         return;
     item->image = item->capture.image;
-    item->photo_side = c->size;
     item->fov = LGD_FOV_OF_PHOTO;
     snprintf(item->fov_from, sizeof item->fov_from, "the sheet, %d photographs", set->good);
 }
@@ -79,7 +86,6 @@ static void read_input(const cl_command *c, bool published, cl_item *item)
     else if (c->corners) read_angle(c, published, item);
     else if (!*c->capture) read_photo(c, published, item);
     else if (!lgd_read_capture(c->capture, c->size, c->max_pixels, !(c->power > 0), &item->capture, &item->st)) {
-        item->photo_side = c->size;
         item->image = item->capture.image;
         item->fov = LGD_FOV_OF_PHOTO;
         snprintf(item->fov_from, sizeof item->fov_from, "the capture");
@@ -90,13 +96,12 @@ static void read_input(const cl_command *c, bool published, cl_item *item)
 void cl_item_read(const cl_command *c, const char *recipe, bool published, cl_item *item)
 {
     ts_status st = {0};
-    const bool one = !c->sheet && !*c->capture;
+    const bool one = cl_command_one_file(c);
     const ts_code hash = one ? ts_hash_file(item->job->photo, &item->hash, &st) : TS_OK;
     item->was_done = one && !hash && c->skip_existing && cl_record_is_done(c, item, recipe, &item->result);
     if (item->was_done) return;
     read_input(c, published, item);
-    /* A pipe has no hash. Of a file that cannot be read the reader has the better words. */
-    if (hash && hash != TS_UNSUPPORTED && !item->st.code) item->st = st;
+    if (hash && !item->st.code) item->st = st; /* of a file that cannot be read the reader has the better words */
 }
 
 /* What the library's calls get as their user. */
@@ -125,21 +130,12 @@ static int before_tile(double done, void *user)
 /* What makes a photograph a poor one: the maps will be guesses. */
 static void look_at(const cl_command *c, cl_item *item)
 {
-    const int64_t pixels = (int64_t)c->size * c->size, values = pixels * 3;
-    int64_t dark = 0, full = 0, over = 0, wanted = 0;
-    for (int64_t i = 0; i < values; i++) {
-        const float v = item->image[i];
-        dark += v < 1e-3f; /* three of 255 sRGB levels */
-        full += v > 0.999f;
-        over += v > 1.001f; /* more than resampling rounds to */
-    }
+    const int64_t pixels = (int64_t)c->size * c->size;
+    int64_t wanted = 0;
+    unsigned light = 0;
+    for (int k = 0; k < cl_item_sources(item); k++) light |= cl_item_light(&cl_item_source(item, k)->levels);
     while (item->mask && wanted < pixels && !item->mask[wanted]) wanted++;
-    item->full = (double)full / (double)values;
-    item->over = (double)over / (double)values;
-    item->warnings = (dark == values               ? CL_WARN_BLACK
-                          : full * 10 > values * 9 ? CL_WARN_FULL
-                                                   : 0) |
-        (*cl_item_fov_is(item) == 'a' ? CL_WARN_FOV : 0) | (*item->profile ? CL_WARN_PROFILE : 0) |
+    item->warnings = light | (*cl_item_fov_is(item) == 'a' ? CL_WARN_FOV : 0) | (*item->profile ? CL_WARN_PROFILE : 0) |
         (item->mask && wanted == pixels ? CL_WARN_MASK : 0) | (item->last > CL_FAR ? CL_WARN_DIFFERENT : 0);
 }
 
@@ -221,6 +217,17 @@ void cl_item_write(const cl_command *c, const char *recipe, cl_item *item)
         free(record);
         return;
     }
+/* Whether the maps in the item's folder were made from another photograph's file. */
+static bool is_of_another(const cl_item *item)
+{
+    static const char key[] = "\nphotograph: ";
+    char *meta = lgd_meta_read(item->job->folder);
+    const char *at = meta ? strstr(meta, key) : NULL;
+    const bool another = at && strtoull(at + sizeof key - 1, NULL, 16) != item->hash;
+    free(meta);
+    return another;
+}
+
     char from[sizeof item->fov_from + 32];
     snprintf(from, sizeof from, "%s%s", cl_item_assumption(item), item->fov_from);
     const lgd_order order = {.which = c->outputs,
@@ -232,6 +239,7 @@ void cl_item_write(const cl_command *c, const char *recipe, cl_item *item)
                              .fov_from = from,
                              .ambient = item->ambient,
                              .record = record};
+    item->replaced = is_of_another(item);
     if (lgd_output_write(c->out, item->job->stem, &item->m, &item->photo[0], &order, &item->written, &item->st))
         ts_context(&item->st, "%s", item->job->photo);
     free(record);

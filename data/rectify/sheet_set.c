@@ -229,3 +229,11 @@ ts_code io_sheet_window(const io_sheet_photo *photo, int size, int64_t max_pixel
     io_photo_close(&rows);
     return code;
 }
+
+double io_sheet_window_side(const io_sheet_photo *photo)
+{
+    double at[4][2], side = 0;
+    for (int k = 0; k < 4; k++) io_pinhole_see(&photo->sight.camera, window_corner[k], at[k]);
+    for (int k = 0; k < 4; k++) side += hypot(at[k][0] - at[(k + 1) % 4][0], at[k][1] - at[(k + 1) % 4][1]) / 4;
+    return side;
+}

@@ -36,6 +36,9 @@ void io_sheet_set_free(io_sheet_set *set);
 ts_code io_sheet_window(const io_sheet_photo *photo, int size, int64_t max_pixels, int threads, io_image *window,
                         ts_status *st);
 
+/* The side of a good photograph's window in its picture, the mean of the four in pixels. */
+double io_sheet_window_side(const io_sheet_photo *photo);
+
 /* A camera's angle of view when nothing is known: a phone's main lens, 26 mm on 35 mm film. */
 #define IO_PHONE_FOCAL (26 / 43.266615305567875) /* in diagonals of the picture */
 #endif

@@ -76,6 +76,51 @@ list() {
     if cmp -s "$T/o/00/maps.exr" "$T/o/three/maps.exr"; then fail "one photograph gives what three give"; fi
 }
 
+# Files that are all called capture.ini go to folders of their folders' names; meta.txt says by what they were made.
+names() {
+    several
+    for s in wood stone; do
+        mkdir "$T/$s"
+        printf 'P6\n2 2\n255\n............' >"$T/$s/a.ppm"
+        printf '[a]\nfile = a.ppm\nlight = 0, 0, 1\ncamera = 0, 0, 1\n' >"$T/$s/capture.ini"
+    done
+    expect 0 infer --capture "$T/wood/capture.ini" -o "$T/o"
+    expect 0 infer --capture "$T/stone/capture.ini" -o "$T/o"
+    (cd "$T/stone" && expect 0 infer --capture capture.ini -o "$T/here") || exit 1
+    [ "$(ls "$T/o" | tr '\n' ' ')" = "stone wood " ] || fail "folders: $(ls "$T/o" | tr '\n' ' ')"
+    [ "$(ls "$T/here")" = stone ] || fail "of the working folder: $(ls "$T/here")"
+    says "$T/o/wood/meta.txt" "weights: \"last.safetensors\" "
+    says "$T/o/wood/meta.txt" "options: lgd-infer "
+    says "$T/o/wood/meta.txt" '"hash": null'
+    if grep -q "^photograph: " "$T/o/wood/meta.txt"; then fail "one hash for several photographs"; fi
+    # maps of a photograph that goes to the same folder
+    cp "$T/wood/a.ppm" "$T/wood.ppm"
+    printf 'P6\n2 2\n255\nmmmmmmmmmmmm' >"$T/wood/wood.ppm"
+    expect 0 infer "$T/wood.ppm" -o "$T/o"
+    if grep -q "another photograph" "$T/err"; then fail "of a capture nothing tells"; fi
+    expect 0 infer "$T/wood.ppm" -o "$T/o"
+    if grep -q "another photograph" "$T/err"; then fail "the same photograph: $(cat "$T/err")"; fi
+    expect 0 infer "$T/wood/wood.ppm" -o "$T/o"
+    says "$T/err" "wood/wood.ppm: note: the maps of another photograph in $T/o/wood were replaced"
+}
+
+# Each photograph of a capture is looked at.
+looked_at() {
+    several
+    for f in a b c; do printf '[%s]\nfile = %s.ppm\nlight = 0, 0, 1\ncamera = 0, 0, 1\n' $f $f; done >"$T/c.ini"
+    for f in a b c; do { printf 'P6\n20 20\n255\n'; head -c 1200 /dev/zero | tr '\000' 'm'; } >"$T/$f.ppm"; done
+    expect 0 infer --capture "$T/c.ini" -o "$T/o"
+    if grep -q "warning: the\|upsampled" "$T/err"; then fail "nothing is wrong: $(cat "$T/err")"; fi
+    { printf 'P6\n20 20\n255\n'; head -c 1200 /dev/zero; } >"$T/b.ppm"
+    { printf 'P6\n9 8\n255\n'; head -c 216 /dev/zero | tr '\000' '\377'; } >"$T/c.ppm"
+    expect 0 infer --capture "$T/c.ini" -o "$T/o"
+    says "$T/err" "$T/b.ppm: warning: the photograph is black"
+    says "$T/err" "$T/c.ppm: warning: the photograph is overexposed (100% of the values)"
+    says "$T/err" "$T/c.ppm: note: upsampled: its square has 8 pixels a side and --size is 16"
+    if grep -q "a.ppm: " "$T/err"; then fail "a.ppm: $(cat "$T/err")"; fi
+    says "$T/o/c/meta.txt" '"warnings": ["black", "overexposed"'
+}
+
 # A message with the file and the line for each mistake.
 mistakes() {
     several
@@ -117,4 +162,6 @@ END
 
 check capture_folder folder
 check capture_list list
+check capture_names names
+check capture_looked_at looked_at
 check capture_mistakes mistakes
