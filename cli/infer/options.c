@@ -113,6 +113,13 @@ const cl_argument cl_infer_arguments[] = {
     {VERSION, "version", NULL, "print the version"},
     {0, NULL, NULL, NULL}};
 
+/* Where the normals' y is to be seen, and what the two workflows have different or one of them alone. */
+enum {
+    WITH_NORMALS = LGD_OUT_NORMAL | LGD_OUT_EXR | LGD_OUT_GLB,
+    OF_A_WORKFLOW = LGD_OUT_DIFFUSE | LGD_OUT_SPECULAR | LGD_OUT_BASECOLOR | LGD_OUT_METALLIC | LGD_OUT_ORM |
+        LGD_OUT_GLTF | LGD_OUT_GLB | LGD_OUT_MATERIALX
+};
+
 static ts_code whole(const char *name, const char *text, int64_t lo, int64_t hi, int64_t *value, ts_status *st)
 {
     if (cl_parse_int(text, lo, hi, value)) return TS_OK;
@@ -152,7 +159,7 @@ ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st)
     int key, operands = argc;
     int64_t n = 0;
     ts_code code = TS_OK;
-    bool power_given = false, exr_given = false, ao = false;
+    bool power_given = false, exr_given = false, normal_given = false, workflow_given = false, ao = false;
     while (!code && !c->help && !c->version &&
            (key = cl_argument_next(argc, argv, cl_infer_arguments, &value, &operands, st)) != CL_ARGUMENT_END) {
         switch (key) {
@@ -245,11 +252,13 @@ ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st)
                 code = ts_fail(st, TS_INVALID, "--exr: '%s' is neither half nor float", value);
             break;
         case WORKFLOW:
+            workflow_given = true;
             c->metallic = strcmp(value, "metallic") == 0;
             if (!c->metallic && strcmp(value, "specular") != 0)
                 code = ts_fail(st, TS_INVALID, "--workflow: '%s' is neither specular nor metallic", value);
             break;
         case NORMAL:
+            normal_given = true;
             c->directx = strcmp(value, "dx") == 0;
             if (!c->directx && strcmp(value, "gl") != 0)
                 code = ts_fail(st, TS_INVALID, "--normal: '%s' is neither gl nor dx", value);
@@ -263,6 +272,16 @@ ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st)
     if (c->seamless && c->size < IO_SEAMLESS_LEAST)
         return ts_fail(st, TS_INVALID, "--seamless needs a --size of %d at least", IO_SEAMLESS_LEAST);
     c->outputs = lgd_output_complete((c->outputs ? c->outputs : LGD_OUT_DEFAULT) | (ao ? LGD_OUT_AO : 0), c->metallic);
+    if (exr_given && !(c->outputs & LGD_OUT_EXR))
+        return ts_fail(st, TS_INVALID, "--exr is for maps.exr: --maps must list exr");
+    if (normal_given && !(c->outputs & WITH_NORMALS))
+        return ts_fail(st, TS_INVALID, "--normal is for normal.png and maps.exr: --maps must list normal or exr");
+    if (workflow_given && !(c->outputs & OF_A_WORKFLOW))
+        return ts_fail(st, TS_INVALID,
+                       "--workflow is for colours and documents: --maps must list one of diffuse, specular, basecolor, "
+                       "metallic, orm, gltf, glb, materialx");
+    if (c->mask && c->iterations == 0)
+        return ts_fail(st, TS_INVALID, "--mask says where the maps are refined: not with --iterations 0");
     if (!exr_given) c->half = c->size > LGD_HALF_ABOVE;
     c->photo = argv + operands;
     c->photos = argc - operands;

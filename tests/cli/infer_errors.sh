@@ -30,6 +30,33 @@ same_stem() {
     says "$T/err" "$T/y/wall.ppm"
     [ ! -e "$T/o" ] || fail "work was begun"
 }
+    cp "$T/x/wall.ppm" "$T/x/floor.ppm"
+    cp "$T/x/wall.ppm" "$T/x/floor.pnm"
+    expect 2 infer "$T/x" "$T/x/floor.pnm" "$T/y/wall.ppm" -o "$T/o"
+    says "$T/err" "(2 such pairs in all)"
+    says "$T/err" "@LIST"
+    # the same file once more, by another name of its folder
+    ln -s x "$T/link"
+    expect 0 infer "$T/x/wall.ppm" "$T/x/wall.ppm" "$T/link/wall.ppm" -o "$T/o"
+    lines "$T/out" 1
+}
+
+# What would have no effect is refused before any work.
+without_effect() {
+    model
+    photo "$T/p.ppm" 8 8
+    for bad in "--exr half --maps diffuse" "--normal dx --maps roughness" "--normal gl --maps page" \
+        "--workflow metallic --maps roughness" "--workflow specular --maps height,exr" "--mask $T/p.ppm -i 0"; do
+        # shellcheck disable=SC2086
+        expect 2 infer $bad "$T/p.ppm" -o "$T/o"
+        says "$T/err" "${bad%% *}"
+    done
+    [ ! -e "$T/o" ] || fail "the folder was made"
+    for good in "--exr float --maps diffuse,exr" "--normal dx --maps exr" "--normal gl --maps glb" \
+        "--workflow metallic --maps basecolor,orm" "--workflow specular --maps materialx" "--mask $T/p.ppm -i 1"; do
+        # shellcheck disable=SC2086
+        expect 0 infer $good "$T/p.ppm" -o "$T/o"
+    done
 
 odd_stems() {
     model
@@ -263,3 +290,4 @@ check infer_model_lookup model_lookup
 check infer_without_the_image_library without_the_image_library
 check infer_too_many_pixels too_many_pixels
 check infer_max_memory max_memory
+check infer_without_effect without_effect

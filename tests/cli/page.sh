@@ -13,7 +13,8 @@ views() {
     says "$T/o/a <b> & \"c\" {{photo}} 100%#1/view.html" \
         '<title>a &lt;b&gt; &amp; &quot;c&quot; {{photo}} 100%#1 - material</title>'
     # an odd size, a long lens, normals that files have upside down; maps that repeat, brighter light
-    expect 0 "$BIN/lgd-infer" --size 37 -i 1 --threads 1 --fov 28 --normal dx --maps page,preview "$PHOTO" -o "$T/odd"
+    expect 0 "$BIN/lgd-infer" --size 37 -i 1 --threads 1 --fov 28 --normal dx \
+        --maps page,preview,normal "$PHOTO" -o "$T/odd"
     expect 0 "$BIN/lgd-infer" --size 48 -i 1 --threads 1 --seamless --light-power 3 --maps page,preview "$PHOTO" \
         -o "$T/seamless"
     for f in "$T"/o/*/view.html "$T/odd/flash/view.html"; do
