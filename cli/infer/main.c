@@ -7,6 +7,7 @@
 #include "cli/infer/record.h"
 #include "cli/infer/say.h"
 #include "cli/operands.h"
+#include "data/capture_ini.h"
 #include "infer/api_model.h"
 #include "infer/model_path.h"
 #include "infer/output.h"
@@ -158,11 +159,27 @@ static int end_manifest(run *r, int code)
     return st->code ? cl_failed("%s", st->message) : code;
 }
 
+/* What is read beside the plan's photographs is not replaced either. */
+static ts_code spare(const cl_command *c, const cl_plan *plan, ts_status *st)
+{
+    char *file[IO_CAPTURE_IMAGES];
+    int files = 0;
+    ts_code code = c->mask ? cl_plan_check(plan, "mask", &c->mask, 1, st) : TS_OK;
+    if (!code && c->sheet) code = cl_plan_check(plan, "photograph", (const char *const *)c->photo, c->photos, st);
+    if (code || !*c->capture) return code;
+    io_capture_ini_files(c->capture, file, &files,
+                         &(ts_status){0}); /* of one that cannot be read, the reader says it */
+    code = cl_plan_check(plan, "photograph", (const char *const *)file, files, st);
+    for (int i = 0; i < files; i++) free(file[i]);
+    return code;
+}
+
 /* The part of the work; its pages and its list. several: not a lone photograph, whose own page and meta.txt are
  * enough. */
 static ts_code settle(run *r, cl_plan *plan, bool several, ts_status *st)
 {
     const cl_command *c = r->command;
+    if (spare(c, plan, st) != TS_OK) return st->code;
     if (several && cl_manifest_check(plan, c->out, st) != TS_OK) return st->code;
     if (c->shards) cl_plan_keep(plan, c->shard, c->shards);
     r->jobs = plan->jobs;

@@ -34,7 +34,7 @@ enum {
 const cl_argument cl_infer_arguments[] = {
     {'o', "output", "DIR",
      "output folder (required); each photograph gets DIR/STEM/, STEM = its file name without extension, of\n"
-     "a capture's folder its whole name"},
+     "a capture's folder its whole name, of a file capture.ini the name of the folder that it lies in"},
     {'s', "size", "N", "side of the maps in pixels, 1 .. 8192 (default 256)"},
     {'i', "iterations", "N|auto",
      "refinement steps, 0 .. 1000; 0 = the first estimate only; auto = as long as the reconstruction improves,\n"
@@ -54,8 +54,8 @@ const cl_argument cl_infer_arguments[] = {
      "precision of the products in convolutions (default f32); bf16 is faster on CPUs with AMX or AMD's AVX512-BF16,\n"
      "slower on others; the maps differ by less than 0.005 (RMS), single values by up to 0.8"},
     {CAPTURE, "capture", "WHERE",
-     "instead of PHOTO: several photographs of one sample under known lights, listed in an INI file or in a folder\n"
-     "in MaterialGAN's layout"},
+     "instead of PHOTO: 1 to 100 photographs of one sample under known lights, listed in an INI file or in a folder\n"
+     "in MaterialGAN's layout; the first nine are used"},
     {FOV, "fov", "DEG",
      "field of view of the photographs, 1 .. 170 degrees across the side of the square that the maps cover\n"
      "(default: from the file's EXIF, else the model's guess, or 54.2 with a warning)"},
@@ -89,8 +89,8 @@ const cl_argument cl_infer_arguments[] = {
      "of these), basecolor, metallic, height, ao (ambient occlusion), orm (occlusion, roughness and metalness in "
      "one),\n"
      "gltf, glb (glTF as one file), materialx, page (view.html lights the material in a browser; of several\n"
-     "photographs, not with --shard, index.html too); those of another estimate in DIR/STEM/, by its meta.txt, are "
-     "removed"},
+     "photographs, not with --shard, index.html too); gltf and materialx come with the maps that they refer to; files\n"
+     "of another estimate that DIR/STEM/meta.txt names are removed"},
     {AO, "ao", NULL, "also write occlusion.png: ambient occlusion of the height"},
     {SEAMLESS, "seamless", NULL,
      "all maps repeat without a visible border: the same seam is cut through all of them; 7/8 of the square remain"},
@@ -315,10 +315,10 @@ ts_code cl_command_parse(int argc, char **argv, cl_command *c, ts_status *st)
     return TS_OK;
 }
 
+bool cl_command_one_file(const cl_command *c) { return !*c->capture && !c->sheet; }
+
 int cl_command_steps(const cl_command *c, const lgd_model *model, int photos)
 {
     if (c->iterations == LGD_AUTO) return LGD_AUTO_MOST;
     return c->iterations < 0 ? lgd_usual_iterations(model, photos) : c->iterations;
 }
-bool cl_command_one_file(const cl_command *c) { return !*c->capture && !c->sheet; }
-

@@ -28,10 +28,27 @@ static char *folder_name(const char *path)
     return name;
 }
 
+/* Of a capture.ini the name of the folder that it lies in: all have this name. NULL: path is none, or that folder has
+ * no name. The caller frees it. */
+static char *capture_name(const char *path)
+{
+    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+    if (strcmp(name, "capture.ini") != 0) return NULL;
+    char *folder = slash ? strndup(path, (size_t)(name - path)) : strdup("."),
+         *found = folder ? folder_name(folder) : NULL;
+    free(folder);
+    if (found && no_name(found)) {
+        free(found);
+        found = NULL;
+    }
+    return found;
+}
+
 /* A copy of the stem, or NULL. *bad: the path has no usable name. */
 static char *stem_of(const char *path, bool *bad)
 {
     char *folder = folder_name(path);
+    if (!folder) folder = capture_name(path);
     if (folder) {
         *bad = no_name(folder);
         return folder;
@@ -53,19 +70,46 @@ static int by_stem(const void *a, const void *b)
     return order ? order : (x > y) - (x < y);
 }
 
-static ts_code check_stems(const cl_plan *plan, ts_status *st)
+static bool same_file(const char *a, const char *b)
 {
-    const cl_job **sorted = malloc((size_t)plan->jobs * sizeof *sorted);
+    struct stat x, y;
+    return strcmp(a, b) == 0 || (stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev && x.st_ino == y.st_ino);
+}
+
+static void free_job(cl_job *job)
+{
+    free(job->stem);
+    free(job->folder);
+    *job = (cl_job){0};
+}
+
+/* Takes out the photographs that are given a second time. Two of one stem are refused. */
+static ts_code check_stems(cl_plan *plan, ts_status *st)
+{
+    cl_job **sorted = malloc((size_t)plan->jobs * sizeof *sorted);
     if (!sorted) return ts_fail(st, TS_NOMEM, "out of memory for %d photographs", plan->jobs);
     for (int i = 0; i < plan->jobs; i++) sorted[i] = &plan->job[i];
     qsort(sorted, (size_t)plan->jobs, sizeof *sorted, by_stem);
+    const cl_job *first = NULL, *second = NULL;
+    int pairs = 0, kept = 0;
+    for (int i = 1, k = 0; i < plan->jobs; i++) { /* k: the last that stays */
+        if (strcmp(sorted[k]->stem, sorted[i]->stem) != 0) k = i;
+        else if (same_file(sorted[k]->photo, sorted[i]->photo)) free_job(sorted[i]);
+        else {
+            if (!pairs++) first = sorted[k], second = sorted[i];
+            k = i;
+        }
+    }
     ts_code code = TS_OK;
-    for (int i = 1; i < plan->jobs && !code; i++)
-        if (strcmp(sorted[i - 1]->stem, sorted[i]->stem) == 0)
-            code = ts_fail(st, TS_INVALID,
-                           "%s and %s would both be written to %s: rename one or use two calls with different folders",
-                           sorted[i - 1]->photo, sorted[i]->photo, sorted[i]->folder);
+    if (pairs)
+        code = ts_fail(st, TS_INVALID,
+                       "%s and %s would both be written to %s (%d such pair%s in all): rename one, list those that are "
+                       "wanted in a file for @LIST, or use calls with different folders",
+                       first->photo, second->photo, second->folder, pairs, pairs > 1 ? "s" : "");
     free(sorted);
+    for (int i = 0; i < plan->jobs; i++)
+        if (plan->job[i].stem) plan->job[kept++] = plan->job[i];
+    plan->jobs = kept;
     return code;
 }
 
@@ -73,7 +117,7 @@ static ts_code check_stems(const cl_plan *plan, ts_status *st)
 typedef struct identity {
     dev_t device;
     ino_t inode;
-    const char *photo;
+    const char *file;
 } identity;
 
 static int by_identity(const void *a, const void *b)
@@ -83,15 +127,14 @@ static int by_identity(const void *a, const void *b)
     return (x->inode > y->inode) - (x->inode < y->inode);
 }
 
-static ts_code check_overwriting(const cl_plan *plan, ts_status *st)
+ts_code cl_plan_check(const cl_plan *plan, const char *what, const char *const *file, int files, ts_status *st)
 {
-    identity *id = malloc((size_t)plan->jobs * sizeof *id);
-    if (!id) return ts_fail(st, TS_NOMEM, "out of memory for %d photographs", plan->jobs);
+    identity *id = malloc((size_t)files * sizeof *id + 1);
+    if (!id) return ts_fail(st, TS_NOMEM, "out of memory for %d photographs", files);
     int known = 0;
-    for (int i = 0; i < plan->jobs; i++) {
+    for (int i = 0; i < files; i++) {
         struct stat info;
-        if (stat(plan->job[i].photo, &info) == 0)
-            id[known++] = (identity){info.st_dev, info.st_ino, plan->job[i].photo};
+        if (stat(file[i], &info) == 0) id[known++] = (identity){info.st_dev, info.st_ino, file[i]};
     }
     qsort(id, (size_t)known, sizeof *id, by_identity);
     ts_code code = TS_OK;
@@ -111,8 +154,8 @@ static ts_code check_overwriting(const cl_plan *plan, ts_status *st)
             const identity key = {info.st_dev, info.st_ino, NULL},
                            *hit = bsearch(&key, id, (size_t)known, sizeof *id, by_identity);
             if (hit && !S_ISDIR(info.st_mode))
-                code = ts_fail(st, TS_INVALID, "%s would replace the photograph %s: use another output folder", path,
-                               hit->photo);
+                code = ts_fail(st, TS_INVALID, "%s would replace the %s %s: use another output folder", path, what,
+                               hit->file);
         }
     }
     free(id);
@@ -136,15 +179,9 @@ ts_code cl_plan_make(char *const *photos, int count, const char *out, cl_plan *p
         }
     }
     if (!code) code = check_stems(plan, st);
-    if (!code) code = check_overwriting(plan, st);
+    if (!code) code = cl_plan_check(plan, "photograph", (const char *const *)photos, count, st);
     if (code) cl_plan_free(plan);
     return code;
-}
-
-static void free_job(cl_job *job)
-{
-    free(job->stem);
-    free(job->folder);
 }
 
 void cl_plan_keep(cl_plan *plan, int shard, int shards)

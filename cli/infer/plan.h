@@ -14,11 +14,14 @@ typedef struct cl_plan {
     int jobs;
 } cl_plan;
 
-/* Rules: STEM is the file's name up to its last dot, or a folder's whole name; a name that would leave an empty stem,
- * "." or ".." is used whole, and refused when it is one of these itself. Two photographs with the same stem are
- * refused, both named; so is a photograph that one of the outputs would replace. TS_INVALID. The caller frees the plan
- * after success. */
+/* Rules: STEM is the file's name up to its last dot, or a folder's whole name, of a file capture.ini that of the folder
+ * that it lies in; a name that would leave an empty stem, "." or ".." is used whole, and refused when it is one of
+ * these itself. A photograph that is given twice counts once. Two with the same stem are refused, both named; so is a
+ * photograph that one of the outputs would replace. TS_INVALID. The caller frees the plan after success. */
 ts_code cl_plan_make(char *const *photos, int count, const char *out, cl_plan *plan, ts_status *st);
+
+/* TS_INVALID where one of the plan's outputs would replace one of these files, each a `what`. */
+ts_code cl_plan_check(const cl_plan *plan, const char *what, const char *const *file, int files, ts_status *st);
 
 /* Leaves the jobs of part shard, 1 .. shards, in their order. The STEM alone decides, whatever other photographs there
  * are. */

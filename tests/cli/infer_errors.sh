@@ -28,8 +28,8 @@ same_stem() {
     expect 2 infer "$T/x/wall.ppm" "$T/y/wall.ppm" -o "$T/o"
     says "$T/err" "$T/x/wall.ppm"
     says "$T/err" "$T/y/wall.ppm"
+    says "$T/err" "(1 such pair in all)"
     [ ! -e "$T/o" ] || fail "work was begun"
-}
     cp "$T/x/wall.ppm" "$T/x/floor.ppm"
     cp "$T/x/wall.ppm" "$T/x/floor.pnm"
     expect 2 infer "$T/x" "$T/x/floor.pnm" "$T/y/wall.ppm" -o "$T/o"
@@ -57,6 +57,7 @@ without_effect() {
         # shellcheck disable=SC2086
         expect 0 infer $good "$T/p.ppm" -o "$T/o"
     done
+}
 
 odd_stems() {
     model
@@ -88,6 +89,18 @@ output_beside_input() {
     cp "$T/d/p.ppm" "$T/d/plain"
     expect 2 infer "$T/d/plain" -o "$T/d"
     cmp -s "$T/d/plain" "$T/before" || fail "the photograph without extension changed"
+    # a mask, photographs of a sheet but the first, and those of a capture
+    mkdir "$T/d/q"
+    cp "$T/d/p.ppm" "$T/d/q.ppm"
+    cp "$T/d/p/render.png" "$T/d/q/diffuse.png"
+    expect 2 infer --mask "$T/d/q/diffuse.png" "$T/d/q.ppm" -o "$T/d"
+    says "$T/err" "q/diffuse.png would replace the mask"
+    expect 2 infer --sheet "$T/d/q.ppm" "$T/d/q/diffuse.png" -o "$T/d"
+    says "$T/err" "q/diffuse.png would replace the photograph"
+    printf '[a]\nfile = diffuse.png\nlight = 0, 0, 1\ncamera = 0, 0, 1\n' >"$T/d/q/capture.ini"
+    expect 2 infer --capture "$T/d/q/capture.ini" -o "$T/d"
+    says "$T/err" "q/diffuse.png would replace the photograph"
+    cmp -s "$T/d/p/render.png" "$T/d/q/diffuse.png" || fail "a file that was read changed"
 }
 
 unwritable_output() {
@@ -278,6 +291,7 @@ check infer_empty_names empty_names
 check infer_bad_photographs_do_not_stop_the_rest bad_ones_do_not_stop
 check infer_same_stem same_stem
 check infer_odd_stems odd_stems
+check infer_without_effect without_effect
 check infer_output_beside_input output_beside_input
 check infer_unwritable_output unwritable_output
 check infer_output_of_another output_of_another
@@ -290,4 +304,3 @@ check infer_model_lookup model_lookup
 check infer_without_the_image_library without_the_image_library
 check infer_too_many_pixels too_many_pixels
 check infer_max_memory max_memory
-check infer_without_effect without_effect
