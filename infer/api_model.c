@@ -130,13 +130,23 @@ void lgd_free(lgd_model **model)
     *model = NULL;
 }
 
-static ts_code check_photo(const lgd_photo *p, int number, ts_status *st)
+static bool apart(const lgd_photo *p)
+{
+    return p->light[0] != p->camera[0] || p->light[1] != p->camera[1] || p->light[2] != p->camera[2];
+}
+
+static ts_code check_photo(const lgd_model *model, const lgd_photo *p, int number, ts_status *st)
 {
     if (!p->image) return ts_fail(st, TS_INVALID, "lgd_estimate: photograph %d has no image", number);
     if (!lgd_photo_can_be(p))
         return ts_fail(st, TS_INVALID,
                        "lgd_estimate: light and camera of photograph %d must be above the sample, its power above 0",
                        number);
+    if (lgd_published(model) && apart(p))
+        return ts_fail(st, TS_UNSUPPORTED,
+                       "lgd_estimate: %s: the published weights know light and camera at one place: those of "
+                       "photograph %d are apart",
+                       nn_file_path(model->net->file), number);
     return TS_OK;
 }
 
@@ -155,15 +165,18 @@ static ts_code check_fov(double fov, int photos, ts_status *st)
 
 ts_code lgd_model_takes(const lgd_model *model, const lgd_options *o, ts_status *st)
 {
+    const char *weights = nn_file_path(model->net->file);
     if (o->sample != LGD_SAMPLE_UNKNOWN && model->net->arch.descent != NN_DESCENT_POSTERIOR)
         return ts_fail(st, TS_UNSUPPORTED,
-                       "these weights do not guess the scene: they cannot be told what the sample is");
+                       "%s: these weights do not guess the scene: they cannot be told what the sample is", weights);
     if ((o->tolerance > 0 || o->mask) && !lgd_tiles_exact(&model->net->arch))
         return ts_fail(st, TS_UNSUPPORTED,
-                       "these weights' loss is taken anew over the whole photograph at every step: no mask and no "
-                       "tolerance");
+                       "%s: these weights' loss is taken anew over the whole photograph at every step: no mask and no "
+                       "tolerance",
+                       weights);
     if (o->iterations > 0 && !nn_arch_refines(&model->net->arch))
-        return ts_fail(st, TS_UNSUPPORTED, "these weights have no refiner: only 0 iterations are possible");
+        return ts_fail(st, TS_UNSUPPORTED, "%s: these weights have no refiner: only 0 iterations are possible",
+                       weights);
     return TS_OK;
 }
 
@@ -175,7 +188,7 @@ static ts_code check_arguments(const lgd_model *model, const lgd_photo *photo, i
         return ts_fail(st, TS_INVALID, "lgd_estimate: %d photographs: these weights read 1 .. %d", photos,
                        nn_most_photographs(&model->net->arch));
     for (int k = 0; k < photos; k++)
-        if (check_photo(&photo[k], k + 1, st) != TS_OK) return st->code;
+        if (check_photo(model, &photo[k], k + 1, st) != TS_OK) return st->code;
     if (side < 1 || side > LGD_SIDE_MAX)
         return ts_fail(st, TS_INVALID, "lgd_estimate: side is %d and must lie in 1 .. %d", side, LGD_SIDE_MAX);
     if (o->iterations < LGD_AUTO || o->iterations > ITERATIONS_MAX)

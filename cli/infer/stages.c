@@ -67,9 +67,14 @@ static void read_angle(const cl_command *c, bool published, cl_item *item)
              r->fov_from);
 }
 
-static void read_sheet(const cl_command *c, cl_item *item)
+static void read_sheet(const cl_command *c, bool published, cl_item *item)
 {
     io_sheet_set *set = &item->sheet;
+    if (published) {
+        ts_fail(&item->st, TS_UNSUPPORTED, "%s: the published weights know light and camera at one place: no --sheet",
+                item->job->photo);
+        return;
+    }
     if (io_sheet_set_read(c->photo, c->photos, c->fov, c->max_pixels, item->threads, cl_interrupted, set, &item->st))
         return;
     if (set->good == 0) item->st = set->photo[0].st;
@@ -82,7 +87,7 @@ static void read_sheet(const cl_command *c, cl_item *item)
 
 static void read_input(const cl_command *c, bool published, cl_item *item)
 {
-    if (c->sheet) read_sheet(c, item);
+    if (c->sheet) read_sheet(c, published, item);
     else if (c->corners) read_angle(c, published, item);
     else if (!*c->capture) read_photo(c, published, item);
     else if (!lgd_read_capture(c->capture, c->size, c->max_pixels, !(c->power > 0), &item->capture, &item->st)) {
@@ -186,12 +191,16 @@ void cl_item_estimate(const cl_command *c, lgd_model *model, cl_item *item, cl_i
 ts_code cl_command_suits(const cl_command *c, const lgd_model *model, ts_status *st)
 {
     const unsigned char some = 1;
-    return lgd_model_takes(model,
-                           &(lgd_options){.iterations = c->iterations,
-                                          .tolerance = c->tolerance,
-                                          .mask = c->mask ? &some : NULL,
-                                          .sample = c->sample},
-                           st);
+    const struct {
+        const char *name;
+        lgd_options option;
+    } each[] = {{"--sample", {.sample = c->sample}},
+                {"--mask", {.mask = c->mask ? &some : NULL}},
+                {"--tolerance", {.tolerance = c->tolerance}},
+                {"--iterations", {.iterations = c->iterations}}};
+    for (size_t i = 0; i < sizeof each / sizeof *each; i++)
+        if (lgd_model_takes(model, &each[i].option, st) != TS_OK) return ts_context(st, "%s", each[i].name);
+    return TS_OK;
 }
 
 double cl_item_bytes(const cl_command *c, const lgd_model *model)
@@ -208,15 +217,6 @@ double cl_item_bytes(const cl_command *c, const lgd_model *model)
     return most;
 }
 
-void cl_item_write(const cl_command *c, const char *recipe, cl_item *item)
-{
-    char *record = cl_record(c, item, recipe);
-    item->result = cl_record_result(record);
-    if (!record || !item->result) {
-        ts_fail(&item->st, TS_NOMEM, "%s: out of memory", item->job->photo);
-        free(record);
-        return;
-    }
 /* Whether the maps in the item's folder were made from another photograph's file. */
 static bool is_of_another(const cl_item *item)
 {
@@ -228,8 +228,18 @@ static bool is_of_another(const cl_item *item)
     return another;
 }
 
+void cl_item_write(const cl_command *c, const char *recipe, cl_item *item)
+{
+    char *record = cl_record(c, item, recipe);
+    item->result = cl_record_result(record);
+    if (!record || !item->result) {
+        ts_fail(&item->st, TS_NOMEM, "%s: out of memory", item->job->photo);
+        free(record);
+        return;
+    }
     char from[sizeof item->fov_from + 32];
     snprintf(from, sizeof from, "%s%s", cl_item_assumption(item), item->fov_from);
+    item->replaced = is_of_another(item);
     const lgd_order order = {.which = c->outputs,
                              .directx = c->directx,
                              .metallic = c->metallic,
@@ -239,7 +249,6 @@ static bool is_of_another(const cl_item *item)
                              .fov_from = from,
                              .ambient = item->ambient,
                              .record = record};
-    item->replaced = is_of_another(item);
     if (lgd_output_write(c->out, item->job->stem, &item->m, &item->photo[0], &order, &item->written, &item->st))
         ts_context(&item->st, "%s", item->job->photo);
     free(record);

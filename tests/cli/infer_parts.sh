@@ -55,7 +55,8 @@ mask_and_tolerance() {
     expect 1 infer --mask "$T/absent.png" "$T/p.ppm" -o "$T/o"
     says "$T/err" "absent.png"
     expect 2 infer --model single --sample metal "$T/p.ppm" -o "$T/o"
-    says "$T/err" "these weights do not guess the scene"
+    says "$T/err" "--sample: "
+    says "$T/err" "single.safetensors: these weights do not guess the scene"
     [ ! -e "$T/o" ] || fail "something was written"
     # a folder of the model's name hides nothing
     mkdir "$T/named" "$T/named/phone"

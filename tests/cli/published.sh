@@ -40,7 +40,17 @@ runs_with_and_without_metadata() {
         cmp -s "$T/one/p/$f" "$T/two/p/$f" || fail "$f: the .pth gives another"
     done
     expect 2 "$BIN/lgd-infer" --tolerance 0.1 --model "$T/a.pth" "$T/p.ppm" -o "$T/three"
+    says "$T/err" "--tolerance: $T/a.pth: "
     says "$T/err" "no mask and no tolerance"
+    # light and camera are at one place
+    expect 1 "$BIN/lgd-infer" --sheet --model "$T/a.pth" "$T/p.ppm" -o "$T/three"
+    says "$T/err" "no --sheet"
+    printf '[a]\nfile = p.ppm\nlight = 0, 0, 1\ncamera = 0, 0, 1\n' >"$T/at_one.ini"
+    sed 's/light = 0/light = 0.1/' "$T/at_one.ini" >"$T/apart.ini"
+    expect 0 "$BIN/lgd-infer" --threads 1 -i 1 --capture "$T/at_one.ini" --model "$T/a.pth" -o "$T/three"
+    expect 1 "$BIN/lgd-infer" --threads 1 -i 1 --capture "$T/apart.ini" --model "$T/a.pth" -o "$T/three"
+    says "$T/err" "a.pth: the published weights know light and camera at one place"
+    [ ! -e "$T/three/apart" ] || fail "maps in spite of a light beside the camera"
 }
 
 # The paper's own size: 640 MB of weights are too many for a test, so that only the configuration is read.
