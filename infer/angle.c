@@ -25,18 +25,22 @@ ts_code lgd_rectify(const char *path, const io_corners *corners, int64_t max_pix
 {
     io_photo_rows photo;
     *r = (lgd_rectified){.fov = fov};
-    if (io_photo_open(path, max_pixels, true, &photo, st) != TS_OK) return st->code;
+    ts_code code = io_photo_open(path, max_pixels, true, &photo, st);
+    if (code) {
+        *r = (lgd_rectified){0};
+        return code;
+    }
     memcpy(r->profile, photo.unread, sizeof r->profile);
     if (fov > 0) snprintf(r->fov_from, sizeof r->fov_from, "--fov");
     else r->fov = io_lens_fov(&photo.raw.lens, photo.width, photo.height, r->fov_from, sizeof r->fov_from);
     r->assumed = !(r->fov > 0);
     if (r->assumed) r->fov = LGD_FOV_DEFAULT;
     const double none[3] = {0};
-    const ts_code code = io_corners_rectify(&photo, corners, r->fov, size, threads, &r->square, &r->camera, &r->side,
-                                            st);
-    r->photo = code ? (lgd_photo){0} : lgd_photo_by(&r->camera, none, r->square.data);
-    if (code) {
+    code = io_corners_rectify(&photo, corners, r->fov, size, threads, &r->square, &r->camera, &r->side, st);
+    if (!code) r->photo = lgd_photo_by(&r->camera, none, r->square.data);
+    else {
         io_image_free(&r->square);
+        *r = (lgd_rectified){0};
         ts_context(st, "%s", path);
     }
     io_photo_close(&photo);

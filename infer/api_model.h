@@ -19,7 +19,8 @@ ts_code lgd_model_takes(const lgd_model *model, const lgd_options *options, ts_s
  * taken at last. */
 const char *lgd_fov_assumption(const lgd_photo *taken);
 
-/* Bytes that such an estimate holds at once, at most, beside its photographs and maps. */
+/* Bytes that such an estimate of one photograph, or of as many as g reads, holds at once, at most, beside its
+ * photographs and maps. */
 double lgd_model_bytes(const lgd_model *model, int side, const lgd_options *options);
 
 /* Of the bytes of its weights' file (tensor/hash.h). */

@@ -8,7 +8,9 @@
  * Functions that return int and take an error return 0, or nonzero with it set, and what they fill unspecified; it may
  * be NULL. The small buffers of convolutions (tensor/scratch.h) are the exception: where they cannot be had the process
  * is aborted.
- * Structs that may grow begin with their size where the caller was compiled. Fields beyond it have their defaults. */
+ * Structs that may grow begin with their size where the caller was compiled. Fields beyond it have their defaults.
+ * Limits, beyond which a call is refused: side 1 .. 16384, iterations at most 1000, threads at most 1024, tolerance
+ * 0 .. 1. */
 #ifndef LGD_H
 #define LGD_H
 #include <stddef.h>
@@ -52,8 +54,9 @@ LGD_API int lgd_published(const lgd_model *model); /* nonzero: the published net
 LGD_API int lgd_find_weights(const char *name, char *path, size_t size, lgd_error *error);
 
 /* LGD_AUTO: steps go on while each lowers the reconstruction RMSE by a thousandth or more, LGD_AUTO_MOST at most. The
- * result is R_t of the last such step. The steps of photographs in several tiles, and of those with mask or tolerance,
- * are counted on the photograph at 256 x 256 pixels. */
+ * result is R_t of the last such step. The first steps of several photographs whose lights and cameras are known may be
+ * revisions (docs/math.md): these are always made. The steps of photographs in several tiles, and of those with mask or
+ * tolerance, are counted on the photograph at 256 x 256 pixels. */
 enum { LGD_AUTO = -2, LGD_AUTO_MOST = 24 };
 
 /* The tolerance of least time whose renderings are at most 1% worse than those of all steps (docs/accuracy.md). */
@@ -144,16 +147,16 @@ static inline lgd_options lgd_options_default(void)
     return options;
 }
 
-/* image: side x side x 3 linear values (clamped to [0, 1] here), top row first. maps: side x side x 9, in [0, 1] where
- * not said otherwise: diffuse rgb, normal x and y in [-1, 1] (OpenGL, z = sqrt(1 - x^2 - y^2)), roughness, specular F0
- * rgb. Returns 0, or nonzero with error set and maps unspecified. */
+/* image: side x side x 3 linear values (clamped to [0, 1] here, black where not finite), top row first. maps: side x
+ * side x 9, in [0, 1] where not said otherwise: diffuse rgb, normal x and y in [-1, 1] (OpenGL, z = sqrt(1 - x^2 -
+ * y^2)), roughness, specular F0 rgb. Returns 0, or nonzero with error set and maps unspecified. */
 LGD_API int lgd_estimate(lgd_model *model, const float *image, int side, const lgd_options *options, float *maps,
                          lgd_error *error);
 
 /* A photograph of the sample, rectified to it. Positions in patch widths (the sample is [-1/2, 1/2]^2 at z = 0, x
  * right, y up), both above the sample; radiance = BRDF max(n.l, 0) power / distance^2. */
 struct lgd_photo {
-    const float *image; /* side x side x 3 linear values (clamped to [0, 1] here), top row first */
+    const float *image; /* as lgd_estimate's */
     float light[3], camera[3], power;
 };
 
@@ -195,8 +198,8 @@ typedef struct lgd_facts {
 LGD_API int lgd_read_photo(const char *path, int side, const lgd_read_options *options, float *image, lgd_facts *facts,
                            lgd_error *error);
 
-/* An image as lgd_options.mask: side x side values, 1 where its largest centred square is not black. width x height:
- * of the photograph, whose shape it must have; 0: it may have any. */
+/* An image as lgd_options.mask: side x side values, 1 where its largest centred square is neither black nor
+ * transparent. width x height: of the photograph, whose shape it must have; 0: it may have any. */
 LGD_API int lgd_read_mask(const char *path, int side, int width, int height, const lgd_read_options *options,
                           unsigned char *mask, lgd_error *error);
 
@@ -226,7 +229,8 @@ typedef struct lgd_write_options {
 } lgd_write_options;
 
 /* Writes maps as returned by lgd_estimate, and meta.txt, into folder, whose parent exists. All files appear together
- * when they are complete; a failure leaves what was there. Files that an earlier call wrote there for other maps are
+ * when they are complete; a failure leaves what was there, but for one amid the renames into a folder that was there,
+ * which leaves a meta.txt that begins with "incomplete". Files that an earlier call wrote there for other maps are
  * removed. Values that are not finite are an error. photo: with light and camera as they were taken
  * (lgd_options.taken) and the image that was read, side x side, for render and page; NULL: lgd_flash_photo(NULL).
  * options may be NULL. */

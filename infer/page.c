@@ -112,8 +112,8 @@ static ts_code fit(page *p, const io_material *m, ts_status *st)
     const int size = m->size < LGD_PAGE_MOST ? m->size : LGD_PAGE_MOST;
     const io_image maps = {m->size, m->size, MAP_CHANNELS, m->maps},
                    photo = {m->size, m->size, 3, (float *)p->photo->image}; /* only read */
-    ts_code code = io_centre_square(&maps, size, 0, &p->m, st);
-    if (!code) code = io_centre_square(&photo, size, 0, &p->image, st);
+    ts_code code = io_centre_square(&maps, size, p->order->threads, &p->m, st);
+    if (!code) code = io_centre_square(&photo, size, p->order->threads, &p->image, st);
     return code ? code : io_image_create(&p->picture, size, size, 3, st);
 }
 

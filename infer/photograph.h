@@ -4,7 +4,7 @@
 #include "data/image/image.h"
 
 /* Whether the weights are of the published network (arch.compat, nn/model.h), whose photographs are prepared as its
- * authors' loader does. Only the file's head is read. */
+ * authors' loader does. Only the file's head is read, of a PyTorch file also the tensors that are compressed. */
 ts_code lgd_weights_published(const char *path, bool *published, ts_status *st);
 
 /* The photograph's largest centred square at size x size pixels, linear, which the caller frees. published: resampled
