@@ -59,6 +59,11 @@ infers() {
     says "$T/err" "3 of 3 photographs"
     says "$T/err" "1 of its 3 photographs are used, the most different"
     says "$T/o/photo_1/meta.txt" "the sheet, 3 photographs"
+    says "$T/o/photo_1/meta.txt" "options: lgd-infer "
+    if grep -q upsampled "$T/err"; then fail "the windows are larger than the maps: $(cat "$T/err")"; fi
+    expect 0 infer --size 800 -i 0 --maps roughness --sheet "$one/photo_2.jpg" -o "$T/large"
+    grep -q "photo_2.jpg: note: upsampled: its square has [2-7][0-9][0-9] pixels a side and --size is 800" "$T/err" ||
+        fail "not said to be upsampled: $(cat "$T/err")"
     expect 0 infer --sheet "$one/photo_1.jpg" -o "$T/p"
     complete "$T/p/photo_1"
 }

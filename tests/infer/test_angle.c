@@ -190,6 +190,7 @@ TEST(angle_corners_that_cannot_be)
     CHECK(lgd_rectify(path, &beyond, 1 << 20, 8, 50, 1, &r, &st) == TS_INVALID && strstr(st.message, "corner 2") &&
               strstr(st.message, "small.png"),
           "%s", st.message);
+    CHECK(!r.square.data && r.fov == 0 && !*r.fov_from && !*r.profile && !r.assumed, "something is left in it");
 }
 
 /* A capture.ini's corners, focal length and exposure. */
