@@ -85,6 +85,7 @@ static ts_code take(cl_operands *all, const char *name, void (*failed)(const cha
 static ts_code read_list(const char *list, char **text, size_t *size, ts_status *st)
 {
     const bool given = strcmp(list, "-") == 0;
+    const char *what = given ? "standard input" : list;
     const int fd = given ? STDIN_FILENO : open(list, O_RDONLY | O_CLOEXEC);
     size_t room = 0;
     ssize_t n = 1;
@@ -100,10 +101,9 @@ static ts_code read_list(const char *list, char **text, size_t *size, ts_status 
         if (code) break;
         n = read(fd, *text + *size, room - 1 - *size);
         if (n > 0) *size += (size_t)n;
-        else if (n < 0 && errno != EINTR)
-            code = ts_fail(st, TS_IO, "%s: cannot be read: %s", given ? "standard input" : list, strerror(errno));
-        else if (n < 0 && cl_interrupted()) code = ts_fail(st, TS_INTERRUPTED, "interrupted while %s was read", list);
-        if (*size > LIST_LIMIT) code = ts_fail(st, TS_UNSUPPORTED, "%s: longer than %zu bytes", list, LIST_LIMIT);
+        else if (n < 0 && errno != EINTR) code = ts_fail(st, TS_IO, "%s: cannot be read: %s", what, strerror(errno));
+        else if (n < 0 && cl_interrupted()) code = ts_fail(st, TS_INTERRUPTED, "interrupted while %s was read", what);
+        if (*size > LIST_LIMIT) code = ts_fail(st, TS_UNSUPPORTED, "%s: longer than %zu bytes", what, LIST_LIMIT);
     }
     if (fd >= 0 && !given) close(fd);
     if (!code) (*text)[*size] = 0;
@@ -127,7 +127,7 @@ static ts_code take_list(cl_operands *all, const char *name, void (*failed)(cons
             if (length && line[length - 1] == '\r') line[length - 1] = 0;
             if (*line) names++, code = take(all, line, failed, st);
         }
-        if (!names && !code) ts_fail(&own, TS_IO, "%s: the list has no names: write one photograph a line", list);
+        if (!names && !code) ts_fail(&own, TS_IO, "%s: the list has no names: write one photograph a line", name);
     } else if (own.code == TS_INTERRUPTED) code = ts_fail(st, own.code, "%s", own.message);
     else if (access(list, F_OK) != 0 && access(name, F_OK) == 0)
         ts_fail(&own, TS_IO, "%s: there is no such list: write ./%s for the photograph", list, name);

@@ -134,7 +134,8 @@ static void print_help(void)
          "output; what was assumed and the difference of the maps' rendering from the photograph (RMSE of linear "
          "values),\n"
          "at first and after the steps, go to standard error. Two photographs with the same STEM\n"
-         "are refused before any work. Of several, DIR/results.jsonl gets a line for each.\n"
+         "are refused before any work; one that is given twice counts once. Of several, DIR/results.jsonl gets a line "
+         "for each.\n"
          "Exit status: 0 done, 1 a photograph failed (the others are done), 2 wrong usage, 130 interrupted (what is "
          "complete stays).");
 }

@@ -69,6 +69,8 @@ folders_and_lists() {
     cat "$T/list.txt" >"$T/pipe" &
     expect 0 infer --maps render "@$T/pipe" -o "$T/s"
     [ "$(cat "$T/out")" = "$(printf '%s\n' "$T/s/b" "$T/s/c")" ] || fail "not b and c: $(cat "$T/out")"
+    expect 1 infer @- -o "$T/u" </dev/null
+    says "$T/err" "@-: the list has no names"
     # a name with an @ is not a list
     cp "$T/in/b.ppm" "$T/@b.ppm"
     (cd "$T" && expect 1 infer --maps render @b.ppm -o s && says err "write ./@b.ppm for the photograph" &&
