@@ -8,7 +8,6 @@
 #include "tensor/cpu.h"
 #include "tensor/peak.h"
 #include "tensor/threads.h"
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -66,7 +65,7 @@ static ts_code load_under_sheet(ev_run *r, bench *b, const ev_set *set, int i, e
         memcpy(c->input[k].light, photo[k].light, sizeof photo[k].light);
     }
     c->view = c->input[0];
-    c->fov = rd_fov_of((double)c->view.camera[2]);
+    c->fov = rd_fov_from(c->view.camera);
     c->fit = r->fit;
     c->lpips = r->lpips;
     return TS_OK;
@@ -104,7 +103,7 @@ static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, t
     rd_eval_views(&rng, RD_EVAL_VIEWS, b->views);
     *c = ev_case_of_maps(&b->truth, b->image, b->views, r->perceptual);
     c->view = r->flash;
-    c->fov = rd_fov_of(hypot((double)r->flash.camera[1], (double)r->flash.camera[2]));
+    c->fov = rd_fov_from(r->flash.camera);
     c->inputs = r->inputs;
     c->exposure = r->exposure;
     c->fit = r->fit;
@@ -114,7 +113,7 @@ static ts_code load(ev_run *r, bench *b, const ev_set *set, int i, ev_case *c, t
         float *image = b->image + (size_t)k * (size_t)r->size * (size_t)r->size * 3;
         if (r->camera) {
             const cl_shot shot = cl_photograph(r->camera, r->seed, which, &c->input[k], r->size, b->truth.maps, image);
-            if (k == 0) c->fov = rd_fov_of((double)shot.view.camera[2]);
+            if (k == 0) c->fov = rd_fov_from(shot.view.camera);
             if (r->light_known) c->input[k] = shot.view;
         } else {
             const ev_photo photo = {c->input[k], c->exposure, (float)r->noise, r->seed, which};

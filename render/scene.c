@@ -23,6 +23,10 @@ rd_view rd_flash(void)
 
 #define DEGREES 57.295779513082320877
 double rd_fov_of(double distance) { return 2 * DEGREES * atan(0.5 / distance); }
+double rd_fov_from(const float camera[3])
+{
+    return rd_fov_of(hypot(hypot((double)camera[0], (double)camera[1]), (double)camera[2]));
+}
 double rd_fov_distance(double fov) { return 0.5 / tan(fov / (2 * DEGREES)); }
 
 rd_view rd_view_from(rd_view view, double distance)

@@ -40,6 +40,8 @@ rd_view rd_flash(void);
 
 /* Seen from height d the sample's side spans the angle fov = 2 atan(1 / 2d), in degrees; RD_FLASH_DISTANCE: 54.2. */
 double rd_fov_of(double distance);
+/* The same from a camera that may be tilted: d is its distance from the centre. */
+double rd_fov_from(const float camera[3]);
 double rd_fov_distance(double fov);
 /* The same view with camera and light at that height, the power as much greater as the light's height has been squared:
  * the sample is as bright as before. */

@@ -105,7 +105,7 @@ ev_case ev_case_of_capture(const io_capture *capture, const float *image, int in
                  .image = image,
                  .inputs = inputs,
                  .exposure = 1,
-                 .fov = rd_fov_of((double)capture->camera[0][2]),
+                 .fov = rd_fov_from(capture->camera[0]),
                  .capture = capture,
                  .perceptual = perceptual};
     for (int i = 0; i < inputs; i++) c.input[i] = light_known ? ev_capture_view(capture, i) : rd_flash();

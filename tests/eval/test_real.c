@@ -259,5 +259,6 @@ TEST(eval_the_nearest_picture_comes_first)
     const ev_case untold = ev_case_of_capture(&c, c.image, 1, false, false);
     const rd_view flash = rd_flash();
     CHECK(memcmp(&untold.view, &flash, sizeof flash) == 0, "the method is given a camera");
+    CHECK(fabs(untold.fov - rd_fov_of(hypot(0.1, 2))) < 1e-6, "a field of view of %g degrees", untold.fov);
     io_capture_free(&c);
 }

@@ -232,6 +232,8 @@ TEST(render_view_tilted)
                   fabs((double)view.camera[1] + d * sin(turn)) < 1e-6,
               "%d degrees: at %g, %g", degrees, (double)view.camera[1], (double)view.camera[2]);
         CHECK(!memcmp(view.camera, view.light, sizeof view.light), "%d degrees: the light has left the lens", degrees);
+        CHECK(fabs(rd_fov_from(view.camera) - 40) < 1e-5, "%d degrees: the field of view became %g", degrees,
+              rd_fov_from(view.camera));
         rd_render(rd_grid_full(1), matt, 9, &straight, false, a);
         rd_render(rd_grid_full(1), matt, 9, &view, false, b);
         /* F of F0 = 0 is not quite 0, and its share grows with the angle */
