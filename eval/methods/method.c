@@ -69,6 +69,7 @@ ts_code ev_method_parse(const char *spec, const char *model, int iterations, ev_
                 return ts_fail(st, TS_INVALID, "--method %s: label has 1 to %zu characters and no '/'", spec,
                                sizeof e->label - 1);
             strcpy(e->label, equals);
+            e->labelled = true;
             continue;
         }
         const int i = ev_find(e->method->settings, pair);

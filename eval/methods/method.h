@@ -47,6 +47,7 @@ extern const ev_method *const ev_methods[]; /* ended by NULL */
 struct ev_estimator {
     const ev_method *method;
     char label[64];
+    bool labelled;                  /* it was given */
     char text[EV_METHOD_TEXT];      /* value points into it */
     const char *value[EV_SETTINGS]; /* by the table's index; NULL: neither given nor a default */
     const char *weights;            /* the program's model, for weights that are not given */

@@ -65,6 +65,12 @@ static ts_code add(ev_tuning *t, const char *spec, int of, const char *model, co
     return TS_OK;
 }
 
+/* Whether setting i is the user's. */
+static bool is_fixed(const ev_estimator *given, int i)
+{
+    return given->value[i] && given->value[i] != given->method->settings[i].initial;
+}
+
 /* From setting number i on: all of its grid, with each all of the following ones'. */
 static ts_code expand(ev_tuning *t, const ev_estimator *given, char *spec, int i, int of, const char *model,
                       const char *tried, ts_status *st)
@@ -75,8 +81,7 @@ static ts_code expand(ev_tuning *t, const ev_estimator *given, char *spec, int i
     const char *comma = strchr(spec, ':') ? "," : ":";
     ts_code code = TS_OK;
     if (!s->key) return add(t, spec, of, model, tried, st);
-    const bool fixed = given->value[i] && given->value[i] != s->initial; /* given by the user */
-    if (!s->grid || fixed) return expand(t, given, spec, i + 1, of, model, tried, st);
+    if (!s->grid || is_fixed(given, i)) return expand(t, given, spec, i + 1, of, model, tried, st);
     if (s->steps) {
         last_word(s->grid, value, sizeof value);
         snprintf(spec + end, SPEC - end, "%s%s=%s", comma, s->key, value);
@@ -90,6 +95,31 @@ static ts_code expand(ev_tuning *t, const ev_estimator *given, char *spec, int i
     return code;
 }
 
+/* The label of combination i: the given one, or the method with what else was given, and then what differs. Paths are
+ * left out. */
+static ts_code put_label(const ev_tuning *t, int i, const ev_estimator *given, const char *spec, ts_status *st)
+{
+    ev_estimator *e = &t->method[i];
+    const size_t size = sizeof e->label;
+    int n = snprintf(e->label, size, "%s", given->labelled ? given->label : e->method->name), pairs = 0;
+    for (int k = 0; e->method->settings[k].key && n < (int)size; k++) {
+        const ev_setting *s = &e->method->settings[k];
+        const bool told = !given->labelled && s->type != EV_WEIGHTS && is_fixed(given, k);
+        if (s->steps || !(s->grid || told)) continue;
+        n += snprintf(e->label + n, size - (size_t)n, "%s%s=%s", pairs++ ? "," : ":", s->key, e->value[k]);
+    }
+    if (n >= (int)size)
+        return ts_fail(st, TS_INVALID,
+                       "--method %s: its rows' labels are longer than %zu characters: give a %slabel=", spec, size - 1,
+                       given->labelled ? "shorter " : "");
+    for (int j = 0; j < i; j++)
+        if (!strcmp(e->label, t->method[j].label))
+            return ts_fail(st, TS_INVALID,
+                           "--method %s: another method's rows are '%s' too: give one of them a label=", spec,
+                           e->label);
+    return TS_OK;
+}
+
 ts_code ev_tune_add(ev_tuning *t, const char *spec, int of, const char *model, ts_status *st)
 {
     ev_estimator given;
@@ -97,17 +127,8 @@ ts_code ev_tune_add(ev_tuning *t, const char *spec, int of, const char *model, t
     if (ev_method_parse(spec, model, -1, &given, st) != TS_OK) return st->code;
     snprintf(all, sizeof all, "%s", spec);
     const int before = t->methods;
-    const ts_code code = expand(t, &given, all, 0, of, model, NULL, st);
-    for (int i = before; i < t->methods; i++) { /* a label says what differs; paths are left out */
-        ev_estimator *e = &t->method[i];
-        int n = snprintf(e->label, sizeof e->label, "%s", e->method->name);
-        for (int k = 0; e->method->settings[k].key && n < (int)sizeof e->label; k++) {
-            const ev_setting *s = &e->method->settings[k];
-            if (!s->grid || s->steps) continue;
-            n += snprintf(e->label + n, sizeof e->label - (size_t)n, "%s%s=%s", strchr(e->label, ':') ? "," : ":",
-                          s->key, e->value[k]);
-        }
-    }
+    ts_code code = expand(t, &given, all, 0, of, model, NULL, st);
+    for (int i = before; i < t->methods && !code; i++) code = put_label(t, i, &given, spec, st);
     return code;
 }
 

@@ -12,7 +12,8 @@ typedef struct ev_tuning {
 /* Whether it is searched where no method is named: it has a grid, and needs no weights of its own. */
 bool ev_tune_by_default(const ev_method *m);
 
-/* Adds all combinations of the grid of spec (NAME[:key=value,...]; what is given is not searched). */
+/* Adds all combinations of the grid of spec (NAME[:key=value,...]; what is given is not searched), each with a label of
+ * its own: TS_INVALID for a label that is there already or gets too long. */
 ts_code ev_tune_add(ev_tuning *t, const char *spec, int of, const char *model, ts_status *st);
 void ev_tune_free(ev_tuning *t);
 

@@ -271,6 +271,16 @@ searches_and_figures() {
     least=$(grep descent "$T/t/tune.csv" |
         awk -F, '{ v = $(NF - 2); if (!n++ || v < m) m = v } END { printf "%.4f", m }')
     [ "$best" = "$least" ] || fail "the best is $best, the least $least"
+    # rows say which model they are of
+    set -- "$BIN/lgd-eval" --size 16 --threads 1 --set procedural:1000001,1 --tune --method mean
+    expect 2 "$@" --method mean:fit=no -o "$T/u"
+    says "$T/err" "another method's rows are 'mean:fit=no' too: give one of them a label="
+    expect 2 "$@" --method "mean:label=$(printf %60s | tr ' ' m)" -o "$T/u"
+    says "$T/err" "give a shorter label="
+    [ ! -e "$T/u" ] || fail "work was begun"
+    expect 0 "$@" --method mean:label=two -o "$T/u"
+    [ "$(awk -F, 'NR > 1 { print $1 }' "$T/u/tune.csv" | xargs)" = \
+        "mean:fit=no mean:fit=yes two:fit=no two:fit=yes" ] || fail "$(cat "$T/u/tune.csv")"
     expect 0 "$BIN/lgd-eval" --fast --size 16 --threads 1 --set procedural:1,2 --figure iterations --figure methods \
         --method lgd --method mean -o "$T/f"
     lines "$T/f/iterations.csv" 27 # T = 0 .. 24 and mean
