@@ -6,8 +6,9 @@
 #include "eval/command.h"
 #include "eval/run.h"
 
-/* A number of all that decides the results: options, methods, materials, weights, version, instruction set. Parts of
- * other numbers are not put together. model: the weights' file. 0: no memory. */
+/* A number of all that decides the results: options, methods, the materials' names (not what their files hold),
+ * weights, version, instruction set. Parts of other numbers are not put together. model: the weights' file. 0: no
+ * memory. */
 uint64_t ev_shards_print(const ev_command *c, const ev_run *r, const char *model);
 
 /* Writes the report and failures of r, which did r->shard, to a file in folder. */
