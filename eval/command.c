@@ -67,7 +67,8 @@ static const cl_argument arguments[] = {
     {METHOD, "method", "NAME[:KEY=VALUE,...]",
      "a method to compare (may be repeated; default: lgd, every step); their keys are listed below"},
     {'i', "iterations", "N", "refinement steps, 0 .. 1000 (default: as in lgd-infer)"},
-    {'m', "model", "FILE", "weights (default: $LGD_MODEL, else those installed or built with the program)"},
+    {'m', "model", "FILE",
+     "weights: a file, or the name of a shipped model, phone or single (default: $LGD_MODEL, else phone)"},
     {SIZE, "size", "N", "side of the photographs and maps in pixels, 1 .. 4096 (default 256)"},
     {SEED, "seed", "N", "seed of the renderings' lights and cameras and of the noise (default 1)"},
     {NOISE, "noise", "X", "sensor noise of the input picture, 0 = none .. 1 = a phone at night (default 0)"},
@@ -75,8 +76,8 @@ static const cl_argument arguments[] = {
      "the photographs' light is S times the power that the methods assume, 0.01 .. 100; renderings are then\n"
      "compared after fitting one factor to the estimate's (default 1, without a fit)"},
     {CAMERA, "camera", "phone|KEY=VALUE,...",
-     "known materials are photographed by a camera with faults, drawn from --seed: phone, or the ranges that\n"
-     "lgd-data --help names; the methods do not know light and camera, unless --told"},
+     "generated materials, strips and map folders are photographed by a camera with faults, drawn from --seed:\n"
+     "phone, or the ranges that lgd-data --help names; the methods do not know light and camera, unless --told"},
     {FOV, "fov", "DEG",
      "the photographs' field of view, 1 .. 170 degrees across their side; the methods know it unless they say\n"
      "view=unknown; not of captures and photographs, which have theirs (default 54.2)"},
@@ -136,7 +137,7 @@ static ts_code parse_light(const char *text, double light[2], ts_status *st)
 
 ts_code ev_command_parse(int argc, char **argv, ev_command *c, ts_status *st)
 {
-    *c = (ev_command){.iterations = -1, .size = 256, .seed = 1, .repeat = 1};
+    *c = (ev_command){.iterations = -1, .seed = 1, .repeat = 1};
     const char *value = NULL;
     int key, operands = argc;
     int64_t n = 0;
@@ -241,6 +242,9 @@ ts_code ev_command_parse(int argc, char **argv, ev_command *c, ts_status *st)
         return ts_fail(st, TS_INVALID, "'%s' is not an option; sets are given as --set KIND:WHERE", argv[operands]);
     if (c->photographed && (c->exposure > 0 || c->noise > 0 || c->light_unknown))
         return ts_fail(st, TS_INVALID, "--camera draws light and noise: give no --exposure, --noise or --untold");
+    if (c->photographed && (c->tilt > 0 || (c->fov > 0 && c->camera.fov_max > 0)))
+        return ts_fail(st, TS_INVALID, "--camera draws where the photographs are taken from: give no --%s",
+                       c->tilt > 0 ? "tilt" : "fov");
     if (c->sets == 0) return ts_fail(st, TS_INVALID, "no set is given: --set KIND:WHERE");
     if (c->tune + c->pareto + (c->iterations_figure || c->methods_figure) > 1)
         return ts_fail(st, TS_INVALID, "--tune, --pareto and --figure are different tasks: choose one");
@@ -252,12 +256,15 @@ ts_code ev_command_parse(int argc, char **argv, ev_command *c, ts_status *st)
         return ts_fail(st, TS_INVALID, "--pareto measures times: it is one process's work, without --shard or mpirun");
     if (c->tune && c->iterations >= 0)
         return ts_fail(st, TS_INVALID, "--tune: --iterations does not go with it: give each method iterations=");
-    if (c->lpips[0] && c->size < EV_LPIPS_SIDE && !c->pareto)
+    if (c->pareto && c->size) return ts_fail(st, TS_INVALID, "--pareto has its own sizes: --size does not go with it");
+    if ((c->tune || c->pareto) && c->lpips[0])
+        return ts_fail(st, TS_INVALID, "--lpips-weights does not go with --tune or --pareto, which write no LPIPS");
+    if (!c->size) c->size = 256;
+    if (c->lpips[0] && c->size < EV_LPIPS_SIDE)
         return ts_fail(st, TS_INVALID, "--lpips-weights needs pictures of at least %d x %d pixels: --size",
                        EV_LPIPS_SIDE, EV_LPIPS_SIDE);
     if ((c->tune || c->pareto) && c->images)
         return ts_fail(st, TS_INVALID, "--images does not go with --tune or --pareto");
-    if (c->iterations_figure && c->iterations < 0) c->iterations = 24;
     if (!c->out || !*c->out) return ts_fail(st, TS_INVALID, "no output folder is given: -o DIR");
     return TS_OK;
 }
@@ -276,5 +283,5 @@ void ev_command_help(void)
     puts("\nMethods (values contain no commas; every method also has label=TEXT):");
     ev_method_help(stdout);
     puts("\nExit status: 0 done, 1 a material failed (the others are in the results) or nothing could be written, 2 "
-         "wrong usage.");
+         "wrong usage, 130\ninterrupted.");
 }

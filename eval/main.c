@@ -71,11 +71,12 @@ static ts_code parse_methods(work *w, ts_status *st)
     const ev_command *c = w->c;
     w->run.methods = c->methods ? c->methods : 1;
     const char *spec = "lgd";
+    const int iterations = c->iterations < 0 && c->iterations_figure ? 24 : c->iterations;
     if (!c->methods && parse_default(w, &spec, st) != TS_OK) return st->code;
     w->method = calloc((size_t)w->run.methods, sizeof *w->method);
     if (!w->method) return ts_fail(st, TS_NOMEM, "out of memory");
     for (int i = 0; i < w->run.methods; i++) {
-        if (ev_method_parse(c->methods ? c->method[i] : spec, w->model, c->iterations, &w->method[i], st) != TS_OK)
+        if (ev_method_parse(c->methods ? c->method[i] : spec, w->model, iterations, &w->method[i], st) != TS_OK)
             return st->code;
         for (int j = 0; j < i; j++)
             if (!strcmp(w->method[i].label, w->method[j].label))
@@ -229,7 +230,7 @@ static int start(const ev_command *c)
         ((c->tune         ? parse_tuning(w, &st)
               : c->pareto ? TS_OK
                           : parse_methods(w, &st)) != TS_OK ||
-         ev_usable_methods(w->run.method, w->run.methods, w->set, c->sets, &st) != TS_OK))
+         ev_usable_methods(c, w->run.method, w->run.methods, w->set, &st) != TS_OK))
         code = refuse(&st);
     const bool there = access(c->out, F_OK) == 0;
     if (code == CL_OK) code = evaluate(w, &st);

@@ -9,6 +9,8 @@
  * be read, or has maps of none of the photographs. */
 ts_code ev_usable_options(const ev_command *c, const ev_set *set, ts_status *st);
 
-/* TS_INVALID for a method that scores a peer's maps where no set has any. */
-ts_code ev_usable_methods(const ev_estimator *method, int methods, const ev_set *set, int sets, ts_status *st);
+/* TS_INVALID for a method that scores a peer's maps where no set has any, or is to read more photographs than a set has
+ * of each material, and for --iterations where no method has them. */
+ts_code ev_usable_methods(const ev_command *c, const ev_estimator *method, int methods, const ev_set *set,
+                          ts_status *st);
 #endif

@@ -138,6 +138,13 @@ bool ev_ends_early(const ev_estimator *e)
     return ev_find(e->method->settings, "tolerance") >= 0 && ev_number(e, "tolerance") > 0;
 }
 
+int ev_asked_photos(const ev_estimator *e)
+{
+    return ev_find(e->method->settings, "photos") >= 0 && ev_given(e, "photos") ? ev_photos(e) : 0;
+}
+
+bool ev_has_iterations(const ev_estimator *e) { return ev_find(e->method->settings, "iterations") >= 0; }
+
 int ev_points(const ev_estimator *e, int step[EV_POINTS])
 {
     const int steps = e->method->steps ? e->method->steps(e) : 0;

@@ -75,6 +75,11 @@ void ev_close(ev_estimator *e);
 /* Whether a tolerance decides how many steps are made, so that the last alone is scored. Parsed, not yet open. */
 bool ev_ends_early(const ev_estimator *e);
 
+/* How many photographs its settings say that it reads, 0: nothing is said; whether it has a number of iterations.
+ * Parsed, not yet open. */
+int ev_asked_photos(const ev_estimator *e);
+bool ev_has_iterations(const ev_estimator *e);
+
 /* The steps that are scored, the first and the last among them: ascending, at most EV_POINTS. Of an open one. */
 int ev_points(const ev_estimator *e, int step[EV_POINTS]);
 

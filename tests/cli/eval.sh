@@ -7,6 +7,7 @@ help_names_the_options() {
         untold peer-maps shard; do grep -qE -- "--$o( |\$)" "$T/out" || fail "no --$o"; done
     for word in procedural: strips: maps: photos: peers: " descent" " finetune"; do says "$T/out" "$word"; done
     says "$T/out" "default: of mean, lgd, descent, newton and finetune"
+    says "$T/out" "phone or single (default: \$LGD_MODEL, else phone)"
 }
 
 wrong_usage() {
@@ -255,7 +256,7 @@ methods() {
 searches_and_figures() {
     model
     for o in "--tune --pareto" "--tune --figure methods" "--pareto --method mean" "--figure pie" "--tune --images" \
-        "--tune --iterations 2"; do
+        "--tune --iterations 2" "--pareto --size 64" "--pareto --lpips-weights a b" "--tune --lpips-weights a b"; do
         expect 2 "$BIN/lgd-eval" --set procedural:1,1 $o -o "$T/o"
         lines "$T/err" 2
     done

@@ -88,6 +88,19 @@ tilt() {
     if cmp -s "$T/0/results.csv" "$T/20/results.csv"; then fail "--tilt changes nothing"; fi
 }
 
+# --camera draws where the photographs are taken from; a field of view that it does not draw is --fov's.
+camera_draws_the_view() {
+    for o in "phone --fov 30" "fov-min=20,fov-max=40 --fov 30" "noise=0.1 --tilt 10"; do
+        expect 2 "$BIN/lgd-eval" --set procedural:1,1 --camera $o -o "$T/o"
+        says "$T/err" "--camera draws where the photographs are taken from"
+    done
+    model
+    set -- --set procedural:1,1 --method lgd:view=told,label=told --method lgd:label=set
+    expect 0 evaluate --camera blur=0 --fov 30 "$@" -o "$T/fov"
+    awk -F, '$5 == 2 { v[$4] = $10 } END { exit !(v["told"] > 0 && (v["told"] - v["set"]) ^ 2 < 1e-8) }' \
+        "$T/fov/results.csv" || fail "$(cat "$T/fov/results.csv")"
+}
+
 # Photographs without known maps, and what others made of them.
 photographs() {
     model
@@ -114,25 +127,25 @@ peers() {
     mkdir "$T/photos" "$T/peers"
     cp demo/flash.jpg "$T/photos/a.jpg"
     cp demo/flash.jpg "$T/photos/b.jpg"
-    set -- --set "photos:$T/photos" --method mean --method peer -o "$T/o"
-    expect 1 evaluate --peer-maps "$T/absent" "$@"
+    set -- "$BIN/lgd-eval" --size 32 --threads 1 --set "photos:$T/photos" --method mean --method peer -o "$T/o"
+    expect 1 "$@" --peer-maps "$T/absent"
     says "$T/err" "--peer-maps $T/absent: cannot be read"
-    expect 1 evaluate --peer-maps "$T/peers" "$@"
+    expect 1 "$@" --peer-maps "$T/peers"
     says "$T/err" "--peer-maps $T/peers: has maps of none of the photographs"
-    expect 2 evaluate "$@"
+    expect 2 "$@"
     says "$T/err" "--method peer: no set has a peer's maps"
     expect 2 evaluate --peer-maps "$T/peers" --set procedural:1,1 -o "$T/o"
     says "$T/err" "--peer-maps"
     [ ! -e "$T/o" ] || fail "work was begun"
     # four grey panels; what an image is, its first bytes say
     { printf 'P6\n128 32\n255\n'; head -c 12288 /dev/zero | tr '\0' '\200'; } >"$T/peers/b.png"
-    expect 0 evaluate --peer-maps "$T/peers" "$@"
+    expect 0 "$@" --peer-maps "$T/peers"
     says "$T/out" "2 materials"
     grep -q '^mean  *2 ' "$T/out" && grep -q '^peer  *1 ' "$T/out" || fail "the lines are of: $(cat "$T/out")"
     if grep -q nan "$T/out"; then fail "nan: $(cat "$T/out")"; fi
     [ "$(column "$T/o/summary.csv" materials | tr '\n' ' ')" = "2 1 " ] || fail "$(cat "$T/o/summary.csv")"
     says "$T/o/report.html" "peer <small>1 of 2</small>"
-    expect 0 evaluate --peer-maps "$T/peers" --set "photos:$T/photos" --method peer -o "$T/p"
+    expect 0 "$BIN/lgd-eval" --size 32 --peer-maps "$T/peers" --set "photos:$T/photos" --method peer -o "$T/p"
     says "$T/out" "1 material,"
 }
 
@@ -187,6 +200,16 @@ unused() {
         says "$T/err" "${o%%=*}: no set that is given uses it"
         lines "$T/err" 2
     done
+    for o in --camera=phone --light=1,1 --noise=1 --fov=30 --tilt=10; do
+        expect 2 "$BIN/lgd-eval" --set "photos:$T/photos" $o -o "$T/o"
+        says "$T/err" "or add generated materials, strips or map folders"
+    done
+    for m in lgd:photos=5 descent:photos=2; do
+        expect 2 "$BIN/lgd-eval" --set procedural:1,1 --set "photos:$T/photos" --method $m -o "$T/o"
+        says "$T/err" "--set photos:$T/photos has one of each material"
+    done
+    expect 2 "$BIN/lgd-eval" --set procedural:1,1 -i 3 --method mean --method descent -o "$T/o"
+    says "$T/err" "--iterations: no method that is given has iterations"
     [ ! -e "$T/o" ] || fail "work was begun"
     expect 0 evaluate --told --camera phone --set procedural:1,1 -o "$T/p"
     expect 0 evaluate --noise 1 --light 1,1 --method lgd --set procedural:1,1 --set "photos:$T/photos" -o "$T/q"
@@ -196,6 +219,7 @@ check eval_captures captures
 check eval_field_of_view field_of_view
 check eval_tells_g_what_is_known what_g_is_told
 check eval_tilt tilt
+check eval_camera_draws_the_view camera_draws_the_view
 check eval_photographs photographs
 check eval_peers peers
 check eval_untold untold

@@ -116,6 +116,8 @@ measures() {
     awk -F, -v last=1 '$4 == 1 { n++; v[n] = $9 }
         END { exit !(n == 2 && v[1] > 0 && v[1] < 0.3 && v[1] != v[2] && (v[1] - v[2]) ^ 2 < 0.03 ^ 2) }' \
         "$T/e/results.csv" || fail "$(cat "$T/e/results.csv")"
+    expect 2 "$BIN/lgd-eval" --camera phone --set "sheets:$T/s" -o "$T/f"
+    says "$T/err" "--camera: no set that is given uses it"
     cp "$one/photo_1.jpg" "$T/first.jpg"
     photo "$one/photo_1.jpg" 200 150
     expect 1 "$BIN/lgd-eval" --size 32 --set "sheets:$T/s" -o "$T/f"
