@@ -342,14 +342,6 @@ void nn_model_range(const nn_model *model, nn_part part, size_t *first, size_t *
     *last = offset_of(model, layers_of(model)->first[part + 1]);
 }
 
-size_t nn_model_numbers(const nn_model *model, nn_part part)
-{
-    size_t sum = 0;
-    for (int i = layers_of(model)->first[part]; i < layers_of(model)->first[part + 1]; i++)
-        sum += model->param[i].count;
-    return sum;
-}
-
 ag_value *nn_parameter(ag_tape *tape, const nn_model *model, int index)
 {
     if (index < 0) return NULL;

@@ -7,7 +7,7 @@
 #include "render/scene.h"
 
 typedef enum nn_rmse {
-    NN_RMSE_START, /* per image, taken from R_0 once (ours) */
+    NN_RMSE_START, /* per image, taken once, from what the steps at a size begin with (ours) */
     NN_RMSE_BATCH  /* over the whole batch, anew at every step (published) */
 } nn_rmse;
 
@@ -127,9 +127,6 @@ typedef enum nn_part {
     NN_COARSE /* what refines at coarse_size */
 } nn_part;
 
-/* Trained numbers in a part, without the block's padding. */
-size_t nn_model_numbers(const nn_model *model, nn_part part);
-
 /* Allocates the gradient block (zero); idempotent. */
 ts_code nn_model_train(nn_model *model, ts_status *st);
 
@@ -229,10 +226,15 @@ typedef struct nn_state {
                               * [h, w, channels] and [h, w, NN_SPREADS]; nn_steps cuts them where it cuts the window */
     float *burnt;            /* the same: nn/burnt.h's of the window's photograph, [h, w], or NULL */
     float *best, *misfit;    /* of several photographs: what rd_search keeps, [h, w, MAP_CHANNELS] and [h, w] */
-    double *rmse0; /* of each whole photograph by R_0, in the tape's arena; NULL: nn_refine measures it on its maps */
+    double *rmse0; /* of each whole photograph by what the steps at this size begin with, in the tape's arena; NULL:
+                      nn_refine measures it on its maps */
     int step;      /* steps done; those beyond arch.iterations are shortened (docs/math.md, S7), but if compat is
-                      published */
+                      published or descent NN_DESCENT_POSTERIOR */
 } nn_state;
+
+/* Of NN_DESCENT_POSTERIOR: how colours hang together, and how far a rendering of the right maps is from a photograph of
+ * which known (nn_known) is true, one of so many of the material. */
+ts_prior nn_step_prior(int known, int photographs);
 
 /* A step at the photograph's size (docs/math.md, S4): R_{t+1} = R_t + h(R_t, e) + D p. e is dL/dR_t, encoded
  * (arch.encoding), one for each photograph (zero for a missing one). D is a learned matrix over the channels, and p
@@ -241,9 +243,6 @@ typedef struct nn_state {
  *     NN_DESCENT_GRADIENT  e; D begins as -0.003 times the identity: an untrained loop is plain descent
  *     NN_DESCENT_POSTERIOR the step to the most probable maps; D is the identity
  *     NN_DESCENT_NONE      0, as published */
-/* Of NN_DESCENT_POSTERIOR: how colours hang together, and how far a rendering of the right maps is from a photograph of
- * which known (nn_known) is true, one of so many of the material. */
-ts_prior nn_step_prior(int known, int photographs);
 ag_value *nn_refine(ag_tape *tape, const nn_model *model, const nn_input *in, ag_value *maps, nn_state *state);
 
 /* RMSE(R_t) = nn_rmse_of what nn_add_squares leaves: squares[i] += the squared differences between photograph i of in

@@ -2,6 +2,7 @@
 #include "nn/adam.h"
 #include "tensor/threads.h"
 #include "tests/support/networks.h"
+#include "tests/support/trained.h"
 #include <stddef.h>
 
 TEST(nn_trial_model_has_the_size_of_the_design)
@@ -10,7 +11,7 @@ TEST(nn_trial_model_has_the_size_of_the_design)
     nn_arch a = nn_arch_default();
     nn_model *m = nn_model_plan(&a, &st);
     CHECK(m, "%s", st.message);
-    size_t g = nn_model_numbers(m, NN_G), h = nn_model_numbers(m, NN_H), first, last;
+    size_t g = trained_numbers(m, NN_G), h = trained_numbers(m, NN_H), first, last;
     printf("  trial model: g %zu, h %zu numbers\n", g, h);
     CHECK(g > 2000000 && g < 2200000,
           "g has %zu numbers, not the 2.2 M of the trial less the linear layers that it never used", g);
