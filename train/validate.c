@@ -178,7 +178,8 @@ ts_code tr_validate(tr_trainer *t, tr_validation *out, ts_status *st)
     ts_code code = TS_OK;
     for (int i = 0; i < v->count && !code; i += together)
         code = measure(t, i, v->count - i < together ? v->count - i : together, out->iterations, st);
-    if (tr_agree(&t->ranks, code, st) != TS_OK) return ts_context(st, "validation");
+    if (code) ts_context(st, "validation");
+    if (tr_agree(&t->ranks, code, st) != TS_OK) return st->code;
     /* The others' are zeros here: the sums are what one process has. */
     if (t->ranks.mpi) t->ranks.mpi->sum(v->errors, count * TR_ERRORS);
     for (int i = 0; i < count; i++) {
