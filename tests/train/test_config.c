@@ -302,11 +302,14 @@ TEST(config_checks_keys_against_each_other)
                                          {"data.fov_max=30", "fov_min"},
                                          {"data.collected=0.5", "data.collection"},
                                          {"data.collection=sets", "data.collected"},
+                                         {"data.told_view=0.5", "told_view is 0.5 and data.told_power 1"},
+                                         {"data.told_power=0", "told_power 0"},
                                          {"model.g_size=50", "g_size"},
                                          {"model.g_kernel=4", "g_kernel"}};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         tr_config c = tr_config_default();
         ts_status st = {0};
+        c.arch.conditions = true;
         CHECK(tr_config_set_assignment(&c, bad[i][0], &st) == TS_OK, "%s", st.message);
         CHECK(tr_config_check(&c, &st) == TS_INVALID && strstr(st.message, bad[i][1]), "%s: %s", bad[i][0], st.message);
     }
