@@ -108,12 +108,12 @@ static ts_code write(tr_trainer *t, curve *c, ts_status *st)
 
 ts_code tr_curve_write(tr_trainer *t, ts_status *st)
 {
+    ts_status drawn = {0};
+    if (tr_log_flush(t, st) != TS_OK) return st->code;
     curve *c = calloc(4, sizeof *c);
-    if (tr_log_flush(t, st) != TS_OK) {
-        free(c);
-        return st->code;
-    }
-    const ts_code code = c ? write(t, c, st) : ts_fail(st, TS_NOMEM, "out of memory for curve.svg");
+    if (!c) ts_fail(&drawn, TS_NOMEM, "out of memory");
+    else write(t, c, &drawn);
+    if (drawn.code) tr_note(t, "curve.svg is not drawn: %s", drawn.message);
     free(c);
-    return code;
+    return TS_OK;
 }

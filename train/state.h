@@ -176,6 +176,7 @@ ts_code tr_log_validation(tr_trainer *t, const tr_validation *v, ts_status *st);
 ts_code tr_log_flush(tr_trainer *t, ts_status *st);
 void tr_log_close(tr_trainer *t);
 
-/* curve.c: curve.svg in the folder, from the two logs as they are. */
+/* curve.c: curve.svg in the folder, from the two logs as they are. One that cannot be drawn is a note; an error is one
+ * of the logs. */
 ts_code tr_curve_write(tr_trainer *t, ts_status *st);
 #endif

@@ -3,7 +3,6 @@
 #include "data/text.h"
 #include "nn/weights/weights.h"
 #include "tensor/cpu.h"
-#include "tensor/maps.h"
 #include "tensor/new_file.h"
 #include "train/state.h"
 #include <errno.h>
@@ -74,10 +73,10 @@ static ts_code check_folder(const tr_trainer *t, bool *resume, ts_status *st)
  * number that is free. */
 static ts_code set_aside(const tr_trainer *t, ts_status *st)
 {
-    static const char *const names[][2] = {
-        {"last", "safetensors"}, {"best", "safetensors"}, {"config", "ini"}, {"log", "csv"}, {"val", "csv"}};
+    static const char *const names[][2] = {{"last", "safetensors"}, {"best", "safetensors"}, {"config", "ini"},
+                                           {"log", "csv"},          {"val", "csv"},          {"curve", "svg"}};
     bool weights = false;
-    for (int i = 0; i < 5; i++) {
+    for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         char path[TR_PATH], kept[TR_PATH], file[64];
         int number = 1;
         snprintf(file, sizeof file, "%s.%s", names[i][0], names[i][1]);

@@ -10,7 +10,7 @@
  *
  * The folder's files: config.ini (as it runs), log.csv (a row a step), val.csv (a row a validation), best.safetensors
  * (weights with the least validated error in the phase), last.safetensors (weights at the last checkpoint after
- * step 1), checkpoint.safetensors (what --resume reads; there before step 1), lock. */
+ * step 1), checkpoint.safetensors (what --resume reads; there before step 1), curve.svg (the logs drawn), lock. */
 #ifndef TR_TRAINER_H
 #define TR_TRAINER_H
 #include "train/config.h"

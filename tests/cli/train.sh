@@ -41,9 +41,21 @@ run_makes_its_files() {
     says "$T/err" "complete at step 10 of 10"
     expect 1 train
     says "$T/err" "there is a run already"
+    rm "$T/run/checkpoint.safetensors"
+    expect 0 train
+    for f in best-1.safetensors log-1.csv curve-1.svg curve.svg; do [ -s "$T/run/$f" ] || fail "no $f"; done
     rm -r "$T/run"
     expect 0 train --set train.g_rate=0
     says "$T/err" "step 10/10  h alone"
+}
+
+# A drawing is not worth a run.
+no_curve() {
+    config
+    mkdir -p "$T/run/curve.svg"
+    expect 0 train
+    says "$T/err" "curve.svg is not drawn: "
+    says "$T/err" "step 10/10  g and h"
 }
 
 # A small network of the published kind: its weights before training are a file, and it trains, its tenth channel
@@ -366,6 +378,7 @@ shipped_configurations_are_valid() {
 }
 
 check train_run_makes_its_files run_makes_its_files
+check train_goes_on_without_a_curve no_curve
 check train_published_kind published_kind
 check train_default_folder_has_the_files_name default_folder_has_the_files_name
 check train_options_and_usage options_and_usage
