@@ -24,6 +24,12 @@ typedef struct tr_shot {
 /* Of a material: of its renderings under R_0 ... R_T, then of the last maps. */
 enum { TR_ERRORS = TR_MOST_ITERATIONS + 5 };
 
+/* What the ranks' losses are summed as, each with its rank's share of the batch as weight, and how many ranks were
+ * asked to stop. */
+typedef struct tr_losses {
+    double loss, render_start, map_start, render_end, map_end, spread, scene, stop;
+} tr_losses;
+
 /* The fixed materials of validation: this rank's share of them. */
 typedef struct tr_validator {
     int first, count;
@@ -44,6 +50,8 @@ typedef struct tr_trainer {
     tr_listener listener;
     tr_ranks ranks;
     tr_reducer reducer; /* of several ranks */
+    tr_losses losses;   /* of this step, summed while backward goes on */
+    bool posted;        /* sums over the ranks may still write to losses and the model's gradients */
     int first, batch;   /* this rank's share of train.batch */
     bool stop;          /* a rank was asked to stop when the last step's losses were summed */
     double waited;      /* seconds, of all steps here */

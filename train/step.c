@@ -275,31 +275,30 @@ static const float *draw(tr_trainer *t, int given, ts_status *st)
     return target;
 }
 
-/* What the ranks' losses are summed as, each with its rank's share of the batch as weight, and how many ranks were
- * asked to stop. */
-typedef struct losses {
-    double loss, render_start, map_start, render_end, map_end, spread, scene, stop;
-} losses;
-
-static ts_code begin_losses(tr_trainer *t, const tr_row *row, double weight, losses *l, ts_status *st)
+/* The sums outlive a step that fails before they end. */
+static ts_code begin_losses(tr_trainer *t, const tr_row *row, double weight, ts_status *st)
 {
-    *l = (losses){.loss = weight * row->loss,
-                  .render_start = weight * row->render_start,
-                  .map_start = weight * row->map_start,
-                  .render_end = weight * row->render_end,
-                  .map_end = weight * row->map_end,
-                  .spread = weight * row->spread,
-                  .scene = weight * row->scene,
-                  .stop = t->listener.stop && t->listener.stop(t->listener.user)};
+    tr_losses *l = &t->losses;
+    *l = (tr_losses){.loss = weight * row->loss,
+                     .render_start = weight * row->render_start,
+                     .map_start = weight * row->map_start,
+                     .render_end = weight * row->render_end,
+                     .map_end = weight * row->map_end,
+                     .spread = weight * row->spread,
+                     .scene = weight * row->scene,
+                     .stop = t->listener.stop && t->listener.stop(t->listener.user)};
     tr_reduce_begin(&t->reducer);
+    t->posted = true;
     return t->ranks.mpi->begin_sum(&l->loss, sizeof *l / sizeof l->loss, st);
 }
 
 /* Waits for the gradients and losses of all ranks. One whose loss is not finite has begun the same sums. */
-static ts_code end_losses(tr_trainer *t, tr_row *row, const losses *l, ts_status *st)
+static ts_code end_losses(tr_trainer *t, tr_row *row, ts_status *st)
 {
+    const tr_losses *l = &t->losses;
     const double start = tr_seconds();
     if (tr_reduce_finish(&t->reducer, st) != TS_OK) return st->code;
+    t->posted = false;
     row->waited = tr_seconds() - start;
     row->loss = l->loss;
     row->render_start = l->render_start, row->map_start = l->map_start;
@@ -313,11 +312,10 @@ static ts_code end_losses(tr_trainer *t, tr_row *row, const losses *l, ts_status
 static ts_code differentiate(tr_trainer *t, const float *target, int given, tr_row *row, ts_status *st)
 {
     const double weight = (double)t->batch / t->config.train.batch;
-    losses sums;
     ag_value *loss = forward(t, target, given, row);
     if (loss) row->loss = (double)loss->t.data[0];
     if (loss && t->ranks.mpi) {
-        if (begin_losses(t, row, weight, &sums, st) != TS_OK) return st->code;
+        if (begin_losses(t, row, weight, st) != TS_OK) return st->code;
         loss = ag_scale(t->tape, loss, (float)weight);
     }
     if (loss && isfinite(row->loss)) ag_backward(t->tape, loss);
@@ -325,7 +323,7 @@ static ts_code differentiate(tr_trainer *t, const float *target, int given, tr_r
         *st = *ag_status(t->tape);
         return st->code;
     }
-    if (t->ranks.mpi && end_losses(t, row, &sums, st) != TS_OK) return st->code;
+    if (t->ranks.mpi && end_losses(t, row, st) != TS_OK) return st->code;
     if (isfinite(row->loss)) row->norm = gradient_norm(t, row);
     return TS_OK;
 }

@@ -210,9 +210,10 @@ static void share_blocks(tr_trainer *t)
     t->ranks.mpi->meet();
 }
 
-/* What is shared belongs to MPI. */
+/* What is shared belongs to MPI, and what it may still write to stays until the process ends. */
 static void leave_blocks(tr_trainer *t)
 {
+    if (t->posted) t->model->grad = NULL;
     if (!t->reducer.parts) return;
     t->model->value = t->model->grad = NULL;
     t->adam.m = t->adam.v = t->adam.ema = NULL;
@@ -327,7 +328,7 @@ void tr_destroy(tr_trainer **trainer)
     free(t->shots);
     free(t->views);
     if (t->lock >= 0) close(t->lock);
-    free(t);
+    if (!t->posted) free(t);
     *trainer = NULL;
 }
 
