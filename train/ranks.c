@@ -47,6 +47,14 @@ ts_code tr_ranks_start(tr_ranks *ranks, ts_status *st)
         return ts_context(st, "started as one of %d processes, for which lgd has to be built where %s is installed",
                           number(by->size), by->package);
     if (mpi->start(&ranks->world, st) != TS_OK) return st->code;
+    const int begun = number(by->size), seen = ranks->world.count;
+    if (seen != begun) { /* each would train by itself, all of them in one folder */
+        mpi->finish();
+        return ts_fail(st, TS_INVALID,
+                       "started as one of %d processes, of which %s sees %d: use the mpirun of %s, or build lgd with "
+                       "the MPI of this one",
+                       begun, by->library, seen, by->package);
+    }
     ranks->mpi = mpi;
     ranks->rank = ranks->world.rank;
     ranks->count = ranks->world.count;

@@ -252,6 +252,8 @@ static ts_code check_ranks(const tr_trainer *t, ts_status *st)
         code = tr_same_bytes(&t->ranks, isa, strlen(isa), "its CPU's instruction set (LGD_ISA chooses one) is not", st);
     if (!code) code = tr_same_bytes(&t->ranks, text, strlen(text), "its configuration is not", st);
     free(text);
+    const int64_t met[] = {c->train.checkpoint_every, c->train.max_skipped};
+    if (!code) code = tr_same_bytes(&t->ranks, met, sizeof met, "its train.checkpoint_every or max_skipped is not", st);
     if (code) return code;
     if (t->ranks.count > c->train.batch)
         ts_fail(st, TS_INVALID, "train.batch is %d: %d ranks cannot share it (start fewer)", c->train.batch,

@@ -243,6 +243,19 @@ errors_are_said_once() {
     fails "its configuration is not rank 0's" \
         $LAUNCH -np 1 "$TRAIN" "$T/small.ini" --set output.folder="$T/keys" --threads 1 : \
         -np 1 "$TRAIN" "$T/small.ini" --set output.folder="$T/keys" --threads 1 --set train.rate=0.002
+    fails "its train.checkpoint_every or max_skipped is not rank 0's" \
+        $LAUNCH -np 1 "$TRAIN" "$T/small.ini" --set output.folder="$T/keys" --threads 1 : \
+        -np 1 "$TRAIN" "$T/small.ini" --set output.folder="$T/keys" --threads 1 --set train.checkpoint_every=3
+}
+
+# A launcher that does not speak the library's language: each process would train by itself.
+strangers() {
+    launcher "$1"
+    [ "$1" = openmpi ] || skip "MPICH does not start without its launcher"
+    config
+    OMPI_COMM_WORLD_SIZE=2 OMPI_COMM_WORLD_RANK=0 expect 1 alone run
+    says "$T/err" "started as one of 2 processes, of which liblgd_openmpi.so sees 1: use the mpirun of Open MPI"
+    [ ! -e "$T/run" ] || fail "a run was begun"
 }
 
 # What rank 0 cannot write ends the job: before the first step, and later.
@@ -346,8 +359,8 @@ programs_know_no_mpi() {
 
 check mpi_programs_know_no_mpi programs_know_no_mpi
 for library in openmpi mpich; do
-    for name in ranks_agree signals_save killed_rank skip_together rounded_gradients errors_are_said_once lost_folder \
-        no_room hosts_with_ranks two_nodes; do
+    for name in ranks_agree signals_save killed_rank skip_together rounded_gradients errors_are_said_once strangers \
+        lost_folder no_room hosts_with_ranks two_nodes; do
         with() { $name $library; }
         check mpi_${library}_$name with
     done
