@@ -56,11 +56,13 @@ endif
 ifeq (0,$(MAKELEVEL)$(filter -j% --jobserver%,$(MAKEFLAGS)))
 MAKEFLAGS += -j$(shell nproc 2>/dev/null || echo 2)
 endif
-# Of several goals those that begin makes of their own meet in one folder: one after the other, each in parallel.
+# Several goals would begin makes at once that write the same files: they are made one after the other. The makes below
+# compile in parallel as ever.
 ifeq (0,$(MAKELEVEL))
-ifneq (,$(and $(word 2,$(MAKECMDGOALS)),$(filter-out programs library $(BUILD)/%,$(MAKECMDGOALS))))
-.NOTPARALLEL:
+ONE_BY_ONE := $(and $(word 2,$(MAKECMDGOALS)),$(filter-out programs library $(BUILD)/%,$(MAKECMDGOALS)))
 endif
+ifneq (,$(ONE_BY_ONE))
+.NOTPARALLEL:
 endif
 
 # What the programs read and write themselves, and what only the shared object needs that reads all other image formats.
@@ -145,10 +147,15 @@ all: needs
 	@$(MAKE) --no-print-directory programs
 	@echo "The programs are in $(BUILD)/bin: $(BUILD)/bin/lgd-infer PHOTO.jpg -o DIR"
 
+ifneq (,$(ONE_BY_ONE))
+programs library:
+	@$(MAKE) --no-print-directory $@
+else
 programs: $(BIN) library $(MPI_LIBS) $(MPI_LINKS)
 	@:
 
 library: $(LIB) $(SHARED) $(IMAGE_LIB)
+endif
 
 help:
 	@sed -n 's/^#: //p' Makefile

@@ -242,7 +242,9 @@ ts_code ev_command_parse(int argc, char **argv, ev_command *c, ts_status *st)
         return ts_fail(st, TS_INVALID, "'%s' is not an option; sets are given as --set KIND:WHERE", argv[operands]);
     if (c->photographed && (c->exposure > 0 || c->noise > 0 || c->light_unknown))
         return ts_fail(st, TS_INVALID, "--camera draws light and noise: give no --exposure, --noise or --untold");
-    if (c->photographed && (c->tilt > 0 || (c->fov > 0 && c->camera.fov_max > 0)))
+    const bool draws_fov = c->photographed && c->camera.fov_max > 0,
+               draws_tilt = c->photographed && (c->camera.tilt > 0 || c->camera.off_centre > 0);
+    if ((c->tilt > 0 && (draws_tilt || draws_fov)) || (c->fov > 0 && draws_fov))
         return ts_fail(st, TS_INVALID, "--camera draws where the photographs are taken from: give no --%s",
                        c->tilt > 0 ? "tilt" : "fov");
     if (c->sets == 0) return ts_fail(st, TS_INVALID, "no set is given: --set KIND:WHERE");

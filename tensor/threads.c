@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 static atomic_int wanted;
 
@@ -73,13 +72,25 @@ int ts_threads_of_share(int cpus, int processes)
     return n < 1 ? 1 : n;
 }
 
+/* CPUs of the affinity mask; the kernel refuses a set without room for all CPUs that it knows. */
+static int cpus_of_process(void)
+{
+    enum { MOST_CPUS = 1 << 20 };
+    int cpus = 0;
+    for (int n = CPU_SETSIZE; !cpus && n <= MOST_CPUS; n *= 2) {
+        cpu_set_t *set = CPU_ALLOC(n);
+        const size_t size = CPU_ALLOC_SIZE(n);
+        if (!set) return 1;
+        if (sched_getaffinity(0, size, set) == 0) cpus = CPU_COUNT_S(size, set);
+        CPU_FREE(set);
+    }
+    return cpus > 0 ? cpus : 1;
+}
+
 int ts_threads_allowed(void)
 {
-    cpu_set_t set;
-    long cpus = 0;
-    if (sched_getaffinity(0, sizeof set, &set) == 0) cpus = CPU_COUNT(&set);
-    else cpus = sysconf(_SC_NPROCESSORS_ONLN); /* the set has no room for what a kernel for many CPUs tells */
-    return ts_threads_of_share(cpus < MOST_THREADS ? (int)cpus : MOST_THREADS, 1);
+    const int cpus = cpus_of_process();
+    return ts_threads_of_share(cpus < MOST_THREADS ? cpus : MOST_THREADS, 1);
 }
 
 void ts_threads_set(int n) { atomic_store(&wanted, n >= 1 ? n : ts_threads_allowed()); }

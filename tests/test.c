@@ -130,7 +130,6 @@ static void handle(bool in_runner)
 
 static _Noreturn void be_test(int i, int out)
 {
-    handle(false);
     report = out;
     tests[i].f();
     leave('O', "");
@@ -143,15 +142,22 @@ static int run(int i)
     if (pipe2(ends, O_CLOEXEC) != 0 || fcntl(ends[0], F_SETFL, O_NONBLOCK) != 0) abort();
     fflush(NULL);
     late = 0;
+    sigset_t all, before; /* a signal between the fork and the note of its group would leave the test behind */
+    sigfillset(&all);
+    sigprocmask(SIG_BLOCK, &all, &before);
     const pid_t child = fork();
     if (child < 0) abort();
     if (child == 0) {
         setpgid(0, 0);
+        handle(false);
+        sigprocmask(SIG_SETMASK, &before, NULL);
+        alarm(LIMIT_SECONDS + 10); /* where the runner itself was killed */
         close(ends[0]);
         be_test(i, ends[1]);
     }
     setpgid(child, child); /* whichever of the two comes first */
     group = child;
+    sigprocmask(SIG_SETMASK, &before, NULL);
     alarm(LIMIT_SECONDS);
     close(ends[1]);
     int status;

@@ -296,8 +296,8 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
     if (c->train.lesson != TR_LESSON_DIFFUSE && !*c->train.teacher)
         return ts_fail(st, TS_INVALID,
                        "train.lesson is given without train.teacher, whose lesson it is: give both or none");
-    if (c->train.steps && c->arch.conditions && nn_arch_refines(&c->arch) && c->arch.descent != NN_DESCENT_POSTERIOR &&
-        (c->data.told_view < 1 || c->data.told_power < 1))
+    if (c->train.steps && c->arch.conditions && c->arch.gradient && nn_arch_refines(&c->arch) &&
+        c->arch.descent != NN_DESCENT_POSTERIOR && (c->data.told_view < 1 || c->data.told_power < 1))
         return ts_fail(st, TS_INVALID,
                        "data.told_view is %g and data.told_power %g: the steps of model.descent = newton, gradient and "
                        "none render with light and camera, so use 1 for both, model.descent = posterior or "

@@ -95,20 +95,29 @@ static ts_code expand(ev_tuning *t, const ev_estimator *given, char *spec, int i
     return code;
 }
 
-/* The label of combination i: the given one, or the method with what else was given, and then what differs. Paths are
- * left out. */
-static ts_code put_label(const ev_tuning *t, int i, const ev_estimator *given, const char *spec, ts_status *st)
+/* The given label, or the method's name, then what was given, if all says so, and what differs. Paths are left out.
+ * False: it is too long. */
+static bool write_label(ev_estimator *e, const ev_estimator *given, bool all)
 {
-    ev_estimator *e = &t->method[i];
     const size_t size = sizeof e->label;
     int n = snprintf(e->label, size, "%s", given->labelled ? given->label : e->method->name), pairs = 0;
     for (int k = 0; e->method->settings[k].key && n < (int)size; k++) {
         const ev_setting *s = &e->method->settings[k];
-        const bool told = !given->labelled && s->type != EV_WEIGHTS && is_fixed(given, k);
-        if (s->steps || !(s->grid || told)) continue;
-        n += snprintf(e->label + n, size - (size_t)n, "%s%s=%s", pairs++ ? "," : ":", s->key, e->value[k]);
+        const bool told = all && s->type != EV_WEIGHTS && is_fixed(given, k);
+        if (told || (s->grid && !s->steps))
+            n += snprintf(e->label + n, size - (size_t)n, "%s%s=%s", pairs++ ? "," : ":", s->key, e->value[k]);
     }
-    if (n >= (int)size)
+    return n < (int)size;
+}
+
+/* The label of combination i: with what was given where there is room for it. */
+static ts_code put_label(const ev_tuning *t, int i, const ev_estimator *given, const char *spec, ts_status *st)
+{
+    ev_estimator *e = &t->method[i];
+    const size_t size = sizeof e->label;
+    bool fits = write_label(e, given, !given->labelled);
+    if (!fits && !given->labelled) fits = write_label(e, given, false);
+    if (!fits)
         return ts_fail(st, TS_INVALID,
                        "--method %s: its rows' labels are longer than %zu characters: give a %slabel=", spec, size - 1,
                        given->labelled ? "shorter " : "");

@@ -90,7 +90,7 @@ tilt() {
 
 # --camera draws where the photographs are taken from; a field of view that it does not draw is --fov's.
 camera_draws_the_view() {
-    for o in "phone --fov 30" "fov-min=20,fov-max=40 --fov 30" "noise=0.1 --tilt 10"; do
+    for o in "phone --fov 30" "fov-min=20,fov-max=40 --fov 30" "tilt=5 --tilt 10" "off-centre=0.1 --tilt 10"; do
         expect 2 "$BIN/lgd-eval" --set procedural:1,1 --camera $o -o "$T/o"
         says "$T/err" "--camera draws where the photographs are taken from"
     done

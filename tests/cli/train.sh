@@ -228,14 +228,14 @@ interrupt_saves_and_resume_is_exact() {
 hangup_is_ignored_under_nohup() {
     config
     command -v nohup >/dev/null || skip "no nohup(1)"
-    nohup "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 --set train.steps=100 >"$T/out" 2>"$T/err" &
+    nohup "$TRAIN" "$T/small.ini" --set output.folder="$T/run" --threads 1 --set train.steps=400 >"$T/out" 2>"$T/err" &
     job=$!
     await "$T/run/last.safetensors"
-    halted_before 105
+    halted_before 405
     kill -HUP $job || fail "it has ended: the test is none"
     kill -CONT $job
     wait $job || fail "it was stopped: $(tail -n 1 "$T/err")"
-    lines "$T/run/log.csv" 105
+    lines "$T/run/log.csv" 405
 }
 
 # A run that was killed before its first checkpoint after step 1 goes on, and in a folder without a checkpoint one

@@ -146,11 +146,11 @@ static ts_code start(tr_world *w, ts_status *st)
 
 static void finish(void)
 {
-    for (int i = 0; i < capacity; i++) {
+    for (int i = 0; first == used && i < capacity; i++) { /* those of sums that a failed step has left are MPI's */
         free(slots[i].from);
         free(slots[i].to);
     }
-    free(slots);
+    if (first == used) free(slots);
     slots = NULL;
     capacity = used = first = 0;
     if (shared.gradient) {
