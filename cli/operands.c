@@ -91,7 +91,9 @@ static ts_code read_list(const char *list, char **text, size_t *size, ts_status 
     ssize_t n = 1;
     ts_code code = TS_OK;
     *size = 0;
-    if (fd < 0) code = ts_fail(st, TS_IO, "%s: %s", list, strerror(errno));
+    if (fd < 0 && errno == EINTR && cl_interrupted())
+        code = ts_fail(st, TS_INTERRUPTED, "interrupted while %s was opened", what);
+    else if (fd < 0) code = ts_fail(st, TS_IO, "%s: %s", list, strerror(errno));
     while (!code && n != 0) {
         if (*size + 1 >= room) {
             char *more = realloc(*text, room = room ? 2 * room : 1 << 16);

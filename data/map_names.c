@@ -32,8 +32,7 @@ static const struct {
     {"nor", IO_NORMAL_MAP},        {"nrm", IO_NORMAL_MAP},         {"roughness", IO_ROUGHNESS_MAP},
     {"rough", IO_ROUGHNESS_MAP},   {"gloss", IO_GLOSS_MAP},        {"glossiness", IO_GLOSS_MAP},
     {"metallic", IO_METALLIC_MAP}, {"metalness", IO_METALLIC_MAP}, {"metal", IO_METALLIC_MAP},
-    {"specular", IO_SPECULAR_MAP}, {"spec", IO_SPECULAR_MAP},      {"reflection", IO_SPECULAR_MAP},
-    {"refl", IO_SPECULAR_MAP},
+    {"specular", IO_SPECULAR_MAP}, {"spec", IO_SPECULAR_MAP},
 };
 
 /* Words of maps and pictures that are not read, with a number behind them or without: rusty_metal_disp_1k is no
@@ -43,12 +42,13 @@ static const char *const others[] = {
     "bump",       "cavity",       "curvature",        "thickness", "emission",     "emissive",  "arm",
     "orm",        "ior",          "anisotropy",       "aniso",     "translucency", "sss",       "subsurface",
     "scattering", "transmission", "clearcoat",        "coat",      "sheen",        "speclevel", "specularlevel",
-    "nrm16",      "preview",      "sphere",           "thumbnail", "thumb",        "render",
+    "nrm16",      "preview",      "sphere",           "thumbnail", "thumb",        "render",    "alphamasked",
+    "idmap",      "overlay",      "direction",
 };
 /* Behind the name of a map they are in its channels: BaseColor_Alpha. */
 static const char *const parts[] = {"alpha", "opacity", "transparency", "mask"};
 
-enum { NONE = -1, OTHER = IO_MAP_KINDS, PART };
+enum { NONE = -1, OTHER = IO_MAP_KINDS, PART, REFLECTION };
 
 /* The words of a file name, cut at everything that is no letter or digit and where a capital follows a small letter. */
 enum { WORDS = 16, WORD = 32 };
@@ -78,6 +78,7 @@ static int kind_of_word(const char *word)
 {
     for (size_t w = 0; w < sizeof words / sizeof words[0]; w++)
         if (!strcmp(word, words[w].word)) return words[w].kind;
+    if (!strcmp(word, "refl") || !strcmp(word, "reflection")) return REFLECTION;
     size_t n = strlen(word);
     while (n && isdigit((unsigned char)word[n - 1])) n--;
     for (size_t w = 0; w < sizeof others / sizeof others[0]; w++)
@@ -90,14 +91,25 @@ static int kind_of_word(const char *word)
 /* Words of maps that are as often part of an asset's own name. */
 static bool is_noun(const char *word) { return !strcmp(word, "metal") || !strcmp(word, "rough"); }
 
-/* The map that the first count words mean, by the last that says something: a kind, OTHER or NONE. *at: its number. */
+/* Whether a word behind a map's says nothing of the asset: a size, a number, a version. */
+static bool is_detail(const char *word)
+{
+    static const char *const details[] = {"map", "tex", "texture", "linear", "raw", "srgb"};
+    bool found = strpbrk(word, "0123456789") != NULL;
+    for (size_t w = 0; w < sizeof details / sizeof details[0]; w++) found = found || !strcmp(word, details[w]);
+    return found;
+}
+
+/* The map that the first count words mean, by the last that says something: a kind, OTHER or NONE. *at: its number. A
+ * noun that is not the last is the asset's: metal_plate_02. */
 static int kind_of_words(const split *s, int count, int *at)
 {
-    for (int i = count - 1; i >= 0; i--) {
+    bool last = true;
+    for (int i = count - 1; i >= 0; last = last && is_detail(s->word[i]), i--) {
         const int kind = kind_of_word(s->word[i]), before = i ? kind_of_word(s->word[i - 1]) : NONE;
         const bool named = before >= 0 && before < IO_MAP_KINDS && !is_noun(s->word[i - 1]);
         *at = i;
-        if (kind == PART && named) continue;
+        if ((kind == PART && named) || (is_noun(s->word[i]) && !last)) continue;
         if (kind == PART || (before == IO_SPECULAR_MAP && !strcmp(s->word[i], "level"))) return OTHER;
         if (kind != NONE) return kind;
     }
@@ -109,7 +121,7 @@ static bool is_scalar(int kind) { return kind == IO_ROUGHNESS_MAP || kind == IO_
 typedef enum side { UNKNOWN, GL, DX, BOTH } side;
 
 typedef struct meaning {
-    int kind; /* -1: no map that is read */
+    int kind; /* -1: no map that is read; REFLECTION: F0 beside gloss, where no other map says it */
     side y;   /* OpenGL or DirectX if the name says so */
     bool packed;
 } meaning;
@@ -122,8 +134,8 @@ static meaning meaning_of(const split *s, bool suffix)
     meaning m = {.kind = kind == OTHER ? NONE : kind};
     if (is_scalar(m.kind) && at > 0) {
         const int before = kind_of_word(s->word[at - 1]);
-        m.packed = (is_scalar(before) && before != m.kind) || !strcmp(s->word[at - 1], "ao") ||
-            !strcmp(s->word[at - 1], "occlusion");
+        m.packed = (is_scalar(before) && before != m.kind) || (before == IO_SPECULAR_MAP && m.kind == IO_GLOSS_MAP) ||
+            !strcmp(s->word[at - 1], "ao") || !strcmp(s->word[at - 1], "occlusion");
     }
     for (int i = 0; i < s->count && m.kind == IO_NORMAL_MAP; i++) {
         const char *word = s->word[i];
@@ -218,12 +230,15 @@ static ts_code scan(const char *path, io_map_set *set, unsigned named, side want
     if (!folder) return ts_fail(st, TS_IO, "%s: %s", path, errno == ENOTDIR ? "not a folder of maps" : strerror(errno));
     ts_code code = TS_OK;
     const bool suffix = all_end_alike(folder, set, named);
+    char reflection[sizeof set->file[0]] = "";
     rewinddir(folder);
     for (struct dirent *entry; code == TS_OK && (entry = readdir(folder));) {
         split s;
         if (!split_name(entry->d_name, &s) || strlen(entry->d_name) >= sizeof set->file[0]) continue;
         const meaning m = meaning_of(&s, suffix);
-        if (m.kind < 0 || named & alternatives(m.kind) || is_named(set, named, entry->d_name)) continue;
+        if (m.kind == REFLECTION) strcpy(reflection, entry->d_name);
+        if (m.kind < 0 || m.kind >= IO_MAP_KINDS || named & alternatives(m.kind) || is_named(set, named, entry->d_name))
+            continue;
         char *file = set->file[m.kind];
         if (!file[0]) {
             strcpy(file, entry->d_name);
@@ -238,6 +253,8 @@ static ts_code scan(const char *path, io_map_set *set, unsigned named, side want
         }
     }
     closedir(folder);
+    if (*reflection && set->file[IO_GLOSS_MAP][0] && !set->file[IO_METALLIC_MAP][0] && !set->file[IO_SPECULAR_MAP][0])
+        strcpy(set->file[IO_SPECULAR_MAP], reflection);
     return code;
 }
 

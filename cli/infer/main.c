@@ -227,7 +227,7 @@ static int work(const cl_command *given)
     ts_threads_set(c->threads);
     ts_budget_set(c->max_memory);
     /* A sheet is one material. */
-    const bool several = !c->sheet && (photos > 1 || strcmp(photo[0], given->photo[0]) != 0);
+    const bool several = !c->sheet && (plan.jobs > 1 || strcmp(photo[0], given->photo[0]) != 0);
     run r = {.command = c, .lock = PTHREAD_MUTEX_INITIALIZER};
     if (settle(&r, &plan, several, &st) != TS_OK) {
         cl_plan_free(&plan);

@@ -106,7 +106,7 @@ static int not_hidden(const struct dirent *e) { return e->d_name[0] != '.'; }
 static bool is_material(const char *path, const char *name, bool strips)
 {
     struct stat about;
-    if (stat(path, &about)) return false;
+    if (stat(path, &about)) return true; /* a link that leads nowhere: reading it says so */
     return strips ? S_ISREG(about.st_mode) && io_is_image_name(name) : S_ISDIR(about.st_mode);
 }
 

@@ -39,6 +39,7 @@ not_root() {
     command -v setpriv >/dev/null || skip "root may write everywhere, and setpriv is not installed (util-linux)"
     NOT_ROOT="setpriv --reuid=65534 --regid=65534 --clear-groups"
     chmod -R a+rX "$T"
+    $NOT_ROOT test -r "$T" || skip "root may write everywhere, and no other user may read $T"
     $NOT_ROOT "$1" --version >/dev/null 2>&1 || skip "root may write everywhere, and no other user may run $1"
 }
 

@@ -43,13 +43,13 @@ TEST(map_folder_names_of_other_maps)
 TEST(map_folder_packed)
 {
     static const char *const names[] = {"metallicRoughness.png", "Wood_OcclusionRoughnessMetallic.png",
-                                        "a_rough_metal.png"};
-    for (int i = 0; i < 3; i++) {
+                                        "a_rough_metal.png", "a_specularGlossiness.png"};
+    for (int i = 0; i < 4; i++) {
         char name[16];
         snprintf(name, sizeof name, "packed%d", i);
         const char *folder = fresh(name);
         flat(folder, "basecolor.png", 4, 4, 128, 128, 128), flat(folder, "normal.png", 4, 4, 128, 204, 230);
-        if (i) flat(folder, "roughness.png", 4, 4, 51, 51, 51);
+        if (i == 1 || i == 2) flat(folder, "roughness.png", 4, 4, 51, 51, 51);
         flat(folder, names[i], 4, 4, 255, 51, 0);
         refused(folder, IO_NORMAL_GL, "a packed map must be taken apart");
         refused(folder, IO_NORMAL_GL, names[i]);
@@ -90,6 +90,21 @@ TEST(map_folder_workflow_in_all_names)
     const io_texel gloss = first(older, IO_NORMAL_GL, 0);
     CHECK(near(gloss.specular[0], io_srgb_to_linear(128 / 255.f), 1e-6f) && near(gloss.roughness, 0.8f, 1e-6f),
           "reflection and gloss");
+    flat(older, "Wood01_OVERLAY_2K_SPECULAR.png", 4, 4, 255, 0, 0);
+    CHECK(near(first(older, IO_NORMAL_GL, 0).roughness, 0.8f, 1e-6f), "an overlay is no map");
+}
+
+/* A reflection map is F0 only beside a gloss map, and where no other map says F0. */
+TEST(map_folder_reflection)
+{
+    const char *folder = usual("dielectric");
+    flat(folder, "wood_reflection.png", 4, 4, 128, 128, 128);
+    CHECK(near(first(folder, IO_NORMAL_GL, 0).specular[0], 0.04f, 1e-6f), "beside roughness");
+    const char *metal = fresh("metal");
+    flat(metal, "m_col.png", 4, 4, 128, 128, 128), flat(metal, "m_nrm.png", 4, 4, 128, 204, 230);
+    flat(metal, "m_gloss.png", 4, 4, 51, 51, 51), flat(metal, "m_metalness.png", 4, 4, 255, 255, 255);
+    flat(metal, "m_refl.png", 4, 4, 9, 9, 9);
+    CHECK(near(first(metal, IO_NORMAL_GL, 0).specular[0], io_srgb_to_linear(128 / 255.f), 1e-6f), "beside metalness");
 }
 
 /* Alpha of a colour map is another map or a cut-out, whether it is sRGB or linear; names are whole. */
