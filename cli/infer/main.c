@@ -19,6 +19,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 typedef struct run {
@@ -167,7 +168,9 @@ static ts_code spare(const cl_command *c, const cl_plan *plan, ts_status *st)
     int files = 0;
     ts_code code = c->mask ? cl_plan_check(plan, "mask", &c->mask, 1, st) : TS_OK;
     if (!code && c->sheet) code = cl_plan_check(plan, "photograph", (const char *const *)c->photo, c->photos, st);
-    if (code || !*c->capture) return code;
+    struct stat about;
+    if (code || !*c->capture || stat(c->capture, &about) || !S_ISREG(about.st_mode))
+        return code; /* a pipe is read once */
     io_capture_ini_files(c->capture, file, &files,
                          &(ts_status){0}); /* of one that cannot be read, the reader says it */
     code = cl_plan_check(plan, "photograph", (const char *const *)file, files, st);
