@@ -49,7 +49,7 @@ BENCH(weights)
     for (int k = 0; s.block && k < 3; k++) {
         char label[80];
         snprintf(s.path, sizeof s.path, "%s/lgd-bench-%ld.pth", folder && *folder ? folder : "/tmp", (long)getpid());
-        if (nn_file_write(s.path, NN_FORM_TORCH_ZIP, entry, TENSORS, type[k], NULL, 0, &s.st) == TS_OK) {
+        if (nn_file_write(s.path, NN_FORM_TORCH_ZIP, entry, TENSORS, type[k], NULL, 0, NULL, &s.st) == TS_OK) {
             const bench_time t = bench_measure(load, &s);
             snprintf(label, sizeof label, "open a .pth of %s and read it as floats", nn_dtype_name(type[k]));
             if (!s.st.code)
