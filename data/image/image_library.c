@@ -1,7 +1,6 @@
 /* Loads the shared object that has OpenImageIO behind it, once, when the first call needs it. */
 #include "data/image/oiio.h"
 #include "data/library.h"
-#include "tensor/threads.h"
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,7 +23,7 @@ static void load(void)
         ts_fail(&failure, TS_UNSUPPORTED, FILE_NAME " belongs to another version of this program: install it again");
         return;
     }
-    found->start(ts_threads());
+    found->start();
     library = found;
 }
 

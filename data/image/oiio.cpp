@@ -261,10 +261,13 @@ static bool knows_extension(const char *extension)
     return known;
 }
 
-static void start(int threads)
+/* No threads beside the caller's (of OpenEXR -1 says so, 0 is as many as there are CPUs): a forked child would wait for
+ * its parent's for ever, and signals for the program would go to them. */
+static void start(void)
 {
-    guarded("start", nullptr, [&] {
-        OIIO::attribute("threads", threads);
+    guarded("start", nullptr, [] {
+        OIIO::attribute("threads", 1);
+        OIIO::attribute("exr_threads", -1);
         OIIO::attribute("limits:imagesize_MB", 0); /* ours counts pixels and says how to raise it */
         return TS_OK;
     });

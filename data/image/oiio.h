@@ -68,14 +68,14 @@ bool oi_knows_extension(const char *extension);
 /* What the shared object exports under the name OI_LIBRARY: build says whether it belongs to this program. */
 typedef struct oi_library {
     const char *build;
-    void (*start)(int threads);
+    void (*start)(void); /* once, before the others */
     ts_code (*read)(const char *path, int64_t max_pixels, double max_bytes, oi_image *image, ts_status *st);
     ts_code (*encode_jpeg)(const char *name, const oi_encoding *e, const uint8_t *pixels, unsigned char **bytes,
                            size_t *size, ts_status *st);
     bool (*knows_extension)(const char *extension);
 } oi_library;
 #define OI_LIBRARY "lgd_image_library"
-#define OI_BUILD "lgd " LGD_VERSION " image library 4"
+#define OI_BUILD "lgd " LGD_VERSION " image library 5"
 
 #ifdef __cplusplus
 }

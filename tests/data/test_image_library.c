@@ -6,8 +6,11 @@
 #include "tests/test.h"
 #include <dirent.h>
 #include <math.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 static bool library_is_loaded(void)
 {
@@ -94,6 +97,55 @@ TEST(png_and_jpeg_load_no_image_library)
     snprintf(path, sizeof path, "%s/a.jpg", test_folder());
     CHECK(io_write_jpeg(path, &image, 90, &st) == TS_OK, "%s", st.message);
     CHECK(library_is_loaded(), "the image library is not seen in /proc/self/maps");
+}
+
+/* Threads of this process beside the first that SIGTERM may go to. */
+static int threads_for_signals(void)
+{
+    char path[300], line[256];
+    int found = 0;
+    DIR *d = opendir("/proc/self/task");
+    CHECK(d, "no /proc/self/task");
+    for (struct dirent *e; (e = readdir(d));) {
+        if (e->d_name[0] == '.' || atoi(e->d_name) == getpid()) continue;
+        snprintf(path, sizeof path, "/proc/self/task/%s/status", e->d_name);
+        FILE *f = fopen(path, "r");
+        unsigned long long blocked;
+        while (f && fgets(line, sizeof line, f))
+            if (sscanf(line, "SigBlk: %llx", &blocked) == 1) found += !(blocked >> (SIGTERM - 1) & 1);
+        if (f) fclose(f);
+    }
+    closedir(d);
+    return found;
+}
+
+static bool library_reads(const char *path)
+{
+    oi_image image;
+    if (oi_read(path, 1 << 20, INFINITY, &image, NULL) != TS_OK) return false;
+    oi_free(&image);
+    return true;
+}
+
+/* Of its parent's threads it has none. */
+TEST(image_library_reads_in_a_forked_child)
+{
+    enum { SIDE = 64 };
+    static float values[SIDE * SIDE * 3];
+    static uint8_t levels[SIDE * SIDE * 3];
+    bytes exr = exr_file(SIDE, SIDE, values, NULL),
+          tiff = tiff_file(&(tiff_page){SIDE, SIDE, 3, 8, 2, 1, -1, 1, levels}, 1);
+    const char *path[] = {bytes_save(&exr, test_folder(), "a.exr"), bytes_save(&tiff, test_folder(), "a.tif")};
+    for (int k = 0; k < 2; k++) CHECK(library_reads(path[k]), "%s is not read", path[k]);
+    CHECK(threads_for_signals() == 0, "SIGTERM may go to %d threads of the library", threads_for_signals());
+    const pid_t child = fork();
+    if (child == 0) {
+        alarm(20);
+        _exit(library_reads(path[0]) && library_reads(path[1]) ? 0 : 1);
+    }
+    int status;
+    CHECK(child > 0 && waitpid(child, &status, 0) == child, "no child");
+    CHECK(WIFEXITED(status) && WEXITSTATUS(status) == 0, "the child ends with status %#x", status);
 }
 
 TEST(quick_readers_read_what_the_library_reads)
