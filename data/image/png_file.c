@@ -11,24 +11,28 @@ static uint32_t be32(const uint8_t *p)
     return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3];
 }
 
-/* NULL where the file is no PNG (or cannot be opened, which the caller has checked). */
-static FILE *open_png(const char *path)
+/* NULL where the file is no PNG (or cannot be opened, which the caller has checked). *fault: NULL, or what is wrong
+ * with the first eight bytes of one. */
+static FILE *open_png(const char *path, const char **fault)
 {
+    static const char name[] = "\x89PNG", ends[] = "\r\n\x1a\n"; /* which a copy as text changes */
     uint8_t head[8];
     FILE *f = fopen(path, "rbe");
-    if (f && (fread(head, 1, 8, f) != 8 || memcmp(head, "\x89PNG\r\n\x1a\n", 8))) {
+    const size_t size = f ? fread(head, 1, 8, f) : 0;
+    if (f && (size < 4 || memcmp(head, name, 4))) {
         fclose(f);
-        f = NULL;
+        return NULL;
     }
+    *fault = size < 8 ? "cut short" : memcmp(head + 4, ends, 4) ? "its first bytes were changed, copy it again" : NULL;
     return f;
 }
 
 ts_code io_check_png(const char *path, ts_status *st)
 {
-    FILE *f = open_png(path);
+    const char *fault = NULL;
+    FILE *f = open_png(path, &fault);
     if (!f) return TS_OK;
     uint8_t head[8], block[16384];
-    const char *fault = NULL;
     for (bool end = false; !end && !fault;) {
         if (fread(head, 1, 8, f) != 8) {
             fault = "cut short";
@@ -56,12 +60,13 @@ static const float bt709[8] = {.64f, .33f, .3f, .6f, .15f, .06f, .3127f, .329f};
 
 bool io_space_png(const char *path, io_space *space)
 {
-    FILE *f = open_png(path);
+    const char *fault;
+    FILE *f = open_png(path, &fault);
     if (!f) return false;
     uint8_t head[8], d[32];
     bool cicp = false, srgb = false, profile = false, primaries = false;
     float xy[8] = {0}, gamma = -1;
-    while (fread(head, 1, 8, f) == 8 && memcmp(head + 4, "IDAT", 4)) {
+    while (!fault && fread(head, 1, 8, f) == 8 && memcmp(head + 4, "IDAT", 4)) {
         uint32_t length = be32(head);
         size_t take = length < sizeof d ? length : sizeof d;
         if (length > 0x7fffffff || fread(d, 1, take, f) != take) break;

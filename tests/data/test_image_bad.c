@@ -49,6 +49,11 @@ TEST(not_an_image)
     }
     put(&b, "BMW, photographs of the paint, all of them\n", 43); /* begins as a bitmap does */
     refused(bytes_save(&b, folder, "notes.txt"), "is no image");
+    for (int k = 4; k < 8; k++) { /* libpng would print its own line about the last of them */
+        png_begin(&b, 2, 1, 8, 0), png_pixels(&b, "ab", 2, 1), png_end(&b);
+        b.data[k] ^= 0x80;
+        refused(bytes_save(&b, folder, "as_text.png"), "its first bytes were changed");
+    }
     snprintf(path, sizeof path, "%s/pipe.png", folder);
     CHECK(!mkfifo(path, 0600), "mkfifo");
     refused(path, "not a regular file");
