@@ -75,6 +75,35 @@ EOT
 }
 check library_unloaded_with_workers_waiting unloaded_with_workers_waiting
 
+# By a name that is relative to the working folder of then: it finds what ships beside it from any other.
+loaded_by_a_relative_name() {
+    [ -z "$SANITIZED" ] || skip "the sanitizers' libraries are not loaded later"
+    cat >"$T/relative.c" <<'EOT'
+#include "infer/lgd.h"
+#include <dlfcn.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+int main(int count, char **words)
+{
+    int (*find)(const char *, char *, size_t, lgd_error *);
+    void *library = count == 2 ? dlopen(words[1], RTLD_NOW) : NULL;
+    void *f = library ? dlsym(library, "lgd_find_weights") : NULL;
+    char path[4096];
+    lgd_error e;
+    if (!f || chdir("/")) return puts(dlerror()), 1;
+    memcpy(&find, &f, sizeof find);
+    return find("phone", path, sizeof path, &e) ? puts(e.message), 1 : 0;
+}
+EOT
+    expect 0 ${CC:-gcc} -I. -o "$T/relative" "$T/relative.c" -ldl
+    mkdir "$T/lib" "$T/models"
+    cp "$BUILD/liblgd.so" "$T/lib"
+    ln -s "$ROOT/models/phone.safetensors" "$T/models"
+    (cd "$T" && expect 0 "$T/relative" ./lib/liblgd.so) || exit 1
+}
+check library_loaded_by_a_relative_name loaded_by_a_relative_name
+
 # What stands in $(...) of the README's command that begins so, for an installation that has been moved.
 linked_by() {
     grep -F -m 1 "$1" README.md | sed 's/.*cc user.c $(\(.*\)) -o user.*/\1/; s/pkg-config/& --define-prefix/'
