@@ -4,8 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-enum { STRUCT_MOST = 4096 }; /* a larger size is a field that nobody set */
-
 _Static_assert(sizeof((lgd_error *)0)->message == sizeof((ts_status *)0)->message, "messages are copied whole");
 
 int lgd_report(lgd_error *error, const ts_status *st)
@@ -22,7 +20,7 @@ ts_code lgd_take_struct(const char *call, const void *given, size_t least, void 
     size_t theirs;
     if (!given) return TS_OK;
     memcpy(&theirs, given, sizeof theirs);
-    if (theirs < least || theirs > STRUCT_MOST)
+    if (theirs < least || theirs > LGD_STRUCT_MOST)
         return ts_fail(st, TS_INVALID, "%s: options.size is %zu: begin with a struct of the defaults, as lgd.h says",
                        call, theirs);
     for (size_t i = size; i < theirs; i++)

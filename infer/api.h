@@ -5,7 +5,11 @@
 #include "tensor/status.h"
 #include <stdbool.h>
 
-enum { LGD_SIDE_MAX = 16384, /* 9.7 GB of maps: a larger number is a mistake */ LGD_THREADS_MAX = 1024 };
+enum {
+    LGD_SIDE_MAX = 16384, /* 9.7 GB of maps: a larger number is a mistake */
+    LGD_THREADS_MAX = 1024,
+    LGD_STRUCT_MOST = 4096 /* a struct's larger size is a field that nobody set */
+};
 
 /* Copies st into error, which may be NULL. Returns its code. */
 int lgd_report(lgd_error *error, const ts_status *st);

@@ -22,9 +22,11 @@ int lgd_find_weights(const char *name, char *path, size_t size, lgd_error *error
     ts_status st = {0};
     char found[LGD_PATH_MAX];
     if (!path || size == 0) ts_fail(&st, TS_INVALID, "lgd_find_weights: path must be given");
-    else if (lgd_model_path(name, LGD_DEFAULT_MODEL, found, &st) == TS_OK &&
-             snprintf(path, size, "%s", found) >= (int)size)
-        ts_fail(&st, TS_INVALID, "lgd_find_weights: %zu bytes are too few for %s", size, found);
+    else if (lgd_model_path(name, LGD_DEFAULT_MODEL, found, &st) == TS_OK) {
+        const size_t length = strlen(found);
+        if (length < size) memcpy(path, found, length + 1);
+        else ts_fail(&st, TS_INVALID, "lgd_find_weights: %zu bytes are too few for %s", size, found);
+    }
     return lgd_report(error, &st);
 }
 
@@ -60,7 +62,7 @@ int lgd_read_photo(const char *path, int side, const lgd_read_options *options, 
     io_image square = {0};
     lgd_facts told = {.size = facts ? facts->size : sizeof told};
     if (!path || !image) ts_fail(&st, TS_INVALID, "%s: path and image must be given", call);
-    else if (told.size < sizeof told.size || told.size > sizeof told)
+    else if (told.size < sizeof told.size || told.size > LGD_STRUCT_MOST)
         ts_fail(&st, TS_INVALID, "%s: facts.size is %zu: set it to sizeof(lgd_facts)", call, told.size);
     else if (check_side(call, side, &st) == TS_OK && take_read_options(call, options, &o, &st) == TS_OK)
         lgd_photograph_square(path, o.published, o.max_pixels, side, o.threads, &square, &found, &st);
@@ -70,7 +72,11 @@ int lgd_read_photo(const char *path, int side, const lgd_read_options *options, 
         told.height = found.height;
         told.fov = io_lens_fov(&found.lens, found.width, found.height, told.fov_from, sizeof told.fov_from);
         memcpy(told.profile, found.profile, sizeof told.profile);
-        if (facts) memcpy(facts, &told, told.size);
+        if (facts) { /* of a caller that was compiled with fewer or more of them */
+            const size_t known = told.size < sizeof told ? told.size : sizeof told;
+            memcpy(facts, &told, known);
+            memset((char *)facts + known, 0, told.size - known);
+        }
     }
     io_image_free(&square);
     return lgd_report(error, &st);

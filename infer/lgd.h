@@ -183,7 +183,8 @@ typedef struct lgd_read_options {
 
 /* What is known of a photograph beside its pixels. */
 typedef struct lgd_facts {
-    size_t size;       /* sizeof(lgd_facts), set by the caller; lgd_read_photo fills the others */
+    size_t size;       /* sizeof(lgd_facts), set by the caller; lgd_read_photo fills the others, with zeros what it does
+                        * not know */
     int width, height; /* of the whole photograph, upright */
     double fov; /* degrees across its largest centred square, from EXIF: for lgd_options.fov; or LGD_FOV_UNKNOWN */
     char fov_from[128]; /* where fov is known from, or why it is not: for lgd_write_options, with fov_unknown */
@@ -193,8 +194,9 @@ typedef struct lgd_facts {
 /* A photograph's largest centred square as side x side x 3 linear values (sRGB primaries; above 1 only from files that
  * say so), top row first. Upright by its EXIF orientation; colour profiles are honoured, alpha lies on black (neither
  * with options.published). Ordinary PNG and JPEG files are read by this library; other formats, palettes, CMYK and
- * files with IPTC or an orientation in XMP by OpenImageIO in lgd/liblgd_image.so beside it. options and facts may be
- * NULL. */
+ * files with IPTC or an orientation in XMP by OpenImageIO in lgd/liblgd_image.so beside it. A process that is forked
+ * after that was loaded may read on, but ends by _exit or exec: in exit, libraries behind OpenImageIO wait for threads
+ * that only its parent has. options and facts may be NULL. */
 LGD_API int lgd_read_photo(const char *path, int side, const lgd_read_options *options, float *image, lgd_facts *facts,
                            lgd_error *error);
 

@@ -71,7 +71,7 @@ TEST(infer_a_photograph_in_memory_is_that_of_its_file)
     for (int i = 0; i < CUT * CUT * 3; i++) CHECK(isfinite(from_memory[i]), "a value spreads");
 }
 
-/* A caller that was compiled with fewer facts keeps what stands behind them. */
+/* A caller that was compiled with fewer facts keeps what stands behind them, one with more gets zeros. */
 TEST(infer_facts_grow)
 {
     static unsigned char levels[W * H * 3];
@@ -80,7 +80,16 @@ TEST(infer_facts_grow)
     lgd_facts facts = {.size = offsetof(lgd_facts, fov), .fov = 7};
     CHECK(!lgd_read_photo(make_photo(levels), CUT, NULL, image, &facts, &e) && facts.width == W && facts.fov == 7, "%s",
           e.message);
-    facts.size = sizeof facts + 1;
+    struct {
+        lgd_facts known;
+        char more[40], behind;
+    } later = {.known = {.size = offsetof(__typeof__(later), behind)}, .more = {1, [39] = 1}, .behind = 1};
+    CHECK(!lgd_read_photo(in_folder("photo.png"), CUT, NULL, image, &later.known, &e) && later.known.height == H, "%s",
+          e.message);
+    CHECK(later.known.size == sizeof facts + 40 && !later.more[0] && !later.more[39] && later.behind == 1,
+          "size %zu, what the library does not know is %d and %d, behind it is %d", later.known.size, later.more[0],
+          later.more[39], later.behind);
+    facts.size = 5000;
     CHECK(lgd_read_photo(in_folder("photo.png"), CUT, NULL, image, &facts, &e) && strstr(e.message, "facts.size"),
           "taken: %s", e.message);
 }
@@ -119,6 +128,7 @@ TEST(infer_find_weights)
     CHECK(!lgd_find_weights(NULL, path, sizeof path, &e) && !strcmp(path, "/a/b.safetensors"), "%s", e.message);
     CHECK(!lgd_find_weights("c.safetensors", path, sizeof path, &e) && !strcmp(path, "c.safetensors"), "%s", e.message);
     CHECK(lgd_find_weights("", path, sizeof path, &e) == TS_INVALID && strstr(e.message, "empty"), "%s", e.message);
+    CHECK(!lgd_find_weights("d.pth", path, (size_t)1 << 32, &e) && !strcmp(path, "d.pth"), "%s", e.message);
     CHECK(lgd_find_weights(NULL, path, 5, &e) == TS_INVALID && strstr(e.message, "5 bytes"), "%s", e.message);
     CHECK(lgd_find_weights("no-such-model", path, sizeof path, &e) == TS_IO && strstr(e.message, "no-such-model"), "%s",
           e.message);
