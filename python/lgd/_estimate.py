@@ -20,49 +20,71 @@ Progress = Callable[[float, float], None]
 
 
 class _Calls:
-    """The library's calls into Python. What these raise ends the work and is raised again behind it, as does Ctrl-C:
-    what a signal's handler raises at the beginning of such a call would be lost, so it runs behind the work."""
+    """The library's calls into Python. What these raise ends the work and is raised again behind it, as does what the
+    handler of a signal raises, Ctrl-C's or another's. Python runs handlers where such a call begins, where it would be
+    lost: they wait until it is caught."""
 
     def __init__(self, progress: Optional[Progress], steps: int):
         self.progress, self.steps = progress, steps
         self.raised: Optional[BaseException] = None
-        self.interrupt: Optional[tuple] = None  # the handler's arguments
+        self.caught = False  # whether what a handler raises now is
+        self.waiting: List[tuple] = []  # handlers and their arguments
         self.done = 0.0
         self.rmse: List[float] = []
         self.step, self.tile = c.Progress(self._step), c.Tile(self._tile)
 
     def _tell(self, done: float, rmse: float) -> int:
         try:
+            self.caught = True
+            self._handle()
             self.done = max(self.done, done)
             if self.progress:
                 self.progress(self.done, rmse)
+            self.caught = False
         except BaseException as error:  # KeyboardInterrupt too
+            self.caught = False
             self.raised = error
-        return self.raised is not None or self.interrupt is not None
+        return self.raised is not None
 
     def _step(self, step: int, rmse: float, user: object) -> int:
         self.rmse = self.rmse[:step] + [rmse]
         return self._tell((step + 1) / (self.steps + 1), rmse)
 
-    def _interrupted(self, number: int, frame: object) -> None:
-        self.interrupt = (number, frame)
+    def _handle(self) -> None:
+        while self.waiting:
+            handler, number, frame = self.waiting.pop(0)
+            handler(number, frame)
+
+    def _later(self, handler: Callable[[int, object], object]) -> Callable[[int, object], None]:
+        def handle(number: int, frame: object) -> None:
+            if self.caught:
+                handler(number, frame)
+            else:
+                self.waiting.append((handler, number, frame))
+
+        return handle
 
     def run(self, call: Callable[[], int]) -> int:
-        handler = signal.getsignal(signal.SIGINT) if threading.current_thread() is threading.main_thread() else None
-        if not callable(handler):  # another thread's, ignored, or not Python's
-            return self._raise(call())
-        signal.signal(signal.SIGINT, self._interrupted)
+        ours = {}
+        if threading.current_thread() is threading.main_thread():  # whose they are
+            for number in signal.valid_signals():
+                handler = signal.getsignal(number)
+                if callable(handler):  # neither ignored nor not Python's
+                    ours[number] = handler, self._later(handler)
         try:
+            for number, (_, handle) in ours.items():
+                signal.signal(number, handle)
             code = call()
         finally:
-            signal.signal(signal.SIGINT, handler)
-        if self.interrupt:
-            handler(*self.interrupt)
-        return self._raise(code)
-
-    def _raise(self, code: int) -> int:
-        if self.raised:
-            raise self.raised
+            self.caught = True  # by the caller: where one raises here, those that are left go on
+            for number, (handler, handle) in ours.items():
+                if signal.getsignal(number) is handle:  # progress may have set another
+                    signal.signal(number, handler)
+        try:
+            self._handle()
+        finally:
+            if self.raised:
+                raise self.raised
         return code
 
     def _tile(self, done: float, user: object) -> int:

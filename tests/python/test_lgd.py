@@ -161,6 +161,34 @@ class Estimates(unittest.TestCase):
 
     def test_an_image_that_was_exchanged_is_read_as_it_is(self):
         maps = lgd.estimate(PHOTO, size=64)
+    def test_what_a_signals_handler_raises_ends_the_work(self):
+        def late(number, frame):
+            raise TimeoutError
+
+        def catch(done, rmse):
+            with self.assertRaises(TimeoutError):
+                signal.raise_signal(signal.SIGALRM)
+
+        self.addCleanup(signal.signal, signal.SIGALRM, signal.signal(signal.SIGALRM, late))
+        self.addCleanup(signal.setitimer, signal.ITIMER_REAL, 0)
+        for after in (0.05, 0.1, 0.2):
+            with self.assertRaises(TimeoutError):
+                signal.setitimer(signal.ITIMER_REAL, after)
+                for _ in range(100):
+                    lgd.estimate(PHOTO, size=128, iterations=40)
+        quick(PHOTO, progress=catch)
+        self.assertIs(signal.getsignal(signal.SIGALRM), late)
+
+    def test_handlers_that_raise_nothing_change_nothing(self):
+        undisturbed, numbers = lgd.estimate(PHOTO, size=128, iterations=10), []
+        before = signal.signal(signal.SIGALRM, lambda number, frame: numbers.append(number))
+        self.addCleanup(signal.signal, signal.SIGALRM, before)
+        self.addCleanup(signal.setitimer, signal.ITIMER_REAL, 0)
+        signal.setitimer(signal.ITIMER_REAL, 0.005, 0.005)
+        while len(numbers) < 5:
+            maps = lgd.estimate(PHOTO, size=128, iterations=10)
+            np.testing.assert_array_equal(maps.array, undisturbed.array)
+
         with tempfile.TemporaryDirectory() as folder:
             maps.save(folder + "/a", ["render"])
             maps.photo.image = maps.photo.image[::-1].copy()[::-1].astype(np.float64)
