@@ -99,7 +99,8 @@ class Model:
         path, error = ctypes.create_string_buffer(4096), c.Failure()
         name = None if weights is None else os.fsencode(weights)
         check(lib.lgd_find_weights(name, path, len(path), error), error)
-        self.weights = os.fsdecode(path.value)
+        found = os.fsdecode(path.value)
+        self.weights = found if os.path.isabs(found) else os.path.join(os.getcwd(), found)
         self._model = ctypes.c_void_p(lib.lgd_load(path.value, error))
         if not self._model:
             check(error.code, error)
@@ -107,6 +108,9 @@ class Model:
     def __del__(self) -> None:
         if getattr(self, "_model", None):
             lib.lgd_free(ctypes.byref(self._model))
+
+    def __reduce__(self) -> tuple:
+        return type(self), (self.weights,)  # a copy reads them again: what is loaded has one owner
 
     @property
     def iterations(self) -> int:

@@ -23,6 +23,9 @@ class Error(RuntimeError):
         self.code = code
 
 
+    def __reduce__(self) -> tuple:  # the usual one has the message alone
+        return type(self), (self.code, str(self))
+
 def check(code: int, error: c.Failure) -> None:
     if code:
         raise Error(code, error.message.decode("utf-8", "surrogateescape"))

@@ -1,9 +1,11 @@
 """The Python package. Environment: PHOTO, a photograph; LGD_LIBRARY and LGD_MODEL, or an installed package."""
 
+import copy
 import ctypes
 import math
 import os
 import pathlib
+import pickle
 import re
 import signal
 import tempfile
@@ -213,6 +215,16 @@ class Estimates(unittest.TestCase):
         for r in results[1:]:
             np.testing.assert_array_equal(r, results[0])
 
+    def test_a_copy_of_a_model_is_its_own(self):
+        model = lgd.Model()
+        expected = quick(bump(), model=model).array
+        made = [copy.copy(model), copy.deepcopy(model), pickle.loads(pickle.dumps(model))]
+        self.assertEqual(len({m._model.value for m in made + [model]}), 4)
+        del model
+        for copied in made:
+            np.testing.assert_array_equal(quick(bump(), model=copied).array, expected)
+        self.assertTrue(os.path.isabs(lgd.Model(os.path.relpath(made[0].weights)).weights))
+
     def test_photos_with_known_lights(self):
         model, image = lgd.Model(PHONE), RNG.uniform(0.2, 0.6, (SIZE, SIZE, 3)).astype(np.float32)
         photo = lgd.Photo(image, light=(0.1, 0.2, 1.5), camera=(0, 0, 1.5), power=10)
@@ -292,7 +304,7 @@ class Estimates(unittest.TestCase):
         ]:
             with self.subTest(text), self.assertRaisesRegex(kind, text):
                 quick(**options)
-        with self.assertRaisesRegex(lgd.Error, "absent.safetensors"):
+        with self.assertRaisesRegex(lgd.Error, "absent.safetensors") as raised:
             lgd.Model("absent.safetensors")
         maps = quick(bump())
         for wrong in ((0, 0), (0, 0, 1, 1), 1, "up"):
@@ -301,6 +313,8 @@ class Estimates(unittest.TestCase):
                     maps.render(**{place: wrong})
         with self.assertRaisesRegex(ValueError, "light must be three numbers"):
             lgd.Photo(None, light=(0, 1))
+        again = pickle.loads(pickle.dumps(raised.exception))  # as from a process of a pool
+        self.assertEqual((again.code, str(again)), (raised.exception.code, str(raised.exception)))
 
     def test_a_model_by_its_name(self):
         model = lgd.Model()
