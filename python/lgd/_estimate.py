@@ -12,7 +12,7 @@ from typing import Callable, List, Optional, Sequence, Union
 import numpy as np
 
 from . import _library as c
-from ._maps import Maps, Path, Photo, check, cut_mask, floats, lib, read_photo, square
+from ._maps import Maps, Path, Photo, check, cut_mask, floats, lib, read_photo, square, text, whole
 
 Image = Union[Path, np.ndarray]
 # done: 0 .. 1; rmse: of the linear values, NaN where it is not known. What it raises ends the work.
@@ -97,7 +97,7 @@ class Model:
 
     def __init__(self, weights: Optional[Path] = None):
         path, error = ctypes.create_string_buffer(4096), c.Failure()
-        name = None if weights is None else os.fsencode(weights)
+        name = None if weights is None else text(weights)
         check(lib.lgd_find_weights(name, path, len(path), error), error)
         found = os.fsdecode(path.value)
         self.weights = found if os.path.isabs(found) else os.path.join(os.getcwd(), found)
@@ -192,9 +192,9 @@ def _run(
         structs[k].power *= power.value
     lib.lgd_options_init(options, ctypes.sizeof(options))
     options.iterations = -1 if iterations is None else c.AUTO if iterations == "auto" else steps
-    options.exact, options.precision, options.sample = exact, c.PRECISIONS[precision], c.SAMPLES[sample]
-    options.orientations = 0 if orientations == "auto" else int(orientations)
-    options.threads, options.fov = threads, fov
+    options.exact, options.precision, options.sample = bool(exact), c.PRECISIONS[precision], c.SAMPLES[sample]
+    options.orientations = 0 if orientations == "auto" else whole("orientations", orientations)
+    options.threads, options.fov = whole("threads", threads), fov
     options.progress, options.tile, options.taken = calls.step, calls.tile, taken
     ambient = ctypes.c_double(0)
     options.ambient = ctypes.pointer(ambient)

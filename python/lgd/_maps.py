@@ -2,6 +2,7 @@
 
 import ctypes
 import math
+import operator
 import os
 from dataclasses import dataclass, field
 from typing import List, NamedTuple, Optional, Sequence, Union
@@ -22,9 +23,9 @@ class Error(RuntimeError):
         super().__init__(message)
         self.code = code
 
-
     def __reduce__(self) -> tuple:  # the usual one has the message alone
         return type(self), (self.code, str(self))
+
 
 def check(code: int, error: c.Failure) -> None:
     if code:
@@ -33,6 +34,21 @@ def check(code: int, error: c.Failure) -> None:
 
 def floats(array: np.ndarray) -> "ctypes._Pointer[ctypes.c_float]":
     return array.ctypes.data_as(ctypes.POINTER(ctypes.c_float))
+
+
+def text(words: Union[Path, bytes]) -> bytes:
+    """As the library reads it, to a zero byte."""
+    encoded = os.fsencode(words)
+    if b"\0" in encoded:
+        raise ValueError(f"embedded null byte in {words!r}")
+    return encoded
+
+
+def whole(name: str, number: int) -> int:
+    """As the library reads it, in 32 bits."""
+    if not -(1 << 31) <= operator.index(number) < 1 << 31:
+        raise ValueError(f"{name} is {number} and must lie in {-(1 << 31)} .. {(1 << 31) - 1}")
+    return operator.index(number)
 
 
 def version() -> str:
@@ -179,18 +195,19 @@ class Maps:
             raise ValueError(f"maps of shape {values.shape} and a photograph of shape {self.photo.image.shape}")
         options = c.WriteOptions(
             ctypes.sizeof(c.WriteOptions),
-            None if names is None else names.encode(),
-            directx,
+            None if names is None else text(names),
+            bool(directx),
             workflow == "metallic",
-            seamless,
+            bool(seamless),
             c.EXR[exr],
-            threads,
-            self.fov_from.encode("utf-8", "surrogateescape"),
+            whole("threads", threads),
+            text(self.fov_from.encode("utf-8", "surrogateescape")),
             False,
             self.ambient,
         )
+        path = text(folder)
         made = _make_parents(os.path.abspath(os.fspath(folder)))
-        code = lib.lgd_write_maps(os.fsencode(folder), floats(values), values.shape[0], photo, options, error)
+        code = lib.lgd_write_maps(path, floats(values), values.shape[0], photo, options, error)
         if code:
             _remove_empty(made)
         check(code, error)
@@ -220,12 +237,12 @@ def read_photo(path: Path, size: int = 256, *, published: bool = False, threads:
     if size < 1:
         raise ValueError(f"size is {size} and must be 1 or more")
     image = np.empty((size, size, 3), np.float32)
-    options = c.ReadOptions(ctypes.sizeof(c.ReadOptions), published, 0, threads)
+    options = c.ReadOptions(ctypes.sizeof(c.ReadOptions), bool(published), 0, whole("threads", threads))
     facts, error = c.FactsStruct(size=ctypes.sizeof(c.FactsStruct)), c.Failure()
-    check(lib.lgd_read_photo(os.fsencode(path), size, options, floats(image), facts, error), error)
-    text = lambda t: t.decode("utf-8", "replace")  # noqa: E731
+    check(lib.lgd_read_photo(text(path), size, options, floats(image), facts, error), error)
+    told = lambda t: t.decode("utf-8", "replace")  # noqa: E731
     fov = None if facts.fov == c.UNKNOWN else facts.fov
-    return image, Facts(facts.width, facts.height, fov, text(facts.fov_from), text(facts.profile))
+    return image, Facts(facts.width, facts.height, fov, told(facts.fov_from), told(facts.profile))
 
 
 def square(pixels: np.ndarray, size: int) -> np.ndarray:
@@ -262,7 +279,7 @@ def cut_mask(mask: Union[Path, np.ndarray], size: int, width: int, height: int) 
     if not isinstance(mask, np.ndarray):
         values, error = np.empty((size, size), np.uint8), c.Failure()
         room = values.ctypes.data_as(ctypes.POINTER(ctypes.c_ubyte))
-        check(lib.lgd_read_mask(os.fsencode(mask), size, width, height, None, room, error), error)
+        check(lib.lgd_read_mask(text(mask), size, width, height, None, room, error), error)
         return values
     if mask.ndim != 2 or mask.shape != (height, width):
         raise ValueError(f"a mask of shape {mask.shape}: it must be that of the photograph, ({height}, {width})")

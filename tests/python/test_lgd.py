@@ -161,8 +161,6 @@ class Estimates(unittest.TestCase):
             timer.join()
         self.assertIs(signal.getsignal(signal.SIGINT), signal.default_int_handler)
 
-    def test_an_image_that_was_exchanged_is_read_as_it_is(self):
-        maps = lgd.estimate(PHOTO, size=64)
     def test_what_a_signals_handler_raises_ends_the_work(self):
         def late(number, frame):
             raise TimeoutError
@@ -191,6 +189,8 @@ class Estimates(unittest.TestCase):
             maps = lgd.estimate(PHOTO, size=128, iterations=10)
             np.testing.assert_array_equal(maps.array, undisturbed.array)
 
+    def test_an_image_that_was_exchanged_is_read_as_it_is(self):
+        maps = lgd.estimate(PHOTO, size=64)
         with tempfile.TemporaryDirectory() as folder:
             maps.save(folder + "/a", ["render"])
             maps.photo.image = maps.photo.image[::-1].copy()[::-1].astype(np.float64)
@@ -297,8 +297,15 @@ class Estimates(unittest.TestCase):
             ({"image": bump(), "precision": "f16"}, ValueError, "f16"),
             ({"image": bump(), "light_power": "all"}, ValueError, "all"),
             ({"image": bump(), "orientations": 3}, lgd.Error, "orientations is 3"),
+            ({"image": bump(), "orientations": 2.7}, TypeError, "float"),
+            ({"image": bump(), "orientations": (1 << 32) + 1}, ValueError, "orientations is 4294967297"),
             ({"image": bump(), "sample": "wood"}, ValueError, "wood"),
             ({"image": bump(), "threads": -1}, lgd.Error, "threads is -1"),
+            ({"image": bump(), "threads": (1 << 32) + 1}, ValueError, "threads is 4294967297"),
+            ({"image": PHOTO, "threads": (1 << 32) + 1}, ValueError, "threads is 4294967297"),
+            ({"image": PHOTO + "\0x"}, ValueError, "embedded null byte"),
+            ({"image": bump(), "mask": PHOTO + "\0x"}, ValueError, "embedded null byte"),
+            ({"image": bump(), "model": "phone\0x"}, ValueError, "embedded null byte"),
             ({"image": bump(), "model": "absent"}, lgd.Error, "absent"),
             ({"image": bump(), "model": 3}, TypeError, "model must be an lgd.Model, a name or a file .*, not 3"),
         ]:
@@ -306,6 +313,8 @@ class Estimates(unittest.TestCase):
                 quick(**options)
         with self.assertRaisesRegex(lgd.Error, "absent.safetensors") as raised:
             lgd.Model("absent.safetensors")
+        again = pickle.loads(pickle.dumps(raised.exception))  # as from a process of a pool
+        self.assertEqual((again.code, str(again)), (raised.exception.code, str(raised.exception)))
         maps = quick(bump())
         for wrong in ((0, 0), (0, 0, 1, 1), 1, "up"):
             for place in ("light", "camera"):
@@ -313,8 +322,10 @@ class Estimates(unittest.TestCase):
                     maps.render(**{place: wrong})
         with self.assertRaisesRegex(ValueError, "light must be three numbers"):
             lgd.Photo(None, light=(0, 1))
-        again = pickle.loads(pickle.dumps(raised.exception))  # as from a process of a pool
-        self.assertEqual((again.code, str(again)), (raised.exception.code, str(raised.exception)))
+
+    def test_truth_of_numpy(self):
+        for exact in (True, False):
+            np.testing.assert_array_equal(quick(bump(), exact=np.bool_(exact)).array, quick(bump(), exact=exact).array)
 
     def test_a_model_by_its_name(self):
         model = lgd.Model()
@@ -351,9 +362,15 @@ class Files(unittest.TestCase):
                 ({"maps": "colour"}, lgd.Error, "'colour' is nothing"),
                 ({"workflow": "other"}, ValueError, "other"),
                 ({"exr": "double"}, ValueError, "double"),
+                ({"threads": (1 << 32) + 1}, ValueError, "threads is 4294967297"),
+                ({"maps": "normal\0,colour"}, ValueError, "embedded null byte"),
+                ({"folder": path + "\0x"}, ValueError, "embedded null byte"),
             ]:
                 with self.subTest(text), self.assertRaisesRegex(kind, text):
-                    maps.save(path, **options)
+                    maps.save(**{"folder": path, **options})
+            maps.fov_from = "given\0by hand"
+            with self.assertRaisesRegex(ValueError, "embedded null byte"):
+                maps.save(path)
 
     def test_a_rendering_under_the_photographs_light_is_the_photograph(self):
         hazy = (bump(256, 256) // 2 + 60).astype(np.uint8)  # as if there were light beside the flash's
