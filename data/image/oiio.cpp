@@ -3,9 +3,15 @@
 #include "data/image/oiio.h"
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
+#include <OpenImageIO/thread.h>
+#include <atomic>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
+#include <future>
 #include <new>
+#include <thread>
+#include <unistd.h>
 
 using namespace OIIO;
 
@@ -261,14 +267,33 @@ static bool knows_extension(const char *extension)
     return known;
 }
 
+/* Ends the threads that OpenImageIO begins with and waits until they are gone: as they come and go they hold a lock,
+ * which a process that is forked meanwhile would find taken for ever. */
+static void end_threads(void)
+{
+    thread_pool *pool = default_thread_pool();
+    std::vector<pid_t> ids((size_t)pool->size());
+    std::vector<std::future<void>> seen;
+    std::atomic<size_t> there(0);
+    for (size_t i = 0; i < ids.size(); i++)
+        seen.push_back(pool->push([&](int) {
+            ids[there++] = gettid();
+            while (there < ids.size()) std::this_thread::yield(); /* so that each of them comes once */
+        }));
+    for (auto &s : seen) s.wait();
+    OIIO::attribute("threads", 1);
+    for (pid_t id : ids)
+        while (tgkill(getpid(), id, 0) == 0) std::this_thread::yield();
+}
+
 /* No threads beside the caller's (of OpenEXR -1 says so, 0 is as many as there are CPUs): a forked child would wait for
  * its parent's for ever, and signals for the program would go to them. */
 static void start(void)
 {
     guarded("start", nullptr, [] {
-        OIIO::attribute("threads", 1);
         OIIO::attribute("exr_threads", -1);
         OIIO::attribute("limits:imagesize_MB", 0); /* ours counts pixels and says how to raise it */
+        end_threads();
         return TS_OK;
     });
 }
