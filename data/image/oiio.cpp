@@ -5,10 +5,12 @@
 #include <OpenImageIO/imageio.h>
 #include <OpenImageIO/thread.h>
 #include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <future>
+#include <memory>
 #include <new>
 #include <thread>
 #include <unistd.h>
@@ -267,23 +269,30 @@ static bool knows_extension(const char *extension)
     return known;
 }
 
-/* Ends the threads that OpenImageIO begins with and waits until they are gone: as they come and go they hold a lock,
- * which a process that is forked meanwhile would find taken for ever. */
+struct pool_threads {
+    std::vector<pid_t> ids;
+    std::atomic<size_t> there{0};
+};
+
+/* Ends the threads that OpenImageIO begins with and waits until they are gone, a second at most: as they come and go
+ * they hold a lock, which a process that is forked meanwhile would find taken for ever. */
 static void end_threads(void)
 {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(1);
+    const auto late = [end] { return std::chrono::steady_clock::now() > end; };
     thread_pool *pool = default_thread_pool();
-    std::vector<pid_t> ids((size_t)pool->size());
+    const auto threads = std::make_shared<pool_threads>();
     std::vector<std::future<void>> seen;
-    std::atomic<size_t> there(0);
-    for (size_t i = 0; i < ids.size(); i++)
-        seen.push_back(pool->push([&](int) {
-            ids[there++] = gettid();
-            while (there < ids.size()) std::this_thread::yield(); /* so that each of them comes once */
+    threads->ids.resize((size_t)pool->size());
+    for (size_t i = 0; i < threads->ids.size(); i++)
+        seen.push_back(pool->push([threads, late](int) {
+            threads->ids[threads->there++] = gettid();
+            while (threads->there < threads->ids.size() && !late()) std::this_thread::yield(); /* each comes once */
         }));
-    for (auto &s : seen) s.wait();
+    for (auto &s : seen) s.wait_until(end);
     OIIO::attribute("threads", 1);
-    for (pid_t id : ids)
-        while (tgkill(getpid(), id, 0) == 0) std::this_thread::yield();
+    for (pid_t id : threads->ids)
+        while (id && tgkill(getpid(), id, 0) == 0 && !late()) std::this_thread::yield();
 }
 
 /* No threads beside the caller's (of OpenEXR -1 says so, 0 is as many as there are CPUs): a forked child would wait for
