@@ -5,7 +5,7 @@
 #include "infer/tiles.h"
 #include "nn/burnt.h"
 #include "nn/clip.h"
-#include "nn/middle_view.h"
+#include "nn/likely_views.h"
 #include "nn/need.h"
 #include "nn/revise.h"
 #include "tensor/budget.h"
@@ -162,7 +162,7 @@ static double most_bytes(const nn_arch *a, int photos, int copied, int side, int
     const int around = a->descent == NN_DESCENT_POSTERIOR ? 2 * a->iterations * nn_burnt_reach(side) : 0,
               part = tile + around < side ? tile + around : side,
               coarse = a->coarse_size < side ? a->coarse_size : side;
-    double most = fmax(nn_guess_bytes(a, orientations_of(a, o), nn_middle_tellings(a, lgd_guess_known(o))),
+    double most = fmax(nn_guess_bytes(a, orientations_of(a, o), nn_likely_views(a, lgd_guess_known(o))),
                        step_bytes(a, photos, part, a->h_width, a->h_gru));
     if (a->coarse_steps > 0) most = fmax(most, step_bytes(a, photos, coarse, a->coarse_width, a->coarse_gru));
     if (a->revisions > 0 && photos > 1) most = fmax(most, nn_revision_bytes(a, photos));

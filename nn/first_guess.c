@@ -7,7 +7,7 @@
 #include "nn/kind.h"
 #include "nn/lattice.h"
 #include "nn/lean.h"
-#include "nn/middle_view.h"
+#include "nn/likely_views.h"
 #include "nn/relief.h"
 #include "render/scene_model.h"
 #include "tensor/maps.h"
@@ -190,14 +190,14 @@ ts_code nn_first_guess_settle(rd_grid grid, int channels, const float *image, co
 /* g's guess of a photograph [1, S, S, 3], of which in says what is known. False after an error, which the tape has. */
 static bool ask_g(ag_tape *tape, const nn_model *model, const nn_input *in, nn_guess *guess)
 {
-    if (in->known[0] & NN_KNOWN_POWER) return nn_guess_in_middle_view(tape, model, in, guess);
+    if (in->known[0] & NN_KNOWN_POWER) return nn_guess_in_likely_views(tape, model, in, guess);
     const ts_mark mark = ag_scope_begin(tape);
     ag_value *darker = ag_empty(tape, in->image.shape);
     if (!darker) return false;
     for (int64_t i = 0; i < ts_count(darker->t.shape); i++) darker->t.data[i] = NN_READ_AT * in->image.data[i];
     nn_input dim = *in;
     dim.image = darker->t;
-    if (!nn_guess_in_middle_view(tape, model, &dim, guess)) return false;
+    if (!nn_guess_in_likely_views(tape, model, &dim, guess)) return false;
     guess->scene->t.data[RD_SCENE_EXPOSURE] -= log2f(NN_READ_AT);
     ag_value *keep[3] = {guess->maps, guess->spread, guess->scene};
     ag_scope_end(tape, mark, keep, 3);

@@ -84,6 +84,8 @@ ts_code nn_find_levels(rd_grid grid, const float *image, int side, const rd_view
         for (int k = 0; k < NN_LEVELS && !better; k++) stride[k] *= 0.5f;
     }
     nn_trial_end(&t);
-    if (best < NN_LEVEL_SURE * as_read) nn_set_levels((int64_t)grid.side * grid.side, channels, level, r0);
+    const double believed = fmin((NN_LEVEL_DOUBTFUL - best / as_read) / (NN_LEVEL_DOUBTFUL - NN_LEVEL_SURE), 1);
+    for (int k = 0; k < NN_LEVELS; k++) level[k] *= (float)believed;
+    if (believed > 0) nn_set_levels((int64_t)grid.side * grid.side, channels, level, r0);
     return TS_OK;
 }

@@ -23,14 +23,17 @@ enum {
 
 /* What the square of a level over its standard deviation (nn/level.c) costs beside the misfit (nn/trial.h). */
 #define NN_LEVEL_COST 0.02
-/* Pixels a side that are tried; steps of each trial; by how much the sum of misfit and cost must fall for r0 to change:
- * less is not to be told from what is wrong in each pixel. */
+/* Pixels a side that are tried; steps of each trial. */
 #define NN_LEVEL_SIDE 32
 #define NN_LEVEL_STEPS 4
-#define NN_LEVEL_SURE 0.85
+/* What part of the sum of misfit and cost is left where the levels are believed whole, and not at all: what takes less
+ * off is not to be told from what is wrong in each pixel. Between both they are believed in part, so that no rounding
+ * and no shade of the photograph makes all maps jump. */
+#define NN_LEVEL_SURE 0.8
+#define NN_LEVEL_DOUBTFUL 0.9
 
 /* The maps r0 [grid.side][grid.side][channels] become those of the levels with the least sum, by a search along each of
- * them in turn, if it is less than NN_LEVEL_SURE of what it is for r0. image [side][side][3], linear, taken under
+ * them in turn, as far as they are believed. image [side][side][3], linear, taken under
  * view with light and camera as known; kind: what the sample is known to be, a metal's diffuse and a dielectric's F0
  * stay as they are; deviation [grid.side][grid.side][NN_SPREADS] as the steps believe it. The same bytes for any number
  * of threads. Fails where memory is out; r0 is then as it was. */

@@ -75,6 +75,31 @@ TEST(levels_that_are_off_are_found)
     free(truth), free(read);
 }
 
+/* A level that is ever more off, of a photograph whose pixels differ from the maps otherwise too, is repaired ever
+ * more, without a jump from nothing to all of it. */
+TEST(levels_are_believed_by_degrees)
+{
+    enum { STEPS = 80 };
+    float *truth = malloc(VALUES * sizeof *truth), *read = malloc(VALUES * sizeof *read);
+    float *shown = malloc(VALUES * sizeof *shown), *r = numbers(PIXELS, 19, -1, 1);
+    double before = 0, most = 0, jump = 0;
+    paint(0.12f, 0.2f, truth);
+    memcpy(shown, truth, VALUES * sizeof *shown);
+    for (int i = 0; i < PIXELS; i++)
+        for (int c = 0; c < 3; c++) shown[i * C + MAP_DIFFUSE + c] = (1 + 0.9f * r[i]) * (truth[i * C + c] + 1) - 1;
+    for (int i = 0; i <= STEPS; i++) {
+        const float off[NN_LEVELS] = {[NN_LEVEL_DIFFUSE] = 0.4f * (float)i / STEPS};
+        memcpy(read, truth, VALUES * sizeof *read);
+        nn_set_levels(PIXELS, C, off, read);
+        find(shown, 2, read);
+        const double left = log((double)(mean_of(read, MAP_DIFFUSE, 3) / mean_of(truth, MAP_DIFFUSE, 3))),
+                     repaired = (double)off[NN_LEVEL_DIFFUSE] - left;
+        jump = fmax(jump, fabs(repaired - before)), most = fmax(most, repaired), before = repaired;
+    }
+    CHECK(most > 0.35 && jump < 0.25 * most, "e^%.3f of e^0.4 is repaired, a jump is e^%.3f", most, jump);
+    free(truth), free(read), free(shown), free(r);
+}
+
 /* Red and blue of diffuse beside its green. */
 TEST(levels_find_a_hue)
 {

@@ -1,5 +1,5 @@
 /* g told a photograph's scene more than once, and what a camera that is not known is taken for. */
-#include "nn/middle_view.h"
+#include "nn/likely_views.h"
 #include "tensor/maps.h"
 #include "tests/support/networks.h"
 
@@ -33,7 +33,7 @@ static double apart(const ag_value *a, const float *b)
 }
 
 /* Told the same over and over, g says what it says when it is told once, in every orientation. */
-TEST(middle_view_tellings_of_one_scene_are_one)
+TEST(likely_views_tellings_of_one_scene_are_one)
 {
     for (int detailed = 0; detailed < 2; detailed++) {
         nn_model *m = talking(detailed);
@@ -68,7 +68,7 @@ TEST(middle_view_tellings_of_one_scene_are_one)
 }
 
 /* Where the U-Net's maps are the maps, those of two tellings are the mean of both before the tanh. */
-TEST(middle_view_is_the_mean_of_the_tellings)
+TEST(likely_views_are_the_mean_of_the_tellings)
 {
     nn_model *m = talking(false);
     nn_input in = photographs(1, SIDE, 93, NULL);
@@ -111,7 +111,7 @@ TEST(middle_view_is_the_mean_of_the_tellings)
     free(in.image.data);
 }
 
-TEST(middle_view_tellings_are_for_estimates)
+TEST(likely_views_tellings_are_for_estimates)
 {
     nn_model *m = talking(true);
     nn_input in = photographs(1, FINE, 95, NULL);
@@ -130,9 +130,9 @@ TEST(middle_view_tellings_are_for_estimates)
     free(in.image.data);
 }
 
-/* A camera that is known is believed; of one that is not known the guess is drawn to the middle distance, and where the
- * view says that it is does not matter. */
-TEST(middle_view_is_for_a_camera_that_is_not_known)
+/* A camera that is known is believed; of one that is not known the scene is the mean of what is guessed in the likely
+ * views, and where the view says that it is does not matter. */
+TEST(likely_views_are_for_a_camera_that_is_not_known)
 {
     nn_model *m = talking(true);
     nn_input in = photographs(1, FINE, 94, NULL);
@@ -143,32 +143,35 @@ TEST(middle_view_is_for_a_camera_that_is_not_known)
         nn_guess alone, guess[2];
         in.known = &flags, in.views = &near;
         CHECK(nn_guess_from(tape, m, &in, &alone), "%s", ag_status(tape)->message);
-        CHECK(nn_guess_in_middle_view(tape, m, &in, &guess[0]), "%s", ag_status(tape)->message);
+        CHECK(nn_guess_in_likely_views(tape, m, &in, &guess[0]), "%s", ag_status(tape)->message);
         in.views = &far;
-        CHECK(nn_guess_in_middle_view(tape, m, &in, &guess[1]), "%s", ag_status(tape)->message);
+        CHECK(nn_guess_in_likely_views(tape, m, &in, &guess[1]), "%s", ag_status(tape)->message);
         const double moved = apart(alone.maps, guess[0].maps->t.data),
                      differ = apart(guess[0].maps, guess[1].maps->t.data);
         if (known & NN_KNOWN_CAMERA)
-            CHECK(moved == 0 && differ > 1e-7 && nn_middle_tellings(&m->arch, known) == 1, "known %d: moved by %g",
-                  known, moved);
+            CHECK(moved == 0 && differ > 1e-7 && nn_likely_views(&m->arch, known) == 1, "known %d: moved by %g", known,
+                  moved);
         else {
-            const float said = alone.scene->t.data[RD_SCENE_DISTANCE], is = guess[0].scene->t.data[RD_SCENE_DISTANCE],
-                        middle = logf(NN_MIDDLE_DISTANCE / RD_FLASH_DISTANCE),
-                        want = said + NN_MIDDLE_PART * (middle - said);
-            CHECK(moved > 1e-6 && differ == 0 && nn_middle_tellings(&m->arch, known) == 2,
+            static const float distance[NN_LIKELY_VIEWS] = NN_LIKELY_DISTANCES, part[NN_LIKELY_VIEWS] = NN_LIKELY_PARTS;
+            double want[NUMBERS] = {0}, parts = 0;
+            CHECK(moved > 1e-6 && differ == 0 && nn_likely_views(&m->arch, known) == NN_LIKELY_VIEWS,
                   "known %d: moved by %g, and by %g where the view is another", known, moved, differ);
-            const rd_view middle_view = from(NN_MIDDLE_DISTANCE);
-            const unsigned char told = flags | NN_KNOWN_CAMERA;
-            nn_guess second;
-            in.known = &told, in.views = &middle_view;
-            CHECK(nn_guess_from(tape, m, &in, &second), "%s", ag_status(tape)->message);
-            for (int i = 0; i < NUMBERS; i++) {
-                const float a = alone.scene->t.data[i], b = second.scene->t.data[i],
-                            mean = a + NN_MIDDLE_PART * (b - a);
-                CHECK(i == RD_SCENE_DISTANCE || fabsf(guess[0].scene->t.data[i] - mean) < 1e-5f,
-                      "known %d: number %d of the scene is no mean", known, i);
+            for (int t = 0; t < NN_LIKELY_VIEWS; t++) {
+                const rd_view told_view = from(distance[t]);
+                const unsigned char told = distance[t] > 0 ? flags | NN_KNOWN_CAMERA : flags;
+                nn_guess one;
+                in.known = &told, in.views = &told_view;
+                CHECK(nn_guess_from(tape, m, &in, &one), "%s", ag_status(tape)->message);
+                float *said = one.scene->t.data;
+                if (distance[t] > 0) said[RD_SCENE_DISTANCE] = logf(distance[t] / RD_FLASH_DISTANCE);
+                for (int i = 0; i < NUMBERS; i++) want[i] += (double)part[t] * (double)said[i];
+                parts += (double)part[t];
             }
-            CHECK(fabsf(is - want) < 1e-5f, "known %d: the distance is %g, said %g", known, (double)is, (double)said);
+            CHECK(fabs(parts - 1) < 1e-6, "the parts' sum is %g", parts);
+            for (int i = 0; i < NUMBERS; i++)
+                CHECK(fabs((double)guess[0].scene->t.data[i] - want[i]) < 1e-5,
+                      "known %d: number %d of the scene is %g, the mean %g", known, i,
+                      (double)guess[0].scene->t.data[i], want[i]);
         }
         ag_tape_destroy(&tape);
     }
