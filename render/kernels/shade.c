@@ -74,34 +74,39 @@ static void render(const ts_shade_view *view, const ts_shade_row *row, float lim
     KINDS(render_kind, false, row, limit, image)
 }
 
-/* What is needed is decided for all pixels in the lanes: a highlight is seldom one pixel wide. */
+/* Each pixel takes the points that it needs itself, whatever stands beside it in a vector. */
 static void render_disk(const ts_shade_view *view, const ts_shade_row *row, const ts_shade_disk *disk, float *image)
 {
     static const double centre[1][2];
+    const double(*const point[3])[2] = {disk->many, disk->few, centre};
+    static const int points[3] = {TS_DISK_MANY, TS_DISK_FEW, 1};
     for (int i = 0; i < row->count; i += VL) {
         const int n = lanes_left(row, i);
         surface s;
-        vf sum[3] = {0};
+        vf mean[3] = {0};
         decode(view->guards, row->maps + (int64_t)i * row->channels, row->channels, n, &s);
         const vf a = TS_ALPHA(s.roughness);
-        const bool sharp = v_any(a < v_set(disk->as_few)), seen = v_any(a < v_set(disk->as_one));
-        const double(*point)[2] = sharp ? disk->many : seen ? disk->few : centre;
-        const int points = sharp ? TS_DISK_MANY : seen ? TS_DISK_FEW : 1;
-        for (int k = 0; k < points; k++) {
-            ts_shade_view at = *view;
-            lighting e;
-            angles g;
-            radiance r;
-            at.light[0] += point[k][0];
-            at.light[1] += point[k][1];
-            light(&at, TS_SHADE_POSITIONS, row, i, &e);
-            measure(&s, &e, TS_SHADE_POSITIONS, &g);
-            if (!v_any(g.seen)) continue;
-            shade(&at, TS_SHADE_POSITIONS, false, &s, &e, &g, &r);
-            for (int c = 0; c < 3; c++) sum[c] += r.value[c];
+        const vi sharp = a < v_set(disk->as_few), seen = a < v_set(disk->as_one);
+        const vi wants[3] = {sharp, seen & ~sharp, ~seen};
+        for (int j = 0; j < 3; j++) {
+            vf sum[3] = {0};
+            if (!v_any(wants[j])) continue;
+            for (int k = 0; k < points[j]; k++) {
+                ts_shade_view at = *view;
+                lighting e;
+                angles g;
+                radiance r;
+                at.light[0] += point[j][k][0];
+                at.light[1] += point[j][k][1];
+                light(&at, TS_SHADE_POSITIONS, row, i, &e);
+                measure(&s, &e, TS_SHADE_POSITIONS, &g);
+                if (!v_any(g.seen)) continue;
+                shade(&at, TS_SHADE_POSITIONS, false, &s, &e, &g, &r);
+                for (int c = 0; c < 3; c++) sum[c] += r.value[c];
+            }
+            for (int c = 0; c < 3; c++) mean[c] = v_select(wants[j], sum[c] * (1.0f / (float)points[j]), mean[c]);
         }
-        for (int c = 0; c < 3; c++) sum[c] *= 1.0f / (float)points;
-        v_store_pixels(image + (int64_t)i * 3, 3, n, 3, sum);
+        v_store_pixels(image + (int64_t)i * 3, 3, n, 3, mean);
     }
 }
 

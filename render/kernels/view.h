@@ -41,8 +41,7 @@ typedef struct ts_shade_disk {
 } ts_shade_disk;
 
 /* count pixels, pixel i with its centre at ((column + i + 1/2) step - 1/2, y); maps [count, channels], channels >= 9. A
- * pixel's result does not depend on the row that it is computed in, but for how many points of a disk it takes: what
- * the smoothest of a vector's pixels needs. */
+ * pixel's result does not depend on the row that it is computed in. */
 typedef struct ts_shade_row {
     double y, step;
     int column, count, channels;
