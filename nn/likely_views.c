@@ -2,6 +2,9 @@
 #include <math.h>
 #include <string.h>
 
+const float nn_likely_distance[NN_LIKELY_VIEWS] = {0, 1.07f, 2.26f};
+const float nn_likely_part[NN_LIKELY_VIEWS] = {0.4f, 0.25f, 0.35f};
+
 int nn_likely_views(const nn_arch *a, int known)
 {
     return a->conditions && a->descent == NN_DESCENT_POSTERIOR && !(known & NN_KNOWN_CAMERA) ? NN_LIKELY_VIEWS : 1;
@@ -10,7 +13,7 @@ int nn_likely_views(const nn_arch *a, int known)
 bool nn_guess_in_likely_views(ag_tape *tape, const nn_model *model, const nn_input *in, nn_guess *guess)
 {
     if (nn_likely_views(&model->arch, in->known[0]) == 1) return nn_guess_from(tape, model, in, guess);
-    static const float distance[NN_LIKELY_VIEWS] = NN_LIKELY_DISTANCES, parts[NN_LIKELY_VIEWS] = NN_LIKELY_PARTS;
+    const float *const distance = nn_likely_distance, *const parts = nn_likely_part;
     rd_view views[NN_LIKELY_VIEWS];
     unsigned char known[NN_LIKELY_VIEWS];
     for (int t = 0; t < NN_LIKELY_VIEWS; t++) {

@@ -8,14 +8,7 @@
  * far away counts for more: g takes real materials for nearer than they are. More of it would be better still on
  * captures of such, and worse on renderings from .98 widths. */
 enum { NN_LIKELY_VIEWS = 3 };
-#define NN_LIKELY_DISTANCES \
-    {                       \
-        0, 1.07f, 2.26f     \
-    }
-#define NN_LIKELY_PARTS  \
-    {                    \
-        0.3f, 0.3f, 0.4f \
-    }
+extern const float nn_likely_distance[NN_LIKELY_VIEWS], nn_likely_part[NN_LIKELY_VIEWS];
 
 /* How often the first guess tells g of a photograph of which known (nn_known) is true: NN_LIKELY_VIEWS where the camera
  * is guessed, else 1. */

@@ -152,7 +152,7 @@ TEST(likely_views_are_for_a_camera_that_is_not_known)
             CHECK(moved == 0 && differ > 1e-7 && nn_likely_views(&m->arch, known) == 1, "known %d: moved by %g", known,
                   moved);
         else {
-            static const float distance[NN_LIKELY_VIEWS] = NN_LIKELY_DISTANCES, part[NN_LIKELY_VIEWS] = NN_LIKELY_PARTS;
+            const float *const distance = nn_likely_distance, *const part = nn_likely_part;
             double want[NUMBERS] = {0}, parts = 0;
             CHECK(moved > 1e-6 && differ == 0 && nn_likely_views(&m->arch, known) == NN_LIKELY_VIEWS,
                   "known %d: moved by %g, and by %g where the view is another", known, moved, differ);
