@@ -2,6 +2,18 @@
 #include <math.h>
 
 #define DIELECTRIC 0.04 /* F0 of everything that is no metal, in this workflow */
+/* What is dark all over is a dielectric or a metal that is as dark as its F0: metalness costs as much as an error of a
+ * tenth in one value where F0 and diffuse are at most DARK, and nothing where one of them is BRIGHT. */
+#define COST 0.01
+#define DARK 0.08
+#define BRIGHT 0.16
+
+/* 1 to 0 for the largest of the three values. */
+static double is_dark(const float v[3])
+{
+    const double most = (double)fmaxf(fmaxf(v[0], v[1]), v[2]), x = fmin(fmax((most - DARK) / (BRIGHT - DARK), 0), 1);
+    return 1 - x * x * (3 - 2 * x);
+}
 
 /* The best base colour for metalness k, and what is left. */
 static double residual(const io_texel *t, double k, double base[3])
@@ -20,15 +32,16 @@ static double residual(const io_texel *t, double k, double base[3])
 static double best_metalness(const io_texel *t, double base[3])
 {
     enum { GRID = 16, HALVINGS = 12 };
+    const double cost = COST * is_dark(t->specular) * is_dark(t->diffuse);
     double best = 0, least = INFINITY;
     for (int i = 0; i <= GRID; i++) {
-        const double r = residual(t, (double)i / GRID, base);
-        if (r < least) least = r, best = (double)i / GRID;
+        const double k = (double)i / GRID, r = residual(t, k, base) + cost * k;
+        if (r < least) least = r, best = k;
     }
     double step = 0.5 / GRID;
     for (int i = 0; i < HALVINGS; i++, step /= 2)
         for (int side = -1; side <= 1; side += 2) {
-            const double k = fmin(fmax(best + side * step, 0), 1), r = residual(t, k, base);
+            const double k = fmin(fmax(best + side * step, 0), 1), r = residual(t, k, base) + cost * k;
             if (r < least) least = r, best = k;
         }
     residual(t, best, base);

@@ -200,6 +200,16 @@ TEST(metallic_conversion_and_its_error)
             CHECK(fabsf(got_base[3 * i + c] - base[i][c]) < 5e-3f, "base %g became %g", (double)base[i][c],
                   (double)got_base[3 * i + c]);
     }
+    for (int i = 0; i < N * N; i++) { /* dark dielectrics, whose F0 varies */
+        io_texel t = {.normal = {0, 0, 1}, .roughness = 0.5f};
+        for (int c = 0; c < 3; c++)
+            t.diffuse[c] = ts_rng_range(&r, 0, 0.03f), t.specular[c] = ts_rng_range(&r, 0.01f, 0.06f);
+        io_texel_put(m.maps + i * MAP_CHANNELS, &t);
+    }
+    e = io_to_metallic(&m, got_base, got_metal);
+    for (int i = 0; i < N * N; i++)
+        CHECK(got_metal[i] < 0.05f, "a dark dielectric has a metalness of %g", (double)got_metal[i]);
+    CHECK(e.diffuse < 0.02 && e.specular < 0.03, "RMS error of dark dielectrics: %g and %g", e.diffuse, e.specular);
     for (int i = 0; i < N * N; i++) { /* a dielectric with a blue reflection */
         const io_texel t = {.normal = {0, 0, 1}, .diffuse = {0.5f, 0.5f, 0.5f}, .specular = {0.04f, 0.04f, 0.3f}};
         io_texel_put(m.maps + i * MAP_CHANNELS, &t);
