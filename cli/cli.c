@@ -66,10 +66,17 @@ int cl_init(const char *program)
 
 void cl_speak_as(const char *who) { speaker = who; }
 
+static int flush_failed; /* errno of the first time */
+
+void cl_flush(void)
+{
+    if (fflush(stdout) != 0 && !flush_failed) flush_failed = errno;
+}
+
 static void say(const char *format, va_list args)
 {
     if (!speaker) return;
-    fflush(stdout);
+    cl_flush();
     fprintf(stderr, "%s: %s%s", program_name, speaker, *speaker ? ": " : "");
     vfprintf(stderr, format, args);
     fputc('\n', stderr);
@@ -168,8 +175,9 @@ bool cl_parse_shard(const char *text, int *shard, int *shards)
 
 int cl_finish(int code)
 {
-    if (fflush(stdout) != 0 || ferror(stdout)) {
-        const int failed = cl_failed("cannot write to standard output: %s", strerror(errno));
+    cl_flush();
+    if (flush_failed || ferror(stdout)) {
+        const int failed = cl_failed("cannot write to standard output: %s", strerror(flush_failed));
         return code ? code : failed;
     }
     return code;

@@ -38,6 +38,9 @@ bool cl_parse_size(const char *text, double *bytes);
 /* "I/N" with I in 1 .. N and N up to a million. */
 bool cl_parse_shard(const char *text, int *shard, int *shards);
 
+/* Flushes stdout; cl_finish says why that failed. */
+void cl_flush(void);
+
 /* Flushes stdout; a failed write (closed pipe, full disk) prints one line and returns CL_FAILED, otherwise code. */
 int cl_finish(int code);
 

@@ -78,7 +78,7 @@ static void show_validation(const tr_validation *v, void *user)
     for (int k = 0; k <= v->iterations; k++) printf(" %.4f", v->render[k]);
     printf("  diffuse %.4f specular %.4f roughness %.4f normal %.4f%s\n", v->diffuse, v->specular, v->roughness,
            v->normal, v->best ? "  (best)" : "");
-    fflush(stdout);
+    cl_flush();
 }
 
 static void show_note(const char *line, void *user)

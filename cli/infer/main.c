@@ -70,7 +70,7 @@ static void report(run *r, const cl_item *item)
     if (r->command->quiet) return;
     cl_say_replaced(item);
     printf("%s\n", item->job->folder);
-    fflush(stdout); /* a reader at the other end of a pipe gets each folder when it is there */
+    cl_flush(); /* a reader at the other end of a pipe gets each folder when it is there */
 }
 
 /* How many, how long, which to look at. */
@@ -222,6 +222,7 @@ static int work(const cl_command *given)
         cl_operands_free(&operands);
         return code;
     }
+    if (c->sheet) own.photos = cl_plan_distinct(operands.photo, photos);
     const ts_code bad = cl_plan_make(photo, c->sheet ? 1 : photos, c->out, &plan, &st);
     if (bad) {
         cl_operands_free(&operands);

@@ -76,6 +76,20 @@ static bool same_file(const char *a, const char *b)
     return strcmp(a, b) == 0 || (stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev && x.st_ino == y.st_ino);
 }
 
+int cl_plan_distinct(char **photo, int count)
+{
+    int kept = 0;
+    for (int i = 0; i < count; i++) {
+        char *own = photo[i];
+        bool again = false;
+        for (int k = 0; k < kept && !again; k++) again = same_file(photo[k], own);
+        if (again) continue;
+        photo[i] = photo[kept];
+        photo[kept++] = own;
+    }
+    return kept;
+}
+
 static void free_job(cl_job *job)
 {
     free(job->stem);

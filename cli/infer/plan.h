@@ -20,6 +20,10 @@ typedef struct cl_plan {
  * photograph that one of the outputs would replace. TS_INVALID. The caller frees the plan after success. */
 ts_code cl_plan_make(char *const *photos, int count, const char *out, cl_plan *plan, ts_status *st);
 
+/* Moves each photograph that is the same file as one before it behind the others, which keep their order. Returns how
+ * many these are. */
+int cl_plan_distinct(char **photo, int count);
+
 /* TS_INVALID where one of the plan's outputs would replace one of these files, each a `what`. */
 ts_code cl_plan_check(const cl_plan *plan, const char *what, const char *const *file, int files, ts_status *st);
 

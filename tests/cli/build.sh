@@ -53,6 +53,11 @@ help_to_a_full_disk_fails() {
         [ $? -eq 1 ] || fail "lgd-$p --help >/dev/full does not exit with 1"
         lines "$T/err" 1
     done
+    # What a later call fails at is not the reason.
+    LGD_MODEL=$ROOT/models/single.safetensors "$BIN/lgd-infer" --size 32 -i 0 --threads 1 "$ROOT/demo/flash.jpg" \
+        -o "$T/o" >/dev/full 2>"$T/err"
+    [ $? -eq 1 ] || fail "lgd-infer does not exit with 1"
+    says "$T/err" "cannot write to standard output: No space left on device"
 }
 check help_to_a_full_disk_fails help_to_a_full_disk_fails
 

@@ -57,6 +57,10 @@ infers() {
     expect 0 infer --sheet "$one/photo_1.jpg" "$one/photo_2.jpg" "$one/photo_3.jpg" -o "$T/o"
     complete "$T/o/photo_1"
     says "$T/err" "3 of 3 photographs"
+    expect 0 infer --sheet "$one/photo_1.jpg" "$one/../${one##*/}/photo_1.jpg" "$one/photo_2.jpg" "$one/photo_2.jpg" \
+        "$one/photo_3.jpg" -o "$T/again"
+    says "$T/err" "3 of 3 photographs"
+    cmp -s "$T/o/photo_1/diffuse.png" "$T/again/photo_1/diffuse.png" || fail "a photograph given twice counts twice"
     says "$T/err" "1 of its 3 photographs are used, the most different"
     says "$T/o/photo_1/meta.txt" "the sheet, 3 photographs"
     says "$T/o/photo_1/meta.txt" "options: lgd-infer "
