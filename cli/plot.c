@@ -75,7 +75,7 @@ static void draw_axes(FILE *f, const frame *r, const char *x_title, const char *
     fprintf(f, "<rect x=\"%d\" y=\"%d\" width=\"%d\" height=\"%d\" fill=\"none\" stroke=\"#888\"/>\n", LEFT, TOP,
             WIDTH - LEFT - RIGHT, HEIGHT - TOP - BOTTOM);
     const double step = round_step((r->y1 - r->y0) / TICKS);
-    for (double y = ceil(r->y0 / step) * step; y <= r->y1; y += step)
+    for (double y = ceil(r->y0 / step) * step + 0.0; y <= r->y1; y += step) /* + 0: no -0 */
         fprintf(f,
                 "<line x1=\"%d\" x2=\"%d\" y1=\"%.1f\" y2=\"%.1f\" stroke=\"#ddd\"/><text x=\"%d\" y=\"%.1f\" "
                 "text-anchor=\"end\">%.3g</text>\n",
@@ -83,7 +83,7 @@ static void draw_axes(FILE *f, const frame *r, const char *x_title, const char *
     if (r->log_x) log_axis(f, r);
     else {
         const double unit = round_step((r->x1 - r->x0) / TICKS);
-        for (double x = ceil(r->x0 / unit) * unit + 0.0; x <= r->x1; x += unit) tick(f, r, x, true); /* + 0: no -0 */
+        for (double x = ceil(r->x0 / unit) * unit + 0.0; x <= r->x1; x += unit) tick(f, r, x, true);
     }
     fprintf(f, "<text x=\"%d\" y=\"%d\" text-anchor=\"middle\">", (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 10);
     io_put_text(f, x_title);

@@ -337,6 +337,7 @@ TEST(report_plot_labels_keep_apart)
                   i, labels);
         labels++;
     }
+    CHECK(strstr(text, ">0</text>") && !strstr(text, ">-0<"), "an axis from below 0 has a zero, without a sign");
     CHECK(labels == 4, "%d of 5 labels, for which there are four places", labels);
     free(text);
 }
