@@ -1,5 +1,6 @@
 #include "nn/trial.h"
 #include "nn/clip.h"
+#include "render/rows.h"
 #include "tensor/maps.h"
 #include <math.h>
 #include <stdlib.h>
@@ -10,12 +11,13 @@ static void take(rd_grid from, const float *r0, const float *deviation, nn_trial
     const nn_photos *p = t->photos;
     const int side = t->side, channels = t->channels;
     for (int i = 0; i < side * side; i++) {
-        const double x = (i % side + 0.5) / side, y = (i / side + 0.5) / side;
-        const size_t map = (size_t)(y * from.side) * (size_t)from.side + (size_t)(x * from.side),
-                     photo = (size_t)(y * p->side) * (size_t)p->side + (size_t)(x * p->side);
-        memcpy(t->r0 + (size_t)(i * channels), r0 + map * (size_t)channels, (size_t)channels * sizeof *r0);
-        memcpy(t->deviation + (size_t)(i * NN_SPREADS), deviation + map * NN_SPREADS, NN_SPREADS * sizeof *deviation);
-        for (int k = 0; k < p->given; k++) nn_clip(3, p->image[k] + photo * 3, t->image[k] + (size_t)i * 3);
+        const int x = i % side, y = i / side,
+                  map = rd_middle(y, side, from.side) * from.side + rd_middle(x, side, from.side),
+                  photo = rd_middle(y, side, p->side) * p->side + rd_middle(x, side, p->side);
+        memcpy(t->r0 + (size_t)(i * channels), r0 + (size_t)map * (size_t)channels, (size_t)channels * sizeof *r0);
+        memcpy(t->deviation + (size_t)(i * NN_SPREADS), deviation + (size_t)map * NN_SPREADS,
+               NN_SPREADS * sizeof *deviation);
+        for (int k = 0; k < p->given; k++) nn_clip(3, p->image[k] + (size_t)photo * 3, t->image[k] + (size_t)i * 3);
     }
 }
 

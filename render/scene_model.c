@@ -150,7 +150,7 @@ typedef struct sums_job {
     rd_grid grid;
     const float *maps, *deviation, *image;
     float level;
-    int channels, first;
+    int channels, rows;
     const rd_scene_how *how;
     ts_scene scene;
     ts_scene_sums *part;
@@ -160,7 +160,7 @@ static void sums_of_rows(const void *job, int64_t begin, int64_t end)
 {
     const sums_job *j = job;
     for (int64_t i = begin; i < end; i++) {
-        const int y = j->first + (int)i * j->how->every;
+        const int y = rd_middle((int)i, j->rows, j->grid.h);
         const int64_t at = (int64_t)y * j->grid.w;
         float *maps = ts_scratch(1, (size_t)(j->grid.w * j->channels) * sizeof *maps);
         rd_scene_roughen(j->grid.w, j->maps + at * j->channels, j->channels, j->level, 1, maps);
@@ -177,12 +177,11 @@ static ts_scene_sums sums_of(rd_grid grid, const float *maps, int channels, cons
                              const rd_scene_how *how, bool least, const float unknown[K])
 {
     ts_scene scene = rd_scene_of(unknown);
-    const int first = how->every / 2 < grid.h ? how->every / 2 : 0,
-              rows = (grid.h - first + how->every - 1) / how->every;
+    const int rows = (grid.h + how->every - 1) / how->every;
     scene.least = least;
     ts_scene_sums *part = ts_scratch(0, (size_t)rows * sizeof *part), all = {.right = {0}};
     ts_for(grid.threads, rows, 1, sums_of_rows,
-           &(sums_job){grid, maps, deviation, image, unknown[RD_SCENE_ROUGHNESS], channels, first, how, scene, part});
+           &(sums_job){grid, maps, deviation, image, unknown[RD_SCENE_ROUGHNESS], channels, rows, how, scene, part});
     for (int i = 0; i < rows; i++) {
         for (int j = 0; j < TS_SCENE_PAIRS; j++) all.matrix[j] += part[i].matrix[j];
         for (int j = 0; j < K; j++) all.right[j] += part[i].right[j];

@@ -45,7 +45,7 @@ typedef struct rd_scene_prior {
 
 typedef struct rd_scene_how {
     int steps;
-    int every;        /* rows: the first one read is every / 2; 1 reads all */
+    int every;        /* of so many rows the middle one is read (rd_middle); 1 reads all */
     float correlated; /* so many pixels are worth one: the maps' errors of neighbours are alike */
     ts_prior scale;   /* q of the maps' prior, and of a photograph's values the variance */
 } rd_scene_how;
