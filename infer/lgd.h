@@ -90,7 +90,8 @@ typedef struct lgd_options {
     int precision;    /* LGD_F32; LGD_BF16: inputs and weights of convolutions are rounded to bf16, for CPUs with AMX or
                        * AVX512-BF16 (much slower on others). Sums, renderer and maps stay f32. Maps differ by
                        * less than 0.005 (RMS), fewer than one value in 10,000 by more than 0.05, single ones by up to
-                       * 0.8 (docs/accuracy.md) */
+                       * 0.8; in a field of view that is given the roughness by less than 0.05, where a photograph
+                       * leaves its level open (docs/accuracy.md) */
     int orientations; /* R_0 is the mean over so many orientations of the photograph: 1: as it is, 2: and turned by a
                        * quarter, 4: all quarter turns, 8: and their mirror images; 0: LGD_ORIENTATIONS_DEFAULT. Only
                        * of a photograph with light and camera above its centre, and not with published weights; of

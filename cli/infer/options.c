@@ -52,7 +52,8 @@ const cl_argument cl_infer_arguments[] = {
      "than 1e-5 (RMS), single values by less than 1e-3"},
     {PRECISION, "precision", "f32|bf16",
      "precision of the products in convolutions (default f32); bf16 is faster on CPUs with AMX or AMD's AVX512-BF16,\n"
-     "slower on others; the maps differ by less than 0.005 (RMS), single values by up to 0.8"},
+     "slower on others; the maps differ by less than 0.005 (RMS; with --fov the roughness of a few by up to 0.05),\n"
+     "single values by up to 0.8"},
     {CAPTURE, "capture", "WHERE",
      "instead of PHOTO: 1 to 100 photographs of one sample under known lights, listed in an INI file or in a folder\n"
      "in MaterialGAN's layout; the first nine are used"},
