@@ -127,19 +127,21 @@ static int finish_part(work *w, ts_status *st)
     const ev_command *c = w->c;
     const uint64_t print = ev_shards_print(c, &w->run, w->model);
     const int own = w->run.failures;
-    int missing, first;
-    bool mine;
+    ev_parts parts;
     if (!print) return cl_failed("out of memory");
     if (ev_shard_write(&w->run, print, c->out, st) != TS_OK) return cl_failed("%s", st->message);
     const int lock = ev_shards_lock(c->out);
     int code = CL_OK;
-    if (ev_shards_merge(&w->run, print, c->out, &missing, &first, &mine, st) != TS_OK)
-        code = cl_failed("%s", st->message);
-    else if (missing) {
-        if (mine && !c->quiet)
+    if (ev_shards_merge(&w->run, print, c->out, &parts, st) != TS_OK) code = cl_failed("%s", st->message);
+    else if (parts.missing) {
+        if (parts.mine && !c->quiet)
             cl_note("part %d of %d is done; %d of the same options, weights and materials are missing, the first is "
                     "part %d: who ends last writes the results",
-                    c->shard, c->shards, missing, first);
+                    c->shard, c->shards, parts.missing, parts.first);
+        if (parts.mine && parts.strange)
+            cl_note("%s: %d of the missing parts have files of other options, weights, materials or instruction sets: "
+                    "unless another process replaces them now, do those parts again",
+                    c->out, parts.strange);
         if (own > 0) code = cl_failed("%d estimates of part %d failed", own, c->shard);
     } else {
         code = finish(w, st);

@@ -124,8 +124,8 @@ int ev_shards_lock(const char *folder)
 
 static bool get(FILE *f, void *to, size_t size) { return size == 0 || fread(to, size, 1, f) == 1; }
 
-/* The part's file if it is of this evaluation, or NULL. */
-static FILE *open_part(const ev_run *r, uint64_t print, const char *folder, int shard, head *h)
+/* The part's file if it is of this evaluation, or NULL; *strange: there is another in its place. */
+static FILE *open_part(const ev_run *r, uint64_t print, const char *folder, int shard, head *h, bool *strange)
 {
     char path[PATH_LENGTH];
     FILE *f = name_of(path, folder, shard, r->shards, NULL) == TS_OK ? fopen(path, "re") : NULL;
@@ -134,6 +134,7 @@ static FILE *open_part(const ev_run *r, uint64_t print, const char *folder, int 
           h->shard == shard && h->shards == r->shards && h->methods == r->methods && h->columns == r->report.columns &&
           h->results >= 0 && h->results <= INT_MAX)) {
         fclose(f);
+        *strange = true;
         f = NULL;
     }
     return f;
@@ -203,20 +204,19 @@ static void drop_pictures(ev_report *all)
         }
 }
 
-ts_code ev_shards_merge(ev_run *r, uint64_t print, const char *folder, int *missing, int *first, bool *mine,
-                        ts_status *st)
+ts_code ev_shards_merge(ev_run *r, uint64_t print, const char *folder, ev_parts *parts, ts_status *st)
 {
     head h;
-    *missing = 0;
-    *first = 0;
-    *mine = false;
+    *parts = (ev_parts){0};
     for (int shard = 1; shard <= r->shards; shard++) {
-        FILE *f = open_part(r, print, folder, shard, &h);
+        bool strange = false;
+        FILE *f = open_part(r, print, folder, shard, &h, &strange);
         if (f) fclose(f);
-        if (f && shard == r->shard) *mine = true;
-        if (!f && (*missing)++ == 0) *first = shard;
+        if (f && shard == r->shard) parts->mine = true;
+        if (!f && parts->missing++ == 0) parts->first = shard;
+        parts->strange += strange;
     }
-    if (*missing) return TS_OK;
+    if (parts->missing) return TS_OK;
     ev_report all = r->report;
     all.result = NULL;
     all.results = all.capacity = 0;
@@ -224,7 +224,7 @@ ts_code ev_shards_merge(ev_run *r, uint64_t print, const char *folder, int *miss
     int64_t failures = 0;
     ts_code code = bytes ? TS_OK : ts_fail(st, TS_NOMEM, "out of memory");
     for (int shard = 1; shard <= r->shards && !code; shard++) {
-        FILE *f = open_part(r, print, folder, shard, &h);
+        FILE *f = open_part(r, print, folder, shard, &h, &(bool){false});
         code = f ? get_part(f, &h, r, &all, bytes, st) : TS_FORMAT;
         if (f) fclose(f);
         failures += code ? 0 : h.failures;

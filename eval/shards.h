@@ -18,11 +18,15 @@ ts_code ev_shard_write(const ev_run *r, uint64_t print, const char *folder, ts_s
  * where it cannot be opened. */
 int ev_shards_lock(const char *folder);
 
-/* With all parts there, the report and failures of r become those of all of them. *missing: how many are not there, or
- * are of another evaluation; the first is *first. *mine: whether r's own is, which it is not when another process has
- * put it together with the others. */
-ts_code ev_shards_merge(ev_run *r, uint64_t print, const char *folder, int *missing, int *first, bool *mine,
-                        ts_status *st);
+typedef struct ev_parts {
+    int missing; /* not there, or of another evaluation */
+    int first;   /* of them */
+    int strange; /* of them, those with a file that is of another evaluation, or of none */
+    bool mine;   /* r's own is there, which it is not when another process has put it together with the others */
+} ev_parts;
+
+/* With all parts there, the report and failures of r become those of all of them. */
+ts_code ev_shards_merge(ev_run *r, uint64_t print, const char *folder, ev_parts *parts, ts_status *st);
 
 /* Once the reports are written: removes the parts' files. */
 void ev_shards_remove(const ev_run *r, const char *folder);

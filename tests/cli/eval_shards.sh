@@ -39,8 +39,16 @@ strangers() {
     expect 0 evaluate --fast --seed 2 --shard 1/2 -o "$T/o"
     expect 0 evaluate --fast --shard 2/2 -o "$T/o"
     says "$T/err" "the first is part 1"
+    says "$T/err" "o: 1 of the missing parts have files of other options"
     lines "$T/out" 0
     [ ! -e "$T/o/results.csv" ] || fail "parts of two evaluations are put together"
+    expect 0 evaluate --fast -q --shard 2/2 -o "$T/o"
+    lines "$T/err" 1
+    says "$T/err" "1 of the missing parts have files of other options"
+    mv "$T/o/part-1-of-2" "$T/other"
+    expect 0 evaluate --fast -q --shard 2/2 -o "$T/o"
+    lines "$T/err" 0
+    mv "$T/other" "$T/o/part-1-of-2"
     cp "$T/o/part-2-of-2" "$T/whole"
     head -c 3000 "$T/whole" >"$T/o/part-2-of-2"
     expect 1 evaluate --fast --shard 1/2 -o "$T/o"
