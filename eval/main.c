@@ -58,9 +58,9 @@ static ts_code parse_default(const work *w, const char **spec, ts_status *st)
     const bool known = is_light_known(w->c, &w->set[0]);
     for (int s = 1; s < w->c->sets; s++)
         if (is_light_known(w->c, &w->set[s]) != known)
-            return ts_fail(st, TS_INVALID,
-                           "--set %s: its light is %s, unlike that of %s: give --method, --told or --untold",
-                           w->set[s].spec, known ? "not given" : "given", w->set[0].spec);
+            return ts_fail(st, TS_INVALID, "--set %s: its light is %s, unlike that of %s: give --method%s",
+                           w->set[s].spec, known ? "not given" : "given", w->set[0].spec,
+                           w->c->light_known && w->c->light_unknown ? "" : ", --told or --untold");
     *spec = known ? "lgd" : "lgd:power=auto,orientations=auto,label=lgd";
     return TS_OK;
 }

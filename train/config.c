@@ -303,6 +303,13 @@ ts_code tr_config_check(const tr_config *c, ts_status *st)
                        "none render with light and camera, so use 1 for both, model.descent = posterior or "
                        "train.steps = 0",
                        c->data.told_view, c->data.told_power);
+    if (c->train.steps && !c->train.pretrain_steps && c->arch.revisions > 0 &&
+        (c->data.told_view < 1 || c->data.told_power < 1))
+        return ts_fail(
+            st, TS_INVALID,
+            "data.told_view is %g and data.told_power %g: h of model.revisions is told both of all photographs "
+            "that it learns from, so use 1 for both",
+            c->data.told_view, c->data.told_power);
     const int side = nn_arch_side(&c->arch);
     if (*c->train.teacher && c->data.patch != side)
         return ts_fail(st, TS_INVALID, "data.patch is %d: a teacher's maps have %d pixels a side", c->data.patch, side);

@@ -66,7 +66,7 @@ const tr_key tr_keys[] = {
     {"model", "recurrent", TR_BOOL, AT(arch.recurrent), 0, 1, NULL, NULL, false,
      "h carries its states from step to step"},
     {"model", "gradient", TR_BOOL, AT(arch.gradient), 0, 1, NULL, NULL, false,
-     "h reads the gradient of the reconstruction error (no: zeros, an ablation)"},
+     "h reads the gradient of the reconstruction error (no: zeros, and no model.descent either, an ablation)"},
     {"model", "descent", TR_CHOICE, AT(arch.descent), 0, NN_DESCENT_POSTERIOR, NULL, descent_names, false,
      "what is added to the maps beside h: nothing (none, published), through a learned matrix over the channels the "
      "gradient or the Gauss-Newton step of each pixel (newton), or the whole step to the most probable maps "

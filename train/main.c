@@ -3,6 +3,7 @@
 #include "cli/cli.h"
 #include "tensor/threads.h"
 #include "train/trainer.h"
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,10 +35,12 @@ typedef struct shown {
     int64_t first, log_every;
     double loss, seconds, waited;    /* sums since the last line */
     int steps, made, samples, ranks; /* steps: those that were not skipped */
+    bool coder;
 } shown;
 
-static const char *trained(const tr_row *row)
+static const char *trained(const shown *s, const tr_row *row)
 {
+    if (s->coder) return "auto-encoder";
     return row->pretraining ? "g alone" : row->g_fixed ? "h alone" : "g and h";
 }
 
@@ -55,7 +58,7 @@ static void show_step(const tr_row *row, void *user)
     const bool line = row->step % s->log_every == 0 || row->step == row->total;
     const double mean = s->steps ? s->loss / s->steps : NAN, speed = s->seconds > 0 ? s->samples / s->seconds : 0;
     if (s->progress.terminal) {
-        snprintf(extra, sizeof extra, "%s  step %lld  loss %.4f  %.1f samples/s", trained(row), (long long)row->step,
+        snprintf(extra, sizeof extra, "%s  step %lld  loss %.4f  %.1f samples/s", trained(s, row), (long long)row->step,
                  mean, speed);
         cl_progress_show(&s->progress, done, extra);
     } else if (line) {
@@ -63,7 +66,7 @@ static void show_step(const tr_row *row, void *user)
         const long left = s->made ? lround(s->seconds / s->made * (double)(row->total - row->step)) : 0;
         if (s->ranks > 1) snprintf(extra, sizeof extra, "  waiting %.1f%%", 100 * s->waited / s->seconds);
         cl_note("step %lld/%lld  %s  loss %.4f  rate %.2e  %.1f samples/s%s  ETA %ld:%02ld:%02ld", (long long)row->step,
-                (long long)row->total, trained(row), mean, row->rate, speed, s->ranks > 1 ? extra : "", left / 3600,
+                (long long)row->total, trained(s, row), mean, row->rate, speed, s->ranks > 1 ? extra : "", left / 3600,
                 left / 60 % 60, left % 60);
     }
     if (line) s->loss = s->seconds = s->waited = 0, s->steps = s->made = s->samples = 0;
@@ -112,7 +115,7 @@ static ts_code find_folder(const char *folder, bool resume, ts_status *st)
 static int train(const tr_config *config, const char *folder, bool resume, const tr_ranks *ranks)
 {
     ts_status st = {0};
-    shown s = {.log_every = config->train.log_every, .ranks = ranks->count};
+    shown s = {.log_every = config->train.log_every, .ranks = ranks->count, .coder = config->coder.code > 0};
     const tr_listener listener = {
         .step = show_step, .validated = show_validation, .note = show_note, .stop = stop, .user = &s};
     const bool made = ranks->rank == 0 && access(folder, F_OK) != 0;
@@ -131,8 +134,10 @@ static int train(const tr_config *config, const char *folder, bool resume, const
     cl_progress_end(&s.progress);
     tr_destroy(&t);
     if (code != TS_OK) return failed(&st);
+    char best[PATH_MAX];
+    snprintf(best, sizeof best, "%s/best.safetensors", folder);
     if (ranks->rank == 0)
-        cl_note("done: %s/%slast.safetensors", folder, config->validate.every ? "best.safetensors and " : "");
+        cl_note("done: %s/%slast.safetensors", folder, access(best, F_OK) == 0 ? "best.safetensors and " : "");
     return CL_OK;
 }
 

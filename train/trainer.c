@@ -396,5 +396,5 @@ ts_code tr_run(tr_trainer *t, ts_status *st)
         if (tr_step(t, &row, st) != TS_OK || after_step(t, &row, st) != TS_OK) return st->code;
     }
     note_waiting(t, t->step - begin_at);
-    return TS_OK;
+    return begin_at == t->step ? tr_save_checkpoint(t, st) : TS_OK; /* of a complete run what was removed */
 }

@@ -25,7 +25,10 @@ captures() {
     expect 0 evaluate --told --set "multiview:$one" -o "$T/told"
     if cmp -s "$T/p/results.csv" "$T/told/results.csv"; then fail "--told changes nothing"; fi
     expect 2 evaluate --set "multiview:$one" --set procedural:1,1 -o "$T/mixed"
-    says "$T/err" "--told"
+    says "$T/err" "give --method, --told or --untold"
+    expect 2 evaluate --told --untold --set "multiview:$one" --set procedural:1,1 -o "$T/mixed"
+    says "$T/err" "give --method"
+    if grep -q -- "or --untold" "$T/err"; then fail "advice that was followed: $(cat "$T/err")"; fi
     rm "$one/light_pos.txt"
     expect 1 evaluate --set "multiview:$T/c" -o "$T/q"
     says "$T/err" light_pos.txt

@@ -50,13 +50,13 @@ static bool same(const char *one, const char *two, nn_part part)
 /* h learns to revise what a fixed g says of several photographs: whatever the threads, resumed exactly, and g stays. */
 TEST(trainer_teaches_revisions)
 {
-    static const char *const keys[] = {
-        "model.unshuffle=4",      "model.g_detail=6",        "model.conditions=yes", "model.spread=yes",
-        "model.scene=yes",        "model.descent=posterior", "model.h_width=0",      "model.revisions=2",
-        "model.revise_width=8",   "data.patch=64",           "validate.size=64",     "train.window=0",
-        "train.g_rate=0",         "train.pretrain_steps=0",  "train.steps=6",        "train.iterations_min=0",
-        "train.iterations_max=0", "train.disturb=0.7",       "train.given_min=2",    "train.given_max=3",
-        "data.sheet=0.5",         "data.told_power=0.5"};
+    static const char *const keys[] = {"model.unshuffle=4",      "model.g_detail=6",       "model.conditions=yes",
+                                       "model.spread=yes",       "model.scene=yes",        "model.descent=posterior",
+                                       "model.h_width=0",        "model.revisions=2",      "model.revise_width=8",
+                                       "data.patch=64",          "validate.size=64",       "train.window=0",
+                                       "train.g_rate=0",         "train.pretrain_steps=0", "train.steps=6",
+                                       "train.iterations_min=0", "train.iterations_max=0", "train.disturb=0.7",
+                                       "train.given_min=2",      "train.given_max=3",      "data.sheet=0.5"};
     ts_status st = {0};
     tr_config c = small();
     for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
@@ -75,7 +75,10 @@ TEST(trainer_teaches_revisions)
     CHECK(run(&c, on, false, 0, &st) == TS_OK, "%s", st.message);
     CHECK(same(one, on, NN_G), "g moved");
     CHECK(!same(one, on, NN_H), "h did not move");
-    c.train.g_rate = 0;
+    c.data.told_power = 0.5;
+    CHECK(run(&c, folder("both"), false, 0, &st) == TS_INVALID && strstr(st.message, "told_power 0.5: h"), "%s",
+          st.message);
+    c.data.told_power = 1;
     c.data.patch = 128;
     CHECK(run(&c, folder("both"), false, 0, &st) == TS_INVALID && strstr(st.message, "data.patch"), "%s", st.message);
     c.data.patch = 64, c.train.given_min = 1;
