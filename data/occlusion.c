@@ -1,86 +1,145 @@
 #include "data/occlusion.h"
+#include "tensor/scratch.h"
 #include "tensor/team.h"
 #include <math.h>
 #include <stddef.h>
 
 #define PI 3.14159265f
-enum { SLICES = 8 };
+enum { SLICES = 8, STEPS_MOST = 64 };
 #define GROWTH 1.2f /* of the steps along a direction: near ones hide more */
+
+/* A pixel that may hide another: where it is beside it, right and down, and one over its distance. */
+typedef struct step {
+    int x, y;
+    float over;
+} step;
+
+typedef struct slice {
+    float x, y; /* its direction, right and down */
+    int steps;
+    step step[STEPS_MOST];
+} slice;
 
 typedef struct relief {
     int size;
     const float *height;
     bool repeats;
+    slice slice[SLICES];
+    float *to;
 } relief;
 
-/* The height of the pixel, or false beyond the border. */
-static bool at(const relief *r, int i, int j, float *z)
-{
-    const int n = r->size;
-    if (r->repeats) i = ((i % n) + n) % n, j = ((j % n) + n) % n;
-    if (i < 0 || j < 0 || i >= n || j >= n) return false;
-    *z = r->height[(size_t)i * (size_t)n + (size_t)j];
-    return true;
-}
-
-/* dz/dx by the neighbours that there are; along the rows (x) or down the columns (y). */
-static float slope(const relief *r, int i, int j, int di, int dj)
-{
-    float before = 0, after = 0, here = 0;
-    at(r, i, j, &here);
-    const bool left = at(r, i - di, j - dj, &before), right = at(r, i + di, j + dj, &after);
-    const float difference = left && right ? 0.5f * (after - before) : right ? after - here : left ? here - before : 0;
-    return difference * (float)r->size;
-}
-
-/* The tangent of the highest elevation that is met in the direction (dx right, dy down), or least. */
-static float horizon(const relief *r, int i, int j, float z, float dx, float dy, float least)
+static void plan(relief *r)
 {
     const float reach = IO_OCCLUSION_REACH * (float)r->size;
-    for (float t = 1; t <= reach; t = fmaxf(t + 1, t * GROWTH)) {
-        const int x = (int)lroundf(t * dx), y = (int)lroundf(t * dy);
-        float other;
-        if (!at(r, i + y, j + x, &other)) break;
-        const float distance = hypotf((float)x, (float)y) / (float)r->size;
-        if (distance > 0) least = fmaxf(least, (other - z) / distance);
-    }
-    return least;
-}
-
-/* Of a slice, the part between the normal's angle g (from above, toward the positive side) and its horizon at h. */
-static float arc(float h, float g) { return 0.25f * (-cosf(2 * h - g) + cosf(g) + 2 * h * sinf(g)); }
-
-static float visible(const relief *r, int i, int j)
-{
-    const float z = r->height[(size_t)i * (size_t)r->size + (size_t)j];
-    const float nx = -slope(r, i, j, 0, 1), ny = -slope(r, i, j, 1, 0), length = sqrtf(nx * nx + ny * ny + 1);
-    float sum = 0;
     for (int k = 0; k < SLICES; k++) {
-        const float phi = PI * ((float)k + 0.5f) / SLICES, dx = cosf(phi), dy = sinf(phi);
-        const float along = nx * dx + ny * dy, projected = sqrtf(along * along + 1) / length, g = atanf(along);
-        /* nothing below the tangent plane counts: the plane itself is the least horizon */
-        const float up = horizon(r, i, j, z, dx, dy, -along), down = horizon(r, i, j, z, -dx, -dy, along);
-        const float ahead = 0.5f * PI - atanf(up), behind = -(0.5f * PI - atanf(down));
-        sum += projected * (arc(ahead, g) + arc(behind, g));
+        slice *s = &r->slice[k];
+        const float phi = PI * ((float)k + 0.5f) / SLICES;
+        s->x = cosf(phi), s->y = sinf(phi), s->steps = 0;
+        for (float t = 1; t <= reach && s->steps < STEPS_MOST; t = fmaxf(t + 1, t * GROWTH)) {
+            const int x = (int)lroundf(t * s->x), y = (int)lroundf(t * s->y);
+            s->step[s->steps++] = (step){x, y, (float)r->size / hypotf((float)x, (float)y)};
+        }
     }
-    return fminf(fmaxf(sum / SLICES, 0), 1);
 }
 
-typedef struct occlusion_job {
-    const relief *r;
-    float *to;
-} occlusion_job;
+static int around(int i, int n) { return ((i % n) + n) % n; }
+
+/* Row i, or NULL beyond the border. */
+static const float *row_of(const relief *r, int i)
+{
+    if (r->repeats) i = around(i, r->size);
+    return i < 0 || i >= r->size ? NULL : r->height + (size_t)i * (size_t)r->size;
+}
+
+/* dz/dx and dz/dy by the neighbours that there are. */
+static void slopes(const relief *r, int i, float *dx, float *dy)
+{
+    const int n = r->size, last = n - 1;
+    const float *here = row_of(r, i), *above = row_of(r, i - 1), *below = row_of(r, i + 1),
+                scale = (float)n * (above && below ? 0.5f : 1);
+    if (!above) above = here;
+    if (!below) below = here;
+    for (int j = 0; j < n; j++) dy[j] = scale * (below[j] - above[j]);
+    for (int j = 1; j < last; j++) dx[j] = 0.5f * (float)n * (here[j + 1] - here[j - 1]);
+    if (n == 1) dx[0] = 0;
+    else if (r->repeats) {
+        dx[0] = 0.5f * (float)n * (here[1] - here[last]);
+        dx[last] = 0.5f * (float)n * (here[0] - here[last - 1]);
+    } else dx[0] = (float)n * (here[1] - here[0]), dx[last] = (float)n * (here[last] - here[last - 1]);
+}
+
+/* The tangents of count pixels' horizons, where those of a row beside them are higher. */
+static void raise_to(int count, const float *other, const float *z, float over, float *horizon)
+{
+    for (int j = 0; j < count; j++) {
+        const float tangent = (other[j] - z[j]) * over;
+        horizon[j] = tangent > horizon[j] ? tangent : horizon[j];
+    }
+}
+
+/* Of row i, in a slice's direction (sign 1) or the other: the tangents of the highest elevations, or what is there. */
+static void find_horizons(const relief *r, const slice *s, int sign, int i, float *horizon)
+{
+    const int n = r->size;
+    const float *z = row_of(r, i);
+    for (int k = 0; k < s->steps; k++) {
+        const step *at = &s->step[k];
+        const float *other = row_of(r, i + sign * at->y);
+        if (!other) break; /* as all that are farther */
+        const int x = sign * at->x,
+                  right = r->repeats ? around(x, n)
+            : x > 0                  ? x
+                                     : 0,
+                  left = right - x, inside = r->repeats ? n - right : n - right - left;
+        if (inside <= 0) break;
+        if (r->repeats) {
+            raise_to(inside, other + right, z, at->over, horizon);
+            raise_to(right, other, z + inside, at->over, horizon + inside);
+        } else raise_to(inside, other + right, z + left, at->over, horizon + left);
+    }
+}
+
+/* What a slice adds to each pixel: its part between the two horizons, whose tangents are up and down, of a surface that
+ * falls by dx and dy. With g the normal's angle in the slice and h a horizon's from above (cos(h - g) is what counts),
+ * (-cos(2h - g) + cos g + 2h sin g) / 4 each. */
+static void add_slice(const slice *s, int n, const float *dx, const float *dy, const float *up, const float *down,
+                      float *sum)
+{
+    for (int j = 0; j < n; j++) {
+        const float along = -dx[j] * s->x - dy[j] * s->y, sides = 1 + along * along,
+                    projected = sqrtf(sides / (dx[j] * dx[j] + dy[j] * dy[j] + 1)), cos_g = 1 / sqrtf(sides),
+                    sin_g = along * cos_g, u = up[j], d = down[j], u2 = 1 + u * u, d2 = 1 + d * d,
+                    cosines = (u * u - 1) / u2 + (d * d - 1) / d2, sines = 2 * u / u2 - 2 * d / d2,
+                    angles = atanf(d) - atanf(u);
+        sum[j] += projected * 0.25f * ((2 - cosines) * cos_g - sines * sin_g + 2 * angles * sin_g);
+    }
+}
 
 static void occlude_rows(const void *job, int64_t begin, int64_t end)
 {
-    const occlusion_job *o = job;
-    for (int64_t i = begin; i < end; i++)
-        for (int j = 0; j < o->r->size; j++)
-            o->to[(size_t)i * (size_t)o->r->size + (size_t)j] = visible(o->r, (int)i, j);
+    const relief *r = job;
+    const int n = r->size;
+    float *dx = ts_scratch(0, 5 * (size_t)n * sizeof *dx), *dy = dx + n, *up = dy + n, *down = up + n, *sum = down + n;
+    for (int i = (int)begin; i < (int)end; i++) {
+        slopes(r, i, dx, dy);
+        for (int j = 0; j < n; j++) sum[j] = 0;
+        for (int k = 0; k < SLICES; k++) {
+            const slice *s = &r->slice[k];
+            for (int j = 0; j < n; j++) { /* nothing below the tangent plane counts: itself is the least horizon */
+                up[j] = dx[j] * s->x + dy[j] * s->y;
+                down[j] = -up[j];
+            }
+            find_horizons(r, s, 1, i, up);
+            find_horizons(r, s, -1, i, down);
+            add_slice(s, n, dx, dy, up, down, sum);
+        }
+        for (int j = 0; j < n; j++) r->to[(size_t)i * (size_t)n + (size_t)j] = fminf(fmaxf(sum[j] / SLICES, 0), 1);
+    }
 }
 
 void io_occlusion(int size, const float *height, bool repeats, float *occlusion, int threads)
 {
-    const relief r = {size, height, repeats};
-    ts_for(threads, size, 1, occlude_rows, &(occlusion_job){&r, occlusion});
+    relief r = {.size = size, .height = height, .repeats = repeats, .to = occlusion};
+    plan(&r);
+    ts_for(threads, size, 1, occlude_rows, &r);
 }

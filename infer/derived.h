@@ -6,8 +6,17 @@
 
 enum { LGD_DERIVED = LGD_OUT_HEIGHT | LGD_OUT_AO | LGD_OUT_ORM | LGD_OUT_BASECOLOR | LGD_OUT_METALLIC };
 
-/* Those of which (bits of LGD_DERIVED) into the folder, by lgd_files' names; what each takes is computed once. facts
- * gets what it takes to read them. */
-ts_code lgd_write_derived(const char *folder, const io_material *m, unsigned which, bool repeats,
-                          lgd_output_result *facts, ts_status *st);
+/* Each empty where it is not needed. */
+typedef struct lgd_derived {
+    const io_material *m; /* the caller's */
+    io_image height, occlusion, base, metal;
+} lgd_derived;
+
+/* Computes what those of which (bits of LGD_DERIVED) take, on so many threads (0: the process's number). facts gets
+ * what base colour and metalness cannot express. d is released with lgd_derived_free, after a failure too. */
+ts_code lgd_derive(const io_material *m, unsigned which, bool repeats, int threads, lgd_derived *d,
+                   lgd_output_result *facts, ts_status *st);
+/* Those of which into the folder, by lgd_files' names. facts gets the heights' range. */
+ts_code lgd_write_derived(const char *folder, lgd_derived *d, unsigned which, lgd_output_result *facts, ts_status *st);
+void lgd_derived_free(lgd_derived *d);
 #endif

@@ -63,7 +63,8 @@ typedef struct task {
     const char *mark; /* a line of meta.txt */
 } task;
 
-static ts_code write_portion(const task *t, unsigned which, lgd_output_result *facts, ts_status *st)
+static ts_code write_portion(const task *t, unsigned which, lgd_derived *derived, lgd_output_result *facts,
+                             ts_status *st)
 {
     char path[TS_PATH_LENGTH];
     switch (which) {
@@ -84,7 +85,7 @@ static ts_code write_portion(const task *t, unsigned which, lgd_output_result *f
         return ts_path_in(path, t->folder, "material.mtlx", st) ? st->code : lgd_write_materialx(path, st);
     default:
         return which & LGD_DERIVED
-            ? lgd_write_derived(t->folder, t->m, which, t->order->repeats, facts, st)
+            ? lgd_write_derived(t->folder, derived, which, facts, st)
             : io_write_map_files(t->folder, t->m, map_bits(which) | (t->order->half ? IO_MAPS_HALF : 0),
                                  t->order->directx, st);
     }
@@ -105,6 +106,7 @@ static ts_code write_glb(const task *t, unsigned written, ts_status *st)
 typedef struct writing {
     const task *t;
     unsigned which;
+    lgd_derived *derived;
     lgd_output_result *facts;
     ts_status *failure; /* of each portion */
 } writing;
@@ -112,18 +114,27 @@ typedef struct writing {
 static void write_one(const void *job, int64_t i)
 {
     const writing *w = job;
-    write_portion(w->t, w->which & portions[i], w->facts, &w->failure[i]);
+    write_portion(w->t, w->which & portions[i], w->derived, w->facts, &w->failure[i]);
 }
 
-/* Of several failures the first portion's is reported. */
+/* What is derived all threads compute, then each makes files. Of several failures the first portion's is reported. */
+static ts_code write_portions(const task *t, unsigned which, lgd_output_result *facts, ts_status *st)
+{
+    lgd_derived derived;
+    ts_status failure[PORTIONS] = {{0}};
+    ts_code code = lgd_derive(t->m, which, t->order->repeats, t->order->threads, &derived, facts, st);
+    if (!code) ts_tasks(t->order->threads, PORTIONS, write_one, &(writing){t, which, &derived, facts, failure});
+    for (int i = 0; i < PORTIONS && !code; i++)
+        if (failure[i].code) code = ts_fail(st, failure[i].code, "%s", failure[i].message);
+    lgd_derived_free(&derived);
+    return code;
+}
+
 static ts_code write_all(const task *t, lgd_output_result *facts, ts_status *st)
 {
-    ts_status failure[PORTIONS] = {{0}};
     const bool glb = t->order->which & LGD_OUT_GLB;
     const unsigned which = t->order->which | (glb ? lgd_output_referred(t->order->metallic) : 0);
-    ts_tasks(t->order->threads, PORTIONS, write_one, &(writing){t, which, facts, failure});
-    for (int i = 0; i < PORTIONS; i++)
-        if (failure[i].code) return ts_fail(st, failure[i].code, "%s", failure[i].message);
+    if (write_portions(t, which, facts, st) != TS_OK) return st->code;
     if (glb && write_glb(t, which, st) != TS_OK) return st->code;
     char path[TS_PATH_LENGTH];
     return ts_path_in(path, t->folder, "meta.txt", st)

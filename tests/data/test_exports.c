@@ -2,7 +2,6 @@
 #include "data/height.h"
 #include "data/label.h"
 #include "data/metallic.h"
-#include "data/occlusion.h"
 #include "data/seamless.h"
 #include "tensor/rng.h"
 #include "tests/data/new_material.h"
@@ -99,27 +98,6 @@ TEST(height_of_what_repeats)
                   (double)height[i * N + j], want);
         }
     io_material_free(&m);
-}
-
-/* A plane sees all of its sky, however it lies (to what eight slices leave out); the middle of a trench what its width
- * over its depth says. */
-TEST(occlusion_of_known_reliefs)
-{
-    enum { N = 256 };
-    static float height[N * N], occlusion[N * N];
-    for (int i = 0; i < N * N; i++) height[i] = 0.4f * (float)(i % N) / N - 0.3f * (float)(i / N) / N;
-    io_occlusion(N, height, false, occlusion, 0);
-    for (int i = 0; i < N * N; i++) CHECK(occlusion[i] > 0.997f, "pixel %d of a plane: %g", i, (double)occlusion[i]);
-    const float depth = 0.02f;
-    const int width = 9;
-    for (int i = 0; i < N * N; i++) height[i] = abs(i % N - N / 2) <= width / 2 ? 0 : depth;
-    io_occlusion(N, height, true, occlusion, 0);
-    const double half = (width / 2 + 1.0) / N, want = half / hypot(half, (double)depth);
-    for (int i = 0; i < N; i++) {
-        const double got = (double)occlusion[i * N + N / 2];
-        CHECK(fabs(got - want) < 0.05, "the middle of a trench sees %g of %g", got, want);
-        CHECK(occlusion[i * N] > 0.999f, "far beside it %g", (double)occlusion[i * N]);
-    }
 }
 
 /* RMS of the differences of neighbours across the borders over those within, all maps or the heights. */
