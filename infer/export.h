@@ -12,6 +12,7 @@
 typedef struct lgd_gltf {
     bool metallic, repeats;
     const char *name; /* of the object and its material */
+    bool occlusion;   /* not metallic: occlusion.png too */
 } lgd_gltf;
 ts_code lgd_write_gltf(const char *path, const lgd_gltf *kind, ts_status *st);
 /* material.glb: the same with the images of the folder in it, 2 GB at most. */

@@ -34,12 +34,14 @@ static void square(unsigned char out[BUFFER])
     for (int i = 0; i < 6; i++) *at++ = index[i], *at++ = 0;
 }
 
-enum { IMAGES_MOST = 4 };
+enum { IMAGES_MOST = 5 };
 #define IMAGE_LIMIT ((size_t)1 << 31) /* of a binary file the lengths have 32 bits */
 
 /* The images in the order of the document's textures. */
-static const char *const f0_images[] = {"diffuse.png", "roughness.png", "normal.png", "specular.png"},
+static const char *const f0_images[] = {"diffuse.png", "roughness.png", "normal.png", "specular.png", "occlusion.png"},
                          *const metallic_images[] = {"basecolor.png", "orm.png", "normal.png"};
+
+static int count_images(const lgd_gltf *kind) { return kind->metallic ? 3 : 4 + kind->occlusion; }
 
 static const char f0_material[] =
     "    \"pbrMetallicRoughness\": {\"baseColorTexture\": {\"index\": 0}, \"metallicFactor\": 0, "
@@ -56,7 +58,7 @@ static const char f0_material[] =
  * document that names them. */
 static void print_gltf(FILE *f, const lgd_gltf *kind, const size_t *size)
 {
-    const int images = kind->metallic ? 3 : 4;
+    const int images = count_images(kind);
     const char *const *name = kind->metallic ? metallic_images : f0_images;
     unsigned char bytes[BUFFER];
     size_t total = BUFFER;
@@ -76,12 +78,10 @@ static void print_gltf(FILE *f, const lgd_gltf *kind, const size_t *size)
           "    \"name\": ",
           f);
     io_put_json(f, kind->name);
-    fprintf(f,
-            ",\n"
-            "%s"
-            "  }],\n"
-            "  \"textures\": [",
-            kind->metallic ? metallic_material : f0_material);
+    fputs(",\n", f);
+    if (kind->occlusion && !kind->metallic) fputs("    \"occlusionTexture\": {\"index\": 4},\n", f);
+    fputs(kind->metallic ? metallic_material : f0_material, f);
+    fputs("  }],\n  \"textures\": [", f);
     for (int k = 0; k < images; k++) fprintf(f, "%s{\"source\": %d, \"sampler\": 0}", k ? ", " : "", k);
     fprintf(f, "],\n  \"samplers\": [{\"magFilter\": 9729, \"minFilter\": 9987, \"wrapS\": %d, \"wrapT\": %d}],\n",
             kind->repeats ? 10497 : 33071, kind->repeats ? 10497 : 33071);
@@ -178,7 +178,7 @@ static ts_code put_together(const char *path, const lgd_gltf *kind, int images, 
 
 ts_code lgd_write_glb(const char *path, const char *folder, const lgd_gltf *kind, ts_status *st)
 {
-    const int images = kind->metallic ? 3 : 4;
+    const int images = count_images(kind);
     const char *const *name = kind->metallic ? metallic_images : f0_images;
     char file[TS_PATH_LENGTH], *image[IMAGES_MOST] = {NULL};
     size_t size[IMAGES_MOST] = {0};

@@ -257,7 +257,9 @@ static ts_code write_folder(const char *parent, const char *stem, const io_mater
     /* inside the folder when it exists: it may lie on another file system than its parent */
     if (ts_hidden_folder(there ? folder : parent, &hidden, &lock, st) != TS_OK) return st->code;
     mark_of(m, order->directx, mark);
-    const task t = {hidden, stem, m, estimate, photo, order, {order->metallic, order->repeats, stem}, mark};
+    const task t = {
+        hidden, stem, m, estimate, photo, order, {order->metallic, order->repeats, stem, order->which & LGD_OUT_AO},
+        mark};
     ts_code code = write_all(&t, r, st);
     bool moves = there;
     if (!code && !there && rename(hidden, folder) != 0) {

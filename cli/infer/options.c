@@ -92,7 +92,7 @@ const cl_argument cl_infer_arguments[] = {
      "gltf, glb (glTF as one file), materialx, page (view.html lights the material in a browser; of several\n"
      "photographs, not with --shard, index.html too); gltf and materialx come with the maps that they refer to; files\n"
      "of another estimate that DIR/STEM/meta.txt names are removed"},
-    {AO, "ao", NULL, "also write occlusion.png: ambient occlusion of the height"},
+    {AO, "ao", NULL, "also write occlusion.png: ambient occlusion of the height; gltf and glb then have it too"},
     {SEAMLESS, "seamless", NULL,
      "all maps repeat without a visible border: the same seam is cut through all of them; 7/8 of the square remain"},
     {EXR, "exr", "half|float",

@@ -59,6 +59,13 @@ def corners(accessor, n):
 for p, t in zip(corners(0, 3), corners(3, 2)):
     assert t == (p[0] + 0.5, 0.5 - p[1]), (p, t) # the picture's top is the sample's top
 EOF
+    if grep -q occlusion "$T/o/flash/material.gltf"; then fail "ambient occlusion that nobody asked for"; fi
+    expect 0 infer --maps gltf --ao
+    python3 - "$T/o/flash/material.gltf" <<'EOF' || fail "the document does not say where the occlusion is"
+import json, sys
+d = json.load(open(sys.argv[1]))
+assert d["images"][d["textures"][d["materials"][0]["occlusionTexture"]["index"]]["source"]]["uri"] == "occlusion.png"
+EOF
     command -v assimp >/dev/null || skip "assimp is not installed (assimp-utils)"
     expect 0 assimp info "$T/o/flash/material.gltf"
     says "$T/out" "Vertices:           4"
@@ -69,10 +76,13 @@ EOF
 glb() {
     command -v python3 >/dev/null || skip "python3 is not installed"
     for workflow in specular metallic; do
+        expect 0 infer --workflow $workflow --maps glb --ao
+        holds "material.glb meta.txt occlusion.png"
+        rm -r "$T/o"
         expect 0 infer --workflow $workflow --maps glb
         [ $workflow = specular ] || says "$T/err" "base colour and metalness miss diffuse by 0.0"
         holds "material.glb meta.txt"
-        expect 0 infer --workflow $workflow --maps gltf,glb
+        expect 0 infer --workflow $workflow --maps gltf,glb --ao
         python3 - "$T/o/flash" <<'EOF' || fail "$workflow: material.glb does not hold what it should"
 import json, os, struct, sys
 b = open(sys.argv[1] + "/material.glb", "rb").read()
