@@ -147,8 +147,8 @@ ts_code io_check_claim(const char *path, double width, double height, int64_t ma
 {
     if (width * height > (double)max_pixels)
         return ts_fail(st, TS_UNSUPPORTED,
-                       "%s: %.0f x %.0f pixels are more than the limit of %lld (lgd-infer "
-                       "--max-pixels)",
+                       "%s: %.0f x %.0f pixels are more than the limit of %lld; of "
+                       "photographs --max-pixels raises it",
                        path, width, height, (long long)max_pixels);
     if (ts_budget_check(bytes, st) != TS_OK) return ts_context(st, "%s: %.0f x %.0f pixels", path, width, height);
     return TS_OK;

@@ -182,8 +182,8 @@ static ts_code read_file(const char *path, int64_t max_pixels, double max_bytes,
                        spec.nchannels);
     if ((int64_t)spec.width * spec.height > max_pixels)
         return ts_fail(st, TS_UNSUPPORTED,
-                       "%s: %d x %d pixels are more than the limit of %lld (lgd-infer "
-                       "--max-pixels)",
+                       "%s: %d x %d pixels are more than the limit of %lld; of "
+                       "photographs --max-pixels raises it",
                        path, spec.width, spec.height, (long long)max_pixels);
     if (spec.depth > 1) return ts_fail(st, TS_UNSUPPORTED, "%s: a volume, not an image", path);
     if (spec.deep) return ts_fail(st, TS_UNSUPPORTED, "%s: a deep image; flatten it first", path);

@@ -5,6 +5,7 @@
 #include "data/image/png_file.h"
 #include "tensor/budget.h"
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -46,14 +47,14 @@ static io_space space_of(const char *path, io_photo_rows *p)
 {
     const oi_image *image = &p->raw;
     io_space space;
-    char name[sizeof p->unread];
-    if (io_space_png(path, &space)) return space;
+    char name[sizeof p->unread], named[IO_PNG_NAME];
+    if (io_space_png(path, &space, named)) return space;
     if (io_space_icc(image->icc, image->icc_size, &space)) return space;
     if (image->icc) {
         p->profile = io_profile_open(image->icc, image->icc_size, image->grey, name, sizeof name);
         if (!p->profile && image->code_points && io_space_code_points(image->code_point, &space)) return space;
         if (!p->profile) memcpy(p->unread, name, sizeof name);
-    }
+    } else snprintf(p->unread, sizeof p->unread, "%s", named); /* one that no library takes */
     if (image->code_points && io_space_code_points(image->code_point, &space)) return space;
     if (image->primaries && io_space_primaries(image->chromaticities, image->floating ? 1 : 0, &space)) return space;
     if (image->floating || image->linear) return io_space_linear();

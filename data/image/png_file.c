@@ -58,12 +58,21 @@ ts_code io_check_png(const char *path, ts_status *st)
 
 static const float bt709[8] = {.64f, .33f, .3f, .6f, .15f, .06f, .3127f, .329f};
 
-bool io_space_png(const char *path, io_space *space)
+static void take_name(const uint8_t *d, size_t size, char name[IO_PNG_NAME])
+{
+    snprintf(name, IO_PNG_NAME, "%.*s", (int)size, (const char *)d);
+    for (char *c = name; *c; c++)
+        if ((unsigned char)*c < 32 || (unsigned char)*c > 126) *c = '?';
+    if (!*name) snprintf(name, IO_PNG_NAME, "without a name");
+}
+
+bool io_space_png(const char *path, io_space *space, char named[IO_PNG_NAME])
 {
     const char *fault;
     FILE *f = open_png(path, &fault);
+    *named = 0;
     if (!f) return false;
-    uint8_t head[8], d[32];
+    uint8_t head[8], d[IO_PNG_NAME];
     bool cicp = false, srgb = false, profile = false, primaries = false;
     float xy[8] = {0}, gamma = -1;
     while (!fault && fread(head, 1, 8, f) == 8 && memcmp(head + 4, "IDAT", 4)) {
@@ -73,8 +82,10 @@ bool io_space_png(const char *path, io_space *space)
         if (!memcmp(head + 4, "cICP", 4) && length == 4 && io_space_code_points((int[]){d[0], d[1]}, space))
             cicp = true;
         else if (!memcmp(head + 4, "sRGB", 4)) srgb = true;
-        else if (!memcmp(head + 4, "iCCP", 4)) profile = true;
-        else if (!memcmp(head + 4, "gAMA", 4) && length == 4 && be32(d) > 0) gamma = (float)(100000.0 / be32(d));
+        else if (!memcmp(head + 4, "iCCP", 4)) {
+            profile = true;
+            take_name(d, take, named);
+        } else if (!memcmp(head + 4, "gAMA", 4) && length == 4 && be32(d) > 0) gamma = (float)(100000.0 / be32(d));
         else if (!memcmp(head + 4, "cHRM", 4) && length == 32) {
             primaries = true;
             for (int i = 0; i < 8; i++)

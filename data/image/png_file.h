@@ -9,6 +9,7 @@
 ts_code io_check_png(const char *path, ts_status *st);
 
 /* From the colour chunks (cICP, sRGB, gAMA, cHRM; a profile goes before all but the first); false when it is no PNG or
- * they say nothing. */
-bool io_space_png(const char *path, io_space *space);
+ * they say nothing. named: the name of a profile that the file has, also where its bytes are none, or empty. */
+enum { IO_PNG_NAME = 80 };
+bool io_space_png(const char *path, io_space *space, char named[IO_PNG_NAME]);
 #endif

@@ -182,6 +182,29 @@ TEST(profile_that_cannot_be_used_is_named)
     io_image_free(&square);
 }
 
+/* So is a PNG's that libpng refuses: of another number of colours than the image, or damaged. */
+TEST(profile_that_libpng_refuses_is_named)
+{
+    static const uint8_t pixel[3] = {137, 137, 137}, stored[] = "of a scanner\0\0these bytes are not deflated";
+    for (int damaged = 0; damaged < 2; damaged++) {
+        bytes b = {0}, profile = table_profile(cmsSigCmykData, false);
+        ts_status st = {0};
+        io_image square;
+        io_photo_facts facts;
+        png_begin(&b, 1, 1, 8, 2);
+        if (damaged) png_chunk(&b, "iCCP", stored, sizeof stored - 1);
+        else png_profile(&b, &profile);
+        png_pixels(&b, pixel, 3, 1), png_end(&b);
+        bytes_free(&profile);
+        CHECK(!io_read_photo_square(bytes_save(&b, test_folder(), "p.png"), 1 << 20, 1, 0, &square, &facts, &st), "%s",
+              st.message);
+        CHECK(*facts.profile && (!damaged || !strcmp(facts.profile, "of a scanner")), "'%s' is reported",
+              facts.profile);
+        CHECK(fabsf(square.data[0] - 0.25f) < 0.01f, "%g, not sRGB", (double)square.data[0]);
+        io_image_free(&square);
+    }
+}
+
 static void chunk(bytes *b, const char *type, const void *data, size_t size)
 {
     put(b, type, 4), put32le(b, (uint32_t)size), put(b, data, size);
