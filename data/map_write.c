@@ -37,12 +37,12 @@ static ts_code make_rows(int y, int count, float *out, void *user, ts_status *st
 }
 
 static ts_code write_map(const char *folder, const char *file, const io_material *m, unsigned which, bool directx,
-                         bool half, ts_status *st)
+                         bool half, int threads, ts_status *st)
 {
     char path[PATH_MAX];
     if (snprintf(path, sizeof path, "%s/%s", folder, file) >= (int)sizeof path)
         return ts_fail(st, TS_INVALID, "%s: name too long", folder);
-    if (which == IO_MAPS_EXR) return io_write_maps_exr(path, m, directx, half, st);
+    if (which == IO_MAPS_EXR) return io_write_maps_exr(path, m, directx, half, threads, st);
     bool colour = which == IO_MAPS_DIFFUSE || which == IO_MAPS_SPECULAR;
     map q = {m, which, directx};
     const io_rows rows = {.width = m->size,
@@ -75,7 +75,8 @@ ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_
     return io_text_write(&text, path, st);
 }
 
-ts_code io_write_map_files(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st)
+ts_code io_write_map_files(const char *folder, const io_material *m, unsigned which, bool directx, int threads,
+                           ts_status *st)
 {
     static const struct {
         unsigned which;
@@ -87,7 +88,7 @@ ts_code io_write_map_files(const char *folder, const io_material *m, unsigned wh
                  {IO_MAPS_EXR, "maps.exr"}};
     for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
         if (!(which & files[i].which)) continue;
-        ts_code code = write_map(folder, files[i].file, m, files[i].which, directx, which & IO_MAPS_HALF, st);
+        ts_code code = write_map(folder, files[i].file, m, files[i].which, directx, which & IO_MAPS_HALF, threads, st);
         if (code != TS_OK) return code;
     }
     return TS_OK;
@@ -95,7 +96,7 @@ ts_code io_write_map_files(const char *folder, const io_material *m, unsigned wh
 
 ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st)
 {
-    const ts_code code = io_write_map_files(folder, m, which, directx, st);
+    const ts_code code = io_write_map_files(folder, m, which, directx, 0, st);
     if (code != TS_OK) return code;
     return which ? io_write_maps_meta(folder, which, directx, st) : TS_OK;
 }

@@ -52,8 +52,10 @@ enum {
     IO_MAPS_HALF = 32 /* maps.exr in half floats (data/image/exr.h) */
 };
 ts_code io_write_maps(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st);
-/* The two halves of it: the files alone (from several threads at once too, for different files), the meta.txt alone. */
-ts_code io_write_map_files(const char *folder, const io_material *m, unsigned which, bool directx, ts_status *st);
+/* The two halves of it: the files alone (from several threads at once too, for different files; threads: that maps.exr
+ * is made on, 0: the process's number), the meta.txt alone. */
+ts_code io_write_map_files(const char *folder, const io_material *m, unsigned which, bool directx, int threads,
+                           ts_status *st);
 ts_code io_write_maps_meta(const char *folder, unsigned which, bool directx, ts_status *st);
 /* The lines of meta.txt that io_read_map_folder reads; without metallic files the colours are diffuse and F0. */
 void io_print_conventions(FILE *f, unsigned which, bool directx);

@@ -1,4 +1,6 @@
 #include "data/metallic.h"
+#include "tensor/scratch.h"
+#include "tensor/team.h"
 #include <math.h>
 
 #define DIELECTRIC 0.04 /* F0 of everything that is no metal, in this workflow */
@@ -15,15 +17,18 @@ static double is_dark(const float v[3])
     return 1 - x * x * (3 - 2 * x);
 }
 
+static double in_unit(double x) { return x < 0 ? 0 : x < 1 ? x : 1; }
+
 /* The best base colour for metalness k, and what is left. */
 static double residual(const io_texel *t, double k, double base[3])
 {
+    const double rest = 1 - k, over = 1 / (rest * rest + k * k), least = DIELECTRIC * rest;
     double sum = 0;
     for (int c = 0; c < 3; c++) {
-        const double d = (double)t->diffuse[c], s = (double)t->specular[c] - DIELECTRIC * (1 - k);
-        const double b = fmin(fmax(((1 - k) * d + k * s) / ((1 - k) * (1 - k) + k * k), 0), 1);
+        const double d = (double)t->diffuse[c], s = (double)t->specular[c] - least,
+                     b = in_unit((rest * d + k * s) * over), in_diffuse = b * rest - d, in_f0 = b * k - s;
         base[c] = b;
-        sum += (b * (1 - k) - d) * (b * (1 - k) - d) + (b * k - s) * (b * k - s);
+        sum += in_diffuse * in_diffuse + in_f0 * in_f0;
     }
     return sum;
 }
@@ -41,31 +46,49 @@ static double best_metalness(const io_texel *t, double base[3])
     double step = 0.5 / GRID;
     for (int i = 0; i < HALVINGS; i++, step /= 2)
         for (int side = -1; side <= 1; side += 2) {
-            const double k = fmin(fmax(best + side * step, 0), 1), r = residual(t, k, base) + cost * k;
+            const double k = in_unit(best + side * step), r = residual(t, k, base) + cost * k;
             if (r < least) least = r, best = k;
         }
     residual(t, best, base);
     return best;
 }
 
-io_metallic_error io_to_metallic(const io_material *m, float *basecolor, float *metallic)
+typedef struct conversion {
+    const io_material *m;
+    float *base, *metal;
+    io_metallic_error *lost; /* sums of squares of each row */
+} conversion;
+
+static void convert_rows(const void *job, int64_t begin, int64_t end)
 {
-    const size_t pixels = (size_t)m->size * (size_t)m->size;
-    io_metallic_error e = {0};
-    for (size_t i = 0; i < pixels; i++) {
-        const io_texel t = io_texel_get(m->maps + i * MAP_CHANNELS);
-        double base[3];
-        const double k = best_metalness(&t, base);
-        metallic[i] = (float)k;
-        for (int c = 0; c < 3; c++) {
-            basecolor[3 * i + (size_t)c] = (float)base[c];
-            const double d = base[c] * (1 - k) - (double)t.diffuse[c],
-                         s = DIELECTRIC * (1 - k) + base[c] * k - (double)t.specular[c];
-            e.diffuse += d * d;
-            e.specular += s * s;
+    const conversion *j = job;
+    const size_t n = (size_t)j->m->size;
+    for (size_t y = (size_t)begin; y < (size_t)end; y++) {
+        io_metallic_error e = {0};
+        for (size_t i = y * n; i < (y + 1) * n; i++) {
+            const io_texel t = io_texel_get(j->m->maps + i * MAP_CHANNELS);
+            double base[3];
+            const double k = best_metalness(&t, base);
+            j->metal[i] = (float)k;
+            for (size_t c = 0; c < 3; c++) {
+                j->base[3 * i + c] = (float)base[c];
+                const double d = base[c] * (1 - k) - (double)t.diffuse[c],
+                             s = DIELECTRIC * (1 - k) + base[c] * k - (double)t.specular[c];
+                e.diffuse += d * d;
+                e.specular += s * s;
+            }
         }
+        j->lost[y] = e;
     }
-    e.diffuse = sqrt(e.diffuse / (3.0 * (double)pixels));
-    e.specular = sqrt(e.specular / (3.0 * (double)pixels));
+}
+
+io_metallic_error io_to_metallic(const io_material *m, float *basecolor, float *metallic, int threads)
+{
+    const double values = 3.0 * m->size * m->size;
+    io_metallic_error e = {0}, *lost = ts_scratch(0, (size_t)m->size * sizeof *lost);
+    ts_for(threads, m->size, 1, convert_rows, &(conversion){m, basecolor, metallic, lost});
+    for (int y = 0; y < m->size; y++) e.diffuse += lost[y].diffuse, e.specular += lost[y].specular;
+    e.diffuse = sqrt(e.diffuse / values);
+    e.specular = sqrt(e.specular / values);
     return e;
 }

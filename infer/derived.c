@@ -29,7 +29,7 @@ ts_code lgd_derive(const io_material *m, unsigned which, bool repeats, int threa
     if (!code && which & (LGD_OUT_BASECOLOR | LGD_OUT_METALLIC | LGD_OUT_ORM)) {
         code = io_image_create(&d->base, n, n, 3, st);
         if (!code) code = io_image_create(&d->metal, n, n, 1, st);
-        if (!code) facts->lost = io_to_metallic(m, d->base.data, d->metal.data);
+        if (!code) facts->lost = io_to_metallic(m, d->base.data, d->metal.data, threads);
     }
     return code;
 }

@@ -84,10 +84,8 @@ static ts_code write_portion(const task *t, unsigned which, lgd_derived *derived
     case LGD_OUT_MATERIALX:
         return ts_path_in(path, t->folder, "material.mtlx", st) ? st->code : lgd_write_materialx(path, st);
     default:
-        return which & LGD_DERIVED
-            ? lgd_write_derived(t->folder, derived, which, facts, st)
-            : io_write_map_files(t->folder, t->m, map_bits(which) | (t->order->half ? IO_MAPS_HALF : 0),
-                                 t->order->directx, st);
+        return which & LGD_DERIVED ? lgd_write_derived(t->folder, derived, which, facts, st)
+                                   : io_write_map_files(t->folder, t->m, map_bits(which), t->order->directx, 1, st);
     }
 }
 
@@ -117,13 +115,18 @@ static void write_one(const void *job, int64_t i)
     write_portion(w->t, w->which & portions[i], w->derived, w->facts, &w->failure[i]);
 }
 
-/* What is derived all threads compute, then each makes files. Of several failures the first portion's is reported. */
+/* What takes long all threads make together, one after the other: what is derived, and a maps.exr that is compressed.
+ * Then each makes files. Of several failures the first portion's is reported. */
 static ts_code write_portions(const task *t, unsigned which, lgd_output_result *facts, ts_status *st)
 {
     lgd_derived derived;
     ts_status failure[PORTIONS] = {{0}};
-    ts_code code = lgd_derive(t->m, which, t->order->repeats, t->order->threads, &derived, facts, st);
-    if (!code) ts_tasks(t->order->threads, PORTIONS, write_one, &(writing){t, which, &derived, facts, failure});
+    const unsigned first = t->order->half ? which & LGD_OUT_EXR : 0;
+    const int threads = t->order->threads;
+    ts_code code = lgd_derive(t->m, which, t->order->repeats, threads, &derived, facts, st);
+    if (!code)
+        code = io_write_map_files(t->folder, t->m, map_bits(first) | IO_MAPS_HALF, t->order->directx, threads, st);
+    if (!code) ts_tasks(threads, PORTIONS, write_one, &(writing){t, which & ~first, &derived, facts, failure});
     for (int i = 0; i < PORTIONS && !code; i++)
         if (failure[i].code) code = ts_fail(st, failure[i].code, "%s", failure[i].message);
     lgd_derived_free(&derived);

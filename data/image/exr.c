@@ -3,6 +3,7 @@
 #include "data/image/exr.h"
 #include "data/file.h"
 #include "data/name.h"
+#include "tensor/team.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <openexr.h>
@@ -114,8 +115,12 @@ static int named(int stored) { return stored < SHOWN ? stored : stored - SHOWN; 
 
 static exr_result_t write_header(exr_context_t f, int size, bool directx, bool half)
 {
+    enum {
+        ZIP_LEVEL = 4
+    }; /* as OpenEXR's C++ library has it: zlib's own, 6, takes twice the time to save a twentieth */
     int part = 0;
     exr_result_t r = exr_add_part(f, "maps", EXR_STORAGE_SCANLINE, &part);
+    if (!r && half) r = exr_set_zip_compression_level(f, part, ZIP_LEVEL);
     if (!r)
         r = exr_initialize_required_attr_simple(f, part, size, size, half ? EXR_COMPRESSION_ZIP : EXR_COMPRESSION_NONE);
     for (int k = 0; k < STORED && !r; k++) {
@@ -128,51 +133,107 @@ static exr_result_t write_header(exr_context_t f, int size, bool directx, bool h
     return r ? r : exr_write_header(f);
 }
 
-/* rows: memory for the scan lines of a chunk, [lines][size][CHANNELS]. */
-static exr_result_t write_chunks(exr_context_t f, const io_material *m, bool directx, int lines, float *rows)
+/* A chunk that one thread makes, and what it makes it with. */
+typedef struct packer {
+    exr_encode_pipeline_t encoder;
+    exr_result_t (*write)(exr_encode_pipeline_t *encoder); /* the library's, of its turn */
+    float *rows;                                           /* [lines][size][CHANNELS] */
+    exr_result_t result;
+    stream said; /* a message alone */
+} packer;
+
+/* Chunks first .. first + count - 1 of so many lines. */
+typedef struct packing {
+    exr_context_t f;
+    const io_material *m;
+    bool directx;
+    int lines, first;
+    packer *packer;
+} packing;
+
+static exr_result_t written_later(exr_encode_pipeline_t *encoder)
 {
-    exr_encode_pipeline_t encoder = EXR_ENCODE_PIPELINE_INITIALIZER;
-    exr_result_t r = EXR_ERR_SUCCESS;
-    for (int y = 0; y < m->size && !r; y += lines) {
-        const int count = m->size - y < lines ? m->size - y : lines;
-        for (size_t i = 0; i < (size_t)count * (size_t)m->size; i++) {
-            io_texel t = io_texel_get(m->maps + ((size_t)y * (size_t)m->size + i) * MAP_CHANNELS);
-            if (directx) t.normal[1] = -t.normal[1];
-            to_values(&t, rows + i * CHANNELS);
-        }
-        exr_chunk_info_t chunk;
-        r = exr_write_scanline_chunk_info(f, 0, y, &chunk);
-        if (!r)
-            r = y == 0 ? exr_encoding_initialize(f, 0, &chunk, &encoder) : exr_encoding_update(f, 0, &chunk, &encoder);
-        for (int c = 0; c < encoder.channel_count && !r; c++) {
-            exr_coding_channel_info_t *info = &encoder.channels[c];
-            info->encode_from_ptr = (const uint8_t *)(rows + named(c));
-            info->user_pixel_stride = CHANNELS * sizeof(float);
-            info->user_line_stride = CHANNELS * (int32_t)sizeof(float) * m->size;
-            info->user_bytes_per_element = sizeof(float);
-            info->user_data_type = EXR_PIXEL_FLOAT;
-        }
-        if (!r && y == 0) r = exr_encoding_choose_default_routines(f, 0, &encoder);
-        if (!r) r = exr_encoding_run(f, 0, &encoder);
+    (void)encoder;
+    return EXR_ERR_SUCCESS;
+}
+
+static exr_result_t pack(const packing *p, packer *to, int y)
+{
+    const int size = p->m->size, count = size - y < p->lines ? size - y : p->lines;
+    const bool begun = to->write != NULL;
+    for (size_t i = 0; i < (size_t)count * (size_t)size; i++) {
+        io_texel t = io_texel_get(p->m->maps + ((size_t)y * (size_t)size + i) * MAP_CHANNELS);
+        if (p->directx) t.normal[1] = -t.normal[1];
+        to_values(&t, to->rows + i * CHANNELS);
     }
-    exr_encoding_destroy(f, &encoder);
+    exr_chunk_info_t chunk;
+    exr_result_t r = exr_write_scanline_chunk_info(p->f, 0, y, &chunk);
+    if (!r)
+        r = begun ? exr_encoding_update(p->f, 0, &chunk, &to->encoder)
+                  : exr_encoding_initialize(p->f, 0, &chunk, &to->encoder);
+    for (int c = 0; c < to->encoder.channel_count && !r; c++) {
+        exr_coding_channel_info_t *info = &to->encoder.channels[c];
+        info->encode_from_ptr = (const uint8_t *)(to->rows + named(c));
+        info->user_pixel_stride = CHANNELS * sizeof(float);
+        info->user_line_stride = CHANNELS * (int32_t)sizeof(float) * size;
+        info->user_bytes_per_element = sizeof(float);
+        info->user_data_type = EXR_PIXEL_FLOAT;
+    }
+    if (!r && !begun) {
+        r = exr_encoding_choose_default_routines(p->f, 0, &to->encoder);
+        to->write = to->encoder.write_fn;
+        to->encoder.yield_until_ready_fn = to->encoder.write_fn = written_later;
+    }
+    return r ? r : exr_encoding_run(p->f, 0, &to->encoder);
+}
+
+static void pack_one(const void *job, int64_t i)
+{
+    const packing *p = job;
+    packer *to = &p->packer[i];
+    stream *outer = opened;
+    opened = &to->said;
+    to->result = pack(p, to, (p->first + (int)i) * p->lines);
+    opened = outer;
+}
+
+/* Some chunks at a time are compressed by all threads, then written in their order. */
+static exr_result_t write_chunks(exr_context_t f, const io_material *m, bool directx, int lines, packer *packers,
+                                 int most, int threads, stream *s)
+{
+    exr_result_t r = EXR_ERR_SUCCESS;
+    const int chunks = (m->size + lines - 1) / lines;
+    for (int first = 0; first < chunks && !r; first += most) {
+        const int count = chunks - first < most ? chunks - first : most;
+        ts_tasks(threads, count, pack_one, &(packing){f, m, directx, lines, first, packers});
+        for (int i = 0; i < count && !r; i++) {
+            r = packers[i].result;
+            if (r) memcpy(s->message, packers[i].said.message, sizeof s->message);
+            else r = packers[i].write(&packers[i].encoder);
+        }
+    }
+    for (int i = 0; i < most; i++) exr_encoding_destroy(f, &packers[i].encoder);
     return r;
 }
 
-ts_code io_write_maps_exr(const char *path, const io_material *m, bool directx, bool half, ts_status *st)
+ts_code io_write_maps_exr(const char *path, const io_material *m, bool directx, bool half, int threads, ts_status *st)
 {
     const int lines = half ? 16 : 1; /* of a chunk, by the kind of compression */
     enum {
-        HEADER = 1 << 16
-    }; /* more than it takes, as 16 bytes are more than a line has beside its values; on_write has the last word */
-    const size_t line = (size_t)m->size * STORED * sizeof(float);
+        HEADER = 1 << 16, /* more than it takes, as 16 bytes are more than a line has beside its values; on_write has
+                           * the last word */
+        PACKERS = 8
+    };
+    const size_t line = (size_t)m->size * STORED * sizeof(float), rows = (size_t)lines * (size_t)m->size * CHANNELS;
     stream s = {.fd = -1, .capacity = HEADER + (size_t)m->size * ((half ? line / 2 : line) + 16)};
-    float *row = malloc((size_t)lines * (size_t)m->size * CHANNELS * sizeof *row);
+    packer packers[PACKERS] = {0};
+    float *memory = malloc(PACKERS * rows * sizeof *memory);
     s.bytes = calloc(s.capacity, 1);
-    if (!row || !s.bytes) {
-        free(row), free(s.bytes);
+    if (!memory || !s.bytes) {
+        free(memory), free(s.bytes);
         return ts_fail(st, TS_NOMEM, "%s: no memory for %zu bytes", path, s.capacity);
     }
+    for (int i = 0; i < PACKERS; i++) packers[i].rows = memory + (size_t)i * rows;
     exr_context_t f = NULL;
     exr_context_initializer_t init = EXR_DEFAULT_CONTEXT_INITIALIZER;
     init.error_handler_fn = on_error;
@@ -181,11 +242,11 @@ ts_code io_write_maps_exr(const char *path, const io_material *m, bool directx, 
     opened = &s;
     exr_result_t r = exr_start_write(&f, path, EXR_WRITE_FILE_DIRECTLY, &init);
     if (!r) r = write_header(f, m->size, directx, half);
-    if (!r) r = write_chunks(f, m, directx, lines, row);
+    if (!r) r = write_chunks(f, m, directx, lines, packers, PACKERS, threads, &s);
     exr_result_t finish = exr_finish(&f);
     opened = NULL;
     if (!r) r = finish;
-    free(row);
+    free(memory);
     ts_code code = r ? ts_fail(st, TS_IO, "%s: %s", path, s.message[0] ? s.message : exr_get_error_code_as_string(r))
                      : io_write_bytes(path, s.bytes, s.size, st);
     free(s.bytes);

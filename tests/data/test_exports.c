@@ -158,7 +158,7 @@ TEST(metallic_conversion_and_its_error)
     enum { N = 12 };
     io_material m = new_material(N);
     ts_rng r = ts_rng_make(6, TS_STREAM_TEST, 0);
-    float base[N * N][3], metal[N * N], got_base[N * N * 3], got_metal[N * N];
+    float base[N * N][3], metal[N * N], got_base[N * N * 3], got_metal[N * N], threes[N * N * 3], three[N * N];
     for (int i = 0; i < N * N; i++) {
         metal[i] = i % 3 == 0 ? 0 : i % 3 == 1 ? 1 : ts_rng_range(&r, 0, 1);
         io_texel t = {.normal = {0, 0, 1}, .roughness = 0.5f};
@@ -169,7 +169,11 @@ TEST(metallic_conversion_and_its_error)
         }
         io_texel_put(m.maps + i * MAP_CHANNELS, &t);
     }
-    io_metallic_error e = io_to_metallic(&m, got_base, got_metal);
+    const io_metallic_error of_three = io_to_metallic(&m, threes, three, 3);
+    io_metallic_error e = io_to_metallic(&m, got_base, got_metal, 1);
+    CHECK(!memcmp(three, got_metal, sizeof three) && !memcmp(threes, got_base, sizeof threes) &&
+              e.diffuse == of_three.diffuse && e.specular == of_three.specular,
+          "the number of threads changes it");
     CHECK(e.diffuse < 1e-4 && e.specular < 1e-4, "RMS error of what can be expressed: %g and %g", e.diffuse,
           e.specular);
     for (int i = 0; i < N * N; i++) {
@@ -184,7 +188,7 @@ TEST(metallic_conversion_and_its_error)
             t.diffuse[c] = ts_rng_range(&r, 0, 0.03f), t.specular[c] = ts_rng_range(&r, 0.01f, 0.06f);
         io_texel_put(m.maps + i * MAP_CHANNELS, &t);
     }
-    e = io_to_metallic(&m, got_base, got_metal);
+    e = io_to_metallic(&m, got_base, got_metal, 0);
     for (int i = 0; i < N * N; i++)
         CHECK(got_metal[i] < 0.05f, "a dark dielectric has a metalness of %g", (double)got_metal[i]);
     CHECK(e.diffuse < 0.02 && e.specular < 0.03, "RMS error of dark dielectrics: %g and %g", e.diffuse, e.specular);
@@ -192,7 +196,7 @@ TEST(metallic_conversion_and_its_error)
         const io_texel t = {.normal = {0, 0, 1}, .diffuse = {0.5f, 0.5f, 0.5f}, .specular = {0.04f, 0.04f, 0.3f}};
         io_texel_put(m.maps + i * MAP_CHANNELS, &t);
     }
-    e = io_to_metallic(&m, got_base, got_metal);
+    e = io_to_metallic(&m, got_base, got_metal, 0);
     CHECK(e.diffuse + e.specular > 0.05, "no error is reported for what cannot be expressed: %g and %g", e.diffuse,
           e.specular);
     io_material_free(&m);

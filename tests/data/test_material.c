@@ -85,14 +85,14 @@ TEST(maps_exr_is_exact)
     for (int k = 0; k < 5; k++) {
         io_material m = random_material(sizes[k], 5), back, again;
         for (int i = 0; i < 2; i++) snprintf(path[i], sizeof path[i], "%s/%d.exr", test_folder(), i);
-        CHECK(io_write_maps_exr(path[0], &m, k & 1, false, &st) == TS_OK, "%s", st.message);
+        CHECK(io_write_maps_exr(path[0], &m, k & 1, false, 0, &st) == TS_OK, "%s", st.message);
         CHECK(io_read_maps_exr(path[0], &back, &st) == TS_OK, "%s", st.message);
         CHECK(back.size == sizes[k], "size %d", back.size);
         for (int i = 0; i < m.size * m.size * MAP_CHANNELS; i++)
             CHECK(fabsf(m.maps[i] - back.maps[i]) < 1e-6f, "value %d: %g became %g", i, (double)m.maps[i],
                   (double)back.maps[i]);
         /* The file is the truth: from it on, every bit stays. */
-        CHECK(io_write_maps_exr(path[1], &back, false, false, &st) == TS_OK &&
+        CHECK(io_write_maps_exr(path[1], &back, false, false, 0, &st) == TS_OK &&
                   io_read_maps_exr(path[1], &again, &st) == TS_OK,
               "%s", st.message);
         CHECK(!memcmp(back.maps, again.maps, (size_t)m.size * (size_t)m.size * MAP_CHANNELS * sizeof(float)),
@@ -100,6 +100,33 @@ TEST(maps_exr_is_exact)
         io_material_free(&m), io_material_free(&back), io_material_free(&again);
         CHECK(!back.maps && !back.size, "free leaves something");
     }
+}
+
+/* Compressed by several threads: the same bytes, and what is read is the half float of each value. */
+TEST(maps_exr_of_half_floats)
+{
+    char path[2][512];
+    ts_status st = {0};
+    static const int sizes[] = {1, 16, 37, 200};
+    for (int i = 0; i < 2; i++) snprintf(path[i], sizeof path[i], "%s/%d.exr", test_folder(), i);
+    for (int k = 0; k < 4; k++) {
+        io_material m = random_material(sizes[k], 6), back;
+        for (int i = 0; i < 2; i++)
+            CHECK(io_write_maps_exr(path[i], &m, false, true, i ? 3 : 1, &st) == TS_OK, "%s", st.message);
+        bytes one = bytes_load(path[0]), three = bytes_load(path[1]);
+        CHECK(one.size == three.size && !memcmp(one.data, three.data, one.size), "threads change the bytes");
+        CHECK(one.size < 3000 + (size_t)(sizes[k] * sizes[k]) * 26, "%zu bytes", one.size);
+        bytes_free(&one), bytes_free(&three);
+        CHECK(io_read_maps_exr(path[1], &back, &st) == TS_OK && back.size == sizes[k], "%s", st.message);
+        for (int i = 0; i < m.size * m.size * MAP_CHANNELS; i++)
+            CHECK(fabsf(m.maps[i] - back.maps[i]) < 1.5e-3f, "%d pixels, value %d: %g became %g", sizes[k], i,
+                  (double)m.maps[i], (double)back.maps[i]);
+        io_material_free(&m), io_material_free(&back);
+    }
+    io_material m = random_material(40, 6);
+    CHECK(io_write_maps_exr("/dev/full", &m, false, true, 3, &st) == TS_IO && strstr(st.message, "/dev/full"), "%s",
+          st.message);
+    io_material_free(&m);
 }
 
 /* Other programs see the channels by name: OpenImageIO, an independent reader of the file, finds red before green
@@ -114,7 +141,7 @@ TEST(maps_exr_channel_values)
     const io_texel t = {{0.1f, 0.2f, 0.3f}, {0.6f, 0, 0.8f}, 0.4f, {0.5f, 0.6f, 0.7f}};
     for (int i = 0; i < 400; i++) io_texel_put(m.maps + i * MAP_CHANNELS, &t);
     snprintf(path, sizeof path, "%s/maps.exr", test_folder());
-    CHECK(io_write_maps_exr(path, &m, true, false, &st) == TS_OK, "%s", st.message);
+    CHECK(io_write_maps_exr(path, &m, true, false, 0, &st) == TS_OK, "%s", st.message);
     bytes b = bytes_load(path);
     static const char *const names[] = {"diffuse.R", "diffuse.G", "diffuse.B",   "normal.X",
                                         "normal.Y",  "normal.Z",  "roughness.Y", "specular.R"};
@@ -145,7 +172,7 @@ TEST(maps_exr_damaged)
     ts_status st = {0};
     io_material m = random_material(20, 2);
     snprintf(path, sizeof path, "%s/maps.exr", folder);
-    CHECK(io_write_maps_exr(path, &m, false, false, &st) == TS_OK, "%s", st.message);
+    CHECK(io_write_maps_exr(path, &m, false, false, 0, &st) == TS_OK, "%s", st.message);
     bytes whole = bytes_load(path);
     for (size_t size = 1; size < whole.size; size += 1 + whole.size / 97) {
         bytes part = {0};
@@ -282,7 +309,7 @@ TEST(which_maps_are_written)
               "map %u: %s", which, st.message);
     }
     if (access("/dev/full", W_OK) == 0)
-        CHECK(io_write_maps_exr("/dev/full", &m, false, false, &st) == TS_IO && strstr(st.message, "/dev/full"),
+        CHECK(io_write_maps_exr("/dev/full", &m, false, false, 0, &st) == TS_IO && strstr(st.message, "/dev/full"),
               "a full device");
 }
 
