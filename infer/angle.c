@@ -31,6 +31,7 @@ ts_code lgd_rectify(const char *path, const io_corners *corners, int64_t max_pix
         return code;
     }
     memcpy(r->profile, photo.unread, sizeof r->profile);
+    r->transparent = photo.transparent;
     if (fov > 0) snprintf(r->fov_from, sizeof r->fov_from, "--fov");
     else r->fov = io_lens_fov(&photo.raw.lens, photo.width, photo.height, r->fov_from, sizeof r->fov_from);
     r->assumed = !(r->fov > 0);

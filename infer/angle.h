@@ -8,6 +8,7 @@
 typedef struct lgd_rectified {
     io_image square;  /* linear, size a side; the caller frees it */
     char profile[96]; /* io_photo_facts.profile */
+    bool transparent; /* io_photo_facts.transparent */
     io_pinhole camera;
     lgd_photo photo;    /* the square with the camera's place; the light is in the lens, and as strong as makes the
                            centre of the sample as bright as the default flash does */

@@ -72,6 +72,7 @@ int lgd_read_photo(const char *path, int side, const lgd_read_options *options, 
         told.height = found.height;
         told.fov = io_lens_fov(&found.lens, found.width, found.height, told.fov_from, sizeof told.fov_from);
         memcpy(told.profile, found.profile, sizeof told.profile);
+        told.transparent = found.transparent;
         if (facts) { /* of a caller that was compiled with fewer or more of them */
             const size_t known = told.size < sizeof told ? told.size : sizeof told;
             memcpy(facts, &told, known);

@@ -190,6 +190,7 @@ typedef struct lgd_facts {
     double fov; /* degrees across its largest centred square, from EXIF: for lgd_options.fov; or LGD_FOV_UNKNOWN */
     char fov_from[128]; /* where fov is known from, or why it is not: for lgd_write_options, with fov_unknown */
     char profile[96];   /* the name of a colour profile that cannot be used: sRGB was assumed; or empty */
+    int transparent;    /* 1: somewhere, where it is taken as black */
 } lgd_facts;
 
 /* A photograph's largest centred square as side x side x 3 linear values (sRGB primaries; above 1 only from files that

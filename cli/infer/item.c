@@ -7,7 +7,8 @@ const char *const cl_warning_names[CL_WARNINGS] = {"black",
                                                    "field of view assumed",
                                                    "colour profile not used",
                                                    "mask black",
-                                                   "maps do not look like the photograph"};
+                                                   "maps do not look like the photograph",
+                                                   "transparent in places"};
 
 const char *cl_item_assumption(const cl_item *item)
 {

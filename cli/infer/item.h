@@ -12,14 +12,15 @@
 
 /* Why maps may mean little; a bit each in the order of cl_warning_names. */
 enum {
-    CL_WARN_BLACK = 1 << 0,    /* the photograph is black */
-    CL_WARN_FULL = 1 << 1,     /* more than nine tenths of its values are overexposed */
-    CL_WARN_FOV = 1 << 2,      /* its field of view is assumed */
-    CL_WARN_PROFILE = 1 << 3,  /* its colour profile cannot be used */
-    CL_WARN_MASK = 1 << 4,     /* the mask is black all over */
-    CL_WARN_DIFFERENT = 1 << 5 /* the maps do not look like it: a difference above CL_FAR */
+    CL_WARN_BLACK = 1 << 0,      /* the photograph is black */
+    CL_WARN_FULL = 1 << 1,       /* more than nine tenths of its values are overexposed */
+    CL_WARN_FOV = 1 << 2,        /* its field of view is assumed */
+    CL_WARN_PROFILE = 1 << 3,    /* its colour profile cannot be used */
+    CL_WARN_MASK = 1 << 4,       /* the mask is black all over */
+    CL_WARN_DIFFERENT = 1 << 5,  /* the maps do not look like it: a difference above CL_FAR */
+    CL_WARN_TRANSPARENT = 1 << 6 /* it is transparent somewhere: black is taken there */
 };
-enum { CL_WARNINGS = 6 };
+enum { CL_WARNINGS = 7 };
 extern const char *const cl_warning_names[CL_WARNINGS];
 /* Reconstruction RMSE from which the difference is seen. Of 32 photographs by others (docs/real.md) the default model
  * leaves one beyond it, whose highlights are missing. */
@@ -39,6 +40,7 @@ typedef struct cl_item {
     double fov;               /* of the photograph, in degrees across the square; LGD_FOV_UNKNOWN, LGD_FOV_OF_PHOTO */
     char fov_from[192];       /* where it is known from, or why it is not */
     char profile[96];         /* io_photo_facts.profile */
+    bool transparent;         /* io_photo_facts.transparent */
     io_capture_source source; /* of a photograph: without a file; of a capture or a sheet: see cl_item_source */
     lgd_photo photo[IO_CAPTURE_IMAGES];
     double ambient;     /* light beside the flash's that was found */

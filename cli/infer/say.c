@@ -118,6 +118,9 @@ const char *cl_say_photo(const cl_command *c, const cl_item *item)
     if (item->warnings & CL_WARN_MASK) /* of another photograph, or black and white exchanged */
         cl_note("%s: warning: the mask %s is black all over its square: nothing is refined", item->job->photo, c->mask);
     say_profile(*item->capture.profile ? item->capture.profile_of : item->job->photo, item->profile);
+    if (item->transparent)
+        cl_note("%s: warning: it is transparent in places, black is taken there%s", item->job->photo,
+                c->mask ? "" : ": with --mask and the same file they are not refined");
     const char *why = item->image ? say_levels(item, c->size) : NULL;
     if (item->st.code) return NULL;
     if (!why && item->last > CL_FAR) why = "its maps do not look like it";

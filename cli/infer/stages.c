@@ -43,6 +43,7 @@ static void read_photo(const cl_command *c, bool published, cl_item *item)
     item->fov = c->fov > 0 ? c->fov : facts.fov;
     snprintf(item->fov_from, sizeof item->fov_from, "%s", c->fov > 0 ? "--fov" : facts.fov_from);
     snprintf(item->profile, sizeof item->profile, "%s", facts.profile);
+    item->transparent = facts.transparent;
     if (!c->mask || !(item->mask = take(item, c, 1))) return;
     if (lgd_read_mask(c->mask, c->size, facts.width, facts.height, &o, item->mask, &error)) {
         failed(item, &error);
@@ -60,6 +61,7 @@ static void read_angle(const cl_command *c, bool published, cl_item *item)
     }
     if (lgd_rectify(item->job->photo, &c->angle, c->max_pixels, c->size, c->fov, item->threads, r, &item->st)) return;
     snprintf(item->profile, sizeof item->profile, "%s", r->profile);
+    item->transparent = r->transparent;
     item->image = item->square = r->square.data;
     note_source(c, (int)ceil(r->side), item);
     item->fov = LGD_FOV_OF_PHOTO;
@@ -141,7 +143,8 @@ static void look_at(const cl_command *c, cl_item *item)
     for (int k = 0; k < cl_item_sources(item); k++) light |= cl_item_light(&cl_item_source(item, k)->levels);
     while (item->mask && wanted < pixels && !item->mask[wanted]) wanted++;
     item->warnings = light | (*cl_item_fov_is(item) == 'a' ? CL_WARN_FOV : 0) | (*item->profile ? CL_WARN_PROFILE : 0) |
-        (item->mask && wanted == pixels ? CL_WARN_MASK : 0) | (item->last > CL_FAR ? CL_WARN_DIFFERENT : 0);
+        (item->mask && wanted == pixels ? CL_WARN_MASK : 0) | (item->last > CL_FAR ? CL_WARN_DIFFERENT : 0) |
+        (item->transparent ? CL_WARN_TRANSPARENT : 0);
 }
 
 /* Whether g sees the photographs in several orientations where they are asked for. */

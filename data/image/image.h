@@ -31,6 +31,7 @@ typedef struct io_photo_facts {
     int width, height; /* of the whole, upright */
     io_lens lens;
     char profile[96]; /* the name of a colour profile that cannot be used: sRGB is assumed; empty: there is none */
+    bool transparent; /* somewhere, where it is taken as black */
 } io_photo_facts;
 
 /* Its largest centred square as io_centre_square has it, the same values, with memory for a few of the photograph's

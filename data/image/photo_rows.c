@@ -61,6 +61,15 @@ static io_space space_of(const char *path, io_photo_rows *p)
     return image->adobe ? io_space_adobe_rgb() : io_space_srgb();
 }
 
+static bool is_transparent(const oi_image *raw)
+{
+    const size_t pixels = (size_t)raw->width * (size_t)raw->height;
+    bool opaque = true;
+    for (size_t i = 0; raw->alpha >= 0 && i < pixels && opaque; i++)
+        opaque = oi_value(raw, i * (size_t)raw->channels + (size_t)raw->alpha) > 0.9999f;
+    return !opaque;
+}
+
 static bool shows_through(const oi_image *raw) { return raw->alpha >= 0 && !raw->associated; }
 
 /* Integers have few different values: the curve is evaluated once for each. */
@@ -86,7 +95,8 @@ ts_code io_photo_open(const char *path, int64_t max_pixels, bool photograph, io_
     if (code) return code;
     p->space = space_of(path, p);
     p->orientation = photograph ? p->raw.orientation : 1;
-    if (!photograph) p->raw.alpha = -1;
+    p->transparent = photograph && is_transparent(&p->raw);
+    if (!p->transparent) p->raw.alpha = -1;
     const bool swap = p->orientation >= 5;
     p->width = swap ? p->raw.height : p->raw.width;
     p->height = swap ? p->raw.width : p->raw.height;

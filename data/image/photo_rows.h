@@ -16,6 +16,7 @@ typedef struct io_photo_rows {
     bool plain;
     io_profile *profile; /* NULL, or what takes the place of space */
     char unread[96];     /* empty, or the name of a profile that cannot be used: sRGB is assumed */
+    bool transparent;    /* of a photograph: black shows through it somewhere */
 } io_photo_rows;
 
 /* As io_read_photo; photograph: turned by the file's orientation, over black where it is transparent. Of a colour map

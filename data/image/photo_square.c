@@ -108,6 +108,7 @@ ts_code io_read_photo_square(const char *path, int64_t max_pixels, int size, int
     if (facts) {
         *facts = (io_photo_facts){.width = photo.width, .height = photo.height, .lens = photo.raw.lens};
         memcpy(facts->profile, photo.unread, sizeof facts->profile);
+        facts->transparent = photo.transparent;
     }
     ts_arena_destroy(&arena);
     io_photo_close(&photo);

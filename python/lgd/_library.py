@@ -61,6 +61,7 @@ class FactsStruct(ctypes.Structure):  # lgd_facts
         ("fov", c_double),
         ("fov_from", c_char * 128),
         ("profile", c_char * 96),
+        ("transparent", c_int),
     ]
 
 

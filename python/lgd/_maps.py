@@ -103,6 +103,7 @@ class Facts(NamedTuple):
     fov: Optional[float]  # degrees across its largest centred square, from EXIF
     fov_from: str  # where fov is known from, or why it is not
     profile: str  # a colour profile that cannot be used: sRGB was assumed
+    transparent: bool = False  # somewhere, where it is taken as black
 
 
 @dataclass(eq=False)
@@ -242,7 +243,8 @@ def read_photo(path: Path, size: int = 256, *, published: bool = False, threads:
     check(lib.lgd_read_photo(text(path), size, options, floats(image), facts, error), error)
     told = lambda t: t.decode("utf-8", "replace")  # noqa: E731
     fov = None if facts.fov == c.UNKNOWN else facts.fov
-    return image, Facts(facts.width, facts.height, fov, told(facts.fov_from), told(facts.profile))
+    where, profile = told(facts.fov_from), told(facts.profile)
+    return image, Facts(facts.width, facts.height, fov, where, profile, bool(facts.transparent))
 
 
 def square(pixels: np.ndarray, size: int) -> np.ndarray:

@@ -233,6 +233,16 @@ poor_photographs() {
     do printf '\000\000\200\100\000\000\200\100\000\000\000\077'; done; } >"$T/bright.pfm"
     expect 0 infer --size 1 "$T/bright.pfm" -o "$T/o"
     says "$T/err" "66.7% of the values are above 1"
+    # TGA files of 4 x 4 pixels with alpha, all of it opaque or one pixel not
+    for last in 377 000; do
+        { printf '\0\0\2\0\0\0\0\0\0\0\0\0\4\0\4\0\40\10'
+          for i in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15; do printf '\100\120\140\377'; done
+          printf "\\100\\120\\140\\$last"; } >"$T/alpha.tga"
+        expect 0 infer --size 4 "$T/alpha.tga" -o "$T/$last"
+    done
+    says "$T/err" "alpha.tga: warning: it is transparent in places"
+    says "$T/000/alpha/meta.txt" '"transparent in places"'
+    if grep -q transparent "$T/377/alpha/meta.txt"; then fail "what is opaque is transparent"; fi
 }
 
 sizes() {

@@ -71,6 +71,27 @@ TEST(infer_a_photograph_in_memory_is_that_of_its_file)
     for (int i = 0; i < CUT * CUT * 3; i++) CHECK(isfinite(from_memory[i]), "a value spreads");
 }
 
+TEST(infer_says_what_is_transparent)
+{
+    static float image[CUT * CUT * 3];
+    lgd_error e;
+    ts_status st = {0};
+    for (int holes = 0; holes < 2; holes++) {
+        lgd_facts facts = {.size = sizeof facts};
+        io_image with_alpha;
+        char path[512];
+        CHECK(!io_image_create(&with_alpha, W, H, 4, &st), "%s", st.message);
+        for (int i = 0; i < W * H * 4; i++) with_alpha.data[i] = i % 4 == 3 ? 1 : 0.25f;
+        if (holes) with_alpha.data[W * H * 4 - 1] = 0.5f;
+        snprintf(path, sizeof path, "%s/alpha.png", test_folder());
+        CHECK(!io_write_png(path, &with_alpha, 8, true, &st), "%s", st.message);
+        CHECK(!lgd_read_photo(path, CUT, NULL, image, &facts, &e) && facts.transparent == holes, "%d: %d, %s", holes,
+              facts.transparent, e.message);
+        CHECK(fabsf(image[0] - 0.25f) < 0.01f, "what is opaque is %g", (double)image[0]);
+        io_image_free(&with_alpha);
+    }
+}
+
 /* A caller that was compiled with fewer facts keeps what stands behind them, one with more gets zeros. */
 TEST(infer_facts_grow)
 {

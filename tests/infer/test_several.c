@@ -170,7 +170,8 @@ TEST(several_photographs_in_any_order)
     CHECK(ambient[0] > 0 && ambient[1] == 0, "ambient light of the flash's photograph %g, of another %g", ambient[0],
           ambient[1]);
     estimate(m, photo, &factor, taken, maps[0]);
-    CHECK(factor > 0 && fabs(factor - 1) > 1e-3, "a factor of %g on the lights", factor);
+    /* of weights that were drawn it may be any number, but of one that was not looked for it would be 1 */
+    CHECK(factor > 0 && fabs(factor - 1) > 1e-5, "a factor of %g on the lights", factor);
     for (int k = 0; k < TAKEN; k++) { /* each photograph has an exposure of its own */
         const double own = (double)taken[k].power / (factor * (double)photo[k].power);
         CHECK(own > 0.01 && own < 100 && (k == 0) == (fabs(own - 1) < 1e-5), "light %d is %g times its power", k, own);
